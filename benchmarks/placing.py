@@ -38,7 +38,7 @@ def drawn(tasks: list[Task], cache: Path) -> list[tuple[np.ndarray, ...]]:
     """Size, position and yaw of a draft of every room, from the cache or drawn by the network."""
     if not cache.exists():
         out = []
-        for room in BASES["network"](tasks, 0):
+        for room in BASES["network"][0](tasks, 0):
             middle = np.insert((room.floor_polygon.max(0) + room.floor_polygon.min(0)) / 2, 1, 0.0)
             out.append([value.tolist() for value in (room.size, room.position - middle, room.yaw)])
         cache.parent.mkdir(parents=True, exist_ok=True)

@@ -25,7 +25,8 @@ from echomodel.echo import EchoModel
 from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
 from echomodel.furniture.description import piece_of
 from echomodel.graph import GraphBatch
-from echomodel.metrics.shapes import set_scores, surface_points
+from echomodel.metrics.pointsets import set_scores
+from echomodel.metrics.shapes import surface_points
 from echomodel.tsdf import mesh_from_tsdf
 from echomodel.vocabulary import vocabulary
 
@@ -154,7 +155,8 @@ def main() -> None:
         for kind, made in pieces(model, classes, asked.per_class, seed, sdf=asked.sdf).items():
             clouds = {name: np.stack([cloud(mesh) for mesh in made[name]]) for name in classes}
             every = np.concatenate([clouds[name] for name in classes])
-            scores = set_scores({name: unit(v) for name, v in clouds.items()}, references)["mean"]
+            by_class = set_scores({name: unit(v) for name, v in clouds.items()}, references).values()
+            scores = {key: float(np.mean([one[key] for one in by_class])) for key in ("mmd", "cov", "acc")}
             scores["named"] = float(np.mean([named(judge, every, words) for judge in judges]))
             for key in ("named", "mmd", "cov", "acc"):
                 found.setdefault(kind, {}).setdefault(key, []).append(scores[key])

@@ -16,7 +16,7 @@ from echomodel.data.shapeset import ShapeSet
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.guidance import outside
-from echomodel.metrics.pointsets import chamfer_matrix
+from echomodel.metrics.pointsets import chamfer
 from echomodel.metrics.shapes import surface_points
 from echomodel.roomboxes import RoomBoxes, read_rooms
 from echomodel.rules import label_rooms, verdicts
@@ -57,10 +57,10 @@ def shape_row(
     nearest = []
     for grid, category in zip(grids.numpy(), graph.category.tolist(), strict=True):
         try:
-            points = torch.from_numpy(surface_points(mesh_from_tsdf(grid), POINTS))[None]
+            points = torch.from_numpy(surface_points(mesh_from_tsdf(grid), POINTS))
         except ValueError:
             continue
-        nearest.append(float(chamfer_matrix(points, references[category]).min()))
+        nearest.append(float(chamfer(points, references[category]).min()))
     whole = float(wholeness(grids).mean())
     return (
         f"{sampler:10} {steps:5d}  nearest true shape {np.mean(nearest):.5f}  wholeness {whole:.3f}"

@@ -52,7 +52,7 @@ def areas(folder: Path) -> dict[str, Callable[[], object]]:
     return {
         "graph read": lambda: echousd.read_graph(SAMPLE),
         "a room of the generator": lambda: generate_rooms(1, 5, room_type="living_room"),
-        "a layout drawn": lambda: BASES["network"]([task], 0),
+        "a layout drawn": lambda: BASES["network"][0]([task], 0),
         "a layout searched": lambda: finished(System.parse("real+search"), task, [task.room]),
         "a layout scored": lambda: layout_scores(task, task.room),
         "a room generated": made,

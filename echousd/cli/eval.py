@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
 
 from echousd.cli.options import Written
 from echousd.cli.output import say
 from echousd.cli.report import say_done
-
-if TYPE_CHECKING:
-    from echomodel.progress import StageListener
 
 eval_app = typer.Typer(help="Scores of whoever lays out rooms, and studies with people.", no_args_is_help=True)
 Against = Annotated[
@@ -59,6 +54,7 @@ def suite(
 
     Example: echousd eval suite default guided --against rooms.json -o report --only relations,faults
     """
+    from echousd.cli.generate import progress_bar
     from echousd.evaluation.report import write_report
     from echousd.evaluation.runs import SYSTEMS, SuiteSettings
     from echousd.evaluation.suite import evaluate
@@ -67,13 +63,12 @@ def suite(
     chosen = tuple(word.strip() for word in only.split(",") if word.strip())
     asked = tuple(systems) if systems else SYSTEMS
     files = {"shapes": shapes, "inception": inception, "clip": clip}
-    named = [None if path is None else str(path) for path in files.values()]
-    settings = replace(SuiteSettings(asked, against, count, seed, chosen, relations), workers=workers)
-    settings = replace(settings, shapes=named[0], inception=named[1], clip=named[2])
+    named: dict[str, Any] = {name: str(path) for name, path in files.items() if path}
+    settings = replace(SuiteSettings(asked, against, count, seed, chosen, relations, workers=workers), **named)
     command = f"echousd eval suite {' '.join(asked)} --against {against} --count {count} --seed {seed}"
     command += f" --relations {relations:g}" * (relations != 1.0) + f" --only {','.join(chosen)}" * bool(chosen)
-    command += "".join(f" --{name} {path}" for name, path in files.items() if path is not None)
-    with _progress() as told_to:
+    command += "".join(f" --{name} {path}" for name, path in named.items())
+    with progress_bar() as told_to:
         found, run = evaluate(settings, told_to)
     written = write_report(found, run, out, command)
     say_done(json, written, started, map(str, written))
@@ -92,10 +87,11 @@ def study(
 
     Example: echousd eval study default generator+search real -o study.html --count 12
     """
+    from echousd.cli.generate import progress_bar
     from echousd.evaluation.study import write_study
 
     started = time.perf_counter()
-    with _progress() as told_to:
+    with progress_bar() as told_to:
         path = write_study(systems, against, count, seed, out, told_to)
     say_done(json, [path], started, [str(path)])
 
@@ -122,21 +118,3 @@ def answers(
             f"({row['share']:.2f} [{row['low']:.2f}, {row['high']:.2f}], p {row['p']:.3f}), {row['ties']} undecided"
         )
     say(f"{found['people']} people, {found['kept']} kept; repeats answered alike: {found['repeats']}")
-
-
-@contextmanager
-def _progress() -> Iterator[StageListener]:
-    from rich.progress import Progress, TaskID
-
-    from echousd.cli.terminal import Terminal
-
-    console = Terminal(stderr=True)
-    with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
-        tasks: dict[str, TaskID] = {}
-
-        def told(what: str, done: int, total: int) -> None:
-            if what not in tasks:
-                tasks[what] = bar.add_task(what, total=total)
-            bar.update(tasks[what], completed=done)
-
-        yield told

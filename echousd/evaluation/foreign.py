@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -18,7 +19,7 @@ from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import vocabulary
 from echousd.assets.naming import category_of
 from echousd.folder.found import rooms_at
-from echousd.stage.boxes import read_stages, room_of
+from echousd.stage.boxes import room_of
 from echousd.stage.files import open_stage
 from echousd.stage.foreign import boxed_graph
 from echousd.stage.read import find_rooms
@@ -40,30 +41,27 @@ def foreign_rooms(path: Path) -> list[RoomBoxes]:
         found = [room for file in files for room in _from_json(file)]
         if found:
             return found
-        try:
-            return [room for file in rooms_at(path) for room in _from_usd(file)]
-        except ValueError:
-            stages = [file for file in sorted(path.iterdir()) if file.suffix in USD]
-            if not stages:
-                raise ValueError(
-                    f"{path}: no room in this folder, allowed: rooms of ours, USD, rooms or scene JSON"
-                ) from None
-            return read_stages(stages)
+        stages = [(file, file.stem) for file in sorted(path.iterdir()) if file.suffix in USD]
+        with suppress(ValueError):
+            stages = [(file, file.parent.name) for file in rooms_at(path)]
+        if not stages:
+            raise ValueError(f"{path}: no room in this folder, allowed: rooms of ours, USD, rooms or scene JSON")
+        return [room for file, name in stages for room in _from_usd(file, name)]
     if path.suffix in USD:
-        return _from_usd(path)
+        return _from_usd(path, path.parent.name)
     rooms = load_rooms(path) if path.suffix == ".npz" else _from_json(path)
     if not rooms:
         raise ValueError(f"{path}: no rooms, a state of SceneEval, Holodeck's or SceneSmith's JSON")
     return rooms
 
 
-def _from_usd(file: Path) -> list[RoomBoxes]:
+def _from_usd(file: Path, name: str) -> list[RoomBoxes]:
     out = []
     stage = open_stage(file)
     for graph in map(boxed_graph, find_rooms(stage)):
         if graph.nodes:
             corners = graph.room.corners
-            room = replace(room_of(graph, file.parent.name), openings=graph.room.openings)
+            room = replace(room_of(graph, name), openings=graph.room.openings)
             out.append(room if corners is None else replace(room, floor_polygon=np.asarray(corners, float)))
     return out
 
@@ -96,15 +94,11 @@ def _room(name: str, kind: str, floor: Iterable[Iterable[float]], height: float,
         room_type=words[0] if words else "living_room",
         floor_polygon=np.array([tuple(corner) for corner in floor], float).reshape(-1, 2),
         height=height,
-        categories=tuple(word for word, *_ in found),
+        categories=tuple(category_of([], word, dims=size)[0] or word for word, size, *_ in found),
         size=np.array([size for _, size, _, _ in found], float).reshape(-1, 3),
         position=np.array([place for _, _, place, _ in found], float).reshape(-1, 3),
         yaw=np.array([yaw for *_, yaw in found], float),
     )
-
-
-def _word(name: str, size: np.ndarray) -> str:
-    return category_of([], name, dims=size)[0] or name
 
 
 def _sceneeval(scene: dict[str, Any], file: Path) -> RoomBoxes:
@@ -122,11 +116,9 @@ def _sceneeval(scene: dict[str, Any], file: Path) -> RoomBoxes:
         middle = matrix[:3, :3] @ bounds.mean(0) + matrix[:3, 3]
         place = np.array([middle[0], corners[:, 2].min(), -middle[1]])
         size = (bounds[1] - bounds[0]) * scale
-        found.append((_word(word, size), size, place, math.atan2(front[0], -front[1])))
-    rooms = {str(e.get("roomId", "")) for e in elements}
-    return _room(
-        file.stem, " ".join(sorted(rooms)), ((x, -y) for x, y, _ in floor), max(heights, default=HEIGHT), found
-    )
+        found.append((word, size, place, math.atan2(front[0], -front[1])))
+    kind = " ".join(sorted({str(e.get("roomId", "")) for e in elements}))
+    return _room(file.stem, kind, ((x, -y) for x, y, _ in floor), max(heights, default=HEIGHT), found)
 
 
 @cache
@@ -137,9 +129,8 @@ def _model(name: str, file: Path) -> tuple[str, np.ndarray]:
         for folder in (place for kind in ASSETS for place in sorted((top / kind).glob(f"*/{number}"))):
             told = json.loads((folder / "data.json").read_text("utf-8"))["annotations"]
             return str(told["category"]), np.asarray(trimesh.load_scene(folder / f"{number}.glb").bounds, float)
-    raise ValueError(
-        f"{file}: model {name} is not there, wanted: _data/<data set>/{number}/{number}.glb beside it or above"
-    )
+    wanted = f"_data/<data set>/{number}/{number}.glb"
+    raise ValueError(f"{file}: model {name} is not there, wanted: {wanted} beside it or above")
 
 
 def _holodeck(house: dict[str, Any], room: dict[str, Any], file: Path) -> RoomBoxes:
@@ -154,7 +145,7 @@ def _holodeck(house: dict[str, Any], room: dict[str, Any], file: Path) -> RoomBo
         size = np.array([plan[1] if turned else plan[0], 2 * place["y"], plan[0] if turned else plan[1]]).clip(0.02)
         name = entry.get("object_name", entry["id"])
         where = np.array([-place["x"], 0.0, place["z"]])
-        found.append((_word(name.rpartition("-")[0] or name, size), size, where, -math.radians(entry["rotation"]["y"])))
+        found.append((name.rpartition("-")[0] or name, size, where, -math.radians(entry["rotation"]["y"])))
     floor = [(-point["x"], point["z"]) for point in room["floorPolygon"]]
     height = float(house.get("wall_height", HEIGHT))
     return _room(f"{file.stem} {room['id']}", str(room.get("roomType", "")), floor, height, found)
@@ -174,10 +165,8 @@ def _scenesmith(raw: dict[str, Any], file: Path) -> RoomBoxes:
         plan = at[:2] + np.array([cos * middle[0] - sin * middle[1], sin * middle[0] + cos * middle[1]])
         size = (high - low)[[0, 2, 1]]
         place = np.array([plan[0], at[2] + low[2], -plan[1]])
-        found.append((_word(entry["name"], size), size, place, turn + math.pi))
+        found.append((entry["name"], size, place, turn + math.pi))
     outline = raw.get("room_geometry") or {}
-    floor: list[tuple[float, float]] = []
-    if "length" in outline and "width" in outline:
-        x, z = float(outline["length"]) / 2, float(outline["width"]) / 2
-        floor = [(-x, -z), (x, -z), (x, z), (-x, z)]
+    x, z = (float(outline.get(side, 0)) / 2 for side in ("length", "width"))
+    floor = [(-x, -z), (x, -z), (x, z), (-x, z)] if x and z else []
     return _room(file.stem, str(raw.get("room_type", "")), floor, float(outline.get("wall_height", HEIGHT)), found)

@@ -1,4 +1,4 @@
-"""The section of shapes: pieces alone against a set (the paper's Tables 3 and 6), told styles, reconstruction."""
+"""The section of shapes: pieces alone against a set (the paper's Tables 3 and 6), and told styles."""
 
 from __future__ import annotations
 
@@ -11,19 +11,18 @@ import trimesh
 
 from echomodel.boxes import Boxes
 from echomodel.data.shapeset import ShapeSet
-from echomodel.echo import EchoModel
 from echomodel.furniture import Choices, Style, mesh_of, solids
 from echomodel.furniture.description import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.metrics.furniture import piece_scores, sampled, style_scores, usual_size
-from echomodel.metrics.pointsets import chamfer_matrix
-from echomodel.metrics.shapes import reconstruction_scores, set_scores, surface_points
-from echomodel.metrics.statistics import Counts, Figure, figure, interval
+from echomodel.metrics.pointsets import chamfer, set_scores
+from echomodel.metrics.shapes import surface_points
+from echomodel.metrics.statistics import Figure, mean
 from echomodel.protocols import FurnitureModel, RoomModel, furnishes
 from echomodel.tsdf import mesh_from_tsdf
 from echomodel.vocabulary import vocabulary
-from echousd.evaluation.runs import Run, Table
+from echousd.evaluation.runs import Run, Table, note
 from echousd.evaluation.systems import shuffled_model
 
 PUBLISHED = (  # classes of the paper's Tables 3 and 6, in our words
@@ -32,7 +31,7 @@ PUBLISHED = (  # classes of the paper's Tables 3 and 6, in our words
 )  # fmt: skip
 CONSISTENT = ("wardrobe", "nightstand", "dining_chair", "dining_table")  # classes of Table 3
 POINTS, MOVED = 1024, 128  # points of a shape, and of those that the earth mover's distance looks at
-SUITES, PAIRS, HELD = 24, 6, 40  # of four classes told one style; of one class; shapes that are reconstructed
+SUITES, PAIRS = 24, 6  # of four classes told one style; of one class
 DISTANCES = {"Chamfer": 0, "EMD": MOVED}
 FIGURES = {"mmd": "MMD", "cov": "COV", "acc": "1-NNA", "variety": "variety"}
 Pieces = Sequence[tuple[trimesh.Trimesh, dict[str, float]]]
@@ -53,17 +52,14 @@ def shapes(run: Run) -> list[Table]:
         made[name] = {word: [mesh for mesh, _ in row] for word, row in found.items()}
         scores = [score for row in found.values() for _, score in row]
         rows[name] = {
-            key: figure(Counts.of([(score[key], 1.0) for score in scores if key in score]), seed)
-            for key in ("closed", "loose") if key in scores[0]
-        }  # fmt: skip
+            key: mean([score[key] for score in scores], seed) for key in ("closed", "loose") if key in scores[0]
+        }
     made["retrieval"] = {word: row[::-1] for word, row in programs(sizes, [seed, 21, 0]).items()}
     made["random"] = {word: [trimesh.creation.box(size) for size in sizes[word]] for word in PUBLISHED}
     made["programs"] = programs(sizes, [seed, 21, 1])
     against = {word: clouds(row) for word, row in programs(sizes, [seed, 21, 2]).items()}
     if run.settings.shapes:
-        folder = Path(run.settings.shapes)
-        held = ShapeSet(folder / "shapes" if (folder / "shapes").is_dir() else folder)
-        against = _set_clouds(held, count, seed)
+        against = _set_clouds(Path(run.settings.shapes), count, seed)
     ours = {name: {word: clouds(row[word]) for word in against} for name, row in made.items()}
     scored = {
         (name, distance): set_scores(by_class, against, points=points)
@@ -71,26 +67,14 @@ def shapes(run: Run) -> list[Table]:
     }  # fmt: skip
     for (name, distance), by_class in scored.items():
         for key, title in FIGURES.items():
-            values = np.array([score[key] for word, score in by_class.items() if word != "mean"])
-            rows.setdefault(name, {})[f"{title}, {distance}"] = Figure(
-                float(values.mean()), *interval(values, seed), len(values)
-            )
-    note = (
-        f"{count} pieces of each of the paper's ten classes, each alone and filling the unit box, against "
-        f"{run.settings.shapes or 'pieces of the programs drawn anew'}; means over classes with intervals over them. "
-        "`programs` is another draw of the programs (what `real` is elsewhere), `retrieval` pieces of the programs of "
-        "other sizes, `random` bare boxes. Variety: mean distance of two pieces of a class."
-    )
-    tables = [Table("shapes", "Shapes", note, {name: rows[name] for name in made})]
+            rows.setdefault(name, {})[f"{title}, {distance}"] = mean([row[key] for row in by_class.values()], seed)
+    told = note("shapes", count=count, against=run.settings.shapes or "pieces of the programs drawn anew")
+    tables = [Table("shapes", "Shapes", told, {name: rows[name] for name in made})]
     for key in ("mmd", "cov", "acc"):
         for distance in DISTANCES:
-            by = {n: {w: Figure(s[key]) for w, s in scored[n, distance].items() if w != "mean"} for n in made}
+            by = {name: {word: Figure(row[key]) for word, row in scored[name, distance].items()} for name in made}
             tables.append(Table("shapes", f"{FIGURES[key]} by class, {distance}", "As above.", by, plain=True))
-    tables.append(_consistency(models, sizes, seed))
-    if run.settings.shapes:
-        return [*tables, _reconstruction(held, run.settings.shapes, seed)]
-    run.missing.append("reconstruction of held-out shapes: name a set with --shapes (echousd data build, data meshes)")
-    return tables
+    return [*tables, _consistency(models, sizes, seed)]
 
 
 def pieces(model: RoomModel, scenes: Sequence[Sequence[str]], sizes: np.ndarray, seed: int, told: str = "") -> Pieces:
@@ -140,7 +124,7 @@ def clouds(meshes: Sequence[trimesh.Trimesh]) -> np.ndarray:
 
 def _consistency(models: Mapping[str, RoomModel], sizes: Mapping[str, np.ndarray], seed: int) -> Table:
     """Table 3: Chamfer distances of pieces of one class that are told to be of one style."""
-    rows: dict[str, dict[str, Figure]] = {"random": {f"{word} x 1000": Figure(0.0) for word in CONSISTENT}}
+    rows: dict[str, dict[str, Figure]] = {}
     for name, model in {**models, "independent shapes": models["network"]}.items():
         told = "same_style_as" if name in models else ""
         rows[name] = _styles(model, bool(told), seed) if furnishes(model) else {}
@@ -148,20 +132,10 @@ def _consistency(models: Mapping[str, RoomModel], sizes: Mapping[str, np.ndarray
             doubled = np.repeat(sizes[word][:PAIRS], 2, axis=0)
             scenes = [[word] * 2] * (len(doubled) // 2) if told else [[word]] * len(doubled)
             found = torch.from_numpy(clouds([mesh for mesh, _ in pieces(model, scenes, doubled, seed, told)]))
-            apart = [
-                float(chamfer_matrix(one[None], other[None]))
-                for one, other in zip(found[::2], found[1::2], strict=True)
-            ]
-            rows[name][f"{word} x 1000"] = figure(Counts.of([(1000 * value, 1.0) for value in apart]), seed)
-    note = (
-        "Chamfer distance of two pieces of a class told to be of one style, in the unit box (the paper's are raw "
-        "shapes of one model); `independent shapes` hear nothing of each other. Our network makes such pieces equal by "
-        "its wiring and bare boxes (`random`) are equal, too: 0 alone says nothing of quality. Style distance of "
-        "pieces of different classes: told to be of one style, nothing told, of other suites."
-    )
-    return Table(
-        "shapes", "Consistency", note, {name: rows[name] for name in [*models, "independent shapes", "random"]}
-    )
+            apart = [1000 * float(chamfer(one, found[2 * k + 1 :][:1])) for k, one in enumerate(found[::2])]
+            rows[name][f"{word} x 1000"] = mean(apart, seed)
+    rows["random"] = {f"{word} x 1000": Figure(0.0) for word in CONSISTENT}
+    return Table("shapes", "Consistency", note("consistency"), rows)
 
 
 def _styles(model: FurnitureModel, together: bool, seed: int) -> dict[str, Figure]:
@@ -175,21 +149,11 @@ def _styles(model: FurnitureModel, together: bool, seed: int) -> dict[str, Figur
     return {f"style distance, {key}": Figure(value) for key, value in found.items()}
 
 
-def _set_clouds(found: ShapeSet, count: int, seed: int) -> dict[str, np.ndarray]:
+def _set_clouds(folder: Path, count: int, seed: int) -> dict[str, np.ndarray]:
+    found = ShapeSet(folder / "shapes" if (folder / "shapes").is_dir() else folder)
     rng, out = np.random.default_rng([seed, 22]), {}
     for word in PUBLISHED:
         if word in found.categories:
             chosen = rng.permutation(np.flatnonzero(found.category == found.categories.index(word)))[:count]
             out[word] = clouds([mesh_from_tsdf(found[int(i)]) for i in chosen])
     return out
-
-
-def _reconstruction(found: ShapeSet, name: str, seed: int) -> Table:
-    """Held-out shapes through the autoencoder."""
-    model, held = EchoModel.load(), np.random.default_rng(seed).permutation(np.flatnonzero(found.held_out))[:HELD]
-    scores = reconstruction_scores(
-        [found[int(i)] for i in held], [found.categories[found.category[i]] for i in held],
-        lambda grid: model.reconstruct(torch.from_numpy(grid)[None])[0].cpu().numpy(),
-    )  # fmt: skip
-    rows = {name: {key: Figure(row[key]) for key in ("f_score", "iou", "chamfer")} for name, row in scores.items()}
-    return Table("shapes", "Held-out shapes there and back", f"{len(held)} shapes of {name}.", rows)

@@ -7,8 +7,7 @@ import io
 import json
 import re
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from importlib import resources
 from pathlib import Path
@@ -36,58 +35,39 @@ def write_report(found: Mapping[str, Any], run: Run, out: Path, command: str) ->
     """
     out = out.with_suffix("") if out.suffix in FORMS else out
     out.parent.mkdir(parents=True, exist_ok=True)
-    content = _content(found, command)
-    paths = [out.with_name(out.name + form) for form in FORMS]
-    write_text(paths[0], _rendered("report.md.j2", content, escaped=False))
-    plain = {**found, "about": content["about"], "tables": [asdict(table) for table in found["tables"]]}
-    write_text(paths[1], json.dumps(plain, indent=1, default=float) + "\n")
-    told = [table for tables in content["sections"].values() for table in tables]
-    for table, made in zip(told, found["tables"], strict=True):
-        table["plot"] = plot(made)
-    write_text(paths[2], _rendered("report.html.j2", content | {"pictures": pictures(run)}, escaped=True))
-    seconds = out.with_name(f"{out.name}.seconds.json")
+    content = {**found, "about": {**found["about"], "command": command}}
+    page = {**content, **_arranged(found["tables"]), "pictures": pictures(run)}
+    md, plain, html, seconds = (out.with_name(out.name + form) for form in (*FORMS, ".seconds.json"))
+    write_text(md, rendered("report.md.j2", page, escaped=False))
+    told = content | {"tables": [asdict(table) for table in found["tables"]]}
+    write_text(plain, json.dumps(told, indent=1, default=float) + "\n")
+    write_text(html, rendered("report.html.j2", page))
     write_json(seconds, {"CPU seconds a room": {name: round(value, 3) for name, value in run.seconds.items()}})
-    return [*paths, seconds]
+    return [md, plain, html, seconds]
 
 
-def _content(found: Mapping[str, Any], command: str) -> dict[str, Any]:
+def _arranged(tables: Sequence[Table]) -> dict[str, Any]:
+    """The tables by sections, and which published ones stand `beside` ours: those whose columns are all measured."""
     published = json.loads(resources.files("echousd.evaluation").joinpath("published.json").read_text("utf-8"))
-    theirs = {table["title"]: table for table in published["tables"]}
-    sections: dict[str, list[dict[str, Any]]] = {}
-    for table in found["tables"]:
-        columns = list(dict.fromkeys(column for row in table.rows.values() for column in row))
-        other = theirs.get(table.title) or {"columns": [], "rows": {}, "where": ""}
-        if not {*other["columns"]} <= {*columns}:
-            other = {"columns": [], "rows": {}, "where": ""}  # not measured here: it stands below
-        theirs.pop(table.title if other["rows"] else "", None)
-        sections.setdefault(table.name, []).append(
-            {
-                "title": table.title, "note": table.note, "columns": columns, "where": other["where"],
-                "rows": [{"name": n, "cells": [cell(row.get(c)) for c in columns]} for n, row in table.rows.items()],
-                "published": _published(other, columns),
-            }
-        )  # fmt: skip
-    rest = [table | {"cells": _published(table, table["columns"])} for table in theirs.values()]
+    for table in published["tables"]:
+        table["rows"] = {n: dict(zip(table["columns"], row, strict=True)) for n, row in table["rows"].items()}
+    measured = {table.title: {*table.columns} for table in tables}
+    sections: dict[str, list[Table]] = {}
+    for ours in tables:
+        sections.setdefault(ours.name, []).append(ours)
     return {
-        **found,
-        "about": {**found["about"], "command": command},
         "sections": sections,
-        "reference": next(iter(found["tables"][0].rows)) if found["tables"] else "",
-        "published": published | {"tables": rest},
+        "reference": next(iter(tables[0].rows)) if tables else "",
+        "published": published,
+        "beside": {t["title"]: t for t in published["tables"] if {*t["columns"]} <= measured.get(t["title"], set())},
     }
 
 
-def _published(table: Mapping[str, Any], columns: Sequence[str]) -> list[dict[str, Any]]:
-    told = {name: dict(zip(table["columns"], row, strict=True)) for name, row in table["rows"].items()}
-    return [
-        {"name": name, "cells": ["-" if row.get(c) is None else f"{row[c]:g}" for c in columns]}
-        for name, row in told.items()
-    ]
-
-
-def cell(found: Figure | None) -> str:
+def cell(found: Figure | float | None) -> str:
     """A figure as a table shows it."""
-    if found is None or found.value is None:
+    if not isinstance(found, Figure):
+        return "-" if found is None else f"{found:g}"
+    if found.value is None:
         return "-"
     digits = 1 if abs(found.value) >= 100 else 2 if abs(found.value) >= 10 else 3
     text = f"{found.value:.{digits}f}"
@@ -98,12 +78,14 @@ def cell(found: Figure | None) -> str:
     return text
 
 
-def _rendered(name: str, content: Mapping[str, Any], *, escaped: bool) -> str:
+def rendered(name: str, content: Mapping[str, Any], *, escaped: bool = True) -> str:
+    """A template of this package, filled."""
     from jinja2 import Environment
     from markupsafe import Markup, escape
 
     environment = Environment(autoescape=escaped)
-    environment.filters["code"] = lambda text: Markup(re.sub("`(.*?)`", r"<code>\1</code>", str(escape(text))))
+    code = lambda text: Markup(re.sub("`(.*?)`", r"<code>\1</code>", str(escape(text))))  # noqa: E731
+    environment.filters.update(code=code, cell=cell, plot=plot)
     text = resources.files("echousd.evaluation").joinpath("templates", name).read_text("utf-8")
     return environment.from_string(text).render(**content) + "\n"
 
@@ -113,51 +95,39 @@ def plot(table: Table) -> str:
 
     Bars have their intervals, every panel a scale of its own.
     """
-    told = [c for row in table.rows.values() for c, found in row.items() if found.value is not None]
-    columns = list(dict.fromkeys(told))
-    if table.plain or not (table.curves or 0 < len(columns) <= PANELS):
-        return ""
-    if table.curves:
-        with _panels(list(table.curves), 2.6) as (every, out):
-            for axes, lines in zip(every, table.curves.values(), strict=True):
-                for number, (name, (x, y)) in enumerate(lines.items()):
-                    axes.plot(x, y, ["-", "--", ":"][number % 3], label=name, lw=1.2, color=f"C{number % 10}")
-            every[0].legend(fontsize=6, frameon=False)
-        return out[0]
-    names = list(table.rows)
-    with _panels(columns, 0.5 + 0.14 * len(names)) as (every, out):
-        for number, (axes, column) in enumerate(zip(every, columns, strict=True)):
-            found = [table.rows[name].get(column) or Figure(None) for name in names]
-            value = np.array([f.value if f.value is not None else np.nan for f in found], float)
-            ends = np.array([[f.low, f.high] if f.low is not None else [np.nan] * 2 for f in found], float)
-            reach = np.nan_to_num(np.abs(ends - value[:, None])).T
-            tint = ["#356" if name == names[0] else "#9ab" for name in names]
-            axes.barh(range(len(names)), value, xerr=reach, error_kw={"lw": 0.7}, color=tint)
-            axes.set_yticks(range(len(names)), names if number % ACROSS == 0 else [""] * len(names))
-            axes.invert_yaxis()
-    return out[0]
-
-
-@contextmanager
-def _panels(titles: Sequence[str], height: float) -> Iterator[tuple[list[Any], list[str]]]:
-    """Axes with these titles, and a list that holds the SVG of them afterwards."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure as Canvas
 
-    lines, out = -(-len(titles) // ACROSS), list[str]()
+    names, lacking = list(table.rows), Figure(None)
+    bars = {column: [table.rows[name].get(column, lacking) for name in names] for column in table.columns}
+    bars = {column: found for column, found in bars.items() if any(one.value is not None for one in found)}
+    panels = list(table.curves or bars)
+    if table.plain or not panels or (not table.curves and len(panels) > PANELS):
+        return ""
+    lines, across = -(-len(panels) // ACROSS), min(len(panels), ACROSS)
+    height = 2.9 if table.curves else 0.8 + 0.14 * len(names)
     with rc_context({"svg.hashsalt": "echousd", "svg.fonttype": "none", "font.size": 7}):
-        across = min(len(titles), ACROSS)
-        canvas = Canvas(figsize=(1.4 + 1.9 * across, lines * (height + 0.3)), layout="constrained")
+        canvas = Canvas(figsize=(1.4 + 1.9 * across, lines * height), layout="constrained")
         every = list(np.ravel(canvas.subplots(lines, across)))
-        for axes, title in zip(every, titles, strict=False):
-            axes.set_title(title, fontsize=7.5)
-            axes.spines[["top", "right"]].set_visible(False)
-        for axes in every[len(titles) :]:
+        for axes in every[len(panels) :]:
             axes.remove()
-        yield every[: len(titles)], out
+        for number, (axes, panel) in enumerate(zip(every, panels, strict=False)):
+            axes.set_title(panel, fontsize=7.5)
+            axes.spines[["top", "right"]].set_visible(False)
+            for k, (name, (x, y)) in enumerate(table.curves.get(panel, {}).items()):
+                axes.plot(x, y, ["-", "--", ":"][k % 3], label=name, lw=1.2, color=f"C{k % 10}")
+            if not table.curves:
+                value, low, high = np.array([(f.value, f.low, f.high) for f in bars[panel]], float).T
+                reach = np.nan_to_num(np.abs([low - value, high - value]))
+                tint = ["#356" if name == names[0] else "#9ab" for name in names]
+                axes.barh(range(len(names)), value, xerr=reach, error_kw={"lw": 0.7}, color=tint)
+                axes.set_yticks(range(len(names)), names if number % ACROSS == 0 else [""] * len(names))
+                axes.invert_yaxis()
+        if table.curves:
+            every[0].legend(fontsize=6, frameon=False)
         text = io.StringIO()
         canvas.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
-    out.append(re.sub(r"<metadata>.*?</metadata>", "", text.getvalue(), flags=re.DOTALL).partition('.dtd">')[2].strip())
+    return re.sub(r"<metadata>.*?</metadata>", "", text.getvalue(), flags=re.DOTALL).partition('.dtd">')[2].strip()
 
 
 def pictures(run: Run) -> dict[str, str]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from functools import partial
+from importlib import resources
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -81,6 +85,11 @@ class Table:
     curves: Mapping[str, Mapping[str, tuple[Sequence[float], Sequence[float]]]] = field(default_factory=dict)
     plain: bool = False
 
+    @property
+    def columns(self) -> list[str]:
+        """Of all rows, in their order."""
+        return list(dict.fromkeys(column for row in self.rows.values() for column in row))
+
 
 @dataclass(frozen=True, eq=False)
 class Run:
@@ -103,6 +112,11 @@ class Run:
     missing: list[str] = field(default_factory=list)
     shown: dict[str, np.ndarray] = field(default_factory=dict)
 
+    @property
+    def asked(self) -> list[System]:
+        """Systems that lay out other tasks as well, one draft each."""
+        return [system for system in self.systems if not system.foreign and system.finish != "half"]
+
 
 def rooms_against(settings: SuiteSettings) -> tuple[list[RoomBoxes], list[RoomBoxes]]:
     """Rooms to lay out and, of the same source, as many others to compare with; raises ValueError for too few."""
@@ -122,9 +136,14 @@ def rooms_against(settings: SuiteSettings) -> tuple[list[RoomBoxes], list[RoomBo
     rooms = [room for room in known if len(room) > 1 and len(room.floor_polygon) > 2]
     if len(rooms) < 4:
         raise ValueError(f"{settings.against}: {len(rooms)} rooms with a floor and two known objects, 4 are needed")
-    count = min(wanted, len(rooms) // 2 * 2)
-    chosen = [rooms[number * len(rooms) // count] for number in range(count)]
+    chosen = _spread(rooms, min(wanted, len(rooms) // 2 * 2))
     return chosen[::2], chosen[1::2]
+
+
+def _spread(found: Sequence[Any], count: int) -> list[Any]:
+    """At most so many, from all parts of a sequence."""
+    count = min(count, len(found))
+    return [found[number * len(found) // count] for number in range(count)]
 
 
 def known_rooms(name: str, rooms: Sequence[RoomBoxes]) -> list[RoomBoxes]:
@@ -145,26 +164,23 @@ def run_systems(
     several = settings.workers > 1
     with ProcessPoolExecutor(settings.workers, get_context("spawn")) if several else nullcontext() as pool:
         for number, system in enumerate(systems):
-            drafts, spent = [], 0.0
-            for draft in range(settings.drafts if system.finish == "half" else 1):
-                if (system.base, draft) not in bases:
-                    began = time.process_time()
-                    found = drawn(system, tasks, settings.seed + 1000 * draft)
-                    bases[system.base, draft] = found, time.process_time() - began
-                drafts.append(bases[system.base, draft][0])
-                spent += bases[system.base, draft][1]
-            asked = [(system, *row) for row in zip(tasks, zip(*drafts, strict=True), strict=True)]
-            done = list(pool.map(_finished, asked, chunksize=2) if pool else map(_finished, asked))
+            keys = [(system.base, draft) for draft in range(settings.drafts if system.finish == "half" else 1)]
+            for base, draft in keys:
+                if (base, draft) not in bases:
+                    bases[base, draft] = _timed(drawn, system, tasks, settings.seed + 1000 * draft)
+            drafts = [bases[key] for key in keys]
+            work, given = partial(_timed, finished, system), (tasks, zip(*(rooms for rooms, _ in drafts), strict=True))
+            done = list(pool.map(work, *given, chunksize=2) if pool else map(work, *given))
             made[system.name] = [room for room, _ in done]
-            seconds[system.name] = (spent + sum(took for _, took in done)) / len(tasks)
+            seconds[system.name] = sum(took for _, took in [*drafts, *done]) / len(tasks)
             if progress:
                 progress("rooms", number + 1, len(systems))
     return made, seconds
 
 
-def _finished(asked: tuple[System, Task, Sequence[RoomBoxes]]) -> tuple[RoomBoxes, float]:
+def _timed(work: Callable[..., Any], *given: Any) -> tuple[Any, float]:
     began = time.process_time()
-    return finished(*asked), time.process_time() - began
+    return work(*given), time.process_time() - began
 
 
 def rooms_of(system: System, settings: SuiteSettings) -> tuple[list[Task], list[str]]:
@@ -176,19 +192,22 @@ def rooms_of(system: System, settings: SuiteSettings) -> tuple[list[Task], list[
                   if vocabulary().known_category(word) is None})  # fmt: skip
     notes = [f"{system.name}: objects that the vocabulary does not hold are left out: {', '.join(odd)}"] if odd else []
     bare = sum(len(room.floor_polygon) < 3 for room in known)
-    notes += [f"{system.name}: {bare} of {len(known)} rooms have no floor, figures of floors leave them out"] * bool(
-        bare
-    )
+    if bare:
+        notes.append(f"{system.name}: {bare} of {len(known)} rooms have no floor, figures of floors leave them out")
     tasks = []
     for old, new in zip(found, known, strict=True):
-        kept = old.relations is not None and len(old) == len(new)
-        told = np.asarray(old.relations if kept else np.zeros((0, 3)), np.int64).reshape(-1, 3)
+        kept = old.relations if old.relations is not None and len(old) == len(new) else ()
         if len(new):
-            tasks.append(Task(new, told))
+            tasks.append(Task(new, np.array(kept, np.int64).reshape(-1, 3)))
     if len(tasks) < 2:
         raise ValueError(f"{system.name}: {len(tasks)} rooms with known objects, 2 or more are needed for an interval")
-    count = min(settings.count, len(tasks))
-    return [tasks[number * len(tasks) // count] for number in range(count)], notes
+    return _spread(tasks, settings.count), notes
+
+
+def note(section: str, **told: Any) -> str:
+    """What a table measures, as notes.toml has it."""
+    text = resources.files("echousd.evaluation").joinpath("notes.toml").read_text("utf-8")
+    return " ".join(tomllib.loads(text)[section].split()).format(**told)
 
 
 def figures(

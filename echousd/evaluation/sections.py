@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import torch
@@ -14,19 +15,12 @@ from echomodel.loading import load_model
 from echomodel.metrics.bodies import body_scores
 from echomodel.metrics.layouts import layout_scores, strata_of
 from echomodel.metrics.pictures import WEIGHTS, features, picture, picture_figures, told_by_pictures
-from echomodel.metrics.sets import (
-    AXES,
-    layout_distance,
-    set_figures,
-    size_distances,
-    size_scores,
-    told_apart,
-)
+from echomodel.metrics.sets import AXES, layout_distance, set_figures, size_distances, size_scores, told_apart
 from echomodel.metrics.statistics import Counts, Figure, figure
-from echomodel.metrics.tasks import GROUPS, changed, extended, kept_relations, tasks_of
+from echomodel.metrics.tasks import GROUPS, Task, changed, extended, kept_relations, tasks_of
 from echomodel.roomboxes import RoomBoxes
 from echousd.evaluation.pieces import shapes
-from echousd.evaluation.runs import Run, Table, figures, run_systems
+from echousd.evaluation.runs import Run, Table, figures, note, run_systems
 from echousd.evaluation.systems import System, networks
 
 AGAIN, ALIKE = 1, 8  # added to the seed for a second layout of the same graph; rooms that are laid out twice
@@ -39,7 +33,6 @@ ROOMS: dict[str, tuple[str, ...]] = {  # of the paper: a living and dining room 
 LEAST, SHOWN = 4, 6  # rooms of a type that have a figure of their own; that are shown
 SWEPT = (2, 5, 10, 20, 50)  # steps of sampling
 SETTLED = 4  # rooms that are simulated
-SIZES = "Share of pieces up to a size, as the standard score of its class; what a search does to sizes is left out."
 
 
 def relations(run: Run) -> list[Table]:
@@ -52,45 +45,31 @@ def relations(run: Run) -> list[Table]:
         "after a change": [changed(task, rng) for task in plain[::2]],
         "after an addition": [extended(task, rng) for task in plain[::2]],
     }
-    asked = [system for system in run.systems if system.finish != "half" and not system.foreign]
     tables = []
     for mode, tasks in modes.items():
-        made, _ = run_systems(asked, tasks, settings)
-        scores = {
-            name: [kept_relations(task, room) for task, room in zip(tasks, found, strict=True)]
-            for name, found in made.items()
-        }
+        made, _ = run_systems(run.asked, tasks, settings)
+        scores = {name: list(map(kept_relations, tasks, found)) for name, found in made.items()}
         columns = [*GROUPS, "all"] + (["edited", "rest"] if tasks is not plain else [])
-        rows = figures(scores, columns, settings.seed, asked[0].name)
-        note = (
-            "Share of the told relations that hold, by the published rules (yaw ignored, quirks kept); half of all "
-            "relations that hold are told. A pair of words counts as the mean of its two shares. Edits are made in "
-            "every second room; a change turns one relation round and keeps what contradicts it."
-        )
-        tables.append(Table("relations", f"Relations kept, {mode}", note, rows))
+        rows = figures(scores, columns, settings.seed, run.asked[0].name)
+        tables.append(Table("relations", f"Relations kept, {mode}", note("relations"), rows))
     return tables
 
 
 def faults(run: Run) -> list[Table]:
     """What a person would point at, by kind, stratum and term."""
-    scores = _layout_scores(run)
+    scores = _scored(run.made, run.of)
     first, seed = next(iter(scores)), run.settings.seed
     columns = ["told", "faults", "faults A", "faults B", "faultless", "physics"]
-    note = (
-        f"{run.settings.relations:g} relations an object told, as people write. Faults an object by the living and "
-        "composition terms; A and B are halves of them. `+search` searches with the terms that count here: its own "
-        "count flatters it, see the next section."
-    )
-    tables = [Table("faults", "Faults an object", note, figures(scores, columns, seed, first))]
+    rows = figures(scores, columns, seed, first)
+    tables = [Table("faults", "Faults an object", note("faults", told=run.settings.relations), rows)]
     for stratum in strata_of(run.tasks[0]):
         rows = {}
         for name, found in scores.items():
-            words = [strata_of(task)[stratum] for task in run.of[name]]
+            words = np.array([strata_of(task)[stratum] for task in run.of[name]])
+            counts = Counts.of([one["faults"] for one in found])
             rows[name] = {
-                f"{word} ({words.count(word)})": figure(
-                    Counts.of([one["faults"] for one, at in zip(found, words, strict=True) if at == word]), seed
-                )
-                for word in sorted(set(words))
+                f"{word} ({number})": figure(counts.at(words == word), seed)
+                for word, number in zip(*np.unique(words, return_counts=True), strict=True)
             }
         tables.append(Table("faults", f"Faults an object by {stratum}", "Rooms in brackets.", rows))
     terms = sorted({name for rows in scores.values() for row in rows for name in row if name.startswith("term ")})
@@ -104,45 +83,28 @@ def faults(run: Run) -> list[Table]:
 
 def selection(run: Run) -> list[Table]:
     """The counter is never the selector: searched and chosen by half A of the terms, judged by half B and a judge."""
-    bases = dict.fromkeys(system.base for system in run.systems if system.finish and not system.foreign)
-    halves = [System.parse(f"{base}+half") for base in bases]
+    halves = [System(f"{s.base}+half", s.base, "half") for s in run.systems if s.finish and not s.foreign]
+    halves = list(dict.fromkeys(halves))
     made: dict[str, Sequence[RoomBoxes]] = {**run_systems(halves, run.tasks, run.settings)[0]}
     made |= {system.name: run.made[system.name] for system in run.systems if not system.finish and not system.foreign}
-    scores = {
-        name: [layout_scores(t, r) for t, r in zip(run.tasks, rooms, strict=True)] for name, rooms in made.items()
-    }
-    rows = figures(scores, ["told", "faults A", "faults B"], run.settings.seed, next(iter(made)))
-    for name, rooms in made.items():
-        rows[name]["real or generated, AUC"] = told_apart(rooms, run.reference, run.settings.seed)
-    note = (
-        f"`+half` searches with half A of the terms and keeps the best of {run.settings.drafts} drafts by A alone; "
-        "half B and the judge (a random forest on rooms of the same source) saw neither. The search's proposals know "
-        "habits of furniture, so that B is not blind to them."
-    )
-    return [Table("selection", "Selector and counter apart", note, rows)]
+    rows = _judged(run, made, ["told", "faults A", "faults B"])
+    return [Table("selection", "Selector and counter apart", note("selection", drafts=run.settings.drafts), rows)]
 
 
 def field(run: Run) -> list[Table]:
     """SceneEval's four, walkable share, fullness, and how different two layouts of one graph are."""
-    scores, seed = _layout_scores(run), run.settings.seed
-    for name, rows in scores.items():
-        for row, room in zip(rows, run.made[name], strict=True):
+    scores, seed = _scored(run.made, run.of), run.settings.seed
+    for name, rooms in run.made.items():
+        for row, room in zip(scores[name], rooms, strict=True):
             row.update(body_scores(room, seed))
-    asked = [system for system in run.systems if not system.foreign and system.finish != "half"]
-    again, _ = run_systems(asked, run.tasks[:ALIKE], replace(run.settings, seed=seed + AGAIN))
-    for system in asked:
-        for k, (one, other) in enumerate(zip(run.made[system.name], again[system.name], strict=False)):
-            scores[system.name][k]["diversity, m"] = layout_distance(one, other), 1.0
+    again, _ = run_systems(run.asked, run.tasks[:ALIKE], replace(run.settings, seed=seed + AGAIN))
+    for name, others in again.items():
+        for row, one, other in zip(scores[name], run.made[name], others, strict=False):
+            row["diversity, m"] = layout_distance(one, other), 1.0
     columns = ["colliding", "rooms colliding", "out of bounds", "navigability", "clearance", "walkable", "fullness",
                "diversity, m"]  # fmt: skip
-    note = (
-        "Boxes are filled with furniture of the programs, the same pieces for every system. Objects and rooms whose "
-        "meshes cross (FCL) and still do after 5 mm; objects of which 1 % or more of the points lie off the floor; "
-        "largest connected part of the floor for a robot of 0.2 m; openings free; share of the free floor that is "
-        "walked to from the door; floor covered; mean distance of furniture between two layouts of one graph "
-        f"(first {ALIKE} rooms)."
-    )
-    return [Table("field", "Collision, bounds, ways", note, figures(scores, columns, seed, next(iter(scores))))]
+    rows = figures(scores, columns, seed, next(iter(scores)))
+    return [Table("field", "Collision, bounds, ways", note("field", alike=ALIKE), rows)]
 
 
 def realism(run: Run) -> list[Table]:
@@ -157,21 +119,16 @@ def realism(run: Run) -> list[Table]:
             **set_figures(rooms, run.reference, seed),
             **{f"KS of {axis}": Figure(value) for axis, value in size_distances(rooms, run.reference).items()},
         }
-    note = (
-        "Area under the curve of a random forest that tells made rooms from the true ones of the same furniture, and "
-        "from other rooms of the source (split by room; 0.5 = it cannot; `real` is what real rooms score against real "
-        "ones). Then against those others, on layout features (means and spreads over a room's objects, principal "
-        "components of the reference): 1-NNA (0.5 best), COV, MMD, a Frechet and a kernel distance (no FID, no KID); "
-        "KL divergence of categories, which a graph states; Kolmogorov-Smirnov distances of sizes within classes. "
-        "Intervals of set figures are those of random parts of 80 %."
-    )
     share = np.linspace(0, 1, 41)
     spread = {n: np.quantile(size_scores(rooms), share, axis=0).T for n, rooms in run.made.items() if "+" not in n}
     curves = {
         f"{axis}, standard score": {name: (at[k].tolist(), share.tolist()) for name, at in spread.items()}
         for k, axis in enumerate(AXES)
     }
-    return [Table("realism", "Real or generated", note, rows), Table("realism", "Sizes", SIZES, {}, curves)]
+    return [
+        Table("realism", "Real or generated", note("realism"), rows),
+        Table("realism", "Sizes", note("sizes"), {}, curves),
+    ]
 
 
 def pictures(run: Run) -> list[Table]:
@@ -199,35 +156,24 @@ def pictures(run: Run) -> list[Table]:
                     scored = picture_figures(found[name][of[0]], found[real][of[1]], NAMES[kind], seed)
                     rows[name] |= {f"{title} {word}".strip(): value for title, value in scored.items()}
     run.shown.update({name: shown[name][:SHOWN] for name in run.made})
-    note = (
-        "Rooms from above, 256 x 256, by the paper's camera, palette and shader (no floor, walls or lamps), with "
-        "furniture of the programs, the same pieces for every system; `real` stands against other rooms of the source. "
-        "Small CNN: share of pictures that a network of three convolutions, trained here on the other half, tells "
-        "rightly as made or real (0.5: it cannot); it is no published classifier, and weak with some dozens of rooms."
-    )
-    return [Table("pictures", "Pictures from above", note, rows)]
+    return [Table("pictures", "Pictures from above", note("pictures"), rows)]
 
 
 def steps(run: Run) -> list[Table]:
     """What a network makes in so many steps of sampling, without a search."""
     system = next((s for s in run.systems if s.weights or s.base == "network"), System.parse("network"))
-    model, seed = load_model(system.weights), run.settings.seed
-    made = {f"{count} steps": networks(model, steps=count)(run.tasks, seed) for count in SWEPT}
+    load, seed = partial(load_model, system.weights), run.settings.seed
+    made = {f"{count} steps": networks(load, steps=count)(run.tasks, seed) for count in SWEPT}
     made |= {name: list(run.made[name]) for name in ("random", "real") if name in run.made}
-    scores = {n: [layout_scores(t, r) for t, r in zip(run.tasks, rooms, strict=True)] for n, rooms in made.items()}
-    rows = figures(scores, ["told", "faults", "physics"], seed, next(iter(made)))
-    for name, rooms in made.items():
-        rows[name]["real or generated, AUC"] = told_apart(rooms, run.reference, seed)
-
-    def line(name: str, column: str) -> tuple[list[float], list[float]]:
-        swept = [f"{count} steps" for count in SWEPT] if name == system.base else [name] * 2
-        ends = [float(count) for count in SWEPT] if name == system.base else [float(SWEPT[0]), float(SWEPT[-1])]
-        return ends, [rows[at][column].value or 0.0 for at in swept]
-
-    names = [system.base, *(name for name in ("random", "real") if name in run.made)]
-    curves = {column: {name: line(name, column) for name in names} for column in next(iter(rows.values()))}
-    note = f"`{system.base}` as drawn, without a search, sampled in fewer and more steps."
-    return [Table("steps", "Steps of sampling", note, rows, curves)]
+    rows = _judged(run, made, ["told", "faults", "physics"])
+    swept = list(rows)[: len(SWEPT)]
+    lines: dict[str, tuple[Sequence[float], list[str]]] = {system.base: (SWEPT, swept)}
+    lines |= {name: ((SWEPT[0], SWEPT[-1]), [name] * 2) for name in rows if name not in swept}
+    curves = {
+        column: {name: (at, [rows[row][column].value or 0.0 for row in of]) for name, (at, of) in lines.items()}
+        for column in rows[swept[0]]
+    }
+    return [Table("steps", "Steps of sampling", note("steps", name=system.base), rows, curves)]
 
 
 def physics(run: Run) -> list[Table]:
@@ -236,17 +182,15 @@ def physics(run: Run) -> list[Table]:
     from echousd.settle import SettleUnavailable, settle
     from echousd.stage.boxes import graph_of
 
-    named = [system.name for system in run.systems if not system.foreign and system.finish != "half"]
-    chosen = [name for name in dict.fromkeys([named[0], "random+search", "real"]) if name in run.made]
+    chosen = [name for name in dict.fromkeys([run.asked[0].name, "random+search", "real"]) if name in run.made]
     scores: dict[str, list] = {name: [] for name in chosen}
     for name in chosen:
         for made in run.made[name][:SETTLED]:
             room = replace(made, yaw=np.remainder(made.yaw, 2 * np.pi))
-            values = (torch.from_numpy(value).float() for value in (room.size, room.position, room.yaw))
-            graph, boxes = graph_of(room, None), Boxes(*values)
+            boxes = Boxes(*(torch.from_numpy(value).float() for value in (room.size, room.position, room.yaw)))
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of what boxes of others do not keep
-                whole = generate(graph, boxes=boxes, seed=run.settings.seed, dress="none")
+                whole = generate(graph_of(room, None), boxes=boxes, seed=run.settings.seed, dress="none")
             try:
                 moved = settle(whole.stage).motions
             except SettleUnavailable as error:
@@ -257,29 +201,24 @@ def physics(run: Run) -> list[Table]:
                 "rooms at rest": (float(all(motion.rests for motion in moved)), 1.0),
                 "furthest, m": (max((motion.shift for motion in moved), default=0.0), 1.0),
             })  # fmt: skip
-    note = (
-        f"The first {SETTLED} rooms of the system, furnished as `generate` does and simulated by MuJoCo: pieces that "
-        "move less than 1 cm and 1 degree in two seconds. One piece may hold up or push many."
-    )
     columns = ["at rest", "rooms at rest", "furthest, m"]
-    return [Table("physics", "At rest", note, figures(scores, columns, run.settings.seed, chosen[0]))]
+    rows = figures(scores, columns, run.settings.seed, chosen[0])
+    return [Table("physics", "At rest", note("physics", rooms=SETTLED), rows)]
 
 
-def _layout_scores(run: Run) -> dict[str, list[dict]]:
-    return {
-        name: [layout_scores(task, room) for task, room in zip(run.of[name], rooms, strict=True)]
-        for name, rooms in run.made.items()
-    }
+def _scored(made: Mapping[str, Sequence[RoomBoxes]], of: Mapping[str, Sequence[Task]]) -> dict[str, list[dict]]:
+    return {name: list(map(layout_scores, of[name], rooms)) for name, rooms in made.items()}
+
+
+def _judged(run: Run, made: Mapping[str, Sequence[RoomBoxes]], columns: Sequence[str]) -> dict[str, dict[str, Figure]]:
+    """Columns of what rooms score that were made of the run's tasks, and whether they are told from real ones."""
+    rows = figures(_scored(made, dict.fromkeys(made, run.tasks)), columns, run.settings.seed, next(iter(made)))
+    for name, rooms in made.items():
+        rows[name]["real or generated, AUC"] = told_apart(rooms, run.reference, run.settings.seed)
+    return rows
 
 
 RUNNERS: dict[str, Callable[[Run], list[Table]]] = {
-    "relations": relations,
-    "faults": faults,
-    "selection": selection,
-    "field": field,
-    "realism": realism,
-    "pictures": pictures,
-    "steps": steps,
-    "shapes": shapes,
-    "physics": physics,
+    section.__name__: section
+    for section in (relations, faults, selection, field, realism, pictures, steps, shapes, physics)
 }

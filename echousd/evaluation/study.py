@@ -13,15 +13,16 @@ import json
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 from typing import Any
+
+from scipy.stats import binomtest
 
 from echomodel.files import write_text
 from echomodel.metrics.statistics import LEVEL
 from echomodel.metrics.tasks import tasks_of
 from echomodel.progress import StageListener
-from echousd.evaluation.report import sheet
+from echousd.evaluation.report import rendered, sheet
 from echousd.evaluation.runs import SuiteSettings, rooms_against, run_systems
 from echousd.evaluation.systems import System
 
@@ -48,11 +49,8 @@ def write_study(
         for number in range(len(tasks))
         for one, other in itertools.combinations(made, 2)
     ]
-    page = resources.files("echousd.evaluation").joinpath("templates", "study.html.j2").read_text("utf-8")
-    from jinja2 import Environment
-
     content = {"pairs": pairs, "pictures": pictures, "repeated": REPEATED, "seed": seed}
-    write_text(out, Environment(autoescape=True).from_string(page).render(question=QUESTION, content=content))
+    write_text(out, rendered("study.html.j2", {"question": QUESTION, "content": content}))
     return out
 
 
@@ -66,8 +64,6 @@ def preferences(files: Sequence[Path]) -> dict[str, Any]:
 
     Raises ValueError for a file that no page saved.
     """
-    from scipy.stats import binomtest
-
     votes: dict[tuple[str, str], list[int]] = defaultdict(lambda: [0, 0, 0])
     kept = alike = repeats = 0
     for file in files:

@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
+import shapely
 import torch
 from scipy.optimize import linear_sum_assignment
 
 from echomodel.boxes import Boxes
 from echomodel.echo import EchoModel
-from echomodel.furniture import sample_size
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
+from echomodel.metrics.furniture import usual_size
 from echomodel.metrics.layouts import HALVES, layout_scores
 from echomodel.metrics.tasks import Task
-from echomodel.objective.sizes import size_range
 from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.randomness import SceneGenerators
 from echomodel.roomboxes import RoomBoxes
@@ -80,27 +80,22 @@ class System:
 
 def drawn(system: System, tasks: Sequence[Task], seed: int) -> list[RoomBoxes]:
     """The layouts of a system that can be asked, without its finish."""
-    return (networks(load_model(system.weights)) if system.weights else BASES[system.base])(tasks, seed)
+    return (networks(partial(load_model, system.weights)) if system.weights else BASES[system.base][0])(tasks, seed)
 
 
 def finished(system: System, task: Task, drafts: Sequence[RoomBoxes]) -> RoomBoxes:
     """What becomes of the drafts of one room: the best by half A of the terms, if there are several."""
-    match system.finish:
-        case "search":
-            made = [searched(task, draft, PlaceConfig()) for draft in drafts]
-        case "half":
-            made = [searched(task, draft, PlaceConfig(without=HALVES[1])) for draft in drafts]
-        case _:
-            made = list(drafts)
-    if len(made) == 1:
-        return made[0]
+    made = list(drafts)
+    if system.finish:
+        config = PlaceConfig(without=HALVES[1]) if system.finish == "half" else PlaceConfig()
+        made = [searched(task, draft, config) for draft in drafts]
 
-    def worth(number: int) -> tuple[float, ...]:
-        scores = layout_scores(task, made[number])
+    def worth(room: RoomBoxes) -> tuple[float, ...]:
+        scores = layout_scores(task, room)
         kept, told = map(np.sum, scores["told"])
-        return float(told - kept), *(float(np.sum(scores[name][0])) for name in ("physics", "faults A")), float(number)
+        return float(told - kept), *(float(np.sum(scores[name][0])) for name in ("physics", "faults A"))
 
-    return made[min(range(len(made)), key=worth)]
+    return min(made, key=worth) if len(made) > 1 else made[0]
 
 
 def searched(task: Task, draft: RoomBoxes, config: PlaceConfig) -> RoomBoxes:
@@ -117,12 +112,12 @@ def searched(task: Task, draft: RoomBoxes, config: PlaceConfig) -> RoomBoxes:
 # -- networks ----------------------------------------------------------------------------------------------------------
 
 
-def networks(model: RoomModel, guidance: float | None = 0.0, steps: int | None = None) -> Layouts:
+def networks(load: Callable[[], RoomModel], guidance: float | None = 0.0, steps: int | None = None) -> Layouts:
     """Layouts by a model, many scenes at once; `guidance` of compact ones, and `steps`: None = the model's own."""
-    extra = {} if guidance is None or not isinstance(model, EchoModel) else {"relation_guidance": guidance}
 
     def layouts(tasks: Sequence[Task], seed: int) -> list[RoomBoxes]:
-        out: list[RoomBoxes] = []
+        model, out = load(), list[RoomBoxes]()
+        extra = {} if guidance is None or not isinstance(model, EchoModel) else {"relation_guidance": guidance}
         for start in range(0, len(tasks), TOGETHER):
             part = tasks[start : start + TOGETHER]
             graph, rows = GraphBatch.pack([task.graph for task in part]), [len(task.room) for task in part]
@@ -139,16 +134,13 @@ def networks(model: RoomModel, guidance: float | None = 0.0, steps: int | None =
 
 
 def _edit(tasks: Sequence[Task]) -> GraphEdit | None:
-    if any(task.before is None for task in tasks):
+    before = [task.before for task in tasks if task.before is not None]
+    if len(before) < len(tasks):
         return None
     first = np.cumsum([0, *(len(task.room) for task in tasks)])
-    before = [
-        task.before + np.array([at, 0, at])
-        for task, at in zip(tasks, first[:-1], strict=True)
-        if task.before is not None
-    ]
-    added = [task.added for task in tasks if task.added is not None]
-    return GraphEdit(torch.from_numpy(np.concatenate(before)), torch.from_numpy(np.concatenate(added)))
+    moved = [told + np.array([at, 0, at]) for told, at in zip(before, first, strict=False)]
+    added = np.concatenate([task.added for task in tasks if task.added is not None])
+    return GraphEdit(torch.from_numpy(np.concatenate(moved)), torch.from_numpy(added))
 
 
 def _with_boxes(room: RoomBoxes, boxes: Boxes) -> RoomBoxes:
@@ -174,18 +166,19 @@ def shuffled_model(seed: int = 0) -> EchoModel:
 # -- without a network -------------------------------------------------------------------------------------------------
 
 
-def random_places(tasks: Sequence[Task], seed: int) -> list[RoomBoxes]:
+def room_by_room(make: Callable[[RoomBoxes, np.random.Generator], RoomBoxes], stream: int) -> Layouts:
+    """Layouts of one room after the other, each by random numbers of its own."""
+    return lambda tasks, seed: [
+        make(task.room, np.random.default_rng([seed, stream, number])) for number, task in enumerate(tasks)
+    ]
+
+
+def random_places(room: RoomBoxes, rng: np.random.Generator) -> RoomBoxes:
     """Usual sizes at random places of the floor, along its walls; what hangs hangs. Chance for all that is told."""
-    return [_random(task.room, np.random.default_rng([seed, 7, number])) for number, task in enumerate(tasks)]
-
-
-def _random(room: RoomBoxes, rng: np.random.Generator) -> RoomBoxes:
-    import shapely
-
     floor = room.floor_polygon if len(room.floor_polygon) > 2 else np.array([(-2, -2), (2, -2), (2, 2), (-2, 2)], float)
     polygon, low, high = shapely.Polygon(floor), floor.min(0), floor.max(0)
     position, yaw = np.zeros((len(room), 3)), rng.integers(4, size=len(room)) * QUARTERS
-    size = np.array([np.clip(sample_size(word, rng), *size_range(word)) for word in room.categories]).reshape(-1, 3)
+    size = np.array([usual_size(word, rng) for word in room.categories]).reshape(-1, 3)
     for k, word in enumerate(room.categories):
         for _ in range(100):
             position[k, [0, 2]] = rng.uniform(low, high)
@@ -199,36 +192,27 @@ def _random(room: RoomBoxes, rng: np.random.Generator) -> RoomBoxes:
     return replace(room, size=size, position=position, yaw=yaw, relations=None)
 
 
-def generator(tasks: Sequence[Task], seed: int) -> list[RoomBoxes]:
+def generated(room: RoomBoxes, rng: np.random.Generator) -> RoomBoxes:
     """The room generator, asked for the same furniture on a floor of the same extents; what it left out is random."""
-    out = []
-    for number, task in enumerate(tasks):
-        room, rng = task.room, np.random.default_rng([seed, 8, number])
-        short, long = np.sort(np.ptp(room.floor_polygon, axis=0))
-        statistics = replace(
-            room_type_statistics(room.room_type), short=(short,) * 5, long=(long,) * 5, height=(room.height,) * 5,
-            area=tuple(short * long * np.array([0.98, 0.99, 1.0, 1.01, 1.02])),
-            presence={word: (1.0, (count,), (1.0,)) for word, count in sorted(Counter(room.categories).items())},
-        )  # fmt: skip
-        drawn = generate_room(rng, room.room_type, statistics=statistics)
-        out.append(borrowed(room, drawn, rng))
-    return out
+    short, long = np.sort(np.ptp(room.floor_polygon, axis=0))
+    statistics = replace(
+        room_type_statistics(room.room_type), short=(short,) * 5, long=(long,) * 5, height=(room.height,) * 5,
+        area=tuple(short * long * np.array([0.98, 0.99, 1.0, 1.01, 1.02])),
+        presence={word: (1.0, (count,), (1.0,)) for word, count in sorted(Counter(room.categories).items())},
+    )  # fmt: skip
+    return borrowed(room, generate_room(rng, room.room_type, statistics=statistics), rng)
 
 
-def retrieval(tasks: Sequence[Task], seed: int) -> list[RoomBoxes]:
+def retrieved(room: RoomBoxes, rng: np.random.Generator) -> RoomBoxes:
     """The boxes of the training room whose furniture and floor are most like the asked ones; the rest is random."""
-    out = []
-    for number, task in enumerate(tasks):
-        have = Counter(task.room.categories)
-        extent = np.ptp(task.room.floor_polygon, axis=0)
+    have, extent = Counter(room.categories), np.ptp(room.floor_polygon, axis=0)
 
-        def apart(other: RoomBoxes, have: Counter[str] = have, extent: np.ndarray = extent) -> float:
-            there = Counter(other.categories)
-            odd = sum((have - there).values()) + sum((there - have).values())
-            return odd + float(np.abs(np.ptp(other.floor_polygon, axis=0) - extent).sum())
+    def apart(other: RoomBoxes) -> float:
+        there = Counter(other.categories)
+        odd = sum((have - there).values()) + sum((there - have).values())
+        return odd + float(np.abs(np.ptp(other.floor_polygon, axis=0) - extent).sum())
 
-        out.append(borrowed(task.room, min(_pool(), key=apart), np.random.default_rng([seed, 9, number])))
-    return out
+    return borrowed(room, min(_pool(), key=apart), rng)
 
 
 @cache
@@ -245,7 +229,7 @@ def borrowed(room: RoomBoxes, other: RoomBoxes, rng: np.random.Generator) -> Roo
         plan, corners, yaw = plan[:, ::-1] * [1, -1], corners[:, ::-1] * [1, -1], yaw + QUARTERS
     stretch = np.ptp(mine, axis=0) / np.maximum(np.ptp(corners, axis=0), 1e-6)
     plan = (plan - (corners.max(0) + corners.min(0)) / 2) * stretch + (mine.max(0) + mine.min(0)) / 2
-    made = _random(room, rng)
+    made = random_places(room, rng)
     size, position, heading = made.size.copy(), made.position.copy(), made.yaw.copy()
     words, others = np.array(room.categories, dtype=object), np.array(other.categories, dtype=object)
     for word in sorted(set(room.categories)):
@@ -258,32 +242,21 @@ def borrowed(room: RoomBoxes, other: RoomBoxes, rng: np.random.Generator) -> Roo
     return replace(made, size=size, position=position, yaw=heading)
 
 
-def true_boxes(tasks: Sequence[Task], seed: int) -> list[RoomBoxes]:
-    """The true boxes: what the figures are for real rooms themselves."""
-    return [task.room for task in tasks]
-
-
-BASES: dict[str, Layouts] = {
-    "network": lambda tasks, seed: networks(load_model(None))(tasks, seed),
-    "guided": lambda tasks, seed: networks(load_model(None), None)(tasks, seed),
-    "shuffled": lambda tasks, seed: networks(shuffled_model())(tasks, seed),
-    "generator": generator,
-    "random": random_places,
-    "retrieval": retrieval,
-    "real": true_boxes,
-}
-MEANS = {
-    "network": "the compact network from noise, unguided",
-    "guided": "the same, pulled by the rules' margins while it samples",
-    "shuffled": "the same network, the numbers of each of its tensors in another order: untrained",
-    "generator": "the room generator, asked for the same furniture on such a floor",
-    "random": "usual sizes at random places: chance",
-    "retrieval": f"boxes of the most similar of {POOL} rooms like those of the training",
-    "real": "the true boxes",
+BASES: dict[str, tuple[Layouts, str]] = {  # name -> who, and what it is in a few words
+    "network": (networks(load_model), "the compact network from noise, unguided"),
+    "guided": (networks(load_model, None), "the same, pulled by the rules' margins while it samples"),
+    "shuffled": (
+        networks(shuffled_model),
+        "the same network, the numbers of each of its tensors in another order: untrained",
+    ),
+    "generator": (room_by_room(generated, 8), "the room generator, asked for the same furniture on such a floor"),
+    "random": (room_by_room(random_places, 7), "usual sizes at random places: chance"),
+    "retrieval": (room_by_room(retrieved, 9), f"boxes of the most similar of {POOL} rooms like those of the training"),
+    "real": (lambda tasks, seed: [task.room for task in tasks], "the true boxes"),
 }
 
 
 def described(system: System) -> str:
     """What a system is, in a few words."""
-    base = MEANS.get(system.base, "weights" if system.weights else "rooms from elsewhere")
+    base = "weights" if system.weights else "rooms from elsewhere" if system.foreign else BASES[system.base][1]
     return base + (f"; {FINISHES[system.finish]}" if system.finish else "")

@@ -81,9 +81,7 @@ def door_handle(opening: Opening, left_first: bool, wall: float = WALL) -> trime
     return joined(boards)
 
 
-def hinge_line(
-    opening: Opening, left_first: bool, wall: float = WALL
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def hinge_line(opening: Opening, left_first: bool, wall: float = WALL) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(3,) each: foot of the line that a leaf turns about, and the unit vectors along it when closed and when open.
 
     Arguments: see `door_handle`.

@@ -82,8 +82,6 @@ def test_edits_turn_one_relation_or_bring_one_object(rooms):
         broken = kept_relations(turned, task.room)
         assert broken["rest"][0] == broken["rest"][1]
         assert broken["all"][1][0] - broken["all"][0][0] == (1 if len(new) else 0) or len(turned.told) < len(task.told)
-        clean = changed(task, np.random.default_rng(1), contradictions=False)
-        assert len(clean.told) in (len(task.told), len(task.told) - 1)
         added = extended(task, rng)
         assert added.added.sum() == 1
         assert not added.added[added.before[:, [0, 2]]].any()
@@ -115,8 +113,9 @@ def test_ways_and_openings_by_hand():
     assert clearance(room_with(before, openings=[window])) == (pytest.approx(0.75), 1.0)
     assert clearance(room_with(wall)) == (0.0, 0.0)
     bare = replace(halved, floor_polygon=np.zeros((0, 2)))
-    assert navigability(bare) == clearance(bare) == fullness(bare) == (0.0, 0.0)
-    assert layout_scores(Task(bare, np.zeros((0, 3), int)), bare)["walkable"] == (0.0, 0.0)
+    scores = layout_scores(Task(bare, np.zeros((0, 3), int)), bare)
+    assert "faults" in scores
+    assert not {"walkable", "navigability", "clearance", "fullness"} & set(scores)  # nothing to measure them on
 
 
 def test_bodies_that_touch_do_not_collide_and_those_that_cross_do():

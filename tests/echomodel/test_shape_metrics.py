@@ -3,12 +3,8 @@
 import numpy as np
 import pytest
 
-from echomodel.metrics.shapes import (
-    reconstruction_scores,
-    set_scores,
-    surface_points,
-    surface_scores,
-)
+from echomodel.metrics.pointsets import set_scores
+from echomodel.metrics.shapes import surface_points, surface_scores
 from echomodel.tsdf import FILLED, RESOLUTION, TRUNCATION, mesh_from_tsdf
 
 
@@ -49,14 +45,6 @@ def test_nothing_scores_nothing():
     assert scores == {"f_score": 0.0, "precision": 0.0, "recall": 0.0, "chamfer": 1.0, "iou": 0.0}
 
 
-def test_scores_are_averaged_per_class():
-    grids = [box_grid(10), box_grid(15), box_grid(20)]
-    scores = reconstruction_scores(grids, ["chair", "chair", "desk"], lambda grid: grid)
-    assert scores["chair"]["n"] == 2
-    assert scores["all"]["n"] == 3
-    assert scores["all"]["f_score"] == 1.0
-
-
 def clouds():
     rng = np.random.default_rng(0)
     shapes = [rng.random((200, 3)).astype(np.float32) * size for size in (0.2, 0.5, 1.0)]
@@ -70,7 +58,7 @@ def test_a_set_covers_itself_and_not_another():
     assert same["mmd"] == pytest.approx(0, abs=1e-9)
     apart = set_scores({"chair": points}, {"chair": points + 10, "desk": points})
     assert apart["chair"]["acc"] == 1.0
-    assert set(apart) == {"chair", "mean"}
+    assert set(apart) == {"chair"}
 
 
 def test_points_repeat_for_equal_seeds():

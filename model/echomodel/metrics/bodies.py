@@ -6,6 +6,7 @@ import zlib
 from collections.abc import Sequence
 
 import numpy as np
+import shapely
 import trimesh
 
 from echomodel.furniture import Choices, Style, mesh_of, solids
@@ -34,13 +35,11 @@ def bodies(room: RoomBoxes, seed: int) -> list[trimesh.Trimesh]:
 def body_scores(room: RoomBoxes, seed: int) -> dict[str, Pair]:
     """SceneEval's collision and bounds: bodies that run into another one, rooms with such, bodies beyond the floor."""
     made = bodies(room, seed)
-    hit = {k for pair in collisions(made) for k in pair}
-    beyond = out_of_bounds(made, room.floor_polygon) if len(room.floor_polygon) > 2 else None
-    return {
-        "colliding": (float(len(hit)), float(len(room))),
-        "rooms colliding": (float(bool(hit)), 1.0),
-        "out of bounds": (0.0, 0.0) if beyond is None else (float(sum(beyond)), float(len(room))),
-    }
+    hit, objects = {k for pair in collisions(made) for k in pair}, float(len(room))
+    scores: dict[str, Pair] = {"colliding": (float(len(hit)), objects), "rooms colliding": (float(bool(hit)), 1.0)}
+    if len(room.floor_polygon) > 2:
+        scores["out of bounds"] = float(sum(out_of_bounds(made, room.floor_polygon))), objects
+    return scores
 
 
 def collisions(meshes: Sequence[trimesh.Trimesh]) -> list[tuple[int, int]]:
@@ -69,8 +68,6 @@ def collisions(meshes: Sequence[trimesh.Trimesh]) -> list[tuple[int, int]]:
 
 def out_of_bounds(meshes: Sequence[trimesh.Trimesh], floor: np.ndarray) -> list[bool]:
     """Which bodies have more than 1 % of points on their surface off the floor's polygon, (k, 2) metres, in plan."""
-    import shapely
-
     polygon, out = shapely.Polygon(floor), []
     shapely.prepare(polygon)
     for mesh in meshes:

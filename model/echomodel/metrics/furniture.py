@@ -70,11 +70,7 @@ def style_distances(descriptions: Tensor) -> Tensor:
     Arguments:
         descriptions: (N, D).
     """
-    words, start = [], 0
-    for size in GROUPS:
-        words.append(descriptions[:, start : start + size].argmax(1))
-        start += size
-    kinds = torch.stack(words, 1)
+    kinds = torch.stack([part.argmax(1) for part in descriptions[:, :HOT].split(GROUPS, 1)], 1)
     differ = (kinds[:, None] != kinds).float().mean(2)
     numbers = descriptions[:, HOT:STYLE]
     return (differ + (numbers[:, None] - numbers).abs().mean(2) / 2) / 2

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
+import shapely
 
 from echomodel.metrics.statistics import Pair
 from echomodel.metrics.tasks import Task, kept_relations
@@ -20,7 +21,10 @@ BEFORE_WINDOW = 0.5  # metres that it wants free before a window; before a door 
 JUDGED = tuple(term.name for term in TERMS if term.kind in BY_EYE)
 # Half of the terms chooses, the other one judges; they take turns down the table, so that both look at everything.
 HALVES = (frozenset(JUDGED[::2]), frozenset(JUDGED[1::2]) | {REACHED})
-NOT_ASKED = (0.0, 0.0)
+COUNTED = {
+    "faults": HALVES[0] | HALVES[1], "faults A": HALVES[0], "faults B": HALVES[1],
+    "physics": frozenset(term.name for term in TERMS if term.kind == "physics"),
+}  # fmt: skip
 
 
 def layout_scores(task: Task, room: RoomBoxes) -> dict[str, Pair]:
@@ -39,30 +43,19 @@ def layout_scores(task: Task, room: RoomBoxes) -> dict[str, Pair]:
     floor, openings = room.floor_polygon, room.openings
     plan = plan_of(room, room.categories, floor, openings, task.told, height=room.height, rules=task.rules)
     found = Counter(fault.rule for fault in [*faults_of(plan, KINDS), *unreached(plan)])
-    kinds = {term.name: term.kind for term in TERMS} | {REACHED: BY_EYE[0]}
-    seen = sum(n for name, n in found.items() if kinds[name] in BY_EYE)
-    walked = walk(plan) if len(room.floor_polygon) else None
-    scores = {
-        "faults": (float(seen), objects),
-        "faults A": (float(sum(found[name] for name in HALVES[0])), objects),
-        "faults B": (float(sum(found[name] for name in HALVES[1])), objects),
-        "physics": (float(sum(n for name, n in found.items() if kinds[name] == "physics")), objects),
-        "faultless": (float(not seen), 1.0),
-        "told": kept_relations(task, room)["all"],
-        "walkable": NOT_ASKED if walked is None else (walked.share, 1.0),
-        "navigability": navigability(room),
-        "clearance": clearance(room),
-        "fullness": fullness(room),
+    scores: dict[str, Pair] = {
+        name: (float(sum(found[term] for term in terms)), objects) for name, terms in COUNTED.items()
     }
-    return scores | {f"term {name}": (float(n), objects) for name, n in found.items() if kinds[name] in BY_EYE}
+    scores |= {"faultless": (float(not scores["faults"][0]), 1.0), "told": kept_relations(task, room)["all"]}
+    if len(room.floor_polygon) > 2:
+        if walked := walk(plan):
+            scores["walkable"] = walked.share, 1.0
+        scores |= {score.__name__: score(room) for score in (navigability, clearance, fullness)}
+    return scores | {f"term {name}": (float(n), objects) for name, n in found.items() if name in COUNTED["faults"]}
 
 
 def navigability(room: RoomBoxes) -> Pair:
     """SceneEval's: of the floor on which a robot of 0.2 m can stand, the share of the largest connected part."""
-    import shapely
-
-    if len(room.floor_polygon) < 3:
-        return NOT_ASKED
     low = room.position[:, 1] + room.size[:, 1] / 2 <= OVERHEAD
     solid = shapely.union_all([p.buffer(ROBOT / 2, join_style="mitre") for p in _prints(room)[low]])
     free = shapely.Polygon(room.floor_polygon).buffer(-ROBOT / 2, join_style="mitre").difference(solid)
@@ -72,10 +65,6 @@ def navigability(room: RoomBoxes) -> Pair:
 
 def clearance(room: RoomBoxes) -> Pair:
     """SceneEval's: share of each opening before which nothing stands (a door's width deep, 0.5 m before windows)."""
-    import shapely
-
-    if len(room.floor_polygon) < 3 or not room.openings:
-        return NOT_ASKED
     prints, free = _prints(room), 0.0
     for opening in room.openings:
         depth = BEFORE_WINDOW if opening.kind == "window" else opening.width
@@ -94,10 +83,6 @@ def clearance(room: RoomBoxes) -> Pair:
 
 def fullness(room: RoomBoxes) -> Pair:
     """Square metres under furniture that stands, and of the floor."""
-    import shapely
-
-    if len(room.floor_polygon) < 3:
-        return NOT_ASKED
     stands = np.array([vocabulary().category(word).support == "floor" for word in room.categories], bool)
     floor = shapely.Polygon(room.floor_polygon)
     return float(shapely.union_all(_prints(room)[stands]).intersection(floor).area), float(floor.area)
@@ -114,6 +99,4 @@ def strata_of(task: Task) -> Mapping[str, str]:
 
 
 def _prints(room: RoomBoxes) -> np.ndarray:
-    import shapely
-
     return np.atleast_1d(shapely.polygons(footprints(np.maximum(room.size, 1e-6), room.position, room.yaw)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import colorsys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from torch import nn
 
 from echomodel.metrics.bodies import bodies
 from echomodel.metrics.sets import frechet_distance, kernel_distance, with_subsets
-from echomodel.metrics.statistics import Figure, interval
+from echomodel.metrics.statistics import Figure, mean
 from echomodel.roomboxes import RoomBoxes
 from echomodel.text import ClipTextEncoder
 from echomodel.vocabulary import vocabulary
@@ -180,4 +181,4 @@ def told_by_pictures(made: np.ndarray, real: np.ndarray, seed: int) -> Figure:
             with torch.inference_mode():
                 said = sum(net(torch.rot90(x[half == held], k, (2, 3)))[:, 0] for k in range(TURNS))
         right[half == held] = ((said > 0) == (truth[half == held] > 0)).float()
-    return Figure(float(right.mean()), *interval(right.numpy(), seed), len(made))
+    return replace(mean(right.tolist(), seed), rooms=len(made))

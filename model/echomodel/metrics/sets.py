@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 import torch
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import pdist, squareform
+from scipy.stats import entropy, ks_2samp
 
 from echomodel.boxes import Boxes
 from echomodel.compact.draft import measurable, seen_from, wall_features
 from echomodel.floors import centred
-from echomodel.metrics.pointsets import coverage, one_nearest_neighbour
-from echomodel.metrics.statistics import LEVEL, Figure
+from echomodel.metrics.pointsets import compared
+from echomodel.metrics.statistics import Figure, spread
 from echomodel.roomboxes import RoomBoxes
 from echomodel.sizes import size_score
 from echomodel.vocabulary import vocabulary
@@ -56,16 +60,12 @@ def layout_features(rooms: Sequence[RoomBoxes], reference: Sequence[RoomBoxes]) 
     from sklearn.decomposition import PCA
     from sklearn.preprocessing import StandardScaler
 
-    tables = [np.array([_of_room(room) for room in part]) for part in (rooms, reference)]
+    measured = [[object_features(room)[:, :-WORDS] for room in part] for part in (rooms, reference)]
+    tables = [np.array([np.concatenate([one.mean(0), one.std(0)]) for one in part]) for part in measured]
     scaler = StandardScaler().fit(tables[1])
     ours, theirs = (np.clip(scaler.transform(table), -10, 10) for table in tables)
     found = PCA(min(COMPONENTS, len(theirs) - 1), svd_solver="full").fit(theirs)
     return found.transform(ours), found.transform(theirs)
-
-
-def _of_room(room: RoomBoxes) -> np.ndarray:
-    measured = object_features(room)[:, :-WORDS]
-    return np.concatenate([measured.mean(0), measured.std(0)])
 
 
 def set_figures(rooms: Sequence[RoomBoxes], reference: Sequence[RoomBoxes], seed: int) -> dict[str, Figure]:
@@ -90,25 +90,20 @@ def with_subsets(
     measured: Callable[[np.ndarray, np.ndarray], dict[str, float]], first: int, second: int, seed: int
 ) -> dict[str, Figure]:
     """What is measured of two whole sets, with the interval of their random parts."""
-    rng, whole = np.random.default_rng([seed, 4]), measured(np.arange(first), np.arange(second))
-    sizes = [max(2, round(PART * count)) for count in (first, second)]
+    rng = np.random.default_rng([seed, 4])
     parts = [
-        measured(*(np.sort(rng.permutation(n)[:m]) for n, m in zip((first, second), sizes, strict=True)))
+        measured(*(np.sort(rng.permutation(count)[: max(2, round(PART * count))]) for count in (first, second)))
         for _ in range(SUBSETS)
     ]
-    out = {}
-    for name, value in whole.items():
-        low, high = np.quantile([part[name] for part in parts], [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-        out[name] = Figure(value, float(low), float(high), first)
-    return out
+    whole = measured(np.arange(first), np.arange(second))
+    return {name: spread(value, [part[name] for part in parts], first) for name, value in whole.items()}
 
 
 def neighbours(ours: np.ndarray, theirs: np.ndarray) -> dict[str, float]:
     """1-NNA (0.5 is best), COV and MMD of two sets of vectors, (A, D) and (B, D) cut to the smaller number."""
     count = min(len(ours), len(theirs))
-    a, b = (torch.from_numpy(np.ascontiguousarray(part[:count], dtype=float)) for part in (ours, theirs))
-    between = torch.cdist(a, b)
-    found = coverage(between) | one_nearest_neighbour(torch.cdist(b, b), between.t(), torch.cdist(a, a))
+    apart = squareform(pdist(np.concatenate([theirs[:count], ours[:count]])))
+    found = compared(torch.from_numpy(apart), count)
     return {"1-NNA": found["acc"], "COV": found["cov"], "MMD": found["mmd"]}
 
 
@@ -123,29 +118,23 @@ def frechet_distance(first: np.ndarray, second: np.ndarray) -> float:
 
 def kernel_distance(first: np.ndarray, second: np.ndarray) -> float:
     """Unbiased squared MMD with the kernel (x.y / D + 1)^3 of (A, D) and (B, D) (Binkowski et al. 2018)."""
-
-    def kernel(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return (x @ y.T / x.shape[1] + 1) ** 3
+    from sklearn.metrics.pairwise import polynomial_kernel
 
     def within(x: np.ndarray) -> float:
-        k = kernel(x, x)
-        return float((k.sum() - np.trace(k)) / (len(x) * (len(x) - 1)))
+        kernel = polynomial_kernel(x)
+        return float((kernel.sum() - np.trace(kernel)) / (len(x) * (len(x) - 1)))
 
-    return within(first) + within(second) - 2 * float(kernel(first, second).mean())
+    return within(first) + within(second) - 2 * float(polynomial_kernel(first, second).mean())
 
 
 def category_divergence(rooms: Sequence[Sequence[str]], reference: Sequence[Sequence[str]]) -> float:
     """KL divergence of the categories of the reference from those of the rooms, nats; half a piece added of each."""
-    ours, theirs = (Counter(word for room in part for word in room) for part in (rooms, reference))
+    ours, theirs = (Counter(chain.from_iterable(part)) for part in (rooms, reference))
     words = sorted({*ours, *theirs})
-    q, p = (np.array([count[word] + 0.5 for word in words]) for count in (ours, theirs))
-    p, q = p / p.sum(), q / q.sum()
-    return float((p * np.log(p / q)).sum())
+    return float(entropy(*([count[word] + 0.5 for word in words] for count in (theirs, ours))))
 
 
-def told_apart(
-    made: Sequence[RoomBoxes], real: Sequence[RoomBoxes], seed: int, *, paired: bool = False
-) -> Figure:  # fmt: skip
+def told_apart(made: Sequence[RoomBoxes], real: Sequence[RoomBoxes], seed: int, *, paired: bool = False) -> Figure:
     """Area under the curve of a random forest that tells made rooms from real ones, by their objects; 0.5 = it cannot.
 
     It judges rooms that it was not trained on; a room's score is the mean over its objects. Fewer rooms than there are
@@ -156,7 +145,7 @@ def told_apart(
     """
     from sklearn.ensemble import RandomForestClassifier
     from sklearn.metrics import roc_auc_score
-    from sklearn.model_selection import GroupKFold
+    from sklearn.model_selection import GroupKFold, cross_val_predict
 
     if min(len(made), len(real)) < FOLDS:
         return Figure(None)
@@ -165,18 +154,14 @@ def told_apart(
     x, room = np.concatenate(tables), np.repeat(np.arange(len(rooms)), [len(table) for table in tables])
     truth = np.arange(len(rooms)) < len(made)
     group = np.where(truth, np.arange(len(rooms)), np.arange(len(rooms)) - (len(made) if paired else 0))[room]
-    said = np.zeros(len(x))
-    for train, test in GroupKFold(FOLDS).split(x, truth[room], group):
-        forest = RandomForestClassifier(TREES, min_samples_leaf=LEAF, class_weight="balanced", random_state=seed)
-        forest.fit(x[train], truth[room][train])
-        said[test] = forest.predict_proba(x[test])[:, list(forest.classes_).index(True)]
+    forest = RandomForestClassifier(TREES, min_samples_leaf=LEAF, class_weight="balanced", random_state=seed)
+    folds = {"groups": group, "cv": GroupKFold(FOLDS), "method": "predict_proba"}
+    said = cross_val_predict(forest, x, truth[room], **folds)[:, 1]
     score = np.bincount(room, said) / np.bincount(room)
-    rng, drawn = np.random.default_rng([seed, 6]), []
-    for _ in range(200):
-        rows = np.concatenate([rng.choice(np.flatnonzero(truth == side), (truth == side).sum()) for side in (0, 1)])
-        drawn.append(roc_auc_score(truth[rows], score[rows]))
-    low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return Figure(float(roc_auc_score(truth, score)), float(low), float(high), len(made))
+    rng, sides = np.random.default_rng([seed, 6]), [np.flatnonzero(truth == side) for side in (0, 1)]
+    drawn = [np.concatenate([rng.choice(side, len(side)) for side in sides]) for _ in range(200)]
+    areas = [roc_auc_score(truth[rows], score[rows]) for rows in drawn]
+    return spread(float(roc_auc_score(truth, score)), areas, len(made))
 
 
 def size_scores(rooms: Sequence[RoomBoxes]) -> np.ndarray:
@@ -187,16 +172,12 @@ def size_scores(rooms: Sequence[RoomBoxes]) -> np.ndarray:
 
 def size_distances(rooms: Sequence[RoomBoxes], reference: Sequence[RoomBoxes]) -> dict[str, float]:
     """Kolmogorov-Smirnov distances of `size_scores`, axis by axis."""
-    from scipy.stats import ks_2samp
-
     pairs = zip(AXES, size_scores(rooms).T, size_scores(reference).T, strict=True)
     return {name: float(ks_2samp(ours, theirs, method="asymp").statistic) for name, ours, theirs in pairs}
 
 
 def layout_distance(one: RoomBoxes, other: RoomBoxes) -> float:
     """Mean distance in plan between the pieces of two layouts of the same furniture, metres; equal pieces may swap."""
-    from scipy.optimize import linear_sum_assignment
-
     words, total = np.array(one.categories, dtype=object), 0.0
     for word in set(one.categories):
         a, b = (room.position[words == word][:, [0, 2]] for room in (one, other))

@@ -1,4 +1,4 @@
-"""Scores of shapes: reconstruction (F-score, IoU, Chamfer) and sets (MMD, COV, 1-NNA).
+"""Scores of reconstructed shapes: F-score, IoU, Chamfer distance.
 
 All distances are measured in the box frame, in which a shape fills the unit box; one voxel of the grid is 1/60 there,
 and the F-score's threshold is 1/64.
@@ -6,15 +6,10 @@ and the F-score's threshold is 1/64.
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
-
 import numpy as np
-import torch
 import trimesh
 from scipy.spatial import cKDTree
 
-from echomodel.metrics.pointsets import chamfer_matrix, compare_sets, earth_mover_matrix
 from echomodel.tsdf import mesh_from_tsdf
 
 THRESHOLD = 1 / 64
@@ -61,47 +56,3 @@ def _distances(mesh: trimesh.Trimesh, target: trimesh.Trimesh) -> np.ndarray:
     found, index = cKDTree(dense).query(points)
     closest = trimesh.triangles.closest_point(target.triangles[face[index]], points)
     return np.minimum(found, np.linalg.norm(closest - points, axis=1))
-
-
-def reconstruction_scores(
-    grids: Sequence[np.ndarray], labels: Sequence[str], reconstruct: Callable[[np.ndarray], np.ndarray]
-) -> dict[str, dict[str, float]]:
-    """Mean `surface_scores` of reconstructions, per label and under "all" (mean over shapes), with their number `n`.
-
-    Arguments:
-        grids: (64, 64, 64) float32 each, with a class of `labels` each. reconstruct: grid -> grid.
-    """
-    found: dict[str, list[dict[str, float]]] = defaultdict(list)
-    for label, grid in zip(labels, grids, strict=True):
-        scores = surface_scores(reconstruct(grid), grid)
-        found[label].append(scores)
-        found["all"].append(scores)
-    return {label: {**_means(rows), "n": float(len(rows))} for label, rows in sorted(found.items())}
-
-
-def _means(rows: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    return {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}
-
-
-def set_scores(
-    generated: Mapping[str, np.ndarray], references: Mapping[str, np.ndarray], least: int = 4, *, points: int = 0
-) -> dict[str, dict[str, float]]:
-    """MMD, COV and 1-NNA of generated against reference shapes, per class and averaged over classes ("mean").
-
-    Arguments:
-        generated, references: class -> (n, p, 3) float32 surface points; both are cut to the smaller number.
-        least: classes with fewer shapes on either side are left out.
-        points: by the earth mover's distance of so many points each; 0 = by the Chamfer distance of all.
-    """
-    matrix = earth_mover_matrix if points else chamfer_matrix
-
-    scores: dict[str, dict[str, float]] = {}
-    for label in sorted(set(generated) & set(references)):
-        count = min(len(generated[label]), len(references[label]))
-        if count < least:
-            continue
-        ours, real = (torch.as_tensor(side[label][:count, : points or None]) for side in (generated, references))
-        scores[label] = {**compare_sets(ours, real, matrix), "n": float(count)}
-    if scores:
-        scores["mean"] = _means(list(scores.values()))
-    return scores

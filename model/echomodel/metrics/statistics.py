@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 RESAMPLES = 2000
 LEVEL, POWERED = 0.95, 2.8  # 2.8 standard errors: found at 5 % in four of five repetitions
-
-
 Pair = tuple[float | Sequence[float], float | Sequence[float]]  # part and whole
 
 
@@ -29,6 +27,10 @@ class Counts:
         """From (part, whole) of each room."""
         part, whole = np.moveaxis(np.array(pairs, float).reshape(len(pairs), 2, -1), 1, 0)
         return cls(part, whole)
+
+    def at(self, rooms: np.ndarray) -> Counts:
+        """Of some rooms alone, (n,) bool."""
+        return Counts(self.part[rooms], self.whole[rooms])
 
     @property
     def value(self) -> float | None:
@@ -61,30 +63,34 @@ def figure(counts: Counts, seed: int, reference: Counts | None = None) -> Figure
         return Figure(counts.value, rooms=asked)
     drawn = _resampled(len(counts.whole), seed)
     ratio = _ratio(counts.part[drawn].sum(1), counts.whole[drawn].sum(1))
-    low, high = np.nanquantile(ratio, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    found = Figure(counts.value, float(low), float(high), asked)
+    found = spread(counts.value, ratio, asked)
     if reference is None or reference.value is None or len(reference.whole) != len(counts.whole):
         return found
     other = _ratio(reference.part[drawn].sum(1), reference.whole[drawn].sum(1))
-    detects = POWERED * float(np.nanstd(ratio - other))
-    return Figure(found.value, found.low, found.high, asked, paired_p(counts, reference, seed), detects)
+    return replace(found, p=paired_p(counts, reference, seed), detects=POWERED * float(np.nanstd(ratio - other)))
 
 
 def paired_p(one: Counts, other: Counts, seed: int) -> float:
     """Share of exchanges of the two, room by room, after which they differ at least as much as they do."""
     swap = np.random.default_rng([seed, 5]).random((RESAMPLES, len(one.whole), 1)) < 0.5
-    parts = [np.where(swap, a, b).sum(1) for a, b in ((one.part, other.part), (other.part, one.part))]
-    wholes = [np.where(swap, a, b).sum(1) for a, b in ((one.whole, other.whole), (other.whole, one.whole))]
-    apart = np.abs(_ratio(parts[0], wholes[0]) - _ratio(parts[1], wholes[1]))
+    first, second = (
+        _ratio(np.where(swap, a.part, b.part).sum(1), np.where(swap, a.whole, b.whole).sum(1))
+        for a, b in ((one, other), (other, one))
+    )
+    apart = np.abs(first - second)
     seen = abs((one.value or 0.0) - (other.value or 0.0))
     return float((1 + (apart >= seen - 1e-12).sum()) / (1 + RESAMPLES))
 
 
-def interval(values: np.ndarray, seed: int) -> tuple[float, float]:
-    """Bootstrap interval of 95 % of the mean of (n,) values."""
-    means = values[_resampled(len(values), seed)].mean(1)
-    low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return float(low), float(high)
+def spread(value: float, drawn: Sequence[float] | np.ndarray, rooms: int) -> Figure:
+    """A value with the interval of 95 % of values that were drawn for it."""
+    low, high = np.nanquantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return Figure(value, float(low), float(high), rooms)
+
+
+def mean(values: Iterable[float], seed: int) -> Figure:
+    """The mean of values and its interval."""
+    return figure(Counts.of([(value, 1.0) for value in values]), seed)
 
 
 def _resampled(count: int, seed: int) -> np.ndarray:

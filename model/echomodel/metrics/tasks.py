@@ -74,11 +74,10 @@ def tasks_of(
     return [Task(room, np.asarray(edges, np.int64), rules=rules) for room, edges in zip(rooms, labels, strict=True)]
 
 
-def changed(task: Task, rng: np.random.Generator, *, contradictions: bool = True) -> Task:
+def changed(task: Task, rng: np.random.Generator) -> Task:
     """The task with one relation turned round, as it is where none can be.
 
-    Arguments:
-        contradictions: keep the mirrored edge that says what no longer holds, as the published evaluation does.
+    A mirrored edge that says what no longer holds stays, as in the published evaluation.
     """
     can = np.flatnonzero(np.isin(task.told[:, 1], list(OPPOSITE)))
     none = np.zeros(len(task.room), bool)
@@ -88,10 +87,7 @@ def changed(task: Task, rng: np.random.Generator, *, contradictions: bool = True
     subject, predicate, other = task.told[chosen].tolist()
     after = task.told.copy()
     after[chosen, 1] = OPPOSITE[predicate]
-    if not contradictions:
-        after = after[~(after == [other, OPPOSITE[predicate], subject]).all(1)]
-    touched = none.copy()
-    touched[[subject, other]] = True
+    touched = np.isin(np.arange(len(task.room)), [subject, other])
     return replace(task, told=after, before=task.told, added=none, touched=touched)
 
 
