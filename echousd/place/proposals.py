@@ -19,7 +19,7 @@ from echousd.place.slots import INNER, STANDS
 
 HALF_PI = math.pi / 2
 STEP = 0.2  # metres between two places at a wall
-GRID, PLACES = 0.35, 300  # metres between two places in the open; in a hall so many, farther apart
+GRID, PLACES = 0.35, 1000  # metres between two places in the open; in a hall so many, farther apart
 SLIDES = (0.08, 0.2, 0.45, 0.8)  # metres by which a piece is moved along its width and its depth
 AMID = 0.7  # share of the farthest watching distance at which a sofa stands in the room
 Row = tuple[float, float, float, float]  # x, z, yaw, and how much others are preferred
