@@ -72,7 +72,7 @@ def _walls(
     bare: frozenset[str],
     outdoor: bool,
     thickness: tuple[float, ...],
-) -> tuple[ShellPart, ...]:
+) -> tuple[ShellPart, ...]:  # fmt: skip
     polygon = np.frombuffer(corners).reshape(-1, 2)
     lengths = edge_lengths(polygon)
     deep = np.array(thickness or [WALL] * len(polygon))
@@ -101,7 +101,7 @@ def _walls(
                 both=not thickness,
             )
             for opening in here
-        ]
+        ]  # fmt: skip
         parts.append(ShellPart(name, "wall", tuple(pieces), tuple(part for part in inner if part.pieces)))
     return tuple(parts)
 
