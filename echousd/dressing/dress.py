@@ -91,25 +91,26 @@ def dress(room: RoomData) -> Dressing:
     known: dict[tuple, str] = {}
     kinds: dict[str, tuple] = {}
     taken = {*room.names, *room.assets.values()}
-    bare = {o.name for o in room.graph.room.openings if o.kind == "window" and room.options.dress != "none"}
-    if room.options.dress != "none":
-        for number in range(max(len(room.layouts), 1)):
-            named: dict[str, Thing] = {}
-            setting = dressed(room, number)
-            bare -= setting.curtained
-            for found in setting.placed:
-                key = (found.kind, *np.round(found.size, 4).tolist(), found.variant)
-                if key not in known:
-                    known[key] = free_name(f"small_{found.kind}", taken | set(geometry))
-                    geometry[known[key]] = geometry_of(found)
-                word = KINDS[found.kind].name
-                name = free_name(word, taken | set(named))
-                while kinds.setdefault(name, key) != key:  # a name has one asset in all layouts
-                    name = free_name(word, taken | set(named) | set(kinds))
-                named[name], assets[name] = found, known[key]
-            layouts.append(named)
-            if room.options.dress_graph:
-                graphs.append(graph_of(setting, named))
+    bare = {o.name for o in room.graph.room.openings if o.kind == "window"}
+    for number in range(max(len(room.layouts), 1)):
+        named: dict[str, Thing] = {}
+        setting = dressed(room, number)
+        bare -= setting.curtained
+        if room.options.dress == "none":  # rails hang where curtains would
+            continue
+        for found in setting.placed:
+            key = (found.kind, *np.round(found.size, 4).tolist(), found.variant)
+            if key not in known:
+                known[key] = free_name(f"small_{found.kind}", taken | set(geometry))
+                geometry[known[key]] = geometry_of(found)
+            word = KINDS[found.kind].name
+            name = free_name(word, taken | set(named))
+            while kinds.setdefault(name, key) != key:  # a name has one asset in all layouts
+                name = free_name(word, taken | set(named) | set(kinds))
+            named[name], assets[name] = found, known[key]
+        layouts.append(named)
+        if room.options.dress_graph:
+            graphs.append(graph_of(setting, named))
     return Dressing(tuple(layouts), assets, geometry, frozenset(bare), tuple(graphs))
 
 
@@ -119,9 +120,9 @@ def placed(room: RoomData, layout: int = 0) -> list[Thing]:
 
 
 def dressed(room: RoomData, layout: int = 0) -> Setting:
-    """One layout after all rules."""
+    """One layout after all rules; after that of the curtains in a room that is not dressed."""
     setting = setting_of(room, layout)
-    for rule in RULES:
+    for rule in (walls.curtains,) if room.options.dress == "none" else RULES:
         rule(setting)
     return setting
 

@@ -120,6 +120,15 @@ def test_a_window_without_room_for_curtains_has_a_blind_and_no_rail():
         assert sum(name.endswith("rail") for name in pieces) == rails
 
 
+def test_an_undressed_room_has_a_rail_only_where_curtains_would_hang(bare):
+    assert dress(bare).bare == dress(replace(bare, options=RoomOptions(walls=True, dress="full"))).bare
+    windows = {opening.name for opening in bare.graph.room.openings if opening.kind == "window"}
+    assert windows
+    assert not dress(bare).bare
+    kitchen = bare.graph.replaced(room=bare.graph.room.replaced(type="kitchen"))
+    assert dress(replace(bare, graph=kitchen)).bare == windows
+
+
 def test_nothing_stands_over_an_edge_or_in_the_air(room):
     setting = setting_of(room)
     for rule in RULES:
