@@ -15,6 +15,8 @@ PILLOW = 3.2  # exponent of the outline of a cushion
 STEP = 0.02  # metres from place to place
 WIDE_BED = 1.3  # metres
 LEVEL = 0.005  # metres: what is as high as that is one height
+AHEAD = (0.0, 0.04, 0.08)  # metres that a blanket lies before where the back seems to begin
+RAISED = 0.04  # metres that a flat thing is raised at most so that it lies on the solids of a seat
 
 
 def cushions(setting: Setting) -> None:
@@ -69,10 +71,28 @@ def folded(setting: Setting) -> None:
         size, variant, seat = usual_size("folded_throw", rng), int(rng.integers(4)), _Seat.of(host)
         if seat is None:
             continue
-        spots = (spot for end in (0.25, -0.3, 0.0) if (spot := seat.resting(end, size)) is not None)
+        seen = (spot for end in (0.25, -0.3, 0.0) if (spot := seat.resting(end, size)) is not None)
+        fronts = (spot + np.array([0.0, 0.0, ahead]) for spot in seen for ahead in AHEAD)
+        spots = (spot for place in fronts if (spot := _upon(host, place, size)) is not None)
         places = (host.to_room(spot[None] + np.array([0.0, 0.002, 0.0]))[0] for spot in spots)
         wanted = (Thing("folded_throw", size, place, host.yaw, host.name, variant) for place in places)
         setting.put_first(wanted, host=host.name, margin=0.0, floor=False)
+
+
+def _upon(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | None:
+    """The spot (3,) for a flat thing, raised onto the solids below it; None where one of them stands far out."""
+    x, z = (spot[axis] + size[axis] * np.linspace(-0.5, 0.5, 7) for axis in (0, 2))
+    points = np.stack(np.meshgrid(x, z), -1).reshape(-1, 2)
+    top = float(spot[1])
+    for collider in host.geometry.colliders:
+        normal = np.asarray(collider.mesh.face_normals)
+        beyond = (normal * collider.mesh.triangles_center).sum(1) - points @ normal[:, [0, 2]].T  # metres, of y = 0
+        up, down = normal[:, 1] > 1e-6, normal[:, 1] < -1e-6
+        high = (beyond[:, up] / normal[up, 1]).min(1)
+        low = (beyond[:, down] / normal[down, 1]).max(1)
+        over = (high > low) & (beyond[:, ~up & ~down] > 0).all(1)
+        top = max(top, float(high[over].max(initial=top)))
+    return np.array([spot[0], top, spot[2]]) if top - spot[1] < RAISED else None
 
 
 def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -> np.ndarray | None:

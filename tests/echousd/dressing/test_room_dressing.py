@@ -1,6 +1,7 @@
 """Small things: where they stand, that they stay out of the way, and that the room is the same without them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -331,3 +332,15 @@ def test_curtains_hang_over_the_pane_where_something_stands_beside_it(beside):
     assert left.footprint.intersection(shelf.footprint).area == 0 or not beside
     assert (left.position[0] > -0.85) == beside
     assert all(thing.position[1] < 0.1 for thing in hung)
+
+
+def test_a_folded_blanket_lies_on_the_solids_of_its_seat():
+    """Not on what is seen of it: a back's solid reaches further forward than its cloth, a seat's may be higher."""
+    seat, back = trimesh.creation.box((1.6, 0.4, 0.9)), trimesh.creation.box((1.6, 0.8, 0.2))
+    seat.apply_translation((0, 0.2, 0))
+    back.apply_translation((0, 0.4, -0.35))
+    host = SimpleNamespace(geometry=SimpleNamespace(colliders=[SimpleNamespace(mesh=seat), SimpleNamespace(mesh=back)]))
+    size = np.array([0.4, 0.06, 0.3])
+    np.testing.assert_allclose(upholstery._upon(host, np.array([0.3, 0.385, 0.1]), size), (0.3, 0.4, 0.1), atol=1e-9)
+    assert upholstery._upon(host, np.array([0.3, 0.4, -0.12]), size) is None  # its back edge is in the back
+    assert upholstery._upon(host, np.array([0.3, 0.35, 0.1]), size) is None  # as high as no seat is above what one sees
