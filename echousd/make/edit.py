@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.loading import load_model
 from echomodel.progress import StageListener
 from echomodel.vocabulary import vocabulary
 from echousd.assets.record import Vector
@@ -19,7 +18,7 @@ from echousd.graph import Node, SceneGraph
 from echousd.graph.floors import with_plan_of
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
-from echousd.make.layouts import Draws, best_boxes, check_objects, most_drafts, room_floor, with_sizes
+from echousd.make.layouts import Draws, best_boxes, check_objects, model_of, most_drafts, room_floor, with_sizes
 from echousd.make.reading import SavedRoom, read_room
 from echousd.make.verdicts import layout_outcome, warn_of_faults
 from echousd.naming import free_name
@@ -96,7 +95,7 @@ def edit(
     own = Retrieved()
     if fresh or moving:
         with timer.stage("load"), one_thread():
-            model_used = load_model(asked.weights, device=asked.device) if model is None else model
+            model_used = model_of(asked, model)
             _compare(saved.manifest, model_used, given=bool(model or asked.weights), root=Path(room))
         if fresh:
             made_of = saved.manifest["shapes"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ import torch
 from echomodel.boxes import Boxes
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
+from echomodel.loading import load_model
 from echomodel.openings import free_area
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
@@ -26,6 +28,7 @@ from echousd.tensors import floor_centre, graph_batch, seeded
 
 if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
+    from echousd.options import RoomOptions
 
 DRAFTS = 8  # of which the best is kept
 ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
@@ -45,6 +48,13 @@ def check_objects(graph: SceneGraph, file: str = "") -> None:
 def usual_drafts(objects: int) -> int:
     """Layouts that are drawn where nobody says how many: fewer for very many objects, which take long enough."""
     return max(1, min(DRAFTS, CROWD // max(objects, 1)))
+
+
+def model_of(asked: RoomOptions, model: RoomModel | None) -> RoomModel:
+    """A model that is given, else that of the option `weights`; raises ValueError for a path, as `load_model` does."""
+    if isinstance(model, str | os.PathLike):
+        raise ValueError(f"model is {str(model)!r}, allowed: a loaded model; a file goes to weights")
+    return load_model(asked.weights, device=asked.device) if model is None else model
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from echomodel.boxes import Boxes
-from echomodel.loading import load_model
 from echomodel.progress import StageListener
 from echomodel.roomboxes import footprints
 from echousd.graph import SceneGraph, load_graph
@@ -22,6 +21,7 @@ from echousd.make.layouts import (
     Draws,
     best_boxes,
     check_objects,
+    model_of,
     most_drafts,
     plan_boxes,
     room_floor,
@@ -121,7 +121,7 @@ def generate(
     graph = with_own_boxes(with_own_pieces(graph, meshes or {}), boxes)
     check_objects(graph, file)
     with timer.stage("load"), one_thread():
-        echo = load_model(asked.weights, device=asked.device) if model is None else model
+        echo = model_of(asked, model)
         shapes = asked.shapes or default_source(echo)
         check_sources([shapes, *sources_of(graph, shapes).values()], echo)
     pieces = given_pieces(graph, shapes, wishes, timer=timer)

@@ -208,7 +208,7 @@ def odd(value, rng):
 
 
 def test_indices(tmp_path, echousd_command, monkeypatch):
-    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    monkeypatch.setattr("echousd.make.layouts.load_model", lambda *_, **__: StandIn())
     monkeypatch.setattr("echousd.make.save.PREVIEW", 16)
     write_obj(tmp_path / "models", "wardrobe", chest(1.0, 2.0, 0.5))
     file = index([tmp_path / "models"], tmp_path / "lib.parquet").file

@@ -49,7 +49,7 @@ def test_a_damaged_file_is_named(room, kind, ending):
 
 @pytest.fixture
 def stand_in(monkeypatch):
-    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    monkeypatch.setattr("echousd.make.layouts.load_model", lambda *_, **__: StandIn())
     monkeypatch.setattr("echousd.make.save.PREVIEW", 16)
 
 

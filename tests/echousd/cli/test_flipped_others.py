@@ -178,7 +178,7 @@ FEW = ("store", "undo")
 def test_the_file_is_named(name, tmp_path, monkeypatch):
     if not MANY and name not in FEW:
         pytest.skip("minutes: ECHOUSD_MUTATIONS=100")
-    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    monkeypatch.setattr("echousd.make.layouts.load_model", lambda *_, **__: StandIn())
     monkeypatch.setattr("echousd.make.save.PREVIEW", 16)
     torch.set_num_threads(1)  # threads do not survive a fork
     case, top, faults = CASES[name], tmp_path / "top", []

@@ -59,7 +59,7 @@ def watch(monkeypatch) -> Iterator[None]:
     def stop(*_: object) -> None:
         raise Hang
 
-    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    monkeypatch.setattr("echousd.make.layouts.load_model", lambda *_, **__: StandIn())
     monkeypatch.setattr("echousd.make.save.PREVIEW", 16)
     before = signal.signal(signal.SIGALRM, stop)
     yield

@@ -19,7 +19,7 @@ REFUSED = ("room:SDF_FORMAT_ARGS:a=b", "ro\\om", "ro\tom", "ro\nom", "ro\x1b[31m
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    monkeypatch.setattr("echousd.make.layouts.load_model", lambda *_, **__: StandIn())
     monkeypatch.setattr("echousd.make.save.PREVIEW", 16)
 
 

@@ -128,7 +128,7 @@ def test_what_a_person_would_point_at_in_their_arrangement_is_told(tmp_path, tur
 
 
 def test_the_command_collects_their_pieces(loft, tmp_path, echousd_command, monkeypatch):
-    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    monkeypatch.setattr("echousd.make.layouts.load_model", lambda *_, **__: StandIn())
     words = ("adopt", loft, "-o", tmp_path / "room", "--add", "wardrobe:wardrobe", "--shapes", "boxes")
     done = echousd_command(*words, "--collect", "--json")
     assert done.code in (0, 1), done.err
@@ -144,7 +144,7 @@ def test_the_command_collects_their_pieces(loft, tmp_path, echousd_command, monk
 
 
 def test_a_stage_without_labels_is_known_by_its_names(tmp_path, echousd_command, monkeypatch):
-    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    monkeypatch.setattr("echousd.make.layouts.load_model", lambda *_, **__: StandIn())
     loft = stage_of(tmp_path / "loft.usda", ("SM_Double_Bed_03", seat(1.8, 1.0, 2.1), "", (0, 0, 0), 0))
     words = ("adopt", loft, "-o", tmp_path / "room", "--add", "wardrobe:wardrobe", "--shapes", "boxes", "--quiet")
     done = echousd_command(*words)

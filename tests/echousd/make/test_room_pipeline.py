@@ -172,7 +172,8 @@ class Empty(StandIn):
         ({"seed": -1}, "seed is -1, allowed: 0 to 9223372036854775807"),
         ({"model": NoShapes()}, "no shape branch; use shapes 'boxes'"),
         ({"model": Empty()}, "shape of 'bed': TSDF holds no surface"),
-        ({"model": "/nowhere.safetensors"}, "/nowhere.safetensors"),
+        ({"model": "/nowhere.safetensors"}, "model is '/nowhere.safetensors', allowed: a loaded model; a file goes to"),
+        ({"model": None, "weights": "/nowhere.safetensors"}, "/nowhere.safetensors"),
     ],
 )
 def test_bad_arguments_are_named(arguments, text):
@@ -228,7 +229,7 @@ def test_stated_sizes_that_no_such_furniture_has_are_kept_and_said():
 
 
 def test_python_and_the_command_make_the_same_room(tmp_path, echousd_command, monkeypatch):
-    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    monkeypatch.setattr("echousd.make.layouts.load_model", lambda *_, **__: StandIn())
     echousd.write_graph(small_graph(), tmp_path / "graph.usda")
     done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "told/room", "--shapes", "boxes")
     assert done.code in (0, 1), done.err

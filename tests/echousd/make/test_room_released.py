@@ -91,7 +91,7 @@ def test_what_does_not_fit_is_named(weights, tmp_path, echousd_command, monkeypa
     def absent(self):
         raise TextEncoderError("text features need the package open_clip_torch: pip install 'echousd[text]'")
 
-    monkeypatch.setattr(ClipTextEncoder, "_load", absent)
+    monkeypatch.setattr(ClipTextEncoder, "model", property(absent))
     fresh = shutil.copy(weights, tmp_path / "fresh.safetensors")  # a file that this process has not loaded yet
     done = echousd_command("generate", graph, "-o", out, "--weights", fresh)
     assert (done.code, out.exists()) == (2, False)

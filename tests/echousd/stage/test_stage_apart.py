@@ -121,7 +121,7 @@ def rooms(tmp_path_factory):
 
 @pytest.fixture
 def stand_in(monkeypatch):
-    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    monkeypatch.setattr("echousd.make.layouts.load_model", lambda *_, **__: StandIn())
     monkeypatch.setattr("echomodel.echo.EchoModel.load", classmethod(lambda cls, path=None, **options: StandIn()))
     monkeypatch.setattr("echousd.make.save.PREVIEW", 16)
 
