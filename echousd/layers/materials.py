@@ -28,7 +28,7 @@ def look_images(look: Look, harmony: str) -> dict[str, tuple[str, bytes]]:
     """Input of a UsdPreviewSurface -> (path in the room's folder, image) of a look with a pattern; {} without one."""
     if not look.pattern:
         return {}
-    tint = harmony if look.pattern.startswith("painting_") else baking.hexadecimal(look.color)
+    tint = harmony if look.pattern.startswith("picture_") else baking.hexadecimal(look.color)
     found = {"diffuseColor": (f"{look.pattern}_{tint}", baking.color_image(look.pattern, look.color, harmony))}
     normal, rough = baking.normal_image(look.pattern, look.metres), baking.rough_image(look.pattern, look.roughness)
     if normal is not None:
@@ -100,14 +100,14 @@ def _connect(
 
 def tint_factor(base: Look, look: Look) -> list[float]:
     """What the image of a material is multiplied with, to be in the colours of `look`; paintings have their own."""
-    if base.pattern.startswith("painting_"):
+    if base.pattern.startswith("picture_"):
         return [1.0, 1.0, 1.0]
     return [round(b / max(a, 1e-4), 4) for a, b in zip(base.color, look.color, strict=True)]
 
 
 def tint_material(stage: Usd.Stage, path: str, base: Look, look: Look) -> None:
     """Author, for a variant, how a material comes from its images in the colours of `base` to those of `look`."""
-    if base.pattern.startswith("painting_"):
+    if base.pattern.startswith("picture_"):
         return
     if base.pattern:
         image = UsdShade.Shader(stage.OverridePrim(f"{path}/{IMAGES['diffuseColor']}"))

@@ -183,9 +183,11 @@ def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int |
     from echousd.place.living import living_faults
 
     boxes, conflicts = found
-    if seed is not None:
+    faults = living_faults(graph, boxes)
+    if seed is not None and any(fault.rule in OF_OPENINGS for fault in faults):
         graph = with_free_openings(graph, [boxes], seed)
-    late = [seed is not None and fault.rule in OF_OPENINGS for fault in living_faults(graph, boxes)]
+        faults = living_faults(graph, boxes)
+    late = [seed is not None and fault.rule in OF_OPENINGS for fault in faults]
     return len(layout_outcome(graph, boxes).faults), len(conflicts), len(late) - sum(late), sum(late)
 
 

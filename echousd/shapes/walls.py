@@ -66,11 +66,7 @@ def walls(
 
 @lru_cache(maxsize=4)  # furniture is moved away from them before they are written
 def _walls(
-    corners: bytes,
-    height: float,
-    openings: tuple[Opening, ...],
-    bare: frozenset[str],
-    outdoor: bool,
+    corners: bytes, height: float, openings: tuple[Opening, ...], bare: frozenset[str], outdoor: bool,
     thickness: tuple[float, ...],
 ) -> tuple[ShellPart, ...]:  # fmt: skip
     polygon = np.frombuffer(corners).reshape(-1, 2)
@@ -91,14 +87,8 @@ def _walls(
         left_first = signed_area(polygon) > 0
         inner = [
             _filled(
-                name,
-                opening,
-                frame,
-                float(length),
-                0.0 if opening.name in bare else height,
-                left_first,
-                float(deep[edge]),
-                both=not thickness,
+                name, opening, frame, float(length), 0.0 if opening.name in bare else height, left_first,
+                float(deep[edge]), both=not thickness,
             )
             for opening in here
         ]  # fmt: skip

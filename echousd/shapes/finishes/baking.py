@@ -31,7 +31,7 @@ PATTERNS: Mapping[str, Callable[[], Relief]] = {
         patterns.leather, patterns.plaster, patterns.wicker, patterns.leaf, patterns.stone, patterns.papered,
         patterns.carpet, patterns.tiles, patterns.brushed, patterns.bound,
     )
-} | {f"rug_{design}_{variant}": partial(woven, design, variant) for design in RUGS for variant in range(2)}  # fmt: skip
+} | {material: partial(woven, *woven_in) for material, woven_in in RUGS.items()}  # fmt: skip
 QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
 
 
@@ -84,7 +84,7 @@ def hexadecimal(color: Color) -> str:
 @kept
 def color_image(pattern: str, color: Color, harmony: str) -> bytes:
     """A pattern in a colour (linear RGB), or a painting in the colours of a harmony, as JPEG."""
-    if pattern.startswith("painting_"):
+    if pattern.startswith("picture_"):
         tones = HARMONIES[harmony]
         named = ("f4efe6", tones.accent, tones.cloth, tones.wood, "2d3136")
         return _jpeg(picture([linear(c) for c in named], int(pattern.rsplit("_", 1)[1])))
@@ -96,7 +96,7 @@ def color_image(pattern: str, color: Color, harmony: str) -> bytes:
 @kept
 def normal_image(pattern: str, metres: float) -> bytes | None:
     """Tangent-space normals of a pattern that covers `metres`, +Y up as UsdPreviewSurface takes it; None if flat."""
-    height = None if pattern.startswith("painting_") else relief(pattern).height
+    height = None if pattern.startswith("picture_") else relief(pattern).height
     if height is None:
         return None
     step = 2 * max(metres, 0.4) / SIZE
@@ -110,7 +110,7 @@ def normal_image(pattern: str, metres: float) -> bytes | None:
 @kept
 def rough_image(pattern: str, roughness: float) -> bytes | None:
     """Roughness about a mean, grey; None where it is even."""
-    rough = None if pattern.startswith("painting_") else relief(pattern).rough
+    rough = None if pattern.startswith("picture_") else relief(pattern).rough
     return None if rough is None else _encoded(np.clip(roughness + rough, 0.05, 1), 70)
 
 

@@ -16,7 +16,7 @@ class Slot:
     Arguments:
         color: a field of `Harmony`, or an sRGB hex of its own.
         roughness, metallic, opacity: of a UsdPreviewSurface.
-        pattern: a word of `baking.PATTERNS`, "" = plain; `painting_0` ... are pictures.
+        pattern: a word of `baking.PATTERNS`, "" = plain; `picture_0` ... are pictures.
         metres: of surface that one picture of the pattern covers; 0 = the whole of it fits the thing.
         mix: an sRGB hex and how much of it is mixed in.
         material: what it is made of, the word of the label `semantics:labels:material`; "" = as the slot is called.
@@ -52,15 +52,11 @@ SLOTS: Mapping[str, Slot] = {
     "mirror": Slot("c9d2d4", 0.05, metallic=1.0, material="glass"),
     "book": Slot("7a4a40", 0.8, material="paper"),
     "stem": Slot("6b5436", 0.85, material="wood"),
-    **{
-        f"rug_{design}_{variant}": Slot("rug", 0.97, f"rug_{design}_{variant}", 0.0, material="wool")
-        for design in RUGS
-        for variant in range(2)
-    },
+    **{name: Slot("rug", 0.97, name, 0.0, material="wool") for name in RUGS},
     "curtain": Slot("curtain", 0.92, "linen", 0.6, material="linen"),
     "accent_cloth": Slot("accent", 0.95, "knitted", 0.3, material="wool"),
     "accent_plain": Slot("accent", 0.92, "woven", 0.22, material="fabric"),
-    **{f"picture_{n}": Slot("ffffff", 0.7, f"painting_{n}", 0.0, material="print") for n in range(PICTURES)},
+    **{name: Slot("ffffff", 0.7, name, 0.0, material="print") for name in PICTURES},
     "frame": Slot("wood", 0.45, "wood", 0.7, material="wood"),
     "paper": Slot("f1ede4", 0.9),
     "book_a": Slot("accent", 0.7, "bound", 0.24, material="paper"),

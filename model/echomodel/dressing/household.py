@@ -8,7 +8,7 @@ from echomodel.dressing.solids import Lathe
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.solids import Block, Solid, ball, rotation, tube, turned
 
-PICTURES = 60  # that there are
+PICTURES = tuple(f"picture_{number}" for number in range(60))  # what is printed, by its material
 
 
 def picture(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -25,7 +25,7 @@ def picture(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 
 def _painting(rng: np.random.Generator) -> str:
-    return f"picture_{int(rng.integers(PICTURES))}"
+    return PICTURES[int(rng.integers(len(PICTURES)))]
 
 
 def _frame(w: float, h: float, d: float, bar: float) -> list[Solid]:

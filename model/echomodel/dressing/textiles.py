@@ -8,18 +8,19 @@ from echomodel.dressing.solids import Sheet
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.solids import Solid, ball, turned
 
-RUGS = (
+DESIGNS = (
     "bordered", "striped", "latticed", "medallion", "checked", "chevrons", "dotted", "scalloped", "broken", "ringed",
     "berber", "shaded", "carved",
 )  # fmt: skip
 ROUND = ("dotted", "scalloped", "broken", "ringed", "berber", "carved")  # designs that a round one has, too
+RUGS = {f"rug_{design}_{variant}": (design, variant) for design in DESIGNS for variant in range(2)}  # by material
 FOLD = 0.14  # metres of curtain from one fold to the next
 
 
 def rug(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A rectangle of pile."""
     w, h, d = size
-    return [box((-w / 2, 0, -d / 2), (w / 2, h, d / 2), _woven(RUGS, rng), h * 0.45)]
+    return [box((-w / 2, 0, -d / 2), (w / 2, h, d / 2), _woven(DESIGNS, rng), h * 0.45)]
 
 
 def round_rug(size: Size, rng: np.random.Generator) -> list[Solid]:

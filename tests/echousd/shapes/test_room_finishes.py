@@ -11,6 +11,7 @@ from pxr import Usd, UsdShade
 from small_room import BARE, StandIn, small_graph
 
 import echousd
+from echomodel.dressing import textiles
 from echomodel.dressing.household import PICTURES
 from echomodel.dressing.textiles import ROUND, RUGS
 from echomodel.furniture.solids import Block
@@ -187,8 +188,8 @@ def test_a_baked_image_is_kept_for_later_processes(tmp_path, monkeypatch):
 def test_pictures_are_sixty_unlike_ones_and_rugs_twenty_six():
     """What hangs or lies in fifty rooms is not met all the time: no two are nearly the same."""
     paper = [linear(color) for color in ("f4efe6", "c47f4f", "7d8b91", "b98f5f", "2d3136")]
-    drawn = [picture(paper, number)[::16, ::16] for number in range(PICTURES)]
-    rugs = [relief(f"rug_{design}_{variant}").tone[::16, ::16] for design in RUGS for variant in range(2)]
+    drawn = [picture(paper, number)[::16, ::16] for number in range(len(PICTURES))]
+    rugs = [relief(name).tone[::16, ::16] for name in RUGS]
     assert (len(drawn), len(rugs)) == (60, 26)
     for which, least in ((drawn, 0.02), (rugs, 0.01)):
         apart = [float(np.abs(one - other).mean()) for k, one in enumerate(which) for other in which[:k]]
@@ -199,5 +200,5 @@ def test_pictures_are_sixty_unlike_ones_and_rugs_twenty_six():
 
 
 def test_what_is_woven_into_rugs_has_a_program_each():
-    assert set(RUGS) == DESIGNS.keys()
-    assert set(ROUND) < set(RUGS)
+    assert set(textiles.DESIGNS) == DESIGNS.keys()
+    assert set(ROUND) < set(textiles.DESIGNS)
