@@ -31,7 +31,7 @@ class Cleared:
 
     Arguments:
         boxes: N boxes, those that were moved in other places.
-        collisions: what still reaches into one another, deepest first.
+        collisions: what still reaches into one another, or into what a wall holds, deepest first.
         moved: name -> metres, of what was moved.
     """
 
@@ -88,9 +88,7 @@ def cleared(
         else:
             moves = found
     names = graph.names
-    left = tuple(
-        Collision(names[i], names[k], deep) for (i, k), deep in scene.overlaps(moves, DEEP) if k < len(names)
-    )  # fmt: skip
+    left = tuple(Collision(scene.names[i], scene.names[k], deep) for (i, k), deep in scene.overlaps(moves, DEEP))
     far = np.linalg.norm(moves, axis=1)
     if not far.any():
         return Cleared(boxes, left, {})
@@ -145,7 +143,11 @@ def _moved_apart(
         for group in groups:
             if other in group:
                 continue
-            for way in _ways(scene.space(group, moves, GAP), scene.heading[mover]):
+            ways = _ways(scene.space(group, moves, GAP), scene.heading[mover])
+            if not ways and len(groups) <= GROUPS:  # boxed in: who stands in its nearest way goes with it
+                nearest = _ways(scene.space(group, moves, GAP, pushing=True), scene.heading[mover])[:1]
+                groups += [more for way in nearest if (more := scene.pushed(group, moves, way)) not in groups]
+            for way in ways:
                 trial = moves.copy()
                 trial[group] += way
                 tried = _at(boxes, trial)

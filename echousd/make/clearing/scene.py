@@ -38,7 +38,7 @@ class Scene:
         heading: (n,) float, yaw in radians. seat: (n,) bool. bulk: (n,) float, square root of the footprint, metres.
         outline: n polygons, footprints. floor: the floor, a little wider.
         level: n polygons, where the top of each is: a desk with a shelf behind has it there alone.
-        bounds: (s, 2, 3) float, boxes of everything.
+        bounds: (s, 2, 3) float, boxes of everything. names: s names, those of walls for what they hold.
         known: pair -> forbidden moves of its first against its second from where both stood at first.
     """
 
@@ -52,6 +52,7 @@ class Scene:
     level: Sequence[BaseGeometry]
     floor: shapely.Polygon
     bounds: np.ndarray
+    names: Sequence[str]
     known: dict[tuple[int, int], BaseGeometry] = field(default_factory=dict)
 
     def forbidden(self, pair: tuple[int, int]) -> BaseGeometry:
@@ -92,13 +93,21 @@ class Scene:
             out += [int(i) for i in np.flatnonzero(self.carrier == one) if i not in out and not self.fixed[i]]
         return out
 
-    def space(self, group: Sequence[int], moves: np.ndarray, gap: float) -> BaseGeometry:
-        """Further moves (x, z) of a group at which it is clear of everything by `gap` metres and stays on the floor."""
+    def stays(self, one: int) -> bool:
+        """Whether a thing cannot be moved: what is fixed, and the shell."""
+        return one >= len(self.fixed) or bool(self.fixed[one])
+
+    def space(self, group: Sequence[int], moves: np.ndarray, gap: float, *, pushing: bool = False) -> BaseGeometry:
+        """Further moves (x, z) of a group at which it is clear of everything by `gap` metres and stays on the floor.
+
+        Arguments:
+            pushing: whether it only has to be clear of what stays where it is.
+        """
         space: BaseGeometry = shapely.Point(-moves[group[0]]).buffer(REACH)
         taken = []
         for one in group:
             for other in self.near(one, moves, 2 * REACH):
-                if other not in group:
+                if other not in group and (self.stays(other) or not pushing):
                     way = moves[one] - moves[other] if other < len(moves) else moves[one]
                     taken.append(translate(self.forbidden((one, other)), *-way))
             for corner in self._corners(one, moves):
@@ -106,6 +115,18 @@ class Scene:
                 if below.covers(shapely.Point(corner)):
                     space = space.intersection(translate(below, *-corner))
         return space.difference(shapely.union_all(taken).buffer(gap, quad_segs=2))
+
+    def pushed(self, group: Sequence[int], moves: np.ndarray, way: np.ndarray) -> list[int]:
+        """A group and whatever free it runs into on its way (2,), with what stands on that."""
+        out, trial = list(group), moves.copy()
+        trial[out] += way
+        for one in group:
+            for other in self.near(one, trial, 0.0):
+                if other in out or self.stays(other):
+                    continue
+                if depth(self.forbidden((one, other)), trial[one] - trial[other]) > 0.0:
+                    out += [each for each in self.carried(other) if each not in out]
+        return out
 
     def price(self, mover: int, way: np.ndarray) -> float:
         """What a move costs: its length, more for what is large, and for a seat that does not go back."""
@@ -162,7 +183,7 @@ def scene_of(
     height = graph.room.height or DEFAULT_HEIGHT
     built = walls_of(plan, height, graph.room.openings, thickness=graph.room.walls) if walls else []
     shell = list(shell_solids(built))
-    everything = [*solids, *shell]
+    everything = [*solids, *(pieces for _, pieces in shell)]
     return Scene(
         everything,
         np.array([node.locked or node.position is not None for node in nodes]),
@@ -174,16 +195,17 @@ def scene_of(
         [_level(pieces) for pieces in solids],
         shapely.Polygon(floor).buffer(EDGE, join_style="mitre"),
         np.array([(np.concatenate(pieces).min(0), np.concatenate(pieces).max(0)) for pieces in everything]),
+        [*graph.names, *(wall for wall, _ in shell)],
     )
 
 
-def shell_solids(parts: Sequence[ShellPart]) -> Iterator[Solids]:
-    """Convex pieces of what stands before the walls: sills, casings, leaves; the walls are the floor's edge."""
+def shell_solids(parts: Sequence[ShellPart]) -> Iterator[tuple[str, Solids]]:
+    """Walls' names and convex pieces of what stands before them: sills, casings, leaves; walls are the floor's edge."""
     for part in parts:
         for filled in part.inner:
             for piece in filled.pieces:
                 if piece.solid:
-                    yield _boards(piece.mesh)
+                    yield part.name, _boards(piece.mesh)
 
 
 def _level(solids: Solids) -> BaseGeometry:

@@ -165,6 +165,25 @@ def test_high_furniture_keeps_clear_of_a_window_sill(walls):
         assert found.boxes.position[0, 2] - 0.2 >= -2.0 + 0.04
 
 
+def test_what_is_boxed_in_takes_along_who_stands_in_its_way():
+    # the bed's head is in the window's sill, the bench stands at its foot: both go, or the collision is told
+    window = Opening("window", "window", 0, 1.0, 1.5, 1.2, 0.9)
+    bed = piece(board((1.6, 1.0, 2.0), (0, 0, 0)))
+    block = piece(board((3.9, 0.4, 0.4), (0, 0, 0)))
+    side = piece(board((1.1, 0.5, 2.0), (0, 0, 0)))
+    graph, boxes, geometry = room(
+        ("bed", "double_bed", bed, (0, 0, -0.99), 0.0, False), ("bench", "bench", block, (0, 0, 0.215), 0.0, False),
+        ("left", "sideboard", side, (-1.36, 0, -0.98), 0.0, False),
+        ("right", "sideboard", side, (1.36, 0, -0.98), 0.0, False), openings=(window,),
+    )  # fmt: skip
+    found = cleared(graph, boxes, geometry, FLOOR, walls=True)
+    assert found.collisions == ()
+    assert {"bed", "bench"} <= set(found.moved)
+    held = graph.replaced(nodes=tuple(node.replaced(locked=True) for node in graph.nodes))
+    stuck = cleared(held, boxes, geometry, FLOOR, walls=True).collisions
+    assert (stuck[0].first, stuck[0].second) == ("bed", "Wall_1")
+
+
 def solids(seed, count):
     rng = np.random.default_rng(seed)
     return [rng.uniform(-0.4, 0.4, (10, 3)) + rng.uniform(-0.3, 0.3, 3) for _ in range(count)]
