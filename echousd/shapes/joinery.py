@@ -26,6 +26,7 @@ CREASE = np.radians(50.0)  # a rounding of two steps still shades as one
 COARSE = 0.7  # share of the faces below which a second level of detail is worth its file
 COLLIDERS = 64  # convex pieces of one body at most
 SLACK = 0.003  # metres that a mesh may reach beyond its convex pieces
+MOST = 0.8  # share of what the worst face lacks, from which on a face gets a corner in the same round
 SMALL = 0.002  # share of its box below which a solid alone is no obstacle
 
 
@@ -122,15 +123,19 @@ def covering(plain: np.ndarray, shown: np.ndarray) -> np.ndarray:
     by more than `SLACK`: a round top of twelve corners lacks a centimetre of what is seen.
     """
     corners = plain
-    while True:
+    while not np.array_equal(plain, shown):
         try:
             planes = ConvexHull(corners).equations
         except QhullError:  # flat
-            return corners
-        beyond = (shown @ planes[:, :3].T + planes[:, 3]).max(1)
-        if beyond.max() <= SLACK:
-            return corners
-        corners = np.concatenate([corners, shown[[beyond.argmax()]]])
+            break
+        beyond = shown @ planes[:, :3].T + planes[:, 3]
+        far = beyond.max(0)
+        if far.max() <= SLACK:
+            break
+        # the one farthest beyond each face, of faces that lack most: one at a time takes a hull for each
+        wanted = beyond[:, far > max(SLACK, MOST * far.max())].argmax(0)
+        corners = np.concatenate([corners, shown[np.unique(wanted)]])
+    return corners
 
 
 def convex_pieces(points: Sequence[np.ndarray], box: float, most: int = COLLIDERS) -> list[trimesh.Trimesh]:

@@ -24,6 +24,7 @@ from echousd.shapes.walls import ShellPart
 from echousd.shapes.walls import walls as walls_of
 
 REACH = 0.5  # metres that a piece is moved at most in all
+NEAR = 0.01  # metres within which solids are looked at first: most things at most touch
 EDGE = 0.002  # metres beyond the floor, or beyond what it stands on, that a piece may be
 ASIDE = 2.0  # a seat moves back from its table more easily than aside
 
@@ -62,9 +63,7 @@ class Scene:
             turned: BaseGeometry = shapely.transform(self.forbidden((k, i)), np.negative)
             return turned
         if pair not in self.known:
-            stands = k < len(self.carrier) and (self.carrier[i] == k or self.carrier[k] == i)
-            found = shapely.Polygon() if stands else forbidden_moves(self.solids[i], self.solids[k], 2 * REACH)
-            self.known[pair] = found
+            self.known[pair] = self._against(pair, np.zeros(2), 2 * REACH)
         return self.known[pair]
 
     def near(self, one: int, moves: np.ndarray, reach: float) -> list[int]:
@@ -82,9 +81,23 @@ class Scene:
         for i in range(len(moves)):
             for k in self.near(i, moves, 0.0):
                 way = moves[i] - moves[k] if k < len(moves) else moves[i]
-                if k > i and (far := depth(self.forbidden((i, k)), way)) > deep:
+                if k > i and (far := self._depth((i, k), way)) > deep:
                     found.append(((i, k), far))
         return sorted(found, key=lambda hit: -hit[1])
+
+    def _against(self, pair: tuple[int, int], way: np.ndarray, reach: float) -> BaseGeometry:
+        i, k = pair
+        if k < len(self.carrier) and (self.carrier[i] == k or self.carrier[k] == i):
+            return shapely.Polygon()
+        return forbidden_moves([np.add(solid, (way[0], 0.0, way[1])) for solid in self.solids[i]], self.solids[k], reach)
+
+    def _depth(self, pair: tuple[int, int], way: np.ndarray) -> float:
+        """How deep two things reach into one another after a move (2,) of the first, metres."""
+        if pair not in self.known:  # a way out that is shorter than `NEAR` passes near solids alone, which are few
+            deep = depth(self._against(pair, way, NEAR), np.zeros(2))
+            if deep < NEAR:
+                return deep
+        return depth(self.forbidden(pair), way)
 
     def carried(self, mover: int) -> list[int]:
         """A thing and all that stands on it, and on that."""
