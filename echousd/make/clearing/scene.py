@@ -89,7 +89,8 @@ class Scene:
         i, k = pair
         if k < len(self.carrier) and (self.carrier[i] == k or self.carrier[k] == i):
             return shapely.Polygon()
-        return forbidden_moves([np.add(solid, (way[0], 0.0, way[1])) for solid in self.solids[i]], self.solids[k], reach)
+        moved = [np.add(solid, (way[0], 0.0, way[1])) for solid in self.solids[i]]
+        return forbidden_moves(moved, self.solids[k], reach)
 
     def _depth(self, pair: tuple[int, int], way: np.ndarray) -> float:
         """How deep two things reach into one another after a move (2,) of the first, metres."""
