@@ -24,8 +24,8 @@ WIDEST = 4.0  # width of a picture over its height, and the other way round
 
 @dataclass(frozen=True)
 class View:
-    """A camera: (4, 4) camera to world and half the picture's width, in metres (top) or as a tangent (perspective);
-    its width over its height; whether it is inside a closed room."""
+    """A camera: (4, 4) camera to world, sheared where its lens is shifted, and half the picture's width, in metres
+    (top) or as a tangent (perspective); its width over its height; whether it is inside a closed room."""
 
     matrix: np.ndarray
     half: float
@@ -49,7 +49,10 @@ def stage_views(stage: Usd.Stage) -> dict[str, View]:
         matrix[:3, :3] /= np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
         flat = camera.projection == camera.Orthographic
         wide = camera.horizontalAperture
-        half = wide / 2 * camera.APERTURE_UNIT * unit if flat else wide / 2 / max(camera.focalLength, 1e-6)
+        of_film = camera.APERTURE_UNIT * unit if flat else 1 / max(camera.focalLength, 1e-6)
+        shift = matrix[:3, :2] @ (camera.horizontalApertureOffset * of_film, camera.verticalApertureOffset * of_film)
+        matrix[:3, 3 if flat else 2] += shift if flat else -shift
+        half = wide / 2 * of_film
         aspect = float(np.clip(wide / max(camera.verticalAperture, 1e-6), 1 / WIDEST, WIDEST))
         views[free_name(prim.GetName(), views)] = View(matrix, float(half), flat, aspect)
     return views

@@ -17,7 +17,7 @@ APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
 LENSES = (24.0, 28.0, 35.0)  # mm, of a camera inside: 74 to 54 degrees across
 EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
-SLOPES = (0.05, 0.15, 0.25, 0.36)  # metres that it looks down for a metre ahead
+SLOPES = (0.05, 0.12, 0.2, 0.28)  # metres that the middle of its picture is lower for a metre ahead
 PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
 WHOLE, CLEAR = 200.0, 30.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
 TRIED = 128  # views of all that are looked at closely
@@ -27,8 +27,9 @@ BARE, BAREST, DEEP = (
     0.28,
     0.02,
 )  # bare walls: what all of a picture costs, from which share on, metres of rounding
-BEFORE, WALLED = 2.0, 0.9  # metres: what is nearer to the eye fills the picture, and which walls do
+BEFORE, WALLED = 2.0, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
 FILLED = 60.0  # metres of depth that a picture full of what is near is worth
+UNSEEN = 3.0  # metres of depth that each piece in the picture is worth
 SHOWN, FAR = 20.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
 TOUCHED = 0.86  # nearness of what the eye must not be at: a quarter of a metre
 STEPS = (0.3, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
@@ -59,6 +60,17 @@ def view_matrix(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
     for column, axis in enumerate((right, cross(back, right), back, eye)):
         matrix[..., :3, column] = axis
     return matrix
+
+
+def shifted(view: np.ndarray, slope: np.ndarray | float) -> np.ndarray:
+    """(..., 4, 4) float: level views whose pictures are moved down by `slope` (...,) metres for a metre ahead.
+
+    So a lens with a shift looks: the third column is no longer upright to the others, and walls stay upright in the
+    picture, as whoever photographs interiors has them.
+    """
+    view = np.array(view, float)
+    view[..., :3, 2] += np.asarray(slope)[..., None] * view[..., :3, 1]
+    return view
 
 
 def perspective_view(points: np.ndarray, furniture: Furniture) -> np.ndarray:
@@ -116,7 +128,7 @@ def inside_view(
     openings: Furniture | None = None,
     main: int | None = None,
 ) -> tuple[np.ndarray, float]:
-    """Camera to world (4, 4) float and focal length in mm of a view inside a room with walls, its main piece whole.
+    """Camera to world (4, 4) float, `shifted`, and focal length in mm of a view inside a room, its main piece whole.
 
     Of all eyes, headings and lenses those count that have the main piece whole in the picture; of these the one that
     hides and cuts off least, has most furniture and depth in its picture and no bare wall over a third of it.
@@ -162,7 +174,7 @@ def inside_view(
         merit = min(_depth(room, eye[[0, 2]], -view[[0, 2], 2]), FAR) - first
         if len(furniture.size):
             unseen = blocked | (_aside(points, view) > half)
-            merit += float((eye[[0, 2]] - middle) @ furniture.facing - unseen.mean(1).sum())
+            merit += float((eye[[0, 2]] - middle) @ furniture.facing - UNSEEN * unseen.mean(1).sum())
         if merit + SHOWN <= most:  # the rest only takes away
             continue
         if len(furniture.size):
@@ -212,7 +224,8 @@ def _aside(points: np.ndarray, view: np.ndarray) -> np.ndarray:
 
     What is up or down counts as in the picture's width, whose half is `ASPECT` times that of its height.
     """
-    x, y, z = np.moveaxis((points - view[..., None, :3, 3]) @ view[..., :3, :3], -1, 0)
+    into = np.linalg.inv(view[..., :3, :3]).swapaxes(-1, -2)
+    x, y, z = np.moveaxis((points - view[..., None, :3, 3]) @ into, -1, 0)
     return np.asarray(np.where(z < 0, np.maximum(np.abs(x), ASPECT * np.abs(y)) / np.maximum(-z, 1e-9), np.inf))
 
 
@@ -238,19 +251,19 @@ def _spots(floor: np.ndarray, middle: np.ndarray) -> list[np.ndarray]:
 
 
 def _view(spot: np.ndarray, aim: np.ndarray, level: float, slope: float) -> np.ndarray:
-    """(4, 4) float camera to world over `spot` at a level towards `aim`, `slope` metres down for a metre ahead."""
-    away = float(np.linalg.norm(aim - spot))
-    return view_matrix(np.array([spot[0], level, spot[1]]), np.array([aim[0], level - slope * away, aim[1]]))
+    """(4, 4) float camera to world over `spot` at a level towards `aim`, `shifted` by a slope."""
+    eye, target = np.insert(spot, 1, level), np.insert(aim, 1, level)
+    return shifted(view_matrix(eye, target), slope)
 
 
 def _turned(eye: np.ndarray, ways: np.ndarray) -> np.ndarray:
-    """(w, `PANS`, `SLOPES`, 4, 4) float camera to world of an eye that looks along ways (w, 2), turned and down."""
+    """(w, `PANS`, `SLOPES`, 4, 4) float camera to world of an eye that looks along ways (w, 2), turned, `shifted`."""
     cos, sin = np.cos(PANS), np.sin(PANS)
-    turned = np.einsum("pij,wj->wpi", np.array([[cos, -sin], [sin, cos]]).transpose(2, 0, 1), ways)[:, :, None]
-    down = -np.array(SLOPES) * np.linalg.norm(turned, axis=-1)
-    flat = np.broadcast_to(turned, (*down.shape, 2))
-    target = eye + np.stack([flat[..., 0], down, flat[..., 1]], -1)
-    return view_matrix(np.broadcast_to(eye, target.shape), target)
+    turned = np.einsum("pij,wj->wpi", np.array([[cos, -sin], [sin, cos]]).transpose(2, 0, 1), ways)
+    target = eye + np.insert(turned, 1, 0.0, axis=-1)
+    level = view_matrix(np.broadcast_to(eye, target.shape), target)
+    shape = (*level.shape[:-2], len(SLOPES), 4, 4)
+    return shifted(np.broadcast_to(level[..., None, :, :], shape), np.broadcast_to(SLOPES, shape[:-2]))
 
 
 def _depth(room: shapely.Polygon, spot: np.ndarray, way: np.ndarray) -> float:

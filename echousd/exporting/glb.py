@@ -113,6 +113,9 @@ class _Tree:
         if prim.IsA(UsdGeom.Camera) or prim.HasAPI(UsdLux.LightAPI):  # which no scale changes
             length = np.linalg.norm(world[:3, :3], axis=0)
             world[:3, :3] /= np.where(length > 0, length, 1.0)
+        if prim.IsA(UsdGeom.Camera):
+            cos, sin = np.cos(tilt := _tilt(UsdGeom.Camera(prim).GetCamera())), np.sin(tilt)
+            world[:3, :3] = world[:3, :3] @ ((1, 0, 0), (0, cos, -sin), (0, sin, cos))
         index = self._new(path, prim.GetName(), world, parent)
         if own_category(prim):
             self.extras(index, {"id": path, "category": own_category(prim)})
@@ -335,6 +338,14 @@ def _camera(found: Gf.Camera, metres: float) -> dict[str, Any] | None:
     half = 0.5 * Gf.Camera.APERTURE_UNIT * metres
     lens = {"xmag": found.horizontalAperture * half, "ymag": found.verticalAperture * half, "znear": near, "zfar": far}
     return {"type": "orthographic", "orthographic": lens}
+
+
+def _tilt(found: Gf.Camera) -> float:
+    """Radians by which a lens that has no shift, as in glTF, looks up to see the middle of what a shifted one sees."""
+    if found.projection != Gf.Camera.Perspective or not found.verticalApertureOffset or found.focalLength <= 0:
+        return 0.0
+    up, half = found.verticalApertureOffset / found.focalLength, found.verticalAperture / found.focalLength / 2
+    return float(np.arctan(up + half) + np.arctan(up - half)) / 2
 
 
 def _light(prim: Usd.Prim, metres: float) -> dict[str, Any] | None:

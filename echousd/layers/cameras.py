@@ -12,7 +12,7 @@ from echomodel.openings import inward_normal, segment
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.draw.sight import ASPECT, Furniture
-from echousd.draw.views import APERTURE, FOCAL_LENGTH, MARGIN, inside_view, perspective_view
+from echousd.draw.views import APERTURE, FOCAL_LENGTH, MARGIN, inside_view, perspective_view, shifted
 from echousd.room import RoomData
 from echousd.shapes import shell, walls
 
@@ -77,8 +77,10 @@ def write_cameras(
         matrix, lens = inside_view(walled, furniture, float(volume.upper[1]), hung, openings, main)
     else:
         matrix, lens = perspective_view(points, furniture), FOCAL_LENGTH
-    camera.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
+    slope = float(matrix[:3, 1] @ matrix[:3, 2])  # 0 of a camera that has no shift
+    camera.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(shifted(matrix, -slope).T)))
     camera.CreateFocalLengthAttr(lens * TENTHS)
+    camera.CreateVerticalApertureOffsetAttr(-slope * lens * TENTHS)
     camera.CreateHorizontalApertureAttr(APERTURE * TENTHS)
     camera.CreateVerticalApertureAttr(APERTURE * TENTHS / (1.0 if walled is None else ASPECT))
     distance = float(np.linalg.norm(matrix[:3, 3] - volume.centre))

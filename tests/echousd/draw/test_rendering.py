@@ -13,6 +13,7 @@ from echousd.draw.drawables import read_drawables
 from echousd.draw.rendering import render, render_stage, render_turn
 from echousd.draw.scenery import class_color, read_scenery
 from echousd.draw.tracing import BACKGROUND, outside, smooth_light
+from echousd.draw.viewpoints import stage_views
 from echousd.options import RoomOptions
 
 
@@ -261,3 +262,28 @@ def test_command_draws_turns_and_counts_rays(root, tmp_path, echousd_command):
         done = echousd_command("render", root, *words)
         assert (done.code, told in done.err) == (2, True), done.err
     assert [one.name for one in tmp_path.iterdir()] == ["turn.gif"]
+
+
+@pytest.mark.parametrize("kind", ["perspective", "orthographic"])
+@pytest.mark.parametrize("up", ["Y", "Z"])
+def test_a_shifted_lens_shows_what_usd_says(kind, up):
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(stage, up)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    camera = UsdGeom.Camera.Define(stage, "/eye")
+    camera.AddTranslateOp().Set((1.0, 2.0, 3.0))
+    camera.AddRotateXYZOp().Set((20.0, 30.0, 40.0))
+    camera.CreateProjectionAttr(kind)
+    for name, value in (("HorizontalAperture", 36.0), ("VerticalAperture", 24.0), ("FocalLength", 30.0)):
+        getattr(camera, f"Create{name}Attr")(value)
+    camera.CreateHorizontalApertureOffsetAttr(5.0)
+    camera.CreateVerticalApertureOffsetAttr(-7.0)
+    view, gf = stage_views(stage)["eye"], camera.GetCamera(0).frustum
+    into = gf.ComputeViewMatrix() * gf.ComputeProjectionMatrix()
+    for u, v in ((0.0, 0.0), (0.5, -0.75), (-1.0, 1.0)):
+        right, above, back, eye = view.matrix[:3].T
+        aside = view.half * (u * right + v / view.aspect * above)
+        point = eye + aside - back if kind == "orthographic" else eye + 2.0 * (aside - back)
+        if up == "Z":
+            point = np.array([point[0], -point[2], point[1]])
+        np.testing.assert_allclose(into.Transform(Gf.Vec3d(*point))[:2], (u, v), atol=1e-6)

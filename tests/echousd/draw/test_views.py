@@ -69,7 +69,8 @@ def test_the_main_piece_is_whole_in_the_picture_and_the_eye_in_the_room(floor, s
     assert 24.0 <= lens <= 35.0
     assert lens in LENSES
     assert room.contains(shapely.Point(view[0, 3], view[2, 3]))
-    x, y, z = ((piece.corners[0] - view[:3, 3]) @ view[:3, :3]).T
+    assert np.allclose(view[:3, 1], (0, 1, 0))  # walls stay upright in the picture
+    x, y, z = ((piece.corners[0] - view[:3, 3]) @ np.linalg.inv(view[:3, :3]).T).T
     assert (z < 0).all()
     assert (np.maximum(np.abs(x), ASPECT * np.abs(y)) < -z * APERTURE / 2 / lens).all()
 
