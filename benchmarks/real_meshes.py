@@ -25,8 +25,7 @@ from echomodel.echo import EchoModel
 from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
 from echomodel.furniture.description import piece_of
 from echomodel.graph import GraphBatch
-from echomodel.metrics.pointsets import set_scores
-from echomodel.metrics.shapes import surface_points
+from echomodel.metrics.pointsets import set_scores, surface_points
 from echomodel.tsdf import mesh_from_tsdf
 from echomodel.vocabulary import vocabulary
 

@@ -10,14 +10,13 @@ import numpy as np
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.compact.predictors import wholeness
+from echomodel.compact.sampling import wholeness
 from echomodel.data.roomset import with_known_words
 from echomodel.data.shapeset import ShapeSet
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.guidance import outside
-from echomodel.metrics.pointsets import chamfer
-from echomodel.metrics.shapes import surface_points
+from echomodel.metrics.pointsets import chamfer, surface_points
 from echomodel.roomboxes import RoomBoxes, read_rooms
 from echomodel.rules import label_rooms, verdicts
 from echomodel.samplers import SAMPLERS

@@ -357,6 +357,6 @@ def to_sgfront(
     Example: echousd data to-sgfront rooms.json -o sgfront
     """
     from echomodel.data.roomset import load_rooms, with_known_words
-    from echomodel.data.sgfront_writer import write_sgfront
+    from echomodel.data.sgfront import write_sgfront
 
     write_sgfront(out, with_known_words(load_rooms(rooms)), split=split, drop=drop, seed=seed)

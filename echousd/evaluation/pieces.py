@@ -16,8 +16,7 @@ from echomodel.furniture.description import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.metrics.furniture import piece_scores, sampled, style_scores, usual_size
-from echomodel.metrics.pointsets import chamfer, set_scores
-from echomodel.metrics.shapes import surface_points
+from echomodel.metrics.pointsets import chamfer, set_scores, surface_points
 from echomodel.metrics.statistics import Figure, mean
 from echomodel.protocols import FurnitureModel, RoomModel, furnishes
 from echomodel.tsdf import mesh_from_tsdf

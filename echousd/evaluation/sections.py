@@ -12,9 +12,8 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.loading import load_model
-from echomodel.metrics.bodies import body_scores
 from echomodel.metrics.layouts import layout_scores, strata_of
-from echomodel.metrics.pictures import WEIGHTS, features, picture, picture_figures, told_by_pictures
+from echomodel.metrics.pictures import WEIGHTS, body_scores, features, picture, picture_figures, told_by_pictures
 from echomodel.metrics.sets import AXES, layout_distance, set_figures, size_distances, size_scores, told_apart
 from echomodel.metrics.statistics import Counts, Figure, figure
 from echomodel.metrics.tasks import GROUPS, Task, changed, extended, kept_relations, tasks_of

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from echomodel.objective.access import PASSAGE
 from echomodel.objective.company import PLACE
 from echomodel.objective.sight import WATCHED_FROM
 from echomodel.objective.support import ON_CEILING
-from echomodel.objective.walls import PASSAGE
 from echomodel.vocabulary import vocabulary
 from echousd.place.distances import APART, MOST_UNDER, kept_apart, over_bed, seen_from, spread_at_walls
 from echousd.place.geometry import Floor, depth_inside

@@ -15,13 +15,21 @@ from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
 from echomodel.compact.branches import branches
-from echomodel.compact.furnishing import sample_descriptions, with_whole_styles
-from echomodel.compact.given import CompactSampling, known_values, repeated
-from echomodel.compact.layouts import sample_boxes
 from echomodel.compact.learned import unlearned
 from echomodel.compact.model import CompactModel, WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
-from echomodel.compact.predictors import agreeing, group_means, merit, shape_predictor
+from echomodel.compact.sampling import (
+    CompactSampling,
+    agreeing,
+    group_means,
+    known_values,
+    merit,
+    repeated,
+    sample_boxes,
+    sample_descriptions,
+    shape_predictor,
+    with_whole_styles,
+)
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
 from echomodel.packed import pack_linear_maps

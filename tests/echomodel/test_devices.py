@@ -24,12 +24,11 @@ from echomodel.rules import label_relations
 from echomodel.training import parts_stage
 from echomodel.training import run as training_run
 from echomodel.training.autoencoder_stage import AutoencoderStage
-from echomodel.training.joint_stage import JointStage
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import OptimizerConfig, Recipe
 from echomodel.training.rooms import PackedRooms
-from echomodel.training.shape_stage import EncodedShapes, ShapeStage
+from echomodel.training.shape_stage import EncodedShapes, JointStage, ShapeStage
 from echomodel.training.trainer import Trainer, step_generator
 
 GPU = pytest.param(torch.device("cuda"), marks=pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU"))

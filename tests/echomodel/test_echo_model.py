@@ -10,7 +10,7 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.model import CompactModel
-from echomodel.compact.predictors import agreeing
+from echomodel.compact.sampling import agreeing
 from echomodel.config import CompactConfig, from_dict, from_json, to_json, with_settings
 from echomodel.echo import EchoModel, equal_furniture
 from echomodel.graph import GraphBatch

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
 from echomodel.furniture.assembly import pieces_of
-from echomodel.furniture.choices import OPEN
 from echomodel.furniture.description import GROUPS, STYLE, WIDTH, described, draw_styles, piece_of
-from echomodel.furniture.joined import loose_solids
 from echomodel.furniture.solids import FINEST
+from echomodel.furniture.style import OPEN
+from echomodel.metrics.furniture import loose_solids
 from echomodel.vocabulary import vocabulary
 
 CATEGORIES = [category.name for category in vocabulary().categories]

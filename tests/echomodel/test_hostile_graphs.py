@@ -13,7 +13,7 @@ from echomodel.compact.model import CompactModel
 from echomodel.config import CompactConfig, from_dict
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
-from echomodel.objectives import clean_from
+from echomodel.samplers import clean_from
 from echomodel.text import ClipTextEncoder, TextEncoderError
 from echoscene.config import PaperSizes, paper
 from echoscene.encoder import SceneGraphTensors

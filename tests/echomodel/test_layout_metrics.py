@@ -7,8 +7,8 @@ import pytest
 
 from echomodel.data.figures import compare, ray_lengths, room_figures, section_means
 from echomodel.data.roomset import with_known_words
-from echomodel.metrics.bodies import bodies, body_scores, collisions, out_of_bounds
 from echomodel.metrics.layouts import HALVES, clearance, fullness, layout_scores, navigability
+from echomodel.metrics.pictures import bodies, body_scores, collisions, out_of_bounds
 from echomodel.metrics.sets import (
     category_divergence,
     frechet_distance,

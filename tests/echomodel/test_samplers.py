@@ -7,8 +7,17 @@ import torch
 from torch import Tensor
 
 from echomodel.config import Objective, Sampler
-from echomodel.objectives import add_noise, alpha_sigma, clean_from, expand, output_from, target
-from echomodel.samplers import SAMPLERS, Predict, sample
+from echomodel.samplers import (
+    SAMPLERS,
+    Predict,
+    add_noise,
+    alpha_sigma,
+    clean_from,
+    expand,
+    output_from,
+    sample,
+    target,
+)
 
 MEAN, SPREAD = 0.7, 0.4
 SWEEP = [(s, o) for s in SAMPLERS for o in ("noise", "velocity", "flow")]

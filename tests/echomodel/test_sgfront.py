@@ -5,8 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from echomodel.data.sgfront import SGFront, SGFrontError
-from echomodel.data.sgfront_writer import write_sgfront
+from echomodel.data.sgfront import SGFront, SGFrontError, write_sgfront
 from echomodel.graph import GraphBatch
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts

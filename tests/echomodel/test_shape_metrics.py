@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from echomodel.metrics.pointsets import set_scores
-from echomodel.metrics.shapes import surface_points, surface_scores
+from echomodel.metrics.pointsets import set_scores, surface_points, surface_scores
 from echomodel.tsdf import FILLED, RESOLUTION, TRUNCATION, mesh_from_tsdf
 
 

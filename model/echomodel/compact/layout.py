@@ -23,8 +23,8 @@ from echomodel.compact.room_echo import RoomEcho, side_features, sides_of
 from echomodel.config import CompactConfig
 from echomodel.floors import GRID, plan_features
 from echomodel.graph import GraphBatch
-from echomodel.objectives import clean_from
 from echomodel.openingrows import OPENING_FEATURES, PLAN, clearances, room_features
+from echomodel.samplers import clean_from
 
 BOX = 8
 WILDEST = 8.0  # at high noise the clean boxes of the `noise` objective may lie anywhere

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from echomodel.dressing import books, floorware, household, hung, textiles, vessels
+from echomodel.dressing import books, floorware, household, textiles, vessels
 from echomodel.furniture.solids import Solid
 
 Program = Callable[[np.ndarray, np.random.Generator], list[Solid]]
@@ -75,10 +75,10 @@ KINDS: dict[str, Kind] = {
         Kind("picture", "painting", household.picture, (0.3, 0.4, 0.03), (1.2, 0.9, 0.03), True),
         Kind("mirror", "mirror", household.mirror, (0.5, 0.7, 0.03), (0.7, 1.1, 0.03), True),
         Kind("mirror", "mirror", household.round_mirror, (0.5, 0.5, 0.03), (0.8, 0.8, 0.03), True),
-        Kind("wall_clock", "clock", hung.wall_clock, (0.26, 0.26, 0.04), (0.36, 0.36, 0.04), True),
-        Kind("wall_shelf", "shelf", hung.wall_shelf, (0.7, 0.12, 0.2), (1.1, 0.12, 0.22), True),
-        Kind("coats", "apparel", hung.coats, (0.5, 0.95, 0.17), (0.64, 1.05, 0.19), True),
-        Kind("mirror", "mirror", hung.tall_mirror, (0.44, 1.4, 0.03), (0.55, 1.6, 0.03), True),
+        Kind("wall_clock", "clock", household.wall_clock, (0.26, 0.26, 0.04), (0.36, 0.36, 0.04), True),
+        Kind("wall_shelf", "shelf", household.wall_shelf, (0.7, 0.12, 0.2), (1.1, 0.12, 0.22), True),
+        Kind("coats", "apparel", household.coats, (0.5, 0.95, 0.17), (0.64, 1.05, 0.19), True),
+        Kind("mirror", "mirror", household.tall_mirror, (0.44, 1.4, 0.03), (0.55, 1.6, 0.03), True),
         Kind("photo", "painting", household.photo, (0.13, 0.18, 0.09), (0.18, 0.24, 0.1)),
         Kind("clock", "clock", household.clock, (0.1, 0.1, 0.05), (0.13, 0.13, 0.05)),
         Kind("laptop", "computer", household.laptop, (0.32, 0.22, 0.28), (0.36, 0.24, 0.3)),

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.dressing.solids import Lathe
-from echomodel.dressing.vessels import vessel
+from echomodel.dressing.vessels import Lathe, vessel
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.solids import Solid, ball, rotation, tube, turned
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
-from echomodel.dressing.solids import Sheet
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.solids import Solid, ball, turned
+from echomodel.furniture.solids import FINEST, Array, Solid, ball, turned
 
 DESIGNS = (
     "bordered", "striped", "latticed", "medallion", "checked", "chevrons", "dotted", "scalloped", "broken", "ringed",
@@ -15,6 +16,37 @@ DESIGNS = (
 ROUND = ("dotted", "scalloped", "broken", "ringed", "berber", "carved")  # designs that a round one has, too
 RUGS = {f"rug_{design}_{variant}": (design, variant) for design in DESIGNS for variant in range(2)}  # by material
 FOLD = 0.14  # metres of curtain from one fold to the next
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet(Solid):
+    """Cloth: `front` and `back` (n, m, 3) float are its two sides, point for point, metres."""
+
+    front: Array = field(default_factory=lambda: np.zeros((2, 2, 3)))
+    back: Array = field(default_factory=lambda: np.zeros((2, 2, 3)))
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        n, m = self.front.shape[:2]
+        index = np.arange(n * m).reshape(n, m)
+        vertices = np.concatenate([self.front.reshape(-1, 3), self.back.reshape(-1, 3)])
+        border = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
+        after = np.roll(border, -1)
+        far = n * m
+        faces = np.concatenate(
+            [
+                _quads(index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]),
+                _quads(index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]) + far,
+                _quads(after, border, border + far, after + far),
+            ]
+        )
+        corners = vertices[faces]
+        volume = np.einsum("nx,nx->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()
+        return vertices, faces if volume > 0 else np.ascontiguousarray(faces[:, ::-1])
+
+
+def _quads(a: Array, b: Array, c: Array, d: Array) -> Array:
+    a, b, c, d = (v.ravel() for v in (a, b, c, d))
+    return np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
 
 
 def rug(size: Size, rng: np.random.Generator) -> list[Solid]:

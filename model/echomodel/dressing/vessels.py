@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
-from echomodel.dressing.solids import Lathe
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.solids import Solid, ball, rotation, tube
+from echomodel.furniture.solids import FINEST, Array, Solid, ball, loft, rotation, superellipse, tube
+
+
+@dataclass(frozen=True, eq=False)
+class Lathe(Solid):
+    """A solid of revolution about +Y: `profile` (k, 2) float holds radius and height from rim to rim, metres.
+
+    A profile that comes back down inside makes a vessel.
+    """
+
+    profile: Array = field(default_factory=lambda: np.array([[1.0, 0.0], [1.0, 1.0]]))
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        circle = superellipse(2.0, (8, 10, 14, 20)[detail])
+        return loft([np.insert(circle * max(radius, 1e-4), 1, height, axis=1) for radius, height in self.profile])
 
 
 def vessel(outer: np.ndarray, wall: float, material: str, inside: float = 0.1) -> Lathe:

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echomodel.furniture.assembly import MATERIALS, box_uv, mesh_of, tsdf_of
-from echomodel.furniture.choices import Choices
 from echomodel.furniture.solids import Joint, Solid
-from echomodel.furniture.style import Style, sample_size
+from echomodel.furniture.style import Choices, Style, sample_size
 from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:
@@ -24,16 +23,15 @@ __all__ = ["MATERIALS", "Choices", "Style", "box_uv", "furniture", "mesh_of", "s
 Builder = Callable[[np.ndarray, Style, Choices], list[Solid]]
 # Module -> its programs, functions of these names; one is loaded when a category asks for it.
 PROGRAMS = {
-    "chairs": ("dining_chair", "chair", "chinese_chair", "dressing_chair", "bar_stool", "office_chair"),
-    "armchairs": ("armchair", "lounge_chair"),
-    "stools": ("stool", "bench", "ottoman"),
-    "sofas": ("multi_seat_sofa", "loveseat_sofa", "sofa", "l_shaped_sofa", "chaise_longue_sofa", "lazy_sofa"),
+    "chairs": ("dining_chair", "chair", "chinese_chair", "dressing_chair", "bar_stool", "office_chair", "stool",
+               "bench", "ottoman"),
+    "sofas": ("armchair", "lounge_chair", "multi_seat_sofa", "loveseat_sofa", "sofa", "l_shaped_sofa",
+              "chaise_longue_sofa", "lazy_sofa"),
     "tables": ("dining_table", "coffee_table", "side_table", "round_end_table", "corner_side_table", "console_table",
                "desk", "dressing_table"),
     "storage": ("nightstand", "dresser", "sideboard", "cabinet", "children_cabinet", "wardrobe", "tv_stand"),
     "shelving": ("bookshelf", "shelf", "wine_cabinet"),
-    "beds": ("double_bed", "single_bed"),
-    "bunks": ("kids_bed",),
+    "beds": ("double_bed", "single_bed", "kids_bed"),
     "lamps": ("pendant_lamp", "ceiling_lamp", "floor_lamp", "table_lamp", "wall_lamp"),
     "decor": ("plant", "tv"),
     "kitchens": ("base_unit", "wall_unit", "tall_unit", "sink_unit", "hob_unit", "dishwasher", "fridge", "range_hood",

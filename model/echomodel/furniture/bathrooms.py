@@ -11,11 +11,10 @@ from itertools import pairwise
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, around, box, of_role, post
-from echomodel.furniture.choices import Choices
 from echomodel.furniture.fronts import front
 from echomodel.furniture.kitchens import spout
 from echomodel.furniture.solids import Solid, bent, rotation, tube, turned
-from echomodel.furniture.style import Style
+from echomodel.furniture.style import Choices, Style
 
 SEAT = 0.42  # metres
 GLASS = 0.008  # metres

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.furniture.choices import OPEN, Choices
-from echomodel.furniture.style import FAMILIES, KINDS, PROPORTIONS, Style
+from echomodel.furniture.style import FAMILIES, KINDS, OPEN, PROPORTIONS, Choices, Style
 
 WORDS: dict[str, tuple[str, ...]] = {"family": tuple(FAMILIES), **KINDS}
 GROUPS = tuple(len(words) for words in WORDS.values())  # numbers per kind, in order

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, box, of_role, post
-from echomodel.furniture.cases import carcass
-from echomodel.furniture.choices import Choices
-from echomodel.furniture.fronts import front
+from echomodel.furniture.fronts import carcass, front
 from echomodel.furniture.solids import Solid, ball, tube
-from echomodel.furniture.style import Style
+from echomodel.furniture.style import Choices, Style
 
 SLAT = 0.09  # metres, width of a slat outdoors
 GRIP = 0.03  # metres that handles stand out

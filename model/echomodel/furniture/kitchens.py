@@ -10,10 +10,9 @@ from itertools import pairwise
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, around, box, core, of_role
-from echomodel.furniture.choices import Choices
 from echomodel.furniture.fronts import front
 from echomodel.furniture.solids import Solid, Tube, Turned, rotation
-from echomodel.furniture.style import Style
+from echomodel.furniture.style import Choices, Style
 
 PLINTH, WORKTOP = 0.1, 0.04  # metres: height of the plinth, thickness of the worktop
 SPOUT = 0.0094  # metres that a tap is thick over its line

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.choices import Choices
 from echomodel.furniture.lathe import Lathe, wall
 from echomodel.furniture.solids import Solid, Turned, ball, rotation, tube, turned
-from echomodel.furniture.style import Style
+from echomodel.furniture.style import Choices, Style
 
 DOWN = rotation(x=np.pi)
 

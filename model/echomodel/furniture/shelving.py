@@ -7,12 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, box, core, of_role, post
-from echomodel.furniture.cases import BOARD, carcass, depth_of, foot_height, shelves
-from echomodel.furniture.choices import Choices
-from echomodel.furniture.fronts import front
+from echomodel.furniture.fronts import BOARD, carcass, depth_of, foot_height, front, shelves
 from echomodel.furniture.lathe import Lathe
 from echomodel.furniture.solids import Solid, rotation
-from echomodel.furniture.style import Style
+from echomodel.furniture.style import Choices, Style
 
 BOOKS = ("book", "cushion", "blanket", "linen", "accent")  # slots that books take their colours from
 

@@ -7,11 +7,22 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, box, core
-from echomodel.furniture.cases import BOARD, carcass, columns, depth_of, foot_height, fronted, mixed, pattern, shelves
-from echomodel.furniture.choices import Choices
-from echomodel.furniture.fronts import case, front, sliding
+from echomodel.furniture.fronts import (
+    BOARD,
+    carcass,
+    case,
+    columns,
+    depth_of,
+    foot_height,
+    front,
+    fronted,
+    mixed,
+    pattern,
+    shelves,
+    sliding,
+)
 from echomodel.furniture.solids import Solid, rotation, turned
-from echomodel.furniture.style import Style
+from echomodel.furniture.style import Choices, Style
 
 GABLED = 1.2  # metres: on what is lower people put things, for which its top is flat
 

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, between_legs, box, of_role, pedestal, post, top, within
-from echomodel.furniture.choices import Choices
 from echomodel.furniture.fronts import case, front
 from echomodel.furniture.solids import Block, Solid, rotation, turned
-from echomodel.furniture.style import Style
+from echomodel.furniture.style import Choices, Style
 
 KNEES, LAP = 0.5, 0.605  # metres between what stands on both sides of a seat, and below what is above the knees
 

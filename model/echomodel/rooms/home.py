@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from echomodel.rooms.builder import Builder, Item
+from echomodel.rooms.groups import dining_group
 from echomodel.rooms.runs import Site, runs
-from echomodel.rooms.tables import dining_group
 from echomodel.vocabulary import vocabulary
 
 GIVEN_UP = ("kitchen_island", "tall_unit", "dishwasher", "wall_unit", "base_unit")  # where a run does not fit

@@ -10,10 +10,18 @@ import numpy as np
 
 from echomodel.rooms.builder import BODY, HALF_PI, Builder, Item, Size
 from echomodel.rooms.floor import Wall
+from echomodel.rooms.groups import (
+    SOFAS,
+    VANITY_SEATS,
+    desk_group,
+    dining_group,
+    groups_left,
+    seat_at,
+    sofa_group,
+    television,
+)
 from echomodel.rooms.home import balcony, bathroom, childrens_room, hallway, kitchen
-from echomodel.rooms.sofas import SOFAS, groups_left, sofa_group, television
 from echomodel.rooms.statistics import RoomTypeStatistics
-from echomodel.rooms.tables import VANITY_SEATS, desk_group, dining_group, seat_at
 from echomodel.vocabulary import vocabulary
 
 LOW_ROOM = 3.7

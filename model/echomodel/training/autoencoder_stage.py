@@ -11,7 +11,7 @@ from torch import Tensor
 from echomodel.compact.model import CompactModel
 from echomodel.compact.shape import ShapeDenoiser
 from echomodel.data.shapeset import ShapeSet
-from echomodel.metrics.shapes import surface_scores
+from echomodel.metrics.pointsets import surface_scores
 from echomodel.randomness import normal
 from echomodel.training.shape_stage import draw_grids, read
 from echomodel.training.start import Start

@@ -15,13 +15,12 @@ from echomodel.compact.draft import measurable, pair_features, wall_features
 from echomodel.compact.layout import exactly
 from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
-from echomodel.compact.predictors import layout_predictor
+from echomodel.compact.sampling import layout_predictor
 from echomodel.objective import faults_of
-from echomodel.objectives import add_noise, clean_from, draw_levels, sampling_levels, target
 from echomodel.openingrows import clearances
 from echomodel.randomness import normal
 from echomodel.rules import verdicts
-from echomodel.samplers import SAMPLERS, sample
+from echomodel.samplers import SAMPLERS, add_noise, clean_from, draw_levels, sample, sampling_levels, target
 from echomodel.training.living_loss import (
     HEADINGS,
     heading_distance,
@@ -29,9 +28,10 @@ from echomodel.training.living_loss import (
     living_miss,
     physics_loss,
     plan_of_batch,
+    relation_hinge,
     stands_low,
+    told_triplets,
 )
-from echomodel.training.relation_loss import relation_hinge, told_triplets
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
 from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary

@@ -10,9 +10,8 @@ from torch import Tensor
 
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import Pairs
-from echomodel.furniture.choices import OPEN
 from echomodel.furniture.description import draw_styles
-from echomodel.furniture.style import sample_size
+from echomodel.furniture.style import OPEN, sample_size
 from echomodel.graph import GraphBatch
 from echomodel.training.rooms import PackedRooms, draw_batch
 from echomodel.training.shape_stage import ShapeBatch, draw_suites, noised

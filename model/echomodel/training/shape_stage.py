@@ -1,4 +1,4 @@
-"""The shape stage: denoising codes of all objects of a scene, joined by their echoes (EchoScene 3.4)."""
+"""The shape stage, denoising codes of a scene's objects joined by echoes (EchoScene 3.4), and the joint stage."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from echomodel.compact.pairs import Pairs, pairs_of
 from echomodel.config import Objective
 from echomodel.data.shapeset import ShapeSet
 from echomodel.graph import GraphBatch
-from echomodel.objectives import add_noise, draw_levels, output_from, target
 from echomodel.randomness import normal
-from echomodel.training.layout_stage import draw_known
+from echomodel.samplers import add_noise, draw_levels, output_from, target
+from echomodel.training.layout_stage import LayoutStage, draw_known, edited_latent
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch
 from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
@@ -257,3 +257,41 @@ def draw_grids(shapes: ShapeSet, numbers: np.ndarray, count: int, generator: tor
     grids = read(shapes, numbers[torch.randint(len(numbers), (count,), generator=generator).numpy()])
     flip = torch.rand(count, generator=generator) < 0.5
     return torch.where(flip[:, None, None, None], grids.flip(1), grids)
+
+
+class JointStage:
+    """What the trainer needs to know about joint training.
+
+    A batch of scenes feeds the layout branch and a smaller one, within the node budget of shapes, the shape branch
+    (Supplement, batch size definition); both pass the same encoder and manipulator.
+
+    Arguments:
+        layout, shape: the two stages, with their data and budgets.
+    """
+
+    trained = saved = ("latent", "layout", "shape")
+    parts: ClassVar[tuple[str, ...]] = ("latent", "layout", "autoencoder", "shape")
+    needs: ClassVar[tuple[str, ...]] = ("autoencoder",)
+
+    def __init__(self, layout: LayoutStage, shape: ShapeStage) -> None:
+        self.layout, self.shape = layout, shape
+
+    @classmethod
+    def open(cls, start: Start) -> JointStage:
+        """Both stages of a recipe, on the same rooms."""
+        layout = LayoutStage.open(start)
+        return cls(layout, ShapeStage.on(layout.rooms, start))
+
+    def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
+        """Sum of both branches' losses on one random batch."""
+        batch = draw_batch(self.layout.rooms, self.layout.nodes, generator).to(model.device)
+        layout, parts = self.layout.scored(model, batch, generator)
+        few = draw_batch(self.layout.rooms, self.shape.batch, generator)
+        objects = room_shapes(few, self.shape.shapes).to(model.device)
+        latent = edited_latent(model, few.to(model.device))
+        shape, more = shape_loss(model, objects, *self.shape.truth(model, objects), generator, latent)
+        return layout + shape, {**parts, **more}
+
+    def validate(self, model: CompactModel) -> dict[str, float]:
+        """Both branches' validation."""
+        return {**self.layout.validate(model), **self.shape.validate(model)}

@@ -8,7 +8,7 @@ from dataclasses import replace
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.compact.predictors import bearing, group_means, wholeness
+from echomodel.compact.sampling import bearing, group_means, wholeness
 
 
 def solid(*boxes: tuple[slice, slice, slice]) -> torch.Tensor:

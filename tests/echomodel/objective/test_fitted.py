@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.objective import access, fitted, walls
+from echomodel.objective import access, fitted
 from echomodel.objective.copies import copies_of
 from echomodel.objective.plan import plan_of
 from echomodel.openings import Opening
@@ -136,5 +136,5 @@ def test_cupboards_hang_at_walls_and_before_no_window():
     for x, kept in ((0.0, False), (1.2, True)):
         hung = ("wall_unit", x, -1.82, 0.0, 1.4)
         assert (seen(access.window_free, hung, openings=[window])["wall_unit"] >= 0) == kept
-    assert seen(walls.at_wall, ("towel_radiator", 0.0, -1.95, 0.0, 0.3))["towel_radiator"] > 0
-    assert seen(walls.at_wall, ("towel_radiator", 0.0, 0.0, 0.0, 0.3))["towel_radiator"] < 0
+    assert seen(access.at_wall, ("towel_radiator", 0.0, -1.95, 0.0, 0.3))["towel_radiator"] > 0
+    assert seen(access.at_wall, ("towel_radiator", 0.0, 0.0, 0.0, 0.3))["towel_radiator"] < 0

@@ -11,8 +11,8 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.objective import TERMS, faults, faults_of, missed, plan_of
+from echomodel.objective.faults import ways
 from echomodel.objective.plan import kinds_of
-from echomodel.objective.ways import ways
 from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
 from echomodel.vocabulary import vocabulary

@@ -20,9 +20,8 @@ from echomodel.guidance import outside
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts
 from echomodel.training.layout_stage import measure_distance
-from echomodel.training.living_loss import heading_distance, living_loss
+from echomodel.training.living_loss import heading_distance, living_loss, told_triplets
 from echomodel.training.recipe import OptimizerConfig, Recipe, read_recipe
-from echomodel.training.relation_loss import told_triplets
 from echomodel.training.rooms import PackedRooms, draw_batch, make_batch
 from echomodel.training.run import open_run
 from echomodel.training.trainer import read_log, step_generator

@@ -9,8 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from echomodel.data.sgfront import SGFront
-from echomodel.data.sgfront_writer import write_sgfront
+from echomodel.data.sgfront import SGFront, write_sgfront
 from echomodel.metrics.tasks import tasks_of
 from echomodel.rooms.generator import generate_rooms
 from echomodel.training.recipe import read_recipe

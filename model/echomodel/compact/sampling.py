@@ -1,0 +1,302 @@
+"""Sampling with a compact model: what a caller gives, what samplers call, boxes and descriptions that come of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+import torch
+from scipy import ndimage
+from torch import Tensor
+
+from echomodel.boxes import Boxes
+from echomodel.compact.model import CompactModel
+from echomodel.compact.pairs import Pairs, pairs_of
+from echomodel.config import Objective, Sampler
+from echomodel.graph import GraphBatch
+from echomodel.guidance import relation_guided
+from echomodel.protocols import GraphEdit, Sampling
+from echomodel.randomness import normal
+from echomodel.samplers import Predict, clean_from, sample
+from echomodel.vocabulary import vocabulary
+
+
+def layout_predictor(model: CompactModel, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor) -> Predict:
+    """Clean boxes (N, 8) in noisy ones; arguments as for `LayoutDenoiser.context`."""
+    context = model.layout.context(graph, pairs, latent, rules, model.scale(graph.category))
+
+    def predict(x: Tensor, level: Tensor) -> Tensor:
+        return clean_from(model.layout(x, level, context), x, level, model.config.layout.objective)
+
+    return predict
+
+
+def shape_predictor(model: CompactModel, graph: GraphBatch, size: Tensor, pairs: Pairs, latent: Tensor) -> Predict:
+    """Clean codes (N, K) in noisy ones; arguments as for `ShapeDenoiser.context`."""
+    context = model.shape.context(graph, size, pairs, latent)
+    settings = model.config.shape
+
+    def predict(x: Tensor, level: Tensor) -> Tensor:
+        output = model.shape(x, level, context)
+        return output if settings.prediction == "sample" else clean_from(output, x, level, settings.objective)
+
+    return predict
+
+
+def agreeing(predict: Predict, groups: Tensor) -> Predict:
+    """Clean codes on which each group agrees, their mean, so that equal furniture stays equal from the first step on.
+
+    Arguments:
+        predict: the denoiser's clean sample (N, K).
+        groups: (N,) int64, number of each node's group in [0, N). Known nodes (level 0) speak for their whole group.
+    """
+    alone = bool((groups == torch.arange(len(groups), device=groups.device)).all())
+
+    def agreed(x: Tensor, level: Tensor) -> Tensor:
+        clean = predict(x, level)
+        weight = torch.where(level == 0, 1.0, 1e-6).to(clean)[:, None]
+        return group_means(clean * weight, groups) / group_means(weight, groups)
+
+    return predict if alone else agreed
+
+
+FILLED = 60  # voxels that a shape spans on every axis of its box-normalised grid
+TOP = 58  # voxel from which on a column counts as reaching the top of the box
+PLAY = 0.1  # metres between the bottom of one and the top of the other
+
+
+def wholeness(grids: Tensor) -> Tensor:
+    """Share of a shape's volume in its largest piece times the shares of its box's sides that it spans.
+
+    Arguments:
+        grids: (N, 64, 64, 64) float signed distances, negative inside.
+
+    Returns:
+        (N,) float32 in [0, 1]: 1 for one piece that fills its box, 0 for an empty grid.
+    """
+    return torch.tensor([_whole(grid.cpu().numpy() < 0) for grid in grids], dtype=torch.float32, device=grids.device)
+
+
+def _whole(inside: np.ndarray) -> float:
+    parts, count = ndimage.label(inside)
+    if not count:
+        return 0.0
+    volume = np.bincount(parts.ravel())[1:]
+    spans = 1.0
+    for axis in range(3):
+        used = np.flatnonzero(inside.any(axis=tuple(other for other in range(3) if other != axis)))
+        spans *= min((used[-1] - used[0] + 1) / FILLED, 1.0)
+    return float(volume.max() / volume.sum() * spans)
+
+
+def bearing(grids: Tensor, boxes: Boxes, triplets: Tensor) -> Tensor:
+    """How much of the ground under what stands on each shape is really there, at the top of its box.
+
+    A desk with a shelf at its back fills its box as well as a plain one, but a lamp in its middle would float.
+
+    Arguments:
+        grids: (N, 64, 64, 64) float signed distances, negative inside.
+        boxes: N boxes.
+        triplets: (E, 3) int64; `standing_on` with the subject at the object's top counts.
+
+    Returns:
+        (N,) float32 in [0, 1]; 1 for whatever bears nothing.
+    """
+    out = torch.ones(len(grids), device=grids.device)
+    high = (grids[:, :, TOP:] < 0).any(2)  # (N, x, z): columns that reach the top
+    resting = [predicate.id for predicate in vocabulary().predicates if predicate.rests]
+    for above, _, below in triplets[torch.isin(triplets[:, 1], triplets.new_tensor(resting))].tolist():
+        gap = boxes.position[above, 1] - boxes.position[below, 1] - boxes.size[below, 1]
+        if above == below or abs(float(gap)) > PLAY:
+            continue
+        x, z = (boxes.position[above] - boxes.position[below])[[0, 2]].tolist()
+        sin, cos = float(boxes.yaw[below].sin()), float(boxes.yaw[below].cos())
+        place = np.array([cos * x - sin * z, sin * x + cos * z])
+        extent = boxes.size[below][[0, 2]].cpu().numpy()
+        foot = float(boxes.size[above][[0, 2]].min()) / 4
+        first = np.round((place - foot) / extent * FILLED + 31.5).clip(2, 61).astype(int)
+        last = np.round((place + foot) / extent * FILLED + 31.5).clip(2, 61).astype(int)
+        ground = high[below, first[0] : last[0] + 1, first[1] : last[1] + 1]
+        out[below] = torch.minimum(out[below], ground.float().mean())
+    return out
+
+
+def merit(grids: Tensor, boxes: Boxes, triplets: Tensor) -> Tensor:
+    """What draws are chosen by: (N,), whole shapes that bear what stands on them first."""
+    return wholeness(grids) * (0.1 + 0.9 * bearing(grids, boxes, triplets))
+
+
+def group_means(values: Tensor, groups: Tensor) -> Tensor:
+    """Each value (N, ...) replaced by the mean of its group; groups (N,) int64 in [0, N)."""
+    total = torch.zeros_like(values).index_add(0, groups, values)
+    count = torch.zeros_like(values).index_add(0, groups, torch.ones_like(values))
+    return (total / count.clamp_min(1))[groups]
+
+
+class SamplerSettings(Protocol):
+    """What the configuration of every branch says of its sampling."""
+
+    @property
+    def sampler(self) -> Sampler: ...
+    @property
+    def steps(self) -> int: ...
+    @property
+    def objective(self) -> Objective: ...
+
+
+@dataclass(frozen=True, eq=False)
+class CompactSampling(Sampling):
+    """How a compact model samples; what is given beside goes by these.
+
+    Arguments:
+        sampler: None = the branch's. rules: the rule set that the relations are meant in, `strict` or `sgfront`.
+        relation_guidance: strength of the pull of the rules' margins on denoised boxes at every step, 0 = off, None =
+            the branch's.
+        noise: (N, K) starting noise in place of the generator's, taken as it is (no temperature, no candidates).
+        candidates: draws of a shape, of which the most whole that bears what stands on it is kept (pieces of one class
+            and style together); None = the branch's.
+        styles: (N,) int64, nodes with one number of 0 or more are furniture of one style, beside those that relations
+            of style join; None = nothing is known of styles.
+    """
+
+    sampler: Sampler | None = None
+    rules: str = "strict"
+    relation_guidance: float | None = None
+    noise: Tensor | None = None
+    candidates: int | None = None
+    styles: Tensor | None = None
+
+    def denoised(self, predict: Predict, noise: Tensor, settings: SamplerSettings) -> Tensor:
+        """What becomes of `noise` (N, ...), by the branch's sampler and steps where none are asked for."""
+        return sample(
+            self.sampler or settings.sampler, predict, noise, self.steps or settings.steps, settings.objective,
+            known=self.known, known_mask=self.known_mask, generator=self.generator, progress=self.progress,
+        )  # fmt: skip
+
+    def start(self, nodes: int, width: int, device: torch.device) -> Tensor:
+        """The noise (nodes, width) that is given, checked, or the generator's."""
+        if self.noise is None:
+            return normal((nodes, width), self.generator, device)
+        if tuple(self.noise.shape) != (nodes, width):
+            raise ValueError(f"noise is {tuple(self.noise.shape)}, expected {(nodes, width)}")
+        bad = ~torch.isfinite(self.noise).all(1)
+        if bool(bad.any()):
+            raise ValueError(f"noise of node {int(bad.nonzero()[0])} is not finite")
+        return self.noise.to(device)
+
+
+def known_values(graph: GraphBatch, known: Any, mask: Tensor | None, device: torch.device) -> tuple[Any, Tensor | None]:
+    """Known values and their mask on `device`, with unknown rows replaced by something harmless."""
+    if (known is None) != (mask is None):
+        raise ValueError("known and known_mask belong together, one of them is missing")
+    if known is None or mask is None:
+        return None, None
+    nodes = graph.num_nodes
+    if len(known) != nodes or tuple(mask.shape) != (nodes,) or mask.dtype != torch.bool:
+        found = f"{len(known)} values and a {tuple(mask.shape)} {mask.dtype} mask"
+        raise ValueError(f"known: {found} for a graph of {nodes} nodes, expected one of each per node (bool)")
+    known, mask = known.to(device), mask.to(device)
+    if isinstance(known, Boxes):
+        one = known.size.new_ones(())
+        filled = Boxes(
+            torch.where(mask[:, None], known.size, one),
+            torch.where(mask[:, None], known.position, 0 * one),
+            torch.where(mask, known.yaw, 0 * one),
+        )
+        filled.check()
+        return filled, mask
+    bad = ~torch.isfinite(known.flatten(1)).all(1) & mask
+    if bool(bad.any()):
+        raise ValueError(f"known shape of node {int(bad.nonzero()[0])} holds values that are not finite")
+    return torch.where(mask.reshape(-1, *[1] * (known.ndim - 1)), known, torch.ones_like(known)), mask
+
+
+def repeated(values: Tensor | None, count: int) -> Tensor | None:
+    """(N, ...) behind itself `count` times."""
+    return None if values is None else torch.cat([values] * count)
+
+
+Latent = Callable[[GraphBatch, GraphEdit | None], Tensor]
+
+
+def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: CompactSampling) -> Boxes:
+    """Boxes (N) of S scenes, drawn from noise.
+
+    Arguments:
+        model: with a layout branch. latent: the latent graph of some scenes before and after an edit.
+        graph: checked and on the model's device. how: to sample; what is known is checked.
+
+    Raises:
+        ValueError: rules that the model does not know.
+    """
+    config = model.config.layout
+    scale = model.scale(graph.category)
+    given = None if how.known is None else how.known.encode(scale)
+    if how.rules not in model.config.rules:
+        raise ValueError(f"rules is {how.rules!r}, allowed: {', '.join(model.config.rules)}")
+    rules = torch.full_like(graph.room_type, model.config.rules.index(how.rules))
+    pairs = pairs_of(graph, model.config.predicates)
+    predict = layout_predictor(model, graph, pairs, latent(graph, how.edit), rules)
+    strength = config.guidance if how.relation_guidance is None else how.relation_guidance
+    if strength:
+        predict = relation_guided(
+            predict, graph.triplets, scale,
+            rules=how.rules, strength=strength, rounds=config.guidance_rounds, floor=graph.floor[graph.scene],
+            openings=_in_the_way(graph), category=graph.category, placements=graph.placements, scene=graph.scene,
+        )  # fmt: skip
+    noise = how.start(graph.num_nodes, 8, graph.category.device)
+    vectors = replace(how, known=given).denoised(predict, noise, config)
+    boxes = Boxes.decode(vectors, scale)
+    boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
+    if how.known is None or how.known_mask is None:
+        return boxes
+    return boxes.replaced(how.known_mask, how.known)
+
+
+def _in_the_way(graph: GraphBatch) -> Tensor | None:
+    """(N, O, ROW) the openings that each node must leave free: those of its room where it stands on the floor."""
+    if not bool(torch.isfinite(graph.openings).any()):
+        return None
+    floor = [kind.support == "floor" for kind in vocabulary().categories]
+    stands = torch.tensor(floor, device=graph.category.device)[graph.category]
+    return torch.where(stands[:, None, None], graph.openings[graph.scene], torch.nan)
+
+
+def with_whole_styles(graph: GraphBatch, groups: Tensor) -> GraphBatch:
+    """The graph with every two nodes of one group told to be of one style: who is like my like is like me.
+
+    Arguments:
+        groups: (N,) int64, number of each node's style group in [0, N).
+    """
+    alike = (groups[:, None] == groups) & (graph.scene[:, None] == graph.scene)
+    subject, target = (alike & ~torch.eye(len(groups), dtype=torch.bool, device=groups.device)).nonzero(as_tuple=True)
+    told = torch.stack([subject, torch.full_like(subject, vocabulary().predicate_id("same_style_as")), target], dim=1)
+    return graph.with_triplets(torch.cat([graph.triplets, told]).unique(dim=0))
+
+
+@torch.no_grad()
+def sample_descriptions(
+    model: CompactModel,
+    graph: GraphBatch,
+    size: Tensor,
+    latent: Tensor,
+    equal: Tensor,
+    noise: Tensor,
+    how: CompactSampling,
+) -> Tensor:
+    """Descriptions (N, D) of all pieces of S scenes.
+
+    Arguments:
+        graph: S scenes, N nodes. size: (N, 3) float32, metres.
+        latent: (N, latent width), of the graph.
+        equal: (N,) int64, number of each piece's group in [0, N); a group agrees on one description.
+        noise: (N, D) starting noise. how: to sample.
+    """
+    context = model.furniture.context(graph, size, pairs_of(graph, model.config.predicates), latent)
+
+    def predict(x: Tensor, level: Tensor) -> Tensor:
+        return model.furniture(x, level, context)
+
+    return how.denoised(agreeing(predict, equal), noise, model.config.furniture)
