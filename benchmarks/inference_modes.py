@@ -32,7 +32,7 @@ from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.packed import pack_linear_maps
 from echoscene.config import shape_unet
-from echoscene.shape import ShapeUNet
+from echoscene.denoisers import ShapeUNet
 
 Run = Callable[[], Tensor]
 LAST = torch.channels_last_3d

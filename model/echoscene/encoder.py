@@ -10,7 +10,7 @@ from torch import Tensor, nn
 
 from echomodel.randomness import normal
 from echoscene.config import EncoderConfig
-from echoscene.gcn import TripletGCN
+from echoscene.gcn import TripletGCN, check_range
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,16 +39,10 @@ class SceneGraphTensors:
         nodes = len(self.classes)
         if not nodes:
             raise ValueError("graph has no nodes, at least one is needed")
-        for name, values, size in (
-            ("class of node", self.classes, config.classes),
-            ("subject of triplet", self.triples[:, 0], nodes),
-            ("predicate of triplet", self.triples[:, 1], config.predicates),
-            ("object of triplet", self.triples[:, 2], nodes),
-        ):
-            wrong = (values < 0) | (values >= size)
-            if bool(wrong.any()):
-                at = int(wrong.nonzero()[0])
-                raise ValueError(f"{name} {at} is {int(values[at])}, allowed: 0..{size - 1}")
+        check_range("class of node", self.classes, config.classes)
+        check_range("subject of triplet", self.triples[:, 0], nodes)
+        check_range("predicate of triplet", self.triples[:, 1], config.predicates)
+        check_range("object of triplet", self.triples[:, 2], nodes)
         for name, text, count in (("node", self.node_text, nodes), ("edge", self.edge_text, len(self.triples))):
             if text is None:
                 continue

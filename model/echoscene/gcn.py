@@ -123,3 +123,11 @@ def check_ends(ends: Tensor, nodes: int) -> None:
     if bool(wrong.any()):
         at = int(wrong.nonzero()[0])
         raise ValueError(f"edge {at} goes from node {int(ends[at, 0])} to {int(ends[at, 1])}, allowed: 0..{nodes - 1}")
+
+
+def check_range(name: str, values: Tensor, size: int) -> None:
+    """Raises ValueError naming the first of `values` (n,) that lies outside 0..size-1."""
+    wrong = (values < 0) | (values >= size)
+    if bool(wrong.any()):
+        at = int(wrong.nonzero()[0])
+        raise ValueError(f"{name} {at} is {int(values[at])}, allowed: 0..{size - 1}")

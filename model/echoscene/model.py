@@ -14,9 +14,8 @@ from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.progress import StepListener
 from echomodel.randomness import normal
 from echoscene.config import ReleasedConfig
+from echoscene.denoisers import LayoutNet, ShapeNet
 from echoscene.encoder import GraphEncoder, SceneGraphTensors
-from echoscene.layout import LayoutNet
-from echoscene.shape import ShapeNet
 from echoscene.tables import DDIMGrid, LayoutTables, ShapeTables
 from echoscene.unet import packed
 from echoscene.vqvae import VQVAE

@@ -7,7 +7,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from echoscene.config import VQConfig
-from echoscene.volumes import convolve_repeated
+from echoscene.unet import convolve_repeated
 
 
 def _norm(channels: int) -> nn.GroupNorm:

@@ -17,11 +17,14 @@ from echomodel.config import check_numbers
 from echomodel.files import whole_file
 from echomodel.vocabulary import vocabulary
 from echoscene.config import ReleasedConfig
-from echoscene.inference import CheckpointError
 from echoscene.model import ReleasedModel
 from echoscene.vqvae import VQVAE
 
 FORMAT = "echousd-released-1"
+
+
+class CheckpointError(ValueError):
+    """A file that does not hold the published model; the message names the file's first keys at fault."""
 
 
 def build(config: ReleasedConfig, tensors: Mapping[str, Tensor], where: str) -> nn.Module:

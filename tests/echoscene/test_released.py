@@ -15,11 +15,11 @@ from echomodel.metrics.pointsets import chamfer, compare_sets
 from echomodel.vocabulary import vocabulary
 from echoscene.checkpoint import read_bounds, statistics_from_bounds
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, paper, shape_unet
+from echoscene.denoisers import ShapeUNet
 from echoscene.echo import published_scene
 from echoscene.encoder import SceneGraphTensors
 from echoscene.gcn import TripletGCN
 from echoscene.model import GraphChange, ReleasedModel, node_budget
-from echoscene.shape import ShapeUNet
 from echoscene.tables import LayoutTables
 
 ENCODER = EncoderConfig(text=12, learned=4, flag=4, hidden=16, layers=2, separated=False)

@@ -11,10 +11,8 @@ from parity_numbers import close, fill
 from torch.nn import functional as F
 
 from echoscene.config import UNetConfig, shape_unet
-from echoscene.layout import LayoutNet
-from echoscene.shape import ShapeUNet
-from echoscene.unet import packed
-from echoscene.volumes import convolve_repeated
+from echoscene.denoisers import LayoutNet, ShapeUNet
+from echoscene.unet import convolve_repeated, packed
 
 LAYOUT = UNetConfig(width=128, context=96, objects=40, hidden=32, layers=3, residual=True)
 SHAPE = shape_unet(width=32, mult=(1, 2), blocks=1, attention=(2,), context=48, objects=24, hidden=32, layers=2, grid=8)

@@ -9,9 +9,8 @@ import pytest
 import torch
 from parity_numbers import LISTINGS
 
-from echoscene.checkpoint import CheckpointError, build, class_names
+from echoscene.checkpoint import CheckpointError, build, class_names, infer_config
 from echoscene.config import ReleasedConfig
-from echoscene.inference import infer_config
 
 FILES = sorted(LISTINGS.glob("state_dict_*.json.gz"))
 

@@ -7,7 +7,7 @@ import torch
 from parity_configs import layout_config
 from parity_numbers import Numbers, check_gradients, close
 
-from echoscene.layout import LayoutNet
+from echoscene.denoisers import LayoutNet
 from echoscene.model import ancestral, layout_loss
 from echoscene.tables import LayoutTables
 from echoscene.unet import packed

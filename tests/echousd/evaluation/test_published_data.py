@@ -13,8 +13,7 @@ from echomodel.data.sgfront import SGFront, write_sgfront
 from echomodel.metrics.tasks import tasks_of
 from echomodel.rooms.generator import generate_rooms
 from echomodel.training.recipe import read_recipe
-from echoscene.published import PublishedRooms, PublishedShapes
-from echoscene.training import opened_data
+from echoscene.training import PublishedRooms, PublishedShapes, opened_data
 from echousd.cli.main import run
 from echousd.evaluation.runs import SuiteSettings, rooms_against
 
