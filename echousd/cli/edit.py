@@ -130,12 +130,13 @@ def _step(room: Path, wait: bool, json: bool, run: str) -> None:
     """Take the last edit of a room back (`undo`), or make it again (`redo`), and say what it was."""
     from echousd.folder import history
     from echousd.folder.folder import held
+    from echousd.make.save import write_pictures
 
     started = time.perf_counter()
     step = {"undo": history.undo, "redo": history.redo}[run]
     with held(room.parent, wait=wait, run=run) as finished:
         steps = history.told(room, run) if finished == run else step(room)
-        pictures = _drawn(room)
+        pictures = write_pictures(room)
     _say_steps(room, pictures, {"undo": "undone", "redo": "redone"}[run], steps, started, json)
 
 
@@ -156,18 +157,12 @@ def _recover(room: Path, wait: bool, json: bool) -> None:
 def _say_finished(room: Path, steps: Sequence[str], started: float, json: bool) -> None:
     """Draw a room whose run was finished, and say what it did; exit code 1 where it has faults."""
     from echousd.folder.manifest import find_manifest
+    from echousd.make.save import write_pictures
 
-    _say_steps(room, _drawn(room), "finished", steps, started, json)
+    _say_steps(room, write_pictures(room), "finished", steps, started, json)
     layouts = (find_manifest(room.parent, room.stem) or {}).get("layouts", ())
     if any(layout["broken"] or layout["collisions"] or layout.get("restless") for layout in layouts):
         raise typer.Exit(1)
-
-
-def _drawn(room: Path) -> list[Path]:
-    """The pictures of a room, drawn as it is now."""
-    from echousd.make.save import write_preview, write_sheet
-
-    return [path for path in (write_preview(room), write_sheet(room)) if path]
 
 
 def _say_steps(

@@ -16,7 +16,7 @@ from echousd.shapes.finishes.harmonies import HARMONIES
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.joints import write_joints
 from echousd.shapes.looks import look, palette_for
-from echousd.shapes.surface import Surface, surface
+from echousd.shapes.surface import CREASE, Surface, surfaces
 from echousd.stage.files import new_stage
 from echousd.stage.paths import CLASSES, DESCRIPTION, GEO, MTL, class_path, coarse_name, payload_name, piece_path
 from echousd.stage.taxonomy import ade20k
@@ -113,9 +113,9 @@ def geometry_layer(
         UsdGeom.Xform.Define(stage, piece_path(f"/{name}", name, body))
     for path, form in forms.items():
         write_mesh(stage, f"/{name}{path}", form)
-    for collider in () if geometry.theirs_collides else geometry.colliders:
-        every = np.arange(len(collider.mesh.faces))
-        form = surface(collider.mesh, {"collider": every})
+    guides = () if geometry.theirs_collides else geometry.colliders
+    wholes = [(guide.mesh, {"collider": np.arange(len(guide.mesh.faces))}, CREASE) for guide in guides]
+    for collider, form in zip(guides, surfaces(wholes), strict=True) if guides else ():
         guide = write_mesh(stage, piece_path(f"/{name}", name, collider.name, collider.body), form)
         guide.CreatePurposeAttr(UsdGeom.Tokens.guide)
     _write_looks(stage, name, style, {part: tuple(form.groups) for part, form in forms.items()})
@@ -167,16 +167,17 @@ def component_layer(
     prim.SetDocumentation(f"{category}: origin at the centre of the bottom face, +Y up, +Z is the front; metres")
     if geometry.joints:
         write_joints(stage, name, geometry)
+    slots = most_used(geometry)
     if geometry.original is None:
-        _write_levels(stage, name, geometry)
+        _write_levels(stage, name, geometry, slots[0])
     for taxonomy, word in (("category", category), ("ade20k", ade20k(category))):
         UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr([word])
-    write_asset_physics(stage, name, category, geometry, most_used(geometry))
+    write_asset_physics(stage, name, category, geometry, slots)
     return without_stage(stage, lambda layer: _add_arcs(layer, name, geometry))
 
 
-def _write_levels(stage: Usd.Stage, name: str, geometry: Geometry) -> None:
-    """The variant set `LOD`: all faces, few faces where there are such meshes, or the colliders in place of them."""
+def _write_levels(stage: Usd.Stage, name: str, geometry: Geometry, slot: str) -> None:
+    """The variant set `LOD`: all faces, few where there are such meshes, or the colliders, in the look of a slot."""
     variants = stage.GetPrimAtPath(f"/{name}").GetVariantSets().AddVariantSet(LOD)
     for level in (HIGH, LOW, PROXY) if geometry.coarse else (HIGH, PROXY):
         variants.AddVariant(level)
@@ -189,9 +190,7 @@ def _write_levels(stage: Usd.Stage, name: str, geometry: Geometry) -> None:
             guide = stage.OverridePrim(piece_path(f"/{name}", name, collider.name, collider.body))
             UsdGeom.Imageable(guide).CreatePurposeAttr(UsdGeom.Tokens.default_)
             UsdShade.MaterialBindingAPI.Apply(guide)
-            guide.CreateRelationship("material:binding", False).SetTargets(
-                [Sdf.Path(f"/{name}/{MTL}/{most_used(geometry)[0]}")]
-            )
+            guide.CreateRelationship("material:binding", False).SetTargets([Sdf.Path(f"/{name}/{MTL}/{slot}")])
     variants.SetVariantSelection(HIGH)
 
 

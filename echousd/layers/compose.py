@@ -22,9 +22,9 @@ from echousd.layers.dressing import dressing_layer
 from echousd.naming import free_name
 from echousd.room import RoomData
 from echousd.shapes import joints, looks
-from echousd.shapes.geometry import LICENCE, Geometry, Origin
+from echousd.shapes.geometry import LICENCE, Geometry, Origin, Part
 from echousd.shapes.styles import ROOM_STYLE
-from echousd.shapes.surface import surface
+from echousd.shapes.surface import Surface, surfaces
 from echousd.stage.encoding import relation_name
 from echousd.stage.files import layer_bytes, new_stage
 from echousd.stage.layouts import authored_layouts
@@ -315,22 +315,14 @@ def _small_asset(room: RoomData, name: str, dressing: Dressing) -> Asset:
 
 
 def _written(room: RoomData, name: str, category: str, style: str, geometry: Geometry) -> Asset:
-    forms = {
-        piece_path("", name, part.name, part.body): surface(
-            part.mesh, part.slots, atlas=room.options.atlas, crease=part.crease
-        )
-        for part in geometry.parts
-    }
+    forms = _forms(name, geometry.parts, atlas=room.options.atlas)
     slots = {part: tuple(form.groups) for part, form in forms.items()}
     extents = np.stack([form.extent for form in forms.values()])
     extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])
     data = _asset_data(room, name, geometry)
     payload = assets.geometry_layer(name, forms, geometry, data, style)
     layer = assets.component_layer(name, category, extent, geometry, data)
-    coarse = {
-        piece_path("", name, part.name, part.body): surface(part.mesh, part.slots, crease=part.crease)
-        for part in geometry.coarse
-    }
+    coarse = _forms(name, geometry.coarse) if geometry.coarse else {}
     low = {coarse_file(name): _bytes(room, assets.coarse_layer(name, coarse, data), ".usdc")} if coarse else {}
     files = {
         **low,
@@ -338,6 +330,12 @@ def _written(room: RoomData, name: str, category: str, style: str, geometry: Geo
         component_file(name): _bytes(room, layer, ".usda"),
     }
     return Asset(name, slots, files)
+
+
+def _forms(name: str, parts: Sequence[Part], *, atlas: bool = False) -> dict[str, Surface]:
+    """Path of each part below an asset's root -> its surface."""
+    made = surfaces([(part.mesh, part.slots, part.crease) for part in parts], atlas=atlas)
+    return {piece_path("", name, part.name, part.body): form for part, form in zip(parts, made, strict=True)}
 
 
 def _bytes(room: RoomData, layer: Sdf.Layer, path: str) -> bytes:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pxr import Sdf
+from pxr import Sdf, Usd
 
 import echousd
 from echousd.draw.pictures import is_ours, png
@@ -27,7 +27,7 @@ from echousd.shapes.geometry import Geometry
 from echousd.shapes.sources.retrieval import beside
 from echousd.stage.apart import check_harmless
 from echousd.stage.files import open_stage, write_whole
-from echousd.stage.layouts import layout_names
+from echousd.stage.layouts import layout_names, showing_layout
 from echousd.stage.paths import UNFIT, layer_file
 
 if TYPE_CHECKING:
@@ -47,8 +47,7 @@ def save_room(
     with folders.held(folder, wait=wait):
         root = save_layers(room, folder, force=force, store=store)
         if room.options.preview if preview is None else preview:
-            write_preview(root)
-            write_sheet(root)
+            write_pictures(root)
         return root
 
 
@@ -139,14 +138,24 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
 PREVIEW = 640  # pixels across
 
 
-def write_preview(root: Path) -> Path | None:
-    """Draw `<name>.png` beside the root layer; None where the extra `render` is not installed."""
-    from echousd.draw.rendering import render
+def write_pictures(root: Path) -> list[Path]:
+    """Draw `<name>.png` and, of several layouts, `<name>_layouts.png` beside the root layer; those that were drawn."""
+    stage = open_stage(root)
+    return [drawn for drawn in (write_preview(root, stage), write_sheet(root, stage)) if drawn]
+
+
+def write_preview(root: Path, stage: Usd.Stage | None = None) -> Path | None:
+    """Draw `<name>.png` beside the root layer; None where the extra `render` is not installed.
+
+    Arguments:
+        stage: of the root layer, where it is open.
+    """
+    from echousd.draw.rendering import render_stage
     from echousd.draw.tracing import QUICK, RenderUnavailable
 
     out = root.with_suffix(".png")
     try:
-        picture = render(root, size=PREVIEW, rays=QUICK)
+        picture = render_stage(stage or open_stage(root), size=PREVIEW, rays=QUICK)
     except RenderUnavailable:
         return None
     if out.is_file() and not is_ours(out):
@@ -160,18 +169,18 @@ def write_preview(root: Path) -> Path | None:
 SHEET = 280  # pixels of one layout
 
 
-def write_sheet(root: Path) -> Path | None:
+def write_sheet(root: Path, stage: Usd.Stage) -> Path | None:
     """Draw `<name>_layouts.png`, all layouts side by side, beside the root layer; None where there is only one.
 
     The sheet of a room that has only one layout any more is taken away.
     """
     from PIL import Image, ImageDraw
 
-    from echousd.draw.rendering import render
+    from echousd.draw.rendering import render_stage
     from echousd.draw.tracing import QUICK, RenderUnavailable
 
     out = root.with_name(f"{root.stem}_layouts.png")
-    names = layout_names(open_stage(root))
+    names = layout_names(stage)
     if out.is_file() and not is_ours(out):
         return None
     if not names:
@@ -181,7 +190,8 @@ def write_sheet(root: Path) -> Path | None:
     sheet = Image.new("RGB", (wide * SHEET, -(-len(names) // wide) * SHEET), "white")
     for number, name in enumerate(names):
         try:
-            picture = render(root, size=SHEET, rays=QUICK, layout=name)
+            with showing_layout(stage, name):
+                picture = render_stage(stage, size=SHEET, rays=QUICK)
         except RenderUnavailable:
             return None
         ImageDraw.Draw(picture).text((8, 6), name, fill="black")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from echousd.make.finished import Room
-from echousd.make.save import save_layers, write_preview, write_sheet
+from echousd.make.save import save_layers, write_pictures
 from echousd.progress import StageTimer
 
 
@@ -37,6 +37,5 @@ def write_room(
     if not room.options.preview:
         return Written(room, root)
     with timer.stage("preview"):
-        preview = write_preview(root)
-        preview = write_sheet(root) or preview
-    return Written(room, root, preview)
+        drawn = write_pictures(root)
+    return Written(room, root, drawn[-1] if drawn else None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,39 +54,67 @@ def surface(
         mesh: triangles in metres.
         groups: material group -> face numbers.
         atlas: unwrap without overlaps into the unit square (xatlas, extra `texture`) instead of projecting along the
-            axes, see `laid_out`.
+            axes, see `_laid_out`.
         crease: neighbours that fold more sharply than this keep a hard edge, radians.
     """
-    normals, normal_index = creased_normals(mesh, crease)
-    st, st_index = atlas_unwrap(mesh) if atlas else laid_out(mesh, groups)
-    return Surface(
-        points=unshared(np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces)),
-        faces=np.asarray(mesh.faces, np.int32),
-        normals=normals,
-        normal_index=normal_index,
-        st=st,
-        st_index=st_index,
-        groups={name: np.asarray(index, np.int32) for name, index in sorted(groups.items()) if len(index)},
-    )
+    return surfaces([(mesh, groups, crease)], atlas=atlas)[0]
+
+
+def surfaces(
+    forms: Sequence[tuple[trimesh.Trimesh, Mapping[str, np.ndarray], float]], *, atlas: bool = False
+) -> list[Surface]:
+    """Meshes, groups and creases as for `surface`, all at once: of boards each alone takes several times as long."""
+    meshes = [(np.asarray(mesh.vertices), np.asarray(mesh.faces)) for mesh, _, _ in forms]
+    first = np.cumsum([0, *(len(points) for points, _ in meshes)])
+    start = np.cumsum([0, *(len(faces) for _, faces in meshes)])
+    points = np.concatenate([points for points, _ in meshes])
+    faces = np.concatenate([faces + offset for (_, faces), offset in zip(meshes, first, strict=False)])
+    owner = np.repeat(np.arange(len(forms)), np.diff(start))
+    sharpest = np.repeat([np.cos(crease) for _, _, crease in forms], np.diff(start))
+    normals = _indexed(_corner_normals(points, faces, sharpest), 4, np.repeat(owner, 3))
+    if atlas:
+        st = [atlas_unwrap(mesh) for mesh, _, _ in forms]
+    else:
+        groups = [(slot, start[n] + members) for n, (_, own, _) in enumerate(forms) for slot, members in own.items()]
+        st = _indexed(_laid_out(points, faces, groups, owner), 5, np.repeat(owner, 3))
+    apart = unshared(points.astype(np.float32), faces, np.repeat(np.arange(len(forms)), np.diff(first)))
+    return [
+        Surface(
+            points=apart[first[n] : first[n + 1]],
+            faces=np.asarray(meshes[n][1], np.int32),
+            normals=normals[n][0],
+            normal_index=normals[n][1],
+            st=st[n][0],
+            st_index=st[n][1],
+            groups={name: np.asarray(index, np.int32) for name, index in sorted(own.items()) if len(index)},
+        )
+        for n, (_, own, _) in enumerate(forms)
+    ]
 
 
 def creased_normals(mesh: trimesh.Trimesh, crease: float = CREASE) -> tuple[np.ndarray, np.ndarray]:
     """Corner normals, smooth within `crease` radians: ((k, 3) float32 values, (3 f) int32 indices)."""
     faces = np.asarray(mesh.faces)
-    triangles = np.asarray(mesh.vertices)[faces]
-    area_normal = area_normals(triangles)
+    total = _corner_normals(np.asarray(mesh.vertices), faces, np.full(len(faces), np.cos(crease)))
+    return _indexed(total, 4, np.zeros(len(total), int))[0]
+
+
+def _corner_normals(points: np.ndarray, faces: np.ndarray, sharpest: np.ndarray) -> np.ndarray:
+    """(3 f, 3): normals of the corners, smooth where faces look the same way by a cosine of `sharpest` (f,) or more."""
+    area_normal = area_normals(points[faces])
     unit = area_normal / np.maximum(np.linalg.norm(area_normal, axis=1, keepdims=True), 1e-20)
     corner_vertex = faces.ravel()
     corner_face = np.repeat(np.arange(len(faces)), 3)
     order = np.argsort(corner_vertex, kind="stable")
-    count = np.bincount(corner_vertex, minlength=len(mesh.vertices))
+    count = np.bincount(corner_vertex, minlength=len(points))
     first = np.concatenate([[0], np.cumsum(count)[:-1]])
     # every corner meets every corner of the same vertex
     fan = count[corner_vertex]
     here = np.repeat(np.arange(len(corner_vertex)), fan)
     step = np.arange(len(here)) - np.repeat(np.cumsum(fan) - fan, fan)
     other = order[np.repeat(first[corner_vertex], fan) + step]
-    near = (unit[corner_face[here]] * unit[corner_face[other]]).sum(1) >= np.cos(crease)
+    face = corner_face[here]
+    near = (unit[face] * unit[corner_face[other]]).sum(1) >= sharpest[face]
     total = np.zeros((len(corner_vertex), 3))
     for axis in range(3):
         weight = area_normal[corner_face[other[near]], axis]
@@ -95,17 +123,21 @@ def creased_normals(mesh: trimesh.Trimesh, crease: float = CREASE) -> tuple[np.n
     total = np.where(length > 1e-12, total / np.maximum(length, 1e-12), unit[corner_face])
     flat = np.linalg.norm(total, axis=1) < 0.5  # corners of triangles without area
     total[flat] = (0.0, 1.0, 0.0)
-    return _indexed(total, 4)
+    return total
 
 
-def laid_out(mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Texture coordinates for the patterns of our material slots: ((t, 2) float32, (3 f) int32).
+def _laid_out(
+    points: np.ndarray, faces: np.ndarray, groups: Iterable[tuple[str, np.ndarray]], owner: np.ndarray
+) -> np.ndarray:
+    """(3 f, 2): texture coordinates of the corners for the patterns of our material slots.
 
     Along the axis that each face looks at most, divided by the metres that one picture of its slot covers; u runs along
     the longer side of every board (fibres do), and boards begin at different places of the picture. Slots whose picture
     is of the whole thing get all of it on the side that they show.
+
+    Arguments:
+        groups: slots and the faces of each, of one mesh. owner: (f,) int, the number of each face's mesh.
     """
-    points, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     axis, way = facing_axis(points[faces])
     st = _projected(points[faces], axis, way)
     board = connected_pieces(faces, len(points))
@@ -117,8 +149,11 @@ def laid_out(mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray]) -> tuple[n
     across, along = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
     turned = extent[rows, along] > 1.05 * extent[rows, across]
     st[turned] = np.stack([st[turned][..., 1], -st[turned][..., 0]], -1)
-    st += (np.stack([0.37 * board, 0.61 * board], 1) % 1.0)[:, None]
-    for slot, members in groups.items():
+    least = np.full(int(owner.max(initial=0)) + 1, len(board))
+    np.minimum.at(least, owner, board)
+    number = board - least[owner]  # among the boards of its mesh
+    st += (np.stack([0.37 * number, 0.61 * number], 1) % 1.0)[:, None]
+    for slot, members in groups:
         metres = metres_of(slot)
         if metres:
             st[members] /= metres
@@ -128,17 +163,21 @@ def laid_out(mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray]) -> tuple[n
             upward = int(np.argmin(last - first) == 1)  # what lies shows its upper side, what hangs its front
             share = (shown - first) / np.maximum(last - first, 1e-9)
             st[members] = np.stack([share[..., 0], 1 - share[..., 2] if upward else share[..., 1]], -1)
-    return _indexed(st.reshape(-1, 2), 5)
+    return st.reshape(-1, 2)
 
 
-def unshared(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+def unshared(points: np.ndarray, faces: np.ndarray, owner: np.ndarray) -> np.ndarray:
     """The points (v, 3) float32, where boards meet a few micrometres apart: validators take equal points for a fault.
 
-    What lies at one place and belongs to several connected pieces moves towards the middle of its own; what belongs to
-    one piece (both ends of a cord around a cushion) moves inwards, against its own faces.
+    What lies at one place and belongs to several connected pieces of one mesh (`owner`: (v,) int) moves towards the
+    middle of its own; what belongs to one piece (both ends of a cord around a cushion) moves inwards, against its own
+    faces.
     """
-    _, place, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
-    place = place.reshape(-1)
+    rows = np.column_stack([points, owner])
+    order = np.lexsort(rows.T)  # np.unique(axis=0) takes ten times as long
+    place = np.zeros(len(points), int)
+    place[order[1:]] = np.cumsum((rows[order[1:]] != rows[order[:-1]]).any(1))
+    count = np.bincount(place)
     shared = np.flatnonzero(count[place] > 1)
     if not len(shared):
         return points
@@ -217,9 +256,11 @@ def atlas_unwrap(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(st, np.float32), np.asarray(index, np.int32).ravel()
 
 
-def _indexed(values: np.ndarray, digits: int) -> tuple[np.ndarray, np.ndarray]:
-    """The different rows of `values`, rounded, in lexicographic order, and for every row the number of its value."""
-    whole = np.rint(values * 10.0**digits).astype(np.int64)
+def _indexed(values: np.ndarray, digits: int, owner: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """For each owner of rows (n,) int: the different ones of its `values`, rounded, in lexicographic order, and for
+    every row the number of its value.
+    """
+    whole = np.column_stack([owner, np.rint(values * 10.0**digits).astype(np.int64)])
     low = whole.min(0)
     span = whole.max(0) - low + 1
     if float(np.prod(span.astype(float))) > 2**62:  # rows as one number each sort ten times as fast
@@ -228,4 +269,7 @@ def _indexed(values: np.ndarray, digits: int) -> tuple[np.ndarray, np.ndarray]:
         keys = np.ravel_multi_index(tuple((whole - low).T), tuple(span))
         found, index = np.unique(keys, return_inverse=True)
         unique = np.stack(np.unravel_index(found, tuple(span)), 1) + low
-    return (unique / 10.0**digits).astype(np.float32), index.reshape(-1).astype(np.int32)
+    mine, rows = (np.searchsorted(each, np.arange(owner.max() + 2)) for each in (unique[:, 0], owner))
+    number = (index.reshape(-1) - mine[owner]).astype(np.int32)
+    value = (unique[:, 1:] / 10.0**digits).astype(np.float32)
+    return [(value[mine[n] : mine[n + 1]], number[rows[n] : rows[n + 1]]) for n in range(len(mine) - 1)]

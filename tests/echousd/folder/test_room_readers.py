@@ -55,9 +55,9 @@ def killed(monkeypatch, moved):
         dies()
 
     with monkeypatch.context() as patch, suppress(Killed):
-        for name in ("save", "written") if moved is None else ():
-            patch.setattr(f"echousd.make.{name}.write_preview", dies)
-        if moved is not None:
+        if moved is None:
+            patch.setattr("echousd.make.save.write_preview", dies)
+        else:
             patch.setattr(folders, "_finish", some)
         patch.setattr(folders, "_discard", lambda staging: None)
         yield

@@ -7,7 +7,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.shapes.finishes.slots import metres_of
 from echousd.shapes.looks import BANDS, PALETTES, cut, look, material_groups, palette_for
 from echousd.shapes.meshing import box_mesh
-from echousd.shapes.surface import creased_normals, surface, unshared
+from echousd.shapes.surface import creased_normals, surface, surfaces, unshared
 from echousd.stage.taxonomy import ade20k
 
 
@@ -115,7 +115,18 @@ def test_boards_that_meet_share_no_point_and_stay_closed():
     assert (form.extent[1] <= mesh.bounds[1] + 1e-7).all()
     assert trimesh.Trimesh(form.points, form.faces, process=False).is_watertight
     alone = boards[0].vertices.astype(np.float32)
-    assert unshared(alone, boards[0].faces) is alone
+    assert unshared(alone, boards[0].faces, np.zeros(8)) is alone
+
+
+def test_surfaces_of_several_meshes_are_those_of_each():
+    meshes = [box_mesh((1, 2, 3)), trimesh.creation.icosphere(subdivisions=2), box_mesh((1, 2, 3))]
+    meshes.append(trimesh.util.concatenate([meshes[0], box_mesh((0.1, 0.1, 0.1))]))
+    slots = ("wood", "picture_3", "fabric", "wood")
+    forms = [(m, {w: np.arange(len(m.faces))}, c) for m, w, c in zip(meshes, slots, (0.7, 0.2, 1.0, 0.7), strict=True)]
+    for together, (mesh, groups, crease) in zip(surfaces(forms), forms, strict=True):
+        alone = surface(mesh, groups, crease=crease)
+        for name in ("points", "faces", "normals", "normal_index", "st", "st_index"):
+            np.testing.assert_array_equal(getattr(together, name), getattr(alone, name))
 
 
 def test_the_ends_of_a_cord_around_a_cushion_share_no_point_and_stay_closed():
