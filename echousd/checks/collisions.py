@@ -20,7 +20,7 @@ from echousd.shapes.fittings import SKIRTING
 from echousd.stage.contents import RoomObject, Solid, Surrounding
 
 DEEP = 0.006  # metres: a point of one surface this far inside the other mesh is a collision
-IN_WALL = SKIRTING[1] + 0.003  # metres: furniture stands at the wall behind its skirting
+IN_WALL = SKIRTING + 0.003  # metres: furniture stands at the wall behind its skirting
 PRESSED = 0.04  # metres: cushions and blankets press into what they lie on
 NEAR = 0.05  # metres between two boxes that are one
 SAMPLES = 600  # points per surface and pair

@@ -230,9 +230,9 @@ def room_looks(
             table[name] = looks.look(harmony, slot, voice)
             bindings[path] = name
     table |= {f"{ROOM_STYLE}_{slot}": looks.look(harmony, slot) for slot in small}
-    table |= {slot: looks.look(harmony, slot) for slot in ("wall", "wallpaper", "wall_tiles")} | structure.LOOKS
-    table["floor"] = looks.look(harmony, coverings.floor_slot(room))
     covered = {f"{SHELL}/{name}": slot for name, slot in coverings.covered_walls(room).items()}
+    table |= {slot: looks.look(harmony, slot) for slot in ("wall", *covered.values())} | structure.LOOKS
+    table["floor"] = looks.look(harmony, coverings.floor_slot(room))
     for part in built:
         own = {"wall": covered.get(part.path, "wall")}
         bindings |= {mesh.path: own.get(mesh.look, mesh.look) for mesh in part.meshes}

@@ -1,4 +1,4 @@
-"""What covers the floor and the walls of a room: boards, carpet or tiles, and paper on one wall; the seed chooses."""
+"""What covers the floor and the walls of a room: wood, carpet or stone, and what one wall has; the seed chooses."""
 
 from __future__ import annotations
 
@@ -12,33 +12,34 @@ from echomodel.vocabulary import Category, vocabulary
 from echousd.room import RoomData
 from echousd.shapes.walls import wall_name
 
-THIRD = 3  # one room in so many has the flooring of its type, or a papered wall
+THIRD = 3  # one room in so many has the flooring of its type, or of the others blocks instead of boards
+FLOORS = {"tiles": ("tiles", "terrazzo")}  # floorings that come in several kinds, equally often
+# What one wall may have behind its bed or sofa, and of how many parts of all rooms; the rest has plain walls.
+COVERS = {"wallpaper": 2, "paint": 2, "boarding": 1, "brick": 1, "": 6}
 NEAR = 0.45  # metres between a wall and the back of what stands at it
-HOSTS = ("bed", "sofa")  # roles of what a papered wall stands behind
+HOSTS = ("bed", "sofa")  # roles of what stands before such a wall
 
 
 def floor_slot(room: RoomData) -> str:
     """The material slot of the room's floor."""
     row = vocabulary().room_type(room.graph.room.type)
-    return row.flooring if row.flooring and (row.use or _drawn(room, "floor")) else "floor"
+    if row.flooring and (row.use or _drawn(room, "floor", THIRD) == 0):
+        kinds = FLOORS.get(row.flooring, (row.flooring,))
+        return kinds[_drawn(room, "kind of floor", len(kinds))]
+    return "floor" if _drawn(room, "blocks", THIRD) else "herringbone"
 
 
 def covered_walls(room: RoomData) -> dict[str, str]:
-    """Name of a wall -> the slot of what covers it, for walls that are not plain: tiles where it is wet, paper."""
+    """Name of a wall -> the slot of what covers it, for walls that are not plain: tiles where it is wet, `COVERS`."""
     wet = vocabulary().room_type(room.graph.room.type).use == "wet" and room.options.walls
     if wet and not _behind(room, lambda row: row.task == "cook"):
         return {wall_name(edge): "wall_tiles" for edge in range(len(_corners(room)))}
     if wet:
         return dict.fromkeys(_behind(room, lambda row: row.stands == "row"), "wall_tiles")
-    paper = papered_wall(room)
-    return {paper: "wallpaper"} if paper else {}
-
-
-def papered_wall(room: RoomData) -> str:
-    """Name of the wall that has paper, behind the bed or the sofa, "" = none has."""
-    if not (room.options.walls and _drawn(room, "paper")):
-        return ""
-    return next(iter(_behind(room, lambda row: row.role in HOSTS)), "")
+    words = [word for word, often in COVERS.items() for _ in range(often)]
+    cover = words[_drawn(room, "cover", len(words))] if room.options.walls else ""
+    behind = _behind(room, lambda row: row.role in HOSTS)[:1] if cover else []
+    return dict.fromkeys(behind, cover)
 
 
 def _corners(room: RoomData) -> np.ndarray:
@@ -63,6 +64,7 @@ def _behind(room: RoomData, asked: Callable[[Category], bool]) -> list[str]:
     return out
 
 
-def _drawn(room: RoomData, what: str) -> bool:
+def _drawn(room: RoomData, what: str, among: int) -> int:
+    """A number below `among` that the seed draws for a room."""
     key = f"{room.provenance.seed} {what} {room.graph.room.type}".encode()
-    return int.from_bytes(hashlib.blake2b(key, digest_size=4).digest(), "big") % THIRD == 0
+    return int.from_bytes(hashlib.blake2b(key, digest_size=4).digest(), "big") % among

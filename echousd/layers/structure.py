@@ -16,6 +16,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.layers import assets
 from echousd.room import RoomData
 from echousd.shapes.finishes.harmonies import linear
+from echousd.shapes.fittings import PLAIN, Millwork, millwork_of
 from echousd.shapes.geometry import Mass
 from echousd.shapes.looks import Look
 from echousd.shapes.shell import floor_mesh
@@ -76,10 +77,21 @@ def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[Shel
     if room.options.walls:
         outdoor = vocabulary().room_type(room.graph.room.type).use == "outdoor"
         spec = room.graph.room
-        parts += walls(plan, room.height, spec.openings, bare, outdoor=outdoor, thickness=spec.walls)
+        parts += walls(
+            plan, room.height, spec.openings, bare, outdoor=outdoor, thickness=spec.walls, millwork=millwork(room)
+        )
     if room.options.ceiling:
         parts.append(ceiling(plan, room.height))
     return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component)]
+
+
+def millwork(room: RoomData) -> Millwork:
+    """How the doors and windows of a room are made, as its seed draws it; in a home all are alike."""
+    if room.graph.room.walls:
+        return PLAIN
+    slept = any(vocabulary().category(node.category).role == "bed" for node in room.graph.nodes)
+    wet = vocabulary().room_type(room.graph.room.type).use == "wet"
+    return millwork_of(room.provenance.seed, private=slept or wet)
 
 
 def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any], openings: Sequence[Opening] = ()) -> Sdf.Layer:

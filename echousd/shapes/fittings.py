@@ -6,6 +6,8 @@ All in a wall's own frame: u along the wall from its first corner, v up, w outwa
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import trimesh
@@ -17,9 +19,40 @@ CASING, PROUD = 0.06, 0.012  # width of the trim around a door, and how far it s
 LINING = 0.03
 LEAF = 0.04  # thickness of a door's leaf
 GAP = 0.004
-FRAME = 0.055  # width of a window's frame
-SKIRTING = (0.08, 0.012)  # height, thickness
+FRAME, BAR, PANE = 0.055, 0.022, 0.42  # width of a window's frame and of its glazing bars, and about what lies between
+SKIRTING = 0.012  # thickness
+PLATE, REACH = 0.085, 0.12  # side of a switch's plate, and how far beside a door's trim it is
 RAIL = (0.12, 0.09, 0.25)  # curtain rail: above the window, before the wall, beyond its sides
+
+WINDOWS = {"plain": 3, "sash": 2, "bars": 2, "transom": 2}
+DOORS = {"panelled": 3, "four_panels": 2, "flush": 3, "boarded": 1, "glazed": 2}
+
+
+@dataclass(frozen=True)
+class Millwork:
+    """How the doors, windows and mouldings of a room are made.
+
+    Arguments:
+        window, door: words of `WINDOWS` and `DOORS`. skirting, cornice: their heights, metres; 0 = no cornice.
+    """
+
+    window: str = "plain"
+    door: str = "panelled"
+    skirting: float = 0.08
+    cornice: float = 0.0
+
+
+PLAIN = Millwork()
+
+
+def millwork_of(seed: int, *, private: bool = False) -> Millwork:
+    """The millwork of a room for which a seed is drawn; nobody sees through the doors of a `private` one."""
+    rng = np.random.default_rng([seed, 1931])
+    kinds = {kind: often for kind, often in DOORS.items() if not (private and kind == "glazed")}
+    window, door = (
+        str(rng.choice(list(odds), p=np.array(list(odds.values())) / sum(odds.values()))) for odds in (WINDOWS, kinds)
+    )
+    return Millwork(window, door, float(rng.choice((0.06, 0.08, 0.1, 0.14))), float(rng.choice((0.0, 0.0, 0.06, 0.09))))
 
 
 def board(u: tuple[float, float], v: tuple[float, float], w: tuple[float, float]) -> trimesh.Trimesh:
@@ -46,18 +79,56 @@ def door_frame(opening: Opening, wall: float = WALL, *, both: bool = True) -> tr
     return joined(boards)
 
 
-def door_leaf(opening: Opening, wall: float = WALL) -> trimesh.Trimesh:
-    """The closed leaf with two panels on each side, flush with the side that it opens to."""
-    start, end = opening.offset + LINING + GAP, opening.end - LINING - GAP
-    low, top = 0.008, opening.height - LINING - GAP
-    w = 0.0 if opening.swing == "in" else wall - LEAF
-    boards = [board((start, end), (low, top), (w, w + LEAF))]
+def door_leaf(opening: Opening, wall: float = WALL, kind: str = "panelled") -> trimesh.Trimesh:
+    """The closed leaf, flush with the side that it opens to; `kind` of `DOORS`."""
+    start, end, low, top, w = _leaf(opening, wall)
+    if kind == "glazed":
+        (left, right), (bottom, above) = _lights(start, end, low, top)
+        sides = [board((start, left), (low, top), w), board((right, end), (low, top), w)]
+        return joined([*sides, board((left, right), (low, bottom), w), board((left, right), (above, top), w)])
+    boards = [board((start, end), (low, top), w)]
+    columns = [(start + 0.12, end - 0.12)]
     middle = low + 0.42 * (top - low)
-    for below, above in ((low + 0.14, middle - 0.06), (middle + 0.06, top - 0.12)):
-        if end - start > 0.4 and above - below > 0.2:
-            inner = (start + 0.12, end - 0.12)
-            boards += [board(inner, (below, above), side) for side in ((w - 0.006, w), (w + LEAF, w + LEAF + 0.006))]
+    rows = [(low + 0.14, middle - 0.06), (middle + 0.06, top - 0.12)]
+    if kind == "four_panels":
+        half = (start + end) / 2
+        columns = [(start + 0.11, half - 0.05), (half + 0.05, end - 0.11)]
+    elif kind == "boarded":
+        edges = np.linspace(start, end, max(round((end - start) / 0.14), 1) + 1)
+        columns, rows = [(a + 0.004, b - 0.004) for a, b in pairwise(edges)], [(low, top)]
+    for inner in columns if kind != "flush" and end - start > 0.4 else ():
+        for panel in (row for row in rows if row[1] - row[0] > 0.2):
+            boards += [board(inner, panel, side) for side in ((w[0] - 0.006, w[0]), (w[1], w[1] + 0.006))]
     return joined(boards)
+
+
+def door_glass(opening: Opening, wall: float = WALL) -> trimesh.Trimesh:
+    """The pane of a glazed leaf."""
+    start, end, low, top, (near, far) = _leaf(opening, wall)
+    return board(*_lights(start, end, low, top), ((near + far) / 2 - 0.003, (near + far) / 2 + 0.003))
+
+
+def _leaf(opening: Opening, wall: float) -> tuple[float, float, float, float, tuple[float, float]]:
+    """Where a leaf begins and ends along the wall, above the floor, and through the wall."""
+    w = 0.0 if opening.swing == "in" else wall - LEAF
+    start, end = opening.offset + LINING + GAP, opening.end - LINING - GAP
+    return start, end, 0.008, opening.height - LINING - GAP, (w, w + LEAF)
+
+
+def _lights(start: float, end: float, low: float, top: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Where the glass of a leaf is, along the wall and upwards."""
+    return (start + 0.11, end - 0.11), (low + 0.38 * (top - low), top - 0.12)
+
+
+def light_switch(opening: Opening, left_first: bool, length: float) -> trimesh.Trimesh | None:
+    """A switch beside a door, where its handle is; None where the wall ends there."""
+    beside = CASING + REACH
+    at = opening.end + beside if _hinge_first(opening, left_first) else opening.offset - beside
+    if not PLATE < at < length - PLATE:
+        return None
+    half, rocker = PLATE / 2, 0.55 * PLATE / 2
+    plates = ((half, (-0.007, 0.0)), (rocker, (-0.01, -0.007)))
+    return joined([board((at - r, at + r), (1.05 - r, 1.05 + r), w) for r, w in plates])
 
 
 def door_handle(opening: Opening, left_first: bool, wall: float = WALL) -> trimesh.Trimesh:
@@ -98,19 +169,30 @@ def _hinge_first(opening: Opening, left_first: bool) -> bool:
     return (opening.hinge == "left") == left_first
 
 
-def window_frame(opening: Opening) -> trimesh.Trimesh:
-    """The frame in the middle of the wall, with a bar in the middle of a wide window."""
+def window_frame(opening: Opening, kind: str = "plain") -> trimesh.Trimesh:
+    """The frame in the middle of the wall, with the bars of its `kind` of `WINDOWS`."""
     w = (0.05, 0.11)
     start, end, low, top = opening.offset, opening.end, opening.sill, opening.sill + opening.height
+    inner, height = (start + FRAME, end - FRAME), (low + FRAME, top - FRAME)
     boards = [
         board((start, start + FRAME), (low, top), w),
         board((end - FRAME, end), (low, top), w),
-        board((start + FRAME, end - FRAME), (low, low + FRAME), w),
-        board((start + FRAME, end - FRAME), (top - FRAME, top), w),
+        board(inner, (low, low + FRAME), w),
+        board(inner, (top - FRAME, top), w),
     ]
+    across = {"sash": low + 0.5 * opening.height, "transom": low + 0.7 * opening.height}.get(kind)
+    if across:
+        boards.append(board(inner, (across - FRAME / 2, across + FRAME / 2), w))
     if opening.width > 1.05:
         middle = (start + end) / 2
-        boards.append(board((middle - FRAME / 2, middle + FRAME / 2), (low + FRAME, top - FRAME), w))
+        boards.append(board((middle - FRAME / 2, middle + FRAME / 2), (height[0], across or height[1]), w))
+    if kind == "bars":
+        thin = (0.062, 0.1)
+        for lines, upright in ((inner, True), (height, False)):
+            count = max(round((lines[1] - lines[0]) / PANE), 2)
+            for at in np.linspace(*lines, count + 1)[1:-1]:
+                line = (float(at) - BAR / 2, float(at) + BAR / 2)
+                boards.append(board(line, height, thin) if upright else board(inner, line, thin))
     return joined(boards)
 
 
@@ -142,14 +224,13 @@ def curtain_rail(opening: Opening, length: float, height: float) -> trimesh.Trim
     return joined([rod, *holders])
 
 
-def skirting(openings: Sequence[Opening], length: float) -> trimesh.Trimesh | None:
-    """Boards along the foot of a wall, but for its doors and passages; None where nothing is left."""
-    tall, thick = SKIRTING
+def skirting(openings: Sequence[Opening], length: float, tall: float = 0.08) -> trimesh.Trimesh | None:
+    """Boards of this height along the foot of a wall, but for its doors and passages; None where nothing is left."""
     holes = sorted((o.offset, o.end, CASING if o.kind == "door" else 0.0) for o in openings if o.sill <= tall)
     boards, at = [], 0.0
     for start, end, trim in [*holes, (length, length, 0.0)]:
         if start - trim - at > 0.01:
-            boards.append(board((at, start - trim), (0.0, tall), (-thick, 0.0)))
+            boards.append(board((at, start - trim), (0.0, tall), (-SKIRTING, 0.0)))
         at = max(at, end + trim)
     return joined(boards) if boards else None
 

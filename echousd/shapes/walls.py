@@ -13,10 +13,11 @@ import trimesh
 from echomodel.furniture.solids import Joint
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal, signed_area
 from echousd.shapes import fittings
-from echousd.shapes.fittings import WALL
+from echousd.shapes.fittings import PLAIN, WALL, Millwork
 from echousd.shapes.shell import THICKNESS
 from echousd.stage.paths import piece_name
 
+COVED = 2.5  # metres, height of rooms from which on there may be a cornice
 PARAPET = 1.05  # metres, height of a wall outdoors that nothing opens
 
 
@@ -49,7 +50,7 @@ class ShellPart:
 
 def walls(
     polygon: np.ndarray, height: float, openings: Sequence[Opening] = (), bare: frozenset[str] = frozenset(),
-    *, outdoor: bool = False, thickness: Sequence[float] = (),
+    *, outdoor: bool = False, thickness: Sequence[float] = (), millwork: Millwork = PLAIN,
 ) -> list[ShellPart]:  # fmt: skip
     """`Wall_1` ... for the edges of the floor, with skirting, and a part for every door and window in it.
 
@@ -59,15 +60,16 @@ def walls(
         openings: in these walls. bare: names of the windows that have no curtain rail.
         outdoor: walls without an opening are parapets.
         thickness: of the wall along each edge, metres; those of a home, which has other rooms behind them.
+        millwork: how doors, windows and mouldings are made.
     """
     corners = np.ascontiguousarray(polygon, float)
-    return list(_walls(corners.tobytes(), height, tuple(openings), bare, outdoor, tuple(thickness)))
+    return list(_walls(corners.tobytes(), height, tuple(openings), bare, outdoor, tuple(thickness), millwork))
 
 
 @lru_cache(maxsize=4)  # furniture is moved away from them before they are written
 def _walls(
     corners: bytes, height: float, openings: tuple[Opening, ...], bare: frozenset[str], outdoor: bool,
-    thickness: tuple[float, ...],
+    thickness: tuple[float, ...], millwork: Millwork,
 ) -> tuple[ShellPart, ...]:  # fmt: skip
     polygon = np.frombuffer(corners).reshape(-1, 2)
     lengths = edge_lengths(polygon)
@@ -81,14 +83,17 @@ def _walls(
         frame = wall_frame(polygon, edge)
         tall = min(height, PARAPET) if outdoor and not here else height
         pieces = [Piece(piece_name(name, "mesh"), "wall", _placed(_wall(polygon, edge, tall, here, deep), frame))]
-        boards = fittings.skirting(here, float(length))
+        boards = fittings.skirting(here, float(length), millwork.skirting)
         if boards is not None:
             pieces.append(Piece(piece_name(name, "skirting"), "trim", _placed(boards, frame), solid=False))
+        if millwork.cornice and tall == height >= COVED:
+            coving = _cornice(polygon, edge, height, millwork.cornice)
+            pieces.append(Piece(piece_name(name, "cornice"), "trim", coving, solid=False))
         left_first = signed_area(polygon) > 0
         inner = [
             _filled(
                 name, opening, frame, float(length), 0.0 if opening.name in bare else height, left_first,
-                float(deep[edge]), both=not thickness,
+                float(deep[edge]), millwork, both=not thickness,
             )
             for opening in here
         ]  # fmt: skip
@@ -156,9 +161,22 @@ def _wall(
     return mesh
 
 
+def _cornice(polygon: np.ndarray, edge: int, height: float, tall: float) -> trimesh.Trimesh:
+    """A moulding of two steps in the corner of a wall and the ceiling, mitred with those of the walls beside it."""
+    inner, steps = outline(polygon, [-0.6 * tall] * len(polygon)), []
+    for share, low in ((1.0, 0.5 * tall), (0.5, tall)):
+        last = (edge + 1) % len(polygon)
+        near = [polygon[k] + share * (inner[k] - polygon[k]) for k in (last, edge)]
+        flat = shapely.Polygon(np.array([polygon[edge], polygon[last], *near]) * (1, -1))
+        step = trimesh.creation.extrude_polygon(flat, low - 0.5 * tall * (share < 1))
+        step.vertices = step.vertices[:, [0, 2, 1]] * (1, 1, -1) + (0, height - low, 0)
+        steps.append(step)
+    return fittings.joined(steps)
+
+
 def _filled(
     wall: str, opening: Opening, frame: np.ndarray, length: float, height: float, left_first: bool, deep: float,
-    *, both: bool,
+    millwork: Millwork, *, both: bool,
 ) -> ShellPart:  # fmt: skip
     """What stands in an opening; passages have a frame and nothing else.
 
@@ -171,7 +189,7 @@ def _filled(
 
     if opening.kind == "window":
         pieces = (
-            *made("frame", "trim", fittings.window_frame(opening)),
+            *made("frame", "trim", fittings.window_frame(opening, millwork.window)),
             *made("glass", "glass", fittings.window_glass(opening)),
             *made("sill", "trim", fittings.window_sill(opening)),
             *made("rail", "rail", fittings.curtain_rail(opening, length, height), solid=False),
@@ -179,10 +197,14 @@ def _filled(
         return ShellPart(name, "window", pieces)
     if opening.kind != "door":
         return ShellPart(name, "door", made("frame", "trim", fittings.door_frame(opening, deep, both=both)))
-    leaf = made("leaf", "door_leaf", fittings.door_leaf(opening, deep))
+    leaf = made("leaf", "door_leaf", fittings.door_leaf(opening, deep, millwork.door))
+    if millwork.door == "glazed":
+        leaf += made("pane", "glass", fittings.door_glass(opening, deep), solid=False)
     handle = made("handle", "rail", fittings.door_handle(opening, left_first, deep), solid=False)
     hinge = ShellPart(piece_name(name, "hinge"), "", (*leaf, *handle), joint=_hinge(opening, frame, left_first, deep))
-    return ShellPart(name, "door", made("frame", "trim", fittings.door_frame(opening, deep, both=both)), (hinge,))
+    frames = made("frame", "trim", fittings.door_frame(opening, deep, both=both))
+    switch = made("switch", "trim", fittings.light_switch(opening, left_first, length), solid=False)
+    return ShellPart(name, "door", (*frames, *switch), (hinge,))
 
 
 def _hinge(opening: Opening, frame: np.ndarray, left_first: bool, deep: float) -> Joint:

@@ -30,6 +30,7 @@ PATTERNS: Mapping[str, Callable[[], Relief]] = {
         patterns.wood, patterns.veneer, patterns.planks, patterns.woven, patterns.knitted, patterns.linen,
         patterns.leather, patterns.plaster, patterns.wicker, patterns.leaf, patterns.stone, patterns.papered,
         patterns.carpet, patterns.tiles, patterns.brushed, patterns.bound,
+        patterns.herringbone, patterns.terrazzo, patterns.boarded, patterns.brick,
     )
 } | {material: partial(woven, *woven_in) for material, woven_in in RUGS.items()}  # fmt: skip
 QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours

@@ -79,6 +79,63 @@ def planks(rows: int = 8) -> Relief:
     return Relief(tone / tone.mean(), -0.0006 * gap, 0.06 * noise(23, 3.0, 40.0) + 0.2 * gap)
 
 
+def herringbone(length: int = 4) -> Relief:
+    """Blocks of `length` times their width, at right angles to one another."""
+    cell = SIZE // (2 * length)
+    rng, base = np.random.default_rng(6), wood(21, 6, 0.9).tone
+    rows, columns = np.indices((SIZE, SIZE))
+    i, j = columns // cell, rows // cell
+    step = (i - j) % (2 * length)
+    lies = step < length
+    first = np.where(
+        lies, (i - step) % (2 * length) + 2 * length * j, i + 2 * length * ((j + step - length) % (2 * length))
+    )
+    own = rng.normal(1.0, 0.06, (2, first.max() + 1))[lies.astype(int), first]
+    shift = rng.integers(SIZE, size=first.max() + 1)[first]
+    along, across = np.where(lies, columns, rows), np.where(lies, rows, columns)
+    tone = base[(across + shift) % SIZE, (along + 2 * shift) % SIZE] * own
+    ends = np.where(lies, step == 0, step == 2 * length - 1) & (along % cell == 0)
+    gap = ((across % cell == 0) | ends).astype(float)
+    tone = tone * (1 - 0.35 * gap)
+    return Relief(tone / tone.mean(), -0.0006 * gap, 0.2 * gap)
+
+
+def terrazzo(chips: int = 900) -> Relief:
+    """Chips of stone in cement, ground flat."""
+    rng = np.random.default_rng(7)
+    places, radius = rng.uniform(0, SIZE, (chips, 2)), rng.uniform(1.5, 8.0, chips)
+    pixels = np.indices((SIZE, SIZE)).reshape(2, -1).T
+    warped = (pixels + 2.5 * np.stack([noise(seed, 24.0, 24.0, 4.0).ravel() for seed in (8, 9)], 1)) % SIZE
+    away, nearest = cKDTree(places, boxsize=SIZE).query(warped, distance_upper_bound=12.0)
+    chip = away < np.append(radius, 0.0)[nearest]
+    hues = np.array([(0.72, 0.70, 0.68), (1.12, 1.10, 1.06), (0.98, 0.80, 0.66), (0.86, 0.90, 0.86)])
+    tone = np.where(chip[:, None], hues[rng.integers(len(hues), size=chips + 1)[nearest]], 1.0).reshape(SIZE, SIZE, 3)
+    return Relief(tone / tone.mean((0, 1)))
+
+
+def boarded(boards: int = 8) -> Relief:
+    """Painted boards side by side, upright, with a groove between them."""
+    u, v = _grid()
+    apart = np.abs((boards * u + 0.5) % 1.0 - 0.5) + 0 * v
+    groove = np.clip(1 - apart / 0.035, 0, 1)
+    tone = 1 - 0.28 * groove
+    return Relief(tone / tone.mean(), -0.004 * groove)
+
+
+def brick(rows: int = 16, across: int = 4) -> Relief:
+    """Stretchers in running bond, each of a tone of its own, with pale joints."""
+    u, v = _grid()
+    row = np.floor(rows * v).astype(int)
+    place = across * u + 0.5 * (row % 2)
+    edge = np.minimum(np.abs((place + 0.5) % 1.0 - 0.5) / across, np.abs((rows * v + 0.5) % 1.0 - 0.5) / rows + 0 * u)
+    joint = np.clip(1.6 - edge / 0.005, 0, 1)
+    own = np.random.default_rng(10).normal(1.0, 0.1, (rows, across))[row, np.floor(place).astype(int) % across]
+    grain = noise(11, 60.0, 60.0)
+    tone = ((own + 0.05 * grain) * (1 - joint) + 1.35 * joint)[..., None] * np.ones(3)
+    tone[..., 1:] += joint[..., None] * (0.3, 0.5)  # mortar is no red
+    return Relief(tone / tone.mean((0, 1)), 0.0006 * grain * (1 - joint) - 0.004 * joint, 0.1 * joint)
+
+
 def woven(threads: int = 64) -> Relief:
     """Plain weave, flecked."""
     u, v = _grid()

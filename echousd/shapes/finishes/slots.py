@@ -71,8 +71,13 @@ SLOTS: Mapping[str, Slot] = {
     "floor": Slot("floor", 0.5, "planks", 1.6, material="wood"),
     "carpet": Slot("curtain", 0.97, "carpet", 1.6, mix=("8d8376", 0.35), material="wool"),
     "tiles": Slot("floor", 0.3, "tiles", 1.6, mix=("e6e1d8", 0.65), material="ceramic"),
+    "herringbone": Slot("floor", 0.45, "herringbone", 0.9, material="wood"),
+    "terrazzo": Slot("ceramic", 0.25, "terrazzo", 1.2, mix=("e6e1d8", 0.5), material="stone"),
     "wall_tiles": Slot("wall", 0.2, "tiles", 0.8, mix=("f2f0ea", 0.6), material="ceramic"),
     "wall": Slot("wall", 0.92, "plaster", 1.4, material="plaster"),
+    "paint": Slot("cloth", 0.92, "plaster", 1.4, mix=("ece7dd", 0.4), material="plaster"),
+    "boarding": Slot("wall", 0.6, "boarded", 1.0, mix=("8f9a94", 0.12), material="wood"),
+    "brick": Slot("a8745c", 0.95, "brick", 1.0),
     "wallpaper": Slot("wall", 0.9, "papered", 1.4, mix=("8f9a94", 0.22), material="paper"),
 }
 SECOND = {"wood": "wood2", "cloth": "cloth2", "accent": "blanket"}  # what every other style group takes instead

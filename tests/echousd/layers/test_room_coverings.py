@@ -12,7 +12,7 @@ from small_room import StandIn, small_graph
 import echousd
 from echomodel.boxes import Boxes
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.layers.coverings import covered_walls, floor_slot, papered_wall
+from echousd.layers.coverings import COVERS, covered_walls, floor_slot
 from echousd.options import RoomOptions
 from echousd.room import Provenance
 
@@ -28,17 +28,17 @@ def seeded(room, seed):
     return replace(room, provenance=Provenance(seed=seed))
 
 
-def test_about_a_third_of_the_bedrooms_has_carpet_and_a_third_paper(room):
-    floors = [floor_slot(seeded(room, seed)) for seed in range(90)]
-    papers = [papered_wall(seeded(room, seed)) for seed in range(90)]
-    assert set(floors) == {"floor", "carpet"}
-    assert 18 < floors.count("carpet") < 42
-    assert 18 < 90 - papers.count("") < 42
-    assert len(set(papers)) == 2  # none, and the one behind the bed
-    assert (
-        papered_wall(replace(seeded(room, papers.index(max(papers))), options=RoomOptions(walls=False, dress="none")))
-        == ""
-    )
+def test_floors_and_the_wall_behind_the_bed_differ_from_room_to_room(room):
+    floors = [floor_slot(seeded(room, seed)) for seed in range(120)]
+    covers = [covered_walls(seeded(room, seed)) for seed in range(120)]
+    assert set(floors) == {"floor", "herringbone", "carpet"}
+    assert 24 < floors.count("carpet") < 56
+    assert 14 < floors.count("herringbone") < 42
+    assert {slot for cover in covers for slot in cover.values()} == {*COVERS} - {""}
+    assert 48 < covers.count({}) < 84
+    assert len({wall for cover in covers for wall in cover}) == 1  # the one behind the bed
+    papered = next(seed for seed, cover in enumerate(covers) if cover)
+    assert covered_walls(replace(seeded(room, papered), options=RoomOptions(walls=False, dress="none"))) == {}
 
 
 @pytest.mark.parametrize(("x", "wall"), [(2.0, "Wall_5"), (-2.0, "Wall_1")])
@@ -46,19 +46,22 @@ def test_of_two_walls_in_line_that_behind_the_bed_has_paper(room, x, wall):
     corners = ((-3, -3), (-1, -3), (-1, 0), (1, 0), (1, -3), (3, -3), (3, 3), (-3, 3))
     graph = SceneGraph(RoomSpec("bedroom", floor_polygon=corners), (Node("bed", "double_bed"),), ())
     boxes = Boxes(torch.tensor([[1.8, 0.5, 2.0]]), torch.tensor([[x, 0.0, -2.0]]), torch.zeros(1))
-    papered = {papered_wall(replace(seeded(room, seed), graph=graph, boxes=boxes)) for seed in range(12)}
-    assert papered == {"", wall}
+    covered = [covered_walls(replace(seeded(room, seed), graph=graph, boxes=boxes)) for seed in range(12)]
+    assert {name for cover in covered for name in cover} == {wall}
 
 
 def test_coverings_are_bound_and_have_their_images(room, tmp_path):
-    seed = next(s for s in range(99) if papered_wall(seeded(room, s)) and floor_slot(seeded(room, s)) == "carpet")
+    seed = next(
+        s for s in range(999)
+        if "wallpaper" in covered_walls(seeded(room, s)).values() and floor_slot(seeded(room, s)) == "carpet"
+    )  # fmt: skip
     root = seeded(room, seed).save(tmp_path / "bedroom", preview=False)
     stage = Usd.Stage.Open(str(root))
 
     def look(path):
         return UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(path)).ComputeBoundMaterial()[0].GetPrim().GetName()
 
-    wall = papered_wall(seeded(room, seed))
+    (wall,) = covered_walls(seeded(room, seed))
     assert look(f"/Room/Shell/{wall}/{wall}_mesh") == "wallpaper"
     assert look(f"/Room/Shell/{wall}/{wall}_skirting") == "trim"
     others = [f"Wall_{n}" for n in range(1, 5) if f"Wall_{n}" != wall]
@@ -80,5 +83,4 @@ def test_where_it_is_wet_there_are_tiles(room):
     assert covered_walls(bath) == {f"Wall_{n}": "wall_tiles" for n in range(1, 5)}
     assert covered_walls(wet(room, "kitchen", "hob_unit")) == {"Wall_1": "wall_tiles"}  # behind the run alone
     assert covered_walls(wet(room, "bathroom", "toilet", walls=False)) == {}
-    assert {floor_slot(seeded(bath, seed)) for seed in range(9)} == {"tiles"}
-    assert set(covered_walls(seeded(room, 0)).values()) <= {"wallpaper"}
+    assert {floor_slot(seeded(bath, seed)) for seed in range(9)} == {"tiles", "terrazzo"}

@@ -16,6 +16,7 @@ from echousd.checks.mesh_rules import extents
 from echousd.checks.reading import Reading
 from echousd.graph import RoomSpec
 from echousd.options import RoomOptions
+from echousd.shapes.fittings import DOORS, WINDOWS, Millwork, millwork_of
 from echousd.shapes.walls import WALL, ceiling, outline, walls
 
 NOTCHED = np.array([(0, 0), (1, 0), (1, 1), (4, 1), (4, 3), (0, 3)], float)
@@ -61,6 +62,39 @@ def test_the_handle_is_away_from_the_hinges() -> None:
         door = Opening("door", "door", 0, 1.0, 0.9, 2.0, hinge=hinge)
         handle = pieces(walls(rectangle(4.0, 3.0), 2.6, (door,)))["Wall_1_door_handle"].bounds.mean(0)
         assert side * (handle[0] - (-2.0 + 1.45)) > 0.15
+
+
+@pytest.mark.parametrize("polygon", [rectangle(4.0, 3.0), rectangle(4.0, 3.0)[::-1].copy()], ids=["right", "left"])
+@pytest.mark.parametrize("window", WINDOWS)
+@pytest.mark.parametrize("door", DOORS)
+def test_millwork_of_every_kind_is_closed_and_stays_in_its_holes(polygon, window, door) -> None:
+    made = pieces(walls(polygon, 2.6, (DOOR, WINDOW), millwork=Millwork(window, door, 0.1, 0.09)))
+    assert all(mesh.is_watertight and mesh.volume > 0 for mesh in made.values())
+    frame, glass = made["Wall_1_window_frame"], made["Wall_1_window_glass"]
+    np.testing.assert_allclose(np.ptp(frame.bounds, axis=0)[:2], (WINDOW.width, WINDOW.height), atol=1e-6)
+    share = frame.volume / 0.06 / (WINDOW.width * WINDOW.height)
+    assert 0.1 < share < 0.45
+    plain = pieces(walls(polygon, 2.6, (DOOR, WINDOW)))["Wall_1_window_frame"]
+    assert frame.volume == plain.volume if window == "plain" else frame.volume > 1.02 * plain.volume
+    assert glass.volume > 0
+    assert ("Wall_3_door_pane" in made) == (door == "glazed")
+    leaf = made["Wall_3_door_leaf"]
+    assert leaf.bounds[1, 1] < DOOR.height
+    assert np.ptp(leaf.bounds, axis=0)[2] < 0.06
+    corner = made["Wall_1_cornice"].bounds
+    assert corner[1, 1] == pytest.approx(2.6)
+    assert np.ptp(corner, axis=0) == pytest.approx((4.0, 0.09, 0.054))
+    switch, handle = made["Wall_3_door_switch"].bounds.mean(0), made["Wall_3_door_handle"].bounds.mean(0)
+    hinge = leaf.bounds.mean(0) * 2 - handle
+    assert abs(switch[0] - handle[0]) < abs(switch[0] - hinge[0])
+
+
+def test_rooms_of_other_seeds_have_other_millwork_and_private_ones_no_glass_in_their_doors() -> None:
+    drawn = [millwork_of(seed) for seed in range(60)]
+    assert {one.window for one in drawn} == {*WINDOWS}
+    assert {one.door for one in drawn} == {*DOORS}
+    assert "glazed" not in {millwork_of(seed, private=True).door for seed in range(60)}
+    assert millwork_of(3) == millwork_of(3)
 
 
 def test_ceiling_lies_on_the_walls() -> None:
