@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdPhysics
 
-from echomodel.triangles import area_normals
+from echomodel.triangles import area_normals, cross
 from echousd.checks.findings import UNREADABLE, Finding, rule
 from echousd.checks.geometry_rules import of_others
 from echousd.checks.reading import Reading
 from echousd.stage.layouts import ARTICULATION
-from echousd.stage.values import MeshArrays, array
+from echousd.stage.values import array
 
 THIN = 1e-9  # area of a triangle in shares of the square of its longest side that is none
 UNIT = 0.05  # how far the length of a normal may be from 1
@@ -39,11 +39,11 @@ def mesh_indices(_reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
 def degenerate(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[Finding]:
     """No face uses a point twice or has no area; models of others may, in few faces."""
     arrays = reading.mesh(mesh)
-    triangles = arrays.indices[corners_of(arrays)]
-    twice = (triangles == np.roll(triangles, 1, axis=1)).any(1)
+    triangles = arrays.indices[reading.corners(mesh)]
+    twice = (triangles == triangles[:, [2, 0, 1]]).any(1)
     corners = arrays.points[triangles]
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(1)
-    flat = twice | (np.linalg.norm(area_normals(corners), axis=1) <= THIN * sides**2)
+    sides = ((corners - corners[:, [2, 0, 1]]) ** 2).sum(2).max(1, initial=0.0)  # squares
+    flat = twice | ((area_normals(corners) ** 2).sum(1) <= (THIN * sides) ** 2)
     if flat.any():
         told = f"{int(flat.sum())} of {len(flat)} triangles have no area"
         yield Finding(mesh.GetPath(), told, warning=not twice.any() or of_others(mesh.GetPrim()))
@@ -72,7 +72,7 @@ def normals(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     if reach:
         yield f"primvars:normals:indices reach {reach}"
         return
-    found = _normals(mesh)
+    found = reading.once("normals", mesh.GetPrim(), lambda: _normals(mesh))
     if found is None:
         return
     values, interpolation = found
@@ -168,33 +168,24 @@ def _placed(prim: Usd.Prim, above: Usd.Prim) -> bool:
 def winding(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     """Faces turn outwards: closed surfaces enclose a positive volume, and faces agree with their normals."""
     arrays = reading.mesh(mesh)
-    faces = corners_of(arrays)
+    faces = reading.corners(mesh)
     if not len(faces):
         return
     sign = -1.0 if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded else 1.0
     triangles = arrays.points[arrays.indices[faces]]
     if _closed(arrays.indices[faces]):
         a, b, c = np.moveaxis(triangles - triangles.mean((0, 1)), 1, 0)
-        if sign * float((a * np.cross(b, c)).sum()) < 0:
+        if sign * float((a * cross(b, c)).sum()) < 0:
             yield "closed and turned inside out: its faces wind the wrong way round"
             return
-    found = _normals(mesh)
+    found = reading.once("normals", mesh.GetPrim(), lambda: _normals(mesh))
     if found is None or found[1] != UsdGeom.Tokens.faceVarying or len(found[0]) != len(arrays.indices):
         return
-    cross = sign * area_normals(triangles)
-    against = (cross * found[0][faces].sum(1)).sum(1) < 0
-    area = np.linalg.norm(cross, axis=1)
+    turned = sign * area_normals(triangles)
+    against = (turned * found[0][faces].sum(1)).sum(1) < 0
+    area = np.linalg.norm(turned, axis=1)
     if area[against].sum() > AGAINST * area.sum() > 0:
         yield f"{area[against].sum() / area.sum():.0%} of its surface winds against its normals, allowed: outwards"
-
-
-def corners_of(arrays: MeshArrays) -> np.ndarray:
-    """(t, 3) int: fan triangles of the faces, as positions in the indices."""
-    first = np.cumsum(arrays.counts) - arrays.counts
-    fans = np.clip(arrays.counts - 2, 0, None)
-    start = np.repeat(first, fans)
-    step = np.arange(len(start)) - np.repeat(np.cumsum(fans) - fans, fans)
-    return np.stack([start, start + step + 1, start + step + 2], 1)
 
 
 def _normals(mesh: UsdGeom.Mesh) -> tuple[np.ndarray, str] | None:

@@ -106,6 +106,10 @@ class Reading:
         """Points and faces of a mesh; raises StageError or Tf.ErrorException where they cannot be read."""
         return self.once("mesh", mesh.GetPrim(), lambda: mesh_arrays(mesh))
 
+    def corners(self, mesh: UsdGeom.Mesh) -> np.ndarray:
+        """(t, 3) int: fan triangles of a mesh's faces, as positions in its indices; raises as `mesh` does."""
+        return self.once("corners", mesh.GetPrim(), lambda: corners_of(self.mesh(mesh)))
+
     def is_guide(self, prim: Usd.Prim) -> bool:
         """Whether a prim is there for tools rather than for the eye (purpose guide or proxy)."""
         return self.once("guide", prim, lambda: UsdGeom.Imageable(prim).ComputePurpose() in HIDDEN)
@@ -116,6 +120,17 @@ class Reading:
         if key not in self._kept:
             self._kept[key] = read()
         return self._kept[key]  # type: ignore[return-value]
+
+
+def corners_of(arrays: MeshArrays) -> np.ndarray:
+    """(t, 3) int: fan triangles of the faces, as positions in the indices."""
+    if (arrays.counts == 3).all():
+        return np.arange(len(arrays.indices)).reshape(-1, 3)
+    first = np.cumsum(arrays.counts) - arrays.counts
+    fans = np.clip(arrays.counts - 2, 0, None)
+    start = np.repeat(first, fans)
+    step = np.arange(len(start)) - np.repeat(np.cumsum(fans) - fans, fans)
+    return np.stack([start, start + step + 1, start + step + 2], 1)
 
 
 def below(prim: Usd.Prim) -> list[Usd.Prim]:

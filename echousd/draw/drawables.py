@@ -205,7 +205,7 @@ def _corner_values(
         found, interpolation = values.given(attribute), mesh.GetNormalsInterpolation()
     else:
         return None
-    table = values.numbers(found, width, values.owner(attribute))
+    table = values.numbers(found, width, attribute)
     if interpolation == UsdGeom.Tokens.faceVarying and len(table) == len(index):
         return table[corner]
     if interpolation in (UsdGeom.Tokens.vertex, UsdGeom.Tokens.varying) and len(table) == points:

@@ -31,8 +31,9 @@ class MeshArrays:
     indices: np.ndarray
 
 
-def owner(attribute: Usd.Attribute) -> str:
+def owner(attribute: Usd.Attribute | None) -> str:
     """`file: <prim path>: attribute` for error messages."""
+    assert attribute is not None
     return f"{source(attribute.GetStage())}: <{attribute.GetPrimPath()}>: {attribute.GetName()}"
 
 
@@ -64,25 +65,24 @@ def array(attribute: Usd.Attribute | None, width: int = 1, *, whole: bool = Fals
     Raises StageError for other types, NaN, infinities and numbers beyond `LARGEST`.
     """
     found = given(attribute)
-    missing = found is None or attribute is None
-    return numbers([], width, "", whole=whole) if missing else numbers(found, width, owner(attribute), whole=whole)
+    return numbers([] if found is None else found, width, attribute, whole=whole)
 
 
-def numbers(found: Any, width: int, where: str, *, whole: bool = False) -> np.ndarray:
-    """What `array` gives, of a value that was read already; `where` stands in the error."""
-    allowed = f"a list of {'whole numbers' if whole else 'numbers' if width == 1 else f'{width} numbers each'}"
+def numbers(found: Any, width: int, attribute: Usd.Attribute | None, *, whole: bool = False) -> np.ndarray:
+    """What `array` gives, of a value of the attribute that was read already."""
     table = np.asarray(found) if hasattr(found, "__len__") and not isinstance(found, str) else np.asarray("")
     kinds = "iu" if whole else "iuf"
     right = table.ndim == (1 if width == 1 else 2) and (width == 1 or table.shape[1] == width)
     if len(table.shape) and not table.size and not isinstance(found, tuple):
         table, right = np.zeros((0,) if width == 1 else (0, width), np.int64 if whole else np.float64), True
     if not right or table.dtype.kind not in kinds:
-        raise StageError(f"{where} is {shown(found)}, allowed: {allowed}")
+        allowed = f"a list of {'whole numbers' if whole else 'numbers' if width == 1 else f'{width} numbers each'}"
+        raise StageError(f"{owner(attribute)} is {shown(found)}, allowed: {allowed}")
     if not whole:
         table = table.astype(np.float64)
         bad = ~(np.abs(table) <= LARGEST)
         if bad.any():
-            raise StageError(f"{where} holds {table[bad][0]:g}, allowed: -{LARGEST:g} to {LARGEST:g}")
+            raise StageError(f"{owner(attribute)} holds {table[bad][0]:g}, allowed: -{LARGEST:g} to {LARGEST:g}")
         return table
     return table.astype(np.int64)
 
