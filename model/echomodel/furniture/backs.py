@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.furniture.carpentry import base, box, cushion, leg, of_role, top
+from echomodel.furniture.carpentry import base, both, box, cushion, leg, of_role, top
 from echomodel.furniture.solids import Block, Solid, ball, rotation
 from echomodel.furniture.style import Style
 
@@ -33,14 +33,7 @@ def leaning(low: tuple, high: tuple, rake: float, pivot_y: float, pivot_z: float
 
 
 def back_rest(
-    style: Style,
-    kind: str,
-    w: float,
-    y0: float,
-    y1: float,
-    z: float,
-    thick: float,
-    rake: float,
+    style: Style, kind: str, w: float, y0: float, y1: float, z: float, thick: float, rake: float
 ) -> list[Solid]:
     """The back of a chair from the seat's height y0 up to y1, its foot on the plane z, leaning back by `rake`."""
     return of_role("back", _back(style, kind, w, y0, y1, z, thick, rake))
@@ -59,26 +52,20 @@ def _back(style: Style, kind: str, w: float, y0: float, y1: float, z: float, thi
         return [lean(-a, a, -0.05, 1, t, radius=t * 0.45 * (0.4 + 0.6 * style.softness), material="fabric")]
     if kind == "panel":
         if style.softness > 0.5:
-            return [
-                lean(-a, a, 0.12, 1, 0.05, radius=0.022, material="fabric"),
-                *[lean(s * a * 0.8 - post / 2, s * a * 0.8 + post / 2, -0.1, 0.4, post) for s in (-1, 1)],
-            ]
+            soft = lean(-a, a, 0.12, 1, 0.05, radius=0.022, material="fabric")
+            return [soft, *both(lean(a * 0.8 - post / 2, a * 0.8 + post / 2, -0.1, 0.4, post))]
         behind = max(0.0, post * 0.4 - 0.01)  # stiles thicker than the board stand out behind it, not before it
-        stiles = [lean(s * (a - post) - post / 2, s * (a - post) + post / 2, -0.1, 0.5, post * 0.8) for s in (-1, 1)]
-        return [
-            lean(-a, a, 0.0 if style.contrast < 0.5 else 0.3, 1, 0.025, radius=0.01),
-            *[replace(one, centre=one.centre - [0, 0, behind]) for one in stiles],
-        ]
+        stile = lean(a - post - post / 2, a - post + post / 2, -0.1, 0.5, post * 0.8)
+        board = lean(-a, a, 0.0 if style.contrast < 0.5 else 0.3, 1, 0.025, radius=0.01)
+        return [board, *both(replace(stile, centre=stile.centre - [0, 0, behind]))]
     if kind == "oval":
         t = 0.05
-        stems: list[Solid] = [lean(s * a * 0.45 - post / 2, s * a * 0.45 + post / 2, -0.1, 0.4, post) for s in (-1, 1)]
+        stems = both(lean(a * 0.45 - post / 2, a * 0.45 + post / 2, -0.1, 0.4, post))
         middle = y0 + length * 0.62
         turn = rotation(x=-rake)
         centre = turn @ np.array([0, middle - y0, 0]) + [0, y0, z]
         return [*stems, ball(centre, (a * 0.95, length * 0.4, t / 2), "fabric", power=2.6, turn=turn)]
-    posts: list[Solid] = [
-        lean(s * (a - post / 2) - post / 2, s * (a - post / 2) + post / 2, -0.08, 1, post) for s in (-1, 1)
-    ]
+    posts = both(lean(a - post / 2 - post / 2, a - post / 2 + post / 2, -0.08, 1, post))
     rail = 0.1 + 0.12 * style.contrast
     if kind == "frame":
         posts += [lean(-a, a, 1 - rail, 1, post * 0.8), lean(-a, a, 0.2, 0.2 + rail * 0.6, post * 0.8)]
@@ -104,10 +91,7 @@ def chair_legs(style: Style, w: float, d: float, h: float, thick: float, *, tie:
 
 def slim_arms(w: float, d: float, seat: float, h: float, style: Style, thick: float) -> list[Solid]:
     y = seat + min(0.22, (h - seat) * 0.55)
-    z0, z1 = -d * 0.4, d * 0.34
-    parts: list[Solid] = []
-    for s in (-1, 1):
-        x = s * (w / 2 - thick)
-        parts.append(box((x - thick * 0.8, y - thick, z0), (x + thick * 0.8, y, z1), "wood", 0.008))
-        parts.append(leg((x, seat - 0.08, z1 - thick), (x, y - thick * 0.5, z1 - thick), thick, style))
-    return of_role("arm", parts)
+    x, z0, z1 = w / 2 - thick, -d * 0.4, d * 0.34
+    rest = box((x - thick * 0.8, y - thick, z0), (x + thick * 0.8, y, z1), "wood", 0.008)
+    stay = leg((x, seat - 0.08, z1 - thick), (x, y - thick * 0.5, z1 - thick), thick, style)
+    return of_role("arm", both(rest, stay))

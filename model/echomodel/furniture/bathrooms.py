@@ -6,11 +6,12 @@ Heights and places after VDI 6000: seats at 0.42 m, basins at 0.85 m, showers fr
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, around, box, of_role, post
+from echomodel.furniture.carpentry import Size, around, both, box, of_role, post
 from echomodel.furniture.fronts import front
 from echomodel.furniture.kitchens import spout
 from echomodel.furniture.solids import Solid, bent, rotation, tube, turned
@@ -19,6 +20,7 @@ from echomodel.furniture.style import Choices, Style
 SEAT = 0.42  # metres
 GLASS = 0.008  # metres
 TAP = 0.13  # metres over a rim
+enamelled = partial(turned, power=2.6, material="enamel")
 
 
 def toilet(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -31,25 +33,9 @@ def toilet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     middle, half = (z0 + d / 2) / 2, (d / 2 - z0) / 2
     tank = (w / 2, h) if hung else (0.46 * w, h)
     low = 0.1 if hung else 0.0
-    bowl = turned(
-        (0, low, middle - 0.02),
-        (0.27 * w, 0.6 * half),
-        seat - 0.03 - low,
-        (0.46 * w, half - 0.01),
-        power=2.6,
-        material="enamel",
-        role="bowl",
-    )
-    lid = turned(
-        (0, seat - 0.032, middle),
-        (0.48 * w, half),
-        0.032,
-        (0.47 * w, half),
-        power=2.6,
-        rounding=0.008,
-        material="enamel",
-        role="lid",
-    )
+    bowl = enamelled((0, low, middle - 0.02), (0.27 * w, 0.6 * half), seat - 0.03 - low, (0.46 * w, half - 0.01),
+                     role="bowl")  # fmt: skip
+    lid = enamelled((0, seat - 0.032, middle), (0.48 * w, half), 0.032, (0.47 * w, half), rounding=0.008, role="lid")
     plate = box((-0.1, h - 0.1, z0 - 0.003), (0.1, h - 0.03, z0 + 0.008), "metal", 0.003, "plate")
     if not hung:
         plate = box((-0.03, h - 0.004, -d / 2 + 0.06), (0.03, h + 0.006, -d / 2 + 0.12), "metal", 0.003, "button")
@@ -74,11 +60,8 @@ def washbasin(size: Size, style: Style, choices: Choices) -> list[Solid]:
     foot = 0.25 if choices.chance("raised", 0.6) else 0.08
     x, z = w / 2 - 0.02, d / 2 - 0.05
     body = box((-x, foot, -d / 2), (x, h - thick + 0.004, z), "wood", 0.0, "body")
-    legs = [
-        post(sx, sz, 0.015, 0, foot + 0.004, "metal", 0.0, "leg")
-        for sx in (0.05 - x, x - 0.05)
-        for sz in (0.06 - d / 2, z - 0.05)
-    ]
+    ends = 0.06 - d / 2, z - 0.05
+    legs = both(*(post(x - 0.05, end, 0.015, 0, foot + 0.004, "metal", 0.0, "leg") for end in ends))
     kind, rows, columns = ("drawer", 2, 1) if choices.chance("front", 0.6) else ("door", 1, 2 if w > 0.6 else 1)
     return [*rim, body, *legs, *front((-x, foot), (x, h - thick), z, rows, columns, kind, style)]
 
@@ -93,9 +76,7 @@ def shower(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts.append(box((x - 0.02, tray - 0.002, -z), (x - 0.02 + GLASS, h, z - 0.012), "glass", 0.0, "pane"))
     if not choices.chance("kind", 0.3):  # else one walks in at its front
         parts.append(box((-x + 0.02, tray - 0.002, z - 0.02), (x - 0.02, h, z - 0.02 + GLASS), "glass", 0.0, "pane"))
-        grip = np.array(
-            [[-x + 0.12, 0.95, z - 0.015], [-x + 0.12, 0.95, z], [-x + 0.12, 1.2, z], [-x + 0.12, 1.2, z - 0.015]]
-        )
+        grip = [[-x + 0.12, y, at] for y, at in ((0.95, z - 0.015), (0.95, z), (1.2, z), (1.2, z - 0.015))]
         parts.append(tube(grip, 0.007, "metal", "handle"))
     top = h - 0.08
     rail = np.array([[0, 0.95, -z + 0.03], [0, top, -z + 0.03], [0, top + 0.03, -z + 0.1], [0, top + 0.02, -0.1 * d]])
@@ -115,19 +96,9 @@ def bathtub(size: Size, style: Style, choices: Choices) -> list[Solid]:
     x, z = w / 2 - wall, d / 2 - wall
     taps = spout(0.42 * w - wall, h, -d / 2 + 0.035, TAP, 0.14)
     if choices.chance("kind", 0.3):
-        shell = turned(
-            (0, 0, 0), (0.42 * w, 0.4 * d), floor, (w / 2, d / 2), power=2.6, material="enamel", role="shell"
-        )
-        half = bent(
-            (0, floor - 0.004, 0),
-            (w / 2, d / 2),
-            wall,
-            h - floor,
-            h - floor,
-            power=2.6,
-            material="enamel",
-            role="shell",
-        )
+        shell = enamelled((0, 0, 0), (0.42 * w, 0.4 * d), floor, (w / 2, d / 2), role="shell")
+        half = bent((0, floor - 0.004, 0), (w / 2, d / 2), wall, h - floor, h - floor, power=2.6, material="enamel",
+                    role="shell")  # fmt: skip
         return [shell, half, replace(half, turn=rotation(y=np.pi)), *spout(0.0, h, wall / 2 - d / 2, TAP, 0.14)]
     base = box((-w / 2, 0, -d / 2), (w / 2, floor, d / 2), "enamel", 0.0, "shell")
     rim = around((-w / 2, w / 2, -d / 2, d / 2), (-x, x, -z, z), floor - 0.004, h, "enamel", "shell", 0.012)
@@ -152,15 +123,12 @@ def towel_radiator(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Two uprights and rungs in groups, on brackets at the wall."""
     w, h, d = size
     x, z, rungs = w / 2 - 0.02, d / 2 - 0.02, max(6, round(h / 0.07))
-    parts: list[Solid] = [post(s * x, z, 0.02, 0, h, "enamel", 0.006, "upright") for s in (-1, 1)]
+    parts = both(post(x, z, 0.02, 0, h, "enamel", 0.006, "upright"))
     for number, y in enumerate(np.linspace(0.05, h - 0.05, rungs).tolist()):
         if number % 6 != 5:
-            points = np.array([[-x, y, z], [x, y, z]])
-            parts.append(tube(points, 0.011, "enamel", "rung"))
+            parts.append(tube([[-x, y, z], [x, y, z]], 0.011, "enamel", "rung"))
     for y in (0.12 * h, 0.88 * h):
-        parts += [
-            box((s * x - 0.012, y, -d / 2), (s * x + 0.012, y + 0.024, z), "metal", 0.0, "bracket") for s in (-1, 1)
-        ]
+        parts += both(box((x - 0.012, y, -d / 2), (x + 0.012, y + 0.024, z), "metal", 0.0, "bracket"))
     return parts
 
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, base, box, core, cushion, of_role, post
+from echomodel.furniture.carpentry import Size, base, both, box, core, cushion, four, of_role, post
 from echomodel.furniture.fronts import front
 from echomodel.furniture.solids import Block, Solid, ball, rotation, turned
 from echomodel.furniture.style import Choices, Style
@@ -28,31 +28,18 @@ def _headboard(style: Style, w: float, h: float, z: float) -> list[Solid]:
         return [box((-w / 2, 0.02, z), (w / 2, h, z + t * 0.7))]
     if kind == "channels":
         count = int(4 + 6 * style.tufting)
-        edges = np.linspace(-w / 2, w / 2, count + 1)
+        middle, tall, deep = (0.1 + h) / 2, (h - 0.1) / 2, t * 0.75
         return [
-            Block(
-                centre=np.array([(a + b) / 2, (0.1 + h) / 2, z + t * 0.75]),
-                half=np.array([(b - a) / 2, (h - 0.1) / 2, t * 0.75]),
-                radius=min((b - a) * 0.4, t * 0.7),
-                material="fabric",
-            )
-            for a, b in pairwise(edges)
-        ]
+            Block(np.array([(a + b) / 2, middle, z + deep]), material="fabric", radius=min((b - a) * 0.4, t * 0.7),
+                  half=np.array([(b - a) / 2, tall, deep]))
+            for a, b in pairwise(np.linspace(-w / 2, w / 2, count + 1))
+        ]  # fmt: skip
     if kind == "cushions":
+        low, high = (w * 0.25 - w * 0.23, h * 0.4, z + t * 0.4), (w * 0.25 + w * 0.23, h, z + t * 1.9)
         frame = box((-w / 2, 0.02, z), (w / 2, h * 0.85, z + t * 0.6))
-        turn = rotation(x=-0.1)
-        pads = [
-            cushion(
-                (s * w * 0.25 - w * 0.23, h * 0.4, z + t * 0.4),
-                (s * w * 0.25 + w * 0.23, h, z + t * 1.9),
-                style,
-                turn=turn,
-            )
-            for s in (-1, 1)
-        ]
-        return [frame, *pads]
+        return [frame, *both(cushion(low, high, style, turn=rotation(x=-0.1)))]
     if kind == "slats":
-        parts = [box((s * (w / 2 - 0.03) - 0.03, 0, z), (s * (w / 2 - 0.03) + 0.03, h, z + 0.06)) for s in (-1, 1)]
+        parts = both(box((w / 2 - 0.03 - 0.03, 0, z), (w / 2 - 0.03 + 0.03, h, z + 0.06)))
         parts += [
             box((-w / 2, h - 0.1, z), (w / 2, h, z + 0.05)),
             box((-w / 2, h * 0.45, z), (w / 2, h * 0.45 + 0.06, z + 0.05)),
@@ -63,9 +50,9 @@ def _headboard(style: Style, w: float, h: float, z: float) -> list[Solid]:
         return parts + [box((x - 0.025, h * 0.45, z + 0.01), (x + 0.025, h, z + 0.04)) for x in xs]
     if kind == "posts":
         r = 0.045 * style.bulk
-        parts = [turned((s * (w / 2 - r), 0, z + r), r, h - r, r * 0.8) for s in (-1, 1)]
-        parts += [ball((s * (w / 2 - r), h - r, z + r), r * 1.2) for s in (-1, 1)]
-        return [*parts, box((-w / 2 + r, 0.3, z + r * 0.6), (w / 2 - r, h * 0.86, z + r * 1.3), "wood")]
+        posts = both(turned((w / 2 - r, 0, z + r), r, h - r, r * 0.8))
+        knobs = both(ball((w / 2 - r, h - r, z + r), r * 1.2))
+        return [*posts, *knobs, box((-w / 2 + r, 0.3, z + r * 0.6), (w / 2 - r, h * 0.86, z + r * 1.3), "wood")]
     stuff = "fabric" if style.softness > 0.5 else "wood"
     arch = turned((0, h * 0.6, z), (w / 2, h * 0.4), t, power=2.4, turn=rotation(x=np.pi / 2), material=stuff)
     return [arch, box((-w / 2, 0.02, z + SET_BACK), (w / 2, h * 0.62, z + t - SET_BACK), stuff)]
@@ -77,39 +64,16 @@ def bedding(w: float, z0: float, z1: float, low: float, choices: Choices, style:
     parts: list[Solid] = [box((-w / 2, low, z0), (w / 2, low + thick, z1), "linen", 0.05, "mattress")]
     each = w / pillows
     for i in range(pillows):
-        x = -w / 2 + each * (i + 0.5)
-        parts.append(
-            ball(
-                (x, low + thick + 0.06, z0 + 0.26),
-                (min(each * 0.44, 0.38), 0.09, 0.22),
-                "linen",
-                "pillow",
-                power=2.8,
-                turn=rotation(x=-0.25),
-            )
-        )
+        place, half = (-w / 2 + each * (i + 0.5), low + thick + 0.06, z0 + 0.26), (min(each * 0.44, 0.38), 0.09, 0.22)
+        parts.append(ball(place, half, "linen", "pillow", power=2.8, turn=rotation(x=-0.25)))
     if choices.chance("cover", 0.75):
         start = z0 + (z1 - z0) * choices.between("spread", 0.28, 0.55)
         over = 0.02 + 0.05 * style.softness
-        parts.append(
-            box(
-                (-w / 2 - over, low + thick * 0.35, start),
-                (w / 2 + over, low + thick + 0.045, z1 + over * 0.5),
-                "blanket",
-                0.035,
-                "cover",
-            )
-        )
+        x, y, top = w / 2 + over, low + thick * 0.35, low + thick + 0.045
+        parts.append(box((-x, y, start), (x, top, z1 + over * 0.5), "blanket", 0.035, "cover"))
         fold = 0.1 + 0.08 * style.softness  # the sheet turned back over it
-        parts.append(
-            box(
-                (-w / 2 - over - 0.004, low + thick * 0.4, start - 0.01),
-                (w / 2 + over + 0.004, low + thick + 0.056, start + fold),
-                "linen",
-                0.03,
-                "cover",
-            )
-        )
+        x, y, top = x + 0.004, low + thick * 0.4, low + thick + 0.056
+        parts.append(box((-x, y, start - 0.01), (x, top, start + fold), "linen", 0.03, "cover"))
     return parts
 
 
@@ -135,20 +99,10 @@ def bed(size: Size, style: Style, choices: Choices, pillows: int) -> list[Solid]
     upholstered = style.softness > 0.5
     stuff, radius = ("fabric", 0.025) if upholstered else ("wood", 0.004 + 0.008 * style.edge)
     t = 0.07 if upholstered else 0.04
-    parts += [
-        box(
-            (s * frame / 2 - t * (s > 0), foot, near),
-            (s * frame / 2 + t * (s < 0), deck, end),
-            stuff,
-            radius,
-            "rail",
-        )
-        for s in (-1, 1)
-    ]
+    parts += both(box((frame / 2 - t, foot, near), (frame / 2, deck, end), stuff, radius, "rail"))
     parts += [box((-frame / 2, foot, z), (frame / 2, deck, z + t), stuff, radius, "rail") for z in (near, end - t)]
-    parts.append(
-        box((-frame / 2 + t / 2, deck - 0.09, z0 + head), (frame / 2 - t / 2, deck - 0.06, end - t / 2), role="rail")
-    )
+    inner = frame / 2 - t / 2
+    parts.append(box((-inner, deck - 0.09, z0 + head), (inner, deck - 0.06, end - t / 2), role="rail"))
     parts.append(core((-frame / 2, foot, near), (frame / 2, deck, z1), stuff))
     parts += of_role("headboard", _headboard(style, w, h, z0))
     parts += bedding(frame * 0.95, z0 + head, end - 0.04, deck - 0.06, choices, style, pillows)
@@ -183,14 +137,11 @@ def kids_bed(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return parts + _house(w, h, d)
     y0, y1 = 0.3, min(h * 0.85, 0.72)
     side = -1 if choices.chance("side", 0.5) else 1
+    x, high = side * w / 2, y1 + 0.04
     guard: list[Solid] = [
-        box((side * w / 2 - 0.02, y - 0.035, -d * 0.48), (side * w / 2 + 0.02, y + 0.035, d * 0.1))
-        for y in np.linspace(y0 + 0.12, y1, 2)
+        box((x - 0.02, y - 0.035, -d * 0.48), (x + 0.02, y + 0.035, d * 0.1)) for y in np.linspace(y0 + 0.12, y1, 2)
     ]
-    guard += [
-        box((side * w / 2 - 0.025, y0 - 0.1, z - 0.03), (side * w / 2 + 0.025, y1 + 0.04, z + 0.03))
-        for z in (-d * 0.2, d * 0.08)
-    ]
+    guard += [box((x - 0.025, y0 - 0.1, z - 0.03), (x + 0.025, high, z + 0.03)) for z in (-d * 0.2, d * 0.08)]
     return parts + of_role("guard", guard)
 
 
@@ -199,15 +150,10 @@ def _made_up(x0: float, x1: float, y: float, d: float, inset: float) -> list[Sol
     thick = 0.14
     middle, wide = (x0 + x1) / 2, x1 - x0
     rear, near = -d / 2 + inset, d / 2 - inset
+    place, half = (middle, y + thick + 0.045, rear + 0.22), (min(0.32, 0.36 * wide), 0.075, 0.18)
     return [
         box((x0 + 0.05, y, rear), (x1 - 0.05, y + thick, near), "linen", 0.04, "mattress"),
-        ball(
-            (middle, y + thick + 0.045, rear + 0.22),
-            (min(0.32, 0.36 * wide), 0.075, 0.18),
-            "linen",
-            "pillow",
-            power=2.8,
-        ),
+        ball(place, half, "linen", "pillow", power=2.8),
         box((x0 + 0.045, y + 0.05, -d * 0.12), (x1 - 0.045, y + thick + 0.03, near + 0.01), "blanket", 0.03, "cover"),
     ]
 
@@ -215,14 +161,11 @@ def _made_up(x0: float, x1: float, y: float, d: float, inset: float) -> list[Sol
 def _house(w: float, h: float, d: float) -> list[Solid]:
     """Posts and rafters in the outline of a house."""
     t, eaves = 0.03, h * 0.72
-    parts: list[Solid] = [post(sx * (w / 2 - t), sz * (d / 2 - t), t, 0, eaves) for sx in (-1, 1) for sz in (-1, 1)]
+    parts = four(post(w / 2 - t, d / 2 - t, t, 0, eaves))
     slope, length = np.arctan2(h - eaves, w / 2), np.hypot(h - eaves, w / 2)
     for z in (-(d / 2 - t), d / 2 - t):
-        for s in (-1, 1):
-            rafter = box((-length / 2, -t, -t), (length / 2, t, t))
-            parts.append(
-                replace(rafter, centre=np.array([s * w / 4, (eaves + h) / 2 - t, z]), turn=rotation(z=-s * slope))
-            )
+        centre = np.array([w / 4, (eaves + h) / 2 - t, z])
+        parts += both(Block(centre, rotation(z=-slope), role="board", half=np.array([length / 2, t, t])))
     parts.append(box((-t, h - 2 * t, -d / 2), (t, h, d / 2)))
     return of_role("house", parts)
 
@@ -231,25 +174,22 @@ def _loft(size: Size) -> list[Solid]:
     """One high deck on four posts with a rail round it, a ladder in front, and a chest of shelves below."""
     w, h, d = size
     t, deck = 0.035, h - 0.45
-    posts = [(sx * (w / 2 - t), sz * (d / 2 - t)) for sx in (-1, 1) for sz in (-1, 1)]
-    parts: list[Solid] = [post(x, z, t, 0, h - 0.05, role="leg") for x, z in posts]
+    parts = four(post(w / 2 - t, d / 2 - t, t, 0, h - 0.05, role="leg"))
     parts.append(box((-w / 2, deck, -d / 2), (w / 2, deck + 0.1, d / 2), role="rail"))
     parts += _made_up(-w / 2, w / 2, deck + 0.08, d, 0.05)
     guard: list[Solid] = []
     for y in (deck + 0.26, h - 0.09):
-        guard += [box((s * w / 2 - 0.018, y, -d / 2), (s * w / 2 + 0.018, y + 0.07, d / 2)) for s in (-1, 1)]
+        guard += both(box((w / 2 - 0.018, y, -d / 2), (w / 2 + 0.018, y + 0.07, d / 2)))
         guard.append(box((-w / 2, y, -d / 2), (w / 2, y + 0.07, -d / 2 + 0.03)))
         guard.append(box((-w / 2, y, d / 2 - 0.03), (w * 0.1, y + 0.07, d / 2)))
     parts += of_role("guard", guard)
-    ladder: list[Solid] = [
-        box((x - 0.02, 0, d / 2 - 0.03), (x + 0.02, h - 0.05, d / 2 + 0.01)) for x in (w * 0.14, w * 0.42)
-    ]
+    x0, x1, z0, z1 = w * 0.14, w * 0.42, d / 2 - 0.03, d / 2 + 0.01
+    ladder: list[Solid] = [box((x - 0.02, 0, z0), (x + 0.02, h - 0.05, z1)) for x in (x0, x1)]
     steps = np.linspace(0.2, deck, max(4, round(deck / 0.26)))
-    ladder += [box((w * 0.14, y, d / 2 - 0.03), (w * 0.42, y + 0.035, d / 2 + 0.01)) for y in steps]
-    chest: list[Solid] = [
-        box((-w * 0.45, y, -d * 0.45), (-w * 0.1, y + 0.02, d * 0.2)) for y in (0.03, deck * 0.36, deck * 0.7)
-    ]
-    chest += [box((x - 0.01, 0, -d * 0.45), (x + 0.01, deck, d * 0.2)) for x in (-w * 0.45, -w * 0.1)]
+    ladder += [box((x0, y, z0), (x1, y + 0.035, z1)) for y in steps]
+    x0, x1, z0, z1 = -w * 0.45, -w * 0.1, -d * 0.45, d * 0.2
+    chest: list[Solid] = [box((x0, y, z0), (x1, y + 0.02, z1)) for y in (0.03, deck * 0.36, deck * 0.7)]
+    chest += [box((x - 0.01, 0, z0), (x + 0.01, deck, z1)) for x in (x0, x1)]
     return parts + of_role("ladder", ladder) + of_role("shelf", chest)
 
 
@@ -257,20 +197,15 @@ def _cot(size: Size, style: Style) -> list[Solid]:
     """Bars on four sides round a small mattress."""
     w, h, d = size
     t, y0 = 0.025, min(0.2, h * 0.3)
-    posts: list[Solid] = [post(sx * (w / 2 - t), sz * (d / 2 - t), t, 0, h) for sx in (-1, 1) for sz in (-1, 1)]
-    parts: list[Solid] = []
+    x, z, half, r = w / 2 - t, d / 2 - t, t * 0.7, 0.011
+    posts, parts = four(post(x, z, t, 0, h)), []
     for y in (y0, h - 0.05):
-        parts += [
-            box((s * (w / 2 - t) - t * 0.7, y, -d / 2), (s * (w / 2 - t) + t * 0.7, y + 0.045, d / 2)) for s in (-1, 1)
-        ]
-        parts += [
-            box((-w / 2, y, s * (d / 2 - t) - t * 0.7), (w / 2, y + 0.045, s * (d / 2 - t) + t * 0.7)) for s in (-1, 1)
-        ]
-    r = 0.011
-    for z in np.linspace(-d / 2, d / 2, int(np.clip(d / 0.13, 5, 24)))[1:-1]:
-        parts += [post(s * (w / 2 - t), z, r, y0, h - 0.03) for s in (-1, 1)]
-    for x in np.linspace(-w / 2, w / 2, int(np.clip(w / 0.13, 4, 16)))[1:-1]:
-        parts += [post(x, s * (d / 2 - t), r, y0, h - 0.03) for s in (-1, 1)]
+        parts += both(box((x - half, y, -d / 2), (x + half, y + 0.045, d / 2)))
+        parts += both(box((-w / 2, y, z - half), (w / 2, y + 0.045, z + half)), axis=2)
+    for at in np.linspace(-d / 2, d / 2, int(np.clip(d / 0.13, 5, 24)))[1:-1]:
+        parts += both(post(x, at, r, y0, h - 0.03))
+    for at in np.linspace(-w / 2, w / 2, int(np.clip(w / 0.13, 4, 16)))[1:-1]:
+        parts += both(post(at, z, r, y0, h - 0.03), axis=2)
     low, high = (-w / 2 + 0.04, y0, -d / 2 + 0.04), (w / 2 - 0.04, y0 + 0.12, d / 2 - 0.04)
     mattress = box(low, high, "linen", 0.03, "mattress")
     return [*of_role("leg", posts), *of_role("guard", parts), mattress]
@@ -286,33 +221,26 @@ def _bunk(size: Size, style: Style, choices: Choices) -> list[Solid]:
     upper = h - 0.42
     parts: list[Solid] = []
     for x in (x0 + t, x0 + wide - t):
-        parts += [post(x, s * (d / 2 - t), t, 0, h - 0.08, role="leg") for s in (-1, 1)]
+        parts += both(post(x, d / 2 - t, t, 0, h - 0.08, role="leg"), axis=2)
     for y in (0.22, upper):
         parts.append(box((x0, y, -d / 2), (x0 + wide, y + 0.12, d / 2), role="rail"))
         parts += _made_up(x0, x0 + wide, y + 0.1, d, 0.06)
     guard: list[Solid] = []
-    for x in (x0 + 0.015, x0 + wide - 0.015):
-        guard += [
-            box((x - 0.015, y, -d / 2), (x + 0.015, y + 0.08, d / 2 * (1 if x < x0 + wide / 2 else 0.55)))
-            for y in (upper + 0.22, h - 0.08)
-        ]
-    guard += [
-        box((x0, y, s * (d / 2 - 0.015) - 0.015), (x0 + wide, y + 0.08, s * (d / 2 - 0.015) + 0.015))
-        for y in (upper + 0.22, h - 0.08)
-        for s in (-1, 1)
-    ]
+    heights = upper + 0.22, h - 0.08
+    for x, end in ((x0 + 0.015, d / 2), (x0 + wide - 0.015, d / 2 * 0.55)):
+        guard += [box((x - 0.015, y, -d / 2), (x + 0.015, y + 0.08, end)) for y in heights]
+    z = d / 2 - 0.015
+    for y in heights:
+        guard += both(box((x0, y, z - 0.015), (x0 + wide, y + 0.08, z + 0.015)), axis=2)
     parts += of_role("guard", guard)
     if stairs:
-        steps = 4
-        for i in range(steps):
-            z = d / 2 - (i + 1) * 0.36
-            y = upper * (i + 1) / (steps + 0.5)
+        for i in range(4):
+            z, y = d / 2 - (i + 1) * 0.36, upper * (i + 1) / 4.5
             parts.append(box((x0 + wide, 0, z), (w / 2, y, z + 0.36), role="stairs"))
             parts += front((x0 + wide, 0.02), (w / 2, y), z + 0.36, 1, 1, "drawer", style) if i == 0 else []
         return parts
-    ladder: list[Solid] = [
-        box((w / 2 - 0.02, 0, z - 0.025), (w / 2 + 0.02, h - 0.05, z + 0.025)) for z in (d * 0.2, d * 0.42)
-    ]
-    heights = np.linspace(0.3, upper, max(3, round(upper / 0.27)))
-    ladder += [box((w / 2 - 0.02, y, d * 0.2), (w / 2 + 0.02, y + 0.04, d * 0.42)) for y in heights]
+    x0, x1, z0, z1 = w / 2 - 0.02, w / 2 + 0.02, d * 0.2, d * 0.42
+    ladder: list[Solid] = [box((x0, 0, z - 0.025), (x1, h - 0.05, z + 0.025)) for z in (z0, z1)]
+    steps = np.linspace(0.3, upper, max(3, round(upper / 0.27)))
+    ladder += [box((x0, y, z0), (x1, y + 0.04, z1)) for y in steps]
     return parts + of_role("ladder", ladder)

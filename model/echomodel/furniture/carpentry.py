@@ -21,17 +21,21 @@ def box(low: tuple, high: tuple, material: str = "wood", radius: float = 0.0, ro
 
 
 def post(
-    x: float,
-    z: float,
-    half: float,
-    y0: float,
-    y1: float,
-    material: str = "wood",
-    radius: float = 0.0,
+    x: float, z: float, half: float, y0: float, y1: float, material: str = "wood", radius: float = 0.0,
     role: str = "board",
-) -> Block:
+) -> Block:  # fmt: skip
     """An upright of square section about (x, z), from y0 to y1."""
     return box((x - half, y0, z - half), (x + half, y1, z + half), material, radius, role)
+
+
+def both(*parts: Solid, axis: int = 0) -> list[Solid]:
+    """Parts and before them what they are on the other side of the plane x = 0, or of z = 0 (axis 2)."""
+    return [*(part.mirrored(axis) for part in parts), *parts]
+
+
+def four(part: Solid) -> list[Solid]:
+    """What stands at one corner, at all four: behind and in front at the left, then at the right."""
+    return both(*both(part, axis=2))
 
 
 def around(
@@ -88,15 +92,8 @@ def leg(foot: tuple, head: tuple, thick: float, style: Style, material: str = "w
     bottom, above = np.asarray(foot, float), np.asarray(head, float)
     power = 2.0 if style.profile == "round" else np.inf
     half = thick / 2
-    return turned(
-        bottom,
-        half * taper,
-        float(np.linalg.norm(above - bottom)),
-        half,
-        power=power,
-        turn=upright(bottom, above),
-        material=material,
-    )
+    length, turn = float(np.linalg.norm(above - bottom)), upright(bottom, above)
+    return turned(bottom, half * taper, length, half, power=power, turn=turn, material=material)
 
 
 def turned_leg(x: float, z: float, height: float, thick: float, material: str = "wood") -> list[Solid]:
@@ -138,66 +135,48 @@ def _stand(
     style: Style, width: float, depth: float, height: float, thick: float, kind: str, *, tie: bool
 ) -> list[Solid]:
     x, z, h = width / 2 - thick / 2, depth / 2 - thick / 2, height
-    corners = [(sx * x, sz * z) for sx in (-1, 1) for sz in (-1, 1)]
     if kind == "plinth":
         return [box((-width / 2 * 0.94, 0, -depth / 2 * 0.94), (width / 2 * 0.94, h, depth / 2 * 0.9), "accent")]
     if kind == "bun":
-        return [
-            ball((cx, h / 2 + 0.004, cz), (thick * 0.8, h / 2 + 0.004, thick * 0.8), power=2.5) for cx, cz in corners
-        ]
+        return four(ball((x, h / 2 + 0.004, z), (thick * 0.8, h / 2 + 0.004, thick * 0.8), power=2.5))
     if kind == "turned":
-        return [part for cx, cz in corners for part in turned_leg(cx, cz, h, thick * 1.15)]
+        return [part for sx in (-x, x) for sz in (-z, z) for part in turned_leg(sx, sz, h, thick * 1.15)]
     if kind == "sled":
         return _sled(x, z, h, thick)
     if kind == "trestle":
         return _trestle(x, z, h, thick)
     if kind == "hairpin":
-        r = max(0.006, thick * 0.16)
-        return [
-            tube([[cx - np.sign(cx) * d, h, cz], [cx, r, cz], [cx, h, cz - np.sign(cz) * d]], r, "metal")
-            for cx, cz in corners
-            for d in (min(0.12, width * 0.12),)
-        ]
+        r, d = max(0.006, thick * 0.16), min(0.12, width * 0.12)
+        return four(tube([[x - d, h, z], [x, r, z], [x, h, z - d]], r, "metal"))
     spread = np.tan(style.splay) * h if kind == "splayed" else 0.0
     spread = min(spread, 0.3 * min(width, depth))
     taper = style.taper if kind in ("tapered", "splayed") else 1.0
     material = "metal" if style.family == "industrial" else "wood"
-    inner = [(np.sign(cx) * (x - spread), np.sign(cz) * (z - spread)) for cx, cz in corners]
-    parts: list[Solid] = [
-        leg((cx, 0, cz), (ix, h, iz), thick, style, material, taper)
-        for (cx, cz), (ix, iz) in zip(corners, inner, strict=True)
-    ]
+    parts = four(leg((x, 0, z), (x - spread, h, z - spread), thick, style, material, taper))
     if tie and h > 0.3:
         y, t = h * 0.35, thick * 0.35
         mx, mz = x - spread * 0.35, z - spread * 0.35
-        parts += [box((s * mx - t, y - t, -mz), (s * mx + t, y + t, mz), material) for s in (-1, 1)]
+        parts += both(box((mx - t, y - t, -mz), (mx + t, y + t, mz), material))
         parts.append(box((-mx, y - t, -t), (mx, y + t, t), material))
     return parts
 
 
 def _sled(x: float, z: float, h: float, thick: float) -> list[Solid]:
     t = max(thick * 0.3, 0.008)
-    parts: list[Solid] = []
-    for side in (-x, x):
-        parts.append(box((side - t, 0, -z), (side + t, 2 * t, z), "metal"))
-        parts += [post(side, end, t, 0, h, "metal") for end in (-z, z)]
-        parts.append(box((side - t, h - 2 * t, -z), (side + t, h, z), "metal"))
-    return parts
+    low, high = (box((x - t, y, -z), (x + t, y + 2 * t, z), "metal") for y in (0, h - 2 * t))
+    return both(low, *(post(x, end, t, 0, h, "metal") for end in (-z, z)), high)
 
 
 def _trestle(x: float, z: float, h: float, thick: float) -> list[Solid]:
-    t = thick / 2
-    parts: list[Solid] = []
-    for side in (-x * 0.82, x * 0.82):
-        parts.append(box((side - t, 0, -z), (side + t, thick, z)))
-        parts.append(box((side - t, h - thick, -z * 0.9), (side + t, h, z * 0.9)))
-        parts += [
-            turned((side, thick * 0.5, s * z * 0.25), t, h - thick, power=np.inf, turn=rotation(x=-s * 0.12))
-            for s in (-1, 1)
-        ]
-        parts.append(box((side - t * 0.8, h * 0.45, -z * 0.25), (side + t * 0.8, h * 0.45 + thick, z * 0.25)))
-    parts.append(box((-x * 0.82, h * 0.45, -t), (x * 0.82, h * 0.45 + thick, t)))
-    return parts
+    t, side = thick / 2, x * 0.82
+    slanted = turned((side, thick * 0.5, z * 0.25), t, h - thick, power=np.inf, turn=rotation(x=-0.12))
+    trestles = both(
+        box((side - t, 0, -z), (side + t, thick, z)),
+        box((side - t, h - thick, -z * 0.9), (side + t, h, z * 0.9)),
+        *both(slanted, axis=2),
+        box((side - t * 0.8, h * 0.45, -z * 0.25), (side + t * 0.8, h * 0.45 + thick, z * 0.25)),
+    )
+    return [*trestles, box((-side, h * 0.45, -t), (side, h * 0.45 + thick, t))]
 
 
 def pedestal(width: float, depth: float, height: float, style: Style) -> list[Solid]:
@@ -211,18 +190,10 @@ def _column(width: float, depth: float, height: float, style: Style) -> list[Sol
     spread = min(width, depth) * 0.32
     column = turned((0, 0, 0), r, height, r * 0.8, material=material)
     if style.family in ("classic", "rustic"):
-        feet: list[Solid] = [
-            tube(
-                [
-                    [0, height * 0.3, 0],
-                    [s * spread * c, height * 0.14, s * spread * d * 0.9],
-                    [s * spread * 1.3 * c, r * 0.6, s * spread * 1.3 * d],
-                ],
-                r * 0.6,
-            )
-            for s in (-1, 1)
-            for c, d in ((0.7, 0.7), (0.7, -0.7))
-        ]
+        feet: list[Solid] = []
+        for x, z in ((-0.7, -0.7), (-0.7, 0.7), (0.7, 0.7), (0.7, -0.7)):
+            knee, toe = [spread * x, height * 0.14, spread * z * 0.9], [spread * 1.3 * x, r * 0.6, spread * 1.3 * z]
+            feet.append(tube([[0, height * 0.3, 0], knee, toe], r * 0.6))
         bulb = ball((0, height * 0.55, 0), (r * 1.5, height * 0.12, r * 1.5))
         return [column, bulb, *feet]
     if style.contrast > 0.6:

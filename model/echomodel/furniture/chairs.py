@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from echomodel.furniture.backs import back_rest, chair_legs, leaning, seat_of, slim_arms
-from echomodel.furniture.carpentry import Size, base, box, cushion, of_role, top, within
+from echomodel.furniture.carpentry import Size, base, both, box, cushion, four, of_role, top, within
 from echomodel.furniture.solids import Block, Solid, ball, bent, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
 
@@ -27,16 +27,11 @@ def stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
         ]
     thick = min(0.03 + 0.07 * style.softness, h * 0.4)
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "tapered"
-    seat = replace(
-        top(shape, w, d, h, thick, style, "fabric" if style.softness > 0.4 else "wood"), rounding=thick * 0.4,
-        role="seat",
-    )  # fmt: skip
+    board = top(shape, w, d, h, thick, style, "fabric" if style.softness > 0.4 else "wood")
     outside = legs == "splayed"  # feet may reach beyond the seat, their heads do not
     inner = 0.8 if outside and shape == "round" else within(shape, style)
-    return [
-        seat,
-        *base(style, w * inner, d * inner, h - thick * 0.8, 0.032 * style.bulk, legs, tie=style.contrast > 0.5),
-    ]
+    stand = base(style, w * inner, d * inner, h - thick * 0.8, 0.032 * style.bulk, legs, tie=style.contrast > 0.5)
+    return [replace(board, rounding=thick * 0.4, role="seat"), *stand]
 
 
 def bench(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -63,23 +58,13 @@ def ottoman(size: Size, style: Style, choices: Choices) -> list[Solid]:
     foot = min(style.leg_height, h * 0.4) if choices.chance("raised", 0.65) else 0.0
     kind = style.legs if style.legs not in ("trestle", "hairpin", "sled", "plinth") else "tapered"
     inner = 0.64 if alike and style.round_tops > 0.45 else 0.8
-    parts: list[Solid] = (
-        base(style, w * inner, d * inner, foot + min(0.03, h * 0.1), 0.04 * style.bulk, kind) if foot else []
-    )
+    tall = foot + min(0.03, h * 0.1)
+    parts = base(style, w * inner, d * inner, tall, 0.04 * style.bulk, kind) if foot else []
     if alike and style.round_tops > 0.45:
         if foot == 0 and style.softness > 0.6:
             return [ball((0, h / 2, 0), (w / 2, h / 2, d / 2), "fabric", "seat", power=2.6)]
-        return [
-            *parts,
-            turned(
-                (0, foot, 0),
-                (w / 2, d / 2),
-                h - foot,
-                rounding=0.1 * h + 0.15 * h * style.softness,
-                material="fabric",
-                role="seat",
-            ),
-        ]
+        soft = 0.1 * h + 0.15 * h * style.softness
+        return [*parts, turned((0, foot, 0), (w / 2, d / 2), h - foot, rounding=soft, material="fabric", role="seat")]
     split = foot + (h - foot) * 0.5
     return [
         *parts,
@@ -101,15 +86,8 @@ def dining_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if style.back == "shell":
         arms = seat + (h - seat) * (0.35 + 0.3 * style.arm_height)
         wall = 0.035 + 0.04 * style.softness
-        shell = bent(
-            (0, seat - wall, d * 0.15),  # whose floor is what is sat on
-            (w / 2, d * 0.62),
-            wall,
-            h - seat + wall,
-            arms - seat + wall,
-            power=2.4 + style.corner,
-            ease=2.5,
-        )
+        low, power = (0, seat - wall, d * 0.15), 2.4 + style.corner  # its floor is what is sat on
+        shell = bent(low, (w / 2, d * 0.62), wall, h - seat + wall, arms - seat + wall, power=power, ease=2.5)
         return [*parts, shell]
     return parts + back_rest(style, style.back, w * 0.9, seat, h, -d * 0.38, 0.06, rake)
 
@@ -130,10 +108,9 @@ def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     seat = min(0.46, h * 0.56)
     x, z = w / 2 - r * 1.5, d / 2 - r * 1.5
     parts: list[Solid] = [box((-w / 2, seat - 0.04, -d / 2), (w / 2, seat, d / 2), "wood", 0.01, "seat")]
-    corners = [(sx * x, sz * z) for sx in (-1, 1) for sz in (-1, 1)]
-    legs: list[Solid] = [tube([[cx, 0, cz], [cx * 0.97, seat, cz * 0.97]], r) for cx, cz in corners]
+    legs = four(tube([[x, 0, z], [x * 0.97, seat, z * 0.97]], r))
     legs += [tube([[-x, y, cz], [x, y, cz]], r * 0.7) for y, cz in ((0.1, z), (0.16, -z))]
-    legs += [tube([[cx, 0.13, -z], [cx, 0.13, z]], r * 0.7) for cx in (-x, x)]
+    legs += both(tube([[x, 0.13, -z], [x, 0.13, z]], r * 0.7))
     parts += of_role("leg", legs)
     splat = w * choices.between("share", 0.14, 0.24)
     parts.append(leaning((-splat / 2, seat, -z - 0.012), (splat / 2, h - r, -z + 0.012), 0.1, seat, -z))
@@ -143,32 +120,15 @@ def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         fall = np.abs(t) / (np.pi / 2)
         bow = np.stack([x * np.sin(t), h - r - (h - arm) * fall**1.5, z * 0.7 - (z * 1.7 + 0.05) * np.cos(t)], 1)
         arms: list[Solid] = [tube(bow, r * 1.1)]
-        arms += [tube([[s * x, seat, z * 0.6], [s * x, arm, z * 0.68]], r * 0.8) for s in (-1, 1)]
+        arms += both(tube([[x, seat, z * 0.6], [x, arm, z * 0.68]], r * 0.8))
         head = bow[int(np.abs(bow[:6, 2] + z * 0.5).argmin())]  # where the posts behind meet the bow
         arms += [tube([[s * head[0] * 1.05, seat, -z * 0.6], [s * head[0], *head[1:]]], r * 0.8) for s in (-1, 1)]
         return parts + of_role("arm", arms)
-    yoke = np.array(
-        [
-            [-w * 0.5, h - 0.03, -z - 0.07],
-            [-w * 0.25, h - r, -z - 0.08],
-            [w * 0.25, h - r, -z - 0.08],
-            [w * 0.5, h - 0.03, -z - 0.07],
-        ]
-    )
-    parts.append(tube(yoke, r * 1.2, role="back"))
-    posts = [tube([[s * x, seat, -z], [s * x * 0.98, h - r, -z - 0.07]], r) for s in (-1, 1)]
-    parts += of_role("back", [*posts])
-    for s in (-1, 1):
-        parts.append(
-            tube(
-                [[s * x, arm + 0.03, -z - 0.03], [s * x, arm, z * 0.7], [s * x * 1.02, arm - 0.02, z * 0.8]],
-                r * 0.9,
-                role="arm",
-            )
-        )
-        post = np.array([[s * x, seat, z * 0.75], [s * x, arm, z * 0.75]])
-        parts.append(tube(post, r * 0.8, role="arm"))
-    return parts
+    heights = (-0.5, h - 0.03, -0.07), (-0.25, h - r, -0.08), (0.25, h - r, -0.08), (0.5, h - 0.03, -0.07)
+    yoke = tube([[w * across, y, -z + back] for across, y, back in heights], r * 1.2)
+    parts += of_role("back", [yoke, *both(tube([[x, seat, -z], [x * 0.98, h - r, -z - 0.07]], r))])
+    rest = tube([[x, arm + 0.03, -z - 0.03], [x, arm, z * 0.7], [x * 1.02, arm - 0.02, z * 0.8]], r * 0.9)
+    return parts + of_role("arm", both(rest, tube([[x, seat, z * 0.75], [x, arm, z * 0.75]], r * 0.8)))
 
 
 def dressing_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -181,10 +141,8 @@ def dressing_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts: list[Solid] = chair_legs(style, w * 0.82, d * 0.8, seat - thick * 0.5, 0.034 * style.bulk)
     parts.append(seat_of(replace(style, softness=max(style.softness, 0.5)), w * 0.95, d * 0.92, seat, thick))
     if style.back in ("shell", "cushion", "oval"):
-        return [
-            *parts,
-            bent((0, seat - thick * 0.5, d * 0.05), (w / 2, d * 0.55), 0.05, h - seat, (h - seat) * 0.6, ease=2.0),
-        ]
+        low, half = (0, seat - thick * 0.5, d * 0.05), (w / 2, d * 0.55)
+        return [*parts, bent(low, half, 0.05, h - seat, (h - seat) * 0.6, ease=2.0)]
     return parts + back_rest(style, style.back, w * 0.85, seat, h, -d * 0.4, 0.05, style.rake * 0.5)
 
 
@@ -197,12 +155,8 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts: list[Solid] = []
     if choices.chance("form", 0.25):
         r = 0.026
-        parts += [
-            turned((0, 0, 0), r, seat - thick, material="metal"),
-            turned((0, 0, 0), w * 0.46, 0.03, w * 0.42, material="metal"),
-            turned((0, seat * 0.35, 0), w * 0.28, 0.022, material="metal"),
-        ]
-        parts = of_role("leg", parts)
+        foot, rest = turned((0, 0, 0), w * 0.46, 0.03, w * 0.42), turned((0, seat * 0.35, 0), w * 0.28, 0.022)
+        parts = of_role("leg", [turned((0, 0, 0), r, seat - thick), foot, rest], material="metal")
     else:
         legs = style.legs if style.legs in ("tapered", "splayed", "straight", "sled") else "splayed"
         upright_legs = legs != "splayed"
@@ -211,20 +165,16 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
         spread = min(np.tan(style.splay) * (seat - thick * 0.6), 0.3 * min(w, d * 0.96) * share)
         lean = 0.0 if upright_legs else spread * 0.35
         x, z, y, t = w * share / 2 - 0.02 - lean, d * share * 0.48 - 0.02 - lean, seat * 0.35, 0.011
-        parts += [box((-x, y - t, s * z - t), (x, y + t, s * z + t), "metal", 0.0, "rail") for s in (-1, 1)]
-        parts += [box((s * x - t, y - t, -z), (s * x + t, y + t, z), "metal", 0.0, "rail") for s in (-1, 1)]
+        parts += both(box((-x, y - t, z - t), (x, y + t, z + t), "metal", 0.0, "rail"), axis=2)
+        parts += both(box((x - t, y - t, -z), (x + t, y + t, z), "metal", 0.0, "rail"))
     shape = "round" if style.round_tops > 0.5 else "corners"
-    parts.append(
-        replace(top(shape, w * 0.92, d * 0.88, seat, thick, style, "fabric"), rounding=thick * 0.4, role="seat")
-    )
+    board = top(shape, w * 0.92, d * 0.88, seat, thick, style, "fabric")
+    parts.append(replace(board, rounding=thick * 0.4, role="seat"))
     if not backed:
         return parts
     wide = w * (0.5 if shape == "round" else 0.8)
     if style.back in ("shell", "cushion", "oval"):
-        return [
-            *parts,
-            bent((0, seat - thick * 0.5, 0), (w * 0.48, d * 0.46), 0.035, h - seat, (h - seat) * 0.4),
-        ]
+        return [*parts, bent((0, seat - thick * 0.5, 0), (w * 0.48, d * 0.46), 0.035, h - seat, (h - seat) * 0.4)]
     return parts + back_rest(style, style.back, wide, seat, h, -d * 0.36, 0.04, style.rake * 0.5)
 
 
@@ -249,23 +199,12 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return leaning((-x, low, z + rear), (x, high, z + before), rake, seat, z, **look)
 
     if style.back == "shell":
-        parts.append(
-            bent(
-                (0, seat - 0.05, d * 0.05),
-                (sw / 2 + 0.02, d * 0.5),
-                0.05,
-                h - seat + 0.05,
-                0.12 + 0.1 * style.arm_height,
-            )
-        )
-        return parts
+        low, arms = (0, seat - 0.05, d * 0.05), 0.12 + 0.1 * style.arm_height
+        return [*parts, bent(low, (sw / 2 + 0.02, d * 0.5), 0.05, h - seat + 0.05, arms)]
     if style.corner > 0.45 or style.back == "oval":
-        tall = (h - y0) / np.cos(rake)
-        turn = rotation(x=-rake)
+        tall, turn, power = (h - y0) / np.cos(rake), rotation(x=-rake), 2.6 + 2 * style.contrast
         centre = turn @ np.array([0, y0 - seat + tall / 2, 0]) + [0, seat, -d * 0.4]
-        parts.append(
-            ball(centre, (sw * 0.47, tall / 2, 0.04), "fabric", "back", power=2.6 + 2 * style.contrast, turn=turn)
-        )
+        parts.append(ball(centre, (sw * 0.47, tall / 2, 0.04), "fabric", "back", power=power, turn=turn))
     elif style.tufting > 0.6:
         for a, b in pairwise(np.linspace(y0, h, 5)):
             parts.append(lean(sw * 0.44, a + 0.01, b, -0.02, 0.02, material="fabric", radius=0.018))
@@ -276,10 +215,8 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     rest = [0, y0 + 0.15, -d * 0.4 - rise * np.tan(rake) - 0.012]
     parts.append(tube([[0, seat - 0.05, -d * 0.1], [0, seat - 0.05, -d * 0.43], rest], 0.016, "metal", "stem"))
     if choices.chance("extra", 0.75):
-        y = seat + 0.2
-        for s in (-1, 1):
-            x = s * (w / 2 - 0.025)
-            parts.append(tube([[s * sw * 0.4, seat - 0.05, 0], [x, seat - 0.03, 0], [x, y, 0]], 0.016, "metal", "arm"))
-            pad = box((x - 0.025, y - 0.015, -d * 0.22), (x + 0.025, y + 0.015, d * 0.22), "accent", 0.012, "arm")
-            parts.append(pad)
+        x, y = w / 2 - 0.025, seat + 0.2
+        stay = tube([[sw * 0.4, seat - 0.05, 0], [x, seat - 0.03, 0], [x, y, 0]], 0.016, "metal", "arm")
+        pad = box((x - 0.025, y - 0.015, -d * 0.22), (x + 0.025, y + 0.015, d * 0.22), "accent", 0.012, "arm")
+        parts += both(stay, pad)
     return parts

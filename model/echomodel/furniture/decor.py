@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, box, of_role
+from echomodel.furniture.carpentry import Size, both, box, of_role
 from echomodel.furniture.lathe import Blade
 from echomodel.furniture.solids import Solid, ball, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
@@ -28,10 +28,8 @@ def plant(size: Size, style: Style, choices: Choices) -> list[Solid]:
             parts.append(tube([[x, 0, z], [x * 0.9, foot + pot_h * 0.5, z * 0.9]], 0.014, role="leg"))
     waist = 0.6 + 0.35 * style.taper
     parts.append(turned((0, foot, 0), pot_r * waist, pot_h, pot_r, power=power, material="ceramic", role="pot"))
-    parts.append(
-        turned((0, foot + pot_h * 0.98, 0), pot_r * 0.9, pot_h * 0.04, power=power, material="soil", role="soil")
-    )
-    y0 = foot + pot_h
+    y0, level = foot + pot_h, (0, foot + pot_h * 0.98, 0)
+    parts.append(turned(level, pot_r * 0.9, pot_h * 0.04, power=power, material="soil", role="soil"))
     kind = choices.pick("kind", ["tree", "blades", "leaves", "cactus"], [0.38, 0.22, 0.32, 0.08])
     grow = {"tree": _tree, "blades": _blades, "leaves": _leaves, "cactus": _cactus}[kind]
     return parts + grow(y0, h, w / 2, d / 2, choices)
@@ -65,16 +63,8 @@ def _tree(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Sol
 
 def _leaf(base: np.ndarray, yaw: float, lift: float, length: float, wide: float, bend: float = 0.6) -> Blade:
     """A leaf that starts at `base`, points to `yaw` and rises by the angle `lift`, its tip bent down by `bend`."""
-    return Blade(
-        centre=base,
-        turn=rotation(y=yaw) @ rotation(x=-lift),
-        length=length,
-        width=wide,
-        thick=max(0.003, 0.012 * length),
-        bend=bend,
-        material="leaf",
-        role="leaf",
-    )
+    turn, thick = rotation(y=yaw) @ rotation(x=-lift), max(0.003, 0.012 * length)
+    return Blade(base, turn, "leaf", "leaf", length=length, width=wide, thick=thick, bend=bend)
 
 
 def _blades(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Solid]:
@@ -116,10 +106,8 @@ def _cactus(y0: float, h: float, a: float, b: float, choices: Choices) -> list[S
     """A column with bent arms."""
     rng = choices.stream("detail")
     r = min(a, b) * 0.26
-    parts: list[Solid] = [
-        tube([[0, y0 - 0.02, 0], [0, h - r, 0]], r, "leaf", "stem"),
-        ball((0, h - r, 0), r, "leaf", "stem"),
-    ]
+    parts: list[Solid] = [tube([[0, y0 - 0.02, 0], [0, h - r, 0]], r, "leaf", "stem")]
+    parts.append(ball((0, h - r, 0), r, "leaf", "stem"))
     for s in (-1, 1):
         y = y0 + (h - y0) * rng.uniform(0.3, 0.5)
         tip = y + (h - y0) * rng.uniform(0.2, 0.4)
@@ -150,15 +138,13 @@ def tv(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts = [*of_role("housing", body), *of_role("screen", [glass])]
     feet: list[Solid] = []
     if kind == "feet":
-        for s in (-1, 1):
-            for reach in (-d / 2 + 0.006, d / 2 - 0.006):
-                top, toe = np.array([s * w * 0.34, low + 0.03, (back + thin) / 2]), [s * w * 0.37, 0.008, reach]
-                feet.append(tube([top, [s * w * 0.35, low * 0.6, reach * 0.4], toe], 0.008))
+        top = [w * 0.34, low + 0.03, (back + thin) / 2]
+        for reach in (-d / 2 + 0.006, d / 2 - 0.006):
+            feet.append(tube([top, [w * 0.35, low * 0.6, reach * 0.4], [w * 0.37, 0.008, reach]], 0.008))
+        feet = both(*feet)
     elif kind == "plate":
-        feet = [
-            box((-w * 0.17, 0, -d / 2), (w * 0.17, 0.012, d / 2), radius=0.005),
-            box((-w * 0.05, 0, back), (w * 0.05, low + 0.1 * h, back + 0.014)),
-        ]
+        feet = [box((-w * 0.17, 0, -d / 2), (w * 0.17, 0.012, d / 2), radius=0.005)]
+        feet.append(box((-w * 0.05, 0, back), (w * 0.05, low + 0.1 * h, back + 0.014)))
     elif kind == "arc":
         turn = np.linspace(-np.pi / 2, np.pi / 2, 9)
         bow = np.stack([0.24 * w * np.sin(turn), 0 * turn + 0.009, d / 2 - 0.009 - (d - 0.018) * np.cos(turn)], 1)

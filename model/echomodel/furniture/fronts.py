@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, base, box, core
+from echomodel.furniture.carpentry import Size, base, both, box, core
 from echomodel.furniture.solids import Joint, Solid, ball, tube
 from echomodel.furniture.style import Choices, Style
 
@@ -61,20 +61,14 @@ def sliding(low: Point, high: Point, z: float, count: int, style: Style, materia
     wide = (high[0] - low[0]) / count
     parts: list[Solid] = []
     for i in range(count):
-        near = z + 0.026 * (i % 2)
-        reach = wide - 0.04
-        axis = (1.0, 0.0, 0.0) if i == 0 else (-1.0, 0.0, 0.0)
-        joint = Joint("door", "prismatic", axis, (xs[i], low[1], near), reach)
-        panel: list[Solid] = [
-            box(
-                (xs[i] - 0.015, low[1], near - 0.003), (xs[i + 1] + 0.015, high[1], near + 0.019), material, 0.0, "door"
-            )
-        ]
+        near, axis = z + 0.026 * (i % 2), (1.0 if i == 0 else -1.0, 0.0, 0.0)
+        joint = Joint("door", "prismatic", axis, (xs[i], low[1], near), wide - 0.04)
+        corners = (xs[i] - 0.015, low[1], near - 0.003), (xs[i + 1] + 0.015, high[1], near + 0.019)
+        panel: list[Solid] = [box(*corners, material, 0.0, "door")]
         for x in (xs[i] + 0.02, xs[i + 1] - 0.02):
             if i % 2 or material != "accent":
-                panel.append(
-                    box((x - 0.035, low[1], near + 0.012), (x + 0.015, high[1], near + 0.0235), "metal", 0.0, "handle")
-                )
+                corners = (x - 0.035, low[1], near + 0.012), (x + 0.015, high[1], near + 0.0235)
+                panel.append(box(*corners, "metal", 0.0, "handle"))
         parts += [replace(part, joint=joint) for part in panel]
     return parts
 
@@ -125,15 +119,19 @@ def _inside(low: Point, high: Point, z0: float, z1: float) -> list[Solid]:
 
 
 def _frame(x0: float, x1: float, y0: float, y1: float, z: float, border: float, role: str) -> list[Solid]:
-    b, t = max(border, 0.02), 0.012
-    bars = [((x0, y0), (x0 + b, y1)), ((x1 - b, y0), (x1, y1)), ((x0, y0), (x1, y0 + b)), ((x0, y1 - b), (x1, y1))]
-    return [box((*lo, z - 0.004), (*hi, z + t), "accent", 0.002, role) for lo, hi in bars]
+    bars = _bars(x0, x1, y0, y1, max(border, 0.02))
+    return [box((*lo, z - 0.004), (*hi, z + 0.012), "accent", 0.002, role) for lo, hi in bars]
+
+
+def _bars(x0: float, x1: float, y0: float, y1: float, b: float) -> list[tuple[Point, Point]]:
+    """Corners of the four bars of a frame `b` wide: left, right, below, above."""
+    return [((x0, y0), (x0 + b, y1)), ((x1 - b, y0), (x1, y1)), ((x0, y0), (x1, y0 + b)), ((x0, y1 - b), (x1, y1))]
 
 
 def _pane(x0: float, x1: float, y0: float, y1: float, z: float, role: str) -> list[Solid]:
     """Glass in a frame of four bars."""
     b = min(0.045, 0.2 * (x1 - x0))
-    bars = [((x0, y0), (x0 + b, y1)), ((x1 - b, y0), (x1, y1)), ((x0, y0), (x1, y0 + b)), ((x0, y1 - b), (x1, y1))]
+    bars = _bars(x0, x1, y0, y1, b)
     pane = box((x0 + b / 2, y0 + b / 2, z + 0.006), (x1 - b / 2, y1 - b / 2, z + 0.01), "glass", 0.0, role)
     return [pane, *(box((*lo, z), (*hi, z + PANEL), "accent", 0.002, role) for lo, hi in bars)]
 
@@ -153,32 +151,22 @@ def _handle(
         r = 0.016
         places = [-0.28 * w, 0.28 * w] if not door and w > 0.75 else [0.0]
         stem = np.array([[0, 0, -deep], [0, 0, r]])
-        return [
-            part
-            for dx in places
-            for part in (
-                tube(np.array([x + dx, y, z]) + stem, 0.006, "metal", "handle"),
-                ball((x + dx, y, z + r + 0.004), (r, r, r * 0.8), "metal", "handle"),
-            )
-        ]
+        parts: list[Solid] = []
+        for dx in places:
+            parts.append(tube(np.array([x + dx, y, z]) + stem, 0.006, "metal", "handle"))
+            parts.append(ball((x + dx, y, z + r + 0.004), (r, r, r * 0.8), "metal", "handle"))
+        return parts
     if style.handles == "edge":
+        low, high = (x0 + 0.1 * w, y1 - 0.02), (x1 - 0.1 * w, y1 - 0.004)
         if door:
-            return [
-                box((x - 0.008, y0 + 0.1 * h, z - deep), (x + 0.008, y1 - 0.1 * h, z + 0.02), "metal", 0.003, "handle")
-            ]
-        return [
-            box((x0 + 0.1 * w, y1 - 0.02, z - deep), (x1 - 0.1 * w, y1 - 0.004, z + 0.02), "metal", 0.003, "handle")
-        ]
+            low, high = (x - 0.008, y0 + 0.1 * h), (x + 0.008, y1 - 0.1 * h)
+        return [box((*low, z - deep), (*high, z + 0.02), "metal", 0.003, "handle")]
     length = min(0.3, 0.45 * h) / 2 if door else min(0.25, 0.4 * w) / 2
     along = np.array([0.0, length, 0.0]) if door else np.array([length, 0.0, 0.0])
     grip, out = np.array([x, y, z]), np.array([0.0, 0.0, 0.026])
-    ends = np.array([grip + out - along, grip + out + along])
-    bar = tube(ends, 0.0055, "metal", "handle")
-    posts = [
-        tube([end - np.array([0, 0, deep]), end + out], 0.005, "metal", "handle")
-        for end in (grip - 0.85 * along, grip + 0.85 * along)
-    ]
-    return [bar, *posts]
+    bar, sunk = tube([grip + out - along, grip + out + along], 0.0055, "metal", "handle"), np.array([0, 0, deep])
+    ends = grip - 0.85 * along, grip + 0.85 * along
+    return [bar, *(tube([end - sunk, end + out], 0.005, "metal", "handle") for end in ends)]
 
 
 BOARD = 0.02
@@ -211,10 +199,7 @@ def carcass(
     deep = 0.022 if not recessed else 0.02 + min(0.05, 0.1 * d)  # recessed fronts stand behind the boards
     z0, z1 = -d / 2, d / 2 - deep
     edge, r = d / 2 if recessed else z1, 0.003 * style.edge
-    parts += [
-        box((s * body - (t if s > 0 else 0), foot, z0), (s * body + (t if s < 0 else 0), lid, edge), "wood", r, "side")
-        for s in (-1, 1)
-    ]
+    parts += both(box((body - t, foot, z0), (body, lid, edge), "wood", r, "side"))
     parts.append(box((-body, foot, z0), (body, foot + t, edge), "wood", r, "bottom"))
     parts.append(box((-body, lid - t, z0), (body, lid, edge), "wood", r, "top"))
     if back or solid:
@@ -234,15 +219,10 @@ def depth_of(d: float, z: float) -> float:
 def shelves(rect: tuple, d: float, z0: float, rows: int, columns: int, style: Style) -> list[Solid]:
     """Boards that divide an open case into rows and columns."""
     x0, y0, x1, y1, z1 = rect
-    t = BOARD * (0.8 + 0.5 * style.bulk)
-    parts: list[Solid] = [
-        box((x0, y - t / 2, z0), (x1, y + t / 2, z1 - 0.01), role="shelf") for y in np.linspace(y0, y1, rows + 1)[1:-1]
-    ]
-    parts += [
-        box((x - t / 2, y0, z0), (x + t / 2, y1, z1 - 0.01), role="side")
-        for x in np.linspace(x0, x1, columns + 1)[1:-1]
-    ]
-    return parts
+    t, z1 = BOARD * (0.8 + 0.5 * style.bulk), z1 - 0.01
+    ys, xs = np.linspace(y0, y1, rows + 1)[1:-1], np.linspace(x0, x1, columns + 1)[1:-1]
+    parts: list[Solid] = [box((x0, y - t / 2, z0), (x1, y + t / 2, z1), role="shelf") for y in ys]
+    return parts + [box((x - t / 2, y0, z0), (x + t / 2, y1, z1), role="side") for x in xs]
 
 
 def foot_height(style: Style, h: float, most: float = 0.3) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, box, of_role, post
+from echomodel.furniture.carpentry import Size, both, box, four, of_role, post
 from echomodel.furniture.fronts import carcass, front
 from echomodel.furniture.solids import Solid, ball, tube
 from echomodel.furniture.style import Choices, Style
@@ -19,10 +19,8 @@ def coat_rack(size: Size, style: Style, choices: Choices) -> list[Solid]:
     hooks: list[Solid] = []
     y, count = min(1.65, 0.86 * h), max(3, round(w / 0.18))
     if choices.chance("kind", 0.4):
-        x, posts = w / 2 - 0.02, []
-        for s in (-1, 1):
-            posts.append(tube([[s * x, 0.014, -d / 2 + 0.014], [s * x, 0.014, d / 2 - 0.014]], 0.014))
-            posts.append(tube([[s * x, 0.01, 0.0], [s * x, h - 0.014, 0.0]], 0.014))
+        x, z = w / 2 - 0.02, d / 2 - 0.014
+        posts = both(tube([[x, 0.014, -z], [x, 0.014, z]], 0.014), tube([[x, 0.01, 0.0], [x, h - 0.014, 0.0]], 0.014))
         posts.append(tube([[-x, h - 0.014, 0.0], [x, h - 0.014, 0.0]], 0.014))
         shelf = box((-x, 0.16, -d / 2 + 0.03), (x, 0.18, d / 2 - 0.03), role="shelf")
         return [*of_role("post", posts, material="metal"), shelf]
@@ -32,8 +30,7 @@ def coat_rack(size: Size, style: Style, choices: Choices) -> list[Solid]:
         box((-w / 2, h - 0.025, -d / 2), (w / 2, h, min(d / 2, z + 0.27)), "wood", 0.003, "shelf"),
         box((-w / 2, 0.43, z - 0.004), (w / 2, 0.47, d / 2), "wood", 0.004, "seat"),
     ]
-    for x in (-w / 2, w / 2 - 0.03):
-        parts.append(box((x, 0, z - 0.004), (x + 0.03, 0.432, d / 2 - 0.01), "wood", 0.0, "side"))
+    parts += both(box((w / 2 - 0.03, 0, z - 0.004), (w / 2, 0.432, d / 2 - 0.01), "wood", 0.0, "side"))
     for x in np.linspace(-w / 2 + 0.1, w / 2 - 0.1, count):
         bend = np.array([[x, y, z - 0.004], [x, y - 0.01, z + 0.05], [x, y + 0.03, z + 0.075]])
         hooks.append(tube(bend, 0.008, "metal", "hook"))
@@ -62,7 +59,7 @@ def radiator(size: Size, style: Style, choices: Choices) -> list[Solid]:
         parts.append(box((-w / 2, low, -d / 2 + 0.03), (w / 2, h, d / 2 - 0.012), radius=0.004))
         for x in np.arange(-w / 2 + 0.04, w / 2 - 0.02, 0.05):
             parts.append(box((x - 0.012, low + 0.03, d / 2 - 0.014), (x + 0.012, h - 0.03, d / 2), radius=0.004))
-    feet = [box((s * 0.35 * w - 0.02, 0, -d / 2), (s * 0.35 * w + 0.02, low + 0.05, 0.0)) for s in (-1, 1)]
+    feet = both(box((0.35 * w - 0.02, 0, -d / 2), (0.35 * w + 0.02, low + 0.05, 0.0)))
     return [*of_role("body", parts, material="enamel"), *of_role("foot", feet, material="metal")]
 
 
@@ -72,10 +69,7 @@ def fireplace(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if choices.chance("kind", 0.4):
         body = box((-w / 2, 0.08, -d / 2), (w / 2, h, d / 2 - 0.02), "screen", 0.01, "stove")
         pane = box((-0.36 * w, 0.4 * h, d / 2 - 0.024), (0.36 * w, 0.85 * h, d / 2), "glass", 0.0, "pane")
-        feet = [
-            post(x, z, 0.02, 0, 0.084, "metal", 0.0, "leg") for x in (-0.4 * w, 0.4 * w) for z in (-0.35 * d, 0.35 * d)
-        ]
-        return [body, pane, *feet]
+        return [body, pane, *four(post(0.4 * w, 0.35 * d, 0.02, 0, 0.084, "metal", 0.0, "leg"))]
     pier, top = 0.17 * w, h - 0.06
     inner = d / 2 - 0.05
     parts: list[Solid] = [
@@ -84,14 +78,9 @@ def fireplace(size: Size, style: Style, choices: Choices) -> list[Solid]:
         box((-w / 2 + 0.03, 0, -d / 2), (w / 2 - 0.03, 0.72 * h, -d / 2 + 0.06), "screen", 0.0, "hearth"),
         box((-w / 2 + 0.03, 0, -d / 2), (w / 2 - 0.03, 0.06, inner), "ceramic", 0.002, "stone"),
     ]
-    parts += [
-        box((min(a, b), 0, -d / 2), (max(a, b), 0.72 * h, inner), "ceramic", 0.004, "stone")
-        for a, b in ((-w / 2 + 0.03, -w / 2 + pier), (w / 2 - pier, w / 2 - 0.03))
-    ]
-    logs = [
-        tube([[-0.2 * w, 0.1 + 0.06 * k, z], [0.2 * w, 0.1 + 0.06 * k, z]], 0.042)
-        for k, z in ((0, -0.05), (0, 0.03), (1, -0.01))
-    ]
+    parts += both(box((w / 2 - pier, 0, -d / 2), (w / 2 - 0.03, 0.72 * h, inner), "ceramic", 0.004, "stone"))
+    places = (0.1, -0.05), (0.1, 0.03), (0.1 + 0.06, -0.01)
+    logs = [tube([[-0.2 * w, y, z], [0.2 * w, y, z]], 0.042) for y, z in places]
     return parts + of_role("log", logs, material="stem")
 
 
@@ -107,28 +96,17 @@ def piano(size: Size, style: Style, choices: Choices) -> list[Solid]:
         box((-w / 2 + t, keys - 0.024, z), (w / 2 - t, keys, d / 2 - 0.03), "enamel", 0.001, "keys"),
         box((-0.45 * w, keys + 0.2, z - 0.004), (0.45 * w, keys + 0.22, z + 0.03), material, 0.0, "desk"),
     ]
-    for s in (-1, 1):
-        x = s * (w / 2 - t / 2)
-        parts.append(box((x - t / 2, keys - 0.03, z - 0.004), (x + t / 2, keys + 0.1, d / 2), material, 0.004, "cheek"))
-        parts.append(box((x - t / 2, 0, d / 2 - 0.07), (x + t / 2, keys - 0.09, d / 2 - 0.02), material, 0.004, "leg"))
+    x = w / 2 - t / 2
+    cheek = box((x - t / 2, keys - 0.03, z - 0.004), (x + t / 2, keys + 0.1, d / 2), material, 0.004, "cheek")
+    leg = box((x - t / 2, 0, d / 2 - 0.07), (x + t / 2, keys - 0.09, d / 2 - 0.02), material, 0.004, "leg")
+    parts += both(cheek, leg)
     pitch = (w - 2 * t) / 52
-    x0 = -w / 2 + t
+    half, y0, y1, z1 = 0.3 * pitch, keys - 0.004, keys + 0.01, d / 2 - 0.12
     for k in range(51):
         if k % 7 not in (1, 4):  # from A: no black key between B and C, E and F
-            x = x0 + (k + 1) * pitch
-            parts.append(
-                box(
-                    (x - 0.3 * pitch, keys - 0.004, z),
-                    (x + 0.3 * pitch, keys + 0.01, d / 2 - 0.12),
-                    "screen",
-                    0.0,
-                    "keys",
-                )
-            )
-    pedals = [
-        box((x - 0.012, 0.03, z - 0.01), (x + 0.012, 0.045, z + 0.09), "metal", 0.0, "pedal") for x in (-0.06, 0.06)
-    ]
-    return parts + pedals
+            x = -w / 2 + t + (k + 1) * pitch
+            parts.append(box((x - half, y0, z), (x + half, y1, z1), "screen", 0.0, "keys"))
+    return parts + both(box((0.06 - 0.012, 0.03, z - 0.01), (0.06 + 0.012, 0.045, z + 0.09), "metal", 0.0, "pedal"))
 
 
 def cot(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -136,10 +114,10 @@ def cot(size: Size, style: Style, choices: Choices) -> list[Solid]:
     w, h, d = size
     x, z, t = w / 2 - 0.02, d / 2 - 0.02, 0.02
     low, floor = 0.12, min(0.35, 0.4 * h)
-    parts: list[Solid] = [post(sx * x, sz * z, t, 0, h, "wood", 0.004, "leg") for sx in (-1, 1) for sz in (-1, 1)]
+    parts = four(post(x, z, t, 0, h, "wood", 0.004, "leg"))
     for y in (low, h - 0.05):
-        parts += [box((-x, y, s * z - 0.013), (x, y + 0.04, s * z + 0.013), "wood", 0.0, "rail") for s in (-1, 1)]
-        parts += [box((s * x - 0.013, y, -z), (s * x + 0.013, y + 0.04, z), "wood", 0.0, "rail") for s in (-1, 1)]
+        parts += both(box((-x, y, z - 0.013), (x, y + 0.04, z + 0.013), role="rail"), axis=2)
+        parts += both(box((x - 0.013, y, -z), (x + 0.013, y + 0.04, z), role="rail"))
     for s in (-1, 1):
         for at in np.arange(-z + 0.08, z - 0.05, 0.075):
             parts.append(tube([[s * x, low + 0.02, at], [s * x, h - 0.03, at]], 0.008, role="bar"))
@@ -161,8 +139,7 @@ def toy_box(size: Size, style: Style, choices: Choices) -> list[Solid]:
         box((-0.08, 0.62 * h, d / 2 - 0.016), (0.08, 0.72 * h, d / 2 - 0.006), "accent", 0.0, "handle"),
     ]
     if foot:
-        wheels = [ball((sx * (w / 2 - 0.06), 0.027, sz * (d / 2 - 0.06)), 0.027) for sx in (-1, 1) for sz in (-1, 1)]
-        parts += of_role("foot", wheels, material="screen")
+        parts += of_role("foot", four(ball((w / 2 - 0.06, 0.027, d / 2 - 0.06), 0.027)), material="screen")
     return parts
 
 
@@ -174,12 +151,9 @@ def garden_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts: list[Solid] = []
     for z0, z1 in _slats(d):
         parts.append(box((-w / 2, h - t, z0), (w / 2, h, z1), material, 0.003, "top"))
-    parts += [
-        box((s * x - 0.02, h - t - 0.06, -z), (s * x + 0.02, h - t + 0.003, z), material, 0.0, "apron") for s in (-1, 1)
-    ]
-    parts += [box((-x, h - t - 0.06, s * z - 0.02), (x, h - t, s * z + 0.02), material, 0.0, "apron") for s in (-1, 1)]
-    parts += [post(sx * x, sz * z, 0.025, 0, h - t, material, 0.003, "leg") for sx in (-1, 1) for sz in (-1, 1)]
-    return parts
+    parts += both(box((x - 0.02, h - t - 0.06, -z), (x + 0.02, h - t + 0.003, z), material, 0.0, "apron"))
+    parts += both(box((-x, h - t - 0.06, z - 0.02), (x, h - t, z + 0.02), material, 0.0, "apron"), axis=2)
+    return parts + four(post(x, z, 0.025, 0, h - t, material, 0.003, "leg"))
 
 
 def garden_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -189,11 +163,12 @@ def garden_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts: list[Solid] = []
     for z0, z1 in _slats(d - 0.08):
         parts.append(box((-x, seat - t, z0), (x, seat, z1), "wood", 0.003, "seat"))
-    for s in (-1, 1):
-        parts.append(box((s * x - t, 0, -d / 2), (s * x + t, h, -d / 2 + 0.04), "wood", 0.004, "leg"))
-        parts.append(box((s * x - t, 0, d / 2 - 0.04), (s * x + t, 0.64, d / 2), "wood", 0.004, "leg"))
-        parts.append(box((s * x - t, seat - 0.07, -d / 2), (s * x + t, seat - t + 0.003, d / 2), "wood", 0.0, "apron"))
-        parts.append(box((s * x - t, 0.635, -d / 2), (s * x + t, 0.665, d / 2), "wood", 0.006, "arm"))
+    parts += both(
+        box((x - t, 0, -d / 2), (x + t, h, -d / 2 + 0.04), "wood", 0.004, "leg"),
+        box((x - t, 0, d / 2 - 0.04), (x + t, 0.64, d / 2), "wood", 0.004, "leg"),
+        box((x - t, seat - 0.07, -d / 2), (x + t, seat - t + 0.003, d / 2), role="apron"),
+        box((x - t, 0.635, -d / 2), (x + t, 0.665, d / 2), "wood", 0.006, "arm"),
+    )
     for y in np.arange(seat + 0.08, h - 0.06, 0.1):
         parts.append(box((-x, y, -d / 2 + 0.008), (x, y + 0.07, -d / 2 + 0.03), "wood", 0.003, "back"))
     return parts

@@ -11,7 +11,7 @@ import numpy as np
 
 from echomodel.furniture.carpentry import Size, around, box, core, of_role
 from echomodel.furniture.fronts import front
-from echomodel.furniture.solids import Solid, Tube, Turned, rotation
+from echomodel.furniture.solids import Solid, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
 
 PLINTH, WORKTOP = 0.1, 0.04  # metres: height of the plinth, thickness of the worktop
@@ -87,11 +87,7 @@ def hob_unit(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts = _worktop(size, hole=(-half, half, -0.24, 0.26))
     parts.append(box((-half, h - WORKTOP, -0.24), (half, h - 0.002, 0.26), "screen", 0.0, "hob"))
     for x, z, radius in ((-0.14, -0.1, 0.08), (0.14, -0.1, 0.1), (-0.14, 0.13, 0.1), (0.14, 0.13, 0.08)):
-        ring = Turned(
-            centre=np.array([x * half / 0.29, h - 0.0035, z]), low=(radius, radius), high=(radius, radius),
-            height=0.0035, material="steel", role="hob",
-        )  # fmt: skip
-        parts.append(ring)
+        parts.append(turned((x * half / 0.29, h - 0.0035, z), radius, 0.0035, material="steel", role="hob"))
     side = (w - UNIT) / 2
     low, high = (-w / 2, w / 2) if side < 0.15 else (-UNIT / 2, UNIT / 2)
     parts += _oven(low, high, (PLINTH, h - WORKTOP), _deep(d))
@@ -124,10 +120,10 @@ def fridge(size: Size, style: Style, choices: Choices) -> list[Solid]:
     ]
     for low, high in ((foot, split), (split, h)):
         parts.append(box((-w / 2, low + 0.004, z - 0.002), (w / 2, high - 0.004, z + 0.045), material, 0.01, "front"))
-        y = (high - 0.12, high - 0.5) if high == split else (low + 0.12, low + 0.5)
-        points = np.array([[w * 0.4, min(y), z + 0.04], [w * 0.4, min(y), z + 0.06], [w * 0.4, max(y), z + 0.06],
-                           [w * 0.4, max(y), z + 0.04]])  # fmt: skip
-        parts.append(Tube(points=points, radius=0.009, material="steel", role="handle"))
+        y0 = high - 0.5 if high == split else low + 0.12
+        y1 = high - 0.12 if high == split else low + 0.5
+        grip = [[w * 0.4, y, z + out] for y, out in ((y0, 0.04), (y0, 0.06), (y1, 0.06), (y1, 0.04))]
+        parts.append(tube(grip, 0.009, "steel", "handle"))
     return parts
 
 
@@ -139,10 +135,8 @@ def range_hood(size: Size, style: Style, choices: Choices) -> list[Solid]:
     slab = box((-w / 2, 0, -d / 2), (w / 2, lip, d / 2), "steel", 0.004, "hood")
     if choices.chance("kind", 0.5):
         return [slab, chimney]
-    slope = Turned(
-        centre=np.array([0, lip - 0.002, 0.0]), low=(w / 2 * 0.98, d / 2 * 0.98), high=(0.2, d * 0.22),
-        height=max(0.1, 0.35 * h), power=np.inf, material="steel", role="hood",
-    )  # fmt: skip
+    slope = turned((0, lip - 0.002, 0.0), (w / 2 * 0.98, d / 2 * 0.98), max(0.1, 0.35 * h), (0.2, d * 0.22),
+                   power=np.inf, material="steel", role="hood")  # fmt: skip
     return [slab, slope, chimney]
 
 
@@ -225,13 +219,11 @@ def _oven(low: float, high: float, span: Span, deep: Span) -> list[Solid]:
         box((low + 0.003, top + 0.003, z - 0.004), (high - 0.003, y1 - 0.003, z + 0.016), "steel", 0.002, "switches"),
     ]
     y = top - 0.045
-    grip = np.array([[low + 0.07, y, z + 0.012], [low + 0.07, y, z + 0.045], [high - 0.07, y, z + 0.045],
-                     [high - 0.07, y, z + 0.012]])  # fmt: skip
-    parts.append(Tube(points=grip, radius=0.007, material="steel", role="handle"))
+    ends = (low + 0.07, 0.012), (low + 0.07, 0.045), (high - 0.07, 0.045), (high - 0.07, 0.012)
+    parts.append(tube([[x, y, z + out] for x, out in ends], 0.007, "steel", "handle"))
     for x in np.linspace(low + 0.1, high - 0.1, 4):
-        centre, ahead = np.array([x, (top + y1) / 2, z + 0.014]), rotation(x=np.pi / 2)
-        knob = Turned(centre=centre, low=(0.016, 0.016), high=(0.014, 0.014), height=0.02, turn=ahead)
-        parts += of_role("knob", [knob], material="screen")
+        place, ahead = (x, (top + y1) / 2, z + 0.014), rotation(x=np.pi / 2)
+        parts.append(turned(place, 0.016, 0.02, 0.014, turn=ahead, material="screen", role="knob"))
     return parts
 
 
@@ -249,7 +241,5 @@ def spout(x: float, y: float, z: float, high: float, reach: float) -> list[Solid
     bend = np.array([[0, 0, 0], [0, 0.75 * high, 0], [0, 0.95 * high, 0.12 * reach], [0, high, 0.42 * reach],
                      [0, high, 0.58 * reach], [0, 0.93 * high, 0.9 * reach], [0, 0.8 * high, reach]])  # fmt: skip
     lever = np.array([[0, 0.2 * high, 0], [0.06, 0.28 * high, 0]])
-    foot = Turned(centre=np.array([x, y - 0.003, z]), low=(0.024, 0.024), high=(0.024, 0.024), height=0.015)
-    at = np.array([x, y, z])
-    tubes = [Tube(points=points + at, radius=radius) for points, radius in ((bend, 0.011), (lever, 0.007))]
-    return of_role("tap", [foot, *tubes], material="metal")
+    at, foot = np.array([x, y, z]), turned((x, y - 0.003, z), 0.024, 0.015)
+    return of_role("tap", [foot, tube(bend + at, 0.011), tube(lever + at, 0.007)], material="metal")

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, box
+from echomodel.furniture.carpentry import Size, both, box
 from echomodel.furniture.lathe import Lathe, wall
 from echomodel.furniture.solids import Solid, Turned, ball, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
@@ -51,10 +51,9 @@ def shade(kind: str, x: float, y: float, z: float, a: float, b: float, h: float,
     socket = _disc(x, low, z, 0.45 * bulb, 0.45 * bulb, y + high * h - low, role="bulb")
     arms: list[Solid] = []
     if kind != "dome":
-        arms = [
-            box((x - i, y + 0.9 * h, z - k), (x + i, y + 0.9 * h + 0.005, z + k), "metal", 0.0, "shade")
-            for i, k in ((reach, 0.003), (0.003, reach * squash))
-        ]
+        low, up = y + 0.9 * h, y + 0.9 * h + 0.005
+        bars = (reach, 0.003), (0.003, reach * squash)
+        arms = [box((x - i, low, z - k), (x + i, up, z + k), "metal", 0.0, "shade") for i, k in bars]
     return [skin, body, light, socket, *arms]
 
 
@@ -100,7 +99,7 @@ def _row(size: Size, style: Style, choices: Choices) -> list[Solid]:
     bar = box((-w * 0.42, h - 0.03, -d * 0.15), (w * 0.42, h, d * 0.15), "metal", 0.0, "canopy")
     if d < 0.25 and (style.shade == "ring" or choices.chance("form", 0.3)):
         beam = box((-w / 2, 0, -d * 0.4), (w / 2, min(0.08, h * 0.15), d * 0.4), "shade", 0.01, "shade")
-        return [bar, beam, *[tube([[s * w * 0.35, 0.05, 0], [s * w * 0.35, h, 0]], 0.006, "metal") for s in (-1, 1)]]
+        return [bar, beam, *both(tube([[w * 0.35, 0.05, 0], [w * 0.35, h, 0]], 0.006, "metal"))]
     count = int(np.clip(round(w / max(d * 1.35, 0.16)), 2, 6))
     each = min(w / count * 0.46, d / 2)
     xs = np.linspace(-w / 2 + each, w / 2 - each, count)
@@ -126,15 +125,8 @@ def _chandelier(size: Size, style: Style, choices: Choices) -> list[Solid]:
     cup = min(0.07, w * 0.11)
     for angle in np.arange(arms) * 2 * np.pi / arms + np.pi / arms:
         c, s = np.cos(angle) * (w / 2 - cup), np.sin(angle) * (d / 2 - cup)
-        curve = np.array(
-            [
-                [0, body * 0.3, 0],
-                [c * 0.45, body * 0.06, s * 0.45],
-                [c * 0.85, body * 0.14, s * 0.85],
-                [c, body * (0.68 if style.taper > 0.55 else 0.42), s],
-            ]
-        )
-        parts.append(tube(curve, r * 0.9, "metal"))
+        heights = (0, 0.3), (0.45, 0.06), (0.85, 0.14), (1, 0.68 if style.taper > 0.55 else 0.42)
+        parts.append(tube([[c * out, body * up, s * out] for out, up in heights], r * 0.9, "metal"))
         if style.taper > 0.55:
             parts += shade("cone", c, body * 0.5, s, cup, cup, body * 0.4, style)
         else:
@@ -151,12 +143,13 @@ def _rings(size: Size, style: Style) -> list[Solid]:
     for i in range(count):
         share = 1 - 0.28 * i
         y = 0.02 + i * min(0.25, h * 0.22)
-        ring = np.stack(
-            [np.cos(angle) * (w / 2 - 0.02) * share, np.full(33, y), np.sin(angle) * (d / 2 - 0.02) * share], 1
-        )
-        parts.append(tube(ring, 0.02, "shade"))
-        for a in np.arange(3) * 2 * np.pi / 3:
-            foot = [np.cos(a) * (w / 2 - 0.02) * share, y, np.sin(a) * (d / 2 - 0.02) * share]
+
+        def at(turn: np.ndarray, y: float = y, share: float = share) -> np.ndarray:
+            x, z = np.cos(turn) * (w / 2 - 0.02) * share, np.sin(turn) * (d / 2 - 0.02) * share
+            return np.stack([x, np.full(len(turn), y), z], 1)
+
+        parts.append(tube(at(angle), 0.02, "shade"))
+        for foot in at(np.arange(3) * 2 * np.pi / 3):
             parts.append(tube([foot, [0, h - 0.02, 0]], 0.004, "metal"))
     return parts
 
@@ -178,11 +171,8 @@ def ceiling_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 parts.append(tube([[0, h * 0.5, 0], [x, tall, z]], 0.011, "metal"))
                 parts += shade(kind, x, 0.0, z, r, r, tall, style)
             return parts
-        return [
-            stem,
-            _disc(0, h - 0.03, 0, w * 0.18, d * 0.18, 0.03),
-            *shade(_kind(style, "sphere"), 0, 0, 0, w / 2, d / 2, h * 0.55, style),
-        ]
+        one = shade(_kind(style, "sphere"), 0, 0, 0, w / 2, d / 2, h * 0.55, style)
+        return [stem, _disc(0, h - 0.03, 0, w * 0.18, d * 0.18, 0.03), *one]
     kind = choices.pick("kind", ["panel", "bowl", "drum", "ring"], [0.3, 0.3, 0.25, 0.15])
     if not alike or (style.profile == "square" and kind == "panel"):
         glow = box((-w / 2, 0, -d / 2), (w / 2, h * 0.85, d / 2), "shade", min(0.03, h * 0.3) * style.softness)
@@ -190,15 +180,11 @@ def ceiling_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if kind == "ring":
         angle, r = np.linspace(0, 2 * np.pi, 33), min(h * 0.3, w * 0.08)
         circle = np.stack([np.cos(angle) * (w / 2 - r), np.full(33, r), np.sin(angle) * (d / 2 - r)], 1)
-        spokes = [
-            box((-w / 2 + r, r, -0.012), (w / 2 - r, r + 0.03, 0.012), "metal"),
-            box((-0.012, r, -d / 2 + r), (0.012, r + 0.03, d / 2 - r), "metal"),
-        ]
+        spokes = [box((-x, r, -z), (x, r + 0.03, z), "metal") for x, z in ((w / 2 - r, 0.012), (0.012, d / 2 - r))]
         return [tube(circle, r, "shade"), *spokes, _disc(0, r, 0, w * 0.16, d * 0.16, h - r)]
     if kind == "bowl":
-        bowl = turned(
-            (0, h * 0.8, 0), (w / 2, d / 2), h * 0.8, (w * 0.2, d * 0.2), rounding=0.02, turn=DOWN, material="shade"
-        )
+        high = w * 0.2, d * 0.2
+        bowl = turned((0, h * 0.8, 0), (w / 2, d / 2), h * 0.8, high, rounding=0.02, turn=DOWN, material="shade")
         return [bowl, _disc(0, h * 0.78, 0, w * 0.42, d * 0.42, h * 0.22)]
     drum = _disc(0, 0, 0, w / 2, d / 2, h * 0.85, "shade")
     if style.tufting > 0.5:
@@ -254,34 +240,25 @@ def table_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     a, b = w / 2, d / 2
     if style.family == "industrial" and choices.chance("form", 0.6):
         r = 0.008
-        arm = np.array([[0, 0.02, -b * 0.6], [0, h * 0.6, -b * 0.8], [0, h * 0.95, b * 0.3]])
-        return [
-            _disc(0, 0, -b * 0.5, a * 0.7, b * 0.5, 0.02),
-            tube(arm, r, "metal"),
-            *shade("cone", 0, h * 0.72, b * 0.5, a * 0.55, b * 0.5, h * 0.22, style),
-        ]
+        arm = tube([[0, 0.02, -b * 0.6], [0, h * 0.6, -b * 0.8], [0, h * 0.95, b * 0.3]], r, "metal")
+        head = shade("cone", 0, h * 0.72, b * 0.5, a * 0.55, b * 0.5, h * 0.22, style)
+        return [_disc(0, 0, -b * 0.5, a * 0.7, b * 0.5, 0.02), arm, *head]
     kind, tall = _one_shade(style, min(w, d), h * (0.36 + 0.12 * style.taper), 0.6 * h)
     parts = shade(kind, 0, h - tall, 0, a, b, tall, style)
     stem = h - tall
     body = choices.pick("kind", ["vase", "column", "balls", "cone"])
     if body == "vase":
-        parts += [
-            ball((0, stem * 0.42, 0), (a * 0.5, stem * 0.42, b * 0.5), "ceramic", power=2.3),
-            _disc(0, 0, 0, a * 0.3, b * 0.3, stem * 0.1, "ceramic"),
-        ]
+        parts.append(ball((0, stem * 0.42, 0), (a * 0.5, stem * 0.42, b * 0.5), "ceramic", power=2.3))
+        parts.append(_disc(0, 0, 0, a * 0.3, b * 0.3, stem * 0.1, "ceramic"))
     elif body == "balls":
-        parts += [
-            ball((0, stem * y, 0), (a * s, stem * 0.2, b * s), "ceramic")
-            for y, s in ((0.22, 0.42), (0.55, 0.32), (0.82, 0.22))
-        ]
+        for y, s in ((0.22, 0.42), (0.55, 0.32), (0.82, 0.22)):
+            parts.append(ball((0, stem * y, 0), (a * s, stem * 0.2, b * s), "ceramic"))
         parts.append(_disc(0, 0, 0, a * 0.4, b * 0.4, stem * 0.08))
     elif body == "cone":
         parts.append(_disc(0, 0, 0, a * 0.5, b * 0.5, stem, "ceramic", 0.2))
     else:
-        parts += [
-            _disc(0, 0, 0, a * 0.5, b * 0.5, max(0.012, stem * 0.06)),
-            _disc(0, 0, 0, a * 0.12, b * 0.12, stem, "metal"),
-        ]
+        parts.append(_disc(0, 0, 0, a * 0.5, b * 0.5, max(0.012, stem * 0.06)))
+        parts.append(_disc(0, 0, 0, a * 0.12, b * 0.12, stem))
     parts.append(tube([[0, stem * 0.7, 0], [0, stem + tall * 0.5, 0]], 0.012, "metal"))
     return parts
 
@@ -294,16 +271,8 @@ def wall_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
         r = min(w * 0.22, d * 0.4)
         bar = tube([[-w / 2 + r, h * 0.3, d / 2 - r], [w / 2 - r, h * 0.3, d / 2 - r]], 0.01, "metal")
         arm = tube([[0, h * 0.4, -d / 2 + 0.01], [0, h * 0.3, d / 2 - r]], 0.01, "metal")
-        return [
-            plate,
-            bar,
-            arm,
-            *[
-                p
-                for s in (-1, 1)
-                for p in shade(_kind(style), s * (w / 2 - r), h * 0.3, d / 2 - r, r, r, h * 0.7, style)
-            ],
-        ]
+        glow = shade(_kind(style), w / 2 - r, h * 0.3, d / 2 - r, r, r, h * 0.7, style)
+        return [plate, bar, arm, *both(*glow)]
     if choices.chance("form", 0.3):
         body = turned((0, 0, d * 0.1), (w / 2, d * 0.4), h, material="shade")
         return [body, box((-w * 0.2, h * 0.2, -d / 2), (w * 0.2, h * 0.8, d * 0.1), "metal")]

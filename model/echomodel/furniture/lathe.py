@@ -35,11 +35,8 @@ class Lathe(Solid):
             length = off_r * off_r + off_y * off_y
             if a[0] > 0 or b[0] > 0:  # the axis itself is no surface
                 closer = length < nearest
-                nearest, nx, ny = (
-                    np.where(closer, length, nearest),
-                    np.where(closer, off_r, nx),
-                    np.where(closer, off_y, ny),
-                )
+                nearest = np.where(closer, length, nearest)
+                nx, ny = np.where(closer, off_r, nx), np.where(closer, off_y, ny)
             crosses = ((a[1] <= y) & (y < b[1])) | ((b[1] <= y) & (y < a[1]))
             if abs(d[1]) > 1e-12:
                 inside ^= crosses & (radius < a[0] + (y - a[1]) / d[1] * d[0])
@@ -67,9 +64,8 @@ class Lathe(Solid):
         if not self.hollow:
             return float(np.median(self.profile[:, 0]) / scale[0])
         outline = self._outline()
-        area = 0.5 * abs(
-            np.sum(outline[:, 0] * np.roll(outline[:, 1], -1) - np.roll(outline[:, 0], -1) * outline[:, 1])
-        )
+        after = np.roll(outline, -1, axis=0)
+        area = 0.5 * abs(np.sum(outline[:, 0] * after[:, 1] - after[:, 0] * outline[:, 1]))
         length = np.linalg.norm(outline - np.roll(outline, -1, axis=0), axis=1).sum()
         return float(area / length / scale[0])
 
@@ -120,17 +116,8 @@ class Blade(Solid):
         side = np.array([1.0, 0.0, 0.0])
         rings = []
         for point, up, reach in zip(points, normal, np.maximum(half, 0.06 * self.width), strict=True):
-            fold = 0.25 * reach
-            rings.append(
-                np.array(
-                    [
-                        point + reach * side + fold * up,
-                        point + self.thick / 2 * up,
-                        point - reach * side + fold * up,
-                        point - self.thick / 2 * up,
-                    ]
-                )
-            )
+            out, fold, thick = reach * side, 0.25 * reach * up, self.thick / 2 * up
+            rings.append(np.array([point + out + fold, point + thick, point - out + fold, point - thick]))
         return loft(rings)
 
     def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:

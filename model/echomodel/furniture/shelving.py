@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, base, box, core, of_role, post
+from echomodel.furniture.carpentry import Size, base, both, box, core, of_role, post
 from echomodel.furniture.fronts import BOARD, carcass, depth_of, foot_height, front, shelves
 from echomodel.furniture.lathe import Lathe
 from echomodel.furniture.solids import Solid, rotation
@@ -27,16 +27,13 @@ def _count(wished: float, most: int, least: int = 1) -> int:
 def bookshelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Open rows and columns with a back or without, some cells closed, some books; or a ladder of boards."""
     w, h, d = size
-    rows, columns = (
-        _count(h / choices.between("rows", 0.3, 0.42), ROWS, 1 + (h > 0.55)),
-        _count(w / choices.between("columns", 0.4, 0.8), COLUMNS),
-    )
+    rows = _count(h / choices.between("rows", 0.3, 0.42), ROWS, 1 + (h > 0.55))
+    columns = _count(w / choices.between("columns", 0.4, 0.8), COLUMNS)
     if style.family == "industrial" and choices.chance("form", 0.6):
         return _rack(size, rows, columns)
     foot = min(0.08, style.leg_height) if choices.chance("raised", 0.5) else 0.02
-    parts, rect = carcass(
-        size, style, foot, kind="plinth" if foot < 0.04 else None, solid=False, back=choices.chance("back", 0.8)
-    )
+    kind, back = "plinth" if foot < 0.04 else None, choices.chance("back", 0.8)
+    parts, rect = carcass(size, style, foot, kind=kind, solid=False, back=back)
     parts += shelves(rect, d, -d / 2, rows, columns, style)
     x0, y0, x1, y1, z = rect
     xs, ys = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
@@ -50,13 +47,9 @@ def bookshelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
     for i in range(columns):
         for j in range(closed, rows):
             if rng.random() < 0.8 * few:
-                cell = (
-                    float(xs[i]) + 0.6 * t,
-                    float(xs[i + 1]) - 0.6 * t,
-                    float(ys[j]) + t / 2,
-                    float(ys[j + 1]) - t / 2,
-                )
-                parts += _books(*cell, -d / 2 + 0.02, z - 0.012, rng)
+                across = float(xs[i]) + 0.6 * t, float(xs[i + 1]) - 0.6 * t
+                upwards = float(ys[j]) + t / 2, float(ys[j + 1]) - t / 2
+                parts += _books(*across, *upwards, -d / 2 + 0.02, z - 0.012, rng)
     return parts
 
 
@@ -103,7 +96,7 @@ def _rack(size: Size, rows: int, columns: int) -> list[Solid]:
     w, h, d = size
     t = 0.014
     xs = np.linspace(-w / 2 + t, w / 2 - t, min(columns, 3) + 1)
-    parts: list[Solid] = [post(x, s * (d / 2 - t), t, 0, h, "metal") for x in xs for s in (-1, 1)]
+    parts = [part for x in xs for part in both(post(x, d / 2 - t, t, 0, h, "metal"), axis=2)]
     ys = np.linspace(min(0.12, 0.2 * h), h - 0.02, rows + 1)
     boards: list[Solid] = [box((-w / 2, y - 0.018, -d / 2), (w / 2, y + 0.018, d / 2)) for y in ys]
     return of_role("side", parts) + of_role("shelf", boards)
@@ -121,39 +114,23 @@ def shelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
     t = BOARD * (0.8 + 0.5 * style.bulk)
     ys = np.linspace(0.08 * min(1, h), h - t, rows + 1)
     if kind == "boards":
-        parts: list[Solid] = [
-            box((s * w / 2 - (t if s > 0 else 0), 0, -d / 2), (s * w / 2 + (t if s < 0 else 0), h, d / 2), role="side")
-            for s in (-1, 1)
-        ]
+        parts = both(box((w / 2 - t, 0, -d / 2), (w / 2, h, d / 2), role="side"))
         return parts + [box((-w / 2, y, -d / 2), (w / 2, y + t, d / 2), role="shelf") for y in ys]
     if kind == "ladder":
         lean = np.arctan2(d * 0.6, h)
         half = h / 2 / np.cos(lean) - t * np.tan(lean)  # their lowest and highest corners end with the posts
-        rails: list[Solid] = [
-            replace(
-                box((-t, -half, -t), (t, half, t)),
-                centre=np.array([s * (w / 2 - t), h / 2, -d * 0.1]),
-                turn=rotation(x=-lean),
-            )
-            for s in (-1, 1)
-        ]
-        posts: list[Solid] = [box((x - t, 0, -d / 2), (x + t, h, -d / 2 + 2 * t)) for x in (t - w / 2, w / 2 - t)]
-        boards: list[Solid] = []
-        for y in ys:
-            z1 = d / 2 - (d * 0.6) * y / h
-            boards.append(box((-w / 2, y, -d / 2), (w / 2, y + t, max(z1, -d / 2 + 0.12))))
+        rail = replace(box((-t, -half, -t), (t, half, t)), centre=np.array([w / 2 - t, h / 2, -d * 0.1]))
+        rails = both(replace(rail, turn=rotation(x=-lean)))
+        posts = both(box((w / 2 - t - t, 0, -d / 2), (w / 2 - t + t, h, -d / 2 + 2 * t)))
+        deep = [max(d / 2 - (d * 0.6) * y / h, -d / 2 + 0.12) for y in ys]
+        boards = [box((-w / 2, y, -d / 2), (w / 2, y + t, z1)) for y, z1 in zip(ys, deep, strict=True)]
         return of_role("side", rails + posts) + of_role("shelf", boards)
     xs = np.linspace(-w / 2, w / 2, rows + 2)
     parts = [box((-w / 2, y, -d / 2), (w / 2, y + t, d / 2), role="shelf") for y in ys]
     ends: list[Solid] = []
     for i in range(rows):
-        x = float(xs[1 + (i * 2) % rows])
-        ends.append(box((x - t / 2, ys[i], -d / 2), (x + t / 2, ys[i + 1], d / 2)))
-        ends += [
-            box((s * (w / 2 - t) - t / 2, ys[i], -d / 2), (s * (w / 2 - t) + t / 2, ys[i + 1], d / 2))
-            for s in (-1, 1)
-            if (i + (s > 0)) % 2
-        ]
+        for x in (float(xs[1 + (i * 2) % rows]), (w / 2 - t) * (-1 if i % 2 else 1)):
+            ends.append(box((x - t / 2, ys[i], -d / 2), (x + t / 2, ys[i + 1], d / 2)))
     return [*parts, *of_role("side", ends), *base(style, w * 0.9, d * 0.9, float(ys[0]), 0.035, "straight")]
 
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from echomodel.furniture.backs import chair_legs, leaning, slim_arms
-from echomodel.furniture.carpentry import Size, base, box, cushion, of_role
+from echomodel.furniture.carpentry import Size, base, both, box, cushion, of_role
 from echomodel.furniture.lathe import Lathe
 from echomodel.furniture.solids import Block, Solid, ball, bent, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
+
+padded = partial(turned, material="fabric")
 
 
 def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -21,30 +24,17 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     seat = 0.43 if h > 0.6 else h * 0.6
     kind = style.legs if style.legs not in ("trestle", "hairpin", "sled") else "tapered"
     curved = style.arms == "shell" or style.back == "shell"
-    inside = 0.72 if curved else 0.86
-    parts: list[Solid] = base(style, w * inside, d * inside, foot, 0.045 * style.bulk, kind)
+    share = 0.72 if curved else 0.86
+    parts: list[Solid] = base(style, w * share, d * share, foot, 0.045 * style.bulk, kind)
     if curved:
         wall = 0.09 + 0.05 * style.softness
         arms = foot + (h - foot) * (0.6 + 0.3 * style.arm_height)
         power = 2.2 + 3 * style.corner
         parts.append(bent((0, foot, d * 0.42), (w / 2, d * 0.92), wall, h - foot, arms - foot, power=power, ease=2.5))
-        low = turned(
-            (0, foot, 0),
-            (w / 2 - wall * 0.7, d * 0.45),
-            (seat - foot) * 0.62,
-            power=power + 1,
-            material="fabric",
-            role="base",
-        )
-        disc = turned(
-            (0, foot + (seat - foot) * 0.6, d * 0.04),
-            (w / 2 - wall, d * 0.44),
-            (seat - foot) * 0.4,
-            power=power + 1,
-            rounding=0.05 * style.softness,
-            material="fabric",
-            role="seat",
-        )
+        inside = w / 2 - wall * 0.7, d * 0.45
+        low = padded((0, foot, 0), inside, (seat - foot) * 0.62, power=power + 1, role="base")
+        disc = padded((0, foot + (seat - foot) * 0.6, d * 0.04), (w / 2 - wall, d * 0.44), (seat - foot) * 0.4,
+                      power=power + 1, rounding=0.05 * style.softness, role="seat")  # fmt: skip
         return [*parts, low, disc]
     if style.arms in ("slim", "none"):
         arm = 0.035
@@ -71,27 +61,15 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
 
 def upholstered_arms(w: float, foot: float, y: float, d: float, arm: float, style: Style) -> list[Solid]:
     """Box arms, or arms with a roll along the top, at both ends of a seat `w` wide."""
-    parts: list[Solid] = []
-    for s in (-1, 1):
-        x0, x1 = sorted((s * w / 2, s * (w / 2 - arm)))
-        if style.arms == "rolled":
-            r = arm * 0.6
-            x = (x0 + x1) / 2 - s * (r - arm / 2) * 0.5
-            parts.append(
-                box((x0 + arm * 0.14, foot, -d / 2 + 0.03), (x1 - arm * 0.14, y - r, d / 2 - 0.02), "fabric", 0.015)
-            )
-            parts.append(
-                turned(
-                    (x, y - r, -d / 2 + 0.03), r, d - 0.05, rounding=0.02, turn=rotation(x=np.pi / 2), material="fabric"
-                )
-            )
-        else:
-            parts.append(
-                cushion(
-                    (x0, foot, -d / 2 + 0.01), (x1, y, d / 2 - 0.01), replace(style, softness=min(style.softness, 0.8))
-                )
-            )
-    return of_role("arm", parts)
+    x0, x1 = w / 2 - arm, w / 2
+    if style.arms != "rolled":
+        firm = replace(style, softness=min(style.softness, 0.8))
+        return of_role("arm", both(cushion((x0, foot, -d / 2 + 0.01), (x1, y, d / 2 - 0.01), firm)))
+    r = arm * 0.6
+    x = (x0 + x1) / 2 - (r - arm / 2) * 0.5
+    side = box((x0 + arm * 0.14, foot, -d / 2 + 0.03), (x1 - arm * 0.14, y - r, d / 2 - 0.02), "fabric", 0.015)
+    roll = padded((x, y - r, -d / 2 + 0.03), r, d - 0.05, rounding=0.02, turn=rotation(x=np.pi / 2))
+    return of_role("arm", both(side, roll))
 
 
 def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -107,10 +85,7 @@ def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         one, other = (-w * 0.43, seat - 0.06, z - 0.05), (w * 0.43, seat + (h - seat) / np.cos(rake), z + 0.05)
         back = leaning(one, other, rake, seat, z, material="fabric", radius=0.045)
         x, y, t = w * 0.48, seat * 0.8, 0.04 * style.bulk
-        rails: list[Solid] = [
-            box((s * x - t * (s > 0), y - t, -d * 0.43), (s * x + t * (s < 0), y, d * 0.43), role="rail")
-            for s in (-1, 1)
-        ]
+        rails = both(box((x - t, y - t, -d * 0.43), (x, y, d * 0.43), role="rail"))
         rails += [box((-x, y - t, z - t / 2), (x, y, z + t / 2), role="rail") for z in (-d * 0.3, d * 0.36)]
         arms = slim_arms(w, d, seat, h, style, 0.035) if style.arms != "none" else []
         return [*parts, *rails, pad, back, *arms]
@@ -119,14 +94,13 @@ def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     arms = foot + (h - foot) * (0.3 + 0.25 * style.arm_height)
     body: list[Solid] = [
         bent((0, foot, d * 0.32), (w / 2, d * 0.8), wall, h - foot, arms - foot, power=2.6 + style.corner, ease=2.6),
-        turned(
+        padded(
             (0, foot, d * 0.02),
             (w * 0.42, d * 0.42),
             seat - foot,
             (w * 0.46, d * 0.46),
             power=2.6,
             rounding=0.05,
-            material="fabric",
             role="seat",
         ),
     ]
@@ -145,10 +119,7 @@ def _foot(style: Style) -> float:
 def _legs(style: Style, w: float, d: float, foot: float) -> list[Solid]:
     kind = style.legs if style.legs not in ("trestle", "hairpin") else "straight"
     if kind == "sled":
-        return [
-            box((s * w * 0.42 - 0.02, 0, -d * 0.4), (s * w * 0.42 + 0.02, foot, d * 0.4), "metal", 0.0, "leg")
-            for s in (-1, 1)
-        ]
+        return both(box((w * 0.42 - 0.02, 0, -d * 0.4), (w * 0.42 + 0.02, foot, d * 0.4), "metal", 0.0, "leg"))
     return base(style, w * 0.94, d * 0.88, foot, 0.05 * style.bulk, kind)
 
 
@@ -174,11 +145,10 @@ def _piping(pad: Solid) -> list[Solid]:
     c = min(r * 0.8 + 0.01, a, b)
     turn = np.linspace(0, np.pi / 2, 4)
     corners = [(a - c, b - c, 0.0), (-a + c, b - c, 0.5), (-a + c, -b + c, 1.0), (a - c, -b + c, 1.5)]
-    loop = [
-        (x + c * np.cos(t + start * np.pi), z + c * np.sin(t + start * np.pi)) for x, z, start in corners for t in turn
-    ]
-    loop.append(loop[0])
-    plan = np.array(loop)
+    plan = np.array(
+        [(x + c * np.cos(t + s * np.pi), z + c * np.sin(t + s * np.pi)) for x, z, s in corners for t in turn]
+    )
+    plan = np.concatenate([plan, plan[:1]])
     cords: list[Solid] = []
     for y in (pad.half[1] - sunk, -pad.half[1] + sunk):
         points = np.insert(plan, 1, y, axis=1) @ pad.turn.T + pad.centre
@@ -220,10 +190,8 @@ def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_dept
     soft = 0.02 + 0.05 * style.softness
     parts.append(leaning(low, high, 0.5 * style.rake, seat, z0 + frame / 2, material="fabric", radius=soft))
     if style.arms == "slim":
-        inner = arm = 0.05
-        for s in (-1, 1):
-            x0, x1 = sorted((s * w / 2, s * (w / 2 - arm)))
-            parts.append(box((x0, foot, z0 + 0.02), (x1, y_arm, z1 - 0.02), "fabric", 0.015, "arm"))
+        arm = 0.05
+        parts += both(box((w / 2 - arm, foot, z0 + 0.02), (w / 2, y_arm, z1 - 0.02), "fabric", 0.015, "arm"))
     elif not armless:
         parts += upholstered_arms(w, foot, y_arm, d, arm, style)
     inner = w / 2 - arm
@@ -237,10 +205,8 @@ def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_dept
         parts.append(box((x0, foot, z1 - 0.1), (x1, seat - pad, reach - 0.015), "fabric", 0.015, "base"))
         parts.append(cushion((x0, seat - pad, z1 - 0.04), (x1, seat, reach), style))
         t = 0.05 * style.bulk
-        parts += [
-            box((x - t / 2, 0, reach - 0.12), (x + t / 2, foot, reach - 0.12 + t), role="leg")
-            for x in (x0 + 0.08, x1 - 0.08)
-        ]
+        z = reach - 0.12
+        parts += [box((x - t / 2, 0, z), (x + t / 2, foot, z + t), role="leg") for x in (x0 + 0.08, x1 - 0.08)]
     if style.tufting > 0.75:
         parts += _throw_pillows(inner, seat, h, z0 + frame + 0.14, style)
     return parts
@@ -248,19 +214,9 @@ def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_dept
 
 def _throw_pillows(inner: float, seat: float, h: float, z: float, style: Style) -> list[Solid]:
     a = min(0.22, (h - seat) * 0.5, inner * 0.32)
-    turn = rotation(x=-0.35)
-    sides = (-1, 1) if style.contrast > 0.4 else (1,)
-    return [
-        ball(
-            (s * (inner - a * 1.05), seat + a * 0.85, z + 0.06),
-            (a, a, 0.07),
-            "cushion",
-            "cushion",
-            power=2.8,
-            turn=turn,
-        )
-        for s in sides
-    ]
+    place, turn = (inner - a * 1.05, seat + a * 0.85, z + 0.06), rotation(x=-0.35)
+    one = ball(place, (a, a, 0.07), "cushion", "cushion", power=2.8, turn=turn)
+    return both(one) if style.contrast > 0.4 else [one]
 
 
 def multi_seat_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -289,27 +245,10 @@ def _curved(size: Size, style: Style) -> list[Solid]:
     foot, wall = _foot(style), 0.13
     seat = min(0.43, h * 0.58)
     parts: list[Solid] = _legs(style, w * 0.8, d * 0.9, foot)
-    parts.append(
-        bent(
-            (0, foot, d * 0.4),
-            (w / 2, d * 0.9),
-            wall,
-            h - foot,
-            (h - foot) * (0.55 + 0.3 * style.arm_height),
-            power=2.6 + 2 * style.corner,
-            ease=3,
-        )
-    )
-    parts.append(
-        turned(
-            (0, foot, 0.02),
-            (w / 2 - wall * 0.6, d * 0.46),
-            (seat - foot) * 0.6,
-            power=3.5,
-            material="fabric",
-            role="base",
-        )
-    )
+    arms = (h - foot) * (0.55 + 0.3 * style.arm_height)
+    power = 2.6 + 2 * style.corner
+    parts.append(bent((0, foot, d * 0.4), (w / 2, d * 0.9), wall, h - foot, arms, power=power, ease=3))
+    parts.append(padded((0, foot, 0.02), (w / 2 - wall * 0.6, d * 0.46), (seat - foot) * 0.6, power=3.5, role="base"))
     pads = 2 if style.tufting > 0.4 else 1
     edges = np.linspace(-w / 2 + wall, w / 2 - wall, pads + 1)
     for a, b in pairwise(edges):
@@ -331,17 +270,9 @@ def l_shaped_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
         parts.append(box((x0, foot, -d / 2 + 0.05), (x1, y1, -d / 2 + depth - 0.05), "fabric", 0.04, "back"))
         inner = side * (w / 2 - frame - 0.07)
         z0, z1 = d * 0.05, -d / 2 + depth - 0.12
-        tilt = rotation(z=-side * 0.15)
-        parts.append(
-            Block(
-                centre=np.array([inner, (seat + y1) / 2, (z0 + z1) / 2]),
-                half=np.array([0.075, (y1 - seat) / 2, (z1 - z0) / 2]),
-                radius=0.05,
-                turn=tilt,
-                material="fabric",
-                role="back",
-            )
-        )
+        centre, half = [inner, (seat + y1) / 2, (z0 + z1) / 2], [0.075, (y1 - seat) / 2, (z1 - z0) / 2]
+        pad = Block(np.array(centre), rotation(z=-side * 0.15), "fabric", "back", half=np.array(half), radius=0.05)
+        parts.append(pad)
     return parts
 
 
@@ -362,17 +293,8 @@ def chaise_longue_sofa(size: Size, style: Style, choices: Choices) -> list[Solid
         reach = -d / 2 + d * choices.between("share", 0.35, 0.6)
         parts.append(cushion((x0, foot, -d / 2 + 0.02), (x1, seat + (h - seat) * 0.5, reach), style, role="arm"))
     if style.arms == "rolled":
-        parts.append(
-            turned(
-                (-w * 0.46, seat + 0.09, -d / 2 + 0.28),
-                0.09,
-                w * 0.92,
-                rounding=0.02,
-                turn=rotation(z=-np.pi / 2),
-                material="accent",
-                role="cushion",
-            )
-        )
+        place, turn = (-w * 0.46, seat + 0.09, -d / 2 + 0.28), rotation(z=-np.pi / 2)
+        parts.append(turned(place, 0.09, w * 0.92, rounding=0.02, turn=turn, material="accent", role="cushion"))
     return parts
 
 
@@ -381,16 +303,7 @@ def lazy_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
     w, h, d = size
     kind = choices.pick("kind", ["pear", "lounger", "folded"])
     if kind == "pear":
-        outline = [
-            (0.3, 0.0),
-            (0.44, 0.05),
-            (0.5, 0.2),
-            (0.47, 0.38),
-            (0.38, 0.58),
-            (0.28, 0.76),
-            (0.18, 0.9),
-            (0.07, 1.0),
-        ]
+        outline = [(0.3, 0), (0.44, 0.05), (0.5, 0.2), (0.47, 0.38), (0.38, 0.58), (0.28, 0.76), (0.18, 0.9), (0.07, 1)]
         profile = np.array(outline) * [w, h]
         bag = Lathe(profile=profile, squash=d / w, material="fabric", role="seat")
         seams: list[Solid] = []

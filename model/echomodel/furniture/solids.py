@@ -8,8 +8,8 @@ planes and first-order exact elsewhere, which is what the few voxels inside the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -88,6 +88,12 @@ class Solid:
         # Columns: what one metre along a local axis is worth in voxel gradients.
         local = self.turn * np.asarray(scale)[:, None]
         return self.local_distance(x, y, z, local.T @ local)
+
+    def mirrored(self, axis: int = 0) -> Self:
+        """The solid on the other side of the plane x = 0 (axis 0) or z = 0 (axis 2); its own halves are alike."""
+        sign = np.where(np.arange(3) == axis, -1.0, 1.0)
+        turn = self.turn if self.turn is IDENTITY else sign[:, None] * self.turn * sign
+        return replace(self, centre=self.centre * sign, turn=turn)
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         raise NotImplementedError
@@ -246,6 +252,9 @@ class Tube(Solid):
     points: Array = field(default_factory=lambda: np.zeros((2, 3)))
     radius: float = 0.01
 
+    def mirrored(self, axis: int = 0) -> Self:
+        return replace(super().mirrored(axis), points=self.points * np.where(np.arange(3) == axis, -1.0, 1.0))
+
     def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
         nearest: Array = np.array(np.inf)
         last = len(self.points) - 2
@@ -318,16 +327,10 @@ class Shell(Solid):
         s, c = np.sin(angle), np.cos(angle)
         norm = (np.abs(s) ** self.power + np.abs(c) ** self.power) ** (1 / self.power)
         top, rings = self._top(angle), []
-        for i in range(len(angle)):
-            outer = np.array([s[i] * self.half[0], -c[i] * self.half[1]]) / norm[i]
-            inner = (
-                np.array([s[i] * (self.half[0] - self.thickness), -c[i] * (self.half[1] - self.thickness)]) / norm[i]
-            )
-            rings.append(
-                np.array(
-                    [[p[0], h, p[1]] for p, h in zip((inner, outer, outer, inner), (0, 0, top[i], top[i]), strict=True)]
-                )
-            )
+        outside, inside = np.array(self.half), np.array(self.half) - self.thickness
+        for sine, cosine, length, high in zip(s, c, norm, top, strict=True):
+            (ox, oz), (ix, iz) = (np.array([sine, -cosine]) * half / length for half in (outside, inside))
+            rings.append(np.array([[ix, 0, iz], [ox, 0, oz], [ox, high, oz], [ix, high, iz]]))
         return loft(rings)
 
     def inradius(self, scale: Array) -> float:
@@ -394,13 +397,9 @@ Wide = float | tuple[float, float]  # half widths along x and z, one number wher
 
 
 def ball(
-    centre: Vector,
-    half: float | Vector,
-    material: str = "wood",
-    role: str = "",
-    power: float = 2.0,
+    centre: Vector, half: float | Vector, material: str = "wood", role: str = "", power: float = 2.0,
     turn: Array = IDENTITY,
-) -> Ball:
+) -> Ball:  # fmt: skip
     """A ball or cushion about `centre` (3,) with half axes `half`, (3,) or one number."""
     axes = np.array(np.broadcast_to(half, 3), float)
     return Ball(np.array(centre, float), turn, material, role, half=axes, power=power)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, base, box, core
+from echomodel.furniture.carpentry import Size, base, both, box, core
 from echomodel.furniture.fronts import (
     BOARD,
     carcass,
@@ -48,10 +48,8 @@ def nightstand(size: Size, style: Style, choices: Choices) -> list[Solid]:
         t = style.top
         low = h - max(0.12, h * 0.25)
         legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
-        parts = [
-            box((-w / 2, h - t, -d / 2), (w / 2, h, d / 2), role="top"),
-            *case((-w * 0.46, low, -d * 0.44), (w * 0.46, h - t, d * 0.44)),
-        ]
+        parts = [box((-w / 2, h - t, -d / 2), (w / 2, h, d / 2), role="top")]
+        parts += case((-w * 0.46, low, -d * 0.44), (w * 0.46, h - t, d * 0.44))
         parts += front((-w * 0.46, low), (w * 0.46, h - t), d * 0.44, 1, 1, "drawer", style, d * 0.85)
         return parts + base(style, w * 0.95, d * 0.92, low, 0.035 * style.bulk, legs)
     return fronted(size, style, foot, choices.pick("rows", [1, 2, 2, 3]), 1, "drawer")
@@ -78,11 +76,8 @@ def sideboard(size: Size, style: Style, choices: Choices) -> list[Solid]:
         lower = 0.85
         t = BOARD
         parts = mixed(np.array([w, lower, d]), style, choices, foot_height(style, lower, 0.25), 0.5)
-        inner = w * 0.92
-        z1 = -d / 2 + d * 0.7
-        upper: list[Solid] = [
-            box((s * inner / 2 - t, lower, -d / 2), (s * inner / 2 + t, h, z1), role="side") for s in (-1, 1)
-        ]
+        inner, z1 = w * 0.92, -d / 2 + d * 0.7
+        upper = both(box((inner / 2 - t, lower, -d / 2), (inner / 2 + t, h, z1), role="side"))
         levels = (lower + (h - lower) * 0.5, h - t)
         upper += [box((-inner / 2, y, -d / 2), (inner / 2, y + t, z1), role="shelf") for y in levels]
         upper.append(box((-inner / 2, lower, -d / 2), (inner / 2, h, -d / 2 + 0.012), "accent", 0.0, "back"))
@@ -117,9 +112,8 @@ def children_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     w, h, d = size
     gable = h > GABLED and choices.chance("form", 0.3)
     body = h * 0.8 if gable else h
-    parts, (x0, y0, x1, y1, z) = carcass(
-        np.array([w, body, d]), style, min(0.06, style.leg_height), kind="plinth", solid=False
-    )
+    foot = min(0.06, style.leg_height)
+    parts, (x0, y0, x1, y1, z) = carcass(np.array([w, body, d]), style, foot, kind="plinth", solid=False)
     columns, rows = int(np.clip(round((x1 - x0) / 0.36), 1, 8)), int(np.clip(round((y1 - y0) / 0.34), 2, 7))
     parts += shelves((x0, y0, x1, y1, z), d, -d / 2, rows, columns, style)
     xs, ys = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
@@ -133,11 +127,9 @@ def children_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if gable:
         slope = np.arctan2(h - body, w / 2)
         length = np.hypot(h - body, w / 2)
-        for s in (-1, 1):
-            panel = box((-length / 2, -0.015, -d / 2), (length / 2, 0.015, d / 2 - 0.02), role="roof")
-            parts.append(
-                replace(panel, centre=np.array([s * w / 4, (body + h) / 2 - 0.015, -0.01]), turn=rotation(z=-s * slope))
-            )
+        panel = box((-length / 2, -0.015, -d / 2), (length / 2, 0.015, d / 2 - 0.02), role="roof")
+        middle = np.array([w / 4, (body + h) / 2 - 0.015, -0.01])
+        parts += both(replace(panel, centre=middle, turn=rotation(z=-slope)))
     return parts
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -69,27 +69,19 @@ KINDS: dict[str, tuple[str, ...]] = {
     part: tuple(dict.fromkeys(kind for family in FAMILIES.values() for kind in family[part]))
     for part in FAMILIES["modern"]
 }
-# Least and largest value of every proportion that `Style.draw` draws.
-PROPORTIONS: dict[str, tuple[float, float]] = {
-    "bulk": (0.85 * 0.85, 1.3 * 1.2),
-    "splay": (math.radians(5), math.radians(13)),
-    "rake": (math.radians(3), math.radians(16)),
-    "taper": (0.4, 0.8),
-    "leg_height": (0.04, 0.2),
-    "softness": (0.05, 1.0),
-    "corner": (0.0, 1.0),
-    "top": (0.018, 0.05),
-    "overhang": (0.0, 0.05),
-    "gap": (0.004, 0.01),
-    "round_tops": (0.0, 1.0),
-    "tufting": (0.0, 1.0),
-    "contrast": (0.0, 1.0),
-    "arm_height": (0.0, 1.0),
+# From where to where the numbers of a style are drawn, in this order; the last ones after its sizes.
+DRAWN: dict[str, tuple[float, float]] = {
+    "bulk": (0.85, 1.2), "splay": (5, 13), "rake": (3, 16), "taper": (0.4, 0.8), "leg_height": (0.04, 0.2),
+    "softness": (-0.25, 0.3), "corner": (0.0, 1.0), "top": (0.018, 0.05), "overhang": (0.0, 0.05), "gap": (0.004, 0.01),
+    "round_tops": (0.0, 1.0), "tufting": (0.0, 1.0), "contrast": (0.0, 1.0), "arm_height": (0.0, 1.0),
     "seat_depth": (0.0, 1.0),
-    "edge": (0.0, 1.0),
-    "piping": (0.0, 1.0),
-    "finish": (0.0, 1.0),
-}
+}  # fmt: skip
+DRAWN_LAST: dict[str, tuple[float, float]] = {"edge": (0.0, 1.0), "piping": (0.0, 1.0), "finish": (0.0, 1.0)}
+# Least and largest value of every proportion that `Style.draw` makes of them.
+PROPORTIONS = DRAWN | {
+    "bulk": (0.85 * 0.85, 1.3 * 1.2), "splay": (math.radians(5), math.radians(13)),
+    "rake": (math.radians(3), math.radians(16)), "softness": (0.05, 1.0),
+} | DRAWN_LAST  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -135,29 +127,15 @@ class Style:
         kinds = {name: weighted(rng, odds) for name, odds in FAMILIES[family].items()}
         slender = {"modern": 0.9, "scandinavian": 0.85, "industrial": 0.9, "classic": 1.1, "rustic": 1.3}[family]
         soft = {"modern": 0.35, "scandinavian": 0.5, "industrial": 0.25, "classic": 0.7, "rustic": 0.45}[family]
-        return cls(
-            family=family,
-            **kinds,
-            bulk=float(slender * rng.uniform(0.85, 1.2)),
-            splay=float(np.radians(rng.uniform(5, 13))),
-            rake=float(np.radians(rng.uniform(3, 16))),
-            taper=float(rng.uniform(0.4, 0.8)),
-            leg_height=float(rng.uniform(0.04, 0.2)),
-            softness=float(np.clip(soft + rng.uniform(-0.25, 0.3), 0.05, 1)),
-            corner=float(rng.uniform(0, 1) ** 1.5),
-            top=float(rng.uniform(0.018, 0.05)),
-            overhang=float(rng.uniform(0, 0.05)),
-            gap=float(rng.uniform(0.004, 0.01)),
-            round_tops=float(rng.uniform(0, 1)),
-            tufting=float(rng.uniform(0, 1)),
-            contrast=float(rng.uniform(0, 1)),
-            arm_height=float(rng.uniform(0, 1)),
-            seat_depth=float(rng.uniform(0, 1)),
-            size_shift=tuple(rng.normal(0, 1, 3).tolist()),
-            edge=float(rng.uniform(0, 1)),
-            piping=float(rng.uniform(0, 1)),
-            finish=float(rng.uniform(0, 1)),
-        )
+        numbers = {name: float(rng.uniform(*ends)) for name, ends in DRAWN.items()}
+        shift = tuple(rng.normal(0, 1, 3).tolist())
+        numbers |= {name: float(rng.uniform(*ends)) for name, ends in DRAWN_LAST.items()}
+        numbers["bulk"] *= slender
+        numbers["softness"] = float(np.clip(soft + numbers["softness"], 0.05, 1))
+        numbers["corner"] **= 1.5
+        numbers |= {name: float(np.radians(numbers[name])) for name in ("splay", "rake")}
+        drawn: dict[str, Any] = {**kinds, **numbers}
+        return cls(family=family, **drawn, size_shift=shift)
 
 
 def weighted(rng: np.random.Generator, odds: dict[str, float]) -> str:
@@ -198,24 +176,8 @@ T = TypeVar("T")
 
 # A name means much the same in all programs, so that pieces can agree on it: `rows` are rows of drawers or of shelves.
 OPEN = (
-    "kind",
-    "form",
-    "count",
-    "rows",
-    "columns",
-    "split",
-    "share",
-    "spread",
-    "side",
-    "symmetry",
-    "extra",
-    "second",
-    "back",
-    "raised",
-    "front",
-    "cover",
-    "pattern",
-    "detail",
+    "kind", "form", "count", "rows", "columns", "split", "share", "spread", "side", "symmetry", "extra", "second",
+    "back", "raised", "front", "cover", "pattern", "detail",
 )  # fmt: skip
 GRAINS = 4096  # different streams that one number can make
 

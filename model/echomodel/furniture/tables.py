@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, base, between_legs, box, of_role, pedestal, post, top, within
+from echomodel.furniture.carpentry import Size, base, between_legs, both, box, of_role, pedestal, post, top, within
 from echomodel.furniture.fronts import case, front
 from echomodel.furniture.solids import Block, Solid, rotation, turned
 from echomodel.furniture.style import Choices, Style
@@ -40,7 +40,7 @@ def dining_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if style.legs == "plinth" and choices.chance("form", 0.5):
         panel = max(0.05, 0.06 * w)
         x, z = w / 2 * 0.72, d / 2 * 0.75
-        return parts + [box((s * x - panel / 2, 0, -z), (s * x + panel / 2, h - thick, z), role="leg") for s in (-1, 1)]
+        return parts + both(box((x - panel / 2, 0, -z), (x + panel / 2, h - thick, z), role="leg"))
     kind = "straight" if style.legs in ("plinth", "bun") else None
     leg = _leg(style, w, h)
     share = within(shape, style)
@@ -49,9 +49,9 @@ def dining_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if style.legs in ("straight", "tapered", "turned", "bun") and style.contrast < 0.7:
         a = 0.04 + 0.05 * style.contrast
         x, z = fw / 2 - leg * 0.6, fd / 2 - leg * 0.6
-        apron: list[Solid] = [box((-x, h - thick - a, s * z - 0.01), (x, h - thick, s * z + 0.01)) for s in (-1, 1)]
-        apron += [box((s * x - 0.01, h - thick - a, -z), (s * x + 0.01, h - thick, z)) for s in (-1, 1)]
-        parts += of_role("apron", apron)
+        across = both(box((-x, h - thick - a, z - 0.01), (x, h - thick, z + 0.01)), axis=2)
+        along = both(box((x - 0.01, h - thick - a, -z), (x + 0.01, h - thick, z)))
+        parts += of_role("apron", across + along)
     return parts
 
 
@@ -66,22 +66,10 @@ def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if kind == "block" and shape != "round":
         foot = max(0.04, h * 0.15)
         body = case((-w / 2 * 0.97, foot, -d / 2 * 0.95), (w / 2 * 0.97, h - thick, d / 2 * 0.95))
-        drawers = front(
-            (-w / 2 * 0.97 + 0.01, foot + 0.01),
-            (w / 2 * 0.97 - 0.01, h - thick - 0.01),
-            d / 2 * 0.95,
-            1,
-            choices.whole("columns", 1, 3),
-            "drawer",
-            style,
-            d * 0.9,
-        )
-        return [
-            top("square", w, d, h, thick, style),
-            *body,
-            *drawers,
-            *base(style, w * 0.85, d * 0.85, foot, 0.05, "plinth"),
-        ]
+        low, high = (-w / 2 * 0.97 + 0.01, foot + 0.01), (w / 2 * 0.97 - 0.01, h - thick - 0.01)
+        drawers = front(low, high, d / 2 * 0.95, 1, choices.whole("columns", 1, 3), "drawer", style, d * 0.9)
+        stand = base(style, w * 0.85, d * 0.85, foot, 0.05, "plinth")
+        return [top("square", w, d, h, thick, style), *body, *drawers, *stand]
     if kind == "nested" and w > 0.7:
         low_top = turned((w * 0.28, h * 0.62, d * 0.1), w * 0.22, thick, material="accent", role="top")
         post = turned((w * 0.28, 0, d * 0.1), w * 0.14, h * 0.62, 0.03, role="leg")
@@ -116,19 +104,17 @@ def side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
         t = 0.02
         return [
             top("square", w, d, h, thick, style),
-            box((-w / 2, 0, -d / 2), (-w / 2 + t, h - thick, d / 2), role="side"),
-            box((w / 2 - t, 0, -d / 2), (w / 2, h - thick, d / 2), role="side"),
+            *both(box((w / 2 - t, 0, -d / 2), (w / 2, h - thick, d / 2), role="side")),
             box((-w / 2, 0, -d / 2), (w / 2, t * 1.5, d / 2), role="bottom"),
             box((-w / 2, h * 0.5, -d / 2), (w / 2, h * 0.5 + t, d / 2), role="shelf"),
             box((-w / 2, 0, -d / 2), (w / 2, h - thick, -d / 2 + t), role="back"),
         ]
     if kind == "c" and shape != "round":
         t = 0.014
-        bars = [
-            box((-w / 2 * 0.9, 0, s * d * 0.4 - t), (w / 2 * 0.9, 2 * t, s * d * 0.4 + t), "metal") for s in (-1, 1)
-        ]
-        posts = [post(-w / 2 * 0.9, s * d * 0.4, t, 0, h, "metal") for s in (-1, 1)]
-        return [top("square", w, d, h, thick, style), *of_role("leg", [*bars, *posts])]
+        x, z = w / 2 * 0.9, d * 0.4
+        bars = both(box((-x, 0, z - t), (x, 2 * t, z + t), "metal"), axis=2)
+        posts = both(post(-x, z, t, 0, h, "metal"), axis=2)
+        return [top("square", w, d, h, thick, style), *of_role("leg", bars + posts)]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
     inner = within(shape, style)
     leg = _leg(style, w * 0.6, h) * 0.8
@@ -147,10 +133,8 @@ def round_end_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if kind == "pedestal":
         return parts + pedestal(w, d, h - thick, style)
     if kind == "drum":
-        return [
-            *parts,
-            turned((0, 0, 0), (w * 0.36, d * 0.36), h - thick, (w * 0.46, d * 0.46), material="accent", role="leg"),
-        ]
+        wide = w * 0.46, d * 0.46
+        return [*parts, turned((0, 0, 0), (w * 0.36, d * 0.36), h - thick, wide, material="accent", role="leg")]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle", "sled") else "tapered"
     inner = 0.8 if legs == "splayed" else within("round", style)
     parts += base(style, w * inner, d * inner, h - thick, 0.035 * style.bulk, legs)
@@ -211,21 +195,18 @@ def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
     legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
     y1 = desk_height - t
     if kind in ("left", "both"):
-        sides = (
-            (-1, 1) if kind == "both" and 0.96 * w - 2 * unit >= KNEES else (-1 if choices.chance("side", 0.5) else 1,)
-        )
+        two = kind == "both" and 0.96 * w - 2 * unit >= KNEES
+        sides = (-1, 1) if two else (-1 if choices.chance("side", 0.5) else 1,)
         for s in sides:
             x0, x1 = sorted((s * w * 0.48, s * (w * 0.48 - unit)))
             foot = 0.1 if style.contrast > 0.5 else 0.02
             parts += case((x0, foot, -d * 0.46), (x1, y1, d * 0.46))
             rows = choices.whole("rows", 2, 4)
             parts += front((x0, foot), (x1, y1), d * 0.46, rows, 1, "drawer", style, d * 0.88)
-            parts += [
-                post(x, z, 0.02, 0, foot, role="leg") for x in (x0 + 0.04, x1 - 0.04) for z in (-d * 0.42, d * 0.42)
-            ]
+            for x in (x0 + 0.04, x1 - 0.04):
+                parts += both(post(x, d * 0.42, 0.02, 0, foot, role="leg"), axis=2)
         if len(sides) == 1:
-            x = -sides[0] * w * 0.47
-            parts += [post(x, s * d * 0.43, 0.025, 0, y1, role="leg") for s in (-1, 1)]
+            parts += both(post(-sides[0] * w * 0.47, d * 0.43, 0.025, 0, y1, role="leg"), axis=2)
     else:
         parts += base(style, w * 0.96, d * 0.94, y1, _leg(style, w * 0.6, desk_height), legs)
         if kind == "shallow":
@@ -314,11 +295,6 @@ def _framed(x: float, low: float, high: float, half: float, z: float, turn: floa
     """A pane about (x, z) on a board that shows as its frame, turned by `turn` about the vertical."""
     edge = min(0.012 + 0.012 * style.contrast, 0.3 * half)
     middle, upright, about = np.array([x, (low + high) / 2, z]), (high - low) / 2, rotation(y=turn)
-    board = Block(centre=middle, half=np.array([half, upright, 0.011]), radius=0.003, turn=about)
-    pane = Block(
-        centre=middle + about @ np.array([0, 0, 0.01]),
-        half=np.array([half - edge, upright - edge, 0.003]),
-        turn=about,
-        material="mirror",
-    )
-    return [board, pane]
+    board = Block(middle, about, half=np.array([half, upright, 0.011]), radius=0.003)
+    before, inner = middle + about @ np.array([0, 0, 0.01]), np.array([half - edge, upright - edge, 0.003])
+    return [board, Block(before, about, "mirror", half=inner)]
