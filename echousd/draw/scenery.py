@@ -32,7 +32,7 @@ class Scenery:
         gloss: (f,) float32 in [0, 1].
         st: (f, 3, 2) float32 texture coordinates.
         texture: (f,) int, which of `images` colours the face, -1 for none.
-        images: (h, w, 3) float32 linear RGB each.
+        images: (h, w, 3) uint8 sRGB each, and (3,) float32, what its linear RGB is multiplied by.
         furniture: boxes of the objects. hung: of what hangs on walls.
         wall: (f,) int, which wall a face belongs to, -1 for none.
         panes: (p, 3, 3) float32: middle, half of the width and half of the height of every window's pane.
@@ -47,7 +47,7 @@ class Scenery:
     gloss: np.ndarray
     st: np.ndarray
     texture: np.ndarray
-    images: tuple[np.ndarray, ...]
+    images: tuple[tuple[np.ndarray, np.ndarray], ...]
     furniture: Furniture
     hung: Furniture
     wall: np.ndarray
@@ -93,14 +93,14 @@ class Scenery:
         """(n, 3) mean colour of faces (n,) at texture coordinates (n, k, 2)."""
         out = self.flat_colors[face]
         texture = self.texture[face]
-        for number, image in enumerate(self.images):
+        for number, (image, tint) in enumerate(self.images):
             here = np.flatnonzero(texture == number)
             if len(here):
                 height, width = image.shape[:2]
                 places = st[here] % 1.0
                 column = (places[..., 0] * width).astype(np.int32) % width
                 row = ((1 - places[..., 1]) * height).astype(np.int32) % height
-                out[here] = image.reshape(-1, 3)[row * width + column].mean(1)
+                out[here] = (LINEAR[image.reshape(-1, 3)[row * width + column]] * tint).mean(1)
         return out
 
 
@@ -127,7 +127,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     Raises ValueError when there is no mesh to see.
     """
     parts: list[dict[str, np.ndarray]] = []
-    images: dict[tuple, tuple[int, np.ndarray]] = {}
+    images: dict[tuple, tuple[int, tuple[np.ndarray, np.ndarray]]] = {}
     boxes, curtains = [], []
     hung: list[int] = []
     words: list[str] = []
@@ -161,8 +161,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             if paint.texture:
                 key = (paint.texture, paint.tint)
                 if key not in images:
-                    linear = LINEAR[paint_image(paint)]
-                    images[key] = (len(images), linear * np.array(paint.tint, np.float32))
+                    images[key] = (len(images), (paint_image(paint), np.array(paint.tint, np.float32)))
                 part["texture"][faces] = images[key][0]
         parts.append(part)
         words.append(mesh.category)
