@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -19,6 +21,7 @@ from echomodel.rules.geometry import BoxesLike
 
 CELL = 0.05  # metres
 ROBOT = 0.2  # metres, its radius
+BEFORE = 0.35  # metres around the place before a door from which one walks
 ARM = 0.4  # metres between the robot and what it can take hold of
 
 
@@ -52,15 +55,14 @@ def ways(
     """
     from scipy import ndimage
 
-    low, high = polygon.min(0) - CELL, polygon.max(0) + CELL
-    xs, zs = (np.arange(a, b + CELL, CELL) for a, b in zip(low, high, strict=True))
-    free = _inside(xs, zs, polygon)
-    near = [_near(xs, zs, size[i], position[i], float(yaw[i])) for i in range(len(size))]
-    away = [_distance(xs[x], zs[z], size[i], position[i], float(yaw[i])) for i, (x, z) in enumerate(near)]
+    corners = polygon.dtype.char, polygon.tobytes()
+    xs, zs, floor = _grid(*corners)
+    boxes = np.column_stack([size[:, [0, 2]], position[:, [0, 2]], yaw])
+    seen = [_beside(*corners, box.tobytes(), boxes.dtype.char) for box in boxes]
+    free = floor.copy()
     for i in np.flatnonzero(obstacle):
-        free[near[i]] &= away[i] > 0
-    # the distance to the next cell that is not free, less half of that cell
-    room = (ndimage.distance_transform_edt(free) - 0.5) * CELL >= ROBOT - 0.5 * CELL
+        free[seen[i].near] &= ~seen[i].under
+    room = _roomy(free)
     parts, count = ndimage.label(room)
     if not count:
         return Ways(np.zeros(len(size), bool), 1.0)
@@ -68,9 +70,25 @@ def ways(
     if not start:
         areas = np.bincount(parts.ravel())[1:]
         start = {int(areas.argmax()) + 1}
-    walked = np.isin(parts, sorted(start))
-    reached = np.array([bool((away[i][walked[near[i]]] <= ROBOT + ARM).any()) for i in range(len(size))], bool)
+    entered = np.zeros(count + 1, bool)
+    entered[list(start)] = True
+    walked = entered[parts]
+    reached = np.array([bool((walked[one.near] & one.touched).any()) for one in seen], bool)
     return Ways(reached, float(walked.sum() / room.sum()))
+
+
+def _roomy(free: np.ndarray) -> np.ndarray:
+    """(x, z) bool: cells whose middles are the robot's radius, less half a cell, away from what is not free."""
+    most = round(ROBOT / CELL)
+    out, column, tall = free.copy(), free.copy(), 0
+    for aside in range(most - 1, -1, -1):
+        while aside**2 + (tall + 1) ** 2 < most**2:
+            tall += 1
+            column[:, tall:] &= free[:, :-tall]
+            column[:, :-tall] &= free[:, tall:]
+        out[aside:] &= column[: len(free) - aside]
+        out[: len(free) - aside] &= column[aside:]
+    return out
 
 
 def _entered(
@@ -82,42 +100,55 @@ def _entered(
         if opening.kind == "window" or opening.edge >= len(polygon):
             continue
         inside = segment(polygon, opening).mean(0) + inward_normal(polygon, opening.edge) * (ROBOT + 2 * CELL)
-        near = np.hypot(xs[:, None] - inside[0], zs[None] - inside[1]) < 0.35
-        met = np.bincount(parts[near], minlength=1)
+        x, z = (_within(each, at, BEFORE) for each, at in zip((xs, zs), inside, strict=True))
+        near = np.hypot(xs[x, None] - inside[0], zs[None, z] - inside[1]) < BEFORE
+        met = np.bincount(parts[x, z][near], minlength=1)
         met[0] = 0
         if met.any():
             out.add(int(met.argmax()))
     return out
 
 
-def _inside(xs: np.ndarray, zs: np.ndarray, polygon: np.ndarray) -> np.ndarray:
-    """(len(xs), len(zs)) bool, whether cells lie on the floor (even-odd rule)."""
+def _within(places: np.ndarray, middle: float, far: float) -> slice:
+    """Those of ascending places that lie no further than `far` from one."""
+    return slice(*np.searchsorted(places, (middle - far, middle + far)))
+
+
+@lru_cache(maxsize=8)
+def _grid(kind: str, corners: bytes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Middles of the cells around a floor, and (len(xs), len(zs)) bool: whether they lie on it (even-odd rule)."""
+    polygon = np.frombuffer(corners, kind).reshape(-1, 2)
+    low, high = polygon.min(0) - CELL, polygon.max(0) + CELL
+    xs, zs = (np.arange(a, b + CELL, CELL) for a, b in zip(low, high, strict=True))
     x, z = xs[:, None, None], zs[None, :, None]
     start, end = polygon, np.roll(polygon, -1, 0)
     crossed = (start[:, 1] > z) != (end[:, 1] > z)
     run = np.where(end[:, 1] == start[:, 1], 1.0, end[:, 1] - start[:, 1])
     meets = start[:, 0] + (z - start[:, 1]) / run * (end[:, 0] - start[:, 0])
-    return (crossed & (meets > x)).sum(-1) % 2 == 1
+    return xs, zs, (crossed & (meets > x)).sum(-1) % 2 == 1
 
 
-def _near(xs: np.ndarray, zs: np.ndarray, size: np.ndarray, position: np.ndarray, yaw: float) -> tuple[slice, slice]:
-    """The cells around a box that hold all those within reach of it."""
-    cos, sin = abs(np.cos(yaw)), abs(np.sin(yaw))
-    far = ROBOT + ARM + CELL
-    x, z = (cos * size[0] + sin * size[2]) / 2 + far, (sin * size[0] + cos * size[2]) / 2 + far
-    return (
-        slice(*np.searchsorted(xs, (position[0] - x, position[0] + x))),
-        slice(*np.searchsorted(zs, (position[2] - z, position[2] + z))),
-    )
+class _Beside(NamedTuple):
+    """The cells around a box: where they lie in the grid, those in its footprint, those that it is touched from."""
+
+    near: tuple[slice, slice]
+    under: np.ndarray
+    touched: np.ndarray
 
 
-def _distance(xs: np.ndarray, zs: np.ndarray, size: np.ndarray, position: np.ndarray, yaw: float) -> np.ndarray:
-    """(len(xs), len(zs)) float: metres from cells to a footprint, 0 inside it."""
-    dx, dz = xs[:, None] - position[0], zs[None] - position[2]
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    lateral = np.abs(cos * dx - sin * dz) - size[0] / 2
-    forward = np.abs(sin * dx + cos * dz) - size[2] / 2
-    return np.hypot(np.maximum(lateral, 0.0), np.maximum(forward, 0.0))
+@lru_cache(maxsize=2000)  # a search asks again and again, and moves a few boxes of a room at a time
+def _beside(kind: str, corners: bytes, box: bytes, kind_of_box: str) -> _Beside:
+    """What is beside a box: its width, depth, x, z and yaw as bytes; those of the floor's corners."""
+    xs, zs, _ = _grid(kind, corners)
+    width, depth, x, z, yaw = np.frombuffer(box, kind_of_box)
+    cos, sin, far = np.cos(float(yaw)), np.sin(float(yaw)), ROBOT + ARM + CELL
+    wide, deep = ((abs(cos) * a + abs(sin) * b) / 2 + far for a, b in ((width, depth), (depth, width)))
+    near = _within(xs, x, wide), _within(zs, z, deep)
+    dx, dz = xs[near[0], None] - x, zs[None, near[1]] - z
+    lateral = np.abs(cos * dx - sin * dz) - width / 2
+    forward = np.abs(sin * dx + cos * dz) - depth / 2
+    away = np.hypot(np.maximum(lateral, 0.0), np.maximum(forward, 0.0))
+    return _Beside(near, away <= 0, away <= ROBOT + ARM)
 
 
 REACHED = "reached"

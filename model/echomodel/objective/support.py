@@ -79,9 +79,9 @@ def allowed_overlap(categories: Sequence[str], size: np.ndarray, pairs: np.ndarr
     """
     if not len(pairs):
         return np.zeros(0)
-    words = [(categories[i], categories[j]) for i, j in pairs.tolist()]
-    rows = {word: vocabulary().category(word) for word in {*categories}}
-    shares = {(one, other): shared_fraction(rows[one], rows[other]) for one, other in {*words}}
-    share, owner = (np.array(column) for column in zip(*(shares[pair] for pair in words), strict=True))
-    side = size[pairs[np.arange(len(pairs)), owner]]
+    words, kind = np.unique(categories, return_inverse=True)
+    rows = [vocabulary().category(word) for word in words.tolist()]
+    shares = np.array([[shared_fraction(one, other) for other in rows] for one in rows])
+    share, owner = np.moveaxis(shares[kind[pairs[:, 0]], kind[pairs[:, 1]]], -1, 0)
+    side = size[pairs[np.arange(len(pairs)), owner.astype(int)]]
     return share * np.minimum(side[:, 0], side[:, 2])
