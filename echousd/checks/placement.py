@@ -10,7 +10,7 @@ import numpy as np
 from echomodel.dressing import SMALL
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
-from echousd.place.geometry import Floor, axes, floor_from_polygon, inside
+from echousd.place.geometry import Floor, axes, depth_inside, floor_from_polygon
 from echousd.place.placing import DEFAULT_HEIGHT, floor_of_room
 from echousd.stage.contents import RoomContents, RoomObject, Shape, Solid, Surrounding
 
@@ -83,7 +83,7 @@ def misplaced_screens(room: RoomContents, small: Sequence[Surrounding]) -> tuple
         before = screen.position[[0, 2]] + front * (screen.size[2] / 2 + CLOSE)
         below = [one for one in room.objects if one is not screen and _carries(one, screen)]
         across = any(np.cos(one.yaw - screen.yaw) < ACROSS for one in below)
-        if across or (floor is not None and float(inside(floor, before[None])[0][0]) < 0):
+        if across or (floor is not None and float(depth_inside(floor, before[None])[0]) < 0):
             found.append(Misplacement(name, "turned"))
     return tuple(found)
 
@@ -138,7 +138,7 @@ def _small_faults(
     if bottom < -FLOATING:
         yield "sunk", -bottom
         return
-    off = float(inside(floor, _back(shape)[None])[0][0])
+    off = float(depth_inside(floor, _back(shape)[None])[0])
     if kind.fixed and not kind.lies:
         if off > LEANING:
             yield "off its wall", off
@@ -179,7 +179,7 @@ def _beside(shape: Shape, windows: np.ndarray) -> float:
 
 def _beyond(thing: Solid, floor: Floor) -> float:
     points = thing.points[:, [0, 2]] if len(thing.points) else _footprint(thing)
-    return float(-inside(floor, points)[0].min())
+    return float(-depth_inside(floor, points).min())
 
 
 def _footprint(thing: Solid) -> np.ndarray:
@@ -220,5 +220,5 @@ def _held(thing: RoomObject, floor: Floor | None, height: float) -> bool:
     if row.support == "ceiling":
         return height - top <= HANGING
     if row.support == "wall" or row.hangs:
-        return floor is None or float(inside(floor, _footprint(thing))[0].min()) <= LEANING
+        return floor is None or float(depth_inside(floor, _footprint(thing)).min()) <= LEANING
     return False

@@ -1,22 +1,34 @@
-"""The constraints of a room, linearised at its present boxes: relations, collisions, floor, walls and support."""
+"""The constraints of a room, linearised at its present boxes: relations, collisions, floor, walls and support.
+
+What the graph states has the margins of `echomodel.rules`, whose slopes are torch's: every row looks at copies of its
+own boxes, so that one way back from the sum of all margins gives the gradients of each. Headings stay, and so do the
+slopes of what stands apart, against a wall or on something.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
+import torch
 from scipy import sparse
+from torch import Tensor
 
+from echomodel.boxes2d import CORNERS, hull
+from echomodel.floors import signed_distance
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, allowed_overlap
-from echousd.place.geometry import COLUMNS, Rows, axes, floor_rows, separation_rows, spread, spread_sparsely
-from echousd.place.placements import placement_rows
-from echousd.place.problem import Problem, wall_gaps
-from echousd.place.relations import relation_margins
+from echomodel.rules import rule_set
+from echomodel.rules.geometry import PairGeometry
+from echomodel.rules.margins import pair_margins
+from echomodel.rules.placements import Spread, margin_of
+from echousd.place.geometry import COLUMNS, PLAN, SIDES, axes, parting
+from echousd.place.problem import Posed
 
-RELATION, COLLISION, FLOOR, WALL, SUPPORT, CEILING, OVERHANG, PLACEMENT = range(8)
-MANY = 60  # boxes beyond which constraints are sparse, and pairs far apart are none
+KINDS = RELATION, PLACEMENT, COLLISION, FLOOR, OVERHANG, WALL, SUPPORT, CEILING = range(8)  # from `WALL` on equalities
+MANY = 60  # boxes beyond which gradients are sparse
+PART = 0.002  # metres that pairs are parted farther than they may overlap
 HANDLES = 0.05  # metres at the front of a box that handles and doors take, on which nothing can stand
 ROUNDED = 0.02  # metres at its back, where a top with rounded corners may end before its box
 LONGEST_STEP = 0.6  # of any number in one round, metres or ratio
@@ -26,158 +38,197 @@ Matrix: TypeAlias = Any  # (r, m) float, an array of numpy or a sparse one
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """Constraints value + gradient . step >= 0 (or = 0) around the present boxes.
+    """Constraints value + gradient . step >= 0 (or = 0) around the present boxes, less those that no step can break.
 
     Arguments:
         value: (r,) float, metres or ratio, the wanted slack already taken off.
-        gradient: (r, n * 6) float; sparse for very many boxes.
-        equal: (r,) bool, True where the value must be zero rather than not negative.
-        kind: (r,) int, `RELATION` ... `PLACEMENT`.
+        gradient: (r, n * 6) float, by the positions and the logarithms of the sides; sparse for very many boxes.
+        kind: (r,) int, one of `KINDS`.
+        number: (r,) int, which one of its kind: row of the problem's triplets, of its pairs; of others any.
         axis: (p,) int, separating axis chosen for each pair.
-        pair: (c,) int, number of the pair of each collision's row.
     """
 
     value: np.ndarray
     gradient: Matrix
-    equal: np.ndarray
     kind: np.ndarray
+    number: np.ndarray
     axis: np.ndarray
-    pair: np.ndarray
 
-    def boxes_of(self, row: int) -> list[int]:
+    @property
+    def equal(self) -> np.ndarray:
+        """(r,) bool, values that must be zero rather than not negative."""
+        return self.kind >= WALL
+
+    def boxes_of(self, row: int) -> set[int]:
         """The boxes that a constraint is about."""
-        slopes = self.gradient[[row]]
-        dense = slopes.toarray() if sparse.issparse(slopes) else slopes
-        found: list[int] = np.flatnonzero(np.abs(dense.reshape(-1, COLUMNS)).sum(1) > 0).tolist()
-        return found
+        return {int(column) // COLUMNS for column in self.gradient[[row]].nonzero()[1]}
 
 
-def linearise(
-    problem: Problem,
-    size: np.ndarray,
-    position: np.ndarray,
-    yaw: np.ndarray,
-    *,
-    handicap: np.ndarray,
-    slack: float,
-) -> Linearised:
-    """All constraints at the present boxes; see `Linearised`.
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Constraints of one kind.
 
     Arguments:
-        size, position: (n, 3) float, metres; yaw: (n,) float, radians.
-        handicap: (p, 5) float as `geometry.separation_rows`.
-        slack: metres or ratio by which relations are to hold, so that rounding does not break them.
+        who: (r, k) int, the boxes that each is about.
+        value: (r,) float, metres or ratio. by: (r, k, 6) float, its slopes by their positions and sides.
     """
-    n = len(size)
-    many = n > MANY
-    values: list[np.ndarray] = []
-    gradients: list[Matrix] = []
-    equals: list[bool] = []
-    kinds: list[np.ndarray] = []
 
-    def add(value: np.ndarray, gradient: np.ndarray, kind: int | np.ndarray, equal: bool = False) -> None:
-        flat = gradient.reshape(len(value), n * COLUMNS)
-        put(value, sparse.csr_array(flat) if many else flat, kind, equal)
-
-    def add_rows(rows: Rows, kind: int) -> None:
-        if many:
-            put(rows.value, spread_sparsely(rows.gradient, rows.who, n), kind)
-        else:
-            add(rows.value, spread(rows.gradient, rows.who, n), kind)
-
-    def put(value: np.ndarray, gradient: Matrix, kind: int | np.ndarray, equal: bool = False) -> None:
-        values.append(value)
-        gradients.append(gradient)
-        equals.extend([equal] * len(value))
-        kinds.append(np.broadcast_to(np.asarray(kind, int), len(value)))
-
-    margin, by_pair = relation_margins(
-        size, position, yaw, problem.triplets, rules=problem.rules, centre=problem.centre, fronts=problem.fronts
-    )
-    add_rows(Rows(margin - slack, by_pair, problem.triplets[:, [0, 2]]), RELATION)
-
-    apart, axis = separation_rows(size, position, yaw, problem.pairs, problem.order, handicap)
-    allowed = np.where(problem.touching, 0.0, allowed_overlap(problem.categories, size, problem.pairs))
-    apart = replace(apart, value=apart.value + allowed - 0.002)
-    pair = np.arange(len(problem.pairs))
-    if many:  # those apart that no step brings together
-        pair = np.flatnonzero(apart.value <= LONGEST_STEP * np.abs(apart.gradient).sum((1, 2)) + 1e-6)
-    add_rows(apart.take(pair), COLLISION)
-
-    if problem.floor is not None:
-        within = floor_rows(problem.floor, size, position, yaw)
-        add_rows(within.take(~problem.fixed[within.who[:, 0]] & (within.value < 1.0)), FLOOR)
-        add(*_wall_rows(problem, size, position, yaw), WALL, equal=True)
-
-    add(*_support_rows(problem, size, position), equal=True)
-    add(*_overhang_rows(problem, size, position, yaw), OVERHANG)
-    if problem.stated:
-        walls = problem.surroundings
-        margin, gradient = placement_rows(problem.stated, walls, problem.categories, size, position, yaw)
-        add(margin - slack, gradient, PLACEMENT)
-    whole = stacked_rows(gradients)
-    return Linearised(np.concatenate(values), whole, np.array(equals, bool), np.concatenate(kinds), axis, pair)
+    kind: int | np.ndarray
+    who: np.ndarray
+    value: np.ndarray
+    by: np.ndarray
 
 
-def stacked_rows(parts: Sequence[Matrix]) -> Matrix:
-    """Rows of gradients below one another."""
-    return sparse.vstack(parts, format="csr") if sparse.issparse(parts[0]) else np.concatenate(parts)
+class Constraints:
+    """The constraints of a room whose boxes keep their headings."""
+
+    def __init__(self, start: Posed, slack: float) -> None:
+        """`slack`: metres or ratio by which what is told is to hold, so that rounding does not break it."""
+        self.problem, self.yaw, self.slack = start.problem, start.yaw, slack
+        self.axis = axes(start.yaw)
+        self.parting = parting(self.axis, start.problem.pairs)
+
+    def at(self, size: np.ndarray, position: np.ndarray, handicap: np.ndarray) -> Linearised:
+        """All constraints at the present boxes.
+
+        Arguments:
+            size, position: (n, 3) float, metres.
+            handicap: (p, 5) float, metres by which a separating axis must be better to be chosen (inf = never).
+        """
+        state = np.concatenate([position, size], 1)
+        apart, axis = self._apart(state, handicap)
+        rows = [*self._told(state), apart, *self._floor(state), self._walls(state), self._support(state)]
+        return _linearised([*rows, self._overhang(state)], state, axis)
+
+    def _told(self, state: np.ndarray) -> list[Rows]:
+        """Relations, and placements, for which furniture moves, but none grows or shrinks."""
+        problem, triplets, found = self.problem, self.problem.triplets, []
+        rules, ends = rule_set(problem.rules), triplets[:, [0, 2]]
+        with torch.inference_mode(False):  # whatever calls this up from slopes
+            if len(triplets):
+                one, other = (self._copies(state, end, problem.centre.tolist()) for end in ends.T)
+                fronts = torch.from_numpy(problem.fronts[ends].all(1))
+                (size_s, at_s, yaw_s), (size_o, at_o, yaw_o) = one, other
+                pair = PairGeometry(size_s, size_o, at_s, at_o, yaw_s, yaw_o, rules.oriented, fronts)
+                margin = pair_margins(pair, torch.from_numpy(triplets[:, 1]), rules)
+                found.append(Rows(RELATION, ends, *_with_slopes(margin - self.slack, [one, other])))
+            for stated in problem.stated:
+                if stated.others or problem.surroundings is not None:
+                    who = [stated.subject, *stated.others]
+                    own = [self._copies(state, np.array([box])) for box in who]
+                    every = {box: Spread(size.detach(), *at) for box, (size, *at) in zip(who, own, strict=True)}
+                    margin = margin_of(stated, every, problem.surroundings, problem.categories)
+                    found.append(Rows(PLACEMENT, np.array([who]), *_with_slopes(margin - self.slack, own)))
+        return found
+
+    def _copies(
+        self, state: np.ndarray, who: np.ndarray, middle: Sequence[float] = (0.0, 0.0)
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Size and position (r, 3) about `middle` and heading (r,) of boxes (r,), each row's its own."""
+        position = torch.from_numpy(state[who, :3] - (middle[0], 0.0, middle[1])).requires_grad_()
+        return torch.from_numpy(state[who, 3:]).requires_grad_(), position, torch.from_numpy(self.yaw[who])
+
+    def _apart(self, state: np.ndarray, handicap: np.ndarray) -> tuple[Rows, np.ndarray]:
+        """Pairs, each parted along the axis and to the side that are best."""
+        problem, row = self.problem, np.arange(len(self.problem.pairs))
+        gap = np.einsum("pasbc,pbc->pas", self.parting, state[problem.pairs])
+        side = np.where(problem.barred, -np.inf, gap).argmax(2)
+        gap = np.take_along_axis(gap, side[..., None], 2)[..., 0]
+        axis = (gap - handicap).argmax(1)
+        allowed = np.where(problem.touching, 0.0, allowed_overlap(problem.categories, state[:, 3:], problem.pairs))
+        value = gap[row, axis] + allowed - PART
+        return Rows(COLLISION, problem.pairs, value, self.parting[row, axis, side[row, axis]]), axis
+
+    def _floor(self, state: np.ndarray) -> list[Rows]:
+        """Corners of footprints within the floor, and corners of the floor that look into it outside of footprints."""
+        floor, who = self.problem.floor, np.flatnonzero(~self.problem.fixed)
+        if floor is None:
+            return []
+        place, side, axis = state[who][:, PLAN], state[who][:, SIDES], self.axis[who]
+        arm = np.array(CORNERS)[:, :, None] / 2 * axis[:, None]  # of each corner, for a metre of each side
+        with torch.inference_mode(False):
+            point = torch.from_numpy(place[:, None] + np.einsum("ncsd,ns->ncd", arm, side)).requires_grad_()
+            inside = signed_distance(point, torch.from_numpy(floor.polygon).expand(len(who), -1, -1))
+            (way,) = (slope.numpy() for slope in torch.autograd.grad(inside.sum(), point))
+        by = np.zeros((*way.shape[:2], COLUMNS))
+        by[..., PLAN], by[..., SIDES] = way, np.einsum("ncd,ncsd->ncs", way, arm)
+        found = [_of_one(FLOOR, who.repeat(4), inside.detach().numpy().ravel(), by.reshape(-1, COLUMNS))]
+        if len(floor.reflex):
+            local = np.einsum("nsd,nrd->nrs", axis, floor.reflex - place[:, None])
+            off = np.abs(local) - side[:, None] / 2
+            by = np.zeros((*off.shape, COLUMNS))
+            by[..., PLAN] = -np.sign(local)[..., None] * axis[:, None]
+            by[..., 0, 3], by[..., 1, 5] = -0.5, -0.5
+            best = off.argmax(2)[..., None]
+            by = np.take_along_axis(by, best[..., None], 2).reshape(-1, COLUMNS)
+            off = np.take_along_axis(off, best, 2).ravel()
+            found.append(_of_one(FLOOR, who.repeat(len(floor.reflex)), off, by))
+        return found
+
+    def _walls(self, state: np.ndarray) -> Rows:
+        """The backs of what leans on a wall as far from it as they are meant to be."""
+        problem = self.problem
+        who = np.flatnonzero(~problem.fixed & ~np.isnan(problem.wall[:, 0, 0]))
+        (start, normal), by = problem.wall[who].transpose(1, 0, 2), np.zeros((len(who), COLUMNS))
+        by[:, PLAN], by[:, SIDES] = normal, -np.abs(np.einsum("nsd,nd->ns", self.axis[who], normal)) / 2
+        return _of_one(WALL, who, (by * state[who]).sum(1) - (start * normal).sum(1) - problem.behind[who], by)
+
+    def _support(self, state: np.ndarray) -> Rows:
+        """Bottoms on the floor or on what carries them, tops of what hangs at the ceiling."""
+        problem, carrier = self.problem, self.problem.carrier
+        hangs = (carrier == ON_CEILING) & (problem.height is not None)
+        who = np.flatnonzero(~problem.fixed & ((carrier >= ON_FLOOR) | hangs))
+        on, hung, by = carrier[who] >= 0, hangs[who], np.zeros((len(who), 2, COLUMNS))
+        by[:, 0, 1], by[hung, 0, 4] = 1.0, 1.0
+        by[on, 1, 1], by[on, 1, 4] = -1.0, -1.0
+        ends = np.stack([who, np.where(on, carrier[who], who)], 1)
+        value = (by * state[ends]).sum((1, 2)) - np.where(hung, problem.height or 0.0, 0.0)
+        return Rows(np.where(hung, CEILING, SUPPORT), ends, value, by)
+
+    def _overhang(self, state: np.ndarray) -> Rows:
+        """Footprints of what stands on something within that one's, or the middle where it is the larger one; none
+        grows or shrinks for it."""
+        problem = self.problem
+        who = np.flatnonzero(problem.carrier >= 0)
+        who = who[~(problem.fixed[who] & problem.fixed[problem.carrier[who]])]
+        on = problem.carrier[who]
+        reach = hull(state[who][:, SIDES] / 2, self.yaw[who] - self.yaw[on])
+        room = (state[on][:, SIDES] / 2 - reach)[..., None] - [[0.0, 0.0], [HANDLES, ROUNDED]]
+        by = np.zeros((*room.shape, 2, COLUMNS))  # along both sides of the one below, to its right or front and back
+        by[..., 0, PLAN] = self.axis[on][:, :, None] * [[-1.0], [1.0]]
+        by[..., 1, PLAN] = -by[..., 0, PLAN]
+        ends = np.stack([who, on], 1).repeat(4, 0)
+        by = by.reshape(-1, 2, COLUMNS)
+        return Rows(OVERHANG, ends, np.maximum(room, 0.02).ravel() + (by * state[ends]).sum((1, 2)), by)
 
 
-def _wall_rows(
-    problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    leaning = np.flatnonzero(~np.isnan(problem.wall[:, 0, 0]) & ~problem.fixed)
-    gradient = np.zeros((len(leaning), len(size), COLUMNS))
-    normal = problem.wall[leaning, 1]
-    r = np.arange(len(leaning))
-    gradient[r, leaning, 0], gradient[r, leaning, 2] = normal[:, 0], normal[:, 1]
-    reach = 0.5 * np.abs(np.einsum("nkd,nd->nk", axes(yaw[leaning]), normal)) * size[leaning][:, [0, 2]]
-    gradient[r, leaning, 3], gradient[r, leaning, 5] = -reach[:, 0], -reach[:, 1]
-    gap = wall_gaps(problem.wall[leaning], size[leaning], position[leaning], yaw[leaning])
-    return gap - problem.behind[leaning], gradient
+def _of_one(kind: int, who: np.ndarray, value: np.ndarray, by: np.ndarray) -> Rows:
+    """Rows about one box each: numbers (r,), values (r,), slopes (r, 6)."""
+    return Rows(kind, who[:, None], value, by[:, None])
 
 
-def _support_rows(
-    problem: Problem, size: np.ndarray, position: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    on = ~problem.fixed & (
-        (problem.carrier >= ON_FLOOR) | (problem.carrier == ON_CEILING) & (problem.height is not None)
-    )
-    who = np.flatnonzero(on)
-    value = np.zeros(len(who))
-    gradient = np.zeros((len(who), len(size), COLUMNS))
-    for row, i in enumerate(who):
-        gradient[row, i, 1] = 1.0
-        carrier = problem.carrier[i]
-        value[row] = position[i, 1]
-        if carrier >= 0:
-            value[row] -= position[carrier, 1] + size[carrier, 1]
-            gradient[row, carrier, 1] = -1.0
-            gradient[row, carrier, 4] = -size[carrier, 1]
-        elif carrier == ON_CEILING and problem.height is not None:
-            value[row] += size[i, 1] - problem.height
-            gradient[row, i, 4] = size[i, 1]
-    return value, gradient, np.where(problem.carrier[who] == ON_CEILING, CEILING, SUPPORT)
+def _with_slopes(margin: Tensor, own: Sequence[tuple[Tensor, Tensor, Tensor]]) -> tuple[np.ndarray, np.ndarray]:
+    """Margins (r,) and their slopes (r, k, 6) by the copies of the k boxes that each is about."""
+    leaves = [of for size, position, _ in own for of in (position, size)]
+    slopes = torch.autograd.grad(margin.sum(), leaves, allow_unused=True, materialize_grads=True)
+    return margin.detach().numpy(), torch.cat(slopes, 1).reshape(len(margin), -1, COLUMNS).numpy()
 
 
-def _overhang_rows(
-    problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """What stands on something keeps its footprint within that thing's, or its centre where it is the larger one."""
-    who = np.flatnonzero(problem.carrier >= 0)
-    who = who[~(problem.fixed[who] & problem.fixed[problem.carrier[who]])]
-    n, u = len(size), axes(yaw)
-    value = np.zeros(2 * len(who))
-    gradient = np.zeros((2 * len(who), n, COLUMNS))
-    for at, i in enumerate(who):
-        k = problem.carrier[i]
-        local = u[k] @ (position[i] - position[k])[[0, 2]]
-        reach = 0.5 * np.abs(u[k] @ u[i].T) @ size[i][[0, 2]]
-        for axis in (0, 1):
-            row, sign = 2 * at + axis, 1.0 if local[axis] >= 0 else -1.0
-            room = 0.5 * size[k, 2 * axis] - reach[axis] - (0.0 if axis == 0 else HANDLES if sign > 0 else ROUNDED)
-            value[row] = max(room, 0.02) - abs(local[axis])
-            gradient[row, i, [0, 2]] = -sign * u[k, axis]
-            gradient[row, k, [0, 2]] = sign * u[k, axis]
-    return value, gradient
+def _linearised(every: Sequence[Rows], state: np.ndarray, axis: np.ndarray) -> Linearised:
+    """Rows below one another as `Linearised`, by the logarithms of the sides."""
+    scale = np.concatenate([np.ones((len(state), 3)), state[:, 3:]], 1)
+    kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    gradient: Matrix = np.zeros((sum(len(rows.value) for rows in every), *state.shape))
+    first = 0
+    for rows in every:
+        by, kind = rows.by * scale[rows.who], np.broadcast_to(rows.kind, len(rows.value))
+        near = np.flatnonzero((kind >= WALL) | (rows.value <= LONGEST_STEP * np.abs(by).sum((1, 2))))
+        kept.append((rows.value[near], kind[near], near))
+        for end in range(by.shape[1]):
+            gradient[np.arange(first, first + len(near)), rows.who[near, end]] += by[near, end]
+        first += len(near)
+    value, kind, number = (np.concatenate(part) for part in zip(*kept, strict=True))
+    gradient = gradient[:first].reshape(first, state.size)
+    if len(state) > MANY:
+        gradient = sparse.csr_array(gradient)
+    return Linearised(value, gradient, kind, number, axis)

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import torch
 
 from echomodel.objective import plan_of
 from echomodel.openings import Opening
 from echomodel.rooms.runs import Run, Site, obstacles, runs
+from echomodel.rules import margins
 from echomodel.vocabulary import vocabulary
 from echousd.place.problem import Posed
-from echousd.place.relations import relation_margins
 from echousd.place.search import cost_of, part_of
 
 MISSED = 3.0  # what a relation costs that a plan breaks
@@ -50,12 +51,12 @@ def fitted(
 
     def missed(run: Run) -> float:
         _, size, position, yaw = built(run)
-        margin, _ = relation_margins(
-            size, position, yaw, told, rules=problem.rules, centre=problem.centre, fronts=problem.fronts, slopes=False
-        )
+        boxes = Posed(problem, size, position, yaw)
+        margin = margins(boxes, told, rules=problem.rules, center=torch.from_numpy(problem.centre), fronts=fronts)
         return MISSED * float((margin < 0).sum())
 
-    told = problem.triplets[(mine | problem.fixed)[problem.triplets[:, [0, 2]]].all(1)]
+    told = torch.from_numpy(problem.triplets[(mine | problem.fixed)[problem.triplets[:, [0, 2]]].all(1)])
+    fronts = torch.from_numpy(problem.fronts)
     found = runs([kinds[i] for i in number], at.size[mine], ~rigid[mine], site, over=over, draft=at.position[mine],
                  missed=missed if len(told) else None)  # fmt: skip
     best, least = (at, none), np.inf

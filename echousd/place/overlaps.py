@@ -35,11 +35,12 @@ def depths(
 
 
 def beyond(floor: Floor, size: np.ndarray, at: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """(K,) float: how far a box (3,) at each pose, at (K, 3) and turn (K,), leaves the floor, metres."""
-    corner = footprints(np.broadcast_to(size, (len(turn), 3)), at, turn)
+    """(K,) float: how far a box (3,), or each of K, leaves the floor at (K, 3) and turn (K,), metres."""
+    size = np.broadcast_to(size, at.shape)
+    corner = footprints(size, at, turn)
     out: np.ndarray = -depth_inside(floor, corner.reshape(-1, 2)).reshape(-1, 4).min(1)
     if len(floor.reflex):
         offset = floor.reflex[None] - at[:, None, [0, 2]]
-        local = np.abs(np.einsum("kad,kmd->kma", axes(turn), offset)) - size[[0, 2]] / 2
+        local = np.abs(np.einsum("kad,kmd->kma", axes(turn), offset)) - size[:, None, [0, 2]] / 2
         out = np.maximum(out, -local.max(2).min(1))
     return out

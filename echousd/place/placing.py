@@ -26,18 +26,16 @@ from echousd.place.fitted import fitted
 from echousd.place.overhead import lamps_along
 from echousd.place.placements import stated_placements
 from echousd.place.problem import Posed, pose, stacked
-from echousd.place.relations import relation_margins
 from echousd.place.report import Conflict, collisions, conflicts, outside, sentence
 from echousd.place.search import ANEW, Arranged, Search
 from echousd.place.setting import setting_of
-from echousd.place.solver import PlaceConfig, solve, violation
+from echousd.place.solver import PlaceConfig, solve, unmet
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
     from echomodel.rules.placements import Stated
     from echousd.graph import Relation, RoomSpec, SceneGraph
 
-UNMET = 0.01  # metres or ratio of hard constraints that are missed in all
 FULL = 0.3  # share of a floor that is covered from which on smaller furniture is tried
 BAD = 1.5  # cost of a room in which something is broken
 WORTH = 1.0  # that smaller furniture must save of what an arrangement costs
@@ -204,7 +202,7 @@ def place_boxes(
     import torch
 
     from echomodel.boxes import Boxes
-    from echomodel.rules import verdicts
+    from echomodel.rules import margins, verdicts
 
     started = time.perf_counter()
     n = len(categories)
@@ -267,9 +265,9 @@ def place_boxes(
         hung = hung_lamps(at.problem.categories, at.size, chosen.position, chosen.yaw, free)
         at = posed(hung, chosen.position, chosen.yaw, kept)
     found = solve(at, config)
-    if at is not drawn and violation(found.at) > UNMET:  # what the graph states comes before all habits
+    if at is not drawn and unmet(found.at):  # what the graph states comes before all habits
         plain = solve(drawn, config)
-        if violation(plain.at) < violation(found.at) - UNMET:
+        if unmet(plain.at) < unmet(found.at):
             found, at, held = plain, drawn, fixed
     problem, turn, centre = at.problem, at.yaw, at.problem.centre
     # The supports are met to a fraction of a millimetre; put them exactly, ceiling things as the solver left them.
@@ -282,8 +280,8 @@ def place_boxes(
     boxes = Boxes(*(t.float() for t in ends))
     headed = torch.from_numpy(problem.fronts)
     verdict = verdicts(boxes, torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(centre), fronts=headed)
-    margin, _ = relation_margins(
-        size_end, end, turn, triplets, rules=rules, centre=centre, fronts=problem.fronts, slopes=False
+    margin = margins(
+        Boxes(*ends), torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(centre), fronts=headed
     )
     hit, beyond = collisions(problem, size_end, end, turn), outside(problem, size_end, end, turn)
     failures = (
@@ -296,7 +294,7 @@ def place_boxes(
         position=end,
         yaw=turn,
         verdict=verdict.numpy(),
-        margin=margin,
+        margin=margin.numpy(),
         conflicts=conflicts(problem, found, failures),
         collisions=hit,
         outside=beyond,

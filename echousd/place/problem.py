@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echomodel.boxes2d import seen
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, carriers
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.place.distances import kept_behind
-from echousd.place.geometry import Floor, axes, floor_from_polygon, pair_gaps, pair_indices
+from echousd.place.geometry import Floor, axes, floor_from_polygon, pair_indices
 
 if TYPE_CHECKING:
     from echomodel.rules.placements import Stated, Walls
@@ -39,8 +40,8 @@ class Problem:
         wall: (n, 2, 2) float, point and inward normal (x, z) of the wall that each one leans on; NaN = none.
         behind: (n,) float, metres that each one keeps between its back and a wall that it leans on.
         pairs: (p, 2) int, pairs that must not collide.
-        order: (p, 2) float, sign that the relations ask of (second - first) in x and z; 0 = none.
-        handicap: (p, 5) float, metres by which a separating axis must be better to be chosen.
+        barred: (p, 5, 2) bool, sides that the relations forbid: see `geometry.parting`.
+        handicap: (p, 5) float, metres by which a separating axis, the last one upright, must be better to be chosen.
         stated: where single objects must stand in the room.
     """
 
@@ -57,7 +58,7 @@ class Problem:
     wall: np.ndarray
     behind: np.ndarray
     pairs: np.ndarray
-    order: np.ndarray
+    barred: np.ndarray
     handicap: np.ndarray
     stated: tuple[Stated, ...] = ()
 
@@ -135,6 +136,7 @@ def pose(
     i, j = pairs[:, 0], pairs[:, 1]
     apart = ~(fixed[i] & fixed[j]) & (carrier[i] != j) & (carrier[j] != i)
     pairs = pairs[apart]
+    axis = axes(yaw)[pairs].reshape(-1, 4, 2)
     problem = Problem(
         words,
         triplets[told],
@@ -149,8 +151,8 @@ def pose(
         wall,
         behind,
         pairs,
-        required_order(n, triplets)[pairs[:, 0], pairs[:, 1]],
-        axis_handicap(size, position, yaw, pairs, wall),
+        barred_sides(n, triplets, pairs, axis),
+        axis_handicap(size, position, pairs, axis, wall),
         stated,
     )
     return Posed(problem, size, position, yaw)
@@ -159,36 +161,36 @@ def pose(
 def wall_gaps(wall: np.ndarray, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """(n,) float: metres between the back of each leaning piece and its wall (`Problem.wall`); NaN for the others."""
     normal = wall[:, 1]
-    reach = 0.5 * np.abs(np.einsum("nkd,nd->nk", axes(yaw), normal)) * size[:, [0, 2]]
-    return ((position[:, [0, 2]] - wall[:, 0]) * normal).sum(1) - reach.sum(1)
+    reach = (np.abs(seen(normal, yaw)) * size[:, [0, 2]]).sum(-1) / 2
+    return ((position[:, [0, 2]] - wall[:, 0]) * normal).sum(-1) - reach
 
 
 def axis_handicap(
-    size: np.ndarray, position: np.ndarray, yaw: np.ndarray, pairs: np.ndarray, wall: np.ndarray
+    size: np.ndarray, position: np.ndarray, pairs: np.ndarray, axis: np.ndarray, wall: np.ndarray
 ) -> np.ndarray:
     """(p, 5) float: pairs pass over one another only where they do already; neighbours at one wall part along it."""
-    out = np.zeros((len(pairs), 5))
-    if not len(pairs):
-        return out
-    gap, direction, _ = pair_gaps(size, position, yaw, pairs)
-    out[:, 4] = np.where(gap[:, 4] > -0.02, 0.0, np.inf)
-    first, second = wall[pairs[:, 0]], wall[pairs[:, 1]]
-    neighbours = (np.abs(first - second) < 1e-6).all((1, 2))
-    across = np.abs(np.einsum("pad,pd->pa", direction, np.nan_to_num(first[:, 1]))) > 0.7
-    out[:, :4] += np.where(neighbours[:, None] & across, NEIGHBOURS, 0.0)
-    return out
+    (i, j), low, high = pairs.T, position[:, 1], position[:, 1] + size[:, 1]
+    rise = np.maximum(low[j] - high[i], low[i] - high[j])
+    neighbours = (np.abs(wall[i] - wall[j]) < 1e-6).all((1, 2))
+    across = np.abs(np.einsum("pad,pd->pa", axis, np.nan_to_num(wall[i, 1]))) > 0.7
+    aside = np.where(neighbours[:, None] & across, NEIGHBOURS, 0.0)
+    return np.concatenate([aside, np.where(rise > -0.02, 0.0, np.inf)[:, None]], 1)
 
 
-def required_order(n: int, triplets: np.ndarray) -> np.ndarray:
-    """(n, n, 2) float: sign that the relations with a direction ask of (second - first) in x and in z."""
+def barred_sides(n: int, triplets: np.ndarray, pairs: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """(p, 5, 2) bool: to which sides of the first of each pair the relations do not have the second.
+
+    Arguments:
+        axis: (p, 4, 2) float, the horizontal axes of both, of which those along x or z count.
+    """
+    step = np.array([predicate.step for predicate in vocabulary().predicates])[triplets[:, 1]]
     order = np.zeros((n, n, 2))
-    for predicate in vocabulary().predicates:
-        chosen = triplets[triplets[:, 1] == predicate.id]
-        for column, sign in enumerate(predicate.step):
-            if sign:
-                order[chosen[:, 0], chosen[:, 2], column] = -sign
-                order[chosen[:, 2], chosen[:, 0], column] = sign
-    return order
+    np.add.at(order, (triplets[:, 2], triplets[:, 0]), step)
+    wanted = (order - order.transpose(1, 0, 2))[pairs[:, 0], pairs[:, 1]]
+    along = (np.where(np.abs(axis) > 0.9, axis, 0.0) * wanted[:, None]).sum(-1)
+    out = np.zeros((len(pairs), 5, 2), bool)
+    out[:, :4] = np.stack([along < 0, along > 0], -1)
+    return out
 
 
 def stacked(

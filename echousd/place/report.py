@@ -9,7 +9,8 @@ import numpy as np
 
 from echomodel.objective.support import allowed_overlap
 from echousd.place.constraints import COLLISION, FLOOR, RELATION
-from echousd.place.geometry import floor_rows, separation
+from echousd.place.geometry import separation
+from echousd.place.overlaps import beyond
 from echousd.place.problem import Problem
 from echousd.place.solver import Solution
 
@@ -66,9 +67,7 @@ def outside(problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.nd
     """Objects that leave the floor, with the depth in metres."""
     if problem.floor is None:
         return ()
-    rows = floor_rows(problem.floor, size, position, yaw)
-    depth = np.zeros(len(size))
-    np.maximum.at(depth, rows.who[:, 0], -rows.value)
+    depth = beyond(problem.floor, size, position, yaw)
     return tuple((i, float(depth[i])) for i in np.flatnonzero(depth > TOUCH).tolist())
 
 
@@ -84,46 +83,26 @@ def conflicts(
         failures: broken relations, colliding pairs and objects outside; a group without any is no conflict.
     """
     at = found.at
-    violated = np.flatnonzero((at.value < -0.002) & np.isin(at.kind, (RELATION, COLLISION, FLOOR)))
-    touched = [frozenset(at.boxes_of(r)) for r in violated.tolist()]
-    groups: list[tuple[set[int], list[int]]] = []
-    for row, objects in zip(violated.tolist(), touched, strict=True):
-        movable = {int(i) for i in objects if not (problem.fixed[i] and problem.rigid[i])}
-        joined, members = set(movable), [row]
-        apart = []
-        for other, numbers in groups:
-            if other & joined:
-                joined |= other
-                members = numbers + members
-            else:
-                apart.append((other, numbers))
-        groups = [*apart, (joined, members)]
-    first = {kind: first_row(at.kind, kind) for kind in (RELATION, COLLISION)}
-    objects_of = dict(zip(violated.tolist(), touched, strict=True))
-    every = (
-        Conflict(
-            tuple(int(problem.rows[r - first[RELATION]]) for r in members if at.kind[r] == RELATION),
-            tuple(
-                (int(problem.pairs[pair, 0]), int(problem.pairs[pair, 1]))
-                for pair in (int(at.pair[r - first[COLLISION]]) for r in members if at.kind[r] == COLLISION)
-            ),
-            tuple(sorted({int(i) for r in members if at.kind[r] == FLOOR for i in objects_of[r]})),
-        )
-        for _, members in groups
-    )
+    groups: list[tuple[set[int], list[int]]] = []  # of boxes that could have moved, and of the rows around them
+    for row in np.flatnonzero((at.value < -0.002) & np.isin(at.kind, (RELATION, COLLISION, FLOOR))).tolist():
+        joined, members = {i for i in at.boxes_of(row) if not (problem.fixed[i] and problem.rigid[i])}, [row]
+        touched = [group for group in groups if group[0] & joined]
+        for boxes, rows in touched:
+            joined, members = joined | boxes, rows + members
+        groups = [*(group for group in groups if group not in touched), (joined, members)]
+
+    def conflict(members: list[int]) -> Conflict:
+        told, pairs = ([at.number[r] for r in members if at.kind[r] == kind] for kind in (RELATION, COLLISION))
+        beyond = {i for r in members if at.kind[r] == FLOOR for i in at.boxes_of(r)}
+        rows: list[int] = problem.rows[told].tolist()
+        return Conflict(tuple(rows), tuple((i, j) for i, j in problem.pairs[pairs].tolist()), tuple(sorted(beyond)))
+
     relations, pairs, outside = failures
     return tuple(
-        conflict
-        for conflict in every
-        if not relations.isdisjoint(conflict.relations)
-        or not pairs.isdisjoint(conflict.pairs)
-        or not outside.isdisjoint(conflict.outside)
+        one
+        for one in (conflict(members) for _, members in groups)
+        if relations & {*one.relations} or pairs & {*one.pairs} or outside & {*one.outside}
     )
-
-
-def first_row(kinds: np.ndarray, kind: int) -> int:
-    """Row of the first constraint of a kind, 0 where there is none: boxes that are all fixed leave nothing to hold."""
-    return int(np.argmax(kinds == kind)) if len(kinds) else 0
 
 
 def sentence(conflict: Conflict, graph: SceneGraph) -> str:

@@ -14,12 +14,13 @@ import numpy as np
 import torch
 from scipy.optimize import linear_sum_assignment
 
+from echomodel.boxes import Boxes
 from echomodel.objective import TERMS, Plan, Term, unreached
 from echomodel.objective.copies import OF_WORDS, copies_of, looks_at
 from echomodel.objective.found import Found, found, nobody
+from echomodel.rules import margins
 from echousd.place.overlaps import beyond, depths
 from echousd.place.proposals import ahead, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
-from echousd.place.relations import margins_at
 from echousd.place.setting import Setting
 
 JUDGED = 48  # poses that are judged at once
@@ -338,10 +339,7 @@ class Search:
         told = setting.told(i)
         told = told[there[told[:, [0, 2]]].all(1) & ~np.isin(np.where(told[:, 0] == i, told[:, 2], told[:, 0]), group)]
         if len(told):
-            margin = margins_at(
-                i, (position[:, i], yaw[:, i]), told, setting.size, state.position, state.yaw,
-                rules=setting.problem.rules, centre=setting.problem.centre, fronts=setting.problem.fronts,
-            )  # fmt: skip
+            margin = self.margins_at(state, i, position[:, i], yaw[:, i], told)
             cost += MISSED * (np.maximum(-margin, 0.0) + (margin < 0)).sum(1)
         order = np.argsort(np.round((cost + taste) * GRAIN), kind="stable")
         if len(order) <= JUDGED:
@@ -351,6 +349,22 @@ class Search:
         some = free[np.linspace(0, len(free) - 1, JUDGED // 2).round().astype(int)] if len(free) else free
         chosen = np.concatenate([order[: JUDGED // 2], some])
         return chosen[np.sort(np.unique(chosen, return_index=True)[1])]
+
+    def margins_at(self, state: State, i: int, at: np.ndarray, turn: np.ndarray, told: np.ndarray) -> np.ndarray:
+        """(K, e) float: margins of relations (e, 3) of box i at poses (K, 3) and (K,), the others where they are."""
+        problem, ends, count = self.setting.problem, told[:, [0, 2]], len(turn) * len(told)
+        own = (ends == i)[None]
+        position = np.where(own[..., None], at[:, None, None], state.position[ends]).reshape(-1, 3)
+        yaw = np.where(own, turn[:, None, None], state.yaw[ends]).ravel()
+        size, fronts = (np.tile(of[ends], (len(turn), *[1] * of.ndim)) for of in (self.setting.size, problem.fronts))
+        rows = np.stack([2 * np.arange(count), np.tile(told[:, 1], len(turn)), 2 * np.arange(count) + 1], 1)
+        boxes = (torch.from_numpy(of) for of in (size.reshape(-1, 3), position, yaw))
+        with torch.inference_mode():
+            found = margins(
+                Boxes(*boxes), torch.from_numpy(rows), rules=problem.rules, center=torch.from_numpy(problem.centre),
+                fronts=torch.from_numpy(fronts.ravel()),
+            )  # fmt: skip
+        return np.asarray(found.reshape(len(turn), -1).numpy())
 
     def exchanged(self, state: State, boxes: list[int]) -> State:
         """The state after two pieces, with their groups, changed places if that is better."""

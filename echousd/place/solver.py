@@ -17,18 +17,12 @@ from scipy.sparse.linalg import splu
 from echousd.place.constraints import (
     CEILING,
     COLLISION,
-    FLOOR,
-    LONGEST_STEP,
-    MANY,
+    KINDS,
     OVERHANG,
-    PLACEMENT,
-    RELATION,
-    SUPPORT,
     WALL,
+    Constraints,
     Linearised,
     Matrix,
-    linearise,
-    stacked_rows,
 )
 from echousd.place.geometry import COLUMNS
 from echousd.place.problem import Posed
@@ -61,17 +55,10 @@ class PlaceConfig:
 
 
 # Stiffness of each kind of constraint; walls and ceilings give way to relations and collisions.
-STIFFNESS = {
-    RELATION: 1e5,
-    COLLISION: 1e5,
-    FLOOR: 1e5,
-    WALL: 3e2,
-    SUPPORT: 1e5,
-    CEILING: 1e3,
-    OVERHANG: 1e4,
-    PLACEMENT: 1e5,
-}
+STIFFNESS = np.full(len(KINDS), 1e5)
+STIFFNESS[[OVERHANG, CEILING, WALL]] = 1e4, 1e3, 3e2
 LIMIT_STIFFNESS = 1e6
+UNMET = 0.01  # metres or ratio by which a constraint is missed that does not hold
 THROUGH = 4  # rounds in which collisions do not count, in an attempt that walks through other things
 SOFT = 1e-2  # weight of a metre to the wall or the ceiling against a metre of collision when results are compared
 LARGEST_STEP = np.array([0.5, 0.5, 0.5, 0.25, 0.25, 0.25])
@@ -96,13 +83,13 @@ class Solution:
 
 def solve(start: Posed, config: PlaceConfig) -> Solution:
     """Move and size boxes until the constraints hold; the best attempt where they cannot all hold."""
-    handicap = start.problem.handicap.copy()
+    handicap, constraints = start.problem.handicap.copy(), Constraints(start, config.slack)
     best: Solution | None = None
     through = 0
     spent = 0
     while best is None or spent < config.budget:
         left = replace(config, rounds=min(config.rounds, max(config.budget - spent - 1, 1)))
-        found = _descend(start, handicap, through, left)
+        found = _descend(start, constraints, handicap, through, left)
         spent += found.rounds
         if best is None or found.score < best.score:
             best = found
@@ -110,7 +97,7 @@ def solve(start: Posed, config: PlaceConfig) -> Solution:
             break
         # Next time colliding pairs part along another axis; what still does not fit first walks through the others.
         stuck = np.flatnonzero((found.at.kind == COLLISION) & (found.at.value < -0.01))
-        colliding = found.at.pair[stuck - (int(np.argmax(found.at.kind == COLLISION)) if len(stuck) else 0)]
+        colliding = found.at.number[stuck]
         handicap[colliding, found.at.axis[colliding]] += 0.4
         if not len(stuck) or best is not found:
             through = THROUGH
@@ -118,22 +105,21 @@ def solve(start: Posed, config: PlaceConfig) -> Solution:
     return best
 
 
-def _descend(start: Posed, handicap: np.ndarray, through: int, config: PlaceConfig) -> Solution:
+def _descend(
+    start: Posed, constraints: Constraints, handicap: np.ndarray, through: int, config: PlaceConfig
+) -> Solution:
     problem, n = start.problem, len(start.size)
     free = np.stack([~problem.fixed] * 3 + [~problem.rigid] * 3, 1).ravel()
     weight = np.tile([config.move**-2] * 3 + [config.stretch**-2] * 3, n)[free]
     origin = np.concatenate((start.position, np.log(start.size)), 1)
-    stiffnesses = np.array([STIFFNESS[kind] for kind in range(len(STIFFNESS))])
-    sides = np.eye(n * COLUMNS).reshape(n, COLUMNS, -1)[:, 3:].reshape(3 * n, -1)
-    bounds = np.concatenate((-sides, sides))
-    bounds = sparse.csr_array(bounds) if n > MANY else bounds
+    limit = np.tile([np.inf] * 3 + [config.limit] * 3, n)[free]
     state = origin.copy()
     best: Solution | None = None
     before, last = np.inf, 0
     for number in range(config.rounds + 1):
         now_size, now_position = np.exp(state[:, 3:]), state[:, :3].copy()
-        at = linearise(problem, now_size, now_position, start.yaw, handicap=handicap, slack=config.slack)
-        hard, soft = violation(at), unmet(at)
+        at = constraints.at(now_size, now_position, handicap)
+        hard, soft = violation(at), afar(at)
         score = hard + SOFT * soft
         if best is None or score < best.score - 1e-9:
             best, last = Solution(now_size, now_position, at, score, number), number
@@ -143,19 +129,11 @@ def _descend(start: Posed, handicap: np.ndarray, through: int, config: PlaceConf
             break
         # Late rounds are damped: two constraints that take turns would otherwise swing for ever.
         damping = 1.0 if number < 6 + through else 4.0 * (number - through - 5)
-        stiffness = stiffnesses[at.kind]
+        stiffness = STIFFNESS[at.kind]
         if number < through:
             stiffness = np.where(at.kind == COLLISION, 0.0, stiffness)
-        grown = (state - origin)[:, 3:].ravel()
-        step = newton(
-            stacked_rows((at.gradient, bounds))[:, free],
-            np.concatenate((at.value, config.limit - grown, config.limit + grown)),
-            np.concatenate((at.equal, np.zeros(6 * n, bool))),
-            np.concatenate((stiffness, np.full(6 * n, LIMIT_STIFFNESS))),
-            weight,
-            (state - origin).ravel()[free],
-            damping,
-        )
+        moved = (state - origin).ravel()[free]
+        step = newton(at.gradient[:, free], at.value, at.equal, stiffness, weight, moved, limit, damping)
         full = np.zeros(n * COLUMNS)
         full[free] = step
         state = state + np.clip(full.reshape(n, COLUMNS), -LARGEST_STEP, LARGEST_STEP)
@@ -166,50 +144,54 @@ def _descend(start: Posed, handicap: np.ndarray, through: int, config: PlaceConf
 
 def violation(at: Linearised) -> float:
     """Sum of the violations of relations, collisions, floor and overhang, beyond a tolerance of 2 mm."""
-    hard = ~at.equal
-    return float(np.maximum(-at.value[hard] - 0.002, 0.0).sum())
+    return float(np.maximum(-at.value[~at.equal] - 0.002, 0.0).sum())
 
 
-def unmet(at: Linearised) -> float:
+def unmet(at: Linearised) -> int:
+    """How many of them are missed by more than `UNMET`."""
+    return int((at.value[~at.equal] < -UNMET).sum())
+
+
+def afar(at: Linearised) -> float:
     """Sum of what is missing to the walls and the ceiling, metres."""
     return float(np.abs(at.value[np.isin(at.kind, (WALL, CEILING))]).sum())
 
 
 def newton(
-    gradient: np.ndarray,
+    rows: Matrix,
     value: np.ndarray,
     equal: np.ndarray,
     stiffness: np.ndarray,
     weight: np.ndarray,
     moved: np.ndarray,
+    limit: np.ndarray,
     damping: float,
 ) -> np.ndarray:
-    """Exact minimiser of 1/2 |moved + d|^2_W + damping' |d|^2 + sum rho/2 hinge(-(value + gradient d))^2 over d.
+    """Exact minimiser of 1/2 |moved + d|^2_W + damping' |d|^2 + sum rho/2 hinge(-(value + rows d))^2 over d.
 
     Arguments:
-        gradient: (r, m) float, sparse or not; value, stiffness: (r,) float; equal: (r,) bool.
-        weight, moved: (m,) float: price of and present distance from the starting boxes.
+        rows: (r, m) float, sparse or not; value, stiffness: (r,) float; equal: (r,) bool.
+        weight, moved: (m,) float: price of and present distance from the starting boxes; limit: the most of that.
         damping: factor >= 1 on the price of this step.
 
     Returns: d (m,) float.
     """
     extra = (damping - 1.0) * weight
-    # Rows that no step of the allowed length can violate never become active.
-    far = value - LONGEST_STEP * np.asarray(abs(gradient).sum(1)).ravel() > 0
-    keep = equal | ~far
-    gradient, value, equal, stiffness = gradient[keep], value[keep], equal[keep], stiffness[keep]
     step = np.zeros(len(weight))
 
     def cost(d: np.ndarray) -> tuple[float, np.ndarray]:
-        residual = value + gradient @ d
-        active = equal | (residual < 0)
-        total = 0.5 * (weight * (moved + d) ** 2).sum() + 0.5 * (extra * d * d).sum()
-        return total + 0.5 * (stiffness[active] * residual[active] ** 2).sum(), active
+        """Of a step, and which rows and limits count there."""
+        residual, there = value + rows @ d, moved + d
+        past = np.maximum(np.abs(there) - limit, 0.0)
+        active = np.concatenate([equal | (residual < 0), past > 0])
+        own = (weight * there**2 + extra * d * d + LIMIT_STIFFNESS * past**2).sum()
+        return 0.5 * (own + (stiffness * residual**2)[active[: len(value)]].sum()), active
 
     now, active = cost(step)
     for _ in range(20):
-        rows = gradient[active]
-        target = _least(rows, stiffness[active], weight + extra, value[active], weight * moved)
+        row, hold = active[: len(value)], LIMIT_STIFFNESS * active[len(value) :]
+        pull = weight * moved + hold * (moved - np.clip(moved + step, -limit, limit))
+        target = _least(rows[row], stiffness[row], weight + extra + hold, value[row], pull)
         direction, length = target - step, 1.0
         for _ in range(12):
             after, following = cost(step + length * direction)

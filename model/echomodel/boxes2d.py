@@ -53,3 +53,14 @@ def hull(half: Any, yaw: Any) -> Any:
     cos, sin = abs(kit.cos(yaw)), abs(kit.sin(yaw))
     width, depth = half[..., 0], half[..., 1]
     return kit.stack([cos * width + sin * depth, sin * width + cos * depth], -1)
+
+
+def along_sides(away: Any, half: Any, yaw: Any, other_half: Any, other_yaw: Any) -> tuple[Any, Any]:
+    """(..., 4) each: `away` (..., 2) along the sides of a rectangle and along those of another, and what both reach.
+
+    The two are apart, along the side that parts them best, by the largest of |first| - second.
+    """
+    kit = _kit(away)
+    along = kit.concatenate([seen(away, yaw), seen(away, other_yaw)], -1)
+    turn = yaw - other_yaw
+    return along, kit.concatenate([half + hull(other_half, turn), hull(half, turn) + other_half], -1)

@@ -9,7 +9,7 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
-from echomodel.boxes2d import CORNERS, axes, outline, seen
+from echomodel.boxes2d import CORNERS, along_sides, outline, seen
 
 TINY = 1e-12
 
@@ -53,9 +53,14 @@ class PairGeometry:
         return self.position_s - self.position_o
 
     @cached_property
+    def flat(self) -> Tensor:
+        """(P, 2) x and z of `offset`."""
+        return self.offset[:, ::2]
+
+    @cached_property
     def local(self) -> Tensor:
         """(P, 2) the subject's centre in the object's frame: along its width, along its front."""
-        return seen(self.offset[:, [0, 2]], self.yaw_o)
+        return seen(self.flat, self.yaw_o)
 
     @cached_property
     def top_s(self) -> Tensor:
@@ -72,7 +77,7 @@ class PairGeometry:
         """Half extents (P, 2) along the subject's own axes and its corners (P, 4, 2), about the object's centre."""
         half = self._half(self.size_s)
         corners = outline(half, self.yaw_s if self.oriented else torch.zeros_like(self.yaw_s))
-        return half, corners + self.offset[:, None, [0, 2]]
+        return half, corners + self.flat[:, None]
 
     @cached_property
     def footprint_o(self) -> tuple[Tensor, Tensor]:
@@ -81,7 +86,7 @@ class PairGeometry:
         return half, outline(half, self.yaw_o if self.oriented else torch.zeros_like(self.yaw_o))
 
     def _half(self, size: Tensor) -> Tensor:
-        return size[:, [0, 2]] / 2 if self.oriented else size[:, [2, 0]] / 2
+        return size[:, ::2] / 2 if self.oriented else size[:, [2, 0]] / 2
 
     @cached_property
     def overlap_ratio(self) -> Tensor:
@@ -96,12 +101,14 @@ class PairGeometry:
         """(P,) area of the intersection of the two footprints, square metres."""
         if not self.oriented:
             half_s, half_o = self.footprint_s[0], self.footprint_o[0]
-            reach = (half_s + half_o) - self.offset[:, [0, 2]].abs()
+            reach = (half_s + half_o) - self.flat.abs()
             return torch.minimum(reach, 2 * torch.minimum(half_s, half_o)).clamp_min(0).prod(-1)
         corners, half, yaw = self.footprint_s[1], self.footprint_o[0], self.yaw_o
-        away, reach = self.offset[:, [0, 2]].norm(dim=1), self.footprint_s[0].norm(dim=1) + half.norm(dim=1)
+        away, reach = self.flat.norm(dim=1), self.footprint_s[0].norm(dim=1) + half.norm(dim=1)
         near = (away < reach + 0.01).nonzero()[:, 0]  # others are apart whatever their heading
         none = torch.zeros_like(yaw)
+        if not len(near):
+            return none
         return none.index_copy(0, near, rectangle_overlap(corners[near], half[near], yaw[near]))
 
     @cached_property
@@ -117,11 +124,8 @@ class PairGeometry:
     def footprint_penetration(self) -> Tensor:
         """(P,) depth by which the footprints overlap (positive) or the gap between them (negative), metres: the
         largest gap over the four edge directions (separating axes), with its sign changed."""
-        gaps = [
-            _gap(self.footprint_s[1] - self.offset[:, None, [0, 2]], self.footprint_o[1], self.offset, axis)
-            for axis in (*axes(self.yaw_s), *axes(self.yaw_o))
-        ]
-        return -torch.stack(gaps, -1).amax(-1)
+        along, reach = along_sides(self.flat, self.size_s[:, ::2] / 2, self.yaw_s, self.size_o[:, ::2] / 2, self.yaw_o)
+        return (reach - along.abs()).amin(-1)
 
     @cached_property
     def centre_inside(self) -> Tensor:
@@ -218,9 +222,3 @@ def _clipped_cross(edges: Tensor, clip: Tensor, winding: Tensor | None = None) -
 
 def _cross(a: Tensor, b: Tensor) -> Tensor:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-
-
-def _gap(corners_s: Tensor, corners_o: Tensor, offset: Tensor, axis: Tensor) -> Tensor:
-    reach_s = (corners_s * axis[:, None]).sum(-1).amax(-1)
-    reach_o = (corners_o * axis[:, None]).sum(-1).amax(-1)
-    return (offset[:, [0, 2]] * axis).sum(-1).abs() - reach_s - reach_o

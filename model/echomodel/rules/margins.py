@@ -9,7 +9,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from echomodel.rules.geometry import BoxesLike, pairs
+from echomodel.rules.geometry import BoxesLike, PairGeometry, pairs
 from echomodel.rules.sets import RuleSet, rule_set
 from echomodel.vocabulary import vocabulary
 
@@ -80,6 +80,19 @@ def verdicts(boxes: BoxesLike, triplets: Tensor, *, rules: str = "strict", **abo
     kept = torch.where(_among(predicate, chosen.open), margin > 0, margin >= 0)
     unmeasured = torch.full_like(kept, -1, dtype=torch.int8)
     return torch.where(_among(predicate, frozenset(chosen.margins)), kept.to(torch.int8), unmeasured)
+
+
+def pair_margins(pair: PairGeometry, predicate: Tensor, rules: RuleSet) -> Tensor:
+    """(P,) signed margin of each pair by the rule of its predicate (P,) int64, 0 where that is not measured.
+
+    What several rules need of the geometry is computed once.
+    """
+    out = pair.yaw_s.new_zeros(len(predicate))
+    for number in sorted(set(predicate.tolist())):
+        rule = rules.rules.get(vocabulary().predicates[number].name)
+        if rule is not None and rule.margin is not None:
+            out = torch.where(predicate == number, rule.margin(pair), out)
+    return out
 
 
 def _margins(

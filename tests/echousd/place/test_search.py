@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import torch
 
+from echomodel.boxes import Boxes
 from echomodel.objective import TERMS, plan_of
 from echomodel.rooms.generator import generate_rooms
-from echomodel.rules import label_relations
+from echomodel.rules import label_relations, margins
 from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place import place_boxes
@@ -168,3 +169,25 @@ def test_poses_that_run_into_others_are_not_among_the_first():
     every = np.ones(2, bool)
     rows = np.array([[0.2, -0.9, 0.0, 0.0], [0.3, -0.6, 0.0, 0.0], [-0.9, 1.7, np.pi, 0.5], [9.0, 9.0, 0.0, 0.0]])
     assert search._promising(state, every, 1, [1], rows, rows[:, 3])[0] == 2
+
+
+def test_margins_of_many_poses_are_those_of_one_after_the_other():
+    words = ["sofa", "armchair", "coffee_table", "plant"]
+    luck = np.random.default_rng(1)
+    told = [(0, "front", 1), (2, "close_by", 0), (0, "facing", 2), (0, "symmetrical_to", 1), (3, "bigger_than", 0)]
+    size, position, yaw = luck.uniform(0.3, 2.0, (4, 3)), luck.normal(0, 1, (4, 3)), luck.uniform(-4, 4, 4)
+    search, state = searched(words, size, position, yaw, told, turned=range(4))
+    poses, turns = luck.normal(0, 1, (7, 3)), luck.uniform(-4, 4, 7)
+    problem = search.setting.problem
+    found = search.margins_at(state, 0, poses, turns, problem.triplets)
+    assert (found > 0).any()
+    assert (found < 0).any()
+    for k in range(7):
+        places, headings = state.position.copy(), state.yaw.copy()
+        places[0], headings[0] = poses[k], turns[k]
+        alone = margins(
+            Boxes(*(torch.from_numpy(of) for of in (search.setting.size, places, headings))),
+            torch.from_numpy(problem.triplets), center=torch.from_numpy(problem.centre),
+            fronts=torch.from_numpy(problem.fronts),
+        )  # fmt: skip
+        np.testing.assert_allclose(found[k], alone.numpy(), atol=1e-9)
