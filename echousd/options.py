@@ -238,7 +238,7 @@ class EditRequest:
     move: Sequence[str] = _ask("Where to, name:x,z or name:x,y,z, metres.")
     turn: Sequence[str] = _ask("Heading, name:degrees; 0 looks along +Z.")
     resize: Sequence[str] = _ask("Size at heading 0, name:x,y,z, metres.")
-    restyle: Sequence[str] = _ask("Style, name:style; without a style none.")
+    restyle: Sequence[str] = _ask("Style, name:style, or room:industrial; without a style none.")
 
 
 Function = TypeVar("Function", bound=Callable[..., Any])

@@ -21,6 +21,7 @@ def with_vocabulary(schema: str) -> str:
     alone = [row for row in words.placements if not row.others]
     for name, rows in (
         ("echo:roomType", words.room_types),
+        ("echo:roomStyle", words.styles),
         ("echo:predicate", (*words.predicates, *words.home_relations)),
         ("echo:place", alone),
     ):
@@ -34,7 +35,7 @@ def with_vocabulary(schema: str) -> str:
 def regenerate(target: Path = RESOURCES) -> None:
     """Write generatedSchema.usda and plugInfo.json of schema.usda to the folder `target`.
 
-    The tokens of room types, predicates and placements in schema.usda itself are brought up to date before.
+    The tokens of room types, styles, predicates and placements in schema.usda itself are brought up to date before.
 
     Raises RuntimeError with usdGenSchema's own words where it fails (for one, when jinja2 is not installed).
     """

@@ -203,7 +203,7 @@ def _optional(check: Callable[[Any], Any]) -> BeforeValidator:
     return BeforeValidator(lambda value: None if value is None else check(value))
 
 
-def _word(kind: str) -> tuple[BeforeValidator, WithJsonSchema]:
+def _word(kind: str) -> tuple[Callable[[Any], str], WithJsonSchema]:
     """A word of the vocabulary, canonicalised; the JSON schema offers the names and lets aliases pass."""
 
     def check(value: Any) -> str:
@@ -216,21 +216,23 @@ def _word(kind: str) -> tuple[BeforeValidator, WithJsonSchema]:
         "category": words.categories,
         "predicate": words.predicates,
         "room_type": words.room_types,
+        "style": words.styles,
     }[kind]
     names = [entry.name for entry in entries]
     known = {"enum": names, "description": f"{kind.replace('_', ' ')} of the vocabulary"}
-    return BeforeValidator(check), WithJsonSchema({"anyOf": [known, {"type": "string", "description": "or an alias"}]})
+    return check, WithJsonSchema({"anyOf": [known, {"type": "string", "description": "or an alias"}]})
 
 
-_category, _predicate, _room_type = _word("category"), _word("predicate"), _word("room_type")
+_category, _predicate, _room_type, _style = map(_word, ("category", "predicate", "room_type", "style"))
 
 Name: TypeAlias = Annotated[
     str, BeforeValidator(checked_identifier), Field(pattern=f"^{IDENTIFIER.pattern}$", max_length=MAX_NAME)
 ]
-CategoryWord: TypeAlias = Annotated[str, _category[0], _category[1]]
-PredicateWord: TypeAlias = Annotated[str, _predicate[0], _predicate[1]]
-RoomTypeWord: TypeAlias = Annotated[str, _room_type[0], _room_type[1]]
+CategoryWord: TypeAlias = Annotated[str, BeforeValidator(_category[0]), _category[1]]
+PredicateWord: TypeAlias = Annotated[str, BeforeValidator(_predicate[0]), _predicate[1]]
+RoomTypeWord: TypeAlias = Annotated[str, BeforeValidator(_room_type[0]), _room_type[1]]
 Style: TypeAlias = Annotated[str | None, _optional(_text)]
+RoomStyleWord: TypeAlias = Annotated[str | None, _optional(_style[0]), _style[1]]
 Shapes: TypeAlias = Annotated[
     str | None,
     _optional(_shapes),

@@ -85,6 +85,7 @@ class RoomSpec(PlainModel):
         openings: doors, windows and passages in the walls; wall i is the edge from corner i of the floor to the next,
             of a rectangle the one at -z, +x, +z and -x.
         walls: thickness of each wall, metres; of a room of a home, whose openings are all stated.
+        style: word of a style, such as industrial, to which furniture, colours, walls, doors and windows keep.
     """
 
     type: field.RoomTypeWord
@@ -93,6 +94,7 @@ class RoomSpec(PlainModel):
     height: field.Height = None
     openings: field.Openings = ()
     walls: field.Thicknesses = ()
+    style: field.RoomStyleWord = None
 
     def __init__(self, type: str, **fields: Any) -> None:
         super().__init__(type=type, **fields)

@@ -101,7 +101,7 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     if room.options.thumbnails:
         files |= thumbnails(files, [*made, *small])
     built = structure.shell_prims(room, dressing.bare)
-    harmony = room.options.palette or looks.palette_of_room(room.provenance.seed)
+    harmony = room.options.palette or looks.palette_of_room(room.provenance.seed, room.graph.room.style)
     slots = _slots(small)
     table, bindings = room_looks(room, made, built, slots, harmony)
     files |= materials.texture_files(table, harmony)

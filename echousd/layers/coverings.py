@@ -36,7 +36,8 @@ def covered_walls(room: RoomData) -> dict[str, str]:
         return {wall_name(edge): "wall_tiles" for edge in range(len(_corners(room)))}
     if wet:
         return dict.fromkeys(_behind(room, lambda row: row.stands == "row"), "wall_tiles")
-    words = [word for word, often in COVERS.items() for _ in range(often)]
+    row = vocabulary().known_style(room.graph.room.style)
+    words = row.covers if row else [word for word, often in COVERS.items() for _ in range(often)]
     cover = words[_drawn(room, "cover", len(words))] if room.options.walls else ""
     behind = _behind(room, lambda row: row.role in HOSTS)[:1] if cover else []
     return dict.fromkeys(behind, cover)

@@ -91,7 +91,7 @@ def millwork(room: RoomData) -> Millwork:
         return PLAIN
     slept = any(vocabulary().category(node.category).role == "bed" for node in room.graph.nodes)
     wet = vocabulary().room_type(room.graph.room.type).use == "wet"
-    return millwork_of(room.provenance.seed, private=slept or wet)
+    return millwork_of(room.provenance.seed, room.graph.room.style, private=slept or wet)
 
 
 def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any], openings: Sequence[Opening] = ()) -> Sdf.Layer:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,7 +40,7 @@ from echousd.shapes.sources.retrieval import (
     with_given_sizes,
 )
 from echousd.shapes.sources.source import ShapeRequest
-from echousd.shapes.styles import asset_names, style_groups
+from echousd.shapes.styles import asset_names, style_groups, told_styles
 from echousd.tensors import graph_batch
 
 if TYPE_CHECKING:
@@ -88,20 +88,21 @@ def edit(
     beside = Path(room).parent
     graph = with_plan_of(anchored(graph, beside), saved.graph)
     fresh, moving = touched(anchored(saved.graph, beside), graph)
+    shaped_anew = fresh | restyled(saved, graph, fresh)
     check_files(graph, beside, outside, str(room), fresh)
     styles = style_groups(graph)
     model_used: RoomModel | None = None
     change: GraphEdit | None = None
     own = Retrieved()
-    if fresh or moving:
+    if shaped_anew or moving:
         with timer.stage("load"), one_thread():
             model_used = model_of(asked, model)
             _compare(saved.manifest, model_used, given=bool(model or asked.weights), root=Path(room))
-        if fresh:
+        if shaped_anew:
             made_of = saved.manifest["shapes"]
             again = made_of in ("parts", "sdf") or (made_of in ("library", "guided") and asked.assets is not None)
             shapes = shapes or (made_of if again else default_source(model_used))
-            check_sources([shapes, *(source_of(graph.node(name), shapes) for name in fresh)], model_used)
+            check_sources([shapes, *(source_of(graph.node(name), shapes) for name in shaped_anew)], model_used)
             own = given_pieces(graph, shapes, wishes, fresh)
         change = graph_edit(saved.graph, graph)
 
@@ -127,16 +128,18 @@ def edit(
         return layouts, pins, notes
 
     (layouts, pins, notes), models = laid_out(own.sizes), own
-    if fresh and shapes is not None:
-        palette = asked.palette or palette_of_room(manifest["seed"])
-        models = retrieved(graph, layouts[0], styles, shapes, wishes, asked.seed, own, among=fresh, palette=palette)
+    if shaped_anew and shapes is not None:
+        palette = asked.palette or palette_of_room(manifest["seed"], graph.room.style)
+        models = retrieved(
+            graph, layouts[0], styles, shapes, wishes, asked.seed, own, among=shaped_anew, palette=palette
+        )
         if models.sizes != own.sizes:
             layouts, pins, notes = laid_out(models.sizes)
         notes = (*models.notes, *notes)
-    geometry = {name: saved.geometry[name] for name in graph.names if name not in fresh}
+    geometry = {name: saved.geometry[name] for name in graph.names if name not in shaped_anew}
     names = {name: saved.assets[name] for name in geometry}
-    if fresh and shapes is not None:
-        wanted = tuple(name for name in graph.names if name in fresh)
+    if shaped_anew and shapes is not None:
+        wanted = tuple(name for name in graph.names if name in shaped_anew)
         request = ShapeRequest(
             graph, layouts[0], styles, asked.seed, model_used, asked.steps, asked.faces, wanted, dict(geometry), change,
             timer, models,
@@ -145,7 +148,7 @@ def edit(
         shaped = {name: made.geometry[owner] for name, owner in made.owners.items()}
         geometry |= merged(shaped, asked.merge, asked.faces)
         names |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
-    names = _own_names({name: names[name] for name in graph.names}, fresh, saved)
+    names = _own_names({name: names[name] for name in graph.names}, shaped_anew, saved)
     geometry = {name: geometry[name] for name in graph.names}
     floor, outcomes = room_floor(graph, layouts), tuple(layout_outcome(graph, found) for found in layouts)
     if asked.place:
@@ -165,10 +168,18 @@ def edit(
         options=asked.replaced(seed=manifest["seed"]),
         timings=timer.seconds,
         edited=Path(room),
-        carried={asset: saved.carried[asset] for name, asset in names.items() if name not in fresh},
+        carried={asset: saved.carried[asset] for name, asset in names.items() if name not in shaped_anew},
     )
     warn_of_faults(after)
     return after
+
+
+def restyled(saved: SavedRoom, graph: SceneGraph, fresh: Collection[str]) -> set[str]:
+    """Names of furniture of ours that keeps its place and gets another shape: a style of another name is told."""
+    before, after = told_styles(saved.graph), told_styles(graph)
+    ours = {name for name, form in saved.geometry.items() if form.description}
+    kept = [node for node in graph.nodes if node.name in ours and node.name not in fresh and not node.locked]
+    return {node.name for node in kept if before[node.name] != after[node.name]}
 
 
 def touched(before: SceneGraph, after: SceneGraph) -> tuple[set[str], set[str]]:

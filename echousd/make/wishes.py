@@ -54,8 +54,11 @@ def wished(saved: SavedRoom, wishes: EditRequest) -> SceneGraph:
         numbers = _numbers("resize", text, size, (3,), "name:x,y,z, metres")
         graph = _placed(graph, saved, name).update_node(name, size=numbers)
     for text in wishes.restyle:
-        name, style = _named(graph, text)
-        graph = graph.update_node(name, style=style or None)
+        name, style = _parts(text)
+        if name == "room" and name not in graph.names:
+            graph = graph.replaced(room=graph.room.replaced(style=style or None))
+        else:
+            graph = graph.update_node(_name(graph, name), style=style or None)
     return graph
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import trimesh
 
 from echomodel.openings import Opening
+from echomodel.vocabulary import vocabulary
 
 WALL = 0.15  # metres, thickness of walls
 CASING, PROUD = 0.06, 0.012  # width of the trim around a door, and how far it stands before the wall
@@ -26,6 +27,7 @@ RAIL = (0.12, 0.09, 0.25)  # curtain rail: above the window, before the wall, be
 
 WINDOWS = {"plain": 3, "sash": 2, "bars": 2, "transom": 2}
 DOORS = {"panelled": 3, "four_panels": 2, "flush": 3, "boarded": 1, "glazed": 2}
+SKIRTINGS, CORNICES = (0.06, 0.08, 0.1, 0.14), (0.0, 0.0, 0.06, 0.09)  # heights, metres
 
 
 @dataclass(frozen=True)
@@ -45,14 +47,16 @@ class Millwork:
 PLAIN = Millwork()
 
 
-def millwork_of(seed: int, *, private: bool = False) -> Millwork:
-    """The millwork of a room for which a seed is drawn; nobody sees through the doors of a `private` one."""
-    rng = np.random.default_rng([seed, 1931])
-    kinds = {kind: often for kind, often in DOORS.items() if not (private and kind == "glazed")}
+def millwork_of(seed: int, style: str | None = None, *, private: bool = False) -> Millwork:
+    """The millwork that a seed draws, of what goes with a `style`; a `private` room has no glass in its doors."""
+    rng, row = np.random.default_rng([seed, 1931]), vocabulary().known_style(style)
+    windows = {kind: WINDOWS[kind] for kind in (row.windows if row else WINDOWS)}
+    doors = {kind: DOORS[kind] for kind in (row.doors if row else DOORS) if not (private and kind == "glazed")}
     window, door = (
-        str(rng.choice(list(odds), p=np.array(list(odds.values())) / sum(odds.values()))) for odds in (WINDOWS, kinds)
+        str(rng.choice(list(odds), p=np.array(list(odds.values())) / sum(odds.values()))) for odds in (windows, doors)
     )
-    return Millwork(window, door, float(rng.choice((0.06, 0.08, 0.1, 0.14))), float(rng.choice((0.0, 0.0, 0.06, 0.09))))
+    skirting, cornice = rng.choice(SKIRTINGS), rng.choice(row.cornices if row else CORNICES)
+    return Millwork(window, door, float(skirting), float(cornice))
 
 
 def board(u: tuple[float, float], v: tuple[float, float], w: tuple[float, float]) -> trimesh.Trimesh:

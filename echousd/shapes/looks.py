@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -48,15 +48,16 @@ def look(palette: str, slot: str, voice: int = 0) -> Look:
     return Look(color, made.roughness, made.metallic, made.opacity, emissive, made.pattern, made.metres)
 
 
-def palette_for(key: str) -> str:
+def palette_for(key: str, among: Iterable[str] = HARMONIES) -> str:
     """A palette for a style's name, the same in every run."""
-    names = sorted(PALETTES)
+    names = sorted(among)
     return names[int.from_bytes(hashlib.blake2b(key.encode(), digest_size=4).digest(), "big") % len(names)]
 
 
-def palette_of_room(seed: int) -> str:
-    """The palette of a room for which nobody chose one."""
-    return palette_for(f"{ROOM_STYLE} {seed}")
+def palette_of_room(seed: int, style: str | None = None) -> str:
+    """The palette of a room for which nobody chose one, of those that go with its `style`."""
+    row = vocabulary().known_style(style)
+    return palette_for(f"{ROOM_STYLE} {seed}", row.palettes if row else PALETTES)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from echomodel.vocabulary import vocabulary
+from echomodel.vocabulary import RoomStyle, vocabulary
 from echousd.naming import free_name
 
 if TYPE_CHECKING:
@@ -56,6 +56,12 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
         named = named or f"set_{group[0]}"
         out.update(dict.fromkeys(group, named))
     return {node.name: out[node.name] for node in graph.nodes}
+
+
+def told_styles(graph: SceneGraph) -> dict[str, RoomStyle | None]:
+    """Object name -> the style of the vocabulary that its group is called by, else that of the room, else None."""
+    known = vocabulary().known_style
+    return {name: known(group) or known(graph.room.style) for name, group in style_groups(graph).items()}
 
 
 def _joined(alike: Sequence[tuple[int, int]], count: int) -> list[int]:

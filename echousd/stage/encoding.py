@@ -30,6 +30,7 @@ ROOM = "echo:room"
 VOCABULARY = "echo:vocabulary"
 VOCABULARY_NAME = "echo-1"
 ROOM_TYPE = "echo:roomType"
+ROOM_STYLE = "echo:roomStyle"
 FLOOR_POLYGON = "echo:floorPolygon"
 FLOOR_SIZE = "echo:floorSize"
 HEIGHT = "echo:height"
@@ -89,6 +90,7 @@ _TYPES = Sdf.ValueTypeNames
 VALUE_TYPES = {
     VOCABULARY: _TYPES.Token,
     ROOM_TYPE: _TYPES.Token,
+    ROOM_STYLE: _TYPES.Token,
     FLOOR_POLYGON: _TYPES.Double2Array,
     FLOOR_SIZE: _TYPES.Double2,
     HEIGHT: _TYPES.Double,
@@ -133,6 +135,8 @@ def room_values(room: RoomSpec) -> dict[str, Any]:
         values[HEIGHT] = float(room.height)
     if room.walls:
         values[WALLS] = Vt.DoubleArray(room.walls)
+    if room.style is not None:
+        values[ROOM_STYLE] = room.style
     return values
 
 

@@ -206,6 +206,7 @@ def room_spec(prims: RoomPrims) -> RoomSpec:
     if words not in (None, usd.VOCABULARY_NAME):
         raise StageError(f"{place(graph)}: {usd.VOCABULARY} is {words!r}, allowed: {usd.VOCABULARY_NAME}")
     names = {"floor_polygon": usd.FLOOR_POLYGON, "size": usd.FLOOR_SIZE, "height": usd.HEIGHT, "walls": usd.WALLS}
+    names |= {"style": usd.ROOM_STYLE}
     said = {field: found for field, name in names.items() if (found := value(graph, name)) is not None}
     try:
         openings = tuple(map(read_opening, prims.openings))

@@ -224,6 +224,28 @@ class HomeRelation:
 
 
 @dataclass(frozen=True)
+class RoomStyle:
+    """What a room, or a set of furniture, of a style that people name keeps to.
+
+    Arguments:
+        family: of furniture making. kinds: (part, kinds of it) where the style has others than its family.
+        palettes: harmonies. windows, doors, cornices: of the millwork (metres of a cornice's height, 0 = none).
+        covers: what a wall behind a bed or sofa has, "" = nothing.
+        aliases: other words for it.
+    """
+
+    name: str
+    family: str
+    palettes: tuple[str, ...]
+    windows: tuple[str, ...]
+    doors: tuple[str, ...]
+    covers: tuple[str, ...]
+    cornices: tuple[float, ...] = (0.0,)
+    kinds: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    aliases: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Placement:
     """Everything that the product knows of a placement, but for the code of its rule (`echomodel.rules.placements`).
 

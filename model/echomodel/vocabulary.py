@@ -26,6 +26,7 @@ from echomodel.rows import (
     Placement,
     Predicate,
     PredicateKind,
+    RoomStyle,
     RoomType,
 )
 
@@ -33,6 +34,7 @@ __all__ = [
     "Category",
     "Predicate",
     "PredicateKind",
+    "RoomStyle",
     "RoomType",
     "UnknownWord",
     "Vocabulary",
@@ -69,6 +71,7 @@ class Vocabulary:
     habits: tuple[Habit, ...] = ()
     placements: tuple[Placement, ...] = ()
     home_relations: tuple[HomeRelation, ...] = ()
+    styles: tuple[RoomStyle, ...] = ()
     meant: dict[str, dict[str, tuple[str, ...]]] = field(default_factory=dict, hash=False)
     hints: dict[str, str] = field(default_factory=dict, hash=False)
     _index: dict[str, dict[str, int]] = field(init=False, repr=False, compare=False, default_factory=dict)
@@ -82,7 +85,7 @@ class Vocabulary:
         self._check()
 
     @property
-    def _rows(self) -> dict[str, Sequence[Category | Predicate | RoomType | Placement | HomeRelation]]:
+    def _rows(self) -> dict[str, Sequence[Category | Predicate | RoomType | Placement | HomeRelation | RoomStyle]]:
         """The rows of every kind of word."""
         return {
             "category": self.categories,
@@ -90,6 +93,7 @@ class Vocabulary:
             "room type": self.room_types,
             "placement": self.placements,
             "relation of rooms": self.home_relations,
+            "style": self.styles,
         }
 
     def category(self, word: str) -> Category:
@@ -121,6 +125,15 @@ class Vocabulary:
     def home_relation(self, word: str) -> HomeRelation:
         """The relation of two rooms called `word` (name or alias); raises `UnknownWord`."""
         return self.home_relations[self._find("relation of rooms", word)]
+
+    def style(self, word: str) -> RoomStyle:
+        """The style called `word` (name or alias); raises `UnknownWord`."""
+        return self.styles[self._find("style", word)]
+
+    def known_style(self, word: str | None) -> RoomStyle | None:
+        """As `style`, but None for no word, and for one that the vocabulary does not hold."""
+        found = None if word is None else self._known("style", word)
+        return None if found is None else self.styles[found]
 
     @cached_property
     def sgfront_predicates(self) -> dict[int, str]:
@@ -274,6 +287,7 @@ def _shipped() -> Vocabulary:
         habits=tuple(Habit(**frozen(entry)) for entry in raw["habits"]),
         placements=tuple(Placement(**frozen(entry)) for entry in raw["placements"]),
         home_relations=tuple(HomeRelation(**frozen(entry)) for entry in raw["home_relations"]),
+        styles=tuple(RoomStyle(**frozen(entry)) for entry in raw["styles"]),
         unsupported=tuple(raw["unsupported"]),
         hints=raw["hints"],
         meant={kind: {word: tuple(near) for word, near in words.items()} for kind, words in raw["meant"].items()},

@@ -9,7 +9,7 @@ from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
 from echomodel.furniture.assembly import pieces_of
 from echomodel.furniture.description import GROUPS, STYLE, WIDTH, described, draw_styles, piece_of
 from echomodel.furniture.solids import FINEST
-from echomodel.furniture.style import OPEN
+from echomodel.furniture.style import FAMILIES, OPEN
 from echomodel.metrics.furniture import loose_solids
 from echomodel.vocabulary import vocabulary
 
@@ -32,6 +32,15 @@ def test_a_piece_is_rebuilt_from_its_description(seed, category):
     np.testing.assert_allclose(same.values, choices.values, atol=1e-6)
     first, second = (mesh_of(solids(category, *pair, size), size) for pair in ((style, choices), (again, same)))
     np.testing.assert_allclose(first.vertices, second.vertices, atol=1e-4)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000), st.sampled_from((None, *vocabulary().styles)))
+def test_kinds_are_those_of_one_family_or_of_the_style_that_is_told(seed, told):
+    style, _ = piece_of(np.random.default_rng(seed).normal(0, 1.5, WIDTH), told)
+    kinds = {part: tuple(odds) for part, odds in FAMILIES[style.family].items()} | dict(told.kinds if told else ())
+    assert told is None or style.family == told.family
+    assert all(getattr(style, part) in allowed for part, allowed in kinds.items())
 
 
 @settings(max_examples=30, deadline=None)

@@ -15,6 +15,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.furniture import PROGRAMS, decor
 from echomodel.furniture.carpentry import box
+from echomodel.furniture.style import FAMILIES, KINDS
 from echomodel.rooms.generator import drawn_shares, generate_rooms
 from echomodel.rows import Habit
 from echomodel.rules import margins, rule, rule_set
@@ -27,8 +28,11 @@ from echousd.dressing.hangings import HUNG_OVER
 from echousd.dressing.tabletops import TOPS
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph, load_graph, starting_graph
 from echousd.graph.picture import draw_graph, to_dot
+from echousd.layers.coverings import COVERS
 from echousd.place import place_boxes
+from echousd.shapes.finishes.harmonies import HARMONIES
 from echousd.shapes.finishes.slots import SLOTS
+from echousd.shapes.fittings import DOORS, WINDOWS
 from echousd.stage.foreign import foreign_graph
 
 LEVEL = 0.05  # metres
@@ -185,6 +189,17 @@ def test_rows_name_tops_that_there_are():
 
 def test_rows_name_floorings_that_there_are():
     assert {row.flooring for row in vocabulary().room_types} <= {"", *SLOTS}
+
+
+def test_rows_of_styles_name_what_there_is():
+    for row in vocabulary().styles:
+        assert row.family in FAMILIES
+        assert all(part in KINDS and set(kinds) <= set(KINDS[part]) for part, kinds in row.kinds)
+        assert set(row.palettes) <= set(HARMONIES)
+        assert set(row.windows) <= set(WINDOWS)
+        assert set(row.doors) <= set(DOORS)
+        assert set(row.doors) != {"glazed"}  # a bedroom has one, too
+        assert set(row.covers) <= set(COVERS)
 
 
 def test_rooms_of_a_new_type_are_drawn_with_their_share(music):

@@ -50,14 +50,14 @@ def openings(draw: st.DrawFn, corners: np.ndarray | None, height: float | None) 
 def rooms(draw: st.DrawFn) -> RoomSpec:
     """A room with a polygon, with extents or with neither, and up to three openings."""
     kind = draw(st.sampled_from([kind.name for kind in WORDS.room_types]))
-    height = draw(st.none() | metres)
+    height, style = draw(st.none() | metres), draw(st.none() | st.sampled_from([row.name for row in WORDS.styles]))
     width, depth = draw(metres), draw(metres)
     floor = draw(st.sampled_from(["none", "size", "polygon"]))
     if floor == "polygon":
         corners = ((0.0, 0.0), (width, 0.0), (width, depth), (0.0, depth))
-        room = RoomSpec(kind, floor_polygon=corners, height=height)
+        room = RoomSpec(kind, floor_polygon=corners, height=height, style=style)
     else:
-        room = RoomSpec(kind, size=(width, depth) if floor == "size" else None, height=height)
+        room = RoomSpec(kind, size=(width, depth) if floor == "size" else None, height=height, style=style)
     return room.replaced(openings=draw(openings(room.corners, height)))
 
 

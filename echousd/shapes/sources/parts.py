@@ -16,6 +16,7 @@ from echousd.reproducible import one_thread, rounded_descriptions
 from echousd.shapes.geometry import Geometry, Origin
 from echousd.shapes.joinery import assembled
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
+from echousd.shapes.styles import told_styles
 from echousd.tensors import floor_centre, graph_batch, seeded
 
 if TYPE_CHECKING:
@@ -44,11 +45,11 @@ class AssembledParts:
     def shapes(self, request: ShapeRequest) -> Shapes:
         """Pieces built from sampled descriptions; those of an edited graph that stay are heard."""
         described = descriptions(request)
-        size = np.asarray(request.boxes.size, float)
+        size, named = np.asarray(request.boxes.size, float), told_styles(request.graph)
 
         def make(row: int) -> Geometry:
             told = tuple(round(float(v), 4) for v in described[row])
-            style, choices = piece_of(np.array(told))
+            style, choices = piece_of(np.array(told), named[request.graph.nodes[row].name])
             kind = vocabulary().category(request.graph.nodes[row].category)
             parts = solids(kind.name, style, choices, size[row])
             return assembled(

@@ -176,7 +176,7 @@ def retrieved(
     asked = wishes()
     size = np.asarray(boxes.size, float)
     with (timer or StageTimer()).stage("assets"):
-        tones = np.array([linear(color) for color in HARMONIES[palette or palette_of_room(seed)]])
+        tones = np.array([linear(color) for color in HARMONIES[palette or palette_of_room(seed, graph.room.style)]])
         found = choose(
             asked, _asked(graph, wanted, size, styles), seed, kept=given.chosen, nearness=nearness, palette=tones
         )

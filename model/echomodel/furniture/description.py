@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from echomodel.furniture.style import FAMILIES, KINDS, OPEN, PROPORTIONS, Choices, Style
+from echomodel.rows import RoomStyle
 
 WORDS: dict[str, tuple[str, ...]] = {"family": tuple(FAMILIES), **KINDS}
 GROUPS = tuple(len(words) for words in WORDS.values())  # numbers per kind, in order
@@ -33,22 +34,25 @@ def described(style: Style, choices: Choices) -> np.ndarray:
     return out
 
 
-def piece_of(vector: np.ndarray) -> tuple[Style, Choices]:
-    """The style and the open choices that a vector (WIDTH,) describes.
+def piece_of(vector: np.ndarray, told: RoomStyle | None = None) -> tuple[Style, Choices]:
+    """The style and the open choices that a vector (WIDTH,) describes: kinds that a family has, or the style `told`.
 
     Raises ValueError for a vector of another width or with numbers that are not finite.
     """
     vector = np.asarray(vector, float)
     if vector.shape != (WIDTH,) or not np.isfinite(vector).all():
         raise ValueError(f"description is {np.shape(vector)} {vector.dtype}, expected ({WIDTH},) finite numbers")
-    told: dict[str, Any] = {
-        name: words[int(vector[start : start + len(words)].argmax())]
+    scores = {
+        name: dict(zip(words, vector[start : start + len(words)], strict=True))
         for start, (name, words) in zip(STARTS, WORDS.items(), strict=False)
     }
+    family = told.family if told else max(FAMILIES, key=scores["family"].__getitem__)
+    kinds = {part: tuple(odds) for part, odds in FAMILIES[family].items()} | dict(told.kinds if told else ())
+    words: dict[str, Any] = {part: max(allowed, key=scores[part].__getitem__) for part, allowed in kinds.items()}
     share = (vector[HOT:].clip(-1, 1) + 1) / 2
     numbers = _LOW + (_HIGH - _LOW) * share[: len(PROPORTIONS)]
-    told |= dict(zip(PROPORTIONS, numbers.tolist(), strict=True))
-    return Style(**told, size_shift=(0.0, 0.0, 0.0)), Choices(share[len(PROPORTIONS) :])
+    words |= dict(zip(PROPORTIONS, numbers.tolist(), strict=True))
+    return Style(family, **words, size_shift=(0.0, 0.0, 0.0)), Choices(share[len(PROPORTIONS) :])
 
 
 def draw_styles(count: int, rng: np.random.Generator) -> np.ndarray:

@@ -56,6 +56,14 @@ def test_move_turn_lock_and_restyle_at_once(root, echousd_command):
     assert after["wardrobe_geo.usdc"] == before["wardrobe_geo.usdc"]
 
 
+def test_a_style_is_told_of_the_room(root):
+    saved = read_room(root)
+    assert wished(saved, EditRequest(restyle=("room:bohemian",))).room.style == "boho"
+    assert wished(saved, EditRequest(restyle=("room:",))).room.style is None
+    with pytest.raises(GraphError, match=r"unknown style 'gothick'.*allowed: scandinavian, japandi"):
+        wished(saved, EditRequest(restyle=("room:gothick",)))
+
+
 def test_another_category_keeps_its_place(root, echousd_command):
     _, position, yaw = box(root, "nightstand_right")
     done = echousd_command("edit", root, "--shapes", "boxes", "--relabel", "nightstand_right:table_lamp")

@@ -151,8 +151,8 @@ def test_labels_say_what_things_are_made_of():
     assert {name: material_of(name) for name in told} == told
     words = {material_of(f"suite_{slot}") for slot in (*SLOTS, *SHELL)}
     assert words <= {
-        "brick", "ceramic", "fabric", "foliage", "fruit", "glass", "leather", "linen", "metal", "paper", "plaster", "print",
-        "soil", "stone", "wax", "wicker", "wood", "wool",
+        "brick", "ceramic", "fabric", "foliage", "fruit", "glass", "leather", "linen", "metal", "paper", "plaster",
+        "print", "soil", "stone", "wax", "wicker", "wood", "wool",
     }  # fmt: skip
 
 
