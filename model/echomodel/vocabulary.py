@@ -31,17 +31,10 @@ from echomodel.rows import (
 )
 
 __all__ = [
-    "Category",
-    "Predicate",
-    "PredicateKind",
-    "RoomStyle",
-    "RoomType",
-    "UnknownWord",
-    "Vocabulary",
-    "normalised",
+    "Category", "Predicate", "PredicateKind", "RoomStyle", "RoomType", "UnknownWord", "Vocabulary", "normalised",
     "speaking",
     "vocabulary",
-]
+]  # fmt: skip
 
 ONE_OF = {"categories": "category", "predicates": "predicate", "room_types": "room type"}
 TYPO = 0.72  # likeness from which a word is taken for another one with a slip: carpet is no cabinet

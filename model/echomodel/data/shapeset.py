@@ -29,14 +29,10 @@ EDGES = (LEVELS[1:] + LEVELS[:-1]) / 2
 MAGIC = b"ECHOSHP1"
 ENTRY = np.dtype(
     [
-        ("offset", "<u8"),
-        ("length", "<u4"),
-        ("category", "<i4"),
-        ("style", "<i4"),
-        ("held_out", "<i4"),
-        ("size", "<f4", 3),
+    ("offset", "<u8"), ("length", "<u4"), ("category", "<i4"), ("style", "<i4"), ("held_out", "<i4"),
+    ("size", "<f4", 3),
     ]
-)
+)  # fmt: skip
 STYLES_PER_SHARD = 8
 COMPRESSION = 12
 HELD_OUT_EVERY = 20  # every twentieth style is kept out of training

@@ -17,26 +17,12 @@ from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.vocabulary import vocabulary
 
 PALETTE = {
-    "wood": (181, 137, 94),
-    "accent": (206, 178, 142),
-    "fabric": (122, 143, 160),
-    "metal": (92, 92, 98),
-    "glass": (170, 205, 214),
-    "ceramic": (214, 206, 196),
-    "enamel": (244, 243, 239),
-    "worktop": (170, 164, 156),
-    "steel": (178, 180, 182),
-    "leaf": (94, 140, 82),
-    "soil": (90, 70, 55),
-    "shade": (240, 230, 200),
-    "screen": (40, 44, 54),
-    "cushion": (150, 165, 176),
-    "linen": (232, 226, 214),
-    "blanket": (150, 120, 104),
-    "mirror": (196, 214, 222),
-    "book": (150, 90, 78),
-    "stem": (118, 104, 66),
-}
+    "wood": (181, 137, 94), "accent": (206, 178, 142), "fabric": (122, 143, 160), "metal": (92, 92, 98),
+    "glass": (170, 205, 214), "ceramic": (214, 206, 196), "enamel": (244, 243, 239), "worktop": (170, 164, 156),
+    "steel": (178, 180, 182), "leaf": (94, 140, 82), "soil": (90, 70, 55), "shade": (240, 230, 200),
+    "screen": (40, 44, 54), "cushion": (150, 165, 176), "linen": (232, 226, 214), "blanket": (150, 120, 104),
+    "mirror": (196, 214, 222), "book": (150, 90, 78), "stem": (118, 104, 66),
+}  # fmt: skip
 PLAIN = (176, 172, 166)
 
 

@@ -20,15 +20,11 @@ from echomodel.vocabulary import vocabulary
 OPPOSITE = {1: 2, 2: 1, 3: 4, 4: 3, 8: 9, 9: 8, 10: 11, 11: 10}
 # The groups of the published table; `above` is ours, the published code does not measure it.
 GROUPS: Mapping[str, tuple[str, ...]] = {
-    "left/right": ("left", "right"),
-    "front/behind": ("front", "behind"),
-    "bigger/smaller": ("bigger_than", "smaller_than"),
-    "taller/shorter": ("taller_than", "shorter_than"),
-    "standing_on": ("standing_on",),
-    "close_by": ("close_by",),
-    "symmetrical_to": ("symmetrical_to",),
+    "left/right": ("left", "right"), "front/behind": ("front", "behind"),
+    "bigger/smaller": ("bigger_than", "smaller_than"), "taller/shorter": ("taller_than", "shorter_than"),
+    "standing_on": ("standing_on",), "close_by": ("close_by",), "symmetrical_to": ("symmetrical_to",),
     "above": ("above",),
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -90,9 +90,7 @@ def before_fronts(plan: Plan, opens: Tensor, depth: Tensor) -> Found:
     low = plan.position[:, 1] + plan.size[:, 1] < CLEAR_HEIGHT  # rugs
     keep = (plan.anchor[j] != i) & (plan.anchor[i] != j) & ~corner & ~low[j]
     i, j = i[keep], j[keep]
-    clear, covered, forward = plan.ahead(i, j)
-    behind = plan.size[i, 2] / 2 - forward  # what stands beside or behind is in no front's way
-    margin = torch.maximum(torch.maximum(clear - depth[i], SHARE * plan.size[i, 0] - covered), behind)
+    margin = plan.more_ahead(i, j, depth[i], SHARE, start=0.5)  # what stands beside or behind is in no front's way
     least, about = plan.worst(i, margin, j)
     who = plan.those(opens)
     walls = _clear_of_walls(plan, who, depth[who])

@@ -119,11 +119,7 @@ def sofa_ahead(plan: Plan) -> Found:
     i, j = plan.pairs(sofas, others, least=True)
     other = plan.group[i] != plan.group[j]
     i, j = i[other], j[other]
-    clear, covered, forward = plan.ahead(i, j)
-    margin = torch.maximum(torch.maximum(clear - AHEAD, COVERED * plan.size[i, 0] - covered), -forward)
-    least, about = plan.worst(i, margin, j)
-    who = (least < FAR).nonzero()[:, 0]
-    return found(who, least[who], other=about[who], measure=(least[who] + AHEAD).clamp_min(0.0))
+    return plan.nearest(i, j, plan.more_ahead(i, j, AHEAD, COVERED), AHEAD)
 
 
 SERVED = 1.0  # metres: floor further from all furniture serves nothing
@@ -186,11 +182,7 @@ def wardrobe_opens(plan: Plan) -> Found:
     i, j = plan.pairs(wardrobes, plan.of("bed") & plan.standing, least=True)
     if not len(i):
         return nobody(plan.size)
-    clear, covered, forward = plan.ahead(i, j)
-    margin = torch.maximum(torch.maximum(clear - OPENS, FACED * plan.size[i, 0] - covered), -forward)
-    least, about = plan.worst(i, margin, j)
-    who = (least < FAR).nonzero()[:, 0]
-    return found(who, least[who], other=about[who], measure=(least[who] + OPENS).clamp_min(0.0))
+    return plan.nearest(i, j, plan.more_ahead(i, j, OPENS, FACED), OPENS)
 
 
 def each_served(plan: Plan) -> Found:

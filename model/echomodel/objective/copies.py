@@ -31,26 +31,21 @@ class Watched(Plan):
     asked: Tensor = field(kw_only=True)
 
     def those(self, mask: Tensor) -> Tensor:
-        """As `Plan.those`."""
         self.asked.logical_or_(mask)
         return super().those(mask)
 
     def pairs(self, first: Tensor, second: Tensor, *, least: bool = False) -> tuple[Tensor, Tensor]:
-        """As `Plan.pairs`."""
         i, j = super().pairs(first, second)
         return self._noted(i), self._noted(j)
 
     def told(self, predicate: str) -> tuple[Tensor, Tensor]:
-        """As `Plan.told`."""
         i, j = super().told(predicate)
         return self._noted(i), self._noted(j)
 
     def everywhere(self, number: int) -> Tensor:
-        """As `Plan.everywhere`."""
         return self._noted(super().everywhere(number))
 
     def beside(self, i: Tensor, others: Tensor) -> tuple[Tensor, Tensor]:
-        """As `Plan.beside`."""
         row, k = super().beside(i, others)
         return row, self._noted(k)
 
@@ -72,6 +67,11 @@ def looks_at(room: Plan, find: Callable[[Plan], Found]) -> tuple[Tensor, Found]:
 def _repeated(name: str) -> cached_property[Tensor]:
     """A column of the room, the same in every copy."""
     return cached_property(lambda copies: getattr(copies.template, name).repeat(copies.count))
+
+
+def _numbered(name: str) -> cached_property[Tensor]:
+    """Numbers of boxes of the room, in every copy its own."""
+    return cached_property(lambda copies: copies._tiled(getattr(copies.template, name)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,11 +113,9 @@ class Copies(Plan):
         raise NotImplementedError("masks of copies are those of their room")
 
     def of(self, *roles: str) -> Tensor:
-        """As `Plan.of`."""
         return self._masked(("of", *roles), lambda: self.template.of(*roles))
 
     def stands(self, *stances: str) -> Tensor:
-        """As `Plan.stands`."""
         return self._masked(("stands", *stances), lambda: self.template.stands(*stances))
 
     def _masked(self, asked: tuple[str, ...], mask: Callable[[], Tensor]) -> Tensor:
@@ -126,50 +124,27 @@ class Copies(Plan):
         return self._masks[asked]
 
     def which(self, asked: Callable[[Category], object]) -> Tensor:
-        """As `Plan.which`."""
         return self.template.which(asked).repeat(self.count)
 
     def column(self, asked: Callable[[Category], Any]) -> Tensor:
-        """As `Plan.column`."""
         one = self.template.column(asked)
         return one.repeat(self.count, *[1] * (one.ndim - 1))
 
     @cached_property
-    def joins(self) -> Tensor:
-        """As `Plan.joins`."""
-        return self._tiled(self.template.joins)
-
-    @cached_property
     def stance(self) -> tuple[str, ...]:
-        """As `Plan.stance`."""
         return self.template.stance * self.count
 
     standing, movable, solid = _repeated("standing"), _repeated("movable"), _repeated("solid")
     works, dining, fronts = _repeated("works"), _repeated("dining"), _repeated("fronts")
     smaller, walled = _repeated("smaller"), _repeated("walled")
+    joins, carrier, anchor, group = _numbered("joins"), _numbered("carrier"), _numbered("anchor"), _numbered("group")
 
     def inside(self, points: Tensor, who: Tensor) -> Tensor:
-        """As `Plan.inside`."""
         if self.template.rectangle is None:
             return super().inside(points, who)
         middle, half = self.template.rectangle
         out = (points - middle).abs() - half
         return torch.where((out <= 0).all(-1), -out.amax(-1), -out.clamp_min(0).norm(dim=-1))
-
-    @cached_property
-    def carrier(self) -> Tensor:
-        """As `Plan.carrier`, of the room."""
-        return self._tiled(self.template.carrier)
-
-    @cached_property
-    def anchor(self) -> Tensor:
-        """As `Plan.anchor`, of the room."""
-        return self._tiled(self.template.anchor)
-
-    @cached_property
-    def group(self) -> Tensor:
-        """As `Plan.group`, of the room."""
-        return self._tiled(self.template.group)
 
     @cached_property
     def couples(self) -> tuple[Tensor, Tensor, Tensor]:
@@ -180,22 +155,18 @@ class Copies(Plan):
         return self._tiled(i), self._tiled(j), allowed.repeat(self.count)
 
     def told(self, predicate: str) -> tuple[Tensor, Tensor]:
-        """As `Plan.told`."""
         one, other = self.template.told(predicate)
         return self._tiled(one), self._tiled(other)
 
     def everywhere(self, number: int) -> Tensor:
-        """As `Plan.everywhere`."""
         return number + self._shift[:, 0]
 
     @cached_property
     def rooms(self) -> list[tuple[Tensor, np.ndarray, tuple[Opening, ...]]]:
-        """As `Plan.rooms`."""
         return [(torch.arange(self.count), corners, openings) for _, corners, openings in self.template.rooms]
 
     @cached_property
     def walls(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """As `Plan.walls`."""
         start, along, normal, length = (of.expand(self.count, *of.shape[1:]) for of in self.template.walls)
         return start, along, normal, length
 
@@ -213,7 +184,6 @@ class Copies(Plan):
         return torch.cat([one, i]), torch.cat([other, j])
 
     def beside(self, i: Tensor, others: Tensor) -> tuple[Tensor, Tensor]:
-        """As `Plan.beside`."""
         n = len(self.template)
         which = others[:n].nonzero()[:, 0]
         row = torch.arange(len(i)).repeat_interleave(len(which))
@@ -227,7 +197,6 @@ class Copies(Plan):
         return ~(self.apart_in[:, None] | self.apart_in)
 
     def worst(self, who: Tensor, margin: Tensor, other: Tensor) -> tuple[Tensor, Tensor]:
-        """As `Plan.worst`."""
         least, about = super().worst(who, margin, other)
         if self._still is None:
             return least, about
@@ -258,17 +227,14 @@ class Copies(Plan):
         return i * n + j % n
 
     def local(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
-        """As `Plan.local`."""
         at = self._at(i, j)
         return self._dense[0][at], self._dense[1][at]
 
     def reach(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
-        """As `Plan.reach`."""
         at = self._at(i, j)
         return self._dense[2][at], self._dense[3][at]
 
     def apart(self, i: Tensor, j: Tensor) -> Tensor:
-        """As `Plan.apart`."""
         return self._dense[4][self._at(i, j)]
 
     def __len__(self) -> int:

@@ -140,10 +140,8 @@ def lamp_aside(plan: Plan) -> Found:
     i, j = plan.pairs(plan.of("light", "decor") & plan.standing, fronts, least=True)
     if not len(i):
         return nobody(plan.size)
-    clear, covered, forward = plan.ahead(j, i)
     free = torch.where(plan.stands("head"), AT_BED, LAMP).to(plan.size)
-    margin = torch.maximum(torch.maximum(clear - free[j], EDGE * plan.size[j, 0] - covered), -forward)
-    least, about = plan.worst(i, margin, j)
+    least, about = plan.worst(i, plan.more_ahead(j, i, free[j], EDGE), j)
     who = (least < FAR).nonzero()[:, 0]
     return found(who, least[who], other=about[who], measure=least[who] + free[about[who]])
 
@@ -172,9 +170,7 @@ def loungers_apart(plan: Plan) -> Found:
     i, j = i[keep], j[keep]
     if not len(i):
         return nobody(plan.size)
-    least, about = plan.worst(i, plan.apart(i, j) - HAND, j)
-    who = (least < FAR).nonzero()[:, 0]
-    return found(who, least[who], other=about[who], measure=(least[who] + HAND).clamp_min(0.0))
+    return plan.nearest(i, j, plan.apart(i, j) - HAND, HAND)
 
 
 def _clear(
@@ -190,9 +186,7 @@ def _clear(
     i, j = plan.pairs(fronts, block, least=True)
     other = plan.kin(i, j) == kin
     i, j = i[other], j[other]
-    clear, covered, forward = plan.ahead(i, j, sign)
-    beyond = plan.size[i, 2] / 4 - forward  # beside it, or on its other side
-    margin = torch.maximum(torch.maximum(clear - needed[i], MET * plan.size[i, 0] - covered), beyond)
+    margin = plan.more_ahead(i, j, needed[i], MET, start=0.25, sign=sign)
     least, about = plan.worst(i, margin, j)
     least, about, needed, needed_wall = least[who], about[who], needed[who], needed_wall[who]
     if bool((needed_wall > 0).any()):

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from echomodel.floors import edges, known, signed_distance
-from echomodel.objective.found import worst
+from echomodel.objective.found import Found, found, worst
 from echomodel.objective.support import carriers, shared_fraction
 from echomodel.openings import Opening
 from echomodel.rules.geometry import BoxesLike
@@ -25,6 +25,11 @@ FACING = np.cos(np.radians(30.0))  # a back turned further from a wall's normal 
 FAR = 9.0  # metres, in place of the distance to something that is not there
 CLEAR_HEIGHT = 0.05  # metres: a rug is in nobody's way
 UNKNOWN = Category("", "", "", support="floor", role="", look="", density=0.0, ade20k="")
+
+
+def _answered(asked: Callable[[Category], object]) -> cached_property[Tensor]:
+    """(N,) bool, boxes whose row answers a question with yes, kept."""
+    return cached_property(lambda plan: plan.which(asked))
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,25 +117,13 @@ class Plan:
         """Numbers as a tensor like the boxes."""
         return torch.tensor(values, dtype=self.size.dtype, device=self.size.device)
 
-    @cached_property
-    def movable(self) -> Tensor:
-        """(N,) bool, seats that are moved aside to open or to reach something."""
-        return self.which(lambda kind: kind.role == "seat" and not kind.access)
-
-    @cached_property
-    def solid(self) -> Tensor:
-        """(N,) bool, seats without a front: stools."""
-        return self.which(lambda kind: kind.solid)
-
-    @cached_property
-    def works(self) -> Tensor:
-        """(N,) bool, boxes at whose front somebody works or takes things out."""
-        return self.which(lambda kind: kind.access > 0)
-
-    @cached_property
-    def dining(self) -> Tensor:
-        """(N,) bool, tables that people sit around."""
-        return self.which(lambda kind: kind.role == "board" and not (kind.access or kind.wall))
+    # (N,) bool: seats that are moved aside to open or to reach something, and those without a front, stools;
+    # boxes at whose front somebody works or takes things out, and those that have one; tables that people sit around
+    movable = _answered(lambda kind: kind.role == "seat" and not kind.access)
+    solid = _answered(lambda kind: kind.solid)
+    works = _answered(lambda kind: kind.access > 0)
+    fronts = _answered(lambda kind: kind.front)
+    dining = _answered(lambda kind: kind.role == "board" and not (kind.access or kind.wall))
 
     @cached_property
     def smaller(self) -> Tensor:
@@ -154,11 +147,6 @@ class Plan:
     def standing(self) -> Tensor:
         """(N,) bool, boxes that stand on the floor and are in the way of legs and doors."""
         return self.which(lambda kind: kind.support == "floor") & (self.position[:, 1].detach() < 0.3)
-
-    @cached_property
-    def fronts(self) -> Tensor:
-        """(N,) bool, boxes that have a front."""
-        return self.which(lambda kind: kind.front)
 
     @cached_property
     def carrier(self) -> Tensor:
@@ -269,10 +257,8 @@ class Plan:
         """(P,) and (P,): lateral and forward, in j's frame, from i's centre to the nearest point of j's footprint."""
         lateral, forward = self.local(i, j)
         half = self.size[j][:, [0, 2]] / 2
-        return (
-            torch.minimum(torch.maximum(lateral, -half[:, 0]), half[:, 0]) - lateral,
-            torch.minimum(torch.maximum(forward, -half[:, 1]), half[:, 1]) - forward,
-        )
+        aside = torch.minimum(torch.maximum(lateral, -half[:, 0]), half[:, 0]) - lateral
+        return aside, torch.minimum(torch.maximum(forward, -half[:, 1]), half[:, 1]) - forward
 
     def gap(self, i: Tensor, j: Tensor) -> Tensor:
         """(P,): distance from i's centre to j's footprint, 0 inside it, metres."""
@@ -290,6 +276,24 @@ class Plan:
         forward = sign * forward
         covered = torch.minimum(self.size[i, 0], self.size[i, 0] / 2 + half_width - lateral.abs())
         return forward - half_depth - self.size[i, 2] / 2, covered, forward
+
+    def more_ahead(
+        self, i: Tensor, j: Tensor, needed: float | Tensor, share: float, *, start: float = 0.0, sign: float = 1.0
+    ) -> Tensor:
+        """(P,): how much more than `needed` metres is free before i, where j covers more than a share of its width.
+
+        Arguments:
+            start: share of i's depth before its middle from which on j counts. sign: -1 looks at i's back.
+        """
+        clear, covered, forward = self.ahead(i, j, sign)
+        beside = torch.maximum(clear - needed, share * self.size[i, 0] - covered)
+        return torch.maximum(beside, start * self.size[i, 2] - forward)
+
+    def nearest(self, i: Tensor, j: Tensor, margin: Tensor, needed: float) -> Found:
+        """What a rule finds at boxes i (P,) that keep more than `needed` metres to j (P,), the least of each."""
+        least, about = self.worst(i, margin, j)
+        who = (least < FAR).nonzero()[:, 0]
+        return found(who, least[who], other=about[who], measure=(least[who] + needed).clamp_min(0.0))
 
     @cached_property
     def couples(self) -> tuple[Tensor, Tensor, Tensor]:
@@ -361,10 +365,8 @@ class Plan:
         for a, b in ((i, j), (j, i)):
             lateral, forward = self.local(a, b)
             half_width, half_depth = self.reach(a, b)
-            gaps += [
-                lateral.abs() - half_width - self.size[b, 0] / 2,
-                forward.abs() - half_depth - self.size[b, 2] / 2,
-            ]
+            gaps.append(lateral.abs() - half_width - self.size[b, 0] / 2)
+            gaps.append(forward.abs() - half_depth - self.size[b, 2] / 2)
         return torch.stack(gaps, -1).amax(-1)
 
     def attended(self, *stances: str) -> tuple[Tensor, Tensor]:
@@ -452,20 +454,13 @@ def plan_of(
     size = torch.as_tensor(boxes.size).to(dtype)
     none = np.zeros(len(size), bool)
     triplets = np.zeros((0, 3), int) if relations is None else np.asarray(relations)
+    position, yaw = (torch.as_tensor(values).to(dtype) for values in (boxes.position, boxes.yaw))
     return Plan(
-        kinds_of(categories, triplets),
-        size,
-        torch.as_tensor(boxes.position).to(dtype),
-        torch.as_tensor(boxes.yaw).to(dtype),
-        torch.zeros(len(size), dtype=torch.int64),
-        corners,
-        (tuple(openings),),
-        torch.as_tensor(triplets, dtype=torch.int64).reshape(-1, 3),
+        kinds_of(categories, triplets), size, position, yaw, torch.zeros(len(size), dtype=torch.int64), corners,
+        (tuple(openings),), torch.as_tensor(triplets, dtype=torch.int64).reshape(-1, 3),
         torch.as_tensor(none if given is None else np.asarray(given, bool)),
-        None if height is None else torch.tensor([height], dtype=dtype),
-        rules,
-        tuple(stated),
-    )
+        None if height is None else torch.tensor([height], dtype=dtype), rules, tuple(stated),
+    )  # fmt: skip
 
 
 def _listed(i: Tensor, j: Tensor) -> list[tuple[int, int]]:
