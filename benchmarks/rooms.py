@@ -24,6 +24,7 @@ from echomodel.data.roomset import RoomSet, build_rooms
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_rooms
 from echomodel.training.layout_stage import LayoutStage
+from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import PackedRooms
 
 SCENES = 64
@@ -61,7 +62,7 @@ def main() -> None:
     nodes = int(packed.count.sum())
     statistics = BoxStatistics.from_boxes(packed.boxes, packed.category, CompactConfig().categories)
     model = CompactModel(CompactConfig(), statistics, ("latent", "layout"))
-    stage = LayoutStage(packed, packed, nodes, 1.0)
+    stage = LayoutStage(packed, packed, Recipe("layout", 1, nodes=nodes, relation_weight=1.0))
     generator = torch.Generator().manual_seed(0)
 
     def step() -> None:

@@ -126,7 +126,7 @@ def stages(packed: PackedRooms, model: CompactModel) -> dict:
     latents = torch.randn(3 * len(CONFIG.categories), 6, 16, 16, 16, generator=torch.Generator().manual_seed(0)).half()
     sizes = torch.ones(len(latents), 3)
     shapes = EncodedShapes(latents, sizes, len(CONFIG.categories), torch.tensor([0, 1]), torch.tensor([2]))
-    layout = LayoutStage(packed, packed, 40, 0.5, (), 0.3, physics_weight=1.0)
+    layout = LayoutStage(packed, packed, Recipe("layout", 1, nodes=40, measure_weight=0.3, physics_weight=1.0))
     shape = ShapeStage(packed, shapes, 24)
     return {
         "layout": layout,

@@ -32,6 +32,7 @@ from echomodel.training.living_loss import (
     stands_low,
     told_triplets,
 )
+from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
 from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
@@ -47,22 +48,14 @@ def edited_latent(model: CompactModel, batch: LayoutBatch) -> Tensor:
 
 
 def layout_loss(
-    model: CompactModel,
-    batch: LayoutBatch,
-    latent: Tensor,
-    generator: torch.Generator,
-    relation_weight: float,
-    measure_weight: float = 0.0,
-    living_weight: float = 0.0,
-    physics_weight: float = 0.0,
+    model: CompactModel, batch: LayoutBatch, latent: Tensor, generator: torch.Generator, recipe: Recipe
 ) -> tuple[Tensor, dict[str, Tensor]]:
     """Denoising loss of the unknown nodes, of the drafts too, plus the weighted relation hinge and measure distance.
 
     Arguments:
         model: with latent graph and layout denoiser. batch: true rooms. latent: (N, latent width), the edited graph's.
         generator: source of levels, noise and of what is known.
-        relation_weight, measure_weight, living_weight, physics_weight: 0 leaves the hinge, the distance, the living
-            rules or collisions and walls out.
+        recipe: its weights; 0 leaves the hinge, the distance, the living rules or collisions and walls out.
 
     Returns:
         The loss, and the parts that the log names.
@@ -83,19 +76,19 @@ def layout_loss(
         parts["draft"] = errors[0]
     loss = errors[-1] + DRAFT * sum(errors[:-1], noise.new_zeros(()))
     predicted = Boxes.decode(clean_from(output, noisy, level, objective), scale).replaced(known, batch.boxes)
-    if relation_weight:
+    if recipe.relation_weight:
         parts["relations"] = relation_hinge(batch, predicted, level, known, model.config.rules)
-        loss = loss + relation_weight * parts["relations"]
-    if measure_weight:
+        loss = loss + recipe.relation_weight * parts["relations"]
+    if recipe.measure_weight:
         parts["measures"] = measure_distance(batch, predicted, context.floor, level, free)
-        loss = loss + measure_weight * parts["measures"]
-    if living_weight:
+        loss = loss + recipe.measure_weight * parts["measures"]
+    if recipe.living_weight:
         parts["living"] = living_loss(batch, predicted, level, known)
         parts["headings"] = heading_distance(batch, predicted, level, known)
-        loss = loss + living_weight * (parts["living"] + HEADINGS * parts["headings"])
-    if physics_weight:
+        loss = loss + recipe.living_weight * (parts["living"] + HEADINGS * parts["headings"])
+    if recipe.physics_weight:
         parts["physics"] = physics_loss(batch, predicted, level, known)
-        loss = loss + physics_weight * parts["physics"]
+        loss = loss + recipe.physics_weight * parts["physics"]
     return loss, parts
 
 
@@ -131,77 +124,53 @@ class LayoutStage:
     """What the trainer needs to know about layouts.
 
     Arguments:
-        rooms, held: packed rooms to train on and to validate with.
-        nodes: node budget of a batch.
-        relation_weight: weight of the relation hinge.
-        frozen: parts that stay as they are.
-        measure_weight: weight of the difference in what predicted and true boxes measure.
-        living_weight: weight of what a person would point at in the predicted boxes. physics_weight: of collisions and
-            of what is through a wall.
-        own_weight: weight of what is wrong with rooms that the network arranges alone. own_kept: last steps of sampling
-            that it is led back through.
+        rooms, held: packed rooms to train on and to validate with. recipe: budgets, weights and parts that stay.
     """
 
     saved = ("latent", "layout")
     parts: ClassVar[tuple[str, ...]] = saved
     needs: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(
-        self,
-        rooms: PackedRooms,
-        held: PackedRooms,
-        nodes: int,
-        relation_weight: float,
-        frozen: tuple[str, ...] = (),
-        measure_weight: float = 0.0,
-        living_weight: float = 0.0,
-        own_weight: float = 0.0,
-        own_kept: int = 2,
-        physics_weight: float = 0.0,
-        workers: int = 0,
-    ) -> None:
-        self.rooms, self.held, self.nodes = rooms, held, nodes
-        self.weights = relation_weight, measure_weight, living_weight, physics_weight
-        self.workers = workers
+    def __init__(self, rooms: PackedRooms, held: PackedRooms, recipe: Recipe) -> None:
+        self.rooms, self.held, self.recipe = rooms, held, recipe
         self._ahead: Iterator[LayoutBatch] | None = None
-        self.own_weight, self.own_kept = own_weight, own_kept
-        self.trained = tuple(part for part in ("latent", "layout") if part not in frozen)
+        self.trained = tuple(part for part in self.saved if part not in recipe.frozen)
 
     @classmethod
     def open(cls, start: Start) -> LayoutStage:
         """The stage of a recipe; new layouts are normalised by its rooms."""
-        recipe, (rooms, held) = start.recipe, (start.rooms(held=held) for held in (False, True))
+        rooms, held = (start.rooms(held=held) for held in (False, True))
         if "layout" not in start.given:
             names = start.model.config.categories
             rows = places("categories", names, rooms.category)
             start.model.statistics = BoxStatistics.from_boxes(rooms.boxes, rows, len(names))
-        weights = recipe.measure_weight, recipe.living_weight, recipe.own_weight, recipe.own_kept, recipe.physics_weight
-        return cls(rooms, held, recipe.nodes, recipe.relation_weight, recipe.frozen, *weights, recipe.workers)
+        return cls(rooms, held, start.recipe)
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch, and of rooms that the network arranges alone."""
         batch = self._drawn(generator).to(model.device)
         loss, parts = self.scored(model, batch, generator)
-        if self.own_weight:
-            alone = draw_batch(self.rooms, self.nodes, generator, SPARSE).to(model.device)
-            own, of_own = own_loss(model, alone, generator, self.own_kept)
-            loss, parts = loss + self.own_weight * own, {**parts, **of_own}
+        if self.recipe.own_weight:
+            alone = draw_batch(self.rooms, self.recipe.nodes, generator, SPARSE).to(model.device)
+            own, of_own = own_loss(model, alone, generator, self.recipe.own_kept)
+            loss, parts = loss + self.recipe.own_weight * own, {**parts, **of_own}
         return loss, parts
 
     def _drawn(self, generator: torch.Generator) -> LayoutBatch:
         """A batch drawn here, or by `workers` processes ahead of the step: then a resumed run draws other batches."""
-        if not self.workers:
-            return draw_batch(self.rooms, self.nodes, generator)
+        nodes, workers = self.recipe.nodes, self.recipe.workers
+        if not workers:
+            return draw_batch(self.rooms, nodes, generator)
         if self._ahead is None:
-            source = _Batches(self.rooms, self.nodes, generator.initial_seed())
-            self._ahead = iter(DataLoader(source, batch_size=None, num_workers=self.workers, prefetch_factor=4))
+            source = _Batches(self.rooms, nodes, generator.initial_seed())
+            self._ahead = iter(DataLoader(source, batch_size=None, num_workers=workers, prefetch_factor=4))
         return next(self._ahead)
 
     def scored(
         self, model: CompactModel, batch: LayoutBatch, generator: torch.Generator
     ) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one batch, whose graph passes encoder and manipulator, and its parts."""
-        return layout_loss(model, batch, edited_latent(model, batch), generator, *self.weights)
+        return layout_loss(model, batch, edited_latent(model, batch), generator, self.recipe)
 
     @torch.no_grad()
     def validate(self, model: CompactModel, rooms: int = 96) -> dict[str, float]:
@@ -215,10 +184,10 @@ class LayoutStage:
                 continue
             batch = make_batch(self.held, picked, generator, train=False).to(model.device)
             latent = model.latent(batch.graph.category, batch.pairs)
-            _, parts = layout_loss(model, batch, latent, torch.Generator().manual_seed(1), *self.weights)
+            _, parts = layout_loss(model, batch, latent, torch.Generator().manual_seed(1), self.recipe)
             out |= {f"{name}/held_{part}": float(value) for part, value in parts.items()}
             boxes = sample_boxes(model, batch, generator)
-            cpu, made = batch.to("cpu"), Boxes(*(part.cpu() for part in (boxes.size, boxes.position, boxes.yaw)))
+            cpu, made = batch.to("cpu"), boxes.to("cpu")
             found = faults_of(plan_of_batch(cpu, made, torch.zeros(len(made), dtype=torch.bool)))
             out[f"{name}/faults"] = len(found) / len(made)
             wrong = {int(cpu.graph.scene[fault.object]) for fault in found}
@@ -280,7 +249,7 @@ def own_loss(
     made = own_rooms(model, batch, generator, kept)
     with exactly(made.position):
         # whom each attends is found by many small steps, for which a GPU is slow
-        batch, boxes = batch.to("cpu"), Boxes(*(part.cpu() for part in (made.size, made.position, made.yaw)))
+        batch, boxes = batch.to("cpu"), made.to("cpu")
         graph, level = batch.graph, torch.zeros_like(boxes.yaw)
         given = torch.zeros(len(boxes), dtype=torch.bool)
         plan, openings = plan_of_batch(batch, boxes, given), graph.openings[graph.scene]

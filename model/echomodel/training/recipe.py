@@ -53,11 +53,7 @@ BOUNDS: tuple[tuple[str, float, float], ...] = (
     ("seed", 0, 2**63 - 1),
     ("threads", 0, 1024),
     ("workers", 0, 1024),
-    ("relation_weight", 0, 10**6),
-    ("measure_weight", 0, 10**6),
-    ("living_weight", 0, 10**6),
-    ("physics_weight", 0, 10**6),
-    ("own_weight", 0, 10**6),
+    *((f"{name}_weight", 0, 10**6) for name in ("relation", "measure", "living", "physics", "own")),
     ("own_kept", 1, 1000),
 )
 

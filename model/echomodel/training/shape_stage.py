@@ -284,7 +284,7 @@ class JointStage:
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Sum of both branches' losses on one random batch."""
-        batch = draw_batch(self.layout.rooms, self.layout.nodes, generator).to(model.device)
+        batch = draw_batch(self.layout.rooms, self.layout.recipe.nodes, generator).to(model.device)
         layout, parts = self.layout.scored(model, batch, generator)
         few = draw_batch(self.layout.rooms, self.shape.batch, generator)
         objects = room_shapes(few, self.shape.shapes).to(model.device)
