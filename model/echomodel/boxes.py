@@ -27,8 +27,7 @@ class Boxes:
         position: (N, 3) float32, centre of the bottom face, metres.
         yaw: (N,) float32, radians about +Y.
 
-    Raises:
-        ValueError: the shapes do not belong together.
+    Raises ValueError where the shapes do not belong together.
     """
 
     size: Tensor
@@ -134,9 +133,8 @@ class BoxStatistics:
             them sizes become standard scores within their class and the size range is not used. Empty = one range for
             all.
 
-    Raises:
-        ValueError: not three or nine numbers each, a high that is not above its low, a step that is not positive, or
-            classes without `log_size`.
+    Raises ValueError for not three or nine numbers each, a high that is not above its low, a step that is not positive,
+    or classes without `log_size`.
     """
 
     size_low: tuple[float, ...]
@@ -183,8 +181,7 @@ class BoxStatistics:
     def scale(self, category: Tensor | None = None) -> BoxScale:
         """What the numbers of boxes stand for: of N boxes of `category` (N,) int64, or of all alike.
 
-        Raises:
-            ValueError: sizes are normalised within classes and there is no `category`.
+        Raises ValueError where sizes are normalised within classes and there is no `category`.
         """
         device = "cpu" if category is None else category.device
         low = torch.tensor([*self.size_low, *self.position_low])[None].to(device)

@@ -204,8 +204,7 @@ def from_json(kind: type[C], text: str) -> C:
 def from_dict(kind: type[C], raw: dict[str, Any], where: str = "") -> C:
     """A configuration from nested plain values; fields left out keep their defaults, those that are `GONE` say nothing.
 
-    Raises:
-        ValueError: a field is not known or its value has the wrong type.
+    Raises ValueError where a field is not known or its value has the wrong type.
     """
     if not isinstance(raw, dict):
         raise ValueError(f"{where or kind.__name__} is {raw!r}, expected fields with values")
@@ -224,8 +223,7 @@ def from_dict(kind: type[C], raw: dict[str, Any], where: str = "") -> C:
 def with_settings(config: C, settings: list[str]) -> C:
     """The configuration with `key.sub=value` settings applied; values are read as JSON, else as text.
 
-    Raises:
-        ValueError: a setting has no `=`, names no field or has a value of the wrong type.
+    Raises ValueError where a setting has no `=`, names no field or has a value of the wrong type.
     """
     raw: dict[str, Any] = json.loads(to_json(config))
     for setting in settings:

@@ -74,8 +74,7 @@ class EchoModel:
         Arguments:
             path: file or folder, None = the shipped weights. device: where to. half_decode: as in the class.
 
-        Raises:
-            WeightsError: there are none, or they are damaged or do not belong together.
+        Raises WeightsError where there are none, or they are damaged or do not belong together.
         """
         source = Path(str(resources.files("echomodel") / "weights")) if path is None else Path(path)
         files = [source]
@@ -117,8 +116,7 @@ class EchoModel:
         Arguments:
             graph: S scenes, N nodes. how: fields of `CompactSampling`.
 
-        Raises:
-            ValueError: a graph, box or argument that the model cannot work with; the message names it.
+        Raises ValueError for a graph, box or argument that the model cannot work with; the message names it.
         """
         graph = self._checked(graph)
         return sample_boxes(self.model, self.graph_latent, graph, self._how(graph, how))
@@ -145,8 +143,7 @@ class EchoModel:
 
         Arguments as for `sample_layout`; the shapes will fill the sizes of the boxes.
 
-        Returns:
-            (N, 64, 64, 64) float32 truncated signed distances on the box-normalised grid, negative inside.
+        Returns (N, 64, 64, 64) float32 truncated signed distances on the box-normalised grid, negative inside.
         """
         settings, coder = self.config.shape, self.model.autoencoder
         graph, boxes = self._checked(graph), self._of(graph, boxes)
@@ -191,8 +188,7 @@ class EchoModel:
 
         Arguments as for `sample_layout`; only the sizes of the boxes matter.
 
-        Returns:
-            (N, D) float32; pieces of one class that relations of style or material join are equal.
+        Returns (N, D) float32; pieces of one class that relations of style or material join are equal.
         """
         graph, boxes = self._checked(graph), self._of(graph, boxes)
         by, equal = self._how(graph, how), equal_furniture(graph)

@@ -26,8 +26,7 @@ def centred(floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | No
     Arguments:
         floor: None, two extents (x, z) of a rectangle, or k >= 3 corners (x, z) in any frame, metres.
 
-    Raises:
-        ValueError: neither of these.
+    Raises ValueError for neither of these.
     """
     if floor is None:
         return torch.full((4, 2), torch.nan)
@@ -87,8 +86,7 @@ def signed_distance(points: Tensor, floor: Tensor) -> Tensor:
     Arguments:
         points: (M, Q, 2) float32, x and z. floor: (M, K, 2) float32, the floor that each row of points belongs to.
 
-    Returns:
-        (M, Q) float32.
+    Returns (M, Q) float32.
     """
     start, end = (wall[:, None] for wall in edges(floor))
     along, off = end - start, points[:, :, None] - start
@@ -135,8 +133,7 @@ def wall_distances(points: Tensor, floor: Tensor) -> Tensor:
     Arguments:
         points: (M, 2) float32, x and z. floor: (M, K, 2) float32.
 
-    Returns:
-        (M, 4) float32, 0 where the floor is unknown.
+    Returns (M, 4) float32, 0 where the floor is unknown.
     """
     start, end = edges(floor)
     out = []
@@ -156,8 +153,7 @@ def footprint(size: Tensor, position: Tensor, yaw: Tensor) -> Tensor:
     Arguments:
         size, position: (N, 3) float32, metres, as in `Boxes`. yaw: (N,) float32, radians.
 
-    Returns:
-        (N, 8, 2) float32, x and z, metres. Walls that enter between two of these points are not met.
+    Returns (N, 8, 2) float32, x and z, metres. Walls that enter between two of these points are not met.
     """
     return outline(size[:, [0, 2]] / 2, yaw, SIDES) + position[:, None, [0, 2]]
 

@@ -32,8 +32,7 @@ class GraphBatch:
         placements: (P, 4) int64, [subject, position in the vocabulary's placements, and the two other nodes that it
             names, -1 where it names none]; None = none.
 
-    Raises:
-        ValueError: a tensor has the wrong shape, dtype or device.
+    Raises ValueError where a tensor has the wrong shape, dtype or device.
     """
 
     category: Tensor
@@ -186,10 +185,9 @@ class GraphBatch:
     def check(self) -> None:
         """Check the values against the vocabulary.
 
-        Raises:
-            ValueError: no node, an unknown class, predicate or room type id, an end that is no node, a relation of
-                an object to itself or across scenes, scenes out of order, or a floor that is none; the message names
-                the entry at fault.
+        Raises ValueError for no node, an unknown class, predicate or room type id, an end that is no node, a relation
+        of an object to itself or across scenes, scenes out of order, or a floor that is none; the message names the
+        entry at fault.
         """
         words = vocabulary()
         categories, predicates, room_types = len(words.categories), len(words.predicates), len(words.room_types)

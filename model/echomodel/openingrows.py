@@ -57,8 +57,7 @@ def clearances(boxes: Boxes, rows: Tensor) -> Tensor:
     Arguments:
         boxes: N boxes. rows: (N, O, ROW), openings of the room of each, NaN = none.
 
-    Returns:
-        (N, OPENING_FEATURES) float32; zeros where there is no opening of the kind.
+    Returns (N, OPENING_FEATURES) float32; zeros where there is no opening of the kind.
     """
     if not rows.shape[1]:
         return boxes.size.new_zeros(len(boxes), OPENING_FEATURES)
@@ -81,9 +80,8 @@ def kept_free(boxes: Boxes, rows: Tensor) -> Tensor:
     Arguments:
         boxes: N boxes that stand on the floor. rows: (N, O, ROW), openings of the room of each, NaN = none.
 
-    Returns:
-        (N,) float32, negative in the way of a door or passage, or before a window and higher than its sill; `FAR`
-        where there is no opening.
+    Returns (N,) float32, negative in the way of a door or passage, or before a window and higher than its sill; `FAR`
+    where there is no opening.
     """
     if not rows.shape[1]:
         return boxes.size.new_full((len(boxes),), FAR)

@@ -115,10 +115,7 @@ def ancestral(objective: Objective, generator: Randomness | None = None) -> Step
     return step
 
 
-SAMPLERS: dict[Sampler, Callable[[Objective, Randomness | None], Step]] = {
-    "ddim": ddim,
-    "ancestral": ancestral,
-}
+SAMPLERS: dict[Sampler, Callable[[Objective, Randomness | None], Step]] = {"ddim": ddim, "ancestral": ancestral}
 
 
 def sample(
@@ -141,8 +138,7 @@ def sample(
         generator: source of the noise that `ancestral` adds.
         progress: called with (steps done, steps) after every step.
 
-    Raises:
-        ValueError: the sampler is not known, or steps < 1.
+    Raises ValueError where the sampler is not known, or steps < 1.
     """
     if sampler not in SAMPLERS:
         raise ValueError(f"sampler is {sampler!r}, allowed: {', '.join(SAMPLERS)}")

@@ -187,8 +187,7 @@ class CachedTextEncoder:
 def encoder_named(name: str | None) -> TextEncoder:
     """The encoder that a weights file names; None stands for CLIP, as in published checkpoints.
 
-    Raises:
-        TextEncoderError: a name that belongs to no encoder of ours, or to CLIP weights of one's own.
+    Raises TextEncoderError for a name that belongs to no encoder of ours, or to CLIP weights of one's own.
     """
     clip = ClipTextEncoder()
     if name in (None, clip.name):

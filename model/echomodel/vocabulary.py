@@ -50,8 +50,8 @@ class Vocabulary:
 
     The order of rows means nothing: predicates stand by their ids, and what outlives a process names its words.
 
-    Raises:
-        ValueError: a row names something that does not exist, or ids of predicates are not 0, 1, 2 ... each once.
+    Raises ValueError where a row names something that does not exist, or ids of predicates are not 0, 1, 2 ... each
+    once.
     """
 
     categories: tuple[Category, ...]

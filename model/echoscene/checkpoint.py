@@ -116,11 +116,8 @@ def convert(
         classes: class names in the order of their ids; None = those of the published mappings.
         statistics: box normalisation; None = unknown (sampling of boxes then asks for it).
 
-    Returns:
-        The config read off the keys.
-
-    Raises:
-        CheckpointError: as `read_published` and `build`, or the number of class names is wrong.
+    Returns the config read off the keys.
+    Raises CheckpointError: as `read_published` and `build`, or the number of class names is wrong.
     """
     tensors = read_published(source)
     try:
@@ -139,8 +136,7 @@ def convert(
 def statistics_from_bounds(bounds: Sequence[float]) -> BoxStatistics:
     """Fourteen numbers, lowest and highest size (3 + 3, metres), position (3 + 3, metres) and angle (unused).
 
-    Raises:
-        ValueError: not fourteen finite numbers, or a highest that is not above its lowest.
+    Raises ValueError for not fourteen finite numbers, or a highest that is not above its lowest.
     """
     numbers = [float(v) for v in bounds]
     if len(numbers) != 14 or not all(map(math.isfinite, numbers)):
@@ -171,8 +167,7 @@ def infer_config(shapes: Shapes) -> ReleasedConfig:
     Arguments:
         shapes: shape of each parameter; nested dicts joined by dots, a bare autoencoder under `vqvae.`.
 
-    Raises:
-        CheckpointError: no known part, or a key that the inference rests on is missing; the message names it.
+    Raises CheckpointError for no known part, or a key that the inference rests on is missing; the message names it.
     """
     names = shapes.keys()
     has = {part: any(key.startswith(part) for key in names) for part in (LAYOUT, SHAPE, VQVAE)}

@@ -69,11 +69,8 @@ class Denoiser(UNet):
             t: (N,) int64, step of each node, 0..999.
             edge_attr: (E, edge_features) float32, further edge features (`paper` preset).
 
-        Returns:
-            The noise, as large as x.
-
-        Raises:
-            ValueError: wrong shapes, an unknown predicate, an edge outside the nodes, NaN in a condition.
+        Returns the noise, as large as x.
+        Raises ValueError for wrong shapes, an unknown predicate, an edge outside the nodes, NaN in a condition.
         """
         self._check(x, objects, triples, t)
         embedding = self.embed_time(t)

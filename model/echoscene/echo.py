@@ -34,8 +34,8 @@ class ReleasedEcho:
             the cache on disk.
         hash: short hash of the weights it came from.
 
-    Raises:
-        ValueError: class names are missing, or the model's text encoder is unknown or has another width than it reads.
+    Raises ValueError where class names are missing, or the model's text encoder is unknown or has another width than it
+    reads.
     """
 
     def __init__(self, model: ReleasedModel, text: TextEncoder | None = None, hash: str = "") -> None:
@@ -82,9 +82,8 @@ class ReleasedEcho:
         Arguments:
             how: fields of `Sampling`; known boxes are put in afterwards: the published sampler cannot be told of them.
 
-        Raises:
-            ValueError: no layout branch, no box statistics, too many steps, a category without a class, or no text
-                features.
+        Raises ValueError for no layout branch, no box statistics, too many steps, a category without a class, or no
+        text features.
         """
         by = Sampling(**how)
         assert isinstance(by.generator, torch.Generator)  # scenes of their own seeds are for compact weights
@@ -105,11 +104,8 @@ class ReleasedEcho:
             boxes: not used, the published shapes do not know their boxes.
             how: fields of `Sampling`; the published steps are 100 of DDIM, shapes that are known are not looked at.
 
-        Returns:
-            (N, R, R, R) float32, negative inside, in the published unit cube: stretch the mesh to its box.
-
-        Raises:
-            ValueError: no shape branch, a category without a class, or no text features.
+        Returns (N, R, R, R) float32, negative inside, in the published unit cube: stretch the mesh to its box.
+        Raises ValueError for no shape branch, a category without a class, or no text features.
         """
         by = Sampling(**how)
         assert isinstance(by.generator, torch.Generator)  # scenes of their own seeds are for compact weights
@@ -140,8 +136,7 @@ class ReleasedEcho:
     def labels(self, graph: GraphBatch) -> list[str]:
         """The model's class of each node: the category's own name there, else its coarse class.
 
-        Raises:
-            ValueError: categories that the model has no class for; names them all and the nearest classes.
+        Raises ValueError for categories that the model has no class for; names them all and the nearest classes.
         """
         known, categories = set(self.classes) - {*STRUCTURE}, vocabulary().categories
         found, missing = {}, []
@@ -226,12 +221,7 @@ def floor_relations(category: Tensor, triplets: Tensor) -> Tensor:
 
 
 def published_scene(
-    labels: Sequence[str],
-    triples: Tensor,
-    *,
-    classes: Sequence[str],
-    text: TextEncoder,
-    edges: bool = False,
+    labels: Sequence[str], triples: Tensor, *, classes: Sequence[str], text: TextEncoder, edges: bool = False
 ) -> SceneGraphTensors:
     """One scene as the published model takes it.
 
@@ -245,11 +235,8 @@ def published_scene(
         text: encoder of labels and relations.
         edges: encode relations too (`paper` preset; the published weights never use them).
 
-    Returns:
-        N + 2 nodes and E + N + 1 triples.
-
-    Raises:
-        ValueError: a label that is no class, or a triple with an unknown predicate or end; names it.
+    Returns N + 2 nodes and E + N + 1 triples.
+    Raises ValueError for a label that is no class, or a triple with an unknown predicate or end; names it.
     """
     index = {name: number for number, name in enumerate(classes)}
     names = [*labels, *STRUCTURE]
@@ -309,8 +296,7 @@ def pseudo_graph(
         graph: one scene, its floor and `_scene_` node last. generator: source of the choice.
         relation_text: text features of a changed relation; needed where the graph has edge texts.
 
-    Raises:
-        ValueError: the graph has edge texts and `relation_text` is missing.
+    Raises ValueError where the graph has edge texts and `relation_text` is missing.
     """
     if graph.edge_text is not None and relation_text is None:
         raise ValueError("a graph with edge texts needs relation_text for the relations that are changed")

@@ -112,11 +112,8 @@ class GraphEncoder(nn.Module):
             noise: (added and touched nodes, flag) float32, change flags, a row a node in ascending order of the nodes
                 after the edit; drawn with `generator` when None.
 
-        Returns:
-            (N, node) latents, (E, node) edge latents and (N,) bool, the nodes that were kept.
-
-        Raises:
-            ValueError: the counts do not add up, or the graph is one that `SceneGraphTensors.check` refuses.
+        Returns (N, node) latents, (E, node) edge latents and (N,) bool, the nodes that were kept.
+        Raises ValueError where the counts do not add up, or the graph is one that `SceneGraphTensors.check` refuses.
         """
         config = self.encoder_config
         graph.check(config)

@@ -84,12 +84,9 @@ class TripletGCN(nn.Module):
             e: (E, edges) float, edge features; E may be 0.
             ends: (E, 2) int64, subject and object of each edge.
 
-        Returns:
-            (N, out) node and (E, edges) edge features.
-
-        Raises:
-            ValueError: a tensor has the wrong shape, an edge ends outside the nodes, or batch statistics are wanted of
-                a single node or edge.
+        Returns (N, out) node and (E, edges) edge features.
+        Raises ValueError where a tensor has the wrong shape, an edge ends outside the nodes, or batch statistics are
+        wanted of a single node or edge.
         """
         self._check(x, e, ends)
         for layer in self.gconvs:

@@ -55,10 +55,7 @@ class ReleasedModel(GraphEncoder):
     text_encoder: str | None = None
 
     def __init__(
-        self,
-        config: ReleasedConfig,
-        classes: tuple[str, ...] | None = None,
-        statistics: BoxStatistics | None = None,
+        self, config: ReleasedConfig, classes: tuple[str, ...] | None = None, statistics: BoxStatistics | None = None
     ) -> None:
         encoder = config.encoder
         if encoder is None:
@@ -102,10 +99,7 @@ class ReleasedModel(GraphEncoder):
         return next(self.parameters()).device
 
     def conditions(
-        self,
-        graph: SceneGraphTensors,
-        change: GraphChange | None = None,
-        generator: torch.Generator | None = None,
+        self, graph: SceneGraphTensors, change: GraphChange | None = None, generator: torch.Generator | None = None
     ) -> Conditions:
         """What the denoisers are conditioned on.
 
@@ -117,8 +111,7 @@ class ReleasedModel(GraphEncoder):
             graph: the graph to generate. change: the graph that it came from; None = no edit.
             generator: source of the change flags.
 
-        Raises:
-            ValueError: a graph that cannot be used, or one without edge texts for the `paper` preset.
+        Raises ValueError for a graph that cannot be used, or one without edge texts for the `paper` preset.
         """
         graph.check(self.encoder_config)
         nodes, _ = self.embed(graph)
@@ -150,11 +143,9 @@ class ReleasedModel(GraphEncoder):
             steps: how many of the published 1,000 steps, None = all.
             progress: called with (steps done, steps).
 
-        Returns:
-            N boxes in the scene's own frame, metres and radians.
-
-        Raises:
-            ValueError: no layout branch, no box statistics, more steps than there are, or a graph that cannot be used.
+        Returns N boxes in the scene's own frame, metres and radians.
+        Raises ValueError for no layout branch, no box statistics, more steps than there are, or a graph that cannot be
+        used.
         """
         net, statistics = self.layout_net, self.statistics
         if statistics is None:
@@ -174,11 +165,7 @@ class ReleasedModel(GraphEncoder):
         # The paper's text takes sigma_t^2 = beta_t; the published code takes the posterior variance.
         variance = "beta" if self.config.preset == "paper" else "posterior"
         states = ancestral(
-            denoise,
-            start,
-            tables,
-            noise=lambda step: normal(shape, generator, device),
-            variance=variance,
+            denoise, start, tables, noise=lambda step: normal(shape, generator, device), variance=variance
         )
         return Boxes.decode(last(states, progress, len(chosen)), statistics.scale())
 
@@ -200,11 +187,8 @@ class ReleasedModel(GraphEncoder):
             shared_noise: all nodes start from one draw (published code) rather than from one each (paper).
             change: as `conditions`. progress: called with (steps done, steps).
 
-        Returns:
-            (N, 3, 16, 16, 16) float32; floor and `_scene_` nodes have latents that mean nothing.
-
-        Raises:
-            ValueError: no shape branch, or a graph that cannot be used.
+        Returns (N, 3, 16, 16, 16) float32; floor and `_scene_` nodes have latents that mean nothing.
+        Raises ValueError for no shape branch, or a graph that cannot be used.
         """
         if self.config.shape is None:
             raise ValueError("this model has no shape branch")
@@ -280,12 +264,7 @@ Denoiser = Callable[[Tensor, Tensor], Tensor]  # (state (N, ...), step (N,) int6
 
 
 def ancestral(
-    denoise: Denoiser,
-    x: Tensor,
-    tables: LayoutTables,
-    *,
-    noise: Callable[[int], Tensor],
-    variance: str = "posterior",
+    denoise: Denoiser, x: Tensor, tables: LayoutTables, *, noise: Callable[[int], Tensor], variance: str = "posterior"
 ) -> Iterator[tuple[int, Tensor]]:
     """Ancestral sampling of the layout branch (Ho et al. 2020, algorithm 2; EchoScene, section 3.3).
 
@@ -373,8 +352,7 @@ def layout_loss(
         noise: (N, 8) float32.
         tables: schedule.
 
-    Returns:
-        `loss`, and its parts `size`, `trans`, `angle` (scalars), each the mean over the nodes.
+    Returns `loss`, and its parts `size`, `trans`, `angle` (scalars), each the mean over the nodes.
     """
     if boxes.shape[1] == 7:
         boxes = torch.cat([boxes[:, :6], boxes[:, 6:].sin(), boxes[:, 6:].cos()], dim=1)
@@ -410,12 +388,9 @@ def node_budget(triples: Tensor, scene: Tensor, budget: int = 64) -> tuple[int, 
     Arguments:
         triples: (E, 3) int64; scene: (N,) int64, scene of each node; budget: largest number of nodes.
 
-    Returns:
-        The number of nodes kept and the (K, 3) triples among them. The published code stops at the first scene that
-        does not fit, although a later one might.
-
-    Raises:
-        ValueError: the first scene alone exceeds the budget.
+    Returns the number of nodes kept and the (K, 3) triples among them. The published code stops at the first scene that
+    does not fit, although a later one might.
+    Raises ValueError where the first scene alone exceeds the budget.
     """
     ends = torch.bincount(scene).cumsum(0)
     if int(ends[0]) > budget:

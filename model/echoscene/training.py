@@ -276,8 +276,7 @@ def grids_of(shapes: ShapeSet | PublishedShapes, numbers: np.ndarray, side: int)
 def paper_model(sizes: PaperSizes, start: tuple[str, ...] = ()) -> PaperModel:
     """The `paper` preset, with the autoencoder (or everything that fits) of earlier runs.
 
-    Raises:
-        ValueError: a file of `start` was trained with other sizes.
+    Raises ValueError where a file of `start` was trained with other sizes.
     """
     classes = vocabulary().coarse_categories
     model = PaperModel(paper(len(classes), sizes), classes=classes)

@@ -31,8 +31,7 @@ def convolve_repeated(x: Tensor, weight: Tensor, bias: Tensor | None, doubled: t
         x: (N, C, D, H, W) float32. weight: (O, C, 3, 3, 3). bias: (O,) or None.
         doubled: which of the axes D, H, W are repeated.
 
-    Returns:
-        (N, O, D', H', W') float32, doubled axes twice as long.
+    Returns (N, O, D', H', W') float32, doubled axes twice as long.
     """
     size = x.shape[2:]
     padded = F.pad(x, tuple(int(twice) for twice in reversed(doubled) for _ in range(2)))

@@ -30,11 +30,8 @@ class CheckpointError(ValueError):
 def build(config: ReleasedConfig, tensors: Mapping[str, Tensor], where: str) -> nn.Module:
     """The model of a config with these very tensors as its weights (cast to float32, else not copied).
 
-    Returns:
-        `ReleasedModel`, or a module with `vqvae` alone where the config has no encoder.
-
-    Raises:
-        CheckpointError: names `where` and the first missing, unexpected and misshapen keys.
+    Returns `ReleasedModel`, or a module with `vqvae` alone where the config has no encoder.
+    Raises CheckpointError: names `where` and the first missing, unexpected and misshapen keys.
     """
     with torch.device("meta"):
         model: nn.Module = ReleasedModel(config) if config.encoder else _Autoencoder(config)
@@ -100,8 +97,7 @@ def write_released(
 def load_released(path: str | os.PathLike[str]) -> nn.Module:
     """Load a converted file.
 
-    Returns:
-        `ReleasedModel` in evaluation mode, or a module with `vqvae` alone.
+    Returns `ReleasedModel` in evaluation mode, or a module with `vqvae` alone.
 
     Raises:
         CheckpointError: not a converted file, or damaged; names the file and the first keys at fault.

@@ -49,8 +49,7 @@ class LayoutDenoiser(nn.Module):
     Arguments:
         config: its `layout` and what it shares with the other parts.
 
-    Raises:
-        ValueError: a negative number of drafts, or fewer layers than drafts and the last prediction need.
+    Raises ValueError for a negative number of drafts, or fewer layers than drafts and the last prediction need.
 
     Shapes:
         boxes (N, 8), level (N,) in [0, 1], `LayoutContext` -> (N, 8)

@@ -40,8 +40,7 @@ def places(kind: str, names: Names, words: Tensor) -> Tensor:
         kind: `categories` or `room_types`. names: of the weights' rows.
         words: (...) int64, positions in the vocabulary.
 
-    Raises:
-        ValueError: a word that the weights do not know, like nothing that they know.
+    Raises ValueError for a word that the weights do not know, like nothing that they know.
     """
     found = table_of(kind, names).to(words.device)[words]
     if bool((table_of(kind, names) < 0).any()) and bool((found < 0).any()):

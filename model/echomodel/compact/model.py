@@ -145,9 +145,8 @@ def load_weights(
         paths: at least one. device: where to.
         later: parts whose files are read when the parts are asked for, where they hold nothing else.
 
-    Raises:
-        WeightsError: a file is missing, truncated or of another kind, two files disagree on the configuration, or
-            tensors are missing, unexpected or misshapen; the first of each are named.
+    Raises WeightsError where a file is missing, truncated or of another kind, two files disagree on the configuration,
+    or tensors are missing, unexpected or misshapen; the first of each are named.
     """
     if not paths:
         raise WeightsError("no weights files found: install the package with its weights or name a file")

@@ -63,8 +63,7 @@ def side_features(boxes: Boxes, sides: Tensor) -> tuple[Tensor, Tensor]:
     Arguments:
         boxes: N boxes. sides: (N, M, SIDE), those of the room of each, NaN = none.
 
-    Returns:
-        (N, M, SIDE_FEATURES) and (N, M) float32, 1 for those that are there; the others are zero.
+    Returns (N, M, SIDE_FEATURES) and (N, M) float32, 1 for those that are there; the others are zero.
     """
     there = torch.isfinite(sides[..., 0])
     sides = torch.where(there[..., None], sides, 0.0)

@@ -73,8 +73,7 @@ def wholeness(grids: Tensor) -> Tensor:
     Arguments:
         grids: (N, 64, 64, 64) float signed distances, negative inside.
 
-    Returns:
-        (N,) float32 in [0, 1]: 1 for one piece that fills its box, 0 for an empty grid.
+    Returns (N,) float32 in [0, 1]: 1 for one piece that fills its box, 0 for an empty grid.
     """
     return torch.tensor([_whole(grid.cpu().numpy() < 0) for grid in grids], dtype=torch.float32, device=grids.device)
 
@@ -101,8 +100,7 @@ def bearing(grids: Tensor, boxes: Boxes, triplets: Tensor) -> Tensor:
         boxes: N boxes.
         triplets: (E, 3) int64; `standing_on` with the subject at the object's top counts.
 
-    Returns:
-        (N,) float32 in [0, 1]; 1 for whatever bears nothing.
+    Returns (N,) float32 in [0, 1]; 1 for whatever bears nothing.
     """
     out = torch.ones(len(grids), device=grids.device)
     high = (grids[:, :, TOP:] < 0).any(2)  # (N, x, z): columns that reach the top
@@ -228,8 +226,7 @@ def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: Co
         model: with a layout branch. latent: the latent graph of some scenes before and after an edit.
         graph: checked and on the model's device. how: to sample; what is known is checked.
 
-    Raises:
-        ValueError: rules that the model does not know.
+    Raises ValueError for rules that the model does not know.
     """
     config = model.config.layout
     scale = model.scale(graph.category)

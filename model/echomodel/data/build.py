@@ -45,8 +45,7 @@ def build_data(
         seed: seed of the world: equal seeds give equal bytes.
         progress: called with (part, done, in all).
 
-    Raises:
-        ValueError: an unknown recipe, or a folder that was begun with another recipe or seed.
+    Raises ValueError for an unknown recipe, or a folder that was begun with another recipe or seed.
     """
     if recipe not in RECIPES:
         raise ValueError(f"unknown recipe {recipe!r}: allowed are {', '.join(RECIPES)}")

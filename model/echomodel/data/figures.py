@@ -26,9 +26,8 @@ LEAST = 25  # figures of fewer real or generated samples say little and are left
 def room_figures(rooms: Sequence[RoomBoxes]) -> dict:
     """All figures of rooms in the vocabulary's words (see `with_known_words`).
 
-    Returns:
-        `rooms` (per type), `sizes`, `walls` (per class), `pairs`, `relations`, `overlap`: percentiles in metres, shares
-        0 to 1, in the form of `room_statistics.json`.
+    Returns `rooms` (per type), `sizes`, `walls` (per class), `pairs`, `relations`, `overlap`: percentiles in metres,
+    shares 0 to 1, in the form of `room_statistics.json`.
     """
     return {
         "rooms": {kind: _type_figures(group) for kind, group in _by_type(rooms).items()},
@@ -97,8 +96,7 @@ def ray_lengths(polygon: np.ndarray, origin: np.ndarray, direction: np.ndarray) 
         polygon: (k, 2) float, x and z of the corners.
         origin: (n, 2) float. direction: (n, 2) float, unit vectors.
 
-    Returns:
-        (n,) float, infinity where no wall is met.
+    Returns (n,) float, infinity where no wall is met.
     """
     start, side = polygon, np.roll(polygon, -1, axis=0) - polygon
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -61,8 +61,7 @@ def build_rooms(
         progress: called with (rooms done, rooms in all).
         halls: share of large rooms of several zones, 0 to 1.
 
-    Raises:
-        ValueError: the folder holds a set that was begun with other arguments.
+    Raises ValueError where the folder holds a set that was begun with other arguments.
     """
     if count < 1:
         raise ValueError(f"number of rooms is {count}, need at least 1")

@@ -96,8 +96,7 @@ class SGFront:
 
     Attributes: `classes`, the fine ones, sorted; `predicates`, names by id (0 is `in`).
 
-    Raises:
-        SGFrontError: a file is missing or malformed.
+    Raises SGFrontError where a file is missing or malformed.
     """
 
     def __init__(self, folder: str | os.PathLike[str], room: str = "all", split: str = "trainval") -> None:
@@ -234,8 +233,7 @@ def write_sgfront(
         split: `trainval` or `test`. room: the `{room}` of the file names.
         drop: share of the relations that is left out. seed: of the dropping and of the rooms' places in the world.
 
-    Raises:
-        ValueError: no room or an unknown split; `UnknownWord`: a category that the vocabulary does not hold.
+    Raises ValueError for no room or an unknown split; `UnknownWord`: a category that the vocabulary does not hold.
     """
     if not rooms or split not in SPLITS:
         raise ValueError(f"{len(rooms)} rooms, split {split!r}: need at least one room and {' or '.join(SPLITS)}")

@@ -64,10 +64,7 @@ def quantised(tsdf: np.ndarray) -> np.ndarray:
 
 
 def build_shapes(
-    directory: str | os.PathLike[str],
-    styles: int,
-    seed: int,
-    progress: StepListener | None = None,
+    directory: str | os.PathLike[str], styles: int, seed: int, progress: StepListener | None = None
 ) -> ShapeSet:
     """Make all categories in `styles` styles, shard by shard; the same bytes for the same seed, whenever interrupted.
 

@@ -98,8 +98,7 @@ def plot_rooms(
         path: picture file (.png, .pdf, .svg).
         columns: rooms in a row. labels: write the categories.
 
-    Raises:
-        ValueError: no rooms.
+    Raises ValueError for no rooms.
     """
     if not rooms:
         raise ValueError("no rooms to plot")

@@ -160,8 +160,7 @@ def sample_size(
         category: word of the vocabulary. rng: source of every draw. style: of the suite that the piece belongs to.
         shift: how many standard deviations each axis is moved by.
 
-    Raises:
-        UnknownWord: the vocabulary does not know the category.
+    Raises UnknownWord where the vocabulary does not know the category.
     """
     statistics = size_statistics(category)
     z = rng.standard_normal(3)

@@ -33,11 +33,10 @@ def layout_scores(task: Task, room: RoomBoxes) -> dict[str, Pair]:
     Arguments:
         task: what was asked. room: its boxes as a system made them.
 
-    Returns:
-        Faults an object in all (`faults`), of either half of the terms (`faults A`, `faults B`), of collisions and the
-        like (`physics`) and of each term that found one (`term NAME`); `faultless` rooms; `told` relations kept;
-        `walkable` share of the free floor that is reached, SceneEval's `navigability` and `clearance` of openings;
-        `fullness`, share of the floor that is covered.
+    Returns faults an object in all (`faults`), of either half of the terms (`faults A`, `faults B`), of collisions and
+    the like (`physics`) and of each term that found one (`term NAME`); `faultless` rooms; `told` relations kept;
+    `walkable` share of the free floor that is reached, SceneEval's `navigability` and `clearance` of openings;
+    `fullness`, share of the floor that is covered.
     """
     objects = float(len(room))
     floor, openings = room.floor_polygon, room.openings

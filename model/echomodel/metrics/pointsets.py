@@ -35,10 +35,9 @@ def surface_scores(ours: np.ndarray, reference: np.ndarray, threshold: float = T
         ours, reference: (64, 64, 64) float, signed distances, negative inside; the reference holds a surface.
         threshold: distance in the box frame that counts as a hit.
 
-    Returns:
-        `f_score`, the harmonic mean of `precision` (our points near the reference) and `recall` (its points near ours);
-        `chamfer`, the mean distance both ways, averaged; `iou` of the insides. A grid without surface scores 0 with a
-        Chamfer distance of 1.
+    Returns `f_score`, the harmonic mean of `precision` (our points near the reference) and `recall` (its points near
+    ours); `chamfer`, the mean distance both ways, averaged; `iou` of the insides. A grid without surface scores 0 with
+    a Chamfer distance of 1.
     """
     union = ((ours < 0) | (reference < 0)).sum()
     iou = float(((ours < 0) & (reference < 0)).sum() / max(union, 1))
@@ -86,12 +85,10 @@ def earth_mover(one: Tensor, others: Tensor) -> Tensor:
 def compared(apart: Tensor, count: int) -> dict[str, float]:
     """What tells two sets from each other, by (N, N) distances of which the first `count` are references.
 
-    Returns:
-        `mmd`, minimum matching distance: mean over references of the nearest sample; `mmd_smp`: mean over samples of
-        the nearest reference; `cov`: references that are nearest to some sample, as a fraction (Achlioptas et al.
-        2018). `acc`: accuracy of a leave-one-out nearest neighbour, 0.5 is best (Lopez-Paz et al. 2017), `acc_t` over
-        references, `acc_f` over samples. `variety`: mean distance of two samples.
-
+    Returns `mmd`, minimum matching distance: mean over references of the nearest sample; `mmd_smp`: mean over samples
+    of the nearest reference; `cov`: references that are nearest to some sample, as a fraction (Achlioptas et al. 2018).
+    `acc`: accuracy of a leave-one-out nearest neighbour, 0.5 is best (Lopez-Paz et al. 2017), `acc_t` over references,
+    `acc_f` over samples. `variety`: mean distance of two samples.
     Raises ValueError where either set is empty.
     """
     samples = len(apart) - count

@@ -72,9 +72,8 @@ def in_rooms(plan: Plan, scenes: Tensor) -> Tensor:
 def floor_gaps(plan: Plan, scenes: Tensor, points: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """How far points (P, 2) lie from the pieces of rooms (s,) of one floor.
 
-    Returns:
-        (s, n) int64, the pieces. (q,) int64, numbers of the points that count: in copies of one room not those near to
-        what stands alike in all. (s, q) float, metres to the nearest piece, and (s, q) int64, which that is.
+    Returns (s, n) int64, the pieces. (q,) int64, numbers of the points that count: in copies of one room not those near
+    to what stands alike in all. (s, q) float, metres to the nearest piece, and (s, q) int64, which that is.
     """
     kept: dict[int, tuple[Tensor, Tensor, Tensor, Tensor]] = vars(plan).setdefault("floor_gaps", {})
     asked = int(scenes[0])

@@ -126,10 +126,9 @@ def _watched(plan: Plan) -> Watched:
 def _viewers(plan: Plan) -> Watched:
     """Each screen with the viewer that sees it best, of those that the graph names where it names any.
 
-    Returns:
-        screen, viewer: (P,) int64. margin, measure: (P, 4) float, of the three demands on where the screen lies (seen
-        from its viewer, its own front, too near, too far). clear: (P,) float, metres that the line of sight keeps from
-        what is high. about: (P,) int64, what is nearest to it, -1 = nothing.
+    Returns screen, viewer: (P,) int64. margin, measure: (P, 4) float, of the three demands on where the screen lies
+    (seen from its viewer, its own front, too near, too far). clear: (P,) float, metres that the line of sight keeps
+    from what is high. about: (P,) int64, what is nearest to it, -1 = nothing.
     """
     stands = plan.stands("opposite")
     on_stand = (plan.anchor >= 0) & stands[plan.anchor.clamp_min(0)] if len(plan) else stands

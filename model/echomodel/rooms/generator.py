@@ -47,11 +47,8 @@ def generate_room(
         size_shift: which sizes to try (see `room_requests`), default those that give real rooms' sizes.
         hall: draw a large room of two or three zones.
 
-    Returns:
-        The room with its floor's bounding box centred at the origin, metres and radians.
-
-    Raises:
-        ValueError: a room type that the statistics do not hold.
+    Returns the room with its floor's bounding box centred at the origin, metres and radians.
+    Raises ValueError for a room type that the statistics do not hold.
     """
     if room_type is None:
         shares = drawn_shares()

@@ -154,13 +154,7 @@ class PairGeometry:
 
 
 def pairs(
-    boxes: BoxesLike,
-    subject: Tensor,
-    object_: Tensor,
-    centre: Tensor,
-    *,
-    oriented: bool,
-    fronts: Tensor | None = None,
+    boxes: BoxesLike, subject: Tensor, object_: Tensor, centre: Tensor, *, oriented: bool, fronts: Tensor | None = None
 ) -> PairGeometry:
     """The geometry of the pairs (subject[i], object_[i]).
 

@@ -37,11 +37,8 @@ def label_relations(
         rng: source of the dropping; needed where drop > 0.
         headings: `symmetrical_to` asks how furniture with a front is turned, too (rooms to learn from go by places).
 
-    Returns:
-        (E, 3) int64 [subject, predicate id, object], sorted by subject, object, predicate.
-
-    Raises:
-        ValueError: unknown rules, a drop outside 0..1, or drop > 0 without rng.
+    Returns (E, 3) int64 [subject, predicate id, object], sorted by subject, object, predicate.
+    Raises ValueError for unknown rules, a drop outside 0..1, or drop > 0 without rng.
     """
     return label_rooms([room], rules=rules, drop=drop, rng=rng, headings=headings)[0]
 

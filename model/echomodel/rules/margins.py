@@ -58,9 +58,8 @@ def margins(
             in the set `strict`, too; None = none.
         rigid: relations of place have no gradient in the sizes: furniture moves aside, it does not shrink.
 
-    Returns:
-        (E,) float, in metres (sides, close by, standing on, above, symmetrical to) or as a ratio (sizes, overlap);
-        0 where the rules do not measure the predicate. Never NaN or infinite for finite boxes.
+    Returns (E,) float, in metres (sides, close by, standing on, above, symmetrical to) or as a ratio (sizes, overlap);
+    0 where the rules do not measure the predicate. Never NaN or infinite for finite boxes.
     """
     return _margins(_Tensors(boxes), triplets, rule_set(rules), scene, center, fronts, rigid)
 

@@ -251,8 +251,7 @@ def rule(predicate: str, *, sets: Sequence[str] = ("strict",), labels: bool = Fa
         sets: rule sets that measure it.
         labels: whether rooms are labelled with it too (only what is labelled can be learned).
 
-    Raises:
-        ValueError: an unknown set, or one that has a rule for the predicate.
+    Raises ValueError for an unknown set, or one that has a rule for the predicate.
     """
 
     def register(margin: Margin) -> Margin:

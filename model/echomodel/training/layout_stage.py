@@ -57,8 +57,7 @@ def layout_loss(
         generator: source of levels, noise and of what is known.
         recipe: its weights; 0 leaves the hinge, the distance, the living rules or collisions and walls out.
 
-    Returns:
-        The loss, and the parts that the log names.
+    Returns the loss, and the parts that the log names.
     """
     objective = model.config.layout.objective
     scale = model.scale(batch.graph.category)
@@ -243,8 +242,7 @@ def own_loss(
         batch: the graphs; its true boxes are not looked at. generator: source of all noise.
         kept: last steps of sampling through which the gradient is kept.
 
-    Returns:
-        The loss, and the parts that the log names.
+    Returns the loss, and the parts that the log names.
     """
     made = own_rooms(model, batch, generator, kept)
     with exactly(made.position):

@@ -131,8 +131,8 @@ class Recipe:
 def read_recipe(path: Path, settings: list[str] | None = None) -> Recipe:
     """Read a recipe file and apply `key=value` settings; paths in it are relative to its folder.
 
-    Raises:
-        ValueError: the file is not TOML, or a field is unknown or has a wrong type; the message names file and field.
+    Raises ValueError where the file is not TOML, or a field is unknown or has a wrong type; the message names file and
+    field.
     """
     try:
         raw = tomllib.loads(path.read_text("utf-8"))

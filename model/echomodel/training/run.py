@@ -36,8 +36,7 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
         resume: continue from the folder's checkpoint.
         report: called with (step, values).
 
-    Raises:
-        ValueError: a file that the stage needs is not named or does not exist, or the checkpoint does not fit.
+    Raises ValueError for a file that the stage needs is not named or does not exist, or the checkpoint does not fit.
     """
     if recipe.threads:
         torch.set_num_threads(recipe.threads)

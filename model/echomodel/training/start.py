@@ -124,8 +124,7 @@ def warm_start(model: CompactModel, path: Path) -> tuple[str, ...]:
     A tensor that has grown keeps what it had in its first rows and columns and is zero elsewhere, so that the network
     starts out computing what the earlier one did; a tensor that the file does not hold stays as initialised.
 
-    Raises:
-        ValueError: the file cannot be read, or a tensor of it is larger than the model's.
+    Raises ValueError where the file cannot be read, or a tensor of it is larger than the model's.
     """
     header, given = read_weights(path)
     own = model.state_dict()

@@ -68,9 +68,8 @@ class Trainer:
         resume: continue from the folder's checkpoint.
         report: called with (step, values) whenever something is logged.
 
-    Raises:
-        ValueError: `resume` without a checkpoint, or one of a recipe that differs in more than `MAY_CHANGE`; names the
-            fields.
+    Raises ValueError for `resume` without a checkpoint, or one of a recipe that differs in more than `MAY_CHANGE`;
+    names the fields.
     """
 
     def __init__(
