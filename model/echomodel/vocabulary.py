@@ -32,8 +32,7 @@ from echomodel.rows import (
 
 __all__ = [
     "Category", "Predicate", "PredicateKind", "RoomStyle", "RoomType", "UnknownWord", "Vocabulary", "normalised",
-    "speaking",
-    "vocabulary",
+    "speaking", "vocabulary",
 ]  # fmt: skip
 
 ONE_OF = {"categories": "category", "predicates": "predicate", "room_types": "room type"}
