@@ -15,7 +15,9 @@ EYE = 1.52  # metres, height of a picture's middle on an empty wall
 OVER = 0.22  # metres between furniture and what hangs over it
 NEAR = 0.45  # metres: furniture whose back is so near to a wall stands at it
 SIDE = 0.32  # metres that curtains take beside a window
-BLIND = 0.016  # metres, thickness of a roller blind, which hangs between a window's jambs
+BLIND = 0.016  # metres, thickness of a blind, which hangs between a window's jambs
+CURTAINS = ("curtain", "eyelet_curtain", "pleated_curtain", "sheer_curtain")  # of a room all are alike
+BLINDS = ("blind", "roman_blind")  # where it is wet, the first
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +67,7 @@ def curtains(setting: Setting) -> None:
             if setting.use == "wet" or rail > setting.height - 0.05:
                 _blind(setting, wall, window)
                 continue
-            rng = setting.rng(window.name, "curtain")
+            rng, kind = setting.rng(window.name, "curtain"), CURTAINS[setting.rng("curtains").integers(len(CURTAINS))]
             wide, variant = round(min(0.45, 0.16 + 0.14 * window.width), 3), int(rng.integers(4))
             left = max(window.offset - beyond + wide / 2, 0.02 + wide / 2)
             right = min(window.end + beyond - wide / 2, wall.length - 0.02 - wide / 2)
@@ -78,7 +80,7 @@ def curtains(setting: Setting) -> None:
                     next((one for one in hung if setting.clear(one, margin=0.0, floor=False)), None)
                     for hung in (
                         [
-                            Thing("curtain", size, wall.at(end + way * off, before, foot), wall.yaw, "", variant)
+                            Thing(kind, size, wall.at(end + way * off, before, foot), wall.yaw, "", variant)
                             for off in inner
                         ]
                         for end, way in ((left, 1), (right, -1))
@@ -95,11 +97,12 @@ def curtains(setting: Setting) -> None:
 def _blind(setting: Setting, wall: Wall, window: Opening) -> None:
     """A roller blind, let down over a part of the pane."""
     rng = setting.rng(window.name, "blind")
+    kind = BLINDS[int(setting.use != "wet" and setting.rng("blinds").integers(len(BLINDS)))]
     tall = round(window.height * float(rng.choice((0.2, 0.3, 0.4))), 3)
     size = np.array([round(window.width - 0.012, 3), tall, BLIND])
     middle = (window.offset + window.end) / 2
     place = wall.at(middle, -BLIND / 2 - 0.003, window.sill + window.height - 0.004 - tall)
-    setting.placed.append(Thing("blind", size, place, wall.yaw))
+    setting.placed.append(Thing(kind, size, place, wall.yaw))
 
 
 def pictures(setting: Setting) -> None:

@@ -54,6 +54,7 @@ SLOTS: Mapping[str, Slot] = {
     "stem": Slot("6b5436", 0.85, material="wood"),
     **{name: Slot("rug", 0.97, name, 0.0, material="wool") for name in RUGS},
     "curtain": Slot("curtain", 0.92, "linen", 0.6, material="linen"),
+    "sheer": Slot("curtain", 0.9, "linen", 0.6, opacity=0.6, mix=("ffffff", 0.6), material="linen"),
     "accent_cloth": Slot("accent", 0.95, "knitted", 0.3, material="wool"),
     "accent_plain": Slot("accent", 0.92, "woven", 0.22, material="fabric"),
     **{name: Slot("ffffff", 0.7, name, 0.0, material="print") for name in PICTURES},

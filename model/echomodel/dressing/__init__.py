@@ -47,6 +47,11 @@ KINDS: dict[str, Kind] = {
         Kind("rug", "rug", textiles.rug, (1.2, 0.012, 0.8), (3.5, 0.012, 2.5), True, True),
         Kind("rug", "rug", textiles.round_rug, (1.2, 0.012, 1.2), (2.6, 0.012, 2.6), True, True),
         Kind("curtain", "curtain", textiles.curtain, (0.3, 1.2, 0.09), (0.8, 2.6, 0.09), True, yields=True),
+        *(
+            Kind("curtain", "curtain", program, (0.3, 1.2, 0.09), (0.8, 2.6, 0.09), True, yields=True)
+            for program in (textiles.eyelet_curtain, textiles.pleated_curtain, textiles.sheer_curtain)
+        ),
+        Kind("blind", "blind", textiles.roman_blind, (0.5, 0.3, 0.016), (2.0, 0.8, 0.016), True),
         Kind("blind", "blind", textiles.blind, (0.5, 0.2, 0.016), (2.0, 0.8, 0.016), True),
         Kind("cushion", "cushion", textiles.cushion, (0.38, 0.36, 0.13), (0.46, 0.42, 0.16), faces=400),
         Kind("throw", "blanket", textiles.throw, (1.0, 0.2, 0.4), (2.0, 0.3, 0.7), True, True),

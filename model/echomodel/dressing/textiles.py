@@ -67,19 +67,42 @@ def _woven(designs: tuple[str, ...], rng: np.random.Generator) -> str:
 
 
 def curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """One curtain in folds, which spread towards its foot."""
+    """One curtain in loose folds, which spread towards its foot."""
+    return _hung(size, rng, FOLD, top=0.65, drift=0.4)
+
+
+def eyelet_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """One curtain in even waves from its rod to its foot, as eyelets make them."""
+    return _hung(size, rng, 1.3 * FOLD, top=1.0, drift=0.0)
+
+
+def pleated_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """One curtain whose head is pinched into narrow pleats and whose foot is wide."""
+    return _hung(size, rng, 0.75 * FOLD, top=0.3, drift=0.25, narrow=0.16)
+
+
+def sheer_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """One thin curtain in many small folds, through which light comes."""
+    return _hung(size, rng, 0.6 * FOLD, top=0.5, drift=0.5, material="sheer")
+
+
+def _hung(
+    size: Size, rng: np.random.Generator, fold: float, *, top: float, drift: float, narrow: float = 0.04,
+    material: str = "curtain",
+) -> list[Solid]:  # fmt: skip
+    """Cloth in folds of `fold` metres, at its head `top` times as deep and by `narrow` of its width less wide."""
     w, h, d = size
-    folds = max(2, round(w / FOLD))
+    folds = max(2, round(w / fold))
     x = np.linspace(-w / 2, w / 2, 6 * folds + 1)
-    phase, drift = rng.uniform(0, 2 * np.pi), rng.uniform(-0.4, 0.4, 3)
+    phase, wander = rng.uniform(0, 2 * np.pi), drift * rng.uniform(-1, 1, 3)
     rows = []
     for share in np.linspace(0, 1, 5):
-        depth = (d - 0.012) / 2 * (1.0 - 0.35 * share)
-        bend = drift[0] * np.sin(2.1 * x / w + drift[1]) * (1 - share)
+        depth = (d - 0.012) / 2 * (1.0 - (1.0 - top) * share)
+        bend = wander[0] * np.sin(2.1 * x / w + wander[1]) * (1 - share)
         z = depth * np.sin(2 * np.pi * folds * (x + w / 2) / w + phase + bend)
-        rows.append(np.stack([x * (1.0 - 0.04 * share), np.full_like(x, share * h), z], 1))
+        rows.append(np.stack([x * (1.0 - narrow * share), np.full_like(x, share * h), z], 1))
     front, thick = np.stack(rows), np.array([0, 0, 0.004])
-    return [Sheet(front=front + thick, back=front - thick, material="curtain")]
+    return [Sheet(front=front + thick, back=front - thick, material=material)]
 
 
 def blind(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -91,6 +114,19 @@ def blind(size: Size, rng: np.random.Generator) -> list[Solid]:
         box((-0.49 * w, bar, -0.001), (0.49 * w, h - roller, 0.001), "curtain"),
         box((-0.49 * w, 0, -0.3 * d), (0.49 * w, bar, 0.3 * d), "frame", 0.1 * d),
     ]
+
+
+def roman_blind(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A blind drawn up: cloth that falls flat from its head, and below in folds one before the other."""
+    w, h, d = size
+    stack, solids = min(0.16, 0.5 * h), [box((-w / 2, h - 0.03, -d / 2), (w / 2, h, d / 2), "curtain", 0.2 * d)]
+    solids.append(box((-0.495 * w, 0.8 * stack, -0.002), (0.495 * w, h - 0.03, 0.002), "curtain"))
+    for number in range(3):
+        low = 0.2 * stack * number
+        solids.append(
+            box((-0.495 * w, low, -d / 2), (0.495 * w, low + 0.5 * stack, d * (0.5 - 0.2 * number)), "curtain", 0.3 * d)
+        )
+    return solids
 
 
 def cushion(size: Size, rng: np.random.Generator) -> list[Solid]:

@@ -69,7 +69,7 @@ def test_curtains_keep_clear_of_the_coats_on_a_rack():
         room = setting("coat_rack", seed=seed, openings=[Opening("window", "window", 0, offset, 1.0, 1.3, 0.9)])
         for rule in (rule for rule in RULES if rule in (walls.curtains, hangings.hung_up)):
             rule(room)
-        curtains = [thing for thing in room.placed if thing.kind == "curtain"]
+        curtains = [thing for thing in room.placed if KINDS[thing.kind].name == "curtain"]
         coats = [thing for thing in room.placed if thing.kind == "coats"]
         assert coats
         met += bool(curtains)
@@ -93,7 +93,7 @@ def test_toys_lie_before_their_chest():
 def test_windows_have_what_suits_the_room(use, kinds):
     room = setting(use=use, openings=[WINDOW])
     walls.curtains(room)
-    assert {thing.kind for thing in room.placed} == kinds
+    assert {KINDS[thing.kind].name for thing in room.placed} == kinds
 
 
 @pytest.mark.parametrize("use", ["", "wet", "outdoor"])
@@ -112,3 +112,15 @@ def test_shoes_stand_in_some_rooms_only():
         floors.by_doors(room)
         found += len(room.placed)
     assert 4 <= found <= 17  # of 40, a quarter wanted
+
+
+def test_all_windows_of_a_room_have_the_same_curtains_and_rooms_differ():
+    windows = [Opening(f"window{k}", "window", 0, 0.4 + 2.0 * k, 0.9, 1.3, 0.9) for k in range(2)]
+    found = set()
+    for seed in range(24):
+        room = setting(seed=seed, openings=windows)
+        walls.curtains(room)
+        hung = {thing.kind for thing in room.placed}
+        assert len(hung) <= 2  # curtains, and a blind where there is no place for them
+        found |= hung
+    assert found >= set(walls.CURTAINS)

@@ -110,7 +110,7 @@ def test_a_window_without_room_for_curtains_has_a_blind_and_no_rail():
     setting.placed = [Thing("floor_vase", np.array([3.4, 2.4, 0.35]), np.array([0.0, 0.0, -1.8]), 0.0)]
     curtains(setting)
     (blind,) = setting.placed[1:]
-    assert blind.kind == "blind"
+    assert KINDS[blind.kind].name == "blind"
     assert not setting.curtained
     assert -2.02 < blind.footprint.bounds[1] < blind.footprint.bounds[3] < -2.0  # between the jambs, not in the room
     assert blind.footprint.bounds[0] > -0.9
@@ -159,7 +159,7 @@ def test_full_rooms_are_full_and_clean(name, least, tmp_path):
             over = min(high, other.position[1] + other.size[1]) - max(low, other.position[1])
             assert over <= 0 or one.footprint.intersection(other.footprint).area < 1e-6, (one, other)
         for host in setting.objects.values():
-            if one.on != host.name and one.kind not in ("curtain",):
+            if one.on != host.name and KINDS[one.kind].name != "curtain":
                 within = host.top > low and host.position[1] < high
                 assert not within or not meets(host, low, high, one.footprint.buffer(-5e-3)), (one, host.name)
     assert check(room.save(tmp_path / name, preview=False)).ok
@@ -177,7 +177,7 @@ def test_kinds_of_one_category_agree():
 def test_doors_stay_free(room):
     setting = setting_of(room)
     for thing in placed(room):
-        if thing.kind != "curtain":
+        if KINDS[thing.kind].name != "curtain":
             assert not any(way.intersects(thing.footprint) and thing.position[1] < o.height for way, o in setting.ways)
 
 
@@ -326,7 +326,7 @@ def test_curtains_hang_over_the_pane_where_something_stands_beside_it(beside):
     shelf = Thing("floor_vase", np.array([0.7, 2.3, 0.35]), np.array([-1.2, 0.0, -1.8]), 0.0)
     setting.placed = [shelf] if beside else []
     curtains(setting)
-    hung = [thing for thing in setting.placed if thing.kind == "curtain"]
+    hung = [thing for thing in setting.placed if KINDS[thing.kind].name == "curtain"]
     assert len(hung) == 2
     left = min(hung, key=lambda thing: thing.position[0])
     assert left.footprint.intersection(shelf.footprint).area == 0 or not beside
