@@ -41,8 +41,8 @@ def render(
     cameras: Annotated[
         bool, typer.Option("--cameras", help="A picture through each camera of the stage, named after it.")
     ] = False,
-    size: Annotated[int, typer.Option(help="Pixels across a picture.")] = 512,
-    rays: Annotated[int, typer.Option(help="Rays along each side of a pixel.", min=1, max=16)] = 3,
+    quality: Annotated[str, typer.Option(help="fast, or fine: more rays, 1280 pixels across.")] = "fast",
+    size: Annotated[int | None, typer.Option(help="Pixels across a picture, else by --quality.")] = None,
     frames: Annotated[int, typer.Option(help="Pictures of a turntable.", min=2, max=360)] = 24,
     colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
     layout: Layout = None,
@@ -51,13 +51,17 @@ def render(
 ) -> None:
     """Draw a room from inside, from above, from a corner, from all around, or through each of its cameras."""
     from echousd.draw.pictures import gif, png
-    from echousd.draw.rendering import VIEWS, render_cameras, render_turn
+    from echousd.draw.rendering import QUALITIES, VIEWS, render_cameras, render_turn
     from echousd.draw.rendering import render as draw
     from echousd.folder.found import room_at
     from echousd.stage.files import write_all
 
     started = time.perf_counter()
     room = room_at(room)
+    if quality not in QUALITIES:
+        raise ValueError(f"--quality is {quality!r}, allowed: {', '.join(QUALITIES)}")
+    usual, rays = QUALITIES[quality]
+    size = usual if size is None else size
     if view not in (*VIEWS, TURN):
         raise ValueError(f"--view is {view!r}, allowed: {', '.join((*VIEWS, TURN))}")
     if cameras:

@@ -23,6 +23,7 @@ VIEWS = (HERO, DOLLHOUSE, "top", EVERY, CONTACT)
 COLORS = ("materials", "class")
 SHEET = (HERO, "top")  # beside the best corner in the first row; below, the views from the others
 LARGEST = 4096
+QUALITIES = {"fast": (640, QUICK), "fine": (1280, FINE)}  # pixels across, rays along each side of a pixel
 FRAMES = (2, 360)  # pictures that a turn may have
 
 

@@ -243,7 +243,7 @@ def test_a_turn_goes_all_around(root):
 
 def test_command_draws_turns_and_counts_rays(root, tmp_path, echousd_command):
     path = tmp_path / "turn.gif"
-    done = echousd_command("render", root, "-o", path, "--view", "turntable", "--frames", 3, "--size", 32, "--rays", 1)
+    done = echousd_command("render", root, "-o", path, "--view", "turntable", "--frames", 3, "--size", 32)
     assert done.code == 0, done.err
     with Image.open(path) as moving:
         assert (moving.format, moving.n_frames, moving.size) == ("GIF", 3, (32, 32))
@@ -257,7 +257,7 @@ def test_command_draws_turns_and_counts_rays(root, tmp_path, echousd_command):
             "--view is 'side', allowed: hero, dollhouse, top, every-camera, sheet, turntable",
         ),
         (("-o", tmp_path / "one.gif"), "pictures are written as .png, found '.gif'"),
-        (("-o", tmp_path / "one.png", "--rays", 17), "Invalid value for '--rays'"),
+        (("-o", tmp_path / "one.png", "--quality", "best"), "--quality is 'best', allowed: fast, fine"),
     ):
         done = echousd_command("render", root, *words)
         assert (done.code, told in done.err) == (2, True), done.err
