@@ -28,13 +28,13 @@ BARE, BAREST, DEEP = (
     0.02,
 )  # bare walls: what all of a picture costs, from which share on, metres of rounding
 BEFORE, WALLED = 2.0, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
-FILLED = 60.0  # metres of depth that a picture full of what is near is worth
+FILLED = 130.0  # metres of depth that a picture full of what is near is worth
 UNSEEN = 3.0  # metres of depth that each piece in the picture is worth
 SHOWN, FAR = 20.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
 TOUCHED = 0.86  # nearness of what the eye must not be at: a quarter of a metre
 STEPS = (0.3, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
 APART = 3.0  # metres from the middle that it keeps where it stands further from its corner
-ALONG, OFF = (0.2, 0.35, 0.5, 0.65, 0.8), 0.25  # or along a wall, as shares of its length, and metres from it
+ALONG, OFF = (0.2, 0.35, 0.5, 0.65, 0.8), 0.4  # or along a wall, as shares of its length, and metres from it
 MARGIN = 1.06
 RISE = 0.62  # of a camera outside over the room's middle, for a metre that it is away
 FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than their sides is worth

@@ -119,7 +119,8 @@ def blind(size: Size, rng: np.random.Generator) -> list[Solid]:
 def roman_blind(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A blind drawn up: cloth that falls flat from its head, and below in folds one before the other."""
     w, h, d = size
-    stack, solids = min(0.16, 0.5 * h), [box((-w / 2, h - 0.03, -d / 2), (w / 2, h, d / 2), "curtain", 0.2 * d)]
+    stack = min(0.16, 0.5 * h)
+    solids: list[Solid] = [box((-w / 2, h - 0.03, -d / 2), (w / 2, h, d / 2), "curtain", 0.2 * d)]
     solids.append(box((-0.495 * w, 0.8 * stack, -0.002), (0.495 * w, h - 0.03, 0.002), "curtain"))
     for number in range(3):
         low = 0.2 * stack * number
