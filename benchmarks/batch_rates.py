@@ -2,17 +2,20 @@
 
     OMP_NUM_THREADS=1 PXR_WORK_THREAD_LIMIT=1 python benchmarks/batch_rates.py [--rooms 32] [--shapes boxes] [--preview]
     OMP_NUM_THREADS=1 PXR_WORK_THREAD_LIMIT=1 python benchmarks/batch_rates.py --memory --rooms 500
+    OMP_NUM_THREADS=1 PXR_WORK_THREAD_LIMIT=1 python benchmarks/batch_rates.py --store --shapes parts --rooms 100
 
 Wanted: per room at least 2.5 times the single calls on boxes and 1.5 times with shapes (two workers, two cores), at
-least 1.7 times from one worker to two, and at most 1.5 times the network's own time with shapes. CPU seconds a room are
-printed beside: a busy machine changes those least. `--memory`: what one worker holds while it makes the rooms.
-`--paper`: one and two workers on a clock of their own, which only the CPU seconds of every task move.
+least 1.8 times from one worker to two, and at most 1.5 times the network's and the placing's own time. CPU seconds a
+room are printed beside: a busy machine changes those least. `--memory`: what one worker holds while it makes the rooms.
+`--paper`: one and two workers on a clock of their own, which only the CPU seconds of every task move. `--store`: what
+rooms of all types cost and take beside a store, and would take alone.
 """
 
 from __future__ import annotations
 
 import argparse
 import heapq
+import json
 import resource
 import tempfile
 import time
@@ -29,6 +32,8 @@ from echousd.batches.journal import Journal, shard_folder
 from echousd.batches.options import BatchRequest, request_of
 from echousd.batches.plan import make_plan, save_plan
 from echousd.batches.run import BatchProgress, Run, RunOptions
+from echousd.make import layouts as layouts_module
+from echousd.store import Store
 
 
 def cpu() -> float:
@@ -50,22 +55,24 @@ def one_by_one(request: BatchRequest, folder: Path) -> tuple[float, float]:
     return (time.perf_counter() - wall) / (len(jobs) - 1), (cpu() - used) / (len(jobs) - 1)
 
 
-def network(request: BatchRequest, folder: Path) -> tuple[float, float, float]:
-    """CPU seconds a room in one process: of the layout branch as it is packed, of the other branches, of everything."""
-    plan, spent = make_plan(request, ""), [0.0]
+def network(request: BatchRequest, folder: Path) -> tuple[float, float, float, float]:
+    """CPU seconds a room in one process: of the layout branch as it is packed, of the other branches, of placing, of
+    everything."""
+    plan, spent = make_plan(request, ""), {"network": 0.0, "placing": 0.0}
 
-    def timed(method: Callable[..., Any]) -> Callable[..., Any]:
+    def timed(method: Callable[..., Any], part: str) -> Callable[..., Any]:
         def call(*given: Any, **more: Any) -> Any:
             began = time.process_time()
             try:
                 return method(*given, **more)
             finally:
-                spent[0] += time.process_time() - began
+                spent[part] += time.process_time() - began
 
         return call
 
     for name in ("sample_shapes", "sample_furniture"):
-        setattr(EchoModel, name, timed(getattr(EchoModel, name)))
+        setattr(EchoModel, name, timed(getattr(EchoModel, name), "network"))
+    layouts_module.finished_boxes = timed(layouts_module.finished_boxes, "placing")
     packed, rooms = 0.0, 0.0
     for pack in plan.packs():
         jobs = [
@@ -80,7 +87,33 @@ def network(request: BatchRequest, folder: Path) -> tuple[float, float, float]:
             work.room(replace(job, text=new.text, first=new.first))
         rooms += time.process_time() - began
     count = len(plan.entries)
-    return packed / count, spent[0] / count, (packed + rooms) / count
+    return packed / count, spent["network"] / count, spent["placing"] / count, (packed + rooms) / count
+
+
+def stored(request: BatchRequest, folder: Path) -> None:
+    """Print CPU seconds and bytes a room after 10, 20, 50 and 100 of the rooms: alone, and beside a store with it."""
+    plan, alone, own = make_plan(request, ""), 0, 0
+    store, began = folder / "store", time.process_time()
+    for done, entry in enumerate(plan.entries, 1):
+        place = folder / entry.path
+        work.room(work.Job(entry.id, str(place), entry.seed, plan.options[0], draw=entry.draw, store=str(store)))
+        files = [path.stat().st_size for path in place.rglob("*") if path.is_file()]
+        told = json.loads(next(place.glob("*.json")).read_text())
+        taken = {key: sum(_sizes(Store.create(store).folder(key))) for key in {*told["stored"].values()}}
+        own, alone = own + sum(files), alone + sum(files) + sum(taken.values())
+        if done in (10, 20, 50, 100, len(plan.entries)):
+            held, cpu = sum(_sizes(store)), (time.process_time() - began) / done
+            print(
+                f"{done:4d} rooms  CPU {cpu:.2f} s a room; kB a room: alone {alone / done / 1000:.0f}, "
+                f"own {own / done / 1000:.0f}, with the store {(own + held) / done / 1000:.0f}: "
+                f"1/{alone / (own + held):.1f}",
+                flush=True,
+            )
+
+
+def _sizes(place: Path) -> list[int]:
+    files = [place] if place.is_file() else [path for path in place.rglob("*") if path.is_file()]
+    return [path.stat().st_size for path in files]
 
 
 def memory(request: BatchRequest, folder: Path) -> None:
@@ -182,23 +215,30 @@ def main() -> None:
     parser.add_argument("--preview", action="store_true")
     parser.add_argument("--memory", action="store_true")
     parser.add_argument("--paper", action="store_true")
+    parser.add_argument("--store", action="store_true")
     parser.add_argument("--drafts", type=int, default=None)
     options = parser.parse_args()
     raw = {"shapes": options.shapes, "preview": options.preview, "drafts": options.drafts}
-    request = request_of({"sample": {"bedroom": options.rooms}, "options": raw}, "benchmark")
+    kinds = ("bedroom", "living_room", "dining_room", "study", "living_dining_room") if options.store else ("bedroom",)
+    sample = {kind: -(-options.rooms // len(kinds)) for kind in kinds}
+    request = request_of({"sample": sample, "options": raw}, "benchmark")
     with tempfile.TemporaryDirectory() as scratch:
         if options.memory:
             memory(request, Path(scratch) / "memory")
+            return
+        if options.store:
+            stored(request, Path(scratch))
             return
         if options.paper:
             on_paper(request, Path(scratch) / "paper")
             return
         single = one_by_one(request, Path(scratch) / "single")
         print(f"single     {single[0]:6.2f} s a room, CPU {single[1]:6.2f} s", flush=True)
-        layouts, others, all_of_it = network(request, Path(scratch) / "network")
+        layouts, others, placing, all_of_it = network(request, Path(scratch) / "network")
         print(
-            f"network    CPU {layouts:6.2f} s a room for layouts, {others:.2f} s for shapes, {all_of_it:.2f} s with "
-            f"all else: {all_of_it / (layouts + others):.2f} times the network",
+            f"network    CPU {layouts:6.2f} s a room for layouts, {others:.2f} s for shapes, {placing:.2f} s for "
+            f"placing, {all_of_it:.2f} s with all else: {all_of_it / (layouts + others):.2f} times the network, "
+            f"{all_of_it / (layouts + others + placing):.2f} times network and placing",
             flush=True,
         )
         for workers in (1, 2):

@@ -1,8 +1,9 @@
-"""What large inputs cost, and what is refused with its number: python benchmarks/limits.py [--only floor]
+"""What large inputs cost, what is refused with its number: python benchmarks/limits.py [--only floor] [--scale parts]
 
 Each line is a process of its own: seconds of the processor and peak memory of `echousd.generate` and `save` (one
 thread, no preview, the start of Python included), or of reading a text graph alone. What takes more than `--longest`
-of these seconds is killed; of what is refused the line is shown.
+of these seconds is killed; of what is refused the line is shown. `--scale`: groups of 5 to 400 objects, warm, of one
+source of shapes: seconds of the processor to generate and to save, and their growth as a power of the number.
 """
 
 from __future__ import annotations
@@ -20,6 +21,20 @@ from pathlib import Path
 
 TOLD = "import sys, echousd; sys.excepthook = lambda kind, error, trace: print(error)\n"
 GENERATE = TOLD + "echousd.generate(sys.argv[1], shapes=sys.argv[3]).save(sys.argv[2], preview=False)"
+WARM = (
+    TOLD
+    + """
+import time
+from pathlib import Path
+small, large, folder, shapes = sys.argv[1:]
+echousd.generate(small, shapes=shapes, progress=None).save(Path(folder, "small"), preview=False)
+started = time.process_time()
+room = echousd.generate(large, shapes=shapes, progress=None)
+made = time.process_time() - started
+room.save(Path(folder, "large"), preview=False)
+print(made, time.process_time() - started - made, len(room.faults))
+"""
+)
 READ = TOLD + "from echousd.graph import load_graph; load_graph(sys.argv[1])"
 GROUP = ("dining_table", "chair", "chair", "bookshelf", "floor_lamp")
 AROUND = {"chair": "close by", "floor_lamp": "close by"}
@@ -84,26 +99,53 @@ def cases() -> Iterator[Case]:
     yield Case("parts, 100 objects", groups(100), "parts")
 
 
+SIZES = (5, 10, 20, 40, 100, 200, 400)
+
+
+def scale(shapes: str, longest: int) -> Iterator[str]:
+    """Rows of the table of rooms of `SIZES`, each of a process that has made a small room before."""
+    first: tuple[int, float] | None = None
+    before: tuple[int, float] | None = None
+    for count in SIZES:
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            for file, many in (("small.yaml", SIZES[0]), ("large.yaml", count)):
+                (folder / file).write_text(groups(many), "utf-8")
+            words = [WARM, str(folder / "small.yaml"), str(folder / "large.yaml"), name, shapes]
+            _, peak, how, lines = child(words, folder, longest)
+        if how:
+            yield f"| {count} | {lines[-1] if lines else how} | | {peak:,.0f} | | | |"
+            continue
+        made, saved, faults = map(float, lines[-1].split())
+        now = count, made + saved
+        grown = [f"{math.log(now[1] / t) / math.log(count / n):.2f}" for n, t in filter(None, (before, first))]
+        yield f"| {count} | {made:.2f} | {saved:.2f} | {peak:,.0f} | {faults:.0f} | {' | '.join(grown) or '|'} |"
+        first, before = first or now, now
+
+
+def child(words: list[str], folder: Path, longest: int) -> tuple[float, float, str, list[str]]:
+    """CPU seconds and peak MiB of a new process, how it ended ("" = well), and what it said."""
+    told, environment = folder / "told.txt", {**os.environ, "OMP_NUM_THREADS": "1"}
+    with told.open("w") as output:
+        process = subprocess.Popen(
+            [sys.executable, "-W", "ignore", "-c", *words], stdout=output, stderr=subprocess.STDOUT, env=environment,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (longest, longest)),
+        )  # fmt: skip
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = code = os.waitstatus_to_exitcode(status)
+    lines = told.read_text("utf-8", "replace").replace(str(folder), "").strip().splitlines()
+    how = {0: "", -9: f"killed after {longest} s"}.get(code, lines[-1].replace("|", "\\|") if lines else str(code))
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024, how, lines
+
+
 def measured(case: Case, longest: int) -> str:
     """A row of the table: seconds of the processor, peak MiB, and how it ended."""
-    with tempfile.TemporaryDirectory() as folder:
-        graph, told = Path(folder, "graph.yaml"), Path(folder, "told.txt")
+    with tempfile.TemporaryDirectory() as name:
+        graph = Path(name, "graph.yaml")
         graph.write_text(case.graph, "utf-8")
-        more = (GENERATE, str(graph), str(Path(folder, "room")), case.shapes) if case.shapes else (READ, str(graph))
-        environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-        with told.open("w") as output:
-            command = [sys.executable, "-c", *more]
-            child = subprocess.Popen(
-                command, stdout=output, stderr=subprocess.STDOUT, env=environment,
-                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (longest, longest)),
-            )  # fmt: skip
-            _, status, usage = os.wait4(child.pid, 0)
-            child.returncode = os.waitstatus_to_exitcode(status)
-        lines = told.read_text("utf-8", "replace").replace(folder, "").strip().splitlines()
-    spent, peak = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
-    how = {0: "made" if case.shapes else "read", -9: f"killed after {longest} s"}
-    said = lines[-1].replace("|", "\\|") if lines else ""
-    return f"| {case.name} | {spent:.1f} | {peak:,.0f} | {how.get(child.returncode, said)} |"
+        more = (GENERATE, str(graph), str(Path(name, "room")), case.shapes) if case.shapes else (READ, str(graph))
+        spent, peak, how, _ = child([*more], Path(name), longest)
+    return f"| {case.name} | {spent:.1f} | {peak:,.0f} | {how or ('made' if case.shapes else 'read')} |"
 
 
 def main() -> None:
@@ -111,7 +153,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", help="cases whose name begins so")
     parser.add_argument("--longest", type=int, default=180, help="seconds of the processor for one case")
+    parser.add_argument("--scale", default="", help="source of shapes of rooms of 5 to 400 objects")
     options = parser.parse_args()
+    if options.scale:
+        print("| objects | generate, CPU s | save | MiB at most | faults | growth from the row before | from 5 |")
+        print("|---|---|---|---|---|---|---|")
+        for row in scale(options.scale, options.longest):
+            print(row, flush=True)
+        return
     print("| | seconds of the processor | MiB at most | |\n|---|---|---|---|")
     for case in cases():
         if case.name.startswith(options.only):

@@ -29,8 +29,12 @@ def inside(folder: Path, name: object, entry: str) -> Path:
 
 def check_links(folder: Path, path: Path, entry: str) -> None:
     """Raises ValueError if a link at or above `path` (which lies below `folder`) leads out of the folder."""
-    way = [path, *path.parents][: len(path.parts) - len(folder.parts)]
-    if ".." not in path.parts and not any(place.is_symlink() for place in way):
+    place = path
+    for _ in path.parts[len(folder.parts) :]:
+        if place.name == ".." or place.is_symlink():
+            break
+        place = place.parent
+    else:
         return
     top = os.path.realpath(folder)
     real = os.path.realpath(path)
