@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -102,7 +103,7 @@ def dress(room: RoomData) -> Dressing:
             key = (found.kind, *np.round(found.size, 4).tolist(), found.variant)
             if key not in known:
                 known[key] = free_name(f"small_{found.kind}", taken | set(geometry))
-                geometry[known[key]] = geometry_of(found)
+                geometry[known[key]] = geometry_of(found.kind, tuple(found.size.tolist()), found.variant)
             word = KINDS[found.kind].name
             name = free_name(word, taken | set(named))
             while kinds.setdefault(name, key) != key:  # a name has one asset in all layouts
@@ -143,10 +144,10 @@ def setting_of(room: RoomData, layout: int = 0) -> Setting:
     )  # fmt: skip
 
 
-def geometry_of(found: Thing) -> Geometry:
+@lru_cache(maxsize=100)  # a room that is edited keeps most of its things
+def geometry_of(kind: str, size: tuple[float, float, float], variant: int) -> Geometry:
     """The geometry of a thing, with one hull to bump into that stands."""
-    kind = KINDS[found.kind]
-    solids = solids_of(found.kind, found.size, np.random.default_rng(found.variant))
-    pieces = within_budget(solids, found.size, kind.faces)
+    solids = solids_of(kind, np.array(size), np.random.default_rng(variant))
+    pieces = within_budget(solids, np.array(size), KINDS[kind].faces)
     part = part_of("mesh", pieces)
     return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, weighed(pieces))
