@@ -33,7 +33,7 @@ def bare_walls(setting: Setting) -> None:
         if length > LONG:
             size = np.array([0.5, 0.68, 0.03])
             spots = [middle + step * 0.66 for step in (-1, 0, 1)]
-        variant = int(rng.integers(12))
+        variant = int(rng.integers(1 << 30))
         low = EYE - float(size[1]) / 2
         row = [hung_at(setting, wall, spot, "picture", size, low, variant + n, "") for n, spot in enumerate(spots)]
         setting.placed += [one for one in row if one is not None] if None not in row else []

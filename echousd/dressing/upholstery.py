@@ -28,7 +28,7 @@ def cushions(setting: Setting) -> None:
         ends = [-1.0, 1.0] if wide > 1.3 else [float(rng.choice([-0.6, 0.6]))]
         if setting.full and wide > 1.7:
             ends.append(-0.62)
-        variant = int(rng.integers(3))
+        variant = int(rng.integers(1 << 30))
         seat = _Seat.of(host)
         if seat is None:
             continue
@@ -49,7 +49,7 @@ def bed_cushions(setting: Setting) -> None:
     """Two cushions before the pillows of a wide bed; in full rooms one on a narrow bed, too."""
     for host in setting.of("bed"):
         rng = setting.rng(host.name, "bed cushion")
-        size, variant, seat = usual_size("cushion", rng), int(rng.integers(3)), _Seat.of(host)
+        size, variant, seat = usual_size("cushion", rng), int(rng.integers(1 << 30)), _Seat.of(host)
         wide = float(host.size[0])
         if seat is None or not (setting.full or wide > WIDE_BED):
             continue
@@ -68,7 +68,7 @@ def folded(setting: Setting) -> None:
         return
     for host in sorted(setting.of("sofa"), key=lambda o: -float(o.size[0]))[:1]:
         rng = setting.rng(host.name, "folded")
-        size, variant, seat = usual_size("folded_throw", rng), int(rng.integers(4)), _Seat.of(host)
+        size, variant, seat = usual_size("folded_throw", rng), int(rng.integers(1 << 30)), _Seat.of(host)
         if seat is None:
             continue
         seen = (spot for end in (0.25, -0.3, 0.0) if (spot := seat.resting(end, size)) is not None)

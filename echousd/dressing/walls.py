@@ -155,7 +155,7 @@ def _group(setting: Setting, wall: Wall, along: float, host: Standing, rng: np.r
             if rows == 2:
                 least = host.top + OVER + row * (h + 0.08)
             spot = along + column * (float(size[0]) + 0.08)
-            one = hung_at(setting, wall, spot, "picture", size, least, int(rng.integers(12)), host.name)
+            one = hung_at(setting, wall, spot, "picture", size, least, int(rng.integers(1 << 30)), host.name)
             if one is None:
                 del setting.placed[before:]
                 return False

@@ -86,14 +86,14 @@ def magazine(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 
 def notebook(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A closed notebook with a pencil on it."""
+    """A closed notebook, thick or thin, with a pencil on it."""
     w, h, d = size
-    book = h * 0.6
-    parts = _flat(0.0, book, w, d, rotation(), "book_a")
+    book = h * float(rng.uniform(0.45, 0.7))
+    parts = _flat(0.0, book, w, d, rotation(), str(rng.choice(("book_a", "book_b", "book_c", "book_d"))))
     pencil = Block(
         centre=np.array([w * 0.12, book + (h - book) / 2, 0]),
         half=np.array([(h - book) / 2, (h - book) / 2, d * 0.36]),
-        turn=rotation(y=0.35),
+        turn=rotation(y=float(rng.uniform(-0.5, 0.5))),
         material="frame",
     )
     return [*parts, pencil]

@@ -78,14 +78,15 @@ def photo(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 
 def clock(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A round clock on two feet, or without them on a wall."""
+    """A clock, its case round or nearly square, its rim narrow or wide, at some time of the day."""
     w, h, d = size
     face, middle = rotation(x=np.pi / 2), np.array([0.0, h / 2, -d / 2])
-    half = (w / 2, h / 2)
-    parts: list[Solid] = [turned(middle, half, d * 0.9, turn=face, material="frame")]
-    inner = (w * 0.44, h * 0.44)
-    parts.append(turned(middle, inner, d * 0.92, turn=face, material="paper"))
-    for angle, length in ((0.9, 0.24), (-2.1, 0.36)):
+    power, rim = float(rng.choice((2.0, 2.0, 4.0, 8.0))), float(rng.choice((0.38, 0.42, 0.46)))
+    case = str(rng.choice(("frame", "metal", "ceramic")))
+    parts: list[Solid] = [turned(middle, (w / 2, h / 2), d * 0.9, turn=face, power=power, material=case)]
+    parts.append(turned(middle, (w * rim, h * rim), d * 0.92, turn=face, power=power, material="paper"))
+    hour = float(rng.uniform(0, 12))
+    for angle, length in ((-2 * np.pi * hour / 12, 0.24), (-2 * np.pi * hour, 0.36)):
         turn = rotation(z=angle)
         half3 = np.array([0.012 * w + 0.001, length * h / 2, d * 0.02])
         centre = np.array([0, h / 2, d * 0.45]) + turn @ np.array([0, length * h / 2, 0])

@@ -131,12 +131,12 @@ def roman_blind(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 
 def cushion(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A square cushion that leans back."""
+    """A cushion that leans back: square or rounded, full or flat, of one of four cloths."""
     w, h, d = size
     half = np.array([w / 2, h / 2, d / 2])
     # A pillow is thick in the middle and thin at its seams: a flat superellipsoid, drawn in at the sides.
-    material = str(rng.choice(("accent_cloth", "accent_plain")))
-    return [ball((0, h / 2, 0), half, material, power=3.2)]
+    material = str(rng.choice(("accent_cloth", "accent_plain", "blanket", "curtain"), p=(0.35, 0.35, 0.15, 0.15)))
+    return [ball((0, h / 2, 0), half, material, power=float(rng.uniform(2.3, 3.2)))]
 
 
 def throw(size: Size, rng: np.random.Generator) -> list[Solid]:
