@@ -9,8 +9,7 @@ import torch
 from torch.utils.flop_counter import FlopCounterMode
 
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.compact.branches import PARTS
-from echomodel.compact.model import CompactModel
+from echomodel.compact.model import PARTS, CompactModel
 from echomodel.compact.pairs import pairs_of
 from echomodel.config import CompactConfig
 from echomodel.echo import EchoModel

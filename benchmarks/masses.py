@@ -16,7 +16,7 @@ import torch
 
 from echomodel.furniture import solids
 from echomodel.furniture.assembly import pieces_of
-from echomodel.furniture.description import piece_of
+from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.objective.sizes import usual_sizes

@@ -15,7 +15,7 @@ from torch.utils.flop_counter import FlopCounterMode
 from echomodel.boxes import Boxes
 from echomodel.echo import EchoModel
 from echomodel.furniture import sample_size, solids
-from echomodel.furniture.description import piece_of
+from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.vocabulary import vocabulary
 from echousd.layers import assets

@@ -23,7 +23,7 @@ from echomodel.boxes import Boxes
 from echomodel.data.meshes import draft_table, entries_of, prepared
 from echomodel.echo import EchoModel
 from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
-from echomodel.furniture.description import piece_of
+from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.metrics.pointsets import set_scores, surface_points
 from echomodel.tsdf import mesh_from_tsdf

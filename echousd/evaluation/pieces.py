@@ -12,7 +12,7 @@ import trimesh
 from echomodel.boxes import Boxes
 from echomodel.data.shapeset import ShapeSet
 from echomodel.furniture import Choices, Style, mesh_of, solids
-from echomodel.furniture.description import piece_of
+from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.metrics.furniture import piece_scores, sampled, style_scores, usual_size

@@ -125,7 +125,7 @@ class ShapeConfig:
 
 @dataclass(frozen=True)
 class FurnitureConfig:
-    """Denoiser of descriptions of furniture (`echomodel.furniture.description`).
+    """Denoiser of descriptions of furniture (`echomodel.furniture.style`).
 
     Arguments:
         kinds: words of every kind that a description tells, in order.

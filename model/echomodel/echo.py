@@ -14,9 +14,8 @@ import torch
 from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
-from echomodel.compact.branches import branches
 from echomodel.compact.learned import unlearned
-from echomodel.compact.model import CompactModel, WeightsError, load_weights
+from echomodel.compact.model import CompactModel, WeightsError, branches, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.sampling import (
     CompactSampling,
@@ -184,7 +183,7 @@ class EchoModel:
 
     @torch.no_grad()
     def sample_furniture(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Tensor:
-        """Descriptions of all pieces of furniture of S scenes (`echomodel.furniture.description`).
+        """Descriptions of all pieces of furniture of S scenes (`echomodel.furniture.style`).
 
         Arguments as for `sample_layout`; only the sizes of the boxes matter.
 

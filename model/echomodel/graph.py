@@ -9,8 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from echomodel.floors import area, centred, extents, padded, trimmed
-from echomodel.openingrows import ROW, opening_rows, padded_rows
+from echomodel.floors import ROW, area, centred, extents, opening_rows, padded, padded_rows, trimmed
 from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import vocabulary
@@ -28,7 +27,7 @@ class GraphBatch:
         floor: (S, K, 2) float32, x and z of each floor's corners about the centre of their bounding box, metres; padded
             with NaN, all NaN = unknown.
         names: N node names, or None.
-        openings: (S, O, ROW) float32, doors and windows (`echomodel.openingrows`), padded with NaN; None = none.
+        openings: (S, O, ROW) float32, doors and windows (`echomodel.floors`), padded with NaN; None = none.
         placements: (P, 4) int64, [subject, position in the vocabulary's placements, and the two other nodes that it
             names, -1 where it names none]; None = none.
 

@@ -16,10 +16,9 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxScale
-from echomodel.floors import footprint, signed_distance
+from echomodel.floors import footprint, kept_free, signed_distance
 from echomodel.objective import physics
 from echomodel.objective.plan import Plan
-from echomodel.openingrows import kept_free
 from echomodel.rules import fronts, margins, measured
 from echomodel.rules.placements import Spread, Stated, Walls, margin_of
 from echomodel.samplers import Predict
@@ -56,7 +55,7 @@ def relation_guided(
         rounds: steps after each call of the denoiser.
         floor: (N, K, 2) float32, corners of the floor under each node (`GraphBatch.floor`), NaN = unknown; None = all
             unknown.
-        openings: (N, O, ROW) float32, what each node must keep out of the way of (`echomodel.openingrows`), NaN = none;
+        openings: (N, O, ROW) float32, what each node must keep out of the way of (`echomodel.floors`), NaN = none;
             None = no node of any.
         category: (N,) int64, whose fronts `symmetrical_to` and the placements ask for; None = none has one.
         placements: (P, 4) int64 (`GraphBatch.placements`), which need `category`; None = none.

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 
 from echoscene.config import UNetConfig
-from echoscene.gcn import TripletGCN, check_range
+from echoscene.encoder import TripletGCN, check_range
 from echoscene.unet import UNet
 
 

@@ -16,19 +16,18 @@ from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.model import CompactModel
 from echomodel.config import CompactConfig, from_dict
 from echomodel.echo import EchoModel
-from echomodel.furniture.description import WIDTH
+from echomodel.furniture.style import WIDTH
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 from echomodel.training import parts_stage
 from echomodel.training import run as training_run
-from echomodel.training.autoencoder_stage import AutoencoderStage
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import OptimizerConfig, Recipe
 from echomodel.training.rooms import PackedRooms
-from echomodel.training.shape_stage import EncodedShapes, JointStage, ShapeStage
+from echomodel.training.shape_stage import AutoencoderStage, EncodedShapes, JointStage, ShapeStage
 from echomodel.training.trainer import Trainer, step_generator
 
 GPU = pytest.param(torch.device("cuda"), marks=pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU"))

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from echomodel.furniture import MATERIALS, Choices, Style, furniture, mesh_of, sample_size, solids, tsdf_of
-from echomodel.furniture.backs import back_rest
+from echomodel.furniture.carpentry import back_rest
 from echomodel.furniture.lathe import Lathe
 from echomodel.furniture.solids import Ball, Block, Shell, Tube, Turned, rotation
 from echomodel.metrics.furniture import loose_solids

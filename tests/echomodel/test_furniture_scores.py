@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from echomodel.furniture import Choices, Style, solids
-from echomodel.furniture.description import described
+from echomodel.furniture.style import described
 from echomodel.metrics.furniture import piece_scores, style_scores, usual_size
 from echomodel.objective.sizes import size_range
 

@@ -7,9 +7,8 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.floors import rectangle
+from echomodel.floors import kept_free, opening_rows, rectangle
 from echomodel.guidance import outside, relation_guided
-from echomodel.openingrows import kept_free, opening_rows
 from echomodel.openings import Opening
 from echomodel.rules import fronts, verdicts
 from echomodel.rules.placements import Stated, placement_margins

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echomodel.boxes import Boxes
-from echomodel.openingrows import ROW, clearances, opening_rows
+from echomodel.floors import ROW, clearances, opening_rows
 from echomodel.openings import (
     Opening,
     check_openings,

@@ -17,8 +17,7 @@ from echoscene.checkpoint import read_bounds, statistics_from_bounds
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, paper, shape_unet
 from echoscene.denoisers import ShapeUNet
 from echoscene.echo import published_scene
-from echoscene.encoder import SceneGraphTensors
-from echoscene.gcn import TripletGCN
+from echoscene.encoder import SceneGraphTensors, TripletGCN
 from echoscene.model import GraphChange, ReleasedModel, node_budget
 from echoscene.tables import LayoutTables
 

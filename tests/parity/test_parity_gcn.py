@@ -10,8 +10,7 @@ from parity_configs import encoder_config
 from parity_numbers import Numbers, close, value
 from torch import nn
 
-from echoscene.encoder import GraphEncoder, SceneGraphTensors
-from echoscene.gcn import TripletGCN
+from echoscene.encoder import GraphEncoder, SceneGraphTensors, TripletGCN
 
 
 @pytest.mark.parametrize("name", ["gcn", "gcn_noresidual"])

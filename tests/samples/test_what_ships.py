@@ -12,7 +12,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.echo import EchoModel
 from echomodel.furniture import solids
-from echomodel.furniture.description import piece_of
+from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.metrics.furniture import piece_scores, sampled, style_scores
 from echomodel.rooms.generator import generate_rooms

@@ -9,7 +9,7 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.furniture import solids
-from echomodel.furniture.description import WIDTH, piece_of
+from echomodel.furniture.style import WIDTH, piece_of
 from echomodel.protocols import furnishes
 from echomodel.vocabulary import vocabulary
 from echousd.reproducible import one_thread, rounded_descriptions

@@ -1,6 +1,6 @@
 """Furniture denoiser: descriptions of all pieces of a scene at once; at every step each hears the others (3.4).
 
-A description (`echomodel.furniture.description`) has the same places in all classes, so what a chair hears of its
+A description (`echomodel.furniture.style`) has the same places in all classes, so what a chair hears of its
 table it can say of itself: legs, edges, fronts, how soft, how slender.
 """
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from echomodel.dressing import books, floorware, household, textiles, vessels
+from echomodel.dressing import books, household, textiles, vessels
 from echomodel.furniture.solids import Solid
 
 Program = Callable[[np.ndarray, np.random.Generator], list[Solid]]
@@ -72,9 +72,9 @@ KINDS: dict[str, Kind] = {
         Kind("tray", "tray", vessels.tray, (0.34, 0.03, 0.24), (0.44, 0.04, 0.3)),
         Kind("plates", "plate", vessels.plates, (0.2, 0.06, 0.2), (0.26, 0.12, 0.26)),
         Kind("bottles", "bottle", vessels.bottles, (0.17, 0.2, 0.07), (0.24, 0.3, 0.08)),
-        Kind("ball", "ball", floorware.toy_ball, (0.16, 0.16, 0.16), (0.24, 0.24, 0.24), faces=600),
-        Kind("blocks", "plaything", floorware.blocks, (0.2, 0.13, 0.065), (0.26, 0.17, 0.085), faces=400),
-        Kind("bear", "plaything", floorware.bear, (0.2, 0.26, 0.17), (0.26, 0.34, 0.22)),
+        Kind("ball", "ball", vessels.toy_ball, (0.16, 0.16, 0.16), (0.24, 0.24, 0.24), faces=600),
+        Kind("blocks", "plaything", vessels.blocks, (0.2, 0.13, 0.065), (0.26, 0.17, 0.085), faces=400),
+        Kind("bear", "plaything", vessels.bear, (0.2, 0.26, 0.17), (0.26, 0.34, 0.22)),
         Kind("towel", "towel", textiles.towel, (0.36, 0.4, 0.05), (0.48, 0.6, 0.06), True),
         Kind("basket", "basket", vessels.basket, (0.36, 0.36, 0.36), (0.46, 0.48, 0.46)),
         Kind("picture", "painting", household.picture, (0.3, 0.4, 0.03), (1.2, 0.9, 0.03), True),
@@ -90,11 +90,11 @@ KINDS: dict[str, Kind] = {
         Kind("pens", "pot", household.pens, (0.08, 0.17, 0.08), (0.09, 0.19, 0.09)),
         Kind("remote", "box", household.remote, (0.045, 0.018, 0.17), (0.05, 0.02, 0.2)),
         Kind("television", "television receiver", household.television, (0.6, 0.39, 0.18), (0.95, 0.58, 0.22)),
-        Kind("slippers", "apparel", floorware.slippers, (0.22, 0.07, 0.26), (0.24, 0.08, 0.28)),
-        Kind("floor_plant", "plant", floorware.floor_plant, (0.42, 0.85, 0.42), (0.58, 1.35, 0.58), faces=2600),
-        Kind("floor_vase", "vase", floorware.floor_vase, (0.24, 0.8, 0.24), (0.32, 1.1, 0.32)),
-        Kind("pouf", "ottoman", floorware.pouf, (0.42, 0.34, 0.42), (0.52, 0.42, 0.52)),
-        Kind("cable", "lamp", floorware.cable, (0.05, 0.008, 0.3), (0.12, 0.008, 2.4), True, True),
+        Kind("slippers", "apparel", vessels.slippers, (0.22, 0.07, 0.26), (0.24, 0.08, 0.28)),
+        Kind("floor_plant", "plant", vessels.floor_plant, (0.42, 0.85, 0.42), (0.58, 1.35, 0.58), faces=2600),
+        Kind("floor_vase", "vase", vessels.floor_vase, (0.24, 0.8, 0.24), (0.32, 1.1, 0.32)),
+        Kind("pouf", "ottoman", vessels.pouf, (0.42, 0.34, 0.42), (0.52, 0.42, 0.52)),
+        Kind("cable", "lamp", vessels.cable, (0.05, 0.008, 0.3), (0.12, 0.008, 2.4), True, True),
         Kind("shoes", "apparel", household.shoes, (0.24, 0.1, 0.27), (0.27, 0.12, 0.31)),
     )
 }

@@ -13,8 +13,8 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.furniture import mesh_of, sample_size
-from echomodel.furniture.description import GROUPS, HOT, STYLE
 from echomodel.furniture.solids import Array, Solid
+from echomodel.furniture.style import GROUPS, HOT, STYLE
 from echomodel.graph import GraphBatch
 from echomodel.objective.sizes import size_range
 from echomodel.protocols import FurnitureModel

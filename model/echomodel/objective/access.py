@@ -7,8 +7,7 @@ import math
 import torch
 from torch import Tensor
 
-from echomodel.objective.found import Found, found, nobody, worst
-from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Plan
+from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, nobody, worst
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_normal, segment
 
 CROOKED = math.radians(5.0)  # 98 to 100 % of such furniture in real rooms is turned less

@@ -12,10 +12,8 @@ import torch
 from torch import Tensor
 
 from echomodel.floors import signed_distance
-from echomodel.objective.company import AROUND, seats_at
-from echomodel.objective.found import Found, found, joined, nobody, worst
-from echomodel.objective.groups import BESIDE
-from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Plan
+from echomodel.objective.company import AROUND, BESIDE, seats_at
+from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
 from echomodel.plans import REACH, filled_area
 
 BARE = 1.05  # radius of an empty circle, of the side of a square that is each piece's share of the floor

@@ -11,8 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from echomodel.objective.found import Found, worst
-from echomodel.objective.plan import FAR, Plan
+from echomodel.objective.plan import FAR, Found, Plan, worst
 from echomodel.openings import Opening
 from echomodel.vocabulary import Category
 

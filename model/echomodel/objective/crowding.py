@@ -6,8 +6,7 @@ import torch
 from torch import Tensor
 
 from echomodel.objective.company import Seats, seats_at
-from echomodel.objective.found import Found, found, joined, nobody, worst
-from echomodel.objective.plan import FAR, Plan
+from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody, worst
 
 # Metres between pieces of different groups, by role: the 2nd to 3rd percentile in real rooms.
 APART = {

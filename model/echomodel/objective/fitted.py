@@ -6,8 +6,7 @@ import torch
 from torch import Tensor
 
 from echomodel.objective.access import before_fronts
-from echomodel.objective.found import Found, found, joined, nobody, worst
-from echomodel.objective.plan import FAR, Plan
+from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody, worst
 from echomodel.openings import segment
 from echomodel.rooms.runs import AISLE, LANDING, TALL, TRIANGLE
 

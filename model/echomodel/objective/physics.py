@@ -9,8 +9,7 @@ import torch
 from torch import Tensor
 
 from echomodel.floors import SIDES, edges, signed_area
-from echomodel.objective.found import Found, found, joined, nobody
-from echomodel.objective.plan import FAR, Plan
+from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody
 from echomodel.objective.support import ON_CEILING, ON_FLOOR
 from echomodel.rules import RULE_SETS, rule_set
 from echomodel.rules.geometry import pairs

@@ -8,8 +8,7 @@ import torch
 from torch import Tensor
 
 from echomodel.floors import extents, known
-from echomodel.objective.found import Found, found, nobody, worst
-from echomodel.objective.plan import FAR, Plan, facing_angle
+from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, nobody, worst
 
 OVER = 0.25  # metres by which a pendant's middle may lie beyond the edge of what it hangs over
 MIDDLE = 0.22  # share of the room's extent: so near to the middle a lamp lights the room

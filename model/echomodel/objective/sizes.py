@@ -8,8 +8,7 @@ from functools import cache
 import numpy as np
 import torch
 
-from echomodel.objective.found import Found, found
-from echomodel.objective.plan import Plan, kind_of
+from echomodel.objective.plan import Found, Plan, found, kind_of
 from echomodel.sizes import size_statistics, usual_range
 
 LARGEST, SMALLEST = 1.2, 0.5  # times the 95th and 5th percentile of the class: 97 % of real pieces lie between

@@ -10,9 +10,8 @@ import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from echomodel.objective import access, company, composition, crowding, fitted, groups, physics, sight, sizes
-from echomodel.objective.found import Found
-from echomodel.objective.plan import Plan
+from echomodel.objective import access, company, composition, crowding, fitted, physics, sight, sizes
+from echomodel.objective.plan import Found, Plan
 from echomodel.vocabulary import vocabulary
 
 KINDS = ("relations", "physics", "living", "composition")
@@ -71,20 +70,20 @@ LIVING = (
          REAL + "98 to 100 % of such furniture within 5 degrees", unit="rad"),
     Term(access.at_wall, ("{a} has no wall behind it", "{a} stands {x:.2f} m off the wall behind it"),
          REAL + "84 to 93 % within 0.15 m, gaps over 0.3 m are rare"),
-    Term(groups.seat_faces, ("{a} looks {x:.0f} degrees past {b}",),
+    Term(company.seat_faces, ("{a} looks {x:.0f} degrees past {b}",),
          REAL + "chairs at corners look at their table by up to 45 degrees", unit="rad"),
-    Term(groups.seat_in_reach, ("{a} stands {x:.2f} m from {b}",), REAL + "99 % of dining chairs within 0.45 m"),
-    Term(groups.lounger_faces, ("{a} turns its back on {b} ({x:.0f} degrees)",),
+    Term(company.seat_in_reach, ("{a} stands {x:.2f} m from {b}",), REAL + "99 % of dining chairs within 0.45 m"),
+    Term(company.lounger_faces, ("{a} turns its back on {b} ({x:.0f} degrees)",),
          REAL + "armchairs take part in their group", unit="rad"),
-    Term(groups.table_before_sofa, ("{a} leaves only {x:.2f} m before {b}",
+    Term(company.table_before_sofa, ("{a} leaves only {x:.2f} m before {b}",
           "{a} lies {x:.2f} m before {b}, out of reach", "{a} lies {x:.2f} m beside the middle of {b}, not before it"),
          REAL + "95th percentile of the gap, a leg's width; within the sofa's width"),
-    Term(groups.nightstand_at_head, ("{a} stands {x:.2f} m beside {b}", "{a} stands in {b}",
+    Term(company.nightstand_at_head, ("{a} stands {x:.2f} m beside {b}", "{a} stands in {b}",
           "{a} stands {x:.2f} m from the head of {b}", "{a} is turned by {x:.0f} degrees against {b}"),
          REAL + "95 % within 0.34 m beside and 0.4 m along the bed"),
-    Term(groups.nightstands_alike, ("{a} stands {x:.2f} m further from the bed than {b}",),
+    Term(company.nightstands_alike, ("{a} stands {x:.2f} m further from the bed than {b}",),
          REAL + "98 % of pairs differ by less than 0.15 m"),
-    Term(groups.bench_at_foot, ("{a} stands {x:.2f} m from the foot of {b}",
+    Term(company.bench_at_foot, ("{a} stands {x:.2f} m from the foot of {b}",
           "{a} lies {x:.2f} m beside the middle of {b}"),
          REAL + "95 % within 0.35 m of the foot, and 0.38 of the bed's width"),
     Term(sight.screen_in_view, ("{a} lies {x:.0f} degrees off where {b} looks",

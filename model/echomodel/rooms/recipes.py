@@ -13,14 +13,18 @@ from echomodel.rooms.floor import Wall
 from echomodel.rooms.groups import (
     SOFAS,
     VANITY_SEATS,
+    balcony,
+    bathroom,
+    childrens_room,
     desk_group,
     dining_group,
     groups_left,
+    hallway,
+    kitchen,
     seat_at,
     sofa_group,
     television,
 )
-from echomodel.rooms.home import balcony, bathroom, childrens_room, hallway, kitchen
 from echomodel.rooms.statistics import RoomTypeStatistics
 from echomodel.vocabulary import vocabulary
 

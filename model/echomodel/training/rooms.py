@@ -13,10 +13,9 @@ from echomodel.boxes import Boxes
 from echomodel.compact.pairs import Pairs, inverse_predicates, ordered_pairs, reverse_pairs
 from echomodel.config import names_of
 from echomodel.data.roomset import RoomSet
-from echomodel.floors import padded, trimmed
+from echomodel.floors import padded, padded_rows, trimmed
 from echomodel.graph import GraphBatch
 from echomodel.objective import plan_of
-from echomodel.openingrows import padded_rows
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.telling import near_first
 from echomodel.vocabulary import vocabulary

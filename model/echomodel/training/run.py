@@ -8,11 +8,10 @@ from pathlib import Path
 
 import torch
 
-from echomodel.training.autoencoder_stage import AutoencoderStage
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import Recipe
-from echomodel.training.shape_stage import JointStage, ShapeStage
+from echomodel.training.shape_stage import AutoencoderStage, JointStage, ShapeStage
 from echomodel.training.start import CompactStage, started
 from echomodel.training.trainer import Report, Trainer
 

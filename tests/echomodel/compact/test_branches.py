@@ -10,8 +10,7 @@ import torch
 from torch import nn
 
 from echomodel.boxes import BoxStatistics
-from echomodel.compact.branches import PARTS, Part, branches
-from echomodel.compact.model import CompactModel, WeightsError, load_weights, save_weights
+from echomodel.compact.model import PARTS, CompactModel, Part, WeightsError, branches, load_weights, save_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.config import CompactConfig, LatentConfig
 from echomodel.echo import EchoModel

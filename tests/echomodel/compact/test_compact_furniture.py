@@ -10,7 +10,7 @@ from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.model import CompactModel, WeightsError, load_weights, save_weights
 from echomodel.config import CompactConfig, FurnitureConfig
 from echomodel.echo import EchoModel
-from echomodel.furniture.description import GROUPS, HOT, STYLE, WIDTH
+from echomodel.furniture.style import GROUPS, HOT, STYLE, WIDTH
 from echomodel.graph import GraphBatch
 
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3)

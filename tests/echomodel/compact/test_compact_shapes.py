@@ -7,9 +7,9 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import BoxStatistics
-from echomodel.compact.autoencoder import Autoencoder, from_patches, to_patches
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import pairs_of
+from echomodel.compact.shape import Autoencoder, from_patches, to_patches
 from echomodel.config import CompactConfig, from_dict
 from echomodel.graph import GraphBatch
 

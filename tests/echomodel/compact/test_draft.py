@@ -7,11 +7,10 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.compact.draft import PAIR_FEATURES, WALL_FEATURES, pair_features, wall_features
+from echomodel.compact.layout import SIDE_FEATURES, side_features, sides_of
 from echomodel.compact.pairs import pairs_of
-from echomodel.compact.room_echo import SIDE_FEATURES, side_features, sides_of
-from echomodel.floors import padded, rectangle
+from echomodel.floors import opening_rows, padded, rectangle
 from echomodel.graph import GraphBatch
-from echomodel.openingrows import opening_rows
 from echomodel.openings import Opening
 
 

@@ -19,8 +19,7 @@ from echomodel.graph import GraphBatch
 from echomodel.guidance import outside
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts
-from echomodel.training.layout_stage import measure_distance
-from echomodel.training.living_loss import heading_distance, living_loss, told_triplets
+from echomodel.training.layout_stage import heading_distance, living_loss, measure_distance, told_triplets
 from echomodel.training.recipe import OptimizerConfig, Recipe, read_recipe
 from echomodel.training.rooms import PackedRooms, draw_batch, make_batch
 from echomodel.training.run import open_run

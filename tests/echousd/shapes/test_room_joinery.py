@@ -11,7 +11,7 @@ from shapely.geometry import MultiPoint, Point
 
 from echomodel.data.shapeset import piece as styled
 from echomodel.furniture import solids
-from echomodel.furniture.description import WIDTH, piece_of
+from echomodel.furniture.style import WIDTH, piece_of
 from echomodel.vocabulary import vocabulary
 from echousd.shapes.geometry import FRAME, Origin
 from echousd.shapes.joinery import COLLIDERS, SLACK, assembled, convex_pieces, within_budget

@@ -6,8 +6,8 @@ import trimesh
 
 from echomodel.furniture import sample_size, solids
 from echomodel.furniture.assembly import MATERIALS, Piece, pieces_of
-from echomodel.furniture.description import WIDTH, piece_of
 from echomodel.furniture.solids import Solid
+from echomodel.furniture.style import WIDTH, piece_of
 from echomodel.vocabulary import vocabulary
 from echousd.shapes.matter import MATTER, PARTS, weighed
 

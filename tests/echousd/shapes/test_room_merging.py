@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from echomodel.furniture import solids
-from echomodel.furniture.description import WIDTH, piece_of
+from echomodel.furniture.style import WIDTH, piece_of
 from echousd.shapes.geometry import FRAME, Geometry, Origin, Part
 from echousd.shapes.joinery import assembled
 from echousd.shapes.merging import merged
