@@ -17,6 +17,7 @@ NEAR_TABLE = 1.5  # metres: a seat further from its table is judged for its dist
 COMPANY = 2.5  # metres: an armchair further away stands for itself
 REACH = 0.6  # metres between a seat's front and its table: 99 % of real dining chairs are nearer
 BEFORE_SOFA = (0.12, 1.0)  # metres between a sofa and its coffee table: less than 0.3 is tight, a hand is too little
+AT_DESK = 0.33  # share of a desk's width that a seat's middle may lie beside its own: 19 of 20 real ones
 WITHIN = 0.35  # share of a sofa's width that the table's middle may lie beside its own: 80 % of real ones lie 0.2
 BESIDE = 0.4  # metres between a bed and its nightstand: 95 % of real ones are nearer
 PAIR = 0.15  # metres by which the gaps of the two nightstands of a bed may differ: 98 % of real ones differ less
@@ -52,6 +53,19 @@ def seat_in_reach(plan: Plan) -> Found:
     i, j = i[bound], j[bound]
     off = plan.gap(i, j) - plan.size[i, 2] / 2
     return found(i, REACH - off, other=j, measure=off)
+
+
+def seat_before_desk(plan: Plan) -> Found:
+    """Who works at a desk or dressing table sits before it, not at its corner."""
+    i, j = plan.attended("at")
+    works = plan.which(lambda kind: kind.role == "board" and (kind.access > 0 or kind.wall))
+    if not len(i) or not bool(works[j].any()):
+        return nobody(plan.size)
+    i, j = i[works[j]], j[works[j]]
+    near = plan.gap(i, j).detach() < NEAR_TABLE
+    i, j = i[near], j[near]
+    aside = plan.local(i, j)[0].abs()
+    return found(i, AT_DESK * plan.size[j, 0] - aside, other=j, measure=aside)
 
 
 def lounger_faces(plan: Plan) -> Found:

@@ -73,6 +73,8 @@ LIVING = (
     Term(company.seat_faces, ("{a} looks {x:.0f} degrees past {b}",),
          REAL + "chairs at corners look at their table by up to 45 degrees", unit="rad"),
     Term(company.seat_in_reach, ("{a} stands {x:.2f} m from {b}",), REAL + "99 % of dining chairs within 0.45 m"),
+    Term(company.seat_before_desk, ("{a} stands {x:.2f} m beside the middle of {b}, not before it",),
+         REAL + "19 of 20 such seats within a third of the width"),
     Term(company.lounger_faces, ("{a} turns its back on {b} ({x:.0f} degrees)",),
          REAL + "armchairs take part in their group", unit="rad"),
     Term(company.table_before_sofa, ("{a} leaves only {x:.2f} m before {b}",

@@ -46,6 +46,10 @@ class Room:
         return {(names[f.object], f.rule): f.sentence(names) for f in out}
 
 
+STUDY = Room({
+    "desk": {"kind": "desk", "size": (1.4, 0.75, 0.7), "at": (0.0, -1.63)},
+    "chair": {"kind": "office_chair", "size": (0.6, 1.0, 0.6), "at": (0.3, -0.98), "yaw": np.pi},
+})  # fmt: skip
 BEDROOM = Room({
     "bed": {"kind": "double_bed", "size": (1.8, 1.0, 2.1), "at": (0.0, -0.93)},
     "left": {"kind": "nightstand", "size": (0.5, 0.5, 0.4), "at": (-1.2, -1.78)},
@@ -91,8 +95,8 @@ SOFAS = Room({**LIVING.things, "other": {
 
 @pytest.mark.parametrize(
     "room",
-    [BEDROOM, LIVING, DINING, SET, SOFAS, BENCH, SMALL],
-    ids=["bedroom", "living", "dining", "set", "sofas", "bench", "small"],
+    [BEDROOM, LIVING, DINING, STUDY, SET, SOFAS, BENCH, SMALL],
+    ids=["bedroom", "living", "dining", "study", "set", "sofas", "bench", "small"],
 )
 def test_a_tidy_room_has_no_fault(room):
     assert room.found() == {}
@@ -113,6 +117,11 @@ FAULTS = [
     (LIVING.moved("armchair", yaw=HALF), ("armchair", "lounger_faces"), "armchair turns its back on sofa"),
     (DINING.moved("chair", yaw=0.0), ("chair", "seat_faces"), "chair looks 180 degrees past table"),
     (DINING.moved("chair", at=(0.3, 1.6)), ("chair", "seat_in_reach"), "chair stands 0.90 m from table"),
+    (
+        STUDY.moved("chair", at=(0.9, -1.1)),
+        ("chair", "seat_before_desk"),
+        "chair stands 0.90 m beside the middle of desk",
+    ),
     (DINING.moved("pendant", at=(1.2, 0.0)), ("pendant", "pendant_over"), "pendant hangs 0.50 m beside a table"),
     (DINING.moved("pendant", at=(0.4, 0.2)), ("pendant", "pendant_centred"), "pendant hangs 0.45 m off the middle of"),
     (BEDROOM.moved("left", yaw=HALF), ("left", "nightstand_at_head"), "left is turned by 90 degrees against bed"),
