@@ -219,8 +219,7 @@ def read_json(path: str | os.PathLike[str], most: int) -> Any:
 def read_note(path: Path, **kinds: type) -> dict:
     """What a folder of data says of itself, a JSON object.
 
-    Arguments:
-        kinds: fields that it must have, and their types.
+    `kinds`: fields that it must have, and their types.
 
     Raises ValueError, with the file's path, for anything else.
     """

@@ -25,8 +25,7 @@ def rectangle(width: float, depth: float) -> Tensor:
 def centred(floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | None) -> Tensor:
     """(k, 2) float32, corners of a floor about the centre of their bounding box; four times NaN where it is unknown.
 
-    Arguments:
-        floor: None, two extents (x, z) of a rectangle, or k >= 3 corners (x, z) in any frame, metres.
+    `floor`: None, two extents (x, z) of a rectangle, or k >= 3 corners (x, z) in any frame, metres.
 
     Raises ValueError for neither of these.
     """

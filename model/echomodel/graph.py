@@ -70,16 +70,11 @@ class GraphBatch:
 
     @classmethod
     def single(
-        cls,
-        category: Sequence[int] | Tensor,
-        triplets: Sequence[Sequence[int]] | Tensor = (),
-        *,
-        room_type: int = 0,
+        cls, category: Sequence[int] | Tensor, triplets: Sequence[Sequence[int]] | Tensor = (), *, room_type: int = 0,
         floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | None = None,
-        names: Sequence[str] | None = None,
-        openings: Sequence[Opening] = (),
+        names: Sequence[str] | None = None, openings: Sequence[Opening] = (),
         placements: Sequence[Sequence[int]] | Tensor = (),
-    ) -> GraphBatch:
+    ) -> GraphBatch:  # fmt: skip
         """One scene graph from plain lists; arguments as in the class.
 
         `floor` is None where unknown, two extents (x, z) of a rectangle, or corners in any frame. `openings` lie in the
@@ -87,15 +82,12 @@ class GraphBatch:
         """
         nodes = torch.as_tensor(category, dtype=torch.int64).reshape(-1)
         return cls(
-            category=nodes,
-            triplets=torch.as_tensor(triplets, dtype=torch.int64).reshape(-1, 3),
-            scene=torch.zeros_like(nodes),
-            room_type=torch.tensor([room_type]),
-            floor=(corners := centred(floor))[None],
+            category=nodes, triplets=torch.as_tensor(triplets, dtype=torch.int64).reshape(-1, 3),
+            scene=torch.zeros_like(nodes), room_type=torch.tensor([room_type]), floor=(corners := centred(floor))[None],
             names=None if names is None else tuple(names),
             openings=opening_rows(() if floor is None else openings, corners.numpy())[None],
             placements=torch.as_tensor(placements, dtype=torch.int64).reshape(-1, 4),
-        )
+        )  # fmt: skip
 
     @classmethod
     def from_room(cls, room: RoomBoxes, *, triplets: Sequence[Sequence[int]] | Tensor | None = None) -> GraphBatch:
@@ -125,15 +117,12 @@ class GraphBatch:
             count += graph.num_scenes
         names = [graph.names for graph in graphs]
         return cls(
-            category=torch.cat([graph.category for graph in graphs]),
-            triplets=torch.cat(triplets),
-            scene=torch.cat(scenes),
-            room_type=torch.cat([graph.room_type for graph in graphs]),
+            category=torch.cat([graph.category for graph in graphs]), triplets=torch.cat(triplets),
+            scene=torch.cat(scenes), room_type=torch.cat([graph.room_type for graph in graphs]),
             floor=padded([graph.floor for graph in graphs]),
             names=None if any(n is None for n in names) else tuple(name for n in names for name in n or ()),
-            openings=padded_rows([graph.openings for graph in graphs]),
-            placements=torch.cat(placements),
-        )
+            openings=padded_rows([graph.openings for graph in graphs]), placements=torch.cat(placements),
+        )  # fmt: skip
 
     def unpack(self) -> list[GraphBatch]:
         """One graph per scene, the inverse of `pack`."""

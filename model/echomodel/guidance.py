@@ -28,19 +28,10 @@ SLACK = 0.03  # metres or ratio that the guidance asks for beyond what the rule 
 
 
 def relation_guided(
-    predict: Predict,
-    triplets: Tensor,
-    scale: BoxScale,
-    *,
-    rules: str,
-    strength: float,
-    rounds: int = 2,
-    floor: Tensor | None = None,
-    openings: Tensor | None = None,
-    category: Tensor | None = None,
-    placements: Tensor | None = None,
-    scene: Tensor | None = None,
-) -> Predict:
+    predict: Predict, triplets: Tensor, scale: BoxScale, *, rules: str, strength: float, rounds: int = 2,
+    floor: Tensor | None = None, openings: Tensor | None = None, category: Tensor | None = None,
+    placements: Tensor | None = None, scene: Tensor | None = None,
+) -> Predict:  # fmt: skip
     """Follow `predict` by gradient steps on the missed margins of relations and placements, in the normalised space.
 
     This is reconstruction guidance (Chung et al. 2023, posterior sampling) with the rules' margins as the measurement;

@@ -24,8 +24,7 @@ def load_model(weights: str | Path | None = None, *, device: str = "cpu") -> Roo
 
     A file that did not change since is not read again.
 
-    Arguments:
-        device: where to load it, as torch calls it (`cpu`, `cuda`, `mps`).
+    `device`: where to load it, as torch calls it (`cpu`, `cuda`, `mps`).
 
     Raises ValueError where there is none.
     """

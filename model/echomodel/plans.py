@@ -57,8 +57,7 @@ def filled_area(width: Sequence[float], depth: Sequence[float]) -> float:
 def used_area(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]) -> float:
     """Square metres that furniture takes with the space before fronts, around tables and beds, and before screens.
 
-    Arguments:
-        categories, sizes: as `footprint`.
+    `categories`, `sizes`: as `footprint`.
     """
     pieces = _pieces(categories, sizes)
     chairs = sum(p.kind.stands == "at" for p in pieces)
@@ -90,8 +89,7 @@ def used_area(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]
 def wall_length(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]) -> float:
     """Metres of wall that furniture stands at.
 
-    Arguments:
-        categories, sizes: as `footprint`.
+    `categories`, `sizes`: as `footprint`.
     """
     pieces = _pieces(categories, sizes)
     return sum(p.width + HANDS for p in pieces if p.kind.wall or (p.kind.role == "board" and p.kind.access))
@@ -100,21 +98,15 @@ def wall_length(categories: Sequence[str], sizes: Sequence[Sequence[float] | Non
 def longest_side(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]) -> float:
     """Metres, the longest side of anything that stands on the floor.
 
-    Arguments:
-        categories, sizes: as `footprint`.
+    `categories`, `sizes`: as `footprint`.
     """
     return max((max(p.width, p.depth) for p in _pieces(categories, sizes)), default=0.0)
 
 
 def floor_extents(
-    room_type: str,
-    categories: Sequence[str],
-    sizes: Sequence[Sequence[float] | None],
-    rng: np.random.Generator,
-    *,
-    along_x: float = 0.5,
-    openings: Sequence[Opening] = (),
-) -> tuple[float, float]:
+    room_type: str, categories: Sequence[str], sizes: Sequence[Sequence[float] | None], rng: np.random.Generator, *,
+    along_x: float = 0.5, openings: Sequence[Opening] = (),
+) -> tuple[float, float]:  # fmt: skip
     """(x, z) extents in metres of a rectangular floor that such a room with this furniture would have.
 
     As large as such rooms are for what the furniture covers, and never smaller than its use asks for.

@@ -41,8 +41,7 @@ def normal(
 ) -> Tensor:
     """Standard normal noise on `device`, drawn where the generator is.
 
-    Arguments:
-        shape: (R, ...); with a generator a scene, R is a multiple of all nodes: so many draws behind one another.
+    `shape`: (R, ...); with a generator a scene, R is a multiple of all nodes: so many draws behind one another.
     """
     if source is None or isinstance(source, torch.Generator):
         where = device if source is None else source.device

@@ -61,19 +61,16 @@ class RoomBoxes:
         objects = raw["objects"]
         relations = raw.get("relations")
         return cls(
-            id=raw["id"],
-            room_type=raw["room_type"],
-            floor_polygon=np.asarray(raw["floor_polygon"], float).reshape(-1, 2),
-            height=float(raw["height"]),
+            id=raw["id"], room_type=raw["room_type"],
+            floor_polygon=np.asarray(raw["floor_polygon"], float).reshape(-1, 2), height=float(raw["height"]),
             categories=tuple(o["category"] for o in objects),
             size=np.asarray([o["size"] for o in objects], float).reshape(-1, 3),
             position=np.asarray([o["position"] for o in objects], float).reshape(-1, 3),
             yaw=np.asarray([o["yaw"] for o in objects], float).reshape(-1),
-            models=tuple(o.get("model", "") for o in objects),
-            styles=tuple(o.get("style", -1) for o in objects),
+            models=tuple(o.get("model", "") for o in objects), styles=tuple(o.get("style", -1) for o in objects),
             relations=None if relations is None else np.asarray(relations, int).reshape(-1, 3),
             openings=tuple(map(opening_from_json, raw.get("openings", ()))),
-        )
+        )  # fmt: skip
 
     def to_json(self, digits: int = 4) -> dict:
         """The entry that `from_json` reads, numbers rounded to `digits` decimals."""

@@ -119,17 +119,9 @@ SAMPLERS: dict[Sampler, Callable[[Objective, Randomness | None], Step]] = {"ddim
 
 
 def sample(
-    sampler: Sampler,
-    predict: Predict,
-    x: Tensor,
-    steps: int,
-    objective: Objective,
-    *,
-    known: Tensor | None = None,
-    known_mask: Tensor | None = None,
-    generator: Randomness | None = None,
-    progress: StepListener | None = None,
-) -> Tensor:
+    sampler: Sampler, predict: Predict, x: Tensor, steps: int, objective: Objective, *, known: Tensor | None = None,
+    known_mask: Tensor | None = None, generator: Randomness | None = None, progress: StepListener | None = None,
+) -> Tensor:  # fmt: skip
     """Run a sampler by name.
 
     Arguments:

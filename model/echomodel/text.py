@@ -45,8 +45,7 @@ class ClipTextEncoder:
 
     Weights are loaded at the first call.
 
-    Arguments:
-        weights: a weights file, or None for open_clip's own download and cache of the `openai` weights.
+    `weights`: a weights file, or None for open_clip's own download and cache of the `openai` weights.
     """
 
     width = 512
@@ -104,8 +103,7 @@ class ClipTextEncoder:
 class RandomTextEncoder:
     """A seeded random vector per text: tells texts apart and knows nothing of their meaning; needs no weights.
 
-    Arguments:
-        width: length of the vectors.
+    `width`: length of the vectors.
     """
 
     def __init__(self, width: int = 512) -> None:

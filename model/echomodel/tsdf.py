@@ -74,8 +74,7 @@ def truncated(voxels: np.ndarray) -> np.ndarray:
 def mesh_from_tsdf(grid: Any) -> trimesh.Trimesh:
     """Surface of a TSDF by marching cubes: x, z in [-0.5, 0.5] and y in [0, 1], so that times the size places it.
 
-    Arguments:
-        grid: (n, n, n) float array or tensor, negative inside; any n, laid out as the 64^3 grid is.
+    `grid`: (n, n, n) float array or tensor, negative inside; any n, laid out as the 64^3 grid is.
 
     Raises ValueError when the grid holds no surface.
     """

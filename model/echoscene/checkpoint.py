@@ -103,12 +103,9 @@ def class_names(count: int) -> tuple[str, ...] | None:
 
 
 def convert(
-    source: str | os.PathLike[str],
-    target: str | os.PathLike[str],
-    *,
-    classes: Sequence[str] | None = None,
+    source: str | os.PathLike[str], target: str | os.PathLike[str], *, classes: Sequence[str] | None = None,
     statistics: BoxStatistics | None = None,
-) -> ReleasedConfig:
+) -> ReleasedConfig:  # fmt: skip
     """Write a published checkpoint as one safetensors file with config, vocabulary and box statistics inside.
 
     Arguments:
@@ -164,8 +161,7 @@ def infer_config(shapes: Shapes) -> ReleasedConfig:
     the conditioning are read off the keys. Attention heads (8), attention factors' grid (16) and the resolution of the
     distance grid (64) leave no trace in the shapes and have their published values.
 
-    Arguments:
-        shapes: shape of each parameter; nested dicts joined by dots, a bare autoencoder under `vqvae.`.
+    `shapes`: shape of each parameter; nested dicts joined by dots, a bare autoencoder under `vqvae.`.
 
     Raises CheckpointError for no known part, or a key that the inference rests on is missing; the message names it.
     """
@@ -217,17 +213,10 @@ def _encoder(shapes: Shapes, full: bool) -> EncoderConfig:
     node, _, hidden, _, layers, residual = _graph(shapes, "gconv_net_ec.")
     manipulator = _graph(shapes, "gconv_net_manipulation.")[0]
     return EncoderConfig(
-        classes=rows - 1,
-        predicates=_get(shapes, "pred_embeddings_ec.weight", 2)[0],
-        text=node - learned,
-        learned=learned,
-        flag=manipulator - 2 * node,
-        hidden=hidden,
-        layers=layers,
-        residual=residual,
-        separated=any(k.startswith("gconv_net_ec_rel_") for k in shapes),
-        own_manipulator_table=not full,
-    )
+        classes=rows - 1, predicates=_get(shapes, "pred_embeddings_ec.weight", 2)[0], text=node - learned,
+        learned=learned, flag=manipulator - 2 * node, hidden=hidden, layers=layers, residual=residual,
+        separated=any(k.startswith("gconv_net_ec_rel_") for k in shapes), own_manipulator_table=not full,
+    )  # fmt: skip
 
 
 def _unet(shapes: Shapes, prefix: str, gcn: str, code: str, time: str, conditioning: str = "crossattn") -> UNetConfig:

@@ -79,8 +79,7 @@ class ReleasedEcho:
     def sample_layout(self, graph: GraphBatch, **how: Any) -> Boxes:
         """Boxes by ancestral steps, as many of the published 1,000 as `steps` says, evenly spread.
 
-        Arguments:
-            how: fields of `Sampling`; known boxes are put in afterwards: the published sampler cannot be told of them.
+        `how`: fields of `Sampling`; known boxes are put in afterwards: the published sampler cannot be told of them.
 
         Raises ValueError for no layout branch, no box statistics, too many steps, a category without a class, or no
         text features.

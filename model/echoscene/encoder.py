@@ -214,15 +214,9 @@ class GraphEncoder(nn.Module):
         return self.gconv_net_ec(*self.embed(graph), graph.triples[:, [0, 2]])
 
     def manipulate(
-        self,
-        latent: Tensor,
-        graph: SceneGraphTensors,
-        *,
-        added: Sequence[int] = (),
-        touched: Sequence[int] = (),
-        noise: Tensor | None = None,
-        generator: torch.Generator | None = None,
-    ) -> tuple[Tensor, Tensor, Tensor]:
+        self, latent: Tensor, graph: SceneGraphTensors, *, added: Sequence[int] = (), touched: Sequence[int] = (),
+        noise: Tensor | None = None, generator: torch.Generator | None = None,
+    ) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
         """Latents of an edited graph from those of the graph before (generation: no edit).
 
         Arguments:

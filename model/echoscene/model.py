@@ -128,14 +128,9 @@ class ReleasedModel(GraphEncoder):
 
     @torch.no_grad()
     def sample_layout(
-        self,
-        graph: SceneGraphTensors,
-        *,
-        generator: torch.Generator,
-        steps: int | None = None,
-        change: GraphChange | None = None,
-        progress: StepListener | None = None,
-    ) -> Boxes:
+        self, graph: SceneGraphTensors, *, generator: torch.Generator, steps: int | None = None,
+        change: GraphChange | None = None, progress: StepListener | None = None,
+    ) -> Boxes:  # fmt: skip
         """Boxes of all nodes by ancestral steps (EchoScene, section 3.3); sizes can come out negative.
 
         Arguments:
@@ -171,15 +166,9 @@ class ReleasedModel(GraphEncoder):
 
     @torch.no_grad()
     def sample_shapes(
-        self,
-        graph: SceneGraphTensors,
-        *,
-        generator: torch.Generator,
-        steps: int = 100,
-        shared_noise: bool = True,
-        change: GraphChange | None = None,
-        progress: StepListener | None = None,
-    ) -> Tensor:
+        self, graph: SceneGraphTensors, *, generator: torch.Generator, steps: int = 100, shared_noise: bool = True,
+        change: GraphChange | None = None, progress: StepListener | None = None,
+    ) -> Tensor:  # fmt: skip
         """Shape latents of all nodes by deterministic DDIM (EchoScene, section 3.4); decode them with `vqvae.decode`.
 
         Arguments:
@@ -209,16 +198,9 @@ class ReleasedModel(GraphEncoder):
         return None if change is None else replace(change, before=change.before.to(self.device))
 
     def training_losses(
-        self,
-        graph: SceneGraphTensors,
-        scene: Tensor,
-        boxes: Tensor,
-        latents: Tensor | None,
-        *,
-        generator: torch.Generator,
-        change: GraphChange | None = None,
-        budget: int = 64,
-    ) -> dict[str, Tensor]:
+        self, graph: SceneGraphTensors, scene: Tensor, boxes: Tensor, latents: Tensor | None, *,
+        generator: torch.Generator, change: GraphChange | None = None, budget: int = 64,
+    ) -> dict[str, Tensor]:  # fmt: skip
         """Losses of one joint training step over both branches (EchoScene, section 3.5); `loss` is their sum.
 
         Arguments:
@@ -333,15 +315,9 @@ def noised(clean: Tensor, t: Tensor, noise: Tensor, tables: LayoutTables | Shape
 
 
 def layout_loss(
-    net: Callable[..., Tensor],
-    boxes: Tensor,
-    objects: Tensor,
-    triples: Tensor,
-    t: Tensor,
-    noise: Tensor,
-    tables: LayoutTables,
-    edge_attr: Tensor | None = None,
-) -> dict[str, Tensor]:
+    net: Callable[..., Tensor], boxes: Tensor, objects: Tensor, triples: Tensor, t: Tensor, noise: Tensor,
+    tables: LayoutTables, edge_attr: Tensor | None = None,
+) -> dict[str, Tensor]:  # fmt: skip
     """Noise prediction loss of the layout branch (EchoScene, equation 4).
 
     Arguments:
@@ -362,15 +338,9 @@ def layout_loss(
 
 
 def shape_loss(
-    net: Callable[..., Tensor],
-    latents: Tensor,
-    objects: Tensor,
-    triples: Tensor,
-    t: Tensor,
-    noise: Tensor,
-    tables: ShapeTables,
-    edge_attr: Tensor | None = None,
-) -> Tensor:
+    net: Callable[..., Tensor], latents: Tensor, objects: Tensor, triples: Tensor, t: Tensor, noise: Tensor,
+    tables: ShapeTables, edge_attr: Tensor | None = None,
+) -> Tensor:  # fmt: skip
     """Noise prediction loss of the shape branch (EchoScene, equation 6): mean square over everything, a scalar.
 
     Arguments:
@@ -385,8 +355,7 @@ def shape_loss(
 def node_budget(triples: Tensor, scene: Tensor, budget: int = 64) -> tuple[int, Tensor]:
     """The shape branch's batch: whole scenes in order while their nodes fit (EchoScene, supplement on batch size).
 
-    Arguments:
-        triples: (E, 3) int64; scene: (N,) int64, scene of each node; budget: largest number of nodes.
+    `triples`: (E, 3) int64; scene: (N,) int64, scene of each node; budget: largest number of nodes.
 
     Returns the number of nodes kept and the (K, 3) triples among them. The published code stops at the first scene that
     does not fit, although a later one might.

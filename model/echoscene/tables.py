@@ -67,18 +67,13 @@ class LayoutTables:
         previous = torch.cat([torch.ones(1), bar[:-1]])
         variance = betas * (1.0 - previous) / (1.0 - bar)
         return cls(
-            betas=betas,
-            alphas_cumprod=bar,
-            alphas_cumprod_prev=previous,
-            sqrt_alphas_cumprod=bar.sqrt(),
-            sqrt_one_minus_alphas_cumprod=(1.0 - bar).sqrt(),
-            sqrt_recip_alphas_cumprod=(1.0 / bar).sqrt(),
-            sqrt_recipm1_alphas_cumprod=(1.0 / bar - 1.0).sqrt(),
-            posterior_variance=variance,
+            betas=betas, alphas_cumprod=bar, alphas_cumprod_prev=previous, sqrt_alphas_cumprod=bar.sqrt(),
+            sqrt_one_minus_alphas_cumprod=(1.0 - bar).sqrt(), sqrt_recip_alphas_cumprod=(1.0 / bar).sqrt(),
+            sqrt_recipm1_alphas_cumprod=(1.0 / bar - 1.0).sqrt(), posterior_variance=variance,
             posterior_log_variance_clipped=variance.clamp_min(1e-20).log(),
             posterior_mean_coef1=betas * previous.sqrt() / (1.0 - bar),
             posterior_mean_coef2=(1.0 - previous) * alphas.sqrt() / (1.0 - bar),
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,8 +36,7 @@ HELD_OUT_EVERY = 20
 class PublishedRooms:
     """The scans of `trainval`, with the relations that their graphs state; every twentieth is for validation.
 
-    Arguments:
-        folder: of SG-FRONT. Raises `SGFrontError` as `SGFront`, and ValueError for a folder without scans.
+    `folder`: of SG-FRONT. Raises `SGFrontError` as `SGFront`, and ValueError for a folder without scans.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -132,15 +131,9 @@ class PaperStage:
     """
 
     def __init__(
-        self,
-        rooms: RoomSet | PublishedRooms,
-        shapes: ShapeSet | PublishedShapes,
-        text: TextEncoder,
-        *,
-        scenes: int,
-        budget: int,
-        autoencoder: bool,
-    ) -> None:
+        self, rooms: RoomSet | PublishedRooms, shapes: ShapeSet | PublishedShapes, text: TextEncoder, *, scenes: int,
+        budget: int, autoencoder: bool,
+    ) -> None:  # fmt: skip
         self.rooms, self.shapes, self.text = rooms, shapes, text
         self.scenes, self.budget = scenes, budget
         self.trained = self.saved = (AUTOENCODER,) if autoencoder else ("network",)

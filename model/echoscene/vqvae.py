@@ -143,8 +143,7 @@ class _Codebook(nn.Module):
 class VQVAE(nn.Module):
     """The published shape autoencoder, under its published parameter names.
 
-    Arguments:
-        config: sizes.
+    `config`: sizes.
     """
 
     def __init__(self, config: VQConfig) -> None:

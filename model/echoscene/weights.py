@@ -64,12 +64,9 @@ class _Autoencoder(nn.Module):
 
 
 def write_released(
-    target: str | os.PathLike[str],
-    model: nn.Module,
-    config: ReleasedConfig,
-    classes: Sequence[str] | None,
+    target: str | os.PathLike[str], model: nn.Module, config: ReleasedConfig, classes: Sequence[str] | None,
     statistics: BoxStatistics | None,
-) -> None:
+) -> None:  # fmt: skip
     """Write a model's tensors with config, vocabulary, box statistics and the name of its text encoder, if it has one.
 
     The file appears whole or not at all.

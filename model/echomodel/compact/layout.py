@@ -45,8 +45,7 @@ class RoomEcho(nn.Module):
 
     It begins at zero, so that weights that know no sides stay what they are until it is trained.
 
-    Arguments:
-        width: channels of a node.
+    `width`: channels of a node.
 
     Shapes:
         x (N, width), features (N, M, SIDE_FEATURES), there (N, M) -> (N, width)
@@ -139,8 +138,7 @@ class LayoutContext:
 class LayoutDenoiser(nn.Module):
     """Predicts the objective's target for noisy boxes; each node has its own noise level, 0 = known.
 
-    Arguments:
-        config: its `layout` and what it shares with the other parts.
+    `config`: its `layout` and what it shares with the other parts.
 
     Raises ValueError for a negative number of drafts, or fewer layers than drafts and the last prediction need.
 

@@ -54,14 +54,9 @@ class LatentGraph(nn.Module):
         self.norm = nn.LayerNorm(width)
 
     def forward(
-        self,
-        category: Tensor,
-        pairs: Pairs,
-        *,
-        before: Pairs | None = None,
-        added: Tensor | None = None,
+        self, category: Tensor, pairs: Pairs, *, before: Pairs | None = None, added: Tensor | None = None,
         touched: Tensor | None = None,
-    ) -> Tensor:
+    ) -> Tensor:  # fmt: skip
         """Latent nodes of the edited graph.
 
         Arguments:

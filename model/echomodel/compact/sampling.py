@@ -70,8 +70,7 @@ PLAY = 0.1  # metres between the bottom of one and the top of the other
 def wholeness(grids: Tensor) -> Tensor:
     """Share of a shape's volume in its largest piece times the shares of its box's sides that it spans.
 
-    Arguments:
-        grids: (N, 64, 64, 64) float signed distances, negative inside.
+    `grids`: (N, 64, 64, 64) float signed distances, negative inside.
 
     Returns (N,) float32 in [0, 1]: 1 for one piece that fills its box, 0 for an empty grid.
     """
@@ -264,8 +263,7 @@ def _in_the_way(graph: GraphBatch) -> Tensor | None:
 def with_whole_styles(graph: GraphBatch, groups: Tensor) -> GraphBatch:
     """The graph with every two nodes of one group told to be of one style: who is like my like is like me.
 
-    Arguments:
-        groups: (N,) int64, number of each node's style group in [0, N).
+    `groups`: (N,) int64, number of each node's style group in [0, N).
     """
     alike = (groups[:, None] == groups) & (graph.scene[:, None] == graph.scene)
     subject, target = (alike & ~torch.eye(len(groups), dtype=torch.bool, device=groups.device)).nonzero(as_tuple=True)
@@ -275,14 +273,9 @@ def with_whole_styles(graph: GraphBatch, groups: Tensor) -> GraphBatch:
 
 @torch.no_grad()
 def sample_descriptions(
-    model: CompactModel,
-    graph: GraphBatch,
-    size: Tensor,
-    latent: Tensor,
-    equal: Tensor,
-    noise: Tensor,
+    model: CompactModel, graph: GraphBatch, size: Tensor, latent: Tensor, equal: Tensor, noise: Tensor,
     how: CompactSampling,
-) -> Tensor:
+) -> Tensor:  # fmt: skip
     """Descriptions (N, D) of all pieces of S scenes.
 
     Arguments:

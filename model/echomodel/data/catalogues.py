@@ -73,19 +73,10 @@ def _library(path: Path) -> list[MeshEntry]:
             continue
         if not all(0 < length < 1e5 for length in centimetres) or not np.isfinite(turn).all():
             continue  # nothing that could stand anywhere
-        entries.append(
-            MeshEntry(
-                key=key,
-                name=_plain(item["name"]),
-                group=item.get("category", ""),
-                size=np.array(centimetres) / 100,
-                licence=licence,
-                creator=_plain(item.get("creator", head.get("provider", ""))),
-                source=path,
-                member=item["model"].lstrip("/"),
-                turn=turn,
-            )
-        )
+        name, group, creator = item["name"], item.get("category", ""), item.get("creator", head.get("provider", ""))
+        entry = MeshEntry(key, _plain(name), group, np.array(centimetres) / 100, licence, _plain(creator), path,
+                          item["model"].lstrip("/"), turn)  # fmt: skip
+        entries.append(entry)
     return entries
 
 

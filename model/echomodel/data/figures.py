@@ -56,10 +56,8 @@ def _type_figures(rooms: list[RoomBoxes]) -> dict:
     presence = {}
     for category in sorted({c for count in counts for c in count}):
         held = [count[category] for count in counts if count[category]]
-        presence[category] = {
-            "share": len(held) / len(rooms),
-            "counts": {str(k): v for k, v in sorted(Counter(held).items())},
-        }
+        tally = {str(k): v for k, v in sorted(Counter(held).items())}
+        presence[category] = {"share": len(held) / len(rooms), "counts": tally}
     return {
         "rooms": len(rooms),
         "area": _percentiles(area, FIVE),
@@ -163,19 +161,13 @@ def _pairs(rooms: Iterable[RoomBoxes]) -> list[dict]:
             continue
         lateral, forward, gap, turn, faces = np.array(values).T
         quarter = np.round(turn / (math.pi / 2)).astype(int) % 4
+        spans = {"lateral": np.abs(lateral), "forward": forward, "gap": np.maximum(gap, 0)}
         out.append(
-            {
-                "child": child,
-                "anchor": anchor,
-                "n": len(values),
-                "lateral": _percentiles(np.abs(lateral), FIVE),
-                "forward": _percentiles(forward, FIVE),
-                "gap": _percentiles(np.maximum(gap, 0), FIVE),
-                "near": float((gap < 0.45).mean()),
-                "overlap": float((gap < 0).mean()),
-                "turn": [float((quarter == k).mean()) for k in range(4)],
-                "faces": float((faces < math.radians(30)).mean()),
-            }
+            {"child": child, "anchor": anchor, "n": len(values)}
+            | {name: _percentiles(of, FIVE) for name, of in spans.items()}
+            | {"near": float((gap < 0.45).mean()), "overlap": float((gap < 0).mean())}
+            | {"turn": [float((quarter == k).mean()) for k in range(4)]}
+            | {"faces": float((faces < math.radians(30)).mean())}
         )
     return out
 
@@ -237,8 +229,7 @@ def _percentiles(values: Iterable[float], at: tuple[int, ...]) -> list[float]:
 class Row:
     """One figure: what it is, here and in real rooms, and how far the two are apart.
 
-    Arguments:
-        distance: for shares their difference; for percentiles the mean difference, over the range of the real ones.
+    `distance`: for shares their difference; for percentiles the mean difference, over the range of the real ones.
     """
 
     section: str

@@ -94,17 +94,14 @@ def class_by_name(name: str, group: str, size: Sequence[float] | np.ndarray) -> 
     if group in OTHER_GROUPS or (group == "Exterior" and not re.search(r"chair|table|sofa|bench", text)):
         return ""
     word = next((category for pattern, category in RULES if re.search(pattern, text)), "none")
+    low = "side_table" if width < 0.65 else "coffee_table"
     choice = {
         "none": "",
         "bed?": "double_bed" if width >= 1.3 else "single_bed",
         "sofa?": "multi_seat_sofa" if width >= 1.75 else "loveseat_sofa",
         "stool?": "bar_stool" if height > 0.62 else "stool",
         "chair?": "office_chair" if group == "Office" and height > 0.75 else "chair",
-        "table?": "dining_table"
-        if height >= 0.62 and width >= 0.7
-        else "side_table"
-        if width < 0.65
-        else "coffee_table",
+        "table?": "dining_table" if height >= 0.62 and width >= 0.7 else low,
         "lamp?": "floor_lamp" if height > 1.0 else "table_lamp",
     }
     return choice.get(word, word)
@@ -122,19 +119,9 @@ def draft_table(entries: Sequence[MeshEntry], review: Mapping[str, dict[str, str
         known = review.get(entry.key, {})
         category = known.get("class", class_by_name(entry.name, entry.group, size))
         x, y, z = (round(float(v), 3) for v in size)
-        rows.append(
-            MeshRow(
-                key=entry.key,
-                category=category,
-                use=bool(category) and known.get("use", "1") != "0",
-                yaw=float(known.get("yaw", "0")),
-                name=entry.name,
-                size=(x, y, z),
-                split="train",
-                licence=entry.licence,
-                creator=entry.creator,
-            )
-        )
+        use, yaw = bool(category) and known.get("use", "1") != "0", float(known.get("yaw", "0"))
+        told = entry.licence, entry.creator
+        rows.append(MeshRow(entry.key, category, use, yaw, entry.name, (x, y, z), "train", *told))
     return _split(rows)
 
 
@@ -163,9 +150,8 @@ def write_table(path: Path, rows: Iterable[MeshRow]) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
         for r in rows:
-            writer.writerow(
-                [r.key, r.category, int(r.use), f"{r.yaw:g}", r.name, *r.size, r.split, r.licence, r.creator]
-            )
+            told = r.split, r.licence, r.creator
+            writer.writerow([r.key, r.category, int(r.use), f"{r.yaw:g}", r.name, *r.size, *told])
 
 
 def read_table(path: Path) -> list[MeshRow]:
@@ -188,11 +174,8 @@ def read_table(path: Path) -> list[MeshRow]:
                 found = f"use {raw['use']!r}, split {raw['split']!r}"
                 raise ValueError(f"{where}: {found}; use is 0 or 1, split is train or held_out")
             use = raw["use"] == "1" and bool(category)
-            rows.append(
-                MeshRow(
-                    raw["key"], category, use, yaw, raw["name"], (x, y, z), raw["split"], raw["licence"], raw["creator"]
-                )
-            )
+            told = raw["split"], raw["licence"], raw["creator"]
+            rows.append(MeshRow(raw["key"], category, use, yaw, raw["name"], (x, y, z), *told))
     return rows
 
 
@@ -205,15 +188,10 @@ def prepared(entry: MeshEntry, row: MeshRow, loaders: Mapping[str, Loader] | Non
 
 
 def build_meshes(
-    directory: str | os.PathLike[str],
-    entries: Sequence[MeshEntry],
-    rows: Sequence[MeshRow],
-    *,
-    copies: int = 2,
-    loaders: Mapping[str, Loader] | None = None,
-    progress: StepListener | None = None,
+    directory: str | os.PathLike[str], entries: Sequence[MeshEntry], rows: Sequence[MeshRow], *, copies: int = 2,
+    loaders: Mapping[str, Loader] | None = None, progress: StepListener | None = None,
     skipped: Callable[[str], None] | None = None,
-) -> ShapeSet:
+) -> ShapeSet:  # fmt: skip
     """Turn the meshes that the table uses into a shape set with thumbnails and ATTRIBUTION.md.
 
     Arguments:
@@ -247,9 +225,9 @@ def build_meshes(
             if progress:
                 progress(done, len(used))
         kept.append(row)
-        for record in _copies(tsdf, size, row, copies):
-            records.append(record)
-            names.append(row.key)
+        made = _copies(tsdf, size, row, copies)
+        records += made
+        names += [row.key] * len(made)
     for stale in folder.glob("shapes-*.bin"):
         stale.unlink()
     write_shard(folder / "shapes-0000.bin", records)

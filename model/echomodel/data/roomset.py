@@ -45,14 +45,9 @@ MILLIMETRES, STEPS = 1000.0, {"yaw": 1e4}  # steps to the unit of the numbers of
 
 
 def build_rooms(
-    directory: str | os.PathLike[str],
-    count: int,
-    seed: int,
-    styles: int,
-    progress: StepListener | None = None,
-    *,
+    directory: str | os.PathLike[str], count: int, seed: int, styles: int, progress: StepListener | None = None, *,
     halls: float = 0.0,
-) -> RoomSet:
+) -> RoomSet:  # fmt: skip
     """Generate a set of rooms, shard by shard; the same bytes for the same seed, whenever interrupted.
 
     Arguments:
@@ -164,8 +159,7 @@ def _tables_of(rooms: Sequence[RoomBoxes], held_out: Sequence[bool]) -> dict[str
 class RoomSet:
     """A set of rooms on disk, held in memory and labelled where it is asked.
 
-    Arguments:
-        directory: one file, or a folder with `rooms.json` and its files.
+    `directory`: one file, or a folder with `rooms.json` and its files.
 
     Attributes: `held_out` (n,) bool, `counts` (n,) objects per room, `info`, what the set says of itself. Raises
     ValueError for a folder without a finished set or with a damaged file.
@@ -209,18 +203,14 @@ class RoomSet:
         names = tuple(self.info["categories"][k] for k in objects["category"])
         styles = tuple(int(style) for style in objects["style"])
         return RoomBoxes(
-            id=f"room_{self.info['seed']}_{number:06d}",
-            room_type=self.info["room_types"][entry["type"]],
+            id=f"room_{self.info['seed']}_{number:06d}", room_type=self.info["room_types"][entry["type"]],
             floor_polygon=np.round(self._part("corners", number).astype(float), DIGITS),
-            height=round(float(entry["height"]), DIGITS),
-            categories=names,
+            height=round(float(entry["height"]), DIGITS), categories=names,
             size=np.round(objects["size"].astype(float), DIGITS),
-            position=np.round(objects["position"].astype(float), DIGITS),
-            yaw=objects["yaw"].astype(float),
+            position=np.round(objects["position"].astype(float), DIGITS), yaw=objects["yaw"].astype(float),
             models=tuple(f"s{style}_{name}" if style >= 0 else "" for style, name in zip(styles, names, strict=True)),
-            styles=styles,
-            openings=_openings(self._part("openings", number)),
-        )
+            styles=styles, openings=_openings(self._part("openings", number)),
+        )  # fmt: skip
 
     def relations(self, number: int, *, rules: str = "strict") -> np.ndarray:
         """(E, 3) int64 [subject, predicate, object] of one room; raises ValueError for unknown rules."""

@@ -73,17 +73,12 @@ class Scan:
         corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
         triples = [t for t in self.triples.tolist() if t[0] in place and t[2] in place]
         return RoomBoxes(
-            id=self.name,
-            room_type=self.room_type,
-            floor_polygon=corners,
+            id=self.name, room_type=self.room_type, floor_polygon=corners,
             height=float(max([2.6, *(self.position[keep, 1] + self.size[keep, 1])])),
-            categories=tuple(self.fine[k] for k in keep),
-            size=self.size[keep],
-            position=self.position[keep],
-            yaw=self.yaw[keep],
-            models=tuple(self.model_ids[k] for k in keep),
+            categories=tuple(self.fine[k] for k in keep), size=self.size[keep], position=self.position[keep],
+            yaw=self.yaw[keep], models=tuple(self.model_ids[k] for k in keep),
             relations=np.array([[place[s], p, place[o]] for s, p, o in triples], np.int64).reshape(-1, 3),
-        )
+        )  # fmt: skip
 
 
 class SGFront:
@@ -196,15 +191,10 @@ class SGFront:
             triples.append((local[str(subject)], predicate, local[str(object_)]))
         values = np.array(params, float)
         return Scan(
-            name=name,
-            fine=tuple(objects.values()),
-            model_ids=tuple(models),
-            size=values[:, :3],
-            position=values[:, 3:6] - np.array(centre, float),
-            yaw=values[:, 6],
-            centre=np.array(centre, float),
+            name=name, fine=tuple(objects.values()), model_ids=tuple(models), size=values[:, :3],
+            position=values[:, 3:6] - np.array(centre, float), yaw=values[:, 6], centre=np.array(centre, float),
             triples=np.array(triples, np.int64).reshape(-1, 3),
-        )
+        )  # fmt: skip
 
 
 def small_mapping() -> dict[str, str]:
@@ -217,14 +207,9 @@ ON_FLOOR = 0.04  # metres
 
 
 def write_sgfront(
-    folder: str | os.PathLike[str],
-    rooms: Sequence[RoomBoxes],
-    *,
-    split: str = "trainval",
-    room: str = "all",
-    drop: float = 0.5,
-    seed: int = 0,
-) -> None:
+    folder: str | os.PathLike[str], rooms: Sequence[RoomBoxes], *, split: str = "trainval", room: str = "all",
+    drop: float = 0.5, seed: int = 0,
+) -> None:  # fmt: skip
     """Write rooms as one split of SG-FRONT, labelled by its rules, with the floor as the last object of each scan.
 
     Arguments:

@@ -130,8 +130,7 @@ def write_shard(path: str | os.PathLike[str], records: Iterable[ShapeRecord]) ->
 class ShapeSet:
     """A set of shapes on disk, read shape by shape through memory maps.
 
-    Arguments:
-        directory: folder with `shapes.json` and its shards.
+    `directory`: folder with `shapes.json` and its shards.
 
     Attributes: `category` (n,) int class ids, `style` (n,) int, `size` (n, 3) float32 metres, `held_out` (n,) bool and
     `info`, the content of `shapes.json`. Raises ValueError for a folder without a finished set or with a damaged shard.
@@ -141,9 +140,8 @@ class ShapeSet:
         self.directory = Path(directory)
         index = self.directory / "shapes.json"
         if not index.exists():
-            hint = (
-                "unfinished set, run the build again" if (self.directory / "plan.json").exists() else "no shapes.json"
-            )
+            unfinished = (self.directory / "plan.json").exists()
+            hint = "unfinished set, run the build again" if unfinished else "no shapes.json"
             raise ValueError(f"{self.directory}: not a shape set ({hint})")
         self.info: dict = read_note(index, count=int, categories=list)
         self.categories: tuple[str, ...] = tuple(self.info["categories"])

@@ -56,8 +56,7 @@ def bookshelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
 def _books(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float, rng: np.random.Generator) -> list[Solid]:
     """What stands in a cell: books upright, the last one leaning, then a lying pile, or nothing.
 
-    Arguments:
-        x0, x1, y0, y1, z0, z1: the free space of the cell, metres.
+    `x0`, `x1`, `y0`, `y1`, `z0`, `z1`: the free space of the cell, metres.
     """
     x, end = x0, x0 + (x1 - x0) * rng.uniform(0.4, 0.8)
     deep, most = min(0.21, z1 - z0), min(0.92 * (y1 - y0), 0.29)

@@ -28,8 +28,7 @@ POINTS = 160  # on the surface of a solid
 def loose_solids(solids: Sequence[Solid]) -> list[int]:
     """Numbers of the solids that no chain of touching solids joins to the largest body of the piece.
 
-    Arguments:
-        solids: of a furniture program, metres; cores do not count.
+    `solids`: of a furniture program, metres; cores do not count.
     """
     seen = [number for number, solid in enumerate(solids) if not solid.core]
     group, main = group_of([solids[number] for number in seen])
@@ -119,8 +118,7 @@ def style_scores(
 def style_distances(descriptions: Tensor) -> Tensor:
     """(N, N) in [0, 1]: mean of the share of kinds that differ and of how far the proportions lie apart.
 
-    Arguments:
-        descriptions: (N, D).
+    `descriptions`: (N, D).
     """
     kinds = torch.stack([part.argmax(1) for part in descriptions[:, :HOT].split(GROUPS, 1)], 1)
     differ = (kinds[:, None] != kinds).float().mean(2)

@@ -224,8 +224,7 @@ def told_by_pictures(made: np.ndarray, real: np.ndarray, seed: int) -> Figure:
 
     It is no published classifier. The n-th of both fall into the same half, so that no furniture is seen twice.
 
-    Arguments:
-        made, real: (n, 256, 256, 3) uint8.
+    `made`, `real`: (n, 256, 256, 3) uint8.
     """
     sides = [torch.from_numpy(part).permute(0, 3, 1, 2).float() / 127.5 - 1 for part in (made, real)]
     x = torch.cat([nn.functional.avg_pool2d(part, SIDE // SMALL) for part in sides])

@@ -140,8 +140,7 @@ def told_apart(made: Sequence[RoomBoxes], real: Sequence[RoomBoxes], seed: int, 
     It judges rooms that it was not trained on; a room's score is the mean over its objects. Fewer rooms than there are
     folds of them are not told apart: no value.
 
-    Arguments:
-        paired: the n-th of both are the same furniture, and judged by the same fold.
+    `paired`: the n-th of both are the same furniture, and judged by the same fold.
     """
     from sklearn.ensemble import RandomForestClassifier
     from sklearn.metrics import roc_auc_score

@@ -96,8 +96,7 @@ def extended(task: Task, rng: np.random.Generator) -> Task:
 def kept_relations(task: Task, room: RoomBoxes) -> dict[str, Pair]:
     """Group of relations (a share a predicate), `all`, and for an edit `edited` and `rest` -> (kept, of how many).
 
-    Arguments:
-        room: its boxes as a system made them.
+    `room`: its boxes as a system made them.
     """
     verdict = verdicts(Boxes.from_room(room), torch.from_numpy(task.told), rules=task.rules).numpy()
     names = np.array([vocabulary().predicates[k].name for k in task.told[:, 1]], dtype=object)

@@ -39,13 +39,9 @@ class Ways:
 
 
 def ways(
-    size: np.ndarray,
-    position: np.ndarray,
-    yaw: np.ndarray,
-    obstacle: np.ndarray,
-    polygon: np.ndarray,
+    size: np.ndarray, position: np.ndarray, yaw: np.ndarray, obstacle: np.ndarray, polygon: np.ndarray,
     openings: Sequence[Opening] = (),
-) -> Ways:
+) -> Ways:  # fmt: skip
     """Walk from the doors and passages, or in the largest free part of the room where there are none.
 
     Arguments:
@@ -178,14 +174,9 @@ class Fault:
 
 
 def faults(
-    boxes: BoxesLike,
-    categories: Sequence[str],
-    floor: np.ndarray | None = None,
-    openings: Sequence[Opening] = (),
-    relations: np.ndarray | Tensor | None = None,
-    *,
-    given: np.ndarray | None = None,
-) -> list[Fault]:
+    boxes: BoxesLike, categories: Sequence[str], floor: np.ndarray | None = None, openings: Sequence[Opening] = (),
+    relations: np.ndarray | Tensor | None = None, *, given: np.ndarray | None = None,
+) -> list[Fault]:  # fmt: skip
     """What a person would point at in a room, in the order of the terms; see `plan_of` for the arguments.
 
     A term counts a box at most once. What the relations state decides whom a box attends.

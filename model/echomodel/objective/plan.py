@@ -324,8 +324,7 @@ class Plan:
     def ahead(self, i: Tensor, j: Tensor, sign: float = 1.0) -> tuple[Tensor, Tensor, Tensor]:
         """(P,) each, metres: from i's front to j, of i's width that j covers, and how far j's middle lies before i's.
 
-        Arguments:
-            sign: -1 looks at i's back.
+        `sign`: -1 looks at i's back.
         """
         lateral, forward = self.local(j, i)
         half_width, half_depth = self.reach(j, i)
@@ -482,18 +481,11 @@ class Plan:
 
 
 def plan_of(
-    boxes: BoxesLike,
-    categories: Sequence[str],
-    floor: np.ndarray | Tensor | None = None,
-    openings: Sequence[Opening] = (),
-    relations: np.ndarray | Tensor | None = None,
-    *,
-    given: np.ndarray | None = None,
-    height: float | None = None,
-    rules: str = "strict",
-    stated: Sequence[Stated] = (),
+    boxes: BoxesLike, categories: Sequence[str], floor: np.ndarray | Tensor | None = None,
+    openings: Sequence[Opening] = (), relations: np.ndarray | Tensor | None = None, *, given: np.ndarray | None = None,
+    height: float | None = None, rules: str = "strict", stated: Sequence[Stated] = (),
     dtype: torch.dtype = torch.float64,
-) -> Plan:
+) -> Plan:  # fmt: skip
     """The plan of one room.
 
     Arguments:

@@ -98,18 +98,14 @@ def _boxes(builder: Builder, name: str, room_type: str) -> RoomBoxes:
     plan = turned(np.array([(item.x, item.z) for item in chosen]))
     yaw = mirror * np.array([item.yaw for item in chosen]) + (math.pi if turn < 0 else 0.0)
     return RoomBoxes(
-        id=name,
-        room_type=room_type,
-        floor_polygon=turned(np.array(builder.floor.polygon)),
-        height=builder.floor.height,
-        categories=tuple(item.category for item in chosen),
+        id=name, room_type=room_type, floor_polygon=turned(np.array(builder.floor.polygon)),
+        height=builder.floor.height, categories=tuple(item.category for item in chosen),
         size=np.array([item.size for item in chosen]),
         position=np.stack([plan[:, 0], [item.y for item in chosen], plan[:, 1]], -1),
         yaw=(yaw + math.pi) % (2 * math.pi) - math.pi,
-        models=tuple(f"s{item.style}_{item.category}" for item in chosen),
-        styles=tuple(item.style for item in chosen),
+        models=tuple(f"s{item.style}_{item.category}" for item in chosen), styles=tuple(item.style for item in chosen),
         openings=tuple(_seen_in_a_mirror(o) if mirror < 0 else o for o in builder.floor.openings),
-    )
+    )  # fmt: skip
 
 
 def _seen_in_a_mirror(opening: Opening) -> Opening:

@@ -32,14 +32,9 @@ WINDOWS = {  # by use of a room: sill, height, width at most, metres; above work
 
 
 def place_openings(
-    polygon: np.ndarray,
-    height: float,
-    rng: np.random.Generator,
-    *,
-    boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
-    stated: Sequence[Opening] = (),
-    use: str = "",
-) -> tuple[Opening, ...]:
+    polygon: np.ndarray, height: float, rng: np.random.Generator, *,
+    boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None, stated: Sequence[Opening] = (), use: str = "",
+) -> tuple[Opening, ...]:  # fmt: skip
     """A door and one or two windows (two doors in halls), each where least stands in its way.
 
     Doors like the end of a wall with the hinges at the corner, windows the middle of another wall.
@@ -64,14 +59,9 @@ def place_openings(
 
 
 def _best(
-    kind: str,
-    polygon: np.ndarray,
-    height: float,
-    rng: np.random.Generator,
-    made: Sequence[Opening],
-    boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None,
-    use: str,
-) -> Opening | None:
+    kind: str, polygon: np.ndarray, height: float, rng: np.random.Generator, made: Sequence[Opening],
+    boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None, use: str,
+) -> Opening | None:  # fmt: skip
     """The place of least cost among a grid of places on all walls, None where no wall is long enough."""
     import shapely
 

@@ -23,8 +23,7 @@ _KNOTS = {5: (-1.645, -0.674, 0.0, 0.674, 1.645), 3: (-1.645, 0.0, 1.645)}
 class RoomTypeStatistics:
     """Percentiles (5, 25, 50, 75, 95) of one kind of room in metres, and which categories it holds.
 
-    Arguments:
-        presence: category -> (share of rooms that have it, counts and their shares).
+    `presence`: category -> (share of rooms that have it, counts and their shares).
     """
 
     name: str
@@ -68,16 +67,10 @@ def room_type_statistics(name: str, *, requests: bool = True) -> RoomTypeStatist
         share = asked.get(category, entry["share"])
         presence[category] = (share, counts, tuple(np.cumsum(weights / weights.sum()).tolist()))
     return RoomTypeStatistics(
-        name=name,
-        area=tuple(raw["area"]),
-        short=tuple(raw["short"]),
-        long=tuple(raw["long"]),
-        height=tuple(raw["height"]),
-        rectangular=raw["rectangular"],
-        objects=tuple(raw["objects"]),
-        cuts=vocabulary().room_type(name).cuts,
-        presence=presence,
-    )
+        name=name, area=tuple(raw["area"]), short=tuple(raw["short"]), long=tuple(raw["long"]),
+        height=tuple(raw["height"]), rectangular=raw["rectangular"], objects=tuple(raw["objects"]),
+        cuts=vocabulary().room_type(name).cuts, presence=presence,
+    )  # fmt: skip
 
 
 def _planned(row: RoomType, like: RoomTypeStatistics) -> RoomTypeStatistics:

@@ -61,19 +61,13 @@ class PackedRooms:
         graphs = [GraphBatch.from_room(room) for room in rooms]
         boxes = Boxes.cat([Boxes.from_room(room) for room in rooms])
         return cls(
-            category=torch.cat([g.category for g in graphs]),
-            size=boxes.size,
-            position=boxes.position,
-            yaw=boxes.yaw,
+            category=torch.cat([g.category for g in graphs]), size=boxes.size, position=boxes.position, yaw=boxes.yaw,
             style=torch.tensor([s for room in rooms for s in (room.styles or (-1,) * len(room))]),
-            count=torch.tensor([len(room) for room in rooms]),
-            room_type=torch.cat([g.room_type for g in graphs]),
-            floor=padded([g.floor for g in graphs]),
-            openings=padded_rows([g.openings for g in graphs]),
-            rules=torch.full((len(rooms),), rules),
-            bits=torch.cat([_bits(g) for g in graphs]),
+            count=torch.tensor([len(room) for room in rooms]), room_type=torch.cat([g.room_type for g in graphs]),
+            floor=padded([g.floor for g in graphs]), openings=padded_rows([g.openings for g in graphs]),
+            rules=torch.full((len(rooms),), rules), bits=torch.cat([_bits(g) for g in graphs]),
             allowed=torch.cat([_allowed(room) for room in rooms]),
-        )
+        )  # fmt: skip
 
     @classmethod
     def from_set(cls, rooms: RoomSet, rules: Sequence[str], *, held: bool) -> PackedRooms:
@@ -125,8 +119,7 @@ class LayoutBatch:
 def draw_batch(rooms: PackedRooms, node_budget: int, generator: torch.Generator, dense: float = DENSE) -> LayoutBatch:
     """Draw rooms until the node budget is reached, mirror them, thin their relations and make pseudo edits.
 
-    Arguments:
-        dense: share of the rooms whose graphs tell 30 to 100 % of all relations.
+    `dense`: share of the rooms whose graphs tell 30 to 100 % of all relations.
     """
     picked = torch.randint(len(rooms), (node_budget,), generator=generator)
     fits = rooms.count[picked].cumsum(0) <= node_budget

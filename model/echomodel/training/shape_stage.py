@@ -53,13 +53,9 @@ class ShapeBatch:
 
 
 def shape_loss(
-    model: CompactModel,
-    batch: ShapeBatch,
-    clean: Tensor,
-    size: Tensor,
-    generator: torch.Generator,
+    model: CompactModel, batch: ShapeBatch, clean: Tensor, size: Tensor, generator: torch.Generator,
     graph_latent: Tensor | None = None,
-) -> tuple[Tensor, dict[str, Tensor]]:
+) -> tuple[Tensor, dict[str, Tensor]]:  # fmt: skip
     """Denoising loss of the unknown objects' codes.
 
     Arguments:
@@ -270,8 +266,7 @@ class JointStage:
     A batch of scenes feeds the layout branch and a smaller one, within the node budget of shapes, the shape branch
     (Supplement, batch size definition); both pass the same encoder and manipulator.
 
-    Arguments:
-        layout, shape: the two stages, with their data and budgets.
+    `layout`, `shape`: the two stages, with their data and budgets.
     """
 
     trained = saved = ("latent", "layout", "shape")

@@ -73,15 +73,9 @@ class Trainer:
     """
 
     def __init__(
-        self,
-        recipe: Recipe,
-        model: Trainable,
-        stage: TrainingStage,
-        folder: Path,
-        *,
-        resume: bool = False,
+        self, recipe: Recipe, model: Trainable, stage: TrainingStage, folder: Path, *, resume: bool = False,
         report: Report | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.recipe, self.model, self.stage, self.folder = recipe, model, stage, folder
         self.report = report or (lambda step, values: None)
         self.rank, self.world = int(os.environ.get("RANK", 0)), int(os.environ.get("WORLD_SIZE", 1))
