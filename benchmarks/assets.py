@@ -21,7 +21,7 @@ import numpy as np
 from echomodel.data.meshes import draft_table
 from echomodel.loading import load_model
 from echomodel.vocabulary import vocabulary
-from echousd.assets.catalogues.sweethome import CATALOGUE
+from echousd.assets.catalogues import entries_of
 from echousd.assets.choose import Asked, AssetWishes, choose
 from echousd.assets.describe import described, front_by_shape, named_by_shape
 from echousd.assets.measure import measure
@@ -64,7 +64,7 @@ def main() -> None:
     parser.add_argument("--rooms", type=int, default=20)
     parser.add_argument("--every", type=int, default=4, help="take every so-many-th model for the times")
     given = parser.parse_args()
-    entries = CATALOGUE.entries(given.folder, print)
+    entries = entries_of(given.folder, print)
     for descriptors in (False, True):
         each, records = indexing(entries[:: given.every], descriptors)
         told = "with" if descriptors else "without"

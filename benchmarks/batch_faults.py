@@ -23,8 +23,7 @@ import time
 from pathlib import Path
 
 from echousd.batches.executor import resident
-from echousd.batches.journal import read_journals, room_digest
-from echousd.batches.plan import load_plan
+from echousd.batches.plan import load_plan, read_journals, room_digest
 from echousd.batches.verify import verify
 from echousd.checks import check
 

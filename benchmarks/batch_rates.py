@@ -26,12 +26,10 @@ from typing import Any
 
 from echomodel.echo import EchoModel
 from echousd.batches import work
-from echousd.batches.batch import weights_hash
+from echousd.batches.batch import BatchProgress, Run, RunOptions, weights_hash
 from echousd.batches.executor import LocalWorkers, Outcome, Task, attempt
-from echousd.batches.journal import Journal, shard_folder
 from echousd.batches.options import BatchRequest, request_of
-from echousd.batches.plan import make_plan, save_plan
-from echousd.batches.run import BatchProgress, Run, RunOptions
+from echousd.batches.plan import Journal, make_plan, save_plan, shard_folder
 from echousd.make import layouts as layouts_module
 from echousd.store import Store
 

@@ -148,8 +148,7 @@ def batch(rooms: int, first: int, product: float) -> None:
     from echomodel.loading import load_model
     from echousd.batches.sources import sampled_graph
     from echousd.graph.floors import with_plan
-    from echousd.make.layouts import Draws, best_boxes, most_drafts
-    from echousd.make.packed import first_drafts
+    from echousd.make.layouts import Draws, best_boxes, first_drafts, most_drafts
     from echousd.progress import StageTimer
     from echousd.shapes.styles import style_groups
 

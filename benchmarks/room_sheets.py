@@ -26,7 +26,7 @@ from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd import generate
 from echousd.graph import SceneGraph, load_graph
-from echousd.graph.starting import starting_graph
+from echousd.graph.files import starting_graph
 from echousd.make.finished import Room
 from echousd.place.living import living_faults
 

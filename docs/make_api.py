@@ -15,8 +15,8 @@ from echomodel.rules import rule_set
 from echomodel.rules.placements import RULES as PLACES
 from echousd.checks import CheckReport, Collision, Fault, MeasuredRelation, Misplacement
 from echousd.checks.report import LayoutReport
-from echousd.graph.difference import GraphDiff
 from echousd.graph.nodes import PlainModel
+from echousd.graph.scene import GraphDiff
 from echousd.home.assemble import Made
 from echousd.home.graph import HomeRelation, HomeRoom
 from echousd.home.importing.homes import Imported
@@ -25,7 +25,7 @@ from echousd.options import GROUPS, OF_NEW, RoomOptions, limits_of, words_of
 from echousd.place.living import LivingFault
 from echousd.room import LayoutOutcome, Provenance, Verdict
 from echousd.settle import Motion, SettleReport
-from echousd.shapes.finishes.harmonies import HARMONIES
+from echousd.shapes.finishes.slots import HARMONIES
 
 PAGE = Path(__file__).with_name("API.md")
 ORDER = ("SceneGraph", "generate", "Room", "RoomOptions", "edit", "check", "render", "export", "load_model",

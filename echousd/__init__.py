@@ -67,35 +67,11 @@ _HOME = {
     "vocabulary": "echomodel.vocabulary",
 }
 __all__ = [
-    "GraphError",
-    "HomeGraph",
-    "Node",
-    "Relation",
-    "Room",
-    "RoomOptions",
-    "RoomSpec",
-    "SceneGraph",
-    "batch",
-    "check",
-    "edit",
-    "export",
-    "export_texture_job",
-    "generate",
-    "generate_home",
-    "generate_many",
-    "import_plan",
-    "import_texture_job",
-    "load_model",
-    "plan_home",
-    "read_dressing",
-    "read_graph",
-    "read_rooms",
-    "relations_from_boxes",
-    "render",
-    "update_graph",
-    "vocabulary",
-    "write_graph",
-]
+    "GraphError", "HomeGraph", "Node", "Relation", "Room", "RoomOptions", "RoomSpec", "SceneGraph", "batch", "check",
+    "edit", "export", "export_texture_job", "generate", "generate_home", "generate_many", "import_plan",
+    "import_texture_job", "load_model", "plan_home", "read_dressing", "read_graph", "read_rooms",
+    "relations_from_boxes", "render", "update_graph", "vocabulary", "write_graph",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from importlib import import_module, metadata, resources, util
 from pathlib import Path
 
+from echousd import plugin
+
 # Optional extra of the distribution, the modules it brings, what needs it.
 EXTRAS = (
     ("render", ("embreex",), "fast ray casting for pictures"),
@@ -67,7 +69,6 @@ def _usd() -> Iterator[Diagnosis]:
 
 
 def _plugin() -> Iterator[Diagnosis]:
-    from echousd import plugin
 
     folder = plugin.plugin_path()
     if util.find_spec("pxr") is None:

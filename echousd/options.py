@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from echousd.assets.record import STRETCH
+from echousd.graph.fields import SHAPES
 from echousd.graph.nodes import PlainModel
 
 if TYPE_CHECKING:
@@ -45,14 +46,13 @@ def row(default: Any, group: str, help: str, *, everyday: bool = False, words: s
 
 
 def _source(name: str) -> str:
-    from echousd.shapes.sources import shape_source
-
-    shape_source(name)
+    if name not in SHAPES:
+        raise ValueError(f"shapes is {name!r}, allowed: {', '.join(SHAPES)}")
     return name
 
 
 def _palette(name: str) -> str:
-    from echousd.shapes.finishes.harmonies import HARMONIES
+    from echousd.shapes.finishes.slots import HARMONIES
 
     if name and name not in HARMONIES:
         raise ValueError(f"palette is {name!r}, allowed: {', '.join(HARMONIES)}")

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import trimesh
 
+from echousd.graph import SceneGraph
 from echousd.options import RoomOptions
 from echousd.shapes.styles import style_groups
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
-    from echousd.graph import SceneGraph
     from echousd.place.report import Collision
     from echousd.shapes.geometry import Geometry
 

@@ -26,7 +26,7 @@ LAYERS = (
     ("exporting",),
     ("draw",),
     ("stage",),
-    ("reproducible", "store", "tensors"),
+    ("store", "tensors"),
     ("graph",),
     ("naming", "pending", "plugin", "progress", "srgb", "textures"),
 )
@@ -105,15 +105,6 @@ def test_no_circle_between_packages(imports, whole, edges):
                 graph.add_edge(package_of(module), package_of(target))
     assert graph.number_of_edges() > edges
     assert [sorted(group) for group in networkx.strongly_connected_components(graph) if len(group) > 1] == []
-
-
-def test_commands_are_functions_of_their_modules():
-    """`register` only adds them, so that they can be called and read by themselves."""
-    for path in (ROOT / "echousd" / "cli").glob("*.py"):
-        for node in ast.parse(path.read_text("utf-8")).body:
-            if isinstance(node, ast.FunctionDef) and node.name == "register":
-                inner = [part.name for part in ast.walk(node) if isinstance(part, ast.FunctionDef) and part is not node]
-                assert inner == [], path
 
 
 @pytest.mark.parametrize("package", FORBIDDEN)

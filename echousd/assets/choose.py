@@ -14,11 +14,10 @@ import numpy as np
 
 from echomodel.sizes import size_statistics
 from echomodel.vocabulary import Category, vocabulary
-from echousd.assets.colors import MOST, oklab
+from echousd.assets.colors import MOST, apart, main_colors, oklab, told_colors
+from echousd.assets.colors import costs as color_costs
+from echousd.assets.colors import table as color_table
 from echousd.assets.licences import allowed
-from echousd.assets.matching import apart, main_colors, told_colors
-from echousd.assets.matching import costs as color_costs
-from echousd.assets.matching import table as color_table
 from echousd.assets.record import STRETCH, AssetRecord
 from echousd.assets.table import Library
 

@@ -11,11 +11,10 @@ import trimesh
 
 from echomodel.files import within_memory
 from echomodel.vocabulary import vocabulary
-from echousd.assets.catalogues.entry import Entry
+from echousd.assets.catalogues import Entry
 from echousd.assets.colors import dominant
 from echousd.assets.licences import UNKNOWN, spdx
-from echousd.assets.measure import measure
-from echousd.assets.measured import Measured
+from echousd.assets.measure import Measured, measure
 from echousd.assets.model_file import ModelFile, relative
 from echousd.assets.naming import category_of, likely_unit
 from echousd.assets.record import UPRIGHT, Z_UP, AssetRecord, vector

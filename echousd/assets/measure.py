@@ -1,22 +1,69 @@
-"""Read a model of any kind: stages by USD, glTF by trimesh, OBJ here, whose material libraries are read as well."""
+"""Models as they were read: stages by USD, glTF by trimesh, OBJ and its material libraries here, many times faster."""
 
 from __future__ import annotations
 
+import contextlib
+import re
 import warnings
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 import trimesh
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdUtils
 
 from echomodel.files import within_memory
-from echousd.assets.colors import Coat, flat, pixels
-from echousd.assets.measured import Measured
-from echousd.assets.model_file import STAGES, ModelFile
-from echousd.assets.stages import measured_stage
-from echousd.assets.wavefront import measured_obj
+from echomodel.triangles import area_normals
+from echousd.assets.colors import Coat, flat, pixels, texels
+from echousd.assets.model_file import STAGES, Beside, ModelFile
+from echousd.draw.drawables import Paint, fans, paints_of
 from echousd.srgb import to_linear
+from echousd.stage.contents import triangles_of
+from echousd.stage.encoding import StageError
+from echousd.stage.files import open_stage
+from echousd.stage.foreign import object_box
+from echousd.stage.forms import Form, Polygons, SkippedForms, forms, polygons
+from echousd.stage.labels import labels
+from echousd.stage.units import metres_per_unit, up_axis
+from echousd.textures import TextureError, texture_bytes
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A model as it was read, in its own frame and unit.
+
+    Arguments:
+        points: (v, 3) float. faces: (f, 3) int.
+        metres: per unit, None where the file does not say. z_up: whether +Z points up.
+        above: (4, 4) float, from the frame above its root prim to its own frame, as only a prim below others has one.
+        yaw: radians by which a prim of a stage stands turned about its up axis, counter-clockwise seen from above.
+        coats: areas of its surface with what covers them (`echousd.assets.colors.Coat`), where they were asked for.
+        others: as in `AssetRecord`.
+    """
+
+    points: np.ndarray
+    faces: np.ndarray
+    metres: float | None = None
+    z_up: bool = False
+    prim: str = ""
+    above: np.ndarray = field(default_factory=lambda: np.eye(4))
+    yaw: float = 0.0
+    labels: tuple[str, ...] = ()
+    materials: tuple[str, ...] = ()
+    licence: str = ""
+    author: str = ""
+    joints: int = 0
+    bodies: bool = False
+    colliders: bool = False
+    variants: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
+    coats: tuple[Coat, ...] = ()
+
+    def turned(self, turn: np.ndarray) -> trimesh.Trimesh:
+        """The surface after a rotation (3, 3), in the model's own unit."""
+        return trimesh.Trimesh(self.points @ turn.T, self.faces, process=False)
 
 
 def measure(model: ModelFile, *, painted: bool = False) -> Measured:
@@ -110,3 +157,201 @@ def _cover(part: trimesh.Trimesh) -> np.ndarray | None:
             return None
     shown: Any = part.visual
     return flat(to_linear(np.asarray(shown.main_color, float) / 255))
+
+
+FACE = re.compile(r"^f[ \t]+(.+?)[ \t]*$", re.MULTILINE)
+VERTEX = re.compile(r"^v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+MATERIAL = re.compile(r"^usemtl[ \t]+(.+?)[ \t]*$", re.MULTILINE)
+
+
+def measured_obj(model: ModelFile, text: str, *, painted: bool = False) -> Measured:
+    """Triangles of an OBJ, names of its materials, textures that are missing; with `painted`, its colours as well.
+
+    Raises ValueError that names the file for one that cannot be read.
+    """
+    points = np.array(VERTEX.findall(text), float).reshape(-1, 3)
+    pieces = MATERIAL.split(text)  # what stands before the first name, then names and what follows them in turns
+    names = ["", *pieces[1::2]]
+    found = [FACE.findall(piece) for piece in pieces[::2]]
+    lines = re.sub(r"/\S*|#.*", "", "\n".join(line for piece in found for line in piece)).splitlines()
+    slot = np.repeat(np.arange(len(names)), [len(piece) for piece in found])
+    counts = np.array([len(line.split()) for line in lines], int)
+    corners = np.array(" ".join(lines).split(), int)
+    if (corners < 0).any():
+        raise ValueError(f"{model}: faces count points from the end, allowed: plain numbers; write it again")
+    starts = np.cumsum(counts) - counts
+    triangles, slots = [np.zeros((0, 3), int)], [np.zeros(0, int)]
+    for count in np.unique(counts[counts > 2]):
+        first = starts[counts == count]
+        for k in range(1, count - 1):
+            triangles.append(corners[np.stack([first, first + k, first + k + 1], 1)] - 1)
+            slots.append(slot[counts == count])
+    faces = np.concatenate(triangles)
+    beside = model.beside()
+    coats = dict(_obj_coats(re.findall(r"^mtllib[ \t]+(.+?)[ \t]*$", text, re.MULTILINE), beside, painted))
+    inside = len(faces) > 0 and faces.min() >= 0 and faces.max() < len(points)
+    seen: list[Coat] = []
+    if painted and coats and inside:
+        area = np.bincount(np.concatenate(slots), np.linalg.norm(area_normals(points[faces]), axis=1), len(names))
+        seen = [(float(area[k]), coats[name]) for k, name in enumerate(names) if name in coats and area[k] > 0]
+    used = tuple(dict.fromkeys(names[1:]))
+    return Measured(points, faces, materials=used, missing=tuple(dict.fromkeys(beside.missing)), coats=tuple(seen))
+
+
+def _obj_coats(libraries: list[str], beside: Beside, painted: bool) -> Iterator[tuple[str, np.ndarray]]:
+    """(name, what covers a surface) of the materials of some MTL files; their images are looked for in any case."""
+    images: dict[str, np.ndarray | None] = {}
+    for library in libraries:
+        try:
+            content = beside.get(library.strip()).decode("utf-8", "replace")
+        except ValueError:
+            continue
+        for piece in re.split(r"^[ \t]*newmtl[ \t]+", content, flags=re.MULTILINE | re.IGNORECASE)[1:]:
+            name, _, rest = piece.partition("\n")
+            lines = re.findall(r"^[ \t]*(Kd|map_Kd|d|Tr)[ \t]+(.+?)[ \t]*$", rest, re.MULTILINE | re.IGNORECASE)
+            said = {word.lower(): value for word, value in lines}
+            image = said.get("map_kd", "")
+            if image not in images:
+                images[image] = _image(image, beside, painted)
+            coat = _plain(said) if images[image] is None else images[image]
+            if painted and coat is not None:
+                yield name.strip(), coat
+
+
+def _image(name: str, beside: Beside, painted: bool) -> np.ndarray | None:
+    try:
+        content = beside.get(name) if name else b""
+    except ValueError:
+        return None
+    return texels(content) if painted else None
+
+
+def _plain(said: dict[str, str]) -> np.ndarray | None:
+    try:
+        color = np.clip(np.array(said["kd"].split()[:3], float), 0, 1)
+        opacity = float(said["d"].split()[-1]) if "d" in said else 1.0 - float(said.get("tr", "0").split()[0])
+    except (KeyError, ValueError):
+        return None
+    if len(color) != 3 or not np.isfinite([*color, opacity]).all():
+        return None
+    return flat(to_linear(color), opacity)
+
+
+IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".tga", ".tif", ".tiff", ".bmp", ".webp", ".avif", ".hdr")
+
+
+def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) -> Measured:
+    """What a USD file says of the model in it; raises StageError (a ValueError) as `open_stage` does.
+
+    Arguments:
+        path: of the file. prim_path: of the model's prim where the stage holds more than it, "" = its root.
+        painted: with its colours.
+    """
+    stage = open_stage(path)
+    root = root_prim(stage, path) if not prim_path else named_prim(stage, path, prim_path)
+    cache = UsdGeom.XformCache()
+    box = object_box(root) if prim_path else None
+    points, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), int)], 0
+    coats: list[Coat] = []
+    known: dict[str, Paint] = {}
+    covers: dict[Paint, np.ndarray] = {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SkippedForms)
+        for form in forms(root, cache, _visible):
+            surface = polygons(form.prim)
+            triangles = triangles_of(surface)
+            if len(triangles):
+                points.append(surface.points @ form.world[:3, :3].T + form.world[:3, 3])
+                faces.append(triangles + count)
+                count += len(surface.points)
+                coats += _stage_coats(form, surface, known, covers) if painted else ()
+    prims = [root, *Usd.PrimRange(root, Usd.TraverseInstanceProxies())]
+    layer = stage.GetRootLayer()
+    data = dict(layer.customLayerData)
+    words = {str(key).lower(): str(value) for key, value in data.items() if isinstance(value, str)}
+    joints = sum(prim.IsA(UsdPhysics.Joint) for prim in prims[1:])
+    variants = tuple(
+        f"{name}={root.GetVariantSet(name).GetVariantSelection()}" for name in root.GetVariantSets().GetNames()
+    )
+    return Measured(
+        np.concatenate(points),
+        np.concatenate(faces),
+        metres=metres_per_unit(stage) if _says_unit(stage) else None,
+        z_up=up_axis(stage) == UsdGeom.Tokens.z,
+        prim=str(root.GetPath()),
+        above=np.array(cache.GetParentToWorldTransform(root)).T,
+        yaw=0.0 if box is None else box.yaw,
+        labels=tuple(dict.fromkeys(word for prim in prims[:50] for word in labels(prim))),
+        materials=tuple(dict.fromkeys(p.GetName() for p in prims if p.IsA(UsdShade.Material))),
+        licence=words.get("asset_license") or words.get("license") or words.get("licence") or "",
+        author=words.get("asset_credit") or words.get("author") or "",
+        joints=joints,
+        bodies=any(prim.HasAPI(UsdPhysics.RigidBodyAPI) for prim in prims),
+        colliders=any(prim.HasAPI(UsdPhysics.CollisionAPI) for prim in prims),
+        variants=variants,
+        missing=tuple(missing_files(path)),
+        coats=tuple(coats),
+    )
+
+
+def _stage_coats(
+    form: Form, surface: Polygons, known: dict[str, Paint], covers: dict[Paint, np.ndarray]
+) -> Iterator[Coat]:
+    """What covers a surface, by the areas of its materials; both dictionaries hold what was read, and grow."""
+    face, corner = fans(surface.counts)
+    corners = (surface.points @ form.world[:3, :3].T)[surface.indices[corner]]
+    area = np.linalg.norm(area_normals(corners), axis=1)
+    worn = np.zeros(len(face), int)
+    paints = list(paints_of(form.prim, surface.face[face], known))
+    for number, (_, inside) in enumerate(paints):  # later ones win
+        worn[inside] = number
+    for (paint, _), share in zip(paints, np.bincount(worn, area, len(paints)), strict=True):
+        if share > 0 and paint != Paint():  # of no material that is known
+            if paint not in covers:
+                covers[paint] = _stage_cover(paint)
+            yield float(share), covers[paint]
+
+
+def _stage_cover(paint: Paint) -> np.ndarray:
+    found = None
+    if paint.texture:
+        with contextlib.suppress(TextureError):
+            found = texels(texture_bytes(paint.texture) or b"", paint.tint)
+    return flat(paint.color, paint.opacity) if found is None else found
+
+
+def root_prim(stage: Usd.Stage, path: Path) -> Usd.Prim:
+    """The prim that a reference to the file brings: the default prim, or the only root prim."""
+    default = stage.GetDefaultPrim()
+    if default:
+        return default
+    roots = [prim for prim in stage.GetPseudoRoot().GetChildren() if prim.IsA(UsdGeom.Imageable)]
+    if len(roots) != 1:
+        names = ", ".join(prim.GetName() for prim in roots[:5]) or "none"
+        raise StageError(f"{path}: no default prim and {len(roots)} root prims ({names}), allowed: a default prim")
+    return roots[0]
+
+
+def named_prim(stage: Usd.Stage, path: Path, prim_path: str) -> Usd.Prim:
+    """The prim at a path; raises StageError where there is none."""
+    valid = Sdf.Path.IsValidPathString(prim_path) and Sdf.Path(prim_path).IsPrimPath()
+    prim = stage.GetPrimAtPath(prim_path) if valid else None
+    if not prim:
+        raise StageError(f"{path}: no prim <{prim_path}>, allowed: the path of a prim of the stage")
+    return prim
+
+
+def missing_files(path: Path) -> list[str]:
+    """Files that a stage depends on and that are not there, as their names end."""
+    _, _, unresolved = UsdUtils.ComputeAllDependencies(Sdf.AssetPath(str(path)))
+    return sorted({PurePosixPath(str(name).replace("\\", "/")).name for name in unresolved})
+
+
+def _says_unit(stage: Usd.Stage) -> bool:
+    return any(layer.pseudoRoot.HasInfo("metersPerUnit") for layer in stage.GetUsedLayers())
+
+
+def _visible(prim: Usd.Prim) -> bool:
+    image = UsdGeom.Imageable(prim)
+    shown = image.ComputePurpose() in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
+    return shown and image.ComputeVisibility() != UsdGeom.Tokens.invisible

@@ -12,6 +12,7 @@ from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
+from PIL import Image
 from trimesh.resolvers import Resolver
 
 from echomodel.files import unpacking
@@ -176,7 +177,6 @@ class Beside(Resolver):
 
 def checked_image(content: bytes) -> tuple[str, Any] | None:
     """(ending, image) of the bytes of an image that may be packed, None for anything else."""
-    from PIL import Image
 
     if not 0 < len(content) <= MAX_BYTES:
         return None

@@ -6,6 +6,7 @@ import io
 
 import numpy as np
 import trimesh
+from PIL import Image
 
 LEVEL = 0.95  # least upward part of a normal
 CARRIES = 0.2  # least share of the footprint at one height that things can stand on
@@ -41,7 +42,6 @@ def thumbnail(mesh: trimesh.Trimesh, *, yaw: float = 0.6, pitch: float = 0.4) ->
         mesh: +Y up, front +Z.
         yaw, pitch: direction of view, radians; 0, 0 looks at the front.
     """
-    from PIL import Image
 
     cy, sy, cp, sp = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)
     view = np.array([[cy, 0, -sy], [-sp * sy, cp, -sp * cy], [cp * sy, sp, cp * cy]])

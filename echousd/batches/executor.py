@@ -1,12 +1,14 @@
-"""What runs tasks: the protocol, and worker processes of this machine that may die, stall or eat memory."""
+"""What runs tasks: processes of this machine that may die, stall or eat memory; Ray, whose nodes may be lost."""
 
 from __future__ import annotations
 
 import contextlib
+import math
 import multiprocessing
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -261,3 +263,195 @@ def _ending(code: int | None) -> str:
     if code is not None and code < 0:
         return f"the worker was killed (signal {-code})"
     return f"the worker ended (exit code {code})"
+
+
+ROOMS_A_NETWORK = 8  # rooms at once that one actor draws layouts for; its share of a room's time is smaller
+STARTING = 120.0  # seconds that Ray may take to start a worker, who counts its own; then the cluster ends it
+DYING = 0.2  # seconds between two looks of a worker at its own memory
+
+
+@dataclass
+class _Begun:
+    task: Task
+    since: float
+    actor: int = -1
+
+
+class RayCluster:
+    """Runs tasks on a Ray cluster; every node must see the run's folder under the same path and have echousd installed.
+
+    Ray itself repeats nothing: a task that is lost with its worker or node is an outcome, and the run begins it again.
+
+    Arguments:
+        address: `auto`, the cluster that runs on this machine or a new one, or that of a cluster's head.
+        workers: rooms at once, None = as many as the cluster has CPUs.
+        timeout, memory: as of `LocalWorkers`; memory is watched by each worker itself.
+        gpus: of the cluster that each actor of the network has; 0 = it runs on CPUs.
+
+    Raises ValueError where Ray is not installed or no cluster answers.
+    """
+
+    def __init__(
+        self,
+        address: str = "auto",
+        *,
+        workers: int | None = None,
+        timeout: float | None = None,
+        memory: int | None = None,
+        gpus: float = 0.0,
+    ) -> None:
+        self._ray = _ray()
+        self._ours = not self._ray.is_initialized()
+        if self._ours:
+            self._connect(address, workers)
+        self._timeout, self._memory, self._gpus = timeout, memory, gpus
+        self._slots = workers or max(1, int(self._ray.cluster_resources().get("CPU", 1)))
+        there = int(self._ray.cluster_resources().get("GPU", 0))
+        if gpus and not there:
+            self._leave()
+            raise ValueError("device: the Ray cluster has no GPUs, allowed: cpu")
+        self._begun: dict[Any, _Begun] = {}
+        self._room = self._ray.remote(num_cpus=1, max_retries=0)(watched)
+        networks = there / gpus if gpus else self._slots / ROOMS_A_NETWORK
+        self._actors = [self._start() for _ in range(math.ceil(networks))]
+
+    @property
+    def workers(self) -> int:
+        """How many rooms are made at once."""
+        return self._slots
+
+    @property
+    def megabytes(self) -> float:
+        """0: the workers are elsewhere."""
+        return 0.0
+
+    def free(self, *, network: bool = False) -> int:
+        """How many more tasks are taken now, of the network or of rooms."""
+        busy = sum((begun.actor >= 0) == network for begun in self._begun.values())
+        return (len(self._actors) if network else self._slots) - busy
+
+    def submit(self, task: Task) -> None:
+        """Begin a task."""
+        seconds = None if self._timeout is None else self._timeout * task.rooms
+        if task.network:
+            busy = {begun.actor for begun in self._begun.values()}
+            number = next(number for number in range(len(self._actors)) if number not in busy)
+            memory = None if self._gpus else self._memory
+            reference = self._actors[number].work.remote(task.call, task.given, memory, seconds)
+            self._begun[reference] = _Begun(task, time.monotonic(), number)
+        else:
+            reference = self._room.remote(task.call, task.given, self._memory, seconds)
+            self._begun[reference] = _Begun(task, time.monotonic())
+
+    def outcomes(self, seconds: float) -> list[Outcome]:
+        """What has ended since, after waiting for at most so long; tasks beyond the time limit are cancelled."""
+        found: list[Outcome] = []
+        until = time.monotonic() + seconds
+        while not found and time.monotonic() < until:
+            if not self._begun:
+                time.sleep(min(POLL, max(until - time.monotonic(), 0.0)))
+                continue
+            waiting = list(self._begun)
+            ready, _ = self._ray.wait(waiting, num_returns=1, timeout=min(POLL, max(until - time.monotonic(), 0.0)))
+            more, _ = self._ray.wait(waiting, num_returns=len(waiting), timeout=0) if ready else ([], None)
+            for reference in more:
+                begun = self._begun.pop(reference)
+                found.append(self._ended(reference, begun))
+            found += self._overdue()
+        return found
+
+    def close(self) -> None:
+        """End all that was begun, and the cluster where it is ours alone."""
+        for reference, begun in self._begun.items():
+            if begun.actor < 0:
+                with contextlib.suppress(self._ray.exceptions.RayError, ValueError):
+                    self._ray.cancel(reference, force=True)
+        self._begun.clear()
+        for actor in self._actors:
+            with contextlib.suppress(self._ray.exceptions.RayError, ValueError):
+                self._ray.kill(actor)
+        self._leave()
+
+    def _leave(self) -> None:
+        if self._ours:
+            self._ray.shutdown()
+
+    def _connect(self, address: str, workers: int | None) -> None:
+        quiet = {"log_to_driver": False, "logging_level": "warning"}
+        for name in ("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "RAY_SCHEDULER_EVENTS"):  # what a run says itself
+            os.environ.setdefault(name, "0")
+        try:
+            self._ray.init(address=address, **quiet)
+        except ConnectionError as error:
+            if address != "auto":
+                raise ValueError(f"--ray is {address!r}, where no cluster answers ({error})") from None
+            self._ray.init(num_cpus=workers, include_dashboard=False, **quiet)
+
+    def _start(self) -> Any:
+        return self._ray.remote(num_cpus=0, num_gpus=self._gpus, max_restarts=-1, max_task_retries=0)(_Network).remote()
+
+    def _ended(self, reference: Any, begun: _Begun) -> Outcome:
+        errors = self._ray.exceptions
+        try:
+            fate, value = self._ray.get(reference)
+        except errors.OutOfMemoryError:
+            return Outcome(begun.task, "limit", error="the node had no memory left")
+        except errors.TaskCancelledError:
+            return Outcome(begun.task, "died", error="the task was cancelled")
+        except errors.RayError as error:
+            return Outcome(begun.task, "died", error=f"the worker was lost ({type(error).__name__})")
+        return Outcome(begun.task, fate, value) if fate == "done" else Outcome(begun.task, fate, error=value)
+
+    def _overdue(self) -> list[Outcome]:
+        found = []
+        for reference, begun in list(self._begun.items()):
+            late = None if self._timeout is None else self._timeout * begun.task.rooms + STARTING
+            if late is None or time.monotonic() - begun.since <= late:
+                continue
+            del self._begun[reference]
+            if begun.actor < 0:
+                self._ray.cancel(reference, force=True)
+            else:
+                self._ray.kill(self._actors[begun.actor])
+                self._actors[begun.actor] = self._start()
+            found.append(Outcome(begun.task, "limit", error=f"took longer than {self._timeout:g} s"))
+        return found
+
+
+class _Network:
+    """An actor that keeps its model between packs."""
+
+    def work(self, call: Any, given: Any, memory: int | None, seconds: float | None) -> tuple[str, Any]:
+        return watched(call, given, memory, seconds)
+
+
+def watched(call: Any, given: Any, memory: int | None, seconds: float | None = None) -> tuple[str, Any]:
+    """`attempt`, given up as soon as the process holds more than so many MiB or takes longer than so many seconds."""
+    began = time.monotonic()
+    done = threading.Event()
+    found: list[tuple[str, Any]] = []
+
+    def work() -> None:
+        found.append(attempt(call, given))
+        done.set()
+
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    while not done.wait(DYING):
+        held, told = resident(os.getpid()), ""
+        if memory is not None and held > memory:
+            told = f"held {held:.0f} MiB of memory, allowed: {memory} MiB"
+        elif seconds is not None and time.monotonic() - began > seconds:
+            told = f"took longer than {seconds:g} s"
+        if told:
+            threading.Timer(1.0, os._exit, (1,)).start()  # after this answer is on its way: the thread cannot be ended
+            return "limit", told
+    return found[0]
+
+
+def _ray() -> Any:
+    try:
+        import ray
+    except ImportError:
+        raise ValueError("--ray needs Ray (pip install 'echousd[ray]')") from None
+    return ray

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, ValidationError
 
+from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import PlainModel
 from echousd.options import FILES, MAX_SEED, ROOM, RoomOptions, row, told
 
@@ -109,7 +110,6 @@ def parse_options(words: Sequence[str]) -> dict[str, Any]:
 
 def parse_sample(text: str) -> dict[str, int]:
     """`bedroom:500,living_room:300` as counts; raises ValueError."""
-    from echomodel.vocabulary import vocabulary
 
     found: dict[str, int] = {}
     for part in filter(None, text.split(",")):

@@ -18,6 +18,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from echousd.batches.plan import STORE
+from echousd.folder.manifest import find_manifest
 from echousd.folder.within import inside
 from echousd.store import KEY, MARK, Store
 
@@ -151,7 +152,6 @@ def fetched(url: str, room: str) -> Iterator[Path]:
 
 
 def _stored(folder: Path) -> set[str]:
-    from echousd.folder.manifest import find_manifest
 
     manifest = find_manifest(folder, folder.name) or {} if folder.is_dir() else {}
     return {key for key in (manifest.get("stored") or {}).values() if KEY.fullmatch(key)}

@@ -8,9 +8,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from echomodel.files import within_memory
+from echomodel.vocabulary import vocabulary
 from echousd.assets.table import LARGEST, unpacked
-from echousd.graph import GraphError, SceneGraph
+from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.files import MAX_BYTES, STAGE_FORMS, TEXT_FORMS, load_graph
 
 MANY = (".jsonl", ".parquet")
@@ -70,15 +73,12 @@ def sampled_graph(room_type: str, seed: int, number: int, relations: float) -> S
     Arguments:
         relations: relations an object, the ones that a person would write first.
     """
-    import numpy as np
     import torch
 
     from echomodel.boxes import Boxes
     from echomodel.rooms.generator import generate_room
     from echomodel.rules import label_relations
     from echomodel.rules.telling import told_relations
-    from echomodel.vocabulary import vocabulary
-    from echousd.graph import Node, Relation, RoomSpec
 
     types = [row.name for row in sorted(vocabulary().room_types, key=lambda row: -row.share)]
     if room_type not in types:

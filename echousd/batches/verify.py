@@ -16,11 +16,11 @@ from typing import Any
 from pxr import Gf, Sdf, Usd, UsdGeom
 
 from echomodel.files import read_bounded, read_json, whole_file
-from echousd.batches.journal import fault_of, read_journals, whole_keys
-from echousd.batches.plan import COLUMNS, Plan, load_plan
+from echousd.batches.plan import COLUMNS, Plan, fault_of, load_plan, read_journals, whole_keys
 from echousd.batches.remote import Remote, fetched
 from echousd.folder.manifest import LARGEST
 from echousd.folder.within import inside
+from echousd.stage.apart import check_apart
 from echousd.stage.files import layer_bytes, write_whole
 from echousd.textures import MAX_BYTES
 
@@ -255,7 +255,6 @@ def _fault(place: Path, row: dict[str, Any], stored: Collection[str], *, check: 
     if fault or not check:
         return fault
     from echousd.checks import check as checked
-    from echousd.stage.apart import check_apart
 
     try:
         check_apart(place / row["root"])

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import torch
 
-from echousd.batches.journal import room_digest
 from echousd.batches.options import BatchOptions
+from echousd.batches.plan import room_digest
 from echousd.batches.remote import deliver
 from echousd.batches.sources import sampled_graph
 from echousd.graph import SceneGraph
@@ -78,7 +78,7 @@ def layouts(jobs: list[Job]) -> list[Sampled]:
     A graph that the network refuses does not cost the others theirs: all are sampled alone then.
     """
     from echomodel.loading import load_model
-    from echousd.make.packed import first_drafts
+    from echousd.make.layouts import first_drafts
 
     graphs: dict[int, SceneGraph] = {}
     out = [Sampled() for _ in jobs]
@@ -111,7 +111,7 @@ def layouts(jobs: list[Job]) -> list[Sampled]:
 def samples(asks: tuple[Job, Wanted]) -> bytes:
     """What the network of a job's options makes of what it wants."""
     from echomodel.loading import load_model
-    from echousd.reproducible import one_thread
+    from echousd.tensors import one_thread
 
     asked, wanted = asks[0].options, asks[1]
     with one_thread():
@@ -187,7 +187,6 @@ def _rows(boxes: Any) -> Rows:
 
 
 def _boxes(rows: Rows) -> Any:
-    import torch
 
     from echomodel.boxes import Boxes
 
@@ -303,7 +302,6 @@ def network_processes(device: str) -> list[dict[str, str]]:
     """
     if device == CPU:
         return []
-    import torch
 
     if device == "cuda" and torch.cuda.is_available():
         count = torch.cuda.device_count()

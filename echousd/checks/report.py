@@ -14,10 +14,9 @@ from pxr import Usd
 
 from echomodel.dressing import SMALL
 from echomodel.vocabulary import vocabulary
-from echousd.checks.collisions import find_collisions
-from echousd.checks.placement import Misplacement, find_misplaced, misplaced_screens, misplaced_small
+from echousd.checks.placement import Misplacement, find_collisions, find_misplaced, misplaced_screens, misplaced_small
 from echousd.checks.validity import Fault, find_faults
-from echousd.folder.journal import digest_of
+from echousd.folder.folder import digest_of
 from echousd.folder.manifest import find_manifest
 from echousd.graph import Placed, Relation, SceneGraph
 from echousd.graph.consistency import GraphError

@@ -16,9 +16,9 @@ from echousd.stage.encoding import StageError
 from echousd.stage.files import said
 from echousd.stage.layouts import ARTICULATED, ARTICULATION, showing_variant
 
-FAMILIES = ("graph", "object", "label", "look", "geometry", "mesh", "physics", "file", "value")
-for family in (*(f"{family}_rules" for family in FAMILIES), "ranges"):
-    importlib.import_module(f"echousd.checks.{family}")  # its rules enter the table
+FAMILIES = ("object", "look", "mesh", "physics", "file")
+for family in FAMILIES:
+    importlib.import_module(f"echousd.checks.{family}_rules")  # its rules enter the table
 JOINED = tuple(rule for rule in RULES if rule.name in ("echo:Joints", "echo:PhysicsValues"))
 KEYWORD = "EchoUSD"
 ALONE = "echo:Validators"

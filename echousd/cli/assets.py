@@ -1,26 +1,22 @@
-"""`echousd assets`: libraries of other people's furniture."""
+"""`echousd assets`: libraries of other people's furniture; `echousd store`: where many rooms keep assets once."""
 
 from __future__ import annotations
 
 import os
-import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from echousd.cli.options import AsJson
-from echousd.cli.report import say_done
+from echousd.cli.output import say, say_done, say_json
 
 assets_app = typer.Typer(
     help="Libraries of furniture: index them, look through them; a room's own as packages.", no_args_is_help=True
 )
+app = typer.Typer()
+app.add_typer(assets_app, name="assets")
 SHOWN = 20  # faults that are told; the table holds all
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.add_typer(assets_app, name="assets")
 
 
 @assets_app.command(epilog="Example: echousd assets index ~/models -o models.parquet")
@@ -47,7 +43,7 @@ def index(
 
     if table is not None and not table.is_file():
         raise ValueError(f"{table}: no such file, allowed: a table that `echousd assets review` wrote")
-    started, console = time.perf_counter(), Console(stderr=True)
+    console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task("Reading the models", total=None)
         done = make(
@@ -66,7 +62,7 @@ def index(
     for folder in folders:
         if not folder.resolve().is_relative_to(output.resolve().parent):
             lines.append(f"note     {folder} is not below the index: generate asks for --allow-outside {folder}")
-    say_done(json, [output], started, lines, {**counts, "left_out": list(map(str, done.faults))})
+    say_done(json, [output], lines, {**counts, "left_out": list(map(str, done.faults))})
 
 
 @assets_app.command(epilog="Example: echousd assets review models.parquet")
@@ -81,11 +77,10 @@ def review(
 
     The table lies beside the index; what it says counts when the library is indexed again.
     """
-    from echousd.assets.index import read_corrections, write_table
-    from echousd.assets.review import left_out, write_page, write_sheets
+    from echousd.assets.index import by_reason, read_corrections, write_page, write_sheets, write_table
     from echousd.assets.table import read_library
 
-    started, found = time.perf_counter(), read_library(library)
+    found = read_library(library)
     records = list(found.records.values())
     folder = output or library.with_name(f"{library.stem}_review")
     if folder.exists() and not folder.is_dir():
@@ -94,7 +89,7 @@ def review(
     write_page(folder / "review.html", records)
     table = library.with_suffix(".csv")
     write_table(table, records, read_corrections(table) if table.exists() else None)
-    reasons = {reason: len(members) for reason, members in left_out(records).items()}
+    reasons = {reason: len(members) for reason, members in by_reason(records).items()}
     page = folder / "review.html"
     lines = [
         *(f"left out {count}: {reason}" for reason, count in reasons.items()),
@@ -102,7 +97,7 @@ def review(
         f"sheets   {len(sheets)} in {folder}",
         f"table    {table}: correct it and run echousd assets index again",
     ]
-    say_done(json, [page, *sheets, table], started, lines, {"models": len(records), "left_out": reasons})
+    say_done(json, [page, *sheets, table], lines, {"models": len(records), "left_out": reasons})
 
 
 @assets_app.command(epilog="Example: echousd assets pack out/bedroom -o packages")
@@ -121,9 +116,59 @@ def pack(
     from echousd.folder.found import room_at
     from echousd.layers.simready import pack as write
 
-    started = time.perf_counter()
     done = write(room_at(room), output, names=asset or (), author=author, force=force)
     lines = [f"left out {sentence}" for sentence in done.left]
     lines += [f"package  {path}" for path in done.layers]
     lines += [f"note     {sentence}" for sentence in done.hangs]
-    say_done(json, list(done.layers), started, lines, {"left_out": list(done.left), "hangs": list(done.hangs)})
+    say_done(json, list(done.layers), lines, {"left_out": list(done.left), "hangs": list(done.hangs)})
+
+
+store_app = typer.Typer(no_args_is_help=True)
+app.add_typer(store_app, name="store", help="A folder where many rooms keep their assets and images once.")
+
+
+@store_app.command("verify", epilog="Example: echousd store verify out/night/store")
+def verify(
+    folder: Annotated[Path, typer.Argument(help="Folder of the store.", show_default=False)], json: AsJson = False
+) -> None:
+    """Compare every asset with the hash that it lies under. Exit code 1 where one is not what it was."""
+    from echousd.store import Store
+
+    store = Store.open(folder)
+    wrong = [store.folder(key) for key in store.wrong()]
+    count = len(list(store.keys()))
+    if json:
+        say_json({"ok": not wrong, "count": count, "changed": list(map(str, wrong))}, indent=2)
+    else:
+        for changed in wrong:
+            say(f"changed  {changed}")
+    if wrong:
+        raise typer.Exit(1)
+    if not json:
+        say(f"ok       {count} assets and images as they were stored")
+
+
+@store_app.command("gc", epilog="Example: echousd store gc out/night/store out/night --dry-run")
+def gc(
+    folder: Annotated[Path, typer.Argument(help="Folder of the store.", show_default=False)],
+    rooms: Annotated[
+        list[Path] | None, typer.Argument(help="Folders with all rooms that use it; default: where the store lies.")
+    ] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would go.")] = False,
+    older: Annotated[float, typer.Option(help="Minutes since its last use for which an asset stays.", min=0)] = 60.0,
+    json: AsJson = False,
+) -> None:
+    """Remove assets and images that no room below the given folders names."""
+    from echousd.store import Store
+
+    store = Store.open(folder)
+    places = list(rooms or []) or [folder.resolve().parent]
+    for place in places:
+        if not place.is_dir():
+            raise ValueError(f"{place}: no such folder; allowed: folders with the rooms that use the store")
+    before = len(list(store.keys()))
+    gone = store.collect(places, grace=older * 60, dry=dry_run)
+    if json:
+        say_json({"ok": True, "count": before, "gone": list(map(str, gone)), "dry_run": dry_run}, indent=2)
+        return
+    say(f"{'unused' if dry_run else 'removed':<8} {len(gone)} of {before} assets and images")

@@ -16,7 +16,7 @@ from echousd.cli.options import AsJson, Outside, add_room_command
 from echousd.cli.output import one_line, plain_json, say, say_error, say_json
 
 if TYPE_CHECKING:
-    from echousd.batches.run import BatchProgress
+    from echousd.batches.batch import BatchProgress
 
 
 class _RunByDefault(TyperGroup):
@@ -29,11 +29,8 @@ class _RunByDefault(TyperGroup):
 
 
 batch_app = typer.Typer(cls=_RunByDefault, no_args_is_help=True)
-
-
-def register(app: typer.Typer) -> None:
-    """Add the topic."""
-    app.add_typer(batch_app, name="batch", help="Many rooms: a plan, workers, a journal, a manifest.")
+app = typer.Typer()
+app.add_typer(batch_app, name="batch", help="Many rooms: a plan, workers, a journal, a manifest.")
 
 
 def run(
@@ -71,9 +68,8 @@ def run(
     **given: Any,
 ) -> None:
     """Make many rooms, each whole or not at all; end it, go on with --resume, on as many machines as there are."""
-    from echousd.batches.batch import run_batch
+    from echousd.batches.batch import RunOptions, run_batch
     from echousd.batches.options import parse_options, parse_sample, read_toml, request_of
-    from echousd.batches.run import RunOptions
     from echousd.batches.verify import finish
 
     words = list(sources or [])

@@ -18,14 +18,10 @@ if TYPE_CHECKING:
     from echousd.home.check import HomeReport
     from echousd.settle import SettleReport
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(
-        epilog="Example: echousd check out/bedroom/bedroom.usda  (exit code 0: good, 1: faults, 2: not a room)"
-    )(check)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: echousd check out/bedroom/bedroom.usda  (exit code 0: good, 1: faults, 2: not a room)")
 def check(
     room: Annotated[
         list[Path],

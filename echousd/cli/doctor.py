@@ -9,13 +9,10 @@ import typer
 from echousd.cli.output import say_json
 from echousd.diagnosis import Diagnosis, diagnose
 
-
-def register(app: typer.Typer) -> None:
-    """Add `plugin-path` and `doctor`."""
-    app.command("plugin-path")(plugin_path)
-    app.command()(doctor)
+app = typer.Typer()
 
 
+@app.command("plugin-path")
 def plugin_path() -> None:
     """Print the folder of the USD schema plugin, for PXR_PLUGINPATH_NAME (does not load USD).
 
@@ -26,6 +23,7 @@ def plugin_path() -> None:
     typer.echo(plugin.plugin_path())
 
 
+@app.command()
 def doctor(as_json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
     """Report what EchoUSD finds on this machine and what to do about each gap; exit code 1 if there is one.
 

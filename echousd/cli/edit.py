@@ -1,8 +1,7 @@
-"""`echousd edit`: change the graph of a room, make anew only what the change touches."""
+"""`echousd edit`, `update`, `adopt`: change a room, make anew only what changes; complete somebody's stage."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,19 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from echousd.cli.options import Force, Made, Outside, Wait, add_room_command
-from echousd.cli.output import say
-from echousd.cli.report import report, say_done, telling_faults
+from echousd.cli.output import report, say, say_done, telling_faults
 
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
     from echousd.options import EditRequest
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    example = 'echousd edit out/bedroom/bedroom.usda --add stool:stool --relate "stool close by bed"'
-    add_room_command(app, edit, example, edits=True, asks=True)
-    add_room_command(app, update, "echousd update out/bedroom/mine.usda", edits=True)
+app = typer.Typer()
 
 
 def edit(
@@ -121,7 +114,7 @@ def update(
 
 def _name_of(*asked: object) -> str:
     """A word that tells a run from those of which something else was asked."""
-    from echousd.folder.journal import digest
+    from echousd.folder.folder import digest
 
     return digest(repr(asked).encode())
 
@@ -132,12 +125,11 @@ def _step(room: Path, wait: bool, json: bool, run: str) -> None:
     from echousd.folder.folder import held
     from echousd.make.save import write_pictures
 
-    started = time.perf_counter()
     step = {"undo": history.undo, "redo": history.redo}[run]
     with held(room.parent, wait=wait, run=run) as finished:
         steps = history.told(room, run) if finished == run else step(room)
         pictures = write_pictures(room)
-    _say_steps(room, pictures, {"undo": "undone", "redo": "redone"}[run], steps, started, json)
+    _say_steps(room, pictures, {"undo": "undone", "redo": "redone"}[run], steps, json)
 
 
 def _recover(room: Path, wait: bool, json: bool) -> None:
@@ -146,30 +138,28 @@ def _recover(room: Path, wait: bool, json: bool) -> None:
     from echousd.folder.folder import held
     from echousd.folder.found import room_at
 
-    started, folder = time.perf_counter(), room if room.is_dir() else room.parent
+    folder = room if room.is_dir() else room.parent
     if not folder.is_dir():
         raise ValueError(f"{room}: no such folder")
     with held(folder, wait=wait) as finished:
         root = room_at(folder)
-        _say_finished(root, history.told(root, finished) if finished else (), started, json)
+        _say_finished(root, history.told(root, finished) if finished else (), json)
 
 
-def _say_finished(room: Path, steps: Sequence[str], started: float, json: bool) -> None:
+def _say_finished(room: Path, steps: Sequence[str], json: bool) -> None:
     """Draw a room whose run was finished, and say what it did; exit code 1 where it has faults."""
     from echousd.folder.manifest import find_manifest
     from echousd.make.save import write_pictures
 
-    _say_steps(room, write_pictures(room), "finished", steps, started, json)
+    _say_steps(room, write_pictures(room), "finished", steps, json)
     layouts = (find_manifest(room.parent, room.stem) or {}).get("layouts", ())
     if any(layout["broken"] or layout["collisions"] or layout.get("restless") for layout in layouts):
         raise typer.Exit(1)
 
 
-def _say_steps(
-    room: Path, pictures: Sequence[Path], word: str, steps: Sequence[str], started: float, json: bool
-) -> None:
+def _say_steps(room: Path, pictures: Sequence[Path], word: str, steps: Sequence[str], json: bool) -> None:
     lines = [*(f"{word:<8} {step}" for step in steps), f"room     {room}"]
-    say_done(json, [room, *pictures], started, lines, {word: list(steps)})
+    say_done(json, [room, *pictures], lines, {word: list(steps)})
 
 
 def _change(
@@ -189,20 +179,19 @@ def _change(
     The `run` that did the same and was interrupted is finished instead.
     """
     from echousd.cli.generate import progress_bar
+    from echousd.folder.folder import check_output, writing
     from echousd.folder.found import room_at
     from echousd.folder.history import told
-    from echousd.folder.output import check_output, writing
     from echousd.make.edit import edit as change
     from echousd.make.edit import touched
     from echousd.make.reading import read_room
     from echousd.make.written import write_room
     from echousd.progress import StageTimer
 
-    started = time.perf_counter()
     check_output(folder, flat=False, force=force)
     with writing(folder, flat=False, force=force, wait=wait, run="" if dry_run else run) as finished:
         if finished:
-            _say_finished(room_at(folder), told(room_at(folder), run), started, json)
+            _say_finished(room_at(folder), told(room_at(folder), run), json)
             return
         root, graph = wanted()
         old = read_room(root).graph
@@ -213,11 +202,66 @@ def _change(
             fresh, moving = touched(old, graph)
             plan = {"changes": list(steps), "new": sorted(fresh), "moves": sorted(moving)}
             lines = [*steps, *(f"new      {n}" for n in sorted(fresh)), *(f"moves    {n}" for n in sorted(moving))]
-            say_done(json, [], started, lines, plan)
+            say_done(json, [], lines, plan)
             return
         with telling_faults(), progress_bar() as listen:
             made = change(root, graph, progress=listen, **options)
             written = write_room(made, folder, StageTimer(listen), force=force)
     for step in steps if not json else ():
         say(step)
-    report([written], since=started, json=json, more={"changes": list(steps)})
+    report([written], json=json, more={"changes": list(steps)})
+
+
+def adopt(
+    stage: Annotated[Path, typer.Argument(help="Stage with labels and bounds.", show_default=False)],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the room.", show_default=False)],
+    room: Annotated[str | None, typer.Option(help="Room type; default: as the stage looks.")] = None,
+    add: Annotated[
+        list[str] | None,
+        typer.Option(help="Object to add, name:category; default: what such a room usually holds and this one lacks."),
+    ] = None,
+    relate: Annotated[list[str] | None, typer.Option(help='Relation to keep: "lamp close by sofa".')] = None,
+    names: Annotated[bool, typer.Option("--names", help="Names of prims count where labels are missing.")] = False,
+    force: Force = False,
+    wait: Wait = False,
+    outside: Outside = None,
+    json: Made = False,
+    **given: Any,
+) -> None:
+    """Complete a stage that others began: its furniture stays where and as it is, new pieces stand around it.
+
+    The stage is not written; the room refers to the pieces in it, with --collect to copies. What a person would point
+    at in their arrangement is told and left as it is.
+    """
+    from echousd.cli.generate import progress_bar
+    from echousd.cli.output import report, say, telling_faults
+    from echousd.folder.folder import check_output, writing
+    from echousd.options import RoomOptions
+
+    options = RoomOptions(**given)
+    check_output(output, flat=False, force=force)
+    with writing(output, flat=False, force=force, wait=wait), telling_faults(), progress_bar() as listen:
+        from echousd.make.pipeline import generate
+        from echousd.make.wishes import adopted, seen_in_theirs
+        from echousd.make.written import write_room
+        from echousd.progress import StageTimer
+        from echousd.stage.apart import check_apart
+
+        check_apart(stage)
+        graph = adopted(stage, room=room, add=add, relate=relate or (), names=names)
+        made = generate(graph, options=options, outside=outside or (), progress=listen)
+        written = write_room(made, output, StageTimer(listen), force=force)
+    kept = sum(node.asset is not None for node in graph.nodes)
+    seen = seen_in_theirs(made)
+    if not json:
+        say(f"adopted  {kept} objects of {stage.name}, {len(graph.nodes) - kept} new")
+        for one in seen:
+            say(f"theirs   {one}")
+    more = {"adopted": kept, "new": len(graph.nodes) - kept, "theirs": seen}
+    report([written], json=json, more=more)
+
+
+EXAMPLE = 'echousd edit out/bedroom/bedroom.usda --add stool:stool --relate "stool close by bed"'
+add_room_command(app, edit, EXAMPLE, edits=True, asks=True)
+add_room_command(app, update, "echousd update out/bedroom/mine.usda", edits=True)
+add_room_command(app, adopt, "echousd adopt loft.usd -o out/loft --room living_room")

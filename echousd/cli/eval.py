@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,20 +9,16 @@ from typing import Annotated, Any
 import typer
 
 from echousd.cli.options import Written
-from echousd.cli.output import say
-from echousd.cli.report import say_done
+from echousd.cli.output import say, say_done
 
 eval_app = typer.Typer(help="Scores of whoever lays out rooms, and studies with people.", no_args_is_help=True)
+app = typer.Typer()
+app.add_typer(eval_app, name="eval")
 Against = Annotated[
     str, typer.Option(help="Rooms file, room set or SG-FRONT folder; generated: held-out rooms of the generator.")
 ]
 Count = Annotated[int, typer.Option(help="Rooms that every system lays out.", min=2)]
 Seed = Annotated[int, typer.Option(help="Seed of every draw.")]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the topic."""
-    app.add_typer(eval_app, name="eval")
 
 
 @eval_app.command("suite")
@@ -55,11 +50,9 @@ def suite(
     Example: echousd eval suite default guided --against rooms.json -o report --only relations,faults
     """
     from echousd.cli.generate import progress_bar
-    from echousd.evaluation.report import write_report
     from echousd.evaluation.runs import SYSTEMS, SuiteSettings
-    from echousd.evaluation.suite import evaluate
+    from echousd.evaluation.suite import evaluate, write_report
 
-    started = time.perf_counter()
     chosen = tuple(word.strip() for word in only.split(",") if word.strip())
     asked = tuple(systems) if systems else SYSTEMS
     files = {"shapes": shapes, "inception": inception, "clip": clip}
@@ -71,7 +64,7 @@ def suite(
     with progress_bar() as told_to:
         found, run = evaluate(settings, told_to)
     written = write_report(found, run, out, command)
-    say_done(json, written, started, map(str, written))
+    say_done(json, written, map(str, written))
 
 
 @eval_app.command("study")
@@ -88,12 +81,11 @@ def study(
     Example: echousd eval study default generator+search real -o study.html --count 12
     """
     from echousd.cli.generate import progress_bar
-    from echousd.evaluation.study import write_study
+    from echousd.evaluation.suite import write_study
 
-    started = time.perf_counter()
     with progress_bar() as told_to:
         path = write_study(systems, against, count, seed, out, told_to)
-    say_done(json, [path], started, [str(path)])
+    say_done(json, [path], [str(path)])
 
 
 @eval_app.command("answers")
@@ -106,7 +98,7 @@ def answers(
     Example: echousd eval answers answers_*.json
     """
     from echousd.cli.output import say_json
-    from echousd.evaluation.study import preferences
+    from echousd.evaluation.suite import preferences
 
     found = preferences(files)
     if json:

@@ -1,23 +1,20 @@
-"""`echousd export`: a room as one file for other software."""
+"""`echousd export`, `render`, `convert`: a room as one file or a picture; a published checkpoint as one file."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from echousd.cli.options import Layout, Room, Written
-from echousd.cli.report import say_done
+from echousd.cli.options import AsJson, Layout, Room, Written
+from echousd.cli.output import check_picture, say_done
+
+app = typer.Typer()
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: echousd export out/bedroom/bedroom.usda -o bedroom.usdz")(export)
-
-
+@app.command(epilog="Example: echousd export out/bedroom/bedroom.usda -o bedroom.usdz")
 def export(
     room: Room,
     output: Annotated[
@@ -56,11 +53,9 @@ def export(
     Those that ignore purposes draw its colliders: --no-physics.
     """
     from echousd.exporting import export as write
-    from echousd.exporting.habitat import export_habitat
-    from echousd.exporting.sceneeval import export_sceneeval
+    from echousd.exporting.habitat import export_habitat, export_sceneeval
     from echousd.folder.found import room_at
 
-    started = time.perf_counter()
     room = room_at(room)
     if for_ is not None:
         others: dict[str, Callable[[Path, Path], list[Path]]] = {
@@ -70,9 +65,129 @@ def export(
         if for_ not in others:
             raise ValueError(f"--for is {for_!r}, allowed: {', '.join(others)}")
         written = others[for_](room, output)
-        say_done(json, written, started, [str(written[0])])
+        say_done(json, written, [str(written[0])])
         return
     path = write(
         room, output, arkit=arkit, force=force, search=search or (), layout=layout, physics=physics, pictures=pictures
     )
-    say_done(json, [path], started, [str(path)])
+    say_done(json, [path], [str(path)])
+
+
+TURN = "turntable"
+
+
+@app.command(epilog="Example: echousd render out/bedroom/bedroom.usda -o top.png --view top")
+def render(
+    room: Room,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            help="Picture to write (.png; .gif of a turntable); with --cameras a folder.",
+            show_default=False,
+        ),
+    ],
+    view: Annotated[
+        str,
+        typer.Option(
+            help="hero (from inside), dollhouse (from above a corner), top, every-camera (those of --cameras side by "
+            "side), sheet (six views), turntable (a GIF)."
+        ),
+    ] = "hero",
+    cameras: Annotated[
+        bool, typer.Option("--cameras", help="A picture through each camera of the stage, named after it.")
+    ] = False,
+    quality: Annotated[str, typer.Option(help="fast, or fine: more rays, 1280 pixels across.")] = "fast",
+    size: Annotated[int | None, typer.Option(help="Pixels across a picture, else by --quality.")] = None,
+    frames: Annotated[int, typer.Option(help="Pictures of a turntable.", min=2, max=360)] = 24,
+    colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
+    layout: Layout = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is no picture of ours.")] = False,
+    json: Written = False,
+) -> None:
+    """Draw a room from inside, from above, from a corner, from all around, or through each of its cameras."""
+    from echousd.draw.pictures import gif, png
+    from echousd.draw.rendering import QUALITIES, VIEWS, render_cameras, render_turn
+    from echousd.draw.rendering import render as draw
+    from echousd.folder.found import room_at
+    from echousd.stage.files import write_all
+
+    room = room_at(room)
+    if quality not in QUALITIES:
+        raise ValueError(f"--quality is {quality!r}, allowed: {', '.join(QUALITIES)}")
+    usual, rays = QUALITIES[quality]
+    size = usual if size is None else size
+    if view not in (*VIEWS, TURN):
+        raise ValueError(f"--view is {view!r}, allowed: {', '.join((*VIEWS, TURN))}")
+    if cameras:
+        if view != "hero":
+            raise ValueError(f"--view is {view!r}, which --cameras does not use; leave one of them out")
+        if output.suffix.lower() == ".png":
+            raise ValueError(f"{output}: with --cameras the output is a folder, a picture for each camera")
+        drawn = render_cameras(room, size=size, colors=colors, rays=rays, layout=layout)
+        pictures = {output / f"{name}.png": picture for name, picture in drawn.items()}
+        for path in pictures:
+            check_picture(path, force=force)
+        files = {path: png(picture) for path, picture in pictures.items()}
+    else:
+        ending = ".gif" if view == TURN else ".png"
+        if output.suffix.lower() != ending:
+            kind = "a turntable is" if view == TURN else "pictures are"
+            raise ValueError(f"{output}: {kind} written as {ending}, found {output.suffix or 'no ending'!r}")
+        check_picture(output, force=force)
+        if view == TURN:
+            turn = render_turn(room, frames=frames, size=size, colors=colors, rays=rays, layout=layout)
+            files = {output: gif(turn)}
+        else:
+            files = {output: png(draw(room, view=view, size=size, colors=colors, rays=rays, layout=layout))}
+    write_all(files)
+    say_done(json, list(files), map(str, files))
+
+
+SOURCE = typer.Argument(..., metavar="IN.pth", help="Published checkpoint, a file written by torch.save.")
+OUTPUT = typer.Option(..., "--output", "-o", metavar="OUT.safetensors", help="File to write.")
+BOUNDS = typer.Option(
+    None, "--bounds", metavar="TXT", help="centered_bounds_*_trainval.txt of the data set: box statistics to store."
+)
+CLASSES = typer.Option(None, "--classes", metavar="TXT", help="Class names in the order of their ids, one a line.")
+FORCE = typer.Option(False, "--force", help="Replace OUT.safetensors if it exists.")
+
+
+@app.command("convert")
+def convert(
+    source: Path = SOURCE,
+    output: Path = OUTPUT,
+    bounds: Path | None = BOUNDS,
+    classes: Path | None = CLASSES,
+    force: bool = FORCE,
+    json: AsJson = False,
+) -> None:
+    """Convert a published EchoScene, EchoLayout or VQ-VAE checkpoint.
+
+    Sizes and switches are read off the parameter names. Nothing in the file is executed: it is refused if it holds
+    anything but tensors and numbers. The result carries config, vocabulary and box statistics.
+
+    Example: echousd convert model2050.pth -o echoscene.safetensors --bounds centered_bounds_all_trainval.txt
+    """
+    if output.suffix != ".safetensors":
+        raise ValueError(f"{output}: the output's name must end by .safetensors")
+    if output.exists() and not force:
+        raise ValueError(f"{output}: exists already (--force replaces it)")
+    from echoscene import checkpoint
+    from echoscene.checkpoint import read_bounds
+
+    statistics = read_bounds(bounds) if bounds else None
+    names = classes.read_text("utf-8").split("\n") if classes else None
+    names = [name.strip() for name in names if name.strip()] if names else None
+    config = checkpoint.convert(source, output, classes=names, statistics=statistics)
+    parts = [name for name in ("encoder", "layout", "shape", "vqvae") if getattr(config, name) is not None]
+    echo = config.layout or config.shape
+    lines = [f"{output}: {', '.join(parts)}, {output.stat().st_size / 1e6:.1f} MB"]
+    if config.encoder:
+        timed = "with" if echo and echo.time_in_echo else "without"
+        lines.append(f"{config.encoder.classes} classes, {timed} time embedding in the echo")
+    if config.layout and statistics is None:
+        lines.append("no box statistics: sampling boxes needs a conversion with --bounds")
+    has = {"parts": parts, "bytes": output.stat().st_size, "boxes": statistics is not None}
+    say_done(json, [output], lines, {**has, "classes": config.encoder.classes if config.encoder else None})

@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from echousd.cli.options import Force, Made, Outside, Wait, add_room_command
-from echousd.cli.output import say
-from echousd.cli.report import report, say_done, say_written, telling_faults
+from echousd.cli.output import report, say, say_done, say_written, telling_faults
 
 if TYPE_CHECKING:
     from echomodel.progress import StageListener
     from echousd.home.graph import HomeGraph
     from echousd.make.written import Written
     from echousd.options import RoomOptions
+
+app = typer.Typer()
 
 TITLES = {
     "read": "Reading the graph",
@@ -33,11 +34,6 @@ TITLES = {
     "preview": "Drawing the preview",
     "rooms": "Making the rooms",
 }
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    add_room_command(app, generate, "echousd generate samples/bedroom.usda -o out/bedroom --seed 7")
 
 
 def generate(
@@ -61,7 +57,7 @@ def generate(
     Of a graph's numbers, lengths are metres in the room's frame (+Y up, the floor at 0), yaw is `90 deg` or radians
     about +Y: at 0 a front looks along +Z.
     """
-    from echousd.folder.output import check_output, writing
+    from echousd.folder.folder import check_output, writing
     from echousd.options import RoomOptions
 
     started = time.perf_counter()
@@ -102,7 +98,7 @@ def generate(
     total = time.perf_counter() - started
     spent |= {"other": total - sum(spent.values()), "total": total}
     more = {"timings": {stage: round(seconds, 3) for stage, seconds in spent.items()}}
-    report(made, since=started, json=json, more=more)
+    report(made, json=json, more=more)
 
 
 def home_of(graph: Path) -> HomeGraph | None:
@@ -131,7 +127,6 @@ def generate_home(
         graph: the file that it comes from; a home that was made is planned anew, from the plan that it has.
         dry_run: say what would be made, and make nothing.
     """
-    started = time.perf_counter()
     from echousd.folder.found import is_home
     from echousd.home.assemble import earlier, stale, write_rooms
     from echousd.home.given import next_plan, plan_there
@@ -141,7 +136,7 @@ def generate_home(
     plan = stated or next_plan(home, seed=options.seed, before=before)
     if dry_run:
         again = stale(plan, output, options)
-        say_done(json, [], started, [f"new      {name}" for name in again], {"new": again})
+        say_done(json, [], [f"new      {name}" for name in again], {"new": again})
         return
     with progress_bar() as listen:
         made = write_rooms(
@@ -161,7 +156,7 @@ def generate_home(
             faults += [] if row["check"] else [f"{name}: {'; '.join(row['check_errors']) or 'see echousd check'}"]
     if json:
         rows = {name: dict(row) if row else None for name, row in made.rooms.items()}
-        say_written([made.root], started, faults, {"rooms": rows})
+        say_written([made.root], faults, {"rooms": rows})
     else:
         for line in [*lines, *(f"fault    {fault}" for fault in faults)]:
             say(line)
@@ -196,3 +191,6 @@ def progress_bar() -> Iterator[StageListener]:
             bar.update(tasks[stage], completed=done, total=total)
 
         yield listen
+
+
+add_room_command(app, generate, "echousd generate samples/bedroom.usda -o out/bedroom --seed 7")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,14 +10,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from echousd.cli.options import AsJson
-from echousd.cli.output import check_picture, safe, say, say_json
-from echousd.cli.report import say_done
+from echousd.cli.output import check_picture, safe, say, say_done, say_json
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from echousd.graph import Node, Relation, SceneGraph
     from echousd.home.graph import HomeGraph
+
+app = typer.Typer()
 
 NEW_EXAMPLES = """Examples:
 
@@ -48,12 +48,6 @@ GRAPH_EXAMPLES = """Examples:
     echousd graph --schema > scenegraph.schema.json"""
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands `new` and `graph`."""
-    app.command("new", epilog=NEW_EXAMPLES)(new)
-    app.command("graph", epilog=GRAPH_EXAMPLES)(graph)
-
-
 def _room_types(incomplete: str) -> list[str]:
     from echomodel.vocabulary import vocabulary
 
@@ -66,6 +60,7 @@ def _counts(incomplete: str) -> list[str]:
     return [f"{entry.name}=" for entry in vocabulary().categories if entry.name.startswith(incomplete)]
 
 
+@app.command("new", epilog=NEW_EXAMPLES)
 def new(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="File to write: .usda, .usdc, .usd, .yaml or .json.")],
     source: Annotated[
@@ -115,10 +110,8 @@ def new(
     """Author a scene graph, as a stage or as text, from a file or from a room type."""
     from echousd.graph import GraphError, RoomSpec, load_graph, save_graph, starting_graph
     from echousd.graph.nodes import Placed
-    from echousd.graph.sentences import sentence, stating
-    from echousd.graph.text import with_openings
+    from echousd.graph.text import sentence, stating, with_openings
 
-    started = time.perf_counter()
     if sum(given is not None for given in (source, room, rooms)) != 1:
         raise GraphError("say where the graph comes from: either --from GRAPH, --room TYPE or --rooms ROOMS")
     if room is None and count:
@@ -133,7 +126,7 @@ def new(
 
         save_home(home, out)
         told = f"wrote {out}: {_summary_of_home(home)}"
-        say_done(json, [out], started, [told], {"rooms": len(home.rooms), "relations": len(home.relations)})
+        say_done(json, [out], [told], {"rooms": len(home.rooms), "relations": len(home.relations)})
         return
     if area is not None:
         raise GraphError("--area goes with --rooms; the floor of one room is --size")
@@ -159,7 +152,7 @@ def new(
         raise GraphError(f"{out.parent}: cannot be made ({(error.strerror or str(error)).lower()})") from None
     save_graph(made, out)
     counts = {"objects": len(made.nodes), "relations": len(made.relations), "placements": len(made.placements)}
-    say_done(json, [out], started, [f"wrote {out}: {_summary(made)}"], counts)
+    say_done(json, [out], [f"wrote {out}: {_summary(made)}"], counts)
 
 
 def home_given(
@@ -197,6 +190,7 @@ def _counted(text: str) -> tuple[str, int]:
     return word, int(number)
 
 
+@app.command("graph", epilog=GRAPH_EXAMPLES)
 def graph(
     source: Annotated[
         Path | None, typer.Argument(metavar="GRAPH", help="Stage (.usda .usdc .usd .usdz), YAML or JSON.")

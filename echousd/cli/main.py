@@ -14,11 +14,9 @@ from typing import Any
 
 import typer
 
-from echousd.cli.numbers import bound_numbers
-from echousd.cli.output import one_line, safe
-from echousd.cli.quiet import add_help_all, add_quiet
+from echousd.cli.output import add_help_all, add_quiet, bound_numbers, one_line, safe
 
-# Command -> the module of its topic, which defines `register(app)`. A module is imported when its command is called, or
+# Command -> the module of its topic, whose `app` has it. A module is imported when its command is called, or
 # for the help on all; it must not import torch or pxr at module level (start-up time).
 TOPICS = {
     "new": "graph",
@@ -26,20 +24,20 @@ TOPICS = {
     "plan": "plan",
     "generate": "generate",
     "batch": "batch",
-    "store": "store",
+    "store": "assets",
     "edit": "edit",
     "update": "edit",
-    "render": "render",
+    "render": "export",
     "export": "export",
     "texture": "texture",
     "assets": "assets",
-    "adopt": "adopt",
+    "adopt": "edit",
     "check": "check",
     "train": "train",
-    "convert": "convert",
+    "convert": "export",
     "plugin-path": "doctor",
     "doctor": "doctor",
-    "data": "data",
+    "data": "train",
     "eval": "eval",
 }
 
@@ -125,7 +123,9 @@ def command(*topics: str) -> Any:
     )
     app.callback()(_options)
     for topic in topics or dict.fromkeys(TOPICS.values()):
-        importlib.import_module(f"echousd.cli.{topic}").register(app)
+        own = importlib.import_module(f"echousd.cli.{topic}").app
+        app.registered_commands += own.registered_commands
+        app.registered_groups += own.registered_groups
     root = typer.main.get_command(app)
     bound_numbers(root)
     add_quiet(root)

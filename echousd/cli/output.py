@@ -1,25 +1,36 @@
-"""What reaches a terminal or a file of the user's: no control characters, no endless words, nobody else's picture."""
+"""What reaches a terminal, a file or a script: nothing that a terminal obeys, no NaN; and flags of all commands."""
 
 from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import sys
+import time
 import unicodedata
-from collections.abc import Iterator
-from contextlib import contextmanager
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from contextvars import ContextVar
+from functools import wraps
+from inspect import Parameter
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
+
+from echousd.cli.options import click_options
+
+if TYPE_CHECKING:
+    from echousd.make.written import Written
 
 LONGEST_WORD = 300  # characters: a path is shorter, a name of a million is a prank
 LONGEST_LINE = 4000
 ENDLESS = re.compile(r"(?<![\w./-])(-?\d)(\d{39,})(?:\.\d+)?(?![\w/-]|\.\w)")  # a number that is no part of a path
 MARK = b"echousd"
 HEAD = 2048  # bytes in which a picture of ours says so
+_began: ContextVar[float] = ContextVar("_began", default=0.0)  # when the command did
 _errors: ContextVar[TextIO | None] = ContextVar("_errors", default=None)
 
 
@@ -93,3 +104,188 @@ def check_picture(path: Path, *, force: bool) -> None:
         ours = False
     if not ours:
         raise ValueError(f"{path}: exists and is no picture of echousd; choose another file or use --force")
+
+
+LARGEST = 2**63 - 1  # what a layer, a manifest and a tensor can hold
+
+
+def bound_numbers(command: Any) -> None:
+    """Have a command and those below it refuse NaN, infinities and huge numbers, and remember when they began."""
+    if command.callback is not None:
+        command.callback = _checked(command.callback)
+    for below in getattr(command, "commands", {}).values():
+        bound_numbers(below)
+
+
+def _checked(callback: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(callback)
+    def call(*values: Any, **options: Any) -> Any:
+        _began.set(time.perf_counter())
+        for name, value in options.items():
+            for number in value if isinstance(value, tuple | list) else (value,):
+                check_number(f"--{name.replace('_', '-')}", number)
+        return callback(*values, **options)
+
+    return call
+
+
+def check_number(name: str, value: Any) -> None:
+    """Raises ValueError for a NaN, an infinity, a seed below 0 or an integer beyond `LARGEST`; other values pass."""
+    if name == "--seed" and isinstance(value, int) and not 0 <= value <= LARGEST:
+        raise ValueError(f"seed is {value}, allowed: 0 to {LARGEST}")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"{name} is {value}, allowed: a finite number")
+    if isinstance(value, int) and abs(value) > LARGEST:
+        raise ValueError(f"{name} is {value}, allowed: -{LARGEST} to {LARGEST}")
+
+
+def _show_all(context: typer.Context, wanted: bool) -> None:
+    if wanted:
+        for option in context.command.params:
+            option.hidden = False  # type: ignore[attr-defined]
+        context.command.get_help(context)
+        raise typer.Exit
+
+
+def _flag(name: str, help: str, **more: Any) -> Parameter:
+    option = typer.Option(f"--{name.replace('_', '-')}", help=help, **more)
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=False, annotation=Annotated[bool, option])
+
+
+QUIET = _flag("quiet", "Say errors and warnings alone.")
+HELP_ALL = _flag("help_all", "Show this with all options.", is_eager=True, callback=_show_all, expose_value=False)
+DATA = ("--json", "--yaml", "--dot", "--schema")  # options that ask for data on stdout
+
+
+def add_quiet(command: Any) -> None:
+    """Give a command, or every command below a click group, the flag `--quiet`; exit codes stay what they are."""
+    below = getattr(command, "commands", None)
+    for each in (below or {}).values():
+        add_quiet(each)
+    if below is None:
+        data = [option.name for option in command.params if set(option.opts) & set(DATA)]
+        command.params += click_options(QUIET)
+        command.callback = _hushed(command.callback, data)
+
+
+def add_help_all(command: Any) -> None:
+    """Give every command that keeps some of its options off the first page of its help the flag that shows them."""
+    for below in getattr(command, "commands", {}).values():
+        add_help_all(below)
+    if any(getattr(option, "hidden", False) for option in command.params) and not hasattr(command, "commands"):
+        command.params += click_options(HELP_ALL)
+
+
+def _hushed(callback: Callable[..., Any], data: list[str]) -> Callable[..., Any]:
+    @wraps(callback)
+    def call(*values: Any, quiet: bool = False, **options: Any) -> Any:
+        if not quiet:
+            return callback(*values, **options)
+        with silence(stdout=not any(options.get(name) for name in data)):
+            return callback(*values, **options)
+
+    return call
+
+
+@contextmanager
+def silence(*, stdout: bool) -> Iterator[None]:
+    """Drop what is printed on stderr but warnings, and on stdout if wanted."""
+    errors = sys.stderr
+
+    def warn(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        errors.write(warnings.formatwarning(message, category, filename, lineno, line))
+
+    with open(os.devnull, "w") as nowhere, warnings.catch_warnings(), ExitStack() as held:  # noqa: PTH123
+        warnings.showwarning = warn
+        held.enter_context(errors_to(errors))
+        held.enter_context(redirect_stderr(nowhere))
+        if stdout:
+            held.enter_context(redirect_stdout(nowhere))
+        yield
+
+
+@contextmanager
+def telling_faults() -> Iterator[None]:
+    """Leave it to `report` to tell what a finished room does not keep."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "the room has faults")
+        yield
+
+
+def report(made: Sequence[Written], *, json: bool = False, more: Mapping[str, Any] | None = None) -> None:
+    """Say what was made and what the graphs asked for in vain; exit code 1 for faults.
+
+    Arguments:
+        made: the rooms.
+        json: as one JSON object instead of lines.
+        more: further entries of the JSON object.
+    """
+    faults = [fault for each in made for fault in each.room.faults]
+    if json:
+        files = [path for each in made for path in (each.root, each.preview)]
+        rooms = {"rooms": [_room(each) for each in made]}
+        say_written([path for path in files if path], faults, {**rooms, **(more or {})})
+    else:
+        for each in made:
+            tell_room(each)
+    if faults:
+        raise typer.Exit(1)
+
+
+def say_written(files: Sequence[Path], faults: Sequence[str] = (), more: Mapping[str, Any] | None = None) -> None:
+    """Print as one JSON object which files were written, what is wrong with them, and how long it took.
+
+    Arguments:
+        files: what was written, previews too; not the layers below a room's root.
+        faults: a sentence each.
+        more: further entries.
+    """
+    told = {"ok": not faults, "written": [str(path) for path in files], "faults": list(faults)}
+    say_json({**told, "seconds": round(time.perf_counter() - _began.get(), 3), **(more or {})}, indent=2)
+
+
+def say_done(json: bool, files: Sequence[Path], lines: Iterable[str], more: Mapping[str, Any] | None = None) -> None:
+    """Say what a command has written: as one JSON object (`say_written`), or in lines."""
+    if json:
+        say_written(files, more=more)
+    else:
+        for line in lines:
+            say(line)
+
+
+def _room(written: Written) -> dict[str, Any]:
+    room = written.room
+    return {
+        "room": str(written.root),
+        "preview": str(written.preview) if written.preview else None,
+        "objects": len(room.names),
+        "layouts": [found.to_json() for found in room.outcomes],
+        "notes": list(room.notes),
+    }
+
+
+def tell_room(written: Written) -> None:
+    """Say what became of a room."""
+    room = written.room
+    say(f"room     {written.root}")
+    if written.preview is not None:
+        say(f"preview  {written.preview}")
+    for number, found in enumerate(room.outcomes):
+        counts, several = found.counts(), len(room.outcomes) > 1
+        kept = f"{counts['kept']} of {counts['kept'] + counts['broken']} measured relations kept"
+        say(f"layout_{number} {kept}" if several else f"graph    {len(room.names)} objects, {kept}")
+        for verdict in found.broken:
+            say(f"broken   {verdict.said} (margin {verdict.margin:+.2f})")
+        for hit in found.collisions:
+            say(f"collide  {hit.first} and {hit.second} by {hit.depth:.2f} m")
+        for sentence in found.restless:
+            say(f"restless {sentence}")
+    for note in room.notes:
+        say(f"note     {note}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from echousd.cli.options import Force, Written
-from echousd.cli.report import say_done
+from echousd.cli.output import say_done
 
 EXAMPLES = """Examples:
 
@@ -39,11 +38,8 @@ class _ExportsByItself(TyperGroup):
 
 
 plan_app = typer.Typer(cls=_ExportsByItself, no_args_is_help=True, epilog=EXAMPLES)
-
-
-def register(app: typer.Typer) -> None:
-    """Add the topic."""
-    app.add_typer(plan_app, name="plan", help="Plan a home, draw or write its plan; read somebody's floor plan.")
+app = typer.Typer()
+app.add_typer(plan_app, name="plan", help="Plan a home, draw or write its plan; read somebody's floor plan.")
 
 
 @plan_app.command("import", epilog=IMPORT_EXAMPLES)
@@ -73,7 +69,6 @@ def import_(
     from echousd.home.importing.formats import import_plan
     from echousd.home.stages import write_home
 
-    started = time.perf_counter()
     _writable(output, STAGE_FORMS[:-1], force)
     if picture is not None:
         _writable(picture, PICTURES, force)
@@ -88,7 +83,7 @@ def import_(
     lines = [f"wrote {output}", f"format   {found.format}: {found.frame}", f"found    {told}, {made.plan.area:.1f} m²"]
     lines += [f"ignored  {count} x {what}" for what, count in made.ignored.items()]
     facts = {"format": found.format, "frame": found.frame, "found": made.counts, "ignored": made.ignored}
-    say_done(json, [output, *([picture] if picture else [])], started, lines, facts)
+    say_done(json, [output, *([picture] if picture else [])], lines, facts)
 
 
 def _writable(path: Path, endings: tuple[str, ...], force: bool) -> None:
@@ -118,14 +113,13 @@ def export(
     from echousd.folder.found import room_at
     from echousd.graph import GraphError
     from echousd.graph.files import STAGE_FORMS
-    from echousd.home.draw import PICTURES, draw_plans, write_dxf
+    from echousd.home.draw import PICTURES, draw_plans, write_dxf, write_procthor
     from echousd.home.files import load_home
     from echousd.home.given import plan_of, plan_there
     from echousd.home.plan import plans
-    from echousd.home.procthor import write_procthor
     from echousd.home.stages import furniture, write_home
 
-    started, form = time.perf_counter(), output.suffix.lower()
+    form = output.suffix.lower()
     _writable(output, (*PICTURES, ".dxf", ".json", *STAGE_FORMS[:-1]), force)
     if several > 1 and form not in PICTURES:
         raise GraphError(f"--plans is {several}, allowed with a picture; name one by its --seed")
@@ -148,4 +142,4 @@ def export(
         write_home(found[0].home, output, found[0])
     lines = [f"wrote {output}", *(f"plan     {len(one.floors)} rooms, {one.area:.1f} m²" for one in found)]
     areas = {name: round(float(area), 3) for name, area in found[0].areas.items()}
-    say_done(json, [output], started, lines, {"areas": areas})
+    say_done(json, [output], lines, {"areas": areas})

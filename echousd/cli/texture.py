@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from echousd.cli.options import AsJson, Layout, Wait
-from echousd.cli.output import say
-from echousd.cli.report import say_done
+from echousd.cli.output import say, say_done
 
 if TYPE_CHECKING:
     from echousd.texturing import Job
 
 texture_app = typer.Typer(no_args_is_help=True)
-
-
-def register(app: typer.Typer) -> None:
-    """Add the topic."""
-    app.add_typer(
-        texture_app, name="texture", help="To texturing tools (SceneTex, Hunyuan3D-Paint, MVPainter) and back."
-    )
+app = typer.Typer()
+app.add_typer(texture_app, name="texture", help="To texturing tools (SceneTex, Hunyuan3D-Paint, MVPainter) and back.")
 
 
 @texture_app.command(
@@ -50,7 +43,6 @@ def export(
     from echousd.folder.found import room_at
     from echousd.texturing import export_job
 
-    started = time.perf_counter()
     room = room_at(room)
     job = export_job(
         room, output, tool, prompt=prompt, dressing=dressing, resolution=resolution, layout=layout, shell=shell,
@@ -58,7 +50,7 @@ def export(
     )  # fmt: skip
     told = {"objects": [thing.name for thing in job.objects], "prompt": job.prompt, "left_out": job.left_out}
     lines = [f"job      {output / 'job.json'}", f"objects  {len(job.objects)}, prompt {job.prompt!r}"]
-    say_done(json, [output / "job.json"], started, lines, told)
+    say_done(json, [output / "job.json"], lines, told)
     if not json:
         _tell(job)
 
@@ -78,7 +70,6 @@ def import_(
     from echousd.folder.found import room_at
     from echousd.texturing import import_job
 
-    started = time.perf_counter()
     room = room_at(room)
     look = import_job(room, job, name=name, skip=tuple(skip or ()), preview=preview, force=force, wait=wait)
     lines = [
@@ -89,7 +80,7 @@ def import_(
         if words:
             lines.append(f"as it was: {', '.join(words)} ({what})")
     told = {"look": look.name, "painted": list(look.painted), "no_result": list(look.unpainted)}
-    say_done(json, [look.layer], started, lines, {**told, "left_out": list(look.skipped)})
+    say_done(json, [look.layer], lines, {**told, "left_out": list(look.skipped)})
 
 
 def _tell(job: Job) -> None:

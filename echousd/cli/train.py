@@ -1,18 +1,26 @@
-"""`echousd train`: recipes to weights."""
+"""`echousd train`: recipes to weights; `echousd data`: data sets, made, looked at, compared and converted."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from echousd.cli.output import say_json
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command("train")(train)
+if TYPE_CHECKING:
+    import numpy as np
+    import trimesh
+
+    from echomodel.data.figures import Row
+    from echomodel.roomboxes import RoomBoxes
 
 
+app = typer.Typer()
+
+
+@app.command("train")
 def train(
     recipe: Annotated[Path, typer.Argument(help="Recipe file (TOML), see model/recipes.")],
     settings: Annotated[list[str] | None, typer.Option("--set", help="Change a field: key.sub=value.")] = None,
@@ -40,3 +48,345 @@ def train(
     trainer = open_run(plan, folder, resume=resume, report=report)
     reached = trainer.run(seconds=None if minutes is None else minutes * 60)
     console.print(f"stopped at step {reached} of {plan.steps}: {folder}/weights.safetensors")
+
+
+data_app = typer.Typer(help="Rooms and furniture to learn from.", no_args_is_help=True)
+app.add_typer(data_app, name="data")
+
+PACKAGE = "sweethome3d-furniture"  # as `echomodel.data.meshes` has it, which need not be loaded for --help
+USD_FILES = (".usd", ".usda", ".usdc", ".usdz")
+Seed = Annotated[int, typer.Option(help="Seed of the world; equal seeds give equal bytes.")]
+Rooms = Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")]
+
+
+@data_app.command("build")
+def build(
+    out: Annotated[Path, typer.Option("-o", "--output", help="Folder of the data set.")],
+    recipe: Annotated[str, typer.Option(help="smoke (seconds), packed (at most 40 MB) or full.")] = "smoke",
+    seed: Seed = 0,
+) -> None:
+    """Make rooms and shapes to train on; run again to continue a build that was stopped.
+
+    Example: echousd data build --recipe packed --seed 1 -o data/packed
+    """
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from echomodel.data.build import build_data
+    from echousd.cli.terminal import Terminal
+
+    console = Terminal(stderr=True)
+    columns = (TextColumn("{task.description:8}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    told: dict[str, int] = {}
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        tasks: dict = {}
+
+        def report(part: str, done: int, total: int) -> None:
+            if part not in tasks:
+                tasks[part] = bar.add_task(part, total=total)
+            bar.update(tasks[part], completed=done, total=total)
+            if not console.is_terminal and done * 10 // total > told.get(part, 0):
+                told[part] = done * 10 // total
+                console.print(f"{part} {done}/{total}")
+
+        rooms, shapes = build_data(out, recipe, seed, report)
+    size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file()) / 1e6
+    console.print(f"{out}: {len(rooms)} rooms, {len(shapes)} shapes, {size:.1f} MB")
+
+
+@data_app.command("rooms")
+def rooms_command(
+    out: Annotated[Path, typer.Option("-o", "--output", help="Rooms file (JSON).")],
+    count: Annotated[int, typer.Option(help="Number of rooms.")] = 100,
+    seed: Seed = 0,
+    room: Annotated[str | None, typer.Option(help="Room type; default a mixture.")] = None,
+) -> None:
+    """Generate rooms into a rooms file.
+
+    Example: echousd data rooms --count 50 --room bedroom -o bedrooms.json
+    """
+    from echomodel.roomboxes import write_rooms
+    from echomodel.rooms.generator import generate_rooms
+    from echomodel.vocabulary import vocabulary
+
+    kind = None if room is None else vocabulary().room_type(room).name
+    write_rooms(out, generate_rooms(count, seed, room_type=kind))
+
+
+@data_app.command("search")
+def search(
+    out: Annotated[Path, typer.Option("-o", "--output", help="Folder of the rooms; run again to go on.")],
+    count: Annotated[int, typer.Option(help="Graphs to search rooms of.", min=1)] = 20_000,
+    seed: Seed = 0,
+    drafts: Annotated[int, typer.Option(help="Drafts of the network a room, beside one arrangement.", min=0)] = 2,
+    weights: Annotated[str | None, typer.Option(help="Weights that draw them; default: those that ship.")] = None,
+    workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
+    minutes: Annotated[float | None, typer.Option(help="Begin nothing after so many minutes.")] = None,
+) -> None:
+    """Search rooms without a fault to train on, from several starts each; OUT/rooms.npz is the set.
+
+    Example: echousd data search --count 200 --seed 7 -o data/found
+    """
+    from echousd.cli.terminal import Terminal
+    from echousd.place.examples import GRAPHS, ExamplesPlan, search_examples
+
+    console = Terminal(stderr=True)
+
+    def report(row: dict[str, float]) -> None:
+        console.print("  ".join(f"{name} {value}" for name, value in row.items()))
+
+    plan = ExamplesPlan(seed, drafts, weights)
+    found = search_examples(out, plan, shards=-(-count // GRAPHS), workers=workers, minutes=minutes, report=report)
+    console.print(f"{out}/rooms.npz: {len(found)} rooms, {int(found.counts.sum())} objects")
+
+
+@data_app.command("plot")
+def plot(
+    rooms: Rooms,
+    out: Annotated[Path, typer.Option("-o", "--output", help="Picture file.")],
+    limit: Annotated[int, typer.Option(help="Number of rooms.")] = 50,
+    columns: Annotated[int, typer.Option(help="Rooms in a row.", min=1, max=1000)] = 10,
+    room: Annotated[str | None, typer.Option(help="Only rooms of this type.")] = None,
+    labels: Annotated[bool, typer.Option(help="Write the categories.")] = True,
+) -> None:
+    """Draw rooms from above: rectangles coloured per class, a red line to each front.
+
+    Example: echousd data plot rooms.json -o rooms.png --limit 20 --room bedroom
+    """
+    from echomodel.data.roomset import load_rooms, rooms_of_type
+    from echomodel.data.sheet import plot_rooms
+
+    found = load_rooms(rooms)
+    if room is not None:
+        found = rooms_of_type(found, room, rooms)
+    plot_rooms(found[:limit], out, columns=columns, labels=labels)
+
+
+@data_app.command("report")
+def report(
+    rooms: Annotated[Path | None, typer.Argument(help="Rooms file or folder; default: newly generated rooms.")] = None,
+    against: Annotated[Path | None, typer.Option(help="Rooms to compare with; default: 896 real ones.")] = None,
+    count: Annotated[int, typer.Option(help="Number of rooms to generate.")] = 2000,
+    seed: Seed = 0,
+    worst: Annotated[int, typer.Option(help="Rows to show, the most distant first; 0 = all.")] = 40,
+    section: Annotated[str | None, typer.Option(help="Only sections that begin so, such as pair.")] = None,
+    json_out: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Compare rooms with real ones, figure by figure, the most distant first.
+
+    The distance of shares is their difference, that of lengths the difference over the real range.
+
+    Example: echousd data report --count 2000 --worst 20
+    """
+    from echomodel.data.figures import compare, left_out, section_means
+    from echomodel.data.roomset import load_rooms
+    from echomodel.rooms.generator import generate_rooms
+
+    drawn = generate_rooms(count, seed) if rooms is None else load_rooms(rooms)
+    others = None if against is None else load_rooms(against)
+    rows = compare(drawn, others)
+    chosen = sorted((r for r in rows if r.section.startswith(section or "")), key=lambda row: -row.distance)
+    _print_rows(rows, chosen[: worst or None], section_means(rows), left_out(drawn, others), json_out)
+
+
+def _print_rows(rows: list[Row], shown: list[Row], means: dict[str, float], silent: list[str], as_json: bool) -> None:
+    if as_json:
+        from dataclasses import asdict
+
+        say_json({"mean_distance": means, "left_out": silent, "rows": [asdict(row) for row in rows]})
+        return
+    from rich.table import Table
+
+    from echousd.cli.terminal import Terminal
+
+    console = Terminal(width=None if Terminal().is_terminal else 150)
+    table = Table("section", "figure", "here", "real", "distance", box=None)
+    for row in shown:
+        ours, theirs = (" ".join(f"{v:.2f}" for v in values) for values in (row.ours, row.real))
+        table.add_row(row.section, row.name, ours, theirs, f"{row.distance:.3f}")
+    console.print(table)
+    for line in silent:
+        console.print(f"left out   {line}")
+    console.print("mean distance: " + ", ".join(f"{name} {value:.3f}" for name, value in means.items()))
+
+
+@data_app.command("meshes")
+def meshes(
+    sources: Annotated[
+        list[Path] | None, typer.Argument(help="Libraries (.sh3f), a .deb that holds them, folders of OBJ, GLB or USD.")
+    ] = None,
+    out: Annotated[Path, typer.Option("-o", "--output", help="Folder of the set.")] = Path("meshes"),
+    debian: Annotated[bool, typer.Option(help=f"Fetch the Debian package {PACKAGE} with apt.")] = False,
+    table_only: Annotated[bool, typer.Option(help="Write OUT/table.csv for review and stop.")] = False,
+    copies: Annotated[int, typer.Option(min=1, help="Stored shapes per training mesh: 1 as it is, 2 with mirror.")] = 2,
+) -> None:
+    """Make a shape set from real meshes: classes by name, metric size, flood-filled distances, thumbnails, attribution.
+
+    OUT/table.csv is written first and read again when it exists: correct `class`, `use` and `yaw` there and run again.
+
+    Example: echousd data meshes --debian -o data/meshes
+    """
+    from rich.progress import Progress
+
+    from echomodel.data.meshes import build_meshes, draft_table, entries_of, fetched_package, read_table, write_table
+    from echousd.cli.terminal import Terminal
+    from echousd.stage.contents import stage_mesh
+
+    console = Terminal(stderr=True)
+    out.mkdir(parents=True, exist_ok=True)
+    paths = list(sources or [])
+    if debian:
+        paths.append(fetched_package(out))
+    if not paths:
+        raise ValueError("no source given: name libraries or folders, or use --debian")
+    entries = [entry for path in paths for entry in entries_of(path, out, USD_FILES)]
+    table = out / "table.csv"
+    if not table.exists():
+        write_table(table, draft_table(entries))
+    rows = read_table(table)
+    used = sum(row.use for row in rows)
+    console.print(f"{table}: {len(rows)} models, {used} of them used")
+    if table_only:
+        return
+    loaders = dict.fromkeys(USD_FILES, stage_mesh)
+    with Progress(console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task("meshes", total=used)
+
+        def progress(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+            if not console.is_terminal and done % 50 == 0:
+                console.print(f"meshes {done}/{total}")
+
+        shapes = build_meshes(
+            out, entries, rows, copies=copies, loaders=loaders, progress=progress,
+            skipped=lambda line: console.print(f"skipped: {line}"),
+        )  # fmt: skip
+    console.print(f"{out}: {len(shapes)} shapes, {int(shapes.held_out.sum())} held out")
+
+
+@data_app.command("sheet")
+def sheet(
+    out: Annotated[Path, typer.Option("-o", "--output", help="Picture file.")],
+    categories: Annotated[list[str] | None, typer.Argument(help="Categories; default all.")] = None,
+    count: Annotated[int, typer.Option(help="Samples per category.")] = 12,
+    seed: Annotated[int, typer.Option(help="Seed of the world.")] = 0,
+    shapes: Annotated[Path | None, typer.Option("--set", help="Draw the shapes of this set instead.")] = None,
+    size: Annotated[int, typer.Option(help="Pixels across a picture.")] = 120,
+) -> None:
+    """Draw samples of every category in a grid: parametric pieces of styles 0, 1, ... or the shapes of a set.
+
+    Example: echousd data sheet chair dining_table -o chairs.png
+    """
+    from echomodel.data.shapeset import ShapeSet, piece
+    from echomodel.data.sheet import contact_sheet
+    from echomodel.files import write_picture
+    from echomodel.furniture import mesh_of
+    from echomodel.tsdf import mesh_from_tsdf
+    from echomodel.vocabulary import vocabulary
+
+    words = vocabulary()
+    names = [words.category(word).name for word in categories] if categories else [c.name for c in words.categories]
+    rows: list[tuple[str, list[trimesh.Trimesh]]] = []
+    stored = ShapeSet(shapes) if shapes else None
+    for name in names:
+        if stored is None:
+            pieces = [piece(seed, style, name) for style in range(count)]
+            rows.append((name, [mesh_of(parts, size) for _, size, parts in pieces]))
+            continue
+        found = [i for i in range(len(stored)) if stored.category[i] == words.category_id(name)][:count]
+        drawn = [mesh_from_tsdf(stored[i]) for i in found]
+        for mesh, i in zip(drawn, found, strict=True):
+            mesh.apply_scale(stored.size[i])
+        if drawn:
+            rows.append((f"{name} ({len(drawn)})", drawn))
+    write_picture(out, contact_sheet(rows, size))
+
+
+@data_app.command("to-usd")
+def to_usd(
+    rooms: Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")],
+    out: Annotated[Path, typer.Option("-o", "--output", help="Folder for the stages, one per room.")],
+    limit: Annotated[int | None, typer.Option(help="Only the first rooms.")] = None,
+    rules: Annotated[str, typer.Option(help="Label rooms without relations: strict, sgfront or none.")] = "strict",
+    known: Annotated[bool, typer.Option(help="Leave out objects that the vocabulary does not hold.")] = True,
+) -> None:
+    """Write rooms of any source as USD stages with their scene graphs.
+
+    Example: echousd data to-usd rooms.json -o stages --limit 10
+    """
+    from echomodel.data.roomset import load_rooms, with_known_words
+    from echousd.stage.boxes import write_stages
+
+    found = load_rooms(rooms, limit)
+    given = [room.relations for room in found]
+    if known:
+        kept = with_known_words(found)
+        # Relations speak of places in the list: they stay valid only where nothing was left out.
+        found = [
+            room if len(room) < len(old) else _with_relations(room, edges)
+            for room, old, edges in zip(kept, found, given, strict=True)
+        ]
+    write_stages(found, out, None if rules == "none" else rules)
+
+
+def _with_relations(room: RoomBoxes, relations: np.ndarray | None) -> RoomBoxes:
+    from dataclasses import replace
+
+    return replace(room, relations=relations)
+
+
+@data_app.command("import")
+def import_rooms(
+    sources: Annotated[list[Path], typer.Argument(help="Rooms files, sets, stages, or folders of stages or SG-FRONT.")],
+    out: Annotated[Path, typer.Option("-o", "--output", help="A set to train on (.npz), or a rooms file (.json).")],
+    room: Annotated[str, typer.Option(help="Of SG-FRONT: bedroom, livingroom, diningroom, library or all.")] = "all",
+    split: Annotated[str, typer.Option(help="Of SG-FRONT: trainval or test.")] = "trainval",
+) -> None:
+    """Bring rooms of any source into one file: for `echousd train --set data=FILE.npz`, or for eval.
+
+    A set holds every twentieth room out and is labelled anew where it is read; a rooms file keeps what is told.
+
+    Example: echousd data import my_stages more_rooms.json -o mine.npz
+    """
+    from echomodel.data.roomset import kept_out, load_rooms, pack_rooms, with_known_words
+    from echomodel.data.sgfront import SGFront
+    from echomodel.roomboxes import write_rooms
+    from echousd.cli.terminal import Terminal
+    from echousd.stage.boxes import read_stages
+
+    if out.suffix not in (".npz", ".json"):
+        raise ValueError(f"{out}: allowed are a set to train on (.npz) and a rooms file (.json)")
+    found: list[RoomBoxes] = []
+    for source in sources:
+        if (source / "classes_all.txt").exists():
+            found += SGFront(source, room, split).rooms()
+        elif source.suffix in USD_FILES or (source.is_dir() and not any(source.rglob("rooms*.json"))):
+            found += read_stages([source])
+        else:
+            found += load_rooms(source)
+    if not found:
+        raise ValueError(f"{', '.join(map(str, sources))}: no room found")
+    if out.suffix == ".json":
+        write_rooms(out, found)
+        return
+    known = [one for one in with_known_words(found) if len(one)]
+    pack_rooms(out, known, [kept_out(k) for k in range(len(known))], {"kind": "imported rooms"})
+    left = sum(map(len, found)) - sum(map(len, known))
+    Terminal(stderr=True).print(f"{out}: {len(known)} rooms; objects of unknown words left out: {left}")
+
+
+@data_app.command("to-sgfront")
+def to_sgfront(
+    rooms: Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")],
+    out: Annotated[Path, typer.Option("-o", "--output", help="Folder for the files.")],
+    split: Annotated[str, typer.Option(help="trainval or test.")] = "trainval",
+    drop: Annotated[float, typer.Option(help="Share of the relations that is left out.")] = 0.5,
+    seed: Annotated[int, typer.Option(help="Seed of the dropping.")] = 0,
+) -> None:
+    """Write rooms in the files of SG-FRONT, labelled by its rules.
+
+    Example: echousd data to-sgfront rooms.json -o sgfront
+    """
+    from echomodel.data.roomset import load_rooms, with_known_words
+    from echomodel.data.sgfront import write_sgfront
+
+    write_sgfront(out, with_known_words(load_rooms(rooms)), split=split, drop=drop, seed=seed)

@@ -1,54 +1,42 @@
-"""From a room to its dressing: what stands where, and the geometry of it."""
+"""From a room to its dressing: what stands where, what bare walls and corners get, its geometry and its nodes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import groupby
 
 import numpy as np
+import shapely
+import torch
+from pxr import Sdf
 
-from echomodel.dressing import KINDS
+from echomodel.dressing import KINDS, usual_size
 from echomodel.dressing import thing as solids_of
+from echomodel.openings import inward_normal
+from echomodel.rules import verdicts
+from echomodel.rules.placements import AT_WALL
 from echomodel.vocabulary import vocabulary
 from echousd.draw.sight import Furniture
-from echousd.dressing import bareness, corners, floors, hangings, tabletops, upholstery, walls
-from echousd.dressing.nodes import graph_of
-from echousd.dressing.setting import Setting, Thing, standing
-from echousd.graph.titles import DressingGraph
+from echousd.dressing import floors, tabletops, upholstery, walls
+from echousd.dressing.floors import CORNER_AIR, GREEN
+from echousd.dressing.setting import Setting, Standing, Thing, standing
+from echousd.dressing.walls import EYE, Wall, hung_at, walls_of
+from echousd.graph import Relation
+from echousd.graph.titles import DressingGraph, SmallNode
 from echousd.naming import free_name
 from echousd.room import RoomData
 from echousd.shapes.colliders import standing_hull
 from echousd.shapes.geometry import Geometry, Origin
 from echousd.shapes.joinery import part_of, within_budget
 from echousd.shapes.matter import weighed
+from echousd.stage import encoding as usd
+from echousd.stage.paths import DRESSING, OBJECTS
+from echousd.stage.write import apply_apis, author_relation, put
 
 ORIGIN = Origin("dressing")
 TALL = 0.7  # metres: what reaches or hangs higher may stand in a camera's way
-RULES = (
-    floors.rugs,
-    hangings.hung_up,
-    walls.curtains,
-    walls.pictures,
-    upholstery.throws,
-    upholstery.cushions,
-    upholstery.bed_cushions,
-    upholstery.folded,
-    tabletops.tabletops,
-    floors.by_doors,
-    floors.baskets,
-    hangings.coats,
-    floors.toys,
-    hangings.tall_mirror,
-    hangings.shelves,
-    hangings.clock,
-    corners.cables,
-    corners.slippers,
-    corners.corner_plants,
-    corners.poufs,
-    bareness.bare_walls,
-    bareness.bare_corners,
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,3 +139,170 @@ def geometry_of(kind: str, size: tuple[float, float, float], variant: int) -> Ge
     pieces = within_budget(solids, np.array(size), KINDS[kind].faces)
     part = part_of("mesh", pieces)
     return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, weighed(pieces))
+
+
+STRETCH, LONG = 1.9, 3.2  # metres of bare wall that ask for a picture, and for three of them
+STEP = 0.1  # metres from spot to spot along a wall
+PROBE = np.array([0.3, 0.8, 0.03])  # a picture that tells whether a spot is bare
+EMPTY = 0.8  # metres around a corner where nothing stands
+FLOORS = (12.0, 22.0, 34.0)  # m² of floor from which on one, two, three corners get something
+
+
+def bare_walls(setting: Setting) -> None:
+    """A picture as wide as suits the stretch on the two longest bare ones, three equal ones where it is very long."""
+    if not setting.walls or setting.use:
+        return
+    found = [(length, middle, wall) for wall in walls_of(setting) for length, middle in stretches(setting, wall)]
+    for length, middle, wall in sorted(found, key=lambda one: -one[0])[: None if setting.full else 2]:
+        rng = setting.rng(f"wall {wall.edge}", "bare")
+        wide = float(np.clip(0.3 * length, 0.6, 1.0))
+        size = np.round([wide, wide * rng.uniform(0.66, 0.75), 0.03], 2)
+        spots = [middle]
+        if length > LONG:
+            size = np.array([0.5, 0.68, 0.03])
+            spots = [middle + step * 0.66 for step in (-1, 0, 1)]
+        variant = int(rng.integers(1 << 30))
+        low = EYE - float(size[1]) / 2
+        row = [hung_at(setting, wall, spot, "picture", size, low, variant + n, "") for n, spot in enumerate(spots)]
+        setting.placed += [one for one in row if one is not None] if None not in row else []
+
+
+def stretches(setting: Setting, wall: Wall) -> list[tuple[float, float]]:
+    """Length and middle (metres along the wall) of its longest bare stretch at eye height, [] where it is short."""
+    spots = np.arange(0.3, wall.length - 0.25, STEP)
+    low = EYE - float(PROBE[1]) / 2
+    bare = [hung_at(setting, wall, float(spot), "picture", PROBE, low, 0, "") is not None for spot in spots]
+    runs = [[n for n, _ in run] for free, run in groupby(enumerate(bare), key=lambda one: one[1]) if free]
+    ends = [(float(spots[run[0]]), float(spots[run[-1]])) for run in runs]
+    long = [(last - first + float(PROBE[0]), (first + last) / 2) for first, last in ends]
+    return [one for one in sorted(long)[-1:] if one[0] >= STRETCH]
+
+
+def bare_corners(setting: Setting) -> None:
+    """Plants, then a tall vase, in the emptiest corners of rooms that are large for what stands in them."""
+    green = setting.plants
+    wanted = sum(setting.room.area >= area for area in FLOORS) - green
+    if setting.full or wanted <= 0:
+        return
+    around = [other.footprint for other in setting.objects.values() if other.position[1] < 0.5]
+    away = [min((shapely.Point(corner).distance(plan) for plan in around), default=9.0) for corner in setting.floor]
+    for number in np.argsort(away)[::-1].tolist():
+        inside = [inward_normal(setting.floor, edge) for edge in (number - 1, number)]
+        if wanted <= 0 or away[number] < EMPTY or abs(float(inside[0] @ inside[1])) > 0.5:
+            continue
+        rng = setting.rng(f"corner {number}", "bare")
+        kind = "floor_plant" if green < GREEN else "floor_vase"
+        size, variant = usual_size(kind, rng), int(rng.integers(1 << 30))
+        middles = [setting.floor[number] + (inside[0] + inside[1]) * (float(size[0]) / 2 + off) for off in (0.1, 0.2)]
+        turn = float(rng.uniform(-3, 3))
+        things = (Thing(kind, size, np.array([x, 0.0, z]), turn, "", variant) for x, z in middles)
+        if setting.put_first(things, margin=CORNER_AIR) is not None:
+            green, wanted = green + 1, wanted - 1
+
+
+RULES = (
+    floors.rugs,
+    walls.hung_up,
+    walls.curtains,
+    walls.pictures,
+    upholstery.throws,
+    upholstery.cushions,
+    upholstery.bed_cushions,
+    upholstery.folded,
+    tabletops.tabletops,
+    floors.by_doors,
+    floors.baskets,
+    walls.coats,
+    floors.toys,
+    walls.tall_mirror,
+    walls.shelves,
+    walls.clock,
+    floors.cables,
+    floors.slippers,
+    floors.corner_plants,
+    floors.poufs,
+    bare_walls,
+    bare_corners,
+)
+
+
+MEASURED = ("above", "close_by")  # of what hangs over a piece or lies on the floor at it, the first that holds
+
+
+@dataclass(frozen=True, eq=False)
+class _Box:
+    size: np.ndarray
+    position: np.ndarray
+    yaw: np.ndarray
+
+
+def graph_of(setting: Setting, named: Mapping[str, Thing]) -> DressingGraph:
+    """The things of one layout as nodes, with a relation of each that belongs to a piece or stands on a wall shelf.
+
+    Arguments:
+        setting: after all rules. named: name -> thing.
+    """
+    nodes = tuple(_node(setting, name, thing) for name, thing in named.items())
+    related = (_relation(setting, named, name, thing) for name, thing in named.items() if thing.on)
+    return DressingGraph(nodes, tuple(relation for relation in related if relation))
+
+
+def write_nodes(layer: Sdf.Layer, graph: DressingGraph, room: Sdf.Path, taken: Iterable[str]) -> None:
+    """Make the prims of small things nodes, and write their relations below the scene graph.
+
+    Arguments:
+        layer: holds the things. room: spec path of the room, in a variant where there are several layouts.
+        taken: names of the prims of the furniture's relations.
+    """
+    small, names = {node.name for node in graph.nodes}, set(taken)
+    above = Sdf.Path(DRESSING).ReplacePrefix(Sdf.Path("/Room"), room)
+    for node in graph.nodes:
+        spec = layer.GetPrimAtPath(above.AppendChild(node.name))
+        apply_apis(spec)
+        for attribute, value in usd.small_values(node).items():
+            put(spec, attribute, value)
+    if not graph.relations:
+        return
+    parent = Sdf.CreatePrimInLayer(layer, room.AppendChild(usd.GRAPH_NAME))
+    for relation in graph.relations:
+        name = usd.relation_name(*relation.triple, names)
+        names.add(name)
+        ends = (f"{DRESSING if end in small else OBJECTS}/{end}" for end in (relation.subject, relation.object))
+        author_relation(parent, name, relation, *map(Sdf.Path, ends))
+
+
+def _node(setting: Setting, name: str, thing: Thing) -> SmallNode:
+    size, position = (tuple(round(float(v), 5) + 0.0 for v in found) for found in (thing.size, thing.position))
+    place = "against_wall" if _hangs(setting, thing) else None
+    category, yaw = KINDS[thing.kind].name, round(float(thing.yaw), 6) + 0.0
+    return SmallNode(name=name, category=category, size=size, position=position, yaw=yaw, place=place)
+
+
+def _hangs(setting: Setting, thing: Thing) -> bool:
+    """Whether a thing is fixed to a wall behind it."""
+    kind = KINDS[thing.kind]
+    if not (setting.walls and kind.fixed) or kind.lies:
+        return False
+    cos, sin, deep = np.cos(thing.yaw), np.sin(thing.yaw), thing.size[2] / 2
+    ends = (-thing.size[0] / 2, thing.size[0] / 2)
+    back = [thing.position[[0, 2]] + (side * cos - deep * sin, -side * sin - deep * cos) for side in ends]
+    return bool((shapely.distance(setting.room.exterior, shapely.points(back)) <= AT_WALL).all())
+
+
+def _relation(setting: Setting, named: Mapping[str, Thing], name: str, thing: Thing) -> Relation | None:
+    """What a thing is to what it belongs to: it stands on it, or what the vocabulary's rules measure."""
+    kind, host = KINDS[thing.kind], setting.objects.get(thing.on)
+    if host is None:  # a shelf on a wall is no piece of furniture, but a thing itself
+        board = setting.carriers[thing.on]
+        whose = next(n for n, t in named.items() if np.array_equal(t.position, board.position))
+        return Relation(name, "standing_on", whose)
+    if (kind.lies or not kind.fixed) and thing.position[1] > 0.0:
+        return Relation(name, "standing_on", host.name)
+    return next((Relation(name, word, host.name) for word in MEASURED if _holds(word, thing, host)), None)
+
+
+def _holds(predicate: str, thing: Thing, host: Standing) -> bool:
+    both = _Box(
+        np.stack([thing.size, host.size]), np.stack([thing.position, host.position]), np.array([thing.yaw, host.yaw])
+    )
+    return bool(verdicts(both, torch.tensor([[0, vocabulary().predicate_id(predicate), 1]]))[0] == 1)

@@ -27,8 +27,7 @@ from echomodel.rooms.generator import generate_room, generate_rooms
 from echomodel.rooms.statistics import room_type_statistics
 from echomodel.vocabulary import vocabulary
 from echousd.place import PlaceConfig, place_boxes
-from echousd.reproducible import one_thread
-from echousd.tensors import seeded
+from echousd.tensors import one_thread, seeded
 
 TOGETHER = 64  # scenes in one pass of a network
 POOL, POOL_SEED = 400, 910_000  # generated rooms from which `retrieval` takes

@@ -6,31 +6,120 @@ says which files move where; from then on the run can be finished by whoever com
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from echomodel.files import flush
-from echousd.folder.journal import (
-    DONE,
-    Journal,
-    Move,
-    Removal,
-    digest,
-    digest_of,
-    read_journal,
-    write_journal,
-)
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from echomodel.files import digest, flush
 from echousd.folder.lock import LOCK, locked, run_of
-from echousd.folder.manifest import find_manifest
-from echousd.folder.within import inside
+from echousd.folder.manifest import LARGEST, Digest, find_manifest
+from echousd.folder.within import check_links, inside
 from echousd.naming import free_name
 from echousd.pending import JOURNAL, STAGING, half_written
 from echousd.stage.files import check_path
+
+DONE = "done.json"  # the journal of a run that has more to do once its files are in place
+
+
+class Move(BaseModel):
+    """A staged file that belongs at `to`; `over` is the digest of what it may replace there, "" for nothing."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    staged: Annotated[str, Field(pattern=r"^[0-9]{1,9}$")]
+    to: str
+    digest: Digest
+    over: Digest = ""
+
+
+class Removal(BaseModel):
+    """A file that goes if it still has this digest."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    path: str
+    digest: Digest
+
+
+class Journal(BaseModel):
+    """All that is left to do once every file of a run is staged, in order.
+
+    `run` is what it does, "" = nobody asks; `kept` are files that are not ours, and what each is called from then on.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    echousd_journal: Literal[2] = 2
+    run: Annotated[str, Field(max_length=200)] = ""
+    move: list[Move]
+    remove: list[Removal]
+    kept: dict[str, str] = {}
+
+
+def digest_of(path: Path) -> str:
+    """Digest of the plain file at `path`, "" where there is none."""
+    try:
+        return digest(path.read_bytes()) if path.is_file() else ""
+    except OSError:
+        return ""
+
+
+def write_journal(staging: Path, journal: Journal) -> None:
+    """Put the journal beside its staged files: these are on the disk before, and it is there as a whole."""
+    for entry in journal.move:
+        flush(staging / entry.staged)
+    (staging / "journal.new").write_text(journal.model_dump_json(), "utf-8")
+    flush(staging / "journal.new")
+    (staging / "journal.new").replace(staging / JOURNAL)
+    flush(staging)
+
+
+def read_journal(folder: Path, name: str = JOURNAL) -> Journal | None:
+    """The journal of an interrupted run in `folder`; None where it had not come so far, or cannot be read any more.
+
+    Arguments:
+        name: `JOURNAL`, or `DONE` for that of a run whose files are in place.
+
+    Raises ValueError for entries that name anything outside of the folder; nothing was changed then.
+    """
+    path = folder / STAGING / name
+    check_links(folder, path, f"{path} is read")
+    if not path.is_file():
+        return None
+    try:
+        if path.stat().st_size > LARGEST:
+            raise ValueError("it is too large")
+        journal = Journal.model_validate(json.loads(path.read_bytes()))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise ValueError(
+            f"{path}: {where} is {first.get('input')!r:.100} ({first['msg'].lower()}); "
+            f"delete {folder / STAGING} to give the interrupted run up"
+        ) from None
+    except (ValueError, RecursionError):  # emptied by a power cut, as some disks do
+        warnings.warn(f"{path}: cannot be read; the interrupted run is given up, generate the room again", stacklevel=3)
+        return None
+    for number, entry in enumerate(journal.move):
+        place = inside(folder, entry.to, f"{path}: move[{number}]")
+        _check_place(folder, place, f"{path}: move[{number}]")
+        check_links(folder, folder / STAGING / entry.staged, f"{path}: move[{number}] takes {entry.staged}")
+    for number, removal in enumerate(journal.remove):
+        place = inside(folder, removal.path, f"{path}: remove[{number}]")
+        _check_place(folder, place, f"{path}: remove[{number}]")
+    return journal
+
+
+def _check_place(folder: Path, place: Path, entry: str) -> None:
+    if place.relative_to(folder).parts[0] == STAGING:
+        raise ValueError(f"{entry} names {place}, where runs keep their own files; allowed: the room's files")
 
 
 def claim(folder: Path, *, force: bool, root: str = "") -> dict[str, Any]:
@@ -255,3 +344,32 @@ def _holds(path: Path, content: bytes) -> bool:
         return path.stat().st_size == len(content) and path.read_bytes() == content
     except OSError:
         return False
+
+
+def check_output(output: Path, *, flat: bool, force: bool) -> None:
+    """Refuse before the long work what would be refused after it; raises ValueError."""
+    if flat:
+        if output.suffix not in (".usda", ".usdc"):
+            raise ValueError(f"{output}: with --flat the output is a file that ends in .usda or .usdc")
+        if output.exists() and not force:
+            raise ValueError(f"{output}: exists; choose another file or use --force")
+        return
+    if output.suffix in (".usda", ".usdc", ".usd", ".usdz"):
+        raise ValueError(f"{output}: the output is a folder; --flat writes one file")
+    if output.exists() and not output.is_dir():
+        raise ValueError(f"{output}: is a file, the output must be a folder")
+    check_writable(output)
+
+
+@contextmanager
+def writing(output: Path, *, flat: bool, force: bool, wait: bool, run: str = "") -> Iterator[bool]:
+    """Have the folder for this process alone, from what is read of it to what is written.
+
+    Yields whether the same run was interrupted and has been finished now, see `echousd.folder.folder.held`.
+    """
+    if flat:
+        yield False
+        return
+    with held(output, wait=wait, run=run) as finished:
+        claim(output, force=force)
+        yield bool(run) and finished == run

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 from pxr import Sdf, Tf, UsdUtils
 
 from echousd.draw.pictures import is_ours
-from echousd.folder.folder import backup_name
-from echousd.folder.journal import digest, digest_of
+from echousd.folder.folder import backup_name, digest, digest_of
 from echousd.folder.within import inside
 from echousd.naming import free_name
 from echousd.pending import STAGING

@@ -4,23 +4,12 @@ Nothing here imports pxr or torch; `load_graph` and `save_graph` load `echousd.s
 """
 
 from echousd.graph.consistency import GraphError
-from echousd.graph.difference import GraphDiff
 from echousd.graph.fields import MAX_TEXT
-from echousd.graph.files import load_graph, save_graph
+from echousd.graph.files import load_graph, save_graph, starting_graph
 from echousd.graph.nodes import Node, Placed, Relation, RoomSpec
-from echousd.graph.scene import SceneGraph
-from echousd.graph.starting import starting_graph
+from echousd.graph.scene import GraphDiff, SceneGraph
 
 __all__ = [
-    "MAX_TEXT",
-    "GraphDiff",
-    "GraphError",
-    "Node",
-    "Placed",
-    "Relation",
-    "RoomSpec",
-    "SceneGraph",
-    "load_graph",
-    "save_graph",
-    "starting_graph",
-]
+    "MAX_TEXT", "GraphDiff", "GraphError", "Node", "Placed", "Relation", "RoomSpec", "SceneGraph", "load_graph",
+    "save_graph", "starting_graph",
+]  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from graphlib import CycleError, TopologicalSorter
 
 from echomodel.vocabulary import vocabulary
 
@@ -129,32 +130,19 @@ def ordered_edges(triples: Iterable[Triple]) -> dict[str, dict[tuple[str, str], 
 
 
 def find_cycle(edges: Mapping[tuple[str, str], object]) -> list[tuple[str, str]]:
-    """A shortest cycle through the first node found to lie on one, as its edges in order; empty if there is none.
-
-    Nodes without a predecessor or without a successor cannot lie on a cycle, so they are peeled off first (Kahn).
-    """
+    """A shortest cycle through a node that lies on one, as its edges in order; empty if there is none."""
     after: dict[str, list[str]] = defaultdict(list)
-    before: dict[str, list[str]] = defaultdict(list)
     for less, more in edges:
         after[less].append(more)
-        before[more].append(less)
-    left = set(after) | set(before)
-    for forward, backward in ((after, before), (before, after)):
-        degree = {node: sum(n in left for n in backward[node]) for node in left}
-        ready = [node for node in left if degree[node] == 0]
-        while ready:
-            node = ready.pop()
-            left.discard(node)
-            for other in forward[node]:
-                if other in left:
-                    degree[other] -= 1
-                    if degree[other] == 0:
-                        ready.append(other)
-    cycles = (_shortest_return(start, after, left) for start in after if start in left)
-    return next((cycle for cycle in cycles if cycle), [])
+    try:
+        TopologicalSorter(after).prepare()
+    except CycleError as error:
+        start = next(node for node in after if node in error.args[1])
+        return _shortest_return(start, after)
+    return []
 
 
-def _shortest_return(start: str, after: Mapping[str, list[str]], allowed: set[str]) -> list[tuple[str, str]]:
+def _shortest_return(start: str, after: Mapping[str, list[str]]) -> list[tuple[str, str]]:
     """Breadth-first search from `start` back to itself."""
     came_from: dict[str, str] = {}
     level = [start]
@@ -168,7 +156,7 @@ def _shortest_return(start: str, after: Mapping[str, list[str]], allowed: set[st
                         path.append((came_from[node], node))
                         node = came_from[node]
                     return path[::-1]
-                if other in allowed and other not in came_from:
+                if other not in came_from:
                     came_from[other] = node
                     following.append(other)
         level = following

@@ -234,9 +234,7 @@ RoomTypeWord: TypeAlias = Annotated[str, BeforeValidator(_room_type[0]), _room_t
 Style: TypeAlias = Annotated[str | None, _optional(_text)]
 RoomStyleWord: TypeAlias = Annotated[str | None, _optional(_style[0]), _style[1]]
 Shapes: TypeAlias = Annotated[
-    str | None,
-    _optional(_shapes),
-    WithJsonSchema({"anyOf": [{"enum": list(SHAPES)}, {"type": "null"}]}),
+    str | None, _optional(_shapes), WithJsonSchema({"anyOf": [{"enum": list(SHAPES)}, {"type": "null"}]})
 ]
 Place: TypeAlias = Annotated[
     str | None,

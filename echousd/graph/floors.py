@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from echomodel.openings import swing_area
+from echomodel.openings import signed_area, swing_area
 from echomodel.roomboxes import footprints
+from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError
-
-if TYPE_CHECKING:
-    from echousd.graph.scene import SceneGraph
+from echousd.graph.scene import SceneGraph
 
 HEIGHT = 2.8  # metres, of rooms that state none
 LARGEST = 10_000.0  # m² of the box around a floor; what is rasterized on it takes 0.1 MB for each
@@ -90,7 +87,6 @@ def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGr
         seed: decides between places that are equally good.
     """
     from echomodel.rooms.openings import WINDOWS, place_openings
-    from echomodel.vocabulary import vocabulary
 
     corners = graph.room.corners
     if corners is None or graph.room.walls or any(opening.kind == "window" for opening in graph.room.openings):
@@ -157,7 +153,6 @@ def check_space(graph: SceneGraph) -> tuple[str, ...]:
     if corners is None or extents is None:
         return ()
     check_extents(extents)
-    from echomodel.openings import signed_area
 
     area = abs(signed_area(corners))
     said = f"the floor of {extents[0]:.2f} x {extents[1]:.2f} m ({area:.1f} m²)"

@@ -16,10 +16,9 @@ from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade
 
 import echousd
 from echomodel.openings import numbered
-from echousd.batches.batch import cores, weights_hash
+from echousd.batches.batch import MEMORY, cores, weights_hash
 from echousd.batches.executor import Executor, LocalWorkers, Task
 from echousd.batches.options import BatchOptions
-from echousd.batches.run import MEMORY
 from echousd.batches.work import Job, room
 from echousd.folder.manifest import find_manifest
 from echousd.home.given import next_plan
@@ -31,8 +30,8 @@ from echousd.naming import HOME as ROOT_FILE
 from echousd.naming import HOUSE as MARK
 from echousd.options import MAX_SEED, RoomOptions
 from echousd.shapes.looks import palette_of_room
-from echousd.shapes.shell import THICKNESS
 from echousd.shapes.surface import surface
+from echousd.shapes.walls import THICKNESS
 from echousd.stage.files import layer_bytes, open_stage, write_all
 from echousd.stage.turning import rescale, turn_up
 
@@ -57,12 +56,7 @@ class Made:
 
 
 def generate_home(
-    home: HomeGraph | Plan,
-    output: str | Path,
-    *,
-    force: bool = False,
-    workers: int | None = None,
-    **options: Any,
+    home: HomeGraph | Plan, output: str | Path, *, force: bool = False, workers: int | None = None, **options: Any
 ) -> Made:
     """Plan a home, furnish its rooms side by side and write them to a folder, from whose plan a new one begins.
 

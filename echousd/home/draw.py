@@ -1,18 +1,20 @@
-"""Plans as drawings: walls, doors with their swings, windows, names and areas; PNG, SVG and PDF, or DXF for CAD."""
+"""Plans as drawings: walls, doors, windows, names and areas; PNG, SVG and PDF, DXF for CAD, a house of ProcTHOR."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
 
-from echomodel.files import whole_file
-from echomodel.openings import Opening, hinge_point, inward_normal, segment, signed_area, swing_area
+from echomodel.files import whole_file, write_json
+from echomodel.openings import Opening, direction, hinge_point, inward_normal, segment, signed_area, swing_area
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError
+from echousd.home.openings import Floor, counterpart
 from echousd.home.plan import Plan, ways
 from echousd.home.stages import Standing
 from echousd.naming import free_name
@@ -20,15 +22,7 @@ from echousd.naming import free_name
 PICTURES = (".png", ".svg", ".pdf")
 TINTS = {"": "#f4efe4", "wet": "#e3eef4", "outdoor": "#e6f0df"}
 # Of a DXF, with their colours.
-LAYERS = {
-    "wall": 7,
-    "door": 3,
-    "window": 5,
-    "passage": 9,
-    "room": 8,
-    "furniture": 6,
-    "dimension": 2,
-}
+LAYERS = {"wall": 7, "door": 3, "window": 5, "passage": 9, "room": 8, "furniture": 6, "dimension": 2}
 INK = {"door": "#8a5a2b", "window": "#3a6ea5", "passage": "#c9c2b2"}
 FRONT = [2, 3]  # corners of a footprint at its front
 ASIDE = 0.5  # metres from the walls to what says how long they are
@@ -180,3 +174,52 @@ def write_dxf(plan: Plan, path: Path, things: Sequence[Standing] = ()) -> None:
         made.render()
     with whole_file(path) as beside:
         drawing.saveas(beside)
+
+
+HEIGHT = 2.7  # metres of a room that says nothing of it
+KINDS = {"kitchen": "Kitchen", "bathroom": "Bathroom", "bedroom": "Bedroom", "childrens_room": "Bedroom"}
+LOOK = {"name": "PureWhite"}
+ASSETS = {"door": "Doorway_1", "passage": "Doorframe_1", "window": "Window_Slider_48x36"}
+
+
+def write_procthor(plan: Plan, path: Path) -> None:
+    """Write the rooms, walls, doors and windows of a plan; furniture stays out, whose models AI2-THOR does not have.
+
+    Walls of ProcTHOR have no thickness: rooms end in the middle of the walls between them.
+    """
+    number = {name: index + 2 for index, name in enumerate(plan.cells)}  # 1 is outside
+    floors = {name: Floor(name, floor, plan.walls[name]) for name, floor in plan.floors.items()}
+    rooms, walls = [], []
+    for name, cell in plan.cells.items():
+        spec = plan.home.room(name).graph.room
+        corners = [{"x": z, "y": 0, "z": x} for x, z in cell.round(4).tolist()]  # Unity's x is our east
+        about = {"roomType": KINDS.get(spec.type, "LivingRoom"), "floorPolygon": corners, "floorMaterial": LOOK}
+        rooms.append({"id": f"room|{number[name]}", **about, "ceilings": [], "children": []})
+        for edge, ends in enumerate(zip(corners, [*corners[1:], corners[0]], strict=True)):
+            polygon = [*ends, *({**corner, "y": spec.height or HEIGHT} for corner in ends)]
+            mine = {"id": f"wall|{number[name]}|{edge}", "roomId": f"room|{number[name]}"}
+            walls.append({**mine, "material": LOOK, "polygon": polygon})
+    found: dict[str, Any] = {"rooms": rooms, "walls": walls, "doors": [], "windows": [], "objects": []}
+    inner = [(one, opening) for (one, _), opening in ways(plan)]
+    outer = [
+        (name, opening)
+        for name, floor in floors.items()
+        for opening in plan.openings[name]
+        if counterpart(floor, opening, floors.values()) is None
+    ]
+    for name, opening in (*inner, *outer):
+        behind = counterpart(floors[name], opening, floors.values())
+        wall, room = f"wall|{number[name]}|{opening.edge}", f"room|{number[name]}"
+        there = (f"wall|{number[behind[0]]}|{behind[1].edge}", f"room|{number[behind[0]]}") if behind else (wall, room)
+        cell = plan.cells[name]
+        at = (segment(plan.floors[name], opening) - cell[opening.edge]) @ direction(cell, opening.edge)
+        low, high = {"y": opening.sill}, {"y": opening.sill + opening.height}
+        kind = "window" if opening.kind == "window" else "door"
+        one = {"id": f"{kind}|{number[name]}|{len(found[f'{kind}s'])}", "assetId": ASSETS[opening.kind]}
+        one |= {"room0": room, "room1": there[1], "wall0": wall, "wall1": there[0]}
+        middle = {"x": float(at.mean()), "y": opening.sill + opening.height / 2, "z": 0}
+        hole = [{"x": float(np.round(x, 4)), **y, "z": 0} for x, y in zip(at, (low, high), strict=True)]
+        found[f"{kind}s"].append({**one, "holePolygon": hole, "assetPosition": middle})
+    found["proceduralParameters"] = {"ceilingMaterial": LOOK, "floorColliderThickness": 1.0, "lights": []}
+    found["metadata"] = {"schema": "1.0.0", "generator": "echousd"}
+    write_json(path, found)

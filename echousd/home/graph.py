@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from echomodel.rows import HomeRelation as Row
 from echomodel.vocabulary import normalised, vocabulary
 from echousd.graph import GraphError, RoomSpec, SceneGraph, starting_graph
 from echousd.graph import fields as field
@@ -25,7 +26,6 @@ from echousd.graph.text import graph_from_plain, only_fields
 if TYPE_CHECKING:
     import networkx
 
-    from echomodel.rows import HomeRelation as Row
 
 MOST_ROOMS = 40
 RATIO = 2.5  # long side over short side of a room that says nothing of it

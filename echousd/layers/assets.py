@@ -12,7 +12,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics, UsdShade, Vt
 from echousd.layers.materials import write_looks, write_palettes
 from echousd.layers.physics import write_asset_physics
 from echousd.options import Look
-from echousd.shapes.finishes.harmonies import HARMONIES
+from echousd.shapes.finishes.slots import HARMONIES
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.joints import write_joints
 from echousd.shapes.looks import look, palette_for

@@ -14,7 +14,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.draw.sight import ASPECT, Furniture
 from echousd.draw.views import APERTURE, FOCAL_LENGTH, MARGIN, inside_view, perspective_view, shifted
 from echousd.room import RoomData
-from echousd.shapes import shell, walls
+from echousd.shapes import walls
 
 FAR = 10.0  # widths of the room that the camera above is away: heights hardly show
 TENTHS = 0.01  # what a millimetre is in USD's lens unit, tenths of a scene unit, here of a metre
@@ -108,13 +108,13 @@ def room_points(room: RoomData) -> np.ndarray:
     plan = footprints(size, position, np.asarray(room.boxes.yaw, float)).reshape(-1, 2)
     low, high = np.repeat(position[:, 1], 4), np.repeat(position[:, 1] + size[:, 1], 4)
     points = [np.insert(plan, 1, low, axis=1), np.insert(plan, 1, high, axis=1)]
-    points += [np.insert(room.floor, 1, height, axis=1) for height in (-shell.THICKNESS, 0.0)]
+    points += [np.insert(room.floor, 1, height, axis=1) for height in (-walls.THICKNESS, 0.0)]
     if room.options.walls:
         spec = room.graph.room
         outer = walls.outline(room.floor if spec.corners is None else spec.corners, spec.walls)
-        points += [np.insert(outer, 1, height, axis=1) for height in (-shell.THICKNESS, room.height)]
+        points += [np.insert(outer, 1, height, axis=1) for height in (-walls.THICKNESS, room.height)]
     if room.options.ceiling:
-        points.append(np.insert(room.floor, 1, room.height + shell.THICKNESS, axis=1))
+        points.append(np.insert(room.floor, 1, room.height + walls.THICKNESS, axis=1))
     return np.concatenate(points)
 
 

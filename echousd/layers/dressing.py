@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade
 
-from echousd.dressing.dress import Dressing
-from echousd.dressing.nodes import write_nodes
+from echousd.dressing.dress import Dressing, write_nodes
 from echousd.dressing.setting import Thing
 from echousd.layers import assets
 from echousd.layers.materials import LOOKS

@@ -11,7 +11,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.geometry import Geometry, Mass
 from echousd.shapes.joints import STATIC
-from echousd.shapes.masses import hull_volume, mass_of, write_mass
+from echousd.shapes.matter import hull_volume, mass_of, write_mass
 from echousd.stage.layouts import ARTICULATED, ARTICULATION
 from echousd.stage.paths import MTL, SHELL, piece_path
 

@@ -15,13 +15,12 @@ from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
 from echousd.layers import assets
 from echousd.room import RoomData
-from echousd.shapes.finishes.harmonies import linear
+from echousd.shapes.finishes.slots import linear
 from echousd.shapes.fittings import PLAIN, Millwork, millwork_of
 from echousd.shapes.geometry import Mass
 from echousd.shapes.looks import Look
-from echousd.shapes.shell import floor_mesh
 from echousd.shapes.surface import Surface, surface
-from echousd.shapes.walls import Piece, ShellPart, ceiling, wall_name, walls
+from echousd.shapes.walls import Piece, ShellPart, ceiling, floor_mesh, wall_name, walls
 from echousd.stage import encoding
 from echousd.stage.files import new_stage
 from echousd.stage.paths import OPENINGS, SHELL, piece_name

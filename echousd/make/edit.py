@@ -6,12 +6,13 @@ import warnings
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import torch
 
 from echomodel.boxes import Boxes
 from echomodel.progress import StageListener
+from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.vocabulary import vocabulary
 from echousd.assets.record import Vector
 from echousd.graph import Node, SceneGraph
@@ -24,12 +25,10 @@ from echousd.make.verdicts import layout_outcome, warn_of_faults
 from echousd.naming import free_name
 from echousd.options import OF_NEW, Look, RoomOptions, takes_options
 from echousd.progress import StageTimer
-from echousd.reproducible import one_thread
 from echousd.room import Provenance
 from echousd.shapes.looks import palette_of_room
 from echousd.shapes.merging import merged
-from echousd.shapes.sources import default_source
-from echousd.shapes.sources.mixing import check_sources, mixed_shapes
+from echousd.shapes.sources.mixing import check_sources, default_source, mixed_shapes
 from echousd.shapes.sources.retrieval import (
     Retrieved,
     anchored,
@@ -41,10 +40,7 @@ from echousd.shapes.sources.retrieval import (
 )
 from echousd.shapes.sources.source import ShapeRequest
 from echousd.shapes.styles import asset_names, style_groups, told_styles
-from echousd.tensors import graph_batch
-
-if TYPE_CHECKING:
-    from echomodel.protocols import GraphEdit, RoomModel
+from echousd.tensors import graph_batch, one_thread
 
 
 @takes_options(OF_NEW)
@@ -208,7 +204,6 @@ def graph_edit(before: SceneGraph, after: SceneGraph) -> GraphEdit:
 
     An object of another category counts as new.
     """
-    from echomodel.protocols import GraphEdit
 
     old = {node.name: node.category for node in before.nodes}
     added = torch.tensor([old.get(node.name) != node.category for node in after.nodes], dtype=torch.bool)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pxr import Sdf, Usd
 
-from echousd.exporting.flattening import flat_layer
+from echousd.exporting.formats import flat_layer
 from echousd.exporting.packing import Package, Reach, images_beside
 from echousd.layers.lights import LIGHTS
 from echousd.layers.materials import LOOKS

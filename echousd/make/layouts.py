@@ -1,13 +1,14 @@
-"""Boxes for a graph: sampled by the layout branch, equal within sets of furniture, placed; and the floor below."""
+"""Boxes for a graph: sampled, also many graphs in one pass, equal within sets, placed; and the floor below."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import shapely
 import torch
 
 from echomodel.boxes import Boxes
@@ -15,20 +16,20 @@ from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.openings import free_area
+from echomodel.protocols import GraphEdit, RoomModel
+from echomodel.randomness import SceneGenerators
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
-from echousd.graph.floors import with_placed_openings
+from echousd.graph.floors import with_placed_openings, with_plan
 from echousd.make.verdicts import layout_outcome
+from echousd.options import RoomOptions
+from echousd.place import PlaceConfig, PlaceResult
+from echousd.place import place as placed
 from echousd.progress import StageTimer
-from echousd.reproducible import one_thread, rounded_boxes
-from echousd.shapes.shell import floor_polygon
 from echousd.shapes.styles import equal_sizes, unequal_pairs
-from echousd.tensors import floor_centre, graph_batch, seeded
-
-if TYPE_CHECKING:
-    from echomodel.protocols import GraphEdit, RoomModel
-    from echousd.options import RoomOptions
+from echousd.shapes.walls import floor_polygon
+from echousd.tensors import floor_centre, graph_batch, one_thread, rounded_boxes, seeded
 
 DRAFTS = 8  # of which the best is kept
 ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
@@ -123,7 +124,7 @@ def best_boxes(
 
     Arguments:
         draws: of the first draft. drafts: how many at most. sized: boxes whose sizes the graph states for all layouts.
-        first: the first draft, where it was sampled already (`echousd.make.packed`).
+        first: the first draft, where it was sampled already (`echousd.make.layouts`).
         proposed: nobody stated the openings, which may still be moved: what is in their way counts least.
         others: as `sample_boxes` and `finished_boxes`.
     """
@@ -153,7 +154,6 @@ def best_boxes(
 
 def repeated(change: GraphEdit, nodes: int, count: int) -> GraphEdit:
     """The edit of one graph of `nodes` objects for `count` copies of it behind one another."""
-    from echomodel.protocols import GraphEdit
 
     shift = torch.arange(count)[:, None, None] * torch.tensor([nodes, 0, nodes])
     return GraphEdit((change.before[None] + shift).reshape(-1, 3), change.added.repeat(count))
@@ -198,8 +198,6 @@ def finished_boxes(
     boxes = _alike(graph, _mounted(graph, boxes), styles)
     if not place:
         return rounded_boxes(graph, boxes), ()
-    from echousd.place import PlaceConfig, PlaceResult
-    from echousd.place import place as placed
     from echousd.place.living import living_faults
 
     judged: dict[int, tuple[int, ...]] = {}
@@ -260,7 +258,6 @@ def screens(graph: SceneGraph) -> np.ndarray:
 
 def backlit(graph: SceneGraph, boxes: Boxes) -> int:
     """How many windows have a screen before them."""
-    import shapely
 
     corners, here = graph.room.corners, screens(graph)
     if corners is None or not here.any():
@@ -309,3 +306,64 @@ def _alike(graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str]) -> Boxes:
     free = np.array([node.size is None and not node.locked for node in graph.nodes]) & ~np.array(cut, bool)
     size = equal_sizes(names, categories, styles, np.asarray(boxes.size, float), free, unequal_pairs(graph))
     return Boxes(torch.as_tensor(size, dtype=torch.float32), boxes.position, boxes.yaw)
+
+
+NODES = 512  # of one pass of the network: larger products, bounded memory
+
+
+def first_drafts(
+    model: RoomModel,
+    graphs: Sequence[SceneGraph],
+    seeds: Sequence[int],
+    *,
+    steps: int | None = None,
+    guided: bool = False,
+) -> list[Boxes]:
+    """The first draft of the first layout of every graph, as `generate` takes it (`first`).
+
+    A sum's rounding depends on what is packed together: boxes are those of single runs but for at most a few units of
+    `tensors.LENGTH`, and exactly the same for the same list of graphs and seeds.
+
+    Arguments:
+        model: any model; graphs that cannot be packed (with given boxes, or for other models) are sampled alone.
+        graphs, seeds: as many of each. steps: sampling steps, None for the model's own. guided: as `Draws`.
+    """
+    found: dict[int, Boxes] = {}
+    planned = [with_plan(graph, seed) for graph, seed in zip(graphs, seeds, strict=True)]
+    together = [i for i, graph in enumerate(planned) if isinstance(model, EchoModel) and not _given(graph)]
+    for pack in packs(together, [len(graph.nodes) for graph in planned]):
+        batches = [graph_batch(planned[i]) for i in pack]
+        rows = [batch.num_nodes for batch in batches]
+        with one_thread():
+            assert isinstance(model, EchoModel)
+            drawn = model.sample_layout(
+                GraphBatch.pack(batches),
+                generator=SceneGenerators([seeded(seeds[i], "layout", 0) for i in pack], rows),
+                steps=steps,
+                relation_guidance=None if guided else 0.0,
+            )
+        fields = (drawn.size.cpu().split(rows), drawn.position.cpu().split(rows), drawn.yaw.cpu().split(rows))
+        for i, size, position, yaw in zip(pack, *fields, strict=True):
+            found[i] = rounded_boxes(planned[i], Boxes(size, position + floor_centre(planned[i]), yaw))
+    for i, graph in enumerate(planned):
+        if i not in found:
+            draws = Draws(seeds[i], steps=steps, guided=guided)
+            (found[i],) = sample_boxes(model, graph, draws, timer=StageTimer())
+    return [found[i] for i in range(len(graphs))]
+
+
+def packs(numbers: Iterable[int], nodes: Sequence[int], most: int = NODES) -> list[list[int]]:
+    """The numbers in their order, in groups whose nodes are at most `most` together; a larger one stands alone."""
+    out: list[list[int]] = []
+    held = 0
+    for number in numbers:
+        if not out or held + nodes[number] > most:
+            out.append([])
+            held = 0
+        out[-1].append(number)
+        held += nodes[number]
+    return out
+
+
+def _given(graph: SceneGraph) -> bool:
+    return any(None not in (node.size, node.position, node.yaw) for node in graph.nodes)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from echomodel.boxes import Boxes
 from echomodel.progress import StageListener
+from echomodel.protocols import RoomModel
 from echomodel.roomboxes import footprints
 from echousd.graph import SceneGraph, load_graph
 from echousd.graph.consistency import faults_of
@@ -16,7 +17,6 @@ from echousd.graph.files import STAGE_FORMS
 from echousd.graph.floors import check_doors, check_space, with_plan, with_wider_floor, without_openings
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
-from echousd.make.fitting import fitted, with_space
 from echousd.make.layouts import (
     Draws,
     best_boxes,
@@ -28,28 +28,28 @@ from echousd.make.layouts import (
     with_free_openings,
     with_sizes,
 )
-from echousd.make.locking import with_earlier_locks, with_locked_places
-from echousd.make.owned import with_own_boxes, with_own_pieces
+from echousd.make.stated import (
+    fitted,
+    with_earlier_locks,
+    with_locked_places,
+    with_own_boxes,
+    with_own_pieces,
+    with_space,
+)
 from echousd.make.verdicts import layout_outcome, warn_of_faults
 from echousd.options import RoomOptions, takes_options
 from echousd.place.living import unusual_sizes
 from echousd.progress import StageTimer
-from echousd.reproducible import one_thread
 from echousd.room import Provenance
 from echousd.shapes.merging import merged
-from echousd.shapes.sources import default_source
-from echousd.shapes.sources.mixing import check_sources, mixed_shapes, sources_of
+from echousd.shapes.sources.mixing import check_sources, default_source, mixed_shapes, shape_nearness, sources_of
 from echousd.shapes.sources.retrieval import anchored, check_files, given_pieces, retrieved, with_given_sizes
 from echousd.shapes.sources.source import ShapeRequest
 from echousd.shapes.styles import asset_names, style_groups
 from echousd.stage.files import open_stage
 from echousd.stage.graphs import read_graph
 from echousd.stage.units import conventions
-from echousd.tensors import graph_batch
-
-if TYPE_CHECKING:
-    from echomodel.boxes import Boxes
-    from echomodel.protocols import RoomModel
+from echousd.tensors import graph_batch, one_thread
 
 
 @takes_options()
@@ -86,7 +86,7 @@ def generate(
         meshes: object name -> file of a piece of your own (USD, glTF, OBJ), which keeps its materials; relative to the
             working folder.
         progress: called with (stage, done, total).
-        first: draft of the first layout, where it was sampled already (`echousd.make.packed`).
+        first: draft of the first layout, where it was sampled already (`echousd.make.layouts`).
 
     Raises:
         ValueError: an argument that is not allowed, a graph that cannot be read or contradicts itself, weights that are
@@ -152,8 +152,6 @@ def generate(
     left_out = (*left_out, *more)
     near = None
     if "guided" in sources_of(graph, shapes).values():
-        from echousd.shapes.sources.guided import shape_nearness
-
         near = shape_nearness(graph, boxes, shapes, wishes(), seed, echo, asked.steps, timer)
     models = retrieved(
         graph, boxes, style_groups(graph), shapes, wishes, seed, pieces, near, palette=asked.palette, timer=timer

@@ -1,10 +1,10 @@
-"""Read a room of ours back from its folder: graph, boxes, meshes, and the assets' files as they are."""
+"""A room of ours read back from its folder: graph, boxes, meshes, files; in metres, +Y up, whatever it is saved in."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +21,11 @@ from echousd.folder.within import inside
 from echousd.graph import SceneGraph
 from echousd.layers.component import MODEL, PLACES
 from echousd.shapes.colliders import approximation, hull_of
-from echousd.shapes.geometry import LICENCE, Collider, Geometry, Origin, Part
+from echousd.shapes.geometry import LICENCE, Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.joints import read_joints
-from echousd.shapes.masses import read_mass
+from echousd.shapes.matter import read_mass
 from echousd.shapes.originals.original import Original
-from echousd.shapes.upright import in_our_frame, stands_z_up
-from echousd.stage.contents import Z_TO_Y, triangulated
+from echousd.stage.contents import Z_TO_Y, room_frame, triangulated
 from echousd.stage.files import open_stage
 from echousd.stage.forms import forms
 from echousd.stage.graphs import read_graph
@@ -249,3 +248,38 @@ def _shown(prim: Usd.Prim) -> bool:
     image = UsdGeom.Imageable(prim)
     shown = image.ComputePurpose() in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
     return shown and image.ComputeVisibility() != UsdGeom.Tokens.invisible
+
+
+def stands_z_up(room: Usd.Prim) -> bool:
+    """Whether a room's own axes have +Z up: not where a prim of +Y up is turned as a whole."""
+    cache = UsdGeom.XformCache()
+    own = room_frame(room, cache) @ matrix(cache.GetLocalToWorldTransform(room), room)
+    return bool(abs(own[1, 2]) > abs(own[1, 1]))
+
+
+def in_our_frame(geometry: Geometry, metres: float, *, z_up: bool) -> Geometry:
+    """A piece in the object's frame: metres, +Y up, +Z its front; joints have no places when read.
+
+    Arguments:
+        metres: per unit in which it was read. z_up: read with +Z up, -Y its front.
+    """
+    if metres == 1.0 and not z_up:
+        return geometry
+    turn = Z_TO_Y if z_up else np.eye(3)
+    parts = tuple(replace(part, mesh=_brought(part.mesh, metres * turn)) for part in geometry.parts)
+    colliders = tuple(replace(collider, mesh=_brought(collider.mesh, metres * turn)) for collider in geometry.colliders)
+    original = geometry.original
+    if original is not None:
+        pose = np.eye(4)
+        pose[:3, :3] = metres * turn
+        original = replace(original, pose=pose @ original.pose)
+    mass = geometry.mass
+    if mass is not None:
+        mass = Mass(mass.mass, metres * turn @ mass.centre, metres**2 * mass.inertia, turn @ mass.axes)
+    return replace(geometry, parts=parts, colliders=colliders, mass=mass, original=original)
+
+
+def _brought(mesh: trimesh.Trimesh, to_ours: np.ndarray) -> trimesh.Trimesh:
+    out = mesh.copy()
+    out.vertices = np.asarray(mesh.vertices) @ to_ours.T
+    return out

@@ -10,9 +10,9 @@ import torch
 from echomodel.boxes import Boxes
 from echousd.make.finished import Room
 from echousd.make.verdicts import relation_verdicts
-from echousd.reproducible import rounded_boxes
 from echousd.settle import SettleReport, settle_layouts
 from echousd.stage.paths import OBJECTS, ROOM
+from echousd.tensors import rounded_boxes
 
 UPRIGHT = 1.0  # degrees: what leans further at rest is no pose that a layout can hold
 

@@ -1,13 +1,5 @@
 """Whether a room rests: its physics, simulated for a while (extra `sim`)."""
 
-from echousd.settle.engine import require_engine
-from echousd.settle.settle import Motion, SettleReport, SettleUnavailable, settle, settle_layouts
+from echousd.settle.settle import Motion, SettleReport, SettleUnavailable, require_engine, settle, settle_layouts
 
-__all__ = [
-    "Motion",
-    "SettleReport",
-    "SettleUnavailable",
-    "require_engine",
-    "settle",
-    "settle_layouts",
-]
+__all__ = ["Motion", "SettleReport", "SettleUnavailable", "require_engine", "settle", "settle_layouts"]

@@ -1,19 +1,165 @@
-"""Which pieces of a room do not rest, and why."""
+"""Which pieces of a room do not rest, and why: convex pieces as plain data, simulated in MuJoCo for a while."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from pxr import Usd
+import trimesh
+from pxr import Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
-from echousd.settle.engine import Course, SettleUnavailable, simulate
-from echousd.settle.solids import Body, World, body_root, read_world
+from echousd.shapes.geometry import Mass
+from echousd.shapes.matter import read_mass
+from echousd.stage.contents import triangulated
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.layouts import layout_names, showing_layout
+from echousd.stage.units import metres_per_unit, up_axis
+from echousd.stage.values import array, matrix
+
+GRAVITY = 9.81  # m/s², where the stage tells none
+FRICTION = 0.5  # where no physics material is bound
+SKIN = 0.05  # metres: how thick a triangle of a static concave mesh is made, inwards
+LEAST_DEPTH = 0.002  # metres, of a mesh that is a sheet
+LEAST_AREA = 1e-5  # m² of a triangle that is taken at all
+HULLS = ("convexHull", "boundingCube", "boundingSphere")
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """One convex piece: the corners (n, 3) of its hull in the world, metres, its friction and its collider's path."""
+
+    points: np.ndarray
+    friction: float
+    collider: str
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """What moves as one.
+
+    Arguments:
+        name, path: of the prim. place: (4, 4) float, prim to world without scale, column vectors, metres.
+        solids: its pieces, at least one. mass: in the prim's frame, None = by volume.
+    """
+
+    name: str
+    path: str
+    place: np.ndarray
+    solids: tuple[Solid, ...]
+    mass: Mass | None
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """All that can touch: bodies, what never moves, and gravity (3,) in m/s²."""
+
+    bodies: tuple[Body, ...]
+    fixed: tuple[Solid, ...]
+    gravity: np.ndarray
+
+
+def read_world(stage: Usd.Stage) -> World:
+    """Bodies and colliders of a stage as engines find them; raises StageError naming a prim that cannot be read.
+
+    A piece with joints counts as one body, its drawers and doors closed.
+    """
+    metres = metres_per_unit(stage)
+    cache = UsdGeom.XformCache()
+    owned: dict[str, list[Solid]] = {}
+    roots: dict[str, Usd.Prim] = {}
+    fixed: list[Solid] = []
+    for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()):
+        if not prim.HasAPI(UsdPhysics.CollisionAPI) or not prim.IsA(UsdGeom.Gprim):
+            continue
+        if UsdPhysics.CollisionAPI(prim).GetCollisionEnabledAttr().Get() is False:
+            continue
+        root = body_root(prim)
+        solids = list(_solids(prim, cache, metres, moves=root is not None))
+        if root is None:
+            fixed += solids
+        else:
+            roots[str(root.GetPath())] = root
+            owned.setdefault(str(root.GetPath()), []).extend(solids)
+    bodies = []
+    for path, root in roots.items():
+        place = matrix(cache.GetLocalToWorldTransform(root), root)
+        place[:3, :3] /= np.linalg.norm(place[:3, :3], axis=0)
+        place[:3, 3] *= metres
+        if owned[path]:
+            bodies.append(Body(root.GetName(), path, place, tuple(owned[path]), read_mass(root)))
+    return World(tuple(bodies), tuple(fixed), _gravity(stage, metres))
+
+
+def body_root(prim: Usd.Prim) -> Usd.Prim | None:
+    """The prim that a collider moves with: the outermost enabled body or articulation above it, None = it is fixed."""
+    found = None
+    while prim and not prim.IsPseudoRoot():
+        if prim.HasAPI(UsdPhysics.ArticulationRootAPI) or (
+            prim.HasAPI(UsdPhysics.RigidBodyAPI)
+            and UsdPhysics.RigidBodyAPI(prim).GetRigidBodyEnabledAttr().Get() is not False
+            and not UsdPhysics.RigidBodyAPI(prim).GetKinematicEnabledAttr().Get()
+        ):
+            found = prim
+        prim = prim.GetParent()
+    return found
+
+
+def _solids(prim: Usd.Prim, cache: UsdGeom.XformCache, metres: float, *, moves: bool) -> Iterator[Solid]:
+    try:
+        points, faces = triangulated(prim)
+        world = matrix(cache.GetLocalToWorldTransform(prim), prim)
+    except Tf.ErrorException as error:
+        raise StageError(f"<{prim.GetPath()}>: its collider cannot be read ({error})") from None
+    points = (points @ world[:3, :3].T + world[:3, 3]) * metres
+    if not len(faces):
+        return
+    friction, path = _friction(prim), str(prim.GetPath())
+    kind = prim.GetAttribute("physics:approximation").Get() or "none"
+    if moves or kind in HULLS:
+        yield Solid(points, friction, path)
+        return
+    for part in trimesh.Trimesh(points, faces).split(only_watertight=False):
+        for corners in convex_parts(part):
+            yield Solid(corners, friction, path)
+
+
+def convex_parts(mesh: trimesh.Trimesh) -> Iterator[np.ndarray]:
+    """Corners of convex pieces that have the surface of a connected mesh: itself, or a thin prism below each triangle.
+
+    No prism is thicker than the mesh, so that none comes out on the other side of a board.
+    """
+    if mesh.is_watertight and mesh.is_convex:
+        yield np.asarray(mesh.vertices)
+        return
+    depth = min(SKIN, 2 * abs(float(mesh.volume)) / max(float(mesh.area), 1e-9)) if mesh.is_watertight else SKIN
+    corners = np.asarray(mesh.triangles)
+    for triangle, normal, area in zip(corners, mesh.face_normals, mesh.area_faces, strict=True):
+        if area > LEAST_AREA:
+            yield np.concatenate([triangle, triangle - max(depth, LEAST_DEPTH) * normal])
+
+
+def _friction(prim: Usd.Prim) -> float:
+    material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")[0]
+    told = UsdPhysics.MaterialAPI(material).GetDynamicFrictionAttr().Get() if material else None
+    return FRICTION if told is None else float(told)
+
+
+def _gravity(stage: Usd.Stage, metres: float) -> np.ndarray:
+    down = np.array([0.0, 0, -1] if up_axis(stage) == "Z" else [0.0, -1, 0])
+    for prim in stage.Traverse():
+        if prim.GetTypeName() == "PhysicsScene":
+            told = prim.GetAttribute("physics:gravityDirection")
+            direction = array(told) if told.HasAuthoredValue() else down
+            length = float(np.linalg.norm(direction))
+            strength = prim.GetAttribute("physics:gravityMagnitude").Get()
+            strength = GRAVITY if strength is None or not 0 <= strength < np.inf else float(strength) * metres
+            return strength * (direction / length if length > 0 else down)
+    return GRAVITY * down
+
 
 __all__ = ["Motion", "SettleReport", "SettleUnavailable", "settle", "settle_layouts"]
 SECONDS = 2.0
@@ -156,3 +302,97 @@ def _owner(stage: Usd.Stage, collider: str) -> str:
         return str(root.GetPath())
     above = collider.split("/")
     return "/".join(above[:4])  # /Room/Shell/Floor, /Room/Objects/picture
+
+
+STEP = 0.004  # seconds
+DENSITY = 200.0  # kg/m³ of a body whose mass nobody tells
+
+
+class SettleUnavailable(ValueError):
+    """MuJoCo is not installed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What became of n bodies.
+
+    Arguments:
+        places: (n, 4, 4) float, body to world, at the end.
+        overlaps: (path, path, depth in metres) of colliders of different bodies that overlap at the start.
+    """
+
+    places: np.ndarray
+    overlaps: tuple[tuple[str, str, float], ...]
+
+
+def require_engine() -> Any:
+    """The module of MuJoCo; raises SettleUnavailable without the extra `sim`."""
+    try:
+        import mujoco
+    except ImportError:
+        raise SettleUnavailable("MuJoCo is not installed; pip install 'echousd[sim]'") from None
+    return mujoco
+
+
+def simulate(world: World, seconds: float) -> Course:
+    """Let a world fall for some seconds; raises SettleUnavailable without the extra `sim`."""
+    mujoco = require_engine()
+    spec = mujoco.MjSpec()
+    spec.option.timestep = STEP
+    spec.option.gravity = world.gravity
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC  # the pyramid lets things creep
+    spec.option.impratio = 10
+    paths: list[str] = []
+    _add(mujoco, spec, spec.worldbody, world.fixed, np.eye(4), paths)
+    for number, body in enumerate(world.bodies):
+        made = spec.worldbody.add_body(name=f"body{number}", pos=body.place[:3, 3], quat=_quaternion(body.place))
+        made.add_freejoint()
+        _add(mujoco, spec, made, body.solids, body.place, paths)
+        _weigh(made, body)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    overlaps = tuple(
+        (paths[contact.geom1], paths[contact.geom2], -float(contact.dist))
+        for contact in data.contact
+        if contact.dist < 0
+    )
+    for _ in range(round(seconds / STEP)):
+        mujoco.mj_step(model, data)
+    numbers = [model.body(f"body{number}").id for number in range(len(world.bodies))]
+    places = np.tile(np.eye(4), (len(numbers), 1, 1))
+    places[:, :3, :3] = data.xmat[numbers].reshape(-1, 3, 3)
+    places[:, :3, 3] = data.xpos[numbers]
+    return Course(places, overlaps)
+
+
+def _add(mujoco: Any, spec: Any, body: Any, solids: Sequence[Solid], place: np.ndarray, paths: list[str]) -> None:
+    """Add the hulls of some solids to a body whose place is known; `paths` follows the numbers of the geoms."""
+    for solid in solids:
+        local = (solid.points - place[:3, 3]) @ place[:3, :3]
+        name = f"mesh{len(paths)}"
+        mesh = spec.add_mesh(name=name, uservert=local.ravel())
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, friction=[solid.friction, 0.005, 0.0001], density=DENSITY
+        )
+        paths.append(solid.collider)
+
+
+def _weigh(made: Any, body: Body) -> None:
+    if body.mass is None:
+        return
+    made.explicitinertial = True
+    made.mass = body.mass.mass
+    made.ipos = body.mass.centre
+    made.inertia = body.mass.inertia
+    axes = np.eye(4)
+    axes[:3, :3] = body.mass.axes if np.linalg.det(body.mass.axes) > 0 else body.mass.axes * [-1.0, 1.0, 1.0]
+    made.iquat = _quaternion(axes)
+
+
+def _quaternion(place: np.ndarray) -> np.ndarray:
+    from scipy.spatial.transform import Rotation
+
+    return np.roll(Rotation.from_matrix(place[:3, :3]).as_quat(), 1)  # real part first

@@ -12,8 +12,7 @@ from echomodel.furniture.assembly import Piece, pieces_of
 from echomodel.furniture.solids import FINEST, Solid
 from echomodel.triangles import area_normals
 from echousd.shapes.geometry import FRAME, Collider, Geometry, Mass, Origin, Part
-from echousd.shapes.masses import ballasted
-from echousd.shapes.matter import weighed
+from echousd.shapes.matter import ballasted, weighed
 
 SLOTS = {"accent": "front"}  # material of a solid -> material slot, where they differ
 # role of a solid -> name of the part that all of its kind are in, where they differ

@@ -7,7 +7,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 
 from echomodel.furniture.solids import Joint
 from echousd.shapes.geometry import FRAME, Geometry, Mass
-from echousd.shapes.masses import write_mass
+from echousd.shapes.matter import write_mass
 from echousd.stage.layouts import ARTICULATED, ARTICULATION
 from echousd.stage.paths import GEO, piece_name, piece_of, piece_path
 

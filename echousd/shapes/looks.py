@@ -11,8 +11,7 @@ import numpy as np
 import trimesh
 
 from echomodel.vocabulary import vocabulary
-from echousd.shapes.finishes.harmonies import HARMONIES, Color, linear, mixed
-from echousd.shapes.finishes.slots import SECOND, SLOTS
+from echousd.shapes.finishes.slots import HARMONIES, SECOND, SLOTS, Color, linear, mixed
 from echousd.shapes.styles import ROOM_STYLE
 
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
+import trimesh
 from pxr import Kind, Tf, Usd, UsdGeom
 
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import LABELS, StageError
+from echousd.stage.files import open_stage
 from echousd.stage.forms import Polygons, forms, polygons
 from echousd.stage.read import RoomPrims, node_names, read_node, relation_of, room_spec
 from echousd.stage.units import metres_per_unit, up_axis
@@ -248,3 +251,22 @@ def triangles_of(surface: Polygons) -> np.ndarray:
         for k in range(1, corners - 1):
             triangles.append(np.stack((indices[first], indices[first + k], indices[first + k + 1]), 1))
     return np.concatenate(triangles) if triangles else np.zeros((0, 3), int)
+
+
+def stage_mesh(path: Path) -> trimesh.Trimesh:
+    """Everything with a surface on a stage as triangles; raises ValueError where there is none."""
+    stage = open_stage(path)
+    points, faces, count = [], [], 0
+    for form in forms(stage.GetPseudoRoot(), UsdGeom.XformCache(), is_seen):
+        vertices, triangles = triangulated(form.prim)
+        if not len(triangles):
+            continue
+        points.append(vertices @ form.world[:3, :3].T + form.world[:3, 3])
+        faces.append(triangles + count)
+        count += len(vertices)
+    if not points:
+        raise ValueError("the stage holds no visible surfaces")
+    vertices = np.concatenate(points) * metres_per_unit(stage)
+    if up_axis(stage) == UsdGeom.Tokens.z:
+        vertices = vertices[:, [0, 2, 1]] * [1, 1, -1]
+    return trimesh.Trimesh(vertices, np.concatenate(faces), process=False)

@@ -46,16 +46,7 @@ SILL = "echo:sill"
 HINGE = "echo:hinge"
 SWING = "echo:swing"
 WALL, FRAME, LEAF = "echo:wall", "echo:frame", "echo:leaf"  # what an opening became in the room
-OPENING_FIELDS = {
-    KIND: "kind",
-    EDGE: "edge",
-    OFFSET: "offset",
-    WIDTH: "width",
-    HEIGHT: "height",
-    SILL: "sill",
-    HINGE: "hinge",
-    SWING: "swing",
-}
+OPENING_FIELDS = {name: name.removeprefix("echo:") for name in (KIND, EDGE, OFFSET, WIDTH, HEIGHT, SILL, HINGE, SWING)}
 
 SUBJECT = "echo:subject"
 PREDICATE = "echo:predicate"
@@ -73,51 +64,25 @@ LOCKED = "echo:locked"
 SHAPES = "echo:shapes"
 ASSET = "echo:asset"
 NODE_FIELDS = {
-    CATEGORY: "category",
-    STYLE: "style",
-    SIZE: "size",
-    POSITION: "position",
-    YAW: "yaw",
-    PLACE: "place",
-    LOCKED: "locked",
-    SHAPES: "shapes",
-    ASSET: "asset",
+    name: name.removeprefix("echo:") for name in (CATEGORY, STYLE, SIZE, POSITION, YAW, PLACE, LOCKED, SHAPES, ASSET)
 }
 DRESSING = "dressing"  # the shapes of small things, which are no furniture
 FREE = "echo:attributes:"  # namespace of a node's free attributes
 
 _TYPES = Sdf.ValueTypeNames
-VALUE_TYPES = {
-    VOCABULARY: _TYPES.Token,
-    ROOM_TYPE: _TYPES.Token,
-    ROOM_STYLE: _TYPES.Token,
-    FLOOR_POLYGON: _TYPES.Double2Array,
-    FLOOR_SIZE: _TYPES.Double2,
-    HEIGHT: _TYPES.Double,
-    WALLS: _TYPES.DoubleArray,
-    AREA: _TYPES.Double,
-    RATIO: _TYPES.Double,
-    OUTLINE: _TYPES.Double2Array,
-    KIND: _TYPES.Token,
-    EDGE: _TYPES.Int,
-    OFFSET: _TYPES.Double,
-    WIDTH: _TYPES.Double,
-    SILL: _TYPES.Double,
-    HINGE: _TYPES.Token,
-    SWING: _TYPES.Token,
-    PREDICATE: _TYPES.Token,
-    CONFIDENCE: _TYPES.Double,
-    CATEGORY: _TYPES.Token,
-    STYLE: _TYPES.Token,
-    SIZE: _TYPES.Double3,
-    POSITION: _TYPES.Double3,
-    YAW: _TYPES.Double,
-    PLACE: _TYPES.Token,
-    LOCKED: _TYPES.Bool,
-    SHAPES: _TYPES.Token,
-    ASSET: _TYPES.String,
-    LABELS: _TYPES.TokenArray,
-}
+_NAMES = (
+    (_TYPES.Token, (VOCABULARY, ROOM_TYPE, ROOM_STYLE, KIND, HINGE, SWING, PREDICATE, CATEGORY, STYLE, PLACE, SHAPES)),
+    (_TYPES.Double2Array, (FLOOR_POLYGON, OUTLINE)),
+    (_TYPES.Double2, (FLOOR_SIZE,)),
+    (_TYPES.Double, (HEIGHT, AREA, RATIO, OFFSET, WIDTH, SILL, CONFIDENCE, YAW)),
+    (_TYPES.DoubleArray, (WALLS,)),
+    (_TYPES.Int, (EDGE,)),
+    (_TYPES.Double3, (SIZE, POSITION)),
+    (_TYPES.Bool, (LOCKED,)),
+    (_TYPES.String, (ASSET,)),
+    (_TYPES.TokenArray, (LABELS,)),
+)
+VALUE_TYPES = {name: kind for kind, names in _NAMES for name in names}
 
 
 class StageError(ValueError):

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 import stat
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -109,6 +112,12 @@ def read_job(folder: Path) -> Job:
     if count > 1:
         raise ValueError(f"{path}: objects: {twice!r} comes twice, allowed: each name once")
     return job
+
+
+def script_for(tool: str, said: Mapping[str, str] | None = None) -> bytes:
+    """What runs a tool on a job: its file in `scripts/`, where `@WORD@` stands for a text that a shell has to read."""
+    text = Path(__file__).with_name("scripts").joinpath(f"{tool}.sh").read_text("utf-8")
+    return re.sub("@([A-Z]+)@", lambda word: shlex.quote((said or {})[word[1]]), text).encode()
 
 
 def job_mesh(folder: Path, thing: JobObject) -> Unwrapped:

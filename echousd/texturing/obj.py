@@ -1,11 +1,18 @@
-"""Wavefront OBJ as texturing tools exchange it: triangles with one texture coordinate a vertex, one material."""
+"""Meshes as texturing tools exchange them: Wavefront OBJ, and binary glTF of one material with images."""
 
 from __future__ import annotations
 
+import io
+import json
 import stat
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import trimesh
 
 from echousd.texturing.atlas import DIGITS, Unwrapped
 
@@ -79,3 +86,143 @@ def _corner(field: str, points: int, st: int) -> tuple[int, int]:
             raise ValueError(f"corner {field!r:.40} names number {part}, allowed: 1 to {count}")
         out.append(index)
     return out[0], out[1]
+
+
+MAX_COUNT = 20_000_000  # numbers in one array of a file
+KNOWN = {"KHR_texture_transform"}  # extensions that a file may require and that are looked at
+SLOTS = {"baseColorTexture": "color", "metallicRoughnessTexture": "metal_rough", "normalTexture": "normal"}
+
+
+@dataclass(frozen=True, eq=False)
+class PaintedMesh:
+    """What a tool gave back: triangles with texture coordinates, and images by what they are.
+
+    Arguments:
+        mesh: the triangles of all primitives.
+        images: `color`, `metal_rough` (roughness in green, metal in blue) and `normal` -> the encoded image.
+    """
+
+    mesh: Unwrapped
+    images: Mapping[str, bytes] = field(default_factory=dict)
+
+
+def glb_bytes(mesh: Unwrapped, name: str, color: Any = None) -> bytes:
+    """A mesh as glb with a plain material, or with `color`, a PIL image, as its base colour."""
+    material = trimesh.visual.material.PBRMaterial(
+        name=name, baseColorFactor=[0.8, 0.8, 0.8, 1.0], metallicFactor=0.0, roughnessFactor=0.8, baseColorTexture=color
+    )
+    visual = trimesh.visual.TextureVisuals(uv=mesh.st, material=material)
+    shape = trimesh.Trimesh(mesh.points, mesh.faces, visual=visual, process=False)
+    scene = trimesh.Scene()
+    scene.add_geometry(shape, node_name=name, geom_name=name)
+    return bytes(scene.export(file_type="glb"))
+
+
+def read_glb(path: Path) -> PaintedMesh:
+    """The triangles and images of a glb.
+
+    Several primitives are one mesh if they have one material; node transforms are applied. Raises ValueError that names
+    the file for a damaged one, several materials, images that cannot be read, compression, and links to other files.
+    """
+    content = read_file(path)
+    tree, binary = _chunks(path, content)
+    _check(path, tree)
+    try:
+        scene: Any = trimesh.load(io.BytesIO(content), file_type="glb", process=False, merge_primitives=False)
+        parts = [scene] if isinstance(scene, trimesh.Trimesh) else list(scene.dump())
+        parts = [part for part in parts if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+        if not parts:
+            raise ValueError("no triangles")
+        points, st, faces, count = [], [], [], 0
+        for part in parts:
+            laid = getattr(part.visual, "uv", None)
+            if laid is None or len(laid) != len(part.vertices):
+                raise ValueError("a primitive without texture coordinates (TEXCOORD_0)")
+            points.append(np.asarray(part.vertices, float))
+            st.append(np.asarray(laid, float))
+            faces.append(np.asarray(part.faces, int) + count)
+            count += len(points[-1])
+        mesh = Unwrapped(np.concatenate(points), np.concatenate(st), np.concatenate(faces))
+        if not (np.isfinite(mesh.points).all() and np.isfinite(mesh.st).all()):
+            raise ValueError("numbers that are not finite")
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}, allowed: triangles with texture coordinates") from None
+    except Exception as error:  # a damaged file fails in every way there is
+        raise ValueError(f"{path}: not a glb that can be read ({type(error).__name__})") from None
+    return PaintedMesh(mesh, _images(path, tree, binary))
+
+
+def _chunks(path: Path, content: bytes) -> tuple[dict[str, Any], bytes]:
+    """The JSON and the binary chunk."""
+    try:
+        magic, version, _ = struct.unpack_from("<4sII", content)
+        length, kind = struct.unpack_from("<II", content, 12)
+        if magic != b"glTF" or version != 2 or kind != 0x4E4F534A:
+            raise ValueError
+        tree = json.loads(content[20 : 20 + length])
+        start = 20 + length
+        binary = b""
+        if len(content) > start:
+            size, kind = struct.unpack_from("<II", content, start)
+            binary = content[start + 8 : start + 8 + size]
+        if not isinstance(tree, dict):
+            raise ValueError
+    except (ValueError, struct.error, RecursionError):
+        raise ValueError(f"{path}: not a binary glTF 2.0 file") from None
+    return tree, binary
+
+
+def _check(path: Path, tree: dict[str, Any]) -> None:
+    """Refuse what is not of this file alone, or larger than anything real."""
+    required = set(map(str, _entries(path, tree, "extensionsRequired", str)))
+    if required - KNOWN:
+        raise ValueError(f"{path}: needs {', '.join(sorted(required - KNOWN))}, allowed: uncompressed glTF")
+    for kind in ("buffers", "images"):
+        for entry in _entries(path, tree, kind):
+            if "uri" in entry:
+                raise ValueError(f"{path}: {kind} name {str(entry['uri'])!r:.80}, allowed: what is in the file itself")
+    for entry in _entries(path, tree, "accessors"):
+        count = entry.get("count")
+        if type(count) is not int or not 0 <= count <= MAX_COUNT or "sparse" in entry:
+            raise ValueError(f"{path}: an accessor counts {count!r:.40}, allowed: 0 to {MAX_COUNT}, not sparse")
+    used = set(map(str, _materials(path, tree)))
+    if len(used) > 1:
+        raise ValueError(f"{path}: {len(used)} materials, allowed: one for the whole object")
+
+
+def _materials(path: Path, tree: dict[str, Any]) -> list[Any]:
+    """What the primitives of all meshes name as their material."""
+    meshes = _entries(path, tree, "meshes")
+    return [entry.get("material") for mesh in meshes for entry in _entries(path, mesh, "primitives")]
+
+
+def _images(path: Path, tree: dict[str, Any], binary: bytes) -> dict[str, bytes]:
+    """Images of the only material that is used."""
+    found: dict[str, bytes] = {}
+    materials = _entries(path, tree, "materials")
+    used = _materials(path, tree)
+    number = used[0] if used else None
+    if type(number) is not int or not 0 <= number < len(materials):
+        return found
+    rough = materials[number].get("pbrMetallicRoughness", {})
+    slots = {**(rough if isinstance(rough, dict) else {}), "normalTexture": materials[number].get("normalTexture")}
+    for slot, name in SLOTS.items():
+        if slots.get(slot) is None:
+            continue
+        try:
+            source = tree["textures"][slots[slot]["index"]]["source"]
+            view = tree["bufferViews"][tree["images"][source]["bufferView"]]
+            start, size = int(view.get("byteOffset", 0)), int(view["byteLength"])
+        except (KeyError, IndexError, TypeError, ValueError):
+            raise ValueError(f"{path}: {slot} names no image of the file") from None
+        if start < 0 or size <= 0 or start + size > len(binary):
+            raise ValueError(f"{path}: {slot} lies outside of the file")
+        found[name] = binary[start : start + size]
+    return found
+
+
+def _entries(path: Path, tree: dict[str, Any], key: str, kind: type = dict) -> list[Any]:
+    entries = tree.get(key, [])
+    if not isinstance(entries, list) or not all(isinstance(entry, kind) for entry in entries):
+        raise ValueError(f"{path}: {key} is no list of what glTF says")
+    return entries

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -16,9 +17,8 @@ from scipy.spatial import cKDTree
 from echousd.folder.within import check_links
 from echousd.textures import TextureError, decoded, texture_bytes
 from echousd.texturing.atlas import Unwrapped
-from echousd.texturing.glb import read_glb
 from echousd.texturing.job import JOB, RESULTS, Job, JobObject, job_mesh
-from echousd.texturing.obj import read_obj
+from echousd.texturing.obj import read_glb, read_obj
 from echousd.texturing.scenetex import OUTPUTS
 
 IMAGES = (".png", ".jpg", ".jpeg")
@@ -129,7 +129,6 @@ def image_of(content: bytes, where: str, stem: str) -> tuple[str, bytes]:
 
     Raises TextureError, which calls it `where`, for what is no image or too large.
     """
-    from PIL import Image
 
     if not content:
         raise TextureError(f"{where}: an empty file, allowed: an image")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -11,6 +10,7 @@ import yaml
 
 from echousd.draw.surfaces import Painted
 from echousd.texturing.atlas import Unwrapped
+from echousd.texturing.job import script_for
 from echousd.texturing.obj import obj_bytes
 from echousd.texturing.viewpoints import AZIMUTHS, ELEVATIONS, FIELDS
 
@@ -59,7 +59,8 @@ def scenetex_files(
     files[f"{scene}/meshes/scene_config.json"] = _json(config)
     files[f"{run}/scene_config.json"] = _json(seeded)
     files[f"{run}/scene.obj"] = obj_bytes(_joined(laid), "scene", material=False)
-    files["run.sh"] = _script(room, prompt)
+    said = {"ROOM": room, "PROMPT": prompt, "SCENE": scene_id(room), "STAMP": STAMP, "OUTPUTS": OUTPUTS}
+    files["run.sh"] = script_for("scenetex", {**said, "ANCHORED": str(ANCHORED)})
     return files
 
 
@@ -86,32 +87,3 @@ def _sphere(at: np.ndarray, distance: float) -> bytes:
 
 def _json(found: Mapping[str, object]) -> bytes:
     return (json.dumps(found, indent=4) + "\n").encode()
-
-
-def _script(room: str, prompt: str) -> bytes:
-    scene, words = shlex.quote(scene_id(room)), shlex.quote(prompt)
-    top = shlex.quote(room)
-    return f"""#!/usr/bin/env bash
-# Paints this job with SceneTex (a GPU of 48 GB, its own environment; its licence is CC BY-NC-SA):
-#   SCENETEX=/path/to/SceneTex ./run.sh
-# then: echousd texture import ROOM.usda THIS_FOLDER
-set -euo pipefail
-job=$(cd "$(dirname "${{BASH_SOURCE[0]}}")" && pwd)
-cd "${{SCENETEX:?set SCENETEX to the folder of its checkout}}"
-
-# It reads scenes below its own folder.
-mkdir -p data/scenes
-ln -sfn "$job"/data/scenes/{top} data/scenes/{top}
-# The weights that it names have moved on their hub.
-sed -i 's#"runwayml/stable-diffusion-v1-5"#"stable-diffusion-v1-5/stable-diffusion-v1-5"#' models/modules/guidance.py
-# It opens a picture that its repository does not hold.
-mkdir -p samples/textures
-[ -e samples/textures/dummy.png ] || python -c "from PIL import Image as I; I.new('RGB', (64, 64)).save(
-    'samples/textures/dummy.png')"
-# It stacks as many anchors from every object: no more than the fewest visible texels that it accepts.
-sed 's/^num_anchors:.*/num_anchors: {ANCHORED}/' config/template.yaml > "$job/config.yaml"
-
-# It logs in to a service: not needed. The run's folder holds our texture coordinates already (meshes/).
-WANDB_MODE=offline python scripts/train_texture.py --config "$job/config.yaml" --stamp {STAMP} \\
-    --log_dir "$job/{OUTPUTS}" --prompt {words} --scene_id {scene}
-""".encode()

@@ -20,11 +20,9 @@ import time
 import uuid
 from pathlib import Path
 
-from echousd.batches.batch import batch
-from echousd.batches.cluster import RayCluster
-from echousd.batches.executor import Task
-from echousd.batches.journal import room_digest
-from echousd.batches.run import BatchProgress
+from echousd.batches.batch import BatchProgress, batch
+from echousd.batches.executor import RayCluster, Task
+from echousd.batches.plan import room_digest
 
 MARK = "ECHOUSD_RAY_NODE"
 QUICK = {"shapes": "boxes", "preview": False, "drafts": 1, "steps": 2}

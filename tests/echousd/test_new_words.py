@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from echousd.shapes.finishes.harmonies import HARMONIES
 from inline_batches import Inline
 from pxr import Usd, UsdPhysics
 from small_room import BARE
@@ -24,13 +25,12 @@ from echousd.batches.batch import batch
 from echousd.checks import check
 from echousd.cli.main import command
 from echousd.dressing.dress import placed
-from echousd.dressing.hangings import HUNG_OVER
 from echousd.dressing.tabletops import TOPS
+from echousd.dressing.walls import HUNG_OVER
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph, load_graph, starting_graph
 from echousd.graph.picture import draw_graph, to_dot
 from echousd.layers.coverings import COVERS
 from echousd.place import place_boxes
-from echousd.shapes.finishes.harmonies import HARMONIES
 from echousd.shapes.finishes.slots import SLOTS
 from echousd.shapes.fittings import DOORS, WINDOWS
 from echousd.stage.foreign import foreign_graph

@@ -25,7 +25,7 @@ from echousd.assets.model_file import ModelFile
 from echousd.assets.table import read_library, write_library
 from echousd.batches.batch import batch
 from echousd.batches.verify import finish
-from echousd.shapes.originals.conversion import converted
+from echousd.shapes.originals.loading import converted
 
 MANY = int(os.environ.get("ECHOUSD_MUTATIONS", "0").replace("all", "600")) or 12
 LEAVES = (

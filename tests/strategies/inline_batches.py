@@ -3,7 +3,7 @@
 import json
 
 from echousd.batches.executor import Outcome, attempt
-from echousd.batches.journal import room_digest
+from echousd.batches.plan import room_digest
 
 QUICK = {"shapes": "boxes", "preview": False, "drafts": 1, "steps": 2}
 

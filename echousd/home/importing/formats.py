@@ -10,12 +10,17 @@ from typing import Any
 
 from echomodel.files import read_bounded, within_memory
 from echousd.graph import GraphError
-from echousd.home.importing.drawings import read_dxf, read_svg
+from echousd.home.importing.drawings import read_dxf, read_ifc, read_svg
 from echousd.home.importing.found import Found
 from echousd.home.importing.homes import Imported, imported
-from echousd.home.importing.ifc import read_ifc
-from echousd.home.importing.scans import read_roomplan, read_sweethome
-from echousd.home.importing.simulators import read_infinigen, read_procthor, read_sage, read_scenesmith
+from echousd.home.importing.simulators import (
+    read_infinigen,
+    read_procthor,
+    read_roomplan,
+    read_sage,
+    read_scenesmith,
+    read_sweethome,
+)
 
 MOST = 256 * 2**20  # bytes of a file
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}

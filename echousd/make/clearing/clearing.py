@@ -14,9 +14,9 @@ from echousd.make.clearing.scene import REACH, Scene, scene_of
 from echousd.make.verdicts import relation_verdicts
 from echousd.place.living import living_faults
 from echousd.place.report import Collision
-from echousd.reproducible import rounded_boxes
 from echousd.room import LayoutOutcome
 from echousd.shapes.geometry import Geometry
+from echousd.tensors import rounded_boxes
 
 DEEP = 0.001  # metres that solids may reach into one another
 GAP = 0.001  # metres left between what was moved apart

@@ -12,14 +12,14 @@ from typing import TypeVar, cast
 
 import numpy as np
 import PIL
+from PIL import Image
 
 from echomodel.dressing.textiles import RUGS
 from echomodel.files import cache_folder, digest
 from echousd.shapes.finishes import patterns
-from echousd.shapes.finishes.harmonies import HARMONIES, Color, linear
 from echousd.shapes.finishes.patterns import SIZE, Relief, noise
-from echousd.shapes.finishes.pictures import picture
-from echousd.shapes.finishes.rugs import woven
+from echousd.shapes.finishes.pictures import picture, woven
+from echousd.shapes.finishes.slots import HARMONIES, Color, linear
 from echousd.srgb import from_linear
 
 Bake = TypeVar("Bake", bound=Callable[..., "bytes | None"])
@@ -126,7 +126,6 @@ def _jpeg(value: np.ndarray) -> bytes:
 
 
 def _encoded(value: np.ndarray, quality: int) -> bytes:
-    from PIL import Image
 
     out = io.BytesIO()
     pixels = (np.clip(value, 0, 1) * 255 + 0.5).astype(np.uint8)

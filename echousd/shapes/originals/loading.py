@@ -2,29 +2,37 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 import os
+import re
 import tempfile
 import warnings
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Any
 
 import numpy as np
 import trimesh
-from pxr import Sdf, Tf, UsdUtils
+from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdUtils, Vt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from echousd.assets.catalogues.entry import Entry
+from echomodel.files import within_memory
+from echousd.assets.catalogues import Entry
 from echousd.assets.describe import described, digest_of
-from echousd.assets.measure import measure
-from echousd.assets.measured import Measured
-from echousd.assets.model_file import STAGES, ModelFile, check_reach, joined, split
+from echousd.assets.measure import Measured, measure
+from echousd.assets.model_file import STAGES, Beside, ModelFile, check_reach, checked_image, joined, split
 from echousd.assets.record import AssetRecord, Vector
 from echousd.assets.table import Library
 from echousd.exporting.packing import PACKED, LeftOut, asset_paths
 from echousd.shapes.colliders import hull_of
 from echousd.shapes.geometry import Geometry, Origin, Part
-from echousd.shapes.originals.conversion import ROOT, converted
 from echousd.shapes.originals.original import CONVERTED, Original
-from echousd.stage.files import said
+from echousd.shapes.surface import box_projection, creased_normals
+from echousd.srgb import to_linear
+from echousd.stage.files import layer_bytes, new_stage, said
 from echousd.textures import READABLE
 
 
@@ -135,3 +143,269 @@ def _named_by(layers: Sequence[Sdf.Layer], path: str) -> str:
             if os.path.realpath(layer.ComputeAbsolutePath(name)) == real:
                 return f"{where} "
     return ""
+
+
+ROOT = "/model"
+FOLDER = "textures"
+CLOSED = 0.9  # share of a piece's edges with a neighbour on the other side, from which on it has an inside
+SAME = 1e-6  # of the extent: points nearer than that are one, as texture coordinates cut surfaces apart
+
+
+@dataclass
+class Images:
+    """Images of one model on their way to the disk: name -> content; equal ones are one file."""
+
+    beside: Beside
+    files: dict[str, bytes] = field(default_factory=dict)
+
+    def named(self, image: Any) -> str:
+        """The path of an image (PIL) of a material from the layer, "" where it cannot be packed."""
+        said = image.info.get("file_path", "") if hasattr(image, "info") else ""
+        content = self.beside.images.get(said, b"") if said else b""
+        found = checked_image(content) if content else None
+        if found is None or not found[0]:
+            out = io.BytesIO()
+            image.convert("RGBA" if "A" in image.getbands() or image.mode == "P" else "RGB").save(out, "PNG")
+            content, ending = out.getvalue(), ".png"
+        else:
+            ending = found[0]
+        stem = re.sub(r"[^A-Za-z0-9_\-]+", "_", PurePosixPath(said.replace("\\", "/")).stem) or "image"
+        name = f"{FOLDER}/{stem[:40]}_{hashlib.sha256(content).hexdigest()[:8]}{ending}"
+        self.files[name] = content
+        return f"./{name}"
+
+
+def converted(model: ModelFile) -> Mapping[str, bytes]:
+    """The files of a model as USD: `CONVERTED` with the root prim `ROOT`, and its images.
+
+    The model's own frame and unit are kept. Raises ValueError that names the file where it cannot be read.
+    """
+    beside = model.beside()
+    try:
+        with within_memory(model.path, str(model)), model.opened() as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            scene = trimesh.load_scene(file, file_type=model.suffix[1:], resolver=beside, process=False)
+            parts = list(_parts(scene))
+            if not parts:
+                raise ValueError(f"{model}: holds no triangles")
+            images = Images(beside)
+            layer = _layer(parts, images)
+    except (ValueError, ImportError) as error:
+        raise ValueError(str(error) if str(error).startswith(str(model)) else f"{model}: {error}") from None
+    except Exception as error:  # readers fail on damaged files in every way there is
+        raise ValueError(f"{model}: cannot be read ({type(error).__name__}: {error!s:.120})") from None
+    return {CONVERTED: layer_bytes(layer, ".usdc"), **images.files}
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """One mesh of a scene in the scene's frame: points (v, 3), faces (f, 3), texture coordinates (v, 2), material."""
+
+    points: np.ndarray
+    faces: np.ndarray
+    uv: np.ndarray | None
+    material: Any
+
+
+def _parts(scene: trimesh.Scene) -> Iterator[_Part]:
+    for node in scene.graph.nodes_geometry:
+        matrix, name = scene.graph[node]
+        mesh = scene.geometry[name]
+        if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+            continue
+        points = np.asarray(mesh.vertices) @ matrix[:3, :3].T + matrix[:3, 3]
+        faces = np.asarray(mesh.faces)[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else np.asarray(mesh.faces)
+        faces = outward(points, faces)
+        told = getattr(mesh.visual, "uv", None)
+        uv = None if told is None or len(told) != len(points) else np.asarray(told)
+        if uv is not None:  # beyond a million repeats no digits are left for a place in the image: an exporter's slip
+            uv = np.where(np.abs(uv) < 1e6, uv, 0.0) if np.isfinite(uv).all() else None
+        yield _Part(points, faces, uv, getattr(mesh.visual, "material", None))
+
+
+def _layer(parts: list[_Part], images: Images) -> Sdf.Layer:
+    stage = new_stage(ROOT[1:], ".usdc")
+    root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
+    Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
+    UsdGeom.Scope.Define(stage, f"{ROOT}/Looks")
+    looks: dict[int, UsdShade.Material] = {}
+    taken: set[str] = set()
+    for number, part in enumerate(parts):
+        mesh = _write_mesh(stage, f"{ROOT}/mesh_{number}", part)
+        material = part.material
+        if material is None:
+            continue
+        if id(material) not in looks:
+            said = str(getattr(material, "name", "") or "look")
+            name = Tf.MakeValidIdentifier(said.encode("ascii", "replace").decode())
+            while name in taken:
+                name = f"{name}_{number}"
+            taken.add(name)
+            looks[id(material)] = _write_material(stage, f"{ROOT}/Looks/{name}", material, images)
+        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(looks[id(material)])
+    return stage.GetRootLayer()
+
+
+def _write_mesh(stage: Usd.Stage, path: str, part: _Part) -> UsdGeom.Mesh:
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    points, faces = part.points.astype(np.float32), part.faces.astype(np.int32)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateDoubleSidedAttr(True)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 3, np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(faces).ravel()))
+    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(0), points.max(0)])))
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    whole = trimesh.Trimesh(part.points, part.faces, process=False)
+    flat = None if part.uv is not None else box_projection(whole)
+    whole.merge_vertices()  # along the seams of texture coordinates, so that shading has none
+    normals, index = creased_normals(whole)
+    told = primvars.CreatePrimvar("normals", Sdf.ValueTypeNames.Normal3fArray, UsdGeom.Tokens.faceVarying)
+    told.Set(Vt.Vec3fArray.FromNumpy(normals))
+    told.SetIndices(Vt.IntArray.FromNumpy(index))
+    kind = UsdGeom.Tokens.vertex if flat is None else UsdGeom.Tokens.faceVarying
+    st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, kind)
+    values = part.uv if flat is None else flat.reshape(-1, 2)
+    st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(values, np.float32)))
+    return mesh
+
+
+def _write_material(stage: Usd.Stage, path: str, material: Any, images: Images) -> UsdShade.Material:
+    made = UsdShade.Material.Define(stage, path)
+    shader = UsdShade.Shader.Define(stage, f"{path}/surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    look = _pbr(material) if isinstance(material, trimesh.visual.material.PBRMaterial) else _simple(material)
+    floats, colors = Sdf.ValueTypeNames.Float, Sdf.ValueTypeNames.Color3f
+    for name in ("roughness", "metallic", "opacity"):
+        shader.CreateInput(name, floats).Set(float(look[name]))
+    shader.CreateInput("diffuseColor", colors).Set(Gf.Vec3f(*map(float, look["color"])))
+    if any(look.get("emissive", ())):
+        shader.CreateInput("emissiveColor", colors).Set(Gf.Vec3f(*map(float, look["emissive"])))
+    if look["cutoff"]:
+        shader.CreateInput("opacityThreshold", floats).Set(float(look["cutoff"]))
+    reader = UsdShade.Shader.Define(stage, f"{path}/st")
+    reader.CreateIdAttr("UsdPrimvarReader_float2")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
+    st = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+    for image, outputs in look["images"]:
+        file = images.named(image)
+        _connect(stage, f"{path}/{outputs[0][0]}_image", file, shader, st, outputs, look)
+    made.CreateSurfaceOutput().ConnectToSource(shader.CreateOutput("surface", Sdf.ValueTypeNames.Token))
+    return made
+
+
+def _connect(
+    stage: Usd.Stage, path: str, file: str, shader: UsdShade.Shader, st: UsdShade.Output, outputs: Any, look: Any
+) -> None:
+    """An image that feeds inputs of a surface, given as (input, channel)."""
+    image = UsdShade.Shader.Define(stage, path)
+    image.CreateIdAttr("UsdUVTexture")
+    image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(Sdf.AssetPath(file))
+    colored = outputs[0][0] in ("diffuseColor", "emissiveColor")
+    image.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB" if colored else "raw")
+    for axis in ("wrapS", "wrapT"):
+        image.CreateInput(axis, Sdf.ValueTypeNames.Token).Set("repeat")
+    if outputs[0][0] == "normal":
+        image.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(2, 2, 2, 1))
+        image.CreateInput("bias", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(-1, -1, -1, 0))
+    elif outputs[0][0] == "diffuseColor":
+        tint = [*map(float, look["tint"]), 1.0]
+        if tint != [1.0] * 4:
+            image.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(*tint))
+    image.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(st)
+    kinds = {"diffuseColor": Sdf.ValueTypeNames.Color3f, "emissiveColor": Sdf.ValueTypeNames.Color3f}
+    kinds["normal"] = Sdf.ValueTypeNames.Normal3f
+    for name, channel in outputs:
+        kind = Sdf.ValueTypeNames.Float3 if channel == "rgb" else Sdf.ValueTypeNames.Float
+        wanted = shader.CreateInput(name, kinds.get(name, Sdf.ValueTypeNames.Float))
+        wanted.GetAttr().Clear()
+        wanted.ConnectToSource(image.CreateOutput(channel, kind))
+
+
+def _simple(material: Any) -> dict[str, Any]:
+    """The look of a Phong material of an OBJ."""
+    shown = material.diffuse
+    color = np.full(3, 0.6) if shown is None else to_linear(np.asarray(shown, float)[:3] / 255)
+    kwargs = getattr(material, "kwargs", {}) or {}
+    shine = material.glossiness
+    rough = float(np.clip((2.0 / (float(shine) + 2.0)) ** 0.25, 0.15, 1.0)) if isinstance(shine, float | int) else 0.7
+    image = material.image
+    return {
+        "color": color,
+        "tint": (1.0, 1.0, 1.0),
+        "roughness": rough,
+        "metallic": 0.0,
+        "opacity": _number(kwargs.get("d"), 1.0) if "d" in kwargs else 1.0 - _number(kwargs.get("tr"), 0.0),
+        "cutoff": 0.0,
+        "images": [] if image is None else [(image, [("diffuseColor", "rgb"), *_alpha(image)])],
+    }
+
+
+def _pbr(material: Any) -> dict[str, Any]:
+    """The look of a glTF material."""
+    factor = material.baseColorFactor
+    color = np.ones(4) if factor is None else np.asarray(factor, float) / (255.0 if np.max(factor) > 1 else 1.0)
+    images: list[tuple[Any, list[tuple[str, str]]]] = []
+    masked = material.alphaMode in ("MASK", "BLEND")
+    if material.baseColorTexture is not None:
+        alpha = _alpha(material.baseColorTexture) if masked else []
+        images.append((material.baseColorTexture, [("diffuseColor", "rgb"), *alpha]))
+    if material.metallicRoughnessTexture is not None:
+        images.append((material.metallicRoughnessTexture, [("roughness", "g"), ("metallic", "b")]))
+    if material.normalTexture is not None:
+        images.append((material.normalTexture, [("normal", "rgb")]))
+    if material.emissiveTexture is not None:
+        images.append((material.emissiveTexture, [("emissiveColor", "rgb")]))
+    emissive = material.emissiveFactor
+    return {
+        "color": color[:3],
+        "tint": color[:3],
+        "roughness": 1.0 if material.roughnessFactor is None else material.roughnessFactor,
+        "metallic": 1.0 if material.metallicFactor is None else material.metallicFactor,
+        "opacity": color[3] if masked else 1.0,
+        "emissive": (0.0,) * 3 if emissive is None else np.asarray(emissive, float),
+        "cutoff": (material.alphaCutoff or 0.5) if material.alphaMode == "MASK" else 0.0,
+        "images": images,
+    }
+
+
+def _alpha(image: Any) -> list[tuple[str, str]]:
+    return [("opacity", "a")] if "A" in image.getbands() else []
+
+
+def _number(value: Any, otherwise: float) -> float:
+    try:
+        number = float(value[0] if isinstance(value, list | tuple) else value)
+    except (TypeError, ValueError, IndexError):
+        return otherwise
+    return min(max(number, 0.0), 1.0) if np.isfinite(number) else otherwise
+
+
+def outward(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(f, 3) int, the faces with every piece turned that is nearly closed, evenly wound and inside out.
+
+    Arguments:
+        points: (v, 3) float. faces: (f, 3) int, counter-clockwise seen from outside.
+    """
+    extent = float(np.ptp(points, axis=0).max()) or 1.0
+    place = np.unique(np.rint(points / (SAME * extent)).astype(np.int64), axis=0, return_inverse=True)[1].ravel()
+    corner = place[faces]
+    count = int(place.max()) + 1
+    start, end = corner[:, [0, 1, 2]].ravel(), corner[:, [1, 2, 0]].ravel()
+    piece = connected_components(coo_array((np.ones(len(start)), (start, end)), shape=(count, count)), directed=False)[
+        1
+    ]
+    forth, back = start * count + end, end * count + start
+    known, often = np.unique(forth, return_counts=True)
+    once = often[np.searchsorted(known, forth)] == 1
+    paired = np.isin(back, known)
+    of_edge, of_face, pieces = piece[start], piece[corner[:, 0]], int(piece.max()) + 1
+    edges = np.maximum(np.bincount(of_edge, minlength=pieces), 1)
+    even = np.bincount(of_edge, once, pieces) == edges
+    closed = np.bincount(of_edge, paired, pieces) >= CLOSED * edges
+    sums = np.stack([np.bincount(of_face, points[faces].mean(1)[:, axis], pieces) for axis in range(3)], 1)
+    middle = sums / np.maximum(np.bincount(of_face, minlength=pieces), 1)[:, None]
+    a, b, c = (points[faces[:, k]] - middle[of_face] for k in range(3))
+    volume = np.bincount(of_face, np.einsum("ij,ij->i", a, np.cross(b, c)), pieces)
+    wrong = (even & closed & (volume < 0))[of_face]
+    return np.where(wrong[:, None], faces[:, ::-1], faces)

@@ -12,16 +12,15 @@ import numpy as np
 from echomodel.vocabulary import vocabulary
 from echousd.assets.model_file import ModelFile, check_reach, is_file, joined, relative, split
 from echousd.assets.record import AssetRecord, Vector
-from echousd.graph import SceneGraph
+from echousd.graph import Node, SceneGraph
 from echousd.progress import StageTimer
-from echousd.shapes.finishes.harmonies import HARMONIES, linear
+from echousd.shapes.finishes.slots import HARMONIES, linear
 from echousd.shapes.looks import palette_of_room
 from echousd.shapes.styles import ALIKE, ROOM_STYLE
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
     from echousd.assets.choose import Asked, AssetWishes
-    from echousd.graph import Node
 
     Wanted = Callable[[], AssetWishes]  # what is asked of a library, made where it is needed
 
@@ -100,11 +99,7 @@ def _moved(graph: SceneGraph, change: Callable[[str], str]) -> SceneGraph:
 
 
 def given_pieces(
-    graph: SceneGraph,
-    shapes: str,
-    wishes: Wanted,
-    among: Container[str] | None = None,
-    timer: StageTimer | None = None,
+    graph: SceneGraph, shapes: str, wishes: Wanted, among: Container[str] | None = None, timer: StageTimer | None = None
 ) -> Retrieved:
     """The models that the graph names itself, with their real sizes; raises ValueError that names object and file.
 

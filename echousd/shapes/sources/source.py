@@ -1,23 +1,23 @@
-"""What a source of shapes is asked, what it answers, and the protocol that every source keeps."""
+"""What a source of shapes is asked, and what it answers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echousd.graph import SceneGraph
 from echousd.progress import StageTimer
 from echousd.shapes.geometry import Geometry
-from echousd.shapes.meshing import FACES
+from echousd.shapes.merging import FACES
 from echousd.shapes.sources.retrieval import Retrieved
 from echousd.shapes.styles import shared_assets
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
     from echomodel.protocols import GraphEdit, RoomModel
-    from echousd.graph import SceneGraph
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,23 +70,6 @@ class Shapes:
 
     owners: Mapping[str, str]
     geometry: Mapping[str, Geometry]
-
-
-class ShapeSource(Protocol):
-    """Where geometry comes from; a source is a module of this package with one instance named `SOURCE`."""
-
-    @property
-    def title(self) -> str:
-        """A few words for the help of the command line."""
-        ...
-
-    def check(self, model: RoomModel | None) -> None:
-        """Raises ValueError, before any long work, where the source cannot give shapes with this model."""
-        ...
-
-    def shapes(self, request: ShapeRequest) -> Shapes:
-        """Geometry of the wanted objects; raises ValueError naming the object that there is none for."""
-        ...
 
 
 def per_asset(request: ShapeRequest, make: Callable[[int], Geometry], *, alike: bool = True) -> Shapes:

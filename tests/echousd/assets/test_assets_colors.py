@@ -4,10 +4,9 @@ from small_models import chest, picture, seat, write_glb, write_obj, write_usd
 
 from echousd.assets import table
 from echousd.assets.choose import Asked, AssetWishes, choose
-from echousd.assets.colors import dominant, flat, oklab, swatches, texels
+from echousd.assets.colors import costs, dominant, flat, oklab, swatches, texels, told_colors
+from echousd.assets.colors import table as rows_of
 from echousd.assets.index import index
-from echousd.assets.matching import costs, told_colors
-from echousd.assets.matching import table as rows_of
 from echousd.assets.table import read_library, write_library
 
 GREYS = np.array([[0.8, 0.8, 0.8], [0.1, 0.1, 0.1]])

@@ -14,8 +14,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from echousd.assets import table
-from echousd.assets.catalogues import tables
+from echousd.assets import catalogues, table
 from echousd.assets.index import index
 from echousd.assets.licences import licence_beside
 from echousd.assets.table import read_library, write_library
@@ -133,7 +132,7 @@ def test_bombs_are_not_unpacked(folder, monkeypatch):
     with pytest.raises(ValueError, match=rf"{CATALOGUE} of 131072 bytes, allowed: 65536"):
         indexed(folder)
     (folder / "x.sh3f").unlink()
-    monkeypatch.setattr(tables, "MAX_TEXT", 2**16)
+    monkeypatch.setattr(catalogues, "MAX_TEXT", 2**16)
     (folder / "annotations.json.gz").write_bytes(gzip.compress(b" " * 2**17))
     with pytest.raises(ValueError, match="more than 65536 bytes, allowed for a table"):
         indexed(folder)

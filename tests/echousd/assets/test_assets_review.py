@@ -6,8 +6,7 @@ from PIL import Image
 from small_models import chest, seat, small_library, write_obj
 
 from echousd.assets.describe import front_by_shape
-from echousd.assets.index import index, read_corrections, write_table
-from echousd.assets.review import left_out, write_page, write_sheets
+from echousd.assets.index import by_reason, index, read_corrections, write_page, write_sheets, write_table
 from echousd.assets.table import read_library
 
 
@@ -83,7 +82,7 @@ def test_models_that_are_left_out_are_told_by_reason(tmp_path, echousd_command):
         write_obj(folder, name, chest())
     (folder / "desk.glb").write_bytes(b"no glb")
     file = index([folder], tmp_path / "lib.parquet").file
-    found = left_out(list(read_library(file).records.values()))
+    found = by_reason(list(read_library(file).records.values()))
     reasons = {reason: [record.id for record in members] for reason, members in found.items()}
     unknown = "... is of no known category; set `category` in the table"
     assert next(iter(reasons)) == unknown  # the commonest first

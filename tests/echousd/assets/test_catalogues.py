@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 from small_models import chest, seat, write_glb, write_obj
 
-from echousd.assets.catalogues import catalogue_of
-from echousd.assets.catalogues.folder import stands_in
+from echousd.assets.catalogues import CATALOGUES, entries_of, stands_in
 from echousd.assets.describe import described
 
 
 def rows(folder, told=None):
-    catalogue, said = catalogue_of(folder), [] if told is None else told
-    return catalogue.title, {
-        e.key: described(e, folder / "lib.parquet") for e in catalogue.entries(folder, said.append)
-    }
+    kind = next(find.__name__ for find, _ in CATALOGUES if find(folder))
+    said = [] if told is None else told
+    return kind, {e.key: described(e, folder / "lib.parquet") for e in entries_of(folder, said.append)}
 
 
 def test_abo(tmp_path):
@@ -32,8 +30,8 @@ def test_abo(tmp_path):
     }
     (tmp_path / "listings/metadata").mkdir(parents=True)
     (tmp_path / "listings/metadata/listings_0.json").write_text(json.dumps(listing) + "\nno json\n")
-    title, found = rows(tmp_path)
-    assert (title, list(found)) == ("Amazon Berkeley Objects", ["B07"])
+    kind, found = rows(tmp_path)
+    assert (kind, list(found)) == ("abo", ["B07"])
     chair = found["B07"]
     assert (chair.category, chair.name, chair.licence, chair.tags) == ("chair", "Rivet Chair", "CC-BY-4.0", ("Oak",))
     assert chair.front_confidence == 1.0
@@ -57,8 +55,8 @@ def test_objaverse_with_objathor(tmp_path):
     (tmp_path / "annotations.json").write_text(json.dumps(told))
     (tmp_path / "gone.pkl.gz").write_bytes(b"cposix\nsystem\n")
     said: list[str] = []
-    title, found = rows(tmp_path, said)
-    assert (title, list(found)) == ("Objaverse with objathor's annotations", ["abc"])
+    kind, found = rows(tmp_path, said)
+    assert (kind, list(found)) == ("objaverse", ["abc"])
     chair = found["abc"]
     assert (chair.category, chair.licence, chair.author, chair.placement) == (
         "dining_chair",
@@ -79,8 +77,8 @@ def test_hssd(tmp_path):
         writer.writerows(
             [("id", "name", "wnsynsetkey", "up", "front"), ("a1", "Pax", "wardrobe.n.01", "0,0,1", "0,-1,0")]
         )
-    title, found = rows(tmp_path)
-    assert title == "HSSD"
+    kind, found = rows(tmp_path)
+    assert kind == "hssd"
     assert (found["a1"].category, found["a1"].licence) == ("wardrobe", "CC-BY-NC-4.0")
     assert found["a1"].dims == pytest.approx((1.6, 2.2, 0.6), abs=1e-3)
     assert (found["a1"].up, found["a1"].front) == ((0, 0, 1), (0, -1, 0))
@@ -93,8 +91,8 @@ def test_3d_future(tmp_path):
         {"model_id": "../m2", "category": "Bed"},
     ]
     (tmp_path / "model_info.json").write_text(json.dumps(told))
-    title, found = rows(tmp_path)
-    assert title == "3D-FUTURE"
+    kind, found = rows(tmp_path)
+    assert kind == "future3d"
     assert (found["m1"].category, found["m1"].tags) == ("multi_seat_sofa", ("Modern",))
     assert found["m1"].dims == pytest.approx((2.0, 0.8, 0.9), abs=1e-3)
 
@@ -102,7 +100,7 @@ def test_3d_future(tmp_path):
 def test_broken_tables_are_told(tmp_path):
     (tmp_path / "annotations.json").write_text("{")
     with pytest.raises(ValueError, match=r"annotations.json: cannot be read as JSON"):
-        catalogue_of(tmp_path).entries(tmp_path, print)
+        entries_of(tmp_path, print)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from inline_batches import QUICK, Inline, digests, small
 
 from echousd.batches.batch import batch
-from echousd.batches.journal import read_journals
+from echousd.batches.plan import read_journals
 from echousd.checks.placement import Misplacement
 
 

@@ -13,9 +13,8 @@ from inline_batches import QUICK, Inline
 
 from echomodel.files import HOST
 from echousd.batches.batch import batch
-from echousd.batches.journal import room_digest
 from echousd.batches.options import BatchRequest
-from echousd.batches.plan import make_plan, save_plan
+from echousd.batches.plan import make_plan, room_digest, save_plan
 from echousd.batches.remote import Remote
 from echousd.batches.verify import finish, verify
 from echousd.store import KEY

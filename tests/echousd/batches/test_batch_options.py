@@ -13,8 +13,8 @@ from small_room import small_graph
 from echomodel import text as texts
 from echousd.assets.index import index
 from echousd.batches.batch import batch
-from echousd.batches.journal import read_journals
 from echousd.batches.options import BatchOptions, parse_options, read_toml, request_of
+from echousd.batches.plan import read_journals
 from echousd.batches.verify import finish, verify
 from echousd.graph import Node
 

@@ -9,9 +9,17 @@ from pathlib import Path
 import pytest
 
 from echomodel.vocabulary import vocabulary
-from echousd.batches.journal import Journal, read_journals, room_digest, shard_folder
 from echousd.batches.options import parse_sample, read_toml, request_of
-from echousd.batches.plan import difference, load_plan, make_plan, save_plan
+from echousd.batches.plan import (
+    Journal,
+    difference,
+    load_plan,
+    make_plan,
+    read_journals,
+    room_digest,
+    save_plan,
+    shard_folder,
+)
 from echousd.batches.sources import find_graphs, sampled_graph
 from echousd.batches.verify import verify
 

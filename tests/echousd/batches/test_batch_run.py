@@ -10,11 +10,10 @@ from inline_batches import QUICK, Inline, digests, small
 from pxr import Usd
 
 from echousd.batches import batch as front
-from echousd.batches import run as running
+from echousd.batches import batch as running
 from echousd.batches import work
 from echousd.batches.batch import batch, generate_many
-from echousd.batches.journal import read_journals, room_digest, shard_folder
-from echousd.batches.plan import load_plan
+from echousd.batches.plan import load_plan, read_journals, room_digest, shard_folder
 from echousd.batches.sources import find_graphs, sampled_graph
 from echousd.batches.verify import finish, manifest_rows, status, verify, write_sheet, write_webdataset
 from echousd.folder.lock import locked

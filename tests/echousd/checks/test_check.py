@@ -11,7 +11,7 @@ import trimesh
 from pxr import Gf, Usd, UsdGeom, UsdValidation
 
 from echousd.checks import RULES, check, register
-from echousd.checks.collisions import DEEP, find_collisions, mesh_depth, winding_number
+from echousd.checks.placement import DEEP, find_collisions, mesh_depth, winding_number
 from echousd.checks.report import find_living
 from echousd.cli.main import run
 from echousd.graph import Node, RoomSpec

@@ -57,7 +57,7 @@ def ran(*commands: tuple[str, ...]) -> Callable[[Path], object]:
 
 def interrupted(top: Path) -> None:
     """A room whose last run was killed when its journal was there."""
-    from echousd.folder.journal import STAGING, Journal, Move, digest, digest_of, write_journal
+    from echousd.folder.folder import STAGING, Journal, Move, digest, digest_of, write_journal
 
     ran(MADE)(top)
     staging = top / "room" / STAGING

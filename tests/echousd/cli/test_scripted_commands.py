@@ -13,7 +13,7 @@ from pxr import Usd, UsdGeom
 from small_room import StandIn, small_graph
 
 import echousd
-from echousd.cli import main, output, quiet
+from echousd.cli import main, output
 
 BOXES = ("--shapes", "boxes", "--drafts", 1)
 
@@ -111,7 +111,7 @@ def test_quiet_keeps_errors_warnings_and_what_was_asked_for(graph, echousd_comma
 
     errors = io.StringIO()
     monkeypatch.setattr(sys, "stderr", errors)
-    quiet._hushed(noisy, [])(quiet=True)
+    output._hushed(noisy, [])(quiet=True)
     assert "look out" in errors.getvalue()
     assert errors.getvalue().endswith("a room failed\n")
     assert sys.stderr is errors

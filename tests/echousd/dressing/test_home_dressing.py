@@ -8,8 +8,8 @@ import pytest
 from echomodel.dressing import KINDS
 from echomodel.furniture import Choices, Style, solids
 from echomodel.openings import Opening
-from echousd.dressing import bareness, floors, hangings, tabletops, walls
-from echousd.dressing.dress import RULES
+from echousd.dressing import floors, tabletops, walls
+from echousd.dressing.dress import RULES, bare_walls
 from echousd.dressing.setting import Setting, standing
 from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
@@ -48,7 +48,7 @@ def test_no_books_lie_where_nobody_reads(word):
 def test_coats_hang_on_racks_and_towels_on_rungs(word, kind, least):
     for seed in range(6):
         room = setting(word, seed=seed)
-        hangings.hung_up(room)
+        walls.hung_up(room)
         host = room.objects[word]
         assert len(room.placed) >= least
         for thing in room.placed:
@@ -67,7 +67,7 @@ def test_curtains_keep_clear_of_the_coats_on_a_rack():
     met = 0
     for seed, offset in itertools.product(range(6), np.linspace(0.3, 2.6, 12)):
         room = setting("coat_rack", seed=seed, openings=[Opening("window", "window", 0, offset, 1.0, 1.3, 0.9)])
-        for rule in (rule for rule in RULES if rule in (walls.curtains, hangings.hung_up)):
+        for rule in (rule for rule in RULES if rule in (walls.curtains, walls.hung_up)):
             rule(room)
         curtains = [thing for thing in room.placed if KINDS[thing.kind].name == "curtain"]
         coats = [thing for thing in room.placed if thing.kind == "coats"]
@@ -101,7 +101,7 @@ def test_pictures_and_shoes_stay_out_of_baths_and_off_balconies(use, monkeypatch
     monkeypatch.setattr(floors, "SHOES", 1.0)
     room = setting(use=use, openings=[Opening("door", "door", 1, 0.2, 0.9, 2.0)])
     floors.by_doors(room)
-    bareness.bare_walls(room)
+    bare_walls(room)
     assert {thing.kind for thing in room.placed} == ({"shoes", "picture"} if not use else set())
 
 

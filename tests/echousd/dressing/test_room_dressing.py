@@ -18,14 +18,14 @@ from echousd.checks import check
 from echousd.dressing import upholstery
 from echousd.dressing.dress import RULES, dress, placed, setting_of
 from echousd.dressing.setting import Setting, Thing, meets, standing
-from echousd.dressing.surfaces import surfaces
+from echousd.dressing.tabletops import surfaces
 from echousd.dressing.upholstery import STEP, _Seat
 from echousd.dressing.walls import curtains
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.compose import room_files
 from echousd.options import RoomOptions
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
-from echousd.shapes.sources.boxes import ORIGIN, solid_geometry
+from echousd.shapes.sources.made import solid_geometry
 from echousd.shapes.walls import walls
 from echousd.stage.graphs import read_graph
 
@@ -283,7 +283,7 @@ def test_cushions_lie_before_the_pillows_of_wide_beds():
     pillow.apply_translation((0, 0.53, -deep / 2 + 0.3))
     board = trimesh.creation.box((wide, tall, 0.04))
     board.apply_translation((0, tall / 2, -deep / 2 + 0.02))
-    whole = solid_geometry(trimesh.util.concatenate([mattress, pillow, board]), "double_bed", ORIGIN)
+    whole = solid_geometry(trimesh.util.concatenate([mattress, pillow, board]), "double_bed", Origin("boxes"))
     geometry = {**room.geometry, "bed": replace(whole, colliders=(Collider("collider", board, "convexHull"),))}
     setting = setting_of(replace(room, geometry=geometry))
     upholstery.bed_cushions(setting)

@@ -11,8 +11,7 @@ from echomodel.metrics.tasks import tasks_of
 from echomodel.roomboxes import write_rooms
 from echomodel.rooms.generator import generate_rooms
 from echousd.evaluation import runs
-from echousd.evaluation.foreign import foreign_rooms
-from echousd.evaluation.runs import SuiteSettings, rooms_of
+from echousd.evaluation.runs import SuiteSettings, foreign_rooms, rooms_of
 from echousd.evaluation.suite import evaluate
 from echousd.evaluation.systems import System
 from echousd.stage.boxes import write_stages

@@ -66,7 +66,7 @@ def test_one_command_trains_and_fills_our_column(folder, tmp_path, monkeypatch):
     monkeypatch.setenv("ECHOUSD_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr("echousd.evaluation.suite.HONEST", ("random", "real"))
     for name in ("PUBLISHED", "CONSISTENT"):  # ten classes take minutes
-        monkeypatch.setattr(f"echousd.evaluation.pieces.{name}", ("wardrobe",))
+        monkeypatch.setattr(f"echousd.evaluation.sections.{name}", ("wardrobe",))
     small = [f"paper.{name}={json.dumps(value).replace(' ', '')}" for name, value in SIZES.items()]
     settings = " ".join(f"--set {shlex.quote(word)}" for word in [*RUN, *small])
     given = [f"SGFRONT={folder}", f"PAPER={tmp_path / 'paper'}", f"SETTINGS={settings}", "BIN=bin"]

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from echousd.cli.main import run
-from echousd.evaluation.study import preferences, write_study
+from echousd.evaluation.suite import preferences, write_study
 
 
 def test_the_page_stands_alone_and_shows_every_pair(tmp_path):

@@ -25,8 +25,8 @@ def rooms():
 def quick(monkeypatch):
     """Only rows that cost nothing."""
     monkeypatch.setattr(suite, "HONEST", ("random", "retrieval", "real"))
-    monkeypatch.setattr("echousd.evaluation.pieces.PUBLISHED", ("wardrobe", "nightstand"))
-    monkeypatch.setattr("echousd.evaluation.pieces.CONSISTENT", ("wardrobe",))
+    monkeypatch.setattr("echousd.evaluation.sections.PUBLISHED", ("wardrobe", "nightstand"))
+    monkeypatch.setattr("echousd.evaluation.sections.CONSISTENT", ("wardrobe",))
     monkeypatch.setattr("echousd.evaluation.sections.SWEPT", (2, 4))
     monkeypatch.setattr("echousd.evaluation.sections.SETTLED", 1)
 

@@ -9,7 +9,7 @@ import trimesh
 import echousd
 from echomodel.roomboxes import RoomBoxes
 from echousd.cli.main import run
-from echousd.evaluation.foreign import foreign_rooms
+from echousd.evaluation.runs import foreign_rooms
 from echousd.graph import SceneGraph
 
 GRAPH = """

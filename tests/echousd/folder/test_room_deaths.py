@@ -22,7 +22,7 @@ from echousd.assets.table import read_library
 from echousd.batches.batch import batch
 from echousd.batches.verify import finish
 from echousd.folder import history
-from echousd.folder.journal import DONE
+from echousd.folder.folder import DONE
 from echousd.folder.manifest import find_manifest
 from echousd.make.save import save_room
 from echousd.pending import STAGING

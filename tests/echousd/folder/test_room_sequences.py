@@ -20,7 +20,7 @@ from pxr import Sdf
 
 from echousd.folder import folder as folders
 from echousd.folder import history
-from echousd.folder.journal import digest
+from echousd.folder.folder import digest
 from echousd.folder.lock import LOCK
 from echousd.folder.manifest import find_manifest
 from echousd.make.save import save_room

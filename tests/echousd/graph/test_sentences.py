@@ -7,7 +7,7 @@ import unicodedata
 import pytest
 
 from echousd.graph import GraphError, Node, SceneGraph
-from echousd.graph.sentences import stating, without
+from echousd.graph.text import stating, without
 
 ROOM = """room: living_room
 objects: {sofa: sofa, armchair: armchair, table: side_table, plant: plant}

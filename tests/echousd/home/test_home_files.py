@@ -9,7 +9,7 @@ from homes import QUICK, inline
 from pxr import Usd, UsdGeom
 
 import echousd
-from echousd.batches.journal import room_digest
+from echousd.batches.plan import room_digest
 from echousd.folder.manifest import find_manifest
 from echousd.home.files import load_home
 from echousd.home.given import plan_there

@@ -12,9 +12,9 @@ from echousd.layers.physics import write_asset_physics
 from echousd.shapes.colliders import collider, colliders_of, standing_hull
 from echousd.shapes.geometry import Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.joinery import part_of, within_budget
-from echousd.shapes.masses import ballasted, hull_volume, mass_of, read_mass
-from echousd.shapes.meshing import box_mesh
-from echousd.shapes.sources.boxes import ORIGIN, solid_geometry
+from echousd.shapes.matter import ballasted, hull_volume, mass_of, read_mass
+from echousd.shapes.merging import box_mesh
+from echousd.shapes.sources.made import solid_geometry
 
 SIZE = np.array([1.6, 2.2, 0.6])
 
@@ -24,7 +24,7 @@ def tensor(mass: Mass) -> np.ndarray:
 
 
 def test_mass_of_a_box_is_that_of_the_textbook():
-    mass = mass_of(solid_geometry(box_mesh(SIZE), "wardrobe", ORIGIN), "wardrobe")
+    mass = mass_of(solid_geometry(box_mesh(SIZE), "wardrobe", Origin("boxes")), "wardrobe")
     x, y, z = SIZE
     assert mass.mass == pytest.approx(x * y * z * vocabulary().category("wardrobe").density, abs=0.01)
     np.testing.assert_allclose(mass.centre, (0, y / 2, 0), atol=1e-6)

@@ -12,8 +12,8 @@ import echousd
 from echomodel.boxes import Boxes
 from echousd import check
 from echousd.graph import RoomSpec
-from echousd.make.adopting import adopted, seen_in_theirs
 from echousd.make.reading import read_room
+from echousd.make.wishes import adopted, seen_in_theirs
 from echousd.place.living import living_faults
 from echousd.stage.files import open_stage
 from echousd.stage.foreign import SkippedPrims

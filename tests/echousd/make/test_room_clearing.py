@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 from echomodel.boxes import Boxes
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.openings import Opening
-from echousd.graph.sentences import stating
+from echousd.graph.text import stating
 from echousd.make.clearing import cleared
 from echousd.make.verdicts import relation_verdicts
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part

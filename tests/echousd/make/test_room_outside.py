@@ -15,7 +15,7 @@ import echousd
 from echousd.assets.index import index
 from echousd.assets.table import read_library, write_library
 from echousd.batches.batch import batch
-from echousd.batches.journal import read_journals
+from echousd.batches.plan import read_journals
 from echousd.make.edit import edit
 from echousd.make.reading import read_room
 from echousd.shapes.originals.loading import library_file

@@ -9,8 +9,7 @@ import echousd
 from echomodel.loading import load_model
 from echomodel.randomness import SceneGenerators, normal
 from echousd.graph.floors import with_plan
-from echousd.make.layouts import Draws, sample_boxes
-from echousd.make.packed import first_drafts, packs
+from echousd.make.layouts import Draws, first_drafts, packs, sample_boxes
 from echousd.progress import StageTimer
 
 SAMPLES = Path(__file__).parents[3] / "samples"

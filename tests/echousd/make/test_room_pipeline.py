@@ -10,7 +10,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
-from echousd.make.locking import with_locked_places
+from echousd.make.stated import with_locked_places
 from echousd.make.verdicts import relation_verdicts
 from echousd.shapes.styles import asset_names, equal_sizes, shared_assets, style_groups
 from echousd.tensors import graph_batch

@@ -13,7 +13,7 @@ from small_room import BARE, small_graph
 import echousd
 from echomodel.boxes import Boxes
 from echomodel.loading import load_model
-from echousd.reproducible import one_thread, rounded_boxes, rounded_descriptions, rounded_grids
+from echousd.tensors import one_thread, rounded_boxes, rounded_descriptions, rounded_grids
 
 CODE = textwrap.dedent("""
     import hashlib, os, sys

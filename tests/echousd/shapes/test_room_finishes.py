@@ -20,11 +20,9 @@ from echousd.exporting import export
 from echousd.options import RoomOptions
 from echousd.shapes.finishes import baking
 from echousd.shapes.finishes.baking import PATTERNS, relief
-from echousd.shapes.finishes.harmonies import HARMONIES, linear
 from echousd.shapes.finishes.patterns import SIZE
-from echousd.shapes.finishes.pictures import picture
-from echousd.shapes.finishes.rugs import DESIGNS
-from echousd.shapes.finishes.slots import SHELL, SLOTS, material_of
+from echousd.shapes.finishes.pictures import DESIGNS, picture
+from echousd.shapes.finishes.slots import HARMONIES, SHELL, SLOTS, linear, material_of
 from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
 from echousd.shapes.looks import look

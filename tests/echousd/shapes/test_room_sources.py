@@ -1,6 +1,4 @@
-import sys
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,13 +7,13 @@ from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
 from small_room import BARE, StandIn, small_graph
 
 import echousd
+from echousd import options
 from echousd.make.edit import edit
 from echousd.make.reading import read_room
-from echousd.shapes import sources
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
-from echousd.shapes.meshing import mesh_from_shape
-from echousd.shapes.sources.boxes import solid_geometry
-from echousd.shapes.sources.sdf import within_budget
+from echousd.shapes.merging import mesh_from_shape
+from echousd.shapes.sources import mixing
+from echousd.shapes.sources.made import solid_geometry, within_budget
 from echousd.shapes.sources.source import Shapes, per_asset
 from echousd.stage.files import open_stage
 
@@ -24,8 +22,6 @@ ORIGIN = Origin("slabs", "CC-BY-4.0", "A. Joiner")
 
 class Slabs:
     """A source of its own: a plate of two materials on a foot, each with a collider; remembers what it was asked."""
-
-    title = "slabs"
 
     def __init__(self):
         self.requests = []
@@ -54,12 +50,12 @@ class Slabs:
 @pytest.fixture
 def slabs(monkeypatch):
     source = Slabs()
-    monkeypatch.setitem(sys.modules, "slabs_of_a_test", SimpleNamespace(SOURCE=source))
-    monkeypatch.setitem(sources.MODULES, "slabs", "slabs_of_a_test")
+    monkeypatch.setitem(mixing.SOURCES, "slabs", mixing.ShapeSource(source.shapes, source.check))
+    monkeypatch.setattr(options, "SHAPES", (*options.SHAPES, "slabs"))
     return source
 
 
-def test_a_new_source_is_one_module_and_one_line(slabs, tmp_path):
+def test_a_new_source_is_one_function_and_its_rows(slabs, tmp_path):
     room = echousd.generate(small_graph(), seed=3, model=StandIn(), shapes="slabs", place=False, **BARE)
     root = room.save(tmp_path / "bedroom", preview=False)
     stage = open_stage(root)
@@ -123,7 +119,7 @@ def test_a_source_refuses_a_model_before_the_long_work(slabs):
 
 def test_unknown_sources_are_named():
     with pytest.raises(ValueError, match="shapes is 'lego', allowed: parts, sdf, boxes"):
-        sources.shape_source("lego")
+        options.RoomOptions(shapes="lego")
 
 
 def test_pieces_have_names_of_their_own():

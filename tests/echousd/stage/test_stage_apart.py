@@ -17,7 +17,7 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echousd.assets.index import index
 from echousd.batches.batch import batch
-from echousd.batches.journal import room_digest
+from echousd.batches.plan import room_digest
 from echousd.batches.verify import verify
 from echousd.stage import apart
 from echousd.stage.apart import check_apart, fatal

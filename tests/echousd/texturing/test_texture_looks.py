@@ -22,8 +22,8 @@ from echousd.stage.files import open_stage
 from echousd.stage.graphs import read_graph
 from echousd.texturing import atlas, export_job, import_job
 from echousd.texturing.atlas import Unwrapped
-from echousd.texturing.glb import glb_bytes
 from echousd.texturing.job import job_mesh
+from echousd.texturing.obj import glb_bytes
 from echousd.texturing.results import texture_coordinates
 
 SIZE = 128

@@ -20,8 +20,8 @@ from echousd.stage.files import open_stage
 from echousd.texturing import export as texturing_export
 from echousd.texturing import export_job, import_job, scenetex
 from echousd.texturing.atlas import Unwrapped, texel_faces
-from echousd.texturing.glb import glb_bytes
 from echousd.texturing.job import job_mesh
+from echousd.texturing.obj import glb_bytes
 
 
 @pytest.fixture(scope="module")
