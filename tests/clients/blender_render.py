@@ -32,7 +32,9 @@ scene.cycles.samples = arguments.samples
 scene.cycles.use_denoising = True
 scene.cycles.max_bounces = 6
 scene.view_settings.view_transform = "Standard"  # the looks' own colours; AgX greys them
-scene.render.resolution_x = scene.render.resolution_y = arguments.size
+film = wanted[0].data
+scene.render.resolution_x = arguments.size
+scene.render.resolution_y = round(arguments.size * film.sensor_height / film.sensor_width)
 scene.render.resolution_percentage = 100
 scene.render.image_settings.file_format = "PNG"
 scene.render.filepath = arguments.picture
