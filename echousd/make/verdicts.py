@@ -12,7 +12,7 @@ from echomodel.rules import fronts, margins, verdicts
 from echomodel.rules.placements import placement_margins
 from echousd.graph import SceneGraph
 from echousd.place.geometry import pair_indices, separation
-from echousd.place.placements import stated_placements
+from echousd.place.placing import stated_placements
 from echousd.place.report import TOUCH, Collision
 from echousd.room import LayoutOutcome, RoomData, Verdict
 from echousd.tensors import floor_centre, graph_batch

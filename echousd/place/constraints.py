@@ -23,6 +23,7 @@ from echomodel.rules import rule_set
 from echomodel.rules.geometry import PairGeometry
 from echomodel.rules.margins import pair_margins
 from echomodel.rules.placements import Spread, margin_of
+from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import COLUMNS, PLAN, SIDES, axes, parting
 from echousd.place.problem import Posed
 
@@ -31,6 +32,7 @@ MANY = 60  # boxes beyond which gradients are sparse
 PART = 0.002  # metres that pairs are parted farther than they may overlap
 HANDLES = 0.05  # metres at the front of a box that handles and doors take, on which nothing can stand
 ROUNDED = 0.02  # metres at its back, where a top with rounded corners may end before its box
+NEIGHBOURS = 2.0  # metres by which neighbours at one wall rather part along it than one in front of the other
 LONGEST_STEP = 0.6  # of any number in one round, metres or ratio
 
 Matrix: TypeAlias = Any  # (r, m) float, an array of numpy or a sparse one
@@ -87,6 +89,30 @@ class Constraints:
         self.problem, self.yaw, self.slack = start.problem, start.yaw, slack
         self.axis = axes(start.yaw)
         self.parting = parting(self.axis, start.problem.pairs)
+        self.handicap, self.barred = self._handicap(start), self._barred()
+
+    def _handicap(self, start: Posed) -> np.ndarray:
+        """(p, 5) float, metres by which an axis has to part better than others: pairs pass over one another only where
+        they do already; neighbours at one wall part along it."""
+        wall, pairs = self.problem.wall, self.problem.pairs
+        gap = np.einsum("psbc,pbc->ps", self.parting[:, 4], np.concatenate([start.position, start.size], 1)[pairs])
+        (one, other), axis = wall[pairs].swapaxes(0, 1), self.axis[pairs].reshape(-1, 4, 2)
+        across = np.abs(np.einsum("pad,pd->pa", axis, np.nan_to_num(one[:, 1]))) > 0.7
+        aside = NEIGHBOURS * (across & (np.abs(one - other) < 1e-6).all((1, 2))[:, None])
+        return np.concatenate([aside, np.where(gap.max(1) > -0.02, 0.0, np.inf)[:, None]], 1)
+
+    def _barred(self) -> np.ndarray:
+        """(p, 5, 2) bool: to which sides of the first of each pair the relations do not have the second."""
+        triplets, pairs = self.problem.triplets, self.problem.pairs
+        step = np.array([predicate.step for predicate in vocabulary().predicates])[triplets[:, 1]]
+        order = np.zeros((len(self.yaw), len(self.yaw), 2))
+        np.add.at(order, (triplets[:, 2], triplets[:, 0]), step)
+        wanted = (order - order.swapaxes(0, 1))[pairs[:, 0], pairs[:, 1]]
+        axis = self.axis[pairs].reshape(-1, 4, 2)
+        along = (np.where(np.abs(axis) > 0.9, axis, 0.0) * wanted[:, None]).sum(-1)  # what runs along x or z
+        out = np.zeros((len(pairs), 5, 2), bool)
+        out[:, :4] = np.stack([along < 0, along > 0], -1)
+        return out
 
     def at(self, size: np.ndarray, position: np.ndarray, handicap: np.ndarray) -> Linearised:
         """All constraints at the present boxes.
@@ -132,7 +158,7 @@ class Constraints:
         """Pairs, each parted along the axis and to the side that are best."""
         problem, row = self.problem, np.arange(len(self.problem.pairs))
         gap = np.einsum("pasbc,pbc->pas", self.parting, state[problem.pairs])
-        side = np.where(problem.barred, -np.inf, gap).argmax(2)
+        side = np.where(self.barred, -np.inf, gap).argmax(2)
         gap = np.take_along_axis(gap, side[..., None], 2)[..., 0]
         axis = (gap - handicap).argmax(1)
         allowed = np.where(problem.touching, 0.0, allowed_overlap(problem.categories, state[:, 3:], problem.pairs))

@@ -9,6 +9,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import torch
+
+from echomodel import boxes2d
+from echomodel.boxes2d import seen
+from echomodel.floors import signed_distance
+from echomodel.roomboxes import footprints
 
 COLUMNS = 6  # numbers of a box: its position x, y, z and its sides
 PLAN, SIDES = slice(0, 3, 2), slice(3, 6, 2)  # columns of x and z and of width and depth
@@ -16,10 +22,7 @@ PLAN, SIDES = slice(0, 3, 2), slice(3, 6, 2)  # columns of x and z and of width 
 
 def axes(yaw: np.ndarray) -> np.ndarray:
     """(n, 2, 2) float: unit vectors in (x, z) of the width axis [:, 0] and of the front [:, 1]."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    out = np.empty((len(yaw), 2, 2), c.dtype)
-    out[:, 0, 0], out[:, 0, 1], out[:, 1, 0], out[:, 1, 1] = c, -s, s, c
-    return out
+    return np.stack(boxes2d.axes(yaw), 1)
 
 
 def pair_indices(n: int) -> np.ndarray:
@@ -73,12 +76,6 @@ class Floor:
         return np.roll(self.polygon, -1, 0) - self.polygon
 
     @cached_property
-    def slope(self) -> np.ndarray:
-        """(k,) float: how far each wall goes along x for a metre along z; 0 for walls along x."""
-        x, z = self.edge.T
-        return np.divide(x, z, out=np.zeros(len(x)), where=z != 0)
-
-    @cached_property
     def rectangle(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Middle (2,) and half extents (2,), metres, of a floor that is a rectangle along x and z, else None."""
         low, high = self.polygon.min(0), self.polygon.max(0)
@@ -110,17 +107,42 @@ def depth_inside(floor: Floor, points: np.ndarray) -> np.ndarray:
         middle, half = floor.rectangle
         out = np.abs(points - middle) - half
         return -np.where((out <= 0).all(1), out.max(1), np.linalg.norm(np.maximum(out, 0.0), axis=1))
-    (x0, z0), (ex, ez) = floor.polygon.T, floor.edge.T
-    x, z = points[:, :1] - x0, points[:, 1:] - z0
-    t = np.clip((x * ex + z * ez) / (ex * ex + ez * ez), 0.0, 1.0)
-    x -= t * ex
-    z -= t * ez
-    depth = np.sqrt((x * x + z * z).min(1))
-    return np.where(_within(floor, points), depth, -depth)
+    inside = signed_distance(torch.from_numpy(points)[None], torch.from_numpy(floor.polygon)[None])
+    return np.asarray(inside[0].numpy())
 
 
-def _within(floor: Floor, points: np.ndarray) -> np.ndarray:
-    """(m,) bool: which points lie in the polygon (even-odd rule)."""
-    x, z = points[:, :1] - floor.polygon[:, 0], points[:, 1:] - floor.polygon[:, 1]
-    above = (z < 0) != (z < floor.edge[:, 1])
-    return (above & (x < z * floor.slope)).sum(1) % 2 == 1
+def depths(
+    size: np.ndarray, at: np.ndarray, turn: np.ndarray, others: np.ndarray, position: np.ndarray, yaw: np.ndarray
+) -> np.ndarray:
+    """(K, m) float: how deep a box runs into m others, negative = the gap, metres.
+
+    Arguments:
+        size: (3,) float of the box; at: (K, 3) and turn: (K,) float, its poses.
+        others, position: (m, 3) float, sizes and places of the others; yaw: (m,) float.
+    """
+    if not len(others):
+        return np.full((len(at), 0), -9.0)
+    cos, sin, c, s = np.cos(turn)[:, None], np.sin(turn)[:, None], np.cos(yaw), np.sin(yaw)
+    x = position[:, 0] - at[:, 0, None]
+    z = position[:, 2] - at[:, 2, None]
+    like, across = np.abs(cos * c + sin * s), np.abs(sin * c - cos * s)  # of the axes of both
+    width, deep, reach, length = size[0] / 2, size[2] / 2, others[:, 0] / 2, others[:, 2] / 2
+    gap = np.abs(cos * x - sin * z) - (width + like * reach + across * length)
+    np.maximum(gap, np.abs(sin * x + cos * z) - (deep + across * reach + like * length), out=gap)
+    np.maximum(gap, np.abs(c * x - s * z) - (reach + like * width + across * deep), out=gap)
+    np.maximum(gap, np.abs(s * x + c * z) - (length + across * width + like * deep), out=gap)
+    bottom = at[:, 1, None]
+    np.maximum(gap, position[:, 1] - (bottom + size[1]), out=gap)
+    np.maximum(gap, bottom - (position[:, 1] + others[:, 1]), out=gap)
+    return -gap
+
+
+def beyond(floor: Floor, size: np.ndarray, at: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """(K,) float: how far a box (3,), or each of K, leaves the floor at (K, 3) and turn (K,), metres."""
+    size = np.broadcast_to(size, at.shape)
+    corner = footprints(size, at, turn)
+    out: np.ndarray = -depth_inside(floor, corner.reshape(-1, 2)).reshape(-1, 4).min(1)
+    if len(floor.reflex):
+        local = np.abs(seen(floor.reflex - at[:, None, [0, 2]], turn[:, None])) - size[:, None, [0, 2]] / 2
+        out = np.maximum(out, -local.max(2).min(1))
+    return out

@@ -21,10 +21,10 @@ from echomodel.objective.sizes import (
 )
 from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
+from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place.fitted import fitted
 from echousd.place.overhead import lamps_along
-from echousd.place.placements import stated_placements
 from echousd.place.problem import Posed, pose, stacked
 from echousd.place.report import Conflict, collisions, conflicts, outside, sentence
 from echousd.place.search import ANEW, Arranged, Search
@@ -33,7 +33,6 @@ from echousd.place.solver import PlaceConfig, solve, unmet
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
-    from echomodel.rules.placements import Stated
     from echousd.graph import Relation, RoomSpec, SceneGraph
 
 FULL = 0.3  # share of a floor that is covered from which on smaller furniture is tried
@@ -164,6 +163,14 @@ def floor_of_room(room: RoomSpec) -> np.ndarray | None:
         return None
     x, z = np.asarray(room.size, float) / 2
     return np.array([(-x, -z), (x, -z), (x, z), (-x, z)])
+
+
+def stated_placements(graph: SceneGraph) -> tuple[Stated, ...]:
+    """The placements of a graph by the numbers of its nodes, in the order of `SceneGraph.placements`."""
+    row = {name: i for i, name in enumerate(graph.names)}
+    return tuple(
+        Stated(one.placement, row[one.subject], tuple(row[name] for name in one.others)) for one in graph.placements
+    )
 
 
 def place_boxes(

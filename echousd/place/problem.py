@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it stands free
 WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's normal does not lean on it
-NEIGHBOURS = 2.0  # metres by which neighbours at one wall rather part along it than one in front of the other
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +38,6 @@ class Problem:
         carrier: (n,) int, the object that each one stands on, or `ON_FLOOR`, `ON_CEILING`, `FREE`.
         wall: (n, 2, 2) float, point and inward normal (x, z) of the wall that each one leans on; NaN = none.
         behind: (n,) float, metres that each one keeps between its back and a wall that it leans on.
-        pairs: (p, 2) int, pairs that must not collide.
-        barred: (p, 5, 2) bool, sides that the relations forbid: see `geometry.parting`.
-        handicap: (p, 5) float, metres by which a separating axis, the last one upright, must be better to be chosen.
         stated: where single objects must stand in the room.
     """
 
@@ -57,10 +53,14 @@ class Problem:
     carrier: np.ndarray
     wall: np.ndarray
     behind: np.ndarray
-    pairs: np.ndarray
-    barred: np.ndarray
-    handicap: np.ndarray
     stated: tuple[Stated, ...] = ()
+
+    @cached_property
+    def pairs(self) -> np.ndarray:
+        """(p, 2) int, pairs that must not collide."""
+        i, j = pair_indices(len(self.categories)).T
+        apart = ~(self.fixed[i] & self.fixed[j]) & (self.carrier[i] != j) & (self.carrier[j] != i)
+        return np.stack([i, j], 1)[apart]
 
     @cached_property
     def surroundings(self) -> Walls | None:
@@ -74,7 +74,7 @@ class Problem:
         """(p,) bool, pairs that touch at most, though such a pair may overlap: a bed moved off its nightstand later
         would leave its wall."""
         head = np.array([vocabulary().category(word).stands == "head" for word in self.categories], bool)
-        return head[self.pairs].any(1) if len(self.pairs) else np.zeros(0, bool)
+        return np.asarray(head[self.pairs].any(1))
 
     @cached_property
     def fronts(self) -> np.ndarray:
@@ -132,11 +132,6 @@ def pose(
         turn = ~np.isnan(wall[:, 1, 0]) & ~fixed & ~turned
         yaw[turn] = np.arctan2(wall[turn, 1, 0], wall[turn, 1, 1])
     behind = kept_behind(words, size, wall_gaps(wall, size, position, yaw))
-    pairs = pair_indices(n)
-    i, j = pairs[:, 0], pairs[:, 1]
-    apart = ~(fixed[i] & fixed[j]) & (carrier[i] != j) & (carrier[j] != i)
-    pairs = pairs[apart]
-    axis = axes(yaw)[pairs].reshape(-1, 4, 2)
     problem = Problem(
         words,
         triplets[told],
@@ -150,9 +145,6 @@ def pose(
         carrier,
         wall,
         behind,
-        pairs,
-        barred_sides(n, triplets, pairs, axis),
-        axis_handicap(size, position, pairs, axis, wall),
         stated,
     )
     return Posed(problem, size, position, yaw)
@@ -163,34 +155,6 @@ def wall_gaps(wall: np.ndarray, size: np.ndarray, position: np.ndarray, yaw: np.
     normal = wall[:, 1]
     reach = (np.abs(seen(normal, yaw)) * size[:, [0, 2]]).sum(-1) / 2
     return ((position[:, [0, 2]] - wall[:, 0]) * normal).sum(-1) - reach
-
-
-def axis_handicap(
-    size: np.ndarray, position: np.ndarray, pairs: np.ndarray, axis: np.ndarray, wall: np.ndarray
-) -> np.ndarray:
-    """(p, 5) float: pairs pass over one another only where they do already; neighbours at one wall part along it."""
-    (i, j), low, high = pairs.T, position[:, 1], position[:, 1] + size[:, 1]
-    rise = np.maximum(low[j] - high[i], low[i] - high[j])
-    neighbours = (np.abs(wall[i] - wall[j]) < 1e-6).all((1, 2))
-    across = np.abs(np.einsum("pad,pd->pa", axis, np.nan_to_num(wall[i, 1]))) > 0.7
-    aside = np.where(neighbours[:, None] & across, NEIGHBOURS, 0.0)
-    return np.concatenate([aside, np.where(rise > -0.02, 0.0, np.inf)[:, None]], 1)
-
-
-def barred_sides(n: int, triplets: np.ndarray, pairs: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """(p, 5, 2) bool: to which sides of the first of each pair the relations do not have the second.
-
-    Arguments:
-        axis: (p, 4, 2) float, the horizontal axes of both, of which those along x or z count.
-    """
-    step = np.array([predicate.step for predicate in vocabulary().predicates])[triplets[:, 1]]
-    order = np.zeros((n, n, 2))
-    np.add.at(order, (triplets[:, 2], triplets[:, 0]), step)
-    wanted = (order - order.transpose(1, 0, 2))[pairs[:, 0], pairs[:, 1]]
-    along = (np.where(np.abs(axis) > 0.9, axis, 0.0) * wanted[:, None]).sum(-1)
-    out = np.zeros((len(pairs), 5, 2), bool)
-    out[:, :4] = np.stack([along < 0, along > 0], -1)
-    return out
 
 
 def stacked(

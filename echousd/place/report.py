@@ -9,8 +9,7 @@ import numpy as np
 
 from echomodel.objective.support import allowed_overlap
 from echousd.place.constraints import COLLISION, FLOOR, RELATION
-from echousd.place.geometry import separation
-from echousd.place.overlaps import beyond
+from echousd.place.geometry import beyond, separation
 from echousd.place.problem import Problem
 from echousd.place.solver import Solution
 

@@ -19,7 +19,7 @@ from echomodel.objective import TERMS, Plan, Term, unreached
 from echomodel.objective.copies import OF_WORDS, copies_of, looks_at
 from echomodel.objective.plan import Found, found, nobody
 from echomodel.rules import margins
-from echousd.place.overlaps import beyond, depths
+from echousd.place.geometry import beyond, depths
 from echousd.place.proposals import ahead, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
 from echousd.place.setting import Setting
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -17,9 +16,6 @@ from echomodel.vocabulary import Category
 from echousd.place.distances import BEHIND, kept_behind
 from echousd.place.geometry import Floor
 from echousd.place.problem import Posed, Problem, wall_gaps
-
-if TYPE_CHECKING:
-    from echomodel.rules.placements import Walls
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,12 +59,6 @@ class Setting:
         """The floor."""
         assert self.problem.floor is not None
         return self.problem.floor
-
-    @property
-    def surroundings(self) -> Walls:
-        """The walls as placements are measured to them."""
-        assert self.problem.surroundings is not None
-        return self.problem.surroundings
 
     @cached_property
     def shared(self) -> np.ndarray:

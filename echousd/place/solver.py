@@ -83,7 +83,8 @@ class Solution:
 
 def solve(start: Posed, config: PlaceConfig) -> Solution:
     """Move and size boxes until the constraints hold; the best attempt where they cannot all hold."""
-    handicap, constraints = start.problem.handicap.copy(), Constraints(start, config.slack)
+    constraints = Constraints(start, config.slack)
+    handicap = constraints.handicap.copy()
     best: Solution | None = None
     through = 0
     spent = 0

@@ -34,7 +34,8 @@ def posed(rules: str, square: bool, seed: int) -> Posed:
 
 
 def at(start: Posed, size: np.ndarray, position: np.ndarray) -> Linearised:
-    return Constraints(start, 0.0).at(size, position, start.problem.handicap)
+    found = Constraints(start, 0.0)
+    return found.at(size, position, found.handicap)
 
 
 @pytest.mark.parametrize("rules", ["strict", "sgfront"])
