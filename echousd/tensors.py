@@ -10,6 +10,7 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
+from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 
@@ -59,19 +60,33 @@ def _round(values: np.ndarray, step: float) -> np.ndarray:
 def graph_batch(graph: SceneGraph) -> GraphBatch:
     """The graph as tensors; relations and placements in their order."""
     words = vocabulary()
-    index = {node.name: i for i, node in enumerate(graph.nodes)}
     kinds = [row.name for row in words.placements]
     return GraphBatch.single(
         [words.category_id(node.category) for node in graph.nodes],
-        [(index[r.subject], words.predicate_id(r.predicate), index[r.object]) for r in graph.relations],
+        triplets_of(graph).tolist(),
         room_type=words.room_type_id(graph.room.type),
         floor=graph.room.floor_polygon or graph.room.size,
         names=[node.name for node in graph.nodes],
         openings=graph.room.openings,
         placements=[
-            (index[one.subject], kinds.index(one.placement), *([index[name] for name in one.others] or (-1, -1)))
-            for one in graph.placements
+            (one.subject, kinds.index(one.placement), *(one.others or (-1, -1))) for one in stated_placements(graph)
         ],
+    )
+
+
+def triplets_of(graph: SceneGraph) -> np.ndarray:
+    """(e, 3) int, the relations of a graph in their order: numbers of subject, predicate and object."""
+    number, words = {name: i for i, name in enumerate(graph.names)}, vocabulary()
+    rows = [(number[r.subject], words.predicate_id(r.predicate), number[r.object]) for r in graph.relations]
+    return np.array(rows, np.int64).reshape(-1, 3)
+
+
+def stated_placements(graph: SceneGraph) -> tuple[Stated, ...]:
+    """The placements of a graph by the numbers of its nodes, in the order of `SceneGraph.placements`."""
+    number = {name: i for i, name in enumerate(graph.names)}
+    return tuple(
+        Stated(one.placement, number[one.subject], tuple(number[name] for name in one.others))
+        for one in graph.placements
     )
 
 

@@ -7,15 +7,13 @@ import warnings
 import numpy as np
 
 from echomodel.boxes import Boxes
-from echomodel.objective.support import allowed_overlap
 from echomodel.rules import fronts, margins, verdicts
 from echomodel.rules.placements import placement_margins
 from echousd.graph import SceneGraph
-from echousd.place.geometry import pair_indices, separation
-from echousd.place.placing import stated_placements
-from echousd.place.report import TOUCH, Collision
+from echousd.place.geometry import pair_indices
+from echousd.place.report import Collision, collisions
 from echousd.room import LayoutOutcome, RoomData, Verdict
-from echousd.tensors import floor_centre, graph_batch
+from echousd.tensors import floor_centre, graph_batch, stated_placements
 
 ROUNDING = 1e-4  # metres: boxes are written to a tenth of a millimetre
 STATES = {1: "kept", 0: "broken", -1: "unmeasured"}
@@ -32,18 +30,10 @@ def layout_outcome(graph: SceneGraph, boxes: Boxes) -> LayoutOutcome:
 
 def colliding(graph: SceneGraph, boxes: Boxes) -> tuple[Collision, ...]:
     """Pairs of boxes that run into each other deeper than they may, deepest first."""
-    pairs = pair_indices(len(graph.nodes))
-    if not len(pairs):
-        return ()
     size, position, yaw = (np.asarray(v, float) for v in (boxes.size, boxes.position, boxes.yaw))
-    allowed = allowed_overlap([node.category for node in graph.nodes], size, pairs)
-    depth = -(separation(size, position, yaw, pairs) + allowed)
-    names = graph.names
-    return tuple(
-        Collision(names[pairs[row, 0]], names[pairs[row, 1]], float(depth[row]))
-        for row in np.argsort(-depth, kind="stable")
-        if depth[row] > TOUCH
-    )
+    names, words = graph.names, [node.category for node in graph.nodes]
+    found = collisions(words, size, position, yaw, pair_indices(len(names)))
+    return tuple(Collision(names[i], names[j], depth) for (i, j), depth in found)
 
 
 def warn_of_faults(room: RoomData) -> None:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import torch
 
-from echomodel.objective import plan_of
 from echomodel.openings import Opening
 from echomodel.rooms.runs import Run, Site, obstacles, runs
 from echomodel.rules import margins
@@ -43,15 +41,14 @@ def fitted(
     fixed = problem.fixed & np.array([kind.support in ("floor", "wall") for kind in kinds], bool)
     site = Site(outline, obstacles(outline, openings, at.size[fixed], at.position[fixed], at.yaw[fixed]))
 
-    def built(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def built(run: Run) -> tuple[np.ndarray, Posed]:
         who = np.flatnonzero(mine)[run.which]
         size, position, yaw = at.size.copy(), at.position.copy(), at.yaw.copy()
         size[who], position[who], yaw[who] = run.size, run.position, run.yaw
-        return who, size, position, yaw
+        return who, Posed(problem, size, position, yaw)
 
     def missed(run: Run) -> float:
-        _, size, position, yaw = built(run)
-        boxes = Posed(problem, size, position, yaw)
+        _, boxes = built(run)
         margin = margins(boxes, told, rules=problem.rules, center=torch.from_numpy(problem.centre), fronts=fronts)
         return MISSED * float((margin < 0).sum())
 
@@ -61,13 +58,9 @@ def fitted(
                  missed=missed if len(told) else None)  # fmt: skip
     best, least = (at, none), np.inf
     for run in found:
-        who, size, position, yaw = built(run)
-        room = plan_of(
-            replace(at, size=size, position=position, yaw=yaw), problem.categories, outline, openings,
-            problem.triplets, given=problem.fixed, height=problem.height, rules=problem.rules, stated=problem.stated,
-        )  # fmt: skip
+        who, placed = built(run)
         planned = np.isin(np.arange(len(kinds)), who)
-        cost = cost_of(part_of(room, planned | fixed)) + SHARE * run.cost
+        cost = cost_of(part_of(placed.plan(outline, openings), planned | fixed)) + SHARE * run.cost
         if cost < least - 1e-4:
-            best, least = (Posed(problem, size, position, yaw), planned), cost
+            best, least = (placed, planned), cost
     return best

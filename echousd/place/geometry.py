@@ -52,8 +52,37 @@ def parting(axis: np.ndarray, pairs: np.ndarray) -> np.ndarray:
 
 def separation(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     """(p,) float: distance of each pair along its best axis in metres, negative = depth of penetration."""
-    by, state = parting(axes(yaw), pairs), np.concatenate([position, size], 1)[pairs]
-    return np.einsum("pasbc,pbc->pas", by, state).max((1, 2), initial=-np.inf)
+    i, j = pairs.T
+    return _gaps(size[i], position[i], yaw[i], size[j], position[j], yaw[j])
+
+
+def depths(
+    size: np.ndarray, at: np.ndarray, turn: np.ndarray, others: np.ndarray, position: np.ndarray, yaw: np.ndarray
+) -> np.ndarray:
+    """(K, m) float: how deep a box runs into m others, negative = the gap, metres.
+
+    Arguments:
+        size: (3,) float of the box; at: (K, 3) and turn: (K,) float, its poses.
+        others, position: (m, 3) float, sizes and places of the others; yaw: (m,) float.
+    """
+    return -_gaps(size, at[:, None], turn[:, None], others, position, yaw)
+
+
+def _gaps(
+    size: np.ndarray, at: np.ndarray, turn: np.ndarray, others: np.ndarray, position: np.ndarray, yaw: np.ndarray
+) -> np.ndarray:
+    """(...) float: metres between boxes (..., 3) and (...), and others, along the axis that parts them best."""
+    cos, sin, c, s = np.cos(turn), np.sin(turn), np.cos(yaw), np.sin(yaw)
+    x, z = position[..., 0] - at[..., 0], position[..., 2] - at[..., 2]
+    like, across = np.abs(cos * c + sin * s), np.abs(sin * c - cos * s)  # of the axes of both
+    width, deep, reach, length = size[..., 0] / 2, size[..., 2] / 2, others[..., 0] / 2, others[..., 2] / 2
+    gap: np.ndarray = np.abs(cos * x - sin * z) - (width + like * reach + across * length)
+    np.maximum(gap, np.abs(sin * x + cos * z) - (deep + across * reach + like * length), out=gap)
+    np.maximum(gap, np.abs(c * x - s * z) - (reach + like * width + across * deep), out=gap)
+    np.maximum(gap, np.abs(s * x + c * z) - (length + across * width + like * deep), out=gap)
+    np.maximum(gap, position[..., 1] - at[..., 1] - size[..., 1], out=gap)
+    np.maximum(gap, at[..., 1] - position[..., 1] - others[..., 1], out=gap)
+    return gap
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,32 +138,6 @@ def depth_inside(floor: Floor, points: np.ndarray) -> np.ndarray:
         return -np.where((out <= 0).all(1), out.max(1), np.linalg.norm(np.maximum(out, 0.0), axis=1))
     inside = signed_distance(torch.from_numpy(points)[None], torch.from_numpy(floor.polygon)[None])
     return np.asarray(inside[0].numpy())
-
-
-def depths(
-    size: np.ndarray, at: np.ndarray, turn: np.ndarray, others: np.ndarray, position: np.ndarray, yaw: np.ndarray
-) -> np.ndarray:
-    """(K, m) float: how deep a box runs into m others, negative = the gap, metres.
-
-    Arguments:
-        size: (3,) float of the box; at: (K, 3) and turn: (K,) float, its poses.
-        others, position: (m, 3) float, sizes and places of the others; yaw: (m,) float.
-    """
-    if not len(others):
-        return np.full((len(at), 0), -9.0)
-    cos, sin, c, s = np.cos(turn)[:, None], np.sin(turn)[:, None], np.cos(yaw), np.sin(yaw)
-    x = position[:, 0] - at[:, 0, None]
-    z = position[:, 2] - at[:, 2, None]
-    like, across = np.abs(cos * c + sin * s), np.abs(sin * c - cos * s)  # of the axes of both
-    width, deep, reach, length = size[0] / 2, size[2] / 2, others[:, 0] / 2, others[:, 2] / 2
-    gap = np.abs(cos * x - sin * z) - (width + like * reach + across * length)
-    np.maximum(gap, np.abs(sin * x + cos * z) - (deep + across * reach + like * length), out=gap)
-    np.maximum(gap, np.abs(c * x - s * z) - (reach + like * width + across * deep), out=gap)
-    np.maximum(gap, np.abs(s * x + c * z) - (length + across * width + like * deep), out=gap)
-    bottom = at[:, 1, None]
-    np.maximum(gap, position[:, 1] - (bottom + size[1]), out=gap)
-    np.maximum(gap, bottom - (position[:, 1] + others[:, 1]), out=gap)
-    return -gap
 
 
 def beyond(floor: Floor, size: np.ndarray, at: np.ndarray, turn: np.ndarray) -> np.ndarray:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from echomodel.rules.geometry import BoxesLike
-from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
+from echousd.tensors import triplets_of
 
 
 @dataclass(frozen=True)
@@ -40,16 +40,14 @@ def living_faults(
     """
     from echomodel.objective import faults
 
-    names, words = list(graph.names), vocabulary()
-    rows = {name: row for row, name in enumerate(names)}
-    triplets = [(rows[r.subject], words.predicate_id(r.predicate), rows[r.object]) for r in graph.relations]
+    names = list(graph.names)
     corners = graph.room.corners
     found = faults(
         boxes,
         [node.category for node in graph.nodes],
         floor if corners is None else np.asarray(corners, float),  # openings count the edges of the stated floor
         graph.room.openings if corners is not None else (),
-        np.array(triplets, int).reshape(-1, 3),
+        triplets_of(graph),
         given=np.array([bool(n.obstacle) or (n.position is not None and not all_blamed) for n in graph.nodes]),
     )
     return tuple(

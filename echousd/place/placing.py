@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echomodel.objective import TERMS, plan_of
+from echomodel.objective import TERMS
 from echomodel.objective.sizes import (
     fitting_loads,
     has_proportions,
@@ -21,7 +21,6 @@ from echomodel.objective.sizes import (
 )
 from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
-from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place.fitted import fitted
 from echousd.place.overhead import lamps_along
@@ -30,9 +29,11 @@ from echousd.place.report import Conflict, collisions, conflicts, outside, sente
 from echousd.place.search import ANEW, Arranged, Search
 from echousd.place.setting import setting_of
 from echousd.place.solver import PlaceConfig, solve, unmet
+from echousd.tensors import stated_placements, triplets_of
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
+    from echomodel.rules.placements import Stated
     from echousd.graph import Relation, RoomSpec, SceneGraph
 
 FULL = 0.3  # share of a floor that is covered from which on smaller furniture is tried
@@ -49,7 +50,7 @@ class PlacedBoxes:
 
     Arguments:
         size, position: (n, 3) float, metres; yaw: (n,) float, radians.
-        verdict: (e,) int8, 1 kept, 0 broken, -1 not measured; margin: (e,) float, metres or ratio.
+        verdict: (e,) int8, 1 kept, 0 broken, -1 not measured.
         conflicts: groups of demands that contradict each other.
         collisions: (pair, depth in metres) of boxes that still collide; outside: (object, depth in metres).
         moved: (n,) float, metres; resized: (n,) float, largest relative change of a side; seconds: time spent.
@@ -59,7 +60,6 @@ class PlacedBoxes:
     position: np.ndarray
     yaw: np.ndarray
     verdict: np.ndarray
-    margin: np.ndarray
     conflicts: tuple[Conflict, ...]
     collisions: tuple[tuple[tuple[int, int], float], ...]
     outside: tuple[tuple[int, float], ...]
@@ -110,19 +110,15 @@ def place(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: Pla
 
     from echomodel.boxes import Boxes
 
-    nodes, words = graph.nodes, vocabulary()
+    nodes = graph.nodes
     if len(boxes) != len(nodes):
         raise ValueError(f"{len(boxes)} boxes for a graph of {len(nodes)} objects: need one box per object")
-    index = {node.name: i for i, node in enumerate(nodes)}
-    triplets = np.array(
-        [(index[r.subject], words.predicate_id(r.predicate), index[r.object]) for r in graph.relations], int
-    ).reshape(-1, 3)
     done = place_boxes(
         [node.category for node in nodes],
         np.asarray(boxes.size, float),
         np.asarray(boxes.position, float),
         np.asarray(boxes.yaw, float),
-        triplets,
+        triplets_of(graph),
         floor_polygon=floor_of_room(graph.room),
         height=graph.room.height or DEFAULT_HEIGHT,
         openings=graph.room.openings,
@@ -165,14 +161,6 @@ def floor_of_room(room: RoomSpec) -> np.ndarray | None:
     return np.array([(-x, -z), (x, -z), (x, z), (-x, z)])
 
 
-def stated_placements(graph: SceneGraph) -> tuple[Stated, ...]:
-    """The placements of a graph by the numbers of its nodes, in the order of `SceneGraph.placements`."""
-    row = {name: i for i, name in enumerate(graph.names)}
-    return tuple(
-        Stated(one.placement, row[one.subject], tuple(row[name] for name in one.others)) for one in graph.placements
-    )
-
-
 def place_boxes(
     categories: Sequence[str],
     size: np.ndarray,
@@ -209,7 +197,7 @@ def place_boxes(
     import torch
 
     from echomodel.boxes import Boxes
-    from echomodel.rules import margins, verdicts
+    from echomodel.rules import verdicts
 
     started = time.perf_counter()
     n = len(categories)
@@ -248,7 +236,7 @@ def place_boxes(
         if planned.any():
             held, rigid, kept = fixed | planned, rigid | planned, kept | planned
             at = posed(at.size, at.position, at.yaw, kept)
-        anchor = plan_of(at, at.problem.categories, floor_polygon, (), triplets).anchor.numpy()
+        anchor = at.plan(floor_polygon).anchor.numpy()
         free = ~rigid & ~np.isin(np.arange(n), told)
 
         def suited(to: Posed, size: np.ndarray) -> Posed:
@@ -283,14 +271,11 @@ def place_boxes(
     end = stacked(size_end, hung, problem.carrier, None, held)
     ceiling = np.inf if height is None else np.maximum(height - size_end[:, 1], 0.0)
     end[~held, 1] = np.clip(end[:, 1], 0.0, ceiling)[~held]  # whatever is told of a lamp, it stays in the room
-    ends = torch.as_tensor(size_end), torch.as_tensor(end), torch.as_tensor(turn)
-    boxes = Boxes(*(t.float() for t in ends))
+    boxes = Boxes(*(torch.as_tensor(of).float() for of in (size_end, end, turn)))
     headed = torch.from_numpy(problem.fronts)
     verdict = verdicts(boxes, torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(centre), fronts=headed)
-    margin = margins(
-        Boxes(*ends), torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(centre), fronts=headed
-    )
-    hit, beyond = collisions(problem, size_end, end, turn), outside(problem, size_end, end, turn)
+    hit = collisions(problem.categories, size_end, end, turn, problem.pairs)
+    beyond = outside(problem, size_end, end, turn)
     failures = (
         set(np.flatnonzero(verdict.numpy() == 0).tolist()),
         {pair for pair, _ in hit},
@@ -301,7 +286,6 @@ def place_boxes(
         position=end,
         yaw=turn,
         verdict=verdict.numpy(),
-        margin=margin.numpy(),
         conflicts=conflicts(problem, found, failures),
         collisions=hit,
         outside=beyond,

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echomodel.boxes2d import seen
+from echomodel.objective import Plan, plan_of
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, carriers
+from echomodel.openings import Opening
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.place.distances import kept_behind
@@ -94,6 +96,14 @@ class Posed:
     size: np.ndarray
     position: np.ndarray
     yaw: np.ndarray
+
+    def plan(self, outline: np.ndarray, openings: Sequence[Opening] = ()) -> Plan:
+        """The room as the objective sees it, its floor's corners in the order in which openings count its edges."""
+        of = self.problem
+        return plan_of(
+            self, of.categories, outline, openings, of.triplets, given=of.fixed, height=of.height, rules=of.rules,
+            stated=of.stated,
+        )  # fmt: skip
 
 
 def pose(

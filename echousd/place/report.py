@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -49,17 +50,13 @@ class Conflict:
 
 
 def collisions(
-    problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.ndarray
+    categories: Sequence[str], size: np.ndarray, position: np.ndarray, yaw: np.ndarray, pairs: np.ndarray
 ) -> tuple[tuple[tuple[int, int], float], ...]:
-    """Pairs of boxes that run into each other deeper than they may, deepest first, with the excess depth in metres."""
-    if not len(problem.pairs):
-        return ()
-    allowed = allowed_overlap(problem.categories, size, problem.pairs)
-    depth = -(separation(size, position, yaw, problem.pairs) + allowed)
-    order = np.argsort(-depth)
-    return tuple(
-        ((int(problem.pairs[p, 0]), int(problem.pairs[p, 1])), float(depth[p])) for p in order if depth[p] > TOUCH
-    )
+    """Pairs (p, 2) of boxes that run into each other deeper than they may, deepest first, with the excess in metres."""
+    depth = -(separation(size, position, yaw, pairs) + allowed_overlap(categories, size, pairs))
+    order = np.argsort(-depth, kind="stable")
+    return tuple(((i, j), float(depth[p])) for p, (i, j) in zip(order, pairs[order].tolist(), strict=True)
+                 if depth[p] > TOUCH)  # fmt: skip
 
 
 def outside(problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> tuple[tuple[int, float], ...]:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import torch
 
-from echomodel.objective import Plan, plan_of
+from echomodel.objective import Plan
 from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
 from echomodel.vocabulary import Category
@@ -104,10 +104,7 @@ def setting_of(at: Posed, turned: np.ndarray, *, openings: Sequence[Opening], ou
         openings: doors and windows. outline: (k, 2) float, the floor's corners in the order that these count edges in.
     """
     problem = at.problem
-    plan = plan_of(
-        at, problem.categories, outline, openings, problem.triplets, given=problem.fixed, height=problem.height,
-        rules=problem.rules, stated=problem.stated,
-    )  # fmt: skip
+    plan = at.plan(outline, openings)
     vars(plan)["carrier"] = torch.from_numpy(problem.carrier)
     spread = kept_behind(problem.categories, at.size, np.full(len(at.size), np.nan))  # drawn ones are too alike
     told = np.isin(np.arange(len(spread)), [one.subject for one in problem.stated if not one.others])  # of walls

@@ -22,6 +22,7 @@ from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, save_layer
 from echousd.stage.read import node_names, place, read_rooms, relation_of, the_room, value
 from echousd.stage.write import graph_layer
+from echousd.tensors import triplets_of
 
 
 def relations_from_boxes(graph: SceneGraph, *, rules: str = "strict", per_object: float | None = None) -> SceneGraph:
@@ -157,8 +158,6 @@ def room_of(graph: SceneGraph, name: str) -> RoomBoxes:
     Raises:
         StageError: a node without a box.
     """
-    words, place = vocabulary(), {node.name: k for k, node in enumerate(graph.nodes)}
-    edges = [(place[r.subject], words.predicate_id(r.predicate), place[r.object]) for r in graph.relations]
     given = [node.style for node in graph.nodes]
     ours = all(style is None or re.fullmatch(rf"{STYLE}\d+", style) for style in given)
     room = room_boxes(graph)
@@ -167,7 +166,7 @@ def room_of(graph: SceneGraph, name: str) -> RoomBoxes:
         id=name,
         models=tuple(str(node.attributes.get("model", "")) for node in graph.nodes),
         styles=tuple(int(s.removeprefix(STYLE)) if s else -1 for s in given) if ours else room.styles,
-        relations=np.array(edges, np.int64).reshape(-1, 3),
+        relations=triplets_of(graph),
     )
 
 

@@ -22,6 +22,7 @@ from echousd.shapes.nofit import FLUSH, Solids, depth, forbidden_moves
 from echousd.shapes.surface import connected_pieces
 from echousd.shapes.walls import ShellPart
 from echousd.shapes.walls import walls as walls_of
+from echousd.tensors import triplets_of
 
 REACH = 0.5  # metres that a piece is moved at most in all
 NEAR = 0.01  # metres within which solids are looked at first: most things at most touch
@@ -185,10 +186,7 @@ def scene_of(
     nodes, words = graph.nodes, vocabulary()
     size, position, yaw = (np.asarray(v, float) for v in (boxes.size, boxes.position, boxes.yaw))
     kinds = [words.category(node.category) for node in nodes]
-    index = {node.name: number for number, node in enumerate(nodes)}
-    triplets = np.array(
-        [(index[r.subject], words.predicate_id(r.predicate), index[r.object]) for r in graph.relations], int
-    ).reshape(-1, 3)
+    triplets = triplets_of(graph)
     solids = [
         [_placed(collider.mesh.vertices, position[i], yaw[i]) for collider in geometry[node.name].colliders]
         for i, node in enumerate(nodes)
