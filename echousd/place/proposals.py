@@ -289,16 +289,11 @@ def _in_view(setting: Setting, i: int, at_walls: Sequence[Row]) -> list[Row]:
     """In the room before a screen at the far wall, where a sofa at its own wall would be too far from it."""
     if not any(stance == "opposite" and a == i for stance, a in zip(setting.stances, setting.anchor, strict=True)):
         return []
-    rows, far = [], WATCHED_FROM["sofa"][1]
-    for x, z, yaw, more in at_walls:
-        front = np.array([math.sin(yaw), math.cos(yaw)])
-        steps = np.array([x, z]) + np.arange(0.0, 15.0, 0.1)[:, None] * front
-        inside = depth_inside(setting.floor, steps) > 0
-        ahead = 0.1 * float(len(steps) if inside.all() else inside.argmin())
-        if ahead > max(far, AMID * far + PASSAGE):
-            dx, dz = ((ahead - AMID * far) * front).tolist()
-            rows.append((x + dx, z + dz, yaw, more))
-    return rows
+    far, rows = WATCHED_FROM["sofa"][1], np.array(at_walls).reshape(-1, 4)
+    front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
+    free = ahead(setting.floor, rows[:, :2], front)
+    rows[:, :2] += (free - AMID * far)[:, None] * front
+    return [(x, z, yaw, more) for x, z, yaw, more in rows[free > max(far, AMID * far + PASSAGE)].tolist()]
 
 
 def _nooks(setting: Setting, i: int, more: float) -> list[Row]:
