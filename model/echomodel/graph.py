@@ -126,23 +126,18 @@ class GraphBatch:
 
     def unpack(self) -> list[GraphBatch]:
         """One graph per scene, the inverse of `pack`."""
-        counts = self.node_counts.tolist()
         owner, placed = self.scene[self.triplets[:, 0]], self.scene[self.placements[:, 0]]
         out, start = [], 0
-        for number, count in enumerate(counts):
-            triplets = self.triplets[owner == number]
-            out.append(
-                GraphBatch(
-                    category=self.category[start : start + count],
-                    triplets=triplets - triplets.new_tensor([start, 0, start]),
-                    scene=torch.zeros_like(self.scene[start : start + count]),
-                    room_type=self.room_type[number : number + 1],
-                    floor=trimmed(self.floor[number : number + 1]),
-                    names=None if self.names is None else self.names[start : start + count],
-                    openings=_there(self.openings[number : number + 1]),
-                    placements=_shifted(self.placements[placed == number], -start),
-                )
-            )
+        for number, count in enumerate(self.node_counts.tolist()):
+            nodes, room = slice(start, start + count), slice(number, number + 1)
+            triplets = self.triplets[owner == number] - self.triplets.new_tensor([start, 0, start])
+            names = None if self.names is None else self.names[nodes]
+            graph = GraphBatch(
+                self.category[nodes], triplets, torch.zeros_like(self.scene[nodes]), self.room_type[room],
+                trimmed(self.floor[room]), names, _there(self.openings[room]),
+                _shifted(self.placements[placed == number], -start),
+            )  # fmt: skip
+            out.append(graph)
             start += count
         return out
 

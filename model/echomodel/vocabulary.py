@@ -266,21 +266,14 @@ def _shipped() -> Vocabulary:
     def fixed(value: Any) -> Any:
         return tuple(fixed(v) for v in value) if isinstance(value, list) else value
 
-    def frozen(entry: dict) -> dict:
-        return {key: fixed(value) for key, value in entry.items()}
-
-    return Vocabulary(
-        categories=tuple(Category(**frozen(entry)) for entry in raw["categories"]),
-        structure=tuple(raw["structure"]),
-        coarse_categories=tuple(raw["coarse_categories"]),
-        predicate_kinds=tuple(PredicateKind(**entry) for entry in raw["predicate_kinds"]),
-        predicates=tuple(Predicate(**frozen(entry)) for entry in raw["predicates"]),
-        room_types=tuple(RoomType(**frozen(entry)) for entry in raw["room_types"]),
-        habits=tuple(Habit(**frozen(entry)) for entry in raw["habits"]),
-        placements=tuple(Placement(**frozen(entry)) for entry in raw["placements"]),
-        home_relations=tuple(HomeRelation(**frozen(entry)) for entry in raw["home_relations"]),
-        styles=tuple(RoomStyle(**frozen(entry)) for entry in raw["styles"]),
-        unsupported=tuple(raw["unsupported"]),
-        hints=raw["hints"],
-        meant={kind: {word: tuple(near) for word, near in words.items()} for kind, words in raw["meant"].items()},
-    )
+    kinds: dict[str, Any] = {
+        "categories": Category, "predicate_kinds": PredicateKind, "predicates": Predicate, "room_types": RoomType,
+        "habits": Habit, "placements": Placement, "home_relations": HomeRelation, "styles": RoomStyle,
+    }  # fmt: skip
+    rows: dict[str, Any] = {
+        name: tuple(kind(**{key: fixed(value) for key, value in entry.items()}) for entry in raw[name])
+        for name, kind in kinds.items()
+    }
+    words = {name: tuple(raw[name]) for name in ("structure", "coarse_categories", "unsupported")}
+    meant = {kind: {word: tuple(near) for word, near in said.items()} for kind, said in raw["meant"].items()}
+    return Vocabulary(**rows, **words, hints=raw["hints"], meant=meant)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -215,12 +214,11 @@ class ReleasedModel(GraphEncoder):
         count = len(self.layout_tables.betas)
         t = torch.randint(count, (int(scene.max()) + 1,), generator=generator).to(device)[scene]
         noise = normal(boxes.shape, generator, device)
-        tables = self.layout_tables.to(device)
         losses = layout_loss(
-            self.layout_net, boxes, conditions.layout, graph.triples, t, noise, tables, conditions.edge_attr
-        )
-        losses["layout"] = losses.pop("loss")
-        losses["loss"] = losses["layout"]
+            self.layout_net, boxes, conditions.layout, graph.triples, t, noise, self.layout_tables.to(device),
+            conditions.edge_attr,
+        )  # fmt: skip
+        losses["layout"] = losses["loss"]
         if latents is not None and conditions.shape is not None:
             kept, triples = node_budget(graph.triples, scene, budget)
             inside = (graph.triples[:, 0] < kept) & (graph.triples[:, 2] < kept)
@@ -228,16 +226,9 @@ class ReleasedModel(GraphEncoder):
             t = torch.randint(count, (kept,), generator=generator).to(device)
             clean = latents[:kept].to(device)
             noise = normal(clean.shape, generator, device)
-            args: tuple[Any, ...] = (
-                clean,
-                conditions.shape[:kept],
-                triples,
-                t,
-                noise,
-                self.shape_tables.to(device),
-                edge_attr,
-            )
-            losses["shape"] = shape_loss(self.shape_df, *args)
+            tables = self.shape_tables.to(device)
+            given = conditions.shape[:kept]
+            losses["shape"] = shape_loss(self.shape_df, clean, given, triples, t, noise, tables, edge_attr)
             losses["loss"] = losses["layout"] + losses["shape"]
         return losses
 

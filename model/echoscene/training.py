@@ -220,34 +220,24 @@ class PaperStage:
 
 def scene_boxes(room: RoomBoxes, statistics: BoxStatistics) -> Tensor:
     """Normalised (n + 2, 8) boxes of a room's objects, its floor and its `_scene_` node (SPEC: section 1.3)."""
-    objects = Boxes.from_room(room)
-    extent = torch.as_tensor(room.floor_polygon.max(0) - room.floor_polygon.min(0), dtype=torch.float32)
-    floor = Boxes(torch.stack([extent[0], torch.tensor(0.0), extent[1]])[None], torch.zeros(1, 3), torch.zeros(1))
     angle = torch.tensor(-1.0)
     scene = torch.cat([torch.tensor(SCENE_BOX), torch.stack([angle.sin(), angle.cos()])])
-    return torch.cat([Boxes.cat([objects, floor]).encode(statistics.scale()), scene[None]])
+    return torch.cat([_with_floor(room).encode(statistics.scale()), scene[None]])
 
 
 def box_bounds(rooms: RoomSet | PublishedRooms, count: int = 2000) -> BoxStatistics:
     """Lowest and highest sizes and positions of a set's first rooms, floors included, as the published bounds file."""
-    boxes = []
-    for number in range(min(count, len(rooms))):
-        room = rooms.room(number)
-        boxes.append(Boxes.from_room(room))
-        extent = room.floor_polygon.max(0) - room.floor_polygon.min(0)
-        size = torch.tensor([[float(extent[0]), 0.0, float(extent[1])]])
-        boxes.append(Boxes(size, torch.zeros(1, 3), torch.zeros(1)))
-    every = Boxes.cat(boxes)
+    every = Boxes.cat([_with_floor(rooms.room(number)) for number in range(min(count, len(rooms)))])
+    ends = (end for part in (every.size, every.position) for end in (part.amin(0), part.amax(0)))
+    low, high, start, stop = (tuple(end.tolist()) for end in ends)
+    return BoxStatistics(low, high, start, stop)
 
-    def bound(values: Tensor) -> tuple[float, ...]:
-        return tuple(float(v) for v in values)
 
-    return BoxStatistics(
-        bound(every.size.amin(0)),
-        bound(every.size.amax(0)),
-        bound(every.position.amin(0)),
-        bound(every.position.amax(0)),
-    )
+def _with_floor(room: RoomBoxes) -> Boxes:
+    """A room's objects and its floor, a box without a height."""
+    x, z = torch.as_tensor(room.floor_polygon.max(0) - room.floor_polygon.min(0), dtype=torch.float32).tolist()
+    floor = Boxes(torch.tensor([[x, 0.0, z]]), torch.zeros(1, 3), torch.zeros(1))
+    return Boxes.cat([Boxes.from_room(room), floor])
 
 
 def opened_data(recipe: Recipe) -> tuple[RoomSet | PublishedRooms, ShapeSet | PublishedShapes]:

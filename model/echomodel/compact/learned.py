@@ -73,11 +73,9 @@ def unlearned(graph: GraphBatch, config: CompactConfig) -> tuple[str, ...]:
         known = {vocabulary().name_of(kind, name) for name in getattr(config, kind)}
         for row in (getattr(vocabulary(), kind)[number] for number in sorted(set(held.tolist()))):
             if row.name not in known:
-                becomes = (
-                    "guided, placed and checked, not generated"
-                    if kind == "predicates"
-                    else f"generated as {_nearest(kind, row.name, known)}"
-                )
+                becomes = f"generated as {_nearest(kind, row.name, known)}"
+                if kind == "predicates":
+                    becomes = "guided, placed and checked, not generated"
                 said.append(f"the weights do not know the {text} {row.name}: {becomes}")
     return tuple(said)
 

@@ -196,12 +196,8 @@ def known_values(graph: GraphBatch, known: Any, mask: Tensor | None, device: tor
         raise ValueError(f"known: {found} for a graph of {nodes} nodes, expected one of each per node (bool)")
     known, mask = known.to(device), mask.to(device)
     if isinstance(known, Boxes):
-        one = known.size.new_ones(())
-        filled = Boxes(
-            torch.where(mask[:, None], known.size, one),
-            torch.where(mask[:, None], known.position, 0 * one),
-            torch.where(mask, known.yaw, 0 * one),
-        )
+        plain = Boxes(torch.ones_like(known.size), torch.zeros_like(known.position), torch.zeros_like(known.yaw))
+        filled = plain.replaced(mask, known)
         filled.check()
         return filled, mask
     bad = ~torch.isfinite(known.flatten(1)).all(1) & mask

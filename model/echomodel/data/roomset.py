@@ -276,17 +276,11 @@ def with_known_words(rooms: Iterable[RoomBoxes]) -> list[RoomBoxes]:
         keep = [k for k, row in enumerate(rows) if row is not None]
         styles = room.styles or (-1,) * len(room)
         models = room.models or ("",) * len(room)
-        out.append(
-            replace(
-                room,
-                room_type=vocabulary().room_type(room.room_type).name,
-                categories=tuple(row.name for row in rows if row is not None),
-                size=room.size[keep],
-                position=room.position[keep],
-                yaw=room.yaw[keep],
-                models=tuple(models[k] for k in keep),
-                styles=tuple(styles[k] for k in keep),
-                relations=None,
-            )
-        )
+        known = replace(
+            room, room_type=vocabulary().room_type(room.room_type).name, relations=None,
+            categories=tuple(row.name for row in rows if row is not None), size=room.size[keep],
+            position=room.position[keep], yaw=room.yaw[keep], models=tuple(models[k] for k in keep),
+            styles=tuple(styles[k] for k in keep),
+        )  # fmt: skip
+        out.append(known)
     return out

@@ -90,28 +90,15 @@ def notebook(size: Size, rng: np.random.Generator) -> list[Solid]:
     w, h, d = size
     book = h * float(rng.uniform(0.45, 0.7))
     parts = _flat(0.0, book, w, d, rotation(), str(rng.choice(("book_a", "book_b", "book_c", "book_d"))))
-    pencil = Block(
-        centre=np.array([w * 0.12, book + (h - book) / 2, 0]),
-        half=np.array([(h - book) / 2, (h - book) / 2, d * 0.36]),
-        turn=rotation(y=float(rng.uniform(-0.5, 0.5))),
-        material="frame",
-    )
-    return [*parts, pencil]
+    r, turn = (h - book) / 2, rotation(y=float(rng.uniform(-0.5, 0.5)))
+    return [*parts, Block(np.array([w * 0.12, book + r, 0]), turn, "frame", half=np.array([r, r, d * 0.36]))]
 
 
 def _flat(at: float, thick: float, w: float, d: float, turn: np.ndarray, cover: str) -> list[Solid]:
     half, board = np.array([w / 2, thick / 2, d / 2]), min(COVER, thick / 5)
     middle = np.array([0.0, at + thick / 2, 0.0])
     lower, upper = (middle + np.array([0, s * (thick / 2 - board / 2), 0]) for s in (-1, 1))
-    plate = np.array([w / 2, board / 2, d / 2])
-    return [
-        Block(centre=lower, half=plate, turn=turn, material=cover),
-        Block(centre=upper, half=plate, turn=turn, material=cover),
-        Block(
-            centre=middle + turn @ np.array([-w / 2 + board / 2, 0, 0]),
-            half=np.array([board / 2, thick / 2, d / 2]),
-            turn=turn,
-            material=cover,
-        ),
-        Block(centre=middle, half=half - (0.004, board, 0.004), turn=turn, material="paper"),
-    ]
+    plate, spine = np.array([w / 2, board / 2, d / 2]), np.array([board / 2, thick / 2, d / 2])
+    back = middle + turn @ np.array([-w / 2 + board / 2, 0, 0])
+    covers = [Block(at, turn, cover, half=part) for at, part in ((lower, plate), (upper, plate), (back, spine))]
+    return [*covers, Block(middle, turn, "paper", half=half - (0.004, board, 0.004))]

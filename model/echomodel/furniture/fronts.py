@@ -73,16 +73,20 @@ def sliding(low: Point, high: Point, z: float, count: int, style: Style, materia
     return parts
 
 
-def case(low: tuple, high: tuple, thick: float = 0.016) -> list[Solid]:
-    """An open-fronted case of five boards between two corners (3,), with a core."""
-    (x0, y0, z0), (x1, y1, z1), t = low, high, thick
+def case(low: tuple, high: tuple) -> list[Solid]:
+    """An open-fronted case between two corners (3,), with a core."""
+    return [core(low, high), *boards(low, high, 0.016, 0.008)]
+
+
+def boards(low: tuple, high: tuple, t: float, back: float) -> list[Solid]:
+    """Four boards `t` thick about a case between two corners (3,), open in front, and its back."""
+    (x0, y0, z0), (x1, y1, z1) = low, high
     return [
-        core(low, high),
         box((x0, y0, z0), (x0 + t, y1, z1), role="side"),
         box((x1 - t, y0, z0), (x1, y1, z1), role="side"),
         box((x0, y0, z0), (x1, y0 + t, z1), role="bottom"),
         box((x0, y1 - t, z0), (x1, y1, z1), role="top"),
-        box((x0, y0, z0), (x1, y1, z0 + t / 2), role="back"),
+        box((x0, y0, z0), (x1, y1, z0 + back), role="back"),
     ]
 
 

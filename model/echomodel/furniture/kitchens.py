@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, around, box, core, of_role
-from echomodel.furniture.fronts import front
+from echomodel.furniture.fronts import boards, front
 from echomodel.furniture.solids import Solid, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
 
@@ -183,15 +183,9 @@ def _deep(d: float) -> Span:
 
 def _shell(low: float, high: float, span: Span, deep: Span, *, closed: bool = False) -> list[Solid]:
     """The boards of a unit between two x, two y and two z, open in front."""
-    (y0, y1), (z0, z1) = span, deep
-    parts: list[Solid] = [
-        box((low, y0, z0), (low + SIDE, y1, z1), role="side"),
-        box((high - SIDE, y0, z0), (high, y1, z1), role="side"),
-        box((low, y0, z0), (high, y0 + SIDE, z1), role="bottom"),
-        box((low, y1 - SIDE, z0), (high, y1, z1), role="top"),
-        box((low, y0, z0), (high, y1, z0 + 0.01), role="back"),
-    ]
-    return [*parts, core((low, y0, z0), (high, y1, z1))] if closed else parts
+    corners = (low, span[0], deep[0]), (high, span[1], deep[1])
+    parts = boards(*corners, SIDE, 0.01)
+    return [*parts, core(*corners)] if closed else parts
 
 
 def _unit(low: float, high: float, span: Span, deep: Span, kind: str, style: Style) -> list[Solid]:

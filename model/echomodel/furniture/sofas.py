@@ -90,18 +90,10 @@ def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return [*parts, *rails, pad, back, *arms]
     wall = 0.05 + 0.05 * style.softness
     foot = seat * 0.5
-    arms = foot + (h - foot) * (0.3 + 0.25 * style.arm_height)
+    arms, wide = foot + (h - foot) * (0.3 + 0.25 * style.arm_height), (w * 0.46, d * 0.46)
     body: list[Solid] = [
         bent((0, foot, d * 0.32), (w / 2, d * 0.8), wall, h - foot, arms - foot, power=2.6 + style.corner, ease=2.6),
-        padded(
-            (0, foot, d * 0.02),
-            (w * 0.42, d * 0.42),
-            seat - foot,
-            (w * 0.46, d * 0.46),
-            power=2.6,
-            rounding=0.05,
-            role="seat",
-        ),
+        padded((0, foot, d * 0.02), (w * 0.42, d * 0.42), seat - foot, wide, power=2.6, rounding=0.05, role="seat"),
     ]
     if kind == "swivel":
         stem = turned((0, 0, 0), 0.03, foot, material="metal")

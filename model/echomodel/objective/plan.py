@@ -45,13 +45,9 @@ def found(
     words: Tensor | None = None,
 ) -> Found:  # fmt: skip
     """A `Found` with what is left out filled in: nothing, the margin, the first sentence."""
-    return Found(
-        who,
-        torch.full_like(who, -1) if other is None else other,
-        margin,
-        margin if measure is None else measure,
-        torch.zeros_like(who) if words is None else words,
-    )
+    other = torch.full_like(who, -1) if other is None else other
+    words = torch.zeros_like(who) if words is None else words
+    return Found(who, other, margin, margin if measure is None else measure, words)
 
 
 def nobody(like: Tensor) -> Found:

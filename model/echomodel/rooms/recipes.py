@@ -152,6 +152,7 @@ STORAGE = (
     "wardrobe", "cabinet", "bookshelf", "sideboard", "dresser", "shelf", "console_table", "wine_cabinet",
     "children_cabinet",
 )  # fmt: skip
+Anchors = Callable[[], list[Item]]  # what lamps hang over once the room is furnished
 LOUNGERS = ("armchair", "lounge_chair")
 SMALL_TABLES = ("side_table", "corner_side_table", "round_end_table", "nightstand")
 BOARDS = ("dining_table", "desk", "table", "dressing_table")
@@ -194,7 +195,7 @@ def wanted(statistics: RoomTypeStatistics, area: float, rng: np.random.Generator
 
 def furnish(room: Builder, name: str) -> None:
     """Furnish an empty room of one type of the vocabulary; a type without a recipe like the one that its row names."""
-    recipes: dict[str, Callable[[Builder], None]] = {
+    recipes: dict[str, Callable[[Builder], Anchors]] = {
         "bedroom": _bedroom,
         "living_room": _living_room,
         "dining_room": _dining_room,
@@ -209,14 +210,15 @@ def furnish(room: Builder, name: str) -> None:
     }
     if name not in recipes:
         name = vocabulary().room_type(name).like or "living_room"
-    recipes[name](room)
+    anchors = recipes[name](room)
+    _rest(room)
+    ceiling_lamps(room, anchors())
 
 
-def _home(first: Callable[[Builder], None], room: Builder) -> None:
+def _home(first: Callable[[Builder], None], room: Builder) -> Anchors:
     first(room)
     _radiators(room)
-    _rest(room)
-    ceiling_lamps(room, [])
+    return list
 
 
 def _radiators(room: Builder) -> None:
@@ -224,17 +226,16 @@ def _radiators(room: Builder) -> None:
         room.against_wall("radiator", corner=0.1, gap=0.02)
 
 
-def _childrens_room(room: Builder) -> None:
+def _childrens_room(room: Builder) -> Anchors:
     beds = [bed for category in BEDS for _ in range(room.take(category)) if (bed := bed_group(room, category))]
     childrens_room(room)
     _wardrobe(room, beds[0] if beds else None)
     _radiators(room)
     _desks(room)
-    _rest(room)
-    ceiling_lamps(room, list(beds))
+    return lambda: list(beds)
 
 
-def _bedroom(room: Builder) -> None:
+def _bedroom(room: Builder) -> Anchors:
     beds = _beds(room)
     if beds and room.take("tv_stand"):
         television(room, beds[0])
@@ -243,8 +244,7 @@ def _bedroom(room: Builder) -> None:
         yaw = beds[0].yaw + math.pi if beds and room.chance(0.9) else None
         desk_group(room, "dressing_table", VANITY_SEATS, yaw=yaw)
     _desks(room)
-    _rest(room)
-    ceiling_lamps(room, list(beds))
+    return lambda: list(beds)
 
 
 def _beds(room: Builder) -> list[Item]:
@@ -285,31 +285,28 @@ def _beside_bed(room: Builder, bed: Item, size: tuple[float, float, float], styl
     return None
 
 
-def _living_room(room: Builder) -> None:
+def _living_room(room: Builder) -> Anchors:
     sofa = _sofas(room)
     if room.wanted.get("dining_table") or room.wanted.get("dining_chair", 0) > 2:
         _set_tables(room)
     _desks(room)
-    _rest(room)
-    ceiling_lamps(room, _anchors(room, sofa))
+    return lambda: _anchors(room, sofa)
 
 
-def _dining_room(room: Builder) -> None:
+def _dining_room(room: Builder) -> Anchors:
     tables = _set_tables(room, central=True)
     _no_chairs_without(room, tables)
     if room.wanted.get("coffee_table"):
         _sofas(room)
     _desks(room)
-    _rest(room)
-    ceiling_lamps(room, [table for table in tables if table])
+    return lambda: [table for table in tables if table]
 
 
-def _living_dining_room(room: Builder) -> None:
+def _living_dining_room(room: Builder) -> Anchors:
     sofa = _sofas(room)
     _no_chairs_without(room, _set_tables(room))
     _desks(room)
-    _rest(room)
-    ceiling_lamps(room, _anchors(room, sofa))
+    return lambda: _anchors(room, sofa)
 
 
 def _set_tables(room: Builder, *, central: bool = False) -> list[Item | None]:
@@ -327,7 +324,7 @@ def _no_chairs_without(room: Builder, tables: list[Item | None]) -> None:
             room.take(chair)
 
 
-def _study(room: Builder) -> None:
+def _study(room: Builder) -> Anchors:
     beds = _beds(room)
     if not beds and not room.wanted.get("desk"):
         room.wanted["desk"] = 1
@@ -335,8 +332,7 @@ def _study(room: Builder) -> None:
         room.wanted["office_chair"] = 1
     _desks(room)
     _wardrobe(room, beds[0] if beds else None)
-    _rest(room)
-    ceiling_lamps(room, [item for item in room.items if item.category in (*BEDS, "desk")][:1])
+    return lambda: [item for item in room.items if item.category in (*BEDS, "desk")][:1]
 
 
 def _sofas(room: Builder) -> Item | None:
