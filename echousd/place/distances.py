@@ -10,6 +10,7 @@ from statistics import NormalDist
 
 import numpy as np
 
+from echomodel.boxes2d import hull, seen
 from echomodel.rooms.statistics import USUAL_GAPS, back_gaps, quantile
 from echomodel.vocabulary import vocabulary
 
@@ -107,14 +108,9 @@ def seen_from(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, of: int) 
     Arguments:
         size, position: (n, 3) float, metres; yaw: (n,) float, radians.
     """
-    c, s = np.cos(yaw[of]), np.sin(yaw[of])
-    dx, _, dz = (position - position[of]).T
-    cos, sin = np.abs(np.cos(yaw - yaw[of])), np.abs(np.sin(yaw - yaw[of]))
-    width, _, depth = size.T / 2
-    lateral, forward = c * dx - s * dz, s * dx + c * dz
-    sideways = np.abs(lateral) - cos * width - sin * depth - size[of, 0] / 2
-    ahead = np.abs(forward) - sin * width - cos * depth - size[of, 2] / 2
-    return np.stack([lateral, forward, sideways, ahead], 1)
+    away = seen((position - position[of])[:, [0, 2]], yaw[of])
+    gaps = np.abs(away) - hull(size[:, [0, 2]] / 2, yaw - yaw[of]) - size[of, [0, 2]] / 2
+    return np.concatenate([away, gaps], 1)
 
 
 def over_bed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, lamp: int, bed: int) -> float:

@@ -204,24 +204,19 @@ def lean(
     Arguments:
         told: boxes that the graph has against a wall, whatever they are.
     """
-    out = np.full((len(categories), 2, 2), np.nan)
-    front = axes(yaw)[:, 1]
-    start, end = floor.polygon, np.roll(floor.polygon, -1, 0)
-    along = end - start
-    length = np.linalg.norm(along, axis=1)
-    along = along / length[:, None]
+    rows = [vocabulary().category(word) for word in categories]
+    leaning = [
+        ((row.wall or i in told) and carrier[i] == ON_FLOOR) or row.support == "wall" for i, row in enumerate(rows)
+    ]
+    length = np.linalg.norm(floor.edge, axis=1)
+    along = floor.edge / length[:, None]
+    facing = axes(yaw)[:, 1] @ floor.normal.T > np.cos(WALL_TURN)
     corner = footprints(size, position, yaw)
-    for i, word in enumerate(categories):
-        row = vocabulary().category(word)
-        leaning = ((row.wall or i in told) and carrier[i] == ON_FLOOR) or row.support == "wall"
-        if not leaning:
-            continue
-        facing = floor.normal @ front[i] > np.cos(WALL_TURN)
-        gap = ((corner[i][None] - start[:, None]) * floor.normal[:, None]).sum(-1).min(1)
-        at = ((position[i][[0, 2]] - start) * along).sum(1)
-        beside = (at > -0.2) & (at < length + 0.2)
-        distance = np.where(facing & beside & (gap < WALL_REACH) & (gap > -1.5), np.abs(gap), np.inf)
-        best = int(distance.argmin())
-        if np.isfinite(distance[best]):
-            out[i] = start[best], floor.normal[best]
-    return out
+    gap = ((corner[:, None] - floor.polygon[:, None]) * floor.normal[:, None]).sum(-1).min(2)
+    at = ((position[:, None, [0, 2]] - floor.polygon) * along).sum(-1)
+    near = facing & (at > -0.2) & (at < length + 0.2) & (gap < WALL_REACH) & (gap > -1.5)
+    distance = np.where(near & np.array(leaning, bool)[:, None], np.abs(gap), np.inf)
+    best = distance.argmin(1)
+    found = np.stack([floor.polygon[best], floor.normal[best]], 1)
+    found[np.isinf(distance.min(1))] = np.nan
+    return found
