@@ -21,7 +21,7 @@ import torch
 from PIL import Image, ImageDraw, ImageFont
 
 from echomodel.data.roomset import load_rooms, with_known_words
-from echomodel.metrics.tasks import Task, tasks_of
+from echomodel.metrics.layouts import Task, tasks_of
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
 from echomodel.openings import segment
 from echomodel.roomboxes import RoomBoxes, footprints

@@ -29,8 +29,7 @@ def areas(folder: Path) -> dict[str, Callable[[], object]]:
     """Area -> what is run, in this order: later ones read what earlier ones wrote."""
     import echousd
     from echomodel.loading import load_model
-    from echomodel.metrics.layouts import layout_scores
-    from echomodel.metrics.tasks import tasks_of
+    from echomodel.metrics.layouts import layout_scores, tasks_of
     from echomodel.rooms.generator import generate_rooms
     from echousd.checks import check
     from echousd.draw.rendering import render

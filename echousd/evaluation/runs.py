@@ -21,8 +21,8 @@ import trimesh
 
 from echomodel.data.roomset import load_rooms, with_known_words
 from echomodel.data.sgfront import SGFront
+from echomodel.metrics.layouts import Task
 from echomodel.metrics.statistics import Counts, Figure, Pair, figure
-from echomodel.metrics.tasks import Task
 from echomodel.progress import StageListener
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_rooms

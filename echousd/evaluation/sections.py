@@ -19,12 +19,20 @@ from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.metrics.furniture import piece_scores, sampled, style_scores, usual_size
-from echomodel.metrics.layouts import layout_scores, strata_of
+from echomodel.metrics.layouts import (
+    GROUPS,
+    Task,
+    changed,
+    extended,
+    kept_relations,
+    layout_scores,
+    strata_of,
+    tasks_of,
+)
 from echomodel.metrics.pictures import WEIGHTS, body_scores, features, picture, picture_figures, told_by_pictures
 from echomodel.metrics.pointsets import chamfer, set_scores, surface_points
 from echomodel.metrics.sets import AXES, layout_distance, set_figures, size_distances, size_scores, told_apart
 from echomodel.metrics.statistics import Counts, Figure, figure, mean
-from echomodel.metrics.tasks import GROUPS, Task, changed, extended, kept_relations, tasks_of
 from echomodel.protocols import FurnitureModel, RoomModel, furnishes
 from echomodel.roomboxes import RoomBoxes
 from echomodel.tsdf import mesh_from_tsdf

@@ -25,9 +25,9 @@ from scipy.stats import binomtest
 from echomodel.data.sheet import plot_rooms
 from echomodel.files import write_json, write_text
 from echomodel.loading import load_model
+from echomodel.metrics.layouts import tasks_of
 from echomodel.metrics.pictures import SIDE, WEIGHTS, features
 from echomodel.metrics.statistics import LEVEL, Figure
-from echomodel.metrics.tasks import tasks_of
 from echomodel.progress import StageListener
 from echomodel.roomboxes import RoomBoxes
 from echousd.evaluation.runs import HONEST, SECTIONS, Run, SuiteSettings, Table, rooms_against, rooms_of, run_systems

@@ -18,8 +18,7 @@ from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.metrics.furniture import usual_size
-from echomodel.metrics.layouts import HALVES, layout_scores
-from echomodel.metrics.tasks import Task
+from echomodel.metrics.layouts import HALVES, Task, layout_scores
 from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.randomness import SceneGenerators
 from echomodel.roomboxes import RoomBoxes

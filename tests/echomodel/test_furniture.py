@@ -8,8 +8,7 @@ import trimesh
 
 from echomodel.furniture import MATERIALS, Choices, Style, furniture, mesh_of, sample_size, solids, tsdf_of
 from echomodel.furniture.carpentry import back_rest
-from echomodel.furniture.lathe import Lathe
-from echomodel.furniture.solids import Ball, Block, Shell, Tube, Turned, rotation
+from echomodel.furniture.solids import Ball, Block, Lathe, Shell, Tube, Turned, rotation
 from echomodel.metrics.furniture import loose_solids
 from echomodel.sizes import size_score, size_statistics
 from echomodel.tsdf import mesh_from_tsdf, tsdf_from_mesh

@@ -17,8 +17,7 @@ from echomodel.samplers import clean_from
 from echomodel.text import ClipTextEncoder, TextEncoderError
 from echoscene.config import PaperSizes, paper
 from echoscene.encoder import SceneGraphTensors
-from echoscene.model import ReleasedModel
-from echoscene.tables import LayoutTables
+from echoscene.model import LayoutTables, ReleasedModel
 
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)
 SIZES = {

@@ -7,7 +7,20 @@ import pytest
 
 from echomodel.data.figures import compare, ray_lengths, room_figures, section_means
 from echomodel.data.roomset import with_known_words
-from echomodel.metrics.layouts import HALVES, clearance, fullness, layout_scores, navigability
+from echomodel.metrics.layouts import (
+    GROUPS,
+    HALVES,
+    OPPOSITE,
+    Task,
+    changed,
+    clearance,
+    extended,
+    fullness,
+    kept_relations,
+    layout_scores,
+    navigability,
+    tasks_of,
+)
 from echomodel.metrics.pictures import bodies, body_scores, collisions, out_of_bounds
 from echomodel.metrics.sets import (
     category_divergence,
@@ -21,15 +34,6 @@ from echomodel.metrics.sets import (
     told_apart,
 )
 from echomodel.metrics.statistics import Counts, figure, paired_p
-from echomodel.metrics.tasks import (
-    GROUPS,
-    OPPOSITE,
-    Task,
-    changed,
-    extended,
-    kept_relations,
-    tasks_of,
-)
 from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_rooms

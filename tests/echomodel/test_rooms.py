@@ -8,8 +8,7 @@ from shapely import affinity
 from shapely.geometry import Polygon, box
 
 from echomodel.data.figures import room_figures
-from echomodel.metrics.layouts import layout_scores
-from echomodel.metrics.tasks import Task
+from echomodel.metrics.layouts import Task, layout_scores
 from echomodel.rooms.builder import Item, overlaps
 from echomodel.rooms.floor import sample_floor
 from echomodel.rooms.generator import generate_room, generate_rooms

@@ -17,8 +17,7 @@ from echomodel.training.recipe import Recipe, read_recipe
 from echomodel.training.run import open_run
 from echomodel.training.trainer import read_log, step_generator
 from echoscene.echo import DISTANCE, ReleasedEcho, published_grids, turned_back
-from echoscene.model import ReleasedModel
-from echoscene.tables import LayoutTables
+from echoscene.model import LayoutTables, ReleasedModel
 from echoscene.training import PaperModel, PaperStage, scene_boxes, text_encoder
 from echoscene.weights import load_released
 

@@ -18,8 +18,7 @@ from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig
 from echoscene.denoisers import ShapeUNet
 from echoscene.echo import published_scene
 from echoscene.encoder import SceneGraphTensors, TripletGCN
-from echoscene.model import GraphChange, ReleasedModel, node_budget
-from echoscene.tables import LayoutTables
+from echoscene.model import GraphChange, LayoutTables, ReleasedModel, node_budget
 
 ENCODER = EncoderConfig(text=12, learned=4, flag=4, hidden=16, layers=2, separated=False)
 SMALL = {"hidden": 16, "layers": 2, "code": 8, "predicate": 8, "context": 32}

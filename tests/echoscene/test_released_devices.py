@@ -16,8 +16,7 @@ from echomodel.text import RandomTextEncoder
 from echomodel.vocabulary import vocabulary
 from echoscene.config import PaperSizes, paper
 from echoscene.echo import ReleasedEcho, pack_changes, pack_scenes, published_scene
-from echoscene.model import GraphChange, ReleasedModel
-from echoscene.tables import LayoutTables
+from echoscene.model import GraphChange, LayoutTables, ReleasedModel
 
 SIZES = PaperSizes(
     text=12, learned=4, flag=4, hidden=16, layers=2, context=32, code=8, heads=2, layout_width=128,

@@ -18,8 +18,7 @@ from echomodel.vocabulary import vocabulary
 from echoscene.checkpoint import class_names, convert, statistics_from_bounds
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
 from echoscene.echo import ReleasedEcho, floor_relations
-from echoscene.model import ReleasedModel
-from echoscene.tables import LayoutTables
+from echoscene.model import LayoutTables, ReleasedModel
 from echoscene.weights import write_released
 from echousd.shapes.merging import mesh_from_shape
 

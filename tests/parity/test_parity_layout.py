@@ -8,8 +8,7 @@ from parity_configs import layout_config
 from parity_numbers import Numbers, check_gradients, close
 
 from echoscene.denoisers import LayoutNet
-from echoscene.model import ancestral, layout_loss
-from echoscene.tables import LayoutTables
+from echoscene.model import LayoutTables, ancestral, layout_loss
 from echoscene.unet import packed
 
 

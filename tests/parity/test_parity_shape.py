@@ -8,8 +8,7 @@ from parity_configs import shape_config, vq_config
 from parity_numbers import Numbers, check_gradients, close
 
 from echoscene.denoisers import ShapeNet
-from echoscene.model import ddim, shape_loss
-from echoscene.tables import DDIMGrid, ShapeTables
+from echoscene.model import DDIMGrid, ShapeTables, ddim, shape_loss
 from echoscene.vqvae import VQVAE
 
 

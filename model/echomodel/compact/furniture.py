@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from echomodel.compact.echo import Alone, EchoLayer, level_features
 from echomodel.compact.learned import WordTable
-from echomodel.compact.pairs import Pairs
+from echomodel.compact.pairs import Alone, EchoLayer, Pairs, level_features
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
 

@@ -16,9 +16,8 @@ from torch import Tensor, nn
 
 from echomodel.boxes import Boxes, BoxScale
 from echomodel.compact.draft import PAIR_FEATURES, WALL_FEATURES, measurable, pair_features, wall_features
-from echomodel.compact.echo import Alone, EchoLayer, level_features
 from echomodel.compact.learned import WordTable
-from echomodel.compact.pairs import Pairs
+from echomodel.compact.pairs import Alone, EchoLayer, Pairs, level_features
 from echomodel.config import CompactConfig
 from echomodel.floors import (
     GRID,

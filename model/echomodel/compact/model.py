@@ -23,11 +23,10 @@ from torch import Tensor, nn
 from torch.overrides import TorchFunctionMode
 
 from echomodel.boxes import BoxScale, BoxStatistics
-from echomodel.compact.echo import EchoLayer
 from echomodel.compact.furniture import FurnitureDenoiser
 from echomodel.compact.layout import LayoutDenoiser
 from echomodel.compact.learned import WordTable, places
-from echomodel.compact.pairs import Pairs
+from echomodel.compact.pairs import EchoLayer, Pairs
 from echomodel.compact.shape import Autoencoder, ShapeDenoiser
 from echomodel.config import CompactConfig, FurnitureConfig, check_numbers, from_dict, to_json
 from echomodel.files import whole_file

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, both, box, of_role
-from echomodel.furniture.lathe import Blade
-from echomodel.furniture.solids import Solid, ball, rotation, tube, turned
+from echomodel.furniture.solids import Blade, Solid, ball, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
 
 PANEL = (16 / 9, 21 / 9)  # width over height of a screen with its bezel

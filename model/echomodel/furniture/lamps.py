@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, both, box
-from echomodel.furniture.lathe import Lathe, wall
-from echomodel.furniture.solids import Solid, Turned, ball, rotation, tube, turned
+from echomodel.furniture.solids import Lathe, Solid, Turned, ball, rotation, tube, turned, wall
 from echomodel.furniture.style import Choices, Style
 
 DOWN = rotation(x=np.pi)

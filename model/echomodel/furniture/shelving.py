@@ -8,8 +8,7 @@ import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, both, box, core, of_role, post
 from echomodel.furniture.fronts import BOARD, carcass, depth_of, foot_height, front, shelves
-from echomodel.furniture.lathe import Lathe
-from echomodel.furniture.solids import Solid, rotation
+from echomodel.furniture.solids import Lathe, Solid, rotation
 from echomodel.furniture.style import Choices, Style
 
 BOOKS = ("book", "cushion", "blanket", "linen", "accent")  # slots that books take their colours from

@@ -9,8 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, both, box, chair_legs, cushion, leaning, of_role, slim_arms
-from echomodel.furniture.lathe import Lathe
-from echomodel.furniture.solids import Block, Solid, ball, bent, rotation, tube, turned
+from echomodel.furniture.solids import Block, Lathe, Solid, ball, bent, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
 
 padded = partial(turned, material="fabric")

@@ -9,9 +9,8 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import BoxStatistics
-from echomodel.compact.echo import EchoLayer, pair_messages
 from echomodel.compact.model import CompactModel
-from echomodel.compact.pairs import Pairs, inverse_predicates, pairs_of
+from echomodel.compact.pairs import EchoLayer, Pairs, inverse_predicates, pair_messages, pairs_of
 from echomodel.config import CompactConfig, from_dict, names_of
 from echomodel.graph import GraphBatch
 

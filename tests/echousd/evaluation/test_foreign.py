@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from echomodel.metrics.tasks import tasks_of
+from echomodel.metrics.layouts import tasks_of
 from echomodel.roomboxes import write_rooms
 from echomodel.rooms.generator import generate_rooms
 from echousd.evaluation import runs

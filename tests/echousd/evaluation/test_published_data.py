@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from echomodel.data.sgfront import SGFront, write_sgfront
-from echomodel.metrics.tasks import tasks_of
+from echomodel.metrics.layouts import tasks_of
 from echomodel.rooms.generator import generate_rooms
 from echomodel.training.recipe import read_recipe
 from echoscene.training import PublishedRooms, PublishedShapes, opened_data

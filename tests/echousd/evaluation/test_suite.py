@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from echomodel.metrics.tasks import tasks_of
+from echomodel.metrics.layouts import tasks_of
 from echomodel.roomboxes import write_rooms
 from echomodel.rooms.generator import generate_rooms
 from echousd.cli.main import run

@@ -14,13 +14,12 @@ from safetensors.torch import save_file
 from small_room import ball_tsdf, small_graph
 
 import echousd
-from echomodel.metrics.tasks import extended, kept_relations, tasks_of
+from echomodel.metrics.layouts import extended, kept_relations, tasks_of
 from echomodel.roomboxes import RoomBoxes
 from echomodel.text import ClipTextEncoder
 from echoscene.checkpoint import convert, statistics_from_bounds
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
-from echoscene.model import ReleasedModel
-from echoscene.tables import LayoutTables
+from echoscene.model import LayoutTables, ReleasedModel
 from echoscene.vqvae import VQVAE
 from echousd.evaluation.systems import System, drawn
 
