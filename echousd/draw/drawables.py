@@ -52,28 +52,17 @@ class Paint:
 
 @dataclass(frozen=True, eq=False)
 class Drawable:
-    """One visible mesh.
+    """One visible mesh."""
 
-    Arguments:
-        path: prim path of the mesh.
-        component: name of the nearest prim above with a kind of component, else of the mesh.
-        category: nearest `SemanticsLabelsAPI:category` label, "" without one.
-        world: (4, 4) float, mesh to world, column vectors, y up, metres.
-        triangles, normals: (t, 3, 3) float corners and normals in the mesh's frame.
-        st: (t, 3, 2) float texture coordinates, or None.
-        paints: materials with the triangles that they colour; later entries win.
-        double_sided: whether its back is seen, too.
-    """
-
-    path: str
-    component: str
-    category: str
-    world: np.ndarray
-    triangles: np.ndarray
+    path: str  # prim path of the mesh
+    component: str  # name of the nearest prim above with a kind of component, else of the mesh
+    category: str  # nearest `SemanticsLabelsAPI:category` label, "" without one
+    world: np.ndarray  # (4, 4) float, mesh to world, column vectors, y up, metres
+    triangles: np.ndarray  # triangles, normals: (t, 3, 3) float corners and normals in the mesh's frame
     normals: np.ndarray
-    st: np.ndarray | None
-    paints: tuple[tuple[Paint, np.ndarray], ...]
-    double_sided: bool = False
+    st: np.ndarray | None  # (t, 3, 2) float texture coordinates, or None
+    paints: tuple[tuple[Paint, np.ndarray], ...]  # materials with the triangles that they colour; later entries win
+    double_sided: bool = False  # whether its back is seen, too
 
 
 def world_frame(stage: Usd.Stage) -> np.ndarray:

@@ -27,17 +27,12 @@ OWN = 0.25  # metres around a bulb where its own shade throws no shadow
 
 @dataclass(frozen=True, eq=False)
 class Lights:
-    """Lights of a stage, y up, metres.
+    """Lights of a stage, y up, metres."""
 
-    Arguments:
-        sky: radiance of the dome. sun: (2, 3) float32, direction towards it and irradiance by colour.
-        bulbs: (n, 3) float32 places of lamps. power: (n, 3) float32, radiant intensity by colour.
-    """
-
-    sky: float
-    sun: np.ndarray | None
-    bulbs: np.ndarray
-    power: np.ndarray
+    sky: float  # radiance of the dome
+    sun: np.ndarray | None  # (2, 3) float32, direction towards it and irradiance by colour
+    bulbs: np.ndarray  # (n, 3) float32 places of lamps
+    power: np.ndarray  # (n, 3) float32, radiant intensity by colour
 
 
 def read_lights(stage: Usd.Stage) -> Lights:

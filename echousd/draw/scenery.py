@@ -24,36 +24,23 @@ HUNG = ("picture", "mirror", "curtain", "blind", "wall_shelf", "wall_clock", "co
 
 @dataclass(frozen=True, eq=False)
 class Scenery:
-    """Triangles in the world, y up, metres.
+    """Triangles in the world, y up, metres."""
 
-    Arguments:
-        triangles, normals: (f, 3, 3) float32 corners and their normals.
-        flat_colors, emissive: (f, 3) float32 linear RGB.
-        gloss: (f,) float32 in [0, 1].
-        st: (f, 3, 2) float32 texture coordinates.
-        texture: (f,) int, which of `images` colours the face, -1 for none.
-        images: (h, w, 3) uint8 sRGB each, and (3,) float32, what its linear RGB is multiplied by.
-        furniture: boxes of the objects. hung: of what hangs on walls.
-        wall: (f,) int, which wall a face belongs to, -1 for none.
-        panes: (p, 3, 3) float32: middle, half of the width and half of the height of every window's pane.
-        pane_wall: (p,) int, the walls of the panes.
-        lights: of the stage.
-    """
-
-    triangles: np.ndarray
+    triangles: np.ndarray  # triangles, normals: (f, 3, 3) float32 corners and their normals
     normals: np.ndarray
-    flat_colors: np.ndarray
+    flat_colors: np.ndarray  # flat_colors, emissive: (f, 3) float32 linear RGB
     emissive: np.ndarray
-    gloss: np.ndarray
-    st: np.ndarray
-    texture: np.ndarray
+    gloss: np.ndarray  # (f,) float32 in [0, 1]
+    st: np.ndarray  # (f, 3, 2) float32 texture coordinates
+    texture: np.ndarray  # (f,) int, which of `images` colours the face, -1 for none
+    # (h, w, 3) uint8 sRGB each, and (3,) float32, what its linear RGB is multiplied by
     images: tuple[tuple[np.ndarray, np.ndarray], ...]
-    furniture: Furniture
-    hung: Furniture
-    wall: np.ndarray
-    panes: np.ndarray
-    pane_wall: np.ndarray
-    lights: Lights
+    furniture: Furniture  # boxes of the objects
+    hung: Furniture  # boxes of what hangs on walls
+    wall: np.ndarray  # (f,) int, which wall a face belongs to, -1 for none
+    panes: np.ndarray  # (p, 3, 3) float32: middle, half of the width and half of the height of every window's pane
+    pane_wall: np.ndarray  # (p,) int, the walls of the panes
+    lights: Lights  # of the stage
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:

@@ -24,46 +24,31 @@ DRESSING = ("none", "grouped", "each")
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """One mesh of an object.
+    """One mesh of an object."""
 
-    Arguments:
-        path: prim path of the mesh.
-        corners: (t, 3) int, the mesh's face corners that each triangle has; vertices: (t, 3) int, its points there.
-        size: face corners of the whole mesh.
-        polygon: (t,) int, the face that each triangle is of.
-        local, world: (t, 3, 3) float corners in the mesh's frame, and in the world's (+Y up, metres).
-        kept: what keeps its material, as that is see-through or glows: paths of subsets, or that of the mesh itself.
-        instances: paths of the instances that the mesh belongs to, outermost first.
-    """
-
-    path: str
+    path: str  # prim path of the mesh
+    # (t, 3) int, the mesh's face corners that each triangle has; vertices: (t, 3) int, its points there
     corners: np.ndarray
     vertices: np.ndarray
-    size: int
-    polygon: np.ndarray
-    local: np.ndarray
+    size: int  # face corners of the whole mesh
+    polygon: np.ndarray  # (t,) int, the face that each triangle is of
+    local: np.ndarray  # local, world: (t, 3, 3) float corners in the mesh's frame, and in the world's (+Y up, metres)
     world: np.ndarray
+    # what keeps its material, as that is see-through or glows: paths of subsets, or that of the mesh itself
     kept: tuple[str, ...]
-    instances: tuple[str, ...]
+    instances: tuple[str, ...]  # paths of the instances that the mesh belongs to, outermost first
 
 
 @dataclass(frozen=True, eq=False)
 class Painted:
-    """One object that gets one texture.
+    """One object that gets one texture."""
 
-    Arguments:
-        name: unique in the room. path: of its prim, where its material is bound.
-        kind: `things`, or `stuff` for floor, walls and ceiling.
-        category, style: words of the graph, "" where it has none.
-        pieces: at least one.
-    """
-
-    name: str
-    path: str
-    kind: str
-    category: str
+    name: str  # unique in the room
+    path: str  # of its prim, where its material is bound
+    kind: str  # `things`, or `stuff` for floor, walls and ceiling
+    category: str  # category, style: words of the graph, "" where it has none
     style: str
-    pieces: tuple[Piece, ...]
+    pieces: tuple[Piece, ...]  # at least one
 
     @property
     def triangles(self) -> np.ndarray:
@@ -83,18 +68,13 @@ class Painted:
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """What `read_surfaces` found.
+    """What `read_surfaces` found."""
 
-    Arguments:
-        room: prim path of the room. graph: its scene graph. palette: its selected harmony, "" without one.
-        objects: what can be painted, stuff first. left_out: name -> why it cannot.
-    """
-
-    room: str
-    graph: SceneGraph
-    palette: str
-    objects: tuple[Painted, ...]
-    left_out: Mapping[str, str] = field(default_factory=dict)
+    room: str  # prim path of the room
+    graph: SceneGraph  # its scene graph
+    palette: str  # its selected harmony, "" without one
+    objects: tuple[Painted, ...]  # what can be painted, stuff first
+    left_out: Mapping[str, str] = field(default_factory=dict)  # name -> why it cannot
 
 
 def read_surfaces(stage: Usd.Stage, *, dressing: str = "none") -> Surfaces:

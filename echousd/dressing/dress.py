@@ -41,21 +41,13 @@ TALL = 0.7  # metres: what reaches or hangs higher may stand in a camera's way
 
 @dataclass(frozen=True, eq=False)
 class Dressing:
-    """The small things of a room.
+    """The small things of a room."""
 
-    Arguments:
-        layouts: for every layout of the room, name of a thing -> the thing.
-        assets: name of a thing -> name of its asset; one name is one asset in all layouts.
-        geometry: name of an asset -> its geometry.
-        bare: names of the windows that have curtains in no layout.
-        graphs: the things of every layout as nodes, none without `dress_graph`.
-    """
-
-    layouts: tuple[Mapping[str, Thing], ...]
-    assets: Mapping[str, str]
-    geometry: Mapping[str, Geometry]
-    bare: frozenset[str] = frozenset()
-    graphs: tuple[DressingGraph, ...] = ()
+    layouts: tuple[Mapping[str, Thing], ...]  # for every layout of the room, name of a thing -> the thing
+    assets: Mapping[str, str]  # name of a thing -> name of its asset; one name is one asset in all layouts
+    geometry: Mapping[str, Geometry]  # name of an asset -> its geometry
+    bare: frozenset[str] = frozenset()  # names of the windows that have curtains in no layout
+    graphs: tuple[DressingGraph, ...] = ()  # the things of every layout as nodes, none without `dress_graph`
 
     @property
     def kinds(self) -> dict[str, str]:

@@ -22,23 +22,15 @@ APART = 0.008  # metres of air between a small thing and everything else
 
 @dataclass(frozen=True, eq=False)
 class Thing:
-    """One small thing in its place.
+    """One small thing in its place."""
 
-    Arguments:
-        kind: a word of `echomodel.dressing.KINDS`.
-        size: (3,) float extents, metres. position: (3,) centre of its bottom, room frame. yaw: radians about +Y.
-        on: the object that it belongs to, "" for floor and walls.
-        variant: seed of its program; things of one kind, size and variant share an asset.
-        count: how many things a person would count.
-    """
-
-    kind: str
-    size: np.ndarray
-    position: np.ndarray
-    yaw: float
-    on: str = ""
-    variant: int = 0
-    count: int = 1
+    kind: str  # a word of `echomodel.dressing.KINDS`
+    size: np.ndarray  # (3,) float extents, metres
+    position: np.ndarray  # (3,) centre of its bottom, room frame
+    yaw: float  # radians about +Y
+    on: str = ""  # the object that it belongs to, "" for floor and walls
+    variant: int = 0  # seed of its program; things of one kind, size and variant share an asset
+    count: int = 1  # how many things a person would count
 
     @cached_property
     def footprint(self) -> shapely.Polygon:
@@ -93,29 +85,19 @@ class Standing:
 
 @dataclass(eq=False)
 class Setting:
-    """The room as the rules see it, and the things placed so far.
+    """The room as the rules see it, and the things placed so far."""
 
-    Arguments:
-        objects: what the graph put there.
-        floor: (k, 2) float corners, metres. openings: in its edges.
-        height: of the room, metres. walls: whether there are any to hang things on.
-        full: place as much as looks good, not only a little.
-        seed: of all choices. use: of the room (`echomodel.rows.RoomType`).
-        placed: the things so far. carriers: those of them that others stand on.
-        curtained: names of the windows that have curtains.
-    """
-
-    objects: Mapping[str, Standing]
-    floor: np.ndarray
-    openings: tuple[Opening, ...]
-    height: float
-    walls: bool
-    full: bool
-    seed: int
-    use: str = ""
-    placed: list[Thing] = field(default_factory=list)
-    carriers: dict[str, Standing] = field(default_factory=dict)
-    curtained: set[str] = field(default_factory=set)
+    objects: Mapping[str, Standing]  # what the graph put there
+    floor: np.ndarray  # (k, 2) float corners, metres
+    openings: tuple[Opening, ...]  # in its edges
+    height: float  # of the room, metres
+    walls: bool  # whether there are any to hang things on
+    full: bool  # place as much as looks good, not only a little
+    seed: int  # of all choices
+    use: str = ""  # of the room (`echomodel.rows.RoomType`)
+    placed: list[Thing] = field(default_factory=list)  # the things so far
+    carriers: dict[str, Standing] = field(default_factory=dict)  # those of them that others stand on
+    curtained: set[str] = field(default_factory=set)  # names of the windows that have curtains
 
     def __post_init__(self) -> None:
         self.room = shapely.Polygon(self.floor)

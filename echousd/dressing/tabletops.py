@@ -22,20 +22,13 @@ AIR = 0.6  # metres of air above a top that nothing covers
 
 @dataclass(eq=False)
 class Surface:
-    """A level in an object's frame.
+    """A level in an object's frame."""
 
-    Arguments:
-        host: the object.
-        y: its height above the object's bottom, metres. air: free height above it.
-        area: what lies at this height, in plan; shrinks as things are put down.
-        above: what stands on it or passes through it, in plan.
-    """
-
-    host: Standing
-    y: float
-    air: float
-    area: shapely.Geometry
-    above: shapely.STRtree
+    host: Standing  # the object
+    y: float  # its height above the object's bottom, metres
+    air: float  # free height above it
+    area: shapely.Geometry  # what lies at this height, in plan; shrinks as things are put down
+    above: shapely.STRtree  # what stands on it or passes through it, in plan
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:

@@ -27,19 +27,13 @@ LONGEST = 64  # characters of a look's name
 
 @dataclass(frozen=True)
 class Look:
-    """A painted look, as its layer says.
+    """A painted look, as its layer says."""
 
-    Arguments:
-        name: of the look and of its variant. path: of its layer in the room's folder.
-        dressing: whether small things were painted, see `read_surfaces`.
-        objects: prim path of an object -> digest of its meshes. meshes: prim paths of these meshes.
-    """
-
-    name: str
-    path: str
-    dressing: str
-    objects: Mapping[str, str]
-    meshes: tuple[str, ...]
+    name: str  # of the look and of its variant
+    path: str  # of its layer in the room's folder
+    dressing: str  # whether small things were painted, see `read_surfaces`
+    objects: Mapping[str, str]  # prim path of an object -> digest of its meshes
+    meshes: tuple[str, ...]  # prim paths of these meshes
 
 
 def primvar(look: str) -> str:

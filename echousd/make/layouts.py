@@ -60,18 +60,13 @@ def model_of(asked: RoomOptions, model: RoomModel | None) -> RoomModel:
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Which drafts are drawn, and how.
+    """Which drafts are drawn, and how."""
 
-    Arguments:
-        seed, number: of the draws; equal ones, and equal counts, give equal drafts.
-        steps: of the sampler, None = the model's own. change: what was edited in the graph, None = nothing.
-        guided: at every step by what is specified; where boxes are placed by search afterwards that changes nothing.
-    """
-
-    seed: int
+    seed: int  # seed, number: of the draws; equal ones, and equal counts, give equal drafts
     number: int = 0
-    steps: int | None = None
-    change: GraphEdit | None = None
+    steps: int | None = None  # of the sampler, None = the model's own
+    change: GraphEdit | None = None  # what was edited in the graph, None = nothing
+    # at every step by what is specified; where boxes are placed by search afterwards that changes nothing
     guided: bool = True
 
 

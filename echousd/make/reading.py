@@ -36,25 +36,15 @@ from echousd.stage.values import matrix, reading
 
 @dataclass(frozen=True, eq=False)
 class SavedRoom:
-    """What a room's folder holds.
+    """What a room's folder holds."""
 
-    Arguments:
-        graph: the composed stage's graph, an artist's changes included.
-        boxes: N boxes in the order of the graph's nodes, as composed.
-        layouts: all arrangements of the variant set `layout`, in its order, or `boxes` alone.
-        geometry: object name -> geometry; objects of one asset have one.
-        assets: object name -> asset name.
-        carried: asset name -> its files as they are, path -> bytes.
-        manifest: as `save` wrote it.
-    """
-
-    graph: SceneGraph
-    boxes: Boxes
-    layouts: tuple[Boxes, ...]
-    geometry: Mapping[str, Geometry]
-    assets: Mapping[str, str]
-    carried: Mapping[str, Mapping[str, bytes]]
-    manifest: Mapping[str, Any]
+    graph: SceneGraph  # the composed stage's graph, an artist's changes included
+    boxes: Boxes  # N boxes in the order of the graph's nodes, as composed
+    layouts: tuple[Boxes, ...]  # all arrangements of the variant set `layout`, in its order, or `boxes` alone
+    geometry: Mapping[str, Geometry]  # object name -> geometry; objects of one asset have one
+    assets: Mapping[str, str]  # object name -> asset name
+    carried: Mapping[str, Mapping[str, bytes]]  # asset name -> its files as they are, path -> bytes
+    manifest: Mapping[str, Any]  # as `save` wrote it
 
 
 def read_room(root: str | Path) -> SavedRoom:

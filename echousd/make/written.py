@@ -12,16 +12,11 @@ from echousd.progress import StageTimer
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """A room and where it lies.
+    """A room and where it lies."""
 
-    Arguments:
-        room: what was made. root: its root layer, or the flat file. preview: the picture to look at, None = there is
-            none.
-    """
-
-    room: Room
-    root: Path
-    preview: Path | None = None
+    room: Room  # what was made
+    root: Path  # its root layer, or the flat file
+    preview: Path | None = None  # the picture to look at, None = there is none
 
 
 def write_room(

@@ -32,15 +32,11 @@ SKIRTINGS, CORNICES = (0.06, 0.08, 0.1, 0.14), (0.0, 0.0, 0.06, 0.09)  # heights
 
 @dataclass(frozen=True)
 class Millwork:
-    """How the doors, windows and mouldings of a room are made.
+    """How the doors, windows and mouldings of a room are made."""
 
-    Arguments:
-        window, door: words of `WINDOWS` and `DOORS`. skirting, cornice: their heights, metres; 0 = no cornice.
-    """
-
-    window: str = "plain"
+    window: str = "plain"  # window, door: words of `WINDOWS` and `DOORS`
     door: str = "panelled"
-    skirting: float = 0.08
+    skirting: float = 0.08  # skirting, cornice: their heights, metres; 0 = no cornice
     cornice: float = 0.0
 
 

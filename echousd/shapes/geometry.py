@@ -19,97 +19,64 @@ LICENCE = "Apache-2.0"  # of everything that EchoUSD itself makes
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a piece of furniture comes from.
+    """Where a piece of furniture comes from."""
 
-    Arguments:
-        shapes: name of the source of shapes, see `echousd.shapes.sources`.
-        licence: SPDX identifier of its licence.
-        credit: who must be named, empty where nobody must.
-        asset: file or id of the model that it is, empty for what EchoUSD made. sha256: of the model's file.
-    """
-
-    shapes: str
-    licence: str = LICENCE
-    credit: str = ""
-    asset: str = ""
-    sha256: str = ""
+    shapes: str  # name of the source of shapes, see `echousd.shapes.sources`
+    licence: str = LICENCE  # SPDX identifier of its licence
+    credit: str = ""  # who must be named, empty where nobody must
+    asset: str = ""  # file or id of the model that it is, empty for what EchoUSD made
+    sha256: str = ""  # of the model's file
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One mesh of a piece of furniture.
+    """One mesh of a piece of furniture."""
 
-    Arguments:
-        name: unique in its geometry; the prim is called `<asset>_<name>`.
-        mesh: in the object's frame, metres.
-        slots: material slot (a group of `echousd.shapes.looks`) -> (m,) int face numbers; together every face once.
-        crease: neighbours that fold more sharply than this keep a hard edge, radians.
-        body: what it moves with, see `Geometry.joints`; empty where the whole piece is one body.
-    """
-
-    name: str
-    mesh: trimesh.Trimesh
+    name: str  # unique in its geometry; the prim is called `<asset>_<name>`
+    mesh: trimesh.Trimesh  # in the object's frame, metres
+    # material slot (a group of `echousd.shapes.looks`) -> (m,) int face numbers; together every face once
     slots: Mapping[str, np.ndarray]
-    crease: float = CREASE
-    body: str = ""
+    crease: float = CREASE  # neighbours that fold more sharply than this keep a hard edge, radians
+    body: str = ""  # what it moves with, see `Geometry.joints`; empty where the whole piece is one body
 
 
 @dataclass(frozen=True, eq=False)
 class Mass:
-    """What a piece of furniture, or one body of it, weighs.
+    """What a piece of furniture, or one body of it, weighs."""
 
-    Arguments:
-        mass: kilograms. centre: (3,) float, metres, in the object's frame.
-        inertia: (3,) float, moments about the principal axes, kg m². axes: (3, 3) float rotation, its columns are them.
-    """
-
-    mass: float
-    centre: np.ndarray
-    inertia: np.ndarray
-    axes: np.ndarray
+    mass: float  # kilograms
+    centre: np.ndarray  # (3,) float, metres, in the object's frame
+    inertia: np.ndarray  # (3,) float, moments about the principal axes, kg m²
+    axes: np.ndarray  # (3, 3) float rotation, its columns are them
 
 
 @dataclass(frozen=True, eq=False)
 class Collider:
-    """What a piece of furniture collides with.
+    """What a piece of furniture collides with."""
 
-    Arguments:
-        name: unique in its geometry; the prim is called `<asset>_<name>`.
-        mesh: in the object's frame, metres.
-        approximation: UsdPhysics's word for how the mesh is meant, `convexHull` or `convexDecomposition`.
-        body: as for `Part`.
-    """
-
-    name: str
-    mesh: trimesh.Trimesh
-    approximation: str
-    body: str = ""
+    name: str  # unique in its geometry; the prim is called `<asset>_<name>`
+    mesh: trimesh.Trimesh  # in the object's frame, metres
+    approximation: str  # UsdPhysics's word for how the mesh is meant, `convexHull` or `convexDecomposition`
+    body: str = ""  # as for `Part`
 
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """The geometry of one piece of furniture; objects that share an asset share this object.
+    """The geometry of one piece of furniture; objects that share an asset share this object."""
 
-    Arguments:
-        parts: at least one.
-        colliders: at least one; together they cover all parts.
-        origin: provenance and licence.
-        mass: what it weighs, None = nobody knows, it is estimated from the category and the box.
-        joints: of the bodies that move (drawers, doors); what is fixed then belongs to the body `FRAME`.
-        masses: body -> what it weighs, for every body of a piece with joints.
-        coarse: the parts once more with few faces, of the same names, bodies and slots; empty = there are none.
-        description: numbers from which a furniture program makes the piece again, empty = there are none.
-        original: somebody else's model that the piece is; its parts and colliders only tell what it looks like.
-    """
-
-    parts: tuple[Part, ...]
-    colliders: tuple[Collider, ...]
-    origin: Origin
-    mass: Mass | None = None
+    parts: tuple[Part, ...]  # at least one
+    colliders: tuple[Collider, ...]  # at least one; together they cover all parts
+    origin: Origin  # provenance and licence
+    mass: Mass | None = None  # what it weighs, None = nobody knows, it is estimated from the category and the box
+    # of the bodies that move (drawers, doors); what is fixed then belongs to the body `FRAME`
     joints: tuple[Joint, ...] = ()
+    # body -> what it weighs, for every body of a piece with joints
     masses: Mapping[str, Mass] = field(default_factory=dict)
+    # the parts once more with few faces, of the same names, bodies and slots; empty = there are none
     coarse: tuple[Part, ...] = ()
+    # numbers from which a furniture program makes the piece again, empty = there are none
     description: tuple[float, ...] = ()
+    # somebody else's model that the piece is; its parts and colliders only tell what it looks like
     original: Original | None = None
 
     def __post_init__(self) -> None:

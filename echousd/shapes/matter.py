@@ -23,18 +23,13 @@ from echousd.shapes.geometry import Collider, Geometry, Mass
 
 @dataclass(frozen=True)
 class Matter:
-    """What a solid stands for.
+    """What a solid stands for."""
 
-    Arguments:
-        density: of what it is made of, kg/m³.
-        wall: how thick that is at most, metres: a tube, a shade, a frame with two boards. What is thinner than twice as
-            much is massive.
-        core: density of what a wall encloses, kg/m³.
-    """
-
-    density: float
+    density: float  # of what it is made of, kg/m³
+    # how thick that is at most, metres: a tube, a shade, a frame with two boards. What is thinner than twice as much is
+    # massive
     wall: float = np.inf
-    core: float = 0.0
+    core: float = 0.0  # density of what a wall encloses, kg/m³
 
 
 WOOD = Matter(620.0, 0.010)  # particle board and timber; boards of more than about 2 cm are frames with a skin

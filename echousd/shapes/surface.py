@@ -21,22 +21,15 @@ MANY_FACES = 1000
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles with indexed corner attributes, as UsdGeomMesh stores them.
+    """Triangles with indexed corner attributes, as UsdGeomMesh stores them."""
 
-    Arguments:
-        points: (v, 3) float32, metres.
-        faces: (f, 3) int32, indices into points, counter-clockwise seen from outside.
-        normals, normal_index: (k, 3) float32 unit vectors and (3 f) int32, one index per face corner.
-        st, st_index: (t, 2) float32 and (3 f) int32.
-        groups: material group -> (m,) int32 face numbers; together they name every face exactly once.
-    """
-
-    points: np.ndarray
-    faces: np.ndarray
-    normals: np.ndarray
+    points: np.ndarray  # (v, 3) float32, metres
+    faces: np.ndarray  # (f, 3) int32, indices into points, counter-clockwise seen from outside
+    normals: np.ndarray  # normals, normal_index: (k, 3) float32 unit vectors and (3 f) int32, one index per face corner
     normal_index: np.ndarray
-    st: np.ndarray
+    st: np.ndarray  # st, st_index: (t, 2) float32 and (3 f) int32
     st_index: np.ndarray
+    # material group -> (m,) int32 face numbers; together they name every face exactly once
     groups: Mapping[str, np.ndarray]
 
     @property

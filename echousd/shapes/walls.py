@@ -32,19 +32,13 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class ShellPart:
-    """A floor, wall, ceiling, door or window, or what of one moves.
+    """A floor, wall, ceiling, door or window, or what of one moves."""
 
-    Arguments:
-        name: of its prim. label: what it is, "" for a part of what is labelled.
-        pieces: its meshes. inner: parts that belong to it.
-        joint: how it moves against the part that it belongs to, None = not at all.
-    """
-
-    name: str
-    label: str
-    pieces: tuple[Piece, ...]
-    inner: tuple[ShellPart, ...] = ()
-    joint: Joint | None = None
+    name: str  # of its prim
+    label: str  # what it is, "" for a part of what is labelled
+    pieces: tuple[Piece, ...]  # its meshes
+    inner: tuple[ShellPart, ...] = ()  # parts that belong to it
+    joint: Joint | None = None  # how it moves against the part that it belongs to, None = not at all
 
 
 def walls(

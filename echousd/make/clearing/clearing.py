@@ -27,17 +27,11 @@ GROUPS = 3  # sets of things that are tried for one move
 
 @dataclass(frozen=True, eq=False)
 class Cleared:
-    """What became of a layout.
+    """What became of a layout."""
 
-    Arguments:
-        boxes: N boxes, those that were moved in other places.
-        collisions: what still reaches into one another, or into what a wall holds, deepest first.
-        moved: name -> metres, of what was moved.
-    """
-
-    boxes: Boxes
-    collisions: tuple[Collision, ...]
-    moved: Mapping[str, float]
+    boxes: Boxes  # N boxes, those that were moved in other places
+    collisions: tuple[Collision, ...]  # what still reaches into one another, or into what a wall holds, deepest first
+    moved: Mapping[str, float]  # name -> metres, of what was moved
 
 
 def cleared_layouts(

@@ -32,29 +32,20 @@ ASIDE = 2.0  # a seat moves back from its table more easily than aside
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Everything that can be in the way; numbers from n on are parts of the shell, which stays.
+    """Everything that can be in the way; numbers from n on are parts of the shell, which stays."""
 
-    Arguments:
-        solids: corners of the convex pieces of every thing in the room, metres.
-        fixed: (n,) bool, what must not move. carrier: (n,) int, as `Problem.carrier`.
-        heading: (n,) float, yaw in radians. seat: (n,) bool. bulk: (n,) float, square root of the footprint, metres.
-        outline: n polygons, footprints. floor: the floor, a little wider.
-        level: n polygons, where the top of each is: a desk with a shelf behind has it there alone.
-        bounds: (s, 2, 3) float, boxes of everything. names: s names, those of walls for what they hold.
-        known: pair -> forbidden moves of its first against its second from where both stood at first.
-    """
-
-    solids: Sequence[Solids]
-    fixed: np.ndarray
-    carrier: np.ndarray
-    heading: np.ndarray
-    seat: np.ndarray
-    bulk: np.ndarray
-    outline: Sequence[shapely.Polygon]
-    level: Sequence[BaseGeometry]
-    floor: shapely.Polygon
-    bounds: np.ndarray
-    names: Sequence[str]
+    solids: Sequence[Solids]  # corners of the convex pieces of every thing in the room, metres
+    fixed: np.ndarray  # (n,) bool, what must not move
+    carrier: np.ndarray  # (n,) int, as `Problem.carrier`
+    heading: np.ndarray  # (n,) float, yaw in radians
+    seat: np.ndarray  # (n,) bool
+    bulk: np.ndarray  # (n,) float, square root of the footprint, metres
+    outline: Sequence[shapely.Polygon]  # n polygons, footprints
+    level: Sequence[BaseGeometry]  # n polygons, where the top of each is: a desk with a shelf behind has it there alone
+    floor: shapely.Polygon  # the floor, a little wider
+    bounds: np.ndarray  # (s, 2, 3) float, boxes of everything
+    names: Sequence[str]  # s names, those of walls for what they hold
+    # pair -> forbidden moves of its first against its second from where both stood at first
     known: dict[tuple[int, int], BaseGeometry] = field(default_factory=dict)
 
     def forbidden(self, pair: tuple[int, int]) -> BaseGeometry:

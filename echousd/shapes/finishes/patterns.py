@@ -15,17 +15,11 @@ SIZE = 512  # pixels on each side
 
 @dataclass(frozen=True, eq=False)
 class Relief:
-    """One pattern.
+    """One pattern."""
 
-    Arguments:
-        tone: (SIZE, SIZE) or (SIZE, SIZE, 3) float, what the tint is multiplied with, 1 in the mean.
-        height: (SIZE, SIZE) float, metres above the mean, None for what is flat.
-        rough: (SIZE, SIZE) float, added to the roughness, None where it is even.
-    """
-
-    tone: np.ndarray
-    height: np.ndarray | None = None
-    rough: np.ndarray | None = None
+    tone: np.ndarray  # (SIZE, SIZE) or (SIZE, SIZE, 3) float, what the tint is multiplied with, 1 in the mean
+    height: np.ndarray | None = None  # (SIZE, SIZE) float, metres above the mean, None for what is flat
+    rough: np.ndarray | None = None  # (SIZE, SIZE) float, added to the roughness, None where it is even
 
 
 def noise(seed: int, along: float, across: float, power: float = 2.0) -> np.ndarray:

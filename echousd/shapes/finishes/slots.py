@@ -15,24 +15,16 @@ from echousd.srgb import of_hexadecimal
 
 @dataclass(frozen=True)
 class Slot:
-    """How one kind of material looks.
+    """How one kind of material looks."""
 
-    Arguments:
-        color: a field of `Harmony`, or an sRGB hex of its own.
-        roughness, metallic, opacity: of a UsdPreviewSurface.
-        pattern: a word of `baking.PATTERNS`, "" = plain; `picture_0` ... are pictures.
-        metres: of surface that one picture of the pattern covers; 0 = the whole of it fits the thing.
-        mix: an sRGB hex and how much of it is mixed in.
-        material: what it is made of, the word of the label `semantics:labels:material`; "" = as the slot is called.
-    """
-
-    color: str
-    roughness: float
-    pattern: str = ""
-    metres: float = 1.0
+    color: str  # a field of `Harmony`, or an sRGB hex of its own
+    roughness: float  # roughness, metallic, opacity: of a UsdPreviewSurface
+    pattern: str = ""  # a word of `baking.PATTERNS`, "" = plain; `picture_0` ... are pictures
+    metres: float = 1.0  # of surface that one picture of the pattern covers; 0 = the whole of it fits the thing
     metallic: float = 0.0
     opacity: float = 1.0
-    mix: tuple[str, float] = ("ffffff", 0.0)
+    mix: tuple[str, float] = ("ffffff", 0.0)  # an sRGB hex and how much of it is mixed in
+    # what it is made of, the word of the label `semantics:labels:material`; "" = as the slot is called
     material: str = ""
 
 

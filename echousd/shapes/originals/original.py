@@ -13,21 +13,14 @@ CONVERTED = "model.usdc"
 
 @dataclass(frozen=True, eq=False)
 class Original:
-    """The model that a piece of furniture is.
+    """The model that a piece of furniture is."""
 
-    Arguments:
-        pose: (4, 4) float, its frame and unit to the object's frame, in metres.
-        prim: path of its root prim.
-        layer: the USD file that holds it, which stays where it is and as it is; None where `files` hold it.
-        files: name -> content of a model that was converted to USD or is taken along, to be written beside it.
-        main: which of the files is the model.
-        bodies, colliders: it has rigid bodies or colliders of its own, so that it gets none of ours.
-    """
-
-    pose: np.ndarray
-    prim: str
+    pose: np.ndarray  # (4, 4) float, its frame and unit to the object's frame, in metres
+    prim: str  # path of its root prim
+    # the USD file that holds it, which stays where it is and as it is; None where `files` hold it
     layer: Path | None = None
+    # name -> content of a model that was converted to USD or is taken along, to be written beside it
     files: Mapping[str, bytes] = field(default_factory=dict)
-    main: str = CONVERTED
-    bodies: bool = False
+    main: str = CONVERTED  # which of the files is the model
+    bodies: bool = False  # bodies, colliders: it has rigid bodies or colliders of its own, so that it gets none of ours
     colliders: bool = False

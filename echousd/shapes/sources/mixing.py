@@ -85,14 +85,11 @@ def shape_nearness(
 
 @dataclass(frozen=True)
 class ShapeSource:
-    """Where geometry comes from.
+    """Where geometry comes from."""
 
-    Arguments:
-        shapes: gives geometry of the wanted objects; raises ValueError naming the object that there is none for.
-        check: raises ValueError, before any long work, where the source cannot give shapes with a model.
-    """
-
+    # gives geometry of the wanted objects; raises ValueError naming the object that there is none for
     shapes: Callable[[ShapeRequest], Shapes]
+    # raises ValueError, before any long work, where the source cannot give shapes with a model
     check: Callable[[RoomModel | None], None] = lambda model: None
 
 

@@ -30,20 +30,14 @@ TOGETHER = ("at", "head", "beside")  # stances of things that come in pairs and 
 
 @dataclass(frozen=True, eq=False)
 class Retrieved:
-    """What is known of the models of a room.
+    """What is known of the models of a room."""
 
-    Arguments:
-        chosen: object name -> model. files: object name -> where it lies.
-        sizes: object name -> (3) metres that the layout must give it, as the model cannot be stretched to another.
-        missing: objects that the library has nothing for.
-        collect: take models along with all that they need.
-    """
-
-    chosen: Mapping[str, AssetRecord] = field(default_factory=dict)
-    files: Mapping[str, ModelFile] = field(default_factory=dict)
+    chosen: Mapping[str, AssetRecord] = field(default_factory=dict)  # object name -> model
+    files: Mapping[str, ModelFile] = field(default_factory=dict)  # object name -> where it lies
+    # object name -> (3) metres that the layout must give it, as the model cannot be stretched to another
     sizes: Mapping[str, Vector] = field(default_factory=dict)
-    missing: tuple[str, ...] = ()
-    collect: bool = False
+    missing: tuple[str, ...] = ()  # objects that the library has nothing for
+    collect: bool = False  # take models along with all that they need
 
     @property
     def notes(self) -> tuple[str, ...]:

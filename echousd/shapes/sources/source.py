@@ -22,35 +22,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ShapeRequest:
-    """Everything that a source may look at.
+    """Everything that a source may look at."""
 
-    Arguments:
-        graph: the whole scene graph, n nodes.
-        boxes: n boxes in the room's frame, in the order of the nodes; a shape fills its box.
-        styles: object name -> style, see `echousd.shapes.styles.style_groups`.
-        seed: of all randomness.
-        model: the model that the boxes come from; None where an edit left nothing to sample.
-        steps: sampling steps, None for the model's own.
-        faces: face budget of each mesh.
-        wanted: names of the objects that need geometry, in the order of the nodes; None = all.
-        kept: geometry of the objects that stay as they are (of an edited room).
-        change: how the graph was edited, None = not at all.
-        timer: is told of the stages.
-        retrieved: the models of other people that were chosen for objects.
-    """
-
-    graph: SceneGraph
-    boxes: Boxes
-    styles: Mapping[str, str]
-    seed: int = 0
-    model: RoomModel | None = None
-    steps: int | None = None
-    faces: int = FACES
+    graph: SceneGraph  # the whole scene graph, n nodes
+    boxes: Boxes  # n boxes in the room's frame, in the order of the nodes; a shape fills its box
+    styles: Mapping[str, str]  # object name -> style, see `echousd.shapes.styles.style_groups`
+    seed: int = 0  # of all randomness
+    model: RoomModel | None = None  # the model that the boxes come from; None where an edit left nothing to sample
+    steps: int | None = None  # sampling steps, None for the model's own
+    faces: int = FACES  # face budget of each mesh
+    # names of the objects that need geometry, in the order of the nodes; None = all
     wanted: tuple[str, ...] | None = None
+    # geometry of the objects that stay as they are (of an edited room)
     kept: Mapping[str, Geometry] = field(default_factory=dict)
-    change: GraphEdit | None = None
-    timer: StageTimer = field(default_factory=StageTimer)
-    retrieved: Retrieved = field(default_factory=Retrieved)
+    change: GraphEdit | None = None  # how the graph was edited, None = not at all
+    timer: StageTimer = field(default_factory=StageTimer)  # is told of the stages
+    retrieved: Retrieved = field(default_factory=Retrieved)  # the models of other people that were chosen for objects
 
     @property
     def rows(self) -> list[int]:
@@ -61,15 +48,11 @@ class ShapeRequest:
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """What a source gives.
+    """What a source gives."""
 
-    Arguments:
-        owners: every wanted object -> the wanted object whose geometry it uses, often itself; one asset per owner.
-        geometry: every owner -> its geometry.
-    """
-
+    # every wanted object -> the wanted object whose geometry it uses, often itself; one asset per owner
     owners: Mapping[str, str]
-    geometry: Mapping[str, Geometry]
+    geometry: Mapping[str, Geometry]  # every owner -> its geometry
 
 
 def per_asset(request: ShapeRequest, make: Callable[[int], Geometry], *, alike: bool = True) -> Shapes:
