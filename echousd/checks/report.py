@@ -345,8 +345,7 @@ CLEAR = 0.02  # metres or ratio: verdicts of smaller margins may differ between 
 def rewritten(stage: Usd.Stage, room: str, relations: Sequence[MeasuredRelation]) -> Iterator[Fault]:
     """Where a manifest says other than what is measured, of a room whose layers are those that it was written with.
 
-    Arguments:
-        room: prim path. relations: of the first layout.
+    `room`: prim path. `relations`: of the first layout.
     """
     root = Path(stage.GetRootLayer().realPath)
     if not root.is_file() or not root.with_suffix(".json").is_file():

@@ -222,8 +222,7 @@ def _flattened(primvar: UsdGeom.Primvar) -> Any:
 def paints_of(prim: Usd.Prim, face: np.ndarray, known: dict[str, Paint]) -> list[tuple[Paint, np.ndarray]]:
     """Materials of a surface with the triangles that they colour; later ones win.
 
-    Arguments:
-        face: (t,) int, face of each triangle. known: materials that were read already, by path; grows.
+    `face`: (t,) int, face of each triangle. `known`: materials that were read already, by path; grows.
     """
     paints = [(_bound(prim, known), np.arange(len(face)))]
     for subset in UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets():

@@ -102,8 +102,7 @@ def thrown_back(scenery: Scenery) -> np.ndarray:
 def exposed(color: np.ndarray, light: np.ndarray) -> np.ndarray:
     """(h, w, 3) linear colours in [0, 1]: brightened or darkened to a middle tone, and rolled off as film does.
 
-    Arguments:
-        color: (h, w, 3) linear radiance. light: (3,) that of the room, to whose colour the eye adapts in part.
+    `color`: (h, w, 3) linear radiance. `light`: (3,) that of the room, to whose colour the eye adapts in part.
     """
     color = color / (np.maximum(light, 1e-6) / max(float(light.mean()), 1e-6)) ** ADAPTED
     bright = np.log(np.maximum(color.mean(-1), 1e-4))

@@ -52,10 +52,8 @@ SIZE = 256  # pixels
 def thumbnails(files: Mapping[str, bytes], names: Iterable[str]) -> dict[str, bytes]:
     """Path in the room's folder -> PNG of each asset that has none yet, in the plain colours that it has by itself.
 
-    Arguments:
-        files: relative path -> content of the room's assets. names: of the assets.
-
-    Raises RenderUnavailable (a ValueError) without the extra `render`.
+    `files`: relative path -> content of the room's assets. `names`: of the assets. Raises RenderUnavailable (a
+    ValueError) without the extra `render`.
     """
     wanted = [name for name in names if thumbnail_file(name) not in files and component_file(name) in files]
     found: dict[str, bytes] = {}

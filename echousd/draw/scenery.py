@@ -107,11 +107,8 @@ def class_color(category: str) -> tuple[float, float, float]:
 def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     """Collect every visible mesh of a stage.
 
-    Arguments:
-        stage: any stage; Z-up and other units are converted.
-        by_class: colour by the nearest `SemanticsLabelsAPI:category` instead of by material.
-
-    Raises ValueError when there is no mesh to see.
+    `stage`: any stage; Z-up and other units are converted. `by_class`: colour by the nearest
+    `SemanticsLabelsAPI:category` instead of by material. Raises ValueError when there is no mesh to see.
     """
     parts: list[dict[str, np.ndarray]] = []
     images: dict[tuple, tuple[int, tuple[np.ndarray, np.ndarray]]] = {}

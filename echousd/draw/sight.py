@@ -64,8 +64,7 @@ class Furniture:
     def away(self, view: np.ndarray, half: float) -> np.ndarray:
         """(169,) metres to the nearest box along `RAYS` through a picture from inside, inf where there is none.
 
-        Arguments:
-            view: (4, 4) float camera to world. half: half of the picture's width at distance 1.
+        `view`: (4, 4) float camera to world. `half`: half of the picture's width at distance 1.
         """
         ways = (RAYS * (half, half, 1.0)) @ view[:3, :3].T
         ways /= np.linalg.norm(ways, axis=1, keepdims=True)

@@ -80,11 +80,8 @@ class Surfaces:
 def read_surfaces(stage: Usd.Stage, *, dressing: str = "none") -> Surfaces:
     """Everything in the only room of a stage that can be painted.
 
-    Arguments:
-        stage: the room.
-        dressing: the small things below `Dressing`: `none` of them, `grouped` as one object, or `each`.
-
-    Raises ValueError for another word, StageError for a stage without a room, with several, or with nothing to paint.
+    `dressing`: the small things below `Dressing`: `none` of them, `grouped` as one object, or `each`. Raises ValueError
+    for another word, StageError for a stage without a room, with several, or with nothing to paint.
     """
     if dressing not in DRESSING:
         raise ValueError(f"dressing is {dressing!r}, allowed: {', '.join(DRESSING)}")

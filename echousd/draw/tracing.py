@@ -28,12 +28,9 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
     asks for light covers the sun's disc and the sky evenly, each pixel with another shift (randomised quasi-Monte
     Carlo), so that little noise is left.
 
-    Arguments:
-        scenery: triangles and their colours.
-        view: the camera; inside a room its windows and lamps light it, else sun and sky from above.
-        size: pixels across.
-        rays: along each side of a pixel.
-        seed: of the shifts; the same seed gives the same picture.
+    `scenery`: triangles and their colours. `view`: the camera; inside a room its windows and lamps light it, else sun
+    and sky from above. `size`: pixels across. `rays`: along each side of a pixel. `seed`: of the shifts; the same seed
+    gives the same picture.
     """
     height, many = round(size / view.aspect), rays**2
     across, down = (grid.ravel() for grid in np.meshgrid(np.arange(size), np.arange(height)))
@@ -232,8 +229,7 @@ def _colored(scenery: Scenery, face: np.ndarray, st: np.ndarray, light: np.ndarr
 def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, rings: Sequence[int] = RINGS) -> np.ndarray:
     """Mean of the light (h, w, 4) over neighbours on the same flat piece of surface (joint bilateral filter).
 
-    Arguments:
-        normal, point: (h, w, 3) of the surface.
+    `normal`, `point`: (h, w, 3) of the surface.
     """
     height, width = light.shape[:2]
     light, normal, point = (np.ascontiguousarray(a.transpose(2, 0, 1)) for a in (light, normal, point))

@@ -81,9 +81,7 @@ def perspective_view(points: np.ndarray, furniture: Furniture) -> np.ndarray:
 def perspective_views(points: np.ndarray, furniture: Furniture) -> list[np.ndarray]:
     """(4, 4) float camera to world of the views from the four corners, least hidden first, fronts preferred.
 
-    Arguments:
-        points: (n, 3) float, metres, what must be in the picture.
-        furniture: what shall be seen.
+    `points`: (n, 3) float, metres, what must be in the picture. `furniture`: what shall be seen.
     """
     corners = np.array([(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)])
     facing = corners @ (furniture.facing + np.array([1e-3, 2e-3]))
@@ -190,8 +188,7 @@ def inside_view(
 def bare_share(floor: np.ndarray, height: float, things: Sequence[Furniture], view: np.ndarray, half: float) -> float:
     """Share of a picture inside a room that shows walls with nothing at or before them; `things`: all boxes.
 
-    Arguments:
-        floor: (k, 2) float, metres; height: of the walls, metres. view, half: as `Furniture.away`.
+    `floor`: (k, 2) float, metres; `height`: of the walls, metres. `view`, `half`: as `Furniture.away`.
     """
     wall = _walls(floor, height).away(view, half)
     before = np.min([some.away(view, half) for some in things], axis=0) if things else np.inf

@@ -231,8 +231,7 @@ class _Box:
 def graph_of(setting: Setting, named: Mapping[str, Thing]) -> DressingGraph:
     """The things of one layout as nodes, with a relation of each that belongs to a piece or stands on a wall shelf.
 
-    Arguments:
-        setting: after all rules. named: name -> thing.
+    `setting`: after all rules. `named`: name -> thing.
     """
     nodes = tuple(_node(setting, name, thing) for name, thing in named.items())
     related = (_relation(setting, named, name, thing) for name, thing in named.items() if thing.on)
@@ -242,9 +241,8 @@ def graph_of(setting: Setting, named: Mapping[str, Thing]) -> DressingGraph:
 def write_nodes(layer: Sdf.Layer, graph: DressingGraph, room: Sdf.Path, taken: Iterable[str]) -> None:
     """Make the prims of small things nodes, and write their relations below the scene graph.
 
-    Arguments:
-        layer: holds the things. room: spec path of the room, in a variant where there are several layouts.
-        taken: names of the prims of the furniture's relations.
+    `room`: spec path of the room, in a variant where there are several layouts. `taken`: names of the prims of the
+    furniture's relations.
     """
     small, names = {node.name for node in graph.nodes}, set(taken)
     above = Sdf.Path(DRESSING).ReplacePrefix(Sdf.Path("/Room"), room)

@@ -152,9 +152,7 @@ class Setting:
     ) -> Thing | None:
         """Place the first of some things that is clear, and give it back; None where none is.
 
-        Arguments:
-            things: taken one by one, those after the first clear one not at all.
-            others: as `clear`.
+        `things`: taken one by one, those after the first clear one not at all. Others: as `clear`.
         """
         found = next((one for one in things if self.clear(one, host=host, margin=margin, floor=floor)), None)
         if found is not None:

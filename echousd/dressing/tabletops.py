@@ -60,13 +60,9 @@ class Surface:
     ) -> Thing | None:
         """Put a thing on the first of some places that is free; None where none is.
 
-        Arguments:
-            setting: decides what is free, and learns of the thing.
-            kind: what is put there.
-            at: places as shares (x, z) of the level's half extents from its middle, -1 to 1.
-            size: (3,) extents, None for usual ones.
-            turn: yaw in the object's frame, radians.
-            variant, count: of the thing; word: names its own random numbers.
+        `setting`: decides what is free, and learns of the thing. `kind`: what is put there. `at`: places as shares (x,
+        z) of the level's half extents from its middle, -1 to 1. `size`: (3,) extents, None for usual ones. `turn`: yaw
+        in the object's frame, radians. `variant`, `count`: of the thing; `word`: names its own random numbers.
         """
         rng = setting.rng(self.host.name, kind, word, f"{self.y:.2f}")
         size = usual_size(kind, rng) if size is None else size

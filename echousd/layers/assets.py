@@ -44,8 +44,7 @@ def refer(layer: Sdf.Layer, above: str, references: Mapping[str, str]) -> None:
 def as_asked(layer: Sdf.Layer, look: Look, theirs: Callable[[str], bool] = lambda path: False) -> Sdf.Layer:
     """A layer of ours with the unit, the up axis and the room's path that are asked for, changed in place.
 
-    Arguments:
-        theirs: as for `turn_up`.
+    `theirs`: as for `turn_up`.
     """
     rescale(layer, look.meters_per_unit, theirs)
     return move_room(turn_up(layer, theirs) if look.up_axis == "Z" else layer, look.room_path)
@@ -97,12 +96,8 @@ def geometry_layer(
 ) -> Sdf.Layer:
     """`<name>_geo`: a mesh for every part and, as guides, the colliders; their looks; what the furniture was made from.
 
-    Arguments:
-        name: of the asset.
-        forms: path of a part below the root -> its surface.
-        geometry: whose parts these are, and whose colliders are written.
-        data: customLayerData.
-        style: chooses the looks, which a room's materials layer overrides.
+    `forms`: path of a part below the root -> its surface. `geometry`: whose parts these are, and whose colliders are
+    written. `data`: customLayerData. `style`: chooses the looks, which a room's materials layer overrides.
     """
     stage = new_stage(name, ".usdc", data)
     root = UsdGeom.Xform.Define(stage, f"/{name}").GetPrim()
@@ -152,10 +147,8 @@ def component_layer(
 ) -> Sdf.Layer:
     """`<name>.usda`: kind, class, labels, extentsHint, physics, variants and the payload `./<name>_geo.usdc`.
 
-    Arguments:
-        name, category: words. extent: (2, 3) float, metres.
-        geometry: whose joints, colliders and mass are told.
-        data: customLayerData.
+    `name`, `category`: words. `extent`: (2, 3) float, metres. `geometry`: whose joints, colliders and mass are told.
+    `data`: customLayerData.
     """
     stage = new_stage(name, ".usda", data)
     prim = UsdGeom.Xform.Define(stage, f"/{name}").GetPrim()
@@ -206,9 +199,8 @@ def most_used(geometry: Geometry) -> list[str]:
 def slot_paths(root: str, slots: Mapping[str, Sequence[str]]) -> dict[str, str]:
     """Prim path -> material slot: the part's mesh where it has one slot, a subset of it for each of several.
 
-    Arguments:
-        root: path of the asset's root prim, or of an object that references it.
-        slots: path of a part below that -> its material slots.
+    `root`: path of the asset's root prim, or of an object that references it. `slots`: path of a part below that -> its
+    material slots.
     """
     out: dict[str, str] = {}
     for part, names in slots.items():

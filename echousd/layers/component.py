@@ -25,10 +25,9 @@ def files(
 ) -> dict[str, bytes]:
     """Path in the room's folder -> content: the component, our collider where it has none, a converted model.
 
-    Arguments:
-        name: of the asset. category: its word. geometry: with an original. data: customLayerData.
-        folder: where the component will lie, which the path of an original that stays where it is becomes relative to.
-        options: of what is ours; the model itself stays as it is.
+    `category`: its word. `geometry`: with an original. `data`: customLayerData. `folder`: where the component will lie,
+    which the path of an original that stays where it is becomes relative to. `options`: of what is ours; the model
+    itself stays as it is.
     """
     original = geometry.original
     assert original is not None

@@ -84,9 +84,8 @@ class Asset:
 def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None = None) -> dict[str, bytes]:
     """Relative path -> content of everything that a room consists of, except the preview and the manifest.
 
-    Arguments:
-        shelf: takes assets and images, which are not among the files then.
-        folder: where the room will lie, which paths of models outside of it are relative to; None = the present one.
+    `shelf`: takes assets and images, which are not among the files then. `folder`: where the room will lie, which paths
+    of models outside of it are relative to; None = the present one.
     """
     files: dict[str, bytes] = {}
     made: dict[str, Asset] = {}
@@ -214,8 +213,7 @@ def room_looks(
 ) -> tuple[dict[str, looks.Look], dict[str, str]]:
     """Material name -> look in a harmony, and prim path -> material name; the dressing binds its own.
 
-    Arguments:
-        made: the furniture. built: the shell. small: material slots of the dressing. harmony: of the whole room.
+    `made`: the furniture. `built`: the shell. `small`: material slots of the dressing. `harmony`: of the whole room.
     """
     table: dict[str, looks.Look] = {}
     bindings: dict[str, str] = {}

@@ -29,13 +29,9 @@ def dressing_layer(
 ) -> Sdf.Layer:
     """The layer; several layouts are variants of `layout`, as in the layer of the layout.
 
-    Arguments:
-        dressing: what is written.
-        slots: asset -> name of a part -> its material slots.
-        looks: material slot -> name of its material in the room.
-        data: customLayerData.
-        instances: things of one asset are instances of it.
-        taken: names of the prims of the furniture's relations.
+    `dressing`: what is written. `slots`: asset -> name of a part -> its material slots. `looks`: material slot -> name
+    of its material in the room. `data`: customLayerData. `instances`: things of one asset are instances of it. `taken`:
+    names of the prims of the furniture's relations.
     """
     stage = new_stage("Room", ".usda", data)
     room = stage.OverridePrim("/Room")

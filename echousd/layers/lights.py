@@ -53,10 +53,7 @@ def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
     Radiances are for a camera whose imaging ratio is 1 (UsdGeomCamera's default): a white surface under sky and panel
     comes to about 1, so nothing is blown out. Lamps are in the same scale, `NITS` to 1, from their lumens.
 
-    Arguments:
-        stage: receives the lights.
-        room: whose lamps and windows these are.
-        volume: of the room, metres.
+    `room`: whose lamps and windows these are. `volume`: of the room, metres.
     """
     UsdGeom.Scope.Define(stage, LIGHTS)
     sky = UsdLux.DomeLight.Define(stage, f"{LIGHTS}/sky")

@@ -43,10 +43,8 @@ def define_material(
 ) -> UsdShade.Material:
     """Author a UsdPreviewSurface material; a textured one reads `primvars:st`.
 
-    Arguments:
-        stage: receives the material. path: where. look: what it looks like.
-        harmony: whose colours its images have; "" = without images, for an asset that stands for itself.
-        tinted: leave colours to `tint_material`, which a variant calls.
+    `path`: where. `look`: what it looks like. `harmony`: whose colours its images have; "" = without images, for an
+    asset that stands for itself. `tinted`: leave colours to `tint_material`, which a variant calls.
     """
     material = UsdShade.Material.Define(stage, path)
     word = material_of(path.rpartition("/")[2])
@@ -128,13 +126,9 @@ def write_looks(
 ) -> None:
     """Define every look that is bound, and bind it.
 
-    Arguments:
-        stage: receives the opinions, as overs on whatever is bound.
-        looks: material name -> look.
-        bindings: prim path of a mesh or subset -> material name.
-        scope: path of the prim that the materials stand below.
-        also: names of looks that are defined, too, though another layer binds them.
-        harmony, tinted: see `define_material`.
+    `stage`: receives the opinions, as overs on whatever is bound. `looks`: material name -> look. `bindings`: prim path
+    of a mesh or subset -> material name. `scope`: path of the prim that the materials stand below. `also`: names of
+    looks that are defined, too, though another layer binds them. `harmony`, `tinted`: see `define_material`.
     """
     UsdGeom.Scope.Define(stage, scope)
     for name in sorted({*bindings.values(), *also}):
@@ -150,11 +144,9 @@ def write_palettes(
 ) -> None:
     """The variant set `palette` on a room or an asset: what each harmony makes of the materials.
 
-    Arguments:
-        stage: of the materials' layer, whose materials are defined and have no colours yet.
-        chosen: the harmony that the images are in.
-        looks: harmony -> material name -> look.
-        root: path of the prim that gets the set. scope: of the materials.
+    `stage`: of the materials' layer, whose materials are defined and have no colours yet. `chosen`: the harmony that
+    the images are in. `looks`: harmony -> material name -> look. `root`: path of the prim that gets the set. `scope`:
+    of the materials.
     """
     for harmony in authored(stage.GetPrimAtPath(root), "palette", looks, chosen):
         for name, look in sorted(looks[harmony].items()):  # bytes must not show the order of a set

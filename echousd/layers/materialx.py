@@ -22,10 +22,8 @@ Types = Sdf.ValueTypeNames
 def write_networks(stage: Usd.Stage, chosen: str, looks: Mapping[str, Mapping[str, Look]]) -> None:
     """Add a MaterialX network to every material of the room, and its colours to the variant set `palette`.
 
-    Arguments:
-        stage: of the materials' layer, whose materials and palettes are written.
-        chosen: the harmony that the images are in.
-        looks: harmony -> material name -> look.
+    `stage`: of the materials' layer, whose materials and palettes are written. `chosen`: the harmony that the images
+    are in. `looks`: harmony -> material name -> look.
     """
     for name, look in sorted(looks[chosen].items()):
         _network(stage, f"{LOOKS}/{name}", look, chosen)

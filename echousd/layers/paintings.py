@@ -131,11 +131,9 @@ def unfit_layer(looks: Sequence[Look], unfit: Mapping[str, Sequence[str]], data:
 def brought(root: Path | None, folder: Path) -> dict[str, dict[str, bytes]]:
     """The looks of a room that was edited, for another folder that it goes to.
 
-    Arguments:
-        root: root layer of the room that was edited, None = it was not. folder: where it goes.
-
-    Returns sublayer (`./looks/painted.usda`) -> path -> content of its files, strongest first; warns of those whose
-    place another look has.
+    `root`: root layer of the room that was edited, None = it was not. `folder`: where it goes. Returns sublayer
+    (`./looks/painted.usda`) -> path -> content of its files, strongest first; warns of those whose place another look
+    has.
     """
     if root is None or root.parent.resolve() == folder.resolve():
         return {}
@@ -162,13 +160,10 @@ def refitted(
 ) -> tuple[dict[str, bytes], list[str]]:
     """Keep the looks that a room's root layer names, and mute what of them fits no longer.
 
-    Arguments:
-        folder: of the room. root: name of its root layer in `files`.
-        files: path -> content of the room that will be written; the root layer is changed, `UNFIT` added if need be.
-        current: bytes of the root layer that lies there now.
-        edited: root layer of the room that this one was edited from, whose looks go along.
-
-    Returns the files of looks that go along, and a sentence for every object whose paint is muted.
+    `folder`: of the room. `root`: name of its root layer in `files`. `files`: path -> content of the room that will be
+    written; the root layer is changed, `UNFIT` added if need be. `current`: bytes of the root layer that lies there
+    now. `edited`: root layer of the room that this one was edited from, whose looks go along. Returns the files of
+    looks that go along, and a sentence for every object whose paint is muted.
     """
     along = brought(edited, folder)
     here = [path for path in attached(current) if (folder / path).is_file() and path not in along]

@@ -38,11 +38,9 @@ def movable(category: str) -> bool:
 def write_asset_physics(stage: Usd.Stage, asset: str, category: str, geometry: Geometry, slots: Iterable[str]) -> None:
     """Author colliders, mass and contact material of one asset as overs on its prims.
 
-    Arguments:
-        stage: of the component layer; its default prim is `/<asset>`, where `joints` has already written.
-        category: of the piece; what hangs gets colliders alone.
-        geometry: whose colliders and mass are told.
-        slots: its material slots, the one that most of it is made of first.
+    `stage`: of the component layer; its default prim is `/<asset>`, where `joints` has already written. `category`: of
+    the piece; what hangs gets colliders alone. `geometry`: whose colliders and mass are told. `slots`: its material
+    slots, the one that most of it is made of first.
     """
     root = f"/{asset}"
     cloth = category in SMALL and (SMALL[category].lies or SMALL[category].yields)  # stops nothing
@@ -80,9 +78,8 @@ def bind_contact(
 ) -> None:
     """Author a physics material and bind it on a prim for purpose `physics`.
 
-    Arguments:
-        path: of the prim that gets it. material: path of the material.
-        contact: static friction, dynamic friction, restitution. density: kg/m³.
+    `path`: of the prim that gets it. `material`: path of the material. `contact`: static friction, dynamic friction,
+    restitution. `density`: kg/m³.
     """
     made = UsdShade.Material.Define(stage, material)
     UsdSemantics.LabelsAPI.Apply(made.GetPrim(), "material").CreateLabelsAttr(["contact"])
@@ -99,9 +96,8 @@ def bind_contact(
 def write_physics(stage: Usd.Stage, shell: Mapping[str, str]) -> None:
     """Author the physics scene, and the colliders of the shell as overs.
 
-    Arguments:
-        stage: receives the opinions; its units are metres and kilograms, its up axis is Y below `/Room`.
-        shell: path of a solid mesh -> how it collides, a token of `physics:approximation`.
+    `stage`: receives the opinions; its units are metres and kilograms, its up axis is Y below `/Room`. `shell`: path of
+    a solid mesh -> how it collides, a token of `physics:approximation`.
     """
     scene = UsdPhysics.Scene.Define(stage, SCENE)
     scene.CreateGravityMagnitudeAttr(GRAVITY)

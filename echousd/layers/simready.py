@@ -39,11 +39,9 @@ class Packed:
 def pack(root: Path, out: Path, *, names: Sequence[str] = (), author: str = "EchoUSD", force: bool = False) -> Packed:
     """Write the furniture of a room as `<out>/<name>/usd/<name>.usda` with `payload/` and `.thumbs/256x256/` beside it.
 
-    Arguments:
-        root: root layer of a room of ours. out: folder of the packages. names: of assets; empty = all furniture.
-        author: who is told as the author. force: replace packages that are there.
-
-    Raises ValueError where there is no room of ours, no such asset, a package in the way, or nothing draws pictures.
+    `root`: root layer of a room of ours. `out`: folder of the packages. `names`: of assets; empty = all furniture.
+    `author`: who is told as the author. `force`: replace packages that are there. Raises ValueError where there is no
+    room of ours, no such asset, a package in the way, or nothing draws pictures.
     """
     check_written([root])
     manifest = find_manifest(root.parent, root.stem)

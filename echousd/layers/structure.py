@@ -96,8 +96,7 @@ def millwork(room: RoomData) -> Millwork:
 def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any], openings: Sequence[Opening] = ()) -> Sdf.Layer:
     """`layers/shell.usdc`: floor, walls and what is in them, as meshes, and what each opening of the graph became.
 
-    Arguments:
-        data: customLayerData. openings: of the graph, which point to their wall, frame and leaf.
+    `data`: customLayerData. `openings`: of the graph, which point to their wall, frame and leaf.
     """
     stage = new_stage("Room", ".usdc", data)
     for path in ("/Room", SHELL):

@@ -172,8 +172,7 @@ def draft_rounds(drafts: int) -> list[tuple[int, int]]:
 def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int | None) -> tuple[float, ...]:
     """What a layout leaves to be wished for, the worse first: what is broken or collides, conflicts, living faults.
 
-    Arguments:
-        seed: where nobody stated the openings, that by which they make way; None = they stay.
+    `seed`: where nobody stated the openings, that by which they make way; None = they stay.
     """
     from echousd.place.living import living_faults
 
@@ -319,9 +318,8 @@ def first_drafts(
     A sum's rounding depends on what is packed together: boxes are those of single runs but for at most a few units of
     `tensors.LENGTH`, and exactly the same for the same list of graphs and seeds.
 
-    Arguments:
-        model: any model; graphs that cannot be packed (with given boxes, or for other models) are sampled alone.
-        graphs, seeds: as many of each. steps: sampling steps, None for the model's own. guided: as `Draws`.
+    `model`: any model; graphs that cannot be packed (with given boxes, or for other models) are sampled alone.
+    `graphs`, `seeds`: as many of each. `steps`: sampling steps, None for the model's own. `guided`: as `Draws`.
     """
     found: dict[int, Boxes] = {}
     planned = [with_plan(graph, seed) for graph, seed in zip(graphs, seeds, strict=True)]

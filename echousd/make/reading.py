@@ -191,8 +191,7 @@ def _slots(mesh: UsdGeom.Mesh, faces: int) -> dict[str, np.ndarray]:
 def read_original(root: Usd.Prim, asset: str | None, category: str, manifest: Mapping[str, Any]) -> Geometry | None:
     """The geometry of an object that is somebody else's model, None where its model is not there (any more).
 
-    Arguments:
-        root: prim of the object. asset: name of its asset. category: its word. manifest: of the room.
+    `root`: prim of the object. `asset`: name of its asset. `category`: its word. `manifest`: of the room.
     """
     if not root or not asset:
         return None
@@ -250,8 +249,7 @@ def stands_z_up(room: Usd.Prim) -> bool:
 def in_our_frame(geometry: Geometry, metres: float, *, z_up: bool) -> Geometry:
     """A piece in the object's frame: metres, +Y up, +Z its front; joints have no places when read.
 
-    Arguments:
-        metres: per unit in which it was read. z_up: read with +Z up, -Y its front.
+    `metres`: per unit in which it was read. `z_up`: read with +Z up, -Y its front.
     """
     if metres == 1.0 and not z_up:
         return geometry

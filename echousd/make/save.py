@@ -147,8 +147,7 @@ def write_pictures(root: Path) -> list[Path]:
 def write_preview(root: Path, stage: Usd.Stage | None = None) -> Path | None:
     """Draw `<name>.png` beside the root layer; None where the extra `render` is not installed.
 
-    Arguments:
-        stage: of the root layer, where it is open.
+    `stage`: of the root layer, where it is open.
     """
     from echousd.draw.rendering import render_stage
     from echousd.draw.tracing import QUICK, RenderUnavailable

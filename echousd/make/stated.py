@@ -63,10 +63,7 @@ def with_locked_places(graph: SceneGraph, *files: Path | None) -> tuple[SceneGra
 def with_earlier_locks(graph: SceneGraph, earlier: Path | None) -> tuple[SceneGraph, tuple[str, ...]]:
     """The graph in which what the last generation has locked stays so, where the graph says nothing of its place.
 
-    Arguments:
-        earlier: folder or root layer of that generation.
-
-    Returns: the graph, and a sentence for each object that stays.
+    `earlier`: folder or root layer of that generation. Returns the graph, and a sentence for each object that stays.
     """
     from echousd.folder.manifest import find_manifest
 
@@ -146,8 +143,7 @@ def with_space(graph: SceneGraph) -> tuple[SceneGraph, tuple[str, ...]]:
 def fitted(graph: SceneGraph, arranged: Callable[[SceneGraph], Layout]) -> tuple[SceneGraph, Layout, tuple[str, ...]]:
     """The graph and its layout without the pieces that collide or stand in a door, and a sentence for each of them.
 
-    Arguments:
-        arranged: makes the best layout of a graph.
+    `arranged`: makes the best layout of a graph.
     """
     said: list[str] = []
     while True:

@@ -29,8 +29,7 @@ def approximation(category: str) -> str:
 def colliders_of(mesh: trimesh.Trimesh, category: str) -> tuple[Collider, ...]:
     """What a piece of furniture collides with: one hull of what is solid or convex, else convex pieces.
 
-    Arguments:
-        mesh: in the object's frame, metres. category: its word.
+    `mesh`: in the object's frame, metres. `category`: its word.
     """
     if approximation(category) == "convexHull" or mesh.is_convex:
         return (standing_hull(mesh),)
@@ -53,8 +52,7 @@ def colliders_of(mesh: trimesh.Trimesh, category: str) -> tuple[Collider, ...]:
 def convex_pieces(mesh: trimesh.Trimesh) -> list[trimesh.Trimesh]:
     """Hulls that follow a shape together (CoACD, Wei et al. 2022), the same ones each time; its hull where it is flat.
 
-    Arguments:
-        mesh: any; one that is not closed is closed by voxels.
+    `mesh`: any; one that is not closed is closed by voxels.
     """
     import coacd
 
@@ -88,8 +86,7 @@ def standing_hull(mesh: trimesh.Trimesh, name: str = "collider") -> Collider:
 def flush(mesh: trimesh.Trimesh, bounds: np.ndarray) -> trimesh.Trimesh:
     """The mesh stretched to a box, its lowest and highest points on two planes: it stands, and is stood on.
 
-    Arguments:
-        mesh: a collider, metres. bounds: (2, 3) float, what it must end with.
+    `mesh`: a collider, metres. `bounds`: (2, 3) float, what it must end with.
     """
     low, high = mesh.bounds
     share = (np.asarray(mesh.vertices) - low) / np.maximum(high - low, 1e-9)

@@ -134,10 +134,8 @@ def light_switch(opening: Opening, left_first: bool, length: float) -> trimesh.T
 def door_handle(opening: Opening, left_first: bool, wall: float = WALL) -> trimesh.Trimesh:
     """A lever on both sides of the leaf, away from the hinges.
 
-    Arguments:
-        opening: the door.
-        left_first: whether someone inside who looks at the wall has its first corner on the left.
-        wall: its thickness, metres.
+    `left_first`: whether someone inside who looks at the wall has its first corner on the left. `wall`: its thickness,
+    metres.
     """
     hinge_first = _hinge_first(opening, left_first)
     at = opening.end - LINING - 0.07 if hinge_first else opening.offset + LINING + 0.07

@@ -40,11 +40,9 @@ def assembled(
 ) -> Geometry:
     """The geometry of one piece of furniture: a part for each role (legs, top, back), drawers and doors in bodies.
 
-    Arguments:
-        solids: of a furniture program.
-        size: (3,) float, metres; the geometry fills it, in width or in depth alone where it is `round`.
-        faces: most triangles of all parts together; the finest detail that stays below is taken.
-        origin: provenance. description: what the solids were made from.
+    `solids`: of a furniture program. `size`: (3,) float, metres; the geometry fills it, in width or in depth alone
+    where it is `round`. `faces`: most triangles of all parts together; the finest detail that stays below is taken.
+    `origin`: provenance. `description`: what the solids were made from.
     """
     pieces = within_budget(solids, size, faces, round=round)
     used = [piece.solid for piece in pieces]
@@ -143,10 +141,8 @@ def convex_pieces(points: Sequence[np.ndarray], box: float, most: int = COLLIDER
     Where all of them would waste more than a small one is, and hulls are few enough, it stays alone: on a wedge from a
     panel to the mirror above it nothing could stand.
 
-    Arguments:
-        points: vertices (n, 3) of each solid, metres.
-        box: volume of the whole piece's box, m³; what is far smaller is no obstacle of its own.
-        most: number of hulls.
+    `points`: vertices (n, 3) of each solid, metres. `box`: volume of the whole piece's box, m³; what is far smaller is
+    no obstacle of its own. `most`: number of hulls.
     """
     groups = list(points)
     low, high = np.array([p.min(0) for p in points]), np.array([p.max(0) for p in points])

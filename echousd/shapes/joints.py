@@ -21,9 +21,7 @@ SLOPE, GRAVITY = 0.03, 9.81  # what rubs there holds it on a slope of 3 %; m/s²
 def write_joints(stage: Usd.Stage, asset: str, geometry: Geometry) -> None:
     """Author the variant set `articulation` on the root of an asset: nothing in `static`, bodies and joints else.
 
-    Arguments:
-        stage: receives the opinions; its root prim is `/<asset>`.
-        geometry: with joints.
+    `stage`: receives the opinions; its root prim is `/<asset>`. `geometry`: with joints.
     """
     root = stage.GetPrimAtPath(f"/{asset}")
     variants = root.GetVariantSets().AddVariantSet(ARTICULATION)
@@ -49,9 +47,8 @@ def write_joints(stage: Usd.Stage, asset: str, geometry: Geometry) -> None:
 def write_hinge(stage: Usd.Stage, leaf: str, joint: Joint, mass: Mass) -> None:
     """Author the variant set `articulation` on a door of the shell: nothing in `static`, its leaf on a hinge else.
 
-    Arguments:
-        stage: receives the opinions. leaf: prim path of what turns, whose origin is on the axis, below the door's prim.
-        joint: its anchor in the door's frame. mass: of the leaf.
+    `leaf`: prim path of what turns, whose origin is on the axis, below the door's prim. `joint`: its anchor in the
+    door's frame. `mass`: of the leaf.
     """
     door = leaf.rpartition("/")[0]
     variants = stage.OverridePrim(door).GetVariantSets().AddVariantSet(ARTICULATION)

@@ -36,9 +36,8 @@ GLOW = tuple(round(0.55 * c, 5) for c in linear("ffe2ae"))  # of a lamp's shade
 def look(palette: str, slot: str, voice: int = 0) -> Look:
     """The look of a material slot in a palette; raises KeyError for unknown words.
 
-    Arguments:
-        palette: a word of `HARMONIES`. slot: a word of `SLOTS`.
-        voice: odd ones take the second wood and cloth of the harmony, so that style groups can be told apart.
+    `palette`: a word of `HARMONIES`. `slot`: a word of `SLOTS`. `voice`: odd ones take the second wood and cloth of the
+    harmony, so that style groups can be told apart.
     """
     harmony, made = HARMONIES[palette], SLOTS[slot]
     word = SECOND.get(made.color, made.color) if voice % 2 else made.color

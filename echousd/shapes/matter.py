@@ -120,8 +120,7 @@ SOLID = 200.0  # kg/m³ of what nobody knows
 def mass_of(geometry: Geometry, category: str) -> Mass:
     """What a piece weighs and how that is spread: as its source knows it, else estimated from its category and shape.
 
-    Arguments:
-        geometry: of the piece. category: its word, which has a density of the piece's whole box.
+    `geometry`: of the piece. `category`: its word, which has a density of the piece's whole box.
 
     An estimate takes the matter to fill the convex hulls of the colliders evenly; it is within what real ones weigh.
     """
@@ -204,8 +203,7 @@ STEADY = 0.75  # share of its base, drawn together about its middle, that the ce
 def ballasted(mass: Mass, solids: Sequence[np.ndarray]) -> Mass:
     """The mass with weight added in the middle of the base until the centre is well above it; itself where it is.
 
-    Arguments:
-        solids: (n, 3) float corners of the solids of a piece that stands, in its frame, metres, +Y up.
+    `solids`: (n, 3) float corners of the solids of a piece that stands, in its frame, metres, +Y up.
     """
     points = np.concatenate(list(solids))
     plan = shapely.convex_hull(shapely.multipoints(points[points[:, 1] < points[:, 1].min() + SOLE][:, [0, 2]]))

@@ -21,9 +21,8 @@ SIMPLER = (0.0, 2e-4, 5e-4, 1e-3, 2e-3)  # metres that a closed surface may move
 def merged(geometry: Mapping[str, Geometry], how: str, faces: int) -> dict[str, Geometry]:
     """Object name -> its geometry with fewer meshes; objects that share geometry go on sharing.
 
-    Arguments:
-        how: `parts` as they are, `bodies` one mesh for what moves together, `closed` one closed surface for it.
-        faces: budget of a closed surface, which is simplified by up to 2 mm to keep it.
+    `how`: `parts` as they are, `bodies` one mesh for what moves together, `closed` one closed surface for it. `faces`:
+    budget of a closed surface, which is simplified by up to 2 mm to keep it.
     """
     if how == "parts":
         return dict(geometry)
@@ -77,9 +76,7 @@ def _slot_of_faces(part: Part) -> np.ndarray:
 def closed_surface(parts: Sequence[Part], faces: int) -> tuple[trimesh.Trimesh, np.ndarray]:
     """The union of all closed solids of some parts, and the material slot of every face.
 
-    Arguments:
-        faces: the surface is simplified until it has no more, by 2 mm at most; then its smallest solids are left out.
-
+    `faces`: the surface is simplified until it has no more, by 2 mm at most; then its smallest solids are left out.
     Raises ValueError for parts that are not closed.
     """
 
@@ -142,11 +139,8 @@ class CleanMesh:
 def mesh_from_shape(grid: Any, size: Any, *, faces: int = FACES) -> CleanMesh:
     """The mesh of one generated shape.
 
-    Arguments:
-        grid: (n, n, n) float TSDF in its normalised box, negative inside, see `echomodel.tsdf`.
-        size: (3,) float, extents of the object's box in metres; the mesh fills it on every axis, bottom centre at 0.
-        faces: face budget.
-
+    `grid`: (n, n, n) float TSDF in its normalised box, negative inside, see `echomodel.tsdf`. `size`: (3,) float,
+    extents of the object's box in metres; the mesh fills it on every axis, bottom centre at 0. `faces`: face budget.
     Raises ValueError for a grid without any surface and for sizes that are not positive.
     """
     extent = np.asarray(size, float)

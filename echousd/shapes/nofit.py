@@ -16,8 +16,7 @@ Solids = Sequence[np.ndarray]
 def forbidden(moving: np.ndarray, fixed: np.ndarray) -> BaseGeometry | None:
     """Moves (x, z) in plan by which one convex solid would run into another; None where it never does.
 
-    Arguments:
-        moving, fixed: (n, 3) float, corners in the room, metres, +Y up.
+    `moving`, `fixed`: (n, 3) float, corners in the room, metres, +Y up.
 
     The moves are the Minkowski difference of the two at height 0, a convex polygon.
     """

@@ -116,15 +116,12 @@ def equal_sizes(
 ) -> np.ndarray:
     """(n, 3) sizes in which objects of one category and one style group are exactly alike.
 
-    Those that are nearly alike get the smallest extents among them, very different ones the smallest piece's, and
-    those of a set whose size is given that size. Lamps of the ceiling hang as low as the lowest of them.
+    Those that are nearly alike get the smallest extents among them, very different ones the smallest piece's, and those
+    of a set whose size is given that size. Lamps of the ceiling hang as low as the lowest of them.
 
-    Arguments:
-        names, categories: n words each.
-        styles: object name -> style, see `style_groups`.
-        size: (n, 3) float, metres.
-        free: (n,) bool, sizes that may change.
-        unequal: pairs (i, j), i < j, that the graph tells to differ in size.
+    `names`, `categories`: n words each. `styles`: object name -> style, see `style_groups`. `size`: (n, 3) float,
+    metres. `free`: (n,) bool, sizes that may change. `unequal`: pairs (i, j), i < j, that the graph tells to differ in
+    size.
     """
     out = np.array(size, float)
     apart = set(unequal)
@@ -166,10 +163,8 @@ def shared_assets(
     Objects agree when they have one category and one style group, and their sizes are equal (`equal_sizes`): what is
     told alike is alike, whatever the model draws for each of them.
 
-    Arguments:
-        names, categories: n words each.
-        styles: object name -> style, see `style_groups`.
-        size: (n, 3) float, metres.
+    `names`, `categories`: n words each. `styles`: object name -> style, see `style_groups`. `size`: (n, 3) float,
+    metres.
     """
     owners: list[int] = []
     out: dict[str, str] = {}
@@ -190,9 +185,7 @@ def asset_names(owners: Mapping[str, str], categories: Mapping[str, str]) -> dic
 
     A shared asset must not carry the name of one of its users, which other software shows under all of them.
 
-    Arguments:
-        owners: object name -> object whose asset it uses, see `shared_assets`.
-        categories: object name -> category.
+    `owners`: object name -> object whose asset it uses, see `shared_assets`. `categories`: object name -> category.
     """
     taken = set(owners)
     named: dict[str, str] = {}

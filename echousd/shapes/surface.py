@@ -43,12 +43,9 @@ def surface(
 ) -> Surface:
     """A mesh with normals and texture coordinates.
 
-    Arguments:
-        mesh: triangles in metres.
-        groups: material group -> face numbers.
-        atlas: unwrap without overlaps into the unit square (xatlas, extra `texture`) instead of projecting along the
-            axes, see `_laid_out`.
-        crease: neighbours that fold more sharply than this keep a hard edge, radians.
+    `mesh`: triangles in metres. `groups`: material group -> face numbers. `atlas`: unwrap without overlaps into the
+    unit square (xatlas, extra `texture`) instead of projecting along the axes, see `_laid_out`. `crease`: neighbours
+    that fold more sharply than this keep a hard edge, radians.
     """
     return surfaces([(mesh, groups, crease)], atlas=atlas)[0]
 
@@ -128,8 +125,7 @@ def _laid_out(
     the longer side of every board (fibres do), and boards begin at different places of the picture. Slots whose picture
     is of the whole thing get all of it on the side that they show.
 
-    Arguments:
-        groups: slots and the faces of each, of one mesh. owner: (f,) int, the number of each face's mesh.
+    `groups`: slots and the faces of each, of one mesh. `owner`: (f,) int, the number of each face's mesh.
     """
     axis, way = facing_axis(points[faces])
     st = _projected(points[faces], axis, way)

@@ -226,12 +226,9 @@ def floor_polygon(
 ) -> np.ndarray:
     """Corners of the floor, counter-clockwise seen from above (x to the right, z towards the viewer).
 
-    Arguments:
-        polygon: (k, 2) float x and z of the corners, or None.
-        size: x and z extents of a rectangle around the origin, or None; used where there is no polygon.
-        boxes: (n, 2) float x and z of the furniture's corners, from which the floor comes where nothing else says.
-
-    Raises ValueError for a polygon that crosses itself or has no area.
+    `polygon`: (k, 2) float x and z of the corners, or None. `size`: x and z extents of a rectangle around the origin,
+    or None; used where there is no polygon. `boxes`: (n, 2) float x and z of the furniture's corners, from which the
+    floor comes where nothing else says. Raises ValueError for a polygon that crosses itself or has no area.
     """
     if polygon is not None and len(polygon):
         shape = shapely.Polygon(np.asarray(polygon, float))

@@ -59,10 +59,9 @@ def cleared(
     What is locked or has a position stays, and no relation that holds is broken: where only that would help, the two
     stay where they are and are among the collisions. Living rules are kept before distances.
 
-    Arguments:
-        graph: N objects. boxes: N boxes in its order. geometry: name -> solids of each, in its own frame.
-        floor: (k, 2) float, corners of the floor, metres.
-        walls: whether there are any; their sills and casings reach into the room.
+    `graph`: N objects. `boxes`: N boxes in its order. `geometry`: name -> solids of each, in its own frame. `floor`:
+    (k, 2) float, corners of the floor, metres. `walls`: whether there are any; their sills and casings reach into the
+    room.
     """
     scene = scene_of(graph, boxes, geometry, floor, walls=walls)
     holds = frozenset(_unbroken(graph, boxes))
@@ -124,8 +123,7 @@ def _moved_apart(
 
     What a thing would leave behind goes with it: a nightstand with its bed.
 
-    Arguments:
-        holds: numbers of the relations that must hold afterwards as well.
+    `holds`: numbers of the relations that must hold afterwards as well.
     """
     best: tuple[float, ...] | None = None
     found = None
@@ -169,8 +167,7 @@ def _unbroken(graph: SceneGraph, boxes: Boxes) -> set[int]:
 def _with_partners(scene: Scene, graph: SceneGraph, group: list[int], broken: set[int] | frozenset[int]) -> list[int]:
     """A group and what it would leave behind: all whom some relations name and who are free, with what stands on them.
 
-    Arguments:
-        broken: numbers of verdicts, those of the relations and after them those of the placements.
+    `broken`: numbers of verdicts, those of the relations and after them those of the placements.
     """
     out = list(group)
     told: tuple[Relation | Placed, ...] = (*graph.relations, *graph.placements)

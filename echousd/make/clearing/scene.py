@@ -106,8 +106,7 @@ class Scene:
     def space(self, group: Sequence[int], moves: np.ndarray, gap: float, *, pushing: bool = False) -> BaseGeometry:
         """Further moves (x, z) of a group at which it is clear of everything by `gap` metres and stays on the floor.
 
-        Arguments:
-            pushing: whether it only has to be clear of what stays where it is.
+        `pushing`: whether it only has to be clear of what stays where it is.
         """
         space: BaseGeometry = shapely.Point(-moves[group[0]]).buffer(REACH)
         taken = []

@@ -71,9 +71,8 @@ def geometry_of(
 ) -> Geometry:
     """The geometry of a model that fills `size` metres; raises ValueError that names its file.
 
-    Arguments:
-        model, record: the model's file and its row. category: of the object. source: name of the shape source.
-        collect: take a USD model along with all that it needs, instead of referring to where it lies.
+    `model`, `record`: the model's file and its row. `category`: of the object. `source`: name of the shape source.
+    `collect`: take a USD model along with all that it needs, instead of referring to where it lies.
     """
     found = measure(model)
     pose = record.pose(size)
@@ -384,8 +383,7 @@ def _number(value: Any, otherwise: float) -> float:
 def outward(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(f, 3) int, the faces with every piece turned that is nearly closed, evenly wound and inside out.
 
-    Arguments:
-        points: (v, 3) float. faces: (f, 3) int, counter-clockwise seen from outside.
+    `points`: (v, 3) float. `faces`: (f, 3) int, counter-clockwise seen from outside.
     """
     extent = float(np.ptp(points, axis=0).max()) or 1.0
     place = np.unique(np.rint(points / (SAME * extent)).astype(np.int64), axis=0, return_inverse=True)[1].ravel()

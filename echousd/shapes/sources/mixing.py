@@ -110,11 +110,7 @@ def default_source(model: RoomModel | None) -> str:
 
 
 def sources_of(graph: SceneGraph, shapes: str) -> dict[str, str]:
-    """Object name -> name of its source.
-
-    Arguments:
-        shapes: the source of objects that say nothing.
-    """
+    """Object name -> name of its source. `shapes`: the source of objects that say nothing."""
     return {node.name: source_of(node, shapes) for node in graph.nodes}
 
 

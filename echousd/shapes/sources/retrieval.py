@@ -64,9 +64,8 @@ def check_files(
 ) -> None:
     """Raises ValueError for an asset of a graph that was read whose file lies elsewhere than the graph's own.
 
-    Arguments:
-        graph: as `anchored` gives it. folder: of the graph's file. outside: folders that are allowed besides.
-        file: what the error calls the graph. among: names of the objects that are looked at, None = all.
+    `graph`: as `anchored` gives it. `folder`: of the graph's file. `outside`: folders that are allowed besides. `file`:
+    what the error calls the graph. `among`: names of the objects that are looked at, None = all.
     """
     for node in graph.nodes:
         if node.asset is not None and is_file(node.asset) and (among is None or node.name in among):
@@ -97,8 +96,7 @@ def given_pieces(
 ) -> Retrieved:
     """The models that the graph names itself, with their real sizes; raises ValueError that names object and file.
 
-    Arguments:
-        shapes: the room's source. among: names of the objects that are looked at, None = all. timer: is told.
+    `shapes`: the room's source. `among`: names of the objects that are looked at, None = all.
     """
     nodes = [node for node in graph.nodes if among is None or node.name in among]
     named = [node for node in nodes if node.asset is not None]
@@ -147,10 +145,9 @@ def retrieved(
 ) -> Retrieved:
     """The models of all objects that come from a library, and the sizes of those that their boxes do not fit.
 
-    Arguments:
-        boxes: n boxes in the order of the nodes. styles: object name -> style. shapes: the room's source.
-        given: what `given_pieces` found. nearness: as for `choose`. among, timer: as for `given_pieces`.
-        palette: harmony of the room, whose colours models shall go with; "" = that which the seed chooses.
+    `boxes`: n boxes in the order of the nodes. `styles`: object name -> style. `shapes`: the room's source. `given`:
+    what `given_pieces` found. `nearness`: as for `choose`. `among`, `timer`: as for `given_pieces`. `palette`: harmony
+    of the room, whose colours models shall go with; "" = that which the seed chooses.
     """
     wanted = [
         i

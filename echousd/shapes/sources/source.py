@@ -58,9 +58,8 @@ class Shapes:
 def per_asset(request: ShapeRequest, make: Callable[[int], Geometry], *, alike: bool = True) -> Shapes:
     """Geometry for the first object of each group that can share an asset (`shared_assets`).
 
-    Arguments:
-        make: number of an object in the graph -> its geometry.
-        alike: False gives every object geometry of its own, for comparisons.
+    `make`: number of an object in the graph -> its geometry. `alike`: False gives every object geometry of its own, for
+    comparisons.
     """
     rows, names = request.rows, request.graph.names
     chosen = [names[i] for i in rows]
