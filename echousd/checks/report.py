@@ -218,12 +218,9 @@ class CheckReport:
 
 
 def check(
-    stage: Usd.Stage | str | os.PathLike[str],
-    *,
-    rules: str = "strict",
-    layout: int | None = None,
+    stage: Usd.Stage | str | os.PathLike[str], *, rules: str = "strict", layout: int | None = None,
     settle: bool = False,
-) -> CheckReport:
+) -> CheckReport:  # fmt: skip
     """Check every room on a stage, in all of its layouts.
 
     Arguments:

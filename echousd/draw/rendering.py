@@ -28,14 +28,9 @@ FRAMES = (2, 360)  # pictures that a turn may have
 
 
 def render(
-    room: str | Path,
-    *,
-    view: str = HERO,
-    size: int = 512,
-    colors: str = "materials",
-    rays: int = FINE,
+    room: str | Path, *, view: str = HERO, size: int = 512, colors: str = "materials", rays: int = FINE,
     layout: int | str | None = None,
-) -> Image.Image:
+) -> Image.Image:  # fmt: skip
     """A picture of the room in a file, in one of its layouts (None: the one that it shows); see `render_stage`.
 
     Raises ValueError where it cannot be opened, or has no such layout.
@@ -96,14 +91,9 @@ def render_stage(
 
 
 def render_turn(
-    path: str | Path,
-    *,
-    frames: int = 24,
-    size: int = 320,
-    colors: str = "materials",
-    rays: int = QUICK,
+    path: str | Path, *, frames: int = 24, size: int = 320, colors: str = "materials", rays: int = QUICK,
     layout: int | str | None = None,
-) -> list[Image.Image]:
+) -> list[Image.Image]:  # fmt: skip
     """Pictures of the room in a file from all around, the walls towards the camera left out; see `render`.
 
     Raises ValueError as `render` does, and for a number of frames outside `FRAMES`.

@@ -119,13 +119,9 @@ def framed(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
 
 
 def inside_view(
-    floor: np.ndarray,
-    furniture: Furniture,
-    height: float,
-    hung: Furniture | None = None,
-    openings: Furniture | None = None,
-    main: int | None = None,
-) -> tuple[np.ndarray, float]:
+    floor: np.ndarray, furniture: Furniture, height: float, hung: Furniture | None = None,
+    openings: Furniture | None = None, main: int | None = None,
+) -> tuple[np.ndarray, float]:  # fmt: skip
     """Camera to world (4, 4) float, `shifted`, and focal length in mm of a view inside a room, its main piece whole.
 
     Of all eyes, headings and lenses those count that have the main piece whole in the picture; of these the one that

@@ -47,17 +47,9 @@ class Surface:
         return sum(len(self.above.query(line, predicate="intersects")) > 0 for line in lines) > len(lines) / 2
 
     def put(
-        self,
-        setting: Setting,
-        kind: str,
-        at: Sequence[tuple[float, float]],
-        *,
-        size: np.ndarray | None = None,
-        turn: float = 0.0,
-        variant: int | None = None,
-        count: int = 1,
-        word: str = "",
-    ) -> Thing | None:
+        self, setting: Setting, kind: str, at: Sequence[tuple[float, float]], *, size: np.ndarray | None = None,
+        turn: float = 0.0, variant: int | None = None, count: int = 1, word: str = "",
+    ) -> Thing | None:  # fmt: skip
         """Put a thing on the first of some places that is free; None where none is.
 
         `setting`: decides what is free, and learns of the thing. `kind`: what is put there. `at`: places as shares (x,

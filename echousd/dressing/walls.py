@@ -385,13 +385,9 @@ def _roomiest(setting: Setting) -> Iterable[Wall]:
 
 
 def _hang_first(
-    setting: Setting,
-    one: Thing,
-    spots: Iterable[tuple[Wall, float]],
-    low: float,
-    above: float,
+    setting: Setting, one: Thing, spots: Iterable[tuple[Wall, float]], low: float, above: float,
     wanted: Callable[[Setting, Wall, Thing], bool] = lambda setting, wall, thing: True,
-) -> Thing | None:
+) -> Thing | None:  # fmt: skip
     """Hang a thing at the first of some shares of walls' lengths where it fits and is wanted; None where none is."""
     for wall, share in spots:
         found = _hung_up(setting, wall, share, one, low, above)

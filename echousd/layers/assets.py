@@ -139,12 +139,8 @@ def coarse_layer(name: str, forms: Mapping[str, Surface], data: Mapping[str, Any
 
 
 def component_layer(
-    name: str,
-    category: str,
-    extent: np.ndarray,
-    geometry: Geometry,
-    data: Mapping[str, Any],
-) -> Sdf.Layer:
+    name: str, category: str, extent: np.ndarray, geometry: Geometry, data: Mapping[str, Any],
+) -> Sdf.Layer:  # fmt: skip
     """`<name>.usda`: kind, class, labels, extentsHint, physics, variants and the payload `./<name>_geo.usdc`.
 
     `name`, `category`: words. `extent`: (2, 3) float, metres. `geometry`: whose joints, colliders and mass are told.

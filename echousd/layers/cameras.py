@@ -42,15 +42,9 @@ def opening_boxes(room: RoomData) -> Furniture:
 
 
 def write_cameras(
-    stage: Usd.Stage,
-    volume: Volume,
-    points: np.ndarray,
-    furniture: Furniture,
-    walled: np.ndarray | None = None,
-    hung: Furniture | None = None,
-    openings: Furniture | None = None,
-    main: int | None = None,
-) -> None:
+    stage: Usd.Stage, volume: Volume, points: np.ndarray, furniture: Furniture, walled: np.ndarray | None = None,
+    hung: Furniture | None = None, openings: Furniture | None = None, main: int | None = None,
+) -> None:  # fmt: skip
     """Author `/Room/Cameras/top` (from afar, -Z up in the picture) and `/Room/Cameras/perspective`.
 
     Arguments:

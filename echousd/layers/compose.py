@@ -205,12 +205,9 @@ def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.L
 
 
 def room_looks(
-    room: RoomData,
-    made: Mapping[str, Asset],
-    built: Sequence[structure.ShellPrim],
-    small: Collection[str],
+    room: RoomData, made: Mapping[str, Asset], built: Sequence[structure.ShellPrim], small: Collection[str],
     harmony: str,
-) -> tuple[dict[str, looks.Look], dict[str, str]]:
+) -> tuple[dict[str, looks.Look], dict[str, str]]:  # fmt: skip
     """Material name -> look in a harmony, and prim path -> material name; the dressing binds its own.
 
     `made`: the furniture. `built`: the shell. `small`: material slots of the dressing. `harmony`: of the whole room.
@@ -239,13 +236,9 @@ def room_looks(
 
 
 def materials_layer(
-    room: RoomData,
-    made: Mapping[str, Asset],
-    built: Sequence[structure.ShellPrim],
-    small: Mapping[str, Asset],
-    bindings: Mapping[str, str],
-    harmony: str,
-) -> Sdf.Layer:
+    room: RoomData, made: Mapping[str, Asset], built: Sequence[structure.ShellPrim], small: Mapping[str, Asset],
+    bindings: Mapping[str, str], harmony: str,
+) -> Sdf.Layer:  # fmt: skip
     """`layers/materials.usda`: materials, bindings, and the variant set `palette`; arguments as for `room_looks`."""
     stage = _room_stage(room, "materials")
     stage.OverridePrim("/Room")

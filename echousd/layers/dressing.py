@@ -19,14 +19,9 @@ from echousd.stage.paths import DRESSING, class_path
 
 
 def dressing_layer(
-    dressing: Dressing,
-    slots: Mapping[str, Mapping[str, Sequence[str]]],
-    looks: Mapping[str, str],
-    data: Mapping[str, Any],
-    *,
-    instances: bool = False,
-    taken: Collection[str] = (),
-) -> Sdf.Layer:
+    dressing: Dressing, slots: Mapping[str, Mapping[str, Sequence[str]]], looks: Mapping[str, str],
+    data: Mapping[str, Any], *, instances: bool = False, taken: Collection[str] = (),
+) -> Sdf.Layer:  # fmt: skip
     """The layer; several layouts are variants of `layout`, as in the layer of the layout.
 
     `dressing`: what is written. `slots`: asset -> name of a part -> its material slots. `looks`: material slot -> name
@@ -55,13 +50,9 @@ def dressing_layer(
 
 
 def _write(
-    stage: Usd.Stage,
-    things: Mapping[str, Thing],
-    dressing: Dressing,
-    slots: Mapping[str, Mapping[str, Sequence[str]]],
-    looks: Mapping[str, str],
-    alike: Collection[str],
-) -> None:
+    stage: Usd.Stage, things: Mapping[str, Thing], dressing: Dressing, slots: Mapping[str, Mapping[str, Sequence[str]]],
+    looks: Mapping[str, str], alike: Collection[str],
+) -> None:  # fmt: skip
     group = UsdGeom.Xform.Define(stage, DRESSING).GetPrim()
     Usd.ModelAPI(group).SetKind(Kind.Tokens.group)
     for name, thing in things.items():

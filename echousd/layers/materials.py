@@ -116,14 +116,9 @@ def tint_material(stage: Usd.Stage, path: str, base: Look, look: Look) -> None:
 
 
 def write_looks(
-    stage: Usd.Stage,
-    looks: Mapping[str, Look],
-    bindings: Mapping[str, str],
-    scope: str = LOOKS,
-    also: Iterable[str] = (),
-    harmony: str = "",
-    tinted: bool = False,
-) -> None:
+    stage: Usd.Stage, looks: Mapping[str, Look], bindings: Mapping[str, str], scope: str = LOOKS,
+    also: Iterable[str] = (), harmony: str = "", tinted: bool = False,
+) -> None:  # fmt: skip
     """Define every look that is bound, and bind it.
 
     `stage`: receives the opinions, as overs on whatever is bound. `looks`: material name -> look. `bindings`: prim path

@@ -45,14 +45,9 @@ from echousd.tensors import graph_batch, one_thread
 
 @takes_options(OF_NEW)
 def edit(
-    room: str | Path,
-    graph: SceneGraph,
-    *,
-    model: RoomModel | None = None,
-    outside: Sequence[str | Path] = (),
-    progress: StageListener | None = None,
-    **given: Any,
-) -> Room:
+    room: str | Path, graph: SceneGraph, *, model: RoomModel | None = None, outside: Sequence[str | Path] = (),
+    progress: StageListener | None = None, **given: Any,
+) -> Room:  # fmt: skip
     """A room whose graph was changed; objects that the change does not touch keep box, mesh and files.
 
     New objects and objects of another category get boxes and shapes, subjects of new relations (and what stands on

@@ -19,14 +19,9 @@ class Room(RoomData):
     """A room that can be saved, opened as a stage and looked at; its data are those of `RoomData`."""
 
     def save(
-        self,
-        folder: str | Path,
-        *,
-        force: bool = False,
-        preview: bool | None = None,
-        wait: bool = False,
+        self, folder: str | Path, *, force: bool = False, preview: bool | None = None, wait: bool = False,
         store: str | Path | None = None,
-    ) -> Path:
+    ) -> Path:  # fmt: skip
         """Write the layered room and return the path of its root layer.
 
         Arguments:

@@ -101,18 +101,10 @@ def sample_boxes(
 
 
 def best_boxes(
-    model: RoomModel,
-    graph: SceneGraph,
-    styles: Mapping[str, str],
-    draws: Draws,
-    *,
-    drafts: int = 1,
-    place: bool = True,
-    sized: Boxes | None = None,
-    first: Boxes | None = None,
-    proposed: bool = False,
+    model: RoomModel, graph: SceneGraph, styles: Mapping[str, str], draws: Draws, *, drafts: int = 1,
+    place: bool = True, sized: Boxes | None = None, first: Boxes | None = None, proposed: bool = False,
     timer: StageTimer,
-) -> tuple[Boxes, tuple[str, ...]]:
+) -> tuple[Boxes, tuple[str, ...]]:  # fmt: skip
     """The best of several drafts after place: kept relations first, then collisions, then the living rules.
 
     Further drafts are drawn, a few at once, only where those before leave something to be wished for.
@@ -306,13 +298,9 @@ NODES = 512  # of one pass of the network: larger products, bounded memory
 
 
 def first_drafts(
-    model: RoomModel,
-    graphs: Sequence[SceneGraph],
-    seeds: Sequence[int],
-    *,
-    steps: int | None = None,
+    model: RoomModel, graphs: Sequence[SceneGraph], seeds: Sequence[int], *, steps: int | None = None,
     guided: bool = False,
-) -> list[Boxes]:
+) -> list[Boxes]:  # fmt: skip
     """The first draft of the first layout of every graph, as `generate` takes it (`first`).
 
     A sum's rounding depends on what is packed together: boxes are those of single runs but for at most a few units of

@@ -54,19 +54,11 @@ from echousd.tensors import graph_batch, one_thread
 
 @takes_options()
 def generate(
-    graph: SceneGraph | str | Path,
-    *,
-    room: str | None = None,
-    options: RoomOptions | None = None,
-    model: RoomModel | None = None,
-    earlier: Path | None = None,
-    outside: Sequence[str | Path] = (),
-    boxes: Boxes | None = None,
-    meshes: Mapping[str, str | Path] | None = None,
-    progress: StageListener | None = None,
-    first: Boxes | None = None,
-    **given: Any,
-) -> Room:
+    graph: SceneGraph | str | Path, *, room: str | None = None, options: RoomOptions | None = None,
+    model: RoomModel | None = None, earlier: Path | None = None, outside: Sequence[str | Path] = (),
+    boxes: Boxes | None = None, meshes: Mapping[str, str | Path] | None = None, progress: StageListener | None = None,
+    first: Boxes | None = None, **given: Any,
+) -> Room:  # fmt: skip
     """Make a room from a scene graph.
 
     A floor that nobody stated is proposed before the layout is drawn, and doors and windows that nobody stated are

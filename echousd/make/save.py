@@ -35,14 +35,9 @@ if TYPE_CHECKING:
 
 
 def save_room(
-    room: RoomData,
-    folder: Path,
-    *,
-    force: bool = False,
-    preview: bool | None = None,
-    wait: bool = False,
+    room: RoomData, folder: Path, *, force: bool = False, preview: bool | None = None, wait: bool = False,
     store: str | Path | None = None,
-) -> Path:
+) -> Path:  # fmt: skip
     """Write the layered room and its preview; see `Room.save`."""
     with folders.held(folder, wait=wait):
         root = save_layers(room, folder, force=force, store=store)

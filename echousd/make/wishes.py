@@ -148,13 +148,9 @@ ONE_IS_ENOUGH = ("bed", "sofa", "screen")  # roles of which a room that has one 
 
 
 def adopted(
-    file: Path,
-    *,
-    room: str | None = None,
-    add: Sequence[str] | None = None,
-    relate: Sequence[str] = (),
+    file: Path, *, room: str | None = None, add: Sequence[str] | None = None, relate: Sequence[str] = (),
     names: bool = False,
-) -> SceneGraph:
+) -> SceneGraph:  # fmt: skip
     """The graph of a stage of somebody else's, completed: its objects are locked where they stand and refer to it.
 
     Arguments:

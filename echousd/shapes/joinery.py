@@ -30,14 +30,9 @@ SMALL = 0.002  # share of its box below which a solid alone is no obstacle
 
 
 def assembled(
-    solids: Sequence[Solid],
-    size: np.ndarray,
-    *,
-    faces: int,
-    origin: Origin,
-    description: tuple[float, ...] = (),
+    solids: Sequence[Solid], size: np.ndarray, *, faces: int, origin: Origin, description: tuple[float, ...] = (),
     round: bool = False,
-) -> Geometry:
+) -> Geometry:  # fmt: skip
     """The geometry of one piece of furniture: a part for each role (legs, top, back), drawers and doors in bodies.
 
     `solids`: of a furniture program. `size`: (3,) float, metres; the geometry fills it, in width or in depth alone

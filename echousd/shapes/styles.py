@@ -107,13 +107,9 @@ def _sets(graph: SceneGraph, group_of: Sequence[int]) -> list[tuple[int, int]]:
 
 
 def equal_sizes(
-    names: Sequence[str],
-    categories: Sequence[str],
-    styles: Mapping[str, str],
-    size: np.ndarray,
-    free: np.ndarray,
+    names: Sequence[str], categories: Sequence[str], styles: Mapping[str, str], size: np.ndarray, free: np.ndarray,
     unequal: Collection[tuple[int, int]] = (),
-) -> np.ndarray:
+) -> np.ndarray:  # fmt: skip
     """(n, 3) sizes in which objects of one category and one style group are exactly alike.
 
     Those that are nearly alike get the smallest extents among them, very different ones the smallest piece's, and those

@@ -35,13 +35,9 @@ class Cleared:
 
 
 def cleared_layouts(
-    graphs: Sequence[SceneGraph],
-    layouts: Sequence[Boxes],
-    geometry: Mapping[str, Geometry],
-    floor: np.ndarray,
-    *,
+    graphs: Sequence[SceneGraph], layouts: Sequence[Boxes], geometry: Mapping[str, Geometry], floor: np.ndarray, *,
     walls: bool,
-) -> tuple[list[Boxes], tuple[LayoutOutcome, ...]]:
+) -> tuple[list[Boxes], tuple[LayoutOutcome, ...]]:  # fmt: skip
     """Every layout `cleared`, and what became of it; one graph a layout, which says what must stay."""
     found = [cleared(graph, boxes, geometry, floor, walls=walls) for graph, boxes in zip(graphs, layouts, strict=True)]
     outcomes = [
@@ -111,14 +107,9 @@ def _at(boxes: Boxes, moves: np.ndarray) -> Boxes:
 
 
 def _moved_apart(
-    scene: Scene,
-    graph: SceneGraph,
-    boxes: Boxes,
-    floor: np.ndarray,
-    moves: np.ndarray,
-    pair: tuple[int, int],
+    scene: Scene, graph: SceneGraph, boxes: Boxes, floor: np.ndarray, moves: np.ndarray, pair: tuple[int, int],
     holds: frozenset[int],
-) -> np.ndarray | None:
+) -> np.ndarray | None:  # fmt: skip
     """The moves with one of a pair moved out of everything, where most holds and it goes least far; None = nowhere.
 
     What a thing would leave behind goes with it: a nightstand with its bed.

@@ -56,15 +56,9 @@ def chosen_models(request: ShapeRequest, source: str) -> Shapes:
 
 
 def shape_nearness(
-    graph: SceneGraph,
-    boxes: Boxes,
-    shapes: str,
-    wishes: AssetWishes,
-    seed: int,
-    model: RoomModel | None,
-    steps: int | None,
-    timer: StageTimer,
-) -> Mapping[str, Mapping[str, float]] | None:
+    graph: SceneGraph, boxes: Boxes, shapes: str, wishes: AssetWishes, seed: int, model: RoomModel | None,
+    steps: int | None, timer: StageTimer,
+) -> Mapping[str, Mapping[str, float]] | None:  # fmt: skip
     """Object name -> id of a model -> cost of its shape against the generated one; None where nothing is guided.
 
     Raises ValueError for a library without descriptors. Arguments as for `retrieved` and `ShapeRequest`.

@@ -131,18 +131,10 @@ def _given(node: Node, wishes: AssetWishes) -> tuple[AssetRecord, ModelFile]:
 
 
 def retrieved(
-    graph: SceneGraph,
-    boxes: Boxes,
-    styles: Mapping[str, str],
-    shapes: str,
-    wishes: Wanted,
-    seed: int,
-    given: Retrieved,
-    nearness: Mapping[str, Mapping[str, float]] | None = None,
-    among: Container[str] | None = None,
-    palette: str = "",
-    timer: StageTimer | None = None,
-) -> Retrieved:
+    graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], shapes: str, wishes: Wanted, seed: int,
+    given: Retrieved, nearness: Mapping[str, Mapping[str, float]] | None = None, among: Container[str] | None = None,
+    palette: str = "", timer: StageTimer | None = None,
+) -> Retrieved:  # fmt: skip
     """The models of all objects that come from a library, and the sizes of those that their boxes do not fit.
 
     `boxes`: n boxes in the order of the nodes. `styles`: object name -> style. `shapes`: the room's source. `given`:
