@@ -270,18 +270,12 @@ def _surface(material: UsdShade.Material) -> Paint:
         if image.GetInput("scale"):
             tint = rgb(values.given(image.GetInput("scale").GetAttr()), tint)
     return Paint(
-        material.GetPrim().GetName(),
-        rgb(values.given(found.get("diffuseColor")), (0.18, 0.18, 0.18)),
-        rgb(values.given(found.get("emissiveColor")), (0.0, 0.0, 0.0)),
-        values.number(found.get("roughness"), 0.5),
-        values.number(found.get("metallic"), 0.0),
-        texture.path,
-        texture.prim,
-        tint,
-        values.number(found.get("opacity"), 1.0),
-        laid_out,
+        material.GetPrim().GetName(), rgb(values.given(found.get("diffuseColor")), (0.18, 0.18, 0.18)),
+        rgb(values.given(found.get("emissiveColor")), (0.0, 0.0, 0.0)), values.number(found.get("roughness"), 0.5),
+        values.number(found.get("metallic"), 0.0), texture.path, texture.prim, tint,
+        values.number(found.get("opacity"), 1.0), laid_out,
         *(images[name][1] if name in images else None for name in ("roughness", "normal")),
-    )
+    )  # fmt: skip
 
 
 def _primvar_of(image: UsdShade.Shader) -> str:

@@ -74,13 +74,10 @@ def with_ceiling(scenery: Scenery) -> Scenery:
     added: dict[str, Any] = {
         "triangles": corners[[[0, 1, 2], [0, 2, 3]]],
         "normals": np.broadcast_to(np.array([0, -1, 0], np.float32), (2, 3, 3)),
-        "flat_colors": np.broadcast_to(CEILING, (2, 3)),
-        "emissive": np.zeros((2, 3), np.float32),
-        "gloss": np.zeros(2, np.float32),
-        "st": np.zeros((2, 3, 2), np.float32),
-        "texture": np.full(2, -1),
+        "flat_colors": np.broadcast_to(CEILING, (2, 3)), "emissive": np.zeros((2, 3), np.float32),
+        "gloss": np.zeros(2, np.float32), "st": np.zeros((2, 3, 2), np.float32), "texture": np.full(2, -1),
         "wall": np.full(2, -1),
-    }
+    }  # fmt: skip
     joined: dict[str, Any] = {key: np.concatenate([getattr(scenery, key), more]) for key, more in added.items()}
     return replace(scenery, **joined)
 

@@ -164,14 +164,10 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
         for found in (np.array(each).reshape(-1, 7) for each in (boxes, curtains))
     )
     return Scenery(
-        images=tuple(image for _, image in images.values()),
-        furniture=furniture,
-        hung=at_walls,
+        images=tuple(image for _, image in images.values()), furniture=furniture, hung=at_walls,
         panes=np.array([pane for _, pane in panes], np.float32).reshape(-1, 3, 3),
-        pane_wall=np.array([walls.get(wall, -1) for wall, _ in panes], int),
-        lights=read_lights(stage),
-        **joined,
-    )
+        pane_wall=np.array([walls.get(wall, -1) for wall, _ in panes], int), lights=read_lights(stage), **joined,
+    )  # fmt: skip
 
 
 def _pane(mesh: Drawable) -> np.ndarray:

@@ -138,12 +138,9 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
 def layer_data(room: RoomData, name: str) -> dict[str, Any]:
     """The customLayerData of a layer: who made it, from what, and under which licence."""
     return {
-        "asset_name": name,
-        "generator": f"echousd {echousd.__version__}",
-        "seed": room.provenance.seed,
-        "model": room.provenance.model,
-        "asset_license": LICENCE,
-    }
+        "asset_name": name, "generator": f"echousd {echousd.__version__}", "seed": room.provenance.seed,
+        "model": room.provenance.model, "asset_license": LICENCE,
+    }  # fmt: skip
 
 
 def simready_data(room: RoomData) -> dict[str, Any]:

@@ -109,19 +109,12 @@ def _facts(main: Path, author: str, source: str) -> dict[str, Any]:
     bounds = UsdGeom.BBoxCache(Usd.TimeCode.Default(), ["default"], useExtentsHint=False).ComputeWorldBound(root)
     size = np.array(bounds.ComputeAlignedRange().GetSize())
     return {
-        "asset_name": root.GetName(),
-        "asset_type": "Prop",
-        "author": author,
+        "asset_name": root.GetName(), "asset_type": "Prop", "author": author,
         "asset_license": stage.GetRootLayer().customLayerData.get("asset_license", "Apache-2.0"),
-        "category": root.GetAttribute("semantics:labels:category").Get()[0],
-        "source_file": source,
-        "usd_date_generated": DATE,
-        "generator": f"echousd {echousd.__version__}",
-        "qcode": FURNITURE,
-        "rigid_body_count": len(bodies),
-        "asset_extents": Gf.Vec3f(*map(float, size)),
-        "mass": float(sum(masses)),
-    }
+        "category": root.GetAttribute("semantics:labels:category").Get()[0], "source_file": source,
+        "usd_date_generated": DATE, "generator": f"echousd {echousd.__version__}", "qcode": FURNITURE,
+        "rigid_body_count": len(bodies), "asset_extents": Gf.Vec3f(*map(float, size)), "mass": float(sum(masses)),
+    }  # fmt: skip
 
 
 def _of_others(path: str) -> bool:

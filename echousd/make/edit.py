@@ -146,21 +146,11 @@ def edit(
         with timer.stage("place"), one_thread():
             layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=asked.walls)
     after = Room(
-        name=manifest["name"],
-        graph=graph,
-        boxes=layouts[0],
-        geometry=geometry,
-        assets=names,
-        floor=floor,
-        layouts=tuple(layouts),
-        outcomes=outcomes,
-        notes=notes,
-        provenance=_provenance(manifest, model_used),
-        options=asked.replaced(seed=manifest["seed"]),
-        timings=timer.seconds,
-        edited=Path(room),
+        name=manifest["name"], graph=graph, boxes=layouts[0], geometry=geometry, assets=names, floor=floor,
+        layouts=tuple(layouts), outcomes=outcomes, notes=notes, provenance=_provenance(manifest, model_used),
+        options=asked.replaced(seed=manifest["seed"]), timings=timer.seconds, edited=Path(room),
         carried={asset: saved.carried[asset] for name, asset in names.items() if name not in shaped_anew},
-    )
+    )  # fmt: skip
     warn_of_faults(after)
     return after
 

@@ -142,13 +142,9 @@ def _geometry(root: Usd.Prim, asset: str | None, category: str, manifest: Mappin
     told = manifest.get("meshes", {}).get(asset, {})
     origin = Origin(told.get("shapes", manifest["shapes"]), told.get("licence", LICENCE), told.get("credit", ""))
     return Geometry(
-        tuple(parts),
-        tuple(colliders),
-        origin,
-        read_mass(root),
-        read_joints(root, asset or ""),
+        tuple(parts), tuple(colliders), origin, read_mass(root), read_joints(root, asset or ""),
         description=_description(root),
-    )
+    )  # fmt: skip
 
 
 def _description(root: Usd.Prim) -> tuple[float, ...]:

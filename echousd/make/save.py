@@ -198,25 +198,17 @@ def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
     """What was asked for, what made the room, what became of every relation, and which files are ours."""
     first = room.outcomes[0] if room.outcomes else LayoutOutcome()
     return {
-        MANIFEST_KEY: 1,
-        "name": room.name,
-        "generator": f"echousd {echousd.__version__}",
-        "seed": room.provenance.seed,
-        "preset": room.provenance.preset,
-        "model": room.provenance.model,
-        "shapes": room.provenance.shapes,
-        "source": room.provenance.source,
-        **room.options.model_dump(include=set(Look.model_fields)),
+        MANIFEST_KEY: 1, "name": room.name, "generator": f"echousd {echousd.__version__}", "seed": room.provenance.seed,
+        "preset": room.provenance.preset, "model": room.provenance.model, "shapes": room.provenance.shapes,
+        "source": room.provenance.source, **room.options.model_dump(include=set(Look.model_fields)),
         "layouts": [{"name": f"layout_{i}", **found.to_json()} for i, found in enumerate(room.outcomes)],
-        "relations": first.counts(),
-        "notes": list(room.notes),
+        "relations": first.counts(), "notes": list(room.notes),
         "verdicts": [verdict.to_json() for verdict in room.verdicts],
         "living": [fault.to_json() for fault in living_faults(room.graph, room.boxes, room.floor)],
-        "graph": json.loads(room.graph.to_json()),
-        "assets": dict(room.assets),
+        "graph": json.loads(room.graph.to_json()), "assets": dict(room.assets),
         "meshes": {asset: _mesh_facts(room.geometry[user]) for asset, user in sorted(room.asset_users.items())},
         "files": dict(sorted(files.items())),
-    }
+    }  # fmt: skip
 
 
 def _mesh_facts(geometry: Geometry) -> dict[str, Any]:

@@ -187,18 +187,13 @@ def scene_of(
     shell = list(shell_solids(built))
     everything = [*solids, *(pieces for _, pieces in shell)]
     return Scene(
-        everything,
-        np.array([node.locked or node.position is not None for node in nodes]),
-        carriers(kinds, size, position, yaw, triplets),
-        yaw,
-        np.array([kind.role == "seat" for kind in kinds]),
-        np.sqrt(size[:, 0] * size[:, 2]),
-        [shapely.Polygon(corner) for corner in footprints(size, position, yaw)],
-        [_level(pieces) for pieces in solids],
-        shapely.Polygon(floor).buffer(EDGE, join_style="mitre"),
+        everything, np.array([node.locked or node.position is not None for node in nodes]),
+        carriers(kinds, size, position, yaw, triplets), yaw, np.array([kind.role == "seat" for kind in kinds]),
+        np.sqrt(size[:, 0] * size[:, 2]), [shapely.Polygon(corner) for corner in footprints(size, position, yaw)],
+        [_level(pieces) for pieces in solids], shapely.Polygon(floor).buffer(EDGE, join_style="mitre"),
         np.array([(np.concatenate(pieces).min(0), np.concatenate(pieces).max(0)) for pieces in everything]),
         [*graph.names, *(wall for wall, _ in shell)],
-    )
+    )  # fmt: skip
 
 
 def shell_solids(parts: Sequence[ShellPart]) -> Iterator[tuple[str, Solids]]:

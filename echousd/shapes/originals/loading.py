@@ -330,14 +330,10 @@ def _simple(material: Any) -> dict[str, Any]:
     rough = float(np.clip((2.0 / (float(shine) + 2.0)) ** 0.25, 0.15, 1.0)) if isinstance(shine, float | int) else 0.7
     image = material.image
     return {
-        "color": color,
-        "tint": (1.0, 1.0, 1.0),
-        "roughness": rough,
-        "metallic": 0.0,
+        "color": color, "tint": (1.0, 1.0, 1.0), "roughness": rough, "metallic": 0.0,
         "opacity": _number(kwargs.get("d"), 1.0) if "d" in kwargs else 1.0 - _number(kwargs.get("tr"), 0.0),
-        "cutoff": 0.0,
-        "images": [] if image is None else [(image, [("diffuseColor", "rgb"), *_alpha(image)])],
-    }
+        "cutoff": 0.0, "images": [] if image is None else [(image, [("diffuseColor", "rgb"), *_alpha(image)])],
+    }  # fmt: skip
 
 
 def _pbr(material: Any) -> dict[str, Any]:
