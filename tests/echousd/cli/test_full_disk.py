@@ -65,7 +65,7 @@ def room(tmp_path_factory):
     ("most", "words"),
     [
         (600, ("render", "-o", "top.png", "--size", "64")),
-        (4_000, ("render", "-o", "cameras", "--cameras", "--size", "64")),
+        (3_500, ("render", "-o", "cameras", "--cameras", "--size", "64")),
         (600, ("export", "-o", "room.glb")),
         (40_000, ("export", "-o", "flat/room.usda")),
         (600, ("texture", "export", "-o", "job", "--for", "generic")),
