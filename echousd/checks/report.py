@@ -16,6 +16,7 @@ from echomodel.dressing import SMALL
 from echomodel.vocabulary import vocabulary
 from echousd.checks.placement import Misplacement, find_collisions, find_misplaced, misplaced_screens, misplaced_small
 from echousd.checks.validity import Fault, find_faults
+from echousd.draw.sight import Furniture
 from echousd.folder.folder import digest_of
 from echousd.folder.manifest import find_manifest
 from echousd.graph import Placed, Relation, SceneGraph
@@ -65,10 +66,8 @@ def measured_relations(room: RoomContents, rules: str = "strict") -> tuple[Measu
         [[index[r.subject], words.predicate_id(r.predicate), index[r.object]] for r in room.relations],
         dtype=torch.int64,
     ).reshape(-1, 3)
-    size = np.array([thing.size for thing in room.objects]).reshape(-1, 3)
-    position = np.array([thing.position for thing in room.objects]).reshape(-1, 3)
-    yaw = np.array([thing.yaw for thing in room.objects])
-    boxes = Boxes(*(torch.tensor(v, dtype=torch.float64) for v in (size, position, yaw)))
+    found = _boxes(room)
+    boxes = Boxes(*(torch.tensor(v, dtype=torch.float64) for v in (found.size, found.position, found.yaw)))
     polygon = None if room.spec is None else floor_of_room(room.spec)
     centre = np.zeros(2) if polygon is None else (polygon.max(0) + polygon.min(0)) / 2
     center = torch.as_tensor(centre)
@@ -306,33 +305,25 @@ class Around:
         return cls(tuple(small), tuple(one for one in shell if one.word != "floor"), tuple(strangers))
 
 
-@dataclass(frozen=True, eq=False)
-class _Boxes:
-    size: np.ndarray
-    position: np.ndarray
-    yaw: np.ndarray
+def _boxes(room: RoomContents) -> Furniture:
+    rows = np.array([(*thing.size, *thing.position, thing.yaw) for thing in room.objects], float).reshape(-1, 7)
+    return Furniture(rows[:, :3], rows[:, 3:6], rows[:, 6])
 
 
 def find_living(room: RoomContents) -> tuple[LivingFault, ...]:
     """Every living rule that an object breaks; none in a room whose graph contradicts itself, which others report."""
     if not room.objects or room.spec is None:
         return ()
-    things = room.objects
     try:
         check_extents(room.spec.extents)
     except GraphError as error:
         warnings.warn(f"<{room.path}>: {error}; nobody's ways are looked for on it", stacklevel=2)
         return ()
     try:
-        graph = SceneGraph(room.spec, tuple(thing.node for thing in things), room.relations)
+        graph = SceneGraph(room.spec, tuple(thing.node for thing in room.objects), room.relations)
     except GraphError:
         return ()
-    boxes = _Boxes(
-        np.array([thing.size for thing in things]),
-        np.array([thing.position for thing in things]),
-        np.array([float(thing.yaw) for thing in things]),
-    )
-    return living_faults(graph, boxes)
+    return living_faults(graph, _boxes(room))
 
 
 RULE = "echo:Manifest"

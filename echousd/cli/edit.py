@@ -184,8 +184,8 @@ def _change(
     from echousd.folder.history import told
     from echousd.make.edit import edit as change
     from echousd.make.edit import touched
+    from echousd.make.finished import write_room
     from echousd.make.reading import read_room
-    from echousd.make.written import write_room
     from echousd.progress import StageTimer
 
     check_output(folder, flat=False, force=force)
@@ -241,9 +241,9 @@ def adopt(
     options = RoomOptions(**given)
     check_output(output, flat=False, force=force)
     with writing(output, flat=False, force=force, wait=wait), telling_faults(), progress_bar() as listen:
+        from echousd.make.finished import write_room
         from echousd.make.pipeline import generate
         from echousd.make.wishes import adopted, seen_in_theirs
-        from echousd.make.written import write_room
         from echousd.progress import StageTimer
         from echousd.stage.apart import check_apart
 

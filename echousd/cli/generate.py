@@ -16,7 +16,7 @@ from echousd.cli.output import report, say, say_done, say_written, telling_fault
 if TYPE_CHECKING:
     from echomodel.progress import StageListener
     from echousd.home.graph import HomeGraph
-    from echousd.make.written import Written
+    from echousd.make.finished import Written
     from echousd.options import RoomOptions
 
 app = typer.Typer()
@@ -73,8 +73,8 @@ def generate(
         held.enter_context(writing(output, flat=flat, force=force, wait=wait))
         held.enter_context(telling_faults())
         listen = held.enter_context(progress_bar())
+        from echousd.make.finished import write_room
         from echousd.make.pipeline import generate as make
-        from echousd.make.written import write_room
         from echousd.progress import StageTimer
 
         spent = {"imports": time.perf_counter() - started}

@@ -23,7 +23,7 @@ import typer
 from echousd.cli.options import click_options
 
 if TYPE_CHECKING:
-    from echousd.make.written import Written
+    from echousd.make.finished import Written
 
 LONGEST_WORD = 300  # characters: a path is shorter, a name of a million is a prank
 LONGEST_LINE = 4000

@@ -11,7 +11,7 @@ import numpy as np
 from echousd.draw.indoors import with_ceiling
 from echousd.draw.scenery import Scenery, read_scenery
 from echousd.draw.tracing import FINE, QUICK, trace
-from echousd.draw.viewpoints import View, corner_views, hero_view, stage_views, top_view, turning_views
+from echousd.draw.views import View, corner_views, hero_view, stage_views, top_view, turning_views
 
 if TYPE_CHECKING:
     from PIL import Image

@@ -10,7 +10,7 @@ import numpy as np
 
 from echousd.draw.indoors import OWN, SKY, SUN, THROWN, VIEW, exposed, thrown_back
 from echousd.draw.scenery import Scenery
-from echousd.draw.viewpoints import View
+from echousd.draw.views import View
 
 FINE, QUICK = 3, 2  # squared: rays per pixel
 SKY_RAYS, AROUND = 3, 3  # per ray: rays towards the sky; inside a room, to what stands around

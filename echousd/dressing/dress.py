@@ -203,13 +203,6 @@ RULES = (
 MEASURED = ("above", "close_by")  # of what hangs over a piece or lies on the floor at it, the first that holds
 
 
-@dataclass(frozen=True, eq=False)
-class _Box:
-    size: np.ndarray
-    position: np.ndarray
-    yaw: np.ndarray
-
-
 def graph_of(setting: Setting, named: Mapping[str, Thing]) -> DressingGraph:
     """The things of one layout as nodes, with a relation of each that belongs to a piece or stands on a wall shelf.
 
@@ -274,7 +267,6 @@ def _relation(setting: Setting, named: Mapping[str, Thing], name: str, thing: Th
 
 
 def _holds(predicate: str, thing: Thing, host: Standing) -> bool:
-    both = _Box(
-        np.stack([thing.size, host.size]), np.stack([thing.position, host.position]), np.array([thing.yaw, host.yaw])
-    )
+    size, position = np.stack([thing.size, host.size]), np.stack([thing.position, host.position])
+    both = Furniture(size, position, np.array([thing.yaw, host.yaw]))
     return bool(verdicts(both, torch.tensor([[0, vocabulary().predicate_id(predicate), 1]]))[0] == 1)

@@ -16,7 +16,7 @@ from echomodel.dressing import KINDS
 from echousd.draw.pictures import thumbnails
 from echousd.draw.sight import Furniture
 from echousd.dressing import Dressing, dress
-from echousd.layers import assets, cameras, coverings, lights, materials, physics, structure
+from echousd.layers import assets, cameras, lights, materials, physics, structure
 from echousd.layers.cameras import room_points, room_volume
 from echousd.layers.dressing import dressing_layer
 from echousd.naming import free_name
@@ -222,9 +222,9 @@ def room_looks(
             table[name] = looks.look(harmony, slot, voice)
             bindings[path] = name
     table |= {f"{ROOM_STYLE}_{slot}": looks.look(harmony, slot) for slot in small}
-    covered = {f"{SHELL}/{name}": slot for name, slot in coverings.covered_walls(room).items()}
+    covered = {f"{SHELL}/{name}": slot for name, slot in structure.covered_walls(room).items()}
     table |= {slot: looks.look(harmony, slot) for slot in ("wall", *covered.values())} | structure.LOOKS
-    table["floor"] = looks.look(harmony, coverings.floor_slot(room))
+    table["floor"] = looks.look(harmony, structure.floor_slot(room))
     for part in built:
         own = {"wall": covered.get(part.path, "wall")}
         bindings |= {mesh.path: own.get(mesh.look, mesh.look) for mesh in part.meshes}
@@ -246,9 +246,7 @@ def materials_layer(
         assets.as_class(stage, asset)
     materials.write_palettes(stage, harmony, tables)
     if room.options.materialx:
-        from echousd.layers import materialx
-
-        materialx.write_networks(stage, harmony, tables)
+        materials.write_networks(stage, harmony, tables)
     return stage.GetRootLayer()
 
 
@@ -285,13 +283,11 @@ def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Pa
             original = replace(geometry.original, layer=kept, files={}) if kept else geometry.original
             geometry, folder = replace(geometry, original=original), shelf.place
         assert geometry.original is not None
-        from echousd.layers import component
-
         if name in room.carried:
-            return Asset(name, {}, component.carried(name, geometry.original, room.carried[name], folder))
+            return Asset(name, {}, assets.carried_files(name, geometry.original, room.carried[name], folder))
         data = _asset_data(room, name, geometry)
         word = word_of(room.graph.node(user))
-        return Asset(name, {}, component.files(name, word, geometry, data, folder, room.options))
+        return Asset(name, {}, assets.placed_files(name, word, geometry, data, folder, room.options))
     if name in room.carried:
         carried = {piece_path("", name, part.name, part.body): tuple(part.slots) for part in geometry.parts}
         return Asset(name, carried, room.carried[name])

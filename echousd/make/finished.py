@@ -1,4 +1,4 @@
-"""A finished room: its data, and how it is saved and shown."""
+"""A finished room: its data, how it is saved and shown, and where it was written."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import base64
 import io
 import tempfile
 import weakref
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from echousd.progress import StageTimer
 from echousd.room import RoomData
 
 if TYPE_CHECKING:
@@ -85,3 +87,31 @@ class Room(RoomData):
     def __repr__(self) -> str:
         count = f"{len(self.names)} objects, {len(self.verdicts)} relations"
         return f"Room({self.name!r}, {count}, seed {self.provenance.seed})"
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """A room and where it lies."""
+
+    room: Room  # what was made
+    root: Path  # its root layer, or the flat file
+    preview: Path | None = None  # the picture to look at, None = there is none
+
+
+def write_room(
+    room: Room, output: Path, timer: StageTimer, *, flat: bool = False, force: bool = False, store: Path | None = None
+) -> Written:
+    """Write a room as layers with pictures, or as one flat file without; raises ValueError, see `Room.save`."""
+    from echousd.make.save import save_layers, write_pictures
+
+    with timer.stage("write"):
+        if flat:
+            from echousd.make.flat import save_flat
+
+            return Written(room, save_flat(room, output, force=force))
+        root = save_layers(room, output, force=force, store=store)
+    if not room.options.preview:
+        return Written(room, root)
+    with timer.stage("preview"):
+        drawn = write_pictures(root)
+    return Written(room, root, drawn[-1] if drawn else None)

@@ -19,12 +19,11 @@ from echousd.folder.manifest import find_manifest
 from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.graph import SceneGraph
-from echousd.layers.component import MODEL, PLACES
+from echousd.layers.assets import MODEL, PLACES
 from echousd.shapes.colliders import approximation, hull_of
-from echousd.shapes.geometry import LICENCE, Collider, Geometry, Mass, Origin, Part
+from echousd.shapes.geometry import LICENCE, Collider, Geometry, Mass, Origin, Original, Part
 from echousd.shapes.joints import read_joints
 from echousd.shapes.matter import read_mass
-from echousd.shapes.originals.original import Original
 from echousd.stage.contents import Z_TO_Y, room_frame, triangulated
 from echousd.stage.files import open_stage
 from echousd.stage.forms import forms

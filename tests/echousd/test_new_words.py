@@ -29,7 +29,7 @@ from echousd.dressing.tabletops import TOPS
 from echousd.dressing.walls import HUNG_OVER
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph, load_graph, starting_graph
 from echousd.graph.picture import draw_graph, to_dot
-from echousd.layers.coverings import COVERS
+from echousd.layers.structure import COVERS
 from echousd.place import place_boxes
 from echousd.shapes.finishes.slots import SLOTS
 from echousd.shapes.fittings import DOORS, WINDOWS

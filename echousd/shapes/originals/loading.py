@@ -28,8 +28,7 @@ from echousd.assets.record import AssetRecord, Vector
 from echousd.assets.table import Library
 from echousd.exporting.packing import PACKED, LeftOut, asset_paths
 from echousd.shapes.colliders import hull_of
-from echousd.shapes.geometry import Geometry, Origin, Part
-from echousd.shapes.originals.original import CONVERTED, Original
+from echousd.shapes.geometry import CONVERTED, Geometry, Origin, Original, Part
 from echousd.shapes.surface import box_projection, creased_normals
 from echousd.srgb import to_linear
 from echousd.stage.files import layer_bytes, new_stage, said

@@ -14,8 +14,7 @@ from echousd.draw.indoors import GREY, exposed, read_lights, thrown_back, with_c
 from echousd.draw.rendering import render_stage
 from echousd.draw.scenery import read_scenery
 from echousd.draw.tracing import trace
-from echousd.draw.viewpoints import View, hero_view
-from echousd.draw.views import view_matrix
+from echousd.draw.views import View, hero_view, view_matrix
 from echousd.options import RoomOptions
 
 WALLED = RoomOptions(walls=True, dress="none")

@@ -13,7 +13,7 @@ from echousd.draw.drawables import read_drawables
 from echousd.draw.rendering import render, render_stage, render_turn
 from echousd.draw.scenery import class_color, read_scenery
 from echousd.draw.tracing import BACKGROUND, outside, smooth_light
-from echousd.draw.viewpoints import stage_views
+from echousd.draw.views import stage_views
 from echousd.options import RoomOptions
 
 

@@ -12,7 +12,7 @@ from small_room import StandIn, small_graph
 import echousd
 from echomodel.boxes import Boxes
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.layers.coverings import COVERS, covered_walls, floor_slot
+from echousd.layers.structure import COVERS, covered_walls, floor_slot
 from echousd.options import RoomOptions
 from echousd.room import Provenance
 

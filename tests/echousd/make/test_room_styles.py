@@ -5,8 +5,7 @@ import pytest
 
 import echousd
 from echomodel.vocabulary import vocabulary
-from echousd.layers.coverings import covered_walls
-from echousd.layers.structure import millwork
+from echousd.layers.structure import covered_walls, millwork
 from echousd.shapes.looks import palette_of_room
 
 DECO = vocabulary().style("Art Deco")

@@ -9,8 +9,8 @@ import echousd
 from echousd.assets.index import index
 from echousd.assets.model_file import ModelFile
 from echousd.assets.table import read_library
+from echousd.shapes.geometry import CONVERTED
 from echousd.shapes.originals.loading import converted, outward
-from echousd.shapes.originals.original import CONVERTED
 from echousd.stage.files import open_stage
 
 
