@@ -57,11 +57,9 @@ def read_lights(stage: Usd.Stage) -> Lights:
             power.append(color / 4)  # of what is told as radiance times area, what goes each way
     sun = max(suns, key=lambda one: float(one[1].sum()), default=None)
     return Lights(
-        sky=sky if domes else 1.0,
-        sun=None if sun is None else sun.astype(np.float32),
-        bulbs=np.array(bulbs, np.float32).reshape(-1, 3),
-        power=np.array(power, np.float32).reshape(-1, 3),
-    )
+        sky=sky if domes else 1.0, sun=None if sun is None else sun.astype(np.float32),
+        bulbs=np.array(bulbs, np.float32).reshape(-1, 3), power=np.array(power, np.float32).reshape(-1, 3),
+    )  # fmt: skip
 
 
 def with_ceiling(scenery: Scenery) -> Scenery:

@@ -131,12 +131,10 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             "triangles": (mesh.triangles @ mesh.world[:3, :3].T + mesh.world[:3, 3]).astype(np.float32),
             "normals": (turned / np.maximum(np.linalg.norm(turned, axis=-1, keepdims=True), 1e-12)).astype(np.float32),
             "st": np.zeros((count, 3, 2), np.float32) if mesh.st is None else mesh.st.astype(np.float32),
-            "flat_colors": np.zeros((count, 3), np.float32),
-            "emissive": np.zeros((count, 3), np.float32),
-            "gloss": np.zeros(count, np.float32),
-            "texture": np.full(count, -1),
+            "flat_colors": np.zeros((count, 3), np.float32), "emissive": np.zeros((count, 3), np.float32),
+            "gloss": np.zeros(count, np.float32), "texture": np.full(count, -1),
             "wall": np.full(count, walls.get(mesh.component, -1)),
-        }
+        }  # fmt: skip
         plain = Paint(color=class_color(mesh.category), roughness=1.0)
         for paint, faces in ((plain, np.arange(count)),) if by_class else mesh.paints:
             part["flat_colors"][faces], part["emissive"][faces] = paint.color, paint.emissive

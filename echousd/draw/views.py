@@ -30,11 +30,8 @@ PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from wh
 WHOLE, CLEAR = 200.0, 30.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
 TRIED = 128  # views of all that are looked at closely
 LOW = 1.4  # metres: over what is so high one looks
-BARE, BAREST, DEEP = (
-    60.0,
-    0.28,
-    0.02,
-)  # bare walls: what all of a picture costs, from which share on, metres of rounding
+# bare walls: what all of a picture costs, from which share on, metres of rounding
+BARE, BAREST, DEEP = 60.0, 0.28, 0.02
 BEFORE, WALLED = 2.0, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
 FILLED = 130.0  # metres of depth that a picture full of what is near is worth
 UNSEEN = 3.0  # metres of depth that each piece in the picture is worth

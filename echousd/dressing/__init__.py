@@ -1,5 +1,1 @@
 """Small things that make a room look lived in, placed by rules on what the graph put there; the graph is untouched."""
-
-from echousd.dressing.dress import Dressing, dress
-
-__all__ = ["Dressing", "dress"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -76,23 +77,15 @@ def curtains(setting: Setting) -> None:
             wide, variant = round(min(0.45, 0.16 + 0.14 * window.width), 3), int(rng.integers(4))
             left = max(window.offset - beyond + wide / 2, 0.02 + wide / 2)
             right = min(window.end + beyond - wide / 2, wall.length - 0.02 - wide / 2)
-            inner = np.linspace(
-                0.0, 0.5 * (right - left) - wide / 2, 4
-            )  # drawn over the pane where something is beside
+            inner = np.linspace(0.0, 0.5 * (right - left) - wide / 2, 4)  # over the pane where something is beside
             for foot in (0.015, max(0.3, window.sill - 0.15), window.sill - 0.02, window.sill + 0.2):
                 size = np.array([wide, round(rail + 0.005 - foot, 3), 0.085])
-                sides = [
-                    next((one for one in hung if setting.clear(one, margin=0.0, floor=False)), None)
-                    for hung in (
-                        [
-                            Thing(kind, size, wall.at(end + way * off, before, foot), wall.yaw, "", variant)
-                            for off in inner
-                        ]
-                        for end, way in ((left, 1), (right, -1))
-                    )
-                ]
-                if None not in sides:  # one alone looks forgotten
-                    setting.placed += [one for one in sides if one is not None]
+                sides: list[Thing] = []
+                for ends in (left + inner, right - inner):
+                    hung = (Thing(kind, size, wall.at(x, before, foot), wall.yaw, "", variant) for x in ends)
+                    sides += islice((one for one in hung if setting.clear(one, margin=0.0, floor=False)), 1)
+                if len(sides) == 2:  # one alone looks forgotten
+                    setting.placed += sides
                     setting.curtained.add(window.name)
                     break
             else:
@@ -284,7 +277,6 @@ def _filled(setting: Setting, board: Thing, name: str) -> None:
 
 
 def _geometry(board: Thing) -> Geometry:
-
     rng = np.random.default_rng(board.variant)
     return assembled(solids_of(board.kind, board.size, rng), board.size, faces=1200, origin=Origin("dressing"))
 

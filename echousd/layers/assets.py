@@ -23,6 +23,7 @@ from echousd.shapes.joints import write_joints
 from echousd.shapes.looks import look, palette_for
 from echousd.shapes.surface import CREASE, Surface, surfaces
 from echousd.stage.files import layer_bytes, new_stage
+from echousd.stage.layouts import authoring
 from echousd.stage.paths import (
     CLASSES,
     DESCRIPTION,
@@ -185,11 +186,8 @@ def component_layer(
 
 def _write_levels(stage: Usd.Stage, name: str, geometry: Geometry, slot: str) -> None:
     """The variant set `LOD`: all faces, few where there are such meshes, or the colliders, in the look of a slot."""
-    variants = stage.GetPrimAtPath(f"/{name}").GetVariantSets().AddVariantSet(LOD)
-    for level in (HIGH, LOW, PROXY) if geometry.coarse else (HIGH, PROXY):
-        variants.AddVariant(level)
-    variants.SetVariantSelection(PROXY)
-    with variants.GetVariantEditContext():
+    levels = (HIGH, LOW, PROXY) if geometry.coarse else (HIGH, PROXY)
+    with authoring(stage.GetPrimAtPath(f"/{name}"), LOD, levels, PROXY, HIGH):
         for part in geometry.parts:
             mesh = stage.OverridePrim(piece_path(f"/{name}", name, part.name, part.body))
             UsdGeom.Imageable(mesh).CreateVisibilityAttr(UsdGeom.Tokens.invisible)
@@ -198,7 +196,6 @@ def _write_levels(stage: Usd.Stage, name: str, geometry: Geometry, slot: str) ->
             UsdGeom.Imageable(guide).CreatePurposeAttr(UsdGeom.Tokens.default_)
             UsdShade.MaterialBindingAPI.Apply(guide)
             guide.CreateRelationship("material:binding", False).SetTargets([Sdf.Path(f"/{name}/{MTL}/{slot}")])
-    variants.SetVariantSelection(HIGH)
 
 
 def most_used(geometry: Geometry) -> list[str]:

@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics, UsdShade
 
 import echousd
 from echomodel.dressing import KINDS
 from echousd.draw.pictures import thumbnails
 from echousd.draw.sight import Furniture
-from echousd.dressing import Dressing, dress
+from echousd.dressing.dress import Dressing, dress, write_nodes
+from echousd.dressing.setting import Thing
 from echousd.layers import assets, cameras, lights, materials, physics, structure
 from echousd.layers.cameras import room_points, room_volume
-from echousd.layers.dressing import dressing_layer
 from echousd.naming import free_name
 from echousd.room import RoomData
 from echousd.shapes import joints, looks
@@ -29,6 +29,7 @@ from echousd.stage.encoding import relation_name
 from echousd.stage.files import layer_bytes, new_stage
 from echousd.stage.layouts import authored_layouts
 from echousd.stage.paths import (
+    DRESSING,
     OBJECTS,
     SHELL,
     class_path,
@@ -108,18 +109,11 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     layers = {
         "geometry": geometry_layer(room),
         "shell": structure.shell_layer(built, layer_data(room, f"{room.name}_shell"), room.graph.room.openings),
-        "graph": graph_layer(room),
-        "layout": layout_layer(room),
-        "physics": physics_layer(room, built),
+        "graph": graph_layer(room), "layout": layout_layer(room), "physics": physics_layer(room, built),
         "materials": materials_layer(room, made, built, small, bindings, harmony),
-    }
+    }  # fmt: skip
     if room.options.dress != "none":
-        looks_of = {slot: f"{ROOM_STYLE}_{slot}" for slot in slots}
-        parts = {name: asset.slots for name, asset in small.items()}
-        layers["dressing"] = dressing_layer(
-            dressing, parts, looks_of, layer_data(room, f"{room.name}_dressing"), instances=room.options.instances,
-            taken=[relation_name(*relation.triple) for relation in room.graph.relations],
-        )  # fmt: skip
+        layers["dressing"] = dressing_layer(room, dressing, small)
     if shelf is not None:
         shelf.put(files)
         files = {path: content for path, content in files.items() if not shelf.holds(path)}
@@ -309,10 +303,8 @@ def _written(room: RoomData, name: str, category: str, style: str, geometry: Geo
     coarse = _forms(name, geometry.coarse) if geometry.coarse else {}
     low = {coarse_file(name): _bytes(room, assets.coarse_layer(name, coarse, data), ".usdc")} if coarse else {}
     files = {
-        **low,
-        payload_file(name): _bytes(room, payload, ".usdc"),
-        component_file(name): _bytes(room, layer, ".usda"),
-    }
+        **low, payload_file(name): _bytes(room, payload, ".usdc"), component_file(name): _bytes(room, layer, ".usda"),
+    }  # fmt: skip
     return Asset(name, slots, files)
 
 
@@ -366,3 +358,53 @@ def _place(stage: Usd.Stage, room: RoomData, layout: int) -> None:
         xform.AddTranslateOp().Set(Gf.Vec3d(x, 0.0 - z, y) if z_up else Gf.Vec3d(x, y, z))
         turn = xform.AddRotateZOp() if z_up else xform.AddRotateYOp()
         turn.Set(round(float(np.degrees(float(boxes.yaw[number]))), 4) + 0.0)
+
+
+def dressing_layer(room: RoomData, dressing: Dressing, small: Mapping[str, Asset]) -> Sdf.Layer:
+    """`layers/dressing.usda`: everything below `/Room/Dressing`, in variants as the layout; muted, the room is bare."""
+    stage = _room_stage(room, "dressing")
+    top = stage.OverridePrim("/Room")
+    several = len(dressing.layouts) > 1
+    users = Counter(dressing.assets[name] for things in dressing.layouts for name in things)
+    shared = [asset for asset, count in users.items() if room.options.instances and count > len(dressing.layouts)]
+    for number in authored_layouts(top, len(dressing.layouts)):
+        _write_things(stage, dressing.layouts[number], dressing, small, shared)
+    for asset in sorted(shared):
+        _bind_parts(stage, class_path(asset), small[asset])
+        assets.as_class(stage, asset)
+    taken = [relation_name(*relation.triple) for relation in room.graph.relations]
+
+    def finish(layer: Sdf.Layer) -> None:
+        for number, things in enumerate(dressing.layouts):
+            above = f"/Room{{layout=layout_{number}}}Dressing" if several else DRESSING
+            assets.refer(layer, above, {name: dressing.assets[name] for name in things})
+        for number, graph in enumerate(dressing.graphs):
+            write_nodes(layer, graph, Sdf.Path(f"/Room{{layout=layout_{number}}}" if several else "/Room"), taken)
+
+    return assets.without_stage(stage, finish)
+
+
+def _write_things(
+    stage: Usd.Stage, things: Mapping[str, Thing], dressing: Dressing, small: Mapping[str, Asset], shared: Sequence[str]
+) -> None:
+    group = UsdGeom.Xform.Define(stage, DRESSING).GetPrim()
+    Usd.ModelAPI(group).SetKind(Kind.Tokens.group)
+    for name, thing in things.items():
+        asset, path = dressing.assets[name], f"{DRESSING}/{name}"
+        xform = UsdGeom.Xform.Define(stage, path)
+        x, y, z = (round(float(v), 5) + 0.0 for v in thing.position)
+        xform.AddTranslateOp().Set(Gf.Vec3d(x, y, z))
+        xform.AddRotateYOp().Set(round(float(np.degrees(thing.yaw)), 4) + 0.0)
+        if asset in shared:
+            xform.GetPrim().SetInstanceable(True)
+        else:
+            _bind_parts(stage, path, small[asset])
+
+
+def _bind_parts(stage: Usd.Stage, root: str, asset: Asset) -> None:
+    """Bind a small thing's parts below a prim, or below its class."""
+    for where, slot in assets.slot_paths(root, asset.slots).items():
+        over = stage.OverridePrim(where)
+        UsdShade.MaterialBindingAPI.Apply(over)
+        target = Sdf.Path(f"{materials.LOOKS}/{ROOM_STYLE}_{slot}")  # another layer defines it
+        over.CreateRelationship(UsdShade.Tokens.materialBinding, custom=False).SetTargets([target])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from contextlib import nullcontext
 
 from pxr import Gf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade
 
@@ -12,7 +13,7 @@ from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.geometry import Geometry, Mass
 from echousd.shapes.joints import STATIC
 from echousd.shapes.matter import hull_volume, mass_of, write_mass
-from echousd.stage.layouts import ARTICULATED, ARTICULATION
+from echousd.stage.layouts import ARTICULATED, ARTICULATION, authoring
 from echousd.stage.paths import MTL, SHELL, piece_path
 
 GRAVITY = 9.81  # m/s²
@@ -60,15 +61,8 @@ def write_asset_physics(stage: Usd.Stage, asset: str, category: str, geometry: G
 
 def _make_body(root: Usd.Prim, mass: Mass, *, articulated: bool) -> None:
     """One rigid body; a piece with joints is one only in its variant `static`."""
-    if not articulated:
-        UsdPhysics.RigidBodyAPI.Apply(root)
-        write_mass(root, mass)
-        return
-    variants = root.GetVariantSets().AddVariantSet(ARTICULATION)
-    for name in (ARTICULATED, STATIC):
-        variants.AddVariant(name)
-    variants.SetVariantSelection(STATIC)  # articulated, its bodies are those of its joints
-    with variants.GetVariantEditContext():
+    both = (ARTICULATED, STATIC)  # articulated, its bodies are those of its joints
+    with authoring(root, ARTICULATION, both, STATIC, STATIC) if articulated else nullcontext():
         UsdPhysics.RigidBodyAPI.Apply(root)
         write_mass(root, mass)
 

@@ -189,7 +189,6 @@ def graph_edit(before: SceneGraph, after: SceneGraph) -> GraphEdit:
 
     An object of another category counts as new.
     """
-
     old = {node.name: node.category for node in before.nodes}
     added = torch.tensor([old.get(node.name) != node.category for node in after.nodes], dtype=torch.bool)
     stay = {node.name for node, new in zip(after.nodes, added.tolist(), strict=True) if not new}

@@ -141,7 +141,6 @@ def best_boxes(
 
 def repeated(change: GraphEdit, nodes: int, count: int) -> GraphEdit:
     """The edit of one graph of `nodes` objects for `count` copies of it behind one another."""
-
     shift = torch.arange(count)[:, None, None] * torch.tensor([nodes, 0, nodes])
     return GraphEdit((change.before[None] + shift).reshape(-1, 3), change.added.repeat(count))
 
@@ -244,7 +243,6 @@ def screens(graph: SceneGraph) -> np.ndarray:
 
 def backlit(graph: SceneGraph, boxes: Boxes) -> int:
     """How many windows have a screen before them."""
-
     corners, here = graph.room.corners, screens(graph)
     if corners is None or not here.any():
         return 0

@@ -100,7 +100,6 @@ def _stage_of(file: Path) -> Path | None:
 
 
 def _filled(graph: SceneGraph, file: Path, wanted: set[str]) -> tuple[SceneGraph, set[str]]:
-
     stage = opened(file)
     things = {thing.node.name: thing for room in find_rooms(stage) for thing in read_contents(room).objects}
     found = wanted & things.keys()

@@ -173,11 +173,9 @@ def window_frame(opening: Opening, kind: str = "plain") -> trimesh.Trimesh:
     start, end, low, top = opening.offset, opening.end, opening.sill, opening.sill + opening.height
     inner, height = (start + FRAME, end - FRAME), (low + FRAME, top - FRAME)
     boards = [
-        board((start, start + FRAME), (low, top), w),
-        board((end - FRAME, end), (low, top), w),
-        board(inner, (low, low + FRAME), w),
-        board(inner, (top - FRAME, top), w),
-    ]
+        board((start, start + FRAME), (low, top), w), board((end - FRAME, end), (low, top), w),
+        board(inner, (low, low + FRAME), w), board(inner, (top - FRAME, top), w),
+    ]  # fmt: skip
     across = {"sash": low + 0.5 * opening.height, "transom": low + 0.7 * opening.height}.get(kind)
     if across:
         boards.append(board(inner, (across - FRAME / 2, across + FRAME / 2), w))

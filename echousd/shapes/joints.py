@@ -8,7 +8,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 from echomodel.furniture.solids import Joint
 from echousd.shapes.geometry import FRAME, Geometry, Mass
 from echousd.shapes.matter import write_mass
-from echousd.stage.layouts import ARTICULATED, ARTICULATION
+from echousd.stage.layouts import ARTICULATED, ARTICULATION, authoring
 from echousd.stage.paths import GEO, piece_name, piece_of, piece_path
 
 STATIC = "static"
@@ -24,11 +24,7 @@ def write_joints(stage: Usd.Stage, asset: str, geometry: Geometry) -> None:
     `stage`: receives the opinions; its root prim is `/<asset>`. `geometry`: with joints.
     """
     root = stage.GetPrimAtPath(f"/{asset}")
-    variants = root.GetVariantSets().AddVariantSet(ARTICULATION)
-    for name in (STATIC, ARTICULATED):
-        variants.AddVariant(name)
-    variants.SetVariantSelection(ARTICULATED)
-    with variants.GetVariantEditContext():
+    with authoring(root, ARTICULATION, (STATIC, ARTICULATED), ARTICULATED, STATIC):
         for body, mass in geometry.masses.items():
             prim = stage.OverridePrim(piece_path(f"/{asset}", asset, body))
             UsdPhysics.RigidBodyAPI.Apply(prim)
@@ -41,7 +37,6 @@ def write_joints(stage: Usd.Stage, asset: str, geometry: Geometry) -> None:
             path = f"/{asset}/{piece_name(asset, 'joints')}/{piece_name(asset, joint.body)}_joint"
             still, moving = (piece_path(f"/{asset}", asset, body) for body in (FRAME, joint.body))
             _joint(stage, path, still, moving, joint, (joint.anchor, joint.anchor), geometry.masses[joint.body])
-    variants.SetVariantSelection(STATIC)
 
 
 def write_hinge(stage: Usd.Stage, leaf: str, joint: Joint, mass: Mass) -> None:
@@ -51,17 +46,12 @@ def write_hinge(stage: Usd.Stage, leaf: str, joint: Joint, mass: Mass) -> None:
     door's frame. `mass`: of the leaf.
     """
     door = leaf.rpartition("/")[0]
-    variants = stage.OverridePrim(door).GetVariantSets().AddVariantSet(ARTICULATION)
-    for name in (STATIC, ARTICULATED):
-        variants.AddVariant(name)
-    variants.SetVariantSelection(ARTICULATED)
-    with variants.GetVariantEditContext():
+    with authoring(stage.OverridePrim(door), ARTICULATION, (STATIC, ARTICULATED), ARTICULATED, STATIC):
         body = stage.OverridePrim(leaf)
         UsdPhysics.RigidBodyAPI.Apply(body)
         write_mass(body, mass)
         # against the door's prim, which is no body and stays where it is, wherever the room is put
         _joint(stage, f"{leaf}_joint", door, leaf, joint, (joint.anchor, (0.0, 0.0, 0.0)), mass)
-    variants.SetVariantSelection(STATIC)
 
 
 def _joint(

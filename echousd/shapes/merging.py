@@ -79,7 +79,6 @@ def closed_surface(parts: Sequence[Part], faces: int) -> tuple[trimesh.Trimesh, 
     `faces`: the surface is simplified until it has no more, by 2 mm at most; then its smallest solids are left out.
     Raises ValueError for parts that are not closed.
     """
-
     whole, slot = _side_by_side(parts)
     solids, word_of = [], {}
     points = np.asarray(whole.vertices, np.float32)
@@ -112,7 +111,6 @@ def closed_surface(parts: Sequence[Part], faces: int) -> tuple[trimesh.Trimesh, 
 
 def _union(solids: Sequence[Manifold], faces: int) -> Manifold:
     """All solids as one, as plain as its budget asks for."""
-
     whole = Manifold.batch_boolean(list(solids), OpType.Add)
     found = whole
     for tolerance in SIMPLER:
@@ -201,7 +199,6 @@ def _quadric(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
 
 def _manifold(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh | None:
     """Simplified with ever larger tolerance; never opens a mesh. None where the mesh was not closed to begin with."""
-
     points = np.asarray(mesh.vertices, np.float32)
     solid = Manifold(Mesh(points, np.asarray(mesh.faces, np.uint32)))
     if solid.status() != Error.NoError or solid.is_empty():

@@ -50,6 +50,18 @@ def authored(prim: Usd.Prim, variants: str, names: Iterable[str], chosen: str | 
         made.SetVariantSelection(chosen)
 
 
+@contextmanager
+def authoring(prim: Usd.Prim, variants: str, names: Iterable[str], into: str, chosen: str) -> Iterator[None]:
+    """Within the block, what is authored goes into one variant of a set on a prim; then another is selected."""
+    made = prim.GetVariantSets().AddVariantSet(variants)
+    for name in names:
+        made.AddVariant(name)
+    made.SetVariantSelection(into)
+    with made.GetVariantEditContext():
+        yield
+    made.SetVariantSelection(chosen)
+
+
 def authored_layouts(room: Usd.Prim, count: int, chosen: str | None = None) -> Iterator[int]:
     """The numbers of a room's layouts, as `authored` goes through their variants; one alone is no variant."""
     names = [f"{VARIANTS}_{number}" for number in range(count)]

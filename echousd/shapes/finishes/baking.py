@@ -126,7 +126,6 @@ def _jpeg(value: np.ndarray) -> bytes:
 
 
 def _encoded(value: np.ndarray, quality: int) -> bytes:
-
     out = io.BytesIO()
     pixels = (np.clip(value, 0, 1) * 255 + 0.5).astype(np.uint8)
     Image.fromarray(pixels).save(out, "JPEG", quality=quality, subsampling=0)

@@ -11,8 +11,7 @@ import echousd
 from echomodel.dressing import KINDS
 from echousd.batches.options import BatchOptions
 from echousd.checks import check
-from echousd.dressing import dress
-from echousd.dressing.dress import setting_of
+from echousd.dressing.dress import dress, setting_of
 from echousd.layers.compose import room_files
 from echousd.make.flat import save_flat
 from echousd.options import RoomOptions
