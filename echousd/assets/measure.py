@@ -24,7 +24,7 @@ from echousd.stage.contents import triangles_of
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage
 from echousd.stage.foreign import object_box
-from echousd.stage.forms import Form, Polygons, SkippedForms, forms, polygons
+from echousd.stage.forms import Form, Polygons, SkippedForms, forms, polygons, shown
 from echousd.stage.labels import labels
 from echousd.stage.units import metres_per_unit, up_axis
 from echousd.textures import TextureError, texture_bytes
@@ -155,8 +155,8 @@ def _cover(part: trimesh.Trimesh) -> np.ndarray | None:
             return flat(factor, factor[3]) if image is None else pixels(image, factor)
         except Exception:  # decoders fail on damaged images in every way there is
             return None
-    shown: Any = part.visual
-    return flat(to_linear(np.asarray(shown.main_color, float) / 255))
+    visual: Any = part.visual
+    return flat(to_linear(np.asarray(visual.main_color, float) / 255))
 
 
 FACE = re.compile(r"^f[ \t]+(.+?)[ \t]*$", re.MULTILINE)
@@ -257,7 +257,7 @@ def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) ->
     covers: dict[Paint, np.ndarray] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SkippedForms)
-        for form in forms(root, cache, _visible):
+        for form in forms(root, cache, shown):
             surface = polygons(form.prim)
             triangles = triangles_of(surface)
             if len(triangles):
@@ -349,9 +349,3 @@ def missing_files(path: Path) -> list[str]:
 
 def _says_unit(stage: Usd.Stage) -> bool:
     return any(layer.pseudoRoot.HasInfo("metersPerUnit") for layer in stage.GetUsedLayers())
-
-
-def _visible(prim: Usd.Prim) -> bool:
-    image = UsdGeom.Imageable(prim)
-    shown = image.ComputePurpose() in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
-    return shown and image.ComputeVisibility() != UsdGeom.Tokens.invisible

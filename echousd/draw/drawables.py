@@ -12,7 +12,7 @@ from pxr import Usd, UsdGeom, UsdShade
 from echomodel.triangles import area_normals
 from echousd.stage import values
 from echousd.stage.encoding import LABELS, StageError
-from echousd.stage.forms import forms, polygons
+from echousd.stage.forms import forms, polygons, shown
 from echousd.stage.units import metres_per_unit, up_axis
 from echousd.textures import TextureError, read_image
 
@@ -82,7 +82,7 @@ def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
     cache = UsdGeom.XformCache()
     known: dict[str, Paint] = {}
     shapes: dict[Usd.Prim, tuple | None] = {}  # of what an instancer places often
-    for form in forms(stage.GetPseudoRoot(), cache, _visible):
+    for form in forms(stage.GetPseudoRoot(), cache, shown):
         prim = form.prim
         part = shapes[prim] if prim in shapes else _part(prim, known)
         if form.above is not None:
@@ -107,12 +107,6 @@ def paint_image(paint: Paint) -> np.ndarray:
         return read_image(paint.texture)
     except TextureError as error:
         raise StageError(f"<{paint.image}>: {error}") from None
-
-
-def _visible(prim: Usd.Prim) -> bool:
-    imageable = UsdGeom.Imageable(prim)
-    purpose = imageable.ComputePurpose()
-    return purpose in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render) and imageable.ComputeVisibility() != "invisible"
 
 
 def _category(prim: Usd.Prim) -> str:
@@ -236,8 +230,8 @@ def paints_of(prim: Usd.Prim, face: np.ndarray, known: dict[str, Paint]) -> list
 def _bound(prim: Usd.Prim, known: dict[str, Paint]) -> Paint:
     material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
     if not material:
-        shown: Any = values.given(UsdGeom.Gprim(prim).GetDisplayColorAttr()) if prim.IsA(UsdGeom.Gprim) else None
-        color = rgb(next(iter(shown), None) if hasattr(shown, "__iter__") else None, None)
+        told: Any = values.given(UsdGeom.Gprim(prim).GetDisplayColorAttr()) if prim.IsA(UsdGeom.Gprim) else None
+        color = rgb(next(iter(told), None) if hasattr(told, "__iter__") else None, None)
         return Paint("displayColor", color) if color else Paint()
     path = str(material.GetPath())
     if path not in known:

@@ -21,7 +21,7 @@ from echousd.shapes.fittings import PLAIN, Millwork, millwork_of
 from echousd.shapes.geometry import Mass
 from echousd.shapes.looks import Look
 from echousd.shapes.surface import Surface, surface
-from echousd.shapes.walls import Piece, ShellPart, ceiling, floor_mesh, wall_name, walls
+from echousd.shapes.walls import Piece, ShellPart, ceiling, floor, wall_name, walls
 from echousd.stage import encoding
 from echousd.stage.files import new_stage
 from echousd.stage.paths import OPENINGS, SHELL, piece_name
@@ -131,8 +131,7 @@ def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[Shel
     """All parts of a room's shell, walls before what is in them; `bare`: windows that need no curtain rail."""
     corners = room.graph.room.corners
     plan = room.floor if corners is None else corners
-    slab = Piece(piece_name("Floor", "mesh"), "floor", floor_mesh(room.floor))
-    parts = [ShellPart("Floor", "floor", (slab,))]
+    parts = [floor(room.floor)]
     if room.options.walls:
         outdoor = vocabulary().room_type(room.graph.room.type).use == "outdoor"
         spec = room.graph.room

@@ -26,7 +26,7 @@ from echousd.shapes.joints import read_joints
 from echousd.shapes.matter import read_mass
 from echousd.stage.contents import Z_TO_Y, room_frame, triangulated
 from echousd.stage.files import open_stage
-from echousd.stage.forms import forms
+from echousd.stage.forms import forms, shown
 from echousd.stage.graphs import read_graph
 from echousd.stage.paths import DESCRIPTION, GEO, OBJECTS, asset_files, component_file, piece_name, piece_of
 from echousd.stage.units import metres_per_unit
@@ -193,7 +193,7 @@ def read_original(root: Usd.Prim, asset: str | None, category: str, manifest: Ma
     cache = UsdGeom.XformCache()
     away = np.linalg.inv(np.array(cache.GetLocalToWorldTransform(root)).T)
     points, faces, count = [], [], 0
-    for form in forms(root, cache, _shown):
+    for form in forms(root, cache, shown):
         vertices, triangles = triangulated(form.prim)
         if len(triangles):
             to_root = away @ form.world
@@ -226,12 +226,6 @@ def _original(root: Usd.Prim, asset: str) -> Original:
             prim = payload.primPath or prim
     pose = np.array(UsdGeom.Xformable(places).GetLocalTransformation()).T if places else np.eye(4)
     return Original(pose, str(prim), layer)
-
-
-def _shown(prim: Usd.Prim) -> bool:
-    image = UsdGeom.Imageable(prim)
-    shown = image.ComputePurpose() in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
-    return shown and image.ComputeVisibility() != UsdGeom.Tokens.invisible
 
 
 def stands_z_up(room: Usd.Prim) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -126,15 +126,7 @@ FACES, LEAST_FACES = 5000, 100
 FINEST, COARSENINGS = 1 / 1200, 11  # first tolerance in diagonals of the mesh; it grows to a twentieth
 
 
-@dataclass(frozen=True, eq=False)
-class CleanMesh:
-    """A mesh that fills its box, and whether it is closed."""
-
-    mesh: trimesh.Trimesh
-    watertight: bool
-
-
-def mesh_from_shape(grid: Any, size: Any, *, faces: int = FACES) -> CleanMesh:
+def mesh_from_shape(grid: Any, size: Any, *, faces: int = FACES) -> trimesh.Trimesh:
     """The mesh of one generated shape.
 
     `grid`: (n, n, n) float TSDF in its normalised box, negative inside, see `echomodel.tsdf`. `size`: (3,) float,
@@ -154,8 +146,7 @@ def mesh_from_shape(grid: Any, size: Any, *, faces: int = FACES) -> CleanMesh:
     mesh = decimate(mesh, faces)
     if not len(mesh.faces):
         raise ValueError(f"nothing is left of its noisy surface with {faces} faces")
-    mesh = fit(mesh, extent)
-    return CleanMesh(mesh, bool(mesh.is_watertight))
+    return fit(mesh, extent)
 
 
 def largest_solids(grid: np.ndarray) -> np.ndarray:

@@ -101,10 +101,19 @@ def wall_name(edge: int) -> str:
 
 def ceiling(polygon: np.ndarray, height: float) -> ShellPart:
     """A slab over the room, from the ceiling upwards."""
-    flat = shapely.Polygon(np.stack([polygon[:, 0], -polygon[:, 1]], 1))
+    return ShellPart("Ceiling", "ceiling", (Piece(piece_name("Ceiling", "mesh"), "ceiling", _slab(polygon, height)),))
+
+
+def floor(polygon: np.ndarray) -> ShellPart:
+    """A slab whose top is at height 0."""
+    return ShellPart("Floor", "floor", (Piece(piece_name("Floor", "mesh"), "floor", _slab(polygon, -THICKNESS)),))
+
+
+def _slab(polygon: np.ndarray, bottom: float) -> trimesh.Trimesh:
+    flat = shapely.Polygon(np.stack([polygon[:, 0], -polygon[:, 1]], 1))  # x right, -z up: seen from above
     slab = trimesh.creation.extrude_polygon(flat, THICKNESS)
-    slab.vertices = np.stack([slab.vertices[:, 0], slab.vertices[:, 2] + height, -slab.vertices[:, 1]], 1)
-    return ShellPart("Ceiling", "ceiling", (Piece(piece_name("Ceiling", "mesh"), "ceiling", slab),))
+    slab.vertices = np.stack([slab.vertices[:, 0], slab.vertices[:, 2] + bottom, -slab.vertices[:, 1]], 1)
+    return slab
 
 
 def outline(polygon: np.ndarray, thickness: Sequence[float] | np.ndarray = ()) -> np.ndarray:
@@ -245,17 +254,4 @@ def floor_polygon(
         else:
             lower, upper = np.full(2, -1.5), np.full(2, 1.5)
         corners = np.array([[lower[0], lower[1]], [lower[0], upper[1]], [upper[0], upper[1]], [upper[0], lower[1]]])
-    return corners if _turns_left(corners) else corners[::-1].copy()
-
-
-def floor_mesh(polygon: np.ndarray) -> trimesh.Trimesh:
-    """The floor as a slab whose top is at height 0, metres."""
-    flat = shapely.Polygon(np.stack([polygon[:, 0], -polygon[:, 1]], 1))  # x right, -z up: seen from above
-    slab = trimesh.creation.extrude_polygon(flat, THICKNESS)
-    slab.vertices = np.stack([slab.vertices[:, 0], slab.vertices[:, 2] - THICKNESS, -slab.vertices[:, 1]], 1)
-    return slab
-
-
-def _turns_left(corners: np.ndarray) -> bool:
-    x, z = corners[:, 0], -corners[:, 1]
-    return bool((x * np.roll(z, -1) - z * np.roll(x, -1)).sum() > 0)
+    return corners if signed_area(corners) < 0 else corners[::-1].copy()

@@ -43,6 +43,13 @@ class Form:
     above: Usd.Prim | None = None
 
 
+def shown(prim: Usd.Prim) -> bool:
+    """Whether pictures have a prim: visible, and of purpose default or render."""
+    image = UsdGeom.Imageable(prim)
+    of_pictures = image.ComputePurpose() in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
+    return of_pictures and image.ComputeVisibility() != UsdGeom.Tokens.invisible
+
+
 def forms(
     root: Usd.Prim,
     cache: UsdGeom.XformCache,

@@ -164,7 +164,7 @@ def test_shapes_arrive_as_the_published_code_places_them(monkeypatch):
     monkeypatch.setattr(model.model.vqvae, "decode", lambda z: torch.tensor(grid).expand(len(z), 1, -1, -1, -1))
     turned = model.sample_shapes(BEDROOM, None, generator=seeded())[0].numpy()
     size = np.array([1.0, 0.8, 1.6])
-    ours = mesh_from_shape(turned, size).mesh
+    ours = mesh_from_shape(turned, size)
     published = mesh_from_grid(grid)
     published.vertices = fit_to_box(published.vertices, np.array([*size, 0, 0, 0, 0.0]), centre_first=False)
     if published.volume < 0:

@@ -72,7 +72,7 @@ def lone_shapes(request: ShapeRequest) -> Shapes:
     """
 
     def make(grid: np.ndarray, size: np.ndarray, category: str, faces: int) -> Geometry:
-        return solid_geometry(mesh_from_shape(grid, size, faces=faces).mesh, category, Origin("independent"))
+        return solid_geometry(mesh_from_shape(grid, size, faces=faces), category, Origin("independent"))
 
     alone = [graph_batch(request.graph.replaced(nodes=(node,), relations=())) for node in request.graph.nodes]
     return _meshed(request, _grids(request, GraphBatch.pack(alone), "independent"), make, alike=False)
@@ -99,7 +99,7 @@ def within_budget(grid: np.ndarray, size: np.ndarray, category: str, faces: int)
     """
     asked, best = faces, None
     for _ in range(TRIES):
-        found = solid_geometry(mesh_from_shape(grid, size, faces=asked).mesh, category, Origin("sdf"))
+        found = solid_geometry(mesh_from_shape(grid, size, faces=asked), category, Origin("sdf"))
         best = found if best is None or found.faces < best.faces else best
         if found.faces <= faces or asked == LEAST_FACES:
             break

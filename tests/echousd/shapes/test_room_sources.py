@@ -141,7 +141,7 @@ def bed_grid() -> np.ndarray:
 @pytest.mark.parametrize("faces", [600, 2000])
 def test_faces_are_counted_after_the_cut_along_materials(faces):
     grid, size = bed_grid(), np.array([1.6, 1.0, 2.0])
-    uncut = mesh_from_shape(grid, size, faces=faces).mesh
+    uncut = mesh_from_shape(grid, size, faces=faces)
     assert solid_geometry(uncut, "double_bed", ORIGIN).faces > faces
     found = within_budget(grid, size, "double_bed", faces)
     assert 0.7 * faces < found.faces <= faces
