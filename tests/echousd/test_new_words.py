@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from echousd.shapes.finishes.harmonies import HARMONIES
 from inline_batches import Inline
 from pxr import Usd, UsdPhysics
 from small_room import BARE
@@ -31,7 +30,7 @@ from echousd.graph import Node, Relation, RoomSpec, SceneGraph, load_graph, star
 from echousd.graph.picture import draw_graph, to_dot
 from echousd.layers.structure import COVERS
 from echousd.place import place_boxes
-from echousd.shapes.finishes.slots import SLOTS
+from echousd.shapes.finishes.slots import HARMONIES, SLOTS
 from echousd.shapes.fittings import DOORS, WINDOWS
 from echousd.stage.foreign import foreign_graph
 
