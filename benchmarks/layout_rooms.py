@@ -36,7 +36,7 @@ LAYOUT = PARTS[3:]  # of a layout; the others are what any run needs
 @contextmanager
 def parted() -> Iterator[dict[str, float]]:
     """CPU seconds by `PARTS` of what runs inside the block, each without the parts that run within it."""
-    from echomodel.compact import layouts as sampling
+    from echomodel.compact import sampling
     from echousd.make import layouts
     from echousd.place import living, search
 
