@@ -17,10 +17,9 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics, UsdShade, Vt
 from echousd.layers.materials import write_looks, write_palettes
 from echousd.layers.physics import write_asset_physics
 from echousd.options import Look
-from echousd.shapes.finishes.slots import HARMONIES
 from echousd.shapes.geometry import Geometry, Original
 from echousd.shapes.joints import write_joints
-from echousd.shapes.looks import look, palette_for
+from echousd.shapes.looks import alternatives, look, palette_for
 from echousd.shapes.surface import CREASE, Surface, surfaces
 from echousd.stage.files import layer_bytes, new_stage
 from echousd.stage.layouts import authoring
@@ -142,7 +141,8 @@ def _write_looks(stage: Usd.Stage, name: str, style: str, slots: Mapping[str, Se
     if not bindings:
         return
     used, chosen, scope = sorted(set(bindings.values())), palette_for(style), f"/{name}/{MTL}"
-    plain = {harmony: {slot: replace(look(harmony, slot), pattern="") for slot in used} for harmony in HARMONIES}
+    shown = alternatives(chosen)
+    plain = {harmony: {slot: replace(look(harmony, slot), pattern="") for slot in used} for harmony in shown}
     write_looks(stage, plain[chosen], bindings, scope, tinted=True)
     write_palettes(stage, chosen, plain, f"/{name}", scope)
 

@@ -234,7 +234,8 @@ def materials_layer(
     stage = _room_stage(room, "materials")
     stage.OverridePrim("/Room")
     slots = _slots(small)
-    tables = {name: room_looks(room, made, built, slots, name)[0] for name in looks.PALETTES}
+    shown = looks.alternatives(harmony, room.graph.room.style)
+    tables = {name: room_looks(room, made, built, slots, name)[0] for name in shown}
     materials.write_looks(stage, tables[harmony], bindings, also=tables[harmony], harmony=harmony, tinted=True)
     for asset in sorted({room.assets[name] for name in instanced(room)}):
         assets.as_class(stage, asset)

@@ -28,7 +28,7 @@ class Look:
     metres: float = 1.0
 
 
-PALETTES = HARMONIES
+SHOWN = 6  # harmonies among which a written room or asset lets one choose
 GLOW = tuple(round(0.55 * c, 5) for c in linear("ffe2ae"))  # of a lamp's shade
 
 
@@ -55,7 +55,15 @@ def palette_for(key: str, among: Iterable[str] = HARMONIES) -> str:
 def palette_of_room(seed: int, style: str | None = None) -> str:
     """The palette of a room for which nobody chose one, of those that go with its `style`."""
     row = vocabulary().known_style(style)
-    return palette_for(f"{ROOM_STYLE} {seed}", row.palettes if row else PALETTES)
+    return palette_for(f"{ROOM_STYLE} {seed}", row.palettes if row else HARMONIES)
+
+
+def alternatives(chosen: str, style: str | None = None) -> tuple[str, ...]:
+    """`SHOWN` harmonies that a room of a style may be shown in: its own, the style's, then those next in the table."""
+    names = list(HARMONIES)
+    row, start = vocabulary().known_style(style), names.index(chosen)
+    following = (*names[start + 1 :], *names[:start])
+    return tuple(dict.fromkeys((chosen, *(row.palettes if row else ()), *following)))[:SHOWN]
 
 
 @dataclass(frozen=True)

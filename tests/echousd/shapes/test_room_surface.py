@@ -4,8 +4,8 @@ import trimesh
 
 from echomodel.furniture.solids import Tube
 from echomodel.vocabulary import vocabulary
-from echousd.shapes.finishes.slots import metres_of
-from echousd.shapes.looks import BANDS, PALETTES, cut, look, material_groups, palette_for
+from echousd.shapes.finishes.slots import HARMONIES, metres_of
+from echousd.shapes.looks import BANDS, SHOWN, alternatives, cut, look, material_groups, palette_for
 from echousd.shapes.merging import box_mesh
 from echousd.shapes.surface import creased_normals, surface, surfaces, unshared
 from echousd.stage.taxonomy import ade20k
@@ -83,7 +83,7 @@ def test_every_category_has_looks_for_all_its_faces(category):
     assert (faces == np.arange(len(mesh.faces))).all()
     assert mesh.is_watertight
     for group in groups:
-        assert all(0 <= c <= 1 for palette in PALETTES for c in look(palette, group).color)
+        assert all(0 <= c <= 1 for palette in HARMONIES for c in look(palette, group).color)
     assert vocabulary().category(category).look in BANDS
     assert ade20k(category)
 
@@ -100,7 +100,15 @@ def test_bed_has_linen_above_wood_and_a_headboard():
 
 def test_palettes_are_steady():
     assert palette_for("room 7") == palette_for("room 7")
-    assert len({palette_for(f"style {i}") for i in range(60)}) == len(PALETTES)
+    assert len({palette_for(f"style {i}") for i in range(300)}) == len(HARMONIES)
+
+
+def test_a_written_room_shows_a_few_harmonies_its_own_first():
+    for chosen in HARMONIES:
+        shown = alternatives(chosen)
+        assert shown[0] == chosen
+        assert len(set(shown)) == len(shown) == SHOWN
+    assert set(alternatives("clay", "boho")) >= set(vocabulary().known_style("boho").palettes)
 
 
 def test_boards_that_meet_share_no_point_and_stay_closed():
