@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from echomodel.data.meshes import draft_table
+from echomodel.data.meshes import held_out
 from echomodel.loading import load_model
 from echomodel.vocabulary import vocabulary
 from echousd.assets.catalogues import entries_of
@@ -72,12 +72,10 @@ def main() -> None:
             f"indexing {told} descriptors: {each * 1000:.0f} ms of a core each, two cores {each * 500:.0f} s for 1,000"
         )
     print(f"choosing for a room of 12 from 10,000 rows: {choosing(records, given.rooms) * 1000:.1f} ms")
-    from echomodel.data.catalogues import read_library
-
-    raw = [entry for path in sorted(given.folder.rglob("*.sh3f")) for entry in read_library(path)]
+    known = [entry for entry in entries if entry.decided and entry.category]
+    held = held_out(known)
     for split in ("train", "held_out"):
-        found = {row.key: row for row in draft_table(raw) if row.use and row.split == split}
-        judged(entries, found, split)
+        judged(entries, {one.key: one for one in known if (one.key in held) == (split == "held_out")}, split)
 
 
 def judged(entries: list, held: dict, split: str) -> None:

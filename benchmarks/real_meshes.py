@@ -1,11 +1,11 @@
 """Furniture against real meshes, which no weights have seen: does a classifier name it, how near does it come?
 
-    python benchmarks/real_meshes.py SOURCE... [--least 8] [--per-class 16] [--seeds 1] [--sdf] [--cache F.npz] [--json]
+    python benchmarks/real_meshes.py INDEX... [--least 8] [--per-class 16] [--seeds 1] [--sdf] [--cache F.npz] [--json]
 
-A classifier of point clouds in metres is trained on the real meshes alone (Sweet Home 3D's libraries or whatever
-`echousd data meshes` reads), then names pieces that the furniture branch described and pieces of the programs' own
-styles, of the same sizes. MMD, COV and 1-NNA compare sets of equal size with the real ones, in the unit box. Of
-several seeds the mean and the standard deviation are told.
+A classifier of point clouds in metres is trained on the real meshes alone (of an index by `echousd assets index`, of
+Sweet Home 3D's libraries for example), then names pieces that the furniture branch described and pieces of the
+programs' own styles, of the same sizes. MMD, COV and 1-NNA compare sets of equal size with the real ones, in the unit
+box. Of several seeds the mean and the standard deviation are told.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ import trimesh
 from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
-from echomodel.data.meshes import draft_table, entries_of, prepared
 from echomodel.echo import EchoModel
 from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
 from echomodel.furniture.style import piece_of
@@ -28,6 +27,9 @@ from echomodel.graph import GraphBatch
 from echomodel.metrics.pointsets import set_scores, surface_points
 from echomodel.tsdf import mesh_from_tsdf
 from echomodel.vocabulary import vocabulary
+from echousd.assets.measure import measure
+from echousd.assets.table import read_library
+from echousd.shapes.originals.loading import library_file
 
 POINTS, WIDTH, STEPS, BATCH, FOLDS, JUDGES = 256, 96, 240, 32, 3, 2
 
@@ -82,14 +84,15 @@ def cloud(mesh: trimesh.Trimesh) -> np.ndarray:
 def real_clouds(sources: list[Path], cache: Path) -> dict[str, np.ndarray]:
     """Class -> clouds (n, POINTS, 3) of the real meshes."""
     if not cache.exists():
-        entries = [entry for path in sources for entry in entries_of(path, path.parent)]
-        by_key, found = {entry.key: entry for entry in entries}, {}
-        for row in draft_table(entries):
-            if row.use:
+        found: dict[str, list] = {}
+        for library in map(read_library, sources):
+            for record in (record for record in library.records.values() if record.usable):
                 try:
-                    found.setdefault(row.category, []).append(cloud(prepared(by_key[row.key], row)))
+                    mesh = measure(library_file(library, record)).turned(np.eye(3))
                 except ValueError as error:
                     print(f"left out: {error}")
+                    continue
+                found.setdefault(record.category, []).append(cloud(mesh.apply_transform(record.pose())))
         np.savez(cache, **{name: np.stack(clouds) for name, clouds in found.items()})
     return {name: clouds[:, :POINTS] for name, clouds in np.load(cache).items()}
 

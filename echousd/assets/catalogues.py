@@ -13,6 +13,7 @@ import re
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass
+from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -20,12 +21,11 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Tf
 
-from echomodel.data.catalogues import MeshEntry, read_library
-from echomodel.data.meshes import class_by_name, reviewed
 from echomodel.files import read_bounded, within_memory
 from echousd.assets.licences import licence_beside
 from echousd.assets.model_file import MODELS, ModelFile
-from echousd.assets.naming import fitted
+from echousd.assets.naming import class_by_name, fitted
+from echousd.assets.sweethome import read_library
 from echousd.stage.apart import fatal
 
 Told = Callable[[str], None]  # is told of what cannot be read, one line each
@@ -95,22 +95,26 @@ def sweet_home_entries(folder: Path, libraries: list[Path], tell: Told) -> list[
     found: list[Entry] = []
     for library in libraries:
         try:
-            found += map(_of_sweet_home, read_library(library))
+            for told in read_library(library):
+                file = ModelFile(library, library.parent, told.pop("member"))
+                found.append(Entry(file=file, category=_sweet_home_class(**told), decided=True, **told))
         except (ValueError, KeyError, OSError) as error:
             tell(f"{library}: {error}")
     return found
 
 
-def _of_sweet_home(entry: MeshEntry) -> Entry:
-    assert entry.size is not None
-    category = class_by_name(entry.name, entry.group, entry.size)
-    known = reviewed().get(entry.key, {})
-    category = "" if category and fitted(category, entry.name, entry.group) else category
-    category = "" if known.get("use") == "0" else known.get("class", category)
-    return Entry(
-        entry.key, ModelFile(entry.source, entry.source.parent, entry.member), entry.name, group=entry.group,
-        category=category, decided=True, dims=entry.size, turn=entry.turn, licence=entry.licence, author=entry.creator,
-    )  # fmt: skip
+def _sweet_home_class(key: str, name: str, group: str, dims: np.ndarray, **_: Any) -> str:
+    category = class_by_name(name, group, dims)
+    category = "" if category and fitted(category, name, group) else category
+    known = reviewed().get(key, {})
+    return "" if known.get("use") == "0" else known.get("class", category)
+
+
+@cache
+def reviewed() -> dict[str, dict[str, str]]:
+    """What was found by eye of models of Sweet Home 3D's libraries: key -> `class`, or `use` 0."""
+    review = json.loads(Path(__file__).with_name("mesh_review.json").read_text("utf-8"))
+    return dict(review["models"])
 
 
 # Amazon Berkeley Objects: `3dmodels/metadata/3dmodels.csv.gz`, glb models, and listings that name them

@@ -106,9 +106,10 @@ def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool, encode
     record = replace(record, placement=placement, supports=supports(shape), thumbnail=thumbnail(shape), fault=fault)
     record = replace(record, colors=dominant(found.coats))
     if encoder is not None and not fault:
-        from echousd.assets.descriptor import descriptors, grid_of
+        from echomodel.tsdf import tsdf_from_mesh
+        from echousd.assets.descriptor import descriptors
 
-        (numbers,) = descriptors(encoder, grid_of(shape)[None]).tolist()
+        (numbers,) = descriptors(encoder, tsdf_from_mesh(shape)[None]).tolist()
         record = replace(record, descriptor=tuple(round(number, 5) for number in numbers))
     return record
 

@@ -6,29 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
-import trimesh
-from scipy import ndimage
 
 from echomodel.echo import EchoModel
-from echomodel.tsdf import RESOLUTION, truncated, voxels_from_points
 from echousd.assets.record import AssetRecord
-from echousd.assets.shape import sampled
 
 CELLS = 4  # of the descriptor along a side
-SAMPLES = 60_000
 WEIGHT = 4.0  # of the distance of two descriptors (0 to 2) against the other costs of a choice
-
-
-def grid_of(mesh: trimesh.Trimesh) -> np.ndarray:
-    """(64, 64, 64) float32 signed distances of any mesh in its box, true to a voxel; by flood fill from outside."""
-    points = voxels_from_points(sampled(mesh, SAMPLES)[0], *mesh.bounds)
-    shell = np.zeros((RESOLUTION,) * 3, bool)
-    shell[tuple(np.clip(np.rint(points), 0, RESOLUTION - 1).astype(int).T)] = True
-    parts, _ = ndimage.label(np.pad(~shell, 1, constant_values=True))
-    outside = (parts == parts[0, 0, 0])[1:-1, 1:-1, 1:-1]
-    away = ndimage.distance_transform_edt(outside)
-    depth = ndimage.distance_transform_edt(~outside)
-    return truncated(np.where(outside, away - 0.5, 0.5 - depth))
 
 
 def descriptors(model: object, grids: np.ndarray) -> np.ndarray:

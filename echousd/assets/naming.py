@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from echomodel.data.meshes import class_by_name
 from echomodel.sizes import size_statistics
 from echomodel.vocabulary import normalised, vocabulary
 
@@ -47,6 +46,31 @@ def category_of(
             surely = confidence if known_word(bare) or _within(bare) else min(confidence, MEANT)
             return _refined(found, dims, group), surely * _likeliness(found, dims)
     return "", 0.0
+
+
+OTHER_GROUPS = ("Vehicles", "Characters", "Doors and windows", "Staircases")  # shelves without furniture of ours
+
+
+def class_by_name(name: str, group: str, size: Sequence[float] | np.ndarray) -> str:
+    """Category for a model's name, group and size (3,) in metres, or "" where it is no furniture of the vocabulary.
+
+    The first pattern of `classes.tsv` that is found in the name tells; where its word ends in ?, the size does.
+    """
+    text = name.lower()
+    width, height, _ = size
+    if group in OTHER_GROUPS or (group == "Exterior" and not re.search(r"chair|table|sofa|bench", text)):
+        return ""
+    word = next((word for word, pattern in _patterns("classes.tsv") if re.search(pattern, text)), "")
+    low = "side_table" if width < 0.65 else "coffee_table"
+    choice = {
+        "bed?": "double_bed" if width >= 1.3 else "single_bed",
+        "sofa?": "multi_seat_sofa" if width >= 1.75 else "loveseat_sofa",
+        "stool?": "bar_stool" if height > 0.62 else "stool",
+        "chair?": "office_chair" if group == "Office" and height > 0.75 else "chair",
+        "table?": "dining_table" if height >= 0.62 and width >= 0.7 else low,
+        "lamp?": "floor_lamp" if height > 1.0 else "table_lamp",
+    }
+    return choice.get(word, word)
 
 
 def _abroad(text: str, group: str, size: Sequence[float] | np.ndarray) -> str:
@@ -140,13 +164,13 @@ def plain(text: str) -> str:
 def english(text: str) -> str:
     """The English name of a piece of furniture with a name in one of the languages, "" where there is none."""
     name = plain(text)
-    return next((word for word, pattern in _patterns() if re.search(pattern, name)), "")
+    return next((word for word, pattern in _patterns("words.tsv") if re.search(pattern, name)), "")
 
 
 @cache
-def _patterns() -> list[tuple[str, str]]:
-    """(English word, pattern on a plain name), of which the first that matches counts; "" = nothing of ours."""
-    rows = Path(__file__).with_name("words.tsv").read_text("utf-8").splitlines()
+def _patterns(table: str) -> list[tuple[str, str]]:
+    """(word, pattern on a name) of a table, of which the first that matches counts; "" = nothing of ours."""
+    rows = Path(__file__).with_name(table).read_text("utf-8").splitlines()
     return [(word, pattern) for word, _, pattern in (row.partition("\t") for row in rows)]
 
 

@@ -6,12 +6,10 @@ import io
 
 import numpy as np
 import trimesh
-from PIL import Image
 
 LEVEL = 0.95  # least upward part of a normal
 CARRIES = 0.2  # least share of the footprint at one height that things can stand on
 SIDE = 96  # pixels of a thumbnail
-SPLATS = 24_000
 
 
 def supports(mesh: trimesh.Trimesh) -> tuple[float, ...]:
@@ -35,33 +33,12 @@ def supports(mesh: trimesh.Trimesh) -> tuple[float, ...]:
     return tuple(sorted(height for _, height in sorted(found, reverse=True)[:8]))
 
 
-def thumbnail(mesh: trimesh.Trimesh, *, yaw: float = 0.6, pitch: float = 0.4) -> bytes:
-    """PNG of a mesh in the object frame, seen from its front right above, drawn as points.
+def thumbnail(mesh: trimesh.Trimesh) -> bytes:
+    """PNG of a mesh in the object frame, seen from its front right above."""
+    from echomodel.data.sheet import thumbnail as drawn
 
-    Arguments:
-        mesh: +Y up, front +Z.
-        yaw, pitch: direction of view, radians; 0, 0 looks at the front.
-    """
-
-    cy, sy, cp, sp = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)
-    view = np.array([[cy, 0, -sy], [-sp * sy, cp, -sp * cy], [cp * sy, sp, cp * cy]])
-    points, normals, _ = sampled(mesh, SPLATS)
-    seen = points @ view.T
-    corners = trimesh.bounds.corners(mesh.bounds) @ view.T
-    low, high = corners[:, :2].min(0), corners[:, :2].max(0)
-    scale = 0.92 * SIDE / max(float((high - low).max()), 1e-9)
-    at = (seen[:, :2] - (low + high) / 2) * scale * [1, -1] + SIDE / 2
-    pixel = at.astype(int).clip(0, SIDE - 2)
-    facing = normals @ view.T
-    facing[facing[:, 2] < 0] *= -1
-    light = 0.4 + 0.6 * np.maximum(facing @ (np.array([-0.35, 0.75, 0.6]) / 1.022), 0)
-    shade = np.repeat((186.0 * light[:, None]).clip(0, 255), 3, 1)
-    order = np.argsort(seen[:, 2], kind="stable")  # the nearest last
-    picture = np.full((SIDE, SIDE, 3), 250, np.uint8)
-    for dx, dy in ((1, 1), (1, 0), (0, 1), (0, 0)):  # later ones win: a point's own pixel
-        picture[pixel[order, 1] + dy, pixel[order, 0] + dx] = shade[order]
     out = io.BytesIO()
-    Image.fromarray(picture).save(out, "PNG")
+    drawn(mesh, SIDE).save(out, "PNG")
     return out.getvalue()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -36,24 +37,16 @@ def index(
 
     Models that did not change since the last run are not read again. What cannot be used is listed.
     """
-    from rich.console import Console
-    from rich.progress import Progress
-
     from echousd.assets.index import index as make
+    from echousd.cli.terminal import progress_bar
 
     if table is not None and not table.is_file():
         raise ValueError(f"{table}: no such file, allowed: a table that `echousd assets review` wrote")
-    console = Console(stderr=True)
-    with Progress(console=console, disable=not console.is_terminal) as bar:
-        task = bar.add_task("Reading the models", total=None)
+    with progress_bar() as listen:
         done = make(
-            folders,
-            output,
-            workers=workers or os.cpu_count() or 1,
-            table=table or output.with_suffix(".csv"),
-            descriptors=descriptors,
-            progress=lambda count, of: bar.update(task, completed=count, total=of),
-        )
+            folders, output, workers=workers or os.cpu_count() or 1, table=table or output.with_suffix(".csv"),
+            descriptors=descriptors, progress=partial(listen, "models"),
+        )  # fmt: skip
     counts = {"models": done.models, "usable": done.usable, "read": done.read}
     lines = [f"left out {fault}" for fault in done.faults[:SHOWN]]
     if len(done.faults) > SHOWN:

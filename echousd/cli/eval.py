@@ -49,7 +49,7 @@ def suite(
 
     Example: echousd eval suite default guided --against rooms.json -o report --only relations,faults
     """
-    from echousd.cli.generate import progress_bar
+    from echousd.cli.terminal import progress_bar
     from echousd.evaluation.runs import SYSTEMS, SuiteSettings
     from echousd.evaluation.suite import evaluate, write_report
 
@@ -80,7 +80,7 @@ def study(
 
     Example: echousd eval study default generator+search real -o study.html --count 12
     """
-    from echousd.cli.generate import progress_bar
+    from echousd.cli.terminal import progress_bar
     from echousd.evaluation.suite import write_study
 
     with progress_bar() as told_to:

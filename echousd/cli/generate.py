@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,27 +14,11 @@ from echousd.cli.options import Force, Made, Outside, Wait, add_room_command
 from echousd.cli.output import report, say, say_done, say_written, telling_faults
 
 if TYPE_CHECKING:
-    from echomodel.progress import StageListener
     from echousd.home.graph import HomeGraph
     from echousd.make.finished import Written
     from echousd.options import RoomOptions
 
 app = typer.Typer()
-
-TITLES = {
-    "read": "Reading the graph",
-    "load": "Loading the model",
-    "assets": "Choosing models",
-    "layout": "Placing the furniture",
-    "place": "Placing the furniture",
-    "shapes": "Shaping the furniture",
-    "meshes": "Cleaning the meshes",
-    "settle": "Simulating the room",
-    "write": "Writing the layers",
-    "preview": "Drawing the preview",
-    "rooms": "Making the rooms",
-}
-
 
 def generate(
     graph: Annotated[Path, typer.Argument(help="Scene graph: a stage, YAML or JSON.", show_default=False)],
@@ -57,6 +41,7 @@ def generate(
     Of a graph's numbers, lengths are metres in the room's frame (+Y up, the floor at 0), yaw is `90 deg` or radians
     about +Y: at 0 a front looks along +Z.
     """
+    from echousd.cli.terminal import progress_bar
     from echousd.folder.folder import check_output, writing
     from echousd.options import RoomOptions
 
@@ -127,6 +112,7 @@ def generate_home(
         graph: the file that it comes from; a home that was made is planned anew, from the plan that it has.
         dry_run: say what would be made, and make nothing.
     """
+    from echousd.cli.terminal import progress_bar
     from echousd.folder.found import is_home
     from echousd.home.assemble import earlier, stale, write_rooms
     from echousd.home.given import next_plan, plan_there
@@ -162,35 +148,6 @@ def generate_home(
             say(line)
     if faults:
         raise typer.Exit(1)
-
-
-@contextmanager
-def progress_bar() -> Iterator[StageListener]:
-    """A bar per stage on a terminal, a plain line per stage elsewhere (on stderr)."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        told: set[str] = set()
-
-        def plain(stage: str, done: int, total: int) -> None:
-            if stage not in told:
-                told.add(stage)
-                typer.echo(TITLES.get(stage, stage), err=True)
-
-        yield plain
-        return
-    bar = Progress(TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=console)
-    tasks: dict[str, Any] = {}
-    with bar:
-
-        def listen(stage: str, done: int, total: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bar.add_task(TITLES.get(stage, stage), total=total)
-            bar.update(tasks[stage], completed=done, total=total)
-
-        yield listen
 
 
 add_room_command(app, generate, "echousd generate samples/bedroom.usda -o out/bedroom --seed 7")

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from echomodel.data.figures import Row
     from echomodel.roomboxes import RoomBoxes
+    from echousd.assets.record import AssetRecord
 
 
 app = typer.Typer()
@@ -53,7 +54,6 @@ def train(
 data_app = typer.Typer(help="Rooms and furniture to learn from.", no_args_is_help=True)
 app.add_typer(data_app, name="data")
 
-PACKAGE = "sweethome3d-furniture"  # as `echomodel.data.meshes` has it, which need not be loaded for --help
 USD_FILES = (".usd", ".usda", ".usdc", ".usdz")
 Seed = Annotated[int, typer.Option(help="Seed of the world; equal seeds give equal bytes.")]
 Rooms = Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")]
@@ -69,28 +69,13 @@ def build(
 
     Example: echousd data build --recipe packed --seed 1 -o data/packed
     """
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
     from echomodel.data.build import build_data
-    from echousd.cli.terminal import Terminal
+    from echousd.cli.terminal import Terminal, progress_bar
 
-    console = Terminal(stderr=True)
-    columns = (TextColumn("{task.description:8}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    told: dict[str, int] = {}
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
-        tasks: dict = {}
-
-        def report(part: str, done: int, total: int) -> None:
-            if part not in tasks:
-                tasks[part] = bar.add_task(part, total=total)
-            bar.update(tasks[part], completed=done, total=total)
-            if not console.is_terminal and done * 10 // total > told.get(part, 0):
-                told[part] = done * 10 // total
-                console.print(f"{part} {done}/{total}")
-
-        rooms, shapes = build_data(out, recipe, seed, report)
+    with progress_bar() as listen:
+        rooms, shapes = build_data(out, recipe, seed, listen)
     size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file()) / 1e6
-    console.print(f"{out}: {len(rooms)} rooms, {len(shapes)} shapes, {size:.1f} MB")
+    Terminal(stderr=True).print(f"{out}: {len(rooms)} rooms, {len(shapes)} shapes, {size:.1f} MB")
 
 
 @data_app.command("rooms")
@@ -211,53 +196,39 @@ def _print_rows(rows: list[Row], shown: list[Row], means: dict[str, float], sile
 
 @data_app.command("meshes")
 def meshes(
-    sources: Annotated[
-        list[Path] | None, typer.Argument(help="Libraries (.sh3f), a .deb that holds them, folders of OBJ, GLB or USD.")
-    ] = None,
-    out: Annotated[Path, typer.Option("-o", "--output", help="Folder of the set.")] = Path("meshes"),
-    debian: Annotated[bool, typer.Option(help=f"Fetch the Debian package {PACKAGE} with apt.")] = False,
-    table_only: Annotated[bool, typer.Option(help="Write OUT/table.csv for review and stop.")] = False,
+    library: Annotated[Path, typer.Argument(help="Index of a library (.parquet), from echousd assets index.")],
+    out: Annotated[Path, typer.Option("-o", "--output", help="Folder of the set.")],
     copies: Annotated[int, typer.Option(min=1, help="Stored shapes per training mesh: 1 as it is, 2 with mirror.")] = 2,
 ) -> None:
-    """Make a shape set from real meshes: classes by name, metric size, flood-filled distances, thumbnails, attribution.
+    """Make a shape set from the usable models of a library: metric size, flood-filled distances, attribution.
 
-    OUT/table.csv is written first and read again when it exists: correct `class`, `use` and `yaw` there and run again.
+    Classes and fronts are those of the index; `echousd assets review` tells how they are corrected.
 
-    Example: echousd data meshes --debian -o data/meshes
+    Example: echousd data meshes models.parquet -o data/meshes
     """
-    from rich.progress import Progress
+    from functools import partial
 
-    from echomodel.data.meshes import build_meshes, draft_table, entries_of, fetched_package, read_table, write_table
-    from echousd.cli.terminal import Terminal
-    from echousd.stage.contents import stage_mesh
+    import numpy as np
 
-    console = Terminal(stderr=True)
-    out.mkdir(parents=True, exist_ok=True)
-    paths = list(sources or [])
-    if debian:
-        paths.append(fetched_package(out))
-    if not paths:
-        raise ValueError("no source given: name libraries or folders, or use --debian")
-    entries = [entry for path in paths for entry in entries_of(path, out, USD_FILES)]
-    table = out / "table.csv"
-    if not table.exists():
-        write_table(table, draft_table(entries))
-    rows = read_table(table)
-    used = sum(row.use for row in rows)
-    console.print(f"{table}: {len(rows)} models, {used} of them used")
-    if table_only:
-        return
-    loaders = dict.fromkeys(USD_FILES, stage_mesh)
-    with Progress(console=console, disable=not console.is_terminal) as bar:
-        task = bar.add_task("meshes", total=used)
+    from echomodel.data.meshes import MeshModel, build_meshes
+    from echousd.assets.measure import measure
+    from echousd.assets.table import read_library
+    from echousd.cli.terminal import Terminal, progress_bar
+    from echousd.shapes.originals.loading import library_file
 
-        def progress(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total)
-            if not console.is_terminal and done % 50 == 0:
-                console.print(f"meshes {done}/{total}")
+    found, console = read_library(library), Terminal(stderr=True)
 
+    def model(record: AssetRecord) -> MeshModel:
+        def load() -> trimesh.Trimesh:
+            return measure(library_file(found, record)).turned(np.eye(3)).apply_transform(record.pose())
+
+        about = record.id, record.category, record.name, record.licence, record.author
+        return MeshModel(*about, f"{record.sha256} {record.turn} {record.dims}", load)
+
+    models = [model(record) for record in found.records.values() if record.usable]
+    with progress_bar() as listen:
         shapes = build_meshes(
-            out, entries, rows, copies=copies, loaders=loaders, progress=progress,
+            out, models, copies=copies, progress=partial(listen, "meshes"),
             skipped=lambda line: console.print(f"skipped: {line}"),
         )  # fmt: skip
     console.print(f"{out}: {len(shapes)} shapes, {int(shapes.held_out.sum())} held out")

@@ -9,8 +9,9 @@ import zipfile
 
 import pytest
 
-from echomodel.data.catalogues import load_mesh, read_library
+from echousd.assets.measure import measure
 from echousd.assets.model_file import ModelFile
+from echousd.assets.sweethome import read_library
 from echousd.folder.history import _read_archive
 from echousd.store import Store
 
@@ -30,8 +31,8 @@ def beside(path):
 
 
 def library(path):
-    for entry in read_library(path):
-        load_mesh(entry)
+    for told in read_library(path):
+        measure(ModelFile(path, path.parent, told["member"]))
 
 
 def history(path):
