@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 
 from echoscene.config import UNetConfig
-from echoscene.encoder import TripletGCN, check_range
+from echoscene.encoder import TripletGCN
 from echoscene.unet import UNet
 
 
@@ -49,9 +49,6 @@ class Denoiser(UNet):
         nodes = [objects, getattr(self, coded)(x)]
         if config.time_in_echo:
             nodes.append(getattr(self, timed)(embedding))
-        if (edge_attr is None) != (config.edge_features == 0):
-            found = "none" if edge_attr is None else f"width {edge_attr.shape[-1]}"
-            raise ValueError(f"edge features: {found} given, config wants width {config.edge_features}")
         edges = self.pred_embeddings(triples[:, 1])
         edges = edges if edge_attr is None else torch.cat([edge_attr, edges], dim=1)
         return getattr(self, convolution)(torch.cat(nodes, dim=1), edges, triples[:, [0, 2]])[0]
@@ -69,35 +66,13 @@ class Denoiser(UNet):
             t: (N,) int64, step of each node, 0..999.
             edge_attr: (E, edge_features) float32, further edge features (`paper` preset).
 
-        Returns the noise, as large as x.
-        Raises ValueError for wrong shapes, an unknown predicate, an edge outside the nodes, NaN in a condition.
+        Returns the noise, as large as x. What the graph is was looked at by `SceneGraphTensors.check`.
         """
-        self._check(x, objects, triples, t)
         embedding = self.embed_time(t)
         context = self.echo(x, objects, triples, embedding, edge_attr)
         if self.config.conditioning == "concat":
             return self.denoise(torch.cat([x, context.reshape(-1, 1, *x.shape[2:])], dim=1), embedding, None)
         return self.denoise(x, embedding, context)
-
-    def _check(self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor) -> None:
-        nodes, config = len(x), self.config
-        if not nodes:
-            raise ValueError("graph has no nodes, at least one is needed")
-        for name, tensor, shape in (
-            ("noisy state", x, (nodes, config.channels)),
-            ("node condition", objects, (nodes, config.objects)),
-            ("steps", t, (nodes,)),
-            ("triples", triples, (len(triples), 3)),
-        ):
-            if tuple(tensor.shape[: len(shape)]) != shape:
-                raise ValueError(f"{name} has shape {tuple(tensor.shape)}, expected {shape}")
-        check_range("subject of triplet", triples[:, 0], nodes)
-        check_range("predicate of triplet", triples[:, 1], config.predicates)
-        check_range("object of triplet", triples[:, 2], nodes)
-        for name, tensor in (("noisy state", x), ("node condition", objects)):
-            bad = ~torch.isfinite(tensor).flatten(1).all(1)
-            if bool(bad.any()):
-                raise ValueError(f"{name} of node {int(bad.nonzero()[0])} is not finite")
 
 
 class LayoutNet(Denoiser):
@@ -135,12 +110,6 @@ class ShapeUNet(Denoiser):
             nn.Flatten(),
             nn.Linear(flat, self.config.code),
         )
-
-    def _check(self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor) -> None:
-        grid = (self.config.grid,) * 3
-        if tuple(x.shape[2:]) != grid:
-            raise ValueError(f"shape latents are {tuple(x.shape)}, expected (N, {self.config.channels}, {grid})")
-        super()._check(x, objects, triples, t)
 
 
 class ShapeNet(nn.Module):

@@ -5,9 +5,8 @@ in which it computes them, sampling and joint training.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 import torch
@@ -22,47 +21,42 @@ from echoscene.encoder import GraphEncoder, SceneGraphTensors
 from echoscene.unet import packed
 from echoscene.vqvae import VQVAE
 
-Tables = TypeVar("Tables", "LayoutTables", "ShapeTables")
 
+class Schedule:
+    """Tables of diffusion, (T,) float32 each, under the names of the published code (Ho et al. 2020, equations 4 to 7).
 
-def on_device(tables: Tables, device: torch.device | str) -> Tables:
-    """Tables all of whose tensors lie on a device."""
-    return type(tables)(**{field.name: getattr(tables, field.name).to(device) for field in fields(tables)})
-
-
-@dataclass(frozen=True, eq=False)
-class LayoutTables:
-    """DDPM tables of the layout branch, (T,) float32 each (EchoScene, section 3.3; Ho et al. 2020, equations 4 to 7).
-
-    The cumulative product is taken in float64 and rounded; all the rest is computed in float32 from the rounded
-    values, as the published code does: float64 tables differ in the last digits.
+    Arguments:
+        betas, alphas, bar: (T,) the noise of each step, one less it, and the cumulative product of that; all tables are
+            computed in their precision and then rounded, as the published code does: others differ in the last digits.
     """
 
-    betas: Tensor
-    alphas_cumprod: Tensor
-    alphas_cumprod_prev: Tensor
-    sqrt_alphas_cumprod: Tensor
-    sqrt_one_minus_alphas_cumprod: Tensor
-    sqrt_recip_alphas_cumprod: Tensor
-    sqrt_recipm1_alphas_cumprod: Tensor
-    posterior_variance: Tensor
-    posterior_log_variance_clipped: Tensor
-    posterior_mean_coef1: Tensor
-    posterior_mean_coef2: Tensor
+    def __init__(self, betas: Tensor, alphas: Tensor, bar: Tensor) -> None:
+        previous = torch.cat([torch.ones(1).to(bar), bar[:-1]])
+        variance = betas * (1.0 - previous) / (1.0 - bar)
+        self.betas, self.alphas_cumprod, self.alphas_cumprod_prev = betas.float(), bar.float(), previous.float()
+        self.sqrt_alphas_cumprod = bar.sqrt().float()
+        self.sqrt_one_minus_alphas_cumprod = (1.0 - bar).sqrt().float()
+        self.sqrt_recip_alphas_cumprod = (1.0 / bar).sqrt().float()
+        self.sqrt_recipm1_alphas_cumprod = (1.0 / bar - 1.0).sqrt().float()
+        self.posterior_variance = variance.float()
+        self.posterior_log_variance_clipped = variance.clamp_min(1e-20).log().float()
+        self.posterior_mean_coef1 = (betas * previous.sqrt() / (1.0 - bar)).float()
+        self.posterior_mean_coef2 = ((1.0 - previous) * alphas.sqrt() / (1.0 - bar)).float()
 
     @classmethod
-    def linear(cls, start: float = 1e-4, end: float = 2e-2, steps: int = 1000) -> LayoutTables:
-        """Tables of linearly growing betas."""
-        betas64 = np.linspace(start, end, steps, dtype=np.float64)
-        bar = torch.from_numpy(np.cumprod(1.0 - betas64)).float()
-        betas, alphas = torch.from_numpy(betas64).float(), torch.from_numpy(1.0 - betas64).float()
-        return cls._of(betas, alphas, bar)
+    def linear(cls, start: float = 1e-4, end: float = 2e-2, steps: int = 1000) -> Schedule:
+        """The layout branch's, with linearly growing betas; only the product is taken in float64 (EchoScene, 3.3)."""
+        betas = torch.from_numpy(np.linspace(start, end, steps, dtype=np.float64))
+        bar = torch.from_numpy(np.cumprod(1.0 - betas.numpy()))
+        return cls(betas.float(), (1.0 - betas).float(), bar.float())
 
-    def to(self, device: torch.device | str) -> LayoutTables:
-        """The same tables on a device."""
-        return on_device(self, device)
+    @classmethod
+    def scaled_linear(cls, start: float = 0.00085, end: float = 0.012, steps: int = 1000) -> Schedule:
+        """The shape branch's, whose betas have linearly growing square roots; all in float64."""
+        betas = torch.linspace(start**0.5, end**0.5, steps, dtype=torch.float64) ** 2
+        return cls(betas, 1.0 - betas, torch.from_numpy(np.cumprod(1.0 - betas.numpy())))
 
-    def spaced(self, count: int) -> tuple[LayoutTables, Tensor]:
+    def spaced(self, count: int) -> tuple[Schedule, Tensor]:
         """Tables of `count` of these T steps, evenly spread, and which they are: (count,) int64 (Nichol and Dhariwal
         2021, section 4); raises ValueError for an impossible count."""
         total = len(self.betas)
@@ -73,70 +67,21 @@ class LayoutTables:
         steps = torch.linspace(total - 1, 0, count, dtype=torch.float64).round().long().flip(0)
         bar = self.alphas_cumprod[steps]
         alphas = bar / torch.cat([torch.ones(1), bar[:-1]])
-        return self._of(1.0 - alphas, alphas, bar), steps
+        return Schedule(1.0 - alphas, alphas, bar), steps
 
-    @classmethod
-    def _of(cls, betas: Tensor, alphas: Tensor, bar: Tensor) -> LayoutTables:
-        previous = torch.cat([torch.ones(1), bar[:-1]])
-        variance = betas * (1.0 - previous) / (1.0 - bar)
-        return cls(
-            betas=betas, alphas_cumprod=bar, alphas_cumprod_prev=previous, sqrt_alphas_cumprod=bar.sqrt(),
-            sqrt_one_minus_alphas_cumprod=(1.0 - bar).sqrt(), sqrt_recip_alphas_cumprod=(1.0 / bar).sqrt(),
-            sqrt_recipm1_alphas_cumprod=(1.0 / bar - 1.0).sqrt(), posterior_variance=variance,
-            posterior_log_variance_clipped=variance.clamp_min(1e-20).log(),
-            posterior_mean_coef1=betas * previous.sqrt() / (1.0 - bar),
-            posterior_mean_coef2=(1.0 - previous) * alphas.sqrt() / (1.0 - bar),
-        )  # fmt: skip
+    def ddim(self, count: int = 100) -> tuple[Tensor, Tensor, Tensor]:
+        """The steps of a deterministic DDIM run, (S,) int64, ascending, equally spaced, each one later than its
+        multiple; (S,) float32 the cumulative alpha at each, and (S,) float64 after its update.
 
-
-@dataclass(frozen=True, eq=False)
-class ShapeTables:
-    """Diffusion tables of the shape branch, (T,) float32 rounded from float64."""
-
-    betas: Tensor
-    alphas_cumprod: Tensor
-    sqrt_alphas_cumprod: Tensor
-    sqrt_one_minus_alphas_cumprod: Tensor
-
-    def to(self, device: torch.device | str) -> ShapeTables:
-        """The same tables on a device."""
-        return on_device(self, device)
-
-    @classmethod
-    def scaled_linear(cls, start: float = 0.00085, end: float = 0.012, steps: int = 1000) -> ShapeTables:
-        """Tables of betas whose square roots grow linearly."""
-        betas = torch.linspace(start**0.5, end**0.5, steps, dtype=torch.float64).numpy() ** 2
-        bar = np.cumprod(1.0 - betas, axis=0)
-        tables = (betas, bar, np.sqrt(bar), np.sqrt(1.0 - bar))
-        return cls(*(torch.from_numpy(table).float() for table in tables))
-
-
-@dataclass(frozen=True, eq=False)
-class DDIMGrid:
-    """The steps of a deterministic DDIM run, ascending (Song et al. 2021, equation 12 with eta 0).
-
-    Arguments:
-        timesteps: (S,) int64.
-        alphas: (S,) float32, cumulative alpha at each step.
-        alphas_prev: (S,) float64, cumulative alpha after the update; the first is alpha at step 0, not 1, so that the
-            last update of the published sampler leaves a little noise.
-    """
-
-    timesteps: Tensor
-    alphas: Tensor
-    alphas_prev: Tensor
-
-    @classmethod
-    def uniform(cls, tables: ShapeTables, count: int = 100) -> DDIMGrid:
-        """`count` equally spaced steps, each one later than its multiple; raises ValueError for an impossible count."""
-        total = len(tables.alphas_cumprod)
+        The first of the last is alpha at step 0, not 1, so that the published sampler leaves a little noise in the end.
+        Raises ValueError for an impossible count.
+        """
+        total = len(self.alphas_cumprod)
         if not 1 <= count <= total:
             raise ValueError(f"DDIM steps is {count}, allowed: 1..{total}")
-        steps = np.arange(0, total, total // count) + 1
-        steps = steps[steps < total]
-        bar = tables.alphas_cumprod
-        previous = np.array([float(bar[0]), *bar[torch.from_numpy(steps[:-1])].tolist()])
-        return cls(torch.from_numpy(steps), bar[torch.from_numpy(steps)], torch.from_numpy(previous))
+        steps = torch.arange(1, total, total // count)
+        bar = self.alphas_cumprod
+        return steps, bar[steps], torch.cat([bar[:1], bar[steps[:-1]]]).double()
 
 
 STRUCTURE = ("floor", "_scene_")  # nodes that take part in both diffusions and have no shape
@@ -196,14 +141,14 @@ class ReleasedModel(GraphEncoder):
             self.vqvae = VQVAE(config.vqvae)
 
     @cached_property
-    def layout_tables(self) -> LayoutTables:
+    def layout_tables(self) -> Schedule:
         """The published schedule of the layout branch."""
-        return LayoutTables.linear()
+        return Schedule.linear()
 
     @cached_property
-    def shape_tables(self) -> ShapeTables:
+    def shape_tables(self) -> Schedule:
         """The published schedule of the shape branch."""
-        return ShapeTables.scaled_linear()
+        return Schedule.scaled_linear()
 
     @property
     def layout_net(self) -> LayoutNet:
@@ -267,7 +212,7 @@ class ReleasedModel(GraphEncoder):
         graph, change, device = graph.to(self.device), self._here(change), self.device
         conditions = self.eval().conditions(graph, change, generator)
         tables, chosen = self.layout_tables.spaced(steps or len(self.layout_tables.betas))
-        tables, chosen = tables.to(device), chosen.to(device)
+        chosen = chosen.to(device)
 
         fast = packed(net) if device.type == "cpu" else net
 
@@ -311,7 +256,7 @@ class ReleasedModel(GraphEncoder):
         def denoise(x: Tensor, t: Tensor) -> Tensor:
             return self.shape_df(x, conditions.shape, graph.triples, t, conditions.edge_attr)
 
-        return last(ddim(denoise, start, DDIMGrid.uniform(self.shape_tables, steps)), progress, steps)
+        return last(ddim(denoise, start, self.shape_tables.ddim(steps)), progress, steps)
 
     def _here(self, change: GraphChange | None) -> GraphChange | None:
         return None if change is None else replace(change, before=change.before.to(self.device))
@@ -330,14 +275,15 @@ class ReleasedModel(GraphEncoder):
         """
         device = self.device
         graph, change, scene, boxes = graph.to(device), self._here(change), scene.to(device), boxes.to(device)
+        for node in (~torch.isfinite(boxes)).any(1).nonzero()[:1, 0].tolist():
+            raise ValueError(f"box of node {node} is not finite")
         conditions = self.conditions(graph, change, generator)
         count = len(self.layout_tables.betas)
         t = torch.randint(count, (int(scene.max()) + 1,), generator=generator).to(device)[scene]
         noise = normal(boxes.shape, generator, device)
         losses = layout_loss(
-            self.layout_net, boxes, conditions.layout, graph.triples, t, noise, self.layout_tables.to(device),
-            conditions.edge_attr,
-        )  # fmt: skip
+            self.layout_net, boxes, conditions.layout, graph.triples, t, noise, self.layout_tables, conditions.edge_attr
+        )
         losses["layout"] = losses["loss"]
         if latents is not None and conditions.shape is not None:
             kept, triples = node_budget(graph.triples, scene, budget)
@@ -346,8 +292,7 @@ class ReleasedModel(GraphEncoder):
             t = torch.randint(count, (kept,), generator=generator).to(device)
             clean = latents[:kept].to(device)
             noise = normal(clean.shape, generator, device)
-            tables = self.shape_tables.to(device)
-            given = conditions.shape[:kept]
+            given, tables = conditions.shape[:kept], self.shape_tables
             losses["shape"] = shape_loss(self.shape_df, clean, given, triples, t, noise, tables, edge_attr)
             losses["loss"] = losses["layout"] + losses["shape"]
         return losses
@@ -357,7 +302,7 @@ Denoiser = Callable[[Tensor, Tensor], Tensor]  # (state (N, ...), step (N,) int6
 
 
 def ancestral(
-    denoise: Denoiser, x: Tensor, tables: LayoutTables, *, noise: Callable[[int], Tensor], variance: str = "posterior"
+    denoise: Denoiser, x: Tensor, tables: Schedule, *, noise: Callable[[int], Tensor], variance: str = "posterior"
 ) -> Iterator[tuple[int, Tensor]]:
     """Ancestral sampling of the layout branch (Ho et al. 2020, algorithm 2; EchoScene, section 3.3).
 
@@ -385,25 +330,22 @@ def ancestral(
         yield step, x
 
 
-def ddim(denoise: Denoiser, x: Tensor, grid: DDIMGrid) -> Iterator[tuple[int, Tensor]]:
+def ddim(denoise: Denoiser, x: Tensor, grid: tuple[Tensor, Tensor, Tensor]) -> Iterator[tuple[int, Tensor]]:
     """Deterministic DDIM (Song et al. 2021, equation 12 with eta 0), as the shape branch samples.
 
     Arguments:
         denoise: the network with everything but state and step bound.
-        x: (N, 3, d, h, w) float32, start; the published code repeats one draw for all nodes.
-        grid: steps.
+        x: (N, 3, d, h, w) float32, start; the published code repeats one draw for all nodes. grid: `Schedule.ddim`.
 
     Yields:
         (step, state after its update).
     """
-    for number in range(len(grid.timesteps) - 1, -1, -1):
-        step = int(grid.timesteps[number])
-        predicted = denoise(x, torch.full((len(x),), step, dtype=torch.int64, device=x.device))
-        alpha = torch.full((1,) * x.ndim, float(grid.alphas[number]), device=x.device)
-        previous = torch.full((1,) * x.ndim, float(grid.alphas_prev[number]), device=x.device)
+    for step, alpha, previous in reversed(list(zip(*grid, strict=True))):
+        predicted = denoise(x, torch.full((len(x),), int(step), dtype=torch.int64, device=x.device))
+        alpha, previous = alpha.to(x), previous.to(x)
         clean = (x - (1.0 - alpha).sqrt() * predicted) / alpha.sqrt()
         x = previous.sqrt() * clean + (1.0 - previous).sqrt() * predicted
-        yield step, x
+        yield int(step), x
 
 
 def last(states: Iterator[tuple[int, Tensor]], progress: StepListener | None = None, steps: int = 0) -> Tensor:
@@ -418,16 +360,19 @@ def last(states: Iterator[tuple[int, Tensor]], progress: StepListener | None = N
     return final
 
 
-def noised(clean: Tensor, t: Tensor, noise: Tensor, tables: LayoutTables | ShapeTables) -> Tensor:
+def noised(clean: Tensor, t: Tensor, noise: Tensor, tables: Schedule) -> Tensor:
     """q(x_t | x_0): sqrt(abar_t) x_0 + sqrt(1 - abar_t) noise, `t` (N,) int64 per node."""
     shape = (-1,) + (1,) * (clean.ndim - 1)
-    signal = tables.sqrt_alphas_cumprod[t].reshape(shape)
-    return signal * clean + tables.sqrt_one_minus_alphas_cumprod[t].reshape(shape) * noise
+    signal, spread = (
+        table.to(t.device)[t].reshape(shape)
+        for table in (tables.sqrt_alphas_cumprod, tables.sqrt_one_minus_alphas_cumprod)
+    )
+    return signal * clean + spread * noise
 
 
 def layout_loss(
     net: Callable[..., Tensor], boxes: Tensor, objects: Tensor, triples: Tensor, t: Tensor, noise: Tensor,
-    tables: LayoutTables, edge_attr: Tensor | None = None,
+    tables: Schedule, edge_attr: Tensor | None = None,
 ) -> dict[str, Tensor]:  # fmt: skip
     """Noise prediction loss of the layout branch (EchoScene, equation 4).
 
@@ -450,7 +395,7 @@ def layout_loss(
 
 def shape_loss(
     net: Callable[..., Tensor], latents: Tensor, objects: Tensor, triples: Tensor, t: Tensor, noise: Tensor,
-    tables: ShapeTables, edge_attr: Tensor | None = None,
+    tables: Schedule, edge_attr: Tensor | None = None,
 ) -> Tensor:  # fmt: skip
     """Noise prediction loss of the shape branch (EchoScene, equation 6): mean square over everything, a scalar.
 

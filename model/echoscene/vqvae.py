@@ -7,7 +7,6 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from echoscene.config import VQConfig
-from echoscene.unet import convolve_repeated
 
 
 def _norm(channels: int) -> nn.GroupNorm:
@@ -69,7 +68,7 @@ class _Upsample(nn.Module):
         self.conv = nn.Conv3d(channels, channels, 3, padding=1)
 
     def forward(self, x: Tensor) -> Tensor:
-        return convolve_repeated(x, self.conv.weight, self.conv.bias, (True, True, True))
+        return self.conv(F.interpolate(x, scale_factor=2.0))
 
 
 class _Level(nn.Module):

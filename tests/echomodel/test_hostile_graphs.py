@@ -17,7 +17,7 @@ from echomodel.samplers import clean_from
 from echomodel.text import ClipTextEncoder, TextEncoderError
 from echoscene.config import PaperSizes, paper
 from echoscene.encoder import SceneGraphTensors
-from echoscene.model import LayoutTables, ReleasedModel
+from echoscene.model import ReleasedModel, Schedule
 
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)
 SIZES = {
@@ -50,7 +50,7 @@ def published() -> ReleasedModel:
         layout_mult=(1, 1), shape_width=32, shape_mult=(1, 1), blocks=1, grid=8, vq_channels=4, vq_codes=16,
     )  # fmt: skip
     model = ReleasedModel(paper(14, sizes), statistics=STATISTICS).eval()
-    model.layout_tables = LayoutTables.linear(1e-3, 0.2, 5)
+    model.layout_tables = Schedule.linear(1e-3, 0.2, 5)
     return model
 
 
@@ -121,7 +121,7 @@ def test_nan_in_a_condition_is_named(compact: EchoModel, published: ReleasedMode
         published.sample_layout(edged, generator=seeded())
     targets = torch.zeros(2, 8)
     targets[0, 0] = torch.nan
-    with pytest.raises(ValueError, match="noisy state of node 0 is not finite"):
+    with pytest.raises(ValueError, match="box of node 0 is not finite"):
         published.train().training_losses(
             scene([3, 4], [[0, 1, 1], [1, 2, 0]]), torch.zeros(2, dtype=torch.int64), targets, None, generator=seeded()
         )

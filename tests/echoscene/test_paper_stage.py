@@ -17,7 +17,7 @@ from echomodel.training.recipe import Recipe, read_recipe
 from echomodel.training.run import open_run
 from echomodel.training.trainer import read_log, step_generator
 from echoscene.echo import DISTANCE, ReleasedEcho, published_grids, turned_back
-from echoscene.model import LayoutTables, ReleasedModel
+from echoscene.model import ReleasedModel, Schedule
 from echoscene.training import PaperModel, PaperStage, scene_boxes, text_encoder
 from echoscene.weights import load_released
 
@@ -77,7 +77,7 @@ def test_both_branches_train_on_one_latent_graph_and_sample(data: Path, autoenco
     stage = trainer.stage
     assert isinstance(stage, PaperStage)
     graph = stage.scene(stage.rooms.room(0, rules="sgfront"))
-    model.layout_tables = LayoutTables.linear(1e-3, 0.2, 20)  # 1,000 steps would take too long here
+    model.layout_tables = Schedule.linear(1e-3, 0.2, 20)  # 1,000 steps would take too long here
     boxes = model.sample_layout(graph, generator=torch.Generator().manual_seed(0))
     latents = model.sample_shapes(graph, generator=torch.Generator().manual_seed(0), steps=2, shared_noise=False)
     assert len(boxes) == len(latents) == len(graph.classes)

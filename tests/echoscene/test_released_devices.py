@@ -16,7 +16,7 @@ from echomodel.text import RandomTextEncoder
 from echomodel.vocabulary import vocabulary
 from echoscene.config import PaperSizes, paper
 from echoscene.echo import ReleasedEcho, pack_changes, pack_scenes, published_scene
-from echoscene.model import GraphChange, LayoutTables, ReleasedModel
+from echoscene.model import GraphChange, ReleasedModel, Schedule
 
 SIZES = PaperSizes(
     text=12, learned=4, flag=4, hidden=16, layers=2, context=32, code=8, heads=2, layout_width=128,
@@ -33,7 +33,7 @@ def model():
     classes = vocabulary().coarse_categories
     bounds = BoxStatistics((0.1,) * 3, (3.0,) * 3, (-3.0, 0.0, -3.0), (3.0, 3.0, 3.0))
     made = ReleasedModel(paper(len(classes), SIZES), classes, bounds)
-    made.layout_tables = LayoutTables.linear(1e-3, 0.2, 6)
+    made.layout_tables = Schedule.linear(1e-3, 0.2, 6)
     return made.eval()
 
 

@@ -18,7 +18,7 @@ from echomodel.vocabulary import vocabulary
 from echoscene.checkpoint import class_names, convert, statistics_from_bounds
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
 from echoscene.echo import ReleasedEcho, floor_relations
-from echoscene.model import LayoutTables, ReleasedModel
+from echoscene.model import ReleasedModel, Schedule
 from echoscene.weights import write_released
 from echousd.shapes.merging import mesh_from_shape
 
@@ -59,7 +59,7 @@ def echo(config: ReleasedConfig = CONFIG, text: Words | None = None) -> Released
     with torch.no_grad():
         for parameter in model.parameters():
             parameter.add_(0.02 * torch.randn_like(parameter))
-    model.layout_tables = LayoutTables.linear(1e-3, 0.2, 20)  # the published 1,000 steps are for tests/parity
+    model.layout_tables = Schedule.linear(1e-3, 0.2, 20)  # the published 1,000 steps are for tests/parity
     return ReleasedEcho(model, text or Words())
 
 
@@ -111,7 +111,7 @@ def test_steps_are_spread_over_the_published_ones():
 
 @pytest.mark.parametrize("count", [1, 2, 7, 1000])
 def test_spaced_tables_are_a_schedule_of_their_own(count):
-    published = LayoutTables.linear()
+    published = Schedule.linear()
     tables, steps = published.spaced(count)
     assert len(steps) == len(tables.betas) == count
     assert int(steps[-1]) == 999

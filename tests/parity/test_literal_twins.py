@@ -8,11 +8,10 @@ import pytest
 import torch
 from literal_networks import literal_layout, literal_shape
 from parity_numbers import close, fill
-from torch.nn import functional as F
 
 from echoscene.config import UNetConfig, shape_unet
 from echoscene.denoisers import LayoutNet, ShapeUNet
-from echoscene.unet import convolve_repeated, packed
+from echoscene.unet import packed
 
 LAYOUT = UNetConfig(width=128, context=96, objects=40, hidden=32, layers=3, residual=True)
 SHAPE = shape_unet(width=32, mult=(1, 2), blocks=1, attention=(2,), context=48, objects=24, hidden=32, layers=2, grid=8)
@@ -67,17 +66,3 @@ def test_one_node_alone() -> None:
     x, objects = torch.randn(1, 3, 8, 8, 8), torch.randn(1, SHAPE.objects)
     with torch.inference_mode():
         close(shape(x, objects, none, t), literal_shape(shape, x, objects, none, t), 5e-5)
-
-
-@pytest.mark.parametrize("doubled", [(False, True, True), (True, True, True), (True, False, False)])
-def test_repeated_voxels(doubled: tuple[bool, bool, bool]) -> None:
-    x = torch.randn(2, 5, 3, 4, 6, dtype=torch.float64, requires_grad=True)
-    weight = torch.randn(7, 5, 3, 3, 3, dtype=torch.float64, requires_grad=True)
-    bias = torch.randn(7, dtype=torch.float64)
-    factors = tuple(2 if twice else 1 for twice in doubled)
-    expected = F.conv3d(F.interpolate(x, scale_factor=factors, mode="nearest"), weight, bias, padding=1)
-    found = convolve_repeated(x, weight, bias, doubled)
-    close(found, expected, 1e-12)
-    wanted = torch.autograd.grad(expected.square().sum(), (x, weight))
-    for gradient, other in zip(torch.autograd.grad(found.square().sum(), (x, weight)), wanted, strict=True):
-        close(gradient, other, 1e-9)

@@ -8,7 +8,7 @@ from parity_configs import layout_config
 from parity_numbers import Numbers, check_gradients, close
 
 from echoscene.denoisers import LayoutNet
-from echoscene.model import LayoutTables, ancestral, layout_loss
+from echoscene.model import Schedule, ancestral, layout_loss
 from echoscene.unet import packed
 
 
@@ -18,8 +18,8 @@ def _net(numbers: Numbers) -> LayoutNet:
     return net
 
 
-def _tables(raw: dict) -> LayoutTables:
-    return LayoutTables.linear(raw["beta_start"], raw["beta_end"], raw["time_num"])
+def _tables(raw: dict) -> Schedule:
+    return Schedule.linear(raw["beta_start"], raw["beta_end"], raw["time_num"])
 
 
 @torch.inference_mode()
@@ -91,7 +91,7 @@ def test_loss_and_gradients(name: str) -> None:
     for nudge in (0.0, 1e-7, -1e-7, 2e-7, -2e-7):
         net = _net(numbers).train()
         objects = (numbers["obj_embed"] * (1 + nudge)).requires_grad_()
-        tables = LayoutTables.linear()
+        tables = Schedule.linear()
         losses = layout_loss(net, numbers["box0"], objects, numbers["triples"], numbers["t"], numbers["noise"], tables)
         for part in ("loss", "size", "trans", "angle"):
             close(losses[part].detach(), numbers["loss" if part == "loss" else f"loss_{part}"], 0.0, relative=1e-5)

@@ -8,7 +8,7 @@ from parity_configs import shape_config, vq_config
 from parity_numbers import Numbers, check_gradients, close
 
 from echoscene.denoisers import ShapeNet
-from echoscene.model import DDIMGrid, ShapeTables, ddim, shape_loss
+from echoscene.model import Schedule, ddim, shape_loss
 from echoscene.vqvae import VQVAE
 
 
@@ -37,10 +37,10 @@ def test_step() -> None:
 def test_ddim() -> None:
     numbers = Numbers("shape_ddim")
     net = _net(numbers)
-    grid = DDIMGrid.uniform(ShapeTables.scaled_linear(), numbers.meta["steps"])
-    assert grid.timesteps.tolist() == numbers["timesteps"].tolist()
-    close(grid.alphas, numbers["ddim_alphas"], 1e-7)
-    close(grid.alphas_prev, numbers["ddim_alphas_prev"], 1e-7)
+    timesteps, alphas, after = grid = Schedule.scaled_linear().ddim(numbers.meta["steps"])
+    assert timesteps.tolist() == numbers["timesteps"].tolist()
+    close(alphas, numbers["ddim_alphas"], 1e-7)
+    close(after, numbers["ddim_alphas_prev"], 1e-7)
     states = ddim(lambda x, t: net(x, _objects(numbers), numbers["triples"], t), numbers["x_T"], grid)
     for number, (_, x) in enumerate(states):
         close(x, numbers["x_steps"][number], 1e-3)
@@ -51,7 +51,7 @@ def test_loss_and_gradients() -> None:
     numbers = Numbers("shape_loss")
     net = _net(numbers).train()
     objects = _objects(numbers).requires_grad_()
-    tables = ShapeTables.scaled_linear()
+    tables = Schedule.scaled_linear()
     loss = shape_loss(net, numbers["z0"], objects, numbers["triples"], numbers["t"], numbers["noise"], tables)
     close(loss.detach(), numbers["loss"], 0.0, relative=1e-5)
     loss.backward()
@@ -62,13 +62,13 @@ def test_loss_and_gradients() -> None:
 
 def test_tables() -> None:
     numbers = Numbers("shape_tables")
-    tables = ShapeTables.scaled_linear(numbers.meta["linear_start"], numbers.meta["linear_end"])
+    tables = Schedule.scaled_linear(numbers.meta["linear_start"], numbers.meta["linear_end"])
     for name in ("betas", "alphas_cumprod", "sqrt_alphas_cumprod", "sqrt_one_minus_alphas_cumprod"):
         close(getattr(tables, name), numbers[name], 0.0, relative=2e-7)
-    grid = DDIMGrid.uniform(tables, len(numbers["ddim100_timesteps"]))
-    assert grid.timesteps.tolist() == numbers["ddim100_timesteps"].tolist()
-    close(grid.alphas, numbers["ddim100_alphas"], 1e-7)
-    close(grid.alphas_prev, numbers["ddim100_alphas_prev"], 1e-7)
+    timesteps, alphas, after = tables.ddim(len(numbers["ddim100_timesteps"]))
+    assert timesteps.tolist() == numbers["ddim100_timesteps"].tolist()
+    close(alphas, numbers["ddim100_alphas"], 1e-7)
+    close(after, numbers["ddim100_alphas_prev"], 1e-7)
 
 
 @torch.inference_mode()

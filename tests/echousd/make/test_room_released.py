@@ -19,7 +19,7 @@ from echomodel.roomboxes import RoomBoxes
 from echomodel.text import ClipTextEncoder
 from echoscene.checkpoint import convert, statistics_from_bounds
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
-from echoscene.model import LayoutTables, ReleasedModel
+from echoscene.model import ReleasedModel, Schedule
 from echoscene.vqvae import VQVAE
 from echousd.evaluation.systems import System, drawn
 
@@ -40,7 +40,7 @@ def weights(tmp_path, monkeypatch) -> Path:
     torch.save(ReleasedModel(CONFIG).state_dict(), tmp_path / "model.pth")
     convert(tmp_path / "model.pth", tmp_path / "model.safetensors", statistics=statistics_from_bounds(BOUNDS))
     # few steps, and text features as a cache holds them: no download in a test
-    monkeypatch.setattr(ReleasedModel, "layout_tables", LayoutTables.linear(1e-3, 0.2, 10))
+    monkeypatch.setattr(ReleasedModel, "layout_tables", Schedule.linear(1e-3, 0.2, 10))
     # random weights decode to noise, of which no mesh is left
     ball = torch.tensor(0.2 * ball_tsdf())
     monkeypatch.setattr(VQVAE, "decode", lambda self, z: ball.expand(len(z), 1, -1, -1, -1))
