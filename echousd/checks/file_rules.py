@@ -12,12 +12,12 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from echomodel.vocabulary import vocabulary
-from echousd.checks.findings import UNREADABLE, Finding, rule
-from echousd.checks.reading import Reading, specs
+from echousd.checks.findings import Finding, rule
+from echousd.checks.reading import Reading
 from echousd.exporting.packing import Reach
-from echousd.stage.files import said
-from echousd.stage.units import METRES, UP_AXIS, unit_faults, up_axis
-from echousd.stage.values import LARGEST, asset, misfit, shown
+from echousd.stage.files import said, specs
+from echousd.stage.units import METRES, UP_AXIS, unit_faults, upwards
+from echousd.stage.values import LARGEST, UNREADABLE, asset, misfit, shown
 from echousd.textures import READABLE, TextureError, file_of, read_image
 
 KILOGRAMS = "kilogramsPerUnit"
@@ -125,7 +125,7 @@ def arcs(reading: Reading) -> Iterator[Finding]:
         if not math.isclose(told, mass, rel_tol=SAME):
             where = f"{KILOGRAMS} is {told:g} in {layer.GetDisplayName()}"
             yield Finding(Sdf.Path.absoluteRootPath, f"{where}, {mass:g} in the stage, allowed: the same")
-    up = np.array([0.0, 0, 1] if up_axis(stage) == "Z" else [0.0, 1, 0])
+    up = upwards(stage)
     for prim in reading.distinct:
         for layer in _referenced(prim):
             try:

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from pxr import Sdf, Tf, Usd
+from pxr import Sdf, Usd
 
 from echousd.checks.reading import Reading
-from echousd.stage.encoding import StageError
+from echousd.stage.values import UNREADABLE
 
 Function: TypeAlias = Callable[..., Iterator[Any]]
 
@@ -32,7 +32,6 @@ class Rule:
     find: Callable[[Reading], Iterator[Finding]]
 
 
-UNREADABLE = (StageError, Tf.ErrorException)  # of values: the rules on these report it
 RULES: list[Rule] = []  # filled by the modules of rules as they are imported
 
 

@@ -9,12 +9,12 @@ from functools import partial
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
-from echousd.checks.findings import RULES, UNREADABLE, Finding, Rule, applied, rule
+from echousd.checks.findings import RULES, Finding, Rule, applied, rule
 from echousd.checks.mesh_rules import of_others
 from echousd.checks.placement import inside_solid
 from echousd.checks.reading import Reading, below
 from echousd.stage.contents import room_frame
-from echousd.stage.values import asset
+from echousd.stage.values import UNREADABLE, asset
 
 UNDER = 0.02  # metres below its floor that a camera or a lamp is not
 

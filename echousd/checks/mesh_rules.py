@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from echomodel.triangles import area_normals, cross
-from echousd.checks.findings import UNREADABLE, Finding, applied, rule
+from echousd.checks.findings import Finding, applied, rule
 from echousd.checks.reading import Reading
 from echousd.stage.encoding import NODE_API
 from echousd.stage.layouts import ARTICULATION
-from echousd.stage.values import array, matrix, targets
+from echousd.stage.values import UNREADABLE, MeshArrays, array, lineage, matrix, readable, targets
 
 THIN = 1e-9  # area of a triangle in shares of the square of its longest side that is none
 UNIT = 0.05  # how far the length of a normal may be from 1
@@ -68,23 +69,13 @@ def empty_meshes(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
 @rule("echo:Normals", "meshes")
 def normals(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     """Normals have length 1, and are as many as their interpolation asks for."""
-    arrays, reach = reading.mesh(mesh), _normals_reach(mesh)
-    if reach:
-        yield f"primvars:normals:indices reach {reach}"
-        return
-    found = reading.once("normals", mesh.GetPrim(), lambda: _normals(mesh))
+    found = _normals(reading, mesh)
     if found is None:
         return
-    values, interpolation = found
-    wanted = {
-        UsdGeom.Tokens.constant: 1,
-        UsdGeom.Tokens.uniform: len(arrays.counts),
-        UsdGeom.Tokens.faceVarying: len(arrays.indices),
-    }.get(interpolation, len(arrays.points))
-    if len(values) != wanted:
-        yield f"{len(values)} normals, {interpolation} interpolation needs {wanted}"
+    if found.fault:
+        yield found.fault
         return
-    length = np.linalg.norm(values, axis=1)
+    length = np.linalg.norm(found.values, axis=1)
     wrong = np.abs(length - 1) > UNIT
     if wrong.any():
         yield f"a normal has length {length[wrong][0]:.4g} ({int(wrong.sum())} of {len(length)}), allowed: 1"
@@ -178,43 +169,60 @@ def winding(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
         if sign * float((a * cross(b, c)).sum()) < 0:
             yield "closed and turned inside out: its faces wind the wrong way round"
             return
-    found = reading.once("normals", mesh.GetPrim(), lambda: _normals(mesh))
-    if found is None or found[1] != UsdGeom.Tokens.faceVarying or len(found[0]) != len(arrays.indices):
+    found = _normals(reading, mesh)
+    if found is None or found.interpolation != UsdGeom.Tokens.faceVarying or found.fault:
         return
     turned = sign * area_normals(triangles)
-    against = (turned * found[0][faces].sum(1)).sum(1) < 0
+    against = (turned * found.values[faces].sum(1)).sum(1) < 0
     area = np.linalg.norm(turned, axis=1)
     if area[against].sum() > AGAINST * area.sum() > 0:
         yield f"{area[against].sum() / area.sum():.0%} of its surface winds against its normals, allowed: outwards"
 
 
-def _normals(mesh: UsdGeom.Mesh) -> tuple[np.ndarray, str] | None:
-    primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals")
-    try:
+@dataclass(frozen=True, eq=False)
+class Laid:
+    """Values of a mesh's primvar, one for each of what its interpolation names, and what is wrong with them."""
+
+    values: np.ndarray
+    interpolation: str
+    fault: str = ""
+
+    @classmethod
+    def of(cls, primvar: UsdGeom.Primvar, width: int, arrays: MeshArrays, word: str) -> Laid:
+        """A primvar of so many numbers each; raises as `array`."""
+        values, name = array(primvar.GetAttr(), width), primvar.GetName()
+        if primvar.IsIndexed():
+            index = array(primvar.GetIndicesAttr(), whole=True)
+            if len(index) and (index.min() < 0 or index.max() >= len(values)):
+                reach = f"from {index.min()} to {index.max()}, allowed: 0 to {len(values) - 1}"
+                return cls(values, primvar.GetInterpolation(), f"{name}:indices reach {reach}")
+            values = values[index]
+        return cls.counted(values, primvar.GetInterpolation(), arrays, f"{name} has {len(values)} {word}")
+
+    @classmethod
+    def counted(cls, values: np.ndarray, interpolation: str, arrays: MeshArrays, told: str) -> Laid:
+        """Values that must be as many as their interpolation asks for on a mesh; `told` says how many there are."""
+        tokens = UsdGeom.Tokens
+        many = {
+            tokens.constant: 1, tokens.uniform: len(arrays.counts), tokens.faceVarying: len(arrays.indices)
+        }.get(interpolation, len(arrays.points))  # fmt: skip
+        fault = "" if len(values) == many else f"{told}, {interpolation} interpolation needs {many}"
+        return cls(values, interpolation, fault)
+
+
+def _normals(reading: Reading, mesh: UsdGeom.Mesh) -> Laid | None:
+    """The normals that somebody authored for a mesh, None for none and for such as cannot be read."""
+
+    def read() -> Laid | None:
+        primvar, arrays = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals"), reading.mesh(mesh)
         if primvar and primvar.HasAuthoredValue():
-            values = array(primvar.GetAttr(), 3)
-            if primvar.IsIndexed():
-                values = values[array(primvar.GetIndicesAttr(), whole=True)]
-            return values, primvar.GetInterpolation()
-        if mesh.GetNormalsAttr().HasAuthoredValue():
-            return array(mesh.GetNormalsAttr(), 3), mesh.GetNormalsInterpolation()
-    except (*UNREADABLE, IndexError):
-        pass
-    return None
+            return Laid.of(primvar, 3, arrays, "normals")
+        if not mesh.GetNormalsAttr().HasAuthoredValue():
+            return None
+        values = array(mesh.GetNormalsAttr(), 3)
+        return Laid.counted(values, mesh.GetNormalsInterpolation(), arrays, f"{len(values)} normals")
 
-
-def _normals_reach(mesh: UsdGeom.Mesh) -> str:
-    """What is wrong with the indices of a mesh's normals, "" for nothing."""
-    primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals")
-    try:
-        if not primvar or not primvar.IsIndexed():
-            return ""
-        count, index = len(array(primvar.GetAttr(), 3)), array(primvar.GetIndicesAttr(), whole=True)
-    except UNREADABLE:
-        return ""
-    if not len(index) or (index.min() >= 0 and index.max() < count):
-        return ""
-    return f"from {index.min()} to {index.max()}, allowed: 0 to {count - 1}"
+    return reading.once("normals", mesh.GetPrim(), lambda: readable(read, None))
 
 
 def _closed(faces: np.ndarray) -> bool:
@@ -240,40 +248,19 @@ def texture_coordinates(reading: Reading, prim: Usd.Prim) -> Iterator[Finding]:
 
     Models of others that have none are warnings: they may need none.
     """
-    fault = None if reading.is_guide(prim) else _uv_fault(UsdGeom.Mesh(prim))
-    if fault:
-        yield Finding(prim.GetPath(), fault, warning=fault == NO_UVS and of_others(prim))
+    if reading.is_guide(prim):
+        return
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("st")
+    if not primvar or not primvar.HasValue():
+        yield Finding(prim.GetPath(), NO_UVS, warning=of_others(prim))
+    elif fault := Laid.of(primvar, 2, reading.mesh(UsdGeom.Mesh(prim)), "texture coordinates").fault:
+        yield Finding(prim.GetPath(), fault)
 
 
 def of_others(prim: Usd.Prim) -> bool:
     """Whether a prim is part of a model of somebody else's, which is taken as it is: `<asset>_placed/<asset>_model`."""
     above = prim.GetPath().GetPrefixes()
     return any(at.name.endswith("_model") and at.GetParentPath().name.endswith("_placed") for at in above)
-
-
-def _uv_fault(mesh: UsdGeom.Mesh) -> str | None:
-    primvar = UsdGeom.PrimvarsAPI(mesh).FindPrimvarWithInheritance("st")
-    if not primvar or not primvar.HasValue():
-        return NO_UVS
-    values = array(primvar.GetAttr(), 2)
-    interpolation = primvar.GetInterpolation()
-    points = len(array(mesh.GetPointsAttr(), 3))
-    wanted = {
-        UsdGeom.Tokens.constant: 1,
-        UsdGeom.Tokens.uniform: len(array(mesh.GetFaceVertexCountsAttr(), whole=True)),
-        UsdGeom.Tokens.varying: points,
-        UsdGeom.Tokens.vertex: points,
-        UsdGeom.Tokens.faceVarying: len(array(mesh.GetFaceVertexIndicesAttr(), whole=True)),
-    }.get(interpolation, 0)
-    indices = array(primvar.GetIndicesAttr(), whole=True) if primvar.IsIndexed() else None
-    found = len(values) if indices is None else len(indices)
-    if found != wanted:
-        return f"primvars:st has {found} texture coordinates, {interpolation} interpolation needs {wanted}"
-    if indices is not None and len(indices):
-        table = np.asarray(indices)
-        if table.min() < 0 or table.max() >= len(values):
-            return f"primvars:st:indices reach from {table.min()} to {table.max()}, allowed: 0 to {len(values) - 1}"
-    return None
 
 
 @rule("echo:Scale")
@@ -313,12 +300,10 @@ def mirrored(reading: Reading, prim: Usd.Prim) -> Iterator[str]:
 
 
 def _unevenly_scaled(prim: Usd.Prim, cache: UsdGeom.XformCache) -> Usd.Prim:
-    above = prim
-    while above and not above.IsPseudoRoot():
+    for above in lineage(prim):
         factors = _factors(cache.GetLocalTransformation(above)[0])
         if factors.max() / max(factors.min(), 1e-9) > 1 + EVEN:
             return above
-        above = above.GetParent()
     return prim
 
 

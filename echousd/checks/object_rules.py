@@ -10,18 +10,18 @@ from pxr import Kind, Usd, UsdGeom
 
 from echomodel.dressing import SMALL
 from echomodel.vocabulary import UnknownWord, normalised
-from echousd.checks.findings import UNREADABLE, Finding, applied, rule
+from echousd.checks.findings import Finding, applied, rule
 from echousd.checks.reading import Reading, below
 from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.joints import FRICTION_API
 from echousd.stage import encoding as usd
 from echousd.stage.boxes import read_small
-from echousd.stage.contents import components, is_seen, room_frame
+from echousd.stage.contents import components, is_seen, room_frame, words_of
 from echousd.stage.encoding import StageError
 from echousd.stage.labels import is_structure, known_category, spaced
 from echousd.stage.read import RoomPrims, StatedTwice, find_rooms, node_names, relation_of, room_graph, value
 from echousd.stage.taxonomy import SHELL, ade20k
-from echousd.stage.values import targets, texts
+from echousd.stage.values import UNREADABLE, lineage, targets, texts
 
 UPRIGHT = 0.5  # cosine of the angle between an object's up and the room's
 SIZE = 0.05, 0.1  # metres, and share of the stated size: differences below either are none
@@ -92,30 +92,23 @@ def _states(prim: Usd.Prim, names: tuple[str, ...]) -> bool:
 def floors(reading: Reading) -> Iterator[Finding]:
     """Every room with objects has a floor, stated by its graph or as labelled geometry; nobody switched it off."""
     for prim in reading.inactive:
-        word = next(iter(_words(prim)), "")
+        word = next(iter(words_of(prim)), "")
         if word in SHELL:
             yield Finding(prim.GetPath(), f"the {word} is deactivated", warning=word != "floor")
     for room in reading.rooms:
         stated = any(
             room.graph.GetAttribute(name).HasAuthoredValue() for name in FLOOR if room.graph.HasAttribute(name)
         )
-        if stated and any("wall" in _words(prim) for prim in components(room)) and not _has_floor(room, reading):
+        if stated and any("wall" in words_of(prim) for prim in components(room)) and not _has_floor(room, reading):
             yield Finding(room.room.GetPath(), "the room has walls, but no floor")
-        if room.nodes and not stated and not any("floor" in _words(prim) for prim in below(room.room)):
+        if room.nodes and not stated and not any("floor" in words_of(prim) for prim in below(room.room)):
             allowed = f"{' or '.join(FLOOR)}, or geometry labelled 'floor'"
             yield Finding(room.graph.GetPath(), f"the room has no floor, allowed: {allowed}")
 
 
 def _has_floor(room: RoomPrims, reading: Reading) -> bool:
     """Whether a room has geometry that is labelled as its floor, or one that is reported as switched off."""
-    return any("floor" in _words(prim) for prim in (*below(room.room), *reading.inactive))
-
-
-def _words(prim: Usd.Prim) -> tuple[str, ...]:
-    try:
-        return texts(prim.GetAttribute(usd.LABELS))
-    except UNREADABLE:
-        return ()
+    return any("floor" in words_of(prim) for prim in (*below(room.room), *reading.inactive))
 
 
 @rule("echo:SomeLabel", "distinct")
@@ -175,7 +168,7 @@ def strangers(reading: Reading) -> Iterator[Finding]:
     """Furniture that no graph knows stands in no room that has one."""
     for room in reading.rooms:
         for prim in components(room) if room.nodes else ():
-            word = next(iter(_words(prim)), "")
+            word = next(iter(words_of(prim)), "")
             if word not in SMALL and word not in SHELL and known_category(word) is not None:
                 yield Finding(prim.GetPath(), f"a {word} that is no node of the graph", warning=True)
 
@@ -294,7 +287,7 @@ def semantics(reading: Reading) -> Iterator[Finding]:
     for prim in reading.prims:
         if not prim.IsA(UsdGeom.Gprim) or reading.is_guide(prim) or _labelled(prim):
             continue
-        owner = _component(prim)
+        owner = next((above for above in lineage(prim) if _kind(above) == "component"), prim)
         if owner.GetPath() not in told:
             told.add(owner.GetPath())
             yield Finding(
@@ -303,23 +296,12 @@ def semantics(reading: Reading) -> Iterator[Finding]:
 
 
 def _labelled(prim: Usd.Prim) -> bool:
-    while prim and not prim.IsPseudoRoot():
-        for schema in applied(prim):
-            if schema.startswith(LABELS_PREFIX):
-                attribute = prim.GetAttribute(f"semantics:labels:{schema.removeprefix(LABELS_PREFIX)}")
-                if attribute and attribute.Get():
-                    return True
-        prim = prim.GetParent()
-    return False
-
-
-def _component(prim: Usd.Prim) -> Usd.Prim:
-    above = prim
-    while above and not above.IsPseudoRoot():
-        if Usd.ModelAPI(above).GetKind() == "component":
-            return above
-        above = above.GetParent()
-    return prim
+    taxonomies = (
+        (above, name.removeprefix(LABELS_PREFIX))
+        for above in lineage(prim) for name in applied(above) if name.startswith(LABELS_PREFIX)
+    )  # fmt: skip
+    found = (above.GetAttribute(f"semantics:labels:{taxonomy}") for above, taxonomy in taxonomies)
+    return any(attribute and attribute.Get() for attribute in found)
 
 
 def _without_place(message: str, prim: Usd.Prim) -> str:

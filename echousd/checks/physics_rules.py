@@ -8,14 +8,15 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
 from echomodel.vocabulary import vocabulary
-from echousd.checks.findings import UNREADABLE, Finding, rule
+from echousd.checks.findings import Finding, rule
 from echousd.checks.reading import Reading, below
 from echousd.graph.nodes import OBSTACLE
-from echousd.stage.contents import triangulated
-from echousd.stage.encoding import CATEGORY, FREE, LABELS
+from echousd.settle.settle import moves
+from echousd.stage.contents import triangulated, words_of
+from echousd.stage.encoding import CATEGORY, FREE
 from echousd.stage.read import value
-from echousd.stage.units import up_axis
-from echousd.stage.values import array, targets, texts
+from echousd.stage.units import up_axis, upwards
+from echousd.stage.values import UNREADABLE, array, lineage, readable, targets
 
 HEAVY = 3000.0  # kg in each m³ of a body's box: stone
 APART = 0.05  # metres between the anchors of a hinge, and from a centre of mass to the geometry
@@ -38,7 +39,7 @@ def nested_bodies(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
 def dynamic_colliders(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """What moves collides with hulls or primitives: engines refuse triangle meshes on dynamic bodies."""
     body = _body_above(prim) if prim.IsA(UsdGeom.Mesh) else None
-    if not body or not _dynamic(UsdPhysics.RigidBodyAPI(body)):
+    if not body or not moves(body):
         return
     told = prim.HasAPI(UsdPhysics.MeshCollisionAPI)
     kind = UsdPhysics.MeshCollisionAPI(prim).GetApproximationAttr().Get() if told else UsdPhysics.Tokens.none
@@ -76,10 +77,7 @@ def colliders(reading: Reading) -> Iterator[Finding]:
 def _bare_shell(reading: Reading) -> Iterator[Finding]:
     """Floors that bodies fall through, and walls that they pass."""
     for prim in reading.prims:
-        try:
-            words = texts(prim.GetAttribute(LABELS))
-        except UNREADABLE:
-            continue
+        words = words_of(prim)
         if not {"floor", "wall"} & set(words):
             continue
         shapes = [found for found in below(prim) if found.IsA(UsdGeom.Gprim)]
@@ -113,8 +111,7 @@ def _bounds(gprims: list[Usd.Prim], reading: Reading) -> np.ndarray | None:
 @rule("echo:Gravity", "prims", UsdPhysics.Scene)
 def gravity(reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """Gravity points down."""
-    axis = up_axis(reading.stage)
-    up = np.array([0.0, 0, 1] if axis == UsdGeom.Tokens.z else [0.0, 1, 0])
+    axis, up = up_axis(reading.stage), upwards(reading.stage)
     direction = array(prim.GetAttribute("physics:gravityDirection"))
     length = float(np.linalg.norm(direction))
     if direction.shape == (3,) and length > 0 and direction @ up > -DOWN * length:  # (0, 0, 0) = downwards
@@ -166,7 +163,7 @@ def fixed_furniture(reading: Reading) -> Iterator[Finding]:
         nodes = {prim: _stands(prim) for prim in room.nodes}
         bodies = {prim: [found for found in below(prim) if found.HasAPI(UsdPhysics.RigidBodyAPI)] for prim in nodes}
         standing = [prim for prim, stands in nodes.items() if stands]
-        moving = [prim for prim in standing if any(_dynamic(UsdPhysics.RigidBodyAPI(each)) for each in bodies[prim])]
+        moving = [prim for prim in standing if any(map(moves, bodies[prim]))]
         for prim in standing if 2 * len(moving) > len(standing) else ():
             if prim not in moving:
                 what = "a rigid body that cannot move" if bodies[prim] else "no rigid body"
@@ -175,10 +172,7 @@ def fixed_furniture(reading: Reading) -> Iterator[Finding]:
 
 def _stands(prim: Usd.Prim) -> bool:
     """Whether a node is furniture that stands somewhere, rather than hangs or is an obstacle."""
-    try:
-        word = value(prim, CATEGORY)
-    except UNREADABLE:
-        return False
+    word = readable(lambda: value(prim, CATEGORY), None)
     row = vocabulary().known_category(word) if isinstance(word, str) else None
     return row is not None and row.support in ("floor", "table") and not value(prim, f"{FREE}{OBSTACLE}")
 
@@ -226,13 +220,4 @@ def _anchors_apart(joint: Usd.Prim, ends: list[list[Sdf.Path]], reading: Reading
 
 
 def _body_above(prim: Usd.Prim) -> Usd.Prim | None:
-    while prim and not prim.IsPseudoRoot():
-        if prim.HasAPI(UsdPhysics.RigidBodyAPI):
-            return prim
-        prim = prim.GetParent()
-    return None
-
-
-def _dynamic(body: UsdPhysics.RigidBodyAPI) -> bool:
-    enabled = body.GetRigidBodyEnabledAttr().Get()
-    return enabled is not False and not body.GetKinematicEnabledAttr().Get()
+    return next((above for above in lineage(prim) if above.HasAPI(UsdPhysics.RigidBodyAPI)), None)

@@ -19,7 +19,7 @@ from echousd.place.geometry import Floor, axes, depth_inside, floor_from_polygon
 from echousd.place.placing import DEFAULT_HEIGHT, floor_of_room
 from echousd.place.report import TOUCH, Collision
 from echousd.shapes.fittings import SKIRTING
-from echousd.stage.contents import RoomContents, RoomObject, Shape, Solid, Surrounding
+from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding
 
 OUTSIDE = 0.03  # metres beyond the floor's edge
 FLOATING = 0.03  # metres of air below, or depth below the floor
@@ -82,7 +82,7 @@ def misplaced_screens(room: RoomContents, small: Sequence[Surrounding]) -> tuple
     """Screens that look at a wall, or across what they stand on."""
     polygon = None if room.spec is None else floor_of_room(room.spec)
     floor = None if polygon is None else floor_from_polygon(polygon)
-    screens: list[tuple[str, Solid]] = [(one.node.name, one) for one in room.objects if one.node.category in SCREENS]
+    screens: list[tuple[str, Shape]] = [(one.node.name, one) for one in room.objects if one.node.category in SCREENS]
     screens += [(one.name, one.shape) for one in small if one.word in SCREENS and one.shape is not None]
     found = []
     for name, screen in screens:
@@ -95,7 +95,7 @@ def misplaced_screens(room: RoomContents, small: Sequence[Surrounding]) -> tuple
     return tuple(found)
 
 
-def _carries(one: RoomObject, thing: Solid) -> bool:
+def _carries(one: RoomObject, thing: Shape) -> bool:
     """Whether a thing stands on the top of another."""
     local = np.abs((thing.position[[0, 2]] - one.position[[0, 2]]) @ axes(np.array([one.yaw]))[0].T)
     on_top = abs(float(one.position[1] + one.size[1] - thing.position[1])) < FLOATING
@@ -115,7 +115,7 @@ def misplaced_small(
         return ()
     floor = floor_from_polygon(polygon)
     windows = _windows(room, polygon)
-    carriers: list[Solid] = [*room.objects, *(one.shape for one in (*small, *shell) if one.shape is not None)]
+    carriers: list[Shape] = [*room.objects, *(one.shape for one in (*small, *shell) if one.shape is not None)]
     found = []
     for one in small:
         found += [Misplacement(one.name, *told) for told in _small_faults(one, floor, carriers, windows)]
@@ -123,7 +123,7 @@ def misplaced_small(
 
 
 def _small_faults(
-    one: Surrounding, floor: Floor, carriers: Sequence[Solid], windows: np.ndarray
+    one: Surrounding, floor: Floor, carriers: Sequence[Shape], windows: np.ndarray
 ) -> Iterator[tuple[str, float | None]]:
     kind, shape = SMALL[one.word], one.shape
     if shape is None:
@@ -181,16 +181,16 @@ def _beside(shape: Shape, windows: np.ndarray) -> float:
     return float(np.linalg.norm(away - share[:, None] * along, axis=1).min())
 
 
-def _beyond(thing: Solid, floor: Floor) -> float:
+def _beyond(thing: Shape, floor: Floor) -> float:
     points = thing.points[:, [0, 2]] if len(thing.points) else _footprint(thing)
     return float(-depth_inside(floor, points).min())
 
 
-def _footprint(thing: Solid) -> np.ndarray:
+def _footprint(thing: Shape) -> np.ndarray:
     return footprints(thing.size[None], thing.position[None], np.array([thing.yaw]))[0]
 
 
-def _air_below(thing: Solid, others: Sequence[Solid]) -> float:
+def _air_below(thing: Shape, others: Sequence[Shape]) -> float:
     """Height of the bottom over the floor or over the nearest surface below the middle or a corner of the object."""
     bottom = float(thing.position[1])
     air = abs(bottom)
@@ -207,7 +207,7 @@ def _air_below(thing: Solid, others: Sequence[Solid]) -> float:
     return air
 
 
-def _surface_gap(feet: np.ndarray, bottom: float, other: Solid) -> float:
+def _surface_gap(feet: np.ndarray, bottom: float, other: Shape) -> float:
     plan = other.points[other.faces][:, :, [0, 2]]
     low, high = plan.min(1), plan.max(1)
     best = np.inf
@@ -246,7 +246,7 @@ def find_collisions(
     Arguments:
         strangers: other furniture than the graph's. small: things of a dressing. shell: walls, and what is in them.
     """
-    things: list[tuple[str, Solid]] = [(one.node.name, one) for one in objects]
+    things: list[tuple[str, Shape]] = [(one.node.name, one) for one in objects]
     things += [(one.name, one.shape) for one in strangers if one.shape is not None]
     little = [(one.name, one.shape) for one in small if one.shape is not None]
     fixed = [(one.name, one.shape) for one in shell if one.shape is not None]
@@ -256,7 +256,7 @@ def find_collisions(
 
 
 def _hits(
-    first: Sequence[tuple[str, Solid]], second: Sequence[tuple[str, Solid]] | None, deep: float
+    first: Sequence[tuple[str, Shape]], second: Sequence[tuple[str, Shape]] | None, deep: float
 ) -> list[Collision]:
     """Pairs of the first and the second, or of the first alone, that reach further than `deep` into each other."""
     things = [*first, *(second or ())]
@@ -281,18 +281,18 @@ def _hits(
     return found
 
 
-def _one_place(one: Solid, other: Solid) -> bool:
+def _one_place(one: Shape, other: Shape) -> bool:
     """Whether two things fill one box: surfaces that are the same reach nowhere into one another."""
     near = np.abs(one.position - other.position).max() < NEAR
     return bool(near and np.abs(one.size - other.size).max() < NEAR)
 
 
-def mesh_depth(first: Solid, second: Solid) -> float:
+def mesh_depth(first: Shape, second: Shape) -> float:
     """How deep one surface reaches into the other solid in metres, 0 where they do not meet."""
     return max(_reach(first, second), _reach(second, first))
 
 
-def _reach(surface: Solid, solid: Solid) -> float:
+def _reach(surface: Shape, solid: Shape) -> float:
     points = surface_points(surface, solid)
     if not len(points):
         return 0.0
@@ -313,7 +313,7 @@ def _reach(surface: Solid, solid: Solid) -> float:
     return deepest
 
 
-def surface_points(surface: Solid, solid: Solid) -> np.ndarray:
+def surface_points(surface: Shape, solid: Shape) -> np.ndarray:
     """(s, 3) float: vertices and scattered points of a surface that lie in the other object's box."""
     near = surface.faces[_touches(surface.points[surface.faces], solid)]
     if not len(near):
@@ -332,23 +332,23 @@ def _scatter(points: np.ndarray, faces: np.ndarray, count: int) -> np.ndarray:
     return np.asarray(trimesh.sample.sample_surface(mesh, count, seed=0)[0])
 
 
-def _local(points: np.ndarray, solid: Solid) -> np.ndarray:
+def _local(points: np.ndarray, solid: Shape) -> np.ndarray:
     u = axes(np.array([solid.yaw]))[0]
     offset = points - solid.position
     plan = offset[..., [0, 2]] @ u.T
     return np.stack((plan[..., 0], offset[..., 1] - solid.size[1] / 2, plan[..., 1]), -1)
 
 
-def _within(points: np.ndarray, solid: Solid) -> np.ndarray:
+def _within(points: np.ndarray, solid: Shape) -> np.ndarray:
     return (np.abs(_local(points, solid)) <= solid.size / 2).all(-1)
 
 
-def _touches(triangles: np.ndarray, solid: Solid) -> np.ndarray:
+def _touches(triangles: np.ndarray, solid: Shape) -> np.ndarray:
     local = _local(triangles, solid)
     return ((local.min(1) <= solid.size / 2) & (local.max(1) >= -solid.size / 2)).all(-1)
 
 
-def inside_solid(points: np.ndarray, solid: Solid) -> np.ndarray:
+def inside_solid(points: np.ndarray, solid: Shape) -> np.ndarray:
     """(s,) bool: whether points (s, 3) are inside a solid.
 
     Around its closed pieces nothing turns but within their boxes, so that most points are compared with few triangles.

@@ -11,9 +11,10 @@ from pxr import Sdf, Usd, UsdGeom, UsdUtils
 
 from echousd.stage.contents import HIDDEN, RoomContents, components, read_contents
 from echousd.stage.encoding import StageError
+from echousd.stage.files import specs
 from echousd.stage.read import RoomPrims, find_rooms
 from echousd.stage.units import metres_per_unit
-from echousd.stage.values import MeshArrays, matrix, mesh_arrays
+from echousd.stage.values import MeshArrays, fans, matrix, mesh_arrays
 
 Found = TypeVar("Found")
 
@@ -108,7 +109,7 @@ class Reading:
 
     def corners(self, mesh: UsdGeom.Mesh) -> np.ndarray:
         """(t, 3) int: fan triangles of a mesh's faces, as positions in its indices; raises as `mesh` does."""
-        return self.once("corners", mesh.GetPrim(), lambda: corners_of(self.mesh(mesh)))
+        return self.once("corners", mesh.GetPrim(), lambda: fans(self.mesh(mesh).counts))
 
     def is_guide(self, prim: Usd.Prim) -> bool:
         """Whether a prim is there for tools rather than for the eye (purpose guide or proxy)."""
@@ -120,17 +121,6 @@ class Reading:
         if key not in self._kept:
             self._kept[key] = read()
         return self._kept[key]  # type: ignore[return-value]
-
-
-def corners_of(arrays: MeshArrays) -> np.ndarray:
-    """(t, 3) int: fan triangles of the faces, as positions in the indices."""
-    if (arrays.counts == 3).all():
-        return np.arange(len(arrays.indices)).reshape(-1, 3)
-    first = np.cumsum(arrays.counts) - arrays.counts
-    fans = np.clip(arrays.counts - 2, 0, None)
-    start = np.repeat(first, fans)
-    step = np.arange(len(start)) - np.repeat(np.cumsum(fans) - fans, fans)
-    return np.stack([start, start + step + 1, start + step + 2], 1)
 
 
 def below(prim: Usd.Prim) -> list[Usd.Prim]:
@@ -154,10 +144,3 @@ def _asset_paths(layer: Sdf.Layer) -> list[str]:
         if identifier:
             found.append(getattr(identifier, "path", str(identifier)))
     return found
-
-
-def specs(layer: Sdf.Layer) -> list[Sdf.Spec]:
-    """All that a layer holds."""
-    paths: list[Sdf.Path] = []
-    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
-    return [spec for spec in map(layer.GetObjectAtPath, paths) if spec]

@@ -14,7 +14,7 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdShade, UsdUtil
 from echousd.draw.drawables import rgb
 from echousd.exporting.glb import glb
 from echousd.exporting.packing import Package, Reach, images_beside, take_assets, without_clock
-from echousd.stage.files import layer_bytes, open_stage, source, write_all
+from echousd.stage.files import layer_bytes, open_stage, prim_specs, source, write_all
 from echousd.stage.layouts import selected_layout, showing_layout
 from echousd.stage.units import set_units
 from echousd.stage.values import check_types, given, reading, targets
@@ -164,20 +164,13 @@ def for_arkit(layer: Sdf.Layer) -> None:
     if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z:
         _turn(stage)
     for prim in list(stage.TraverseAll()):
-        if prim.IsValid() and (prim.GetTypeName().startswith(OURS) or _is_light(prim)):
+        ours = prim.IsValid() and prim.GetTypeName().startswith(OURS)
+        if ours or (prim.IsValid() and (prim.HasAPI(UsdLux.LightAPI) or prim.IsA(UsdLux.LightFilter))):
             stage.RemovePrim(prim.GetPath())
     for prim in reversed(list(stage.TraverseAll())):  # what a scope holds before the scope
-        if _is_empty_scope(prim):
+        if prim.GetTypeName() == "Scope" and not prim.GetAllChildren():
             stage.RemovePrim(prim.GetPath())
     strip(layer, PROPERTIES, OURS)
-
-
-def _is_light(prim: Usd.Prim) -> bool:
-    return prim.HasAPI(UsdLux.LightAPI) or prim.IsA(UsdLux.LightFilter)
-
-
-def _is_empty_scope(prim: Usd.Prim) -> bool:
-    return bool(prim.GetTypeName() == "Scope" and not prim.GetAllChildren())
 
 
 def _turn(stage: Usd.Stage) -> None:
@@ -347,25 +340,17 @@ def without_physics(layer: Sdf.Layer) -> None:
 
 def strip(layer: Sdf.Layer, properties: str | tuple[str, ...], schemas: str | tuple[str, ...]) -> None:
     """Take the properties and applied schemas whose names begin so out of every prim of a layer."""
-    paths: list[Sdf.Path] = []
-    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
     with Sdf.ChangeBlock():
-        for spec in filter(None, (layer.GetPrimAtPath(path) for path in paths if path.IsPrimPath())):
-            _strip(spec, properties, schemas)
+        for spec in prim_specs(layer):
+            for name in [found.name for found in spec.properties if found.name.startswith(properties)]:
+                spec.RemoveProperty(spec.properties[name])
+            applied = spec.GetInfo("apiSchemas").GetAddedOrExplicitItems() if spec.HasInfo("apiSchemas") else []
+            kept = [name for name in applied if not name.startswith(schemas)]
+            if not kept:
+                spec.ClearInfo("apiSchemas")
+            elif len(kept) < len(applied):
+                spec.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=kept))
 
 
 def _is_guide(prim: Usd.Prim) -> bool:
     return prim.IsA(UsdGeom.Imageable) and UsdGeom.Imageable(prim).GetPurposeAttr().Get() == UsdGeom.Tokens.guide
-
-
-def _strip(spec: Sdf.PrimSpec, properties: str | tuple[str, ...], schemas: str | tuple[str, ...]) -> None:
-    for name in [found.name for found in spec.properties if found.name.startswith(properties)]:
-        spec.RemoveProperty(spec.properties[name])
-    if not spec.HasInfo("apiSchemas"):
-        return
-    applied = spec.GetInfo("apiSchemas").GetAddedOrExplicitItems()
-    kept = [name for name in applied if not name.startswith(schemas)]
-    if not kept:
-        spec.ClearInfo("apiSchemas")
-    elif len(kept) < len(applied):
-        spec.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=kept))

@@ -105,10 +105,8 @@ class _Tree:
         path = str(prim.GetPath())
         if path in self.known:
             return self.known[path]
-        above = prim.GetParent()
-        while above and not above.IsPseudoRoot() and not above.IsA(UsdGeom.Xform):
-            above = above.GetParent()
-        parent = self.node(above) if above and not above.IsPseudoRoot() else None
+        above = next((each for each in values.lineage(prim.GetParent()) if each.IsA(UsdGeom.Xform)), None)
+        parent = None if above is None else self.node(above)
         world = self.frame @ values.matrix(self.cache.GetLocalToWorldTransform(prim), prim)
         if prim.IsA(UsdGeom.Camera) or prim.HasAPI(UsdLux.LightAPI):  # which no scale changes
             length = np.linalg.norm(world[:3, :3], axis=0)
@@ -131,12 +129,7 @@ class _Tree:
                 self.extras(self.known[path], {"id": f"{path}]", "category": mesh.category})
             return self.known[path]
         prim = self.stage.GetPrimAtPath(mesh.path)
-        above = prim
-        while above and not above.IsPseudoRoot():
-            if above.IsA(UsdGeom.Xform):
-                return self.node(above)
-            above = above.GetParent()
-        return self.node(prim)
+        return self.node(next((each for each in values.lineage(prim) if each.IsA(UsdGeom.Xform)), prim))
 
     def _new(self, key: str, name: str, world: np.ndarray, parent: int | None) -> int:
         local = world

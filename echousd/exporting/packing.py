@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 from pxr import Ar, Sdf, Usd, UsdUtils
 
 from echousd.stage.encoding import StageError
-from echousd.stage.files import assets_in
+from echousd.stage.files import assets_in, specs
 from echousd.store import store_above
 from echousd.textures import TextureError, file_of, texture_bytes
 
@@ -177,11 +177,7 @@ def without_clock(archive: bytes) -> bytes:
 
 def asset_paths(layer: Sdf.Layer) -> Iterator[tuple[str, str]]:
     """(where, path) of every asset path in the values and metadata of a layer; where is `<prim or property path>`."""
-    paths: list[Sdf.Path] = []
-    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
-    for at in paths:
-        spec = layer.pseudoRoot if at == Sdf.Path.absoluteRootPath else layer.GetObjectAtPath(at)
-        if spec:
-            for key in spec.ListInfoKeys():
-                for path in assets_in(spec.GetInfo(key)):
-                    yield f"<{at}>", path
+    for spec in specs(layer):
+        for key in spec.ListInfoKeys():
+            for path in assets_in(spec.GetInfo(key)):
+                yield f"<{spec.path}>", path

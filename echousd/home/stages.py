@@ -21,10 +21,9 @@ from echousd.stage.contents import read_contents
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage, save_layer, source
 from echousd.stage.read import find_rooms, place, room_graph, value
-from echousd.stage.units import metres_per_unit, up_axis
+from echousd.stage.units import to_metres
 from echousd.stage.write import author, define, put, relate
 
-Z_TO_Y = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 HOME, GRAPH, ROOMS = "/House", "/House/Graph", "/House/Rooms"
 DOC = """A home: /House/Graph says how its rooms lie to each other, each room's own graph what stands in it.
 North is +X, east +Z, up +Y. Lengths are metres in the graphs."""
@@ -135,12 +134,9 @@ def read_poses(path: Path) -> dict[str, tuple[SceneGraph, np.ndarray]]:
     with values.reading(stage):
         found = find_rooms(stage)
         names = _names([prims.room.GetPath() for prims in found])
-        cache, metres = UsdGeom.XformCache(), metres_per_unit(stage)
-        turn = Z_TO_Y if up_axis(stage) == "Z" else np.eye(4)
-        out = {}
+        cache, turn, out = UsdGeom.XformCache(), to_metres(stage), {}
         for prims in found:
             pose = turn @ values.matrix(cache.GetLocalToWorldTransform(prims.room), prims.room)
-            pose[:3, 3] *= metres
             pose[:3, :3] = _upright(pose[:3, :3])  # rooms are made upright and in metres
             out[names[prims.room.GetPath()]] = (room_graph(prims), pose)
         return out

@@ -24,12 +24,12 @@ from echousd.shapes.colliders import approximation, hull_of
 from echousd.shapes.geometry import LICENCE, Collider, Geometry, Mass, Origin, Original, Part
 from echousd.shapes.joints import read_joints
 from echousd.shapes.matter import read_mass
-from echousd.stage.contents import Z_TO_Y, room_frame, triangulated
+from echousd.stage.contents import room_frame, triangulated
 from echousd.stage.files import open_stage
 from echousd.stage.forms import forms, shown
 from echousd.stage.graphs import read_graph
 from echousd.stage.paths import DESCRIPTION, GEO, OBJECTS, asset_files, component_file, piece_name, piece_of
-from echousd.stage.units import metres_per_unit
+from echousd.stage.units import Z_TO_Y, metres_per_unit
 from echousd.stage.values import matrix, reading
 
 

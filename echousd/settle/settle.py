@@ -17,8 +17,8 @@ from echousd.stage.contents import triangulated
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.layouts import layout_names, showing_layout
-from echousd.stage.units import metres_per_unit, up_axis
-from echousd.stage.values import array, matrix
+from echousd.stage.units import metres_per_unit, upwards
+from echousd.stage.values import array, lineage, matrix
 
 GRAVITY = 9.81  # m/s², where the stage tells none
 FRICTION = 0.5  # where no physics material is bound
@@ -96,16 +96,15 @@ def read_world(stage: Usd.Stage) -> World:
 
 def body_root(prim: Usd.Prim) -> Usd.Prim | None:
     """The prim that a collider moves with: the outermost enabled body or articulation above it, None = it is fixed."""
-    found = None
-    while prim and not prim.IsPseudoRoot():
-        if prim.HasAPI(UsdPhysics.ArticulationRootAPI) or (
-            prim.HasAPI(UsdPhysics.RigidBodyAPI)
-            and UsdPhysics.RigidBodyAPI(prim).GetRigidBodyEnabledAttr().Get() is not False
-            and not UsdPhysics.RigidBodyAPI(prim).GetKinematicEnabledAttr().Get()
-        ):
-            found = prim
-        prim = prim.GetParent()
-    return found
+    bodies = [above for above in lineage(prim) if above.HasAPI(UsdPhysics.ArticulationRootAPI) or moves(above)]
+    return bodies[-1] if bodies else None
+
+
+def moves(prim: Usd.Prim) -> bool:
+    """Whether a prim is a rigid body that engines move."""
+    body = UsdPhysics.RigidBodyAPI(prim) if prim.HasAPI(UsdPhysics.RigidBodyAPI) else None
+    enabled = body is not None and body.GetRigidBodyEnabledAttr().Get() is not False
+    return enabled and not body.GetKinematicEnabledAttr().Get()
 
 
 def _solids(prim: Usd.Prim, cache: UsdGeom.XformCache, metres: float, *, moves: bool) -> Iterator[Solid]:
@@ -149,7 +148,7 @@ def _friction(prim: Usd.Prim) -> float:
 
 
 def _gravity(stage: Usd.Stage, metres: float) -> np.ndarray:
-    down = np.array([0.0, 0, -1] if up_axis(stage) == "Z" else [0.0, -1, 0])
+    down = -upwards(stage)
     for prim in stage.Traverse():
         if prim.GetTypeName() == "PhysicsScene":
             told = prim.GetAttribute("physics:gravityDirection")

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TypeAlias
 
 import numpy as np
 import trimesh
-from pxr import Kind, Tf, Usd, UsdGeom
+from pxr import Kind, Usd, UsdGeom
 
 from echousd.graph import Node, Relation, RoomSpec
-from echousd.stage.encoding import LABELS, StageError
+from echousd.stage.encoding import LABELS
 from echousd.stage.files import open_stage
 from echousd.stage.forms import Polygons, forms, polygons
 from echousd.stage.read import RoomPrims, node_names, read_node, relation_of, room_spec
-from echousd.stage.units import metres_per_unit, up_axis
-from echousd.stage.values import matrix, texts
+from echousd.stage.units import Z_TO_Y, metres_per_unit, to_metres, upwards
+from echousd.stage.values import fans, matrix, readable, texts
 
-Z_TO_Y = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # (x, y, z) with Z up -> (x, z, -y)
+NOTHING = (np.zeros((0, 3)), np.zeros((0, 3), int))  # points and triangles of what has no surface
 HIDDEN = (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
 
 
@@ -39,28 +40,15 @@ class Shape:
 
 
 @dataclass(frozen=True, eq=False)
-class RoomObject:
-    """One object of a room.
-
-    Arguments:
-        node: what the graph says about it.
-        points, faces, size, position, yaw: as in `Shape`; without points and faces where the object has no geometry.
-    """
+class RoomObject(Shape):
+    """An object of a room: what is seen of it (no points and faces without geometry), what the graph says of it."""
 
     node: Node
-    points: np.ndarray
-    faces: np.ndarray
-    size: np.ndarray
-    position: np.ndarray
-    yaw: float
 
     @property
     def name(self) -> str:
         """Of its prim."""
         return self.node.name
-
-
-Solid: TypeAlias = RoomObject | Shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,26 +92,23 @@ def read_contents(prims: RoomPrims) -> RoomContents:
     """The contents of one room; what is not valid is left out here, the validators report it."""
     stage = prims.room.GetStage()
     cache = UsdGeom.XformCache()
-    found_frame = _readable(lambda: room_frame(prims.room, cache))
-    to_room = np.eye(4) if found_frame is None else found_frame
-    names = _readable(lambda: node_names(prims)) or {}
-    owners = [prim.GetPath() for prim in prims.nodes]
+    to_room = readable(lambda: room_frame(prims.room, cache), np.eye(4))
+    names = readable(lambda: node_names(prims), {})
+    owners = {prim.GetPath() for prim in prims.nodes}
     objects, missing = [], []
     for prim in prims.nodes:
-        node = _readable(lambda prim=prim: read_node(prim, names.get(prim.GetPath(), prim.GetName()), names))  # type: ignore[misc]
+        node = readable(partial(read_node, prim, names.get(prim.GetPath(), prim.GetName()), names), None)
         if node is None:
             continue
-        found = _readable(
-            lambda prim=prim, node=node: _object(prim, node, cache, to_room, set(owners) - {prim.GetPath()})  # type: ignore[misc]
-        )
+        found = readable(partial(_object, prim, node, cache, to_room, owners - {prim.GetPath()}), None)
         if found is None:
             missing.append(node.name)
         else:
             objects.append(found)
     present = {thing.node.name for thing in objects}
-    read = [_readable(lambda prim=prim: relation_of(prim, names)) for prim in prims.relations]  # type: ignore[misc]
+    read = [readable(partial(relation_of, prim, names), None) for prim in prims.relations]
     relations = tuple(r for r in read if r is not None and r.subject in present and r.object in present)
-    spec = _readable(lambda: room_spec(prims))
+    spec = readable(lambda: room_spec(prims), None)
     assert stage
     relations = tuple({relation.triple: relation for relation in relations}.values())
     return RoomContents(str(prims.room.GetPath()), spec, tuple(objects), tuple(missing), relations)
@@ -137,10 +122,9 @@ def room_frame(room: Usd.Prim, cache: UsdGeom.XformCache) -> np.ndarray:
     """
     stage = room.GetStage()
     world = matrix(cache.GetLocalToWorldTransform(room), room)
-    up = np.array([0.0, 0, 1] if up_axis(stage) == UsdGeom.Tokens.z else [0.0, 1, 0])
     scale = np.linalg.norm(world[:3, :3], axis=0)
     scale = np.where(scale > 0, scale, 1.0)
-    local_up = (world[:3, :3] / scale).T @ up
+    local_up = (world[:3, :3] / scale).T @ upwards(stage)
     turn = Z_TO_Y if abs(local_up[2]) > abs(local_up[1]) else np.eye(3)
     out = np.eye(4)
     out[:3, :3] = turn @ np.diag(scale) * metres_per_unit(stage)
@@ -150,35 +134,32 @@ def room_frame(room: Usd.Prim, cache: UsdGeom.XformCache) -> np.ndarray:
         return out
 
 
-def _readable(read):  # type: ignore[no-untyped-def]
-    try:
-        return read()
-    except (StageError, Tf.ErrorException):
-        return None
-
-
 def _object(
     prim: Usd.Prim, node: Node, cache: UsdGeom.XformCache, to_room: np.ndarray, others: set
 ) -> RoomObject | None:
     found = shape_of(prim, cache, to_room, others)
     if found is not None:
-        return RoomObject(node, found.points, found.faces, found.size, found.position, found.yaw)
+        return RoomObject(**vars(found), node=node)
     if node.size is None or node.position is None or node.yaw is None:
         return None
     size, position = np.array(node.size), np.array(node.position)
-    return RoomObject(node, np.zeros((0, 3)), np.zeros((0, 3), int), size, position, node.yaw)
+    return RoomObject(*NOTHING, size, position, node.yaw, node)
 
 
 def surroundings(prims: RoomPrims) -> tuple[Surrounding, ...]:
     """The components of a room that are no nodes of its furniture's graph; what cannot be read has no shape."""
     cache = UsdGeom.XformCache()
-    to_room = _readable(lambda: room_frame(prims.room, cache))
+    to_room = readable(lambda: room_frame(prims.room, cache), None)
     found = []
     for prim in components(prims):
-        words = _readable(lambda prim=prim: texts(prim.GetAttribute(LABELS))) or ("",)  # type: ignore[misc]
-        shape = to_room is not None and _readable(lambda prim=prim: shape_of(prim, cache, to_room))  # type: ignore[misc]
-        found.append(Surrounding(prim, words[0], shape or None))
+        shape = None if to_room is None else readable(partial(shape_of, prim, cache, to_room), None)
+        found.append(Surrounding(prim, next(iter(words_of(prim)), ""), shape))
     return tuple(found)
+
+
+def words_of(prim: Usd.Prim) -> tuple[str, ...]:
+    """The labels of a prim of the taxonomy `category`, none where they cannot be read."""
+    return readable(lambda: texts(prim.GetAttribute(LABELS)), ())
 
 
 def components(room: RoomPrims) -> list[Usd.Prim]:
@@ -198,20 +179,11 @@ def shape_of(
 ) -> Shape | None:
     """What is seen of a prim and of all below it but for `others`, None for nothing; raises StageError."""
     own = to_room @ matrix(cache.GetLocalToWorldTransform(prim), prim)
-    points, faces = [], []
-    count = 0
-    for form in forms(prim, cache, is_seen, others):
-        found = _readable(lambda form=form: triangulated(form.prim))  # type: ignore[misc]
-        if found is None or not len(found[1]):
-            continue
-        vertices, triangles = found
-        world = to_room @ form.world
-        points.append(vertices @ world[:3, :3].T + world[:3, 3])
-        faces.append(triangles + count)
-        count += len(vertices)
-    if not points:
+    vertices, faces = surface_of(
+        prim, cache, to_room, others, lambda each: readable(lambda: triangulated(each), NOTHING)
+    )
+    if not len(faces):
         return None
-    vertices = np.concatenate(points)
     front = own[:3, :3] @ np.array([0.0, 0, 1])
     width = own[:3, :3] @ np.array([1.0, 0, 0])
     # The front is horizontal in our rooms; in a prim whose own up is +Z it is not, then the width tells the heading.
@@ -224,7 +196,7 @@ def shape_of(
     low, high = turned.min(0), turned.max(0)
     x, z = (low[0] + high[0]) / 2, (low[2] + high[2]) / 2
     position = np.array([cos * x + sin * z, low[1], cos * z - sin * x])
-    return Shape(vertices, np.concatenate(faces), high - low, position, yaw)
+    return Shape(vertices, faces, high - low, position, yaw)
 
 
 def is_seen(prim: Usd.Prim) -> bool:
@@ -240,33 +212,35 @@ def triangulated(prim: Usd.Prim) -> tuple[np.ndarray, np.ndarray]:
 
 
 def triangles_of(surface: Polygons) -> np.ndarray:
-    """(f, 3) int points of the triangles of polygons, those of as many corners behind one another."""
-    counts, indices = surface.counts, surface.indices
-    if not len(surface.points):
-        return np.zeros((0, 3), int)
-    starts = np.concatenate(([0], np.cumsum(counts)[:-1]))
-    triangles = []
-    for corners in np.unique(counts[counts >= 3]):
-        first = starts[counts == corners]
-        for k in range(1, corners - 1):
-            triangles.append(np.stack((indices[first], indices[first + k], indices[first + k + 1]), 1))
-    return np.concatenate(triangles) if triangles else np.zeros((0, 3), int)
+    """(f, 3) int points of the triangles of polygons."""
+    return surface.indices[fans(surface.counts)]
+
+
+def surface_of(
+    top: Usd.Prim, cache: UsdGeom.XformCache, placed: np.ndarray, others: set | frozenset = frozenset(),
+    read: Callable[[Usd.Prim], tuple[np.ndarray, np.ndarray]] = triangulated,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Points (v, 3) float and triangles (f, 3) int of all that is seen at and below a prim, but for `others`.
+
+    Arguments:
+        placed: (4, 4) float, column vectors, from the stage's world to where the points are wanted.
+        read: what gives the points and triangles of a prim in its own frame.
+    """
+    points, faces, count = [NOTHING[0]], [NOTHING[1]], 0
+    for form in forms(top, cache, is_seen, others):
+        vertices, triangles = read(form.prim)
+        if len(triangles):
+            world = placed @ form.world
+            points.append(vertices @ world[:3, :3].T + world[:3, 3])
+            faces.append(triangles + count)
+            count += len(vertices)
+    return np.concatenate(points), np.concatenate(faces)
 
 
 def stage_mesh(path: Path) -> trimesh.Trimesh:
     """Everything with a surface on a stage as triangles; raises ValueError where there is none."""
     stage = open_stage(path)
-    points, faces, count = [], [], 0
-    for form in forms(stage.GetPseudoRoot(), UsdGeom.XformCache(), is_seen):
-        vertices, triangles = triangulated(form.prim)
-        if not len(triangles):
-            continue
-        points.append(vertices @ form.world[:3, :3].T + form.world[:3, 3])
-        faces.append(triangles + count)
-        count += len(vertices)
-    if not points:
+    points, faces = surface_of(stage.GetPseudoRoot(), UsdGeom.XformCache(), to_metres(stage))
+    if not len(faces):
         raise ValueError("the stage holds no visible surfaces")
-    vertices = np.concatenate(points) * metres_per_unit(stage)
-    if up_axis(stage) == UsdGeom.Tokens.z:
-        vertices = vertices[:, [0, 2, 1]] * [1, 1, -1]
-    return trimesh.Trimesh(vertices, np.concatenate(faces), process=False)
+    return trimesh.Trimesh(points, faces, process=False)

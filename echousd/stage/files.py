@@ -109,13 +109,24 @@ def _check_harmless(layer: str, stage: Path) -> None:
 
 def _check_clips(layer: Sdf.Layer, path: Path) -> None:
     """Raises StageError for value clips that are no files: USD opens their layers for values, or at once."""
-    paths: list[Sdf.Path] = []
-    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
-    prims = [layer.GetPrimAtPath(at) for at in paths if at.IsPrimPath() or at.IsPrimVariantSelectionPath()]
-    for prim in (prim for prim in prims if prim and prim.HasInfo("clips")):
+    for prim in (prim for prim in prim_specs(layer) if prim.HasInfo("clips")):
         for asset in assets_in(prim.GetInfo("clips")):
             resolved = str(Ar.GetResolver().Resolve(layer.ComputeAbsolutePath(asset)))
             _check_regular(resolved, f"{path}: {layer.identifier}: <{prim.path}>: clips")
+
+
+def specs(layer: Sdf.Layer) -> list[Sdf.Spec]:
+    """All that a layer holds."""
+    paths: list[Sdf.Path] = []
+    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
+    return [spec for spec in map(layer.GetObjectAtPath, paths) if spec]
+
+
+def prim_specs(layer: Sdf.Layer) -> list[Sdf.PrimSpec]:
+    """All prims that a layer speaks of, those in variants too."""
+    paths = (spec.path for spec in specs(layer))
+    found = [at for at in paths if at.IsPrimPath() or at.IsPrimVariantSelectionPath()]
+    return [*filter(None, map(layer.GetPrimAtPath, found))]  # the path of a variant set is of that kind, too
 
 
 def assets_in(value: object) -> Iterator[str]:

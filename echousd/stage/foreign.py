@@ -6,6 +6,7 @@ import math
 import os
 import warnings
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +30,8 @@ from echousd.stage.labels import (
     spaced,
 )
 from echousd.stage.read import RoomPrims, node_names, room_graph
-from echousd.stage.units import metres_per_unit, up_axis
+from echousd.stage.units import Z_TO_Y, to_metres
+from echousd.stage.values import lineage
 
 TAKEN_FOR = "cabinet"  # what the networks take a fixed thing of an unknown class for
 LARGE = 0.3  # metres: a thing of an unknown class with two longer sides is in the way
@@ -37,7 +39,6 @@ COLUMN = (1.2, 0.1, 1.2)  # metres: least height, least and largest side of what
 STOREY = 2.6  # metres above a floor that its furniture stands in
 _UPRIGHT = 1e-3  # how far an axis may lean, as the deviation of a rotation matrix's entries
 _FLAT = 1e-18  # the determinant of a transform that leaves no volume
-_Z_TO_Y = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # (x, y, z) of a Z-up stage -> (x, z, -y)
 
 
 UNTOLD = "living_room"  # what a room is whose furniture tells nothing
@@ -56,37 +57,28 @@ class Box:
     yaw: float
 
 
-@dataclass(frozen=True)
-class StageFrame:
-    """From the stage's axes and unit to the room frame: +Y up, metres."""
+def box_of(bound: Gf.BBox3d, frame: np.ndarray) -> Box | None:
+    """The box around `bound`: turned like its prim where that stands upright, else along the room's axes.
 
-    rotation: np.ndarray
-    metres: float
-
-    @classmethod
-    def of(cls, stage: Usd.Stage) -> StageFrame:
-        z_up = up_axis(stage) == UsdGeom.Tokens.z
-        return cls(_Z_TO_Y if z_up else np.eye(3), metres_per_unit(stage))
-
-    def box(self, bound: Gf.BBox3d) -> Box | None:
-        """The box around `bound`: turned like its prim where that stands upright, else along the room's axes."""
-        local = bound.GetRange()
-        if local.IsEmpty():
-            return None
-        low, high = np.array(local.GetMin()), np.array(local.GetMax())
-        matrix = np.array(bound.GetMatrix())
-        linear = self.rotation @ matrix[:3, :3].T * self.metres  # columns: the prim's axes in the room frame
-        centre = self.rotation @ (matrix[:3, :3].T @ ((low + high) / 2) + matrix[3, :3]) * self.metres
-        for axes in (np.eye(3), _Z_TO_Y.T):  # the object's own up axis is Y or Z, whatever the stage's
-            turned = linear @ axes
-            scale = np.linalg.norm(turned, axis=0)
-            if (scale == 0).any():
-                continue
-            rotation = turned / scale
-            if rotation[1, 1] > 1 - _UPRIGHT and np.allclose(rotation.T @ rotation, np.eye(3), atol=_UPRIGHT):
-                size = np.abs(axes.T @ (high - low)) * scale
-                return _box(size, centre, math.atan2(rotation[0, 2], rotation[2, 2]))
-        return _box(np.abs(linear) @ (high - low), centre, 0.0)
+    `frame`: (3, 3) float, from the stage's axes and unit to the room's, `to_metres`.
+    """
+    local = bound.GetRange()
+    if local.IsEmpty():
+        return None
+    low, high = np.array(local.GetMin()), np.array(local.GetMax())
+    matrix = np.array(bound.GetMatrix())
+    linear = frame @ matrix[:3, :3].T  # columns: the prim's axes in the room frame
+    centre = frame @ (matrix[:3, :3].T @ ((low + high) / 2) + matrix[3, :3])
+    for axes in (np.eye(3), Z_TO_Y.T):  # the object's own up axis is Y or Z, whatever the stage's
+        turned = linear @ axes
+        scale = np.linalg.norm(turned, axis=0)
+        if (scale == 0).any():
+            continue
+        rotation = turned / scale
+        if rotation[1, 1] > 1 - _UPRIGHT and np.allclose(rotation.T @ rotation, np.eye(3), atol=_UPRIGHT):
+            size = np.abs(axes.T @ (high - low)) * scale
+            return _box(size, centre, math.atan2(rotation[0, 2], rotation[2, 2]))
+    return _box(np.abs(linear) @ (high - low), centre, 0.0)
 
 
 def _box(size: np.ndarray, centre: np.ndarray, yaw: float) -> Box:
@@ -161,8 +153,7 @@ class _Found:
 
 
 def _read(stage: Usd.Stage, *, names: bool, columns: bool = False) -> _Found:
-    frame = StageFrame.of(stage)
-    cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_, UsdGeom.Tokens.render], True)
+    boxed = _boxes(stage)
     found = _Found([], [], [])
     taken: set[str] = set()
     skipped: Counter[str] = Counter()
@@ -178,19 +169,19 @@ def _read(stage: Usd.Stage, *, names: bool, columns: bool = False) -> _Found:
         if category is None and names and not words:
             category = category_of_name(prim)
         if category is None:
-            if is_floor(prim, words, names=names) and (ground := frame.box(_object_bound(cache, prim))) is not None:
+            if is_floor(prim, words, names=names) and (ground := boxed(prim)) is not None:
                 found.floors.append((prim.GetPath(), ground))
-            if columns and not words and _is_column(prim, frame.box(_object_bound(cache, prim))):
+            if columns and not words and _is_column(prim, boxed(prim)):
                 words = [spaced(prim.GetName()) or OBSTACLE]
             if not words or any(is_structure(word) for word in words):
                 continue
-            if not _holds_furniture(prim) and _is_large(frame.box(_object_bound(cache, prim))):
+            if not _holds_furniture(prim) and _is_large(boxed(prim)):
                 category, told = TAKEN_FOR, {OBSTACLE: words[0]}
-                obstacles[words[0]] += 1
+                obstacles[repr(words[0])] += 1
             else:
                 skipped[f"unknown label {words[0]!r}"] += 1
                 continue
-        box = frame.box(_object_bound(cache, prim))
+        box = boxed(prim)
         if box is None or min(box.size) <= 0:
             skipped["no bounds"] += 1
             continue
@@ -213,14 +204,8 @@ def _read(stage: Usd.Stage, *, names: bool, columns: bool = False) -> _Found:
 
 
 def _tell(stage: Usd.Stage, skipped: Counter[str], obstacles: Counter[str]) -> None:
-    said = []
-    if skipped:
-        told = ", ".join(f"{reason} ({count})" for reason, count in skipped.most_common(8))
-        said.append(f"labelled prims that became no node: {told}")
-    if obstacles:
-        told = ", ".join(f"{word!r} ({count})" for word, count in obstacles.most_common(8))
-        said.append(f"unknown labels, fixed obstacles: {told}")
-    if said:
+    told = (("labelled prims that became no node", skipped), ("unknown labels, fixed obstacles", obstacles))
+    if said := [f"{what}: {', '.join(f'{w} ({n})' for w, n in found.most_common(8))}" for what, found in told if found]:
         warnings.warn(f"{source(stage)}: {'; '.join(said)}", SkippedPrims, stacklevel=4)
 
 
@@ -244,12 +229,9 @@ def _is_column(prim: Usd.Prim, box: Box | None) -> bool:
         return False
     if not COLUMN[1] <= min(box.size[0], box.size[2]) <= max(box.size[0], box.size[2]) <= COLUMN[2]:
         return False
-    above = prim
-    while above and not above.IsPseudoRoot():
-        if any(labels(above)) or not STRUCTURE.isdisjoint(spaced(above.GetName()).split("_")):
-            return False
-        above = above.GetParent()
-    return True
+    return not any(
+        any(labels(above)) or not STRUCTURE.isdisjoint(spaced(above.GetName()).split("_")) for above in lineage(prim)
+    )
 
 
 def _holds_furniture(prim: Usd.Prim) -> bool:
@@ -259,12 +241,8 @@ def _holds_furniture(prim: Usd.Prim) -> bool:
 
 def _room_above(prim: Usd.Prim) -> str:
     """Path of the innermost prim above one that is labelled or called as a room, "" = there is none."""
-    above = prim.GetParent()
-    while above and not above.IsPseudoRoot():
-        if any(room_word(word) for word in (*labels(above), above.GetName())):
-            return str(above.GetPath())
-        above = above.GetParent()
-    return ""
+    rooms = (each for each in lineage(prim.GetParent()) if any(map(room_word, (*labels(each), each.GetName()))))
+    return next((str(each.GetPath()) for each in rooms), "")
 
 
 def _over(node: Node, floor: Box) -> bool:
@@ -278,8 +256,14 @@ def _over(node: Node, floor: Box) -> bool:
 
 def object_box(prim: Usd.Prim) -> Box | None:
     """The upright box around a prim of a stage, turned as the prim is; None where it has no bounds."""
+    return _boxes(prim.GetStage())(prim)
+
+
+def _boxes(stage: Usd.Stage) -> Callable[[Usd.Prim], Box | None]:
+    """`object_box` of the prims of a stage, which share what is computed once."""
+    frame = to_metres(stage)[:3, :3]
     cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_, UsdGeom.Tokens.render], True)
-    return StageFrame.of(prim.GetStage()).box(_object_bound(cache, prim))
+    return lambda prim: box_of(_object_bound(cache, prim), frame)
 
 
 def boxed_graph(prims: RoomPrims) -> SceneGraph:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Sdf, Vt
 
+from echousd.stage.files import prim_specs
 from echousd.stage.paths import ROOM
 
 # (x, y, z) with Y up -> (x, -z, y) with Z up; what looked along +Z looks along -Y. Of row vectors, as USD's matrices.
@@ -48,7 +49,7 @@ def rescale(layer: Sdf.Layer, metres: float, theirs: Callable[[str], bool] = lam
     if units == 1.0:
         return layer
     with Sdf.ChangeBlock():
-        for spec in _prims(layer):
+        for spec in prim_specs(layer):
             for attribute in spec.attributes:
                 if attribute.default is not None:
                     _rescale(attribute, spec, units, whole=any(_is_theirs(one, theirs) for one in spec.nameChildren))
@@ -119,7 +120,7 @@ def turn_up(layer: Sdf.Layer, theirs: Callable[[str], bool] = lambda path: False
     if root.HasInfo("upAxis") and root.GetInfo("upAxis") == "Z":
         return layer
     with Sdf.ChangeBlock():
-        for spec in _prims(layer):
+        for spec in prim_specs(layer):
             for attribute in list(spec.attributes):
                 _turn(attribute)
             _turn_ops(spec)
@@ -129,14 +130,6 @@ def turn_up(layer: Sdf.Layer, theirs: Callable[[str], bool] = lambda path: False
                 spec.SetInfo("documentation", spec.GetInfo("documentation").replace(SAYS_Y, SAYS_Z))
         root.SetInfo("upAxis", "Z")
     return layer
-
-
-def _prims(layer: Sdf.Layer) -> list[Sdf.PrimSpec]:
-    """All prims that a layer speaks of, those in variants too."""
-    paths: list[Sdf.Path] = []
-    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
-    prims = [path for path in paths if path.IsPrimPath() or path.IsPrimVariantSelectionPath()]
-    return [*filter(None, map(layer.GetPrimAtPath, prims))]  # the path of a variant set is of that kind, too
 
 
 def _turn(attribute: Sdf.AttributeSpec) -> None:

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 from pxr import Sdf, Usd, UsdGeom
 
 METRES = "metersPerUnit"
 UP_AXIS = "upAxis"
+Z_TO_Y = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # (x, y, z) with Z up -> (x, z, -y)
 
 
 def metres_per_unit(stage: Usd.Stage) -> float:
@@ -24,6 +26,18 @@ def up_axis(stage: Usd.Stage) -> str:
     """`Y` or `Z`."""
     layer = _speaker(stage, UP_AXIS)
     return str(layer.pseudoRoot.GetInfo(UP_AXIS)) if layer else str(UsdGeom.GetStageUpAxis(stage))
+
+
+def upwards(stage: Usd.Stage) -> np.ndarray:
+    """(3,) float: the direction in which a stage has its up axis."""
+    return np.array([0.0, 0, 1] if up_axis(stage) == "Z" else [0.0, 1, 0])
+
+
+def to_metres(stage: Usd.Stage) -> np.ndarray:
+    """(4, 4) float, column vectors: from a stage's world to metres with +Y up."""
+    out = np.eye(4)
+    out[:3, :3] = (Z_TO_Y if up_axis(stage) == "Z" else np.eye(3)) * metres_per_unit(stage)
+    return out
 
 
 def set_units(layer: Sdf.Layer, stage: Usd.Stage) -> None:

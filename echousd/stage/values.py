@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom
 
 from echousd.graph import MAX_TEXT
 from echousd.stage.encoding import StageError
-from echousd.stage.files import said, source
+from echousd.stage.files import said, source, specs
 
 LARGEST = 1e9  # in the stage's unit; what is further away is a fault, and its square overflows single precision
 MAX_CORNERS = 50_000_000  # face corners of one mesh
+UNREADABLE = (StageError, Tf.ErrorException)  # what reading a value raises
+Read = TypeVar("Read")
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +151,14 @@ def mesh_arrays(mesh: UsdGeom.Mesh) -> MeshArrays:
     return MeshArrays(points, counts, indices)
 
 
+def fans(counts: np.ndarray) -> np.ndarray:
+    """(t, 3) int: fan triangles of faces of so many corners each, as positions among all corners."""
+    first, triangles = np.cumsum(counts) - counts, np.clip(counts - 2, 0, None)
+    start = np.repeat(first, triangles)
+    step = np.arange(len(start)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    return np.stack([start, start + step + 1, start + step + 2], 1)
+
+
 def misfit(kind: Sdf.ValueTypeName, found: Any) -> bool:
     """Whether a value is of another type than its attribute; OpenUSD reads such a value, but cannot write it."""
     default = kind.defaultValue
@@ -167,16 +177,26 @@ def check_types(layer: Sdf.Layer, where: str) -> None:
     Arguments:
         where: the file that the error names.
     """
-    paths: list[Sdf.Path] = []
-    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
-    for path in paths:
-        spec = layer.GetAttributeAtPath(path) if path.IsPropertyPath() else None
-        if not spec:
-            continue
-        samples = layer.ListTimeSamplesForPath(path) if spec.HasInfo("timeSamples") else ()
-        for found in (spec.default, *(layer.QueryTimeSample(path, time) for time in samples)):
+    for spec in (spec for spec in specs(layer) if isinstance(spec, Sdf.AttributeSpec)):
+        samples = layer.ListTimeSamplesForPath(spec.path) if spec.HasInfo("timeSamples") else ()
+        for found in (spec.default, *(layer.QueryTimeSample(spec.path, time) for time in samples)):
             if misfit(spec.typeName, found):
-                raise StageError(f"{where}: <{path}> is {shown(found)}, allowed: {spec.typeName}")
+                raise StageError(f"{where}: <{spec.path}> is {shown(found)}, allowed: {spec.typeName}")
+
+
+def lineage(prim: Usd.Prim) -> Iterator[Usd.Prim]:
+    """A prim and those above it, the nearest first, but for the pseudo-root."""
+    while prim and not prim.IsPseudoRoot():
+        yield prim
+        prim = prim.GetParent()
+
+
+def readable(read: Callable[[], Read], otherwise: Read) -> Read:
+    """What is read of a stage, or something else where that cannot be read."""
+    try:
+        return read()
+    except UNREADABLE:
+        return otherwise
 
 
 def shown(found: Any, most: int = 40) -> str:

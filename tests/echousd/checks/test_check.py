@@ -157,7 +157,7 @@ def thing(name: str, category: str, mesh: trimesh.Trimesh, position: tuple[float
     points = np.array(mesh.vertices) + position
     low, high = points.min(0), points.max(0)
     middle = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    return RoomObject(Node(name, category), points, np.array(mesh.faces), high - low, middle, 0.0)
+    return RoomObject(points, np.array(mesh.faces), high - low, middle, 0.0, Node(name, category))
 
 
 def box(*extents: float) -> trimesh.Trimesh:
