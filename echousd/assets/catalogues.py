@@ -1,6 +1,6 @@
 """Kinds of libraries: what each says of its models before their files are opened, read with doubt.
 
-A new one is a function that finds it at a path, one that lists its models, and a row of `CATALOGUES`.
+A new one is a function that finds its tables at a path, one that lists their models, and a row of `CATALOGUES`.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from echousd.assets.sweethome import read_library
 from echousd.stage.apart import fatal
 
 Told = Callable[[str], None]  # is told of what cannot be read, one line each
+Models = Iterator[tuple[Path | None, dict[str, Any]]]  # file, None where it is not there; fields of `Entry`
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,42 +66,44 @@ class Entry:
 def entries_of(path: Path, tell: Told) -> list[Entry]:
     """The models of the library, folder or model at a path; what cannot be read is told.
 
-    Raises ValueError for a path that is none, and as the kinds of libraries do.
+    Raises ValueError for a path that is none.
     """
     if not path.exists():
         raise ValueError(f"{path}: no such file or folder")
-    for find, entries in CATALOGUES:
-        found = find(path)
-        if found:
-            return entries(path, found, tell)
+    for find, models in CATALOGUES:
+        tables = find(path)
+        if tables:
+            return [entry for table in tables for entry in _entries(path, table, models(path, table, tell), tell)]
     raise ValueError(f"{path}: neither a folder nor a model nor a library")
+
+
+def _entries(path: Path, table: Path, models: Models, tell: Told) -> list[Entry]:
+    found: list[Entry] = []
+    missing, top = 0, path if path.is_dir() else path.parent
+    try:
+        for file, said in models:
+            missing += file is None
+            if file is not None:
+                found.append(Entry(file=ModelFile(file, top, said.pop("member", "")), **said))
+    except (ValueError, KeyError, OSError) as error:
+        tell(str(error) if str(error).startswith(str(table)) else f"{table}: {error}")
+    if missing:
+        tell(f"{table}: {missing} of {missing + len(found)} models are not below {path}")
+    return found
 
 
 # Sweet Home 3D: `.sh3f` archives of OBJ models with a catalogue of names, sizes, creators and licences
 
-LIBRARY = ".sh3f"
-
 
 def sweet_home(path: Path) -> list[Path]:
     """A library itself, or those somewhere below a folder."""
-    return (
-        [path]
-        if path.suffix == LIBRARY and path.is_file()
-        else sorted(p for p in path.rglob(f"*{LIBRARY}") if p.is_file())
-    )
+    return [p for p in (path, *sorted(path.rglob("*.sh3f"))) if p.suffix == ".sh3f" and p.is_file()]
 
 
-def sweet_home_entries(folder: Path, libraries: list[Path], tell: Told) -> list[Entry]:
+def sweet_home_models(path: Path, library: Path, tell: Told) -> Models:
     """All models; those that were looked at for this project have the class that was found by eye."""
-    found: list[Entry] = []
-    for library in libraries:
-        try:
-            for told in read_library(library):
-                file = ModelFile(library, library.parent, told.pop("member"))
-                found.append(Entry(file=file, category=_sweet_home_class(**told), decided=True, **told))
-        except (ValueError, KeyError, OSError) as error:
-            tell(f"{library}: {error}")
-    return found
+    for said in read_library(library):
+        yield library, {"category": _sweet_home_class(**said), "decided": True, **said}
 
 
 def _sweet_home_class(key: str, name: str, group: str, dims: np.ndarray, **_: Any) -> str:
@@ -119,17 +122,14 @@ def reviewed() -> dict[str, dict[str, str]]:
 
 # Amazon Berkeley Objects: `3dmodels/metadata/3dmodels.csv.gz`, glb models, and listings that name them
 
-ABO_TABLE = "3dmodels.csv"
-ABO_TAGS = ("style", "material", "color", "brand", "pattern")
 
-
-def abo(folder: Path) -> Path | None:
+def abo(folder: Path) -> list[Path]:
     """The table of models somewhere below a folder."""
-    return next((p for p in sorted(folder.rglob(f"{ABO_TABLE}*")) if p.name in (ABO_TABLE, f"{ABO_TABLE}.gz")), None)
+    return [p for p in sorted(folder.rglob("3dmodels.csv*")) if p.name in ("3dmodels.csv", "3dmodels.csv.gz")][:1]
 
 
-def abo_entries(folder: Path, table: Path, tell: Told) -> list[Entry]:
-    """Models of the table whose files are there."""
+def abo_models(folder: Path, table: Path, tell: Told) -> Models:
+    """Models of the table, and what listings say of them."""
     listed: dict[str, Mapping[str, Any]] = {}
     for file in sorted(folder.rglob("listings_*.json*")):
         try:
@@ -137,65 +137,48 @@ def abo_entries(folder: Path, table: Path, tell: Told) -> list[Entry]:
                 listed.setdefault(str(item.get("3dmodel_id", "")), item)
         except ValueError as error:
             tell(str(error))
-    found = []
-    models = table.parent.parent / "original"
     for row in rows_of(table):
-        said, key = Path(row.get("path", "")), row.get("3dmodel_id", "")
-        if key and said.name and not said.is_absolute() and ".." not in said.parts and (models / said).is_file():
-            item = listed.get(key, {})
-            words = _stated(text(item.get("product_type")).replace("_", " ").lower())
-            found.append(
-                Entry(
-                    key, ModelFile(models / said, folder), text(item.get("item_name")) or key, words, turn=np.eye(3),
-                    licence="CC-BY-4.0", author="Amazon.com (Amazon Berkeley Objects)",
-                    tags=_stated(*(text(item.get(name)) for name in ABO_TAGS)),
-                )
-            )  # fmt: skip
-    if not found:
-        tell(f"{table}: none of its models is below {models}")
-    return found
+        key, place = row.get("3dmodel_id", ""), row.get("path", "")
+        item = listed.get(key, {})
+        yield _there(table.parent.parent / "original", key and place), {
+            "key": key, "name": text(item.get("item_name")) or key, "turn": np.eye(3),
+            "words": tuple(word.replace("_", " ").lower() for word in texts(item, "product_type")),
+            "licence": "CC-BY-4.0", "author": "Amazon.com (Amazon Berkeley Objects)",
+            "tags": texts(item, "style", "material", "color", "brand", "pattern"),
+        }  # fmt: skip
 
 
 # Objaverse with the annotations of objathor: what each object is, what it rests on, how it is turned, its licence
 
-OBJAVERSE_TABLES = ("annotations.json", "annotations.json.gz")
 RESTS = (("onCeiling", "ceiling"), ("onWall", "wall"), ("onFloor", "floor"), ("onObject", "surface"))
 
 
-def objaverse(folder: Path) -> Path | None:
+def objaverse(folder: Path) -> list[Path]:
     """The table of annotations in a folder."""
-    return next((folder / name for name in OBJAVERSE_TABLES if (folder / name).is_file()), None)
+    return [p for p in (folder / "annotations.json", folder / "annotations.json.gz") if p.is_file()][:1]
 
 
-def objaverse_entries(folder: Path, table: Path, tell: Told) -> list[Entry]:
-    """Annotated objects whose models are there; pickled ones are never opened."""
-    told = json_of(table)
-    if not isinstance(told, dict):
-        raise ValueError(f"{table}: found a {type(told).__name__}, allowed: uid -> annotation")
+def objaverse_models(folder: Path, table: Path, tell: Told) -> Models:
+    """Annotated objects; pickled ones are never opened."""
+    annotations = json_of(table)
+    if not isinstance(annotations, dict):
+        raise ValueError(f"{table}: found a {type(annotations).__name__}, allowed: uid -> annotation")
     files = {p.stem: p for p in sorted(folder.rglob("*")) if p.suffix.lower() in MODELS}
-    known = {uid: said for uid, said in told.items() if uid in files and isinstance(said, dict)}
-    if len(known) < len(told):
-        tell(f"{table}: {len(told) - len(known)} of {len(told)} objects have no model below {folder}")
-    return [_of_objaverse(uid, ModelFile(files[uid], folder), said) for uid, said in known.items()]
-
-
-def _of_objaverse(uid: str, file: ModelFile, said: Mapping[str, Any]) -> Entry:
-    about = said.get("license_info")
-    about = about if isinstance(about, dict) else {}
-    turn, size, materials = _turned_to_view(said.get("frontView")), said.get("size"), said.get("materials")
-    dims = np.array(size, float) / 100 if _is_size(size) else None
-    return Entry(
-        uid, file, text(said.get("category")) or uid, _stated(text(said.get("category")), text(said.get("synset"))),
-        dims=dims if dims is None or turn is None else np.abs(turn @ dims),
-        turn=turn,
-        licence=str(about.get("license") or said.get("license") or ""),
-        author=str(about.get("creator_display_name") or about.get("creator_username") or ""),
-        placement=next((word for flag, word in RESTS if said.get(flag)), ""),
-        tags=_stated(
-            text(said.get("description")), text(said.get("style")),
-            *map(str, materials if isinstance(materials, list) else ()),
-        ),
-    )  # fmt: skip
+    for uid, said in annotations.items():
+        if not isinstance(said, dict):
+            continue
+        about = said.get("license_info")
+        about = about if isinstance(about, dict) else {}
+        turn, size, materials = _turned_to_view(said.get("frontView")), said.get("size"), said.get("materials")
+        dims = np.array(size, float) / 100 if _is_size(size) else None
+        yield files.get(uid), {
+            "key": uid, "name": text(said.get("category")) or uid, "words": texts(said, "category", "synset"),
+            "dims": dims if dims is None or turn is None else np.abs(turn @ dims), "turn": turn,
+            "licence": str(about.get("license") or said.get("license") or ""),
+            "author": str(about.get("creator_display_name") or about.get("creator_username") or ""),
+            "placement": next((word for flag, word in RESTS if said.get(flag)), ""),
+            "tags": (*texts(said, "description", "style"), *map(str, materials if isinstance(materials, list) else ())),
+        }  # fmt: skip
 
 
 def _turned_to_view(view: Any) -> np.ndarray | None:
@@ -214,95 +197,67 @@ def _is_size(size: Any) -> bool:
 # Habitat Synthetic Scenes (HSSD): glb models and a table of their categories, their up and their front
 
 HSSD_HEAD = 4096  # characters of a table that may name its columns
-HSSD_NAMES = ("main_category", "wnsynsetkey", "main_wnsynsetkey", "category", "super_category")
 
 
-def hssd(folder: Path) -> Path | None:
+def hssd(folder: Path) -> list[Path]:
     """A table with the columns `id`, `up` and `front` in a folder or in its `semantics` or `metadata`."""
-    for place in (folder, folder / "semantics", folder / "metadata"):
-        for path in sorted(place.glob("*.csv")) if place.is_dir() else ():
-            if not path.is_file():
-                continue
+    for path in (path for below in ("", "semantics", "metadata") for path in sorted((folder / below).glob("*.csv"))):
+        if path.is_file():
             with path.open(encoding="utf-8", errors="replace") as file:
                 columns = [word.strip().strip('"').lower() for word in file.readline(HSSD_HEAD).split(",")]
             if {"id", "up", "front"} <= set(columns):
-                return path
-    return None
+                return [path]
+    return []
 
 
-def hssd_entries(folder: Path, table: Path, tell: Told) -> list[Entry]:
-    """Models of the table whose files are there; parts of decomposed models are left out."""
+def hssd_models(folder: Path, table: Path, tell: Told) -> Models:
+    """Models of the table; parts of decomposed models are left out."""
     files = {p.stem: p for p in sorted(folder.rglob("*.glb")) if "decomposed" not in p.parts}
-    rows = rows_of(table)
-    found = [
-        Entry(
-            row["id"], ModelFile(files[row["id"]], folder), row.get("name") or row["id"],
-            _stated(*(row.get(name, "") for name in HSSD_NAMES)),
-            turn=_turned_to_axes(row.get("up", ""), row.get("front", "")),
-            licence="CC-BY-NC-4.0", author="HSSD (Habitat Synthetic Scenes Dataset)",
-            tags=_stated(row.get("style", ""), row.get("material", "")),
-        )
-        for row in rows
-        if row.get("id") in files
-    ]  # fmt: skip
-    if len(found) < len(rows):
-        tell(f"{table}: {len(rows) - len(found)} of {len(rows)} objects have no model below {folder}")
-    return found
+    for row in rows_of(table):
+        yield files.get(row.get("id", "")), {
+            "key": row.get("id", ""), "name": row.get("name") or row.get("id", ""),
+            "words": texts(row, "main_category", "wnsynsetkey", "main_wnsynsetkey", "category", "super_category"),
+            "turn": _turned_to_axes(row.get("up", ""), row.get("front", "")),
+            "licence": "CC-BY-NC-4.0", "author": "HSSD (Habitat Synthetic Scenes Dataset)",
+            "tags": texts(row, "style", "material"),
+        }  # fmt: skip
 
 
 def _turned_to_axes(up: str, front: str) -> np.ndarray | None:
     """The rotation whose rows are the object's axes, from two vectors as texts `x,y,z`; None where they are none."""
     try:
-        high, ahead = (np.array([float(v) for v in said.replace(",", " ").split()]) for said in (up, front))
+        axes = np.array([[float(v) for v in said.replace(",", " ").split()] for said in (up, front)])
     except ValueError:
         return None
-    if len(high) != 3 or len(ahead) != 3 or not (np.isfinite(high).all() and np.isfinite(ahead).all()):
+    if axes.shape != (2, 3) or not np.isfinite(axes).all():
         return None
-    if min(np.linalg.norm(high), np.linalg.norm(ahead)) < 1e-6:
+    high, ahead = axes
+    side = np.cross(high, ahead)
+    if min(np.linalg.norm(high), np.linalg.norm(side)) < 1e-6:
         return None
-    high = high / np.linalg.norm(high)
-    ahead = ahead - high * (ahead @ high)
-    if np.linalg.norm(ahead) < 1e-6:
-        return None
-    ahead = ahead / np.linalg.norm(ahead)
-    return np.stack([np.cross(high, ahead), high, ahead])
+    return np.stack([row / np.linalg.norm(row) for row in (side, high, np.cross(side, high))])
 
 
 # 3D-FUTURE: `model_info.json` and a folder `<model_id>/raw_model.obj` for each; metres, +Y up, front +Z
 
-FUTURE_TABLE = "model_info.json"
-FUTURE_FILES = ("raw_model.obj", "normalized_model.obj", "model.obj")
-
 
 def future3d(folder: Path) -> list[Path]:
     """The tables in a folder and in those right below it."""
-    return [p for p in (folder / FUTURE_TABLE, *sorted(folder.glob(f"*/{FUTURE_TABLE}"))) if p.is_file()]
+    return [p for p in (folder / "model_info.json", *sorted(folder.glob("*/model_info.json"))) if p.is_file()]
 
 
-def future3d_entries(folder: Path, tables: list[Path], tell: Told) -> list[Entry]:
-    """Models of the tables whose files are there."""
-    found: list[Entry] = []
-    missing = 0
-    for table in tables:
-        told = json_of(table)
-        for item in told if isinstance(told, list) else ():
-            key = str(item.get("model_id", "")) if isinstance(item, dict) else ""
-            place = table.parent / key
-            path = next((place / name for name in FUTURE_FILES if (place / name).is_file()), None)
-            if not key or "/" in key or ".." in key or path is None:
-                missing += 1
-                continue
-            words = _stated(*(str(item.get(name) or "") for name in ("category", "super-category")))
-            tags = _stated(*(str(item.get(name) or "") for name in ("style", "theme", "material")))
-            found.append(
-                Entry(
-                    key, ModelFile(path, folder), str(item.get("category") or key), words, metres=1.0, turn=np.eye(3),
-                    licence="3D-FUTURE terms of use (non-commercial)", author="Alibaba Group (3D-FUTURE)", tags=tags,
-                )
-            )  # fmt: skip
-    if missing:
-        tell(f"{folder / FUTURE_TABLE}: {missing} models of the table are not there")
-    return found
+def future3d_models(folder: Path, table: Path, tell: Told) -> Models:
+    """Models of a table."""
+    rows = json_of(table)
+    for item in rows if isinstance(rows, list) else ():
+        item = item if isinstance(item, dict) else {}
+        key = str(item.get("model_id", ""))
+        names = ("raw_model.obj", "normalized_model.obj", "model.obj") if key else ()
+        yield next((path for name in names if (path := _there(table.parent, f"{key}/{name}"))), None), {
+            "key": key, "name": text(item.get("category")) or key, "words": texts(item, "category", "super-category"),
+            "metres": 1.0, "turn": np.eye(3), "licence": "3D-FUTURE terms of use (non-commercial)",
+            "author": "Alibaba Group (3D-FUTURE)", "tags": texts(item, "style", "theme", "material"),
+        }  # fmt: skip
 
 
 # Any folder of models: named as their files or folders, with the licence of a text beside them
@@ -313,32 +268,33 @@ SHOWN = re.compile(r"([_\-. ](visual|render|mesh|geo|model|base|high|lod_?0))?",
 GENERIC = ("model", "mesh", "scene", "asset", "object", "geo", "geometry", "raw_model", "normalized_model", "untitled")
 
 
-def plain_folder(folder: Path) -> bool:
-    """Whether a path is a folder, or a model by itself."""
-    return folder.is_dir() or folder.suffix.lower() in MODELS
+def plain_folder(path: Path) -> list[Path]:
+    """A folder, or a model by itself."""
+    return [path] if path.is_dir() or path.suffix.lower() in MODELS else []
 
 
-def folder_entries(folder: Path, found: bool, tell: Told) -> list[Entry]:
-    """One entry for each model file; parts that a USD model consists of are left to it."""
+def folder_models(path: Path, folder: Path, tell: Told) -> Models:
+    """Every model file; parts that a USD model consists of are left to it."""
     if folder.is_file():
-        return [_of_folder(folder, folder.parent)]
+        yield folder, _of_folder(folder, folder.parent)
+        return
     files = sorted(p for p in folder.rglob("*") if p.suffix.lower() in MODELS and p.is_file())
     files = [file for file in files if not any(part.startswith(".") for part in file.relative_to(folder).parts)]
     parts = parts_of_others(files)
     beside: dict[Path, set[str]] = {}
     for file in files:
         beside.setdefault(file.parent, set()).add(file.stem)
-    files = [file for file in files if not stands_in(file.stem, beside[file.parent])]
-    return [_of_folder(file, folder) for file in files if file not in parts]
+    for file in files:
+        if file not in parts and not stands_in(file.stem, beside[file.parent]):
+            yield file, _of_folder(file, folder)
 
 
-def _of_folder(file: Path, top: Path) -> Entry:
-    key = file.relative_to(top).as_posix()
+def _of_folder(file: Path, top: Path) -> dict[str, Any]:
     stem = file.stem if file.stem.lower() not in GENERIC else file.parent.name
     name = re.sub(r"[_\-.]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem)).strip()
     licence, author = licence_beside(file.parent, top)
     group = file.parent.name if file.parent != top else ""
-    return Entry(key, ModelFile(file, top), name, group=group, licence=licence, author=author)
+    return {"key": file.relative_to(top).as_posix(), "name": name, "group": group, "licence": licence, "author": author}
 
 
 def stands_in(stem: str, others: Set[str]) -> bool:
@@ -369,13 +325,13 @@ def parts_of_others(files: list[Path]) -> set[Path]:
 
 
 # The first that a path is one of counts; a plain folder is everything else.
-CATALOGUES: tuple[tuple[Callable[[Path], Any], Callable[..., list[Entry]]], ...] = (
-    (sweet_home, sweet_home_entries),
-    (abo, abo_entries),
-    (objaverse, objaverse_entries),
-    (hssd, hssd_entries),
-    (future3d, future3d_entries),
-    (plain_folder, folder_entries),
+CATALOGUES: tuple[tuple[Callable[[Path], list[Path]], Callable[[Path, Path, Told], Models]], ...] = (
+    (sweet_home, sweet_home_models),
+    (abo, abo_models),
+    (objaverse, objaverse_models),
+    (hssd, hssd_models),
+    (future3d, future3d_models),
+    (plain_folder, folder_models),
 )
 
 
@@ -442,6 +398,13 @@ def text(value: Any) -> str:
     return ""
 
 
-def _stated(*texts: str) -> tuple[str, ...]:
-    """Those of some texts that say something."""
-    return tuple(filter(None, texts))
+def texts(said: Mapping[str, Any], *names: str) -> tuple[str, ...]:
+    """What some fields of a catalogue say, those that say nothing left out."""
+    return tuple(filter(None, (text(said.get(name)) for name in names)))
+
+
+def _there(folder: Path, place: str) -> Path | None:
+    """The file at a place that a table names below a folder, None where there is none."""
+    said = Path(place)
+    inside = said.name and not said.is_absolute() and ".." not in said.parts
+    return folder / said if inside and (folder / said).is_file() else None

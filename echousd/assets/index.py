@@ -12,11 +12,11 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
+from itertools import groupby
 from multiprocessing import get_context
 from pathlib import Path, PurePath
 
 import numpy as np
-from PIL import Image, ImageDraw
 
 from echomodel.files import read_bounded, whole_file
 from echomodel.vocabulary import vocabulary
@@ -25,7 +25,6 @@ from echousd.assets.colors import swatches
 from echousd.assets.describe import PLACEMENT, described, left_out, relative, stamp
 from echousd.assets.model_file import STAGES
 from echousd.assets.record import AssetRecord, vector
-from echousd.assets.shape import SIDE
 from echousd.assets.table import arrow, read_library, write_library
 from echousd.stage.apart import fatal
 
@@ -236,8 +235,6 @@ def corrected(record: AssetRecord, row: Mapping[str, str]) -> AssetRecord:
     return replace(record, fault="") if helped and record.sha256 else record
 
 
-WIDE = 10  # pictures in a row of a sheet
-LABEL = 24  # pixels below a picture
 STYLE = """body{font:13px sans-serif;margin:2em}div{display:inline-block;width:11em;vertical-align:top;margin:.4em}
 img{width:96px;height:96px}u{display:block;width:96px;height:8px;text-decoration:none}s{display:inline-block;height:8px}
 b,i,span{display:block;overflow-wrap:anywhere}i{color:#777}.doubt{background:#fff3d6}"""
@@ -249,7 +246,9 @@ def write_page(path: Path, records: Sequence[AssetRecord]) -> None:
     """Write an HTML page that stands alone: models by category, those that cannot be used last with the reason."""
     parts = [f"<!doctype html><meta charset=utf-8><title>Models</title><style>{STYLE}</style>"]
     parts.append(f"<h1>{sum(r.usable for r in records)} of {len(records)} models usable</h1>")
-    for category, members in grouped(records).items():
+    usable = sorted((r for r in records if r.usable), key=lambda record: (record.category, record.id))
+    for category, group in groupby(usable, key=lambda record: record.category):
+        members = list(group)
         parts.append(f"<h2>{category} ({len(members)})</h2>")
         parts += map(_card, members)
     out = by_reason(records)
@@ -284,43 +283,3 @@ def _card(record: AssetRecord) -> str:
         f"<div{doubt}><img src='data:image/png;base64,{picture}'><u>{spots}</u><b>{html.escape(record.name)}</b>"
         f"<span>{html.escape(record.id)}</span><span>{told}</span><i>{whose}</i></div>"
     )
-
-
-def grouped(records: Sequence[AssetRecord]) -> dict[str, list[AssetRecord]]:
-    """The usable models by category, both in alphabetical order."""
-    found: dict[str, list[AssetRecord]] = {}
-    for record in sorted(records, key=lambda record: (record.category, record.id)):
-        if record.usable:
-            found.setdefault(record.category, []).append(record)
-    return found
-
-
-def sheet(records: Sequence[AssetRecord], title: str = "") -> Image.Image:
-    """One picture of all models of a list, seen from their front right above, with their names."""
-    rows = -(-len(records) // WIDE)
-    whole = Image.new("RGB", (WIDE * SIDE, 22 + max(rows, 1) * (SIDE + LABEL)), "white")
-    draw = ImageDraw.Draw(whole)
-    draw.text((4, 4), title, fill="black")
-    for number, record in enumerate(records):
-        x, y = number % WIDE * SIDE, 22 + number // WIDE * (SIDE + LABEL)
-        with Image.open(io.BytesIO(record.thumbnail), formats=("PNG",)) as picture:
-            whole.paste(picture.convert("RGB"), (x, y))
-        for spot, (_, rgb) in enumerate(swatches(record.colors)):
-            draw.rectangle((x + 2 + 9 * spot, y + 2, x + 9 + 9 * spot, y + 9), fill=rgb)
-        draw.text((x + 2, y + SIDE), record.name[:16], fill="black")
-        draw.text((x + 2, y + SIDE + 11), record.id.rsplit("/", 1)[-1][:16], fill="grey")
-    return whole
-
-
-def write_sheets(folder: Path, records: Sequence[AssetRecord]) -> list[Path]:
-    """A PNG for each category in a folder; returns them."""
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for category, members in grouped(records).items():
-        out = io.BytesIO()
-        sheet(members, f"{category} ({len(members)}), front to the lower left").save(out, "PNG")
-        path = folder / f"{category}.png"
-        with whole_file(path) as beside:
-            beside.write_bytes(out.getvalue())
-        paths.append(path)
-    return paths

@@ -61,36 +61,28 @@ def index(
 @assets_app.command(epilog="Example: echousd assets review models.parquet")
 def review(
     library: Annotated[Path, typer.Argument(help="Index (.parquet).", show_default=False)],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder; default: INDEX_review, beside it.")
-    ] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="The page; default: INDEX.html.")] = None,
     json: AsJson = False,
 ) -> None:
-    """Write what there is to look at and to correct: a page, a sheet of pictures for each category, and the table.
+    """Write what there is to look at and to correct: a page with a picture of every model, and the table.
 
     The table lies beside the index; what it says counts when the library is indexed again.
     """
-    from echousd.assets.index import by_reason, read_corrections, write_page, write_sheets, write_table
+    from echousd.assets.index import by_reason, read_corrections, write_page, write_table
     from echousd.assets.table import read_library
 
-    found = read_library(library)
-    records = list(found.records.values())
-    folder = output or library.with_name(f"{library.stem}_review")
-    if folder.exists() and not folder.is_dir():
-        raise ValueError(f"{folder}: is a file, the output must be a folder")
-    sheets = write_sheets(folder, records)
-    write_page(folder / "review.html", records)
-    table = library.with_suffix(".csv")
+    records = list(read_library(library).records.values())
+    page, table = output or library.with_suffix(".html"), library.with_suffix(".csv")
+    page.parent.mkdir(parents=True, exist_ok=True)
+    write_page(page, records)
     write_table(table, records, read_corrections(table) if table.exists() else None)
     reasons = {reason: len(members) for reason, members in by_reason(records).items()}
-    page = folder / "review.html"
     lines = [
         *(f"left out {count}: {reason}" for reason, count in reasons.items()),
         f"page     {page}",
-        f"sheets   {len(sheets)} in {folder}",
         f"table    {table}: correct it and run echousd assets index again",
     ]
-    say_done(json, [page, *sheets, table], lines, {"models": len(records), "left_out": reasons})
+    say_done(json, [page, table], lines, {"models": len(records), "left_out": reasons})
 
 
 @assets_app.command(epilog="Example: echousd assets pack out/bedroom -o packages")

@@ -125,8 +125,7 @@ def read_glb(path: Path) -> PaintedMesh:
     the file for a damaged one, several materials, images that cannot be read, compression, and links to other files.
     """
     content = read_file(path)
-    tree, binary = _chunks(path, content)
-    _check(path, tree)
+    _check(path, content)
     try:
         scene: Any = trimesh.load(io.BytesIO(content), file_type="glb", process=False, merge_primitives=False)
         parts = [scene] if isinstance(scene, trimesh.Trimesh) else list(scene.dump())
@@ -134,6 +133,8 @@ def read_glb(path: Path) -> PaintedMesh:
         if not parts:
             raise ValueError("no triangles")
         points, st, faces, count = [], [], [], 0
+        material: Any = getattr(parts[0].visual, "material", None)
+        images = {name: image for slot, name in SLOTS.items() if (image := getattr(material, slot, None)) is not None}
         for part in parts:
             laid = getattr(part.visual, "uv", None)
             if laid is None or len(laid) != len(part.vertices):
@@ -149,80 +150,30 @@ def read_glb(path: Path) -> PaintedMesh:
         raise ValueError(f"{path}: {error}, allowed: triangles with texture coordinates") from None
     except Exception as error:  # a damaged file fails in every way there is
         raise ValueError(f"{path}: not a glb that can be read ({type(error).__name__})") from None
-    return PaintedMesh(mesh, _images(path, tree, binary))
+    # as they lie in the file: nothing has decoded them yet
+    return PaintedMesh(mesh, {name: image.fp.getvalue() for name, image in images.items()})
 
 
-def _chunks(path: Path, content: bytes) -> tuple[dict[str, Any], bytes]:
-    """The JSON and the binary chunk."""
+def _check(path: Path, content: bytes) -> None:
+    """Refuse what is not of this file alone, or larger than anything real."""
     try:
-        magic, version, _ = struct.unpack_from("<4sII", content)
-        length, kind = struct.unpack_from("<II", content, 12)
+        magic, version, _, length, kind = struct.unpack_from("<4sIIII", content)
+        tree = json.loads(content[20 : 20 + length])
+        needed = set(tree.get("extensionsRequired", ())) - KNOWN
+        named = [(what, each) for what in ("buffers", "images") for each in tree.get(what, ())]
+        outside = [(what, each["uri"]) for what, each in named if "uri" in each]
+        accessors = [(each.get("count"), "sparse" in each) for each in tree.get("accessors", ())]
+        used = {each.get("material") for mesh in tree.get("meshes", ()) for each in mesh.get("primitives", ())}
         if magic != b"glTF" or version != 2 or kind != 0x4E4F534A:
             raise ValueError
-        tree = json.loads(content[20 : 20 + length])
-        start = 20 + length
-        binary = b""
-        if len(content) > start:
-            size, kind = struct.unpack_from("<II", content, start)
-            binary = content[start + 8 : start + 8 + size]
-        if not isinstance(tree, dict):
-            raise ValueError
-    except (ValueError, struct.error, RecursionError):
+    except (ValueError, TypeError, AttributeError, struct.error, RecursionError):
         raise ValueError(f"{path}: not a binary glTF 2.0 file") from None
-    return tree, binary
-
-
-def _check(path: Path, tree: dict[str, Any]) -> None:
-    """Refuse what is not of this file alone, or larger than anything real."""
-    required = set(map(str, _entries(path, tree, "extensionsRequired", str)))
-    if required - KNOWN:
-        raise ValueError(f"{path}: needs {', '.join(sorted(required - KNOWN))}, allowed: uncompressed glTF")
-    for kind in ("buffers", "images"):
-        for entry in _entries(path, tree, kind):
-            if "uri" in entry:
-                raise ValueError(f"{path}: {kind} name {str(entry['uri'])!r:.80}, allowed: what is in the file itself")
-    for entry in _entries(path, tree, "accessors"):
-        count = entry.get("count")
-        if type(count) is not int or not 0 <= count <= MAX_COUNT or "sparse" in entry:
+    if needed:
+        raise ValueError(f"{path}: needs {', '.join(sorted(map(str, needed)))}, allowed: uncompressed glTF")
+    for what, name in outside:
+        raise ValueError(f"{path}: {what} name {str(name)!r:.80}, allowed: what is in the file itself")
+    for count, sparse in accessors:
+        if type(count) is not int or not 0 <= count <= MAX_COUNT or sparse:
             raise ValueError(f"{path}: an accessor counts {count!r:.40}, allowed: 0 to {MAX_COUNT}, not sparse")
-    used = set(map(str, _materials(path, tree)))
     if len(used) > 1:
         raise ValueError(f"{path}: {len(used)} materials, allowed: one for the whole object")
-
-
-def _materials(path: Path, tree: dict[str, Any]) -> list[Any]:
-    """What the primitives of all meshes name as their material."""
-    meshes = _entries(path, tree, "meshes")
-    return [entry.get("material") for mesh in meshes for entry in _entries(path, mesh, "primitives")]
-
-
-def _images(path: Path, tree: dict[str, Any], binary: bytes) -> dict[str, bytes]:
-    """Images of the only material that is used."""
-    found: dict[str, bytes] = {}
-    materials = _entries(path, tree, "materials")
-    used = _materials(path, tree)
-    number = used[0] if used else None
-    if type(number) is not int or not 0 <= number < len(materials):
-        return found
-    rough = materials[number].get("pbrMetallicRoughness", {})
-    slots = {**(rough if isinstance(rough, dict) else {}), "normalTexture": materials[number].get("normalTexture")}
-    for slot, name in SLOTS.items():
-        if slots.get(slot) is None:
-            continue
-        try:
-            source = tree["textures"][slots[slot]["index"]]["source"]
-            view = tree["bufferViews"][tree["images"][source]["bufferView"]]
-            start, size = int(view.get("byteOffset", 0)), int(view["byteLength"])
-        except (KeyError, IndexError, TypeError, ValueError):
-            raise ValueError(f"{path}: {slot} names no image of the file") from None
-        if start < 0 or size <= 0 or start + size > len(binary):
-            raise ValueError(f"{path}: {slot} lies outside of the file")
-        found[name] = binary[start : start + size]
-    return found
-
-
-def _entries(path: Path, tree: dict[str, Any], key: str, kind: type = dict) -> list[Any]:
-    entries = tree.get(key, [])
-    if not isinstance(entries, list) or not all(isinstance(entry, kind) for entry in entries):
-        raise ValueError(f"{path}: {key} is no list of what glTF says")
-    return entries
