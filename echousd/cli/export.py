@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -103,6 +103,7 @@ def render(
     frames: Annotated[int, typer.Option(help="Pictures of a turntable.", min=2, max=360)] = 24,
     colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
     layout: Layout = None,
+    light: Annotated[str | None, typer.Option(help="day, evening or night; else as the room shows.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is no picture of ours.")] = False,
     json: Written = False,
 ) -> None:
@@ -118,6 +119,7 @@ def render(
         raise ValueError(f"--quality is {quality!r}, allowed: {', '.join(QUALITIES)}")
     usual, rays = QUALITIES[quality]
     size = usual if size is None else size
+    asked: Any = {"size": size, "colors": colors, "rays": rays, "layout": layout, "light": light}
     if view not in (*VIEWS, TURN):
         raise ValueError(f"--view is {view!r}, allowed: {', '.join((*VIEWS, TURN))}")
     if cameras:
@@ -125,7 +127,7 @@ def render(
             raise ValueError(f"--view is {view!r}, which --cameras does not use; leave one of them out")
         if output.suffix.lower() == ".png":
             raise ValueError(f"{output}: with --cameras the output is a folder, a picture for each camera")
-        drawn = render_cameras(room, size=size, colors=colors, rays=rays, layout=layout)
+        drawn = render_cameras(room, **asked)
         pictures = {output / f"{name}.png": picture for name, picture in drawn.items()}
         for path in pictures:
             check_picture(path, force=force)
@@ -137,10 +139,10 @@ def render(
             raise ValueError(f"{output}: {kind} written as {ending}, found {output.suffix or 'no ending'!r}")
         check_picture(output, force=force)
         if view == TURN:
-            turn = render_turn(room, frames=frames, size=size, colors=colors, rays=rays, layout=layout)
+            turn = render_turn(room, frames=frames, **asked)
             files = {output: gif(turn)}
         else:
-            files = {output: png(draw(room, view=view, size=size, colors=colors, rays=rays, layout=layout))}
+            files = {output: png(draw(room, view=view, **asked))}
     write_all(files)
     say_done(json, list(files), map(str, files))
 

@@ -101,12 +101,12 @@ def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
             )
 
 
-def paint_image(paint: Paint) -> np.ndarray:
-    """(h, w, 3) uint8 sRGB of the image that colours a paint; raises StageError naming prim and file."""
+def image_of(prim: str, file: str) -> np.ndarray:
+    """(h, w, 3) uint8 sRGB of the image that a prim names, by their paths; raises StageError naming both."""
     try:
-        return read_image(paint.texture)
+        return read_image(file)
     except TextureError as error:
-        raise StageError(f"<{paint.image}>: {error}") from None
+        raise StageError(f"<{prim}>: {error}") from None
 
 
 def _category(prim: Usd.Prim) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdLux
 
-from echousd.draw.drawables import world_frame
+from echousd.draw.drawables import image_of, world_frame
 
 if TYPE_CHECKING:
     from echousd.draw.scenery import Scenery
@@ -16,11 +16,13 @@ if TYPE_CHECKING:
 SKY = 4.0  # radiance of the sky in a window for a dome of intensity 1, whose light else comes from above as well
 SUN = 6.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
 CEILING = np.array([0.80, 0.79, 0.77], np.float32)
-VIEW = 1.5  # of the sky's radiance, what is seen of it through a window: eyes adapt
+VIEW = 1.1  # of the sky's radiance, what is seen of it through a window: eyes adapt
 THROWN = 0.6  # of the light that meets a surface, what furnished rooms throw back
 DIM = 0.05  # radiance at every place of a room without lamps and windows, so that one sees it
-ADAPTED = 0.7  # to the colour of the light: lamps stay a little warm
-GREY, BRIGHTEST = 0.24, 6.0  # what the picture's middle tone becomes, and how much at most it is brightened for that
+# To the colour of the light, by night and by day: lamps stay warm. What the picture's middle tone becomes, by night and
+# by day, and how much at most it is brightened for that.
+ADAPTED, GREY, BRIGHTEST = (0.25, 0.7), (0.12, 0.24), 6.0
+DAY, GLOWING = 0.5, 5.0  # radiance of the sky by day; by night a shade glows so much more, as eyes see it
 FILMIC = (2.51, 0.03, 2.43, 0.59, 0.14)  # Narkowicz's fit of the ACES curve, 2015
 OWN = 0.25  # metres around a bulb where its own shade throws no shadow
 
@@ -33,13 +35,19 @@ class Lights:
     sun: np.ndarray | None  # (2, 3) float32, direction towards it and irradiance by colour
     bulbs: np.ndarray  # (n, 3) float32 places of lamps
     power: np.ndarray  # (n, 3) float32, radiant intensity by colour
+    view: np.ndarray | None  # (h, w, 3) uint8 sRGB, what lies around by latitude and longitude, the zenith first
+
+    @property
+    def day(self) -> float:
+        """1 by day, 0 without light from outside."""
+        return min(1.0, self.sky / DAY)
 
 
 def read_lights(stage: Usd.Stage) -> Lights:
     """The lights of a stage: domes, the brightest distant light, spheres; panels of light are for other renderers."""
     frame, cache = world_frame(stage), UsdGeom.XformCache()
     sky, suns, bulbs, power = 0.0, [], [], []
-    domes = 0
+    domes, view = 0, None
     for prim in stage.Traverse():
         if not prim.HasAPI(UsdLux.LightAPI) or UsdGeom.Imageable(prim).ComputeVisibility() == "invisible":
             continue
@@ -49,6 +57,8 @@ def read_lights(stage: Usd.Stage) -> Lights:
         world = frame @ np.array(cache.GetLocalToWorldTransform(prim)).T
         if prim.IsA(UsdLux.DomeLight):
             domes, sky = domes + 1, sky + strength
+            picture = UsdLux.DomeLight(prim).GetTextureFileAttr().Get()
+            view = view if picture is None else image_of(str(prim.GetPath()), picture.resolvedPath)
         elif prim.IsA(UsdLux.DistantLight):
             towards = world[:3, 2] / max(float(np.linalg.norm(world[:3, 2])), 1e-9)
             suns.append(np.stack([towards, color]))
@@ -59,6 +69,7 @@ def read_lights(stage: Usd.Stage) -> Lights:
     return Lights(
         sky=sky if domes else 1.0, sun=None if sun is None else sun.astype(np.float32),
         bulbs=np.array(bulbs, np.float32).reshape(-1, 3), power=np.array(power, np.float32).reshape(-1, 3),
+        view=view,
     )  # fmt: skip
 
 
@@ -94,14 +105,16 @@ def thrown_back(scenery: Scenery) -> np.ndarray:
     return np.asarray(total / np.pi / around * THROWN / (1 - THROWN) + DIM * max(lights.sky, 0.1), np.float32)
 
 
-def exposed(color: np.ndarray, light: np.ndarray) -> np.ndarray:
+def exposed(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> np.ndarray:
     """(h, w, 3) linear colours in [0, 1]: brightened or darkened to a middle tone, and rolled off as film does.
 
-    `color`: (h, w, 3) linear radiance. `light`: (3,) that of the room, to whose colour the eye adapts in part.
+    `color`: (h, w, 3) linear radiance. `light`: (3,) that of the room, to whose colour the eye adapts in part. `day`: 1
+    by day, 0 by night, see `Lights.day`.
     """
-    color = color / (np.maximum(light, 1e-6) / max(float(light.mean()), 1e-6)) ** ADAPTED
+    adapted, grey = (np.interp(day, (0, 1), ends) for ends in (ADAPTED, GREY))
+    color = color / (np.maximum(light, 1e-6) / max(float(light.mean()), 1e-6)) ** adapted
     bright = np.log(np.maximum(color.mean(-1), 1e-4))
-    scale = min(GREY / float(np.exp(bright.mean())), BRIGHTEST)
+    scale = min(grey / float(np.exp(bright.mean())), BRIGHTEST)
     a, b, c, d, e = FILMIC
     x = color * scale
     return np.clip(x * (a * x + b) / (x * (c * x + d) + e), 0, 1)

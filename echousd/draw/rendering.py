@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,37 +26,50 @@ COLORS = ("materials", "class")
 SHEET = (HERO, "top")  # beside the best corner in the first row; below, the views from the others
 LARGEST = 4096
 QUALITIES = {"fast": (640, QUICK), "fine": (1280, FINE)}  # pixels across, rays along each side of a pixel
+LIGHT = "light"  # the variant set of a room's day, evening and night
 FRAMES = (2, 360)  # pictures that a turn may have
 
 
 def render(
     room: str | Path, *, view: str = HERO, size: int = 512, colors: str = "materials", rays: int = FINE,
-    layout: int | str | None = None,
+    layout: int | str | None = None, light: str | None = None,
 ) -> Image.Image:  # fmt: skip
-    """A picture of the room in a file, in one of its layouts (None: the one that it shows); see `render_stage`.
+    """A picture of the room in a file, in one of its layouts and lights (None: what it shows); see `render_stage`.
 
-    Raises ValueError where it cannot be opened, or has no such layout.
+    `light`: day, evening or night. Raises ValueError where it cannot be opened, or has no such layout or light.
     """
-    from echousd.stage.files import open_stage
-    from echousd.stage.layouts import showing_layout
-
-    stage = open_stage(room)
-    with showing_layout(stage, layout):
+    with _showing(room, layout, light) as stage:
         return render_stage(stage, view=view, size=size, colors=colors, rays=rays)
 
 
+@contextmanager
+def _showing(path: str | Path, layout: int | str | None, light: str | None) -> Iterator[Usd.Stage]:
+    """A stage that shows one of its layouts and lights within the block; raises ValueError for what there is not."""
+    from echousd.stage.files import open_stage
+    from echousd.stage.layouts import showing_layout, showing_variant
+
+    stage = open_stage(path)
+    if light is None:
+        with showing_layout(stage, layout):
+            yield stage
+        return
+    sets = [prim.GetVariantSet(LIGHT) for prim in stage.GetPseudoRoot().GetChildren()]
+    names = sorted({name for found in sets for name in found.GetVariantNames()})
+    if light not in names:
+        raise ValueError(f"{path}: light is {light!r}, allowed: {', '.join(names) or 'none, it has no such variants'}")
+    with showing_layout(stage, layout), showing_variant(stage, LIGHT, light):
+        yield stage
+
+
 def render_cameras(
-    path: str | Path, *, size: int = 512, colors: str = "materials", rays: int = FINE, layout: int | str | None = None
+    path: str | Path, *, size: int = 512, colors: str = "materials", rays: int = FINE, layout: int | str | None = None,
+    light: str | None = None,
 ) -> dict[str, Image.Image]:
     """A picture of the room in a file through each of its cameras, by the camera's name; see `render`.
 
     Raises ValueError as `render` does, and where the stage holds no camera.
     """
-    from echousd.stage.files import open_stage
-    from echousd.stage.layouts import showing_layout
-
-    stage = open_stage(path)
-    with showing_layout(stage, layout):
+    with _showing(path, layout, light) as stage:
         scenery = _scenery(stage, size, colors)
         return {name: _image(trace(scenery, view, size, rays=rays)) for name, view in _cameras(stage).items()}
 
@@ -92,19 +107,15 @@ def render_stage(
 
 def render_turn(
     path: str | Path, *, frames: int = 24, size: int = 320, colors: str = "materials", rays: int = QUICK,
-    layout: int | str | None = None,
+    layout: int | str | None = None, light: str | None = None,
 ) -> list[Image.Image]:  # fmt: skip
     """Pictures of the room in a file from all around, the walls towards the camera left out; see `render`.
 
     Raises ValueError as `render` does, and for a number of frames outside `FRAMES`.
     """
-    from echousd.stage.files import open_stage
-    from echousd.stage.layouts import showing_layout
-
     if not FRAMES[0] <= frames <= FRAMES[1]:
         raise ValueError(f"frames is {frames}, allowed: {FRAMES[0]} to {FRAMES[1]}")
-    stage = open_stage(path)
-    with showing_layout(stage, layout):
+    with _showing(path, layout, light) as stage:
         scenery = _scenery(stage, size, colors)
     return [
         _image(trace(scenery.without_near_walls(view.matrix[:3, 3]), view, size, rays=rays))

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from pxr import Usd
 
-from echousd.draw.drawables import Drawable, Paint, paint_image, read_drawables
+from echousd.draw.drawables import Drawable, Paint, image_of, read_drawables
 from echousd.draw.indoors import Lights, read_lights
 from echousd.draw.sight import Furniture
 
@@ -143,7 +143,8 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             if paint.texture:
                 key = (paint.texture, paint.tint)
                 if key not in images:
-                    images[key] = (len(images), (paint_image(paint), np.array(paint.tint, np.float32)))
+                    pixels = image_of(paint.image, paint.texture)
+                    images[key] = (len(images), (pixels, np.array(paint.tint, np.float32)))
                 part["texture"][faces] = images[key][0]
         parts.append(part)
         words.append(mesh.category)

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from echousd.draw.indoors import OWN, SKY, SUN, THROWN, VIEW, exposed, thrown_back
-from echousd.draw.scenery import Scenery
+from echousd.draw.indoors import GLOWING, OWN, SKY, SUN, THROWN, VIEW, exposed, thrown_back
+from echousd.draw.scenery import LINEAR, Scenery
 from echousd.draw.views import View
 
 FINE, QUICK = 3, 2  # squared: rays per pixel
@@ -23,10 +23,9 @@ class RenderUnavailable(ImportError, ValueError):
 def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: int = 0) -> np.ndarray:
     """The picture as (size / aspect, size, 3) float sRGB in [0, 1].
 
-    Every pixel sends `rays`² rays; those that meet the surface of the first only look its texture up. Light is asked
-    `rays`² times a pixel, in a `QUICK` picture, away from edges, once at every second pixel of every second row. What
-    asks for light covers the sun's disc and the sky evenly, each pixel with another shift (randomised quasi-Monte
-    Carlo), so that little noise is left.
+    Pixels at edges send `rays`² rays, others one and look the texture up as often. Light is asked at every second pixel
+    of every second row, twice `rays` times at edges, (`rays` - 1)² times elsewhere. What asks covers the sun's disc and
+    the sky evenly, each pixel with another shift (randomised quasi-Monte Carlo), so that little noise is left.
 
     `scenery`: triangles and their colours. `view`: the camera; inside a room its windows and lamps light it, else sun
     and sky from above. `size`: pixels across. `rays`: along each side of a pixel. `seed`: of the shifts; the same seed
@@ -36,36 +35,42 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
     across, down = (grid.ravel() for grid in np.meshgrid(np.arange(size), np.arange(height)))
     noise = np.random.default_rng(seed).random(4)
     shift = ((across[:, None] * LATTICE[0] + down[:, None] * LATTICE[1] + noise) % 1.0).astype(np.float32)
-    world = World(_embree(scenery), scenery, view, size, shift, thrown_back(scenery))
+    sun = scenery.lights.sun
+    sun = np.float32(SUN / np.pi) * (0 * SUN_LIGHT if sun is None else sun[1]) if view.inside else 0.55 * SUN_LIGHT
+    glow = float(np.interp(scenery.lights.day, (0, 1), (GLOWING, 1))) if view.inside else 1.0
+    world = World(_embree(scenery), scenery, view, size, shift, thrown_back(scenery), sun, glow)
     places = [((inner % rays + 0.5) / rays, (inner // rays + 0.5) / rays) for inner in range(many)]
-    _, seen = _met(world, across + places[0][0], down + places[0][1])
-    finer = [_met(world, across + right, down + below, seen) for right, below in places[1:]]
+    _, seen = _met(world, np.arange(len(across)), places[0])
+    near = np.flatnonzero(_at_edges(seen, (height, size)))
+    finer = [_met(world, near, place, seen) for place in places[1:]]
     edge = np.zeros(len(across), bool)
     for pixel, _ in finer:
         edge[pixel] = True
-    light = _light_of(world, seen, edge, 2 if rays <= QUICK else 1, many)
+    light = _light_of(world, seen, edge, 2 * rays, max(1, (rays - 1) ** 2))
     color, met = seen.glow.copy(), np.flatnonzero(seen.face >= 0)
     st = _spread(seen.st.reshape(height, size, 2), rays).reshape(-1, many, 2)[met]
-    color[met] = _colored(scenery, seen.face[met], st, light[met])
+    color[met] = _colored(world, seen.face[met], st, light[met])
     mixed = color.copy()
     for pixel, more in finer:
         met = np.flatnonzero(more.face >= 0)
         lent = _lent(world, more.of(met), pixel[met], seen, light)
-        more.glow[met] = _colored(scenery, more.face[met], more.st[met, None], lent)
+        more.glow[met] = _colored(world, more.face[met], more.st[met, None], lent)
         mixed[pixel] += (more.glow - color[pixel]) / many
     mixed = mixed.reshape(height, size, 3)
-    return (exposed(mixed, world.thrown) if view.inside else _tone(mixed)) ** (1 / 2.2)
+    return (exposed(mixed, world.thrown, scenery.lights.day) if view.inside else _tone(mixed)) ** (1 / 2.2)
 
 
 BLOCK = 250_000  # rays at a time, which bounds the memory
 RINGS = (1, 2, 4, 8)  # places between neighbours, pass by pass
+CLOSE, EVEN = 2, 0.4  # from which ring on it matters how bright neighbours are, and the share that they may differ by
 ALIKE, FLAT = 0.95, 0.02  # cosine and metres within which two points lie on one flat piece of surface
 KEPT, NOTHING = ("primID", "u", "v", "tfar"), np.float32(-9)  # of a hit; the material of what is not there
 TORN = 0.25  # of a texture: where it changes by more from pixel to pixel, it begins anew
 
 
 class World(NamedTuple):
-    """What rays run through: the tree, what is in it, the camera, pixels across, shifts by pixel, light thrown back."""
+    """What rays run through: the tree, what is in it, the camera, pixels across, shifts by pixel; what light is thrown
+    back and what the sun gives to what faces it, by colour; how much brighter shades are than told."""
 
     scene: Any
     scenery: Scenery
@@ -73,6 +78,8 @@ class World(NamedTuple):
     size: int
     shift: np.ndarray
     thrown: np.ndarray
+    sun: np.ndarray
+    glow: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,27 +109,46 @@ def _rays(world: World, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.nd
     return np.broadcast_to(axes[:3, 3], aside.shape), _unit(aside - axes[:3, 2])
 
 
-def _met(world: World, x: np.ndarray, y: np.ndarray, first: Seen | None = None) -> tuple[np.ndarray, Seen]:
-    """What is seen at places in all pixels, x and y in pixels from the picture's upper left corner, and in which.
+def _met(
+    world: World, pixel: np.ndarray, place: tuple[float, float], first: Seen | None = None
+) -> tuple[np.ndarray, Seen]:
+    """What is seen at a place (right, down) in some pixels, and in which.
 
     Where `first` tells what was seen in each pixel already: only what is another surface or material.
     """
     parts, pixels = [], []
-    for start in range(0, len(x), BLOCK):
-        origin, direction = _rays(world, x[start : start + BLOCK], y[start : start + BLOCK])
+    for rows in (pixel[start : start + BLOCK] for start in range(0, max(len(pixel), 1), BLOCK)):
+        origin, direction = _rays(world, rows % world.size + place[0], rows // world.size + place[1])
         hit = world.scene.run(_f32(origin), _f32(direction), output=1)
-        rows = np.arange(len(origin))
+        part = _seen(world, origin, direction, {key: hit[key] for key in KEPT})
         if first is not None:
-            rows = np.flatnonzero(hit["primID"] != first.face[start : start + BLOCK])
-        part = _seen(world, origin[rows], direction[rows], {key: hit[key][rows] for key in KEPT})
-        if first is not None:
-            known = first.of(start + rows)
-            other = (part.material != known.material) | ~_same(part.normal, part.point, known.normal, known.point)
+            other = _other(part, first.of(rows))
             part, rows = part.of(other), rows[other]
         parts.append(part)
-        pixels.append(start + rows)
+        pixels.append(rows)
     joined = (np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Seen))
     return np.concatenate(pixels), Seen(*joined)
+
+
+def _other(one: Seen, two: Seen) -> np.ndarray:
+    """(n,) bool: what is another surface or material."""
+    return (one.material != two.material) | ~_same(one.normal, one.point, two.normal, two.point)
+
+
+def _at_edges(seen: Seen, shape: tuple[int, int]) -> np.ndarray:
+    """(n,) bool of a picture's pixels: whether another surface is seen beside them, or beside their neighbours."""
+    pixel, out = np.arange(len(seen.face)).reshape(shape), np.zeros(shape, bool)
+    across = (slice(None), slice(None, -1)), (slice(None), slice(1, None))
+    for one, two in (across, (slice(None, -1), slice(1, None))):
+        differs = _other(seen.of(pixel[one].ravel()), seen.of(pixel[two].ravel())).reshape(pixel[one].shape)
+        out[one] |= differs
+        out[two] |= differs
+    wider = out.copy()
+    wider[1:] |= out[:-1]
+    wider[:-1] |= out[1:]
+    wider[:, 1:] |= out[:, :-1]
+    wider[:, :-1] |= out[:, 1:]
+    return wider.ravel()
 
 
 def _seen(world: World, origin: np.ndarray, direction: np.ndarray, hit: Mapping[str, np.ndarray]) -> Seen:
@@ -130,7 +156,7 @@ def _seen(world: World, origin: np.ndarray, direction: np.ndarray, hit: Mapping[
     scenery, face = world.scenery, hit["primID"]
     missed = np.flatnonzero(face < 0)
     glow = np.zeros((len(face), 3), np.float32)
-    glow[missed] = outside(scenery.panes, origin[missed], direction[missed])
+    glow[missed] = outside(scenery, origin[missed], direction[missed])
     glow *= np.float32(VIEW * scenery.lights.sky if world.view.inside else 1.0)
     u, v, far = (np.where(face < 0, np.float32(0), hit[key]) for key in ("u", "v", "tfar"))
     bary = np.stack([1 - u - v, u, v], 1)
@@ -142,8 +168,9 @@ def _seen(world: World, origin: np.ndarray, direction: np.ndarray, hit: Mapping[
 
 
 def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndarray:
-    """(n, 4) light that falls on what was seen in some pixels, and what of it is mirrored to the eye."""
-    view, out = world.view, np.zeros((len(pixel), 4), np.float32)
+    """(n, 5) what falls on what was seen in some pixels: soft light by colour, what of it is mirrored to the eye, and
+    the share of the sun that shines there."""
+    view, out = world.view, np.zeros((len(pixel), 5), np.float32)
     for rows in (slice(start, start + BLOCK) for start in range(0, len(pixel), BLOCK)):
         point, normal = seen.point[rows], seen.normal[rows]
         toward = np.broadcast_to(view.matrix[:3, 2], point.shape) if view.orthographic else view.matrix[:3, 3] - point
@@ -154,24 +181,25 @@ def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndar
     return out / samples
 
 
-def _light_of(world: World, seen: Seen, edge: np.ndarray, step: int, samples: int) -> np.ndarray:
-    """(n, 4) light at all pixels: asked at every `step`th of every `step`th row, lent to those of the same surface.
+def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: int) -> np.ndarray:
+    """(n, 5) light at all pixels: asked at every second of every second row, lent to those of the same surface.
 
-    Where there is little of a surface around to smooth the light over, at an `edge` (n,), it is asked more often.
+    Where there is little of a surface around to smooth the light over, at an `edge` (n,), it is asked `often`.
     """
     shape = len(seen.face) // world.size, world.size
     met, asked = seen.face.reshape(shape) >= 0, np.zeros(shape, bool)
     normal, point = (each.reshape(*shape, 3) for each in (seen.normal, seen.point))
-    light = np.zeros((*shape, 4), np.float32)
-    coarse = slice(None, None, step), slice(None, None, step)
+    light = np.zeros((*shape, 5), np.float32)
+    coarse = slice(None, None, 2), slice(None, None, 2)
     asked[coarse] = met[coarse]
     torn = edge.reshape(shape)
-    for here, often in ((asked & torn, samples), (asked & ~torn, samples if step == 1 else 1)):
+    for here, times in ((asked & torn, often), (asked & ~torn, seldom)):
         pixel = np.flatnonzero(here)
-        light[here] = _asked(world, seen.of(pixel), pixel, often)
-    light[coarse] = smooth_light(light[coarse], normal[coarse], point[coarse])
-    for axis in (1, 0)[: 2 * (step - 1)]:  # between two in a row, then between two rows
-        here, *sides = (_along_axis(axis, start, shape[axis], step) for start in (1, 0, 2))
+        light[here] = _asked(world, seen.of(pixel), pixel, times)
+    for layers, rings in ((slice(4), RINGS), (slice(4, 5), RINGS[:1])):
+        light[coarse][..., layers] = smooth_light(light[coarse][..., layers], normal[coarse], point[coarse], rings)
+    for axis in (1, 0):  # between two in a row, then between two rows
+        here, *sides = (_along_axis(axis, start, shape[axis]) for start in (1, 0, 2))
         total, weight = np.zeros_like(light[here]), np.zeros((*light[here].shape[:2], 1), np.float32)
         for side in sides:
             end = light[side].shape[axis]
@@ -182,13 +210,13 @@ def _light_of(world: World, seen: Seen, edge: np.ndarray, step: int, samples: in
         light[here] = total / np.maximum(weight, 1)
         asked[here] = (weight[..., 0] > 0) & met[here]
     rest = np.flatnonzero(met & ~asked)
-    light.reshape(-1, 4)[rest] = _asked(world, seen.of(rest), rest, samples)
-    return (light if step == 1 else smooth_light(light, normal, point, RINGS[:1])).reshape(-1, 4)
+    light.reshape(-1, 5)[rest] = _asked(world, seen.of(rest), rest, often)
+    return smooth_light(light, normal, point, RINGS[:1]).reshape(-1, 5)
 
 
-def _along_axis(axis: int, start: int, end: int, step: int) -> tuple[slice, slice]:
+def _along_axis(axis: int, start: int, end: int) -> tuple[slice, slice]:
     """Every second place along an axis of a picture; along the other those that have light by then."""
-    return (slice(start, end, 2), slice(None)) if axis == 0 else (slice(None, None, step), slice(start, end, 2))
+    return (slice(start, end, 2), slice(None)) if axis == 0 else (slice(None, None, 2), slice(start, end, 2))
 
 
 def _same(normal: np.ndarray, point: np.ndarray, other_normal: np.ndarray, other_point: np.ndarray) -> np.ndarray:
@@ -208,8 +236,8 @@ def _spread(st: np.ndarray, rays: int) -> np.ndarray:
 
 
 def _lent(world: World, met: Seen, pixel: np.ndarray, seen: Seen, light: np.ndarray) -> np.ndarray:
-    """(n, 4) light of what further rays in some pixels met: that of the same surface there or beside it, else asked."""
-    out, wanted = np.zeros((len(pixel), 4), np.float32), np.arange(len(pixel))
+    """(n, 5) light of what further rays in some pixels met: that of the same surface there or beside it, else asked."""
+    out, wanted = np.zeros((len(pixel), 5), np.float32), np.arange(len(pixel))
     for apart in (0, 1, -1, world.size, -world.size):
         other = np.clip(pixel[wanted] + apart, 0, len(light) - 1)
         fits = (seen.face[other] >= 0) & _same(
@@ -221,15 +249,18 @@ def _lent(world: World, met: Seen, pixel: np.ndarray, seen: Seen, light: np.ndar
     return out
 
 
-def _colored(scenery: Scenery, face: np.ndarray, st: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """(n, 3) radiance of faces whose textures are looked up at st (n, k, 2), in light (n, 4)."""
-    return scenery.colors(face, st) * light[:, :3] + scenery.emissive[face] + np.float32(0.5) * light[:, 3:]
+def _colored(world: World, face: np.ndarray, st: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """(n, 3) radiance of faces whose textures are looked up at st (n, k, 2), in light (n, 5)."""
+    fallen = light[:, :3] + light[:, 4:] * world.sun
+    glow = world.glow * world.scenery.emissive[face] + np.float32(0.5) * light[:, 3:4]
+    return world.scenery.colors(face, st) * fallen + glow
 
 
 def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, rings: Sequence[int] = RINGS) -> np.ndarray:
-    """Mean of the light (h, w, 4) over neighbours on the same flat piece of surface (joint bilateral filter).
+    """Mean of the light (h, w, c) over neighbours on the same flat piece of surface (joint bilateral filter).
 
-    `normal`, `point`: (h, w, 3) of the surface.
+    Far passes leave out what is much lighter or darker, so that shadows keep their edges. `normal`, `point`: (h, w, 3)
+    of the surface.
     """
     height, width = light.shape[:2]
     light, normal, point = (np.ascontiguousarray(a.transpose(2, 0, 1)) for a in (light, normal, point))
@@ -238,6 +269,7 @@ def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, rings
         edge = ((0, 0), (apart, apart), (apart, apart))
         padded = [np.pad(a, edge, mode="edge") for a in (light, normal, point)]
         total, weight = np.zeros_like(light), np.zeros((height, width), np.float32)
+        bright = light.mean(0) if apart > CLOSE else None
         for down in (0, apart, 2 * apart):
             for across in (0, apart, 2 * apart):
                 there = slice(None), slice(down, down + height), slice(across, across + width)
@@ -247,6 +279,8 @@ def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, rings
                 for _ in range(4):  # to the 16th power
                     turn *= turn
                 share = turn * (step < 0.02)
+                if bright is not None:
+                    share /= 1 + np.square((other_light.mean(0) - bright) / (EVEN * bright + 1e-4)) ** 2
                 total += share * other_light
                 weight += share
         light = np.where(weight > 1e-6, total / np.maximum(weight, 1e-6), light)
@@ -283,17 +317,34 @@ def _embree(scenery: Scenery) -> Any:
     return scene
 
 
-def outside(panes: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """(n, 3) colour that rays which meet nothing see: sky over fields through a window's pane, else the paper."""
+def outside(scenery: Scenery, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(n, 3) colour that rays which meet nothing see: through a window's pane what lies around, else the paper."""
     out: np.ndarray = np.broadcast_to(BACKGROUND, direction.shape).copy()
-    for middle, side, rise in panes:
+    around = scenery.lights.view
+    for middle, side, rise in scenery.panes:
         normal = np.cross(side, rise)
         along = direction @ normal
         reach = ((middle - origin) @ normal) / np.where(np.abs(along) < 1e-9, 1e-9, along)
         point = origin + reach[:, None] * direction - middle
         u, v = point @ side / (side @ side), point @ rise / (rise @ rise)
         here = (reach > 0) & (np.abs(u) <= 1) & (np.abs(v) <= 1)
-        out[here] = np.stack([np.interp(v[here], OUTSIDE[0], tone) for tone in OUTSIDE[1].T], 1)
+        if around is None:
+            out[here] = np.stack([np.interp(v[here], OUTSIDE[0], tone) for tone in OUTSIDE[1].T], 1)
+        else:
+            out[here] = _around(around, direction[here])
+    return out
+
+
+def _around(picture: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """(n, 3) linear colour of a picture by latitude and longitude in directions (n, 3), between its pixels."""
+    height, width = picture.shape[:2]
+    down = np.clip(np.arccos(np.clip(way[:, 1], -1, 1)) / np.pi * height - 0.5, 0, height - 1)
+    right = (0.5 + np.arctan2(way[:, 0], way[:, 2]) / (2 * np.pi)) * width - 0.5
+    out = np.zeros((len(way), 3), np.float32)
+    for y, x in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        row, column = np.floor(down).astype(int) + y, np.floor(right).astype(int) + x
+        share = (1 - np.abs(down - row)) * (1 - np.abs(right - column))
+        out += share[:, None] * LINEAR[picture[np.minimum(row, height - 1), column % width]]
     return out
 
 
@@ -311,7 +362,7 @@ class Hits(NamedTuple):
 
 
 def _light(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarray:
-    """(n, 4) light that falls on the points, and the strength of the sun's reflection."""
+    """(n, 5) the sky's light on the points, the sun's reflection, and the share of the sun that shines there."""
     scene, scenery = world.scene, world.scenery
     point, normal, count = hits.point, hits.normal, len(hits.point)
     sun = ABOVE + SUN_SPREAD * _on_sphere(_even(sample, shift[:, :2]))
@@ -320,7 +371,6 @@ def _light(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarr
     lit = np.zeros(count, np.float32)
     ask = np.flatnonzero(facing > 0)
     lit[ask] = scene.run(_f32(point[ask]), _f32(sun[ask]), query="OCCLUDED") != 0
-    direct = (facing * lit)[:, None] * SUN_LIGHT
     sky = np.zeros((count, 3), np.float32)
     for ray in range(SKY_RAYS):
         away = normal + _on_sphere(_even(sample * SKY_RAYS + ray, shift[:, 2:]))  # cosine-weighted
@@ -333,7 +383,7 @@ def _light(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarr
         open_sky = (0.72 + 0.28 * np.clip(away[:, 1:2], -1, 1)) * SKY_LIGHT
         sky += np.where(blocked[:, None], bounce * (0.45 + 0.55 * near), open_sky)
     sky /= SKY_RAYS
-    return np.concatenate([0.55 * direct + 1.05 * sky, (hits.shine(ABOVE) * lit)[:, None]], 1)
+    return np.column_stack([1.05 * sky, hits.shine(ABOVE) * lit, facing * lit])
 
 
 def _light_inside(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarray:
@@ -341,7 +391,7 @@ def _light_inside(world: World, hits: Hits, sample: int, shift: np.ndarray) -> n
     scene, scenery = world.scene, world.scenery
     lights, point, normal, count = scenery.lights, hits.point, hits.normal, len(hits.point)
     spot, turn = _even(sample, shift[:, :2]), _even(sample, shift[:, 2:])
-    light, shine = np.zeros((count, 3), np.float32), np.zeros(count, np.float32)
+    light, shine, sun = np.zeros((count, 3), np.float32), np.zeros(count, np.float32), np.zeros(count, np.float32)
     if len(scenery.panes):  # one place in one window for each ray
         pane = scenery.panes[np.minimum((turn[:, 0] * len(scenery.panes)).astype(int), len(scenery.panes) - 1)]
         place = pane[:, 0] + (2 * spot[:, :1] - 1) * pane[:, 1] + (2 * spot[:, 1:] - 1) * pane[:, 2]
@@ -351,12 +401,12 @@ def _light_inside(world: World, hits: Hits, sample: int, shift: np.ndarray) -> n
         seen *= 0.3 + 0.7 * np.clip(0.5 + 2 * way[:, 1], 0, 1)  # sky above, ground below
         share = _free(scene, point, way, away, seen > 1e-4) * seen
         light += share[:, None] * (len(scenery.panes) * SKY * lights.sky / np.pi) * SKY_LIGHT
-        shine = hits.shine(way) * (share > 0)
+        grazing = 0.2 + 0.8 * (1 - np.clip(_dot(hits.toward, normal), 0, 1)) ** 3
+        shine = hits.shine(way) * grazing * (share > 0) * np.float32(0.4 * SKY * lights.sky)
     if lights.sun is not None and len(scenery.panes):
-        towards = _unit(lights.sun[0] + 0.02 * _on_sphere(spot))
+        towards = _unit(lights.sun[0] + 0.008 * _on_sphere(spot))
         facing = np.clip(_dot(normal, towards), 0, None)
-        lit = _free(scene, point, towards, np.full(count, 1e3, np.float32), facing > 0) * facing
-        light += lit[:, None] * lights.sun[1] * np.float32(SUN / np.pi)
+        sun = _free(scene, point, towards, np.full(count, 1e3, np.float32), facing > 0) * facing
     if len(lights.bulbs):  # one lamp for each ray
         which = np.minimum((turn[:, 1] * len(lights.bulbs)).astype(int), len(lights.bulbs) - 1)
         way, away = _way(point, lights.bulbs[which] + 0.05 * _on_sphere(spot))
@@ -369,9 +419,8 @@ def _light_inside(world: World, hits: Hits, sample: int, shift: np.ndarray) -> n
         other = scene.run(_f32(point), _f32(way), output=1)
         near = np.clip(other["tfar"] / 1.5, 0, 1)[:, None]
         hue = scenery.flat_colors[np.clip(other["primID"], 0, None)] / np.float32(THROWN)
-        around += np.where(other["primID"][:, None] >= 0, (0.4 + 0.6 * hue) * (0.3 + 0.7 * near), 1.0)
-    light += around / AROUND * world.thrown + 0.8 * shine[:, None]
-    return np.concatenate([light, np.zeros((count, 1), np.float32)], 1)
+        around += np.where(other["primID"][:, None] >= 0, (0.4 + 0.6 * hue) * (0.12 + 0.88 * near), 1.0)
+    return np.column_stack([light + around / AROUND * world.thrown, shine, sun])
 
 
 def _way(point: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
-from echousd.draw.drawables import Drawable, Paint, Texture, own_category, paint_image, read_drawables, world_frame
+from echousd.draw.drawables import Drawable, Paint, Texture, image_of, own_category, read_drawables, world_frame
 from echousd.exporting.packing import Reach
 from echousd.stage import values
 from echousd.stage.layouts import selected_layout
@@ -231,7 +231,7 @@ class _Tree:
         key = (texture, metal)
         if ("images", key) not in self.known:
             self.reach.check(texture.path, f"<{texture.prim}>")
-            pixels = paint_image(Paint(texture=texture.path, image=texture.prim))  # refused here if it cannot be read
+            pixels = image_of(texture.prim, texture.path)  # refused here if it cannot be read
             content = texture_bytes(texture.path) or b""
             kind = next((kind for start, kind in ENCODED.items() if content.startswith(start)), "")
             if metal is not None and (metal or not _is_grey(pixels)):

@@ -77,7 +77,7 @@ def errors_in_texels(room: Path, job: Job, samples: int = 400) -> np.ndarray:
 
     What eight bits cannot tell is taken off.
     """
-    from echousd.draw.drawables import paint_image, read_drawables
+    from echousd.draw.drawables import image_of, read_drawables
     from echousd.stage.files import open_stage
 
     rng = np.random.default_rng(0)
@@ -96,7 +96,7 @@ def errors_in_texels(room: Path, job: Job, samples: int = 400) -> np.ndarray:
             own = np.flatnonzero((owner == number) & (area > 1e-7))
             if not len(own) or not paint.texture or paint.st == "st":
                 continue
-            picture = images.setdefault(paint.texture, paint_image(paint))
+            picture = images.setdefault(paint.texture, image_of(paint.image, paint.texture))
             face = own[rng.choice(len(own), samples, p=area[own] / area[own].sum())]
             bary = rng.dirichlet((1, 1, 1), samples)
             assert mesh.st is not None

@@ -11,7 +11,7 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.draw.indoors import GREY, exposed, read_lights, thrown_back, with_ceiling
-from echousd.draw.rendering import render_stage
+from echousd.draw.rendering import render, render_stage
 from echousd.draw.scenery import read_scenery
 from echousd.draw.tracing import trace
 from echousd.draw.views import View, hero_view, view_matrix
@@ -135,8 +135,19 @@ def test_exposure_brings_dark_and_bright_rooms_to_one_middle_tone():
     white = np.ones(3)
     dark, bright = (exposed(scale * room, white) for scale in (0.2, 5.0))
     np.testing.assert_allclose(dark, bright, atol=1e-6)
-    assert 0.6 * GREY < np.median(bright) < 1.8 * GREY
+    assert 0.6 * GREY[1] < np.median(bright) < 1.8 * GREY[1]
+    assert np.median(exposed(room, white, day=0.0)) < 0.8 * np.median(bright)  # the evening is darker
     assert exposed(1e-3 * room, white).mean() < 0.1  # night stays night
     warm = np.array([1.0, 0.7, 0.4])
     left = exposed(warm * room, warm).mean((0, 1)) / exposed(room, white).mean((0, 1))
     assert 1.0 < left[0] / left[2] < 1.6  # of 2.5: the eye adapts to most of a lamp's colour
+
+
+def test_a_room_is_drawn_in_the_light_that_is_asked_for(stage):
+    path = stage.GetRootLayer().realPath
+    lights = (None, "day", "evening")
+    day, told, evening = (np.asarray(render(path, size=48, rays=1, light=light), float) for light in lights)
+    np.testing.assert_array_equal(day, told)
+    assert evening.mean() < 0.9 * day.mean()
+    with pytest.raises(ValueError, match="light is 'dusk', allowed: day, evening, night"):
+        render(path, size=48, light="dusk")
