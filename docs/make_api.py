@@ -13,7 +13,7 @@ import echousd
 from echomodel.rows import Predicate
 from echomodel.rules import rule_set
 from echomodel.rules.placements import RULES as PLACES
-from echousd.checks import CheckReport, Collision, Fault, MeasuredRelation, Misplacement
+from echousd.checks import CheckReport, Collision, Fault, Misplacement
 from echousd.checks.report import LayoutReport
 from echousd.graph.nodes import PlainModel
 from echousd.graph.scene import GraphDiff
@@ -39,7 +39,7 @@ GIVES = {
     "generate_home": (Made,),
     "import_plan": (Imported,),
     "check": (
-        CheckReport, LayoutReport, MeasuredRelation, Collision, Misplacement, LivingFault, Fault, SettleReport, Motion,
+        CheckReport, LayoutReport, Collision, Misplacement, LivingFault, Fault, SettleReport, Motion,
     ),
 }  # fmt: skip
 # run by tests/test_readme.py, top to bottom in one folder

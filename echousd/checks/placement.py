@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import trimesh
@@ -13,14 +14,19 @@ from scipy.spatial import cKDTree
 from trimesh.triangles import closest_point
 
 from echomodel.dressing import SMALL
+from echomodel.openings import segment
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import Floor, axes, depth_inside, floor_from_polygon, pair_indices, separation
 from echousd.place.placing import DEFAULT_HEIGHT, floor_of_room
 from echousd.place.report import TOUCH, Collision
 from echousd.shapes.fittings import SKIRTING
-from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding
+from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding, read_contents, surroundings
+from echousd.stage.labels import known_category
+from echousd.stage.read import RoomPrims
+from echousd.stage.taxonomy import SHELL
 
+DRESSED = "Dressing"  # name of the group that holds the small things of a room
 OUTSIDE = 0.03  # metres beyond the floor's edge
 FLOATING = 0.03  # metres of air below, or depth below the floor
 HANGING = 0.06  # metres between a ceiling thing and the ceiling
@@ -54,45 +60,82 @@ class Misplacement:
         }
 
 
-def find_misplaced(room: RoomContents) -> tuple[Misplacement, ...]:
-    """Every object that is outside the floor, floats, sinks into it, or has no geometry where others have."""
-    polygon = None if room.spec is None else floor_of_room(room.spec)
-    floor = None if polygon is None else floor_from_polygon(polygon)
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """A room with all that is in it besides the nodes of its furniture's graph.
+
+    Arguments:
+        room: its furniture. small: things of its dressing. shell: what is fixed, but for floors, which carry all of it.
+        strangers: other furniture.
+    """
+
+    room: RoomContents
+    small: tuple[Surrounding, ...] = ()
+    shell: tuple[Surrounding, ...] = ()
+    strangers: tuple[Surrounding, ...] = ()
+
+    @classmethod
+    def of(cls, prims: RoomPrims) -> Whole:
+        """All of a room on a stage."""
+        small, shell, strangers = [], [], []
+        for one in surroundings(prims):
+            if one.word in SMALL and one.prim.GetParent().GetName() == DRESSED:
+                small.append(one)
+            elif one.word in SHELL:
+                shell += [one] if one.word != "floor" else []
+            elif known_category(one.word) is not None:
+                strangers.append(one)
+        return cls(read_contents(prims), tuple(small), tuple(shell), tuple(strangers))
+
+    @cached_property
+    def polygon(self) -> np.ndarray | None:
+        """(k, 2) float, corners of its floor, None without one."""
+        return None if self.room.spec is None else floor_of_room(self.room.spec)
+
+    @cached_property
+    def floor(self) -> Floor | None:
+        """Its floor."""
+        return None if self.polygon is None else floor_from_polygon(self.polygon)
+
+
+def find_misplaced(whole: Whole) -> tuple[Misplacement, ...]:
+    """All that stands, hangs or looks where it should not; nothing in a room without furniture."""
+    if not whole.room.objects:
+        return ()
+    return (*_furniture(whole), *_screens(whole), *_dressing(whole))
+
+
+def _furniture(whole: Whole) -> Iterator[Misplacement]:
+    """Objects that are outside the floor, float, sink into it, or have no geometry where others have."""
+    room, floor = whole.room, whole.floor
+    yield from (Misplacement(name, "empty") for name in room.missing)
     told = DEFAULT_HEIGHT if room.spec is None or room.spec.height is None else room.spec.height
     height = max([told, *(float(thing.position[1] + thing.size[1]) for thing in room.objects)])
-    found = [Misplacement(name, "empty") for name in room.missing] if room.objects else []
     for thing in room.objects:
-        if floor is not None:
-            beyond = _beyond(thing, floor)
-            if beyond > OUTSIDE:
-                found.append(Misplacement(thing.node.name, "outside", beyond))
+        beyond = -np.inf if floor is None else _beyond(thing, floor)
+        if beyond > OUTSIDE:
+            yield Misplacement(thing.name, "outside", beyond)
         bottom = float(thing.position[1])
         if bottom < -FLOATING:
-            found.append(Misplacement(thing.node.name, "sunk", -bottom))
-            continue
-        if thing.node.obstacle:  # held by what only its own stage knows
-            continue
-        air = _air_below(thing, room.objects)
-        if air > FLOATING and not _held(thing, floor, height):
-            found.append(Misplacement(thing.node.name, "floating", air))
-    return tuple(found)
+            yield Misplacement(thing.name, "sunk", -bottom)
+        elif not thing.node.obstacle:  # such are held by what only their own stage knows
+            air = _air_below(thing, room.objects)
+            if air > FLOATING and not _held(thing, floor, height):
+                yield Misplacement(thing.name, "floating", air)
 
 
-def misplaced_screens(room: RoomContents, small: Sequence[Surrounding]) -> tuple[Misplacement, ...]:
+def _screens(whole: Whole) -> Iterator[Misplacement]:
     """Screens that look at a wall, or across what they stand on."""
-    polygon = None if room.spec is None else floor_of_room(room.spec)
-    floor = None if polygon is None else floor_from_polygon(polygon)
-    screens: list[tuple[str, Shape]] = [(one.node.name, one) for one in room.objects if one.node.category in SCREENS]
-    screens += [(one.name, one.shape) for one in small if one.word in SCREENS and one.shape is not None]
-    found = []
+    objects, floor = whole.room.objects, whole.floor
+    screens: list[tuple[str, Shape]] = [(one.name, one) for one in objects if one.node.category in SCREENS]
+    screens += [(one.name, one.shape) for one in whole.small if one.word in SCREENS and one.shape is not None]
     for name, screen in screens:
         front = np.array([np.sin(screen.yaw), np.cos(screen.yaw)])
         before = screen.position[[0, 2]] + front * (screen.size[2] / 2 + CLOSE)
-        below = [one for one in room.objects if one is not screen and _carries(one, screen)]
+        below = [one for one in objects if one is not screen and _carries(one, screen)]
         across = any(np.cos(one.yaw - screen.yaw) < ACROSS for one in below)
         if across or (floor is not None and float(depth_inside(floor, before[None])[0]) < 0):
-            found.append(Misplacement(name, "turned"))
-    return tuple(found)
+            yield Misplacement(name, "turned")
 
 
 def _carries(one: RoomObject, thing: Shape) -> bool:
@@ -102,24 +145,14 @@ def _carries(one: RoomObject, thing: Shape) -> bool:
     return on_top and bool((local <= one.size[[0, 2]] / 2).all())
 
 
-def misplaced_small(
-    room: RoomContents, small: Sequence[Surrounding], shell: Sequence[Surrounding]
-) -> tuple[Misplacement, ...]:
-    """Small things that are outside the floor, in the air, off their wall or window, hidden or of no usual size.
-
-    Arguments:
-        small: the things of a dressing. shell: what stands fixed, whose sills carry things, too.
-    """
-    polygon = None if room.spec is None else floor_of_room(room.spec)
-    if room.spec is None or polygon is None:
-        return ()
-    floor = floor_from_polygon(polygon)
-    windows = _windows(room, polygon)
-    carriers: list[Shape] = [*room.objects, *(one.shape for one in (*small, *shell) if one.shape is not None)]
-    found = []
-    for one in small:
-        found += [Misplacement(one.name, *told) for told in _small_faults(one, floor, carriers, windows)]
-    return tuple(found)
+def _dressing(whole: Whole) -> Iterator[Misplacement]:
+    """Small things that are outside the floor, in the air, off their wall or window, hidden or of no usual size."""
+    if whole.floor is None:
+        return
+    windows, around = _windows(whole), (*whole.small, *whole.shell)  # sills carry things, too
+    carriers: list[Shape] = [*whole.room.objects, *(one.shape for one in around if one.shape is not None)]
+    for one in whole.small:
+        yield from (Misplacement(one.name, *told) for told in _small_faults(one, whole.floor, carriers, windows))
 
 
 def _small_faults(
@@ -161,16 +194,10 @@ def _back(shape: Shape) -> np.ndarray:
     return shape.position[[0, 2]] - np.array([np.sin(shape.yaw), np.cos(shape.yaw)]) * shape.size[2] / 2
 
 
-def _windows(room: RoomContents, polygon: np.ndarray) -> np.ndarray:
+def _windows(whole: Whole) -> np.ndarray:
     """(n, 2, 2) float: both ends of every window, in plan."""
-    assert room.spec is not None
-    found = []
-    for opening in room.spec.openings:
-        if opening.kind == "window":
-            start, end = polygon[opening.edge % len(polygon)], polygon[(opening.edge + 1) % len(polygon)]
-            along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
-            found.append([start + along * opening.offset, start + along * (opening.offset + opening.width)])
-    return np.array(found).reshape(-1, 2, 2)
+    openings = () if whole.room.spec is None or whole.polygon is None else whole.room.spec.openings
+    return np.array([segment(whole.polygon, one) for one in openings if one.kind == "window"]).reshape(-1, 2, 2)
 
 
 def _beside(shape: Shape, windows: np.ndarray) -> float:
@@ -235,21 +262,13 @@ NEAR = 0.05  # metres between two boxes that are one
 SAMPLES = 600  # points per surface and pair
 
 
-def find_collisions(
-    objects: Sequence[RoomObject],
-    strangers: Sequence[Surrounding] = (),
-    small: Sequence[Surrounding] = (),
-    shell: Sequence[Surrounding] = (),
-) -> tuple[Collision, ...]:
-    """All pairs whose meshes reach into each other, deepest first; boxes may: a chair stands under its table.
-
-    Arguments:
-        strangers: other furniture than the graph's. small: things of a dressing. shell: walls, and what is in them.
-    """
-    things: list[tuple[str, Shape]] = [(one.node.name, one) for one in objects]
-    things += [(one.name, one.shape) for one in strangers if one.shape is not None]
-    little = [(one.name, one.shape) for one in small if one.shape is not None]
-    fixed = [(one.name, one.shape) for one in shell if one.shape is not None]
+def find_collisions(whole: Whole) -> tuple[Collision, ...]:
+    """All pairs whose meshes reach into each other, deepest first; boxes may: a chair stands under its table."""
+    strangers, little, fixed = (
+        [(one.name, one.shape) for one in part if one.shape is not None]
+        for part in (whole.strangers, whole.small, whole.shell)
+    )
+    things: list[tuple[str, Shape]] = [*((one.name, one) for one in whole.room.objects), *strangers]
     found = _hits(things, None, DEEP) + _hits(things, fixed, IN_WALL)
     found += _hits(things, little, PRESSED) + _hits(little, None, IN_WALL)
     return tuple(sorted(found, key=lambda hit: -hit.depth))

@@ -12,89 +12,45 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pxr import Usd
 
-from echomodel.dressing import SMALL
-from echomodel.vocabulary import vocabulary
-from echousd.checks.placement import Misplacement, find_collisions, find_misplaced, misplaced_screens, misplaced_small
+from echousd.checks.placement import Misplacement, Whole, find_collisions, find_misplaced
 from echousd.checks.validity import Fault, find_faults
 from echousd.draw.sight import Furniture
 from echousd.folder.folder import digest_of
 from echousd.folder.manifest import find_manifest
-from echousd.graph import Placed, Relation, SceneGraph
+from echousd.graph import RoomSpec, SceneGraph
 from echousd.graph.consistency import GraphError
 from echousd.graph.floors import check_extents
 from echousd.place.living import LivingFault, living_faults
-from echousd.place.placing import floor_of_room
 from echousd.place.report import Collision
-from echousd.stage.contents import RoomContents, Surrounding, read_contents, surroundings
+from echousd.room import Verdict
+from echousd.stage.contents import RoomContents
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
-from echousd.stage.labels import known_category
+from echousd.stage.foreign import UNTOLD
 from echousd.stage.layouts import layout_names, showing_layout
-from echousd.stage.read import RoomPrims, find_rooms
-from echousd.stage.taxonomy import SHELL
+from echousd.stage.read import find_rooms
 
 if TYPE_CHECKING:
-    from echomodel.boxes import Boxes
     from echousd.settle import SettleReport
 
 
-@dataclass(frozen=True)
-class MeasuredRelation:
-    """A relation or placement with its signed margin (metres or ratio, >= 0 = kept), None where it is not measured."""
-
-    relation: Relation | Placed
-    kept: bool
-    margin: float | None
-
-    def to_json(self) -> dict:
-        """The entry of the report."""
-        subject, predicate, object_ = self.relation.triple
-        margin = None if self.margin is None else round(self.margin, 4)
-        return {"subject": subject, "predicate": predicate, "object": object_, "margin": margin}
-
-
-def measured_relations(room: RoomContents, rules: str = "strict") -> tuple[MeasuredRelation, ...]:
-    """Every relation and placement of objects with boxes; raises ValueError for unknown rules."""
+def verdicts_of(room: RoomContents, rules: str = "strict") -> tuple[Verdict, ...]:
+    """What became of every relation and placement of objects with boxes; raises ValueError for unknown rules."""
     import torch
 
     from echomodel.boxes import Boxes
-    from echomodel.rules import fronts, margins, verdicts
+    from echousd.make.verdicts import relation_verdicts
 
-    words = vocabulary()
-    index = {thing.node.name: i for i, thing in enumerate(room.objects)}
-    triplets = torch.tensor(
-        [[index[r.subject], words.predicate_id(r.predicate), index[r.object]] for r in room.relations],
-        dtype=torch.int64,
-    ).reshape(-1, 3)
+    here = {thing.name for thing in room.objects}
+    nodes = [
+        thing.node if {*(thing.node.between or ())} <= here else thing.node.model_copy(update={"between": None})
+        for thing in room.objects
+    ]
+    spec = room.spec or RoomSpec(UNTOLD)  # what contradicts itself in it is told by others
+    graph = SceneGraph.model_construct(room=spec, nodes=tuple(nodes), relations=room.relations)
     found = _boxes(room)
-    boxes = Boxes(*(torch.tensor(v, dtype=torch.float64) for v in (found.size, found.position, found.yaw)))
-    polygon = None if room.spec is None else floor_of_room(room.spec)
-    centre = np.zeros(2) if polygon is None else (polygon.max(0) + polygon.min(0)) / 2
-    center = torch.as_tensor(centre)
-    headed = fronts(thing.node.category for thing in room.objects)
-    verdict = verdicts(boxes, triplets, rules=rules, center=center, fronts=headed).tolist()
-    margin = margins(boxes, triplets, rules=rules, center=center, fronts=headed).tolist()
-    # Meshes are stored in single precision: a relation that holds to a tenth of a millimetre holds.
-    return tuple(
-        MeasuredRelation(relation, bool(found != 0 or value > -1e-4), None if found < 0 else float(value))
-        for relation, found, value in zip(room.relations, verdict, margin, strict=True)
-    ) + _measured_placements(room, boxes, polygon)
-
-
-def _measured_placements(room: RoomContents, boxes: Boxes, floor: np.ndarray | None) -> tuple[MeasuredRelation, ...]:
-    from echomodel.rules.placements import Stated, placement_margins
-
-    index = {thing.node.name: i for i, thing in enumerate(room.objects)}
-    told = [one for thing in room.objects for one in thing.node.placements if set(one.others) <= index.keys()]
-    stated = [Stated(one.placement, index[one.subject], tuple(index[name] for name in one.others)) for one in told]
-    margin = placement_margins(boxes, stated, floor, [thing.node.category for thing in room.objects]).tolist()
-    return tuple(
-        MeasuredRelation(one, value != value or value > -1e-4, None if value != value else value)
-        for one, value in zip(told, margin, strict=True)
-    )
-
-
-DRESSED = "Dressing"  # name of the group that holds the small things of a room
+    boxes = Boxes(*(torch.from_numpy(value) for value in (found.size, found.position, found.yaw)))
+    return relation_verdicts(graph, boxes, rules=rules)
 
 
 @dataclass(frozen=True)
@@ -109,20 +65,20 @@ class LayoutReport:
     """
 
     name: str
-    relations: tuple[MeasuredRelation, ...]
+    relations: tuple[Verdict, ...]
     collisions: tuple[Collision, ...]
     placement: tuple[Misplacement, ...]
     living: tuple[LivingFault, ...]
 
     @property
-    def broken(self) -> tuple[MeasuredRelation, ...]:
+    def broken(self) -> tuple[Verdict, ...]:
         """The relations that do not hold."""
-        return tuple(relation for relation in self.relations if not relation.kept)
+        return tuple(relation for relation in self.relations if relation.state == "broken")
 
     @property
     def kept(self) -> int:
         """Number of measured relations that hold."""
-        return sum(relation.kept and relation.margin is not None for relation in self.relations)
+        return sum(relation.state == "kept" for relation in self.relations)
 
     @property
     def ok(self) -> bool:
@@ -135,7 +91,7 @@ class LayoutReport:
             "relations": {
                 "kept": self.kept,
                 "broken": [relation.to_json() for relation in self.broken],
-                "unmeasured": sum(relation.margin is None for relation in self.relations),
+                "unmeasured": sum(relation.state == "unmeasured" for relation in self.relations),
             },
             "collisions": [hit.to_json() for hit in self.collisions],
             "placement": [wrong.to_json() for wrong in self.placement],
@@ -162,7 +118,7 @@ class CheckReport:
     settled: tuple[SettleReport, ...] | None = None
 
     @property
-    def relations(self) -> tuple[MeasuredRelation, ...]:
+    def relations(self) -> tuple[Verdict, ...]:
         """The relations of all layouts."""
         return tuple(relation for layout in self.layouts for relation in layout.relations)
 
@@ -182,7 +138,7 @@ class CheckReport:
         return tuple(fault for layout in self.layouts for fault in layout.living)
 
     @property
-    def broken(self) -> tuple[MeasuredRelation, ...]:
+    def broken(self) -> tuple[Verdict, ...]:
         """The relations that do not hold, of all layouts."""
         return tuple(relation for layout in self.layouts for relation in layout.broken)
 
@@ -260,49 +216,15 @@ def check_layout(stage: Usd.Stage, layout: str | int | None, rules: str) -> tupl
             found = find_rooms(stage)
         except StageError:  # echo:EdgeTargets reports it
             found = []
-        rooms = [read_contents(prims) for prims in found]
-        around = [Around.of(prims) for prims in found]
+        rooms = [Whole.of(prims) for prims in found]
         report = LayoutReport(
             "" if layout is None else name,
-            tuple(relation for room in rooms for relation in measured_relations(room, rules)),
-            tuple(
-                hit
-                for room, other in zip(rooms, around, strict=True)
-                for hit in find_collisions(room.objects, other.strangers, other.small, other.shell)
-            ),
-            tuple(wrong for room, other in zip(rooms, around, strict=True) for wrong in _misplaced(room, other)),
-            tuple(fault for room in rooms for fault in find_living(room)),
+            tuple(relation for whole in rooms for relation in verdicts_of(whole.room, rules)),
+            tuple(hit for whole in rooms for hit in find_collisions(whole)),
+            tuple(wrong for whole in rooms for wrong in find_misplaced(whole)),
+            tuple(fault for whole in rooms for fault in find_living(whole.room)),
         )
-        return tuple(room.path for room in rooms), report
-
-
-def _misplaced(room: RoomContents, other: Around) -> tuple[Misplacement, ...]:
-    if not room.objects:
-        return ()
-    screens = misplaced_screens(room, other.small)
-    return (*find_misplaced(room), *screens, *misplaced_small(room, other.small, other.shell))
-
-
-@dataclass(frozen=True)
-class Around:
-    """What is in a room besides the nodes of its furniture's graph: things of its dressing, its shell, and the rest."""
-
-    small: tuple[Surrounding, ...]
-    shell: tuple[Surrounding, ...]
-    strangers: tuple[Surrounding, ...]
-
-    @classmethod
-    def of(cls, prims: RoomPrims) -> Around:
-        """All of a room, but for floors, which carry all of it."""
-        small, shell, strangers = [], [], []
-        for one in surroundings(prims):
-            if one.word in SMALL and one.prim.GetParent().GetName() == DRESSED:
-                small.append(one)
-            elif one.word in SHELL:
-                shell.append(one)
-            elif known_category(one.word) is not None:
-                strangers.append(one)
-        return cls(tuple(small), tuple(one for one in shell if one.word != "floor"), tuple(strangers))
+        return tuple(whole.room.path for whole in rooms), report
 
 
 def _boxes(room: RoomContents) -> Furniture:
@@ -330,7 +252,7 @@ RULE = "echo:Manifest"
 CLEAR = 0.02  # metres or ratio: verdicts of smaller margins may differ between boxes and meshes
 
 
-def rewritten(stage: Usd.Stage, room: str, relations: Sequence[MeasuredRelation]) -> Iterator[Fault]:
+def rewritten(stage: Usd.Stage, room: str, relations: Sequence[Verdict]) -> Iterator[Fault]:
     """Where a manifest says other than what is measured, of a room whose layers are those that it was written with.
 
     `room`: prim path. `relations`: of the first layout.
@@ -345,23 +267,20 @@ def rewritten(stage: Usd.Stage, room: str, relations: Sequence[MeasuredRelation]
         return
     if manifest is None or manifest["name"] != root.stem or not _as_written(root, manifest["files"]):
         return
-    measured = {one.relation.triple: one for one in relations}
-    told: dict[tuple[str, ...], str] = {}
+    measured = {(one.subject, one.predicate, one.object): one for one in relations}
+    told: dict[tuple[str, str, str], str] = {}
     for verdict in _verdicts(manifest):
-        triple = tuple(str(verdict.get(word)) for word in ("subject", "predicate", "object"))
+        triple = (str(verdict.get("subject")), str(verdict.get("predicate")), str(verdict.get("object")))
         told[triple] = str(verdict.get("state"))
-        found = measured.get(triple)  # type: ignore[arg-type]
+        found = measured.get(triple)
         if found is None or found.margin is None or abs(found.margin) < CLEAR:
             continue
-        if found.kept != (told[triple] == "kept"):
-            state = "kept" if found.kept else "broken"
-            said = (
-                f"{root.stem}.json says that '{found.relation}' is {told[triple]}, it is {state} ({found.margin:+.3f})"
-            )
-            yield Fault(RULE, room, said)
+        if (found.state == "kept") != (told[triple] == "kept"):
+            said = f"'{found.said}' is {told[triple]}, it is {found.state} ({found.margin:+.3f})"
+            yield Fault(RULE, room, f"{root.stem}.json says that {said}")
     for triple, found in measured.items():
         if found.margin is not None and triple not in told:
-            yield Fault(RULE, room, f"{root.stem}.json says nothing of '{found.relation}'")
+            yield Fault(RULE, room, f"{root.stem}.json says nothing of '{found.said}'")
     kept, counts = list(told.values()).count("kept"), manifest.get("relations")
     if not isinstance(counts, dict) or counts.get("kept") != kept:
         yield Fault(RULE, room, f"{root.stem}.json counts {counts} relations, its verdicts say {kept} kept")

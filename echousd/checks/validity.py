@@ -25,7 +25,7 @@ ALONE = "echo:Validators"
 UNKNOWN_NODE, MATERIALX = ".MissingShaderIdInRegistry", "shaderId 'ND_"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, order=True)
 class Fault:
     """A fault of the stage: which rule found it, at which prim, and what it says."""
 
@@ -91,11 +91,10 @@ def find_faults(stage: Usd.Stage) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]
     own = [(rule, found) for rule in RULES for found in safely(rule, reading)]
     with showing_variant(stage, ARTICULATION, ARTICULATED) as changed:  # doors and drawers are joined in it alone
         own += [(rule, found) for rule in JOINED if changed for found in safely(rule, Reading(stage))]
-    errors = {_fault(rule, found) for rule, found in own if not found.warning}
-    warnings = {_fault(rule, found) for rule, found in own if found.warning}
-    theirs = _faults_of_usd(stage)
-    errors |= theirs[0]
-    return tuple(sorted(errors, key=_key)), tuple(sorted(warnings | theirs[1], key=_key))
+    errors, warnings = _faults_of_usd(stage)
+    for rule, found in own:
+        (warnings if found.warning else errors).add(Fault(rule.name, str(found.path), found.message))
+    return tuple(sorted(errors)), tuple(sorted(warnings))
 
 
 def _faults_of_usd(stage: Usd.Stage) -> tuple[set[Fault], set[Fault]]:
@@ -121,7 +120,8 @@ def _faults_of_usd(stage: Usd.Stage) -> tuple[set[Fault], set[Fault]]:
     errors, warnings = set(), set()
     knows_materialx = bool(Plug.Registry().GetPluginWithName("usdMtlx"))  # usd-core comes without it
     for error in told:
-        fault = Fault(_rule_name(error), _site(error), " ".join(error.GetMessage().split()))
+        name = f"{error.GetValidator().GetMetadata().name}.{error.GetName()}"
+        fault = Fault(name, _site(error), " ".join(error.GetMessage().split()))
         if not knows_materialx and fault.rule.endswith(UNKNOWN_NODE) and MATERIALX in fault.message:
             continue
         if error.GetType() == UsdValidation.ValidationErrorType.Error:
@@ -129,18 +129,6 @@ def _faults_of_usd(stage: Usd.Stage) -> tuple[set[Fault], set[Fault]]:
         elif error.GetType() == UsdValidation.ValidationErrorType.Warn:
             warnings.add(fault)
     return errors, warnings
-
-
-def _fault(rule: Rule, found: Finding) -> Fault:
-    return Fault(rule.name, str(found.path), found.message)
-
-
-def _key(fault: Fault) -> tuple[str, str, str]:
-    return fault.rule, fault.prim, fault.message
-
-
-def _rule_name(error: Any) -> str:
-    return f"{error.GetValidator().GetMetadata().name}.{error.GetName()}"
 
 
 def _site(error: Any) -> str:

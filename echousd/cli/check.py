@@ -134,7 +134,7 @@ def _show(report: CheckReport, strict: bool) -> None:
 
     for layout in report.layouts:
         which = f"{layout.name} " if layout.name else ""
-        unmeasured = sum(found.margin is None for found in layout.relations)
+        unmeasured = sum(found.state == "unmeasured" for found in layout.relations)
         measured = len(layout.relations) - unmeasured
         silent = f", {unmeasured} not measured" * bool(unmeasured)
         row(not layout.broken, f"{which}relations", f"{layout.kept} of {measured} kept{silent}")
@@ -178,7 +178,7 @@ def _show_faults(console: Console, layout: LayoutReport, strict: bool) -> None:
         console.print(f"  [{colour}]{kind:<9}[/] {escape(safe(which + text))}", highlight=False)
 
     for found in layout.broken:
-        line("broken", f"{found.relation} (margin {found.margin:+.3f})")
+        line("broken", f"{found.said} (margin {found.margin:+.3f})")
     for hit in layout.collisions:
         line("collision", f"{hit.first} and {hit.second}, {hit.depth:.3f} m deep")
     for wrong in layout.placement:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
+import torch
 
 from echomodel.boxes import Boxes
 from echomodel.rules import fronts, margins, verdicts
@@ -13,9 +14,9 @@ from echousd.graph import SceneGraph
 from echousd.place.geometry import pair_indices
 from echousd.place.report import Collision, collisions
 from echousd.room import LayoutOutcome, RoomData, Verdict
-from echousd.tensors import floor_centre, graph_batch, stated_placements
+from echousd.tensors import floor_centre, stated_placements, triplets_of
 
-ROUNDING = 1e-4  # metres: boxes are written to a tenth of a millimetre
+ROUNDING = 1e-4  # metres: boxes are written to a tenth of a millimetre, meshes in single precision
 STATES = {1: "kept", 0: "broken", -1: "unmeasured"}
 
 
@@ -48,12 +49,12 @@ def relation_verdicts(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict")
     """One verdict per relation of the graph, in its order, then one per placement."""
     if not graph.relations:
         return _placement_verdicts(graph, boxes)
-    triplets, centre = graph_batch(graph).triplets, floor_centre(graph)[[0, 2]]
+    triplets, centre = torch.from_numpy(triplets_of(graph)), floor_centre(graph)[[0, 2]]
     headed = fronts(node.category for node in graph.nodes)
     state = verdicts(boxes, triplets, rules=rules, center=centre, fronts=headed).tolist()
     margin = margins(boxes, triplets, rules=rules, center=centre, fronts=headed).tolist()
     return tuple(
-        Verdict(r.subject, r.predicate, r.object, STATES[s], None if s < 0 else m)
+        Verdict(r.subject, r.predicate, r.object, STATES[s or int(m > -ROUNDING)], None if s < 0 else m)
         for r, s, m in zip(graph.relations, state, margin, strict=True)
     ) + _placement_verdicts(graph, boxes)
 
@@ -62,6 +63,6 @@ def _placement_verdicts(graph: SceneGraph, boxes: Boxes) -> tuple[Verdict, ...]:
     categories = [node.category for node in graph.nodes]
     margin = placement_margins(boxes, stated_placements(graph), graph.room.corners, categories).tolist()
     return tuple(
-        Verdict(*placed.triple, STATES[-1 if m != m else int(m >= -ROUNDING)], None if m != m else m)
+        Verdict(*placed.triple, STATES[-1 if m != m else int(m > -ROUNDING)], None if m != m else m)
         for placed, m in zip(graph.placements, margin, strict=True)
     )

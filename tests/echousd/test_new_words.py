@@ -176,7 +176,7 @@ def test_made_of_parts_dressed_weighed_and_made_in_batches(music, tmp_path, monk
     root = next((tmp_path / "run").glob("rooms/*/*/*.usda"))
     report = check(root)
     assert report.ok, report
-    assert "in_line_with" in {found.relation.triple[1] for found in report.relations if found.margin is not None}
+    assert "in_line_with" in {found.predicate for found in report.relations if found.margin is not None}
     stage = Usd.Stage.Open(str(root))
     prim = next(prim for prim in stage.Traverse() if prim.GetName() == "spinet" and UsdPhysics.MassAPI(prim))
     assert 10 < UsdPhysics.MassAPI(prim).GetMassAttr().Get() < 300

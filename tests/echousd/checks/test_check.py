@@ -10,8 +10,8 @@ import pytest
 import trimesh
 from pxr import Gf, Usd, UsdGeom, UsdValidation
 
-from echousd.checks import RULES, check, register
-from echousd.checks.placement import DEEP, find_collisions, mesh_depth, winding_number
+from echousd.checks import RULES, Collision, check, register
+from echousd.checks.placement import DEEP, Whole, find_collisions, mesh_depth, winding_number
 from echousd.checks.report import find_living
 from echousd.cli.main import run
 from echousd.graph import Node, RoomSpec
@@ -178,10 +178,14 @@ def table(x: float, y: float, z: float) -> trimesh.Trimesh:
     return trimesh.util.concatenate([top, *legs])
 
 
+def hits(*objects: RoomObject) -> tuple[Collision, ...]:
+    return find_collisions(Whole(RoomContents("/Room", None, objects, (), ())))
+
+
 def test_what_fits_between_the_legs_does_not_collide() -> None:
     desk, cabinet = thing("desk", "desk", table(1.6, 0.75, 0.8), (0, 0, 0)), box(0.5, 0.6, 0.5)
-    assert not find_collisions([desk, thing("box", "cabinet", cabinet, (0, 0, 0.1))])
-    (hit,) = find_collisions([desk, thing("box", "cabinet", cabinet, (0.6, 0, 0.2))])
+    assert not hits(desk, thing("box", "cabinet", cabinet, (0, 0, 0.1)))
+    (hit,) = hits(desk, thing("box", "cabinet", cabinet, (0.6, 0, 0.2)))
     assert (hit.first, hit.second) == ("desk", "box")
     assert hit.depth > 0.02
     assert hit.to_json() == {"objects": ["desk", "box"], "depth": round(hit.depth, 4)}
@@ -189,10 +193,10 @@ def test_what_fits_between_the_legs_does_not_collide() -> None:
 
 def test_a_chair_stands_under_a_table_and_not_in_it() -> None:
     top, low = thing("table", "dining_table", table(1.6, 0.75, 0.9), (0, 0, 0)), box(0.5, 0.6, 0.5)
-    assert not find_collisions([top, thing("chair", "dining_chair", low, (0, 0, 0.45))])
-    assert find_collisions([top, thing("chair", "dining_chair", low, (0.6, 0, 0.3))])  # in a leg
+    assert not hits(top, thing("chair", "dining_chair", low, (0, 0, 0.45)))
+    assert hits(top, thing("chair", "dining_chair", low, (0.6, 0, 0.3)))  # in a leg
     high = box(0.5, 0.9, 0.5)
-    (hit,) = find_collisions([top, thing("chair", "dining_chair", high, (0, 0, 0.6))])  # its back in the top
+    (hit,) = hits(top, thing("chair", "dining_chair", high, (0, 0, 0.6)))  # its back in the top
     assert {hit.first, hit.second} == {"table", "chair"}
 
 

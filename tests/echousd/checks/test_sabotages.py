@@ -67,7 +67,7 @@ def named(report: CheckReport) -> Named:
     found = {(fault.rule, fault.prim) for fault in (*report.errors, *report.warnings)}
     found |= {(wrong.problem, wrong.object) for wrong in report.placement}
     found |= {("collision", name) for hit in report.collisions for name in (hit.first, hit.second)}
-    return found | {("broken", one.relation.triple[0]) for one in report.broken}
+    return found | {("broken", one.subject) for one in report.broken}
 
 
 def after(stage: Usd.Stage, sabotage: Sabotage, judge: Callable[[Usd.Stage], Named]) -> Named:
