@@ -16,8 +16,7 @@ from echomodel.openings import STEP, inward_normal, segment
 from echomodel.vocabulary import vocabulary
 from echousd.checks.report import CheckReport, check
 from echousd.home.given import plan_there
-from echousd.home.openings import Floor, counterpart
-from echousd.home.plan import Plan, doorways
+from echousd.home.plan import Plan, doorways, overlapping
 from echousd.home.stages import Standing, furniture
 from echousd.stage.files import open_stage
 from echousd.stage.read import find_rooms
@@ -71,7 +70,9 @@ def check_home(path: Path, *, rules: str = "strict", layout: int | None = None, 
     ground = Ground.of(plan, furniture(plan, path))
     reached = walked(plan, ground)
     told = [("broken", f"{relation}: the plan does not keep it") for relation in plan.broken()]
-    told += [("walls", says) for says in (*_overlaps(plan), *_openings(plan))]
+    for one, other, shared in overlapping(plan.floors, 0.01):
+        told.append(("walls", f"{one} and {other} share {shared:.2f} m² of floor, allowed: none"))
+    told += [("walls", says) for says in _openings(plan)]
     told += [
         ("ways", f"{name}: a robot of 0.3 m from {plan.home.entered_by} gets to {share:.0%} of its free floor")
         for name, share in reached.items()
@@ -95,22 +96,11 @@ def _room_file(prim: Usd.Prim) -> Path:
     )
 
 
-def _overlaps(plan: Plan) -> Iterator[str]:
-    """Rooms that stand in each other."""
-    names = list(plan.floors)
-    for i, one in enumerate(names):
-        for other in names[i + 1 :]:
-            shared = shapely.Polygon(plan.floors[one]).intersection(shapely.Polygon(plan.floors[other])).area
-            if shared > 0.01:
-                yield f"{one} and {other} share {shared:.2f} m² of floor, allowed: none"
-
-
 def _openings(plan: Plan) -> Iterator[str]:
     """Doors that lead into a wall, are there twice, or have no leaf or two."""
-    floors = {name: Floor(name, floor, plan.walls[name]) for name, floor in plan.floors.items()}
     for name, openings in plan.openings.items():
         for opening in openings:
-            behind = counterpart(floors[name], opening, floors.values())
+            behind = plan.behind(name, opening)
             if behind is None:
                 continue
             other, wanted = behind
@@ -193,9 +183,7 @@ def _start(plan: Plan) -> np.ndarray:
     """(2,) float: behind the front door, or in the middle of the room that one enters by."""
     name = plan.home.entered_by
     floor = plan.floors[name]
-    floors = [Floor(each, corners, plan.walls[each]) for each, corners in plan.floors.items()]
-    mine = next(each for each in floors if each.name == name)
     for opening in plan.openings[name]:
-        if opening.kind == "door" and counterpart(mine, opening, floors) is None:
+        if opening.kind == "door" and plan.behind(name, opening) is None:
             return segment(floor, opening).mean(0) + inward_normal(floor, opening.edge) * (ROBOT + 2 * CELL)
     return np.asarray(floor.mean(0))

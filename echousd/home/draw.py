@@ -14,7 +14,6 @@ from echomodel.files import whole_file, write_json
 from echomodel.openings import Opening, direction, hinge_point, inward_normal, segment, signed_area, swing_area
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError
-from echousd.home.openings import Floor, counterpart
 from echousd.home.plan import Plan, ways
 from echousd.home.stages import Standing
 from echousd.naming import free_name
@@ -188,7 +187,6 @@ def write_procthor(plan: Plan, path: Path) -> None:
     Walls of ProcTHOR have no thickness: rooms end in the middle of the walls between them.
     """
     number = {name: index + 2 for index, name in enumerate(plan.cells)}  # 1 is outside
-    floors = {name: Floor(name, floor, plan.walls[name]) for name, floor in plan.floors.items()}
     rooms, walls = [], []
     for name, cell in plan.cells.items():
         spec = plan.home.room(name).graph.room
@@ -203,12 +201,12 @@ def write_procthor(plan: Plan, path: Path) -> None:
     inner = [(one, opening) for (one, _), opening in ways(plan)]
     outer = [
         (name, opening)
-        for name, floor in floors.items()
+        for name in plan.floors
         for opening in plan.openings[name]
-        if counterpart(floor, opening, floors.values()) is None
+        if plan.behind(name, opening) is None
     ]
     for name, opening in (*inner, *outer):
-        behind = counterpart(floors[name], opening, floors.values())
+        behind = plan.behind(name, opening)
         wall, room = f"wall|{number[name]}|{opening.edge}", f"room|{number[name]}"
         there = (f"wall|{number[behind[0]]}|{behind[1].edge}", f"room|{number[behind[0]]}") if behind else (wall, room)
         cell = plan.cells[name]

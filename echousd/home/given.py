@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +13,8 @@ from echomodel.openings import Opening, direction, edge_lengths, inward_normal, 
 from echousd.graph import SceneGraph
 from echousd.graph.files import STAGE_FORMS
 from echousd.home.graph import HomeGraph, HomeRelation
-from echousd.home.openings import Floor, counterpart, facings
-from echousd.home.plan import INNER, OUTER, Plan, plan_home, rectangles, with_openings
+from echousd.home.openings import facings
+from echousd.home.plan import INNER, OUTER, Plan, overlapping, plan_home, rectangles, with_openings
 from echousd.shapes.walls import outline as offset
 
 THICKEST = 0.6  # metres between two floors that have one wall between them
@@ -100,8 +99,7 @@ def walled(home: HomeGraph, rooms: Placed) -> Plan | None:
         if graph.room.corners is None:
             return None
         corners[name] = _placed(graph, pose)
-    shapes = {name: shapely.Polygon(floor) for name, floor in corners.items()}
-    if any(shapes[a].intersection(shapes[b]).area > APART for a, b in combinations(shapes, 2)):
+    if any(overlapping(corners, APART)):
         return None
     if all(graph.room.walls for graph, _ in rooms.values()):
         walls = {name: graph.room.walls for name, (graph, _) in rooms.items()}
@@ -154,11 +152,10 @@ def _moved(openings: tuple[Opening, ...], before: np.ndarray, after: np.ndarray)
 
 def _shared(plan: Plan, stated: Mapping[str, tuple[Opening, ...]]) -> dict[str, tuple[Opening, ...]]:
     """The openings of all rooms with both sides of each: the leaf in the room that states the door first."""
-    floors = {name: Floor(name, floor, plan.walls[name]) for name, floor in plan.floors.items()}
     found = {name: list(openings) for name, openings in stated.items()}
     for name in list(found):
         for opening in list(found[name]):
-            behind = counterpart(floors[name], opening, floors.values()) if opening in found[name] else None
+            behind = plan.behind(name, opening) if opening in found[name] else None
             if behind is None or opening.kind == "window":
                 continue
             other, hole = behind
@@ -178,8 +175,7 @@ def _shared(plan: Plan, stated: Mapping[str, tuple[Opening, ...]]) -> dict[str, 
 
 def _reached(plan: Plan) -> HomeGraph:
     """The graph with doors to rooms that share a wall with those one gets to, where it leads nowhere."""
-    home = plan.home
-    floors = {name: Floor(name, floor, plan.walls[name]) for name, floor in plan.floors.items()}
+    home, floors = plan.home, plan.sides
     order = sorted(floors, key=home.serves, reverse=True)
     reached = [home.entered_by]
     while len(reached) < len(floors):

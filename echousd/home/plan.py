@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeVar
 
 import networkx
 import numpy as np
@@ -32,6 +33,9 @@ RATIOS = (1.3, 1.0, 1.6, 1.15, 1.45, 1.8)  # of a free outline, long side over s
 MOST_PLANS = 12
 NARROW = 0.85  # of the short side that a room's furniture would have
 HALL = 6.0  # long side over short side of a hall
+
+
+Key = TypeVar("Key")
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +68,15 @@ class Plan:
     def floors(self) -> dict[str, np.ndarray]:
         """(k, 2) float of every room, corners (x, z) of its floor, metres, in the home's frame."""
         return {name: floor_of(cell, self.walls[name]) for name, cell in self.cells.items()}
+
+    @cached_property
+    def sides(self) -> dict[str, Floor]:
+        """The floors with their walls, behind which others are found."""
+        return {name: Floor(name, floor, self.walls[name]) for name, floor in self.floors.items()}
+
+    def behind(self, name: str, opening: Opening) -> tuple[str, Opening] | None:
+        """The room behind an opening of a room, and the hole on its side; None for one that leads outside."""
+        return counterpart(self.sides[name], opening, self.sides.values())
 
     @property
     def areas(self) -> dict[str, float]:
@@ -113,10 +126,9 @@ class Plan:
 
 def ways(plan: Plan) -> Iterator[tuple[tuple[str, str], Opening]]:
     """The pairs of rooms that one gets through between, and by what; a door is told by the room that has its leaf."""
-    floors = {name: Floor(name, floor, plan.walls[name]) for name, floor in plan.floors.items()}
     for name, openings in plan.openings.items():
         for opening in openings:
-            other = counterpart(floors[name], opening, floors.values()) if opening.kind != "window" else None
+            other = plan.behind(name, opening) if opening.kind != "window" else None
             match = other and next((o for o in plan.openings[other[0]] if _same(o, other[1])), None)
             if other and match and (opening.kind == "door" or (match.kind == "passage" and name < other[0])):
                 yield (name, other[0]), opening
@@ -124,7 +136,7 @@ def ways(plan: Plan) -> Iterator[tuple[tuple[str, str], Opening]]:
 
 def doorways(plan: Plan) -> Iterator[tuple[tuple[str, str], Opening, np.ndarray]]:
     """The `ways`, and (2, 2) float lower and upper corner (x, z), metres, of the floor in each."""
-    floors = {name: Floor(name, floor, plan.walls[name]) for name, floor in plan.floors.items()}
+    floors = plan.sides
     for (one, other), opening in ways(plan):
         near = segment(floors[one].corners, opening)
         behind = next(f for f in facings(floors[one], floors[other]) if f.edge == opening.edge)
@@ -136,6 +148,15 @@ def doorways(plan: Plan) -> Iterator[tuple[tuple[str, str], Opening, np.ndarray]
 def _same(opening: Opening, wanted: Opening) -> bool:
     gaps = (opening.offset - wanted.offset, opening.width - wanted.width, opening.height - wanted.height)
     return opening.kind != "window" and opening.edge == wanted.edge and max(map(abs, gaps)) < 5e-3
+
+
+def overlapping(floors: Mapping[Key, np.ndarray], most: float) -> Iterator[tuple[Key, Key, float]]:
+    """Pairs of floors, (k, 2) float each, that share more than so many square metres, and how many they share."""
+    shapes = {name: shapely.Polygon(corners) for name, corners in floors.items()}
+    for one, other in itertools.combinations(shapes, 2):
+        shared = shapes[one].intersection(shapes[other]).area
+        if shared > most:
+            yield one, other, shared
 
 
 def floor_of(cell: np.ndarray, walls: Sequence[float]) -> np.ndarray:
@@ -425,8 +446,7 @@ def _finished(home: HomeGraph, lie: Cells) -> Plan:
 
 def with_openings(plan: Plan) -> Plan:
     """The plan with the doors, passages and windows that its graph asks for."""
-    floors = [Floor(name, floor, plan.walls[name]) for name, floor in plan.floors.items()]
-    return replace(plan, openings=openings_of(plan.home, floors))
+    return replace(plan, openings=openings_of(plan.home, [*plan.sides.values()]))
 
 
 def _corners(shape: shapely.Geometry) -> np.ndarray:

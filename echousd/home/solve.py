@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import networkx
@@ -14,11 +14,15 @@ from echousd.graph import GraphError
 from echousd.home.graph import HomeRelation
 
 Rect = tuple[float, float, float, float]  # low x, low z, high x, high z, metres
+Way = list[tuple[Any, bool]]  # terms that must not be negative, or (True) that must be nothing
+Least = Callable[[float, int], float]
 Cells = dict[str, tuple[Rect, ...]]  # of every room the parts of its cell: floor and half of its walls
 
 FACADE = 1.4  # metres of outer wall that a window needs
 CORNERS = 0.35  # metres of a shared wall that corners and casings take
 ELL = 1.4  # metres of either arm of an L
+MORE = 0.4  # square metres that a larger room has more, at least
+GAP = 0.1  # metres between rooms that share no wall, at least
 FINE = 0.05  # metres that wall lines are moved by
 EFFORT = 1.2  # of the solver's own clock, which counts work and is the same on every machine; about seconds
 
@@ -150,8 +154,6 @@ def _model(cp: Any, problem: Problem) -> tuple[Any, dict[str, list[tuple[Any, An
             across, deep = (round(1000 * step) for step in steps)
             model.Add(across * 10 * w <= int(wish.ratio * 10) * deep * h)
             model.Add(deep * 10 * h <= int(wish.ratio * 10) * across * w)
-        else:
-            _as_ell(model, *parts[wish.name][:2], least=[least(ELL, axis) for axis in (0, 1)])
         if problem.before and len(problem.before.get(wish.name, ())) == wish.parts:
             for part, rect in zip(parts[wish.name], problem.before[wish.name], strict=True):
                 for variable, at, step in zip(part, rect, (*steps, *steps), strict=True):
@@ -164,82 +166,79 @@ def _model(cp: Any, problem: Problem) -> tuple[Any, dict[str, list[tuple[Any, An
     if not problem.gaps:
         model.Add(sum(covered) == limits[0] * limits[1] - sum((v[2] - v[0]) * (v[3] - v[1]) for v in voids))
 
-    def touches(one: Sequence[Any], other: Sequence[Any], metres: float) -> list[Any]:
-        """A literal each for the four sides on which two rectangles share so much wall."""
-        found = []
-        for axis in (0, 1):
-            across, shared = 1 - axis, least(metres, 1 - axis)
-            for a, b in ((one, other), (other, one)):
-                side = model.NewBoolVar("")
-                model.Add(a[2 + axis] == b[axis]).OnlyEnforceIf(side)
-                model.Add(a[2 + across] >= b[across] + shared).OnlyEnforceIf(side)
-                model.Add(b[2 + across] >= a[across] + shared).OnlyEnforceIf(side)
-                found.append(side)
-        return found
+    def held(ways: Sequence[Way]) -> None:
+        """Have one of some ways be kept."""
+        literals = [model.NewBoolVar("") for _ in ways] if len(ways) > 1 else []
+        for number, way in enumerate(ways):
+            for term, exact in way:
+                bound = model.Add(term == 0 if exact else term >= 0)
+                if literals:
+                    bound.OnlyEnforceIf(literals[number])
+        if literals:
+            model.AddBoolOr(literals)
 
-    def near(one: str, other: str, metres: float) -> list[Any]:
-        return [side for a in parts[one] for b in parts[other] for side in touches(a, b, metres)]
-
-    for relation in problem.relations:
-        row, (subject, object_) = relation.row, relation.pair
-        if row.wall:
-            model.AddBoolOr(near(subject, object_, row.wall + CORNERS))
-        elif any(row.step):
-            axis = 0 if row.step[0] else 1
-            for a in parts[subject]:
-                for b in parts[object_]:
-                    if row.step[axis] > 0:
-                        model.Add(a[axis] + a[2 + axis] >= 2 * b[2 + axis])
-                    else:
-                        model.Add(a[axis] + a[2 + axis] <= 2 * b[axis])
-        elif row.symmetric:
-            for a in parts[subject]:
-                for b in parts[object_]:
-                    apart = [model.NewBoolVar("") for _ in range(4)]
-                    ways = ((a, b, 0), (b, a, 0), (a, b, 1), (b, a, 1))
-                    for literal, (first, second, axis) in zip(apart, ways, strict=True):
-                        model.Add(first[2 + axis] + 1 <= second[axis]).OnlyEnforceIf(literal)
-                    model.AddBoolOr(apart)
-    sizes = dict(zip([w.name for w in problem.wishes], _sums(problem.wishes, covered), strict=True))
-    for relation in problem.relations:
-        if relation.row.compares:
-            model.Add(sizes[relation.subject] >= sizes[relation.object] + max(int(0.5 / cell), 1))
+    each = iter(covered)
+    sizes = {wish.name: sum(next(each) for _ in range(wish.parts)) for wish in problem.wishes}
+    for ways in _demands(problem, parts, sizes, least, max(int(0.5 / cell), 1)):
+        held(ways)
     for wish in problem.wishes:
         if wish.outer:
-            sides = []
-            for part in parts[wish.name]:
-                for axis in (0, 1):
-                    for end, border in ((part[axis], 0), (part[2 + axis], limits[axis])):
-                        literal = model.NewBoolVar("")
-                        model.Add(end == border).OnlyEnforceIf(literal)
-                        sides.append(literal)
-                sides += [side for void in voids for side in touches(part, void, wish.outer)]
-            model.AddBoolOr(sides)
-    for name in problem.together if len(problem.together) > 1 else ():
-        model.AddBoolOr([side for other in problem.together if other != name for side in near(name, other, 1.0)])
+            own = parts[wish.name]
+            ends = [(part[axis + 2 * far], limits[axis] * far) for part in own for axis in (0, 1) for far in (0, 1)]
+            met = [way for part in own for void in voids for way in _touching(part, void, wish.outer, least)]
+            held([*([(end - border, True)] for end, border in ends), *met])
     return model, parts
 
 
-def _sums(wishes: Sequence[Wish], covered: list[Any]) -> list[Any]:
-    """The area of every room from those of all parts in turn."""
-    each = iter(covered)
-    return [sum(next(each) for _ in range(wish.parts)) for wish in wishes]
+def _touching(one: Sequence[Any], other: Sequence[Any], metres: float, least: Least) -> Iterator[Way]:
+    """The four sides on which two rectangles may share so much wall."""
+    for axis in (0, 1):
+        across, shared = 1 - axis, least(metres, 1 - axis)
+        for a, b in ((one, other), (other, one)):
+            wide = [(first[2 + across] - second[across] - shared, False) for first, second in ((a, b), (b, a))]
+            yield [(a[2 + axis] - b[axis], True), *wide]
 
 
-def _as_ell(model: Any, one: Sequence[Any], other: Sequence[Any], *, least: Sequence[int]) -> None:
+def _ells(one: Sequence[Any], other: Sequence[Any], least: Least) -> Iterator[Way]:
     """The second rectangle stands flush at a corner of the first, on one of its four sides."""
-    ways = []
     for axis in (0, 1):
         across = 1 - axis
-        for a, _b in ((one, other), (other, one)):
+        longer = one[2 + across] - one[across] - (other[2 + across] - other[across]) - least(ELL, across)
+        for a, b in ((one, other), (other, one)):
             for flush in (across, 2 + across):
-                way = model.NewBoolVar("")
-                model.Add(one[2 + axis] == other[axis] if a is one else other[2 + axis] == one[axis]).OnlyEnforceIf(way)
-                model.Add(one[flush] == other[flush]).OnlyEnforceIf(way)
-                inner = one[2 + across] - one[across] - (other[2 + across] - other[across])
-                model.Add(inner >= least[across]).OnlyEnforceIf(way)
-                ways.append(way)
-    model.AddBoolOr(ways)
+                yield [(a[2 + axis] - b[axis], True), (one[flush] - other[flush], True), (longer, False)]
+
+
+def _demands(
+    problem: Problem, parts: Mapping[str, Sequence[Any]], sizes: Mapping[str, Any], least: Least, more: float
+) -> Iterator[Sequence[Way]]:
+    """What must hold between rectangles: each is kept in one of several ways, of numbers or of a solver's variables.
+
+    Arguments:
+        parts: (low x, low z, high x, high z) of all parts of every room. sizes: their areas.
+        least: lengths along an axis, in the unit of the parts. more: area that a larger room has more.
+    """
+    for wish in problem.wishes:
+        if wish.parts > 1:
+            yield [*_ells(*parts[wish.name][:2], least)]
+    for relation in problem.relations:
+        row, pairs = relation.row, [*product(*(parts[name] for name in relation.pair))]
+        if row.wall:
+            yield [way for a, b in pairs for way in _touching(a, b, row.wall + CORNERS, least)]
+        elif any(row.step):
+            axis, on = (0 if row.step[0] else 1), sum(row.step) > 0
+            for a, b in pairs:
+                twice, edge = a[axis] + a[2 + axis], 2 * b[2 + axis if on else axis]
+                yield [[(twice - edge if on else edge - twice, False)]]
+        elif row.symmetric:
+            for a, b in pairs:
+                orders = product((0, 1), ((a, b), (b, a)))
+                yield [[(after[axis] - before[2 + axis] - least(GAP, axis), False)] for axis, (before, after) in orders]
+        if row.compares:
+            yield [[(sizes[relation.subject] - sizes[relation.object] - more, False)]]
+    for name in problem.together if len(problem.together) > 1 else ():
+        near = [(a, b) for other in problem.together if other != name for a in parts[name] for b in parts[other]]
+        yield [way for a, b in near for way in _touching(a, b, 1.0, least)]
 
 
 def _tuned(problem: Problem, lie: Cells, *, grid: bool = True) -> Cells:
@@ -303,30 +302,7 @@ def _cost(problem: Problem, line: np.ndarray, owner: np.ndarray, rects: np.ndarr
     ratio = np.array([w.ratio for w in wishes])
     single = np.array([w.parts == 1 for w in wishes])[owner]
     short = np.array([w.short if w.parts == 1 else ELL for w in wishes])[owner]
-    index = {wish.name: number for number, wish in enumerate(wishes)}
     low, high = rects[:, :2], rects[:, 2:]
-    pairs = [  # (rectangle, rectangle, axis across, metres) of walls that must stay shared
-        (i, j, 1 - axis, need)
-        for need, i, j in _needs(problem, index, owner)
-        for axis in (0, 1)
-        if min(abs(high[i, axis] - low[j, axis]), abs(high[j, axis] - low[i, axis])) < 1e-6
-        and min(high[i, 1 - axis], high[j, 1 - axis]) - max(low[i, 1 - axis], low[j, 1 - axis]) >= need - 2 * FINE
-    ]
-    order = [(index[r.subject], index[r.object]) for r in problem.relations if r.row.compares]
-    beyond = [
-        (i, j, 0 if r.row.step[0] else 1, sum(r.row.step))
-        for r in problem.relations
-        if any(r.row.step)
-        for i in np.flatnonzero(owner == index[r.subject])
-        for j in np.flatnonzero(owner == index[r.object])
-    ]
-    apart = [
-        (i, j)
-        for r in problem.relations
-        if r.row.symmetric and not r.row.wall
-        for i in np.flatnonzero(owner == index[r.subject])
-        for j in np.flatnonzero(owner == index[r.object])
-    ]
     divided = [  # pairs of rectangles, and the axis along which one ends before the other begins
         (i, j, axis)
         for i in range(len(rects))
@@ -346,31 +322,11 @@ def _cost(problem: Problem, line: np.ndarray, owner: np.ndarray, rects: np.ndarr
         wrong += np.maximum(shape - ratio[owner], 0)[single].sum()
         wrong += np.maximum(least - share, 0).sum() + np.maximum(share - most, 0).sum()
         wrong += np.maximum(here[first, 2 + along] - here[second, along], 0).sum()
-        for i, j, across, need in pairs:
-            shared = min(here[i, 2 + across], here[j, 2 + across]) - max(here[i, across], here[j, across])
-            wrong += max(need - shared, 0.0)
-        for larger, smaller in order:
-            wrong += max(areas[smaller] + 0.4 - areas[larger], 0.0)
-        for one, other, axis, sign in beyond:
-            middle, edge = here[one, [axis, 2 + axis]].mean(), here[other, 2 + axis if sign > 0 else axis]
-            wrong += max(sign * (edge - middle), 0.0)
-        for one, other in apart:
-            gaps = np.maximum(here[one, :2] - here[other, 2:], here[other, :2] - here[one, 2:])
-            wrong += max(0.1 - float(gaps.max()), 0.0)
+        rows = iter(here.tolist())
+        parts = {wish.name: [next(rows) for _ in range(wish.parts)] for wish in wishes}
+        for ways in _demands(problem, parts, dict(zip(parts, areas.tolist(), strict=True)), lambda m, _: m, MORE):
+            wrong += min(sum(abs(term) if exact else max(-term, 0.0) for term, exact in way) for way in ways)
         tidy = 0.02 * np.maximum(shape - 1.5, 0)[single].sum()
         return float((np.square(share - 1) / np.maximum(1 - least, 0.05)).sum() + tidy + 1e4 * wrong)
 
     return cost
-
-
-def _needs(problem: Problem, index: Mapping[str, int], owner: np.ndarray) -> list[tuple[float, int, int]]:
-    """(metres, rectangle, rectangle) of all walls that could serve a relation, and those between the arms of an L."""
-    found = [
-        (r.row.wall + CORNERS, int(i), int(j))
-        for r in problem.relations
-        if r.row.wall
-        for i in np.flatnonzero(owner == index[r.subject])
-        for j in np.flatnonzero(owner == index[r.object])
-    ]
-    both = [np.flatnonzero(owner == number) for number in range(len(problem.wishes))]
-    return found + [(ELL, int(own[0]), int(own[1])) for own in both if len(own) > 1]

@@ -21,7 +21,7 @@ from echousd.home.given import APART, walled
 from echousd.home.graph import HomeGraph, HomeRelation, HomeRoom
 from echousd.home.importing.found import Found, Hole, Piece, Room
 from echousd.home.openings import Facing, Floor, facings, outer_spans
-from echousd.home.plan import Plan, ways, with_openings
+from echousd.home.plan import Plan, overlapping, ways, with_openings
 from echousd.naming import free_name
 from echousd.stage.foreign import LARGE, TAKEN_FOR
 
@@ -83,7 +83,8 @@ def imported(found: Found, storey: str | None = None, *, lenient: bool = False) 
     floors = {one: _outline(one) for one in found.rooms if one.storey in ("", level)}
     if not floors:
         raise GraphError("no rooms, allowed: at least one")
-    _apart(floors)
+    for room, other, shared in overlapping(floors, APART):
+        raise GraphError(f"rooms {room.name!r} and {other.name!r} overlap by {shared:.2f} m², allowed: side by side")
     named: dict[str, Room] = {}
     for one in floors:
         named[free_name(_identifier(one.name), named)] = one
@@ -169,14 +170,6 @@ def _tuples(corners: np.ndarray) -> tuple[tuple[float, ...], ...]:
     return tuple(map(tuple, corners.tolist()))
 
 
-def _apart(floors: dict[Room, np.ndarray]) -> None:
-    shapes = {room: shapely.Polygon(corners) for room, corners in floors.items()}
-    for one, other in combinations(shapes, 2):
-        shared = shapes[one].intersection(shapes[other]).area
-        if shared > APART:
-            raise GraphError(f"rooms {one.name!r} and {other.name!r} overlap by {shared:.2f} m², allowed: side by side")
-
-
 # -- doors and windows -------------------------------------------------------------------------------------------------
 
 
@@ -210,7 +203,7 @@ class _Stretch:
 
 def _stretches(plan: Plan) -> list[_Stretch]:
     """Where holes may be: what two rooms share, and what has nothing behind it."""
-    floors = [Floor(name, floor, plan.walls[name]) for name, floor in plan.floors.items()]
+    floors = [*plan.sides.values()]
     found = [
         _Stretch(one, facing.edge, facing.low, facing.high, facing.deep, facing)
         for one, other in combinations(floors, 2)
