@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
+from importlib import resources
 
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade
@@ -183,57 +185,21 @@ class Row:
         return f"{low}{high or ('' if self.beyond else ' or more')}{' m' * self.metres}"
 
 
-MASS, MATTER, BODY = ("PhysicsMassAPI",), ("PhysicsMaterialAPI",), ("PhysicsRigidBodyAPI",)
-SURFACE, DRIVE = ("UsdPreviewSurface",), ("PhysicsDriveAPI",)
 JOINTS = ("PhysicsRevoluteJoint", "PhysicsPrismaticJoint", "PhysicsFixedJoint", "PhysicsSphericalJoint", "PhysicsJoint")
-PHYSICS, LOOK, LIGHT, CAMERA = "echo:PhysicsValues", "echo:MaterialValues", "echo:LightValues", "echo:CameraValues"
-UNIT = "shares lie between 0 and 1"
-TABLE = (
-    Row(PHYSICS, MASS, "physics:mass", 0, 2000, "kilograms; 0 = by volume"),
-    Row(PHYSICS, (*MASS, *MATTER), "physics:density", 0, 25_000, "kg/m³ and osmium is the heaviest; 0 = not told"),
-    Row(PHYSICS, MASS, "physics:diagonalInertia", 0, UNLIMITED, "inertia is never negative"),
-    Row(PHYSICS, MATTER, "physics:staticFriction", 0, 5, "friction pushes nothing on"),
-    Row(PHYSICS, MATTER, "physics:dynamicFriction", 0, 5, "friction pushes nothing on"),
-    Row(PHYSICS, MATTER, "physics:restitution", 0, 1, "nothing bounces higher than it fell"),
-    Row(PHYSICS, BODY, "physics:velocity", 0, 0, "a room is at rest"),
-    Row(PHYSICS, BODY, "physics:angularVelocity", 0, 0, "a room is at rest"),
-    Row(PHYSICS, ("PhysicsScene",), "physics:gravityMagnitude", 0, 50, "m/s²", beyond=True, metres=True),
-    Row(PHYSICS, DRIVE, "drive:*:physics:stiffness", 0, UNLIMITED, "springs pull back"),
-    Row(PHYSICS, DRIVE, "drive:*:physics:damping", 0, UNLIMITED, "dampers slow down"),
-    Row(PHYSICS, DRIVE, "drive:*:physics:maxForce", 0, UNLIMITED, "a limit"),
-    Row(PHYSICS, JOINTS, "physics:breakForce", 0, UNLIMITED, "at 0 a joint holds nothing", beyond=True),
-    Row(PHYSICS, JOINTS, "physics:breakTorque", 0, UNLIMITED, "at 0 a joint holds nothing", beyond=True),
-    Row(LOOK, SURFACE, "inputs:diffuseColor", 0, 1, UNIT),
-    Row(LOOK, SURFACE, "inputs:specularColor", 0, 1, UNIT),
-    Row(LOOK, SURFACE, "inputs:emissiveColor", 0, 1e6, "light is never negative"),
-    Row(LOOK, SURFACE, "inputs:roughness", 0, 1, UNIT),
-    Row(LOOK, SURFACE, "inputs:metallic", 0, 1, UNIT),
-    Row(LOOK, SURFACE, "inputs:clearcoat", 0, 1, UNIT),
-    Row(LOOK, SURFACE, "inputs:clearcoatRoughness", 0, 1, UNIT),
-    Row(LOOK, SURFACE, "inputs:occlusion", 0, 1, UNIT),
-    Row(LOOK, SURFACE, "inputs:opacityThreshold", 0, 1, UNIT),
-    Row(LOOK, SURFACE, "inputs:opacity", 0, 1, "at 0 nobody sees it", beyond=True),
-    Row(LOOK, SURFACE, "inputs:ior", 1, 5, "light is nowhere faster than in vacuum"),
-    Row(LOOK, ("",), "primvars:displayOpacity", 0, 1, "at 0 nobody sees it", beyond=True),
-    Row(LOOK, ("",), "primvars:displayColor", 0, 1, UNIT),
-    Row(LIGHT, LIGHTS, "inputs:intensity", 0, 1e6, "light is never negative"),
-    Row(LIGHT, LIGHTS, "inputs:exposure", -30, 30, "each step doubles the light"),
-    Row(LIGHT, LIGHTS, "inputs:color", 0, UNLIMITED, "light is never negative"),
-    Row(LIGHT, LIGHTS, "inputs:colorTemperature", 1000, 40_000, "kelvin"),
-    Row(LIGHT, LIGHTS, "inputs:diffuse", 0, UNLIMITED, "light is never negative"),
-    Row(LIGHT, LIGHTS, "inputs:specular", 0, UNLIMITED, "light is never negative"),
-    Row(LIGHT, LIGHTS, "inputs:radius", 0, 100, "what has no size shines nowhere", beyond=True, metres=True),
-    Row(LIGHT, LIGHTS, "inputs:width", 0, 100, "what has no size shines nowhere", beyond=True, metres=True),
-    Row(LIGHT, LIGHTS, "inputs:height", 0, 100, "what has no size shines nowhere", beyond=True, metres=True),
-    Row(LIGHT, LIGHTS, "inputs:length", 0, 100, "what has no size shines nowhere", beyond=True, metres=True),
-    Row(LIGHT, LIGHTS, "inputs:angle", 0, 360, "degrees"),
-    Row(CAMERA, ("Camera",), "focalLength", 0, UNLIMITED, "a lens without length shows nothing", beyond=True),
-    Row(CAMERA, ("Camera",), "horizontalAperture", 0, UNLIMITED, "a film without width shows nothing", beyond=True),
-    Row(CAMERA, ("Camera",), "verticalAperture", 0, UNLIMITED, "a film without height shows nothing", beyond=True),
-    Row(CAMERA, ("Camera",), "clippingRange", 0, UNLIMITED, "what is behind a camera is not shown", beyond=True),
-    Row(CAMERA, ("Camera",), "fStop", 0, UNLIMITED, "0 = all is sharp"),
-    Row(CAMERA, ("Camera",), "focusDistance", 0, UNLIMITED, "what is behind a camera is not shown"),
-)
+GROUPS = {"light": LIGHTS, "joint": JOINTS, "*": ("",)}  # what `at` may say in place of types
+
+
+def ranges() -> Iterator[Row]:
+    """The rows of ranges.tsv; a `>` before the lower bound leaves the bound itself out."""
+    text = resources.files("echousd.checks").joinpath("ranges.tsv").read_text("utf-8")
+    for row in csv.DictReader(text.splitlines(), delimiter="\t"):
+        at = GROUPS.get(row["at"], tuple(row["at"].split()))
+        low, beyond = float(row["low"].removeprefix(">")), row["low"].startswith(">")
+        high, metres = float(row["high"]), row["unit"] == "m"
+        yield Row(f"echo:{row['rule']}", at, row["attribute"], low, high, row["why"], beyond, metres)
+
+
+TABLE = tuple(ranges())
 BY_OWNER = {at: [row for row in TABLE if at in row.at] for row in TABLE for at in row.at}
 
 
@@ -282,9 +248,9 @@ def _numbers(attribute: Usd.Attribute) -> np.ndarray:
 
 
 for _name, _doc in (
-    (PHYSICS, "Masses, frictions, gravity, drives are ones that can be."),
-    (LOOK, "Colours, roughness and opacity are ones that can be seen."),
-    (LIGHT, "Lights have an intensity, a colour and a size."),
-    (CAMERA, "Cameras have a lens, a film and something before them."),
+    ("echo:PhysicsValues", "Masses, frictions, gravity, drives are ones that can be."),
+    ("echo:MaterialValues", "Colours, roughness and opacity are ones that can be seen."),
+    ("echo:LightValues", "Lights have an intensity, a colour and a size."),
+    ("echo:CameraValues", "Cameras have a lens, a film and something before them."),
 ):
     RULES.append(Rule(_name, _doc, partial(out_of_range, rule=_name)))

@@ -42,16 +42,16 @@ class Floor:
 
 @dataclass(frozen=True)
 class Facing:
-    """A stretch of wall that two rooms share, from `low` to `high` metres along an edge of the one."""
+    """A stretch of wall from `low` to `high` metres along an edge of a room, which another may share, "" = none."""
 
     one: str
-    other: str
     edge: int
-    other_edge: int
     low: float
     high: float
-    length: float  # from the other's corner to where `low` is, against its own direction
-    deep: float  # metres of wall between the two floors
+    deep: float  # metres of wall to the other floor, or to the outside
+    other: str = ""
+    other_edge: int = -1
+    length: float = 0.0  # from the other's corner to where `low` is, against its own direction
 
     def across(self, opening: Opening) -> Opening:
         """The hole on the other side of the wall."""
@@ -77,7 +77,7 @@ def facings(one: Floor, other: Floor) -> Iterator[Facing]:
             low, high = sorted((at, at + turned * float(other_length)))
             low, high = max(low, 0.0), min(high, float(length))
             if high - low > 0.05:
-                yield Facing(one.name, other.name, edge, other_edge, low, high, at, deep)
+                yield Facing(one.name, edge, low, high, deep, other.name, other_edge, at)
 
 
 def counterpart(floor: Floor, opening: Opening, floors: Iterable[Floor]) -> tuple[str, Opening] | None:
@@ -167,41 +167,40 @@ def _passage_options(home: HomeGraph, floors: dict[str, Floor], one: str, other:
 def _leaves(home: HomeGraph, floors: dict[str, Floor], side: Facing) -> Iterator[_Hole]:
     """Doors in a stretch of wall whose leaf opens into the first of its rooms."""
     floor = floors[side.one]
-    width, height = DOOR
-    length = float(edge_lengths(floor.corners)[side.edge])
     hub = vocabulary().room_type(home.room(side.one).type).hub
     room = shapely.Polygon(floor.corners).buffer(1e-3)
-    for offset in _places(side.low, side.high, width):
-        near, far = float(offset), float(length - width - offset)
-        hinge = "left" if (near <= far) == (signed_area(floor.corners) > 0) else "right"
-        mine = Opening("door", "door", side.edge, near, width, height, hinge=hinge)
+    for mine, corner in _doors(floor, side, *DOOR):
         outside = shapely.Polygon(free_area(floor.corners, mine)).difference(room).area
-        cost = 0.3 * hub + 0.25 * min(near, far) + 50.0 * outside
+        cost = 0.3 * hub + 0.25 * corner + 50.0 * outside
         yield _Hole(((side.one, mine), (side.other, side.across(mine))), cost)
 
 
 def _front_doors(home: HomeGraph, floor: Floor, floors: Sequence[Floor]) -> list[_Hole]:
-    width, height = FRONT_DOOR
-    out = []
-    for edge, low, high in outer_spans(floor, floors):
-        length = float(edge_lengths(floor.corners)[edge])
-        for offset in _places(low, high, width):
-            near, far = float(offset), float(length - width - offset)
-            hinge = "left" if (near <= far) == (signed_area(floor.corners) > 0) else "right"
-            door = Opening("door", "door", edge, near, width, height, hinge=hinge)
-            out.append(_Hole(((floor.name, door),), 0.1 * min(near, far) + 0.05 * length))
+    out: list[_Hole] = []
+    for side in outer_spans(floor, floors):
+        length = float(edge_lengths(floor.corners)[side.edge])
+        out += [_Hole(((floor.name, d),), 0.1 * c + 0.05 * length) for d, c in _doors(floor, side, *FRONT_DOOR)]
     return out
 
 
-def outer_spans(floor: Floor, floors: Sequence[Floor]) -> Iterator[tuple[int, float, float]]:
-    """(edge, from, to) in metres of the stretches of a room's walls that have no other room behind them."""
+def _doors(floor: Floor, side: Facing, width: float, height: float) -> Iterator[tuple[Opening, float]]:
+    """Doors in a stretch of wall, hinged at the nearer corner, and how far that is, metres."""
+    length = float(edge_lengths(floor.corners)[side.edge])
+    for offset in _places(side.low, side.high, width):
+        near, far = float(offset), float(length - width - offset)
+        hinge = "left" if (near <= far) == (signed_area(floor.corners) > 0) else "right"
+        yield Opening("door", "door", side.edge, near, width, height, hinge=hinge), min(near, far)
+
+
+def outer_spans(floor: Floor, floors: Sequence[Floor]) -> Iterator[Facing]:
+    """The stretches of a room's walls that have no other room behind them."""
     met = [facing for other in floors if other.name != floor.name for facing in facings(floor, other)]
     for edge, length in enumerate(edge_lengths(floor.corners)):
         inner = sorted((one.low, one.high) for one in met if one.edge == edge)
         at = 0.0
         for low, high in [*inner, (float(length), float(length))]:
             if low - at > 0.5:
-                yield edge, at, low
+                yield Facing(floor.name, edge, at, low, floor.walls[edge])
             at = max(at, high)
 
 
@@ -212,12 +211,13 @@ def _windows(home: HomeGraph, floor: Floor, floors: Sequence[Floor], there: Sequ
         return
     sill, tall, wide = WINDOWS[row.use]
     spans = []
-    for edge, low, high in outer_spans(floor, floors):
+    for side in outer_spans(floor, floors):
+        low, high = side.low, side.high
         for opening in there:
-            if opening.edge == edge:  # the longer side of it
+            if opening.edge == side.edge:  # the longer side of it
                 left, right = (low, opening.offset - PIER), (opening.end + PIER, high)
                 low, high = max(left, right, key=lambda span: span[1] - span[0])
-        spans.append((high - low, edge, low, high))
+        spans.append((high - low, side.edge, low, high))
     names = [opening.name for opening in there]
     for count, (span, edge, low, high) in enumerate(sorted(spans, reverse=True)[:2]):
         width = round(min(0.5 * span, wide), 1)

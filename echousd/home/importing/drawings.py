@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -18,20 +17,8 @@ import numpy as np
 import shapely
 
 from echousd.graph import GraphError
-from echousd.home.importing.found import MAP, SCREEN, Found, Hole, Piece, Room, long_sides, rooms_between, span
+from echousd.home.importing.found import MAP, SCREEN, Found, Hole, Piece, Room, kind_of, long_sides, rooms_between, span
 
-# First match wins: what the name of a layer, group, class or block means.
-MEANINGS = tuple(
-    (kind, re.compile(words))
-    for kind, words in (
-        ("window", r"window|glaz|fenster|fenetre|ventana|finestra|janela"),
-        ("door", r"door|tuer|tür|porte|puerta|porta\b"),
-        ("passage", r"passage|opening|durchgang|archway"),
-        ("piece", r"furn|moebel|möbel|mobilier|muebl|arred|sanit|equip|fixture|appliance|kitchen ?unit"),
-        ("wall", r"wall|wand|mauer|mur\b|murs\b|muro|parete|parede"),
-        ("room", r"room|space|raum|räume|raeume|zimmer|area|zone|piece|habit|ambient|comodo"),
-    )
-)
 MOST = 200_000  # strokes of a drawing
 
 
@@ -66,8 +53,7 @@ class Drawing:
 
 def meaning(*words: str) -> str:
     """What a layer's or block's names say that it is: window, door, passage, piece, wall, room or nothing."""
-    text = " ".join(words).lower().replace("_", " ").replace("-", " ")
-    return next((kind for kind, pattern in MEANINGS if pattern.search(text)), "")
+    return kind_of("drawings", " ".join(words).lower().replace("_", " ").replace("-", " ")) or ""
 
 
 def found_in(drawing: Drawing, axes: np.ndarray, frame: str) -> Found:

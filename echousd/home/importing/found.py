@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
 
 import numpy as np
 import shapely
@@ -83,6 +87,17 @@ class Found:
     lines: Sequence[np.ndarray] = ()
     ignored: Counter[str] = field(default_factory=Counter)
     format: str = ""
+
+
+@cache
+def _words() -> dict[str, dict[str, re.Pattern[str]]]:
+    text = resources.files("echousd.home.importing").joinpath("words.toml").read_text("utf-8")
+    return {about: {kind: re.compile(w) for kind, w in table.items()} for about, table in tomllib.loads(text).items()}
+
+
+def kind_of(about: str, text: str) -> str | None:
+    """The kind that a text in small letters tells by a table of words.toml, None where it tells none."""
+    return next((kind for kind, pattern in _words()[about].items() if pattern.search(text)), None)
 
 
 def span(middle: np.ndarray, along: np.ndarray, width: float) -> np.ndarray:

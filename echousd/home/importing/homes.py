@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,8 +18,8 @@ from echousd.graph import GraphError, Node, RoomSpec, SceneGraph, starting_graph
 from echousd.graph.nodes import OBSTACLE
 from echousd.home.given import APART, walled
 from echousd.home.graph import HomeGraph, HomeRelation, HomeRoom
-from echousd.home.importing.found import Found, Hole, Piece, Room
-from echousd.home.openings import Facing, Floor, facings, outer_spans
+from echousd.home.importing.found import Found, Hole, Piece, Room, kind_of
+from echousd.home.openings import Facing, facings, outer_spans
 from echousd.home.plan import Plan, overlapping, ways, with_openings
 from echousd.naming import free_name
 from echousd.stage.foreign import LARGE, TAKEN_FOR
@@ -32,22 +31,6 @@ NARROW = 0.4  # metres of what may be a way
 REACH = 0.3  # metres from a wall to what is a hole in it
 STRAIGHT = 0.97  # cosine between a hole and its wall
 UNKNOWN = "living_room"  # what a room is taken for whose kind nobody tells
-# First match wins: in small letters without accents, a kind of room by words that the vocabulary has not.
-ABROAD = tuple(
-    (re.compile(words), kind)
-    for words, kind in (
-        (r"kinder|enfant|infantil|nino", "childrens_room"),
-        (r"schlaf|chambre|dormitor|camera da letto|slaapkamer|quarto", "bedroom"),
-        (r"ku(e)?che|cuisine|cocina|cucina|keuken|cozinha|pantry", "kitchen"),
-        (r"\bbad|\bwc\b|toilet|salle d.eau|salle de bain|bano\b|bagno|banheiro|dusche|powder|\bbath", "bathroom"),
-        (r"flur|diele|couloir|entree|pasillo|corridoio|ingresso|corredor|vestibule|lobby|landing", "hallway"),
-        (r"esszimmer|salle a manger|comedor|pranzo|eetkamer", "dining_room"),
-        (r"wohn|salon|sejour|\bsala\b|soggiorno|woonkamer|estar|family room", "living_room"),
-        (r"arbeits|buro|bureau|despacho|ufficio|werkkamer|escritorio|\boffice", "study"),
-        (r"balkon|balcon|terras|terraza|varanda|loggia|deck|porch", "balcony"),
-        (r"hauswirtschaft|abstell|waschk|buanderie|lavander|cellier|berging|storage|closet|garage", "utility_room"),
-    )
-)
 
 
 @dataclass(frozen=True)
@@ -131,7 +114,7 @@ def room_kind(words: Sequence[str]) -> str | None:
                     return vocabulary().room_type("_".join(parts[start : start + length])).name
                 except UnknownWord:
                     continue
-        kind = next((kind for pattern, kind in ABROAD if pattern.search(plain(text))), None)
+        kind = kind_of("rooms", plain(text))
         if kind is not None:
             return kind
     return None
@@ -173,59 +156,35 @@ def _tuples(corners: np.ndarray) -> tuple[tuple[float, ...], ...]:
 # -- doors and windows -------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class _Stretch:
-    """Metres `low` to `high` of an edge of a room, its wall's thickness, and what it shares with another room."""
-
-    floor: Floor
-    edge: int
-    low: float
-    high: float
-    thick: float
-    facing: Facing | None = None
-
-    def fit(self, hole: Hole, ends: np.ndarray, height: float | None) -> tuple[float, Opening] | None:
-        """How far (metres) a hole is from fitting here, and the opening that it is; None where it does not."""
-        corners = self.floor.corners
-        along, outward = direction(corners, self.edge), -inward_normal(corners, self.edge)
-        at, off = (ends - corners[self.edge]) @ along, float((ends.mean(0) - corners[self.edge]) @ outward)
-        width = float(np.linalg.norm(ends[1] - ends[0]))
-        start, end = max(at.min(), self.low + 0.01), min(at.max(), self.high - 0.01)
-        away = abs(off - self.thick / 2)
-        if away > self.thick / 2 + REACH or np.ptp(at) < STRAIGHT * width or end - start < max(NARROW, 0.6 * width):
-            return None
-        usual = USUAL[hole.kind]
-        sill = (usual["sill"] if hole.sill is None else hole.sill) if hole.kind == "window" else 0.0
-        tall = min(hole.height or usual["height"], (height or np.inf) - sill - 0.01)
-        sides = (round(float(start), 4), round(float(end - start), 4), round(float(tall), 4))
-        return away + width - (end - start), Opening(hole.kind, hole.kind, self.edge, *sides, round(float(sill), 4))
-
-
-def _stretches(plan: Plan) -> list[_Stretch]:
-    """Where holes may be: what two rooms share, and what has nothing behind it."""
-    floors = [*plan.sides.values()]
-    found = [
-        _Stretch(one, facing.edge, facing.low, facing.high, facing.deep, facing)
-        for one, other in combinations(floors, 2)
-        for facing in facings(one, other)
-    ]
-    return found + [
-        _Stretch(floor, edge, low, high, floor.walls[edge])
-        for floor in floors
-        for edge, low, high in outer_spans(floor, floors)
-    ]
+def _fit(plan: Plan, side: Facing, hole: Hole, ends: np.ndarray) -> tuple[float, Opening] | None:
+    """How far (metres) a hole is from fitting into a stretch of wall, and the opening that it is there, if it fits."""
+    corners, height = plan.floors[side.one], plan.home.room(side.one).graph.room.height
+    along, outward = direction(corners, side.edge), -inward_normal(corners, side.edge)
+    at, off = (ends - corners[side.edge]) @ along, float((ends.mean(0) - corners[side.edge]) @ outward)
+    width = float(np.linalg.norm(ends[1] - ends[0]))
+    start, end = max(at.min(), side.low + 0.01), min(at.max(), side.high - 0.01)
+    away = abs(off - side.deep / 2)
+    if away > side.deep / 2 + REACH or np.ptp(at) < STRAIGHT * width or end - start < max(NARROW, 0.6 * width):
+        return None
+    usual = USUAL[hole.kind]
+    sill = (usual["sill"] if hole.sill is None else hole.sill) if hole.kind == "window" else 0.0
+    tall = min(hole.height or usual["height"], (height or np.inf) - sill - 0.01)
+    sides = (round(float(start), 4), round(float(end - start), 4), round(float(tall), 4))
+    return away + width - (end - start), Opening(hole.kind, hole.kind, side.edge, *sides, round(float(sill), 4))
 
 
 def _opened(plan: Plan, holes: Sequence[Hole], *, lenient: bool) -> tuple[dict[str, tuple[Opening, ...]], Counter[str]]:
     """The openings of every room, those between two on both sides; what was left out."""
-    stretches, ignored = _stretches(plan), Counter[str]()
+    floors, ignored = [*plan.sides.values()], Counter[str]()
+    walls = [side for one, other in combinations(floors, 2) for side in facings(one, other)]
+    walls += [side for floor in floors for side in outer_spans(floor, floors)]
     found: dict[str, list[Opening]] = {name: [] for name in plan.floors}
     for hole in holes:
         fits = [
-            (*fit, stretch, which)
-            for stretch in stretches
+            (*fit, wall, which)
+            for wall in walls
             for which, ends in enumerate(hole.ends)
-            if (fit := stretch.fit(hole, ends, plan.home.room(stretch.floor.name).graph.room.height))
+            if (fit := _fit(plan, wall, hole, ends))
         ]
         if not fits:
             x, z = hole.ends.mean((0, 1))
@@ -236,10 +195,8 @@ def _opened(plan: Plan, holes: Sequence[Hole], *, lenient: bool) -> tuple[dict[s
                 )
             ignored[f"{hole.kind}s that meet no wall"] += 1
             continue
-        _, opening, stretch, which = min(fits, key=lambda fit: fit[0])
-        sides = [(stretch.floor.name, opening)]
-        if stretch.facing is not None:
-            sides.append((stretch.facing.other, stretch.facing.across(opening)))
+        _, opening, wall, which = min(fits, key=lambda fit: fit[0])
+        sides = [(wall.one, opening), *([(wall.other, wall.across(opening))] if wall.other else [])]
         if hole.kind == "door":
             sides = _leaf(plan, sides, hole.ends[which][0], None if hole.tips is None else hole.tips[which])
         if any(overlap(side, other) > 0 for room, side in sides for other in found[room]):
