@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import shapely
 from pxr import Usd
-from scipy import ndimage
 
 from echomodel.openings import STEP, inward_normal, segment
 from echomodel.vocabulary import vocabulary
@@ -22,7 +21,9 @@ from echousd.stage.files import open_stage
 from echousd.stage.read import find_rooms
 
 ROBOT = 0.15  # metres, radius of a robot that is 0.3 m wide
-CELL = 0.05
+SLACK = 0.02  # metres that it squeezes through
+AT_DOOR = 0.6  # metres around where it enters
+ENDS = 0.1  # metres before both ends of a way that count as these
 REACHED = 0.5  # share of a room's free floor that it must get to
 LOW = 1.5  # metres below which things are in its way
 
@@ -67,7 +68,7 @@ def check_home(path: Path, *, rules: str = "strict", layout: int | None = None, 
     if plan is None:
         raise ValueError(f"{path}: no home, allowed: a stage of rooms with floors side by side")
     stage = open_stage(path)
-    ground = Ground.of(plan, furniture(plan, path))
+    ground = open_ground(plan, furniture(plan, path))
     reached = walked(plan, ground)
     told = [("broken", f"{relation}: the plan does not keep it") for relation in plan.broken()]
     for one, other, shared in overlapping(plan.floors, 0.01):
@@ -113,66 +114,38 @@ def _openings(plan: Plan) -> Iterator[str]:
                 yield f"{name} and {other}: two leaves in one door, allowed: one"
 
 
-@dataclass(frozen=True, eq=False)
-class Ground:
-    """A home's floors and doorways as cells: points (a, b, 2) in plan, and where the middle of a robot may be."""
-
-    points: np.ndarray
-    open: np.ndarray
-
-    @classmethod
-    def of(cls, plan: Plan, things: Sequence[Standing]) -> Ground:
-        """The ground of a home with what stands on it in a robot's way."""
-        shapes = [shapely.Polygon(floor) for floor in plan.floors.values()]
-        shapes += [shapely.box(*corners.ravel()).buffer(0.02) for *_, corners in doorways(plan)]
-        whole = shapely.union_all(shapes)
-        low, high = np.array(whole.bounds).reshape(2, 2)
-        xs, zs = (np.arange(a, b + CELL, CELL) for a, b in zip(low, high, strict=True))
-        points = np.stack(np.meshgrid(xs, zs, indexing="ij"), -1)
-        free = shapely.contains_xy(whole, points[..., 0], points[..., 1])
-        for thing in things:
-            if thing.low > LOW or vocabulary().category(thing.node.category).support != "floor":
-                continue
-            corners = thing.corners
-            x, z = (
-                slice(*np.searchsorted(axis, (c.min() - CELL, c.max() + CELL)))
-                for axis, c in zip((xs, zs), corners.T, strict=True)
-            )
-            free[x, z] &= ~shapely.contains_xy(shapely.Polygon(corners), points[x, z, 0], points[x, z, 1])
-        room = (ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] - 0.5) * CELL >= ROBOT - CELL / 2
-        return cls(points, room)
-
-    def on(self, shape: shapely.Geometry) -> np.ndarray:
-        """(a, b) bool: where a robot may be in a part of the plan."""
-        inside: np.ndarray = shapely.contains_xy(shape, self.points[..., 0], self.points[..., 1])
-        return inside & self.open
+def open_ground(plan: Plan, things: Sequence[Standing]) -> shapely.Geometry:
+    """Where the middle of a robot may be on a home's floors and in its doorways, with what stands in its way there."""
+    floors = [shapely.Polygon(floor) for floor in plan.floors.values()]
+    floors += [shapely.box(*corners.ravel()).buffer(0.02) for *_, corners in doorways(plan)]
+    solid = [
+        shapely.Polygon(thing.corners)
+        for thing in things
+        if thing.low <= LOW and vocabulary().category(thing.node.category).support == "floor"
+    ]
+    return shapely.union_all(floors).difference(shapely.union_all(solid)).buffer(SLACK - ROBOT)
 
 
-def walked(plan: Plan, ground: Ground) -> dict[str, float]:
+def walked(plan: Plan, ground: shapely.Geometry) -> dict[str, float]:
     """Of every room the share of its free floor that a robot gets to which enters the home by its front door."""
-    parts, _ = ndimage.label(ground.open)
-    start = _start(plan)
-    near = np.hypot(ground.points[..., 0] - start[0], ground.points[..., 1] - start[1]) < 0.6
-    entered = np.bincount(parts[near], minlength=1)
-    entered[0] = 0
-    here = parts == int(entered.argmax()) if entered.any() else np.zeros_like(ground.open)
+    door = shapely.Point(_start(plan)).buffer(AT_DOOR)
+    near = [part for part in shapely.get_parts(ground) if part.intersects(door)]
+    here = max(near, key=lambda part: part.intersection(door).area, default=shapely.Polygon())
     out = {}
     for name, floor in plan.floors.items():
-        mine = ground.on(shapely.Polygon(floor))
-        out[name] = float((here & mine).sum() / mine.sum()) if mine.any() else 0.0
+        mine = ground.intersection(shapely.Polygon(floor))
+        out[name] = float(here.intersection(mine).area / mine.area) if mine.area else 0.0
     return out
 
 
-def _blocked(plan: Plan, ground: Ground) -> Iterator[str]:
+def _blocked(plan: Plan, ground: shapely.Geometry) -> Iterator[str]:
     """Doors and passages that furniture stands in, on either side."""
     for (one, other), opening, corners in doorways(plan):
         near, inward = segment(plan.floors[one], opening), inward_normal(plan.floors[one], opening.edge)
         deep = float(np.ptp(corners, 0) @ np.abs(inward)) + STEP
-        way = shapely.Polygon([*(near + inward * STEP), *(near[::-1] - inward * deep)])
-        parts, _ = ndimage.label(ground.on(way))
-        off = (ground.points - near[0]) @ inward
-        before, behind = ({*np.unique(parts[side])} - {0} for side in (off > STEP - 2 * CELL, off < 2 * CELL - deep))
-        if not before & behind:
+        way = ground.intersection(shapely.Polygon([*(near + inward * STEP), *(near[::-1] - inward * deep)]))
+        offs = [(shapely.get_coordinates(part) - near[0]) @ inward for part in shapely.get_parts(way) if part.area]
+        if not any(off.max() > STEP - ENDS and off.min() < ENDS - deep for off in offs):
             yield (
                 f"{opening.kind} between {one} and {other}: furniture leaves no 0.3 m to get through, "
                 f"allowed: a way of {STEP} m on both sides"
@@ -185,5 +158,5 @@ def _start(plan: Plan) -> np.ndarray:
     floor = plan.floors[name]
     for opening in plan.openings[name]:
         if opening.kind == "door" and plan.behind(name, opening) is None:
-            return segment(floor, opening).mean(0) + inward_normal(floor, opening.edge) * (ROBOT + 2 * CELL)
+            return segment(floor, opening).mean(0) + inward_normal(floor, opening.edge) * (ROBOT + ENDS)
     return np.asarray(floor.mean(0))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from echousd.home.check import CELL, ROBOT, Ground, _blocked
+from echousd.home.check import ROBOT, _blocked, walked
 from echousd.home.graph import home_of_words
 from echousd.home.plan import Plan, doorways, plan_home
 
@@ -17,10 +17,14 @@ def plan(request) -> Plan:
 def ground(plan, *things):
     shapes = [shapely.Polygon(floor) for floor in plan.floors.values()]
     whole = shapely.union_all([*shapes, *(shapely.box(*c.ravel()).buffer(0.02) for *_, c in doorways(plan))])
-    xs, zs = (np.arange(a, b, CELL) for a, b in np.array(whole.bounds).reshape(2, 2).T)
-    points = np.stack(np.meshgrid(xs, zs, indexing="ij"), -1)
-    free = whole.difference(shapely.union_all(things) if things else shapely.Polygon()).buffer(-ROBOT)
-    return Ground(points, shapely.contains_xy(free, points[..., 0], points[..., 1]))
+    return whole.difference(shapely.union_all(things) if things else shapely.Polygon()).buffer(-ROBOT)
+
+
+def test_one_gets_everywhere_but_behind_what_fills_the_way(plan):
+    assert all(share == pytest.approx(1.0) for share in walked(plan, ground(plan)).values())
+    ((*_, corners),) = doorways(plan)
+    reached = walked(plan, ground(plan, shapely.box(*corners.ravel()).buffer(0.1)))
+    assert sorted(reached.values()) == [0.0, pytest.approx(1.0)]
 
 
 def test_a_blocked_way_is_told(plan):
