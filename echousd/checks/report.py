@@ -27,8 +27,9 @@ from echousd.stage.contents import RoomContents
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.foreign import UNTOLD
-from echousd.stage.layouts import layout_names, showing_layout
+from echousd.stage.layouts import each_layout
 from echousd.stage.read import find_rooms
+from echousd.stage.values import readable
 
 if TYPE_CHECKING:
     from echousd.settle import SettleReport
@@ -193,8 +194,7 @@ def check(
     rule_set(rules)
     stage = opened(stage)
     errors, warnings = find_faults(stage)
-    names: tuple[str | int | None, ...] = (layout_names(stage) or (None,)) if layout is None else (layout,)
-    found = [check_layout(stage, name, rules) for name in names]
+    found = [check_layout(stage, name, rules) for name in each_layout(stage, layout)]
     rooms = found[0][0]
     if not rooms and not errors:
         raise StageError(f"{source(stage)}: no room (no EchoSceneGraph prim), nothing to check")
@@ -209,22 +209,17 @@ def check(
     return CheckReport(source(stage), rooms, tuple(report for _, report in found), errors, warnings, settled)
 
 
-def check_layout(stage: Usd.Stage, layout: str | int | None, rules: str) -> tuple[tuple[str, ...], LayoutReport]:
-    """Prim paths of the rooms, and what is wrong with them in one layout."""
-    with showing_layout(stage, layout) as name:
-        try:
-            found = find_rooms(stage)
-        except StageError:  # echo:EdgeTargets reports it
-            found = []
-        rooms = [Whole.of(prims) for prims in found]
-        report = LayoutReport(
-            "" if layout is None else name,
-            tuple(relation for whole in rooms for relation in verdicts_of(whole.room, rules)),
-            tuple(hit for whole in rooms for hit in find_collisions(whole)),
-            tuple(wrong for whole in rooms for wrong in find_misplaced(whole)),
-            tuple(fault for whole in rooms for fault in find_living(whole.room)),
-        )
-        return tuple(whole.room.path for whole in rooms), report
+def check_layout(stage: Usd.Stage, name: str, rules: str) -> tuple[tuple[str, ...], LayoutReport]:
+    """Prim paths of the rooms, and what is wrong with them as a stage shows them, in the layout of that name."""
+    rooms = [Whole.of(prims) for prims in readable(lambda: find_rooms(stage), [])]  # echo:EdgeTargets tells why not
+    report = LayoutReport(
+        name,
+        tuple(relation for whole in rooms for relation in verdicts_of(whole.room, rules)),
+        tuple(hit for whole in rooms for hit in find_collisions(whole)),
+        tuple(wrong for whole in rooms for wrong in find_misplaced(whole)),
+        tuple(fault for whole in rooms for fault in find_living(whole.room)),
+    )
+    return tuple(whole.room.path for whole in rooms), report
 
 
 def _boxes(room: RoomContents) -> Furniture:
@@ -265,11 +260,14 @@ def rewritten(stage: Usd.Stage, room: str, relations: Sequence[Verdict]) -> Iter
     except ValueError as error:
         yield Fault(RULE, room, str(error))
         return
-    if manifest is None or manifest["name"] != root.stem or not _as_written(root, manifest["files"]):
+    files = {} if manifest is None else manifest["files"]
+    layers = [name for name in files if name == root.name or name.startswith("layers/")]
+    if manifest is None or manifest["name"] != root.stem or any(digest_of(root.parent / n) != files[n] for n in layers):
         return
     measured = {(one.subject, one.predicate, one.object): one for one in relations}
     told: dict[tuple[str, str, str], str] = {}
-    for verdict in _verdicts(manifest):
+    verdicts = manifest["verdicts"] if isinstance(manifest.get("verdicts"), list) else []
+    for verdict in (each for each in verdicts if isinstance(each, dict)):
         triple = (str(verdict.get("subject")), str(verdict.get("predicate")), str(verdict.get("object")))
         told[triple] = str(verdict.get("state"))
         found = measured.get(triple)
@@ -284,14 +282,3 @@ def rewritten(stage: Usd.Stage, room: str, relations: Sequence[Verdict]) -> Iter
     kept, counts = list(told.values()).count("kept"), manifest.get("relations")
     if not isinstance(counts, dict) or counts.get("kept") != kept:
         yield Fault(RULE, room, f"{root.stem}.json counts {counts} relations, its verdicts say {kept} kept")
-
-
-def _as_written(root: Path, files: dict[str, str]) -> bool:
-    """Whether the root layer and the layers below it are those that a manifest names."""
-    layers = [name for name in files if name == root.name or name.startswith("layers/")]
-    return all(digest_of(root.parent / name) == files[name] for name in layers)
-
-
-def _verdicts(manifest: dict[str, Any]) -> list[dict[str, Any]]:
-    found = manifest.get("verdicts")
-    return [verdict for verdict in found if isinstance(verdict, dict)] if isinstance(found, list) else []

@@ -51,19 +51,14 @@ def _asks(home: HomeGraph) -> tuple[object, ...]:
 def plan_there(path: Path, home: HomeGraph | None = None) -> Plan | None:
     """The plan on a stage, None where its rooms state no floors or floors in one place."""
     if path.suffix.lower() not in STAGE_FORMS:
-        return _plan_of_graphs(home)
+        if home is None or any(room.graph.room.floor_polygon is None for room in home.rooms):
+            return None
+        return given_plan(home, {room.name: (room.graph, np.eye(4)) for room in home.rooms})  # corners as in the home
     from echousd.home.files import load_home
     from echousd.home.stages import read_poses
 
     home = home or load_home(path)
     return None if home is None else given_plan(home, read_poses(path))
-
-
-def _plan_of_graphs(home: HomeGraph | None) -> Plan | None:
-    """Floors of a text: corners in the frame of the home."""
-    if home is None or any(room.graph.room.floor_polygon is None for room in home.rooms):
-        return None
-    return given_plan(home, {room.name: (room.graph, np.eye(4)) for room in home.rooms})
 
 
 def given_plan(home: HomeGraph, rooms: Placed) -> Plan | None:

@@ -258,13 +258,9 @@ def _areas(home: HomeGraph) -> Iterator[str]:
         room = _inside(home.outline, len(home.rooms))
         if not 0.8 < home.area / room < 1.2:
             yield f"area is {home.area:g} m², the outline leaves {room:.3g} m² between its walls; state one of them"
-    if home.outline is not None and _slanted(home.outline):
+    edges = np.zeros((1, 2)) if home.outline is None else np.diff([*home.outline, home.outline[0]], axis=0)
+    if (np.abs(edges).min(1) > 1e-3).any():
         yield "the outline has a slanted wall, allowed: walls along x and z"
-
-
-def _slanted(outline: Sequence[tuple[float, float]]) -> bool:
-    edges = np.abs(np.roll(np.array(outline), -1, 0) - np.array(outline))
-    return bool((edges.min(1) > 1e-3).any())
 
 
 def _inside(outline: Sequence[tuple[float, float]], rooms: int) -> float:
@@ -314,20 +310,20 @@ def _problem(home: HomeGraph, seed: int, before: Plan | None) -> Problem:
     else:
         ratio = RATIOS[seed % len(RATIOS)]
         extents = np.sqrt(sum(gross.values()) * np.array([1 / ratio, ratio]))
-    wishes = tuple(
-        Wish(
-            room.name, gross[room.name], *(STATED if room.name in stated else FREE), _ratio(room),
-            min(_usual(room)[2], 0.75 * np.sqrt(gross[room.name])) + INNER,
-            FACADE if _wants_outside(home, room) else 0.0,
-        )
-        for room in home.rooms
-    )  # fmt: skip
+    wishes, wet = [], []
+    for room in home.rooms:
+        row, area = vocabulary().room_type(room.type), gross[room.name]
+        outer = FACADE if row.daylight or row.use == "outdoor" or room.name == home.entered_by else 0.0
+        ratio = max(room.ratio, HALL) if row.hub == ENTERED else room.ratio  # a hall may be as long as it must
+        short = min(_usual(room)[2], 0.75 * np.sqrt(area)) + INNER
+        wishes.append(Wish(room.name, area, *(STATED if room.name in stated else FREE), ratio, short, outer))
+        wet += [room.name] if row.use == "wet" else []
     order = np.random.default_rng(seed).permutation(len(wishes)) if seed else range(len(wishes))
-    wishes = tuple(wishes[number] for number in order)  # another order, another plan
-    wet = tuple(room.name for room in home.rooms if vocabulary().room_type(room.type).use == "wet")
+    asked = tuple(wishes[number] for number in order)  # another order, another plan
     lie = None if before is None else before.rects
     sides = (float(extents[0]), float(extents[1]))
-    return Problem(wishes, home.relations, sides, voids, home.outline is None, together=wet, seed=seed, before=lie)
+    free = home.outline is None
+    return Problem(asked, home.relations, sides, voids, free, together=tuple(wet), seed=seed, before=lie)
 
 
 def _wanted(home: HomeGraph) -> tuple[dict[str, float], set[str]]:
@@ -335,7 +331,9 @@ def _wanted(home: HomeGraph) -> tuple[dict[str, float], set[str]]:
 
     What is free grows with the walls that a room shares, as `larger_than` says, and with the whole.
     """
-    stated = {room.name: area for room in home.rooms if (area := room.area or _stated_area(room)) is not None}
+    drawn = {room.name: room.graph.room.corners for room in home.rooms}
+    stated = {name: abs(signed_area(corners)) for name, corners in drawn.items() if corners is not None}
+    stated |= {room.name: room.area for room in home.rooms if room.area is not None}
     floors = {room.name: stated.get(room.name, _usual(room)[1]) for room in home.rooms}
     for room in home.rooms:
         walls = FACADE + sum(r.row.wall + CORNERS for r in home.relations if r.row.wall and room.name in r.pair)
@@ -355,21 +353,6 @@ def _wanted(home: HomeGraph) -> tuple[dict[str, float], set[str]]:
         scale = max(total - sum(stated.values()), 0.2 * rest) / rest
         floors = {name: area * (1.0 if name in stated else scale) for name, area in floors.items()}
     return floors, {*stated}
-
-
-def _wants_outside(home: HomeGraph, room: HomeRoom) -> bool:
-    row = vocabulary().room_type(room.type)
-    return row.daylight or row.use == "outdoor" or room.name == home.entered_by
-
-
-def _stated_area(room: HomeRoom) -> float | None:
-    corners = room.graph.room.corners
-    return None if corners is None else abs(signed_area(corners))
-
-
-def _ratio(room: HomeRoom) -> float:
-    """Of a cell; a hall may be as long as it must."""
-    return max(room.ratio, HALL) if vocabulary().room_type(room.type).hub == ENTERED else room.ratio
 
 
 def rectangles(shape: shapely.Geometry) -> Iterator[tuple[float, float, float, float]]:

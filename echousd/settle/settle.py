@@ -16,7 +16,7 @@ from echousd.shapes.matter import read_mass
 from echousd.stage.contents import triangulated
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
-from echousd.stage.layouts import layout_names, showing_layout
+from echousd.stage.layouts import each_layout
 from echousd.stage.units import metres_per_unit, upwards
 from echousd.stage.values import array, lineage, matrix
 
@@ -165,6 +165,7 @@ SECONDS = 2.0
 SHIFT, TURN = 0.01, 1.0  # metres and degrees that a piece may move
 FALL, TOPPLE = 0.01, 20.0  # metres and degrees from which we say that it fell
 DEEP = 0.002  # metres that pieces may overlap at the start
+Overlap = tuple[str, str, float]  # paths of two colliders, and metres that they are in each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,12 +234,7 @@ class SettleReport:
 def settle_layouts(stage: Usd.Stage | str | os.PathLike[str], *, layout: int | None = None) -> tuple[SettleReport, ...]:
     """`settle` for every layout of a room, or for one; raises what it raises, and ValueError for no such layout."""
     stage = opened(stage)
-    names: tuple[str | int | None, ...] = (layout_names(stage) or (None,)) if layout is None else (layout,)
-    reports = []
-    for name in names:
-        with showing_layout(stage, name) as shown:
-            reports.append(replace(settle(stage), layout="" if name is None else shown))
-    return tuple(reports)
+    return tuple(replace(settle(stage), layout=name) for name in each_layout(stage, layout))
 
 
 def settle(stage: Usd.Stage | str | os.PathLike[str], *, seconds: float = SECONDS) -> SettleReport:
@@ -256,27 +252,27 @@ def settle(stage: Usd.Stage | str | os.PathLike[str], *, seconds: float = SECOND
     if not world.bodies:
         raise StageError(f"{source(stage)}: no rigid body with a collider, nothing to simulate")
     try:
-        course = simulate(world, seconds)
+        places, overlaps = simulate(world, seconds)
     except SettleUnavailable:
         raise
     except ValueError as error:
         raise StageError(f"{source(stage)}: cannot be simulated ({error})") from None
     motions = []
-    for body, place in zip(world.bodies, course.places, strict=True):
+    for body, place in zip(world.bodies, places, strict=True):
         shift = float(np.linalg.norm(place[:3, 3] - body.place[:3, 3]))
         cosine = (np.trace(place[:3, :3] @ body.place[:3, :3].T) - 1) / 2
         turn = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
         rests = shift <= SHIFT and turn <= TURN
-        why = "" if rests else _why(stage, world, course, body, place)
+        why = "" if rests else _why(stage, world, overlaps, body, place)
         motions.append(Motion(body.name, body.path, shift, turn, place, why))
     return SettleReport(source(stage), seconds, tuple(motions))
 
 
-def _why(stage: Usd.Stage, world: World, course: Course, body: Body, place: np.ndarray) -> str:
+def _why(stage: Usd.Stage, world: World, overlaps: Sequence[Overlap], body: Body, place: np.ndarray) -> str:
     """What was wrong at the start, else what it did."""
     up = -world.gravity / max(float(np.linalg.norm(world.gravity)), 1e-9)
     deepest: dict[str, float] = {}
-    for first, second, depth in course.overlaps:
+    for first, second, depth in overlaps:
         for one, other in ((first, second), (second, first)):
             if _owner(stage, one) == body.path and depth > DEEP:
                 name = _owner(stage, other).rpartition("/")[2]
@@ -311,19 +307,6 @@ class SettleUnavailable(ValueError):
     """MuJoCo is not installed."""
 
 
-@dataclass(frozen=True, eq=False)
-class Course:
-    """What became of n bodies.
-
-    Arguments:
-        places: (n, 4, 4) float, body to world, at the end.
-        overlaps: (path, path, depth in metres) of colliders of different bodies that overlap at the start.
-    """
-
-    places: np.ndarray
-    overlaps: tuple[tuple[str, str, float], ...]
-
-
 def require_engine() -> Any:
     """The module of MuJoCo; raises SettleUnavailable without the extra `sim`."""
     try:
@@ -333,8 +316,11 @@ def require_engine() -> Any:
     return mujoco
 
 
-def simulate(world: World, seconds: float) -> Course:
-    """Let a world fall for some seconds; raises SettleUnavailable without the extra `sim`."""
+def simulate(world: World, seconds: float) -> tuple[np.ndarray, Sequence[Overlap]]:
+    """Let a world fall for some seconds; raises SettleUnavailable without the extra `sim`.
+
+    Returns (n, 4, 4) float, body to world in the end, and the colliders of different bodies that overlap at the start.
+    """
     mujoco = require_engine()
     spec = mujoco.MjSpec()
     spec.option.timestep = STEP
@@ -352,18 +338,14 @@ def simulate(world: World, seconds: float) -> Course:
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    overlaps = tuple(
-        (paths[contact.geom1], paths[contact.geom2], -float(contact.dist))
-        for contact in data.contact
-        if contact.dist < 0
-    )
+    overlaps = [(paths[met.geom1], paths[met.geom2], -float(met.dist)) for met in data.contact if met.dist < 0]
     for _ in range(round(seconds / STEP)):
         mujoco.mj_step(model, data)
     numbers = [model.body(f"body{number}").id for number in range(len(world.bodies))]
     places = np.tile(np.eye(4), (len(numbers), 1, 1))
     places[:, :3, :3] = data.xmat[numbers].reshape(-1, 3, 3)
     places[:, :3, 3] = data.xpos[numbers]
-    return Course(places, overlaps)
+    return places, overlaps
 
 
 def _add(mujoco: Any, spec: Any, body: Any, solids: Sequence[Solid], place: np.ndarray, paths: list[str]) -> None:

@@ -87,7 +87,9 @@ def regular_layers(path: Path) -> list[Sdf.Layer]:
         if name in found:
             continue
         try:
-            _check_harmless(name, path)
+            file = Path(Ar.SplitPackageRelativePathOuter(str(Ar.GetResolver().Resolve(name)))[0])
+            if file.is_file() and not Sdf.Layer.Find(name):
+                check_harmless(file, path)
             layer = found[name] = Sdf.Layer.FindOrOpen(name)
         except Tf.ErrorException:
             continue
@@ -98,13 +100,6 @@ def regular_layers(path: Path) -> list[Sdf.Layer]:
             _check_regular(str(Ar.GetResolver().Resolve(other)), f"{path}: a layer, {layer.identifier},")
             todo.append(other)
     return [layer for layer in found.values() if layer]
-
-
-def _check_harmless(layer: str, stage: Path) -> None:
-    """Have a stage read in another process before this one opens a layer of it that OpenUSD may not survive."""
-    file = Path(Ar.SplitPackageRelativePathOuter(str(Ar.GetResolver().Resolve(layer)))[0])
-    if file.is_file() and not Sdf.Layer.Find(layer):
-        check_harmless(file, stage)
 
 
 def _check_clips(layer: Sdf.Layer, path: Path) -> None:

@@ -43,7 +43,9 @@ def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage | str | os.Path
     path = prim_path(room)
     if isinstance(target, str | os.PathLike):
         save_layer(graph_layer(graph, root=room), target)
-    elif _holds_graph(target, path):
+        return
+    stage = target if isinstance(target, Usd.Stage) else Usd.Stage.Open(target)
+    if target.GetPrimAtPath(path) and any(prims.room.GetPath() == path for prims in find_rooms(stage)):
         from echousd.stage.update import update_graph
 
         update_graph(target, graph, room=room)
@@ -52,10 +54,3 @@ def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage | str | os.Path
         author(edit_target.GetLayer(), graph, edit_target.MapToSpecPath(path))
     else:
         author(target, graph, path)
-
-
-def _holds_graph(target: Sdf.Layer | Usd.Stage, room: Sdf.Path) -> bool:
-    if not target.GetPrimAtPath(room):
-        return False
-    stage = target if isinstance(target, Usd.Stage) else Usd.Stage.Open(target)
-    return any(prims.room.GetPath() == room for prims in find_rooms(stage))

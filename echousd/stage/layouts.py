@@ -92,6 +92,17 @@ def showing_layout(stage: Usd.Stage, layout: int | str | None) -> Iterator[str]:
         yield name
 
 
+def each_layout(stage: Usd.Stage, layout: int | None = None) -> Iterator[str]:
+    """Names of all layouts of a stage, or of one by its number, each shown while a loop is at it; "" for an only one.
+
+    Raises StageError for a layout that there is not.
+    """
+    names: tuple[str | int | None, ...] = (layout_names(stage) or (None,)) if layout is None else (layout,)
+    for name in names:
+        with showing_layout(stage, name) as shown:
+            yield "" if name is None else shown
+
+
 @contextmanager
 def showing_variant(stage: Usd.Stage, variants: str, name: str) -> Iterator[bool]:
     """Within the block, every prim that has a variant of a set shows it; yields whether some prim showed another."""

@@ -90,7 +90,7 @@ def judged(rule: str) -> Callable[[Usd.Stage], Named]:
         return lambda stage: {(rule, str(found.path)) for found in safely(ours, Reading(stage))}
     if ":" in rule:
         return lambda stage: named(check(stage))
-    return lambda stage: named(CheckReport("", (), (check_layout(stage, None, "strict")[1],), (), ()))
+    return lambda stage: named(CheckReport("", (), (check_layout(stage, "", "strict")[1],), (), ()))
 
 
 def test_nothing_is_wrong_with_the_room(room: Usd.Stage) -> None:
