@@ -20,7 +20,7 @@ from echousd.stage import values
 from echousd.stage.contents import read_contents
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage, save_layer, source
-from echousd.stage.read import find_rooms, place, room_graph, value
+from echousd.stage.read import find_rooms, place, room_graph, stated_fields, value
 from echousd.stage.units import to_metres
 from echousd.stage.write import author, define, put, relate
 
@@ -44,19 +44,14 @@ def home_layer(home: HomeGraph, plan: Plan | None = None, *, rooms: bool = True)
         for path, kind in ((HOME, "assembly"), (ROOMS, "group")):
             define(layer, Sdf.Path(path), "Xform").kind = kind
         graph = define(layer, Sdf.Path(GRAPH), usd.HOME_TYPE)
-        for name, number in ((usd.AREA, home.area),):
-            if number is not None:
-                put(graph, name, number)
-        if home.outline is not None:
-            put(graph, usd.OUTLINE, Vt.Vec2dArray([Gf.Vec2d(*corner) for corner in home.outline]))
+        for name, told in usd.values_of(home, usd.HOME_FIELDS).items():
+            put(graph, name, told)
         if home.entrance is not None:
             relate(graph, usd.ENTRANCE, room_path(home.entrance))
         for relation in home.relations:
             taken = {spec.name for spec in graph.nameChildren}
-            spec = Sdf.PrimSpec(
-                graph, usd.relation_name(*(relation.subject, relation.predicate, relation.object), taken),
-                Sdf.SpecifierDef, usd.RELATION_TYPE,
-            )  # fmt: skip
+            name = usd.relation_name(relation.subject, relation.predicate, relation.object, taken)
+            spec = Sdf.PrimSpec(graph, name, Sdf.SpecifierDef, usd.RELATION_TYPE)
             relate(spec, usd.SUBJECT, room_path(relation.subject))
             relate(spec, usd.OBJECT, room_path(relation.object))
             put(spec, usd.PREDICATE, relation.predicate)
@@ -105,17 +100,13 @@ def read_home(stage: Usd.Stage) -> HomeGraph:
         try:
             rooms = []
             for prims in found:
-                fields = {"area": value(prims.room, usd.AREA), "ratio": value(prims.room, usd.RATIO)}
-                given = {key: number for key, number in fields.items() if number is not None}
-                rooms.append(HomeRoom(names[prims.room.GetPath()], asked(room_graph(prims)), **given))
+                fields = stated_fields(prims.room, usd.HOME_ROOM_FIELDS)
+                rooms.append(HomeRoom(names[prims.room.GetPath()], asked(room_graph(prims)), **fields))
             if graph is None:
                 return HomeGraph(rooms)
             ways = [_relation(prim, names) for prim in graph.GetChildren() if prim.GetTypeName() == usd.RELATION_TYPE]
-            entrance = values.targets(graph, usd.ENTRANCE)
-            return HomeGraph(
-                rooms, ways, area=value(graph, usd.AREA), outline=value(graph, usd.OUTLINE),
-                entrance=names.get(entrance[0], str(entrance[0])) if entrance else None,
-            )  # fmt: skip
+            entrance = [names.get(end, str(end)) for end in values.targets(graph, usd.ENTRANCE)]
+            return HomeGraph(rooms, ways, entrance=next(iter(entrance), None), **stated_fields(graph, usd.HOME_FIELDS))
         except GraphError as error:
             raise StageError(f"{source(stage)}: {error}") from None
 

@@ -20,7 +20,7 @@ from echousd.stage import encoding as usd
 from echousd.stage import values
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, save_layer
-from echousd.stage.read import node_names, place, read_rooms, relation_of, the_room, value
+from echousd.stage.read import node_names, place, read_rooms, relation_of, stated_fields, the_room
 from echousd.stage.write import graph_layer
 from echousd.tensors import triplets_of
 
@@ -98,8 +98,9 @@ def read_dressing(stage: Usd.Stage | str | os.PathLike[str], room: str | None = 
 
 def read_small(prim: Usd.Prim) -> SmallNode:
     """The small thing that a prim states; raises StageError."""
-    fields = {field: value(prim, name) for name, field in usd.NODE_FIELDS.items() if field in SmallNode.model_fields}
-    if fields["category"] is None:
+    known = {name: field for name, field in usd.NODE_FIELDS.items() if field in SmallNode.model_fields}
+    fields = stated_fields(prim, known)
+    if "category" not in fields:
         raise StageError(f"{place(prim)}: no category, allowed: {usd.CATEGORY}, one of those of small things")
     try:
         return SmallNode(name=prim.GetName(), **fields)

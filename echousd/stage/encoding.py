@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Mapping
 from typing import TYPE_CHECKING, Any
 
-from pxr import Gf, Sdf, Vt
+from pxr import Sdf, Vt
+
+from echousd.naming import free_name
 
 if TYPE_CHECKING:
     from echomodel.openings import Opening
@@ -35,8 +37,13 @@ FLOOR_POLYGON = "echo:floorPolygon"
 FLOOR_SIZE = "echo:floorSize"
 HEIGHT = "echo:height"
 WALLS = "echo:wallThickness"
+ROOM_FIELDS = {
+    ROOM_TYPE: "type", FLOOR_POLYGON: "floor_polygon", FLOOR_SIZE: "size", HEIGHT: "height", WALLS: "walls",
+    ROOM_STYLE: "style",
+}  # fmt: skip
 
 AREA, RATIO, OUTLINE, ENTRANCE = "echo:area", "echo:ratio", "echo:outline", "echo:entrance"  # of homes
+HOME_FIELDS, HOME_ROOM_FIELDS = {AREA: "area", OUTLINE: "outline"}, {AREA: "area", RATIO: "ratio"}
 
 KIND = "echo:kind"
 EDGE = "echo:edge"
@@ -89,47 +96,36 @@ class StageError(ValueError):
     """A stage, layer or prim does not hold what it should; one line with what was found, where and what is allowed."""
 
 
+def values_of(thing: object, fields: Mapping[str, str]) -> dict[str, Any]:
+    """What a thing says of some fields, by property and in USD's types; what it leaves open is left out."""
+    given = {name: getattr(thing, field, None) for name, field in fields.items()}
+    said = {name: value for name, value in given.items() if value is not None and value is not False and value != ()}
+    kinds = {name: type(VALUE_TYPES[name].defaultValue) for name in said}
+    return {name: kinds[name](value) if isinstance(value, tuple) else value for name, value in said.items()}
+
+
 def room_values(room: RoomSpec) -> dict[str, Any]:
     """The authored properties of an EchoSceneGraph, in USD's types, for the `RoomSpec` `room`."""
-    values: dict[str, Any] = {VOCABULARY: VOCABULARY_NAME, ROOM_TYPE: room.type}
-    if room.floor_polygon is not None:
-        values[FLOOR_POLYGON] = Vt.Vec2dArray([Gf.Vec2d(*corner) for corner in room.floor_polygon])
-    if room.size is not None:
-        values[FLOOR_SIZE] = Gf.Vec2d(*room.size)
-    if room.height is not None:
-        values[HEIGHT] = float(room.height)
-    if room.walls:
-        values[WALLS] = Vt.DoubleArray(room.walls)
-    if room.style is not None:
-        values[ROOM_STYLE] = room.style
-    return values
+    return {VOCABULARY: VOCABULARY_NAME, **values_of(room, ROOM_FIELDS)}
 
 
 def opening_values(opening: Opening) -> dict[str, Any]:
     """The authored properties of an EchoOpening; what is at its default and says nothing of the kind is left out."""
     unsaid = {SILL: 0.0, **({} if opening.kind == "door" else {HINGE: "left", SWING: "in"})}
-    values = {name: getattr(opening, field) for name, field in OPENING_FIELDS.items()}
-    return {name: value for name, value in values.items() if unsaid.get(name) != value}
+    return {name: value for name, value in values_of(opening, OPENING_FIELDS).items() if unsaid.get(name) != value}
 
 
 def node_values(node: Node) -> dict[str, Any]:
     """The authored properties of a node's prim, in USD's types, for the `Node` `node`."""
     values: dict[str, Any] = {CATEGORY: node.category, LABELS: Vt.TokenArray([node.obstacle or node.category])}
-    values |= _stated(node)
-    return values | {FREE + key: value for key, value in node.attributes.items()}
-
-
-def _stated(node: Node | SmallNode) -> dict[str, Any]:
-    """What a node says of the fields that it has, in USD's types."""
-    given = {name: getattr(node, field, None) for name, field in NODE_FIELDS.items()}
-    said = {name: value for name, value in given.items() if value is not None and value is not False}
-    return {name: Gf.Vec3d(*value) if isinstance(value, tuple) else value for name, value in said.items()}
+    free = {FREE + key: value for key, value in node.attributes.items()}
+    return values | values_of(node, NODE_FIELDS) | free
 
 
 def small_values(node: SmallNode) -> dict[str, Any]:
     """The authored properties of a small thing that is a node, in USD's types."""
     values: dict[str, Any] = {CATEGORY: node.category, LABELS: Vt.TokenArray([node.category]), SHAPES: DRESSING}
-    return values | _stated(node)
+    return values | values_of(node, NODE_FIELDS)
 
 
 def value_type(name: str, value: Any) -> Sdf.ValueTypeName:
@@ -151,11 +147,6 @@ def plain(value: Any) -> Any:
     return tuple(plain(item) for item in value)
 
 
-def relation_name(subject: str, predicate: str, object_: str, taken: Iterable[str] = ()) -> str:
+def relation_name(subject: str, predicate: str, object_: str, taken: Container[str] = ()) -> str:
     """The prim name of a relation; numbered where names with double underscores make two relations meet."""
-    name = base = f"{subject}__{predicate}__{object_}"
-    number = 2
-    while name in taken:
-        name = f"{base}_{number}"
-        number += 1
-    return name
+    return free_name(f"{subject}__{predicate}__{object_}", taken)

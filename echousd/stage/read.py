@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -192,9 +192,8 @@ def node_names(prims: RoomPrims, *, small: bool = False) -> dict[Sdf.Path, str]:
 
 def read_opening(prim: Usd.Prim) -> Opening:
     """The opening that an EchoOpening prim states, called like the prim; raises StageError."""
-    said = {field: value(prim, name) for name, field in usd.OPENING_FIELDS.items()}
     try:
-        return opening_from_json({"name": prim.GetName(), **{k: v for k, v in said.items() if v is not None}})
+        return opening_from_json({"name": prim.GetName(), **stated_fields(prim, usd.OPENING_FIELDS)})
     except ValueError as error:
         raise StageError(f"{place(prim)}: {error}") from None
 
@@ -205,12 +204,9 @@ def room_spec(prims: RoomPrims) -> RoomSpec:
     words = value(graph, usd.VOCABULARY)
     if words not in (None, usd.VOCABULARY_NAME):
         raise StageError(f"{place(graph)}: {usd.VOCABULARY} is {words!r}, allowed: {usd.VOCABULARY_NAME}")
-    names = {"floor_polygon": usd.FLOOR_POLYGON, "size": usd.FLOOR_SIZE, "height": usd.HEIGHT, "walls": usd.WALLS}
-    names |= {"style": usd.ROOM_STYLE}
-    said = {field: found for field, name in names.items() if (found := value(graph, name)) is not None}
+    fields: dict[str, Any] = {"type": None, **stated_fields(graph, usd.ROOM_FIELDS)}
     try:
-        openings = tuple(map(read_opening, prims.openings))
-        return RoomSpec(value(graph, usd.ROOM_TYPE), openings=openings, **said)
+        return RoomSpec(**fields, openings=tuple(map(read_opening, prims.openings)))
     except GraphError as error:
         raise StageError(f"{place(graph)}: {error}") from None
 
@@ -263,6 +259,11 @@ def value(prim: Usd.Prim, name: str) -> Any:
         if isinstance(text, str) and len(text) > MAX_TEXT:
             raise StageError(f"{place(prim)}: {name} is a text of {len(text)} characters, allowed: {MAX_TEXT}")
     return found
+
+
+def stated_fields(prim: Usd.Prim, fields: Mapping[str, str]) -> dict[str, Any]:
+    """What a prim states of some fields, of property -> field; raises StageError."""
+    return {field: found for name, field in fields.items() if (found := value(prim, name)) is not None}
 
 
 def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:

@@ -70,8 +70,7 @@ class _Editor:
     # -- the room and its nodes ----------------------------------------------------------------------------------------
 
     def room_edits(self, graph: SceneGraph) -> list[Edit]:
-        names = (usd.ROOM_TYPE, usd.ROOM_STYLE, usd.FLOOR_POLYGON, usd.FLOOR_SIZE, usd.HEIGHT, usd.WALLS)
-        return self.value_edits(self.prims.graph, usd.room_values(graph.room), names)
+        return self.value_edits(self.prims.graph, usd.room_values(graph.room), tuple(usd.ROOM_FIELDS))
 
     def opening_edits(self, graph: SceneGraph) -> list[Edit]:
         wanted = {opening.name: opening for opening in graph.room.openings}
