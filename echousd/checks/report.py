@@ -28,7 +28,7 @@ from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.foreign import UNTOLD
 from echousd.stage.layouts import each_layout
-from echousd.stage.read import find_rooms
+from echousd.stage.read import RoomPrims, find_rooms
 from echousd.stage.values import readable
 
 if TYPE_CHECKING:
@@ -211,7 +211,8 @@ def check(
 
 def check_layout(stage: Usd.Stage, name: str, rules: str) -> tuple[tuple[str, ...], LayoutReport]:
     """Prim paths of the rooms, and what is wrong with them as a stage shows them, in the layout of that name."""
-    rooms = [Whole.of(prims) for prims in readable(lambda: find_rooms(stage), [])]  # echo:EdgeTargets tells why not
+    none: list[RoomPrims] = []
+    rooms = [Whole.of(prims) for prims in readable(lambda: find_rooms(stage), none)]  # echo:EdgeTargets tells why not
     report = LayoutReport(
         name,
         tuple(relation for whole in rooms for relation in verdicts_of(whole.room, rules)),

@@ -220,7 +220,7 @@ def _demands(
     """
     for wish in problem.wishes:
         if wish.parts > 1:
-            yield [*_ells(*parts[wish.name][:2], least)]
+            yield [*_ells(parts[wish.name][0], parts[wish.name][1], least)]
     for relation in problem.relations:
         row, pairs = relation.row, [*product(*(parts[name] for name in relation.pair))]
         if row.wall:

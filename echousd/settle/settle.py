@@ -102,8 +102,8 @@ def body_root(prim: Usd.Prim) -> Usd.Prim | None:
 
 def moves(prim: Usd.Prim) -> bool:
     """Whether a prim is a rigid body that engines move."""
-    body = UsdPhysics.RigidBodyAPI(prim) if prim.HasAPI(UsdPhysics.RigidBodyAPI) else None
-    enabled = body is not None and body.GetRigidBodyEnabledAttr().Get() is not False
+    body = UsdPhysics.RigidBodyAPI(prim)
+    enabled = prim.HasAPI(UsdPhysics.RigidBodyAPI) and body.GetRigidBodyEnabledAttr().Get() is not False
     return enabled and not body.GetKinematicEnabledAttr().Get()
 
 

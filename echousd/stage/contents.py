@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from pxr import Kind, Usd, UsdGeom
+from pxr import Kind, Sdf, Usd, UsdGeom
 
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import LABELS
@@ -93,7 +93,8 @@ def read_contents(prims: RoomPrims) -> RoomContents:
     stage = prims.room.GetStage()
     cache = UsdGeom.XformCache()
     to_room = readable(lambda: room_frame(prims.room, cache), np.eye(4))
-    names = readable(lambda: node_names(prims), {})
+    nameless: dict[Sdf.Path, str] = {}
+    names = readable(lambda: node_names(prims), nameless)
     owners = {prim.GetPath() for prim in prims.nodes}
     objects, missing = [], []
     for prim in prims.nodes:
