@@ -11,9 +11,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from echomodel.floors import edges, known, signed_distance
+from echomodel.floors import edges, known, padded, signed_distance
 from echomodel.objective.support import carriers, shared_fraction
 from echomodel.openings import Opening
+from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.geometry import BoxesLike
 from echomodel.rules.placements import Stated
 from echomodel.vocabulary import Category, vocabulary
@@ -504,6 +505,23 @@ def plan_of(
         (tuple(openings),), torch.as_tensor(triplets, dtype=torch.int64).reshape(-1, 3),
         torch.as_tensor(none if given is None else np.asarray(given, bool)),
         None if height is None else torch.tensor([height], dtype=dtype), rules, tuple(stated),
+    )  # fmt: skip
+
+
+def plan_of_rooms(rooms: Sequence[RoomBoxes]) -> Plan:
+    """The plan of many rooms at once, of what their relations state; float32, as sets of rooms are kept."""
+    sizes = [len(room) for room in rooms]
+    told = [np.zeros((0, 3), int) if room.relations is None else room.relations for room in rooms]
+    shift = np.cumsum([0, *sizes[:-1]])
+    columns = ((getattr(room, name) for room in rooms) for name in ("size", "position", "yaw"))
+    size, position, yaw = (torch.as_tensor(np.concatenate(list(of)), dtype=torch.float32) for of in columns)
+    floors = [torch.as_tensor(room.floor_polygon, dtype=torch.float32).reshape(1, -1, 2) for room in rooms]
+    return Plan(
+        tuple(kind for room, t in zip(rooms, told, strict=True) for kind in kinds_of(room.categories, t)),
+        size, position, yaw, torch.arange(len(rooms)).repeat_interleave(torch.tensor(sizes)), padded(floors),
+        tuple(tuple(room.openings) for room in rooms),
+        torch.from_numpy(np.concatenate([t + [k, 0, k] for t, k in zip(told, shift, strict=True)]).astype(np.int64)),
+        torch.zeros(sum(sizes), dtype=torch.bool), torch.tensor([room.height for room in rooms]),
     )  # fmt: skip
 
 

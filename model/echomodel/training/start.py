@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Protocol
 import torch
 
 from echomodel.boxes import BoxStatistics
-from echomodel.compact.learned import places
+from echomodel.compact.learned import WordTable, places
 from echomodel.compact.model import WORDS, CompactModel, load_weights, read_header, read_weights, words_of
 from echomodel.compact.shape import ShapeDenoiser
 from echomodel.config import CompactConfig
@@ -138,11 +138,23 @@ def warm_start(model: CompactModel, path: Path) -> tuple[str, ...]:
             if value.shape != wanted.shape:
                 wanted.zero_()
             wanted[tuple(slice(0, size) for size in value.shape)] = value.to(wanted.dtype)
+    _speak_of_new_words(model, path, header)
     parts = tuple(part for part in json.loads(header.get("parts", "[]")) if part in model.parts)
     if "layout" in parts:
         statistics = BoxStatistics.from_json(json.loads(header["statistics"]))
         model.statistics = replace(statistics, classes=_grown(statistics.classes, model, path, header))
     return parts
+
+
+def _speak_of_new_words(model: CompactModel, path: Path, header: dict[str, str]) -> None:
+    """Words that a file does not know begin as what they are like."""
+    known = words_of(path, header)
+    for table in (module for module in model.modules() if isinstance(module, WordTable)):
+        old = len(known[table.kind])
+        number = vocabulary().category_id if table.kind == "categories" else vocabulary().room_type_id
+        words = torch.tensor([number(name) for name in table.names[old:]], dtype=torch.int64)
+        with torch.no_grad():
+            table.weight[old:] = table.weight[places(table.kind, known[table.kind], words)]
 
 
 def _grown(
