@@ -520,7 +520,7 @@ def plan_of_rooms(rooms: Sequence[RoomBoxes]) -> Plan:
         tuple(kind for room, t in zip(rooms, told, strict=True) for kind in kinds_of(room.categories, t)),
         size, position, yaw, torch.arange(len(rooms)).repeat_interleave(torch.tensor(sizes)), padded(floors),
         tuple(tuple(room.openings) for room in rooms),
-        torch.from_numpy(np.concatenate([t + [k, 0, k] for t, k in zip(told, shift, strict=True)]).astype(np.int64)),
+        torch.as_tensor(np.concatenate([t + np.array([k, 0, k]) for t, k in zip(told, shift, strict=True)])),
         torch.zeros(sum(sizes), dtype=torch.bool), torch.tensor([room.height for room in rooms]),
     )  # fmt: skip
 
