@@ -13,7 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from echousd.cli.options import AsJson, Outside, add_room_command
-from echousd.cli.output import one_line, plain_json, say, say_error, say_json
+from echousd.cli.output import one_line, say, say_error, say_json
 
 if TYPE_CHECKING:
     from echousd.batches.batch import BatchProgress
@@ -116,9 +116,7 @@ def status(
 
     found = found_status(folder)
     if json:
-        import json as text
-
-        typer.echo(text.dumps(plain_json(found), indent=1, allow_nan=False))
+        say_json(found, indent=1)
         return
     say(f"rooms    {found['done']} of {found['rooms']} done, {found['failed']} failed, {found['missing']} to go")
     for error, times in found["errors"].items():
@@ -170,8 +168,6 @@ def _clock(text: str) -> float | None:
 @contextmanager
 def _shown(json: bool) -> Iterator[Callable[[BatchProgress], None]]:
     """A live line on a terminal, plain lines in a log (a failure at once, else every 30 s), JSON lines if wanted."""
-    import json as text
-
     from echousd.cli.terminal import Terminal
 
     console = Terminal(stderr=True)
@@ -190,7 +186,7 @@ def _shown(json: bool) -> Iterator[Callable[[BatchProgress], None]]:
         if json and new:
             fields = {"room": progress.room, "error": progress.error, "done": progress.done, "failed": progress.failed}
             rest = {"total": progress.total, "seconds": round(progress.seconds, 1), "rate": round(progress.rate, 3)}
-            typer.echo(text.dumps({**fields, **rest, "megabytes": round(progress.megabytes)}))
+            say_json({**fields, **rest, "megabytes": round(progress.megabytes)})
         elif new and progress.error:
             say_error(f"failed   {progress.room}: {one_line(progress.error)}")
         if live is not None:
@@ -200,7 +196,7 @@ def _shown(json: bool) -> Iterator[Callable[[BatchProgress], None]]:
             say(line(progress), err=True)
 
     live: Any = None
-    if console.is_terminal and not json:
+    if console.is_terminal and not console.quiet and not json:
         with console.status("starting") as live:
             yield tell
         return

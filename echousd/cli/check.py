@@ -11,12 +11,8 @@ import typer
 from echousd.cli.output import one_line, safe, say, say_json
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from echousd.checks import CheckReport
-    from echousd.checks.report import LayoutReport
     from echousd.home.check import HomeReport
-    from echousd.settle import SettleReport
 
 app = typer.Typer()
 
@@ -76,7 +72,7 @@ def _one(
         if is_home(room):
             home = check_home(room, rules=rules, layout=layout, settle=settle)
             if not json:
-                _show_home(home, strict)
+                _show(*_of_home(home, strict))
             return home.good(strict=strict), home.to_json()
         report = checked(room, rules=rules, layout=layout, settle=settle)
     except (ValueError, OSError) as error:
@@ -88,27 +84,10 @@ def _one(
         return False, {"ok": False, "error": why}
     good = report.good(strict=strict)
     if not json and alone:
-        _show(report, strict)
-        _show_settled(report.settled or ())
+        _show(*_of_room(report, strict))
     elif not json:
         say(f"{'ok' if good else 'no'}  {room}{_seen(report)}")
     return good, report.to_json()
-
-
-def _show_home(home: HomeReport, strict: bool) -> None:
-    """The home as a whole, then a line for each of its rooms."""
-    kinds = [kind for kind, _ in home.faults]
-    broken, ways = kinds.count("broken"), kinds.count("ways")
-    for good, what in (
-        (not broken, f"plan     {home.relations - broken} of {home.relations} relations of rooms kept"),
-        ("walls" not in kinds, f"walls    {kinds.count('walls')} faults where rooms meet"),
-        (not ways, f"ways     {len(home.reached) - ways} of {len(home.reached)} rooms reached from the entrance"),
-    ):
-        say(f"{'ok' if good else 'no'}  {what}")
-    for kind, says in home.faults:
-        say(f"    {kind:<8} {says}")
-    for name, report in home.rooms.items():
-        say(f"{'ok' if report.good(strict=strict) else 'no'}  room     {name}{_seen(report)}")
 
 
 def _seen(report: CheckReport) -> str:
@@ -121,68 +100,73 @@ def _seen(report: CheckReport) -> str:
     return f"  {', '.join(seen)}" if seen else ""
 
 
-def _show(report: CheckReport, strict: bool) -> None:
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
+Row = tuple[str, str, str]  # ok, no or !!; what was looked at; what was found
+Fault = tuple[str, str, str]  # kind, what is wrong, and the colour that says how bad that is
 
-    console = Console(soft_wrap=True)
-    table = Table("", "check", "found", box=None, header_style="bold", pad_edge=False)
 
-    def row(good: bool, check: str, found: str, bad: str = "[red]no[/]") -> None:
-        table.add_row("[green]ok[/]" if good else bad, check, escape(safe(found)))
+def _of_home(home: HomeReport, strict: bool) -> tuple[list[Row], list[Fault]]:
+    """The home as a whole and each of its rooms, and what is wrong between them."""
+    kinds = [kind for kind, _ in home.faults]
+    broken, walls, ways = (kinds.count(kind) for kind in ("broken", "walls", "ways"))
+    rows = [
+        (_mark(not broken), "plan", f"{home.relations - broken} of {home.relations} relations of rooms kept"),
+        (_mark(not walls), "walls", f"{walls} faults where rooms meet"),
+        (_mark(not ways), "ways", f"{len(home.reached) - ways} of {len(home.reached)} rooms reached from the entrance"),
+    ]
+    rows += [(_mark(r.good(strict=strict)), "room", f"{name}{_seen(r)}") for name, r in home.rooms.items()]
+    return rows, [(kind, says, "red") for kind, says in home.faults]
 
+
+def _of_room(report: CheckReport, strict: bool) -> tuple[list[Row], list[Fault]]:
+    """What was looked at in a room, and what is wrong there."""
+    rows: list[Row] = []
+    faults: list[Fault] = []
+    doubt = ("no", "red") if strict else ("!!", "yellow")
     for layout in report.layouts:
-        which = f"{layout.name} " if layout.name else ""
+        which, where = (f"{layout.name} ", f"{layout.name}: ") if layout.name else ("", "")
         unmeasured = sum(found.state == "unmeasured" for found in layout.relations)
-        measured = len(layout.relations) - unmeasured
-        silent = f", {unmeasured} not measured" * bool(unmeasured)
-        row(not layout.broken, f"{which}relations", f"{layout.kept} of {measured} kept{silent}")
-        row(not layout.collisions, f"{which}collisions", f"{len(layout.collisions)} pairs")
-        row(not layout.placement, f"{which}placement", f"{len(layout.placement)} misplaced")
-        seen = f"{len(layout.living)} things that a person would point at"
-        row(not layout.living, f"{which}living", seen, "[red]no[/]" if strict else "[yellow]!![/]")
-    row(not report.errors, "USD", f"{len(report.errors)} errors, {len(report.warnings)} warnings")
-    console.print(table)
-    for layout in report.layouts:
-        _show_faults(console, layout, strict)
-    for color, name, faults in (("red", "error", report.errors), ("yellow", "warning", report.warnings)):
-        for fault in faults:
-            console.print(
-                f"  [{color}]{name}[/] {escape(safe(f'{fault.rule} <{fault.prim}>: {fault.message}'))}", highlight=False
-            )
-
-
-def _show_settled(reports: Sequence[SettleReport]) -> None:
-    from rich.console import Console
-    from rich.markup import escape
-
-    console = Console(soft_wrap=True)
-    for report in reports:
-        which = f"{report.layout} " if report.layout else ""
-        mark = "[green]ok[/]" if report.ok else "[red]no[/]"
-        rest = len(report.motions) - len(report.restless)
-        found = f"{rest} of {len(report.motions)} pieces rest for {report.seconds:g} s"
-        console.print(f"{mark}  {which}settle  {found}", highlight=False)
-        for motion in report.restless:
+        kept = f"{layout.kept} of {len(layout.relations) - unmeasured} kept"
+        living = f"{len(layout.living)} things that a person would point at"
+        rows += [
+            (_mark(not layout.broken), f"{which}relations", kept + f", {unmeasured} not measured" * bool(unmeasured)),
+            (_mark(not layout.collisions), f"{which}collisions", f"{len(layout.collisions)} pairs"),
+            (_mark(not layout.placement), f"{which}placement", f"{len(layout.placement)} misplaced"),
+            (doubt[0] if layout.living else "ok", f"{which}living", living),
+        ]
+        said = [("broken", f"{one.said} (margin {one.margin:+.3f})") for one in layout.broken]
+        said += [("collision", f"{hit.first} and {hit.second}, {hit.depth:.3f} m deep") for hit in layout.collisions]
+        for wrong in layout.placement:
+            far = "" if wrong.distance is None else f" by {wrong.distance:.3f} m"
+            said.append(("placement", f"{wrong.object} is {wrong.problem}{far}"))
+        faults += [(kind, where + text, "red") for kind, text in said]
+        faults += [("living", f"{where}{seen.says} ({seen.rule})", doubt[1]) for seen in layout.living]
+    rows.append((_mark(not report.errors), "USD", f"{len(report.errors)} errors, {len(report.warnings)} warnings"))
+    for kind, colour, found in (("error", "red", report.errors), ("warning", "yellow", report.warnings)):
+        faults += [(kind, f"{fault.rule} <{fault.prim}>: {fault.message}", colour) for fault in found]
+    for rest in report.settled or ():
+        still = len(rest.motions) - len(rest.restless)
+        told = f"{still} of {len(rest.motions)} pieces rest for {rest.seconds:g} s"
+        rows.append((_mark(rest.ok), f"{rest.layout} settle".strip(), told))
+        for motion in rest.restless:
             told = f"{motion.name} moves {motion.shift:.3f} m and {motion.turn:.1f} degrees: {motion.why}"
-            console.print(f"  [red]restless[/]  {escape(safe(told))}", highlight=False)
+            faults.append(("restless", told, "red"))
+    return rows, faults
 
 
-def _show_faults(console: Console, layout: LayoutReport, strict: bool) -> None:
-    """What is wrong in one layout, a line each."""
-    from rich.markup import escape
+def _mark(good: bool) -> str:
+    return "ok" if good else "no"
 
-    def line(kind: str, text: str, colour: str = "red") -> None:
-        which = f"{layout.name}: " if layout.name else ""
-        console.print(f"  [{colour}]{kind:<9}[/] {escape(safe(which + text))}", highlight=False)
 
-    for found in layout.broken:
-        line("broken", f"{found.said} (margin {found.margin:+.3f})")
-    for hit in layout.collisions:
-        line("collision", f"{hit.first} and {hit.second}, {hit.depth:.3f} m deep")
-    for wrong in layout.placement:
-        far = "" if wrong.distance is None else f" by {wrong.distance:.3f} m"
-        line("placement", f"{wrong.object} is {wrong.problem}{far}")
-    for seen in layout.living:
-        line("living", f"{seen.says} ({seen.rule})", "red" if strict else "yellow")
+def _show(rows: Sequence[Row], faults: Sequence[Fault]) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    from echousd.cli.terminal import Terminal
+
+    console = Terminal(soft_wrap=True)
+    table = Table("", "check", "found", box=None, header_style="bold", pad_edge=False)
+    for mark, what, found in rows:
+        table.add_row(Text(mark, {"ok": "green", "no": "red", "!!": "yellow"}[mark]), what, found)
+    console.print(table)
+    for kind, text, colour in faults:
+        console.print(Text.assemble("  ", (f"{kind:<9}", colour), f" {safe(text)}"))

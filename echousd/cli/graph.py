@@ -13,7 +13,7 @@ from echousd.cli.options import AsJson
 from echousd.cli.output import check_picture, safe, say, say_done, say_json
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from rich.tree import Tree
 
     from echousd.graph import Node, Relation, SceneGraph
     from echousd.home.graph import HomeGraph
@@ -39,7 +39,7 @@ GRAPH_EXAMPLES = """Examples:
 
     echousd graph bedroom.usda
 
-    echousd graph bedroom.usda --png bedroom.png
+    echousd graph bedroom.usda -o bedroom.png
 
     echousd graph house.usda --room /House/Bedroom --json > bedroom.json
 
@@ -207,10 +207,9 @@ def graph(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the canonical JSON form.")] = False,
     as_yaml: Annotated[bool, typer.Option("--yaml", help="Print the short YAML form.")] = False,
-    as_dot: Annotated[bool, typer.Option("--dot", help="Print Graphviz' dot.")] = False,
-    as_table: Annotated[bool, typer.Option("--table", help="Print tables instead of a tree.")] = False,
-    png: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw a picture into a PNG file.")] = None,
-    svg: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw a picture into an SVG file.")] = None,
+    picture: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Draw a picture (.png, .svg, .pdf).")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is no picture of ours.")] = False,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON schema of the canonical form; needs no GRAPH.")
@@ -220,7 +219,7 @@ def graph(
     from echousd.graph import GraphError, SceneGraph, load_graph
     from echousd.graph.files import STAGE_FORMS
 
-    forms = {"--json": as_json, "--yaml": as_yaml, "--dot": as_dot, "--table": as_table, "--schema": schema}
+    forms = {"--json": as_json, "--yaml": as_yaml, "--schema": schema}
     chosen = [name for name, wanted in forms.items() if wanted]
     if len(chosen) > 1:
         raise GraphError(f"{' and '.join(chosen)} exclude each other")
@@ -229,17 +228,15 @@ def graph(
         return
     if source is None:
         raise GraphError("GRAPH is missing, allowed: a stage, a YAML or a JSON file")
-    for path, suffix in ((png, ".png"), (svg, ".svg")):
-        if path is not None and path.suffix.lower() != suffix:
-            raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {suffix}")
-    on_stage = source.suffix.lower() in STAGE_FORMS
-    if on_stage and (names or (not chosen and png is None and svg is None and room is None)):
+    if picture is not None and picture.suffix.lower() not in PICTURES:
+        raise GraphError(f"{picture}: extension {picture.suffix!r}, allowed: {', '.join(PICTURES)}")
+    alone = room is not None or bool(chosen) or picture is not None
+    if source.suffix.lower() in STAGE_FORMS and (names or not alone):
         shown = _rooms(source, names=names)
-        if room is not None:
-            if room not in shown:
-                raise GraphError(f"{source}: no room {room!r}, allowed: {', '.join(filter(None, shown)) or 'none'}")
-            shown = {"": shown[room]}
-        elif len(shown) > 1 and (chosen or png or svg):
+        if room is not None and room not in shown:
+            raise GraphError(f"{source}: no room {room!r}, allowed: {', '.join(filter(None, shown)) or 'none'}")
+        shown = shown if room is None else {"": shown[room]}
+        if len(shown) > 1 and alone:
             raise GraphError(f"{source}: {len(shown)} rooms, say which one of {', '.join(shown)} (--room)")
     else:
         shown = {"": load_graph(source, room)}
@@ -248,29 +245,22 @@ def graph(
 
         shown = {prim: relations_from_boxes(each, per_object=relations) for prim, each in shown.items()}
     only = next(iter(shown.values()))
-    for path in (png, svg):
-        if path is not None:
-            from echousd.graph.picture import draw_graph
+    if picture is not None:
+        from echousd.graph.picture import draw_graph
 
-            check_picture(path, force=force)
-            draw_graph(only, path)
-            say(f"wrote {path}: {_summary(only)}", err=True)
-    if as_json:
-        typer.echo(only.to_json(), nl=False)
-    elif as_yaml:
-        typer.echo(only.to_yaml(), nl=False)
-    elif as_dot:
-        from echousd.graph.picture import to_dot
+        check_picture(picture, force=force)
+        draw_graph(only, picture)
+        say(f"wrote {picture}: {_summary(only)}", err=True)
+    if as_json or as_yaml:
+        typer.echo(only.to_json() if as_json else only.to_yaml(), nl=False)
+    elif picture is None:
+        from echousd.cli.terminal import Terminal
 
-        typer.echo(to_dot(only), nl=False)
-    elif as_table or (png is None and svg is None):
-        from rich.console import Console
-
-        console = Console(highlight=False)
+        console = Terminal()
         if not console.is_terminal:
             console.width = 160
         for prim, each in shown.items():
-            (_print_table if as_table else _print_tree)(console, each, prim)
+            console.print(_tree(each, prim))
 
 
 def _rooms(source: Path, *, names: bool) -> dict[str, SceneGraph]:
@@ -297,6 +287,7 @@ def _words(token: str) -> str:
 
 
 KINDS = ("door", "window", "passage")
+PICTURES = (".png", ".svg", ".pdf")
 
 
 def _heading(made: SceneGraph, path: str) -> str:
@@ -323,7 +314,7 @@ def _facts(node: Node) -> list[str]:
     return [safe(fact) for fact in (*facts, *(f"{key}={value}" for key, value in node.attributes.items()))]
 
 
-def _print_tree(console: Console, made: SceneGraph, path: str) -> None:
+def _tree(made: SceneGraph, path: str) -> Tree:
     from rich.text import Text
     from rich.tree import Tree
 
@@ -352,23 +343,4 @@ def _print_tree(console: Console, made: SceneGraph, path: str) -> None:
         for placed in node.placements:
             line = Text(_words(placed.placement), style="yellow")
             branch.add(line.append(f" {' and '.join(placed.others)}" if placed.others else "", style="cyan"))
-    console.print(tree)
-
-
-def _print_table(console: Console, made: SceneGraph, path: str) -> None:
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    from echousd.graph.openings import sentence
-
-    objects = Table("object", "category", "fixed and free data", box=box.SIMPLE_HEAD)
-    for node in made.nodes:
-        objects.add_row(*map(Text, (node.name, node.category, ", ".join(_facts(node)))))
-    relations = Table("subject", "predicate", "object", "confidence", box=box.SIMPLE_HEAD)
-    for relation in made.relations:
-        relations.add_row(*map(Text, (*relation.triple, f"{relation.confidence:.3g}")))
-    for placed in made.placements:
-        relations.add_row(*map(Text, placed.triple), "")
-    console.print(Text(_heading(made, path), style="bold"), *map(sentence, made.room.openings), sep="\n")
-    console.print(objects, relations, sep="\n")
+    return tree

@@ -14,7 +14,7 @@ from typing import Any
 
 import typer
 
-from echousd.cli.output import add_help_all, add_quiet, bound_numbers, one_line, safe
+from echousd.cli.output import one_line, prepare, quiet, safe
 
 # Command -> the module of its topic, whose `app` has it. A module is imported when its command is called, or
 # for the help on all; it must not import torch or pxr at module level (start-up time).
@@ -56,6 +56,7 @@ def _version(wanted: bool) -> None:
 
 def _options(
     version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
+    quiet: bool = typer.Option(False, "--quiet", help="Say errors, warnings and data alone; may stand anywhere."),
     debug: bool = typer.Option(False, "--debug", help="Show the traceback of an error; may stand anywhere."),
 ) -> None:
     """Author indoor scenes in USD from semantic scene graphs."""
@@ -78,7 +79,8 @@ def run(arguments: Sequence[str]) -> int:
     arguments = list(arguments)
     own = arguments[: arguments.index("--")] if "--" in arguments else arguments
     debug = "--debug" in own
-    arguments = [word for word in own if word != "--debug"] + arguments[len(own) :]
+    quiet.set("--quiet" in own)
+    arguments = [word for word in own if word not in ("--debug", "--quiet")] + arguments[len(own) :]
     try:
         _check_depth(arguments)
         topic = TOPICS.get(next((word for word in arguments if not word.startswith("-")), ""))
@@ -127,9 +129,7 @@ def command(*topics: str) -> Any:
         app.registered_commands += own.registered_commands
         app.registered_groups += own.registered_groups
     root = typer.main.get_command(app)
-    bound_numbers(root)
-    add_quiet(root)
-    add_help_all(root)
+    prepare(root)
     return root
 
 

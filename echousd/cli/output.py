@@ -1,22 +1,20 @@
-"""What reaches a terminal, a file or a script: nothing that a terminal obeys, no NaN; and flags of all commands."""
+"""What reaches a terminal, a file or a script: nothing that a terminal obeys, no NaN; what all commands have."""
 
 from __future__ import annotations
 
 import json
 import math
-import os
 import re
-import sys
 import time
 import unicodedata
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import wraps
 from inspect import Parameter
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -31,7 +29,7 @@ ENDLESS = re.compile(r"(?<![\w./-])(-?\d)(\d{39,})(?:\.\d+)?(?![\w/-]|\.\w)")  #
 MARK = b"echousd"
 HEAD = 2048  # bytes in which a picture of ours says so
 _began: ContextVar[float] = ContextVar("_began", default=0.0)  # when the command did
-_errors: ContextVar[TextIO | None] = ContextVar("_errors", default=None)
+quiet: ContextVar[bool] = ContextVar("quiet", default=False)  # whether errors, warnings and data alone are said
 
 
 def safe(text: str) -> str:
@@ -57,22 +55,13 @@ def one_line(text: str) -> str:
 
 def say(text: str, *, err: bool = False) -> None:
     """Print a line that may hold names from files."""
-    typer.echo(safe(text), err=err)
+    if not quiet.get():
+        typer.echo(safe(text), err=err)
 
 
 def say_error(text: str) -> None:
     """Print a line about something that failed to stderr, with `--quiet` as well."""
-    typer.echo(safe(text), file=_errors.get() or sys.stderr)
-
-
-@contextmanager
-def errors_to(stream: TextIO) -> Iterator[None]:
-    """Have `say_error` print to a stream."""
-    before = _errors.set(stream)
-    try:
-        yield
-    finally:
-        _errors.reset(before)
+    typer.echo(safe(text), err=True)
 
 
 def say_json(found: Any, *, indent: int | None = None) -> None:
@@ -109,12 +98,18 @@ def check_picture(path: Path, *, force: bool) -> None:
 LARGEST = 2**63 - 1  # what a layer, a manifest and a tensor can hold
 
 
-def bound_numbers(command: Any) -> None:
-    """Have a command and those below it refuse NaN, infinities and huge numbers, and remember when they began."""
+def prepare(command: Any) -> None:
+    """What all commands below a group have in common, in place.
+
+    They remember when they began, refuse NaN, infinities and huge numbers, and one that keeps some of its options off
+    the first page of its help has a flag that shows them.
+    """
+    for below in getattr(command, "commands", {}).values():
+        prepare(below)
     if command.callback is not None:
         command.callback = _checked(command.callback)
-    for below in getattr(command, "commands", {}).values():
-        bound_numbers(below)
+    if any(getattr(option, "hidden", False) for option in command.params) and not hasattr(command, "commands"):
+        command.params += click_options(HELP_ALL)
 
 
 def _checked(callback: Callable[..., Any]) -> Callable[..., Any]:
@@ -147,68 +142,12 @@ def _show_all(context: typer.Context, wanted: bool) -> None:
         raise typer.Exit
 
 
-def _flag(name: str, help: str, **more: Any) -> Parameter:
-    option = typer.Option(f"--{name.replace('_', '-')}", help=help, **more)
-    return Parameter(name, Parameter.KEYWORD_ONLY, default=False, annotation=Annotated[bool, option])
-
-
-QUIET = _flag("quiet", "Say errors and warnings alone.")
-HELP_ALL = _flag("help_all", "Show this with all options.", is_eager=True, callback=_show_all, expose_value=False)
-DATA = ("--json", "--yaml", "--dot", "--schema")  # options that ask for data on stdout
-
-
-def add_quiet(command: Any) -> None:
-    """Give a command, or every command below a click group, the flag `--quiet`; exit codes stay what they are."""
-    below = getattr(command, "commands", None)
-    for each in (below or {}).values():
-        add_quiet(each)
-    if below is None:
-        data = [option.name for option in command.params if set(option.opts) & set(DATA)]
-        command.params += click_options(QUIET)
-        command.callback = _hushed(command.callback, data)
-
-
-def add_help_all(command: Any) -> None:
-    """Give every command that keeps some of its options off the first page of its help the flag that shows them."""
-    for below in getattr(command, "commands", {}).values():
-        add_help_all(below)
-    if any(getattr(option, "hidden", False) for option in command.params) and not hasattr(command, "commands"):
-        command.params += click_options(HELP_ALL)
-
-
-def _hushed(callback: Callable[..., Any], data: list[str]) -> Callable[..., Any]:
-    @wraps(callback)
-    def call(*values: Any, quiet: bool = False, **options: Any) -> Any:
-        if not quiet:
-            return callback(*values, **options)
-        with silence(stdout=not any(options.get(name) for name in data)):
-            return callback(*values, **options)
-
-    return call
-
-
-@contextmanager
-def silence(*, stdout: bool) -> Iterator[None]:
-    """Drop what is printed on stderr but warnings, and on stdout if wanted."""
-    errors = sys.stderr
-
-    def warn(
-        message: Warning | str,
-        category: type[Warning],
-        filename: str,
-        lineno: int,
-        file: TextIO | None = None,
-        line: str | None = None,
-    ) -> None:
-        errors.write(warnings.formatwarning(message, category, filename, lineno, line))
-
-    with open(os.devnull, "w") as nowhere, warnings.catch_warnings(), ExitStack() as held:  # noqa: PTH123
-        warnings.showwarning = warn
-        held.enter_context(errors_to(errors))
-        held.enter_context(redirect_stderr(nowhere))
-        if stdout:
-            held.enter_context(redirect_stdout(nowhere))
-        yield
+HELP_ALL = Parameter(
+    "help_all", Parameter.KEYWORD_ONLY, default=False,
+    annotation=Annotated[bool, typer.Option(
+        "--help-all", help="Show this with all options.", is_eager=True, callback=_show_all, expose_value=False
+    )],
+)  # fmt: skip
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.text import Text
 
 from echomodel.progress import StageListener
-from echousd.cli.output import safe
+from echousd.cli.output import quiet, safe
 
 TITLES = {
     "read": "Reading the graph",
@@ -32,10 +32,10 @@ LONG = 100  # steps of a stage of which a log hears every tenth part
 
 
 class Terminal(Console):
-    """A rich console of `safe` texts, cells of tables included, and without markup unless it is asked for."""
+    """A rich console of `safe` texts, cells of tables included, without markup unless it is asked for; or quiet."""
 
     def __init__(self, *, markup: bool = False, **options: Any) -> None:
-        super().__init__(markup=markup, highlight=False, **options)
+        super().__init__(markup=markup, highlight=False, quiet=quiet.get(), **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
         """The text as rich shows it, without characters that a terminal obeys."""
@@ -51,7 +51,7 @@ def progress_bar() -> Iterator[StageListener]:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     tasks: dict[str, Any] = {}
     tenths: dict[str, int] = {}
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+    with Progress(*columns, console=console, disable=console.quiet or not console.is_terminal) as bar:
 
         def listen(stage: str, done: int, total: int) -> None:
             title = TITLES.get(stage, stage)

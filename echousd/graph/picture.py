@@ -1,4 +1,4 @@
-"""A picture of a scene graph (matplotlib) and its Graphviz text: objects as boxes, relations as arrows."""
+"""A picture of a scene graph (matplotlib): objects as boxes, relations as arrows."""
 
 from __future__ import annotations
 
@@ -179,28 +179,6 @@ def _draw_legend(figure: Any, used: set[str], tall: float) -> None:
             frameon=False,
             fontsize=8.5,
         )
-
-
-def to_dot(graph: SceneGraph) -> str:
-    """The graph in Graphviz' language, one statement a line."""
-
-    def quoted(text: str) -> str:
-        return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
-
-    lines = [f"digraph {quoted(graph.room.type)} {{", '  node [shape=box, style="rounded,filled", fontname=Helvetica];']
-    for node in graph.nodes:
-        colour = vocabulary().category(node.category).colour
-        label = node.name if node.name == node.category else f"{node.name}\n{node.category}"
-        lines.append(f"  {quoted(node.name)} [label={quoted(label)}, fillcolor={quoted(colour)}];")
-    for arrow in arrows(graph):
-        kind = vocabulary().predicate_kind(arrow.kind)
-        heads = ", dir=none" if arrow.both_ways else ""
-        label = ", ".join(arrow.words)
-        lines.append(
-            f"  {quoted(arrow.subject)} -> {quoted(arrow.object)} "
-            f"[label={quoted(label)}, color={quoted(kind.colour)}, style={kind.line}{heads}];"
-        )
-    return "\n".join([*lines, "}"]) + "\n"
 
 
 WIDTH, HEIGHT = 1.9, 0.62  # of a box, inches

@@ -69,11 +69,6 @@ class SceneGraph(PlainModel):
         """What is said of the places of single objects, in the order of the nodes."""
         return tuple(placed for node in self.nodes for placed in node.placements)
 
-    def relations_of(self, name: str) -> tuple[Relation, ...]:
-        """The relations that `name` takes part in, as subject or object."""
-        self.node(name)
-        return tuple(r for r in self.relations if name in (r.subject, r.object))
-
     # -- edits ---------------------------------------------------------------------------------------------------------
 
     def add_node(self, node: Node | str, category: str | None = None, **fields: Any) -> SceneGraph:
@@ -105,14 +100,6 @@ class SceneGraph(PlainModel):
             nodes = [n.replaced(between=tuple(map(renamed, n.between))) if n.between else n for n in nodes]
         return self.replaced(nodes=tuple(nodes), relations=relations)
 
-    def rename_node(self, name: str, new_name: str) -> SceneGraph:
-        """With a node, and the relations it takes part in, under another name."""
-        return self.update_node(name, name=new_name)
-
-    def relabel_node(self, name: str, category: str) -> SceneGraph:
-        """With another category for a node."""
-        return self.update_node(name, category=category)
-
     def lock(self, name: str, locked: bool = True) -> SceneGraph:
         """With a node that stays as it is (or, `locked=False`, no longer has to)."""
         return self.update_node(name, locked=locked)
@@ -132,14 +119,6 @@ class SceneGraph(PlainModel):
         """Without a relation."""
         gone = self.relation(subject, predicate, object)
         return self.replaced(relations=tuple(r for r in self.relations if r is not gone))
-
-    def change_relation(
-        self, subject: str, predicate: str, object: str, new_predicate: str, confidence: float | None = None
-    ) -> SceneGraph:
-        """With another predicate (and confidence, where given) for one relation."""
-        old = self.relation(subject, predicate, object)
-        new = Relation(subject, new_predicate, object, old.confidence if confidence is None else confidence)
-        return self.replaced(relations=tuple(new if r is old else r for r in self.relations))
 
     def relation(self, subject: str, predicate: str, object: str) -> Relation:
         """The relation with these ends and this predicate (or alias); raises `GraphError`."""

@@ -37,7 +37,7 @@ def wished(saved: SavedRoom, wishes: EditRequest) -> SceneGraph:
         graph = without(graph, text)
     for text in wishes.relabel:
         name, category = _named(graph, text)
-        graph = _placed(graph.relabel_node(name, category), saved, name)
+        graph = _placed(graph.update_node(name, category=category), saved, name)
     for text in wishes.add:
         graph = _added(graph, text)
     for text in wishes.relate:

@@ -91,7 +91,7 @@ Command = Callable[[Path, Path], list[str]]
 COMMANDS: dict[str, Command] = {
     "graph": lambda room, out: ["graph", f"{room}"],
     "graph --json": lambda room, out: ["graph", f"{room}", "--json"],
-    "graph --png": lambda room, out: ["graph", f"{room}", "--png", f"{out}.png"],
+    "graph -o": lambda room, out: ["graph", f"{room}", "-o", f"{out}.png"],
     "new": lambda room, out: ["new", f"{out}.yaml", "--from", f"{room}", "--force"],
     "check": lambda room, out: ["check", f"{room}"],
     "check --json": lambda room, out: ["check", f"{room}", "--json"],

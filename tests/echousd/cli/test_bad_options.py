@@ -64,7 +64,7 @@ def test_terminals_obey_nothing_that_a_file_says(echousd_command, tmp_path):
     assert "\\x1b]0;mine" in done.err
     graph = tmp_path / "graph.yaml"
     graph.write_text('room: bedroom\nobjects: {bed: {category: double_bed, attributes: {note: "\\e[2J [bold]"}}}\n')
-    for form in ("--table", "--yaml", "--json", "--dot"):
+    for form in ("--yaml", "--json"):
         assert "\x1b" not in echousd_command("graph", graph, form).out
     assert "[bold]" in echousd_command("graph", graph).out
 
@@ -78,12 +78,12 @@ def test_pictures_replace_only_pictures_of_ours(echousd_command, tmp_path):
     graph, picture = tmp_path / "graph.yaml", tmp_path / "bed.png"
     graph.write_text(ROOM)
     picture.write_bytes(b"a photo of somebody's")
-    done = echousd_command("graph", graph, "--png", picture)
+    done = echousd_command("graph", graph, "-o", picture)
     assert done.code == 2
     assert "exists and is no picture of echousd; choose another file or use --force" in done.err
     assert picture.read_bytes() == b"a photo of somebody's"
-    assert echousd_command("graph", graph, "--png", picture, "--force").code == 0
-    assert echousd_command("graph", graph, "--png", picture).code == 0  # its own
+    assert echousd_command("graph", graph, "-o", picture, "--force").code == 0
+    assert echousd_command("graph", graph, "-o", picture).code == 0  # its own
     with pytest.raises(ValueError, match="is no picture"):
         check_picture(graph, force=False)
 

@@ -29,13 +29,13 @@ def full(most, *words):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="this system limits no file's size")
-@pytest.mark.parametrize("topic", ["graph --png", "data plot", "data rooms", "new"])
+@pytest.mark.parametrize("topic", ["graph -o", "data plot", "data rooms", "new"])
 def test_what_was_begun_disappears(tmp_path, topic):
     (tmp_path / "graph.yaml").write_text(GRAPH)
     out = tmp_path / "out"
     out.mkdir()
     words = {
-        "graph --png": ("graph", tmp_path / "graph.yaml", "--png", out / "graph.png"),
+        "graph -o": ("graph", tmp_path / "graph.yaml", "-o", out / "graph.png"),
         "data plot": ("data", "plot", tmp_path / "rooms.json", "-o", out / "rooms.png"),
         "data rooms": ("data", "rooms", "-o", out / "rooms.json", "--count", "3"),
         "new": ("new", out / "graph.usda", "--from", tmp_path / "graph.yaml"),

@@ -130,29 +130,23 @@ def test_graph_gathers_what_one_object_says_with_one_word(echousd_command, tmp_p
         "│   ├── close by b",
         "│   └── left b, c",
     ]
-    sure = load_graph(tmp_path / "g.yaml").change_relation("a", "left", "b", "left", 0.25)
+    sure = load_graph(tmp_path / "g.yaml").unrelate("a", "left", "b").relate("a", "left", "b", 0.25)
     (tmp_path / "g.json").write_text(sure.to_json())
-    assert "left b (0.25), c" in echousd_command("graph", tmp_path / "g.json").out
-
-
-def test_graph_prints_tables(echousd_command):
-    out = echousd_command("graph", SAMPLES / "bedroom.usda", "--table").out
-    assert re.search(r"reading_lamp +table_lamp", out)
-    assert re.search(r"wardrobe +taller_than +bed +1", out)
+    assert "left c, b (0.25)" in echousd_command("graph", tmp_path / "g.json").out
 
 
 def test_graph_prints_text_forms(echousd_command):
     graph = load_graph(SAMPLES / "study.yaml")
     assert echousd_command("graph", SAMPLES / "study.usda", "--json").out == graph.to_json()
     assert echousd_command("graph", SAMPLES / "study.usda", "--yaml").out == graph.to_yaml()
-    assert echousd_command("graph", SAMPLES / "study.usda", "--dot").out.startswith('digraph "study" {\n')
 
 
 def test_graph_draws_pictures(echousd_command, tmp_path):
     png, svg = tmp_path / "g.png", tmp_path / "g.svg"
-    outcome = echousd_command("graph", SAMPLES / "study.yaml", "--png", png, "--svg", svg)
-    assert (outcome.code, outcome.out) == (0, "")
-    assert outcome.err == f"wrote {png}: study, 7 objects, 10 relations\nwrote {svg}: study, 7 objects, 10 relations\n"
+    for picture in (png, svg):
+        outcome = echousd_command("graph", SAMPLES / "study.yaml", "-o", picture)
+        assert (outcome.code, outcome.out) == (0, "")
+        assert outcome.err == f"wrote {picture}: study, 7 objects, 10 relations\n"
     with Image.open(png) as image:
         assert min(image.size) > 400
     assert svg.read_text().startswith("<?xml")
@@ -222,9 +216,9 @@ def test_graph_of_several_rooms(echousd_command, tmp_path):
         (["gone.usda"], "gone.usda: no such file"),
         (["gone.json"], "gone.json: no such file or directory"),
         (["notes.txt"], "notes.txt: extension '.txt', allowed: .yaml"),
-        ([SAMPLES / "study.yaml", "--json", "--dot"], "--json and --dot exclude each other"),
-        ([SAMPLES / "study.yaml", "--png", "x.jpg"], "x.jpg: extension '.jpg', allowed: .png"),
-        ([SAMPLES / "study.yaml", "--png", "gone/x.png"], "gone/x.png: No such file or directory"),
+        ([SAMPLES / "study.yaml", "--json", "--yaml"], "--json and --yaml exclude each other"),
+        ([SAMPLES / "study.yaml", "-o", "x.jpg"], "x.jpg: extension '.jpg', allowed: .png"),
+        ([SAMPLES / "study.yaml", "-o", "gone/x.png"], "gone/x.png: No such file or directory"),
     ],
 )
 def test_graph_with_bad_input(echousd_command, tmp_path, monkeypatch, words, text):

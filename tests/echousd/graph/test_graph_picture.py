@@ -10,7 +10,7 @@ from PIL import Image
 
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, SceneGraph, load_graph, starting_graph
-from echousd.graph.picture import HEIGHT, WIDTH, arrows, draw_graph, places, to_dot
+from echousd.graph.picture import HEIGHT, WIDTH, arrows, draw_graph, places
 
 
 def overlaps(place: np.ndarray) -> int:
@@ -91,15 +91,6 @@ def test_a_large_graph_still_makes_a_picture(tmp_path):
     draw_graph(SceneGraph("study", nodes, relations), tmp_path / "g.png")
     with Image.open(tmp_path / "g.png") as image:
         assert max(image.size) <= 42 * 160
-
-
-def test_dot_quotes_what_it_must():
-    graph = SceneGraph("study", (Node("a", "desk"), Node("b", "chair")), (Relation("b", "near", "a"),))
-    assert to_dot(graph) == (
-        'digraph "study" {\n  node [shape=box, style="rounded,filled", fontname=Helvetica];\n'
-        '  "a" [label="a\\ndesk", fillcolor="#f3e9c9"];\n  "b" [label="b\\nchair", fillcolor="#e2efdc"];\n'
-        '  "b" -> "a" [label="close by", color="#7a7f87", style=solid, dir=none];\n}\n'
-    )
 
 
 def test_the_samples_are_drawn_without_overlap():

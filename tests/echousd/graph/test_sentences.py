@@ -88,7 +88,7 @@ def test_between_two_others_told_twice_in_either_order_is_no_contradiction():
 
 def test_what_an_object_stands_between_goes_and_is_renamed_with_it():
     graph = read("table between sofa and armchair")
-    assert graph.rename_node("sofa", "couch").node("table").between == ("couch", "armchair")
+    assert graph.update_node("sofa", name="couch").node("table").between == ("couch", "armchair")
     assert graph.remove_node("armchair").node("table").between is None
 
 

@@ -54,9 +54,9 @@ def test_a_home_is_whole(made, echousd_command, tmp_path):
     assert len(palettes) == 1
     done = echousd_command("check", folder)
     assert done.code == 0, done.out + done.err
-    assert "ok  plan     1 of 1 relations of rooms kept" in done.out
-    assert "ok  ways     2 of 2 rooms reached from the entrance" in done.out
-    assert "ok  room     bedroom" in done.out
+    assert "ok  plan   1 of 1 relations of rooms kept" in done.out
+    assert "ok  ways   2 of 2 rooms reached from the entrance" in done.out
+    assert "ok  room   bedroom" in done.out
     done = echousd_command("check", folder, "--json")
     assert json.loads(done.out)["reached"]["bedroom"] > 0.5
     assert echousd_command("render", folder, "-o", tmp_path / "top.png", "--view", "top", "--size", "32").code == 0

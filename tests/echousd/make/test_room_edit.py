@@ -117,7 +117,7 @@ def test_all_layouts_of_a_room_are_kept(tmp_path):
 
 def test_model_is_told_what_was_edited(root):
     model = StandIn()
-    graph = small_graph().unrelate("wardrobe", "taller_than", "bed").relabel_node("pendant", "table_lamp")
+    graph = small_graph().unrelate("wardrobe", "taller_than", "bed").update_node("pendant", category="table_lamp")
     graph = graph.add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
     edit(root, graph, model=model)
     assert len(model.edits) == 2  # the layout branch and the shape branch
@@ -176,7 +176,7 @@ def test_owner_of_a_shared_asset_may_go(root):
 
 def test_another_category_gets_another_shape(root):
     before = hashes(root.parent)
-    edit(root, small_graph().relabel_node("wardrobe", "double_bed"), model=StandIn(), place=False).save(
+    edit(root, small_graph().update_node("wardrobe", category="double_bed"), model=StandIn(), place=False).save(
         root.parent, preview=False
     )
     after = hashes(root.parent)

@@ -136,7 +136,7 @@ def test_namespace_editor_renames(graph, data, referenced):
     editor = Usd.NamespaceEditor(stage)
     editor.RenamePrim(stage.GetPrimAtPath(f"{root}/Objects/{old}"), "renamed_object")
     assert editor.ApplyEdits()
-    expected = graph.rename_node(old, "renamed_object")
+    expected = graph.update_node(old, name="renamed_object")
     found = read_graph(stage)
     if referenced:  # a relocated prim comes last among its siblings
         assert {node.name: node for node in found.nodes} == {node.name: node for node in expected.nodes}

@@ -117,7 +117,7 @@ EDITS = {
     "lock": (lambda g: g.lock("bed"), {"/Room/Objects/bed.echo:locked"}),
     "unlock": (lambda g: g.lock("stand", False), {"/Room/Objects/stand.echo:locked"}),
     "relabel": (
-        lambda g: g.relabel_node("bed", "single_bed"),
+        lambda g: g.update_node("bed", category="single_bed"),
         {"/Room/Objects/bed.echo:category", "/Room/Objects/bed.semantics:labels:category"},
     ),
     "attribute": (
@@ -136,7 +136,7 @@ EDITS = {
         },
     ),
     "confidence": (
-        lambda g: g.change_relation("closet", "taller_than", "bed", "taller_than", confidence=0.25),
+        lambda g: g.unrelate("closet", "taller_than", "bed").relate("closet", "taller_than", "bed", 0.25),
         {"/Room/SceneGraph/closet__taller_than__bed.echo:confidence"},
     ),
     "remove an object with foreign content": (
@@ -186,7 +186,7 @@ def test_an_object_taken_out_comes_back_with_what_was_on_it():
 
 def test_another_predicate_renames_the_prim_in_place():
     layer = graph_layer(GRAPH)
-    update_graph(layer, GRAPH.change_relation("stand", "left", "bed", "right"))
+    update_graph(layer, GRAPH.unrelate("stand", "left", "bed").relate("stand", "right", "bed"))
     names = [spec.name for spec in layer.GetPrimAtPath("/Room/SceneGraph").nameChildren]
     assert names == ["stand__right__bed", "closet__taller_than__bed"]
 

@@ -144,7 +144,7 @@ def test_what_changed_is_shown_as_made_and_told(room):
 def test_edits_mute_what_they_change(room):
     import_job(room, job_of(room), name="oil", preview=False)
     saved = read_room(room)
-    graph = saved.graph.relabel_node("pendant", "wardrobe")
+    graph = saved.graph.update_node("pendant", category="wardrobe")
     with pytest.warns(UserWarning, match="pendant changed or gone since painted"):
         edit(room, graph, model=StandIn(), shapes="boxes", place=False).save(room.parent, preview=False)
     assert material(room, "pendant") != "oil_pendant"
@@ -163,7 +163,7 @@ def test_edits_mute_what_they_change(room):
 def test_an_edit_that_goes_elsewhere_takes_the_look_along(room, tmp_path):
     import_job(room, job_of(room), name="oil", preview=False)
     before = {path: path.read_bytes() for path in room.parent.rglob("*") if path.is_file()}
-    graph = read_room(room).graph.relabel_node("pendant", "wardrobe")
+    graph = read_room(room).graph.update_node("pendant", category="wardrobe")
     made = edit(room, graph, model=StandIn(), shapes="boxes", place=False)
     with pytest.warns(UserWarning, match="pendant changed or gone since painted"):
         other = made.save(tmp_path / "far/away", preview=False)
