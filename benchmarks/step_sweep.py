@@ -14,8 +14,8 @@ from echomodel.compact.sampling import wholeness
 from echomodel.data.roomset import with_known_words
 from echomodel.data.shapeset import ShapeSet
 from echomodel.echo import EchoModel
+from echomodel.floors import outside
 from echomodel.graph import GraphBatch
-from echomodel.guidance import outside
 from echomodel.metrics.pointsets import chamfer, surface_points
 from echomodel.roomboxes import RoomBoxes, read_rooms
 from echomodel.rules import label_rooms, verdicts

@@ -71,6 +71,7 @@ def graph_batch(graph: SceneGraph) -> GraphBatch:
         placements=[
             (one.subject, kinds.index(one.placement), *(one.others or (-1, -1))) for one in stated_placements(graph)
         ],
+        height=graph.room.height,
     )
 
 

@@ -242,7 +242,7 @@ def borrowed(room: RoomBoxes, other: RoomBoxes, rng: np.random.Generator) -> Roo
 
 BASES: dict[str, tuple[Layouts, str]] = {  # name -> who, and what it is in a few words
     "network": (networks(load_model), "the compact network from noise, unguided"),
-    "guided": (networks(load_model, None), "the same, pulled by the rules' margins while it samples"),
+    "guided": (networks(load_model, None), "the same, moved down what the terms miss, late and afterwards"),
     "shuffled": (
         networks(shuffled_model),
         "the same network, the numbers of each of its tensors in another order: untrained",

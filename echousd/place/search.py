@@ -16,8 +16,9 @@ from scipy.optimize import linear_sum_assignment
 
 from echomodel.boxes import Boxes
 from echomodel.objective import TERMS, Plan, Term, unreached
-from echomodel.objective.copies import OF_WORDS, copies_of, looks_at
+from echomodel.objective.copies import copies_of, looks_at
 from echomodel.objective.plan import Found, found, nobody
+from echomodel.objective.table import PRICE
 from echomodel.rules import margins
 from echousd.place.geometry import beyond, depths
 from echousd.place.proposals import ahead, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
@@ -229,10 +230,7 @@ class Search:
         return [fault.object for fault in unreached(self._plan(position, yaw))]
 
     def _plan(self, position: np.ndarray, yaw: np.ndarray) -> Plan:
-        room = self.setting.plan
-        out = replace(room, position=torch.from_numpy(position), yaw=torch.from_numpy(yaw))
-        vars(out).update({name: getattr(room, name) for name in OF_WORDS})
-        return out
+        return self.setting.plan.at(torch.from_numpy(position), torch.from_numpy(yaw))
 
     def reseated(self, state: State, there: np.ndarray, i: int) -> State:
         """The state with those who stand around box i at one of the ways in which as many sit there."""
@@ -539,10 +537,6 @@ def cost_of(room: Plan) -> float:
     """What a plan of one room costs by all terms."""
     with torch.no_grad():
         return float(priced([(term, term.find(room)) for term in TERMS], room)[1].sum())
-
-
-# What a broken term costs, and a unit that is missed of it, by its kind.
-PRICE = {"relations": (6.0, 4.0), "physics": (3.0, 10.0), "living": (2.0, 1.0), "composition": (1.5, 1.0)}
 
 
 def part_of(room: Plan, there: np.ndarray) -> Plan:

@@ -48,8 +48,8 @@ class LayoutConfig:
         objective: what the network is trained to predict; `flow` is rectified flow.
         steps: default number of sampling steps.
         sampler: default sampler.
-        guidance: default step length of the relation guidance, 0 = off (see `echomodel.guidance`).
-        guidance_rounds: its steps per call of the denoiser.
+        guidance: default of the first step of the guidance, metres and radians, 0 = off (see `echomodel.guidance`).
+        guidance_rounds: its steps per call of the denoiser in the last part of the sampling.
     """
 
     width: int = 192

@@ -159,6 +159,15 @@ def footprint(size: Tensor, position: Tensor, yaw: Tensor) -> Tensor:
     return outline(size[:, [0, 2]] / 2, yaw, SIDES) + position[:, None, [0, 2]]
 
 
+def outside(boxes: Boxes, floor: Tensor) -> Tensor:
+    """How far the corners and the middles of the sides lie beyond the walls: (N, 8) metres, 0 where unknown.
+
+    Arguments:
+        boxes: N boxes; none is asked to shrink. floor: (N, K, 2) float32, corners of the floor under each.
+    """
+    return (-signed_distance(footprint(boxes.size.detach(), boxes.position, boxes.yaw), floor)).clamp_min(0)
+
+
 def plan_features(floor: Tensor) -> Tensor:
     """What a floor looks like: (S, K, 2) -> (S, 6 + GRID^2), zeros where it is unknown.
 

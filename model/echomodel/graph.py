@@ -30,6 +30,7 @@ class GraphBatch:
         openings: (S, O, ROW) float32, doors and windows (`echomodel.floors`), padded with NaN; None = none.
         placements: (P, 4) int64, [subject, position in the vocabulary's placements, and the two other nodes that it
             names, -1 where it names none]; None = none.
+        height: (S,) float32, of the ceilings, metres, NaN = unknown, which None is for all; no network hears it.
 
     Raises ValueError where a tensor has the wrong shape, dtype or device.
     """
@@ -42,6 +43,7 @@ class GraphBatch:
     names: tuple[str, ...] | None = None
     openings: Tensor = None  # type: ignore[assignment]
     placements: Tensor = None  # type: ignore[assignment]
+    height: Tensor = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         nodes, scenes = len(self.category), len(self.room_type)
@@ -49,6 +51,8 @@ class GraphBatch:
             object.__setattr__(self, "openings", self.floor.new_zeros(scenes, 0, ROW))
         if self.placements is None:
             object.__setattr__(self, "placements", self.triplets.new_zeros(0, 4))
+        if self.height is None:
+            object.__setattr__(self, "height", self.floor.new_full((scenes,), torch.nan))
         expected: dict[str, tuple[tuple[int, ...], torch.dtype]] = {
             "category": ((nodes,), torch.int64),
             "triplets": ((len(self.triplets), 3), torch.int64),
@@ -56,6 +60,7 @@ class GraphBatch:
             "scene": ((nodes,), torch.int64),
             "room_type": ((scenes,), torch.int64),
             "floor": ((scenes, max(1, self.floor.shape[1] if self.floor.ndim == 3 else 4), 2), torch.float32),
+            "height": ((scenes,), torch.float32),
             "openings": ((scenes, self.openings.shape[1] if self.openings.ndim == 3 else 0, ROW), torch.float32),
         }
         for name, (shape, dtype) in expected.items():
@@ -73,7 +78,7 @@ class GraphBatch:
         cls, category: Sequence[int] | Tensor, triplets: Sequence[Sequence[int]] | Tensor = (), *, room_type: int = 0,
         floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | None = None,
         names: Sequence[str] | None = None, openings: Sequence[Opening] = (),
-        placements: Sequence[Sequence[int]] | Tensor = (),
+        placements: Sequence[Sequence[int]] | Tensor = (), height: float | None = None,
     ) -> GraphBatch:  # fmt: skip
         """One scene graph from plain lists; arguments as in the class.
 
@@ -87,6 +92,7 @@ class GraphBatch:
             names=None if names is None else tuple(names),
             openings=opening_rows(() if floor is None else openings, corners.numpy())[None],
             placements=torch.as_tensor(placements, dtype=torch.int64).reshape(-1, 4),
+            height=torch.tensor([torch.nan if height is None else height]),
         )  # fmt: skip
 
     @classmethod
@@ -99,8 +105,8 @@ class GraphBatch:
             torch.as_tensor([] if relations is None else relations, dtype=torch.int64).reshape(-1, 3),
             room_type=words.room_type_id(room.room_type),
             floor=room.floor_polygon if len(room.floor_polygon) else None,
-            openings=room.openings,
-        )
+            openings=room.openings, height=room.height,
+        )  # fmt: skip
 
     @classmethod
     def pack(cls, graphs: Iterable[GraphBatch]) -> GraphBatch:
@@ -122,6 +128,7 @@ class GraphBatch:
             floor=padded([graph.floor for graph in graphs]),
             names=None if any(n is None for n in names) else tuple(name for n in names for name in n or ()),
             openings=padded_rows([graph.openings for graph in graphs]), placements=torch.cat(placements),
+            height=torch.cat([graph.height for graph in graphs]),
         )  # fmt: skip
 
     def unpack(self) -> list[GraphBatch]:
@@ -135,7 +142,7 @@ class GraphBatch:
             graph = GraphBatch(
                 self.category[nodes], triplets, torch.zeros_like(self.scene[nodes]), self.room_type[room],
                 trimmed(self.floor[room]), names, _there(self.openings[room]),
-                _shifted(self.placements[placed == number], -start),
+                _shifted(self.placements[placed == number], -start), self.height[room],
             )  # fmt: skip
             out.append(graph)
             start += count

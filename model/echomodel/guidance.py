@@ -1,151 +1,128 @@
-"""Guidance: at every step boxes are nudged towards relations and placements, onto the floor, out of doorways, apart.
+"""Guidance: boxes are moved down the slope of what the terms of the objective miss, while and after they are drawn.
 
-Margins of the objective that losses use as well: `echomodel.objective.physics.apart` (collisions, metres) here and in
-`training`, all others by `TERMS` in `training/living_loss.py`.
+This is reconstruction guidance (Chung et al. 2023, posterior sampling) with the objective as the measurement. None is
+asked to grow or shrink, and each stands at once at the height of what carries it.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxScale
-from echomodel.floors import footprint, kept_free, signed_distance
-from echomodel.objective import physics
-from echomodel.objective.plan import Plan
-from echomodel.rules import fronts, margins, measured
-from echomodel.rules.placements import Spread, Stated, Walls, margin_of
+from echomodel.graph import GraphBatch
+from echomodel.objective import KINDS, Plan, missed
+from echomodel.objective.support import ON_CEILING, ON_FLOOR
+from echomodel.openings import HINGES, STEP, Opening, inward_normal
+from echomodel.rules.placements import Stated
 from echomodel.samplers import Predict
 from echomodel.vocabulary import vocabulary
 
-SLACK = 0.03  # metres or ratio that the guidance asks for beyond what the rule does
+LATE = 0.3  # level of noise below which boxes are where they will be, but for what guidance moves
+AFTER = 40  # steps after the last of the sampler
+MOMENTS = (0.8, 0.95)  # of Adam
+LEAST = 0.02  # share of the first step that the last one has
+BEYOND = 0.01  # metres or ratio that is asked for beyond a term's slack
 
 
-def relation_guided(
-    predict: Predict, triplets: Tensor, scale: BoxScale, *, rules: str, strength: float, rounds: int = 2,
-    floor: Tensor | None = None, openings: Tensor | None = None, category: Tensor | None = None,
-    placements: Tensor | None = None, scene: Tensor | None = None,
-) -> Predict:  # fmt: skip
-    """Follow `predict` by gradient steps on the missed margins of relations and placements, in the normalised space.
-
-    This is reconstruction guidance (Chung et al. 2023, posterior sampling) with the rules' margins as the measurement;
-    nodes at level 0 stay as they are, and the noisier a node the smaller its step.
+def guided(predict: Predict, plan: Plan, scale: BoxScale, *, strength: float, rounds: int) -> Predict:
+    """Follow `predict` by steps on what its clean boxes miss, from `LATE` on; nodes at level 0 stay as they are.
 
     Arguments:
-        predict: the denoiser's clean sample (N, 8).
-        triplets: (E, 3) int64; those that the rules do not measure are ignored.
-        scale: what the numbers of the boxes stand for.
-        rules: name of the rule set.
-        strength: length of a step, 0.1 is a good start.
-        rounds: steps after each call of the denoiser.
-        floor: (N, K, 2) float32, corners of the floor under each node (`GraphBatch.floor`), NaN = unknown; None = all
-            unknown.
-        openings: (N, O, ROW) float32, what each node must keep out of the way of (`echomodel.floors`), NaN = none;
-            None = no node of any.
-        category: (N,) int64, whose fronts `symmetrical_to` and the placements ask for; None = none has one.
-        placements: (P, 4) int64 (`GraphBatch.placements`), which need `category`; None = none.
-        scene: (N,) int64, the room of each node: nodes of one room are kept apart; needs `category`; None = none are.
+        predict: the denoiser's clean sample (N, 8). plan: of the rooms (`plan_of_graph`), wherever its boxes stand.
+        scale: what the numbers of the boxes stand for. strength, rounds: as in `mended`.
     """
-    known = torch.tensor(sorted(measured(rules)), device=triplets.device)
-    wanted = triplets[torch.isin(triplets[:, 1], known)]
-    stated = [] if placements is None or category is None else _stated(placements, category, floor)
-    if not len(wanted) and floor is None and openings is None and not stated and scene is None:
-        return predict
-    words = vocabulary()
-    headed = None
-    if category is not None:
-        headed = fronts(words.categories[k].name for k in category.tolist()).to(category.device)
-    weights = [entry.emphasis for entry in words.predicates]
-    emphasis = torch.tensor(weights, device=wanted.device)[wanted[:, 1]]
 
-    def guided(x: Tensor, level: Tensor) -> Tensor:
+    def pulled(x: Tensor, level: Tensor) -> Tensor:
         clean = predict(x, level)
-        weight = ((1 - level) * (level > 0))[:, None]
-        if not bool(weight.any()):  # in nothing but noise no step has a length
+        if not rounds or bool((level > LATE).any()):
             return clean
-        strangers = None
-        if scene is not None and category is not None:
-            strangers = _strangers(Boxes.decode(clean.detach(), scale), category, scene, triplets)
-        for _ in range(rounds):
-            with torch.enable_grad():
-                free = clean.detach().requires_grad_()
-                boxes = Boxes.decode(free, scale)
-                missed = (SLACK - margins(boxes, wanted, rules=rules, fronts=headed, rigid=True)).clamp(min=0)
-                # the logarithm bounds the pull of a relation that is missed by far
-                pull = (torch.log1p(missed / SLACK) * emphasis).sum()
-                if floor is not None:
-                    # one pull a box: it may overhang twice
-                    beyond = (outside(boxes, floor).square().sum(1) + 1e-12).sqrt()
-                    pull = pull + torch.log1p(beyond / SLACK).sum()
-                if openings is not None:
-                    rigid = Boxes(boxes.size.detach(), boxes.position, boxes.yaw)  # none is asked to shrink
-                    blocked = (SLACK - kept_free(rigid, openings)).clamp_min(0)
-                    pull = pull + torch.log1p(blocked / SLACK).sum()
-                if strangers is not None:  # a room's pieces run into each other where it is nearly drawn
-                    plan = replace(strangers, size=boxes.size.detach(), position=boxes.position, yaw=boxes.yaw)
-                    vars(plan).update(couples=tuple(found.to(free.device) for found in strangers.couples))
-                    seen = physics.apart(plan)
-                    near = (1 - level[seen.who]).square()
-                    pull = pull + (torch.log1p((SLACK - seen.margin).clamp_min(0) / SLACK) * near).sum()
-                for group in stated:
-                    pull = pull + torch.log1p((SLACK - group(boxes)).clamp_min(0) / SLACK).sum()
-                (slope,) = torch.autograd.grad(pull * SLACK, free)
-            norm = slope.norm(dim=1, keepdim=True).clamp_min(1e-6)
-            clean = clean - strength * weight * slope * (1 / norm).clamp(max=1 / 0.05)
-        return clean
+        drawn = Boxes.decode(clean, scale)
+        there = mended(plan, drawn, strength=strength, rounds=rounds, given=level == 0).encode(scale)
+        return torch.where((level > 0)[:, None], torch.cat([clean[:, :3], there[:, 3:]], 1), clean)
 
-    return guided
+    return pulled
 
 
-def _strangers(boxes: Boxes, category: Tensor, scene: Tensor, triplets: Tensor) -> Plan:
-    """The plan of boxes as they were drawn last, which says what belongs together and may overlap; on the CPU."""
-    boxes = boxes.to("cpu")
-    rows, rooms = vocabulary().categories, int(scene.max()) + 1 if len(scene) else 0
-    return Plan(
-        tuple(rows[number] for number in category.tolist()), boxes.size, boxes.position, boxes.yaw, scene.cpu(),
-        torch.full((rooms, 4, 2), torch.nan), ((),) * rooms, triplets.cpu(), torch.zeros(len(scene), dtype=torch.bool),
-    )  # fmt: skip
+def mended(plan: Plan, boxes: Boxes, *, strength: float, rounds: int, given: Tensor | None = None) -> Boxes:
+    """Boxes after so many steps of Adam (Kingma & Ba 2015) on their places and headings, down what all terms miss.
 
-
-def _stated(placements: Tensor, category: Tensor, floor: Tensor | None) -> list[Callable[[Boxes], Tensor]]:
-    """The margins (K,) of all placements as functions of the boxes; those of one kind and floor are measured at once.
-
-    What needs walls where none are known is left out.
+    Arguments:
+        plan: of N boxes of S rooms, wherever they stand. boxes: N, where they are drawn.
+        strength: of the first step, metres and radians; the steps become shorter and shorter.
+        given: (N,) bool, boxes that stay; None = none.
     """
-    words, groups = vocabulary(), defaultdict(list)
-    for row in placements.tolist():
-        corners = None if floor is None else floor[row[0]].double().cpu().numpy()
-        key = b"" if corners is None else corners[np.isfinite(corners).all(1)].tobytes()
-        groups[row[1], int(category[row[0]]), key].append(row)
-    out: list[Callable[[Boxes], Tensor]] = []
-    for (kind, number, key), rows in groups.items():
-        corners = np.frombuffer(key).reshape(-1, 2).copy()
-        walls = Walls(corners).to(category.device) if len(corners) else None
-        if walls is None and not words.placements[kind].others:
-            continue
-        nodes = [torch.tensor(column, device=category.device) for column in zip(*rows, strict=True)]
-        named = [n for n in (nodes[0], *nodes[2:]) if int(n[0]) >= 0]
-        told = Stated(words.placements[kind].name, 0, tuple(range(1, len(named))))
-        out.append(partial(_placement_margin, told, named, walls, words.categories[number].name))
+    device, drawn = boxes.yaw.device, boxes.to("cpu")
+    boxes = Boxes(drawn.size.double(), drawn.position.double(), drawn.yaw.double())  # rounding would choose the side
+    stays = torch.zeros(len(boxes), dtype=torch.bool) if given is None else given.cpu()
+    start = replace(
+        plan, size=boxes.size, position=boxes.position, yaw=boxes.yaw, given=stays, floor=plan.floor.double()
+    )
+    height = torch.where(stays, boxes.position[:, 1], heights(start))
+    start = start.at(torch.stack([boxes.position[:, 0], height, boxes.position[:, 2]], 1), boxes.yaw)
+    place = torch.cat([boxes.position[:, [0, 2]], boxes.yaw[:, None]], 1)
+    mean, square = torch.zeros_like(place), torch.zeros_like(place)
+    for number in range(rounds):
+        with torch.enable_grad():
+            free = place.detach().requires_grad_()
+            pull = missed(start.at(torch.stack([free[:, 0], height, free[:, 1]], 1), free[:, 2]), KINDS, BEYOND)
+            (slope,) = torch.autograd.grad(pull, free, allow_unused=True, materialize_grads=True)
+        mean = MOMENTS[0] * mean + (1 - MOMENTS[0]) * slope
+        square = MOMENTS[1] * square + (1 - MOMENTS[1]) * slope.square()
+        step = mean / (1 - MOMENTS[0] ** (number + 1)) / ((square / (1 - MOMENTS[1] ** (number + 1))).sqrt() + 1e-8)
+        rate = strength * (1 - (1 - LEAST) * number / rounds)
+        place = torch.where(stays[:, None], place, place - rate * step)
+    moved = torch.stack([place[:, 0], height, place[:, 1]], 1)
+    return Boxes(drawn.size, moved.to(drawn.size), place[:, 2].to(drawn.size)).to(device)
+
+
+def heights(plan: Plan) -> Tensor:
+    """(N,) metres: the bottoms of boxes on the floor, on what carries them or at the ceiling, else where they are."""
+    out, carrier, high = plan.position[:, 1], plan.carrier, plan.size[:, 1]
+    out = torch.where(carrier == ON_FLOOR, 0.0, out)
+    out = torch.where((carrier == ON_CEILING) & torch.isfinite(plan.ceiling), plan.ceiling - high, out)
+    for _ in range(len(out)):
+        on = torch.where(carrier >= 0, (out + high)[carrier.clamp_min(0)], out)
+        if torch.equal(on, out):
+            break
+        out = on
     return out
 
 
-def _placement_margin(told: Stated, nodes: list[Tensor], walls: Walls | None, word: str, boxes: Boxes) -> Tensor:
-    size = boxes.size.detach()  # none is asked to shrink
-    every = [Spread(size[n].double(), boxes.position[n].double(), boxes.yaw[n].double()) for n in nodes]
-    return margin_of(told, every, walls, [word]).float()
+def plan_of_graph(graph: GraphBatch, rules: str) -> Plan:
+    """The rooms of a graph as the objective sees them, their boxes nowhere yet; on the CPU."""
+    graph, words = graph.to("cpu"), vocabulary()
+    nowhere = torch.zeros(graph.num_nodes, 3)
+    rooms = zip(graph.floor.double().numpy(), graph.openings.tolist(), strict=True)
+    kinds = [words.placements[kind].name for kind in graph.placements[:, 1].tolist()]
+    return Plan(
+        tuple(words.categories[number] for number in graph.category.tolist()), nowhere, nowhere, nowhere[:, 0],
+        graph.scene, graph.floor, tuple(openings_of(floor, rows) for floor, rows in rooms), graph.triplets,
+        torch.zeros(graph.num_nodes, dtype=torch.bool), graph.height, rules,
+        stated=tuple(Stated(kind, who, tuple(other for other in others if other >= 0))
+                     for kind, (who, _, *others) in zip(kinds, graph.placements.tolist(), strict=True)),
+    )  # fmt: skip
 
 
-def outside(boxes: Boxes, floor: Tensor) -> Tensor:
-    """How far the corners and the middles of the sides lie beyond the walls: (N, 8) metres, 0 where unknown.
+def openings_of(floor: np.ndarray, rows: Sequence[Sequence[float]]) -> tuple[Opening, ...]:
+    """The openings that rows stand for (`floors.opening_rows`); a leaf whose hinges they do not tell swings both ways.
 
-    Arguments:
-        boxes: N boxes; none is asked to shrink. floor: (N, K, 2) float32, corners of the floor under each.
+    `floor`: (K, 2) float, corners of their floor, metres, padded with NaN.
     """
-    return (-signed_distance(footprint(boxes.size.detach(), boxes.position, boxes.yaw), floor)).clamp_min(0)
+    corners, out = floor[np.isfinite(floor).all(1)], []
+    normals = np.array([inward_normal(corners, edge) for edge in range(len(corners))]).reshape(-1, 2)
+    for row in rows:
+        if not np.isfinite(row).all() or not len(corners):
+            continue
+        near, far = np.array(row[:2]), np.array(row[2:4])
+        edge = int((np.abs(((near - corners) * normals).sum(1)) - (normals @ row[4:6])).argmin())
+        offset, width = float(np.linalg.norm(near - corners[edge])), float(np.linalg.norm(far - near))
+        depth, sill, top, window = row[6:]
+        kind = "window" if window else "door" if depth > STEP + 0.01 else "passage"
+        for hinge in HINGES if kind == "door" else HINGES[:1]:
+            out.append(Opening(f"{len(out)}", kind, edge, offset, width, top - sill, sill if window else 0.0, hinge))
+    return tuple(out)

@@ -16,7 +16,7 @@ from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import Pairs, pairs_of
 from echomodel.config import Objective, Sampler
 from echomodel.graph import GraphBatch
-from echomodel.guidance import relation_guided
+from echomodel.guidance import AFTER, guided, mended, plan_of_graph
 from echomodel.protocols import GraphEdit, Sampling
 from echomodel.randomness import normal
 from echomodel.samplers import Predict, clean_from, sample
@@ -149,8 +149,8 @@ class CompactSampling(Sampling):
 
     Arguments:
         sampler: None = the branch's. rules: the rule set that the relations are meant in, `strict` or `sgfront`.
-        relation_guidance: strength of the pull of the rules' margins on denoised boxes at every step, 0 = off, None =
-            the branch's.
+        relation_guidance: of the first step down what the terms of the objective miss, metres (`echomodel.guidance`),
+            0 = off, None = the branch's.
         noise: (N, K) starting noise in place of the generator's, taken as it is (no temperature, no candidates).
         candidates: draws of a shape, of which the most whole that bears what stands on it is kept (pieces of one class
             and style together); None = the branch's.
@@ -232,28 +232,18 @@ def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: Co
     pairs = pairs_of(graph, model.config.predicates)
     predict = layout_predictor(model, graph, pairs, latent(graph, how.edit), rules)
     strength = config.guidance if how.relation_guidance is None else how.relation_guidance
-    if strength:
-        predict = relation_guided(
-            predict, graph.triplets, scale,
-            rules=how.rules, strength=strength, rounds=config.guidance_rounds, floor=graph.floor[graph.scene],
-            openings=_in_the_way(graph), category=graph.category, placements=graph.placements, scene=graph.scene,
-        )  # fmt: skip
+    plan = plan_of_graph(graph, how.rules) if strength else None
+    if plan is not None:
+        predict = guided(predict, plan, scale, strength=strength, rounds=config.guidance_rounds)
     noise = how.start(graph.num_nodes, 8, graph.category.device)
     vectors = replace(how, known=given).denoised(predict, noise, config)
     boxes = Boxes.decode(vectors, scale)
     boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
+    if plan is not None:
+        boxes = mended(plan, boxes, strength=strength, rounds=AFTER, given=how.known_mask)
     if how.known is None or how.known_mask is None:
         return boxes
     return boxes.replaced(how.known_mask, how.known)
-
-
-def _in_the_way(graph: GraphBatch) -> Tensor | None:
-    """(N, O, ROW) the openings that each node must leave free: those of its room where it stands on the floor."""
-    if not bool(torch.isfinite(graph.openings).any()):
-        return None
-    floor = [kind.support == "floor" for kind in vocabulary().categories]
-    stands = torch.tensor(floor, device=graph.category.device)[graph.category]
-    return torch.where(stands[:, None, None], graph.openings[graph.scene], torch.nan)
 
 
 def with_whole_styles(graph: GraphBatch, groups: Tensor) -> GraphBatch:

@@ -11,15 +11,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from echomodel.objective.plan import FAR, Found, Plan, worst
+from echomodel.objective.plan import FAR, OF_WORDS, Found, Plan, worst
 from echomodel.openings import Opening
 from echomodel.vocabulary import Category
 
-# What of a plan stays as it is while its boxes move.
-OF_WORDS = (
-    "anchor", "carrier", "group", "joins", "stance", "standing", "movable", "solid", "works", "dining", "smaller",
-    "walls", "walled", "rectangle", "_masks",
-)  # fmt: skip
 MANY = 80_000  # pairs of boxes in all copies from which on those that stand alike are looked at once
 
 

@@ -5,6 +5,7 @@ From the door a robot of 0.2 m radius finds its way to every piece (grid search,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -15,7 +16,7 @@ import torch
 from torch import Tensor
 
 from echomodel.objective.plan import CLEAR_HEIGHT, Plan, plan_of
-from echomodel.objective.table import TERMS
+from echomodel.objective.table import PRICE, TERMS
 from echomodel.openings import Opening, inward_normal, segment
 from echomodel.rules.geometry import BoxesLike
 
@@ -148,6 +149,7 @@ def _beside(kind: str, corners: bytes, box: bytes, kind_of_box: str) -> _Beside:
 
 
 REACHED = "reached"
+MOST = 2.0  # of a missed unit counts
 BY_EYE = ("living", "composition")  # kinds of terms; relations and collisions have verdicts of their own
 
 
@@ -227,13 +229,18 @@ def walk(plan: Plan) -> Ways | None:
     return ways(size, position, yaw, in_the_way, corners, plan.openings[0])
 
 
-def missed(plan: Plan, kinds: Collection[str] = BY_EYE) -> Tensor:
-    """() float, how much of the terms of some kinds is missed, differentiable: missed margins with their weights."""
+def missed(plan: Plan, kinds: Collection[str] = BY_EYE, beyond: float = -math.inf) -> Tensor:
+    """() float, what the missed margins of the terms of some kinds cost, differentiable.
+
+    `beyond`: what is asked for beyond the slack of each term, in its unit; by default nothing, not even that.
+    """
     total = plan.size.new_zeros(())
     for term in TERMS:
-        if term.kind not in kinds:
+        seen = term.find(plan) if term.kind in kinds else None
+        if seen is None or not len(seen.who):
             continue
-        seen = term.find(plan)
-        free = (~plan.given[seen.who]).to(seen.margin)
-        total = total + term.weight * ((-seen.margin).clamp(min=0, max=2.0) * free).sum()
+        miss = (max(term.slack + beyond, 0.0) - seen.margin).clamp(0.0, MOST)
+        if term.kind in BY_EYE:
+            miss = miss * ~plan.given[seen.who]
+        total = total + PRICE[term.kind][1] * term.weight * miss.sum()
     return total

@@ -78,6 +78,11 @@ FACING = np.cos(np.radians(30.0))  # a back turned further from a wall's normal 
 FAR = 9.0  # metres, in place of the distance to something that is not there
 CLEAR_HEIGHT = 0.05  # metres: a rug is in nobody's way
 UNKNOWN = Category("", "", "", support="floor", role="", look="", density=0.0, ade20k="")
+# What of a plan stays as it is while its boxes move.
+OF_WORDS = (
+    "anchor", "carrier", "group", "joins", "stance", "standing", "movable", "solid", "works", "dining", "fronts",
+    "smaller", "walls", "walled", "rectangle", "_masks",
+)  # fmt: skip
 
 
 def _answered(asked: Callable[[Category], object]) -> cached_property[Tensor]:
@@ -113,6 +118,13 @@ class Plan:
     height: Tensor | None = None
     rules: str = "strict"
     stated: tuple[Stated, ...] = ()
+
+    def at(self, position: Tensor, yaw: Tensor) -> Plan:
+        """The same boxes at position (N, 3) and yaw (N,): whom each attends and what carries it stays as it is here."""
+        out = replace(self, position=position, yaw=yaw)
+        vars(out).update({name: getattr(self, name) for name in OF_WORDS})
+        vars(out)["floor_points"] = vars(self).setdefault("floor_points", [])
+        return out
 
     # -- words -------------------------------------------------------------------------------------------------------
 
@@ -448,9 +460,9 @@ class Plan:
 
     @cached_property
     def rectangle(self) -> tuple[Tensor, Tensor] | None:
-        """Middle (2,) and half extents (2,), metres, of the first floor if that is a rectangle along x and z."""
+        """Middle (2,) and half extents (2,), metres, of the floor of one room if that is a rectangle along x and z."""
         corners = self.floor[0][torch.isfinite(self.floor[0]).all(1)]
-        if len(corners) != 4:
+        if len(corners) != 4 or len(self.openings) > 1:
             return None
         low, high = corners.amin(0), corners.amax(0)
         square = bool(((corners == low) | (corners == high)).all()) and bool((high > low).all())

@@ -14,7 +14,9 @@ from echomodel.objective import access, company, composition, crowding, fitted, 
 from echomodel.objective.plan import Found, Plan
 from echomodel.vocabulary import vocabulary
 
-KINDS = ("relations", "physics", "living", "composition")
+# What a broken term costs, and a unit that is missed of it, by its kind.
+PRICE = {"relations": (6.0, 4.0), "physics": (3.0, 10.0), "living": (2.0, 1.0), "composition": (1.5, 1.0)}
+KINDS = tuple(PRICE)
 
 
 @dataclass(frozen=True)

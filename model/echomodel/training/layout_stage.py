@@ -20,8 +20,7 @@ from echomodel.compact.layout import exactly
 from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import layout_predictor
-from echomodel.floors import clearances, kept_free
-from echomodel.guidance import outside
+from echomodel.floors import clearances, kept_free, outside
 from echomodel.objective import BY_EYE, TERMS, Plan, faults_of
 from echomodel.objective.physics import apart
 from echomodel.objective.plan import UNKNOWN

@@ -14,9 +14,8 @@ from echomodel.compact.model import WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.data.roomset import RoomSet
 from echomodel.echo import EchoModel
-from echomodel.floors import known
+from echomodel.floors import known, outside
 from echomodel.graph import GraphBatch
-from echomodel.guidance import outside
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts
 from echomodel.training.layout_stage import heading_distance, living_loss, measure_distance, told_triplets
