@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import tempfile
 from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -10,6 +13,9 @@ import torch
 from echomodel.boxes import Boxes
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+
+if TYPE_CHECKING:
+    from echousd.room import Room
 
 BARE = {"walls": False, "dress": "none"}  # options of a room that is its furniture alone
 
@@ -103,3 +109,26 @@ def table_tsdf(leg: float = 2.0) -> np.ndarray:
     solids = [block((32, 58, 32), (30, 4, 30))]
     solids += [block((x, 30, z), (leg, 28, leg)) for x in (2 + leg, 62 - leg) for z in (2 + leg, 62 - leg)]
     return np.clip(np.minimum.reduce(solids) / 4, -1, 1).astype(np.float32)
+
+
+@cache
+def small_room(shift: float = 0.0, **options: object) -> Room:
+    """The small graph as a room of the stand-in, bare where `options` do not say more; made once a process."""
+    import echousd
+
+    return echousd.generate(small_graph(), model=StandIn(shift), **{**BARE, **options})
+
+
+def saved_room(folder: Path, **options: object) -> Path:
+    """Root layer of `small_room(**options)`, saved in `folder`: a copy of what is written once a process."""
+    for path, content in _saved(folder.name, **options).items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_bytes(content)
+    return folder / f"{folder.name}.usda"
+
+
+@cache
+def _saved(name: str, **options: object) -> dict[str, bytes]:
+    with tempfile.TemporaryDirectory() as top:
+        folder = small_room(**options).save(Path(top) / name, preview=False).parent
+        return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 from pxr import Sdf, Usd
-from small_room import BARE, StandIn, small_graph
+from small_room import BARE, StandIn, saved_room, small_graph, small_room
 
 import echousd
 from echomodel.protocols import GraphEdit
@@ -19,8 +19,7 @@ from echousd.options import RoomOptions
 
 @pytest.fixture
 def root(tmp_path):
-    room = echousd.generate(small_graph(), seed=5, model=StandIn(), faces=600, **BARE)
-    return room.save(tmp_path / "bedroom", preview=False)
+    return saved_room(tmp_path / "bedroom", seed=5, faces=600)
 
 
 def hashes(folder):
@@ -32,7 +31,7 @@ def hashes(folder):
 
 
 def test_room_reads_back(root):
-    room = echousd.generate(small_graph(), seed=5, model=StandIn(), faces=600, **BARE)
+    room = small_room(seed=5, faces=600)
     saved = read_room(root)
     assert saved.graph == room.graph
     assert saved.assets == room.assets

@@ -38,7 +38,7 @@ def together():
 
 def test_a_collision_that_is_left_is_warned_of_and_in_the_manifest(tmp_path):
     with pytest.warns(RoomWarning, match="bed and wardrobe collide by 1.10 m"):
-        room = echousd.generate(together(), model=StandIn(), shapes="boxes", **BARE)
+        room = echousd.generate(together(), model=StandIn(), shapes="boxes", drafts=1, **BARE)
     assert any("bed and wardrobe collide" in fault for fault in room.faults)
     root = room.save(tmp_path / "room", preview=False)
     (only,) = json.loads(root.with_suffix(".json").read_text())["layouts"]
@@ -56,14 +56,15 @@ def test_exit_code_of_a_room_with_faults(tmp_path, echousd_command, monkeypatch)
 
     monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: StandIn()))
     echousd.write_graph(together(), tmp_path / "graph.usda")
-    done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", "--shapes", "boxes")
+    quick = ("--shapes", "boxes", "--drafts", 1)
+    done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", *quick)
     assert done.code == 1
     assert "collide  bed and wardrobe by 1.10 m" in done.out
     assert "warning" not in done.err
     assert (tmp_path / "room" / "room.usda").is_file()
-    done = echousd_command("edit", tmp_path / "room" / "room.usda", "--remove", "lamp")
+    done = echousd_command("edit", tmp_path / "room" / "room.usda", "--remove", "lamp", *quick)
     assert done.code == 1
-    done = echousd_command("edit", tmp_path / "room" / "room.usda", "--remove", "wardrobe")
+    done = echousd_command("edit", tmp_path / "room" / "room.usda", "--remove", "wardrobe", *quick)
     assert done.code == 0, done.out
 
 
