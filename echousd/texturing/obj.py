@@ -125,7 +125,7 @@ def read_glb(path: Path) -> PaintedMesh:
     the file for a damaged one, several materials, images that cannot be read, compression, and links to other files.
     """
     content = read_file(path)
-    _check(path, content)
+    tree = _checked(path, content)
     try:
         scene: Any = trimesh.load(io.BytesIO(content), file_type="glb", process=False, merge_primitives=False)
         parts = [scene] if isinstance(scene, trimesh.Trimesh) else list(scene.dump())
@@ -133,8 +133,6 @@ def read_glb(path: Path) -> PaintedMesh:
         if not parts:
             raise ValueError("no triangles")
         points, st, faces, count = [], [], [], 0
-        material: Any = getattr(parts[0].visual, "material", None)
-        images = {name: image for slot, name in SLOTS.items() if (image := getattr(material, slot, None)) is not None}
         for part in parts:
             laid = getattr(part.visual, "uv", None)
             if laid is None or len(laid) != len(part.vertices):
@@ -150,12 +148,29 @@ def read_glb(path: Path) -> PaintedMesh:
         raise ValueError(f"{path}: {error}, allowed: triangles with texture coordinates") from None
     except Exception as error:  # a damaged file fails in every way there is
         raise ValueError(f"{path}: not a glb that can be read ({type(error).__name__})") from None
-    # as they lie in the file: nothing has decoded them yet
-    return PaintedMesh(mesh, {name: image.fp.getvalue() for name, image in images.items()})
+    return PaintedMesh(mesh, _images(path, tree, content))
 
 
-def _check(path: Path, content: bytes) -> None:
-    """Refuse what is not of this file alone, or larger than anything real."""
+def _images(path: Path, tree: dict[str, Any], content: bytes) -> dict[str, bytes]:
+    """Images of the only material, as they lie in the file: painted looks keep their bytes."""
+    material = (tree.get("materials") or [{}])[0]
+    slots = {**material.get("pbrMetallicRoughness", {}), **material}
+    begin = struct.unpack_from("<I", content, 12)[0] + 28  # of the binary chunk's content
+    found = {}
+    for slot in SLOTS.keys() & {key for key, value in slots.items() if value is not None}:
+        try:
+            view = tree["bufferViews"][tree["images"][tree["textures"][slots[slot]["index"]]["source"]]["bufferView"]]
+            start, size = begin + int(view.get("byteOffset", 0)), int(view["byteLength"])
+        except (KeyError, IndexError, TypeError, ValueError):
+            raise ValueError(f"{path}: {slot} names no image of the file") from None
+        if not begin <= start < start + size <= len(content):
+            raise ValueError(f"{path}: {slot} lies outside of the file")
+        found[SLOTS[slot]] = content[start : start + size]
+    return found
+
+
+def _checked(path: Path, content: bytes) -> dict[str, Any]:
+    """What the file says of itself; what is not of this file alone, or larger than anything real, is refused."""
     try:
         magic, version, _, length, kind = struct.unpack_from("<4sIIII", content)
         tree = json.loads(content[20 : 20 + length])
@@ -177,3 +192,4 @@ def _check(path: Path, content: bytes) -> None:
             raise ValueError(f"{path}: an accessor counts {count!r:.40}, allowed: 0 to {MAX_COUNT}, not sparse")
     if len(used) > 1:
         raise ValueError(f"{path}: {len(used)} materials, allowed: one for the whole object")
+    return tree

@@ -86,7 +86,7 @@ def test_every_asset_has_a_picture(tmp_path):
         content = (asset / f".thumbs/256x256/{asset.name}.usda.png").read_bytes()
         with Image.open(io.BytesIO(content)) as picture:
             assert picture.size == (256, 256)
-            assert np.ptp(np.asarray(picture.convert("L"))) > 30  # something is to be seen
+            assert np.ptp(np.asarray(picture.convert("RGB")), axis=(0, 1)).max() > 30  # something is to be seen
     edited = echousd.edit(root, read_room(root).graph.add_node("stool", "nightstand"), model=StandIn(), shapes="boxes")
     edited.save(tmp_path / "copy", preview=False)
     pictures = sorted(path.name for path in (tmp_path / "copy/assets").glob("*/.thumbs/256x256/*.png"))
