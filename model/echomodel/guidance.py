@@ -113,7 +113,8 @@ def openings_of(floor: np.ndarray, rows: Sequence[Sequence[float]]) -> tuple[Ope
 
     `floor`: (K, 2) float, corners of their floor, metres, padded with NaN.
     """
-    corners, out = floor[np.isfinite(floor).all(1)], []
+    corners = floor[np.isfinite(floor).all(1)]
+    out: list[Opening] = []
     normals = np.array([inward_normal(corners, edge) for edge in range(len(corners))]).reshape(-1, 2)
     for row in rows:
         if not np.isfinite(row).all() or not len(corners):
