@@ -92,11 +92,6 @@ class Look(BaseModel):
         "/Room", FILES, "prim path of the room", words="path", pattern=r"^(/[A-Za-z_][A-Za-z0-9_]*)+$", max_length=200
     )
     faces: int = row(FACES, FILES, "face budget of each mesh", ge=100)
-    merge: Literal["parts", "bodies", "closed"] = row(
-        "parts",
-        FILES,
-        "a mesh for each part (legs, top ...), for all that moves together, or that as one closed surface",
-    )
     atlas: bool = row(False, FILES, "unwrap without overlaps, not along the axes (extra: texture)")
     materialx: bool = row(False, FILES, "materials have a MaterialX network beside UsdPreviewSurface")
     instances: bool = row(False, FILES, "pieces that share an asset are instances of it: less memory, no overrides")

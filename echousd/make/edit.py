@@ -27,7 +27,6 @@ from echousd.options import OF_NEW, Look, RoomOptions, takes_options
 from echousd.progress import StageTimer
 from echousd.room import Provenance
 from echousd.shapes.looks import palette_of_room
-from echousd.shapes.merging import merged
 from echousd.shapes.sources.mixing import check_sources, default_source, mixed_shapes
 from echousd.shapes.sources.retrieval import (
     Retrieved,
@@ -136,8 +135,7 @@ def edit(
             timer, models,
         )  # fmt: skip
         made = mixed_shapes(request, shapes)
-        shaped = {name: made.geometry[owner] for name, owner in made.owners.items()}
-        geometry |= merged(shaped, asked.merge, asked.faces)
+        geometry |= {name: made.geometry[owner] for name, owner in made.owners.items()}
         names |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
     names = _own_names({name: names[name] for name in graph.names}, shaped_anew, saved)
     geometry = {name: geometry[name] for name in graph.names}

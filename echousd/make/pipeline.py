@@ -41,7 +41,6 @@ from echousd.options import RoomOptions, takes_options
 from echousd.place.living import unusual_sizes
 from echousd.progress import StageTimer
 from echousd.room import Provenance
-from echousd.shapes.merging import merged
 from echousd.shapes.sources.mixing import check_sources, default_source, mixed_shapes, shape_nearness, sources_of
 from echousd.shapes.sources.retrieval import anchored, check_files, given_pieces, retrieved, with_given_sizes
 from echousd.shapes.sources.source import ShapeRequest
@@ -169,8 +168,7 @@ def generate(
     request = ShapeRequest(graph, boxes, styles, seed, echo, asked.steps, asked.faces, timer=timer, retrieved=models)
     made = mixed_shapes(request, shapes)
     floor = room_floor(graph, layouts)
-    own = {name: made.geometry[owner] for name, owner in made.owners.items()}
-    geometry = merged(own, asked.merge, asked.faces)
+    geometry = {name: made.geometry[owner] for name, owner in made.owners.items()}
     outcomes = tuple(layout_outcome(graph, found) for found in layouts)
     if asked.place:
         with timer.stage("place"), one_thread():

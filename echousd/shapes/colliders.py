@@ -10,7 +10,7 @@ import trimesh
 
 from echomodel.vocabulary import vocabulary
 from echousd.shapes.geometry import Collider
-from echousd.shapes.merging import decimate
+from echousd.shapes.meshing import decimate
 
 FACES, HULL_FACES, PIECES_FACES = 400, 120, 1200
 PIECES, CORNERS = 16, 32  # convex pieces of a shape at most, corners of each

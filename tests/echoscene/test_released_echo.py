@@ -20,7 +20,7 @@ from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig
 from echoscene.echo import ReleasedEcho, floor_relations
 from echoscene.model import ReleasedModel, Schedule
 from echoscene.weights import write_released
-from echousd.shapes.merging import mesh_from_shape
+from echousd.shapes.meshing import mesh_from_shape
 
 WIDTH = 12
 SMALL = {"hidden": 16, "layers": 2, "code": 8, "predicate": 8, "context": 32}

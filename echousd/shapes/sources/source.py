@@ -11,7 +11,7 @@ import numpy as np
 from echousd.graph import SceneGraph
 from echousd.progress import StageTimer
 from echousd.shapes.geometry import Geometry
-from echousd.shapes.merging import FACES
+from echousd.shapes.meshing import FACES
 from echousd.shapes.sources.retrieval import Retrieved
 from echousd.shapes.styles import shared_assets
 

@@ -63,7 +63,6 @@ def test_flat_samples_z_up_and_boxes(graph, tmp_path, echousd_command):
         (("-o", "{tmp}/room", "--up-axis", "x"), "up_axis is 'X', allowed: Y or Z"),
         (("-o", "{tmp}/room", "--shapes", "lego"), "shapes is 'lego', allowed: parts, sdf, boxes"),
         (("-o", "{tmp}/room", "--layouts", "0"), "layouts is 0, allowed: 1 to 1000"),
-        (("-o", "{tmp}/room", "--merge", "all"), "merge is 'all', allowed: parts, bodies or closed"),
         (("-o", "{tmp}/room", "--palette", "neon"), "palette is 'neon', allowed: oak, walnut"),
     ],
 )

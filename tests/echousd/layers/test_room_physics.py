@@ -13,7 +13,7 @@ from echousd.shapes.colliders import collider, colliders_of, standing_hull
 from echousd.shapes.geometry import Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.joinery import part_of, within_budget
 from echousd.shapes.matter import ballasted, hull_volume, mass_of, read_mass
-from echousd.shapes.merging import box_mesh
+from echousd.shapes.meshing import box_mesh
 from echousd.shapes.sources.mixing import solid_geometry
 
 SIZE = np.array([1.6, 2.2, 0.6])

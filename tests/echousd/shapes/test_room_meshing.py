@@ -3,7 +3,7 @@ import pytest
 import trimesh
 from small_room import ball_tsdf, table_tsdf
 
-from echousd.shapes.merging import box_mesh, decimate, fit, largest_solids, mesh_from_shape
+from echousd.shapes.meshing import box_mesh, decimate, fit, largest_solids, mesh_from_shape
 
 
 @pytest.mark.parametrize("grid", [ball_tsdf(), table_tsdf()], ids=["ball", "table"])

@@ -11,7 +11,7 @@ from echousd import options
 from echousd.make.edit import edit
 from echousd.make.reading import read_room
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
-from echousd.shapes.merging import mesh_from_shape
+from echousd.shapes.meshing import mesh_from_shape
 from echousd.shapes.sources import mixing
 from echousd.shapes.sources.mixing import solid_geometry, within_budget
 from echousd.shapes.sources.source import Shapes, per_asset

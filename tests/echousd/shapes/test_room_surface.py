@@ -6,7 +6,7 @@ from echomodel.furniture.solids import Tube
 from echomodel.vocabulary import vocabulary
 from echousd.shapes.finishes.slots import HARMONIES, metres_of
 from echousd.shapes.looks import BANDS, SHOWN, alternatives, cut, look, material_groups, palette_for
-from echousd.shapes.merging import box_mesh
+from echousd.shapes.meshing import box_mesh
 from echousd.shapes.surface import creased_normals, surface, surfaces, unshared
 from echousd.stage.taxonomy import ade20k
 
