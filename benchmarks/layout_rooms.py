@@ -2,11 +2,10 @@
 
     OMP_NUM_THREADS=1 python benchmarks/layout_rooms.py [--cold 3] [--rooms 64] [--first 0] [--only cold|batch]
 
-Wanted: at most 1 s in a cold run of 12 objects and at most 60 ms a room in batches of 64. CPU seconds of one thread: a
+Wanted: at most 1 s in a cold run of 12 objects. CPU seconds of one thread: a
 busy machine changes those least; beside them what they are in matrix products of 2048 x 2048 on the same machine.
 `cold`: new processes that import, load the model and lay out one graph as `generate` does, the graphs of 12 objects in
-turns; the median of each part. `batch`: rooms of the room generator as `echousd batch` samples them, in one process,
-the first drafts packed, further ones alone for those that want them.
+turns; the median of each part. `batch`: rooms of the room generator as `echousd batch` samples them, in one process.
 """
 
 from __future__ import annotations
@@ -144,11 +143,11 @@ def cold_runs(times: int, first: int, product: float) -> None:
 
 
 def batch(rooms: int, first: int, product: float) -> None:
-    """Print what a room of a packed batch takes."""
+    """Print what a room takes in one process that makes many."""
     from echomodel.loading import load_model
     from echousd.batches.sources import sampled_graph
     from echousd.graph.floors import with_plan
-    from echousd.make.layouts import Draws, best_boxes, first_drafts, most_drafts
+    from echousd.make.layouts import Draws, best_boxes, most_drafts
     from echousd.progress import StageTimer
     from echousd.shapes.styles import style_groups
 
@@ -159,12 +158,11 @@ def batch(rooms: int, first: int, product: float) -> None:
     alone = sum(best_of_one(model, graph, first) for graph in graphs[:6]) / 6  # and warms
     with parted() as spent:
         began = time.process_time()
-        for graph, seed, most, draft in zip(graphs, seeds, drafts, first_drafts(model, graphs, seeds), strict=True):
+        for graph, seed, most in zip(graphs, seeds, drafts, strict=True):
             planned = with_plan(graph, seed)
             best_boxes(
-                model, planned, style_groups(planned), Draws(seed), drafts=most, first=draft, proposed=True,
-                timer=StageTimer(),
-            )  # fmt: skip
+                model, planned, style_groups(planned), Draws(seed), drafts=most, proposed=True, timer=StageTimer()
+            )
         whole = time.process_time() - began
     objects = sum(len(graph.nodes) for graph in graphs)
     print(f"batch of {rooms} rooms, {objects} objects")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from importlib import resources
@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from echousd.batches import work
-from echousd.batches.executor import Executor, LocalWorkers, Outcome, Task
+from echousd.batches.executor import Executor, LocalWorkers, Outcome, RayCluster, Task
 from echousd.batches.options import BatchRequest, as_paths, request_of
 from echousd.batches.plan import (
     ELSEWHERE,
-    PACK,
     STATE,
     STORE,
     URL,
@@ -29,7 +28,6 @@ from echousd.batches.plan import (
     is_elsewhere,
     load_plan,
     make_plan,
-    packed,
     read_journals,
     room_digest,
     save_plan,
@@ -37,7 +35,6 @@ from echousd.batches.plan import (
     whole_keys,
 )
 from echousd.batches.remote import Remote, complete
-from echousd.batches.work import CPU, Job, generated, layouts, network_processes
 from echousd.folder.folder import check_writable
 from echousd.folder.lock import locked
 from echousd.folder.within import inside
@@ -117,7 +114,7 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
         Remote(how.to).sizes(STATE)  # who cannot reach it is told before the first room
     device = request.options.device
     if not how.ray and how.executor is None:
-        network_processes(device)
+        work.devices(device)
     plan = _with_libraries(make_plan(request, weights_hash(request.options.weights), how.to, how.outside), how.outside)
     place = shard_folder(out, how.shard)
     with locked(place):
@@ -126,7 +123,7 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
         journal = Journal(place)
         pool = how.executor or _executor(how, len(plan.entries), device)
         seen = out.resolve() if how.ray else out  # workers elsewhere stand in another folder
-        run = Run(plan, plan.packs(how.shard), valid, seen, journal, how)
+        run = Run(plan, plan.part(how.shard), valid, seen, journal, how)
         try:
             end = run.execute(pool)
         finally:
@@ -146,30 +143,19 @@ def generate_many(
 
     Raises ValueError for the first graph that no room can be made of.
     """
-    from echomodel.loading import load_model
-
-    request = request_of({"sources": ["graphs"], "options": options}, "generate_many")
-    asked = request.options
-    load_model(asked.weights, device=asked.device)
-    number = 0
-    for pack in packed(graphs):
-        own = [seed if seeds is None else seeds[number + k] for k in range(len(pack))]
-        jobs = [Job("", "", s, asked, graph.to_json()) for s, graph in zip(own, pack, strict=True)]
-        for k, found in enumerate(layouts(jobs)):
-            if found.error:
-                raise ValueError(f"graph {number + k}: {found.error}")
-            yield generated(replace(jobs[k], text=found.text, first=found.first), here=True)
-        number += len(pack)
+    asked = request_of({"sources": ["graphs"], "options": options}, "generate_many").options
+    for number, graph in enumerate(graphs):
+        try:
+            yield work.generated(work.Job("", "", seed if seeds is None else seeds[number], asked, graph.to_json()))
+        except ValueError as error:
+            raise ValueError(f"graph {number}: {error}") from None
 
 
 def _executor(how: RunOptions, rooms: int, device: str) -> Executor:
     if not how.ray:
-        workers, networks = max(min(how.workers or cores(), rooms), 1), network_processes(device)
-        return LocalWorkers(workers, networks=networks, timeout=how.timeout, memory=how.memory)
-    from echousd.batches.executor import RayCluster
-
-    gpus = 0.0 if device == CPU else 1.0
-    return RayCluster(how.ray, workers=how.workers, timeout=how.timeout, memory=how.memory, gpus=gpus)
+        workers = max(min(how.workers or cores(), rooms), 1)
+        return LocalWorkers(workers, devices=work.devices(device), timeout=how.timeout, memory=how.memory)
+    return RayCluster(how.ray, workers=how.workers, timeout=how.timeout, memory=how.memory, gpus=device != work.CPU)
 
 
 def cores() -> int:
@@ -220,11 +206,11 @@ def _agree_on(plan: Plan, out: Path, *, resume: bool) -> None:
 def _valid(plan: Plan, out: Path, shard: tuple[int, int]) -> frozenset[str]:
     """Ids of the shard's rooms that are there as the journal says; a damaged one is set aside."""
     if plan.to:
-        paths = {entry.id: entry.path for pack in plan.packs(shard) for entry in pack}
+        paths = {entry.id: entry.path for entry in plan.part(shard)}
         return frozenset(complete(plan.to, read_journals(out), paths))
     rows, stored = read_journals(out), whole_keys(out, mend=True)
     valid = set()
-    for entry in (entry for pack in plan.packs(shard) for entry in pack):
+    for entry in plan.part(shard):
         row = rows.get(entry.id)
         folder = entry.folder(out)
         if row is None or row["state"] != "done":
@@ -317,55 +303,42 @@ class Run:
     """One shard of a plan on an executor.
 
     Arguments:
-        plan, packs: what there is to do; skip: ids of the rooms that are complete and valid.
+        plan, rooms: what there is to do; skip: ids of the rooms that are complete and valid.
         folder: of the run. journal: of the shard. how: when it stops, and who is told.
     """
 
     plan: Plan
-    packs: list[tuple[Entry, ...]]
+    rooms: Sequence[Entry]
     skip: frozenset[str]
     folder: Path
     journal: Journal
     how: RunOptions
     stopped: str = ""
-    _ready: deque[tuple[Entry, work.Job]] = field(default_factory=deque)
-    _wanted: deque[tuple[Entry, work.Job, work.Wanted]] = field(default_factory=deque)
-    _tries: dict[str, int] = field(default_factory=dict)
-    _asked: dict[str, Any] = field(default_factory=dict)
+    _begun: dict[str, Entry] = field(default_factory=dict)
+    _tries: Counter[str] = field(default_factory=Counter)
 
     def execute(self, executor: Executor) -> BatchProgress:
         """Do all that is left, until it is done or something stops the run; `stopped` says what."""
         began = time.monotonic()
-        progress = BatchProgress(sum(map(len, self.packs)), done=len(self.skip))
-        waiting = deque(pack for pack in self.packs if any(entry.id not in self.skip for entry in pack))
-        layouts_out = 0
-        while waiting or self._ready or self._asked or self._wanted:
+        progress = BatchProgress(len(self.rooms), done=len(self.skip))
+        waiting = deque(entry for entry in self.rooms if entry.id not in self.skip)
+        while waiting or self._begun:
             self._check_stop(progress)
-            while not self.stopped:
-                soon = len(self._ready) + PACK * layouts_out
-                early = waiting and (soon < 2 * executor.workers or not self._ready)  # no worker waits for another's
-                if self._wanted and executor.free(network=True):
-                    entry, job, wanted = self._wanted.popleft()
-                    key = f"samples {len(job.answers)} {entry.id}"
-                    self._submit(executor, Task(key, work.samples, (job, wanted), network=True), entry)
-                elif early and executor.free(network=True):
-                    layouts_out += self._submit_layouts(executor, waiting.popleft(), progress)
-                elif self._ready and executor.free():
-                    entry, job = self._ready.popleft()
-                    self._submit(executor, Task(f"room {entry.id}", work.room, job), entry)
+            while waiting and not self.stopped and executor.free():
+                entry = waiting.popleft()
+                if entry.error:
+                    self._fail(entry, entry.error, progress)
+                    self._check_stop(progress)
                 else:
-                    break
-            if self.stopped and not self._asked:
+                    self._begin(executor, Task(entry.id, work.room, self._job(entry)), entry)
+            if self.stopped and not self._begun:
                 break
-            for outcome in executor.outcomes(1.0):
-                asked = self._asked.pop(outcome.task.key)
-                if outcome.fate == "died" and self._again(outcome.task.key):
-                    self._submit(executor, outcome.task, asked)
-                elif isinstance(asked, Entry):
-                    self._ended(asked, outcome, progress)
+            for outcome in executor.outcomes(1.0) if self._begun else ():
+                entry = self._begun.pop(outcome.task.key)
+                if outcome.fate == "died" and self._again(entry):
+                    self._begin(executor, outcome.task, entry)
                 else:
-                    layouts_out -= 1
-                    self._drawn(asked, outcome, progress)
+                    self._ended(entry, outcome, progress)
             progress.seconds, progress.megabytes = time.monotonic() - began, executor.megabytes
             if self.how.progress is not None:
                 self.how.progress(progress)
@@ -380,46 +353,15 @@ class Run:
         elif until is not None and time.time() >= until:
             self.stopped = "the time is over"
 
-    def _submit_layouts(self, executor: Executor, pack: tuple[Entry, ...], progress: BatchProgress) -> int:
-        """Begin a pack's layouts, of all its rooms, as what is sampled together is part of the plan."""
-        good = tuple(entry for entry in pack if not entry.error)
-        for entry in pack:
-            if entry.error and entry.id not in self.skip:
-                self._fail(entry, entry.error, progress)
-        if all(entry.id in self.skip for entry in good):
-            return 0
-        jobs = [self._job(entry) for entry in good]
-        task = Task(f"layouts {pack[0].number}", work.layouts, jobs, network=True, rooms=len(jobs))
-        self._submit(executor, task, good)
-        return 1
-
-    def _submit(self, executor: Executor, task: Task, asked: Any) -> None:
-        self._asked[task.key] = asked
+    def _begin(self, executor: Executor, task: Task, entry: Entry) -> None:
+        self._begun[task.key] = entry
         executor.submit(task)
 
-    def _again(self, key: str) -> bool:
-        self._tries[key] = self._tries.get(key, 1) + 1
-        return self._tries[key] <= TRIES and not self.stopped
-
-    def _drawn(self, pack: tuple[Entry, ...], outcome: Outcome, progress: BatchProgress) -> None:
-        """Rooms whose first drafts were sampled are ready; if the pack was too much for a worker, each is alone."""
-        found = outcome.value if outcome.fate == "done" else [work.Sampled()] * len(pack)
-        for entry, sampled in zip(pack, found, strict=True):
-            if entry.id in self.skip:
-                continue
-            if sampled.error:
-                self._fail(entry, sampled.error, progress)
-                continue
-            self._ready.append((entry, self._job(entry, sampled.text, sampled.first)))
+    def _again(self, entry: Entry) -> bool:
+        self._tries[entry.id] += 1
+        return self._tries[entry.id] < TRIES and not self.stopped
 
     def _ended(self, entry: Entry, outcome: Outcome, progress: BatchProgress) -> None:
-        if isinstance(outcome.value, work.Wanted):
-            self._wanted.append((entry, outcome.task.given, outcome.value))
-            return
-        if outcome.fate == "done" and isinstance(outcome.value, bytes):
-            job = outcome.task.given[0]
-            self._ready.appendleft((entry, replace(job, answers=(*job.answers, outcome.value))))
-            return
         if outcome.fate != "done":
             if FULL in outcome.error:
                 self.stopped = f"{self.folder}: {FULL.lower()}; make room and go on with --resume"
@@ -444,12 +386,12 @@ class Run:
             return False
         return True
 
-    def _job(self, entry: Entry, text: str = "", first: work.Rows | None = None) -> work.Job:
+    def _job(self, entry: Entry) -> work.Job:
         options = self.plan.options[entry.options]
         folder, store = str(entry.folder(self.folder)), str(inside(self.folder, STORE, f"{self.folder}: the run"))
         if self.plan.to:
             folder, store = entry.path, STORE
         return work.Job(
-            entry.id, folder, entry.seed, options, text or self.plan.graphs.get(entry.graph, ""), entry.draw, first,
+            entry.id, folder, entry.seed, options, self.plan.graphs.get(entry.graph, ""), entry.draw,
             "" if options.self_contained else store, to=self.plan.to, outside=self.how.outside,
         )  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import multiprocessing
 import os
 import signal
@@ -12,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import cycle, islice
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, Protocol
@@ -29,15 +29,11 @@ class Task:
 
     Arguments:
         key: unique in its run; call: the function; given: its one argument.
-        network: whether it is the network's, where that has processes of its own.
-        rooms: how many it is for; each has the time that one may take.
     """
 
     key: str
     call: Callable[[Any], Any]
     given: Any
-    network: bool = False
-    rooms: int = 1
 
 
 @dataclass(frozen=True)
@@ -62,8 +58,8 @@ class Executor(Protocol):
         """How many rooms are made at once."""
         ...
 
-    def free(self, *, network: bool = False) -> int:
-        """How many more tasks are taken now, of the network or others."""
+    def free(self) -> int:
+        """How many more tasks are taken now."""
         ...
 
     @property
@@ -88,7 +84,7 @@ class Executor(Protocol):
 class _Worker:
     process: Any
     pipe: Connection
-    network: dict[str, str] | None = None  # its environment, if it has a device
+    environment: dict[str, str]  # which device it has
     task: Task | None = None
     since: float = 0.0
 
@@ -98,30 +94,29 @@ class LocalWorkers:
 
     Arguments:
         workers: how many. timeout: seconds a room may take, None = for ever. memory: MiB that a worker may hold.
-        networks: environment of each process that runs the network and nothing else, one a device; none = the workers
-            run it, too. Their memory is not limited: it grows with the device's.
+        devices: environment of each device, which the workers take in turn; none = they have the CPU.
     """
 
     def __init__(
         self,
         workers: int,
         *,
-        networks: Sequence[dict[str, str]] = (),
+        devices: Sequence[dict[str, str]] = (),
         timeout: float | None = None,
         memory: int | None = None,
     ) -> None:
         self._timeout, self._memory = timeout, memory
         self._context = multiprocessing.get_context("spawn")
-        self._workers = [self._start(network) for network in (*[None] * workers, *networks)]
+        self._workers = [self._start(one) for one in islice(cycle(devices or [{}]), workers)]
 
     @property
     def workers(self) -> int:
         """How many rooms are made at once."""
-        return len(self._those_for(network=False))
+        return len(self._workers)
 
-    def free(self, *, network: bool = False) -> int:
-        """How many more tasks are taken now, of the network or others."""
-        return sum(worker.task is None for worker in self._those_for(network=network))
+    def free(self) -> int:
+        """How many more tasks are taken now."""
+        return sum(worker.task is None for worker in self._workers)
 
     @property
     def megabytes(self) -> float:
@@ -135,7 +130,7 @@ class LocalWorkers:
 
     def submit(self, task: Task) -> None:
         """Give a task to an idle worker."""
-        worker = next(worker for worker in self._those_for(network=task.network) if worker.task is None)
+        worker = next(worker for worker in self._workers if worker.task is None)
         worker.task, worker.since = task, time.monotonic()
         with contextlib.suppress(OSError):  # it is dead; `outcomes` will see that
             worker.pipe.send((task.call, task.given))
@@ -156,7 +151,7 @@ class LocalWorkers:
                 found.append(outcome)
                 worker.task = None
                 if outcome.fate in ("limit", "died"):
-                    self._workers[number] = self._start(worker.network)
+                    self._workers[number] = self._start(worker.environment)
             if time.monotonic() >= until:
                 break
         return found
@@ -182,13 +177,9 @@ class LocalWorkers:
         if not worker.process.is_alive():
             return Outcome(worker.task, "died", error=_ending(worker.process.exitcode))
         error = ""
-        if self._timeout is not None and time.monotonic() - worker.since > self._timeout * worker.task.rooms:
+        if self._timeout is not None and time.monotonic() - worker.since > self._timeout:
             error = f"took longer than {self._timeout:g} s"
-        elif (
-            self._memory is not None
-            and worker.network is None
-            and (held := resident(worker.process.pid)) > self._memory
-        ):
+        elif self._memory is not None and (held := resident(worker.process.pid)) > self._memory:
             error = f"held {held:.0f} MiB of memory, allowed: {self._memory} MiB"
         if not error:
             return None
@@ -196,14 +187,10 @@ class LocalWorkers:
         worker.process.join(5)
         return Outcome(worker.task, "limit", error=error)
 
-    def _those_for(self, *, network: bool) -> list[_Worker]:
-        own = [worker for worker in self._workers if worker.network is not None]
-        return own if own and network else [worker for worker in self._workers if worker.network is None]
-
-    def _start(self, network: dict[str, str] | None = None) -> _Worker:
+    def _start(self, environment: dict[str, str]) -> _Worker:
         mine, its = self._context.Pipe()
         process = self._context.Process(target=_serve, args=(its, os.getpid()), daemon=True)
-        own = ONE_CORE | (network or {})
+        own = ONE_CORE | environment
         before = {name: os.environ.get(name) for name in own}
         os.environ.update(own)
         try:
@@ -215,7 +202,7 @@ class LocalWorkers:
                 else:
                     os.environ[name] = value
         its.close()
-        return _Worker(process, mine, network)
+        return _Worker(process, mine, environment)
 
 
 def attempt(call: Callable[[Any], Any], given: Any) -> tuple[str, Any]:
@@ -265,7 +252,6 @@ def _ending(code: int | None) -> str:
     return f"the worker ended (exit code {code})"
 
 
-ROOMS_A_NETWORK = 8  # rooms at once that one actor draws layouts for; its share of a room's time is smaller
 STARTING = 120.0  # seconds that Ray may take to start a worker, who counts its own; then the cluster ends it
 DYING = 0.2  # seconds between two looks of a worker at its own memory
 
@@ -274,7 +260,6 @@ DYING = 0.2  # seconds between two looks of a worker at its own memory
 class _Begun:
     task: Task
     since: float
-    actor: int = -1
 
 
 class RayCluster:
@@ -286,7 +271,7 @@ class RayCluster:
         address: `auto`, the cluster that runs on this machine or a new one, or that of a cluster's head.
         workers: rooms at once, None = as many as the cluster has CPUs.
         timeout, memory: as of `LocalWorkers`; memory is watched by each worker itself.
-        gpus: of the cluster that each actor of the network has; 0 = it runs on CPUs.
+        gpus: whether the rooms share the cluster's GPUs out; else they are made on CPUs.
 
     Raises ValueError where Ray is not installed or no cluster answers.
     """
@@ -298,22 +283,21 @@ class RayCluster:
         workers: int | None = None,
         timeout: float | None = None,
         memory: int | None = None,
-        gpus: float = 0.0,
+        gpus: bool = False,
     ) -> None:
         self._ray = _ray()
         self._ours = not self._ray.is_initialized()
         if self._ours:
             self._connect(address, workers)
-        self._timeout, self._memory, self._gpus = timeout, memory, gpus
+        self._timeout, self._memory = timeout, memory
         self._slots = workers or max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         there = int(self._ray.cluster_resources().get("GPU", 0))
         if gpus and not there:
             self._leave()
             raise ValueError("device: the Ray cluster has no GPUs, allowed: cpu")
         self._begun: dict[Any, _Begun] = {}
-        self._room = self._ray.remote(num_cpus=1, max_retries=0)(watched)
-        networks = there / gpus if gpus else self._slots / ROOMS_A_NETWORK
-        self._actors = [self._start() for _ in range(math.ceil(networks))]
+        share = min(1.0, there / self._slots) if gpus else 0.0
+        self._room = self._ray.remote(num_cpus=1, num_gpus=share, max_retries=0)(watched)
 
     @property
     def workers(self) -> int:
@@ -325,23 +309,14 @@ class RayCluster:
         """0: the workers are elsewhere."""
         return 0.0
 
-    def free(self, *, network: bool = False) -> int:
-        """How many more tasks are taken now, of the network or of rooms."""
-        busy = sum((begun.actor >= 0) == network for begun in self._begun.values())
-        return (len(self._actors) if network else self._slots) - busy
+    def free(self) -> int:
+        """How many more tasks are taken now."""
+        return self._slots - len(self._begun)
 
     def submit(self, task: Task) -> None:
         """Begin a task."""
-        seconds = None if self._timeout is None else self._timeout * task.rooms
-        if task.network:
-            busy = {begun.actor for begun in self._begun.values()}
-            number = next(number for number in range(len(self._actors)) if number not in busy)
-            memory = None if self._gpus else self._memory
-            reference = self._actors[number].work.remote(task.call, task.given, memory, seconds)
-            self._begun[reference] = _Begun(task, time.monotonic(), number)
-        else:
-            reference = self._room.remote(task.call, task.given, self._memory, seconds)
-            self._begun[reference] = _Begun(task, time.monotonic())
+        reference = self._room.remote(task.call, task.given, self._memory, self._timeout)
+        self._begun[reference] = _Begun(task, time.monotonic())
 
     def outcomes(self, seconds: float) -> list[Outcome]:
         """What has ended since, after waiting for at most so long; tasks beyond the time limit are cancelled."""
@@ -362,14 +337,10 @@ class RayCluster:
 
     def close(self) -> None:
         """End all that was begun, and the cluster where it is ours alone."""
-        for reference, begun in self._begun.items():
-            if begun.actor < 0:
-                with contextlib.suppress(self._ray.exceptions.RayError, ValueError):
-                    self._ray.cancel(reference, force=True)
-        self._begun.clear()
-        for actor in self._actors:
+        for reference in self._begun:
             with contextlib.suppress(self._ray.exceptions.RayError, ValueError):
-                self._ray.kill(actor)
+                self._ray.cancel(reference, force=True)
+        self._begun.clear()
         self._leave()
 
     def _leave(self) -> None:
@@ -387,9 +358,6 @@ class RayCluster:
                 raise ValueError(f"--ray is {address!r}, where no cluster answers ({error})") from None
             self._ray.init(num_cpus=workers, include_dashboard=False, **quiet)
 
-    def _start(self) -> Any:
-        return self._ray.remote(num_cpus=0, num_gpus=self._gpus, max_restarts=-1, max_task_retries=0)(_Network).remote()
-
     def _ended(self, reference: Any, begun: _Begun) -> Outcome:
         errors = self._ray.exceptions
         try:
@@ -405,24 +373,12 @@ class RayCluster:
     def _overdue(self) -> list[Outcome]:
         found = []
         for reference, begun in list(self._begun.items()):
-            late = None if self._timeout is None else self._timeout * begun.task.rooms + STARTING
-            if late is None or time.monotonic() - begun.since <= late:
+            if self._timeout is None or time.monotonic() - begun.since <= self._timeout + STARTING:
                 continue
             del self._begun[reference]
-            if begun.actor < 0:
-                self._ray.cancel(reference, force=True)
-            else:
-                self._ray.kill(self._actors[begun.actor])
-                self._actors[begun.actor] = self._start()
+            self._ray.cancel(reference, force=True)
             found.append(Outcome(begun.task, "limit", error=f"took longer than {self._timeout:g} s"))
         return found
-
-
-class _Network:
-    """An actor that keeps its model between packs."""
-
-    def work(self, call: Any, given: Any, memory: int | None, seconds: float | None) -> tuple[str, Any]:
-        return watched(call, given, memory, seconds)
 
 
 def watched(call: Any, given: Any, memory: int | None, seconds: float | None = None) -> tuple[str, Any]:

@@ -7,12 +7,11 @@ import json
 import math
 import os
 import re
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from itertools import islice
 from pathlib import Path, PurePosixPath
-from typing import Any, TypeVar
+from typing import Any
 
 import echousd
 from echomodel.files import bounded_lines, whole_file
@@ -36,11 +35,8 @@ HERE = (
     "blockcache", "cached", "data", "git", "jupyter", "jlab", "pyscript", "asyncwrapper", "async_wrapper",
 )  # fmt: skip
 ELSEWHERE = "a URL of another machine, such as s3://bucket/night"
-PACK, LEAST = 32, 4  # rooms whose layouts are sampled together; part of the plan, as sums round by what is packed
 MOST = 1_000_000  # rooms of a run: a plan is held in memory
 SHELF = 1000  # rooms in one folder
-
-Item = TypeVar("Item")
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,18 +104,9 @@ class Plan:
         for entry in self.entries:
             yield json.dumps(asdict(entry)) + "\n"
 
-    def packs(self, shard: tuple[int, int] = (0, 1)) -> list[tuple[Entry, ...]]:
-        """Rooms whose layouts are sampled together; shard i of n takes every n-th pack from number i on."""
-        return list(packed(self.entries))[shard[0] :: shard[1]]
-
-
-def packed(rooms: Iterable[Item]) -> Iterator[tuple[Item, ...]]:
-    """Rooms whose layouts are sampled together, of which the first are two halves: two workers begin at once."""
-    waiting, first = iter(rooms), True
-    while group := tuple(islice(waiting, PACK)):
-        middle = len(group) // 2 if first and len(group) >= 2 * LEAST else len(group)
-        yield from filter(None, (group[:middle], group[middle:]))
-        first = False
+    def part(self, shard: tuple[int, int]) -> tuple[Entry, ...]:
+        """The rooms of shard i of n: every n-th from number i on."""
+        return self.entries[shard[0] :: shard[1]]
 
 
 def make_plan(request: BatchRequest, weights: str, to: str = "", outside: Sequence[str] = ()) -> Plan:
@@ -155,7 +142,6 @@ def make_plan(request: BatchRequest, weights: str, to: str = "", outside: Sequen
         "echousd_batch": 1,
         "version": echousd.__version__,
         "weights": weights,
-        "pack": [PACK // 2, PACK],
         "rooms": len(entries),
         "request": request.model_dump(),
         **({"to": to} if to else {}),

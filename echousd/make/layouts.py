@@ -1,9 +1,9 @@
-"""Boxes for a graph: sampled, also many graphs in one pass, equal within sets, placed; and the floor below."""
+"""Boxes for a graph: sampled, equal within sets, placed; and the floor below."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,11 +17,10 @@ from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.openings import free_area
 from echomodel.protocols import GraphEdit, RoomModel
-from echomodel.randomness import SceneGenerators
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
-from echousd.graph.floors import with_placed_openings, with_plan
+from echousd.graph.floors import with_placed_openings
 from echousd.make.verdicts import layout_outcome
 from echousd.options import RoomOptions
 from echousd.place import PlaceConfig, PlaceResult
@@ -87,7 +86,7 @@ def sample_boxes(
         extra = {"known": Boxes.cat([known] * count), "known_mask": given.repeat(count)}
     if draws.steps is not None:
         extra["steps"] = draws.steps
-    if not draws.guided and isinstance(getattr(model, "own", model), EchoModel):  # ours, though another process has it
+    if not draws.guided and isinstance(model, EchoModel):
         extra["relation_guidance"] = 0.0
     if draws.change is not None:
         extra["edit"] = repeated(draws.change, len(nodes), count)
@@ -102,8 +101,7 @@ def sample_boxes(
 
 def best_boxes(
     model: RoomModel, graph: SceneGraph, styles: Mapping[str, str], draws: Draws, *, drafts: int = 1,
-    place: bool = True, sized: Boxes | None = None, first: Boxes | None = None, proposed: bool = False,
-    timer: StageTimer,
+    place: bool = True, sized: Boxes | None = None, proposed: bool = False, timer: StageTimer,
 ) -> tuple[Boxes, tuple[str, ...]]:  # fmt: skip
     """The best of several drafts after place: kept relations first, then collisions, then the living rules.
 
@@ -111,7 +109,6 @@ def best_boxes(
 
     Arguments:
         draws: of the first draft. drafts: how many at most. sized: boxes whose sizes the graph states for all layouts.
-        first: the first draft, where it was sampled already (`echousd.make.layouts`).
         proposed: nobody stated the openings, which may still be moved: what is in their way counts least.
         others: as `sample_boxes` and `finished_boxes`.
     """
@@ -120,8 +117,7 @@ def best_boxes(
     for start, count in draft_rounds(drafts):
         if best is not None and not any(worth):
             break
-        given = () if first is None or best is not None else (first,)
-        for draft in given or sample_boxes(
+        for draft in sample_boxes(
             model, graph, replace(draws, number=draws.number + start, guided=not place), count=count, timer=timer
         ):
             if sized is not None:
@@ -290,59 +286,3 @@ def _alike(graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str]) -> Boxes:
     free = np.array([node.size is None and not node.locked for node in graph.nodes]) & ~np.array(cut, bool)
     size = equal_sizes(names, categories, styles, np.asarray(boxes.size, float), free, unequal_pairs(graph))
     return Boxes(torch.as_tensor(size, dtype=torch.float32), boxes.position, boxes.yaw)
-
-
-NODES = 512  # of one pass of the network: larger products, bounded memory
-
-
-def first_drafts(
-    model: RoomModel, graphs: Sequence[SceneGraph], seeds: Sequence[int], *, steps: int | None = None,
-    guided: bool = False,
-) -> list[Boxes]:  # fmt: skip
-    """The first draft of the first layout of every graph, as `generate` takes it (`first`).
-
-    A sum's rounding depends on what is packed together: boxes are those of single runs but for at most a few units of
-    `tensors.LENGTH`, and exactly the same for the same list of graphs and seeds.
-
-    `model`: any model; graphs that cannot be packed (with given boxes, or for other models) are sampled alone.
-    `graphs`, `seeds`: as many of each. `steps`: sampling steps, None for the model's own. `guided`: as `Draws`.
-    """
-    found: dict[int, Boxes] = {}
-    planned = [with_plan(graph, seed) for graph, seed in zip(graphs, seeds, strict=True)]
-    together = [i for i, graph in enumerate(planned) if isinstance(model, EchoModel) and not _given(graph)]
-    for pack in packs(together, [len(graph.nodes) for graph in planned]):
-        batches = [graph_batch(planned[i]) for i in pack]
-        rows = [batch.num_nodes for batch in batches]
-        with one_thread():
-            assert isinstance(model, EchoModel)
-            drawn = model.sample_layout(
-                GraphBatch.pack(batches),
-                generator=SceneGenerators([seeded(seeds[i], "layout", 0) for i in pack], rows),
-                steps=steps,
-                relation_guidance=None if guided else 0.0,
-            )
-        fields = (drawn.size.cpu().split(rows), drawn.position.cpu().split(rows), drawn.yaw.cpu().split(rows))
-        for i, size, position, yaw in zip(pack, *fields, strict=True):
-            found[i] = rounded_boxes(planned[i], Boxes(size, position + floor_centre(planned[i]), yaw))
-    for i, graph in enumerate(planned):
-        if i not in found:
-            draws = Draws(seeds[i], steps=steps, guided=guided)
-            (found[i],) = sample_boxes(model, graph, draws, timer=StageTimer())
-    return [found[i] for i in range(len(graphs))]
-
-
-def packs(numbers: Iterable[int], nodes: Sequence[int], most: int = NODES) -> list[list[int]]:
-    """The numbers in their order, in groups whose nodes are at most `most` together; a larger one stands alone."""
-    out: list[list[int]] = []
-    held = 0
-    for number in numbers:
-        if not out or held + nodes[number] > most:
-            out.append([])
-            held = 0
-        out[-1].append(number)
-        held += nodes[number]
-    return out
-
-
-def _given(graph: SceneGraph) -> bool:
-    return any(None not in (node.size, node.position, node.yaw) for node in graph.nodes)

@@ -56,7 +56,7 @@ def generate(
     graph: SceneGraph | str | Path, *, room: str | None = None, options: RoomOptions | None = None,
     model: RoomModel | None = None, earlier: Path | None = None, outside: Sequence[str | Path] = (),
     boxes: Boxes | None = None, meshes: Mapping[str, str | Path] | None = None, progress: StageListener | None = None,
-    first: Boxes | None = None, **given: Any,
+    **given: Any,
 ) -> Room:  # fmt: skip
     """Make a room from a scene graph.
 
@@ -77,7 +77,6 @@ def generate(
         meshes: object name -> file of a piece of your own (USD, glTF, OBJ), which keeps its materials; relative to the
             working folder.
         progress: called with (stage, done, total).
-        first: draft of the first layout, where it was sampled already (`echousd.make.layouts`).
 
     Raises:
         ValueError: an argument that is not allowed, a graph that cannot be read or contradicts itself, weights that are
@@ -126,11 +125,9 @@ def generate(
 
     def arranged(graph: SceneGraph) -> tuple[Boxes, tuple[str, ...]]:
         styles = style_groups(graph)
-        whole = first is not None and len(first) == len(graph.nodes)  # none of them left out
         return best_boxes(
             echo, with_given_sizes(graph, sizes), styles, Draws(seed, steps=asked.steps), drafts=drafts,
-            place=asked.place,
-            first=first if whole else None, proposed=not stated.room.openings, timer=timer,
+            place=asked.place, proposed=not stated.room.openings, timer=timer,
         )  # fmt: skip
 
     def laid_out(graph: SceneGraph) -> tuple[SceneGraph, Boxes, tuple[str, ...], tuple[str, ...]]:

@@ -102,7 +102,7 @@ def main() -> None:
             if options.what == "node":
                 killed[0] = kill(marked(f"{run}_2"))
             else:
-                killed[0] = kill([*marked(f"{run}_1", b"ray::watched")[:1], *marked(f"{run}_1", b"ray::_Network")[:1]])
+                killed[0] = kill(marked(f"{run}_1", b"ray::watched")[:1])
             print(f"after {progress.done} rooms: {killed[0]} processes killed", flush=True)
 
     if options.what == "limits":

@@ -35,7 +35,7 @@ def test_a_killed_run_and_its_killed_worker_leave_the_same_bytes(tmp_path):
     assert len(rooms) == 1
     again = Inline()
     assert batch(source, tmp_path / "run", executor=again, resume=True, **QUICK).done == 2
-    assert f"room {rooms[0]}" not in again.calls
+    assert rooms[0] not in again.calls
     assert digests(tmp_path / "run") == digests(folder)
 
 

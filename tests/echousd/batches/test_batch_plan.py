@@ -42,17 +42,9 @@ def test_a_plan_is_the_same_every_time_and_comes_back_from_the_disk(tmp_path):
 
 def test_shards_share_the_plan_out():
     plan = plan_of(sample={"bedroom": 50})
-    parts = [[e.id for pack in plan.packs((i, 3)) for e in pack] for i in range(3)]
+    parts = [[entry.id for entry in plan.part((i, 3))] for i in range(3)]
+    assert sorted(map(len, parts)) == [16, 17, 17]
     assert sorted(itertools.chain(*parts)) == sorted(entry.id for entry in plan.entries)
-
-
-@pytest.mark.parametrize(
-    ("rooms", "sizes"), [(3, [3]), (7, [7]), (8, [4, 4]), (13, [6, 7]), (32, [16, 16]), (70, [16, 16, 32, 6])]
-)
-def test_the_first_rooms_are_two_packs(rooms, sizes):
-    packs = plan_of(sample={"bedroom": rooms}).packs()
-    assert [len(pack) for pack in packs] == sizes
-    assert [entry.number for pack in packs for entry in pack] == list(range(rooms))
 
 
 def test_a_difference_is_told():
