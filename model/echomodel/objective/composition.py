@@ -123,6 +123,9 @@ SERVED = 1.0  # metres: floor further from all furniture serves nothing
 SOFT = 0.2  # metres on both sides of it over which a point of the floor counts in part
 ELBOW = 0.55  # metres of a table's edge a seat: 96 % of real sides with two seats or more (0.6 m in DIN 68880)
 FENCE = 0.03  # metres between two chairs of one side: 95 % of real ones
+EASY = 0.6  # metres of edge a seat that are enough for anybody: DIN 68880
+SEAT = 0.7  # metres that a side needs before it to seat somebody
+WORKPLACE = 1.0  # metres between the middles of two who work
 OPENS = 0.55  # metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it
 FACED = 0.3  # share of a wardrobe's width from which on something is before it
 
@@ -173,6 +176,58 @@ def elbow_room(plan: Plan) -> Found:
     return found(who, at[who], measure=measure[row[who]], words=which[row[who]])
 
 
+def chairs_at_sides(plan: Plan) -> Found:
+    """Chairs share the sides of their table: none sits shoulder to shoulder with others while a side is free."""
+    seats = seats_at(plan)
+    if seats is None:
+        return nobody(plan.size)
+    who = seats.j.unique()
+    side = 4 * who[:, None] + torch.arange(4)
+    count = torch.bincount(seats.side, minlength=4 * len(plan))[side]
+    edge = plan.size[who][:, [2, 2, 0, 0]]
+    free = _free_beside(plan, who) > SEAT
+    each = torch.where(count > 1, edge / count.clamp_min(1), FAR)
+    best = torch.where(free, edge / (count + 1), 0.0).amax(1).clamp_max(EASY)
+    least = each.amin(1)
+    crowded = least < FAR
+    return found(who[crowded], (least - best)[crowded], measure=least[crowded])
+
+
+def _free_beside(plan: Plan, who: Tensor) -> Tensor:
+    """(P, 4): metres free left, right, behind and before of tables, to walls and to what is no seat."""
+    cos, sin = plan.turn[0][who], plan.turn[1][who]
+    right, front = torch.stack([cos, -sin], -1), torch.stack([sin, cos], -1)
+    out = torch.stack([-right, right, -front, front], 1)
+    half = plan.size[who][:, [0, 0, 2, 2]] / 2
+    edge = plan.position[who][:, None, [0, 2]] + out * half[..., None]
+    walls = plan.inside(edge + out * SEAT, who) + SEAT
+    asked = torch.zeros(len(plan), dtype=torch.bool).index_put((who,), torch.tensor(True))
+    row, k = plan.beside(who, plan.standing & ~plan.of("seat") & (plan.size[:, 1].detach() > CLEAR_HEIGHT))
+    j = who[row]
+    keep = (k != j) & asked[j]
+    row, k, j = row[keep], k[keep], j[keep]
+    lateral, forward = plan.local(k, j)
+    wide, deep = plan.reach(k, j)
+    meets = torch.stack([forward.abs() - deep - plan.size[j, 2] / 2, lateral.abs() - wide - plan.size[j, 0] / 2], -1)
+    beyond = torch.stack([-lateral - wide, lateral - wide, -forward - deep, forward - deep], -1) - half[row]
+    beyond = torch.where((meets.repeat_interleave(2, -1) < 0) & (beyond > -half[row]), beyond, FAR)
+    index = row[:, None].expand(-1, 4)
+    return walls.scatter_reduce(0, index, beyond.to(walls), "amin")
+
+
+def workers_apart(plan: Plan) -> Found:
+    """Two who work at desks of their own sit apart from each other."""
+    chairs, at = plan.attended("at")
+    chairs = chairs[(plan.of("board") & plan.works)[at] & plan.of("seat")[chairs]]
+    sits = torch.zeros(len(plan), dtype=torch.bool).index_put((chairs,), torch.tensor(True))
+    row, k = plan.beside(chairs, sits)
+    i = chairs[row]
+    keep = (i < k) & (plan.anchor[i] != plan.anchor[k])
+    i, k = i[keep], k[keep]
+    apart = (plan.position[i] - plan.position[k])[:, [0, 2]].square().sum(1).clamp_min(1e-12).sqrt()
+    return found(i, apart - WORKPLACE, other=k, measure=apart)
+
+
 def wardrobe_opens(plan: Plan) -> Found:
     """One can stand before an open wardrobe, also at the foot of a bed."""
     wardrobes = plan.of("storage") & plan.standing & plan.which(lambda kind: kind.access > 0.6)
@@ -183,11 +238,12 @@ def wardrobe_opens(plan: Plan) -> Found:
 
 
 def each_served(plan: Plan) -> Found:
-    """No desk has two chairs while another has none, no bed two nightstands while another has none."""
+    """No desk or table has two chairs while another has none, no bed two nightstands while another has none."""
     out = nobody(plan.size)
-    desks = plan.of("board") & plan.works & plan.standing
+    desks, chairs = plan.of("board") & plan.works & plan.standing, plan.stands("at") & plan.of("seat")
+    tables = plan.which(lambda kind: kind.role == "board" and not (kind.belongs_to or kind.access or kind.wall))
     for hosts, guests, near in (
-        (desks, plan.stands("at") & plan.of("seat"), AROUND),
+        (desks, chairs, AROUND), (tables & plan.standing, chairs, AROUND),
         (plan.of("bed") & plan.standing, plan.stands("head"), BESIDE),
     ):
         one, other = plan.pairs(hosts, hosts)

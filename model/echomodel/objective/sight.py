@@ -14,6 +14,7 @@ OVER = 0.25  # metres by which a pendant's middle may lie beyond the edge of wha
 MIDDLE = 0.22  # share of the room's extent: so near to the middle a lamp lights the room
 CLEAR = 0.9  # metres: so far from every table a lamp lights free floor
 CENTRED = 0.3  # metres that a pendant, or the middle of several, may hang off the middle of its table
+IN_ROW, SPACED = 0.15, 0.25  # metres that one of several may hang beside their line, and that they keep apart
 TOUCH = 0.04  # metres of air below a lamp on its table
 
 
@@ -53,6 +54,24 @@ def pendant_centred(plan: Plan) -> Found:
     return found(i, CENTRED - off, other=j, measure=off)
 
 
+def pendants_in_row(plan: Plan) -> Found:
+    """Several pendants over one table hang in one line along it, apart from each other."""
+    lamps = plan.which(lambda kind: kind.look == "pendant_lamp")
+    tables = plan.which(lambda kind: kind.role == "board" and not kind.access) & plan.standing
+    i, j = plan.pairs(lamps, tables)
+    over = plan.gap(i, j).detach() < 1e-3 if len(i) else i.bool()
+    i, j = i[over], j[over]
+    one, other = ((j[:, None] == j[None]) & (i[:, None] < i[None])).nonzero(as_tuple=True)
+    if not len(one):
+        return nobody(plan.size)
+    lateral, forward = plan.local(i, j)
+    long = (plan.size[j, 0] >= plan.size[j, 2])[one]
+    aside, ahead = (lateral[one] - lateral[other]).abs(), (forward[one] - forward[other]).abs()
+    along, across = torch.where(long, aside, ahead), torch.where(long, ahead, aside)
+    margin, which = torch.stack([IN_ROW - across, along - SPACED], -1).min(1)
+    return found(i[one], margin, other=i[other], measure=torch.where(which == 0, across, along), words=which)
+
+
 def lamp_on_surface(plan: Plan) -> Found:
     """A table lamp or television stands on something that can carry it."""
     small = plan.which(lambda kind: kind.support == "table" and not kind.hangs)
@@ -76,6 +95,7 @@ TURNED = math.radians(45.0)  # from a screen's own front to who watches it
 # Metres between the middles of a screen and its viewer: 99 of 100 real sofas and all real beds.
 WATCHED_FROM = {"sofa": (1.2, 5.2), "bed": (0.9, 4.2), "seat": (0.9, 5.2)}
 TOLD = ("facing", "opposite")  # predicates that say who watches
+ON_AXIS = 0.6  # metres beside the axis of its viewer
 STEPS = 13
 HIGH = 0.65  # metres: one looks over what is lower
 GRAZE = 0.25  # metres beside the line of sight that are free: in 2 of 110 real rooms they are not
@@ -89,6 +109,17 @@ def screen_in_view(plan: Plan) -> Found:
         return nobody(plan.size)
     least, which = margin.min(1)
     return found(who, least, other=viewer, measure=measure.gather(1, which[:, None])[:, 0], words=which)
+
+
+def screen_on_axis(plan: Plan) -> Found:
+    """A screen stands on the axis of the seat that looks at it; one that is out of its view is told of for that."""
+    screen, viewer, margin, *_ = _watched(plan)
+    ahead = margin.detach()[:, 0] >= 0
+    screen, viewer = screen[ahead], viewer[ahead]
+    if not len(screen):
+        return nobody(plan.size)
+    aside = plan.local(screen, viewer)[0].abs()
+    return found(screen, ON_AXIS - aside, other=viewer, measure=aside)
 
 
 def view_free(plan: Plan) -> Found:

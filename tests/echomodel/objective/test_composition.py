@@ -110,3 +110,50 @@ def test_no_bed_goes_without_a_nightstand_while_another_has_two():
 
     assert seen(composition.each_served, [*beds, *stands(-2.15, -0.65)])[0] == {1: -1.0}
     assert seen(composition.each_served, [*beds, *stands(-0.65, 0.65)])[0] == {}
+
+
+def seated(*places):
+    """A table 1.3 m long and 0.9 m deep with chairs where their middles lie, each looking at it."""
+    chairs = [("dining_chair", (0.42, 0.9, 0.5), at, yaw) for at, yaw in places]
+    return [("dining_table", (1.3, 0.75, 0.9), (0.0, 0.0), 0.0), *chairs]
+
+
+CROWDED = [((side * 0.85, z), -side * HALF) for side in (-1, 1) for z in (-0.22, 0.22)]  # at both short sides
+
+
+def test_chairs_do_not_crowd_a_short_side_while_the_long_ones_are_free():
+    margin, found, _ = seen(composition.chairs_at_sides, seated(*CROWDED))
+    assert margin == {0: pytest.approx(0.45 - 0.6)}
+    assert found.measure.tolist() == [pytest.approx(0.45)]
+    around = [((0.33 * x, 0.65 * z), np.pi * (z > 0)) for x in (-1, 1) for z in (-1, 1)]
+    assert seen(composition.chairs_at_sides, seated(*around))[0] == {0: pytest.approx(0.65 - 0.6)}
+    turned = [(word, size, (at[1], -at[0]), yaw + HALF) for word, size, at, yaw in seated(*CROWDED)]
+    assert seen(composition.chairs_at_sides, turned, (4.0, 5.0))[0] == {0: pytest.approx(0.45 - 0.6)}
+
+
+def test_a_side_at_a_wall_or_at_furniture_is_not_free():
+    shelves = [("bookshelf", (1.6, 2.0, 0.3), (0.0, z), 0.0) for z in (-1.0, 1.0)]
+    assert seen(composition.chairs_at_sides, seated(*CROWDED) + shelves)[0][0] >= 0
+    one = seen(composition.chairs_at_sides, seated(*CROWDED) + shelves[:1])[0]
+    assert one == {0: pytest.approx(0.45 - 0.6)}
+    assert seen(composition.chairs_at_sides, seated(*CROWDED), (5.0, 2.0))[0][0] >= 0
+
+
+@pytest.mark.parametrize(("apart", "margin"), [(2.4, 0.2), (2.0, -0.2)])
+def test_who_works_back_to_back_sits_apart(apart, margin):
+    things = []
+    for side in (-1, 1):
+        yaw = HALF * (side + 1)  # each desk at its wall, its front into the room
+        things += [("desk", (1.2, 0.75, 0.6), (0.0, side * apart / 2), yaw),
+                   ("office_chair", (0.5, 0.9, 0.5), (0.0, side * (apart / 2 - 0.6)), yaw + np.pi)]  # fmt: skip
+    assert seen(composition.workers_apart, things)[0] == {1: pytest.approx(margin)}
+
+
+def test_no_table_goes_without_a_chair_while_another_has_two():
+    tables = [("dining_table", (1.2, 0.75, 0.8), (x, 0.0), 0.0) for x in (-1.5, 1.5)]
+    chairs = [("dining_chair", (0.45, 0.9, 0.5), (-1.5, z), np.pi * (z > 0)) for z in (-0.6, 0.6)]
+    assert seen(composition.each_served, [*tables, *chairs])[0] == {1: -1.0}
+    moved = ("dining_chair", (0.45, 0.9, 0.5), (1.5, 0.6), np.pi)
+    assert seen(composition.each_served, [*tables, chairs[0], moved])[0] == {}
+    coffee = ("coffee_table", (1.2, 0.4, 0.6), (1.5, 0.0), 0.0)  # nobody sits at it
+    assert seen(composition.each_served, [tables[0], coffee, *chairs])[0] == {}

@@ -91,12 +91,15 @@ SMALL = Room(
 SOFAS = Room({**LIVING.things, "other": {
     "kind": "loveseat_sofa", "size": (1.5, 0.85, 0.9), "at": (-1.7, -0.1), "yaw": HALF,
 }})  # fmt: skip
+PENDANTS = Room({**SET.things, **{f"pendant_{x}": {
+    "kind": "pendant_lamp", "size": (0.3, 0.6, 0.3), "at": (0.35 * x, 0.0), "up": 2.0,
+} for x in (-1, 1)}})  # fmt: skip
 
 
 @pytest.mark.parametrize(
     "room",
-    [BEDROOM, LIVING, DINING, STUDY, SET, SOFAS, BENCH, SMALL],
-    ids=["bedroom", "living", "dining", "study", "set", "sofas", "bench", "small"],
+    [BEDROOM, LIVING, DINING, STUDY, SET, SOFAS, BENCH, SMALL, PENDANTS],
+    ids=["bedroom", "living", "dining", "study", "set", "sofas", "bench", "small", "pendants"],
 )
 def test_a_tidy_room_has_no_fault(room):
     assert room.found() == {}
@@ -114,6 +117,7 @@ FAULTS = [
     (LIVING.moved("coffee", at=(0.0, 0.8)), ("coffee", "table_before_sofa"), "coffee lies 1.58 m before sofa"),
     (LIVING.moved("stand", yaw=0.0), ("stand", "screen_in_view"), "stand is turned by 180 degrees away from sofa"),
     (LIVING.moved("stand", at=(1.6, 1.78)), ("stand", "screen_in_view"), "26 degrees off where sofa looks"),
+    (LIVING.moved("stand", at=(0.8, 1.78)), ("stand", "screen_on_axis"), "stand stands 0.80 m beside the axis of sofa"),
     (LIVING.moved("armchair", yaw=HALF), ("armchair", "lounger_faces"), "armchair turns its back on sofa"),
     (DINING.moved("chair", yaw=0.0), ("chair", "seat_faces"), "chair looks 180 degrees past table"),
     (DINING.moved("chair", at=(0.3, 1.6)), ("chair", "seat_in_reach"), "chair stands 0.90 m from table"),
@@ -124,6 +128,8 @@ FAULTS = [
     ),
     (DINING.moved("pendant", at=(1.2, 0.0)), ("pendant", "pendant_over"), "pendant hangs 0.50 m beside a table"),
     (DINING.moved("pendant", at=(0.4, 0.2)), ("pendant", "pendant_centred"), "pendant hangs 0.45 m off the middle of"),
+    (PENDANTS.moved("pendant_1", at=(0.35, 0.25)), ("pendant_-1", "pendants_in_row"), "hangs 0.25 m out of the row"),
+    (PENDANTS.moved("pendant_1", at=(-0.2, 0.0)), ("pendant_-1", "pendants_in_row"), "only 0.15 m from pendant_1"),
     (BEDROOM.moved("left", yaw=HALF), ("left", "nightstand_at_head"), "left is turned by 90 degrees against bed"),
     (BEDROOM.moved("wardrobe", at=(0.0, 0.72), yaw=np.pi), ("bed", "bed_foot_free"), "the foot of bed leaves 0.30 m"),
     (SET.moved("chair_1_1", at=(1.05, 0.0), yaw=-HALF), ("table", "chairs_even"), "the chairs of table are uneven"),
