@@ -6,6 +6,7 @@ import importlib
 import math
 import os
 import stat
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -128,11 +129,12 @@ def starting_graph(
         if count
     }
     usual: list[Relation] = []
+    served: Counter[tuple[str, str]] = Counter()
     for habit in vocabulary().habits:
         for category in habit.categories:
             anchors = [anchor for word in habit.anchors if word != category for anchor in nodes.get(word, ())]
             if anchors:
-                usual += _related(habit, nodes.get(category, []), anchors)
+                usual += _related(habit, nodes.get(category, []), anchors, served)
     graph = SceneGraph(room, tuple(node for group in nodes.values() for node in group), tuple(relations))
     if not graph.relations:
         return graph.replaced(relations=tuple(usual))
@@ -153,19 +155,27 @@ def _node(category: str, position: int, count: int, place: str | None) -> Node:
     return Node(f"{category}_{position + 1}", category, place=place, **fields)
 
 
-def _related(habit: Habit, nodes: list[Node], anchors: list[Node]) -> list[Relation]:
+def _related(
+    habit: Habit, nodes: list[Node], anchors: list[Node], served: Counter[tuple[str, str]]
+) -> list[Relation]:
     """Objects are dealt to anchors in turn where each serves one (a lamp its nightstand, a chair its desk).
 
     What keeps a sofa company or goes into a wall's row all goes to the first.
+
+    Arguments:
+        served: how many who stand so each anchor has, of whatever category: two kinds of chairs go to two desks.
     """
     near = bool(habit.sides or {"front", "close_by", "opposite"} & set(habit.predicates))
     relations: list[Relation] = []
     sets: dict[str, list[Node]] = {}
     for i, node in enumerate(nodes):
-        hosts = anchors[:1]
-        if not near or vocabulary().category(node.category).stands in DEALT:
-            hosts = [anchor for anchor in anchors if not near or anchor.category == anchors[0].category]
-        anchor = hosts[i % len(hosts)]
+        stance, anchor = vocabulary().category(node.category).stands, anchors[0]
+        if near and stance in DEALT:
+            alike = [other for other in anchors if other.category == anchor.category]
+            anchor = min(alike, key=lambda other: served[stance, other.name])
+            served[stance, anchor.name] += "close_by" in habit.predicates
+        elif not near:
+            anchor = anchors[i % len(anchors)]
         there = sets.setdefault(anchor.name, [])
         relations += [Relation(node.name, predicate, anchor.name) for predicate in habit.predicates]
         if habit.sides:

@@ -243,7 +243,8 @@ def each_served(plan: Plan) -> Found:
     desks, chairs = plan.of("board") & plan.works & plan.standing, plan.stands("at") & plan.of("seat")
     tables = plan.which(lambda kind: kind.role == "board" and not (kind.belongs_to or kind.access or kind.wall))
     for hosts, guests, near in (
-        (desks, chairs, AROUND), (tables & plan.standing, chairs, AROUND),
+        (desks, chairs, AROUND),
+        (tables & plan.standing, chairs, AROUND),
         (plan.of("bed") & plan.standing, plan.stands("head"), BESIDE),
     ):
         one, other = plan.pairs(hosts, hosts)

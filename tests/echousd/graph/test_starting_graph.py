@@ -104,6 +104,15 @@ def test_what_serves_one_piece_is_dealt_to_all_of_its_kind(room, counts, guest, 
         assert len(set(sides)) <= 1
 
 
+@pytest.mark.parametrize(
+    ("room", "counts"), [("bedroom", {"office_chair": 1, "chair": 1}), ("study", {"office_chair": 1, "chair": 3})]
+)
+def test_chairs_of_whatever_kind_are_dealt_to_all_desks(room, counts):
+    graph = starting_graph(room, {"desk": 2, **counts})
+    hosts = [r.object for r in graph.relations if r.predicate == "close_by" and "chair" in r.subject]
+    assert hosts.count("desk_1") == hosts.count("desk_2") == sum(counts.values()) // 2
+
+
 def test_armchairs_keep_the_first_sofa_company():
     graph = starting_graph("living_room", {"sofa": 0, "multi_seat_sofa": 2, "armchair": 2})
     mine = [r for r in graph.relations if r.subject.startswith("armchair")]
