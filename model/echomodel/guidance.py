@@ -54,6 +54,7 @@ def mended(plan: Plan, boxes: Boxes, *, strength: float, rounds: int, given: Ten
     Arguments:
         plan: of N boxes of S rooms, wherever they stand. boxes: N, where they are drawn.
         strength: of the first step, metres and radians; the steps become shorter and shorter.
+        rounds: how many; without one only heights are set.
         given: (N,) bool, boxes that stay; None = none.
     """
     device, drawn = boxes.yaw.device, boxes.to("cpu")

@@ -15,6 +15,7 @@ from echomodel.config import CompactConfig, from_dict, from_json, to_json, with_
 from echomodel.echo import EchoModel, equal_furniture
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit, touched_nodes
+from echomodel.vocabulary import vocabulary
 
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)
 SIZES = {
@@ -64,6 +65,16 @@ def test_equal_seeds_give_equal_bits(model: EchoModel) -> None:
     assert not torch.equal(runs[0].position, runs[2].position)
     grids = [model.sample_shapes(bedroom(), boxes(), generator=seeded(seed)) for seed in (1, 1)]
     assert torch.equal(*grids)
+
+
+def test_what_is_drawn_unguided_hangs_and_stands_where_it_is_carried(model: EchoModel) -> None:
+    words = vocabulary()
+    kinds = [words.category_id(word) for word in ("pendant_lamp", "desk", "table_lamp")]
+    graph = GraphBatch.single(kinds, [[2, words.predicate_id("standing_on"), 1]], floor=(4.0, 3.0), height=2.6)
+    found = model.sample_layout(graph, generator=seeded(), relation_guidance=0.0)
+    bottom, top = found.position[:, 1], (found.position + found.size)[:, 1]
+    wanted = torch.stack([torch.tensor(2.6), torch.tensor(0.0), top[1]])
+    torch.testing.assert_close(torch.stack([top[0], bottom[1], bottom[2]]), wanted)
 
 
 def test_known_boxes_and_shapes_come_back_unchanged(model: EchoModel) -> None:

@@ -215,7 +215,7 @@ Latent = Callable[[GraphBatch, GraphEdit | None], Tensor]
 
 
 def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: CompactSampling) -> Boxes:
-    """Boxes (N) of S scenes, drawn from noise.
+    """Boxes (N) of S scenes, drawn from noise; each stands or hangs at the height that what carries it gives.
 
     Arguments:
         model: with a layout branch. latent: the latent graph of some scenes before and after an edit.
@@ -232,15 +232,14 @@ def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: Co
     pairs = pairs_of(graph, model.config.predicates)
     predict = layout_predictor(model, graph, pairs, latent(graph, how.edit), rules)
     strength = config.guidance if how.relation_guidance is None else how.relation_guidance
-    plan = plan_of_graph(graph, how.rules) if strength else None
-    if plan is not None:
+    plan = plan_of_graph(graph, how.rules)
+    if strength:
         predict = guided(predict, plan, scale, strength=strength, rounds=config.guidance_rounds)
     noise = how.start(graph.num_nodes, 8, graph.category.device)
     vectors = replace(how, known=given).denoised(predict, noise, config)
     boxes = Boxes.decode(vectors, scale)
     boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
-    if plan is not None:
-        boxes = mended(plan, boxes, strength=strength, rounds=AFTER, given=how.known_mask)
+    boxes = mended(plan, boxes, strength=strength, rounds=AFTER if strength else 0, given=how.known_mask)
     if how.known is None or how.known_mask is None:
         return boxes
     return boxes.replaced(how.known_mask, how.known)

@@ -1,0 +1,88 @@
+"""What the layout network draws, judged room by room: weights beside one another and beside the same ones shuffled.
+
+    python benchmarks/drafts.py [WEIGHTS ...] [--ways alone guided searched] [--rooms ROOMS.json] [--count 40]
+
+`ships` and `shuffled` are words for WEIGHTS. The rooms are of the room generator from a seed that no training used, or
+every so many of a rooms file, one near relation an object told, one draft each; faults are those of all terms. Below
+each way stand the means of the differences to the first weights, room by room, with 95 % intervals by bootstrap.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from echomodel.data.roomset import load_rooms, with_known_words
+from echomodel.loading import load_model
+from echomodel.metrics.layouts import Task, kept_relations, tasks_of
+from echomodel.objective import KINDS, faults_of, plan_of, unreached
+from echomodel.rooms.generator import generate_rooms
+from echousd.evaluation.systems import networks, searched, shuffled_model
+from echousd.place import PlaceConfig
+
+SEED = 770_000  # of the generated rooms, as in `placing.py`
+WORDS = {"ships": partial(load_model, None), "shuffled": shuffled_model}
+ROWS = ("told kept", "faults an object", "rooms without")
+DRAWS = 4000  # of the bootstrap
+
+
+def judged(weights: str, way: str, tasks: list[Task]) -> tuple[np.ndarray, Counter[str]]:
+    """Part and whole of `ROWS` in each room (R, 3, 2), and how often each term was missed."""
+    draw = networks(WORDS.get(weights, partial(load_model, weights)), None if way == "guided" else 0.0)
+    rooms = draw(tasks, 0)
+    if way == "searched":
+        rooms = [searched(task, room, PlaceConfig()) for task, room in zip(tasks, rooms, strict=True)]
+    scores, missed = [], Counter[str]()
+    for task, room in zip(tasks, rooms, strict=True):
+        plan = plan_of(room, room.categories, room.floor_polygon, room.openings, task.told, height=room.height)
+        found = [fault.rule for fault in [*faults_of(plan, KINDS), *unreached(plan)]]
+        kept, told = map(np.sum, kept_relations(task, room)["all"])
+        scores.append([(kept, told), (len(found), len(room)), (not found, 1)])
+        missed.update(found)
+    return np.array(scores, float), missed
+
+
+def interval(mine: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """(2, 3), bounds of the differences of two sets of judgements (R, 3, 2) of the same rooms."""
+    rng = np.random.default_rng(0)
+    drawn = rng.integers(len(mine), size=(DRAWS, len(mine)))
+    sums = [of[drawn].sum(1) for of in (mine, first)]
+    mine, first = (of[..., 0] / np.maximum(of[..., 1], 1) for of in sums)
+    return np.quantile(mine - first, [0.025, 0.975], axis=0)
+
+
+def main() -> None:
+    """Print a line for each way and weights."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("weights", nargs="*", default=["ships"])
+    parser.add_argument("--ways", nargs="+", default=["alone"], choices=["alone", "guided", "searched"])
+    parser.add_argument("--rooms", type=Path)
+    parser.add_argument("--count", type=int, default=40)
+    options = parser.parse_args()
+    rooms = generate_rooms(options.count, SEED) if options.rooms is None else load_rooms(options.rooms)
+    rooms = [room for room in with_known_words(rooms) if len(room) > 1]
+    rooms = [rooms[number * len(rooms) // options.count] for number in range(min(options.count, len(rooms)))]
+    tasks = tasks_of(rooms, 0, told=1.0)
+    print(f"{len(tasks)} rooms, {sum(len(task.room) for task in tasks)} objects")
+    for way in options.ways:
+        first: np.ndarray | None = None
+        for weights in options.weights:
+            found, missed = judged(weights, way, tasks)
+            total = found.sum(0)
+            told, faults, clean = total[:, 0] / total[:, 1]
+            most = ", ".join(f"{name} {n}" for name, n in missed.most_common(6))
+            print(f"{way:8s} {weights}: told kept {told:.3f}, {faults:.3f} faults an object, {clean:.2f} without")
+            print(f"         {most}", flush=True)
+            if first is not None:
+                low, high = interval(found, first)
+                spans = (f"{name} {a:+.3f} to {b:+.3f}" for name, a, b in zip(ROWS, low, high, strict=True))
+                print("         beside the first: " + ", ".join(spans), flush=True)
+            first = found if first is None else first
+
+
+if __name__ == "__main__":
+    main()
