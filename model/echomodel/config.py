@@ -43,7 +43,6 @@ class LayoutConfig:
         drafts: how often the prediction so far is measured and told to the next layers.
         measures: which set of measures that is: 2, with openings, headings and both ends of a pair.
         echo: exchange information between the objects at every step (the ablation: off = every object alone).
-        sides: hear every wall, door and window from where each object stands, before every draft.
         frequencies: octaves of the Fourier features of the noisy box.
         objective: what the network is trained to predict; `flow` is rectified flow.
         steps: default number of sampling steps.
@@ -57,14 +56,13 @@ class LayoutConfig:
     drafts: int = 3
     measures: int = 2
     echo: bool = True
-    sides: bool = False
     frequencies: int = 4
     objective: Objective = "velocity"
     steps: int = 20
     sampler: Sampler = "ancestral"
     guidance: float = 0.1
     guidance_rounds: int = 4
-    GONE: ClassVar = ("start",)  # files of before name it: sampling could begin on an arrangement
+    GONE: ClassVar = ("start", "sides")  # files of before name them: beginning on an arrangement, hearing each wall
 
 
 @dataclass(frozen=True)

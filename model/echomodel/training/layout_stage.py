@@ -1,13 +1,11 @@
 """The layout stage: denoising boxes (EchoScene 3.3), with losses on the boxes it predicts.
 
-They are a hinge on the relations told, what a person would point at by the living rules, and physics.
+They are a hinge on the relations told, what true boxes measure, collisions and walls.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
-from itertools import pairwise
 from typing import ClassVar
 
 import torch
@@ -16,17 +14,16 @@ from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.draft import measurable, pair_features, wall_features
-from echomodel.compact.layout import exactly
 from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import layout_predictor
-from echomodel.floors import clearances, kept_free, outside
-from echomodel.objective import BY_EYE, TERMS, Plan, faults_of
+from echomodel.floors import clearances, outside
+from echomodel.objective import Plan, faults_of
 from echomodel.objective.physics import apart
 from echomodel.objective.plan import UNKNOWN
 from echomodel.randomness import normal
 from echomodel.rules import margins, verdicts
-from echomodel.samplers import SAMPLERS, add_noise, clean_from, draw_levels, sample, sampling_levels, target
+from echomodel.samplers import add_noise, clean_from, draw_levels, sample, target
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
 from echomodel.training.start import Start
@@ -65,27 +62,8 @@ def told_triplets(batch: LayoutBatch) -> Tensor:
     return torch.stack([batch.pairs.receiver[pair], predicate, batch.pairs.sender[pair]], dim=1)
 
 
-SLACK = 0.03  # metres or radians that are asked for beyond what a rule does
-# Sizes are learned as they are; openings come as rows; what stands on a table is put there by placing.
-OTHERWISE = ("scale", "door_free", "window_free", "lamp_on_surface")
-STANDING = 0.3  # metres: what begins higher is in nobody's way
-HEADINGS = 4.0  # weight of the headings beside the rules, which forgive five degrees
 TOUCHING = 0.01  # metres that a box may reach into a wall
 FIRM = 10.0  # a miss counts as log(1 + FIRM * metres)
-
-
-def living_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor) -> Tensor:
-    """Mean over the free boxes of how far they miss the living rules, weighted by (1 - level)^2.
-
-    Arguments:
-        boxes: N predicted boxes; places and headings alone are pulled at. level: (N,). known: (N,) bool.
-    """
-    plan = plan_of_batch(batch, boxes, known)
-    with torch.no_grad():
-        truth = replace(plan, size=batch.boxes.size, position=batch.boxes.position, yaw=batch.boxes.yaw)
-        vars(plan)["anchor"] = truth.anchor  # whom each attends is not the network's to choose
-    weight = (1 - level).square() * ~known
-    return living_miss(plan, batch.graph.openings[batch.graph.scene], stands_low(batch.boxes), weight)
 
 
 def physics_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor) -> Tensor:
@@ -120,44 +98,8 @@ def plan_of_batch(batch: LayoutBatch, boxes: Boxes, known: Tensor) -> Plan:
     )  # fmt: skip
 
 
-def stands_low(boxes: Boxes) -> Tensor:
-    """(N,) bool, what begins so low that it is in the way of doors and windows."""
-    return (boxes.position[:, 1] < STANDING).detach()
-
-
-def living_miss(plan: Plan, openings: Tensor, low: Tensor, weight: Tensor) -> Tensor:
-    """Weighted mean over the boxes of how far they miss the living rules and stand in the way of doors and windows.
-
-    Arguments:
-        openings: (N, O, ROW), of the room of each box. low: (N,) bool, what stands so low that it is in their way.
-        weight: (N,).
-    """
-    total = weight.new_zeros(())
-    for term in TERMS:
-        if term.kind not in BY_EYE or term.name in OTHERWISE:
-            continue
-        seen = term.find(plan)
-        total = total + (missed(seen.margin) * weight[seen.who]).sum()
-    clear = kept_free(Boxes(plan.size, plan.position, plan.yaw), openings)
-    total = total + (missed(clear) * weight * (low & plan.which(lambda kind: kind.support == "floor"))).sum()
-    return total / weight.sum().clamp_min(1)
-
-
-def heading_distance(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor) -> Tensor:
-    """Mean angle to the nearest quarter turn from the true heading, radians, weighted by (1 - level)^2."""
-    weight = (1 - level).square() * ~known
-    turn = 4 * (boxes.yaw - batch.boxes.yaw)
-    off = (torch.atan2(turn.sin(), turn.cos()) / 4).abs()
-    return (off * weight).sum() / weight.sum().clamp_min(1)
-
-
-def missed(margin: Tensor) -> Tensor:
-    """By how much margins are missed, as the losses count it: logarithmic, so that none pulls without bounds."""
-    return deep(margin.float() - SLACK)
-
-
 def deep(margin: Tensor) -> Tensor:
-    """The same without slack: true rooms hold things that touch."""
+    """By how much margins are missed, as the loss counts it: logarithmic, so that none pulls without bounds."""
     return torch.log1p(FIRM * (-margin).clamp_min(0))
 
 
@@ -179,7 +121,7 @@ def layout_loss(
     Arguments:
         model: with latent graph and layout denoiser. batch: true rooms. latent: (N, latent width), the edited graph's.
         generator: source of levels, noise and of what is known.
-        recipe: its weights; 0 leaves the hinge, the distance, the living rules or collisions and walls out.
+        recipe: its weights; 0 leaves the hinge, the distance, or collisions and walls out.
 
     Returns the loss, and the parts that the log names.
     """
@@ -198,21 +140,26 @@ def layout_loss(
     if len(errors) > 1:
         parts["draft"] = errors[0]
     loss = errors[-1] + DRAFT * sum(errors[:-1], noise.new_zeros(()))
-    predicted = Boxes.decode(clean_from(output, noisy, level, objective), scale).replaced(known, batch.boxes)
+    drawn = Boxes.decode(clean_from(output, noisy, level, objective), scale).replaced(known, batch.boxes)
+    predicted = as_carried(batch, drawn)
     if recipe.relation_weight:
         parts["relations"] = relation_hinge(batch, predicted, level, known, model.config.rules)
         loss = loss + recipe.relation_weight * parts["relations"]
     if recipe.measure_weight:
         parts["measures"] = measure_distance(batch, predicted, context.floor, level, free)
         loss = loss + recipe.measure_weight * parts["measures"]
-    if recipe.living_weight:
-        parts["living"] = living_loss(batch, predicted, level, known)
-        parts["headings"] = heading_distance(batch, predicted, level, known)
-        loss = loss + recipe.living_weight * (parts["living"] + HEADINGS * parts["headings"])
     if recipe.physics_weight:
         parts["physics"] = physics_loss(batch, predicted, level, known)
         loss = loss + recipe.physics_weight * parts["physics"]
     return loss, parts
+
+
+def as_carried(batch: LayoutBatch, boxes: Boxes) -> Boxes:
+    """Boxes (N) at the heights that floor, ceiling or what carries them gives, as they get them once they are drawn
+    (`guidance.heights`): no loss lifts one over what it runs into. What hangs on a wall keeps its own."""
+    hangs = torch.tensor([row.support == "wall" for row in vocabulary().categories], device=boxes.yaw.device)
+    height = torch.where(hangs[batch.graph.category], boxes.position[:, 1], batch.boxes.position[:, 1])
+    return Boxes(boxes.size, torch.stack([boxes.position[:, 0], height, boxes.position[:, 2]], 1), boxes.yaw)
 
 
 def measure_distance(batch: LayoutBatch, boxes: Boxes, floor: Tensor, level: Tensor, free: Tensor) -> Tensor:
@@ -270,14 +217,8 @@ class LayoutStage:
         return cls(rooms, held, start.recipe)
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
-        """Loss of one random batch, and of rooms that the network arranges alone."""
-        batch = self._drawn(generator).to(model.device)
-        loss, parts = self.scored(model, batch, generator)
-        if self.recipe.own_weight:
-            alone = draw_batch(self.rooms, self.recipe.nodes, generator, SPARSE).to(model.device)
-            own, of_own = own_loss(model, alone, generator, self.recipe.own_kept)
-            loss, parts = loss + self.recipe.own_weight * own, {**parts, **of_own}
-        return loss, parts
+        """Loss of one random batch."""
+        return self.scored(model, self._drawn(generator).to(model.device), generator)
 
     def _drawn(self, generator: torch.Generator) -> LayoutBatch:
         """A batch drawn here, or by `workers` processes ahead of the step: then a resumed run draws other batches."""
@@ -349,57 +290,3 @@ def sample_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Gener
     noise = normal((batch.graph.num_nodes, 8), generator, model.device)
     vectors = sample(layout.sampler, predict, noise, layout.steps, layout.objective, generator=generator)
     return Boxes.decode(vectors, model.scale(batch.graph.category))
-
-
-SPARSE = 0.15  # share of dense graphs among the rooms that the network arranges
-LATE = 0.5  # above this level every second step is left out: nothing is decided there to the centimetre
-RELATIONS = 10.0  # weight of a metre by which something told is missed, as steep as the living rules are
-LONGEST = 0.05  # of the gradient of a box: one that turns at a hair's breadth would drown all others
-
-
-def own_loss(
-    model: CompactModel, batch: LayoutBatch, generator: torch.Generator, kept: int
-) -> tuple[Tensor, dict[str, Tensor]]:
-    """What is wrong with rooms that the network arranges alone: living rules, openings, physics and what is told.
-
-    Arguments:
-        batch: the graphs; its true boxes are not looked at. generator: source of all noise.
-        kept: last steps of sampling through which the gradient is kept.
-
-    Returns the loss, and the parts that the log names.
-    """
-    made = own_rooms(model, batch, generator, kept)
-    with exactly(made.position):
-        # whom each attends is found by many small steps, for which a GPU is slow
-        batch, boxes = batch.to("cpu"), made.to("cpu")
-        graph, level = batch.graph, torch.zeros_like(boxes.yaw)
-        given = torch.zeros(len(boxes), dtype=torch.bool)
-        plan, openings = plan_of_batch(batch, boxes, given), graph.openings[graph.scene]
-        living = living_miss(plan, openings, stands_low(boxes), torch.ones_like(level))
-        relations = relation_hinge(batch, boxes, level, given, model.config.rules)
-        physics = physics_loss(batch, boxes, level, given)
-    parts = {"own_living": living, "own_relations": relations, "own_physics": physics}
-    return living + RELATIONS * relations + physics, parts
-
-
-def own_rooms(model: CompactModel, batch: LayoutBatch, generator: torch.Generator, kept: int) -> Boxes:
-    """Boxes (N) as the network's own sampler ends with them; arguments as for `own_loss`."""
-    layout = model.config.layout
-    step = SAMPLERS[layout.sampler](layout.objective, generator)
-    levels = [level for k, level in enumerate(sampling_levels(layout.steps).tolist()) if level <= LATE or k % 2 == 0]
-    with torch.no_grad():
-        latent = model.latent(batch.graph.category, batch.pairs)
-    predict = layout_predictor(model, batch.graph, batch.pairs, latent, batch.rules)
-    x = normal((batch.graph.num_nodes, 8), generator, batch.graph.category.device)
-    first = max(len(levels) - 1 - kept, 0)
-    for number, (start, end) in enumerate(pairwise(levels)):
-        with torch.set_grad_enabled(number >= first):
-            x = _steadied(step(x, predict(x, torch.full_like(x[:, 0], start)), start, end))
-    return Boxes.decode(x, model.scale(batch.graph.category))
-
-
-def _steadied(x: Tensor) -> Tensor:
-    """The same boxes (N, 8), back through which no gradient of a box goes that is longer than `LONGEST`."""
-    if x.requires_grad:
-        x.register_hook(lambda g: g * (LONGEST / g.norm(dim=1, keepdim=True).clamp_min(1e-12)).clamp_max(1))
-    return x

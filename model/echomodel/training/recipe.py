@@ -53,8 +53,7 @@ BOUNDS: tuple[tuple[str, float, float], ...] = (
     ("seed", 0, 2**63 - 1),
     ("threads", 0, 1024),
     ("workers", 0, 1024),
-    *((f"{name}_weight", 0, 10**6) for name in ("relation", "measure", "living", "physics", "own")),
-    ("own_kept", 1, 1000),
+    *((f"{name}_weight", 0, 10**6) for name in ("relation", "measure", "physics")),
 )
 
 
@@ -78,10 +77,7 @@ class Recipe:
             weights file of CLIP's, or `random` (vectors that only tell texts apart).
         relation_weight: weight of the hinge on the relations' margins of the predicted boxes.
         measure_weight: weight of the difference in what predicted and true boxes measure (gaps to walls, ...).
-        living_weight: weight of what a person would point at in the predicted boxes (the living rules' margins).
         physics_weight: weight of collisions of the predicted boxes and of what is through a wall.
-        own_weight: weight of what is wrong with rooms that the network arranges alone (`training.layout_stage`).
-        own_kept: last steps of sampling that it is led back through.
         validate_every, save_every: steps.
         precision: `float32` or `bfloat16` (autocast).
         threads: CPU threads, 0 = as many as torch likes. workers: processes that draw batches of rooms ahead of a GPU,
@@ -103,10 +99,7 @@ class Recipe:
     text: str = "clip"
     relation_weight: float = 0.5
     measure_weight: float = 0.0
-    living_weight: float = 0.0
     physics_weight: float = 0.0
-    own_weight: float = 0.0
-    own_kept: int = 2
     validate_every: int = 2000
     save_every: int = 1000
     log_every: int = 50

@@ -117,19 +117,16 @@ class LayoutBatch:
         return LayoutBatch(**{f.name: vars(self)[f.name].to(device) for f in fields(self)})
 
 
-def draw_batch(rooms: PackedRooms, node_budget: int, generator: torch.Generator, dense: float = DENSE) -> LayoutBatch:
-    """Draw rooms until the node budget is reached, mirror them, thin their relations and make pseudo edits.
-
-    `dense`: share of the rooms whose graphs tell 30 to 100 % of all relations.
-    """
+def draw_batch(rooms: PackedRooms, node_budget: int, generator: torch.Generator) -> LayoutBatch:
+    """Draw rooms until the node budget is reached, mirror them, thin their relations and make pseudo edits."""
     picked = torch.randint(len(rooms), (node_budget,), generator=generator)
     fits = rooms.count[picked].cumsum(0) <= node_budget
     fits[0] = True
-    return make_batch(rooms, picked[fits], generator, dense=dense)
+    return make_batch(rooms, picked[fits], generator)
 
 
 def make_batch(
-    rooms: PackedRooms, picked: Tensor, generator: torch.Generator, *, train: bool = True, dense: float = DENSE
+    rooms: PackedRooms, picked: Tensor, generator: torch.Generator, *, train: bool = True
 ) -> LayoutBatch:
     """The batch of the picked rooms (K,); without `train` nothing is mirrored and half of the relations is dropped."""
     counts = rooms.count[picked]
@@ -151,7 +148,7 @@ def make_batch(
         openings[(blind[:, 0] < UNKNOWN_FLOOR) | (blind[:, 1] < UNKNOWN_OPENINGS)] = torch.nan
     boxes = Boxes(rooms.size[nodes], position, yaw)
     if train:
-        predicates = _thinned(holds, boxes, receiver, sender, pair_scene, counts, generator, dense)
+        predicates = _thinned(holds, boxes, receiver, sender, pair_scene, counts, generator)
     else:
         predicates = holds & (torch.rand(holds.shape, generator=generator) < 0.5)
     pairs = Pairs(receiver, sender, _told(predicates.float(), receiver, sender, counts), scale)
@@ -221,14 +218,14 @@ def _mirror(
 
 def _thinned(
     holds: Tensor, boxes: Boxes, receiver: Tensor, sender: Tensor, pair_scene: Tensor, counts: Tensor,
-    generator: torch.Generator, dense_share: float,
+    generator: torch.Generator,
 ) -> Tensor:  # fmt: skip
     """(P, 16) bool, the relations that the graph tells: some rooms as dense as SG-FRONT, others as sparse as by hand.
 
     By hand people relate what stands close together, so sparse graphs tell near pairs first, each by one relation.
     """
     scenes = len(counts)
-    dense = torch.rand(scenes, generator=generator) < dense_share
+    dense = torch.rand(scenes, generator=generator) < DENSE
     share = (0.3 + 0.7 * torch.rand(scenes, generator=generator)) * dense
     kept = holds & (torch.rand(holds.shape, generator=generator) < share[pair_scene, None])
     kind, amount = torch.rand(scenes, generator=generator), torch.rand(scenes, generator=generator)

@@ -24,8 +24,8 @@ from echomodel.training.recipe import Recipe
 
 # Fields of a recipe that may change on the way: length, rates and weights, files, and what the machine offers.
 MAY_CHANGE = {
-    "steps", "data", "start", "warm", "optimizer", "relation_weight", "measure_weight", "living_weight",
-    "physics_weight", "own_weight", "own_kept", "validate_every", "save_every", "log_every", "threads", "workers",
+    "steps", "data", "start", "warm", "optimizer", "relation_weight", "measure_weight",
+    "physics_weight", "validate_every", "save_every", "log_every", "threads", "workers",
     "precision", "nodes", "scenes", "shapes_per_batch",
 }  # fmt: skip
 Report = Callable[[int, dict[str, float]], None]

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
 import torch
 
 from echomodel.boxes import Boxes
 from echomodel.compact.draft import PAIR_FEATURES, WALL_FEATURES, pair_features, wall_features
-from echomodel.compact.layout import SIDE_FEATURES, side_features, sides_of
 from echomodel.compact.pairs import pairs_of
-from echomodel.floors import opening_rows, padded, rectangle
+from echomodel.floors import padded, rectangle
 from echomodel.graph import GraphBatch
-from echomodel.openings import Opening
 
 
 def boxes() -> Boxes:
@@ -55,40 +52,3 @@ def test_gradients_are_finite_where_the_floor_is_unknown() -> None:
     assert torch.isfinite(position.grad).all()
     assert position.grad[0].any()
     assert not position.grad[1].any()
-
-
-def test_sides_are_told_in_their_own_frame() -> None:
-    """The gap to each wall, the way to its ends, and how the box is turned to it; the same in a room turned round."""
-    floor, door = rectangle(4, 3), Opening("door", "door", 2, 1.0, 0.9, 2.0)
-    own, found = boxes(), []
-    for turn in (0.0, 0.7):
-        cos, sin = np.cos(turn), np.sin(turn)
-        matrix = torch.tensor([[cos, -sin], [sin, cos]], dtype=torch.float32)  # (x, z) -> as a yaw of `turn` does
-        corners = floor @ matrix
-        position = own.position.clone()
-        position[:, [0, 2]] = own.position[:, [0, 2]] @ matrix
-        turned = Boxes(own.size, position, own.yaw + turn)
-        rows = opening_rows([door], corners.numpy())
-        sides = sides_of(corners[None], rows[None] - shift(corners)).expand(2, -1, -1)
-        found.append(side_features(turned, sides))
-    (features, there), (others, _) = found
-    assert features.shape == (2, 5, SIDE_FEATURES)
-    assert there.all()
-    gaps = torch.atanh(features[0, 0, :4]) * 3  # the wall at -z: touched, 1 m to both ends, half a metre to the middle
-    torch.testing.assert_close(gaps, torch.tensor([0.0, 1.0, 1.0, 0.5]), atol=1e-4, rtol=0)
-    framed = [*range(12), *range(18, SIDE_FEATURES)]  # all but what is told by the compass
-    torch.testing.assert_close(features[..., framed], others[..., framed], atol=1e-4, rtol=0)
-    assert features[0, 4, -2:].tolist() == [1.0, 0.0]  # a door, no window
-
-
-def shift(corners: torch.Tensor) -> torch.Tensor:
-    """What `opening_rows` takes off places: it puts the middle of the bounding box at the origin."""
-    middle = (corners.amax(0) + corners.amin(0)) / 2
-    return -torch.cat([middle, middle, torch.zeros(6)])
-
-
-def test_unknown_floors_and_missing_openings_are_silent() -> None:
-    unknown = torch.full((1, 4, 2), torch.nan)
-    features, there = side_features(boxes(), sides_of(unknown, torch.full((1, 2, 10), torch.nan)).expand(2, -1, -1))
-    assert not features.any()
-    assert not there.any()

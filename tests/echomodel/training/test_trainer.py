@@ -18,11 +18,12 @@ from echomodel.floors import known, outside
 from echomodel.graph import GraphBatch
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts
-from echomodel.training.layout_stage import heading_distance, living_loss, measure_distance, told_triplets
+from echomodel.training.layout_stage import as_carried, measure_distance, told_triplets
 from echomodel.training.recipe import OptimizerConfig, Recipe, read_recipe
 from echomodel.training.rooms import PackedRooms, draw_batch, make_batch
 from echomodel.training.run import open_run
 from echomodel.training.trainer import read_log, step_generator
+from echomodel.vocabulary import vocabulary
 
 RECIPES = Path(__file__).parents[3] / "model" / "recipes"
 
@@ -44,27 +45,13 @@ def test_told_relations_hold_in_mirrored_rooms(packed: PackedRooms) -> None:
     assert seen > 1000
 
 
-def test_living_loss_pulls_what_a_person_would_point_at(packed: PackedRooms) -> None:
+def test_losses_see_boxes_at_the_heights_of_what_carries_them(packed: PackedRooms) -> None:
     batch = draw_batch(packed, 120, torch.Generator().manual_seed(1))
-    nodes = batch.graph.num_nodes
-    level, known_boxes = torch.full((nodes,), 0.2), torch.zeros(nodes, dtype=torch.bool)
-    true = living_loss(batch, batch.boxes, level, known_boxes)
-    assert heading_distance(batch, batch.boxes, level, known_boxes) == 0
-    luck = torch.Generator().manual_seed(0)
-    size = batch.boxes.size.clone().requires_grad_()
-    position = (batch.boxes.position + 0.4 * torch.randn(nodes, 3, generator=luck)).requires_grad_()
-    yaw = (batch.boxes.yaw + 0.3 * torch.randn(nodes, generator=luck)).requires_grad_()
-    shaken = Boxes(size, position, yaw)
-    loss = living_loss(batch, shaken, level, known_boxes) + heading_distance(batch, shaken, level, known_boxes)
-    assert loss > true + 0.1
-    loss.backward()
-    assert size.grad is None
-    assert position.grad is not None
-    assert yaw.grad is not None
-    assert torch.isfinite(position.grad).all()
-    assert torch.isfinite(yaw.grad).all()
-    assert position.grad.abs().max() > 0
-    assert living_loss(batch, shaken, level, ~known_boxes) == 0  # what is given is nobody's fault
+    lifted = batch.boxes.position + torch.tensor([0.1, 0.4, 0.1])
+    seen = as_carried(batch, Boxes(batch.boxes.size, lifted, batch.boxes.yaw))
+    hangs = torch.tensor([vocabulary().categories[number].support == "wall" for number in batch.graph.category])
+    torch.testing.assert_close(seen.position[:, 1], torch.where(hangs[:, None], lifted, batch.boxes.position)[:, 1])
+    torch.testing.assert_close(seen.position[:, [0, 2]], lifted[:, [0, 2]])
 
 
 def test_floors_are_mirrored_with_their_rooms() -> None:
