@@ -33,7 +33,8 @@ from echousd.shapes.joinery import part_of, within_budget
 from echousd.shapes.matter import weighed
 from echousd.stage import encoding as usd
 from echousd.stage.paths import DRESSING, OBJECTS
-from echousd.stage.write import apply_apis, author_relation, put
+from echousd.stage.pen import apply_apis
+from echousd.stage.write import author_relation, put
 
 ORIGIN = Origin("dressing")
 TALL = 0.7  # metres: what reaches or hangs higher may stand in a camera's way
@@ -223,7 +224,7 @@ def write_nodes(layer: Sdf.Layer, graph: DressingGraph, room: Sdf.Path, taken: I
     above = Sdf.Path(DRESSING).ReplacePrefix(Sdf.Path("/Room"), room)
     for node in graph.nodes:
         spec = layer.GetPrimAtPath(above.AppendChild(node.name))
-        apply_apis(spec)
+        apply_apis(spec, *usd.NODE_APIS)
         for attribute, value in usd.small_values(node).items():
             put(spec, attribute, value)
     if not graph.relations:

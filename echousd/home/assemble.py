@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade
+from pxr import Sdf
 
 import echousd
 from echomodel.openings import numbered
@@ -33,6 +33,8 @@ from echousd.shapes.looks import palette_of_room
 from echousd.shapes.surface import surface
 from echousd.shapes.walls import THICKNESS
 from echousd.stage.files import layer_bytes, open_stage, write_all
+from echousd.stage.pen import Pen
+from echousd.stage.shading import preview_surface
 from echousd.stage.turning import rescale, turn_up
 
 PLAN = "plan.usda"
@@ -225,25 +227,18 @@ def home_files(
 
 def _thresholds(layer: Sdf.Layer, plan: Plan) -> None:
     """Author floors in the doorways, where those of the rooms end: /House/Plan, one for each way through."""
-    stage = Usd.Stage.Open(layer)
-    group = UsdGeom.Xform.Define(stage, f"{HOME}/Plan")
-    Usd.ModelAPI(group).SetKind("group")
-    UsdGeom.Scope.Define(stage, f"{HOME}/Plan/Looks")
-    look = UsdShade.Material.Define(stage, f"{HOME}/Plan/Looks/threshold")
-    shader = UsdShade.Shader.Define(stage, f"{HOME}/Plan/Looks/threshold/surface")
-    shader.CreateIdAttr("UsdPreviewSurface")
-    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(THRESHOLD)
-    look.CreateSurfaceOutput().ConnectToSource(shader.CreateOutput("surface", Sdf.ValueTypeNames.Token))
+    pen, above = Pen(layer), f"{HOME}/Plan"
+    pen.define(above, "Xform", kind="group")
+    pen.define(f"{above}/Looks", "Scope")
+    preview_surface(pen, f"{above}/Looks/threshold", {"diffuseColor": THRESHOLD})
     taken: list[str] = []
     for (one, other), _, ((low_x, low_z), (high_x, high_z)) in doorways(plan):
         name = numbered(f"threshold_{one}_{other}", taken)
         taken.append(name)
-        part = UsdGeom.Xform.Define(stage, f"{HOME}/Plan/{name}")
-        Usd.ModelAPI(part).SetKind("component")
-        UsdSemantics.LabelsAPI.Apply(part.GetPrim(), "category").CreateLabelsAttr(["floor"])
+        pen.define(f"{above}/{name}", "Xform", kind="component")
+        pen.label(f"{above}/{name}", category="floor")
         box = trimesh.creation.box(bounds=[(low_x, -THICKNESS, low_z), (high_x, 0.0, high_z)])
-        mesh = write_mesh(
-            stage, f"{HOME}/Plan/{name}/{name}_mesh", surface(box, {"threshold": np.arange(len(box.faces))})
-        )
-        UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
-        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(look)
+        mesh = f"{above}/{name}/{name}_mesh"
+        write_mesh(pen, mesh, surface(box, {"threshold": np.arange(len(box.faces))}))
+        pen.over(mesh, apis=["PhysicsCollisionAPI"])
+        pen.bind(mesh, f"{above}/Looks/threshold")

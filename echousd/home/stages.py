@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdGeom, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom
 
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
@@ -20,9 +20,10 @@ from echousd.stage import values
 from echousd.stage.contents import read_contents
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage, save_layer, source
+from echousd.stage.pen import ops, relate, say
 from echousd.stage.read import find_rooms, place, room_graph, stated_fields, value
 from echousd.stage.units import to_metres
-from echousd.stage.write import author, define, put, relate
+from echousd.stage.write import author, define, put
 
 HOME, GRAPH, ROOMS = "/House", "/House/Graph", "/House/Rooms"
 DOC = """A home: /House/Graph says how its rooms lie to each other, each room's own graph what stands in it.
@@ -76,11 +77,8 @@ def room_path(name: str) -> Sdf.Path:
 
 def _placed(spec: Sdf.PrimSpec, pose: np.ndarray) -> None:
     """Author a room's pose in the home, (4, 4) float, metres, column vectors."""
-    name = "xformOp:transform:home"
     matrix = Gf.Matrix4d(*(np.round(pose.T, 6) + 0.0).ravel().tolist())
-    Sdf.AttributeSpec(spec, name, Sdf.ValueTypeNames.Matrix4d).default = matrix
-    order = Sdf.AttributeSpec(spec, "xformOpOrder", Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
-    order.default = Vt.TokenArray([name])
+    say(spec, ops(**{"transform:home": ("matrix4d", matrix)}))
 
 
 def write_home(home: HomeGraph, path: Path, plan: Plan | None = None) -> None:

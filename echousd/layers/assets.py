@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics, UsdShade, Vt
+from pxr import Gf, Kind, Sdf
 
 from echousd.layers.materials import write_looks, write_palettes
 from echousd.layers.physics import write_asset_physics
@@ -21,8 +21,7 @@ from echousd.shapes.geometry import Geometry, Original
 from echousd.shapes.joints import write_joints
 from echousd.shapes.looks import alternatives, look, palette_for
 from echousd.shapes.surface import CREASE, Surface, surfaces
-from echousd.stage.files import layer_bytes, new_stage
-from echousd.stage.layouts import authoring
+from echousd.stage.files import layer_bytes
 from echousd.stage.paths import (
     CLASSES,
     DESCRIPTION,
@@ -37,26 +36,18 @@ from echousd.stage.paths import (
     piece_name,
     piece_path,
 )
+from echousd.stage.pen import Pen, ops, say
 from echousd.stage.taxonomy import ade20k
 from echousd.stage.turning import move_room, rescale, turn_up
 
 LOD, HIGH, LOW, PROXY = "LOD", "high", "low", "proxy"  # a variant set and its variants, the default first
 
 
-def without_stage(stage: Usd.Stage, finish: Callable[[Sdf.Layer], None]) -> Sdf.Layer:
-    """A copy of a stage's layer, finished where no stage looks on: that would try to load what is not on disk yet."""
-    layer = Sdf.Layer.CreateAnonymous(".usda")
-    layer.TransferContent(stage.GetRootLayer())
-    with Sdf.ChangeBlock():
-        finish(layer)
-    return layer
-
-
-def refer(layer: Sdf.Layer, above: str, references: Mapping[str, str]) -> None:
-    """Have the prims `references` below a path each refer to the asset that it names."""
+def refer(group: Sdf.PrimSpec, references: Mapping[str, str]) -> None:
+    """Have the prims `references` below one each refer to the asset that it names."""
     for name, asset in references.items():
-        prim = layer.GetPrimAtPath(f"{above}/{name}")
-        prim.referenceList.prependedItems.append(Sdf.Reference(f"../assets/{asset}/{asset}.usda"))
+        arcs = group.nameChildren[name].referenceList
+        arcs.prependedItems.append(Sdf.Reference(f"../assets/{asset}/{asset}.usda"))
 
 
 def as_asked(layer: Sdf.Layer, look: Look, theirs: Callable[[str], bool] = lambda path: False) -> Sdf.Layer:
@@ -68,45 +59,39 @@ def as_asked(layer: Sdf.Layer, look: Look, theirs: Callable[[str], bool] = lambd
     return move_room(turn_up(layer, theirs) if look.up_axis == "Z" else layer, look.room_path)
 
 
-def as_class(stage: Usd.Stage, name: str) -> None:
-    """Have what a stage says of an asset's class be a class, and define what is below: no overs of nothing."""
-    layer, top = stage.GetRootLayer(), Sdf.Path(class_path(name))
+def as_class(layer: Sdf.Layer, name: str) -> None:
+    """Have what a layer says of an asset's class be a class, and define what is below: no overs of nothing."""
+    top = Sdf.Path(class_path(name))
     paths: list[Sdf.Path] = []
     layer.Traverse(top, paths.append)
-    with Sdf.ChangeBlock():
-        for path in paths:
-            if path.IsPrimPath():
-                layer.GetPrimAtPath(path).specifier = Sdf.SpecifierDef  # a class below would not be seen
-        for path in (top.GetParentPath(), top):
-            layer.GetPrimAtPath(path).specifier = Sdf.SpecifierClass
+    for path in paths:
+        if path.IsPrimPath():
+            layer.GetPrimAtPath(path).specifier = Sdf.SpecifierDef  # a class below would not be seen
+    for path in (top.GetParentPath(), top):
+        layer.GetPrimAtPath(path).specifier = Sdf.SpecifierClass
 
 
-def write_mesh(stage: Usd.Stage, path: str, form: Surface) -> UsdGeom.Mesh:
-    """Author a UsdGeomMesh with indexed normals and `st`, and a GeomSubset per material group if there are several."""
-    mesh = UsdGeom.Mesh.Define(stage, path)
-    # Blender merges an Xform with an only child that has no transform of its own, and the Xform's name is lost.
-    # In floats: three.js fails on whole numbers in doubles of a usdc.
-    mesh.AddTranslateOp(UsdGeom.XformOp.PrecisionFloat).Set(Gf.Vec3f(0.0))
-    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(form.points))
-    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(form.faces), 3, np.int32)))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(form.faces.ravel()))
-    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(form.extent))
-    primvars = UsdGeom.PrimvarsAPI(mesh)
-    normals = primvars.CreatePrimvar("normals", Sdf.ValueTypeNames.Normal3fArray, UsdGeom.Tokens.faceVarying)
-    normals.Set(Vt.Vec3fArray.FromNumpy(form.normals))
-    normals.SetIndices(Vt.IntArray.FromNumpy(form.normal_index))
-    st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
-    st.Set(Vt.Vec2fArray.FromNumpy(form.st))
-    st.SetIndices(Vt.IntArray.FromNumpy(form.st_index))
+def write_mesh(pen: Pen, path: str, form: Surface, **about: str) -> None:
+    """Author a mesh with indexed normals and `st`, and a GeomSubset per material group if there are several.
+
+    `about`: other tokens of its own that vary, such as its purpose.
+    """
+    spec = pen.define(path, "Mesh", {
+        # Blender merges an Xform with an only child that has no transform of its own, and the Xform's name is lost.
+        # In floats: three.js fails on whole numbers in doubles of a usdc.
+        **ops(translate=("float3", (0.0, 0.0, 0.0))), "uniform token subdivisionScheme": "none",
+        "point3f[] points": form.points, "int[] faceVertexCounts": np.full(len(form.faces), 3, np.int32),
+        "int[] faceVertexIndices": form.faces.ravel(), "float3[] extent": form.extent,
+        "normal3f[] primvars:normals": form.normals, "int[] primvars:normals:indices": form.normal_index,
+        "texCoord2f[] primvars:st": form.st, "int[] primvars:st:indices": form.st_index,
+    } | {f"uniform token {name}": value for name, value in about.items()})  # fmt: skip
+    for name in ("primvars:normals", "primvars:st"):
+        spec.attributes[name].SetInfo("interpolation", "faceVarying")
     if len(form.groups) > 1:
+        told = {"uniform token elementType": "face", "uniform token familyName": "materialBind"}
         for name, faces in form.groups.items():
-            subset = UsdGeom.Subset.Define(stage, f"{path}/{name}")
-            subset.CreateElementTypeAttr(UsdGeom.Tokens.face)
-            subset.CreateFamilyNameAttr("materialBind")
-            subset.CreateIndicesAttr(Vt.IntArray.FromNumpy(faces))
-        UsdGeom.Subset.SetFamilyType(mesh, "materialBind", UsdGeom.Tokens.partition)
-    return mesh
+            pen.define(f"{path}/{name}", "GeomSubset", {**told, "int[] indices": faces})
+        say(spec, {"uniform token subsetFamily:materialBind:familyType": "partition"})
 
 
 def geometry_layer(
@@ -117,25 +102,23 @@ def geometry_layer(
     `forms`: path of a part below the root -> its surface. `geometry`: whose parts these are, and whose colliders are
     written. `data`: customLayerData. `style`: chooses the looks, which a room's materials layer overrides.
     """
-    stage = new_stage(name, ".usdc", data)
-    root = UsdGeom.Xform.Define(stage, f"/{name}").GetPrim()
-    UsdGeom.Scope.Define(stage, f"/{name}/{GEO}")
-    if geometry.description:
-        root.CreateAttribute(DESCRIPTION, Sdf.ValueTypeNames.FloatArray).Set(Vt.FloatArray(geometry.description))
+    pen = Pen.blank(name, ".usdc", data)
+    told = {f"custom float[] {DESCRIPTION}": geometry.description} if geometry.description else {}
+    pen.define(f"/{name}", "Xform", told)
+    pen.define(f"/{name}/{GEO}", "Scope")
     for body in sorted({part.body for part in geometry.parts if part.body}):
-        UsdGeom.Xform.Define(stage, piece_path(f"/{name}", name, body))
+        pen.define(piece_path(f"/{name}", name, body), "Xform")
     for path, form in forms.items():
-        write_mesh(stage, f"/{name}{path}", form)
+        write_mesh(pen, f"/{name}{path}", form)
     guides = () if geometry.theirs_collides else geometry.colliders
     wholes = [(guide.mesh, {"collider": np.arange(len(guide.mesh.faces))}, CREASE) for guide in guides]
     for collider, form in zip(guides, surfaces(wholes), strict=True) if guides else ():
-        guide = write_mesh(stage, piece_path(f"/{name}", name, collider.name, collider.body), form)
-        guide.CreatePurposeAttr(UsdGeom.Tokens.guide)
-    _write_looks(stage, name, style, {part: tuple(form.groups) for part, form in forms.items()})
-    return stage.GetRootLayer()
+        write_mesh(pen, piece_path(f"/{name}", name, collider.name, collider.body), form, purpose="guide")
+    _write_looks(pen, name, style, {part: tuple(form.groups) for part, form in forms.items()})
+    return pen.layer
 
 
-def _write_looks(stage: Usd.Stage, name: str, style: str, slots: Mapping[str, Sequence[str]]) -> None:
+def _write_looks(pen: Pen, name: str, style: str, slots: Mapping[str, Sequence[str]]) -> None:
     """The looks of an asset that stands for itself, in plain colours, and its variant set `palette`."""
     bindings = slot_paths(f"/{name}", slots)
     if not bindings:
@@ -143,18 +126,18 @@ def _write_looks(stage: Usd.Stage, name: str, style: str, slots: Mapping[str, Se
     used, chosen, scope = sorted(set(bindings.values())), palette_for(style), f"/{name}/{MTL}"
     shown = alternatives(chosen)
     plain = {harmony: {slot: replace(look(harmony, slot), pattern="") for slot in used} for harmony in shown}
-    write_looks(stage, plain[chosen], bindings, scope, tinted=True)
-    write_palettes(stage, chosen, plain, f"/{name}", scope)
+    write_looks(pen, plain[chosen], bindings, scope, tinted=True)
+    write_palettes(pen, chosen, plain, f"/{name}", scope)
 
 
 def coarse_layer(name: str, forms: Mapping[str, Surface], data: Mapping[str, Any]) -> Sdf.Layer:
     """`<name>_low`: the meshes once more with few faces; arguments as for `geometry_layer`."""
-    stage = new_stage(name, ".usdc", data)
-    UsdGeom.Xform.Define(stage, f"/{name}")
-    UsdGeom.Scope.Define(stage, f"/{name}/{GEO}")
+    pen = Pen.blank(name, ".usdc", data)
+    pen.define(f"/{name}", "Xform")
+    pen.define(f"/{name}/{GEO}", "Scope")
     for path, form in forms.items():
-        write_mesh(stage, f"/{name}{path}", form)
-    return stage.GetRootLayer()
+        write_mesh(pen, f"/{name}{path}", form)
+    return pen.layer
 
 
 def component_layer(
@@ -165,37 +148,33 @@ def component_layer(
     `name`, `category`: words. `extent`: (2, 3) float, metres. `geometry`: whose joints, colliders and mass are told.
     `data`: customLayerData.
     """
-    stage = new_stage(name, ".usda", data)
-    prim = UsdGeom.Xform.Define(stage, f"/{name}").GetPrim()
-    model = Usd.ModelAPI(prim)
-    model.SetKind(Kind.Tokens.component)
-    model.SetAssetName(name)
-    model.SetAssetIdentifier(Sdf.AssetPath(f"./{name}.usda"))
-    UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([Gf.Vec3f(*map(float, extent[0])), Gf.Vec3f(*map(float, extent[1]))])
-    prim.SetDocumentation(f"{category}: origin at the centre of the bottom face, +Y up, +Z is the front; metres")
+    pen, root = Pen.blank(name, ".usda", data), f"/{name}"
+    pen.define(
+        root, "Xform", {"float3[] extentsHint": np.asarray(extent, np.float32)}, ["GeomModelAPI"],
+        kind="component", assetInfo={"name": name, "identifier": Sdf.AssetPath(f"./{name}.usda")},
+        documentation=f"{category}: origin at the centre of the bottom face, +Y up, +Z is the front; metres",
+    )  # fmt: skip
     if geometry.joints:
-        write_joints(stage, name, geometry)
+        write_joints(pen, name, geometry)
     slots = most_used(geometry)
     if geometry.original is None:
-        _write_levels(stage, name, geometry, slots[0])
-    for taxonomy, word in (("category", category), ("ade20k", ade20k(category))):
-        UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr([word])
-    write_asset_physics(stage, name, category, geometry, slots)
-    return without_stage(stage, lambda layer: _add_arcs(layer, name, geometry))
+        _write_levels(pen, name, geometry, slots[0])
+    pen.label(root, category=category, ade20k=ade20k(category))
+    write_asset_physics(pen, name, category, geometry, slots)
+    _add_arcs(pen.layer, name, geometry)
+    return pen.layer
 
 
-def _write_levels(stage: Usd.Stage, name: str, geometry: Geometry, slot: str) -> None:
+def _write_levels(pen: Pen, name: str, geometry: Geometry, slot: str) -> None:
     """The variant set `LOD`: all faces, few where there are such meshes, or the colliders, in the look of a slot."""
     levels = (HIGH, LOW, PROXY) if geometry.coarse else (HIGH, PROXY)
-    with authoring(stage.GetPrimAtPath(f"/{name}"), LOD, levels, PROXY, HIGH):
-        for part in geometry.parts:
-            mesh = stage.OverridePrim(piece_path(f"/{name}", name, part.name, part.body))
-            UsdGeom.Imageable(mesh).CreateVisibilityAttr(UsdGeom.Tokens.invisible)
-        for collider in geometry.colliders:
-            guide = stage.OverridePrim(piece_path(f"/{name}", name, collider.name, collider.body))
-            UsdGeom.Imageable(guide).CreatePurposeAttr(UsdGeom.Tokens.default_)
-            UsdShade.MaterialBindingAPI.Apply(guide)
-            guide.CreateRelationship("material:binding", False).SetTargets([Sdf.Path(f"/{name}/{MTL}/{slot}")])
+    pen = pen.variants(f"/{name}", LOD, levels, HIGH)[PROXY]
+    for part in geometry.parts:
+        pen.over(piece_path(f"/{name}", name, part.name, part.body), {"token visibility": "invisible"})
+    for collider in geometry.colliders:
+        guide = piece_path(f"/{name}", name, collider.name, collider.body)
+        pen.over(guide, {"uniform token purpose": "default"})
+        pen.bind(guide, f"/{name}/{MTL}/{slot}")
 
 
 def most_used(geometry: Geometry) -> list[str]:
@@ -293,9 +272,7 @@ def _place(layer: Sdf.Layer, name: str, original: Original, path: str) -> None:
         root = layer.GetPrimAtPath(f"/{name}")
         places = Sdf.PrimSpec(root, piece_name(name, PLACES), Sdf.SpecifierDef, "Xform")
         matrix = Gf.Matrix4d(*(round(float(v), 9) + 0.0 for v in np.asarray(original.pose).T.ravel()))
-        Sdf.AttributeSpec(places, "xformOp:transform", Sdf.ValueTypeNames.Matrix4d).default = matrix
-        order = Sdf.AttributeSpec(places, "xformOpOrder", Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
-        order.default = ["xformOp:transform"]
+        say(places, ops(transform=("matrix4d", matrix)))
         model = Sdf.PrimSpec(places, piece_name(name, MODEL), Sdf.SpecifierDef)
         model.kind = Kind.Tokens.subcomponent  # a component has none below it
         model.payloadList.prependedItems.append(Sdf.Payload(path, Sdf.Path(original.prim)))

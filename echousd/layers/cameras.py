@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pxr import Gf, Usd, UsdGeom
+from pxr import Gf
 
 from echomodel.openings import inward_normal, segment
 from echomodel.roomboxes import footprints
@@ -15,6 +15,7 @@ from echousd.draw.sight import ASPECT, Furniture
 from echousd.draw.views import APERTURE, FOCAL_LENGTH, MARGIN, inside_view, perspective_view, shifted
 from echousd.room import RoomData
 from echousd.shapes import walls
+from echousd.stage.pen import Pen, ops
 
 FAR = 10.0  # widths of the room that the camera above is away: heights hardly show
 TENTHS = 0.01  # what a millimetre is in USD's lens unit, tenths of a scene unit, here of a metre
@@ -42,45 +43,45 @@ def opening_boxes(room: RoomData) -> Furniture:
 
 
 def write_cameras(
-    stage: Usd.Stage, volume: Volume, points: np.ndarray, furniture: Furniture, walled: np.ndarray | None = None,
+    pen: Pen, volume: Volume, points: np.ndarray, furniture: Furniture, walled: np.ndarray | None = None,
     hung: Furniture | None = None, openings: Furniture | None = None, main: int | None = None,
 ) -> None:  # fmt: skip
     """Author `/Room/Cameras/top` (from afar, -Z up in the picture) and `/Room/Cameras/perspective`.
 
     Arguments:
-        stage: receives the cameras.
+        pen: writes the cameras.
         volume: of the room. points, furniture: see `perspective_view`.
         walled: corners of the floor of a room with walls; its perspective camera stands inside.
         hung: what hangs or stands at the walls and must not fill that camera's picture. openings: doors and windows.
         main: row of the furniture that this camera has whole in its picture.
     """
-    UsdGeom.Scope.Define(stage, "/Room/Cameras")
-    top = UsdGeom.Camera.Define(stage, "/Room/Cameras/top")
+    pen.define("/Room/Cameras", "Scope")
     # from afar rather than orthographic, whose width Blender takes for ten times what it is
     width = float((volume.upper - volume.lower)[[0, 2]].max()) * MARGIN
     height = float(volume.upper[1]) + FAR * width
-    top.CreateFocalLengthAttr(FAR * APERTURE * TENTHS)
-    for aperture in (top.CreateHorizontalApertureAttr(), top.CreateVerticalApertureAttr()):
-        aperture.Set(APERTURE * TENTHS)
-    top.CreateFocusDistanceAttr(height)
-    top.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height, float(volume.centre[2])))
-    top.AddRotateXOp().Set(-90.0)
-    top.CreateClippingRangeAttr(Gf.Vec2f(0.5 * FAR * width, height + 1.0))
-    camera = UsdGeom.Camera.Define(stage, "/Room/Cameras/perspective")
+    above = (float(volume.centre[0]), height, float(volume.centre[2]))
+    top = {
+        "float focalLength": FAR * APERTURE * TENTHS, "float horizontalAperture": APERTURE * TENTHS,
+        "float verticalAperture": APERTURE * TENTHS, "float focusDistance": height,
+        "float2 clippingRange": (0.5 * FAR * width, height + 1.0),
+        **ops(translate=("double3", above), rotateX=("float", -90.0)),
+    }  # fmt: skip
+    pen.define("/Room/Cameras/top", "Camera", top)
     if walled is not None:
         matrix, lens = inside_view(walled, furniture, float(volume.upper[1]), hung, openings, main)
     else:
         matrix, lens = perspective_view(points, furniture), FOCAL_LENGTH
     slope = float(matrix[:3, 1] @ matrix[:3, 2])  # 0 of a camera that has no shift
-    camera.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(shifted(matrix, -slope).T)))
-    camera.CreateFocalLengthAttr(lens * TENTHS)
-    camera.CreateVerticalApertureOffsetAttr(-slope * lens * TENTHS)
-    camera.CreateHorizontalApertureAttr(APERTURE * TENTHS)
-    camera.CreateVerticalApertureAttr(APERTURE * TENTHS / (1.0 if walled is None else ASPECT))
-    distance = float(np.linalg.norm(matrix[:3, 3] - volume.centre))
     sharp = volume.centre if main is None else furniture.corners[main].mean(0)
-    camera.CreateFocusDistanceAttr(float(np.linalg.norm(matrix[:3, 3] - sharp)))
-    camera.CreateClippingRangeAttr(Gf.Vec2f(0.05, 4 * distance + 10.0))
+    camera = {
+        **ops(transform=("matrix4d", Gf.Matrix4d(np.ascontiguousarray(shifted(matrix, -slope).T)))),
+        "float focalLength": lens * TENTHS, "float verticalApertureOffset": -slope * lens * TENTHS,
+        "float horizontalAperture": APERTURE * TENTHS,
+        "float verticalAperture": APERTURE * TENTHS / (1.0 if walled is None else ASPECT),
+        "float focusDistance": float(np.linalg.norm(matrix[:3, 3] - sharp)),
+        "float2 clippingRange": (0.05, 4 * float(np.linalg.norm(matrix[:3, 3] - volume.centre)) + 10.0),
+    }  # fmt: skip
+    pen.define("/Room/Cameras/perspective", "Camera", camera)
 
 
 @dataclass(frozen=True)

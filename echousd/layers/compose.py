@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics, UsdShade
+from pxr import Sdf
 
 import echousd
 from echomodel.dressing import KINDS
@@ -26,8 +26,8 @@ from echousd.shapes.geometry import LICENCE, Geometry, Origin, Part
 from echousd.shapes.styles import ROOM_STYLE
 from echousd.shapes.surface import Surface, surfaces
 from echousd.stage.encoding import relation_name
-from echousd.stage.files import layer_bytes, new_stage
-from echousd.stage.layouts import authored_layouts
+from echousd.stage.files import layer_bytes
+from echousd.stage.layouts import layout_pens
 from echousd.stage.paths import (
     DRESSING,
     OBJECTS,
@@ -39,6 +39,7 @@ from echousd.stage.paths import (
     payload_file,
     piece_path,
 )
+from echousd.stage.pen import Pen, ops
 from echousd.stage.taxonomy import ade20k, word_of
 from echousd.stage.write import graph_layer as write_graph_layer
 
@@ -145,17 +146,15 @@ def simready_data(room: RoomData) -> dict[str, Any]:
 
 def geometry_layer(room: RoomData) -> Sdf.Layer:
     """`layers/geometry.usda`: every object references its asset."""
-    stage = _room_stage(room, "geometry")
-    root = UsdGeom.Xform.Define(stage, "/Room").GetPrim()
-    Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
-    for path in (OBJECTS, SHELL):
-        Usd.ModelAPI(UsdGeom.Xform.Define(stage, path)).SetKind(Kind.Tokens.group)
+    pen = _pen(room, "geometry")
+    for path, kind in (("/Room", "assembly"), (OBJECTS, "group"), (SHELL, "group")):
+        pen.define(path, "Xform", kind=kind)
     for node in room.graph.nodes:
-        prim = UsdGeom.Xform.Define(stage, f"{OBJECTS}/{node.name}").GetPrim()
-        UsdSemantics.LabelsAPI.Apply(prim, "ade20k").CreateLabelsAttr([ade20k(word_of(node))])
-        if node.name in instanced(room):
-            prim.SetInstanceable(True)
-    return assets.without_stage(stage, lambda layer: assets.refer(layer, OBJECTS, room.assets))
+        alike: dict[str, Any] = {"instanceable": True} if node.name in instanced(room) else {}
+        pen.define(f"{OBJECTS}/{node.name}", "Xform", **alike)
+        pen.label(f"{OBJECTS}/{node.name}", ade20k=ade20k(word_of(node)))
+    assets.refer(pen.over(OBJECTS), room.assets)
+    return pen.layer
 
 
 def instanced(room: RoomData) -> frozenset[str]:
@@ -174,25 +173,25 @@ def graph_layer(room: RoomData) -> Sdf.Layer:
 
 def layout_layer(room: RoomData) -> Sdf.Layer:
     """`layers/layout.usda`: overs with xformOps, in a variant set `layout` where there are several layouts."""
-    stage = _room_stage(room, "layout")
-    UsdGeom.SetStageUpAxis(stage, room.options.up_axis)  # its places are so already
-    top = stage.OverridePrim("/Room")
-    for number in authored_layouts(top, len(room.layouts or (room.boxes,)), "layout_0"):
-        _place(stage, room, number)
-    return stage.GetRootLayer()
+    pen = _pen(room, "layout")
+    pen.layer.pseudoRoot.SetInfo("upAxis", room.options.up_axis)  # its places are so already
+    pen.over("/Room")
+    for number, inside in enumerate(layout_pens(pen, len(room.layouts or (room.boxes,)), "layout_0")):
+        _place(inside, room, number)
+    return pen.layer
 
 
 def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.Layer:
     """`layers/physics.usda`: the scene, the shell, its doors' hinges; the furniture's physics is in its assets."""
-    stage = _room_stage(room, "physics")
-    stage.OverridePrim("/Room")
+    pen = _pen(room, "physics")
+    pen.over("/Room")
     forms = {True: "convexHull", False: "none"}  # what may turn, what stands as it is
     solid = {mesh.path: forms[part.joint is not None] for part in built for mesh in part.meshes if mesh.solid}
-    physics.write_physics(stage, solid)
+    physics.write_physics(pen, solid)
     for part in built:
         if part.joint and part.mass:
-            joints.write_hinge(stage, part.path, part.joint, part.mass)
-    return stage.GetRootLayer()
+            joints.write_hinge(pen, part.path, part.joint, part.mass)
+    return pen.layer
 
 
 def room_looks(
@@ -231,43 +230,40 @@ def materials_layer(
     bindings: Mapping[str, str], harmony: str,
 ) -> Sdf.Layer:  # fmt: skip
     """`layers/materials.usda`: materials, bindings, and the variant set `palette`; arguments as for `room_looks`."""
-    stage = _room_stage(room, "materials")
-    stage.OverridePrim("/Room")
+    pen = _pen(room, "materials")
+    pen.over("/Room")
     slots = _slots(small)
     shown = looks.alternatives(harmony, room.graph.room.style)
     tables = {name: room_looks(room, made, built, slots, name)[0] for name in shown}
-    materials.write_looks(stage, tables[harmony], bindings, also=tables[harmony], harmony=harmony, tinted=True)
+    materials.write_looks(pen, tables[harmony], bindings, also=tables[harmony], harmony=harmony, tinted=True)
     for asset in sorted({room.assets[name] for name in instanced(room)}):
-        assets.as_class(stage, asset)
-    materials.write_palettes(stage, harmony, tables)
+        assets.as_class(pen.layer, asset)
+    materials.write_palettes(pen, harmony, tables)
     if room.options.materialx:
-        materials.write_networks(stage, harmony, tables)
-    return stage.GetRootLayer()
+        materials.write_networks(pen, harmony, tables)
+    return pen.layer
 
 
 def root_layer(room: RoomData, hung: Furniture | None = None) -> Sdf.Layer:
     """The root layer: metadata, sublayers, lights and cameras; `hung`: what stands in a camera's way at walls."""
-    stage = _room_stage(room, "")
-    layer = stage.GetRootLayer()
+    pen = _pen(room, "")
+    layer = pen.layer
     layer.customLayerData = {**layer.customLayerData, **simready_data(room)}
     layer.documentation = (
         "A room made by EchoUSD. Put your own opinions into a stronger layer; layers/ is rewritten. "
         "Readers that compose no sublayers (three.js, tinyusdz) need `echousd export` of it."
     )
-    prim = UsdGeom.Xform.Define(stage, "/Room").GetPrim()
-    Usd.ModelAPI(prim).SetKind(Kind.Tokens.assembly)
-    Usd.ModelAPI(prim).SetAssetName(room.name)
     seen = room_volume(room)
-    low, high = (Gf.Vec3f(*map(float, corner)) for corner in (seen.lower, seen.upper))
-    UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([low, high])
+    values = {"float3[] extentsHint": np.array([seen.lower, seen.upper], np.float32)}
+    pen.define("/Room", "Xform", values, ["GeomModelAPI"], kind="assembly", assetInfo={"name": room.name})
     furniture = Furniture(*(np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw)))
-    lights.write_lights(stage, room, seen)
+    lights.write_lights(pen, room, seen)
     walled = room.floor if room.options.walls else None
     main = cameras.main_piece([node.category for node in room.graph.nodes], furniture)
-    cameras.write_cameras(stage, seen, room_points(room), furniture, walled, hung, cameras.opening_boxes(room), main)
+    cameras.write_cameras(pen, seen, room_points(room), furniture, walled, hung, cameras.opening_boxes(room), main)
     names = [name for name in LAYERS if name != "dressing" or room.options.dress != "none"]
-    paths = [f"./{layer_file(name, crate=room.options.crate)}" for name in names]
-    return assets.without_stage(stage, lambda layer: setattr(layer, "subLayerPaths", paths))
+    layer.subLayerPaths = [f"./{layer_file(name, crate=room.options.crate)}" for name in names]
+    return layer
 
 
 def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Path) -> Asset:
@@ -345,67 +341,56 @@ def _slots(made: Mapping[str, Asset]) -> list[str]:
     return sorted({slot for asset in made.values() for slots in asset.slots.values() for slot in slots})
 
 
-def _room_stage(room: RoomData, layer: str) -> Usd.Stage:
-    name = f"{room.name}_{layer}" if layer else room.name
-    return new_stage("Room", ".usda", layer_data(room, name))
+def _pen(room: RoomData, layer: str) -> Pen:
+    return Pen.blank("Room", data=layer_data(room, f"{room.name}_{layer}" if layer else room.name))
 
 
-def _place(stage: Usd.Stage, room: RoomData, layout: int) -> None:
+def _place(pen: Pen, room: RoomData, layout: int) -> None:
     boxes = room.layouts[layout] if room.layouts else room.boxes
     for number, name in enumerate(room.names):
-        xform = UsdGeom.Xformable(stage.OverridePrim(f"{OBJECTS}/{name}"))
         x, y, z = (round(float(v), 5) + 0.0 for v in boxes.position[number])
-        z_up = room.options.up_axis == "Z"
-        xform.AddTranslateOp().Set(Gf.Vec3d(x, 0.0 - z, y) if z_up else Gf.Vec3d(x, y, z))
-        turn = xform.AddRotateZOp() if z_up else xform.AddRotateYOp()
-        turn.Set(round(float(np.degrees(float(boxes.yaw[number]))), 4) + 0.0)
+        turn = ("float", round(float(np.degrees(float(boxes.yaw[number]))), 4) + 0.0)
+        if room.options.up_axis == "Z":
+            values = ops(translate=("double3", (x, 0.0 - z, y)), rotateZ=turn)
+        else:
+            values = ops(translate=("double3", (x, y, z)), rotateY=turn)
+        pen.over(f"{OBJECTS}/{name}", values)
 
 
 def dressing_layer(room: RoomData, dressing: Dressing, small: Mapping[str, Asset]) -> Sdf.Layer:
     """`layers/dressing.usda`: everything below `/Room/Dressing`, in variants as the layout; muted, the room is bare."""
-    stage = _room_stage(room, "dressing")
-    top = stage.OverridePrim("/Room")
-    several = len(dressing.layouts) > 1
+    pen = _pen(room, "dressing")
+    pen.over("/Room")
     users = Counter(dressing.assets[name] for things in dressing.layouts for name in things)
     shared = [asset for asset, count in users.items() if room.options.instances and count > len(dressing.layouts)]
-    for number in authored_layouts(top, len(dressing.layouts)):
-        _write_things(stage, dressing.layouts[number], dressing, small, shared)
+    for things, inside in zip(dressing.layouts, layout_pens(pen, len(dressing.layouts)), strict=True):
+        _write_things(inside, things, dressing, small, shared)
     for asset in sorted(shared):
-        _bind_parts(stage, class_path(asset), small[asset])
-        assets.as_class(stage, asset)
+        _bind_parts(pen, class_path(asset), small[asset])
+        assets.as_class(pen.layer, asset)
     taken = [relation_name(*relation.triple) for relation in room.graph.relations]
-
-    def finish(layer: Sdf.Layer) -> None:
-        for number, things in enumerate(dressing.layouts):
-            above = f"/Room{{layout=layout_{number}}}Dressing" if several else DRESSING
-            assets.refer(layer, above, {name: dressing.assets[name] for name in things})
-        for number, graph in enumerate(dressing.graphs):
-            write_nodes(layer, graph, Sdf.Path(f"/Room{{layout=layout_{number}}}" if several else "/Room"), taken)
-
-    return assets.without_stage(stage, finish)
+    for number, graph in enumerate(dressing.graphs):
+        at = f"/Room{{layout=layout_{number}}}" if len(dressing.layouts) > 1 else "/Room"
+        write_nodes(pen.layer, graph, Sdf.Path(at), taken)
+    return pen.layer
 
 
 def _write_things(
-    stage: Usd.Stage, things: Mapping[str, Thing], dressing: Dressing, small: Mapping[str, Asset], shared: Sequence[str]
+    pen: Pen, things: Mapping[str, Thing], dressing: Dressing, small: Mapping[str, Asset], shared: Sequence[str]
 ) -> None:
-    group = UsdGeom.Xform.Define(stage, DRESSING).GetPrim()
-    Usd.ModelAPI(group).SetKind(Kind.Tokens.group)
+    group = pen.define(DRESSING, "Xform", kind="group")
     for name, thing in things.items():
         asset, path = dressing.assets[name], f"{DRESSING}/{name}"
-        xform = UsdGeom.Xform.Define(stage, path)
-        x, y, z = (round(float(v), 5) + 0.0 for v in thing.position)
-        xform.AddTranslateOp().Set(Gf.Vec3d(x, y, z))
-        xform.AddRotateYOp().Set(round(float(np.degrees(thing.yaw)), 4) + 0.0)
-        if asset in shared:
-            xform.GetPrim().SetInstanceable(True)
-        else:
-            _bind_parts(stage, path, small[asset])
+        place = tuple(round(float(v), 5) + 0.0 for v in thing.position)
+        turn = round(float(np.degrees(thing.yaw)), 4) + 0.0
+        alike: dict[str, Any] = {"instanceable": True} if asset in shared else {}
+        pen.define(path, "Xform", ops(translate=("double3", place), rotateY=("float", turn)), **alike)
+        if asset not in shared:
+            _bind_parts(pen, path, small[asset])
+    assets.refer(group, {name: dressing.assets[name] for name in things})
 
 
-def _bind_parts(stage: Usd.Stage, root: str, asset: Asset) -> None:
-    """Bind a small thing's parts below a prim, or below its class."""
+def _bind_parts(pen: Pen, root: str, asset: Asset) -> None:
+    """Bind a small thing's parts below a prim, or below its class; another layer defines the material."""
     for where, slot in assets.slot_paths(root, asset.slots).items():
-        over = stage.OverridePrim(where)
-        UsdShade.MaterialBindingAPI.Apply(over)
-        target = Sdf.Path(f"{materials.LOOKS}/{ROOM_STYLE}_{slot}")  # another layer defines it
-        over.CreateRelationship(UsdShade.Tokens.materialBinding, custom=False).SetTargets([target])
+        pen.bind(where, f"{materials.LOOKS}/{ROOM_STYLE}_{slot}")

@@ -7,10 +7,11 @@ as a light's own opinion would be stronger than theirs.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import shapely
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
+from pxr import Gf, UsdLux
 
 from echomodel.openings import inward_normal, segment
 from echomodel.vocabulary import vocabulary
@@ -18,7 +19,8 @@ from echousd.draw.views import view_matrix
 from echousd.layers.cameras import Volume
 from echousd.room import RoomData
 from echousd.shapes.finishes import baking
-from echousd.stage.layouts import authored, authored_layouts
+from echousd.stage.layouts import layout_pens
+from echousd.stage.pen import Pen, ops
 
 LIGHTS = "/Room/Lights"
 NITS = 30.0  # cd/m² of a surface that comes to 1 in the picture: a camera in a lit room
@@ -44,10 +46,10 @@ TIMES: Mapping[str, tuple[float, float, float]] = {
 # Lumens on a square metre of floor: what people have on at a time (the panel gives what the lamps do not, at least
 # `FILL`), and from where on a camera would expose less.
 LIT, FILL, BRIGHT = {"evening": 85.0, "night": 75.0}, 20.0, 160.0
-Intensities = dict[Sdf.Path, tuple[int, float]]  # light -> its column of `TIMES`, intensity at full
+Intensities = dict[str, tuple[int, float]]  # light -> its column of `TIMES`, intensity at full
 
 
-def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
+def write_lights(pen: Pen, room: RoomData, volume: Volume) -> None:
     """Author `/Room/Lights` and the variant set `light`, with `day` chosen.
 
     Radiances are for a camera whose imaging ratio is 1 (UsdGeomCamera's default): a white surface under sky and panel
@@ -55,31 +57,30 @@ def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
 
     `room`: whose lamps and windows these are. `volume`: of the room, metres.
     """
-    UsdGeom.Scope.Define(stage, LIGHTS)
-    sky = UsdLux.DomeLight.Define(stage, f"{LIGHTS}/sky")
-    sky.CreateColorAttr(Gf.Vec3f(1.0, 0.97, 0.93) if room.options.walls else Gf.Vec3f(0.95, 0.98, 1.0))
+    pen.define(LIGHTS, "Scope")
+    sky: dict[str, Any] = {"color3f inputs:color": (1.0, 0.97, 0.93) if room.options.walls else (0.95, 0.98, 1.0)}
     if room.options.walls:  # who looks out of a window or over a wall sees something
-        sky.CreateTextureFileAttr(Sdf.AssetPath(f"./{SKY}"))
-        sky.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
+        sky |= {"asset inputs:texture:file": f"./{SKY}", "token inputs:texture:format": "latlong"}
+    pen.define(f"{LIGHTS}/sky", "DomeLight", sky)
     kind = "open" if not room.options.walls else "ceiling" if room.options.ceiling else "walls"
     above, share = SHARES[kind]
-    panel, flux = _panel(stage, volume, room.height)
-    full: Intensities = {sky.GetPath(): (0, 0.5 * above)}
+    flux = _panel(pen, volume, room.height)
+    full: Intensities = {"sky": (0, 0.5 * above)}
     if room.options.walls:
-        full |= _sun(stage, room)
-    lamps = _lamps(stage, room)
+        full |= _sun(pen, room)
+    lamps = _lamps(pen, room)
     full |= lamps
     area = shapely.Polygon(room.floor).area
     lumens = sum(intensity for _, intensity in lamps.values()) * np.pi * NITS / area
-    for name in authored(stage.GetPrimAtPath("/Room"), "light", TIMES, "day"):
+    for name, inside in pen.variants("/Room", "light", TIMES, "day").items():
         exposed, radiance = 1.0, share * min(20.0, 1.6 * room.height**2 * np.pi * NITS / flux)
         if name in LIT:
             exposed = min(1.0, BRIGHT / max(lumens, 1.0))
             radiance = max(LIT[name] - lumens, FILL) * area / flux
-        UsdLux.LightAPI(stage.OverridePrim(panel)).CreateIntensityAttr(round(radiance * exposed, 4))
-        for path, (column, intensity) in full.items():
-            light = UsdLux.LightAPI(stage.OverridePrim(path))
-            light.CreateIntensityAttr(round(intensity * TIMES[name][column] * exposed, 4))
+        shining = {"ceiling": radiance * exposed}
+        shining |= {light: intensity * TIMES[name][column] * exposed for light, (column, intensity) in full.items()}
+        for light, intensity in shining.items():
+            inside.over(f"{LIGHTS}/{light}", {"float inputs:intensity": round(float(intensity), 4)})
 
 
 def image_files(room: RoomData) -> dict[str, bytes]:
@@ -87,21 +88,21 @@ def image_files(room: RoomData) -> dict[str, bytes]:
     return {SKY: baking.sky_image()} if room.options.walls else {}
 
 
-def _panel(stage: Usd.Stage, volume: Volume, height: float) -> tuple[Sdf.Path, float]:
-    """A panel below the ceiling, and its lumens at radiance 1; of radiance L and area A it lights the floor with about
-    L A / h²."""
-    panel = UsdLux.RectLight.Define(stage, f"{LIGHTS}/ceiling")
-    side = 0.3 * (volume.upper - volume.lower)[[0, 2]]
-    width, depth = (max(float(s), 0.5) for s in side)
-    panel.CreateWidthAttr(width)
-    panel.CreateHeightAttr(depth)
-    panel.CreateColorAttr(UsdLux.BlackbodyTemperatureAsRgb(DAYLIGHT))
-    panel.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height - 0.02, float(volume.centre[2])))
-    panel.AddRotateXOp().Set(-90.0)
-    return panel.GetPath(), np.pi * NITS * width * depth
+def _panel(pen: Pen, volume: Volume, height: float) -> float:
+    """A panel below the ceiling; returns its lumens at radiance 1, of radiance L and area A it lights the floor with
+    about L A / h²."""
+    width, depth = (max(float(s), 0.5) for s in 0.3 * (volume.upper - volume.lower)[[0, 2]])
+    place = (float(volume.centre[0]), height - 0.02, float(volume.centre[2]))
+    values = {
+        "float inputs:width": width, "float inputs:height": depth,
+        "color3f inputs:color": UsdLux.BlackbodyTemperatureAsRgb(DAYLIGHT),
+        **ops(translate=("double3", place), rotateX=("float", -90.0)),
+    }  # fmt: skip
+    pen.define(f"{LIGHTS}/ceiling", "RectLight", values)
+    return np.pi * NITS * width * depth
 
 
-def _sun(stage: Usd.Stage, room: RoomData) -> Intensities:
+def _sun(pen: Pen, room: RoomData) -> Intensities:
     """The sun through the widest window, from a little aside."""
     corners = room.graph.room.corners
     windows = [opening for opening in room.graph.room.openings if opening.kind == "window"]
@@ -112,36 +113,34 @@ def _sun(stage: Usd.Stage, room: RoomData) -> Intensities:
     level = inward_normal(corners, window.edge) + ASIDE * (far - near) / window.width
     level = level / np.linalg.norm(level) * np.cos(ELEVATION)
     way = np.array([level[0], -np.sin(ELEVATION), level[1]])
-    sun = UsdLux.DistantLight.Define(stage, f"{LIGHTS}/sun")
-    sun.CreateAngleAttr(0.53)
-    sun.CreateNormalizeAttr(True)  # intensity is irradiance, whatever the disc's size
-    sun.CreateColorAttr(UsdLux.BlackbodyTemperatureAsRgb(DAYLIGHT - 700))
     matrix = view_matrix(-way, np.zeros(3))
     matrix[:3, 3] = 0.0
-    sun.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
-    return {sun.GetPath(): (1, SUN if room.options.ceiling else OVERHEAD)}
+    values = {
+        "float inputs:angle": 0.53,
+        "bool inputs:normalize": True,  # intensity is irradiance, whatever the disc's size
+        "color3f inputs:color": UsdLux.BlackbodyTemperatureAsRgb(DAYLIGHT - 700),
+        **ops(transform=("matrix4d", Gf.Matrix4d(np.ascontiguousarray(matrix.T)))),
+    }
+    pen.define(f"{LIGHTS}/sun", "DistantLight", values)
+    return {"sun": (1, SUN if room.options.ceiling else OVERHEAD)}
 
 
-def _lamps(stage: Usd.Stage, room: RoomData) -> Intensities:
+def _lamps(pen: Pen, room: RoomData) -> Intensities:
     """A bulb for every lamp: below what hangs, over the shade of what stands; in every layout where its lamp is."""
-    full: Intensities = {}
-    for node in room.graph.nodes:
-        row = vocabulary().category(node.category)
-        if row.role != "light":
-            continue
-        bulb = UsdLux.SphereLight.Define(stage, f"{LIGHTS}/lamp_{node.name}")
-        bulb.CreateRadiusAttr(BULB)
-        bulb.CreateNormalizeAttr(True)  # intensity is radiance times area; Blender reads it so whatever stands here
-        bulb.CreateColorAttr(UsdLux.BlackbodyTemperatureAsRgb(BULBS))
-        bulb.AddTranslateOp()
-        full[bulb.GetPath()] = (2, LUMENS[row.support] / (np.pi * NITS))
-    for layout in authored_layouts(stage.GetPrimAtPath("/Room"), max(len(room.layouts), 1)):
+    rows = [vocabulary().category(node.category) for node in room.graph.nodes]
+    bulbs = {n: f"lamp_{room.names[n]}" for n, row in enumerate(rows) if row.role == "light"}
+    values = {
+        "float inputs:radius": BULB,
+        "bool inputs:normalize": True,  # intensity is radiance times area; Blender reads it so whatever stands here
+        "color3f inputs:color": UsdLux.BlackbodyTemperatureAsRgb(BULBS),
+        **ops(translate=("double3", None)),
+    }
+    for bulb in bulbs.values():
+        pen.define(f"{LIGHTS}/{bulb}", "SphereLight", values)
+    for layout, inside in enumerate(layout_pens(pen, max(len(room.layouts), 1))):
         boxes = room.layouts[layout] if len(room.layouts) > 1 else room.boxes
-        for number, node in enumerate(room.graph.nodes):
-            row = vocabulary().category(node.category)
-            if row.role == "light":
-                x, y, z = (float(v) for v in boxes.position[number])
-                height = y - 0.06 if row.support == "ceiling" else y + float(boxes.size[number][1]) + 0.06
-                over = stage.OverridePrim(f"{LIGHTS}/lamp_{node.name}")
-                over.CreateAttribute("xformOp:translate", Sdf.ValueTypeNames.Double3, False).Set(Gf.Vec3d(x, height, z))
-    return full
+        for number, bulb in bulbs.items():
+            x, y, z = (float(v) for v in boxes.position[number])
+            height = y - 0.06 if rows[number].support == "ceiling" else y + float(boxes.size[number][1]) + 0.06
+            inside.over(f"{LIGHTS}/{bulb}", {"double3 xformOp:translate": (x, height, z)})
+    return {bulb: (2, LUMENS[rows[number].support] / (np.pi * NITS)) for number, bulb in bulbs.items()}

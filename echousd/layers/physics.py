@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from contextlib import nullcontext
-
-from pxr import Gf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade
 
 from echomodel.dressing import SMALL
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
-from echousd.shapes.geometry import Geometry, Mass
+from echousd.shapes.geometry import Geometry
 from echousd.shapes.joints import STATIC
 from echousd.shapes.matter import hull_volume, mass_of, write_mass
-from echousd.stage.layouts import ARTICULATED, ARTICULATION, authoring
+from echousd.stage.layouts import ARTICULATED, ARTICULATION
 from echousd.stage.paths import MTL, SHELL, piece_path
+from echousd.stage.pen import Pen
 
 GRAVITY = 9.81  # m/s²
 SCENE = "/Room/PhysicsScene"
@@ -36,68 +34,60 @@ def movable(category: str) -> bool:
     return vocabulary().category(category).support in ("floor", "table")
 
 
-def write_asset_physics(stage: Usd.Stage, asset: str, category: str, geometry: Geometry, slots: Iterable[str]) -> None:
+def write_asset_physics(pen: Pen, asset: str, category: str, geometry: Geometry, slots: Iterable[str]) -> None:
     """Author colliders, mass and contact material of one asset as overs on its prims.
 
-    `stage`: of the component layer; its default prim is `/<asset>`, where `joints` has already written. `category`: of
-    the piece; what hangs gets colliders alone. `geometry`: whose colliders and mass are told. `slots`: its material
-    slots, the one that most of it is made of first.
+    `pen`: of the component layer, whose default prim is `/<asset>`. `category`: of the piece; what hangs gets colliders
+    alone. `geometry`: whose colliders and mass are told. `slots`: its material slots, the one that most of it is made
+    of first.
     """
     root = f"/{asset}"
     cloth = category in SMALL and (SMALL[category].lies or SMALL[category].yields)  # stops nothing
     for collider in () if cloth or geometry.theirs_collides else geometry.colliders:
-        guide = stage.OverridePrim(piece_path(root, asset, collider.name, collider.body))
-        UsdPhysics.CollisionAPI.Apply(guide)
-        UsdPhysics.MeshCollisionAPI.Apply(guide).CreateApproximationAttr(collider.approximation)
+        collides(pen, piece_path(root, asset, collider.name, collider.body), collider.approximation)
     mass = mass_of(geometry, category)
     volume = sum(max(hull_volume(collider.mesh.vertices), 1e-6) for collider in geometry.colliders)
     slot = next(iter(slots), "wood")
-    UsdGeom.Scope.Define(stage, f"{root}/{MTL}")
-    bind_contact(stage, root, f"{root}/{MTL}/contact", CONTACT.get(slot, WOODEN), mass.mass / volume)
-    theirs = geometry.original is not None and geometry.original.bodies
-    if movable(category) and not theirs:
-        _make_body(stage.GetPrimAtPath(root), mass, articulated=bool(geometry.joints))
+    pen.define(f"{root}/{MTL}", "Scope")
+    bind_contact(pen, root, f"{root}/{MTL}/contact", CONTACT.get(slot, WOODEN), mass.mass / volume)
+    if movable(category) and not (geometry.original is not None and geometry.original.bodies):
+        both = (ARTICULATED, STATIC)  # articulated, its bodies are those of its joints
+        write_mass(pen.variants(root, ARTICULATION, both, STATIC)[STATIC] if geometry.joints else pen, root, mass)
 
 
-def _make_body(root: Usd.Prim, mass: Mass, *, articulated: bool) -> None:
-    """One rigid body; a piece with joints is one only in its variant `static`."""
-    both = (ARTICULATED, STATIC)  # articulated, its bodies are those of its joints
-    with authoring(root, ARTICULATION, both, STATIC, STATIC) if articulated else nullcontext():
-        UsdPhysics.RigidBodyAPI.Apply(root)
-        write_mass(root, mass)
+def collides(pen: Pen, path: str, approximation: str) -> None:
+    """Have a mesh stop things; `approximation`: how, a token of `physics:approximation`."""
+    values = {"uniform token physics:approximation": approximation}
+    pen.over(path, values, ["PhysicsCollisionAPI", "PhysicsMeshCollisionAPI"])
 
 
 def bind_contact(
-    stage: Usd.Stage, path: str, material: str, contact: tuple[float, float, float], density: float | None = None
+    pen: Pen, path: str, material: str, contact: tuple[float, float, float], density: float | None = None
 ) -> None:
     """Author a physics material and bind it on a prim for purpose `physics`.
 
     `path`: of the prim that gets it. `material`: path of the material. `contact`: static friction, dynamic friction,
     restitution. `density`: kg/m³.
     """
-    made = UsdShade.Material.Define(stage, material)
-    UsdSemantics.LabelsAPI.Apply(made.GetPrim(), "material").CreateLabelsAttr(["contact"])
-    api = UsdPhysics.MaterialAPI.Apply(made.GetPrim())
-    api.CreateStaticFrictionAttr(contact[0])
-    api.CreateDynamicFrictionAttr(contact[1])
-    api.CreateRestitutionAttr(contact[2])
+    names = ("staticFriction", "dynamicFriction", "restitution")
+    values = {f"float physics:{name}": value for name, value in zip(names, contact, strict=True)}
     if density is not None:
-        api.CreateDensityAttr(round(density, 2))
-    binding = UsdShade.MaterialBindingAPI.Apply(stage.OverridePrim(path))
-    binding.Bind(made, UsdShade.Tokens.weakerThanDescendants, "physics")
+        values["float physics:density"] = round(density, 2)
+    pen.define(material, "Material")
+    pen.label(material, material="contact")
+    pen.over(material, values, ["PhysicsMaterialAPI"])
+    bound = pen.over(path, {"rel material:binding:physics": material}, ["MaterialBindingAPI"])
+    bound.relationships["material:binding:physics"].SetInfo("bindMaterialAs", "weakerThanDescendants")
 
 
-def write_physics(stage: Usd.Stage, shell: Mapping[str, str]) -> None:
+def write_physics(pen: Pen, shell: Mapping[str, str]) -> None:
     """Author the physics scene, and the colliders of the shell as overs.
 
-    `stage`: receives the opinions; its units are metres and kilograms, its up axis is Y below `/Room`. `shell`: path of
-    a solid mesh -> how it collides, a token of `physics:approximation`.
+    `pen`: of a layer in metres and kilograms, whose up axis is Y below `/Room`. `shell`: path of a solid mesh -> how it
+    collides.
     """
-    scene = UsdPhysics.Scene.Define(stage, SCENE)
-    scene.CreateGravityMagnitudeAttr(GRAVITY)
-    scene.CreateGravityDirectionAttr(Gf.Vec3f(0, -1, 0))
+    down = {"float physics:gravityMagnitude": GRAVITY, "vector3f physics:gravityDirection": (0, -1, 0)}
+    pen.define(SCENE, "PhysicsScene", down)
     for path, form in shell.items():
-        prim = stage.OverridePrim(path)
-        UsdPhysics.CollisionAPI.Apply(prim)
-        UsdPhysics.MeshCollisionAPI.Apply(prim).CreateApproximationAttr(form)
-    bind_contact(stage, SHELL, f"{SHELL}/contact", WOODEN)
+        collides(pen, path, form)
+    bind_contact(pen, SHELL, f"{SHELL}/contact", WOODEN)

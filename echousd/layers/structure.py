@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
+from pxr import Kind, Sdf
 
 from echomodel.furniture.solids import Joint
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal
@@ -23,8 +23,8 @@ from echousd.shapes.looks import Look
 from echousd.shapes.surface import Surface, surface
 from echousd.shapes.walls import Piece, ShellPart, ceiling, floor, wall_name, walls
 from echousd.stage import encoding
-from echousd.stage.files import new_stage
 from echousd.stage.paths import OPENINGS, SHELL, piece_name
+from echousd.stage.pen import Pen, ops
 from echousd.stage.taxonomy import ade20k
 
 THIRD = 3  # one room in so many has the flooring of its type, or of the others blocks instead of boards
@@ -157,10 +157,10 @@ def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any], openings: S
 
     `data`: customLayerData. `openings`: of the graph, which point to their wall, frame and leaf.
     """
-    stage = new_stage("Room", ".usdc", data)
+    pen = Pen.blank("Room", ".usdc", data)
     for path in ("/Room", SHELL):
-        UsdGeom.Xform.Define(stage, path)
-    write_shell(stage, built)
+        pen.define(path, "Xform")
+    write_shell(pen, built)
     paths = {path for part in built for path in (part.path, *(mesh.path for mesh in part.meshes))}
     for opening in openings:
         wall = wall_name(opening.edge)
@@ -171,28 +171,23 @@ def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any], openings: S
             encoding.FRAME: f"{inside}/{piece_name(name, 'frame')}",
             encoding.LEAF: f"{inside}/{piece_name(name, 'hinge')}",
         }
-        prim = stage.OverridePrim(f"{OPENINGS}/{opening.name}") if ends[encoding.WALL] in paths else None
-        for relationship, target in ends.items():
-            if prim and target in paths:
-                prim.CreateRelationship(relationship, custom=False).SetTargets([target])
-    return stage.GetRootLayer()
+        if ends[encoding.WALL] in paths:
+            there = {f"rel {relationship}": target for relationship, target in ends.items() if target in paths}
+            pen.over(f"{OPENINGS}/{opening.name}", there)
+    return pen.layer
 
 
-def write_shell(stage: Usd.Stage, prims: Sequence[ShellPrim]) -> None:
+def write_shell(pen: Pen, prims: Sequence[ShellPrim]) -> None:
     """Author the parts with kind, labels and extents, and their meshes."""
     for part in prims:
-        xform = UsdGeom.Xform.Define(stage, part.path)
-        prim = xform.GetPrim()
+        values: dict[str, Any] = {"float3[] extentsHint": np.asarray(part.extent, np.float32)}
         if part.joint:  # a pivot to turn
-            xform.AddTranslateOp().Set(Gf.Vec3d(*part.joint.anchor))
-            xform.AddRotateYOp().Set(0.0)
-        Usd.ModelAPI(prim).SetKind(part.kind)
-        low, high = (Gf.Vec3f(*map(float, corner)) for corner in part.extent)
-        UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([low, high])
-        for taxonomy, word in (("category", part.label), ("ade20k", ade20k(part.label))) if part.label else ():
-            UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr([word])
+            values |= ops(translate=("double3", part.joint.anchor), rotateY=("float", 0.0))
+        pen.define(part.path, "Xform", values, ["GeomModelAPI"], kind=part.kind)
+        if part.label:
+            pen.label(part.path, category=part.label, ade20k=ade20k(part.label))
         for mesh in part.meshes:
-            assets.write_mesh(stage, mesh.path, mesh.form)
+            assets.write_mesh(pen, mesh.path, mesh.form)
 
 
 def _prims(part: ShellPart, above: str, kind: str) -> Iterator[ShellPrim]:

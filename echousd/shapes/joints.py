@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
+from pxr import Gf, Usd
 
 from echomodel.furniture.solids import Joint
 from echousd.shapes.geometry import FRAME, Geometry, Mass
 from echousd.shapes.matter import write_mass
-from echousd.stage.layouts import ARTICULATED, ARTICULATION, authoring
+from echousd.stage.layouts import ARTICULATED, ARTICULATION
 from echousd.stage.paths import GEO, piece_name, piece_of, piece_path
+from echousd.stage.pen import Pen
 
 STATIC = "static"
 FRICTION_API, FRICTION = "NewtonJointAPI", "newton:friction"  # of a schema that MuJoCo and Newton bring with them
@@ -18,69 +19,59 @@ BRAKE = 20.0  # 1/s: what drifts on a runner or hinge stops in a twentieth of a 
 SLOPE, GRAVITY = 0.03, 9.81  # what rubs there holds it on a slope of 3 %; m/s²
 
 
-def write_joints(stage: Usd.Stage, asset: str, geometry: Geometry) -> None:
+def write_joints(pen: Pen, asset: str, geometry: Geometry) -> None:
     """Author the variant set `articulation` on the root of an asset: nothing in `static`, bodies and joints else.
 
-    `stage`: receives the opinions; its root prim is `/<asset>`. `geometry`: with joints.
+    `pen`: whose root prim is `/<asset>`. `geometry`: with joints.
     """
-    root = stage.GetPrimAtPath(f"/{asset}")
-    with authoring(root, ARTICULATION, (STATIC, ARTICULATED), ARTICULATED, STATIC):
-        for body, mass in geometry.masses.items():
-            prim = stage.OverridePrim(piece_path(f"/{asset}", asset, body))
-            UsdPhysics.RigidBodyAPI.Apply(prim)
-            write_mass(prim, mass)
-        # on the frame, not on the asset's root: importers take whatever bears it for a body
-        frame = stage.OverridePrim(piece_path(f"/{asset}", asset, FRAME))
-        UsdPhysics.ArticulationRootAPI.Apply(frame)
-        UsdGeom.Scope.Define(stage, f"/{asset}/{piece_name(asset, 'joints')}")
-        for joint in geometry.joints:
-            path = f"/{asset}/{piece_name(asset, 'joints')}/{piece_name(asset, joint.body)}_joint"
-            still, moving = (piece_path(f"/{asset}", asset, body) for body in (FRAME, joint.body))
-            _joint(stage, path, still, moving, joint, (joint.anchor, joint.anchor), geometry.masses[joint.body])
+    pen = pen.variants(f"/{asset}", ARTICULATION, (STATIC, ARTICULATED), STATIC)[ARTICULATED]
+    for body, mass in geometry.masses.items():
+        write_mass(pen, piece_path(f"/{asset}", asset, body), mass)
+    # on the frame, not on the asset's root: importers take whatever bears it for a body
+    pen.over(piece_path(f"/{asset}", asset, FRAME), apis=["PhysicsArticulationRootAPI"])
+    above = f"/{asset}/{piece_name(asset, 'joints')}"
+    pen.define(above, "Scope")
+    for joint in geometry.joints:
+        still, moving = (piece_path(f"/{asset}", asset, body) for body in (FRAME, joint.body))
+        places, mass = (joint.anchor, joint.anchor), geometry.masses[joint.body]
+        _joint(pen, f"{above}/{piece_name(asset, joint.body)}_joint", still, moving, joint, places, mass)
 
 
-def write_hinge(stage: Usd.Stage, leaf: str, joint: Joint, mass: Mass) -> None:
+def write_hinge(pen: Pen, leaf: str, joint: Joint, mass: Mass) -> None:
     """Author the variant set `articulation` on a door of the shell: nothing in `static`, its leaf on a hinge else.
 
     `leaf`: prim path of what turns, whose origin is on the axis, below the door's prim. `joint`: its anchor in the
     door's frame. `mass`: of the leaf.
     """
     door = leaf.rpartition("/")[0]
-    with authoring(stage.OverridePrim(door), ARTICULATION, (STATIC, ARTICULATED), ARTICULATED, STATIC):
-        body = stage.OverridePrim(leaf)
-        UsdPhysics.RigidBodyAPI.Apply(body)
-        write_mass(body, mass)
-        # against the door's prim, which is no body and stays where it is, wherever the room is put
-        _joint(stage, f"{leaf}_joint", door, leaf, joint, (joint.anchor, (0.0, 0.0, 0.0)), mass)
+    pen = pen.variants(door, ARTICULATION, (STATIC, ARTICULATED), STATIC)[ARTICULATED]
+    write_mass(pen, leaf, mass)
+    # against the door's prim, which is no body and stays where it is, wherever the room is put
+    _joint(pen, f"{leaf}_joint", door, leaf, joint, (joint.anchor, (0.0, 0.0, 0.0)), mass)
 
 
 def _joint(
-    stage: Usd.Stage, path: str, still: str, moving: str, joint: Joint, places: tuple[Point, Point], mass: Mass
+    pen: Pen, path: str, still: str, moving: str, joint: Joint, places: tuple[Point, Point], mass: Mass
 ) -> None:
     """A joint between two prims, with friction; `places`: its anchor in the frame of each, `mass`: of what moves."""
     slides = joint.kind == "prismatic"
-    made = (UsdPhysics.PrismaticJoint if slides else UsdPhysics.RevoluteJoint).Define(stage, path)
-    made.CreateBody0Rel().SetTargets([Sdf.Path(still)])
-    made.CreateBody1Rel().SetTargets([Sdf.Path(moving)])
-    made.CreateAxisAttr(UsdPhysics.Tokens.x)
     turn = Gf.Rotation(Gf.Vec3d(1, 0, 0), Gf.Vec3d(*joint.axis)).GetQuat()
     turned = Gf.Quatf(turn.GetReal(), Gf.Vec3f(turn.GetImaginary()))
-    for create, place in zip((made.CreateLocalPos0Attr, made.CreateLocalPos1Attr), places, strict=True):
-        create(Gf.Vec3f(*place))
-    for create in (made.CreateLocalRot0Attr, made.CreateLocalRot1Attr):
-        create(turned)
-    made.CreateLowerLimitAttr(0.0)
-    made.CreateUpperLimitAttr(round(joint.reach if slides else float(np.degrees(joint.reach)), 5))
-    drive = UsdPhysics.DriveAPI.Apply(made.GetPrim(), "linear" if slides else "angular")
     # without friction no door stays shut that leans; USD's own physics has no word for it but a brake with a limit
     lever = 1.0 if slides else float(np.linalg.norm(np.cross(joint.axis, mass.centre - places[1])))
     inertia = mass.mass if slides else np.radians(4 / 3 * mass.mass * lever**2)  # angular drives count in degrees
-    friction = round(SLOPE * GRAVITY * mass.mass * lever, 4)
-    drive.CreateDampingAttr(round(BRAKE * inertia, 6))
-    drive.CreateMaxForceAttr(friction)
-    drive.CreateStiffnessAttr(0.0)
-    made.GetPrim().AddAppliedSchema(FRICTION_API)
-    made.GetPrim().CreateAttribute(FRICTION, Sdf.ValueTypeNames.Float, custom=False).Set(friction)
+    friction, drive = round(SLOPE * GRAVITY * mass.mass * lever, 4), f"drive:{'linear' if slides else 'angular'}"
+    values = {
+        "rel physics:body0": still, "rel physics:body1": moving, "uniform token physics:axis": "X",
+        "point3f physics:localPos0": places[0], "point3f physics:localPos1": places[1],
+        "quatf physics:localRot0": turned, "quatf physics:localRot1": turned, "float physics:lowerLimit": 0.0,
+        "float physics:upperLimit": round(joint.reach if slides else float(np.degrees(joint.reach)), 5),
+        f"float {drive}:physics:damping": round(float(BRAKE * inertia), 6),
+        f"float {drive}:physics:maxForce": friction, f"float {drive}:physics:stiffness": 0.0,
+        f"float {FRICTION}": friction,
+    }  # fmt: skip
+    apis = [f"PhysicsDriveAPI:{drive.partition(':')[2]}", FRICTION_API]
+    pen.define(path, "PhysicsPrismaticJoint" if slides else "PhysicsRevoluteJoint", values, apis)
 
 
 def read_joints(root: Usd.Prim, asset: str) -> tuple[Joint, ...]:

@@ -19,6 +19,7 @@ from echomodel.triangles import cross
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.geometry import Collider, Geometry, Mass
+from echousd.stage.pen import Pen
 
 
 @dataclass(frozen=True)
@@ -166,13 +167,15 @@ def _inertia(hull: trimesh.Trimesh) -> np.ndarray:
     return (tensor + tensor.T) / 2
 
 
-def write_mass(prim: Usd.Prim, mass: Mass) -> None:
-    """Author mass, centre of mass, moments of inertia and the axes that they are about."""
-    api = UsdPhysics.MassAPI.Apply(prim)
-    api.CreateMassAttr(round(mass.mass, 3))
-    api.CreateCenterOfMassAttr(Gf.Vec3f(*(round(float(v), 4) + 0.0 for v in mass.centre)))
-    api.CreateDiagonalInertiaAttr(Gf.Vec3f(*(float(f"{max(v, LEAST_INERTIA):.5g}") for v in mass.inertia)))
-    api.CreatePrincipalAxesAttr(_quaternion(np.asarray(mass.axes, float)))
+def write_mass(pen: Pen, path: str, mass: Mass) -> None:
+    """Author mass, centre of mass, moments of inertia and the axes that they are about, of a rigid body."""
+    values = {
+        "float physics:mass": round(mass.mass, 3),
+        "point3f physics:centerOfMass": tuple(round(float(v), 4) + 0.0 for v in mass.centre),
+        "float3 physics:diagonalInertia": tuple(float(f"{max(v, LEAST_INERTIA):.5g}") for v in mass.inertia),
+        "quatf physics:principalAxes": _quaternion(np.asarray(mass.axes, float)),
+    }
+    pen.over(path, values, ["PhysicsRigidBodyAPI", "PhysicsMassAPI"])
 
 
 def read_mass(prim: Usd.Prim) -> Mass | None:

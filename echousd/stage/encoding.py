@@ -22,6 +22,7 @@ TYPES = (GRAPH_TYPE, RELATION_TYPE, OPENING_TYPE, HOME_TYPE)
 ROOM_API = "EchoRoomAPI"
 NODE_API = "EchoNodeAPI"
 LABELS_API = "SemanticsLabelsAPI:category"
+NODE_APIS = (NODE_API, LABELS_API)
 LABELS = "semantics:labels:category"
 
 GRAPH_NAME = "SceneGraph"

@@ -9,9 +9,8 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any
 
-from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdUtils
+from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 
 from echomodel.files import whole_file
 from echousd.pending import check_written
@@ -251,16 +250,3 @@ def write_all(files: Mapping[Path, bytes], *, left: str = "nothing was changed")
             with suppress(OSError):  # somebody else has put something into it
                 place.rmdir()
         raise ValueError(f"{error.filename or path}: cannot be written ({error.strerror or error}); {left}") from None
-
-
-def new_stage(default_prim: str, kind: str = ".usda", data: Mapping[str, Any] | None = None) -> Usd.Stage:
-    """An empty stage in memory with the metadata that all our layers carry."""
-    stage = Usd.Stage.Open(Sdf.Layer.CreateAnonymous(kind))
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-    UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
-    layer = stage.GetRootLayer()
-    layer.defaultPrim = default_prim
-    if data:
-        layer.customLayerData = dict(data)
-    return stage

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from pxr import Sdf, Usd
 
 from echousd.stage.encoding import StageError
 from echousd.stage.files import source
+from echousd.stage.paths import ROOM
+from echousd.stage.pen import Pen
 
 VARIANTS = "layout"
 ARTICULATION, ARTICULATED = "articulation", "articulated"  # variant set of what opens, and the variant with joints
@@ -32,40 +34,14 @@ def selected_layout(stage: Usd.Stage) -> str:
     return next((prim.GetVariantSet(VARIANTS).GetVariantSelection() for prim in layout_prims(stage)), "")
 
 
-def authored(prim: Usd.Prim, variants: str, names: Iterable[str], chosen: str | None) -> Iterator[str]:
-    """Each variant of a set on a prim in turn, which gets what a loop over them authors; then one is selected.
+def layout_pens(pen: Pen, count: int, chosen: str | None = None) -> list[Pen]:
+    """A pen for each layout of a room, in the variant of its number; one alone is no variant.
 
     Arguments:
-        chosen: that variant, None = another layer says which one is seen.
+        chosen: the variant that is seen, None = another layer says which.
     """
-    made = prim.GetVariantSets().AddVariantSet(variants)
-    for name in names:
-        made.AddVariant(name)
-        made.SetVariantSelection(name)
-        with made.GetVariantEditContext():
-            yield name
-    if chosen is None:
-        made.ClearVariantSelection()
-    else:
-        made.SetVariantSelection(chosen)
-
-
-@contextmanager
-def authoring(prim: Usd.Prim, variants: str, names: Iterable[str], into: str, chosen: str) -> Iterator[None]:
-    """Within the block, what is authored goes into one variant of a set on a prim; then another is selected."""
-    made = prim.GetVariantSets().AddVariantSet(variants)
-    for name in names:
-        made.AddVariant(name)
-    made.SetVariantSelection(into)
-    with made.GetVariantEditContext():
-        yield
-    made.SetVariantSelection(chosen)
-
-
-def authored_layouts(room: Usd.Prim, count: int, chosen: str | None = None) -> Iterator[int]:
-    """The numbers of a room's layouts, as `authored` goes through their variants; one alone is no variant."""
     names = [f"{VARIANTS}_{number}" for number in range(count)]
-    yield from [0] if count == 1 else map(names.index, authored(room, VARIANTS, names, chosen))
+    return [pen] if count == 1 else list(pen.variants(ROOM, VARIANTS, names, chosen).values())
 
 
 @contextmanager

@@ -15,8 +15,9 @@ from echomodel.openings import Opening
 from echousd.graph import Node, Relation, SceneGraph
 from echousd.stage import encoding as usd
 from echousd.stage.encoding import StageError
+from echousd.stage.pen import apply_apis, relate
 from echousd.stage.read import RoomPrims, find_rooms, node_names, place, read_node, relation_of, stated, the_room, value
-from echousd.stage.write import apply_apis, author_node, author_opening, author_relation, define, put, relate
+from echousd.stage.write import author_node, author_opening, author_relation, define, put
 
 Edit = Callable[[], Any]
 _OWN_INFO = {"specifier", "typeName", "apiSchemas", "active", "displayName"}
@@ -124,7 +125,7 @@ class _Editor:
         prim = self.stage.GetPrimAtPath(path)
         if not prim:
             return [lambda: self.author(node)]
-        edits = [lambda: apply_apis(self.spec(path)), *self.changed_node(prim, None, node)]
+        edits = [lambda: apply_apis(self.spec(path), *usd.NODE_APIS), *self.changed_node(prim, None, node)]
         if not prim.IsDefined() or not prim.GetTypeName():
             edits.append(lambda: define(self.layer, self.spec_path(path), "Xform"))
         return [*edits, *self.activation(prim)]
@@ -284,6 +285,6 @@ def _holds_nothing_foreign(spec: Sdf.PrimSpec) -> bool:
     return (
         not spec.nameChildren
         and set(spec.ListInfoKeys()) <= _OWN_INFO
-        and apis <= {usd.NODE_API, usd.LABELS_API}
+        and apis <= {*usd.NODE_APIS}
         and all(name in own or name.startswith(usd.FREE) for name in spec.properties.keys())  # noqa: SIM118
     )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from pxr import Sdf
 
 from echousd.stage import encoding as usd
+from echousd.stage.pen import UNIFORM, apply_apis, relate
 
 if TYPE_CHECKING:
     from echomodel.openings import Opening
@@ -15,8 +16,6 @@ if TYPE_CHECKING:
 LAYER_DOC = """Scene graph of a room: what it holds and how its objects relate.
 Directions are the room's: front is +X, behind -X, left -Z, right +Z, up +Y. Lengths are metres, angles radians.
 To take a relation out, say `active = false` on its prim in a stronger layer."""
-
-_UNIFORM = Sdf.VariabilityUniform
 
 
 def graph_layer(graph: SceneGraph, *, root: str = "/Room", identifier: str = ".usda") -> Sdf.Layer:
@@ -101,7 +100,7 @@ def author_relation(
 def author_node(parent: Sdf.PrimSpec, node: Node) -> Sdf.PrimSpec:
     """One Xform with EchoNodeAPI and SemanticsLabelsAPI:category below `parent`, called like the node."""
     spec = define(parent.layer, parent.path.AppendChild(node.name), "Xform")
-    apply_apis(spec)
+    apply_apis(spec, *usd.NODE_APIS)
     for name, value in usd.node_values(node).items():
         put(spec, name, value)
     if node.title is not None:
@@ -109,20 +108,6 @@ def author_node(parent: Sdf.PrimSpec, node: Node) -> Sdf.PrimSpec:
     if node.between is not None:
         relate(spec, usd.BETWEEN, *(parent.path.StripAllVariantSelections().AppendChild(name) for name in node.between))
     return spec
-
-
-def apply_apis(spec: Sdf.PrimSpec) -> None:
-    """Prepend EchoNodeAPI and SemanticsLabelsAPI:category to the prim's API schemas, keeping those it has."""
-    listed = spec.GetInfo("apiSchemas") if spec.HasInfo("apiSchemas") else Sdf.TokenListOp()
-    have = [*listed.explicitItems, *listed.prependedItems, *listed.appendedItems]
-    missing = [name for name in (usd.NODE_API, usd.LABELS_API) if name not in have]
-    if not missing:
-        return
-    if listed.isExplicit:
-        listed.explicitItems = [*missing, *listed.explicitItems]
-    else:
-        listed.prependedItems = [*missing, *listed.prependedItems]
-    spec.SetInfo("apiSchemas", listed)
 
 
 def define(layer: Sdf.Layer, path: Sdf.Path, type_name: str) -> Sdf.PrimSpec:
@@ -139,13 +124,6 @@ def put(spec: Sdf.PrimSpec, name: str, value: Any) -> None:
     attribute = spec.properties.get(name)
     if attribute is None:
         custom = name.startswith(usd.FREE)
-        varying = Sdf.VariabilityVarying if name == usd.LABELS else _UNIFORM
+        varying = Sdf.VariabilityVarying if name == usd.LABELS else UNIFORM
         attribute = Sdf.AttributeSpec(spec, name, usd.value_type(name, value), varying, custom)
     attribute.default = value
-
-
-def relate(spec: Sdf.PrimSpec, name: str, *targets: Sdf.Path) -> None:
-    """Author a relationship with exactly these targets."""
-    relationship = spec.properties.get(name) or Sdf.RelationshipSpec(spec, name, False, _UNIFORM)
-    relationship.targetPathList.ClearEditsAndMakeExplicit()  # no target is an opinion as well
-    relationship.targetPathList.explicitItems = list(targets)

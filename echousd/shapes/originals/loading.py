@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdUtils, Vt
+from pxr import Sdf, Tf, UsdUtils
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -31,7 +31,9 @@ from echousd.shapes.colliders import hull_of
 from echousd.shapes.geometry import CONVERTED, Geometry, Origin, Original, Part
 from echousd.shapes.surface import box_projection, creased_normals
 from echousd.srgb import to_linear
-from echousd.stage.files import layer_bytes, new_stage, said
+from echousd.stage.files import layer_bytes, said
+from echousd.stage.pen import Pen
+from echousd.stage.shading import Image, preview_surface
 from echousd.textures import READABLE
 
 
@@ -222,15 +224,14 @@ def _parts(scene: trimesh.Scene) -> Iterator[_Part]:
 
 
 def _layer(parts: list[_Part], images: Images) -> Sdf.Layer:
-    stage = new_stage(ROOT[1:], ".usdc")
-    root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
-    Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
-    UsdGeom.Scope.Define(stage, f"{ROOT}/Looks")
-    looks: dict[int, UsdShade.Material] = {}
+    pen = Pen.blank(ROOT[1:], ".usdc")
+    pen.define(ROOT, "Xform", kind="component")
+    pen.define(f"{ROOT}/Looks", "Scope")
+    looks: dict[int, str] = {}
     taken: set[str] = set()
     for number, part in enumerate(parts):
-        mesh = _write_mesh(stage, f"{ROOT}/mesh_{number}", part)
-        material = part.material
+        mesh, material = f"{ROOT}/mesh_{number}", part.material
+        _write_mesh(pen, mesh, part)
         if material is None:
             continue
         if id(material) not in looks:
@@ -239,85 +240,47 @@ def _layer(parts: list[_Part], images: Images) -> Sdf.Layer:
             while name in taken:
                 name = f"{name}_{number}"
             taken.add(name)
-            looks[id(material)] = _write_material(stage, f"{ROOT}/Looks/{name}", material, images)
-        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(looks[id(material)])
-    return stage.GetRootLayer()
+            looks[id(material)] = f"{ROOT}/Looks/{name}"
+            _write_material(pen, looks[id(material)], material, images)
+        pen.bind(mesh, looks[id(material)])
+    return pen.layer
 
 
-def _write_mesh(stage: Usd.Stage, path: str, part: _Part) -> UsdGeom.Mesh:
-    mesh = UsdGeom.Mesh.Define(stage, path)
+def _write_mesh(pen: Pen, path: str, part: _Part) -> None:
     points, faces = part.points.astype(np.float32), part.faces.astype(np.int32)
-    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreateDoubleSidedAttr(True)
-    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 3, np.int32)))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(faces).ravel()))
-    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(0), points.max(0)])))
-    primvars = UsdGeom.PrimvarsAPI(mesh)
     whole = trimesh.Trimesh(part.points, part.faces, process=False)
     flat = None if part.uv is not None else box_projection(whole)
     whole.merge_vertices()  # along the seams of texture coordinates, so that shading has none
     normals, index = creased_normals(whole)
-    told = primvars.CreatePrimvar("normals", Sdf.ValueTypeNames.Normal3fArray, UsdGeom.Tokens.faceVarying)
-    told.Set(Vt.Vec3fArray.FromNumpy(normals))
-    told.SetIndices(Vt.IntArray.FromNumpy(index))
-    kind = UsdGeom.Tokens.vertex if flat is None else UsdGeom.Tokens.faceVarying
-    st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, kind)
     values = part.uv if flat is None else flat.reshape(-1, 2)
-    st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(values, np.float32)))
-    return mesh
+    mesh = pen.define(path, "Mesh", {
+        "uniform token subdivisionScheme": "none", "uniform bool doubleSided": True, "point3f[] points": points,
+        "int[] faceVertexCounts": np.full(len(faces), 3, np.int32),
+        "int[] faceVertexIndices": np.ascontiguousarray(faces).ravel(),
+        "float3[] extent": np.stack([points.min(0), points.max(0)]),
+        "normal3f[] primvars:normals": normals, "int[] primvars:normals:indices": index,
+        "texCoord2f[] primvars:st": np.ascontiguousarray(values, np.float32),
+    })  # fmt: skip
+    mesh.attributes["primvars:normals"].SetInfo("interpolation", "faceVarying")
+    mesh.attributes["primvars:st"].SetInfo("interpolation", "vertex" if flat is None else "faceVarying")
 
 
-def _write_material(stage: Usd.Stage, path: str, material: Any, images: Images) -> UsdShade.Material:
-    made = UsdShade.Material.Define(stage, path)
-    shader = UsdShade.Shader.Define(stage, f"{path}/surface")
-    shader.CreateIdAttr("UsdPreviewSurface")
+def _write_material(pen: Pen, path: str, material: Any, images: Images) -> None:
     look = _pbr(material) if isinstance(material, trimesh.visual.material.PBRMaterial) else _simple(material)
-    floats, colors = Sdf.ValueTypeNames.Float, Sdf.ValueTypeNames.Color3f
-    for name in ("roughness", "metallic", "opacity"):
-        shader.CreateInput(name, floats).Set(float(look[name]))
-    shader.CreateInput("diffuseColor", colors).Set(Gf.Vec3f(*map(float, look["color"])))
+    tint = tuple(map(float, look["tint"]))
+    shown = [
+        Image(f"{first}_image", images.named(image), dict(outputs), tint if first == "diffuseColor" else ())
+        for image, outputs in look["images"]
+        for first, _ in outputs[:1]
+    ]
+    values: dict[str, Any] = {name: float(look[name]) for name in ("roughness", "metallic", "opacity")}
+    values["diffuseColor"] = tuple(map(float, look["color"]))
     if any(look.get("emissive", ())):
-        shader.CreateInput("emissiveColor", colors).Set(Gf.Vec3f(*map(float, look["emissive"])))
+        values["emissiveColor"] = tuple(map(float, look["emissive"]))
     if look["cutoff"]:
-        shader.CreateInput("opacityThreshold", floats).Set(float(look["cutoff"]))
-    reader = UsdShade.Shader.Define(stage, f"{path}/st")
-    reader.CreateIdAttr("UsdPrimvarReader_float2")
-    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
-    st = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
-    for image, outputs in look["images"]:
-        file = images.named(image)
-        _connect(stage, f"{path}/{outputs[0][0]}_image", file, shader, st, outputs, look)
-    made.CreateSurfaceOutput().ConnectToSource(shader.CreateOutput("surface", Sdf.ValueTypeNames.Token))
-    return made
-
-
-def _connect(
-    stage: Usd.Stage, path: str, file: str, shader: UsdShade.Shader, st: UsdShade.Output, outputs: Any, look: Any
-) -> None:
-    """An image that feeds inputs of a surface, given as (input, channel)."""
-    image = UsdShade.Shader.Define(stage, path)
-    image.CreateIdAttr("UsdUVTexture")
-    image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(Sdf.AssetPath(file))
-    colored = outputs[0][0] in ("diffuseColor", "emissiveColor")
-    image.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB" if colored else "raw")
-    for axis in ("wrapS", "wrapT"):
-        image.CreateInput(axis, Sdf.ValueTypeNames.Token).Set("repeat")
-    if outputs[0][0] == "normal":
-        image.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(2, 2, 2, 1))
-        image.CreateInput("bias", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(-1, -1, -1, 0))
-    elif outputs[0][0] == "diffuseColor":
-        tint = [*map(float, look["tint"]), 1.0]
-        if tint != [1.0] * 4:
-            image.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(*tint))
-    image.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(st)
-    kinds = {"diffuseColor": Sdf.ValueTypeNames.Color3f, "emissiveColor": Sdf.ValueTypeNames.Color3f}
-    kinds["normal"] = Sdf.ValueTypeNames.Normal3f
-    for name, channel in outputs:
-        kind = Sdf.ValueTypeNames.Float3 if channel == "rgb" else Sdf.ValueTypeNames.Float
-        wanted = shader.CreateInput(name, kinds.get(name, Sdf.ValueTypeNames.Float))
-        wanted.GetAttr().Clear()
-        wanted.ConnectToSource(image.CreateOutput(channel, kind))
+        values["opacityThreshold"] = float(look["cutoff"])
+    fed = {name for image in shown for name in image.inputs}
+    preview_surface(pen, path, {name: value for name, value in values.items() if name not in fed}, shown)
 
 
 def _simple(material: Any) -> dict[str, Any]:

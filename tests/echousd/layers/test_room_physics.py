@@ -15,6 +15,7 @@ from echousd.shapes.joinery import part_of, within_budget
 from echousd.shapes.matter import ballasted, hull_volume, mass_of, read_mass
 from echousd.shapes.meshing import box_mesh
 from echousd.shapes.sources.mixing import solid_geometry
+from echousd.stage.pen import Pen
 
 SIZE = np.array([1.6, 2.2, 0.6])
 
@@ -42,7 +43,7 @@ def test_written_masses_are_read_back(seed):
     geometry = Geometry((part,), (Collider("collider", mesh, "convexHull"),), Origin("boxes"), mass=told)
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.Xform.Define(stage, "/chair")
-    write_asset_physics(stage, "chair", "chair", geometry, ["fabric"])
+    write_asset_physics(Pen(stage.GetRootLayer()), "chair", "chair", geometry, ["fabric"])
     found = read_mass(stage.GetPrimAtPath("/chair"))
     assert found.mass == pytest.approx(7.25)
     np.testing.assert_allclose(found.centre, told.centre, atol=1e-4)
