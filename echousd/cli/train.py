@@ -100,27 +100,28 @@ def rooms_command(
 @data_app.command("search")
 def search(
     out: Annotated[Path, typer.Option("-o", "--output", help="Folder of the rooms; run again to go on.")],
-    count: Annotated[int, typer.Option(help="Graphs to search rooms of.", min=1)] = 20_000,
+    count: Annotated[int, typer.Option(help="Graphs to search rooms of, or rooms to look through.", min=1)] = 20_000,
     seed: Seed = 0,
     drafts: Annotated[int, typer.Option(help="Drafts of the network a room, beside one arrangement.", min=0)] = 2,
     weights: Annotated[str | None, typer.Option(help="Weights that draw them; default: those that ship.")] = None,
     workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
     minutes: Annotated[float | None, typer.Option(help="Begin nothing after so many minutes.")] = None,
+    unsearched: Annotated[bool, typer.Option(help="The generator's rooms that miss no term, none searched.")] = False,
 ) -> None:
     """Search rooms without a fault to train on, from several starts each; OUT/rooms.npz is the set.
 
     Example: echousd data search --count 200 --seed 7 -o data/found
     """
     from echousd.cli.terminal import Terminal
-    from echousd.place.examples import GRAPHS, ExamplesPlan, search_examples
+    from echousd.place.examples import GRAPHS, PLAIN, ExamplesPlan, search_examples
 
     console = Terminal(stderr=True)
 
     def report(row: dict[str, float]) -> None:
         console.print("  ".join(f"{name} {value}" for name, value in row.items()))
 
-    plan = ExamplesPlan(seed, drafts, weights)
-    found = search_examples(out, plan, shards=-(-count // GRAPHS), workers=workers, minutes=minutes, report=report)
+    plan, shards = ExamplesPlan(seed, drafts, weights, not unsearched), -(-count // (PLAIN if unsearched else GRAPHS))
+    found = search_examples(out, plan, shards=shards, workers=workers, minutes=minutes, report=report)
     console.print(f"{out}/rooms.npz: {len(found)} rooms, {int(found.counts.sum())} objects")
 
 

@@ -46,11 +46,12 @@ COLUMNS = ("shard", "graphs", "kept", "from_generator", "faults_generator", "pla
 @dataclass(frozen=True)
 class ExamplesPlan:
     """What a folder of examples is filled with: the world's seed, drafts of the network a room, and the weights that
-    draw them, None = those that ship."""
+    draw them, None = those that ship; not `searched`: rooms of the generator alone are kept."""
 
     seed: int
     drafts: int = 2
     weights: str | None = None
+    searched: bool = True
 
 
 def search_examples(
@@ -67,7 +68,8 @@ def search_examples(
     Raises ValueError for a folder that was begun with another plan, or when nothing was found.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    claim(folder, {"kind": "rooms found by search", "seed": plan.seed, "drafts": plan.drafts})
+    kind = "rooms found by search" if plan.searched else "rooms of the generator"
+    claim(folder, {"kind": kind, "seed": plan.seed, "drafts": plan.drafts})
     left = [number for number in range(shards) if not _shard(folder, number).exists()]
     until = None if minutes is None else time.time() + 60 * minutes
     work = partial(_search_shard, folder, plan, until)
@@ -109,16 +111,17 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
         return None
     torch.set_num_threads(1)
     started = time.process_time()
-    first = number * GRAPHS
-    drawn = generate_rooms(GRAPHS, plan.seed, start=first, halls=HALLS)
+    graphs = GRAPHS if plan.searched else 0
+    first = number * graphs
+    drawn = generate_rooms(graphs, plan.seed, start=first, halls=HALLS)
     luck = np.random.Generator(np.random.PCG64([plan.seed, number, 5]))
-    labels = label_rooms(drawn, rules="strict")
+    labels = label_rooms(drawn, rules="strict") if drawn else []
     told = [
         told_of_room(relations, room, float(luck.uniform(*TOLD)), seed=int(luck.integers(2**31)))
         for relations, room in zip(labels, drawn, strict=True)
     ]
     starts = [[Boxes.from_room(room)] for room in drawn]
-    if plan.drafts:
+    if plan.drafts and drawn:
         for more, drafts in zip(starts, _drafts(plan, drawn, told, number), strict=True):
             more += drafts
     others = generate_rooms(PLAIN, plan.seed + OTHERS, start=number * PLAIN, halls=HALLS)
@@ -139,7 +142,7 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
     kept += plain
     pack_rooms(_shard(folder, number), kept, held, {"kind": "rooms found by search", "seed": plan.seed})
     seconds = round(time.process_time() - started, 1)
-    row = (number, GRAPHS, found, own, faults, len(plain), sum(map(len, kept)), seconds)
+    row = (number, graphs, found, own, faults, len(plain), sum(map(len, kept)), seconds)
     return dict(zip(COLUMNS, row, strict=True))
 
 

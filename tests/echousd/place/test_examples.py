@@ -40,6 +40,14 @@ def test_found_rooms_miss_nothing_and_a_search_goes_on(tmp_path, monkeypatch):
         search_examples(tmp_path, ExamplesPlan(6, drafts=0), shards=1)
 
 
+def test_rooms_of_the_generator_that_miss_nothing_are_kept_unsearched(tmp_path):
+    rooms = search_examples(tmp_path, ExamplesPlan(5, searched=False), shards=1)
+    row = next(csv.DictReader((tmp_path / "log.csv").open()))
+    assert (row["graphs"], row["kept"], int(row["plain"])) == ("0", "0", len(rooms))
+    with pytest.raises(ValueError, match="was begun"):
+        search_examples(tmp_path, ExamplesPlan(5), shards=1)
+
+
 def test_a_room_that_misses_something_is_left_out():
     room = generate_rooms(1, 5)[0]
     start = Boxes.from_room(room)
