@@ -1,4 +1,4 @@
-"""`echousd train`: recipes to weights; `echousd data`: data sets, made, looked at, compared and converted."""
+"""`echousd train`: recipes to weights; `echousd data`: data sets, made, looked at and converted."""
 
 from __future__ import annotations
 
@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from echousd.cli.output import say_json
-
 if TYPE_CHECKING:
     import numpy as np
     import trimesh
 
-    from echomodel.data.figures import Row
     from echomodel.roomboxes import RoomBoxes
     from echousd.assets.record import AssetRecord
 
@@ -145,54 +142,6 @@ def plot(
     if room is not None:
         found = rooms_of_type(found, room, rooms)
     plot_rooms(found[:limit], out, columns=columns, labels=labels)
-
-
-@data_app.command("report")
-def report(
-    rooms: Annotated[Path | None, typer.Argument(help="Rooms file or folder; default: newly generated rooms.")] = None,
-    against: Annotated[Path | None, typer.Option(help="Rooms to compare with; default: 896 real ones.")] = None,
-    count: Annotated[int, typer.Option(help="Number of rooms to generate.")] = 2000,
-    seed: Seed = 0,
-    worst: Annotated[int, typer.Option(help="Rows to show, the most distant first; 0 = all.")] = 40,
-    section: Annotated[str | None, typer.Option(help="Only sections that begin so, such as pair.")] = None,
-    json_out: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-) -> None:
-    """Compare rooms with real ones, figure by figure, the most distant first.
-
-    The distance of shares is their difference, that of lengths the difference over the real range.
-
-    Example: echousd data report --count 2000 --worst 20
-    """
-    from echomodel.data.figures import compare, left_out, section_means
-    from echomodel.data.roomset import load_rooms
-    from echomodel.rooms.generator import generate_rooms
-
-    drawn = generate_rooms(count, seed) if rooms is None else load_rooms(rooms)
-    others = None if against is None else load_rooms(against)
-    rows = compare(drawn, others)
-    chosen = sorted((r for r in rows if r.section.startswith(section or "")), key=lambda row: -row.distance)
-    _print_rows(rows, chosen[: worst or None], section_means(rows), left_out(drawn, others), json_out)
-
-
-def _print_rows(rows: list[Row], shown: list[Row], means: dict[str, float], silent: list[str], as_json: bool) -> None:
-    if as_json:
-        from dataclasses import asdict
-
-        say_json({"mean_distance": means, "left_out": silent, "rows": [asdict(row) for row in rows]})
-        return
-    from rich.table import Table
-
-    from echousd.cli.terminal import Terminal
-
-    console = Terminal(width=None if Terminal().is_terminal else 150)
-    table = Table("section", "figure", "here", "real", "distance", box=None)
-    for row in shown:
-        ours, theirs = (" ".join(f"{v:.2f}" for v in values) for values in (row.ours, row.real))
-        table.add_row(row.section, row.name, ours, theirs, f"{row.distance:.3f}")
-    console.print(table)
-    for line in silent:
-        console.print(f"left out   {line}")
-    console.print("mean distance: " + ", ".join(f"{name} {value:.3f}" for name, value in means.items()))
 
 
 @data_app.command("meshes")

@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from echomodel.data.figures import compare, ray_lengths, room_figures, section_means
-from echomodel.data.roomset import with_known_words
 from echomodel.metrics.layouts import (
     GROUPS,
     HALVES,
@@ -204,47 +202,3 @@ def test_intervals_tests_and_power():
     assert pairs.value == pytest.approx((2 / 4 + 2 / 8) / 2)  # the mean of two shares, not the share of all
     null = [paired_p(*(Counts.of([(v, 1.0) for v in rng.random(20)]) for _ in range(2)), k) for k in range(60)]
     assert 0 <= np.mean(np.array(null) < 0.05) < 0.15
-
-
-def test_rays_meet_the_nearest_wall():
-    polygon = np.array([[-2, -1], [2, -1], [2, 3], [0, 3], [0, 1], [-2, 1]], float)
-    origin = np.array([[1.0, 0.0]] * 4)
-    direction = np.array([[1.0, 0], [-1, 0], [0, 1], [0, -1]])
-    assert ray_lengths(polygon, origin, direction).tolist() == pytest.approx([1, 3, 3, 1])
-
-
-def test_figures_of_a_room_by_hand():
-    room = RoomBoxes(
-        "one", "living", FLOOR, 2.6, ("sofa_3", "coffee_table", "sculpture"),
-        np.array([[2.0, 0.8, 1.0], [1.0, 0.4, 0.6], [1, 1, 1]]), np.array([[0, 0, -1.4], [0.2, 0, -0.2], [0, 0, 1.0]]),
-        np.array([0.0, np.pi, 0.0]),
-    )  # fmt: skip
-    known = with_known_words([room])
-    assert known[0].categories == ("multi_seat_sofa", "coffee_table")
-    assert known[0].room_type == "living_room"
-    figures = room_figures(known)
-    assert figures["walls"]["multi_seat_sofa"]["back_gap"][1] == pytest.approx(0.1)
-    assert figures["walls"]["multi_seat_sofa"]["back"] == 1.0
-    (pair,) = figures["pairs"]
-    assert pair["lateral"][2] == pytest.approx(0.2)
-    assert pair["forward"][2] == pytest.approx(1.2)
-    assert pair["gap"][2] == pytest.approx(0.4)
-    assert pair["turn"] == [0.0, 0.0, 1.0, 0.0]
-    assert pair["faces"] == 1.0
-    assert figures["rooms"]["living_room"]["area"][2] == pytest.approx(16.0)
-    assert figures["overlap"] == {"floor_pairs": 0.0, "outside_floor": 0.0}
-
-
-def test_report_is_near_for_our_rooms_and_far_for_scrambled_ones():
-    rooms = generate_rooms(200, 21)
-    near = section_means(compare(rooms))
-    assert near["all"] < 0.1
-    rng = np.random.default_rng(0)
-    wild = [replace(r, size=r.size * 1.4, position=r.position[rng.permutation(len(r))]) for r in rooms]
-    assert section_means(compare(wild))["all"] > 2 * near["all"]
-    assert section_means(compare(rooms[:140], rooms[60:]))["all"] < 0.06
-
-
-def test_report_leaves_no_room_type_out():
-    rows = compare(generate_rooms(30, 5, room_type="study"))
-    assert {row.section for row in rows} >= {"room study", "presence study"}
