@@ -96,16 +96,16 @@ def report(rooms: list[RoomBoxes], noise: float, arguments: argparse.Namespace) 
 def collisions_of(room: RoomBoxes) -> int:
     """Pairs that collide in a room as it is, by placing's own measure."""
     from echomodel.objective.support import allowed_overlap
-    from echousd.place.problem import pose
     from echousd.place.report import TOUCH
+    from echousd.place.setting import setting_of
 
     none = np.zeros(len(room), bool)
-    problem = pose(
+    setting = setting_of(
         room.categories, room.size, room.position, room.yaw, np.zeros((0, 3), int),
         floor_polygon=None, height=None, fixed=none, rigid=none, turned=none,
-    ).problem  # fmt: skip
-    allowed = allowed_overlap(problem.categories, room.size, problem.pairs)
-    return int((separation(room.size, room.position, room.yaw, problem.pairs) + allowed < -TOUCH).sum())
+    )  # fmt: skip
+    allowed = allowed_overlap(setting.categories, room.size, setting.pairs)
+    return int((separation(room.size, room.position, room.yaw, setting.pairs) + allowed < -TOUCH).sum())
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,10 +24,9 @@ from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
 from echousd.place.fitted import fitted
 from echousd.place.overhead import lamps_along
-from echousd.place.problem import Posed, pose, stacked
 from echousd.place.report import Conflict, collisions, conflicts, outside, sentence
 from echousd.place.search import ANEW, Arranged, Search
-from echousd.place.setting import setting_of
+from echousd.place.setting import Setting, setting_of, stacked
 from echousd.place.solver import PlaceConfig, solve, unmet
 from echousd.tensors import stated_placements, triplets_of
 
@@ -218,10 +217,10 @@ def place_boxes(
 
     held: np.ndarray = fixed
 
-    def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, kept: np.ndarray) -> Posed:
-        return pose(
+    def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, kept: np.ndarray) -> Setting:
+        return setting_of(
             categories, size, position, yaw, triplets, floor_polygon=floor_polygon, height=height,
-            fixed=held, rigid=kept, turned=turned, stated=stated, rules=rules,
+            fixed=held, rigid=kept, turned=turned, openings=openings, stated=stated, rules=rules,
         )  # fmt: skip
 
     drawn = at = posed(np.where(rigid[:, None], size, np.maximum(size, SMALLEST)), position, yaw, rigid)
@@ -229,26 +228,26 @@ def place_boxes(
         higher = [predicate.id for predicate in vocabulary().predicates if predicate.order == "height"]
         of_more = np.unique(triplets[np.isin(triplets[:, 1], list({*sizes} - {*higher}))][:, [0, 2]])
         lenient = np.isin(np.arange(n), of_more)[:, None] | (np.isin(np.arange(n), told)[:, None] & UPRIGHT)
-        usual = usual_sizes(drawn.problem.categories, drawn.size, lenient=lenient)
-        kept = rigid | (has_proportions(drawn.problem.categories) & ~np.isin(np.arange(n), told))
+        usual = usual_sizes(drawn.categories, drawn.size, lenient=lenient)
+        kept = rigid | (has_proportions(drawn.categories) & ~np.isin(np.arange(n), told))
         at = posed(np.where(rigid[:, None], size, usual), position, yaw, kept)
-        at, planned = fitted(at, rigid, turned, openings, floor_polygon)
+        at, planned = fitted(at, rigid)
         if planned.any():
             held, rigid, kept = fixed | planned, rigid | planned, kept | planned
             at = posed(at.size, at.position, at.yaw, kept)
-        anchor = at.plan(floor_polygon).anchor.numpy()
+        anchor = at.anchor
         free = ~rigid & ~np.isin(np.arange(n), told)
 
-        def suited(to: Posed, size: np.ndarray) -> Posed:
-            laid = laid_tables(to.problem.categories, size, anchor, free)
-            return replace(to, size=fitting_loads(to.problem.categories, laid, to.problem.carrier, free))
+        def suited(to: Setting, size: np.ndarray) -> Setting:
+            laid = laid_tables(to.categories, size, anchor, free)
+            return to.at(fitting_loads(to.categories, laid, to.carrier, free), to.position, to.yaw)
 
         at = suited(at, at.size)
 
-        def searched(of: Posed, anew: int = ANEW) -> Arranged:
-            return Search(setting_of(of, turned, openings=openings, outline=floor_polygon), terms).run(anew)
+        def searched(of: Setting, anew: int = ANEW) -> Arranged:
+            return Search(of.spread(), terms).run(anew)
 
-        less = suited(at, smaller_sizes(at.problem.categories, at.size, free)) if fullness(at) > FULL else at
+        less = suited(at, smaller_sizes(at.categories, at.size, free)) if fullness(at) > FULL else at
         shrinks = not np.array_equal(less.size, at.size)
         chosen = searched(at, 0 if shrinks else ANEW)
         if chosen.cost > BAD and shrinks:
@@ -257,25 +256,25 @@ def place_boxes(
                 chosen = searched(at)
             if other.cost < chosen.cost - WORTH:
                 at, chosen = less, other
-        hung = hung_lamps(at.problem.categories, at.size, chosen.position, chosen.yaw, free)
+        hung = hung_lamps(at.categories, at.size, chosen.position, chosen.yaw, free)
         at = posed(hung, chosen.position, chosen.yaw, kept)
     found = solve(at, config)
     if at is not drawn and unmet(found.at):  # what the graph states comes before all habits
         plain = solve(drawn, config)
         if unmet(plain.at) < unmet(found.at):
             found, at, held = plain, drawn, fixed
-    problem, turn, centre = at.problem, at.yaw, at.problem.centre
+    turn = at.yaw
     # The supports are met to a fraction of a millimetre; put them exactly, ceiling things as the solver left them.
     hung = lamps_along(categories, at.position, found.position, triplets, held) if at is not drawn else found.position
-    size_end = in_proportion(problem.categories, found.size, ~rigid)
-    end = stacked(size_end, hung, problem.carrier, None, held)
+    size_end = in_proportion(at.categories, found.size, ~rigid)
+    end = stacked(size_end, hung, at.carrier, None, held)
     ceiling = np.inf if height is None else np.maximum(height - size_end[:, 1], 0.0)
     end[~held, 1] = np.clip(end[:, 1], 0.0, ceiling)[~held]  # whatever is told of a lamp, it stays in the room
     boxes = Boxes(*(torch.as_tensor(of).float() for of in (size_end, end, turn)))
-    headed = torch.from_numpy(problem.fronts)
-    verdict = verdicts(boxes, torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(centre), fronts=headed)
-    hit = collisions(problem.categories, size_end, end, turn, problem.pairs)
-    beyond = outside(problem, size_end, end, turn)
+    headed = torch.from_numpy(at.fronts)
+    verdict = verdicts(boxes, torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(at.centre), fronts=headed)
+    hit = collisions(at.categories, size_end, end, turn, at.pairs)
+    beyond = outside(at, size_end, end, turn)
     failures = (
         set(np.flatnonzero(verdict.numpy() == 0).tolist()),
         {pair for pair, _ in hit},
@@ -286,7 +285,7 @@ def place_boxes(
         position=end,
         yaw=turn,
         verdict=verdict.numpy(),
-        conflicts=conflicts(problem, found, failures),
+        conflicts=conflicts(at, found, failures),
         collisions=hit,
         outside=beyond,
         moved=np.linalg.norm(end - position, axis=1),
@@ -295,10 +294,9 @@ def place_boxes(
     )
 
 
-def fullness(at: Posed) -> float:
+def fullness(at: Setting) -> float:
     """Share of the floor that furniture covers."""
-    assert at.problem.floor is not None
-    standing = at.problem.carrier == ON_FLOOR
-    x, z = at.problem.floor.polygon.T
+    standing = at.carrier == ON_FLOOR
+    x, z = at.floor.polygon.T
     area = float(abs(x @ np.roll(z, -1) - z @ np.roll(x, -1)) / 2)
     return float((at.size[standing, 0] * at.size[standing, 2]).sum()) / area

@@ -57,15 +57,15 @@ def proposals(setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np
         rows += _as_stated(setting, position, yaw, i)
         beside = twins(setting, position, yaw, i)
         rows = [*beside, *((*row[:3], row[3] + APART_TWINS * bool(beside)) for row in rows)]
-    drawn, more = setting.draft[i, [0, 2]].tolist(), loose + out_of_habit(setting, i)
+    drawn, more = setting.position[i, [0, 2]].tolist(), loose + out_of_habit(setting, i)
     carrier = int(setting.carrier[i])
-    turns = (_squared(setting, i), float(setting.heading[i])) if carrier < 0 else (float(yaw[carrier]),)
+    turns = (_squared(setting, i), float(setting.yaw[i])) if carrier < 0 else (float(yaw[carrier]),)
     rows += [(*drawn, turn, more) for turn in turns]
     out = np.array(rows, float)
     if setting.turned[i]:
-        like = np.abs(np.sin((out[:, 2] - setting.heading[i]) / 2)) < 0.05
+        like = np.abs(np.sin((out[:, 2] - setting.yaw[i]) / 2)) < 0.05
         out = out[like] if like.any() else out
-        out[:, 2] = setting.heading[i]
+        out[:, 2] = setting.yaw[i]
     return out
 
 
@@ -78,13 +78,13 @@ EDGE = 0.5  # metres between the middle of a plant or lamp and a wall that it st
 
 def out_of_habit(setting: Setting, i: int) -> float:
     """By how much other poses of a box are preferred to where it was drawn: nothing where such a piece may stand so."""
-    kind, anchor, here = setting.kinds[i], int(setting.anchor[i]), setting.draft[i, [0, 2]]
+    kind, anchor, here = setting.kinds[i], int(setting.anchor[i]), setting.position[i, [0, 2]]
     every = np.ones(len(setting.size), bool)
-    rows = twins(setting, setting.draft, setting.heading, i)
+    rows = twins(setting, setting.position, setting.yaw, i)
     if kind.support == "ceiling":
-        rows = _overhead(setting, setting.draft, setting.heading, every, i)
+        rows = _overhead(setting, setting.position, setting.yaw, every, i)
     elif anchor >= 0 and setting.carrier[i] < 0 and not rows:
-        frame = setting.draft[anchor], float(setting.heading[anchor])
+        frame = setting.position[anchor], float(setting.yaw[anchor])
         rows = [out_of(*frame, slot) for slot in slots_at(setting, i, anchor)]
     if rows and anchor < 0 and kind.support == "floor":
         return APART_TWINS * (min(math.hypot(row[0] - here[0], row[1] - here[1]) for row in rows) > AT)
@@ -99,7 +99,7 @@ def out_of_habit(setting: Setting, i: int) -> float:
 
 def _leans(setting: Setting, i: int) -> bool:
     """Whether a box belongs with its back to a wall, by its kind or because the graph has it there."""
-    told = any(one.subject == i and one.placement == "against_wall" for one in setting.problem.stated)
+    told = any(one.subject == i and one.placement == "against_wall" for one in setting.stated)
     kind = setting.kinds[i]
     return told or kind.wall or (kind.role == "board" and kind.access > 0)
 
@@ -123,7 +123,7 @@ def _apart(setting: Setting, i: int, anchor: int, stands: str) -> tuple[float, f
     """Metres between box i and its anchor and those it stands before its middle, as `distances.kept_apart`."""
     if stands not in APART:
         return 0.0, 0.0
-    drawn = seen_from(setting.size, setting.draft, setting.heading, anchor)[_mates(setting, stands, anchor)]
+    drawn = seen_from(setting.size, setting.position, setting.yaw, anchor)[_mates(setting, stands, anchor)]
     if stands == "before" and setting.kinds[anchor].name in vocabulary().cornered:
         drawn = drawn + np.array([0.0, 0.0, 0.0, INNER])
     kept, ahead = kept_apart(stands, drawn, setting.kinds[anchor].name, setting.size[anchor])
@@ -212,7 +212,7 @@ def aside(setting: Setting, position: np.ndarray, yaw: np.ndarray, i: int) -> np
 def _as_stated(setting: Setting, position: np.ndarray, yaw: np.ndarray, i: int) -> list[Row]:
     """Where the graph says that the box stands in the room: at walls, in corners, between two others, beside a twin."""
     rows: list[Row] = []
-    for one in setting.problem.stated:
+    for one in setting.stated:
         if one.subject == i and not one.others:
             rows += along_walls(setting, i, 0.0) + _corners(setting, i, 0.0)
             rows += _nooks(setting, i, 0.0) if setting.kinds[i].front else []
@@ -224,7 +224,7 @@ def _as_stated(setting: Setting, position: np.ndarray, yaw: np.ndarray, i: int) 
 def twins(setting: Setting, position: np.ndarray, yaw: np.ndarray, i: int) -> list[Row]:
     """For a bed that is told to share a nightstand: beside the other one, with room for it between."""
     rows: list[Row] = []
-    for one in setting.problem.stated:
+    for one in setting.stated:
         if i in one.others and len(one.others) == 2 and setting.stances[one.subject] == "head":
             other = next(k for k in one.others if k != i)
             apart = (setting.size[i, 0] + setting.size[other, 0]) / 2 + setting.size[one.subject, 0] + 0.1
@@ -249,14 +249,14 @@ def _midway(position: np.ndarray, yaw: np.ndarray, others: Sequence[int]) -> lis
 
 def _squared(setting: Setting, i: int) -> float:
     """The heading parallel to the walls that is nearest to the drawn one."""
-    return float(HALF_PI * np.round((setting.heading[i] - setting.grain) / HALF_PI) + setting.grain)
+    return float(HALF_PI * np.round((setting.yaw[i] - setting.grain) / HALF_PI) + setting.grain)
 
 
 def along_walls(setting: Setting, i: int, more: float) -> list[Row]:
     """With the back to every wall that is long enough, from corner to corner and where the draft is nearest."""
     width, depth = float(setting.size[i, 0]), float(setting.size[i, 2])
     gap = 0.0 if setting.kinds[i].support == "wall" else float(setting.behind[i])
-    told = {(one.placement, one.subject) for one in setting.problem.stated}
+    told = {(one.placement, one.subject) for one in setting.stated}
     fills = setting.kinds[i].clear > 0 and ("in_corner", i) in told  # a tub does, other things stand near one
     rows = []
     for start, along, length, yaw in setting.walls:
@@ -264,7 +264,7 @@ def along_walls(setting: Setting, i: int, more: float) -> list[Row]:
         if free < -0.005:
             continue
         low, high = min(0.01, max(free, 0) / 2), max(free - 0.01, max(free, 0) / 2)
-        drawn = float((setting.draft[i, [0, 2]] - start) @ along) - width / 2
+        drawn = float((setting.position[i, [0, 2]] - start) @ along) - width / 2
         steps = [] if fills else [free / 2, drawn, *np.arange(low, high, STEP)]
         offsets = np.unique(np.clip([low, high, *steps], low, high).round(3))
         normal = np.array([math.sin(yaw), math.cos(yaw)])
@@ -325,7 +325,7 @@ def _overhead(
 ) -> list[Row]:  # fmt: skip
     """Over the middle of tables, beds and sofas' tables, and over the middle of the room."""
     above = vocabulary().predicate_id("above")
-    told = [b for a, word, b in setting.problem.triplets.tolist() if a == i and word == above]
+    told = [b for a, word, b in setting.triplets.tolist() if a == i and word == above]
     low = setting.kinds[i].look == "pendant_lamp"  # it would meet heads
     rows: list[Row] = []
     for j, kind in enumerate(setting.kinds):
@@ -346,9 +346,9 @@ def _overhead(
 def _row_over(setting: Setting, i: int, j: int) -> list[float]:
     """Where lamps hang over box j, metres from its middle: as many in a row as are told to."""
     above = vocabulary().predicate_id("above")
-    lamps = {k for k, predicate, other in setting.problem.triplets.tolist() if predicate == above and other == j}
+    lamps = {k for k, predicate, other in setting.triplets.tolist() if predicate == above and other == j}
     if i not in lamps or len(lamps) < 2:
-        return [over_bed(setting.size, setting.draft, setting.heading, i, j) if setting.kinds[j].role == "bed" else 0.0]
+        return [over_bed(setting.size, setting.position, setting.yaw, i, j) if setting.kinds[j].role == "bed" else 0.0]
     length = float(setting.size[j, [0, 2]].max())
     return [((k + 0.5) / len(lamps) - 0.5) * length for k in range(len(lamps))]
 
@@ -365,6 +365,6 @@ def height_of(setting: Setting, position: np.ndarray, i: int) -> float:
     carrier = int(setting.carrier[i])
     if carrier >= 0:
         return float(position[carrier, 1] + setting.size[carrier, 1])
-    if carrier == ON_CEILING and setting.problem.height is not None:
-        return setting.problem.height - float(setting.size[i, 1])
-    return 0.0 if setting.standing(i) else float(setting.draft[i, 1])
+    if carrier == ON_CEILING and setting.height is not None:
+        return setting.height - float(setting.size[i, 1])
+    return 0.0 if setting.standing(i) else float(setting.position[i, 1])

@@ -11,7 +11,7 @@ import numpy as np
 from echomodel.objective.support import allowed_overlap
 from echousd.place.constraints import COLLISION, FLOOR, RELATION
 from echousd.place.geometry import beyond, separation
-from echousd.place.problem import Problem
+from echousd.place.setting import Setting
 from echousd.place.solver import Solution
 
 if TYPE_CHECKING:
@@ -59,16 +59,16 @@ def collisions(
                  if depth[p] > TOUCH)  # fmt: skip
 
 
-def outside(problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> tuple[tuple[int, float], ...]:
+def outside(setting: Setting, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> tuple[tuple[int, float], ...]:
     """Objects that leave the floor, with the depth in metres."""
-    if problem.floor is None:
+    if setting.outline is None:
         return ()
-    depth = beyond(problem.floor, size, position, yaw)
+    depth = beyond(setting.outline, size, position, yaw)
     return tuple((i, float(depth[i])) for i in np.flatnonzero(depth > TOUCH).tolist())
 
 
 def conflicts(
-    problem: Problem, found: Solution, failures: tuple[set[int], set[tuple[int, int]], set[int]]
+    setting: Setting, found: Solution, failures: tuple[set[int], set[tuple[int, int]], set[int]]
 ) -> tuple[Conflict, ...]:
     """Groups of demands that could not all be met: violated constraints that share objects that could have moved.
 
@@ -81,7 +81,7 @@ def conflicts(
     at = found.at
     groups: list[tuple[set[int], list[int]]] = []  # of boxes that could have moved, and of the rows around them
     for row in np.flatnonzero((at.value < -0.002) & np.isin(at.kind, (RELATION, COLLISION, FLOOR))).tolist():
-        joined, members = {i for i in at.boxes_of(row) if not (problem.fixed[i] and problem.rigid[i])}, [row]
+        joined, members = {i for i in at.boxes_of(row) if not (setting.fixed[i] and setting.rigid[i])}, [row]
         touched = [group for group in groups if group[0] & joined]
         for boxes, rows in touched:
             joined, members = joined | boxes, rows + members
@@ -90,8 +90,8 @@ def conflicts(
     def conflict(members: list[int]) -> Conflict:
         told, pairs = ([at.number[r] for r in members if at.kind[r] == kind] for kind in (RELATION, COLLISION))
         beyond = {i for r in members if at.kind[r] == FLOOR for i in at.boxes_of(r)}
-        rows: list[int] = problem.rows[told].tolist()
-        return Conflict(tuple(rows), tuple((i, j) for i, j in problem.pairs[pairs].tolist()), tuple(sorted(beyond)))
+        rows: list[int] = setting.rows[told].tolist()
+        return Conflict(tuple(rows), tuple((i, j) for i, j in setting.pairs[pairs].tolist()), tuple(sorted(beyond)))
 
     relations, pairs, outside = failures
     return tuple(

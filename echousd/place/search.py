@@ -66,7 +66,7 @@ class Search:
 
     def __init__(self, setting: Setting, terms: tuple[Term, ...] = TERMS, budget: int = BUDGET) -> None:
         self.setting, self.budget, self.judged, self.walked = setting, budget, 0, False
-        said = {int(number) for number in setting.problem.triplets[:, 1]}
+        said = {int(number) for number in setting.triplets[:, 1]}
         words = {row.name for row in _predicates() if row.id in said}
         sizes = {row.name for row in _predicates() if row.measures == "size"} | {"scale"}  # which no pose changes
         told = words | {"placed"}
@@ -74,7 +74,7 @@ class Search:
         self.rooms: dict[bytes, Plan] = {}
         self.looks: list[np.ndarray] = []
         steps = np.array([any(row.step) for row in _predicates()], bool)
-        self.sided = steps[setting.problem.triplets[:, 1]]
+        self.sided = steps[setting.triplets[:, 1]]
         self.urgent: list[int] = []
         self.regrets: dict[int, tuple[float, float, float]] = {}
         n = len(setting.size)
@@ -192,7 +192,7 @@ class Search:
         """For a bed that shares a nightstand: that one, and the states with it between both, side by side."""
         setting, out = self.setting, []
         rows = np.array(twins(setting, state.position, state.yaw, i)).reshape(-1, 4)
-        for one in setting.problem.stated if len(rows) else ():
+        for one in setting.stated if len(rows) else ():
             stand = one.subject
             if i in one.others and there[[stand, *one.others]].all() and not setting.fixed[stand]:
                 other = next(k for k in one.others if k != i)
@@ -207,7 +207,7 @@ class Search:
 
     def _sided(self, i: int, group: list[int]) -> bool:
         """Whether the graph says on which side of anything those who go with box i are."""
-        ends = self.setting.problem.triplets[self.sided]
+        ends = self.setting.triplets[self.sided]
         return bool(np.isin(ends[:, [0, 2]], [k for k in group if k != i]).any())
 
     def _best(
@@ -258,8 +258,8 @@ class Search:
     def _taste(self, i: int, rows: np.ndarray) -> np.ndarray:
         """(K,) float: how much others are liked better than these poses of a box."""
         setting = self.setting
-        off = np.minimum(np.hypot(rows[:, 0] - setting.draft[i, 0], rows[:, 1] - setting.draft[i, 2]), FARTHEST)
-        turned = 0.5 * (1 - np.cos(rows[:, 2] - setting.heading[i]))
+        off = np.minimum(np.hypot(rows[:, 0] - setting.position[i, 0], rows[:, 1] - setting.position[i, 2]), FARTHEST)
+        turned = 0.5 * (1 - np.cos(rows[:, 2] - setting.yaw[i]))
         share = ATTENDING if setting.anchor[i] >= 0 or setting.hanging[i] else 1.0
         if i in self.regrets:
             x, z, yaw = self.regrets[i]
@@ -350,16 +350,16 @@ class Search:
 
     def margins_at(self, state: State, i: int, at: np.ndarray, turn: np.ndarray, told: np.ndarray) -> np.ndarray:
         """(K, e) float: margins of relations (e, 3) of box i at poses (K, 3) and (K,), the others where they are."""
-        problem, ends, count = self.setting.problem, told[:, [0, 2]], len(turn) * len(told)
+        setting, ends, count = self.setting, told[:, [0, 2]], len(turn) * len(told)
         own = (ends == i)[None]
         position = np.where(own[..., None], at[:, None, None], state.position[ends]).reshape(-1, 3)
         yaw = np.where(own, turn[:, None, None], state.yaw[ends]).ravel()
-        size, fronts = (np.tile(of[ends], (len(turn), *[1] * of.ndim)) for of in (self.setting.size, problem.fronts))
+        size, fronts = (np.tile(of[ends], (len(turn), *[1] * of.ndim)) for of in (setting.size, setting.fronts))
         rows = np.stack([2 * np.arange(count), np.tile(told[:, 1], len(turn)), 2 * np.arange(count) + 1], 1)
         boxes = (torch.from_numpy(of) for of in (size.reshape(-1, 3), position, yaw))
         with torch.inference_mode():
             found = margins(
-                Boxes(*boxes), torch.from_numpy(rows), rules=problem.rules, center=torch.from_numpy(problem.centre),
+                Boxes(*boxes), torch.from_numpy(rows), rules=setting.rules, center=torch.from_numpy(setting.centre),
                 fronts=torch.from_numpy(fronts.ravel()),
             )  # fmt: skip
         return np.asarray(found.reshape(len(turn), -1).numpy())
@@ -494,7 +494,7 @@ class Search:
         setting = self.setting
         n = len(setting.size)
         habits = [0.02 + 0.3 * out_of_habit(setting, i) for i in range(n)]
-        state = State(setting.draft.copy(), setting.heading.copy(), np.array(habits))
+        state = State(setting.position.copy(), setting.yaw.copy(), np.array(habits))
         state = self.squared(state)
         _, wrong = self.faults(state)
         at = np.array([stance == "at" for stance in setting.stances], bool)

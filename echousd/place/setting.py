@@ -1,43 +1,111 @@
-"""A room in which places are looked for: what stays the same while its boxes move."""
+"""A room to be placed: what is fixed, what stands on what, which wall each piece leans on, who may overlap whom."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
 
-from echomodel.objective import Plan
-from echomodel.objective.support import ON_FLOOR
+from echomodel.boxes import Boxes
+from echomodel.boxes2d import seen
+from echomodel.objective import Plan, plan_of
+from echomodel.objective.support import ON_CEILING, ON_FLOOR, carriers
 from echomodel.openings import Opening
-from echomodel.vocabulary import Category
+from echomodel.roomboxes import footprints
+from echomodel.vocabulary import Category, vocabulary
 from echousd.place.distances import BEHIND, kept_behind
-from echousd.place.geometry import Floor
-from echousd.place.problem import Posed, Problem, wall_gaps
+from echousd.place.geometry import Floor, axes, floor_from_polygon, pair_indices
+
+if TYPE_CHECKING:
+    from echomodel.rules.placements import Stated, Walls
+
+WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it stands free
+WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's normal does not lean on it
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What stays the same.
+    """Everything about one room that stays the same while its boxes move, and where they start from.
 
     Arguments:
-        plan: N boxes where they were drawn, what is told of them, their floor and openings, as the objective sees them.
-        problem: the same for the solver. draft, heading: (n, 3) and (n,) float, where the boxes were drawn.
-        turned: (n,) bool, headings that are stated. behind: (n,) float, metres kept between backs and walls.
-        anchor: (n,) int, whom each attends, -1 = nobody; stances: how.
+        plan: n boxes as the objective sees them: what they are, the relations that are measured, floor and openings;
+            those that must not move are given.
+        rows: (e,) int, number of each of its relations among the graph's triplets.
+        rigid, turned: (n,) bool, boxes that must keep their size, their heading.
+        outline: the floor polygon, or None where the room has none.
+        carrier: (n,) int, the object that each one stands on, or `ON_FLOOR`, `ON_CEILING`, `FREE`.
+        wall: (n, 2, 2) float, point and inward normal (x, z) of the wall that each one leans on; NaN = none.
+        behind: (n,) float, metres that each one keeps between its back and a wall that it leans on.
     """
 
     plan: Plan
-    problem: Problem
-    size: np.ndarray
-    draft: np.ndarray
-    heading: np.ndarray
+    rows: np.ndarray
+    rigid: np.ndarray
     turned: np.ndarray
+    outline: Floor | None
+    carrier: np.ndarray
+    wall: np.ndarray
     behind: np.ndarray
-    anchor: np.ndarray
-    stances: tuple[str, ...]
+
+    def at(self, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> Setting:
+        """The same room with boxes of size and at position (n, 3), metres, and yaw (n,), radians."""
+        wide, there, turned = (torch.from_numpy(of) for of in (size, position, yaw))
+        return replace(self, plan=replace(self.plan, size=wide, position=there, yaw=turned))
+
+    def spread(self) -> Setting:
+        """The setting whose pieces keep usual distances to walls where drawn ones are too alike, at those walls."""
+        usual = kept_behind(self.categories, self.size, np.full(len(self.size), np.nan))
+        told = np.isin(np.arange(len(usual)), [one.subject for one in self.stated if not one.others])  # of walls
+        usual = np.where(told, np.minimum(usual, BEHIND[1]), usual)
+        behind = np.where(self.fixed, self.behind, usual)
+        leaning = np.flatnonzero(~np.isnan(self.wall[:, 0, 0]) & ~self.fixed)
+        position = self.position.copy()
+        away = wall_gaps(self.wall, self.size, position, self.yaw) - behind  # which the solver would take up later
+        position[leaning[:, None], [0, 2]] -= away[leaning, None] * self.wall[leaning, 1]
+        vars(self.plan)["carrier"] = torch.from_numpy(self.carrier)
+        plan = self.plan.at(torch.from_numpy(position), self.plan.yaw)
+        return replace(self, plan=plan, behind=behind)
+
+    # -- what the plan says, as arrays -------------------------------------------------------------------------------
+
+    @cached_property
+    def size(self) -> np.ndarray:
+        """(n, 3) float, metres."""
+        return np.asarray(self.plan.size.numpy())
+
+    @cached_property
+    def position(self) -> np.ndarray:
+        """(n, 3) float, metres, of the middles of the bottoms."""
+        return np.asarray(self.plan.position.numpy())
+
+    @cached_property
+    def yaw(self) -> np.ndarray:
+        """(n,) float, radians."""
+        return np.asarray(self.plan.yaw.numpy())
+
+    @cached_property
+    def triplets(self) -> np.ndarray:
+        """(e, 3) int, [subject, predicate id, object], those that the rules measure."""
+        return np.asarray(self.plan.triplets.numpy())
+
+    @cached_property
+    def fixed(self) -> np.ndarray:
+        """(n,) bool, boxes that must not move."""
+        return np.asarray(self.plan.given.numpy())
+
+    @cached_property
+    def anchor(self) -> np.ndarray:
+        """(n,) int, whom each attends, -1 = nobody."""
+        return np.asarray(self.plan.anchor.numpy())
+
+    @cached_property
+    def fronts(self) -> np.ndarray:
+        """(n,) bool, which of the boxes have a front."""
+        return np.asarray(self.plan.fronts.numpy())
 
     @property
     def kinds(self) -> tuple[Category, ...]:
@@ -45,20 +113,45 @@ class Setting:
         return self.plan.kinds
 
     @property
-    def carrier(self) -> np.ndarray:
-        """(n,) int, as `Problem.carrier`."""
-        return self.problem.carrier
+    def stances(self) -> tuple[str, ...]:
+        """How each stands to whom it attends."""
+        return self.plan.stance
 
     @property
-    def fixed(self) -> np.ndarray:
-        """(n,) bool, boxes that must not move."""
-        return self.problem.fixed
+    def rules(self) -> str:
+        """The rule set that the relations are meant in: `strict` or `sgfront`."""
+        return self.plan.rules
 
     @property
-    def floor(self) -> Floor:
-        """The floor."""
-        assert self.problem.floor is not None
-        return self.problem.floor
+    def stated(self) -> tuple[Stated, ...]:
+        """Where single objects must stand in the room."""
+        return self.plan.stated
+
+    @cached_property
+    def categories(self) -> tuple[str, ...]:
+        """Canonical category words."""
+        return tuple(kind.name for kind in self.kinds)
+
+    @cached_property
+    def height(self) -> float | None:
+        """Height of the ceiling in metres, or None."""
+        return None if self.plan.height is None else float(self.plan.height[0])
+
+    # -- who and what stands where -----------------------------------------------------------------------------------
+
+    @cached_property
+    def pairs(self) -> np.ndarray:
+        """(p, 2) int, pairs that must not collide."""
+        i, j = pair_indices(len(self.size)).T
+        apart = ~(self.fixed[i] & self.fixed[j]) & (self.carrier[i] != j) & (self.carrier[j] != i)
+        return np.stack([i, j], 1)[apart]
+
+    @cached_property
+    def touching(self) -> np.ndarray:
+        """(p,) bool, pairs that touch at most, though such a pair may overlap: a bed moved off its nightstand later
+        would leave its wall."""
+        head = np.array([kind.stands == "head" for kind in self.kinds], bool)
+        return np.asarray(head[self.pairs].any(1))
 
     @cached_property
     def shared(self) -> np.ndarray:
@@ -73,6 +166,38 @@ class Setting:
         """(n,) bool, lamps of the ceiling that go where what they light goes."""
         return np.array([kind.support == "ceiling" for kind in self.kinds], bool) & ~self.fixed
 
+    def standing(self, i: int) -> bool:
+        """Whether a box stands on the floor itself."""
+        return bool(self.carrier[i] == ON_FLOOR)
+
+    def told(self, i: int) -> np.ndarray:
+        """(r, 3) int, the triplets that name a box."""
+        rows: np.ndarray = self.triplets[(self.triplets[:, [0, 2]] == i).any(1)]
+        return rows
+
+    # -- the floor ---------------------------------------------------------------------------------------------------
+
+    @property
+    def floor(self) -> Floor:
+        """The floor of a room that has one."""
+        assert self.outline is not None
+        return self.outline
+
+    @cached_property
+    def centre(self) -> np.ndarray:
+        """(2,) float, x and z of the room's centre, metres."""
+        if self.outline is None:
+            return np.zeros(2)
+        corners = self.outline.polygon
+        return np.asarray((corners.max(0) + corners.min(0)) / 2)
+
+    @cached_property
+    def surroundings(self) -> Walls | None:
+        """The walls as placements are measured to them, None where the room has none."""
+        from echomodel.rules.placements import Walls
+
+        return None if self.outline is None else Walls(self.outline.polygon)
+
     @cached_property
     def walls(self) -> list[tuple[np.ndarray, np.ndarray, float, float]]:
         """Start (2,), direction (2,), length and the heading of what stands with its back to it, for each wall."""
@@ -86,31 +211,96 @@ class Setting:
         """Heading of the longest wall, radians: free furniture stands parallel to it."""
         return max(self.walls, key=lambda wall: wall[2])[3]
 
-    def standing(self, i: int) -> bool:
-        """Whether a box stands on the floor itself."""
-        return bool(self.carrier[i] == ON_FLOOR)
 
-    def told(self, i: int) -> np.ndarray:
-        """(r, 3) int, the triplets that name a box."""
-        rows: np.ndarray = self.problem.triplets[(self.problem.triplets[:, [0, 2]] == i).any(1)]
-        return rows
-
-
-def setting_of(at: Posed, turned: np.ndarray, *, openings: Sequence[Opening], outline: np.ndarray) -> Setting:
-    """The setting of a posed problem with a floor, whose boxes were drawn where they stand.
+def setting_of(
+    categories: Sequence[str], size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: np.ndarray, *,
+    floor_polygon: np.ndarray | None, height: float | None, fixed: np.ndarray, rigid: np.ndarray, turned: np.ndarray,
+    openings: Sequence[Opening] = (), stated: tuple[Stated, ...] = (), rules: str = "strict",
+) -> Setting:  # fmt: skip
+    """The setting of a room, its boxes put at their height and wall furniture turned square to its wall.
 
     Arguments:
-        turned: (n,) bool, headings that are stated.
-        openings: doors and windows. outline: (k, 2) float, the floor's corners in the order that these count edges in.
+        turned: (n,) bool, boxes that must keep their yaw.
+        The others as `echousd.place.place_boxes`.
     """
-    problem = at.problem
-    plan = at.plan(outline, openings)
-    vars(plan)["carrier"] = torch.from_numpy(problem.carrier)
-    spread = kept_behind(problem.categories, at.size, np.full(len(at.size), np.nan))  # drawn ones are too alike
-    told = np.isin(np.arange(len(spread)), [one.subject for one in problem.stated if not one.others])  # of walls
-    behind = np.where(problem.fixed, problem.behind, np.where(told, np.minimum(spread, BEHIND[1]), spread))
-    leaning = np.flatnonzero(~np.isnan(problem.wall[:, 0, 0]) & ~problem.fixed)
-    draft = at.position.copy()
-    away = wall_gaps(problem.wall, at.size, draft, at.yaw) - behind  # which the solver would take up later
-    draft[leaning[:, None], [0, 2]] -= away[leaning, None] * problem.wall[leaning, 1]
-    return Setting(plan, problem, at.size, draft, at.yaw, turned, behind, plan.anchor.numpy(), plan.stance)
+    from echomodel.rules import measured
+
+    words = tuple(vocabulary().category(word).name for word in categories)
+    told = np.flatnonzero(np.isin(triplets[:, 1], sorted(measured(rules))))
+    floor = None if floor_polygon is None else floor_from_polygon(floor_polygon)
+    carrier = carriers([vocabulary().category(word) for word in words], size, position, yaw, triplets)
+    position, yaw = stacked(size, position, carrier, height, fixed), yaw.copy()
+    wall = np.full((len(words), 2, 2), np.nan)
+    if floor is not None:
+        backed = {one.subject for one in stated if one.placement == "against_wall"}
+        wall = lean(words, size, position, yaw, floor, carrier, backed)
+        turn = ~np.isnan(wall[:, 1, 0]) & ~fixed & ~turned
+        yaw[turn] = np.arctan2(wall[turn, 1, 0], wall[turn, 1, 1])
+    behind = kept_behind(words, size, wall_gaps(wall, size, position, yaw))
+    boxes = Boxes(*(torch.from_numpy(of) for of in (size, position, yaw)))
+    plan = plan_of(
+        boxes, words, floor_polygon, openings, triplets[told], given=fixed, height=height, rules=rules, stated=stated
+    )
+    return Setting(plan, told, rigid, turned, floor, carrier, wall, behind)
+
+
+def wall_gaps(wall: np.ndarray, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """(n,) float: metres between the back of each leaning piece and its wall (`Setting.wall`); NaN for the others."""
+    normal = wall[:, 1]
+    reach = (np.abs(seen(normal, yaw)) * size[:, [0, 2]]).sum(-1) / 2
+    return ((position[:, [0, 2]] - wall[:, 0]) * normal).sum(-1) - reach
+
+
+def stacked(
+    size: np.ndarray, position: np.ndarray, carrier: np.ndarray, height: float | None, fixed: np.ndarray
+) -> np.ndarray:
+    """(n, 3) float: positions with each bottom on the floor or its carrier's top, and ceiling things at the ceiling."""
+    out = position.copy()
+    done = fixed.copy()
+
+    def put(i: int) -> float:
+        if not done[i]:
+            done[i] = True
+            if carrier[i] >= 0:
+                out[i, 1] = put(int(carrier[i]))
+            elif carrier[i] == ON_FLOOR:
+                out[i, 1] = 0.0
+            elif carrier[i] == ON_CEILING and height is not None:
+                out[i, 1] = height - size[i, 1]
+        return float(out[i, 1] + size[i, 1])
+
+    for i in range(len(size)):
+        put(i)
+    return out
+
+
+def lean(
+    categories: Sequence[str],
+    size: np.ndarray,
+    position: np.ndarray,
+    yaw: np.ndarray,
+    floor: Floor,
+    carrier: np.ndarray,
+    told: Collection[int] = (),
+) -> np.ndarray:
+    """(n, 2, 2) float: point and inward normal of the wall that each piece of wall furniture leans on, NaN = none.
+
+    Arguments:
+        told: boxes that the graph has against a wall, whatever they are.
+    """
+    rows = [vocabulary().category(word) for word in categories]
+    leaning = [
+        ((row.wall or i in told) and carrier[i] == ON_FLOOR) or row.support == "wall" for i, row in enumerate(rows)
+    ]
+    length = np.linalg.norm(floor.edge, axis=1)
+    along = floor.edge / length[:, None]
+    facing = axes(yaw)[:, 1] @ floor.normal.T > np.cos(WALL_TURN)
+    corner = footprints(size, position, yaw)
+    gap = ((corner[:, None] - floor.polygon[:, None]) * floor.normal[:, None]).sum(-1).min(2)
+    at = ((position[:, None, [0, 2]] - floor.polygon) * along).sum(-1)
+    near = facing & (at > -0.2) & (at < length + 0.2) & (gap < WALL_REACH) & (gap > -1.5)
+    distance = np.where(near & np.array(leaning, bool)[:, None], np.abs(gap), np.inf)
+    best = distance.argmin(1)
+    found = np.stack([floor.polygon[best], floor.normal[best]], 1)
+    found[np.isinf(distance.min(1))] = np.nan
+    return found

@@ -25,7 +25,7 @@ from echousd.place.constraints import (
     Matrix,
 )
 from echousd.place.geometry import COLUMNS
-from echousd.place.problem import Posed
+from echousd.place.setting import Setting
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Solution:
     rounds: int
 
 
-def solve(start: Posed, config: PlaceConfig) -> Solution:
+def solve(start: Setting, config: PlaceConfig) -> Solution:
     """Move and size boxes until the constraints hold; the best attempt where they cannot all hold."""
     constraints = Constraints(start, config.slack)
     handicap = constraints.handicap.copy()
@@ -107,10 +107,10 @@ def solve(start: Posed, config: PlaceConfig) -> Solution:
 
 
 def _descend(
-    start: Posed, constraints: Constraints, handicap: np.ndarray, through: int, config: PlaceConfig
+    start: Setting, constraints: Constraints, handicap: np.ndarray, through: int, config: PlaceConfig
 ) -> Solution:
-    problem, n = start.problem, len(start.size)
-    free = np.stack([~problem.fixed] * 3 + [~problem.rigid] * 3, 1).ravel()
+    n = len(start.size)
+    free = np.stack([~start.fixed] * 3 + [~start.rigid] * 3, 1).ravel()
     weight = np.tile([config.move**-2] * 3 + [config.stretch**-2] * 3, n)[free]
     origin = np.concatenate((start.position, np.log(start.size)), 1)
     limit = np.tile([np.inf] * 3 + [config.limit] * 3, n)[free]

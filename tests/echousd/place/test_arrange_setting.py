@@ -7,7 +7,6 @@ import pytest
 
 from echousd.place import place_boxes
 from echousd.place.geometry import axes, depth_inside
-from echousd.place.problem import pose
 from echousd.place.proposals import proposals, slots_at
 from echousd.place.search import Search, State
 from echousd.place.setting import Setting, setting_of
@@ -18,11 +17,10 @@ FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
 def setting(words: list[str], size: list, position: list, yaw: list, fixed: tuple[int, ...] = ()) -> Setting:
     """The setting of boxes in a room of 5 by 4 metres, some of them fixed."""
     still, none = np.isin(np.arange(len(words)), fixed), np.zeros(len(words), bool)
-    at = pose(
+    return setting_of(
         words, np.array(size, float), np.array(position, float), np.array(yaw, float), np.zeros((0, 3), int),
         floor_polygon=FLOOR, height=2.7, fixed=still, rigid=none, turned=still,
-    )  # fmt: skip
-    return setting_of(at, still, openings=(), outline=FLOOR)
+    ).spread()  # fmt: skip
 
 
 def test_a_lamp_on_the_sideboard_of_a_table_does_not_slide_with_the_table() -> None:
@@ -31,7 +29,7 @@ def test_a_lamp_on_the_sideboard_of_a_table_does_not_slide_with_the_table() -> N
     found = setting(words, size, [(0, 0, 0), (0.3, 0, 0.6), (0, 0, -1.78), (0.3, 0.9, -1.78)], [0, np.pi, 0, 0])
     assert found.stances[2] == "near"
     assert found.carrier[3] == 2
-    state = State(found.draft, found.heading, np.zeros(4))
+    state = State(found.position, found.yaw, np.zeros(4))
     assert Search(found).group(0, np.ones(4, bool), state) == [0, 1]
 
 
@@ -61,9 +59,9 @@ def test_the_coffee_table_of_a_corner_sofa_keeps_the_distance_that_was_drawn() -
 @pytest.mark.parametrize("size", [(0.8, 1.0, 0.3), (0.3, 1.0, 0.8), (0.5, 1.0, 0.5)])
 def test_plants_have_no_pose_that_leaves_the_floor(size: tuple[float, float, float]) -> None:
     found = setting(["plant"], [size], [(0.4, 0.0, 0.3)], [0.0])
-    rows = proposals(found, found.draft, found.heading, np.ones(1, bool), 0)
+    rows = proposals(found, found.position, found.yaw, np.ones(1, bool), 0)
     search = Search(found)
-    state = State(found.draft, found.heading, np.zeros(1))
+    state = State(found.position, found.yaw, np.zeros(1))
     kept = rows[search._promising(state, np.ones(1, bool), 0, [0], rows, rows[:, 3])]
     side = axes(kept[:, 2]) * np.array([[size[0] / 2], [size[2] / 2]])  # (K, 2, 2)
     signs = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)])

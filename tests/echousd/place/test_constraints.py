@@ -10,14 +10,14 @@ from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place.constraints import KINDS, OVERHANG, PLACEMENT, RELATION, Constraints, Linearised
 from echousd.place.geometry import COLUMNS
-from echousd.place.problem import Posed, pose
+from echousd.place.setting import Setting, setting_of
 
 WORDS = ["wardrobe", "dresser", "bookshelf", "table_lamp", "pendant_lamp", "cabinet", "armchair"]
 NOTCHED = np.array([(0, 0), (4, 0), (4, 2), (2, 2), (2, 3.5), (0, 3)], float)
 STATED = (Stated("in_corner", 5), Stated("between", 6, (0, 2)))
 
 
-def posed(rules: str, square: bool, seed: int) -> Posed:
+def posed(rules: str, square: bool, seed: int) -> Setting:
     """A room in which little is right, with all relations at once."""
     luck, n = np.random.default_rng(seed), len(WORDS)
     size, position = luck.uniform(0.4, 1.2, (n, 3)), luck.uniform(0, 4, (n, 3)) * (1, 0.3, 0.8)
@@ -27,13 +27,13 @@ def posed(rules: str, square: bool, seed: int) -> Posed:
     triplets, shelf = np.array([*every, (3, on, 2)]), WORDS.index("bookshelf")
     position[shelf], yaw[shelf] = (1.5, 0.0, size[shelf, 2] / 2 + 0.1), 0.0
     none = np.zeros(n, bool)
-    return pose(
+    return setting_of(
         WORDS, size, position, yaw, triplets, floor_polygon=NOTCHED, height=2.6, fixed=none, rigid=none, turned=none,
         stated=STATED, rules=rules,
     )  # fmt: skip
 
 
-def at(start: Posed, size: np.ndarray, position: np.ndarray) -> Linearised:
+def at(start: Setting, size: np.ndarray, position: np.ndarray) -> Linearised:
     found = Constraints(start, 0.0)
     return found.at(size, position, found.handicap)
 
@@ -69,16 +69,16 @@ def test_slopes_are_those_of_the_values(monkeypatch, rules, square):
 def test_relations_are_those_of_the_rules(monkeypatch, rules):
     monkeypatch.setattr("echousd.place.constraints.LONGEST_STEP", 99.0)
     start = posed(rules, False, 3)
-    found, problem = at(start, start.size, start.position), start.problem
+    found = at(start, start.size, start.position)
     boxes = Boxes(*(torch.from_numpy(of) for of in (start.size, start.position, start.yaw)))
     told = margins(
-        boxes, torch.from_numpy(problem.triplets), rules=rules, center=torch.from_numpy(problem.centre),
-        fronts=torch.from_numpy(problem.fronts),
+        boxes, torch.from_numpy(start.triplets), rules=rules, center=torch.from_numpy(start.centre),
+        fronts=torch.from_numpy(start.fronts),
     )  # fmt: skip
     row = found.kind == RELATION
     np.testing.assert_allclose(found.value[row], told.numpy()[found.number[row]], atol=1e-12)
     sloped = np.abs(found.gradient[row]).sum(1) > 0
-    assert {*problem.triplets[found.number[row][sloped], 1].tolist()} == measured(rules)
+    assert {*start.triplets[found.number[row][sloped], 1].tolist()} == measured(rules)
 
 
 @pytest.mark.parametrize("mode", [torch.no_grad, torch.inference_mode])

@@ -15,7 +15,6 @@ from echomodel.rules import label_relations, margins
 from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place import place_boxes
-from echousd.place.problem import pose
 from echousd.place.search import PRICE, Search, State, priced
 from echousd.place.setting import setting_of
 
@@ -27,12 +26,12 @@ def searched(words, size, position, yaw, told=(), *, turned=(), fixed=(), floor=
     """A search in a room, and the state that its boxes were drawn in."""
     still, kept = np.isin(np.arange(len(words)), fixed), np.isin(np.arange(len(words)), turned)
     triplets = np.array([(a, ID[word], b) for a, word, b in told], int).reshape(-1, 3)
-    at = pose(
+    setting = setting_of(
         words, np.array(size, float), np.array(position, float), np.array(yaw, float), triplets,
         floor_polygon=floor, height=2.7, fixed=still, rigid=still, turned=still | kept,
     )  # fmt: skip
-    setting = setting_of(at, still | kept, openings=(), outline=floor)
-    return Search(setting), State(setting.draft, setting.heading, np.zeros(len(words)))
+    setting = setting.spread()
+    return Search(setting), State(setting.position, setting.yaw, np.zeros(len(words)))
 
 
 @pytest.fixture(scope="module")
@@ -178,8 +177,8 @@ def test_margins_of_many_poses_are_those_of_one_after_the_other():
     size, position, yaw = luck.uniform(0.3, 2.0, (4, 3)), luck.normal(0, 1, (4, 3)), luck.uniform(-4, 4, 4)
     search, state = searched(words, size, position, yaw, told, turned=range(4))
     poses, turns = luck.normal(0, 1, (7, 3)), luck.uniform(-4, 4, 7)
-    problem = search.setting.problem
-    found = search.margins_at(state, 0, poses, turns, problem.triplets)
+    setting = search.setting
+    found = search.margins_at(state, 0, poses, turns, setting.triplets)
     assert (found > 0).any()
     assert (found < 0).any()
     for k in range(7):
@@ -187,7 +186,7 @@ def test_margins_of_many_poses_are_those_of_one_after_the_other():
         places[0], headings[0] = poses[k], turns[k]
         alone = margins(
             Boxes(*(torch.from_numpy(of) for of in (search.setting.size, places, headings))),
-            torch.from_numpy(problem.triplets), center=torch.from_numpy(problem.centre),
-            fronts=torch.from_numpy(problem.fronts),
+            torch.from_numpy(setting.triplets), center=torch.from_numpy(setting.centre),
+            fronts=torch.from_numpy(setting.fronts),
         )  # fmt: skip
         np.testing.assert_allclose(found[k], alone.numpy(), atol=1e-9)
