@@ -2,10 +2,12 @@
 
     python benchmarks/room_sheets.py --seeds 4 -o sheets
     python benchmarks/room_sheets.py --set people --seeds 2 -o sheets
+    python benchmarks/room_sheets.py --set people more --lot 24 --draw 7 -o sheets
 
 The five samples (`samples`), what `echousd new --room` writes for all five types (`new`), and graphs as people write
 them (`people`, `more`: people_graphs.yaml, more_graphs.yaml), each with the same seeds; boxes with their front as a
-dark edge, faults of the rules in red.
+dark edge, faults of the rules in red. `--lot` draws graphs and seeds at random (`--draw` from which) and makes them as
+`generate` does, with parts and small things: from above, from inside, and below what `check` says.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ from PIL import Image, ImageDraw, ImageFont
 from echomodel.openings import segment, swing_area
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
-from echousd import generate
+from echousd import check, generate
+from echousd.draw.rendering import render_stage
 from echousd.graph import SceneGraph, load_graph
 from echousd.graph.files import starting_graph
 from echousd.make.finished import Room
@@ -74,6 +77,28 @@ def cell(room: Room, title: str) -> tuple[Image.Image, list[str]]:
     return picture, faults
 
 
+def seen(room: Room, picture: Image.Image) -> tuple[Image.Image, list[str]]:
+    """The room from above and, at its right, from inside, with what `check` says of its stage."""
+    report = check(room.stage)
+    said = [f"{fault.rule}: {fault.says}" for layout in report.layouts for fault in layout.living]
+    said += [f"relation: {one}" for layout in report.layouts for one in layout.broken]
+    said += [f"placement: {one}" for one in report.placement] + [f"collision: {one}" for one in report.collisions]
+    out = Image.new("RGB", (2 * CELL, picture.height), "white")
+    out.paste(picture.crop((0, 0, CELL, CELL + TITLE)), (0, 0))
+    inside = render_stage(room.stage, view="dollhouse", size=CELL, rays=1)
+    out.paste(inside, (CELL, TITLE + (CELL - inside.height) // 2))
+    for number, text in enumerate(said[:4]):
+        ImageDraw.Draw(out).text((8, CELL + TITLE + 16 * number), text[:150], fill="red", font=FONT)
+    return out, said
+
+
+def drawn_by_lot(graphs: list[tuple[str, SceneGraph]], count: int, draw: int) -> list[tuple[str, SceneGraph, int]]:
+    """Graphs, each once while there are any left, and a seed for each."""
+    luck = np.random.default_rng(draw)
+    order = np.concatenate([luck.permutation(len(graphs)) for _ in range(-(-count // len(graphs)))])[:count]
+    return [(*graphs[number], int(luck.integers(10_000, 1_000_000))) for number in order]
+
+
 def graphs_of(sets: list[str]) -> Iterator[tuple[str, SceneGraph]]:
     """Name and graph of every room of some of `SETS`."""
     here = Path(__file__).parent
@@ -91,11 +116,12 @@ def graphs_of(sets: list[str]) -> Iterator[tuple[str, SceneGraph]]:
 
 def save_sheets(cells: list[Image.Image], folder: Path) -> None:
     """The pictures in their order on as many sheets as they need."""
-    for first in range(0, len(cells), ACROSS * DOWN):
-        sheet = Image.new("RGB", (ACROSS * CELL, DOWN * cells[0].height), "white")
-        for number, picture in enumerate(cells[first : first + ACROSS * DOWN]):
-            sheet.paste(picture, ((number % ACROSS) * CELL, (number // ACROSS) * picture.height))
-        sheet.save(folder / f"sheet_{first // (ACROSS * DOWN):02d}.png")
+    across, down = (ACROSS, DOWN) if cells[0].width == CELL else (2, 2)
+    for first in range(0, len(cells), across * down):
+        sheet = Image.new("RGB", (across * cells[0].width, down * cells[0].height), "white")
+        for number, picture in enumerate(cells[first : first + across * down]):
+            sheet.paste(picture, ((number % across) * picture.width, (number // across) * picture.height))
+        sheet.save(folder / f"sheet_{first // (across * down):02d}.png")
 
 
 def main() -> None:
@@ -105,6 +131,8 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--set", nargs="*", default=list(SETS), choices=SETS)
     parser.add_argument("--only", nargs="*", default=None, help="names of samples, new_TYPE or rooms of people")
+    parser.add_argument("--lot", type=int, default=0, help="so many graphs and seeds by lot, made in full")
+    parser.add_argument("--draw", type=int, default=0, help="seed of the lot")
     parser.add_argument("-o", "--output", type=Path, default=Path("sheets"))
     options = parser.parse_args()
     warnings.simplefilter("ignore")
@@ -112,21 +140,22 @@ def main() -> None:
     cells, took = [], []
     clean = faults = objects = broken = collisions = 0
     by_rule: Counter[str] = Counter()
-    for name, graph in graphs_of(options.set):
-        if options.only and name not in options.only:
-            continue
-        for seed in range(options.first, options.first + options.seeds):
-            started = time.perf_counter()
-            room = generate(graph, seed=seed, shapes="boxes")
-            took.append(room.timings["layout"] + room.timings["place"])
-            picture, found = cell(room, f"{name} seed {seed}  {time.perf_counter() - started:.1f} s")
-            cells.append(picture)
-            clean, faults, objects = clean + (not found), faults + len(found), objects + len(room.names)
-            broken += sum(v.state == "broken" for v in room.verdicts)
-            collisions += len(room.faults) - sum(v.state == "broken" for v in room.verdicts)
-            by_rule.update(sentence.partition(":")[0] for sentence in found)
-            for sentence in found:
-                print(f"{name} {seed}: {sentence}")
+    graphs = [(name, graph) for name, graph in graphs_of(options.set) if not options.only or name in options.only]
+    rows = [(*of, seed) for of in graphs for seed in range(options.first, options.first + options.seeds)]
+    for name, graph, seed in drawn_by_lot(graphs, options.lot, options.draw) if options.lot else rows:
+        started = time.perf_counter()
+        room = generate(graph, seed=seed, shapes="parts" if options.lot else "boxes")
+        took.append(room.timings["layout"] + room.timings["place"])
+        picture, found = cell(room, f"{name} seed {seed}  {time.perf_counter() - started:.1f} s")
+        if options.lot:
+            picture, found = seen(room, picture)
+        cells.append(picture)
+        clean, faults, objects = clean + (not found), faults + len(found), objects + len(room.names)
+        broken += sum(v.state == "broken" for v in room.verdicts)
+        collisions += len(room.faults) - sum(v.state == "broken" for v in room.verdicts)
+        by_rule.update(sentence.partition(":")[0] for sentence in found)
+        for sentence in found:
+            print(f"{name} {seed}: {sentence}", flush=True)
     save_sheets(cells, options.output)
     print(
         f"{len(cells)} rooms, {clean} without a fault, {faults} faults at {objects} objects, {broken} relations broken,"
