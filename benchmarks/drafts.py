@@ -2,9 +2,10 @@
 
     python benchmarks/drafts.py [WEIGHTS ...] [--ways alone guided searched] [--rooms ROOMS.json] [--count 40]
 
-`ships` and `shuffled` are words for WEIGHTS. The rooms are of the room generator from a seed that no training used, or
-every so many of a rooms file, one near relation an object told, one draft each; faults are those of all terms. Below
-each way stand the means of the differences to the first weights, room by room, with 95 % intervals by bootstrap.
+`ships`, `shuffled` and `muted` (the echo off) are words for WEIGHTS. The rooms are of the room generator from a seed
+that no training used, or every so many of a rooms file, one near relation an object told, one draft each; faults are
+those of all terms. Below each way stand the means of the differences to the first weights, room by room, with 95 %
+intervals by bootstrap.
 """
 
 from __future__ import annotations
@@ -21,11 +22,11 @@ from echomodel.loading import load_model
 from echomodel.metrics.layouts import Task, kept_relations, tasks_of
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
 from echomodel.rooms.generator import generate_rooms
-from echousd.evaluation.systems import networks, searched, shuffled_model
+from echousd.evaluation.systems import muted_model, networks, searched, shuffled_model
 from echousd.place import PlaceConfig
 
 SEED = 770_000  # of the generated rooms, as in `placing.py`
-WORDS = {"ships": partial(load_model, None), "shuffled": shuffled_model}
+WORDS = {"ships": partial(load_model, None), "shuffled": shuffled_model, "muted": muted_model}
 ROWS = ("told kept", "faults an object", "rooms without")
 DRAWS = 4000  # of the bootstrap
 

@@ -26,8 +26,8 @@ def suite(
     systems: Annotated[
         list[str] | None,
         typer.Argument(
-            help="default, network, guided, shuffled, generator, random, retrieval, real, each also with +search or "
-            "+half; weights; rooms from elsewhere. None: default, network, guided.",
+            help="default, network, guided, shuffled, muted, generator, random, retrieval, real, each also "
+            "with +search or +half; weights; rooms from elsewhere. None: default, network, guided.",
             show_default=False,
         ),
     ] = None,

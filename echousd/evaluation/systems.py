@@ -12,8 +12,10 @@ import numpy as np
 import shapely
 import torch
 from scipy.optimize import linear_sum_assignment
+from torch import nn
 
 from echomodel.boxes import Boxes
+from echomodel.compact.pairs import EchoLayer
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
@@ -161,6 +163,17 @@ def shuffled_model(seed: int = 0) -> EchoModel:
     return model
 
 
+@cache
+def muted_model() -> EchoModel:
+    """The shipped weights with the echo off: in the layout branch no object hears of another."""
+    model = EchoModel.load()
+    for layer in model.model.layout.modules():
+        if isinstance(layer, EchoLayer):
+            nn.init.zeros_(layer.message.weight)
+            nn.init.zeros_(layer.message.bias)
+    return model
+
+
 # -- without a network -------------------------------------------------------------------------------------------------
 
 
@@ -247,6 +260,7 @@ BASES: dict[str, tuple[Layouts, str]] = {  # name -> who, and what it is in a fe
         networks(shuffled_model),
         "the same network, the numbers of each of its tensors in another order: untrained",
     ),
+    "muted": (networks(muted_model), "the shipped network with its echo off: no object hears of another"),
     "generator": (room_by_room(generated, 8), "the room generator, asked for the same furniture on such a floor"),
     "random": (room_by_room(random_places, 7), "usual sizes at random places: chance"),
     "retrieval": (room_by_room(retrieved, 9), f"boxes of the most similar of {POOL} rooms like those of the training"),

@@ -103,7 +103,7 @@ def test_what_there_is_not_is_named(arguments, text, rooms, tmp_path, capsys):
 
 def test_systems_keep_furniture_and_floor_and_draw_from_their_seed(rooms):
     tasks = tasks_of(rooms, 0, told=1.0)
-    for name in ("random", "generator", "retrieval", "shuffled", "real"):
+    for name in ("random", "generator", "retrieval", "shuffled", "muted", "real"):
         one, again = (BASES[name][0](tasks, 3) for _ in range(2))
         for task, room, same in zip(tasks, one, again, strict=True):
             assert room.categories == task.room.categories
