@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,12 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from echousd.cli.options import AsJson
-from echousd.cli.output import check_picture, safe, say, say_done, say_json
+from echousd.cli.output import check_picture, say, say_done, say_json
 
 if TYPE_CHECKING:
-    from rich.tree import Tree
-
-    from echousd.graph import Node, Relation, SceneGraph
+    from echousd.graph import SceneGraph
     from echousd.home.graph import HomeGraph
 
 app = typer.Typer()
@@ -43,7 +40,7 @@ GRAPH_EXAMPLES = """Examples:
 
     echousd graph house.usda --room /House/Bedroom --json > bedroom.json
 
-    echousd graph scan.usdc --names --relations 2 --yaml > room.yaml
+    echousd graph scan.usdc --names --relations 2 > room.yaml
 
     echousd graph --schema > scenegraph.schema.json"""
 
@@ -206,7 +203,6 @@ def graph(
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the canonical JSON form.")] = False,
-    as_yaml: Annotated[bool, typer.Option("--yaml", help="Print the short YAML form.")] = False,
     picture: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="FILE", help="Draw a picture (.png, .svg, .pdf).")
     ] = None,
@@ -215,11 +211,11 @@ def graph(
         bool, typer.Option("--schema", help="Print the JSON schema of the canonical form; needs no GRAPH.")
     ] = False,
 ) -> None:
-    """Show the scene graph of a stage or a text file: objects, and how they relate."""
+    """Show the scene graph of a stage or a text file, as the text that a person writes."""
     from echousd.graph import GraphError, SceneGraph, load_graph
     from echousd.graph.files import STAGE_FORMS
 
-    forms = {"--json": as_json, "--yaml": as_yaml, "--schema": schema}
+    forms = {"--json": as_json, "--schema": schema}
     chosen = [name for name, wanted in forms.items() if wanted]
     if len(chosen) > 1:
         raise GraphError(f"{' and '.join(chosen)} exclude each other")
@@ -230,7 +226,7 @@ def graph(
         raise GraphError("GRAPH is missing, allowed: a stage, a YAML or a JSON file")
     if picture is not None and picture.suffix.lower() not in PICTURES:
         raise GraphError(f"{picture}: extension {picture.suffix!r}, allowed: {', '.join(PICTURES)}")
-    alone = room is not None or bool(chosen) or picture is not None
+    alone = room is not None or as_json or picture is not None
     if source.suffix.lower() in STAGE_FORMS and (names or not alone):
         shown = _rooms(source, names=names)
         if room is not None and room not in shown:
@@ -251,16 +247,12 @@ def graph(
         check_picture(picture, force=force)
         draw_graph(only, picture)
         say(f"wrote {picture}: {_summary(only)}", err=True)
-    if as_json or as_yaml:
-        typer.echo(only.to_json() if as_json else only.to_yaml(), nl=False)
+    if as_json:
+        typer.echo(only.to_json(), nl=False)
     elif picture is None:
-        from echousd.cli.terminal import Terminal
-
-        console = Terminal()
-        if not console.is_terminal:
-            console.width = 160
-        for prim, each in shown.items():
-            console.print(_tree(each, prim))
+        for number, (prim, each) in enumerate(shown.items()):
+            heading = f"# {prim} {_summary(each)}" if prim else f"# {_summary(each)}"
+            typer.echo(f"{'---' if number else ''}\n{heading}\n{each.to_yaml()}".lstrip("\n"), nl=False)
 
 
 def _rooms(source: Path, *, names: bool) -> dict[str, SceneGraph]:
@@ -277,70 +269,9 @@ def _rooms(source: Path, *, names: bool) -> dict[str, SceneGraph]:
 def _summary(made: SceneGraph) -> str:
     objects, relations = len(made.nodes), len(made.relations)
     return (
-        f"{_words(made.room.type)}, {objects} object{'s' * (objects != 1)}, "
+        f"{made.room.type.replace('_', ' ')}, {objects} object{'s' * (objects != 1)}, "
         f"{relations} relation{'s' * (relations != 1)}"
     )
 
 
-def _words(token: str) -> str:
-    return token.replace("_", " ")
-
-
-KINDS = ("door", "window", "passage")
 PICTURES = (".png", ".svg", ".pdf")
-
-
-def _heading(made: SceneGraph, path: str) -> str:
-    extents, height = made.room.extents, made.room.height
-    known = [f"{extents[0]:.4g} x {extents[1]:.4g} m"] if extents else []
-    known += [f"{height:.4g} m high"] if height else []
-    for kind in KINDS:
-        count = sum(opening.kind == kind for opening in made.room.openings)
-        known += [f"{count} {kind}{'s' * (count != 1)}"] if count else []
-    return ", ".join([f"{path} {_summary(made)}".strip(), *known])
-
-
-def _facts(node: Node) -> list[str]:
-    """What is known of a node besides name and category."""
-    facts = [node.title] if node.title else []
-    facts += [f"style {node.style}"] if node.style else []
-    if node.size:
-        facts.append("size " + " x ".join(f"{value:.3g}" for value in node.size))
-    if node.position:
-        facts.append("at " + " ".join(f"{value:.3g}" for value in node.position))
-    if node.yaw is not None:
-        facts.append(f"yaw {math.degrees(node.yaw):.4g} deg")
-    facts += ["locked"] if node.locked else []
-    return [safe(fact) for fact in (*facts, *(f"{key}={value}" for key, value in node.attributes.items()))]
-
-
-def _tree(made: SceneGraph, path: str) -> Tree:
-    from rich.text import Text
-    from rich.tree import Tree
-
-    from echousd.graph.openings import sentence
-
-    stated: dict[str, list[Relation]] = {node.name: [] for node in made.nodes}
-    for relation in made.relations:
-        stated[relation.subject].append(relation)
-    tree = Tree(Text(_heading(made, path), style="bold"), guide_style="dim")
-    for opening in made.room.openings:
-        tree.add(Text(sentence(opening), style="green"))
-    for node in made.nodes:
-        label = Text(node.name, style="bold cyan")
-        if node.category != node.name:
-            label.append(f"  {_words(node.category)}", style="default not bold")
-        for fact in _facts(node):
-            label.append(f"  {fact}", style="not bold dim")
-        branch = tree.add(label)
-        for predicate in dict.fromkeys(relation.predicate for relation in stated[node.name]):
-            line = Text(_words(predicate), style="yellow")
-            for i, relation in enumerate(r for r in stated[node.name] if r.predicate == predicate):
-                line.append(", " if i else " ").append(relation.object, style="cyan")
-                if relation.confidence != 1:
-                    line.append(f" ({relation.confidence:.3g})", style="dim")
-            branch.add(line)
-        for placed in node.placements:
-            line = Text(_words(placed.placement), style="yellow")
-            branch.add(line.append(f" {' and '.join(placed.others)}" if placed.others else "", style="cyan"))
-    return tree
