@@ -23,7 +23,7 @@ from echomodel.metrics.layouts import Task, kept_relations, tasks_of
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
 from echomodel.rooms.generator import generate_rooms
 from echousd.evaluation.systems import muted_model, networks, searched, shuffled_model
-from echousd.place import PlaceConfig
+from echousd.place.solver import PlaceConfig
 
 SEED = 770_000  # of the generated rooms, as in `placing.py`
 WORDS = {"ships": partial(load_model, None), "shuffled": shuffled_model, "muted": muted_model}

@@ -19,7 +19,6 @@ import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -37,9 +36,7 @@ def parted() -> Iterator[dict[str, float]]:
     """CPU seconds by `PARTS` of what runs inside the block, each without the parts that run within it."""
     from echomodel.compact import sampling
     from echousd.make import layouts
-    from echousd.place import living, search
-
-    placing = import_module("echousd.place.placing")  # the package has a function of that name
+    from echousd.place import living, placing, search
 
     spent: dict[str, float] = defaultdict(float)
     within = [0.0]

@@ -16,7 +16,7 @@ from pathlib import Path
 from pxr import Usd
 
 import echousd
-from echousd.exporting import export
+from echousd.exporting.formats import export
 from echousd.options import RoomOptions
 
 SAMPLES = Path(__file__).parents[1] / "samples"

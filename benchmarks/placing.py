@@ -28,7 +28,8 @@ from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.rooms.generator import generate_rooms
 from echomodel.vocabulary import vocabulary
 from echousd.evaluation.systems import BASES
-from echousd.place import PlaceConfig, place_boxes
+from echousd.place.placing import place_boxes
+from echousd.place.solver import PlaceConfig
 
 SEED = 770_000  # of the generated rooms
 CELL = 420  # pixels

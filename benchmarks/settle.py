@@ -21,7 +21,7 @@ from echousd.graph import SceneGraph
 from echousd.make.reading import read_room
 from echousd.make.verdicts import relation_verdicts
 from echousd.options import RoomOptions
-from echousd.settle import SettleReport, settle
+from echousd.settle.settle import SettleReport, settle
 
 SAMPLES = Path(__file__).parents[1] / "samples"
 KINDS = "bedroom,living_room,dining_room,study,living_dining"

@@ -21,8 +21,8 @@ from echomodel.boxes import Boxes
 from echomodel.roomboxes import RoomBoxes, read_rooms
 from echomodel.rules import label_relations, margins
 from echomodel.vocabulary import vocabulary
-from echousd.place import place_boxes
 from echousd.place.geometry import separation
+from echousd.place.placing import place_boxes
 
 
 def noisy(room: RoomBoxes, noise: float, rng: np.random.Generator) -> RoomBoxes:

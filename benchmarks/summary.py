@@ -34,10 +34,10 @@ def areas(folder: Path) -> dict[str, Callable[[], object]]:
     from echousd.checks import check
     from echousd.draw.rendering import render
     from echousd.evaluation.systems import BASES, System, finished
-    from echousd.exporting import export
+    from echousd.exporting.formats import export
     from echousd.home.graph import home_of_words
     from echousd.home.plan import plan_home
-    from echousd.settle import settle
+    from echousd.settle.settle import settle
 
     task = tasks_of(generate_rooms(1, 770_000, room_type="living_room"), 0, told=1.0)[0]
     load_model(None)

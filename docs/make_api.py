@@ -24,7 +24,7 @@ from echousd.home.plan import Plan
 from echousd.options import GROUPS, OF_NEW, RoomOptions, limits_of, words_of
 from echousd.place.living import LivingFault
 from echousd.room import LayoutOutcome, Provenance, Verdict
-from echousd.settle import Motion, SettleReport
+from echousd.settle.settle import Motion, SettleReport
 from echousd.shapes.finishes.slots import HARMONIES
 
 PAGE = Path(__file__).with_name("API.md")

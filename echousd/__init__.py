@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from echousd.batches.batch import batch, generate_many
     from echousd.checks import check
     from echousd.draw.rendering import render
-    from echousd.exporting import export
+    from echousd.exporting.formats import export
     from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
     from echousd.home.assemble import generate_home
     from echousd.home.graph import HomeGraph
@@ -59,7 +59,7 @@ _HOME = {
     "RoomOptions": "echousd.options",
     "check": "echousd.checks",
     "edit": "echousd.make.edit",
-    "export": "echousd.exporting",
+    "export": "echousd.exporting.formats",
     "export_texture_job": "echousd.texturing:export_job",
     "import_texture_job": "echousd.texturing:import_job",
     "load_model": "echomodel.loading",

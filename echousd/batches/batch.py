@@ -180,7 +180,7 @@ def _with_libraries(plan: Plan, outside: tuple[str, ...]) -> Plan:
     for options in plan.options:
         options.wishes(outside)
         if options.settle:
-            from echousd.settle import require_engine
+            from echousd.settle.settle import require_engine
 
             require_engine()
     found = {path: weights_hash(path) for path in dict.fromkeys(options.assets for options in plan.options) if path}

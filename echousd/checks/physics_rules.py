@@ -11,7 +11,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.checks.findings import Finding, rule
 from echousd.checks.reading import Reading, below
 from echousd.graph.nodes import OBSTACLE
-from echousd.settle.settle import moves
+from echousd.shapes.matter import moves
 from echousd.stage.contents import triangulated, words_of
 from echousd.stage.encoding import CATEGORY, FREE
 from echousd.stage.read import value

@@ -17,8 +17,15 @@ from echomodel.dressing import SMALL
 from echomodel.openings import segment
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
-from echousd.place.geometry import Floor, axes, depth_inside, floor_from_polygon, pair_indices, separation
-from echousd.place.placing import DEFAULT_HEIGHT, floor_of_room
+from echousd.place.geometry import (
+    DEFAULT_HEIGHT,
+    Floor,
+    axes,
+    depth_inside,
+    floor_from_polygon,
+    pair_indices,
+    separation,
+)
 from echousd.place.report import TOUCH, Collision
 from echousd.shapes.fittings import SKIRTING
 from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding, read_contents, surroundings
@@ -90,7 +97,7 @@ class Whole:
     @cached_property
     def polygon(self) -> np.ndarray | None:
         """(k, 2) float, corners of its floor, None without one."""
-        return None if self.room.spec is None else floor_of_room(self.room.spec)
+        return None if self.room.spec is None else self.room.spec.corners
 
     @cached_property
     def floor(self) -> Floor | None:

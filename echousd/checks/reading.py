@@ -11,7 +11,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdUtils
 
 from echousd.stage.contents import HIDDEN, RoomContents, components, read_contents
 from echousd.stage.encoding import StageError
-from echousd.stage.files import specs
+from echousd.stage.files import prim_specs
 from echousd.stage.read import RoomPrims, find_rooms
 from echousd.stage.units import metres_per_unit
 from echousd.stage.values import MeshArrays, fans, matrix, mesh_arrays
@@ -139,8 +139,8 @@ def _asset_paths(layer: Sdf.Layer) -> list[str]:
         return path
 
     UsdUtils.ModifyAssetPaths(copy, note)
-    for spec in specs(layer):
-        identifier = (spec.assetInfo or {}).get("identifier") if isinstance(spec, Sdf.PrimSpec) else None
+    for spec in prim_specs(layer):
+        identifier = (spec.assetInfo or {}).get("identifier")
         if identifier:
             found.append(getattr(identifier, "path", str(identifier)))
     return found

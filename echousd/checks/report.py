@@ -32,7 +32,7 @@ from echousd.stage.read import RoomPrims, find_rooms
 from echousd.stage.values import readable
 
 if TYPE_CHECKING:
-    from echousd.settle import SettleReport
+    from echousd.settle.settle import SettleReport
 
 
 def verdicts_of(room: RoomContents, rules: str = "strict") -> tuple[Verdict, ...]:
@@ -203,7 +203,7 @@ def check(
         errors = (*errors, *rewritten(stage, rooms[0], first.relations))
     settled = None
     if settle:
-        from echousd.settle import settle_layouts
+        from echousd.settle.settle import settle_layouts
 
         settled = settle_layouts(stage, layout=layout)
     return CheckReport(source(stage), rooms, tuple(report for _, report in found), errors, warnings, settled)

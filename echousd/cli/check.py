@@ -66,15 +66,21 @@ def _one(
     Raises ValueError for one that cannot be read if it is alone; of several, that is its report.
     """
     from echousd.checks import check as checked
-    from echousd.home.check import check_home, is_home
+    from echousd.stage.files import open_stage
+    from echousd.stage.read import is_home
 
     try:
-        if is_home(room):
-            home = check_home(room, rules=rules, layout=layout, settle=settle)
-            if not json:
-                _show(*_of_home(home, strict))
-            return home.good(strict=strict), home.to_json()
-        report = checked(room, rules=rules, layout=layout, settle=settle)
+        stage = open_stage(room)
+        if is_home(stage):  # what a single room does not need is not loaded to see that it is one
+            from echousd.home.check import check_home
+            from echousd.home.given import plan_there
+
+            if plan_there(room) is not None:
+                home = check_home(room, rules=rules, layout=layout, settle=settle)
+                if not json:
+                    _show(*_of_home(home, strict))
+                return home.good(strict=strict), home.to_json()
+        report = checked(stage, rules=rules, layout=layout, settle=settle)
     except (ValueError, OSError) as error:
         if alone:
             raise

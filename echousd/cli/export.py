@@ -52,7 +52,7 @@ def export(
     Readers that compose no layers, as three.js and tinyusdz, find nothing in a room's root layer: they need this file.
     Those that ignore purposes draw its colliders: --no-physics.
     """
-    from echousd.exporting import export as write
+    from echousd.exporting.formats import export as write
     from echousd.exporting.habitat import export_habitat, export_sceneeval
     from echousd.folder.found import room_at
 

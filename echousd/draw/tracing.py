@@ -93,9 +93,14 @@ class Seen:
     glow: np.ndarray
     material: np.ndarray
 
-    def of(self, rows: np.ndarray) -> Seen:
+    def of(self, rows: Any) -> Seen:
         """Those of some rays."""
         return Seen(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+    def shaped(self, shape: tuple[int, int]) -> Seen:
+        """Those of a picture's pixels by row and column."""
+        values = (getattr(self, field.name) for field in fields(self))
+        return Seen(*(value.reshape(*shape, *value.shape[1:]) for value in values))
 
 
 def _rays(world: World, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -137,10 +142,10 @@ def _other(one: Seen, two: Seen) -> np.ndarray:
 
 def _at_edges(seen: Seen, shape: tuple[int, int]) -> np.ndarray:
     """(n,) bool of a picture's pixels: whether another surface is seen beside them, or beside their neighbours."""
-    pixel, out = np.arange(len(seen.face)).reshape(shape), np.zeros(shape, bool)
+    seen, out = seen.shaped(shape), np.zeros(shape, bool)
     across = (slice(None), slice(None, -1)), (slice(None), slice(1, None))
     for one, two in (across, (slice(None, -1), slice(1, None))):
-        differs = _other(seen.of(pixel[one].ravel()), seen.of(pixel[two].ravel())).reshape(pixel[one].shape)
+        differs = _other(seen.of(one), seen.of(two))
         out[one] |= differs
         out[two] |= differs
     wider = out.copy()

@@ -197,7 +197,7 @@ def steps(run: Run) -> list[Table]:
 def physics(run: Run) -> list[Table]:
     """Whole rooms as `generate` writes them, simulated for two seconds."""
     from echousd.make.pipeline import generate
-    from echousd.settle import SettleUnavailable, settle
+    from echousd.settle.settle import SettleUnavailable, settle
 
     chosen = [name for name in dict.fromkeys([run.asked[0].name, "random+search", "real"]) if name in run.made]
     scores: dict[str, list] = {name: [] for name in chosen}

@@ -27,7 +27,8 @@ from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_room, generate_rooms
 from echomodel.rooms.statistics import room_type_statistics
 from echomodel.vocabulary import vocabulary
-from echousd.place import PlaceConfig, place_boxes
+from echousd.place.placing import place_boxes
+from echousd.place.solver import PlaceConfig
 from echousd.tensors import one_thread, seeded
 
 TOGETHER = 64  # scenes in one pass of a network

@@ -57,11 +57,6 @@ class HomeReport:
         }
 
 
-def is_home(path: Path) -> bool:
-    """Whether a stage composes the rooms of a home."""
-    return path.suffix in (".usda", ".usdc", ".usd", ".usdz") and path.is_file() and plan_there(path) is not None
-
-
 def check_home(path: Path, *, rules: str = "strict", layout: int | None = None, settle: bool = False) -> HomeReport:
     """Judge the home on a stage; arguments as `echousd.check`. Raises StageError where it holds no plan."""
     plan = plan_there(path)

@@ -17,8 +17,8 @@ from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Placed, Relation, SceneGraph
 from echousd.make.verdicts import relation_verdicts
+from echousd.place.geometry import DEFAULT_HEIGHT
 from echousd.place.living import living_faults
-from echousd.place.placing import DEFAULT_HEIGHT
 from echousd.place.report import Collision
 from echousd.room import LayoutOutcome
 from echousd.shapes.geometry import Geometry

@@ -23,8 +23,9 @@ from echousd.graph import SceneGraph
 from echousd.graph.floors import with_placed_openings
 from echousd.make.verdicts import layout_outcome
 from echousd.options import RoomOptions
-from echousd.place import PlaceConfig, PlaceResult
-from echousd.place import place as placed
+from echousd.place.placing import PlaceResult
+from echousd.place.placing import place as placed
+from echousd.place.solver import PlaceConfig
 from echousd.progress import StageTimer
 from echousd.shapes.styles import equal_sizes, unequal_pairs
 from echousd.shapes.walls import floor_polygon

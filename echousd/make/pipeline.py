@@ -92,7 +92,7 @@ def generate(
     if asked.assets:  # what is absent is told before any long work
         wishes()
     if asked.settle:
-        from echousd.settle import require_engine
+        from echousd.settle.settle import require_engine
 
         require_engine()
     if not isinstance(graph, SceneGraph):

@@ -10,7 +10,7 @@ import torch
 from echomodel.boxes import Boxes
 from echousd.make.finished import Room
 from echousd.make.verdicts import relation_verdicts
-from echousd.settle import SettleReport, settle_layouts
+from echousd.settle.settle import SettleReport, settle_layouts
 from echousd.stage.paths import OBJECTS, ROOM
 from echousd.tensors import rounded_boxes
 

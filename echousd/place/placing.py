@@ -23,24 +23,24 @@ from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
 from echousd.place.fitted import fitted
+from echousd.place.geometry import DEFAULT_HEIGHT
 from echousd.place.overhead import lamps_along
-from echousd.place.report import Conflict, collisions, conflicts, outside, sentence
+from echousd.place.report import collisions, outside
 from echousd.place.search import ANEW, Arranged, Search
 from echousd.place.setting import Setting, setting_of, stacked
-from echousd.place.solver import PlaceConfig, solve, unmet
+from echousd.place.solver import Conflict, PlaceConfig, conflicts, sentence, solve, unmet
 from echousd.tensors import stated_placements, triplets_of
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
     from echomodel.rules.placements import Stated
-    from echousd.graph import Relation, RoomSpec, SceneGraph
+    from echousd.graph import Relation, SceneGraph
 
 FULL = 0.3  # share of a floor that is covered from which on smaller furniture is tried
 BAD = 1.5  # cost of a room in which something is broken
 WORTH = 1.0  # that smaller furniture must save of what an arrangement costs
 UPRIGHT = np.array([False, True, False])  # the side that taller and shorter are about
 SMALLEST = 0.02  # metres: no side of a sampled box is shorter
-DEFAULT_HEIGHT = 2.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ def place(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: Pla
         np.asarray(boxes.position, float),
         np.asarray(boxes.yaw, float),
         triplets_of(graph),
-        floor_polygon=floor_of_room(graph.room),
+        floor_polygon=graph.room.corners,
         height=graph.room.height or DEFAULT_HEIGHT,
         openings=graph.room.openings,
         stated=stated_placements(graph),
@@ -148,16 +148,6 @@ def place(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: Pla
         resized=dict(zip(names, done.resized.tolist(), strict=True)),
         seconds=done.seconds,
     )
-
-
-def floor_of_room(room: RoomSpec) -> np.ndarray | None:
-    """(k, 2) float, the room's floor polygon, the rectangle around the origin of its size, or None."""
-    if room.floor_polygon is not None:
-        return np.asarray(room.floor_polygon, float)
-    if room.size is None:
-        return None
-    x, z = np.asarray(room.size, float) / 2
-    return np.array([(-x, -z), (x, -z), (x, z), (-x, z)])
 
 
 def place_boxes(

@@ -12,7 +12,7 @@ import trimesh
 from pxr import Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from echousd.shapes.geometry import Mass
-from echousd.shapes.matter import read_mass
+from echousd.shapes.matter import moves, read_mass
 from echousd.stage.contents import triangulated
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
@@ -98,13 +98,6 @@ def body_root(prim: Usd.Prim) -> Usd.Prim | None:
     """The prim that a collider moves with: the outermost enabled body or articulation above it, None = it is fixed."""
     bodies = [above for above in lineage(prim) if above.HasAPI(UsdPhysics.ArticulationRootAPI) or moves(above)]
     return bodies[-1] if bodies else None
-
-
-def moves(prim: Usd.Prim) -> bool:
-    """Whether a prim is a rigid body that engines move."""
-    body = UsdPhysics.RigidBodyAPI(prim)
-    enabled = prim.HasAPI(UsdPhysics.RigidBodyAPI) and body.GetRigidBodyEnabledAttr().Get() is not False
-    return enabled and not body.GetKinematicEnabledAttr().Get()
 
 
 def _solids(prim: Usd.Prim, cache: UsdGeom.XformCache, metres: float, *, moves: bool) -> Iterator[Solid]:

@@ -189,6 +189,13 @@ def read_mass(prim: Usd.Prim) -> Mass | None:
     return Mass(float(kilograms), np.array(centre, float), np.array(inertia, float), axes)
 
 
+def moves(prim: Usd.Prim) -> bool:
+    """Whether a prim is a rigid body that engines move."""
+    body = UsdPhysics.RigidBodyAPI(prim)
+    enabled = prim.HasAPI(UsdPhysics.RigidBodyAPI) and body.GetRigidBodyEnabledAttr().Get() is not False
+    return enabled and not body.GetKinematicEnabledAttr().Get()
+
+
 def _quaternion(axes: np.ndarray) -> Gf.Quatf:
     """The rotation whose columns are `axes` (3, 3); a reflection gets one axis turned round, which is the same axis."""
     if np.linalg.det(axes) < 0:

@@ -111,15 +111,18 @@ def _check_clips(layer: Sdf.Layer, path: Path) -> None:
 
 def specs(layer: Sdf.Layer) -> list[Sdf.Spec]:
     """All that a layer holds."""
+    return [spec for spec in map(layer.GetObjectAtPath, _paths(layer)) if spec]
+
+
+def _paths(layer: Sdf.Layer) -> list[Sdf.Path]:
     paths: list[Sdf.Path] = []
     layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
-    return [spec for spec in map(layer.GetObjectAtPath, paths) if spec]
+    return paths
 
 
 def prim_specs(layer: Sdf.Layer) -> list[Sdf.PrimSpec]:
     """All prims that a layer speaks of, those in variants too."""
-    paths = (spec.path for spec in specs(layer))
-    found = [at for at in paths if at.IsPrimPath() or at.IsPrimVariantSelectionPath()]
+    found = [at for at in _paths(layer) if at.IsPrimPath() or at.IsPrimVariantSelectionPath()]
     return [*filter(None, map(layer.GetPrimAtPath, found))]  # the path of a variant set is of that kind, too
 
 

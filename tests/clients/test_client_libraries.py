@@ -14,7 +14,7 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.assets.index import index
-from echousd.exporting import export
+from echousd.exporting.formats import export
 
 pytestmark = pytest.mark.clients
 HERE = Path(__file__).parent

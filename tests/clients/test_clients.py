@@ -15,7 +15,7 @@ from environments import RELEASES, python_of, run, three
 from pxr import Usd, UsdGeom, UsdLux, UsdPhysics, UsdShade
 
 import echousd
-from echousd.exporting import export
+from echousd.exporting.formats import export
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.simready import pack
 from echousd.stage.graphs import read_graph

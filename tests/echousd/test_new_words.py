@@ -29,7 +29,7 @@ from echousd.dressing.walls import HUNG_OVER
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph, load_graph, starting_graph
 from echousd.graph.picture import draw_graph
 from echousd.layers.structure import COVERS
-from echousd.place import place_boxes
+from echousd.place.placing import place_boxes
 from echousd.shapes.finishes.slots import HARMONIES, SLOTS
 from echousd.shapes.fittings import DOORS, WINDOWS
 from echousd.stage.foreign import foreign_graph

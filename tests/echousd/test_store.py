@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pxr import Usd, UsdLux
 
 from echousd.checks import check
-from echousd.exporting import export
+from echousd.exporting.formats import export
 from echousd.exporting.packing import Reach
 from echousd.graph import load_graph
 from echousd.make.edit import edit

@@ -10,7 +10,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 from small_room import BARE, OBJECTS, StandIn, small_graph
 
 import echousd
-from echousd.exporting import export
+from echousd.exporting.formats import export
 from echousd.options import RoomOptions
 
 

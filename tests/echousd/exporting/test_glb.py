@@ -13,7 +13,7 @@ from small_room import StandIn, small_graph
 
 import echousd
 from echomodel.openings import Opening
-from echousd.exporting import export
+from echousd.exporting.formats import export
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.options import RoomOptions
 

@@ -13,7 +13,7 @@ from PIL import Image
 from pxr import Usd
 
 from echousd.draw.drawables import read_drawables
-from echousd.exporting import export
+from echousd.exporting.formats import export
 from echousd.exporting.packing import LeftOut
 from echousd.textures import read_image
 

@@ -11,7 +11,7 @@ from small_room import StandIn, small_graph
 
 import echousd
 from echousd.checks import check
-from echousd.exporting import export
+from echousd.exporting.formats import export
 from echousd.make.reading import read_room
 from echousd.options import RoomOptions
 

@@ -10,7 +10,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.checks import check
-from echousd.exporting import export
+from echousd.exporting.formats import export
 from echousd.make.verdicts import RoomWarning
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from echousd.place import place_boxes
 from echousd.place.geometry import axes, depth_inside
+from echousd.place.placing import place_boxes
 from echousd.place.proposals import proposals, slots_at
 from echousd.place.search import Search, State
 from echousd.place.setting import Setting, setting_of

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from echomodel.vocabulary import vocabulary
-from echousd.place import PlaceConfig, place_boxes
 from echousd.place.distances import APART, kept_behind, over_bed, score, seen_from
+from echousd.place.placing import place_boxes
+from echousd.place.solver import PlaceConfig
 
 FLOOR = np.array([(-3.0, -2.5), (3.0, -2.5), (3.0, 2.5), (-3.0, 2.5)])
 CLOSE = next(p.id for p in vocabulary().predicates if p.name == "close_by")

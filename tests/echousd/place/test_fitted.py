@@ -7,8 +7,8 @@ import torch
 
 from echomodel.boxes import Boxes
 from echousd.graph import SceneGraph
-from echousd.place import place
 from echousd.place.living import living_faults
+from echousd.place.placing import place
 
 WORDS = ("base_unit", "base_unit", "sink_unit", "hob_unit", "fridge", "wall_unit", "range_hood", "ceiling_lamp")
 

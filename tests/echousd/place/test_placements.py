@@ -10,7 +10,7 @@ from echomodel.boxes import Boxes
 from echousd.checks import check
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.make.verdicts import relation_verdicts
-from echousd.place import place
+from echousd.place.placing import place
 
 ROOM = RoomSpec("living_room", size=(4.6, 4.0), height=2.7)
 KINDS = {"sofa": "sofa", "armchair": "armchair", "table": "side_table", "plant": "plant", "board": "dining_table"}

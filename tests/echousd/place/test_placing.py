@@ -8,12 +8,13 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.floors import signed_distance
+from echomodel.objective.support import allowed_overlap
 from echomodel.rules import margins, verdicts
 from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
-from echousd.place import PlaceConfig, allowed_overlap, place, place_boxes
 from echousd.place.geometry import depth_inside, floor_from_polygon, separation
-from echousd.place.placing import PlacedBoxes
+from echousd.place.placing import PlacedBoxes, place, place_boxes
+from echousd.place.solver import PlaceConfig
 
 FLOOR = np.array([(-2.0, -1.8), (2.0, -1.8), (2.0, 1.8), (-2.0, 1.8)])
 

@@ -14,7 +14,7 @@ from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, margins
 from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
-from echousd.place import place_boxes
+from echousd.place.placing import place_boxes
 from echousd.place.search import PRICE, Search, State, priced
 from echousd.place.setting import setting_of
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echousd.place import place_boxes
+from echousd.place.placing import place_boxes
 
 FLOOR = np.array([(-2.5, -2.5), (2.5, -2.5), (2.5, 2.5), (-2.5, 2.5)])
 CLOSE, FACING = 5, 16

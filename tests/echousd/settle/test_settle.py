@@ -12,8 +12,7 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.options import RoomOptions
-from echousd.settle import SettleUnavailable, settle
-from echousd.settle.settle import convex_parts, read_world
+from echousd.settle.settle import SettleUnavailable, convex_parts, read_world, settle
 
 simulated = pytest.mark.skipif("not __import__('importlib.util').util.find_spec('mujoco')", reason="extra sim")
 

@@ -16,7 +16,7 @@ from echomodel.dressing.household import PICTURES
 from echomodel.dressing.textiles import ROUND, RUGS
 from echomodel.furniture.solids import Block
 from echousd.checks.validity import find_faults
-from echousd.exporting import export
+from echousd.exporting.formats import export
 from echousd.options import RoomOptions
 from echousd.shapes.finishes import baking
 from echousd.shapes.finishes.baking import PATTERNS, relief

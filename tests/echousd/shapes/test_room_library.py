@@ -13,7 +13,7 @@ from echousd.assets.index import index
 from echousd.assets.model_file import ModelFile
 from echousd.assets.table import read_library
 from echousd.checks import check
-from echousd.exporting import export
+from echousd.exporting.formats import export
 from echousd.make.edit import edit
 from echousd.make.reading import read_room
 from echousd.shapes.originals.loading import collected

@@ -10,7 +10,7 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echousd.checks import check
 from echousd.draw.drawables import read_drawables
-from echousd.exporting import export
+from echousd.exporting.formats import export
 from echousd.stage.graphs import read_graph
 from echousd.stage.read import StatedTwice
 from echousd.stage.update import update_graph

@@ -13,7 +13,7 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.checks import check
-from echousd.exporting import export
+from echousd.exporting.formats import export
 from echousd.layers.paintings import primvar
 from echousd.options import RoomOptions
 from echousd.stage.files import open_stage
