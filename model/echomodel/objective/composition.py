@@ -125,6 +125,7 @@ ELBOW = 0.55  # metres of a table's edge a seat: 96 % of real sides with two sea
 FENCE = 0.03  # metres between two chairs of one side: 95 % of real ones
 EASY = 0.6  # metres of edge a seat that are enough for anybody: DIN 68880
 SEAT = 0.7  # metres that a side needs before it to seat somebody
+BEYOND = 0.1  # metres that a seat may reach beyond its side of a table: hardly any real one does at all
 WORKPLACE = 1.0  # metres between the middles of two who work
 OPENS = 0.55  # metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it
 FACED = 0.3  # share of a wardrobe's width from which on something is before it
@@ -193,6 +194,17 @@ def chairs_at_sides(plan: Plan) -> Found:
     return found(who[crowded], (least - best)[crowded], measure=least[crowded])
 
 
+def bench_fits(plan: Plan) -> Found:
+    """A bench stands along a side of its table that is as long as it."""
+    seats = seats_at(plan)
+    if seats is None:
+        return nobody(plan.size)
+    half_width, half_depth = plan.reach(seats.i, seats.j)
+    own = 2 * torch.where(seats.ahead, half_width, half_depth)
+    beyond = own - torch.where(seats.ahead, plan.size[seats.j, 0], plan.size[seats.j, 2])
+    return found(seats.i, BEYOND - beyond, other=seats.j, measure=beyond)
+
+
 def _free_beside(plan: Plan, who: Tensor) -> Tensor:
     """(P, 4): metres free left, right, behind and before of tables, to walls and to what is no seat."""
     cos, sin = plan.turn[0][who], plan.turn[1][who]
@@ -229,9 +241,9 @@ def workers_apart(plan: Plan) -> Found:
 
 
 def wardrobe_opens(plan: Plan) -> Found:
-    """One can stand before an open wardrobe, also at the foot of a bed."""
+    """One can stand before an open wardrobe, also at the foot of a bed, and nobody sits there."""
     wardrobes = plan.of("storage") & plan.standing & plan.which(lambda kind: kind.access > 0.6)
-    i, j = plan.pairs(wardrobes, plan.of("bed") & plan.standing, least=True)
+    i, j = plan.pairs(wardrobes, (plan.of("bed") | plan.stands("company")) & plan.standing, least=True)
     if not len(i):
         return nobody(plan.size)
     return plan.nearest(i, j, plan.more_ahead(i, j, OPENS, FACED), OPENS)

@@ -23,7 +23,9 @@ ROOM = 0.25  # metres before a seat to its own group's lamps and other seats
 TOUCHED = 0.08  # metres between a coffee table and a second sofa or an ottoman: 95 % of real ottomans keep 0.12
 HAND = 0.05  # metres between two seats of a group: 90 % of real ones, most others overlap
 FOOT = 0.35  # metres between the foot of a bed and furniture: one passes sideways
-LAMP, AT_BED = 0.6, 0.35  # metres before a front that lamps and plants keep free, before a nightstand's
+# Metres before a front that lamps and plants keep free, before a nightstand's, before who sits (33 of 34 real ones).
+LAMP, AT_BED, AT_SEAT = 0.6, 0.35, 0.35
+IN_LINE, NEXT = 0.15, 0.5  # metres between the backs of desks in a row, and between them
 MET = 0.25  # share of a width from which on something is before it
 EDGE = 0.06  # the same for lamps and plants, which are narrow
 
@@ -52,6 +54,18 @@ def _side_by_side(plan: Plan, i: Tensor, j: Tensor) -> Tensor:
     row = lateral.abs() - half_width - plan.size[j, 0] / 2 > -0.05
     board = plan.of("board")
     return (row & ((plan.yaw[i] - plan.yaw[j]).cos() > 0.97) & board[i] & board[j]).detach()
+
+
+def desks_in_line(plan: Plan) -> Found:
+    """Desks side by side that look the same way have their backs in one line."""
+    desks = plan.of("board") & plan.works & plan.standing
+    i, j = plan.pairs(desks, desks)
+    lateral, forward = plan.local(i, j)
+    half_width, half_depth = plan.reach(i, j)
+    next_to = _side_by_side(plan, i, j) & (lateral.abs() - half_width - plan.size[j, 0] / 2 < NEXT).detach()
+    off = (forward - half_depth + plan.size[j, 2] / 2).abs()
+    once = next_to & (i < j)
+    return found(i[once], IN_LINE - off[once], other=j[once], measure=off[once])
 
 
 def chair_pulls_out(plan: Plan) -> Found:
@@ -134,12 +148,12 @@ def bed_foot_free(plan: Plan) -> Found:
 
 
 def lamp_aside(plan: Plan) -> Found:
-    """Lamps and plants do not stand before shelves, cupboards and drawers."""
-    fronts = plan.of("storage") & plan.standing & plan.works
+    """Lamps and plants do not stand before shelves, cupboards and drawers, nor before who sits."""
+    fronts = (plan.of("storage") & plan.standing & plan.works) | _loungers(plan)
     i, j = plan.pairs(plan.of("light", "decor") & plan.standing, fronts, least=True)
     if not len(i):
         return nobody(plan.size)
-    free = torch.where(plan.stands("head"), AT_BED, LAMP).to(plan.size)
+    free = torch.where(_loungers(plan), AT_SEAT, torch.where(plan.stands("head"), AT_BED, LAMP)).to(plan.size)
     least, about = plan.worst(i, plan.more_ahead(j, i, free[j], EDGE), j)
     who = (least < FAR).nonzero()[:, 0]
     return found(who, least[who], other=about[who], measure=least[who] + free[about[who]])

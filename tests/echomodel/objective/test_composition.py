@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.objective import composition
+from echomodel.objective import composition, crowding
 from echomodel.objective.plan import plan_of
 
 HALF = np.pi / 2
@@ -157,3 +157,27 @@ def test_no_table_goes_without_a_chair_while_another_has_two():
     assert seen(composition.each_served, [*tables, chairs[0], moved])[0] == {}
     coffee = ("coffee_table", (1.2, 0.4, 0.6), (1.5, 0.0), 0.0)  # nobody sits at it
     assert seen(composition.each_served, [tables[0], coffee, *chairs])[0] == {}
+
+
+@pytest.mark.parametrize(("length", "margin"), [(0.8, 0.2), (1.2, -0.2)])
+def test_no_bench_lies_across_the_end_of_its_table(length, margin):
+    bench = ("bench", (length, 0.45, 0.4), (0.95, 0.0), -HALF)
+    assert seen(composition.bench_fits, [*seated(), bench])[0] == {1: pytest.approx(margin)}
+    along = ("bench", (length, 0.45, 0.4), (0.0, 0.75), np.pi)
+    assert seen(composition.bench_fits, [*seated(), along])[0][1] > 0
+
+
+@pytest.mark.parametrize(("back", "margin"), [(0.05, 0.1), (0.35, -0.2)])
+def test_desks_side_by_side_are_in_line(back, margin):
+    desks = [("desk", (1.2, 0.75, 0.6), (-0.65, -1.6), 0.0), ("desk", (1.2, 0.75, 0.8), (0.65, -1.5 + back), 0.0)]
+    assert seen(crowding.desks_in_line, desks)[0] == {0: pytest.approx(margin)}
+    opposite = [desks[0], ("desk", (1.2, 0.75, 0.8), (0.65, 1.5), np.pi)]
+    assert seen(crowding.desks_in_line, opposite)[0] == {}
+
+
+def test_nobody_sits_before_a_wardrobe():
+    wardrobe = ("wardrobe", (1.6, 2.2, 0.6), (0.0, -1.7), 0.0)
+    beanbag = ("lazy_sofa", (0.8, 0.75, 0.8), (0.0, -0.5), 0.0)
+    assert seen(composition.wardrobe_opens, [wardrobe, beanbag])[0] == {0: pytest.approx(0.5 - 0.55)}
+    aside = ("lazy_sofa", (0.8, 0.75, 0.8), (1.6, -0.5), 0.0)
+    assert seen(composition.wardrobe_opens, [wardrobe, aside])[0][0] > 0

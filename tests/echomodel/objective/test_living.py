@@ -178,6 +178,8 @@ MORE = [
      ("chair_1_1", "chair_pulls_out"), "chair_1_1 can be pulled back by only 0.10 m before board"),
     (with_one(DINING, "plant", kind="plant", size=(0.5, 1.2, 0.5), at=(0.5, -1.3)), ("plant", "lamp_aside"),
      "m before the front of sideboard"),
+    (with_one(LIVING, "lamp", kind="floor_lamp", size=(0.3, 1.6, 0.3), at=(0.8, -0.3)), ("lamp", "lamp_aside"),
+     "lamp stands 0.15 m before the front of armchair"),
     (with_one(LIVING, "low", kind="side_table", size=(0.5, 0.5, 0.5), at=(0.6, -0.7)), ("low", "at_its_side"),
      "low stands before sofa, not beside it"),
     (with_one(LIVING, "chair", kind="armchair", size=(0.8, 0.8, 0.8), at=(-1.4, 0.9), yaw=-2.6),
