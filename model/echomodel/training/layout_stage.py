@@ -13,11 +13,11 @@ from torch import Tensor
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.compact.draft import measurable, pair_features, wall_features
+from echomodel.compact.draft import FARTHEST, measurable, pair_features, wall_features
 from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import layout_predictor
-from echomodel.floors import clearances, outside
+from echomodel.floors import clearances, kept_free, outside
 from echomodel.objective import Plan, faults_of
 from echomodel.objective.physics import apart
 from echomodel.objective.plan import UNKNOWN
@@ -67,7 +67,8 @@ FIRM = 10.0  # a miss counts as log(1 + FIRM * metres)
 
 
 def physics_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor) -> Tensor:
-    """Mean over the free boxes of how far they run into others and through walls, weighted by (1 - level)^2.
+    """Mean over the free boxes of how far they run into others, through walls and into the way of doors and windows,
+    weighted by (1 - level)^2.
 
     Arguments:
         boxes: N predicted boxes; places and headings alone are pulled at. level: (N,). known: (N,) bool.
@@ -83,7 +84,10 @@ def physics_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor)
     sure = (1 - level).square()
     weight = torch.minimum(sure[i], sure[j]) * ~(known[i] & known[j])
     over = (outside(free, graph.floor[graph.scene]).square().sum(1) + 1e-12).sqrt()
-    total = (deep(apart(plan).margin) * weight).sum() + (deep(TOUCHING - over) * sure * ~known).sum()
+    stands = torch.tensor([row.support == "floor" for row in vocabulary().categories], device=level.device)
+    clear = kept_free(free, graph.openings[graph.scene]).clamp_min(-FARTHEST)
+    walls = deep(TOUCHING - over) + deep(clear) * stands[graph.category]
+    total = (deep(apart(plan).margin) * weight).sum() + (walls * sure * ~known).sum()
     return total / (sure * ~known).sum().clamp_min(1)
 
 
