@@ -21,6 +21,8 @@ from echousd.batches.sources import sampled_graph
 from echousd.graph import SceneGraph
 
 if TYPE_CHECKING:
+    from pxr import Usd
+
     from echousd.make.finished import Room
 
 
@@ -57,13 +59,21 @@ def room(job: Job) -> dict[str, Any]:
             store = f"{name}/{job.store}" if job.store else ""
             row = room(replace(job, folder=f"{name}/{job.folder}", store=store, to=""))
             return {**row, "stored": deliver(Path(name), job.folder, job.to)}
+    from echousd.folder.folder import held
+    from echousd.make.save import write_pictures
+    from echousd.stage.files import open_stage
+
     started = time.perf_counter()
     folder = Path(job.folder)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         made = generated(job)
-        root = made.save(folder, preview=job.options.preview, wait=True, store=job.store)
-    facts = _facts(made, root, settle=job.options.settle)
+        with held(folder, wait=True):
+            root = made.save(folder, preview=False, store=job.store)
+            stage = open_stage(root)  # for its pictures and to judge it
+            if job.options.preview:
+                write_pictures(root, stage)
+    facts = _facts(made, root, stage, settle=job.options.settle)
     facts["notes"] = [*made.notes, *(str(warning.message) for warning in told)]
     facts["seconds"] = round(time.perf_counter() - started, 3)
     return facts
@@ -94,10 +104,10 @@ def _checked(job: Job) -> Any:
     return graph
 
 
-def _facts(made: Any, root: Path, *, settle: bool) -> dict[str, Any]:
+def _facts(made: Any, root: Path, stage: Usd.Stage, *, settle: bool) -> dict[str, Any]:
     from echousd.checks import check
 
-    report = check(root, settle=settle)
+    report = check(stage, settle=settle)
     floor, geometry = made.floor, made.geometry
     states = Counter(verdict.state for verdict in made.verdicts)
     users = made.asset_users

@@ -20,7 +20,7 @@ from echousd.shapes.finishes.slots import linear
 from echousd.shapes.fittings import PLAIN, Millwork, millwork_of
 from echousd.shapes.geometry import Mass
 from echousd.shapes.looks import Look
-from echousd.shapes.surface import Surface, surface
+from echousd.shapes.surface import CREASE, Surface, surfaces
 from echousd.shapes.walls import Piece, ShellPart, ceiling, floor, wall_name, walls
 from echousd.stage import encoding
 from echousd.stage.paths import OPENINGS, SHELL, piece_name
@@ -140,7 +140,8 @@ def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[Shel
         )
     if room.options.ceiling:
         parts.append(ceiling(plan, room.height))
-    return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component)]
+    forms = iter(surfaces([form for part in parts for form in _forms(part)]))
+    return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component, forms)]
 
 
 def millwork(room: RoomData) -> Millwork:
@@ -190,26 +191,30 @@ def write_shell(pen: Pen, prims: Sequence[ShellPrim]) -> None:
             assets.write_mesh(pen, mesh.path, mesh.form)
 
 
-def _prims(part: ShellPart, above: str, kind: str) -> Iterator[ShellPrim]:
+def _prims(part: ShellPart, above: str, kind: str, forms: Iterator[Surface]) -> Iterator[ShellPrim]:
     path = f"{above}/{part.name}"
-    at = np.array(part.joint.anchor) if part.joint else np.zeros(3)
-    meshes = tuple(_mesh(piece, path, at) for piece in part.pieces)
-    inner = [list(_prims(each, path, Kind.Tokens.subcomponent)) for each in part.inner]
+    meshes = tuple(
+        ShellMesh(f"{path}/{piece.name}", piece.look, next(forms), piece.solid) for piece in part.pieces
+    )
+    inner = [list(_prims(each, path, Kind.Tokens.subcomponent, forms)) for each in part.inner]
     extents = np.stack([mesh.form.extent for mesh in meshes] + [prims[0].extent + prims[0].at for prims in inner])
     extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])
-    mass = _mass([piece for piece in part.pieces if piece.solid], at) if part.joint else None
+    mass = _mass([piece for piece in part.pieces if piece.solid], np.array(part.joint.anchor)) if part.joint else None
     yield ShellPrim(path, part.label, kind, meshes, extent, part.joint, mass)
     for prims in inner:
         yield from prims
 
 
-def _mesh(piece: Piece, above: str, at: np.ndarray) -> ShellMesh:
-    mesh = piece.mesh
-    if at.any():
-        mesh = mesh.copy()
-        mesh.apply_translation(-at)
-    form = surface(mesh, {piece.look: np.arange(len(mesh.faces))})
-    return ShellMesh(f"{above}/{piece.name}", piece.look, form, piece.solid)
+def _forms(part: ShellPart) -> Iterator[tuple[trimesh.Trimesh, Mapping[str, np.ndarray], float]]:
+    """What the surfaces of a part and of those inside it are made from, in their own frames."""
+    for piece in part.pieces:
+        mesh = piece.mesh
+        if part.joint:
+            mesh = mesh.copy()
+            mesh.apply_translation(-np.array(part.joint.anchor))
+        yield mesh, {piece.look: np.arange(len(mesh.faces))}, CREASE
+    for inner in part.inner:
+        yield from _forms(inner)
 
 
 def _mass(pieces: Sequence[Piece], at: np.ndarray) -> Mass:

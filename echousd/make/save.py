@@ -133,9 +133,12 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
 PREVIEW = 640  # pixels across
 
 
-def write_pictures(root: Path) -> list[Path]:
-    """Draw `<name>.png` and, of several layouts, `<name>_layouts.png` beside the root layer; those that were drawn."""
-    stage = open_stage(root)
+def write_pictures(root: Path, stage: Usd.Stage | None = None) -> list[Path]:
+    """Draw `<name>.png` and, of several layouts, `<name>_layouts.png` beside the root layer; those that were drawn.
+
+    `stage`: of the root layer, where it is open.
+    """
+    stage = stage or open_stage(root)
     return [drawn for drawn in (write_preview(root, stage), write_sheet(root, stage)) if drawn]
 
 

@@ -61,13 +61,14 @@ def surfaces(
     faces = np.concatenate([faces + offset for (_, faces), offset in zip(meshes, first, strict=False)])
     owner = np.repeat(np.arange(len(forms)), np.diff(start))
     sharpest = np.repeat([np.cos(crease) for _, _, crease in forms], np.diff(start))
+    board = connected_pieces(faces, len(points))
     normals = _indexed(_corner_normals(points, faces, sharpest), 4, np.repeat(owner, 3))
     if atlas:
         st = [atlas_unwrap(mesh) for mesh, _, _ in forms]
     else:
         groups = [(slot, start[n] + members) for n, (_, own, _) in enumerate(forms) for slot, members in own.items()]
-        st = _indexed(_laid_out(points, faces, groups, owner), 5, np.repeat(owner, 3))
-    apart = unshared(points.astype(np.float32), faces, np.repeat(np.arange(len(forms)), np.diff(first)))
+        st = _indexed(_laid_out(points, faces, groups, owner, board), 5, np.repeat(owner, 3))
+    apart = unshared(points.astype(np.float32), faces, np.repeat(np.arange(len(forms)), np.diff(first)), board)
     return [
         Surface(
             points=apart[first[n] : first[n + 1]],
@@ -117,19 +118,20 @@ def _corner_normals(points: np.ndarray, faces: np.ndarray, sharpest: np.ndarray)
 
 
 def _laid_out(
-    points: np.ndarray, faces: np.ndarray, groups: Iterable[tuple[str, np.ndarray]], owner: np.ndarray
-) -> np.ndarray:
+    points: np.ndarray, faces: np.ndarray, groups: Iterable[tuple[str, np.ndarray]], owner: np.ndarray,
+    board: np.ndarray,
+) -> np.ndarray:  # fmt: skip
     """(3 f, 2): texture coordinates of the corners for the patterns of our material slots.
 
     Along the axis that each face looks at most, divided by the metres that one picture of its slot covers; u runs along
     the longer side of every board (fibres do), and boards begin at different places of the picture. Slots whose picture
     is of the whole thing get all of it on the side that they show.
 
-    `groups`: slots and the faces of each, of one mesh. `owner`: (f,) int, the number of each face's mesh.
+    `groups`: slots and the faces of each, of one mesh. `owner`, `board`: (f,) int, the numbers of each face's mesh and
+    connected piece.
     """
     axis, way = facing_axis(points[faces])
     st = _projected(points[faces], axis, way)
-    board = connected_pieces(faces, len(points))
     low, high = (np.full((int(board.max(initial=0)) + 1, 3), sign * np.inf) for sign in (1, -1))
     np.minimum.at(low, np.repeat(board, 3), points[faces].reshape(-1, 3))
     np.maximum.at(high, np.repeat(board, 3), points[faces].reshape(-1, 3))
@@ -155,12 +157,12 @@ def _laid_out(
     return st.reshape(-1, 2)
 
 
-def unshared(points: np.ndarray, faces: np.ndarray, owner: np.ndarray) -> np.ndarray:
+def unshared(points: np.ndarray, faces: np.ndarray, owner: np.ndarray, piece: np.ndarray) -> np.ndarray:
     """The points (v, 3) float32, where boards meet a few micrometres apart: validators take equal points for a fault.
 
     What lies at one place and belongs to several connected pieces of one mesh (`owner`: (v,) int) moves towards the
-    middle of its own; what belongs to one piece (both ends of a cord around a cushion) moves inwards, against its own
-    faces.
+    middle of its own (`piece`: (f,) int, of each face); what belongs to one piece (both ends of a cord around a
+    cushion) moves inwards, against its own faces.
     """
     rows = np.column_stack([points, owner])
     order = np.lexsort(rows.T)  # np.unique(axis=0) takes ten times as long
@@ -171,7 +173,7 @@ def unshared(points: np.ndarray, faces: np.ndarray, owner: np.ndarray) -> np.nda
     if not len(shared):
         return points
     board = np.full(len(points), -1)
-    board[faces] = connected_pieces(faces, len(points))[:, None]
+    board[faces] = piece[:, None]
     low, high = (np.full((int(board.max()) + 1, 3), sign * np.inf) for sign in (1, -1))
     used = board >= 0
     np.minimum.at(low, board[used], points[used])

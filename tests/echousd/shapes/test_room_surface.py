@@ -123,7 +123,7 @@ def test_boards_that_meet_share_no_point_and_stay_closed():
     assert (form.extent[1] <= mesh.bounds[1] + 1e-7).all()
     assert trimesh.Trimesh(form.points, form.faces, process=False).is_watertight
     alone = boards[0].vertices.astype(np.float32)
-    assert unshared(alone, boards[0].faces, np.zeros(8)) is alone
+    assert unshared(alone, boards[0].faces, np.zeros(8), np.zeros(12, int)) is alone
 
 
 def test_surfaces_of_several_meshes_are_those_of_each():
