@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -16,16 +17,13 @@ from echousd.batches import work
 from echousd.batches.executor import Executor, LocalWorkers, Outcome, RayCluster, Task
 from echousd.batches.options import BatchRequest, as_paths, request_of
 from echousd.batches.plan import (
-    ELSEWHERE,
     STATE,
     STORE,
-    URL,
     Entry,
     Journal,
     Plan,
     difference,
     fault_of,
-    is_elsewhere,
     load_plan,
     make_plan,
     read_journals,
@@ -34,7 +32,6 @@ from echousd.batches.plan import (
     shard_folder,
     whole_keys,
 )
-from echousd.batches.remote import Remote, complete
 from echousd.folder.folder import check_writable
 from echousd.folder.lock import locked
 from echousd.folder.within import inside
@@ -89,7 +86,7 @@ def batch(
         variations: option -> values, whose combinations a graph's rooms take in turn.
         options: of the rooms, those of `echousd.batches.options.BatchOptions`;
             of the run, fields of `echousd.batches.batch.RunOptions`: workers, shard=(i, n), resume, max_failures,
-            timeout, until, memory, ray, to, outside, executor, progress.
+            timeout, until, memory, ray, outside, executor, progress.
 
     Raises ValueError for what is not allowed, a folder in use or with another plan, and says the difference.
     """
@@ -107,15 +104,12 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
     if out.exists() and not out.is_dir():
         raise ValueError(f"{out}: is a file, the output must be a folder")
     check_writable(out)
-    if URL.match(out.as_posix()) or (how.to and not is_elsewhere(how.to)):
-        what = out if URL.match(out.as_posix()) else how.to
-        raise ValueError(f"{what}: allowed: -o a folder on a disk, --to {ELSEWHERE}, or none")
-    if how.to:
-        Remote(how.to).sizes(STATE)  # who cannot reach it is told before the first room
+    if "://" in str(out) or re.match(r"[A-Za-z][A-Za-z0-9+.-]+:/", out.as_posix()):  # `Path` makes one slash of two
+        raise ValueError(f"{out}: allowed: a folder on a disk; its rooms are whole and may be copied as they appear")
     device = request.options.device
     if not how.ray and how.executor is None:
         work.devices(device)
-    plan = _with_libraries(make_plan(request, weights_hash(request.options.weights), how.to, how.outside), how.outside)
+    plan = _with_libraries(make_plan(request, weights_hash(request.options.weights), how.outside), how.outside)
     place = shard_folder(out, how.shard)
     with locked(place):
         _agree_on(plan, out, resume=how.resume or how.shard[1] > 1)
@@ -205,9 +199,6 @@ def _agree_on(plan: Plan, out: Path, *, resume: bool) -> None:
 
 def _valid(plan: Plan, out: Path, shard: tuple[int, int]) -> frozenset[str]:
     """Ids of the shard's rooms that are there as the journal says; a damaged one is set aside."""
-    if plan.to:
-        paths = {entry.id: entry.path for entry in plan.part(shard)}
-        return frozenset(complete(plan.to, read_journals(out), paths))
     rows, stored = read_journals(out), whole_keys(out, mend=True)
     valid = set()
     for entry in plan.part(shard):
@@ -271,7 +262,6 @@ class RunOptions:
         max_failures: failed rooms after which the run stops. timeout: seconds a room. until: `time.time()` to stop at.
         memory: MiB a worker; a room that needs more fails.
         ray: `auto` or the address of a Ray cluster, whose nodes see the folder under one path; "" = local processes.
-        to: URL of a file system of fsspec that rooms and store go to, "" = the run's folder, which keeps the rest.
         outside: folders besides those of the graphs and of the index in which models may lie.
         executor: runs the tasks in place of either.
         progress: called after every room.
@@ -287,7 +277,6 @@ class RunOptions:
     until: float | None = None
     memory: int | None = MEMORY
     ray: str = ""
-    to: str = ""
     outside: tuple[str, ...] = ()
     executor: Executor | None = None
     progress: Callable[[BatchProgress], None] | None = None
@@ -389,9 +378,7 @@ class Run:
     def _job(self, entry: Entry) -> work.Job:
         options = self.plan.options[entry.options]
         folder, store = str(entry.folder(self.folder)), str(inside(self.folder, STORE, f"{self.folder}: the run"))
-        if self.plan.to:
-            folder, store = entry.path, STORE
         return work.Job(
             entry.id, folder, entry.seed, options, self.plan.graphs.get(entry.graph, ""), entry.draw,
-            "" if options.self_contained else store, to=self.plan.to, outside=self.how.outside,
+            "" if options.self_contained else store, outside=self.how.outside,
         )  # fmt: skip

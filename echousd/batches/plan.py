@@ -27,14 +27,6 @@ from echousd.store import Store
 STATE = ".batch"  # folder of plan and journals
 STORE = "store"  # folder of the assets that the rooms share
 PLAN, GRAPHS = "plan.jsonl", "graphs.jsonl"
-# of a URL, though `Path` made one slash of its two; no drive, and no chain of file systems (`zip://a::file:///b`)
-URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):/(?!.*::)")
-# file systems of fsspec that read this machine's disk, or open another one
-HERE = (
-    "file", "local", "dir", "reference", "generic", "zip", "tar", "libarchive", "simplecache", "filecache",
-    "blockcache", "cached", "data", "git", "jupyter", "jlab", "pyscript", "asyncwrapper", "async_wrapper",
-)  # fmt: skip
-ELSEWHERE = "a URL of another machine, such as s3://bucket/night"
 MOST = 1_000_000  # rooms of a run: a plan is held in memory
 SHELF = 1000  # rooms in one folder
 
@@ -84,11 +76,6 @@ class Plan:
     entries: tuple[Entry, ...]
     graphs: dict[str, str]
 
-    @property
-    def to(self) -> str:
-        """URL that the rooms go to, "" = the run's folder."""
-        return str(self.head.get("to", ""))
-
     @cached_property
     def digest(self) -> str:
         """Hash of all of it."""
@@ -109,11 +96,11 @@ class Plan:
         return self.entries[shard[0] :: shard[1]]
 
 
-def make_plan(request: BatchRequest, weights: str, to: str = "", outside: Sequence[str] = ()) -> Plan:
+def make_plan(request: BatchRequest, weights: str, outside: Sequence[str] = ()) -> Plan:
     """The plan of a request; the same for the same request, files and weights.
 
     Arguments:
-        weights: hash of the weights. to: URL that the rooms go to (`echousd.batches.remote`), "" = the run's folder.
+        weights: hash of the weights.
         outside: folders besides those of the graphs' files in which files of models may lie.
     """
     sets: dict[BatchOptions, int] = {}
@@ -144,7 +131,6 @@ def make_plan(request: BatchRequest, weights: str, to: str = "", outside: Sequen
         "weights": weights,
         "rooms": len(entries),
         "request": request.model_dump(),
-        **({"to": to} if to else {}),
     }
     return Plan(head, tuple(sets), tuple(entries), graphs)
 
@@ -207,16 +193,7 @@ def _head(raw: Any) -> dict[str, Any]:
     kinds = {"version": str, "weights": str, "rooms": int, "request": dict, "sets": list}
     if not isinstance(raw, dict) or any(type(raw.get(key)) is not kind for key, kind in kinds.items()):
         raise ValueError("line 1 is no head of a plan")
-    to = raw.get("to", "")
-    if not isinstance(to, str) or (to and not is_elsewhere(to)):
-        raise ValueError(f"line 1: to is {to!r:.200}, allowed: {ELSEWHERE}")
     return raw
-
-
-def is_elsewhere(to: str) -> bool:
-    """Whether a text is the URL of a file system that is not this machine's."""
-    found = URL.match(to)
-    return found is not None and found[1].lower() not in HERE
 
 
 def _entry(raw: Any, number: int, sets: int) -> Entry:
@@ -274,8 +251,6 @@ def is_row(row: Any) -> bool:
     if not 0 <= row["when"] < LATEST:
         return False
     if not all(_fits(name, row.get(name, default), default) for name, default in COLUMNS.items()):
-        return False
-    if not _fits("stored", row.get("stored", {}), {}):
         return False
     if row.get("state") == "failed":
         return "error" in row and not row.get("root")

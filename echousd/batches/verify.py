@@ -17,7 +17,6 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 
 from echomodel.files import read_bounded, read_json, whole_file
 from echousd.batches.plan import COLUMNS, Plan, fault_of, load_plan, read_journals, whole_keys
-from echousd.batches.remote import Remote, fetched
 from echousd.folder.manifest import LARGEST
 from echousd.folder.within import inside
 from echousd.stage.apart import check_apart
@@ -36,19 +35,17 @@ a.hidden=(type.value&&a.dataset.type!==type.value)||(bad.checked&&!a.classList.c
 type.onchange=bad.onchange=show"""
 
 
-def write_sheet(
-    folder: Path, rows: Iterable[dict[str, Any]], title: str, pictures: Collection[str] | None = None
-) -> Path:
+def write_sheet(folder: Path, rows: Iterable[dict[str, Any]], title: str) -> Path:
     """Write `index.html`; its pictures are those of the rooms, by relative paths.
 
     Arguments:
-        rows: of the manifest. title: what stands above. pictures: paths of those that there are, None = look.
+        rows: of the manifest. title: what stands above.
     """
     cards: list[tuple[int, str, str]] = []
     kinds = set()
     for row in rows:
         kinds.add(row["type"])
-        worst, card = _card(row, folder, pictures)
+        worst, card = _card(row, folder)
         cards.append((worst, row["id"], card))
     cards.sort(key=lambda card: (-card[0], card[1]))
     options = "".join(f"<option>{html.escape(kind)}</option>" for kind in sorted(kinds - {""}))
@@ -64,7 +61,7 @@ def write_sheet(
     return folder / SHEET
 
 
-def _card(row: dict[str, Any], folder: Path, pictures: Collection[str] | None) -> tuple[int, str]:
+def _card(row: dict[str, Any], folder: Path) -> tuple[int, str]:
     """How bad a room is, and its card."""
     told = []
     if row["state"] != "done":
@@ -79,7 +76,7 @@ def _card(row: dict[str, Any], folder: Path, pictures: Collection[str] | None) -
     worst = (1000 if row["state"] != "done" else 100 * (not row["check"])) + len(told) * (row["state"] == "done")
     picture = Path(row["root"]).with_suffix(".png") if row["root"] else None
     image = ""
-    if picture and ((folder / picture).is_file() if pictures is None else picture.as_posix() in pictures):
+    if picture and (folder / picture).is_file():
         image = f'<img loading="lazy" alt="" src="{html.escape(picture.as_posix())}">'
     kept = f"{row['objects']} objects, {row['relations_kept']} of {row['relations_asked']} relations"
     faults = "".join(f'<p class="fault">{html.escape(text[:300])}</p>' for text in told)
@@ -206,9 +203,6 @@ def write_index(folder: Path, rows: Iterable[dict[str, Any]]) -> Path:
     return folder / INDEX
 
 
-ARTEFACTS = (MANIFEST, TABLE, SUMMARY, SHEET, INDEX)
-
-
 @dataclass(frozen=True)
 class Wrong:
     """A room that is not as it should be: its id, and what is wrong with it."""
@@ -222,18 +216,12 @@ def status(folder: Path) -> dict[str, Any]:
     return summary(manifest_rows(load_plan(folder), folder))
 
 
-def verify(folder: Path, *, check: bool = False, to: str = "") -> Iterator[Wrong]:
+def verify(folder: Path, *, check: bool = False) -> Iterator[Wrong]:
     """Rooms that are missing, failed, changed or, with `check`, do not pass `echousd check`.
 
-    Arguments:
-        to: URL of the run's rooms; nobody is contacted for what a plan says alone, which may come from anybody.
-
-    Raises ValueError for a folder without a run, and for a URL that is not the plan's.
+    Raises ValueError for a folder without a run.
     """
     plan, rows, stored = load_plan(folder), read_journals(folder), whole_keys(folder)
-    if plan.to != to:
-        where = f"at {plan.to}, allowed: --to {plan.to}" if plan.to else "in its folder, allowed: no --to"
-        raise ValueError(f"{folder}: the rooms are {where}")
     for entry in plan.entries:
         row, place = rows.get(entry.id), entry.folder(folder)
         settle = plan.options[entry.options].settle  # its verdict said so, too
@@ -241,12 +229,7 @@ def verify(folder: Path, *, check: bool = False, to: str = "") -> Iterator[Wrong
             yield Wrong(entry.id, "missing" if not place.is_dir() else "in the folder, not in the journal")
         elif row["state"] != "done":
             yield Wrong(entry.id, f"failed: {row['error']}")
-        elif plan.to:
-            with fetched(plan.to, entry.path) as copy:
-                fault = _fault(copy / entry.path, row, whole_keys(copy), check=check, settle=settle)
-        else:
-            fault = _fault(place, row, stored, check=check, settle=settle)
-        if row is not None and row["state"] == "done" and fault:
+        elif fault := _fault(place, row, stored, check=check, settle=settle):
             yield Wrong(entry.id, fault)
 
 
@@ -271,20 +254,15 @@ def finish(folder: Path, *, webdataset: bool = False) -> dict[str, Any]:
     """Write manifest, summary, contact sheet and index stage from plan and journals; returns the summary.
 
     Arguments:
-        webdataset: write tars of previews and JSON, too; raises ValueError where the rooms are not in the folder.
+        webdataset: write tars of previews and JSON, too.
     """
     plan = load_plan(folder)
-    if plan.to and webdataset:
-        raise ValueError(f"--webdataset: the rooms are at {plan.to}, allowed: rooms in the run's own folder")
     found = write_manifest(plan, folder)
-    pictures = Remote(plan.to).sizes("rooms") if plan.to else None
     title = f"{folder.resolve().name}: {found['done']} of {found['rooms']} rooms"
-    write_sheet(folder, manifest_rows(plan, folder), title, pictures)
+    write_sheet(folder, manifest_rows(plan, folder), title)
     write_index(folder, manifest_rows(plan, folder))
     if webdataset:
         write_webdataset(folder, manifest_rows(plan, folder))
-    if plan.to:  # the sheet and the index name rooms beside them
-        Remote(plan.to).put(folder, [name for name in ARTEFACTS if (folder / name).is_file()])
     return found
 
 

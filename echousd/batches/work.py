@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
 import time
 import warnings
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,6 @@ import torch
 
 from echousd.batches.options import BatchOptions
 from echousd.batches.plan import room_digest
-from echousd.batches.remote import deliver
 from echousd.batches.sources import sampled_graph
 from echousd.graph import SceneGraph
 
@@ -34,7 +32,6 @@ class Job:
         id: its name; folder: where it goes; store: where its assets go, "" = into the folder.
         text: canonical JSON of its graph; draw: else the graph to draw (`plan.Entry.draw`).
         seed, options: as in the plan.
-        to: URL that `folder` and `store` are below, "" = they lie on a disk.
         outside: as of the run (`RunOptions`).
     """
 
@@ -45,7 +42,6 @@ class Job:
     text: str = ""
     draw: tuple[str, int, int] | None = None
     store: str = ""
-    to: str = ""
     outside: tuple[str, ...] = ()
 
 
@@ -54,11 +50,6 @@ def room(job: Job) -> dict[str, Any]:
 
     Raises ValueError as `generate` and `Room.save` do.
     """
-    if job.to:
-        with tempfile.TemporaryDirectory(prefix="echousd-") as name:
-            store = f"{name}/{job.store}" if job.store else ""
-            row = room(replace(job, folder=f"{name}/{job.folder}", store=store, to=""))
-            return {**row, "stored": deliver(Path(name), job.folder, job.to)}
     from echousd.folder.folder import held
     from echousd.make.save import write_pictures
     from echousd.stage.files import open_stage

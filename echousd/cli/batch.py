@@ -57,9 +57,6 @@ def run(
         list[str] | None, typer.Option("--set", help="An option of the rooms by its name, such as ceiling=true.")
     ] = None,
     ray: Annotated[str, typer.Option(help="Run on Ray: auto, or the address of a cluster.", hidden=True)] = "",
-    to: Annotated[
-        str, typer.Option(help="URL that rooms and store go to (fsspec), such as s3://bucket/night.", hidden=True)
-    ] = "",
     webdataset: Annotated[
         bool, typer.Option("--webdataset", help="Also tars of previews and JSON.", hidden=True)
     ] = False,
@@ -84,18 +81,16 @@ def run(
         given["assets"] = str(Path(given["assets"]).absolute())
     raw["options"] = {**raw.get("options", {}), **parse_options(more or []), **given}
     request = request_of(raw, files[0] if files else "batch")
-    if to and webdataset:
-        raise ValueError("--webdataset takes rooms in the run's own folder; leave out --to")
     with _shown(json) as tell:
         how = RunOptions(
             workers=workers, shard=_shard(shard), resume=resume, max_failures=max_failures, timeout=timeout,
-            until=_clock(until), memory=memory, ray=ray, to=to, progress=tell, outside=tuple(map(str, outside or ())),
+            until=_clock(until), memory=memory, ray=ray, progress=tell, outside=tuple(map(str, outside or ())),
         )  # fmt: skip
         result = run_batch(request, output, how)
     found = finish(output, webdataset=webdataset)
     say(f"rooms    {result.done} of {result.rooms}, {result.failed} failed, in {result.seconds:.0f} s", err=json)
-    sheet = f"{to.rstrip('/')}/index.html" if to else output / "index.html"
-    say(f"run      {to or output}: {found['done']} of {found['rooms']} rooms; see {sheet}", err=json)
+    sheet = output / "index.html"
+    say(f"run      {output}: {found['done']} of {found['rooms']} rooms; see {sheet}", err=json)
     if result.stopped:
         say(f"stopped  {result.stopped}", err=json)
     if result.failed or result.stopped:
@@ -127,14 +122,13 @@ def status(
 def verify(
     folder: Annotated[Path, typer.Argument(help="Folder of the run.", show_default=False)],
     check: Annotated[bool, typer.Option("--check", help="Also run echousd check on every room.")] = False,
-    to: Annotated[str, typer.Option(help="URL that the rooms went to; it is contacted only if it is named.")] = "",
     json: AsJson = False,
 ) -> None:
     """Compare every room with the journal: there, whole, unchanged. Exit code 1 where one is not."""
     from echousd.batches.verify import verify as found_wrong
 
     wrong = []
-    for fault in found_wrong(folder, check=check, to=to):
+    for fault in found_wrong(folder, check=check):
         wrong.append({"room": fault.room, "problem": fault.problem})
         if not json:
             say(f"{fault.room}: {one_line(fault.problem)}")

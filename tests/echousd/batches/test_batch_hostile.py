@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import shutil
-import zipfile
 
 import pytest
 
 from echousd.batches.options import BatchRequest
 from echousd.batches.plan import is_row, make_plan, save_plan
-from echousd.batches.remote import Remote, complete
 from echousd.batches.sources import find_graphs
 from echousd.batches.verify import finish
 
@@ -55,16 +52,6 @@ def test_any_value_in_the_files_of_a_run(made, name, tmp_path, echousd_command):
             assert done.code != 2 or str(tmp_path / "run") in done.err, (mutant, done.err)
 
 
-@pytest.mark.parametrize("extra", [{"stored": ["a"]}, {"stored": {"a": "b"}}])
-def test_lines_that_a_resumed_run_would_fall_over_are_none(made, extra):
-    row = json.loads((made / ".batch/shard_0_of_1/journal.jsonl").read_text())
-    assert is_row(row)
-    assert is_row({**row, "stored": {"a": 5}})
-    assert not is_row({**row, **extra})
-    assert "bytes" not in row
-    assert complete("memory://nobody", {row["room"]: row}, {row["room"]: "rooms/0000/bedroom_000000"}) == set()
-
-
 @pytest.mark.parametrize(
     "extra",
     [{"living_faults": [1]}, {"check_errors": [None]}, {"licences": [2]}, {"bounds": [1e308] * 6}, {"objects": 2**70},
@@ -74,6 +61,7 @@ def test_lines_that_a_resumed_run_would_fall_over_are_none(made, extra):
 def test_lines_that_no_artefact_can_hold_are_none(made, extra, tmp_path, echousd_command):
     lines = (made / ".batch/shard_0_of_1/journal.jsonl").read_text()
     row = json.loads(lines)
+    assert is_row(row)
     assert not is_row({**row, **extra})
     shutil.copytree(made, tmp_path / "run")
     (tmp_path / "run/.batch/shard_0_of_1/journal.jsonl").write_text(json.dumps({**row, **extra}) + "\n")
@@ -109,22 +97,6 @@ def test_an_endless_line_of_a_run_is_told(made, tmp_path, echousd_command):
 
 def code_name(name):
     return name.partition(".")[0].replace("/", "_")
-
-
-def test_a_bucket_of_somebody_else_writes_nothing_outside(tmp_path, echousd_command):
-    with zipfile.ZipFile(tmp_path / "evil.zip", "w") as packed:
-        packed.writestr("night/rooms/0000/bedroom_000000/../../../../escaped/owned.txt", "x")
-    url = f"zip://night::file://{tmp_path}/evil.zip"
-    with pytest.raises(ValueError, match=r"a file names '.*/escaped/owned.txt', outside of"):
-        Remote(url).get("rooms", tmp_path / "here/copy")
-    assert not list(tmp_path.rglob("owned.txt"))
-    for to, said in ((url, "zip://night::"), ("../bucket", "../bucket"), (5, "5")):
-        run = tmp_path / f"run_{len(said)}"
-        save_plan(make_plan(BatchRequest(sources=[], sample={"bedroom": 1}), "0" * 12, to), run)
-        done = echousd_command("batch", "verify", run)
-        assert done.code == 2
-        assert re.search(rf"to is .*{re.escape(said)}", done.err)
-        assert "allowed: a URL of another machine, such as s3://bucket/night" in done.err
 
 
 @pytest.mark.parametrize("name", ["plan.jsonl", "graphs.jsonl", "shard_0_of_1/journal.jsonl"])
