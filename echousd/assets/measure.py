@@ -1,9 +1,8 @@
-"""Models as they were read: stages by USD, glTF by trimesh, OBJ and its material libraries here, many times faster."""
+"""Models as they were read: stages by USD, glTF and OBJ by trimesh."""
 
 from __future__ import annotations
 
 import contextlib
-import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -17,7 +16,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdUtils
 from echomodel.files import within_memory
 from echomodel.triangles import area_normals
 from echousd.assets.colors import Coat, flat, pixels, texels
-from echousd.assets.model_file import STAGES, Beside, ModelFile
+from echousd.assets.model_file import STAGES, ModelFile
 from echousd.draw.drawables import Paint, fans, paints_of
 from echousd.srgb import to_linear
 from echousd.stage.contents import triangles_of
@@ -106,14 +105,13 @@ def _measured(model: ModelFile, painted: bool) -> Measured:
 
 def _mesh(model: ModelFile, painted: bool) -> Measured:
     beside = model.beside()
-    with model.opened() as file:
-        if model.suffix == ".obj":
-            return measured_obj(model, file.read().decode("utf-8", "replace"), painted=painted)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            scene = trimesh.load_scene(
-                file, file_type=model.suffix[1:], resolver=beside, process=False, skip_materials=not painted
-            )
+    obj = model.suffix == ".obj"  # whose materials are in a file of their own
+    with model.opened() as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        scene = trimesh.load_scene(
+            file, file_type=model.suffix[1:], resolver=beside, process=False, skip_materials=not (painted or obj),
+            group_material=not obj,
+        )  # fmt: skip
     parts = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh)]
     if not parts:
         raise ValueError(f"{model}: holds no triangles")
@@ -125,13 +123,20 @@ def _mesh(model: ModelFile, painted: bool) -> Measured:
     return Measured(
         np.concatenate([np.asarray(part.vertices, float) for part in parts]),
         faces,
-        metres=1.0,  # glTF is in metres, +Y up
-        materials=tuple(dict.fromkeys(str(name) for name in scene.geometry)),
+        metres=None if obj else 1.0,  # glTF is in metres, +Y up
+        materials=tuple(dict.fromkeys(_material_names(scene) if obj else map(str, scene.geometry))),
         licence=str(extras.get("license") or ""),
         author=str(extras.get("author") or copyright_),
         missing=tuple(dict.fromkeys(beside.missing)),
         coats=tuple(_coats(scene)) if painted else (),
     )
+
+
+def _material_names(scene: trimesh.Scene) -> Iterator[str]:
+    for part in scene.geometry.values():
+        name = getattr(getattr(part.visual, "material", None), "name", None)
+        if name:
+            yield str(name)
 
 
 def _coats(scene: trimesh.Scene) -> Iterator[Coat]:
@@ -151,93 +156,18 @@ def _cover(part: trimesh.Trimesh) -> np.ndarray | None:
         factor = np.ones(4) if material.baseColorFactor is None else np.asarray(material.baseColorFactor, float)
         factor = factor / 255.0 if factor.max(initial=0.0) > 1 else factor
         image = material.baseColorTexture
+    else:
+        image, factor = getattr(material, "image", None), np.ones(4)
+    if image is not None:
         try:
-            return flat(factor, factor[3]) if image is None else pixels(image, factor)
+            return pixels(image, factor)
         except Exception:  # decoders fail on damaged images in every way there is
             return None
-    visual: Any = part.visual
-    return flat(to_linear(np.asarray(visual.main_color, float) / 255))
-
-
-FACE = re.compile(r"^f[ \t]+(.+?)[ \t]*$", re.MULTILINE)
-VERTEX = re.compile(r"^v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
-MATERIAL = re.compile(r"^usemtl[ \t]+(.+?)[ \t]*$", re.MULTILINE)
-
-
-def measured_obj(model: ModelFile, text: str, *, painted: bool = False) -> Measured:
-    """Triangles of an OBJ, names of its materials, textures that are missing; with `painted`, its colours as well.
-
-    Raises ValueError that names the file for one that cannot be read.
-    """
-    points = np.array(VERTEX.findall(text), float).reshape(-1, 3)
-    pieces = MATERIAL.split(text)  # what stands before the first name, then names and what follows them in turns
-    names = ["", *pieces[1::2]]
-    found = [FACE.findall(piece) for piece in pieces[::2]]
-    lines = re.sub(r"/\S*|#.*", "", "\n".join(line for piece in found for line in piece)).splitlines()
-    slot = np.repeat(np.arange(len(names)), [len(piece) for piece in found])
-    counts = np.array([len(line.split()) for line in lines], int)
-    corners = np.array(" ".join(lines).split(), int)
-    if (corners < 0).any():
-        raise ValueError(f"{model}: faces count points from the end, allowed: plain numbers; write it again")
-    starts = np.cumsum(counts) - counts
-    triangles, slots = [np.zeros((0, 3), int)], [np.zeros(0, int)]
-    for count in np.unique(counts[counts > 2]):
-        first = starts[counts == count]
-        for k in range(1, count - 1):
-            triangles.append(corners[np.stack([first, first + k, first + k + 1], 1)] - 1)
-            slots.append(slot[counts == count])
-    faces = np.concatenate(triangles)
-    beside = model.beside()
-    coats = dict(_obj_coats(re.findall(r"^mtllib[ \t]+(.+?)[ \t]*$", text, re.MULTILINE), beside, painted))
-    inside = len(faces) > 0 and faces.min() >= 0 and faces.max() < len(points)
-    seen: list[Coat] = []
-    if painted and coats and inside:
-        area = np.bincount(np.concatenate(slots), np.linalg.norm(area_normals(points[faces]), axis=1), len(names))
-        seen = [(float(area[k]), coats[name]) for k, name in enumerate(names) if name in coats and area[k] > 0]
-    used = tuple(dict.fromkeys(names[1:]))
-    return Measured(points, faces, materials=used, missing=tuple(dict.fromkeys(beside.missing)), coats=tuple(seen))
-
-
-def _obj_coats(libraries: list[str], beside: Beside, painted: bool) -> Iterator[tuple[str, np.ndarray]]:
-    """(name, what covers a surface) of the materials of some MTL files; their images are looked for in any case."""
-    images: dict[str, np.ndarray | None] = {}
-    for library in libraries:
-        try:
-            content = beside.get(library.strip()).decode("utf-8", "replace")
-        except ValueError:
-            continue
-        for piece in re.split(r"^[ \t]*newmtl[ \t]+", content, flags=re.MULTILINE | re.IGNORECASE)[1:]:
-            name, _, rest = piece.partition("\n")
-            lines = re.findall(r"^[ \t]*(Kd|map_Kd|d|Tr)[ \t]+(.+?)[ \t]*$", rest, re.MULTILINE | re.IGNORECASE)
-            said = {word.lower(): value for word, value in lines}
-            image = said.get("map_kd", "")
-            if image not in images:
-                images[image] = _image(image, beside, painted)
-            coat = _plain(said) if images[image] is None else images[image]
-            if painted and coat is not None:
-                yield name.strip(), coat
-
-
-def _image(name: str, beside: Beside, painted: bool) -> np.ndarray | None:
-    try:
-        content = beside.get(name) if name else b""
-    except ValueError:
-        return None
-    return texels(content) if painted else None
-
-
-def _plain(said: dict[str, str]) -> np.ndarray | None:
-    try:
-        color = np.clip(np.array(said["kd"].split()[:3], float), 0, 1)
-        opacity = float(said["d"].split()[-1]) if "d" in said else 1.0 - float(said.get("tr", "0").split()[0])
-    except (KeyError, ValueError):
-        return None
-    if len(color) != 3 or not np.isfinite([*color, opacity]).all():
-        return None
-    return flat(to_linear(color), opacity)
-
-
-IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".tga", ".tif", ".tiff", ".bmp", ".webp", ".avif", ".hdr")
+    if isinstance(material, trimesh.visual.material.PBRMaterial):
+        return flat(factor, factor[3])
+    plain: Any = part.visual if material is None else material
+    color = np.asarray(plain.main_color, float) / 255
+    return flat(to_linear(color), color[3])
 
 
 def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) -> Measured:

@@ -43,49 +43,30 @@ def read_file(path: Path) -> bytes:
 
 
 def read_obj(path: Path) -> Unwrapped:
-    """Triangles with texture coordinates from an OBJ; raises ValueError that names the file and the line."""
-    points: list[list[float]] = []
-    st: list[list[float]] = []
-    corners: list[tuple[int, int]] = []
-    for number, line in enumerate(read_file(path).decode("utf-8", "replace").splitlines(), 1):
-        word, _, rest = line.partition(" ")
-        if word not in ("v", "vt", "f"):
-            continue
-        fields = rest.split()
-        try:
-            if word == "f":
-                if len(fields) != 3:
-                    raise ValueError(f"a face of {len(fields)} corners, allowed: 3 (triangulate it)")
-                corners += [_corner(field, len(points), len(st)) for field in fields]
-            else:
-                (points if word == "v" else st).append([float(field) for field in fields[: 3 if word == "v" else 2]])
-        except ValueError as error:
-            raise ValueError(f"{path}: line {number}: {error}") from None
-    if not corners:
-        raise ValueError(f"{path}: no faces, allowed: triangles with texture coordinates")
+    """Triangles with texture coordinates from an OBJ; raises ValueError that names the file."""
+    return _unwrapped(path, read_file(path), "obj", skip_materials=True)
+
+
+def _unwrapped(path: Path, content: bytes, form: str, **how: Any) -> Unwrapped:
+    """The triangles of all parts of a mesh's file, each vertex with its texture coordinate; raises ValueError."""
     try:
-        places, laid = np.array(points, float).reshape(-1, 3), np.array(st, float).reshape(-1, 2)
-    except ValueError:
-        raise ValueError(f"{path}: a vertex has too few numbers, allowed: 3, and 2 for texture coordinates") from None
-    if not (np.isfinite(places).all() and np.isfinite(laid).all()):
-        raise ValueError(f"{path}: numbers that are not finite, allowed: metres and coordinates from 0 to 1")
-    pairs, index = np.unique(np.array(corners), axis=0, return_inverse=True)
-    return Unwrapped(places[pairs[:, 0]], laid[pairs[:, 1]], index.reshape(-1, 3))
-
-
-def _corner(field: str, points: int, st: int) -> tuple[int, int]:
-    """(point, texture coordinate) of `12/7` or `12/7/3`, counted from 0."""
-    parts = field.split("/")
-    if len(parts) < 2 or not parts[1]:
-        raise ValueError(f"corner {field!r:.40} has no texture coordinate, allowed: point/coordinate")
-    out = []
-    for part, count in ((parts[0], points), (parts[1], st)):
-        index = int(part)
-        index = index - 1 if index > 0 else count + index
-        if not 0 <= index < count:
-            raise ValueError(f"corner {field!r:.40} names number {part}, allowed: 1 to {count}")
-        out.append(index)
-    return out[0], out[1]
+        scene: Any = trimesh.load_scene(io.BytesIO(content), file_type=form, process=False, **how)
+        parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+        if not parts:
+            raise ValueError("no triangles")
+        laid = [st for part in parts if (st := getattr(part.visual, "uv", None)) is not None]
+        if [len(st) for st in laid] != [len(part.vertices) for part in parts]:
+            raise ValueError("a part without texture coordinates (TEXCOORD_0, vt)")
+        starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+        faces = np.concatenate([np.asarray(part.faces, int) + n for part, n in zip(parts, starts, strict=False)])
+        mesh = Unwrapped(np.concatenate([part.vertices for part in parts]), np.concatenate(laid).astype(float), faces)
+        if not (np.isfinite(mesh.points).all() and np.isfinite(mesh.st).all()):
+            raise ValueError("numbers that are not finite")
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}, allowed: triangles with texture coordinates") from None
+    except Exception as error:  # a damaged file fails in every way there is
+        raise ValueError(f"{path}: no {form} that can be read ({type(error).__name__}: {error!s:.80})") from None
+    return mesh
 
 
 MAX_COUNT = 20_000_000  # numbers in one array of a file
@@ -126,28 +107,7 @@ def read_glb(path: Path) -> PaintedMesh:
     """
     content = read_file(path)
     tree = _checked(path, content)
-    try:
-        scene: Any = trimesh.load(io.BytesIO(content), file_type="glb", process=False, merge_primitives=False)
-        parts = [scene] if isinstance(scene, trimesh.Trimesh) else list(scene.dump())
-        parts = [part for part in parts if isinstance(part, trimesh.Trimesh) and len(part.faces)]
-        if not parts:
-            raise ValueError("no triangles")
-        points, st, faces, count = [], [], [], 0
-        for part in parts:
-            laid = getattr(part.visual, "uv", None)
-            if laid is None or len(laid) != len(part.vertices):
-                raise ValueError("a primitive without texture coordinates (TEXCOORD_0)")
-            points.append(np.asarray(part.vertices, float))
-            st.append(np.asarray(laid, float))
-            faces.append(np.asarray(part.faces, int) + count)
-            count += len(points[-1])
-        mesh = Unwrapped(np.concatenate(points), np.concatenate(st), np.concatenate(faces))
-        if not (np.isfinite(mesh.points).all() and np.isfinite(mesh.st).all()):
-            raise ValueError("numbers that are not finite")
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}, allowed: triangles with texture coordinates") from None
-    except Exception as error:  # a damaged file fails in every way there is
-        raise ValueError(f"{path}: not a glb that can be read ({type(error).__name__})") from None
+    mesh = _unwrapped(path, content, "glb", merge_primitives=False)
     return PaintedMesh(mesh, _images(path, tree, content))
 
 

