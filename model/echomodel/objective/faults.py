@@ -1,6 +1,6 @@
 """What a person would point at in a room: the terms that it misses, in words, and what cannot be walked to.
 
-From the door a robot of 0.2 m radius finds its way to every piece (grid search, as SceneEval and PhyScene).
+From the door a robot of 0.2 m radius finds its way to every piece (as SceneEval and PhyScene ask of rooms).
 """
 
 from __future__ import annotations
@@ -8,8 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -18,10 +16,12 @@ from torch import Tensor
 from echomodel.objective.plan import CLEAR_HEIGHT, Plan, plan_of
 from echomodel.objective.table import PRICE, TERMS
 from echomodel.openings import Opening, inward_normal, segment
+from echomodel.roomboxes import footprints
 from echomodel.rules.geometry import BoxesLike
 
-CELL = 0.05  # metres
-ROBOT = 0.2  # metres, its radius
+ROBOT, SLACK = 0.2, 0.025  # metres, its radius, and how much narrower a way it squeezes through
+STEP = 0.1  # metres beyond that between a door and where it enters
+LEAST = 1e-4  # square metres: no smaller place to be
 BEFORE = 0.35  # metres around the place before a door from which one walks
 ARM = 0.4  # metres between the robot and what it can take hold of
 
@@ -50,102 +50,25 @@ def ways(
         obstacle: (n,) bool, what stands in the way.
         polygon: (k, 2) float, corners of the floor, metres.
     """
-    from scipy import ndimage
+    import shapely
 
-    corners = polygon.dtype.char, polygon.tobytes()
-    xs, zs, floor = _grid(*corners)
-    boxes = np.column_stack([size[:, [0, 2]], position[:, [0, 2]], yaw])
-    seen = [_beside(*corners, box.tobytes(), boxes.dtype.char) for box in boxes]
-    free = floor.copy()
-    for i in np.flatnonzero(obstacle):
-        free[seen[i].near] &= ~seen[i].under
-    room = _roomy(free)
-    parts, count = ndimage.label(room)
-    if not count:
+    boxes = shapely.polygons(footprints(size, position, yaw))
+    taken = shapely.union_all(shapely.buffer(boxes[obstacle], ROBOT - SLACK, quad_segs=4))
+    free = shapely.difference(shapely.buffer(shapely.Polygon(polygon), SLACK - ROBOT, join_style="mitre"), taken)
+    parts = shapely.get_parts(free)
+    parts = parts[shapely.area(parts) > LEAST]
+    if not len(parts):
         return Ways(np.zeros(len(size), bool), 1.0)
-    start = _entered(parts, xs, zs, polygon, openings)
-    if not start:
-        areas = np.bincount(parts.ravel())[1:]
-        start = {int(areas.argmax()) + 1}
-    entered = np.zeros(count + 1, bool)
-    entered[list(start)] = True
-    walked = entered[parts]
-    reached = np.array([bool((walked[one.near] & one.touched).any()) for one in seen], bool)
-    return Ways(reached, float(walked.sum() / room.sum()))
-
-
-def _roomy(free: np.ndarray) -> np.ndarray:
-    """(x, z) bool: cells whose middles are the robot's radius, less half a cell, away from what is not free."""
-    most = round(ROBOT / CELL)
-    out, column, tall = free.copy(), free.copy(), 0
-    for aside in range(most - 1, -1, -1):
-        while aside**2 + (tall + 1) ** 2 < most**2:
-            tall += 1
-            column[:, tall:] &= free[:, :-tall]
-            column[:, :-tall] &= free[:, tall:]
-        out[aside:] &= column[: len(free) - aside]
-        out[: len(free) - aside] &= column[aside:]
-    return out
-
-
-def _entered(
-    parts: np.ndarray, xs: np.ndarray, zs: np.ndarray, polygon: np.ndarray, openings: Sequence[Opening]
-) -> set[int]:
-    """Numbers of the free parts that lie before a door or passage."""
-    out: set[int] = set()
+    area, entered = shapely.area(parts), np.zeros(len(parts), bool)
     for opening in openings:
-        if opening.kind == "window" or opening.edge >= len(polygon):
-            continue
-        inside = segment(polygon, opening).mean(0) + inward_normal(polygon, opening.edge) * (ROBOT + 2 * CELL)
-        x, z = (_within(each, at, BEFORE) for each, at in zip((xs, zs), inside, strict=True))
-        near = np.hypot(xs[x, None] - inside[0], zs[None, z] - inside[1]) < BEFORE
-        met = np.bincount(parts[x, z][near], minlength=1)
-        met[0] = 0
-        if met.any():
-            out.add(int(met.argmax()))
-    return out
-
-
-def _within(places: np.ndarray, middle: float, far: float) -> slice:
-    """Those of ascending places that lie no further than `far` from one."""
-    return slice(*np.searchsorted(places, (middle - far, middle + far)))
-
-
-@lru_cache(maxsize=8)
-def _grid(kind: str, corners: bytes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middles of the cells around a floor, and (len(xs), len(zs)) bool: whether they lie on it (even-odd rule)."""
-    polygon = np.frombuffer(corners, kind).reshape(-1, 2)
-    low, high = polygon.min(0) - CELL, polygon.max(0) + CELL
-    xs, zs = (np.arange(a, b + CELL, CELL) for a, b in zip(low, high, strict=True))
-    x, z = xs[:, None, None], zs[None, :, None]
-    start, end = polygon, np.roll(polygon, -1, 0)
-    crossed = (start[:, 1] > z) != (end[:, 1] > z)
-    run = np.where(end[:, 1] == start[:, 1], 1.0, end[:, 1] - start[:, 1])
-    meets = start[:, 0] + (z - start[:, 1]) / run * (end[:, 0] - start[:, 0])
-    return xs, zs, (crossed & (meets > x)).sum(-1) % 2 == 1
-
-
-class _Beside(NamedTuple):
-    """The cells around a box: where they lie in the grid, those in its footprint, those that it is touched from."""
-
-    near: tuple[slice, slice]
-    under: np.ndarray
-    touched: np.ndarray
-
-
-@lru_cache(maxsize=2000)  # a search asks again and again, and moves a few boxes of a room at a time
-def _beside(kind: str, corners: bytes, box: bytes, kind_of_box: str) -> _Beside:
-    """What is beside a box: its width, depth, x, z and yaw as bytes; those of the floor's corners."""
-    xs, zs, _ = _grid(kind, corners)
-    width, depth, x, z, yaw = np.frombuffer(box, kind_of_box)
-    cos, sin, far = np.cos(float(yaw)), np.sin(float(yaw)), ROBOT + ARM + CELL
-    wide, deep = ((abs(cos) * a + abs(sin) * b) / 2 + far for a, b in ((width, depth), (depth, width)))
-    near = _within(xs, x, wide), _within(zs, z, deep)
-    dx, dz = xs[near[0], None] - x, zs[None, near[1]] - z
-    lateral = np.abs(cos * dx - sin * dz) - width / 2
-    forward = np.abs(sin * dx + cos * dz) - depth / 2
-    away = np.hypot(np.maximum(lateral, 0.0), np.maximum(forward, 0.0))
-    return _Beside(near, away <= 0, away <= ROBOT + ARM)
+        if opening.kind != "window" and opening.edge < len(polygon):
+            inside = segment(polygon, opening).mean(0) + inward_normal(polygon, opening.edge) * (ROBOT + STEP)
+            met = shapely.area(shapely.intersection(parts, shapely.Point(inside).buffer(BEFORE)))
+            entered[met.argmax()] |= met.max() > 0
+    if not entered.any():
+        entered[area.argmax()] = True
+    walked = shapely.multipolygons(parts[entered])
+    return Ways(shapely.dwithin(walked, boxes, ROBOT + ARM), float(area[entered].sum() / area.sum()))
 
 
 REACHED = "reached"
