@@ -73,8 +73,6 @@ class Search:
         self.terms = tuple(t for t in terms if t.name not in sizes and (t.kind != "relations" or t.name in told))
         self.rooms: dict[bytes, Plan] = {}
         self.looks: list[np.ndarray] = []
-        steps = np.array([any(row.step) for row in _predicates()], bool)
-        self.sided = steps[setting.triplets[:, 1]]
         self.urgent: list[int] = []
         self.regrets: dict[int, tuple[float, float, float]] = {}
         n = len(setting.size)
@@ -166,9 +164,6 @@ class Search:
         rows, taste = rows[keep], taste[keep]
         states = [(state.position[None], state.yaw[None]), self._carried(state, i, group, rows)]
         tastes = [state.taste[i : i + 1], taste]
-        if len(group) > 1 and self._sided(i, group):  # its other side may be where the graph wants it
-            states.append(self._carried(state, i, group, rows, mirrored=True))
-            tastes.append(taste)
         screens = [k for k in self.screens[i] if there[k]]
         if screens:  # it takes them along to the wall ahead
             states.append(self._carried(state, i, group, rows, screens))
@@ -204,11 +199,6 @@ class Search:
                 yaw[:, stand] = rows[:, 2]
                 out.append((stand, (position, yaw)))
         return out
-
-    def _sided(self, i: int, group: list[int]) -> bool:
-        """Whether the graph says on which side of anything those who go with box i are."""
-        ends = self.setting.triplets[self.sided]
-        return bool(np.isin(ends[:, [0, 2]], [k for k in group if k != i]).any())
 
     def _best(
         self, there: np.ndarray, position: np.ndarray, yaw: np.ndarray, moved: np.ndarray, taste: np.ndarray
@@ -269,24 +259,16 @@ class Search:
         return taste
 
     def _carried(
-        self,
-        state: State,
-        i: int,
-        group: list[int],
-        rows: np.ndarray,
-        screens: Sequence[int] = (),
-        *,
-        mirrored: bool = False,
+        self, state: State, i: int, group: list[int], rows: np.ndarray, screens: Sequence[int] = ()
     ) -> tuple[np.ndarray, np.ndarray]:
         """(K, n, 3) and (K, n): the boxes with one at each of K poses, and its group with it as one.
 
         Arguments:
             screens: what it looks at, which goes to the wall ahead of it, with what stands on that.
-            mirrored: what stands to its left goes to its right.
         """
         setting = self.setting
         position, yaw = np.repeat(state.position[None], len(rows), 0), np.repeat(state.yaw[None], len(rows), 0)
-        self._carry(position, yaw, state, i, group, rows, mirrored=mirrored)
+        self._carry(position, yaw, state, i, group, rows)
         position[:, i, 1] = height_of(setting, state.position, i)
         for k in screens:
             front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
@@ -297,28 +279,16 @@ class Search:
         return position, yaw
 
     def _carry(
-        self,
-        position: np.ndarray,
-        yaw: np.ndarray,
-        state: State,
-        i: int,
-        group: list[int],
-        rows: np.ndarray,
-        *,
-        mirrored: bool = False,
+        self, position: np.ndarray, yaw: np.ndarray, state: State, i: int, group: list[int], rows: np.ndarray
     ) -> None:
         """Put box i at K poses in K states, and a group with it."""
         turn = rows[:, 2] - state.yaw[i]
         cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
-        away, turned = (state.position[group] - state.position[i])[:, [0, 2]], state.yaw[group]
-        if mirrored:
-            side = np.array([np.cos(state.yaw[i]), -np.sin(state.yaw[i])])
-            away = away - 2 * (away @ side)[:, None] * side
-            turned = 2 * state.yaw[i] - turned
+        away = (state.position[group] - state.position[i])[:, [0, 2]]
         position[:, group, 0] = rows[:, :1] + cos * away[:, 0] + sin * away[:, 1]
         position[:, group, 2] = rows[:, 1:2] - sin * away[:, 0] + cos * away[:, 1]
-        free = ~self.setting.turned[group]
-        yaw[:, np.array(group)[free]] = turned[free] + turn[:, None]
+        free = np.array(group)[~self.setting.turned[group]]
+        yaw[:, free] = state.yaw[free] + turn[:, None]
 
     def _promising(
         self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray, taste: np.ndarray
