@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,7 +32,7 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
     and sky from above. `size`: pixels across. `rays`: along each side of a pixel. `seed`: of the shifts; the same seed
     gives the same picture.
     """
-    height, many = round(size / view.aspect), rays**2
+    height = round(size / view.aspect)
     across, down = (grid.ravel() for grid in np.meshgrid(np.arange(size), np.arange(height)))
     noise = np.random.default_rng(seed).random(4)
     shift = ((across[:, None] * LATTICE[0] + down[:, None] * LATTICE[1] + noise) % 1.0).astype(np.float32)
@@ -39,28 +40,36 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
     sun = np.float32(SUN / np.pi) * (0 * SUN_LIGHT if sun is None else sun[1]) if view.inside else 0.55 * SUN_LIGHT
     glow = float(np.interp(scenery.lights.day, (0, 1), (GLOWING, 1))) if view.inside else 1.0
     world = World(_embree(scenery), scenery, view, size, shift, thrown_back(scenery), sun, glow)
+    mixed = _radiance(world, height, rays)
+    return (exposed(mixed, world.thrown, scenery.lights.day) if view.inside else _tone(mixed)) ** (1 / 2.2)
+
+
+def _radiance(world: World, height: int, rays: int) -> np.ndarray:
+    """(height, size, 3) linear colours of the picture."""
+    size, many = world.size, rays**2
     places = [((inner % rays + 0.5) / rays, (inner // rays + 0.5) / rays) for inner in range(many)]
-    _, seen = _met(world, np.arange(len(across)), places[0])
+    _, seen = _met(world, np.arange(height * size), places[0])
     near = np.flatnonzero(_at_edges(seen, (height, size)))
     finer = [_met(world, near, place, seen) for place in places[1:]]
-    edge = np.zeros(len(across), bool)
+    edge = np.zeros(height * size, bool)
     for pixel, _ in finer:
         edge[pixel] = True
     light = _light_of(world, seen, edge, 2 * rays, max(1, (rays - 1) ** 2))
-    color, met = seen.glow.copy(), np.flatnonzero(seen.face >= 0)
-    st = _spread(seen.st.reshape(height, size, 2), rays).reshape(-1, many, 2)[met]
-    color[met] = _colored(world, seen.face[met], st, light[met])
+    color, st = seen.glow.copy(), _spread(seen.st.reshape(height, size, 2), rays).reshape(-1, many, 2)
+    everywhere = np.flatnonzero(seen.face >= 0)
+    for met in (everywhere[start : start + BLOCK] for start in range(0, len(everywhere), BLOCK)):
+        color[met] = _colored(world, seen.face[met], st[met], light[met])
     mixed = color.copy()
     for pixel, more in finer:
         met = np.flatnonzero(more.face >= 0)
         lent = _lent(world, more.of(met), pixel[met], seen, light)
         more.glow[met] = _colored(world, more.face[met], more.st[met, None], lent)
         mixed[pixel] += (more.glow - color[pixel]) / many
-    mixed = mixed.reshape(height, size, 3)
-    return (exposed(mixed, world.thrown, scenery.lights.day) if view.inside else _tone(mixed)) ** (1 / 2.2)
+    return mixed.reshape(height, size, 3)
 
 
-BLOCK = 250_000  # rays at a time, which bounds the memory
+BLOCK = 32_000  # rays at a time, which bounds the memory and stays in the cache
+BAND = 32  # rows of a picture at a time, for the same reasons
 RINGS = (1, 2, 4, 8)  # places between neighbours, pass by pass
 CLOSE, EVEN = 2, 0.4  # from which ring on it matters how bright neighbours are, and the share that they may differ by
 ALIKE, FLAT = 0.95, 0.02  # cosine and metres within which two points lie on one flat piece of surface
@@ -268,28 +277,36 @@ def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, rings
     of the surface.
     """
     height, width = light.shape[:2]
-    light, normal, point = (np.ascontiguousarray(a.transpose(2, 0, 1)) for a in (light, normal, point))
-    here = _along(normal, point)
     for apart in rings:  # passes with ever wider holes reach far with few neighbours ("a trous")
         edge = ((0, 0), (apart, apart), (apart, apart))
-        padded = [np.pad(a, edge, mode="edge") for a in (light, normal, point)]
-        total, weight = np.zeros_like(light), np.zeros((height, width), np.float32)
-        bright = light.mean(0) if apart > CLOSE else None
-        for down in (0, apart, 2 * apart):
-            for across in (0, apart, 2 * apart):
-                there = slice(None), slice(down, down + height), slice(across, across + width)
-                other_light, other_normal, other_point = (a[there] for a in padded)
-                turn = np.clip(_along(normal, other_normal), 0, 1)
-                step = np.abs(_along(normal, other_point) - here)
-                for _ in range(4):  # to the 16th power
-                    turn *= turn
-                share = turn * (step < 0.02)
-                if bright is not None:
-                    share /= 1 + np.square((other_light.mean(0) - bright) / (EVEN * bright + 1e-4)) ** 2
-                total += share * other_light
-                weight += share
-        light = np.where(weight > 1e-6, total / np.maximum(weight, 1e-6), light)
-    return light.transpose(1, 2, 0)
+        padded = [np.pad(a.transpose(2, 0, 1), edge, mode="edge") for a in (light, normal, point)]
+        light = np.empty((height, width, light.shape[2]), np.float32)
+        for rows in (slice(top, min(top + BAND, height)) for top in range(0, height, BAND)):
+            light[rows] = _smoothed(rows, width, apart, padded).transpose(1, 2, 0)
+    return light
+
+
+def _smoothed(rows: slice, width: int, apart: int, padded: Sequence[np.ndarray]) -> np.ndarray:
+    """(c, rows, w) the light of some rows after one pass; `padded`: light, normals and points with an edge around."""
+
+    def shifted(down: int, across: int) -> Iterator[np.ndarray]:
+        return (a[:, rows.start + down : rows.stop + down, across : across + width] for a in padded)
+
+    light, normal, point = shifted(apart, apart)
+    here, total = _along(normal, point), np.zeros(light.shape, np.float32)
+    weight, bright = np.zeros_like(here), light.mean(0) if apart > CLOSE else None
+    for down, across in product((0, apart, 2 * apart), repeat=2):
+        other_light, other_normal, other_point = shifted(down, across)
+        turn = np.clip(_along(normal, other_normal), 0, 1)
+        step = np.abs(_along(normal, other_point) - here)
+        for _ in range(4):  # to the 16th power
+            turn *= turn
+        share = turn * (step < 0.02)
+        if bright is not None:
+            share /= 1 + np.square((other_light.mean(0) - bright) / (EVEN * bright + 1e-4)) ** 2
+        total += share * other_light
+        weight += share
+    return np.where(weight > 1e-6, total / np.maximum(weight, 1e-6), light)
 
 
 def _along(one: np.ndarray, other: np.ndarray) -> np.ndarray:
