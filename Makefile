@@ -7,7 +7,7 @@ ROOM := $(VENV)/.room
 STAMP := $(VENV)/.installed
 AUDIT := .audit
 
-.PHONY: help room test lint types clients hashes audit benchmarks benchmark eval paper schema clean
+.PHONY: help room test quick mutants lint types clients hashes audit benchmarks benchmark eval paper schema clean
 
 help:
 	@grep -E '^# make' Makefile | cut -c3-
@@ -34,6 +34,14 @@ types: $(STAMP)
 
 test: lint types
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -m "not clients"
+
+# make quick: the tests that answer within a minute, without lint and types.
+quick: $(STAMP)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -m "not clients" --quick -q
+
+# make mutants GROUP=rules: which faults the tests of a group notice (rules, graph, stage, edit, folder, layers).
+mutants: $(STAMP)
+	$(BIN)/python tests/mutants.py $(GROUP)
 
 # make clients: opens generated rooms in Blender, three.js, simulators, validators and older OpenUSDs.
 clients: $(STAMP)
