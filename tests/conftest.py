@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -12,6 +13,18 @@ from hypothesis import HealthCheck, settings
 # Busy machines draw examples slowly, which says nothing about the code.
 settings.register_profile("project", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("project")
+
+
+SLOW = frozenset(Path(__file__).with_name("slow.txt").read_text("utf-8").split())  # files that `make quick` leaves out
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--quick", action="store_true", help="leave out the files that tests/slow.txt names")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    slow = collection_path.is_file() and collection_path.relative_to(Path(__file__).parent).as_posix() in SLOW
+    return True if slow and config.getoption("--quick") else None
 
 
 @pytest.fixture(autouse=True)
