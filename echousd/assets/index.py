@@ -11,6 +11,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import groupby
 from multiprocessing import get_context
@@ -25,7 +26,7 @@ from echousd.assets.colors import swatches
 from echousd.assets.describe import PLACEMENT, described, left_out, relative, stamp
 from echousd.assets.model_file import STAGES
 from echousd.assets.record import AssetRecord, vector
-from echousd.assets.table import arrow, read_library, write_library
+from echousd.assets.table import OldIndex, arrow, read_library, write_library
 from echousd.stage.apart import fatal
 
 PACK = 8  # models that a worker reads in one go
@@ -80,8 +81,11 @@ def index(
         why = f" ({said[0]})" if said else ""
         raise ValueError(f"{where}: holds no models; allowed: {kinds}{why}")
     wishes = read_corrections(table) if table is not None and table.exists() else {}
-    old_index = read_library(file) if file.exists() else None
-    before = old_index.records if old_index is not None and old_index.complete else {}
+    before: Mapping[str, AssetRecord] = {}
+    if file.exists():
+        with suppress(OldIndex):
+            old_index = read_library(file)
+            before = old_index.records if old_index.complete else {}
     done: dict[str, AssetRecord] = {}
     fresh: list[Entry] = []
     for entry in entries:

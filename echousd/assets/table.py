@@ -102,6 +102,10 @@ def write_library(file: Path, records: Iterable[AssetRecord], about: Mapping[str
         raise ValueError(f"{file}: cannot be written ({error.strerror or error})") from None
 
 
+class OldIndex(ValueError):
+    """An index of ours that this version does not read: whoever indexes its folders again makes it anew."""
+
+
 def read_library(file: str | os.PathLike[str]) -> Library:
     """The library whose index is `file`, kept while that does not change; raises ValueError for any other file."""
     file = Path(file)
@@ -120,6 +124,8 @@ def _read(file: Path, changed: int) -> Library:
             raise ValueError(f"{size} bytes when unpacked, allowed: {LARGEST}")
         with within_memory(file):
             return _library(file, pa.parquet.read_table(file))
+    except OldIndex:
+        raise
     except (pa.ArrowException, OSError, ValueError) as error:  # words that are no UTF-8, too
         reason = str(error).splitlines()[0]
         told = reason if reason.startswith(f"{file}: ") else f"{file}: cannot be read as an index ({reason:.120})"
@@ -131,12 +137,13 @@ def _library(file: Path, table: Any) -> Library:
     version = about.get("version") if isinstance(about, dict) else None
     absent = () if version == VERSION else OLDER.get(version) if isinstance(version, int) else None
     if absent is None:
-        version = "none" if version is None else version
-        raise ValueError(f"{file}: version {version} of an index of assets, allowed: {VERSION}; index the folder again")
+        told = f"version {'none' if version is None else version} of an index of assets, allowed: {VERSION}"
+        kind = OldIndex if isinstance(version, int) else ValueError
+        raise kind(f"{file}: {told}; index the folder again")
     wanted = [column for column in _schema() if column.name not in absent]
     wrong = [f.name for f in wanted if f.name not in table.schema.names or table.schema.field(f.name).type != f.type]
     if wrong:
-        raise ValueError(f"{file}: columns {', '.join(wrong)} are missing or of another type; index the folder again")
+        raise OldIndex(f"{file}: columns {', '.join(wrong)} are missing or of another type; index the folder again")
     records: dict[str, AssetRecord] = {}
     for row in table.select([column.name for column in wanted]).to_pylist():
         empty = [name for name, value in row.items() if value is None or (isinstance(value, list) and None in value)]

@@ -95,3 +95,5 @@ def test_an_index_without_colors_is_still_one_and_is_read_anew(tmp_path, monkeyp
     table._read.cache_clear()
     with pytest.raises(ValueError, match="version 2 of an index of assets, allowed: 3; index the folder again"):
         read_library(done.file)
+    assert index([tmp_path / "models"], done.file).read == 1
+    assert read_library(done.file).records == records
