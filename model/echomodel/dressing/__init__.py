@@ -1,12 +1,15 @@
 """Small things that make a room look lived in: what there is, what it is called, and programs that build it of solids.
 
-One row per kind; the words stand beside the furniture's vocabulary, because no graph and no weights know them.
+One row per kind (`things.toml`); the words stand beside the furniture's vocabulary, because no graph and no weights
+know them.
 """
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib import resources
 
 import numpy as np
 
@@ -41,63 +44,18 @@ class Kind:
     faces: int = 1200
 
 
-KINDS: dict[str, Kind] = {
-    kind.program.__name__: kind
-    for kind in (
-        Kind("rug", "rug", textiles.rug, (1.2, 0.012, 0.8), (3.5, 0.012, 2.5), True, True),
-        Kind("rug", "rug", textiles.round_rug, (1.2, 0.012, 1.2), (2.6, 0.012, 2.6), True, True),
-        Kind("curtain", "curtain", textiles.curtain, (0.3, 1.2, 0.09), (0.8, 2.6, 0.09), True, yields=True),
-        *(
-            Kind("curtain", "curtain", program, (0.3, 1.2, 0.09), (0.8, 2.6, 0.09), True, yields=True)
-            for program in (textiles.eyelet_curtain, textiles.pleated_curtain, textiles.sheer_curtain)
-        ),
-        Kind("blind", "blind", textiles.roman_blind, (0.5, 0.3, 0.016), (2.0, 0.8, 0.016), True),
-        Kind("blind", "blind", textiles.blind, (0.5, 0.2, 0.016), (2.0, 0.8, 0.016), True),
-        Kind("cushion", "cushion", textiles.cushion, (0.38, 0.36, 0.13), (0.46, 0.42, 0.16), faces=400),
-        Kind("throw", "blanket", textiles.throw, (1.0, 0.2, 0.4), (2.0, 0.3, 0.7), True, True),
-        Kind("folded_blanket", "blanket", textiles.folded_throw, (0.34, 0.05, 0.3), (0.42, 0.07, 0.36), faces=400),
-        Kind("books", "book", books.book_row, (0.16, 0.19, 0.14), (0.5, 0.27, 0.2), faces=1600),
-        Kind("book", "book", books.book, (0.018, 0.19, 0.13), (0.038, 0.25, 0.16)),
-        Kind("books", "book", books.book_stack, (0.2, 0.06, 0.15), (0.28, 0.12, 0.2)),
-        Kind("magazine", "book", books.magazine, (0.21, 0.008, 0.28), (0.23, 0.01, 0.3)),
-        Kind("notebook", "book", books.notebook, (0.15, 0.018, 0.21), (0.17, 0.022, 0.23)),
-        Kind("vase", "vase", vessels.vase, (0.1, 0.18, 0.1), (0.18, 0.34, 0.18)),
-        Kind("flowers", "flower", vessels.flowers, (0.22, 0.34, 0.22), (0.3, 0.46, 0.3), faces=2600),
-        Kind("small_plant", "plant", vessels.small_plant, (0.18, 0.2, 0.18), (0.3, 0.34, 0.3)),
-        Kind("bowl", "pot", vessels.bowl, (0.2, 0.08, 0.2), (0.3, 0.13, 0.3)),
-        Kind("candles", "light", vessels.candles, (0.13, 0.1, 0.07), (0.2, 0.18, 0.08)),
-        Kind("cup", "glass", vessels.cup, (0.115, 0.09, 0.085), (0.125, 0.1, 0.09)),
-        Kind("plate", "plate", vessels.plate, (0.25, 0.022, 0.25), (0.27, 0.024, 0.27)),
-        Kind("glass", "glass", vessels.glass, (0.07, 0.1, 0.07), (0.08, 0.13, 0.08)),
-        Kind("tray", "tray", vessels.tray, (0.34, 0.03, 0.24), (0.44, 0.04, 0.3)),
-        Kind("plates", "plate", vessels.plates, (0.2, 0.06, 0.2), (0.26, 0.12, 0.26)),
-        Kind("bottles", "bottle", vessels.bottles, (0.17, 0.2, 0.07), (0.24, 0.3, 0.08)),
-        Kind("ball", "ball", vessels.toy_ball, (0.16, 0.16, 0.16), (0.24, 0.24, 0.24), faces=600),
-        Kind("blocks", "plaything", vessels.blocks, (0.2, 0.13, 0.065), (0.26, 0.17, 0.085), faces=400),
-        Kind("bear", "plaything", vessels.bear, (0.2, 0.26, 0.17), (0.26, 0.34, 0.22)),
-        Kind("towel", "towel", textiles.towel, (0.36, 0.4, 0.05), (0.48, 0.6, 0.06), True),
-        Kind("basket", "basket", vessels.basket, (0.36, 0.36, 0.36), (0.46, 0.48, 0.46)),
-        Kind("picture", "painting", household.picture, (0.3, 0.4, 0.03), (1.2, 0.9, 0.03), True),
-        Kind("mirror", "mirror", household.mirror, (0.5, 0.7, 0.03), (0.7, 1.1, 0.03), True),
-        Kind("mirror", "mirror", household.round_mirror, (0.5, 0.5, 0.03), (0.8, 0.8, 0.03), True),
-        Kind("wall_clock", "clock", household.wall_clock, (0.26, 0.26, 0.04), (0.36, 0.36, 0.04), True),
-        Kind("wall_shelf", "shelf", household.wall_shelf, (0.7, 0.12, 0.2), (1.1, 0.12, 0.22), True),
-        Kind("coats", "apparel", household.coats, (0.5, 0.95, 0.17), (0.64, 1.05, 0.19), True),
-        Kind("mirror", "mirror", household.tall_mirror, (0.44, 1.4, 0.03), (0.55, 1.6, 0.03), True),
-        Kind("photo", "painting", household.photo, (0.13, 0.18, 0.09), (0.18, 0.24, 0.1)),
-        Kind("clock", "clock", household.clock, (0.1, 0.1, 0.05), (0.13, 0.13, 0.05)),
-        Kind("laptop", "computer", household.laptop, (0.32, 0.22, 0.28), (0.36, 0.24, 0.3)),
-        Kind("pens", "pot", household.pens, (0.08, 0.17, 0.08), (0.09, 0.19, 0.09)),
-        Kind("remote", "box", household.remote, (0.045, 0.018, 0.17), (0.05, 0.02, 0.2)),
-        Kind("television", "television receiver", household.television, (0.6, 0.39, 0.18), (0.95, 0.58, 0.22)),
-        Kind("slippers", "apparel", vessels.slippers, (0.22, 0.07, 0.26), (0.24, 0.08, 0.28)),
-        Kind("floor_plant", "plant", vessels.floor_plant, (0.42, 0.85, 0.42), (0.58, 1.35, 0.58), faces=2600),
-        Kind("floor_vase", "vase", vessels.floor_vase, (0.24, 0.8, 0.24), (0.32, 1.1, 0.32)),
-        Kind("pouf", "ottoman", vessels.pouf, (0.42, 0.34, 0.42), (0.52, 0.42, 0.52)),
-        Kind("cable", "lamp", vessels.cable, (0.05, 0.008, 0.3), (0.12, 0.008, 2.4), True, True),
-        Kind("shoes", "apparel", household.shoes, (0.24, 0.1, 0.27), (0.27, 0.12, 0.31)),
-    )
-}
+def _kinds() -> dict[str, Kind]:
+    """The rows of `things.toml` by the names of their programs."""
+    programs = {"books": books, "household": household, "textiles": textiles, "vessels": vessels}
+    rows = tomllib.loads(resources.files(__name__).joinpath("things.toml").read_text("utf-8"))
+    made = {}
+    for name, row in rows.items():
+        program = getattr(programs[row.pop("module")], name)
+        made[name] = Kind(program=program, low=tuple(row.pop("low")), high=tuple(row.pop("high")), **row)
+    return made
+
+
+KINDS: dict[str, Kind] = _kinds()
 
 
 def _category(name: str) -> Kind:
