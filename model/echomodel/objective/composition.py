@@ -195,14 +195,15 @@ def chairs_at_sides(plan: Plan) -> Found:
 
 
 def bench_fits(plan: Plan) -> Found:
-    """A bench stands along a side of its table that is as long as it."""
+    """A bench stands along a side of its table that is as long as it, with no end to it."""
     seats = seats_at(plan)
     if seats is None:
         return nobody(plan.size)
     half_width, half_depth = plan.reach(seats.i, seats.j)
     own = 2 * torch.where(seats.ahead, half_width, half_depth)
-    beyond = own - torch.where(seats.ahead, plan.size[seats.j, 0], plan.size[seats.j, 2])
-    return found(seats.i, BEYOND - beyond, other=seats.j, measure=beyond)
+    side = torch.where(seats.ahead, plan.size[seats.j, 0], plan.size[seats.j, 2])
+    least, which = torch.stack([own - side, plan.size[seats.i, 0] - own], -1).max(-1)
+    return found(seats.i, BEYOND - least, other=seats.j, measure=least, words=which)
 
 
 def _free_beside(plan: Plan, who: Tensor) -> Tensor:

@@ -159,12 +159,14 @@ def test_no_table_goes_without_a_chair_while_another_has_two():
     assert seen(composition.each_served, [tables[0], coffee, *chairs])[0] == {}
 
 
-@pytest.mark.parametrize(("length", "margin"), [(0.8, 0.2), (1.2, -0.2)])
+@pytest.mark.parametrize(("length", "margin"), [(0.8, 0.1), (1.2, -0.2)])
 def test_no_bench_lies_across_the_end_of_its_table(length, margin):
     bench = ("bench", (length, 0.45, 0.4), (0.95, 0.0), -HALF)
     assert seen(composition.bench_fits, [*seated(), bench])[0] == {1: pytest.approx(margin)}
     along = ("bench", (length, 0.45, 0.4), (0.0, 0.75), np.pi)
     assert seen(composition.bench_fits, [*seated(), along])[0][1] > 0
+    end_on = ("bench", (length, 0.45, 0.4), (0.0, 0.45 + length / 2), HALF)
+    assert seen(composition.bench_fits, [*seated(), end_on])[0] == {1: pytest.approx(0.5 - length)}
 
 
 @pytest.mark.parametrize(("back", "margin"), [(0.05, 0.1), (0.35, -0.2)])
