@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.rules.placements import Stated, placement, placement_margins
+from echomodel.rules.placements import Stated, placement_margins
 
 FLOOR = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
 NOTCHED = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 0.0), (0.0, 0.0), (0.0, 2.0), (-2.0, 2.0)])
@@ -62,8 +62,3 @@ def test_margins_have_gradients_that_lead_there():
     boxes = Boxes(size, position, torch.zeros(1, dtype=torch.float64))
     (slope,) = torch.autograd.grad(placement_margins(boxes, [Stated("in_corner", 0)], FLOOR, ["plant"]).sum(), position)
     assert float(slope.abs().sum()) > 0.5
-
-
-def test_a_placement_has_one_rule():
-    with pytest.raises(ValueError, match="placement 'between' has a rule already"):
-        placement("between")(lambda *_: torch.zeros(1))

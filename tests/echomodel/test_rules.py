@@ -142,8 +142,6 @@ def test_symmetry_is_about_the_axes_of_the_rooms_centre():
     assert verdicts(boxes, triplets, center=torch.tensor([5.0, 0.0])).tolist() == [1, 0]
     assert verdicts(boxes, triplets, center=torch.tensor([5.0, 0.0]), rules="sgfront").tolist() == [1, 1]
     assert verdicts(boxes, triplets).tolist() == [0, 0]
-    with pytest.raises(ValueError, match="center has 2 rows but scene is missing"):
-        margins(boxes, triplets, center=torch.zeros(2, 2))
 
 
 def test_scene_batches_equal_single_scenes():
@@ -151,12 +149,9 @@ def test_scene_batches_equal_single_scenes():
     both = SimpleNamespace(**{k: torch.cat([getattr(one, k), getattr(two, k)]) for k in ("size", "position", "yaw")})
     triplets = [all_triplets(7, range(1, 13)), all_triplets(5, range(1, 13))]
     joined = torch.cat([triplets[0], triplets[1] + torch.tensor([7, 0, 7])])
-    center = torch.tensor([[0.3, -0.2], [1.0, 0.5]], dtype=torch.float64)
-    scene = torch.tensor([0] * 7 + [1] * 5)
     for rules in ("strict", "sgfront"):
-        got = margins(both, joined, rules=rules, scene=scene, center=center)
-        single = [margins(b, t, rules=rules, center=c) for b, t, c in zip((one, two), triplets, center, strict=True)]
-        assert torch.equal(got, torch.cat(single))
+        single = [margins(b, t, rules=rules) for b, t in zip((one, two), triplets, strict=True)]
+        assert torch.equal(margins(both, joined, rules=rules), torch.cat(single))
 
 
 @pytest.mark.parametrize("rules", ["strict", "sgfront"])

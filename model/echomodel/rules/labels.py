@@ -9,10 +9,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from echomodel.boxes import Boxes
 from echomodel.boxes2d import axes, hull, seen
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.geometry import TINY, PairGeometry, pairs
-from echomodel.rules.margins import _Tensors, fronts
+from echomodel.rules.margins import fronts, tensors
 from echomodel.rules.sets import LOOK, RuleSet, rule, rule_set
 from echomodel.vocabulary import vocabulary
 
@@ -74,7 +75,7 @@ def _label(rooms: Sequence[RoomBoxes], starts: np.ndarray, rules: RuleSet, headi
     subject, object_ = _ordered_pairs(starts)
     if not len(subject):
         return np.zeros((0, 3), np.int64)
-    boxes = _Tensors(_Joined(rooms), torch.float64)
+    boxes = Boxes.cat([tensors(room, torch.float64) for room in rooms])
     centre = torch.from_numpy(np.concatenate([_centres(room) for room in rooms]))
     headed = fronts(word for room in rooms for word in room.categories) if headings else None
     pair = pairs(
@@ -91,15 +92,6 @@ def _label(rooms: Sequence[RoomBoxes], starts: np.ndarray, rules: RuleSet, headi
     ]
     edges = np.concatenate(kept).astype(np.int64)
     return edges[np.lexsort((edges[:, 1], edges[:, 2], edges[:, 0]))]
-
-
-class _Joined:
-    """The boxes of several rooms one after the other."""
-
-    def __init__(self, rooms: Sequence[RoomBoxes]) -> None:
-        self.size = np.concatenate([room.size.reshape(-1, 3) for room in rooms])
-        self.position = np.concatenate([room.position.reshape(-1, 3) for room in rooms])
-        self.yaw = np.concatenate([room.yaw.reshape(-1) for room in rooms])
 
 
 def _ordered_pairs(starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -2,33 +2,24 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import torch
 from torch import Tensor
 
+from echomodel.boxes import Boxes
 from echomodel.rules.geometry import BoxesLike, PairGeometry, pairs
 from echomodel.rules.sets import RuleSet, rule_set
 from echomodel.vocabulary import vocabulary
 
 
-class _Tensors:
+def tensors(boxes: BoxesLike, dtype: torch.dtype | None = None) -> Boxes:
     """Boxes as floating-point tensors of one kind."""
-
-    def __init__(self, boxes: BoxesLike, dtype: torch.dtype | None = None) -> None:
-        size = torch.as_tensor(boxes.size)
-        kind = dtype or (size.dtype if size.is_floating_point() else torch.float32)
-        self.size = size.to(kind)
-        self.position = torch.as_tensor(boxes.position).to(self.size)
-        self.yaw = torch.as_tensor(boxes.yaw).to(self.size)
-
-    def of_fixed_size(self) -> _Tensors:
-        """The same boxes, through whose sizes no gradient passes."""
-        fixed = copy.copy(self)
-        fixed.size = self.size.detach()
-        return fixed
+    size = torch.as_tensor(boxes.size)
+    size = size.to(dtype or (size.dtype if size.is_floating_point() else torch.float32))
+    return Boxes(size, torch.as_tensor(boxes.position).to(size), torch.as_tensor(boxes.yaw).to(size))
 
 
 def measured(rules: str = "strict") -> frozenset[int]:
@@ -41,7 +32,6 @@ def margins(
     triplets: Tensor,
     *,
     rules: str = "strict",
-    scene: Tensor | None = None,
     center: Tensor | None = None,
     fronts: Tensor | None = None,
     rigid: bool = False,
@@ -52,8 +42,7 @@ def margins(
         boxes: N boxes, `size (N, 3)` and `position (N, 3)` in metres, `yaw (N,)` in radians, float tensors or arrays.
         triplets: (E, 3) int64 [subject, predicate id, object], indices into the boxes.
         rules: `strict` or `sgfront`.
-        scene: (N,) int64, scene of each node; needed where `center` holds several rows.
-        center: (2,) or (S, 2) float, x and z of the rooms' centres; default the origin. Only `symmetrical_to` asks.
+        center: (2,) float, x and z of the room's centre; default the origin. Only `symmetrical_to` asks.
         fronts: (N,) bool, boxes that have a front (`echomodel.rules.fronts`), whose headings `symmetrical_to` measures
             in the set `strict`, too; None = none.
         rigid: relations of place have no gradient in the sizes: furniture moves aside, it does not shrink.
@@ -61,12 +50,30 @@ def margins(
     Returns (E,) float, in metres (sides, close by, standing on, above, symmetrical to) or as a ratio (sizes, overlap);
     0 where the rules do not measure the predicate. Never NaN or infinite for finite boxes.
     """
-    return _margins(_Tensors(boxes), triplets, rule_set(rules), scene, center, fronts, rigid)
+    own = tensors(boxes)
+    triplets = torch.as_tensor(triplets, device=own.size.device)
+    centre = torch.zeros_like(own.position)
+    if center is not None:
+        centre[:, [0, 2]] = torch.as_tensor(center).to(centre)
+    out = own.size.new_zeros(len(triplets))
+    headed = None if fronts is None else torch.as_tensor(fronts, device=own.size.device)
+    placed = replace(own, size=own.size.detach()) if rigid else own
+    words, told, chosen = vocabulary().predicates, triplets[:, 1], rule_set(rules)
+    there = {words[number].name: words[number] for number in sorted(set(told.tolist())) if 0 <= number < len(words)}
+    for name, rule in chosen.rules.items():  # in their order, so that gradients add up in one
+        if name in there and rule.margin is not None:
+            rows = (told == there[name].id).nonzero()[:, 0]
+            of = own if there[name].measures == "size" else placed  # all others are of place
+            ends = triplets[rows, 0], triplets[rows, 2]
+            pair = pairs(of, *ends, centre, oriented=chosen.oriented, fronts=headed)
+            out = out.index_copy(0, rows, rule.margin(pair))
+    return out
 
 
 def fronts(categories: Iterable[str]) -> Tensor:
     """(N,) bool, which of the categories have a front; words that the vocabulary does not hold have none."""
-    return torch.tensor([_has_front(word) for word in categories], dtype=torch.bool)
+    rows = (vocabulary().known_category(word) for word in categories)
+    return torch.tensor([row is not None and row.front for row in rows], dtype=torch.bool)
 
 
 def verdicts(boxes: BoxesLike, triplets: Tensor, *, rules: str = "strict", **about: Any) -> Tensor:
@@ -74,7 +81,7 @@ def verdicts(boxes: BoxesLike, triplets: Tensor, *, rules: str = "strict", **abo
     chosen = rule_set(rules)
     triplets = torch.as_tensor(triplets)
     with torch.no_grad():
-        margin = _margins(_Tensors(boxes, torch.float64), triplets, chosen, **about)
+        margin = margins(tensors(boxes, torch.float64), triplets, rules=rules, **about)
     predicate = triplets[:, 1]
     kept = torch.where(_among(predicate, chosen.open), margin > 0, margin >= 0)
     unmeasured = torch.full_like(kept, -1, dtype=torch.int8)
@@ -92,50 +99,6 @@ def pair_margins(pair: PairGeometry, predicate: Tensor, rules: RuleSet) -> Tenso
         if rule is not None and rule.margin is not None:
             out = torch.where(predicate == number, rule.margin(pair), out)
     return out
-
-
-def _margins(
-    boxes: _Tensors,
-    triplets: Tensor,
-    rules: RuleSet,
-    scene: Tensor | None = None,
-    center: Tensor | None = None,
-    fronts: Tensor | None = None,
-    rigid: bool = False,
-) -> Tensor:
-    triplets = torch.as_tensor(triplets, device=boxes.size.device)
-    centre = node_centres(boxes.position, scene, center)
-    out = boxes.size.new_zeros(len(triplets))
-    headed = None if fronts is None else torch.as_tensor(fronts, device=boxes.size.device)
-    placed = boxes.of_fixed_size() if rigid else boxes
-    words, told = vocabulary().predicates, triplets[:, 1]
-    there = {words[number].name: words[number] for number in sorted(set(told.tolist())) if 0 <= number < len(words)}
-    for name, rule in rules.rules.items():  # in their order, so that gradients add up in one
-        if name in there and rule.margin is not None:
-            chosen = (told == there[name].id).nonzero()[:, 0]
-            subject, object_ = triplets[chosen, 0], triplets[chosen, 2]
-            of = boxes if there[name].measures == "size" else placed  # all others are of place
-            pair = pairs(of, subject, object_, centre, oriented=rules.oriented, fronts=headed)
-            out = out.index_copy(0, chosen, rule.margin(pair))
-    return out
-
-
-def node_centres(position: Tensor, scene: Tensor | None, center: Tensor | None) -> Tensor:
-    """(N, 3) centre of each node's room from `center` (2,) or (S, 2) and `scene` (N,); zeros where not given."""
-    out = torch.zeros_like(position)
-    if center is not None:
-        plan = torch.as_tensor(center).to(position)
-        if plan.ndim == 2:
-            if scene is None and len(plan) > 1:
-                raise ValueError(f"center has {len(plan)} rows but scene is missing: give the scene of each node")
-            plan = plan[0] if scene is None else plan[torch.as_tensor(scene)]
-        out[:, [0, 2]] = plan.expand(len(position), 2)
-    return out
-
-
-def _has_front(word: str) -> bool:
-    row = vocabulary().known_category(word)
-    return row is not None and row.front
 
 
 def _among(predicate: Tensor, ids: frozenset[int]) -> Tensor:

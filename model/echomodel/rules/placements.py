@@ -5,7 +5,6 @@ As relations beyond SG-FRONT they are measured, guided to, placed and checked; t
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
@@ -74,13 +73,6 @@ class Walls:
         before = self.along.roll(1, 0)
         self.inner = sign * (before[:, 0] * self.along[:, 1] - before[:, 1] * self.along[:, 0]) > 0.1
 
-    def to(self, device: torch.device | str) -> Walls:
-        """The same walls on another device."""
-        moved = copy.copy(self)
-        for name, values in vars(self).items():
-            setattr(moved, name, values.to(device))
-        return moved
-
     def away(self, points: Tensor) -> Tensor:
         """(..., E) distance of points (..., 2) from the line of every wall, inwards positive."""
         return ((points[..., None, :] - self.start) * self.normal).sum(-1)
@@ -92,22 +84,8 @@ class Walls:
 
 
 Measure = Callable[[Spread, Sequence[Spread], Walls, Category], Tensor]
-RULES: dict[str, Measure] = {}
 
 
-def placement(name: str) -> Callable[[Measure], Measure]:
-    """Decorator that registers a margin as what a placement of the vocabulary means; raises ValueError for two."""
-
-    def register(measure: Measure) -> Measure:
-        if name in RULES:
-            raise ValueError(f"placement {name!r} has a rule already")
-        RULES[name] = measure
-        return measure
-
-    return register
-
-
-@placement("against_wall")
 def against_wall(own: Spread, others: Sequence[Spread], walls: Walls, kind: Category) -> Tensor:
     """The back stands against a wall; of beds and of what has no front any side but the front."""
     away = walls.away(own.corners).abs()  # (K, 4, E)
@@ -118,7 +96,6 @@ def against_wall(own: Spread, others: Sequence[Spread], walls: Walls, kind: Cate
     return torch.minimum(AT_WALL - gap, walls.beside(own.centre)).amax(-1)
 
 
-@placement("in_corner")
 def in_corner(own: Spread, others: Sequence[Spread], walls: Walls, kind: Category) -> Tensor:
     """Both walls of one of the room's corners are near."""
     gap = walls.away(own.corners).amin(1).abs()  # (K, E)
@@ -129,7 +106,6 @@ def in_corner(own: Spread, others: Sequence[Spread], walls: Walls, kind: Categor
     return both[:, walls.inner].amax(-1)
 
 
-@placement("between")
 def between(own: Spread, others: Sequence[Spread], walls: Walls | None, kind: Category) -> Tensor:
     """The centre lies in the space that the two others span (the hull of their footprints), and in neither of them."""
     angle = torch.arange(DIRECTIONS, dtype=own.position.dtype) * (2 * torch.pi / DIRECTIONS)
@@ -140,6 +116,10 @@ def between(own: Spread, others: Sequence[Spread], walls: Walls | None, kind: Ca
         (seen(own.centre - other.centre, other.yaw).abs() - other.size[:, [0, 2]] / 2).amax(-1) for other in others
     ]
     return reduce(torch.minimum, [inside, *clear])
+
+
+# a placement of the vocabulary -> what it means
+RULES: dict[str, Measure] = {"against_wall": against_wall, "in_corner": in_corner, "between": between}
 
 
 def placement_margins(
