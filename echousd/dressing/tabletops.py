@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import resources
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -122,83 +125,33 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
     return np.array([*lines, *areas], object)
 
 
-Places = Sequence[tuple[float, float]]
-ENDS: Places = ((-0.85, 0.0), (0.85, 0.0), (-0.6, 0.0), (0.6, 0.0), (0.0, 0.0))
-OTHER: Places = tuple((-x, z) for x, z in ENDS)
-BACK: Places = ((-0.8, -0.6), (0.8, -0.6), (-0.4, -0.6), (0.4, -0.6), (0.0, -0.6))
-FRONT: Places = ((0.5, 0.6), (-0.5, 0.6), (0.0, 0.7), (0.7, 0.2), (-0.7, 0.2), (0.0, 0.0))
-MIDDLE: Places = ((0.0, 0.0), (0.35, 0.0), (-0.35, 0.0), (0.6, 0.3), (-0.6, -0.3))
-CORNERS: Places = ((0.9, -0.8), (-0.9, -0.8), (0.9, 0.8), (-0.9, 0.8), (0.0, -0.8))
 BETWEEN = 0.002  # metres from book to book
 EYE = 1.7  # metres: what is put higher cannot be seen
-
-# What is put on a top, by what a row calls `top`: kinds of which one is taken, places, and whether only in full rooms.
 CASES = ("cabinet", "shelf")  # looks of what books and baskets stand in and on: no cistern, no fridge
-TOPS: dict[str, tuple[tuple[tuple[str, ...], Places, bool], ...]] = {
-    "nightstand": (
-        (("book_stack", "cup", "small_plant"), FRONT, False),
-        (("clock", "candles", "photo"), BACK, False),
-        (("glass",), FRONT, True),
-        (("photo", "small_plant", "vase"), BACK, True),
-        (("notebook",), FRONT, True),
-    ),
-    "coffee_table": (
-        (("bowl", "flowers", "tray", "small_plant"), ((-0.35, 0.0), *MIDDLE), False),
-        (("book_stack", "magazine"), ((0.6, 0.2), *ENDS), False),
-        (("remote",), ((0.2, 0.8), *FRONT), False),
-        (("candles",), OTHER, True),
-        (("cup",), ((-0.2, 0.8), *FRONT), True),
-        (("cup",), ((0.5, -0.8), *BACK), True),
-        (("magazine",), CORNERS, True),
-    ),
-    "side_table": (
-        (("flowers", "small_plant", "vase", "book_stack"), ((-0.2, -0.2), *MIDDLE), False),
-        (("cup", "candles"), FRONT, False),
-        (("book_stack", "photo"), CORNERS, True),
-        (("glass",), FRONT, True),
-    ),
-    "desk": (
-        (("laptop",), ((0.0, 0.0), (0.0, 0.2), (-0.3, 0.0), (0.3, 0.0)), False),
-        (("cup",), ((0.62, 0.2), (-0.62, 0.2), (0.8, 0.6)), False),
-        (("pens",), CORNERS, False),
-        (("notebook",), ((-0.62, 0.5), (0.62, 0.5), *FRONT), False),
-        (("small_plant",), ((-0.95, -0.9), *CORNERS), True),
-        (("book_stack",), ((0.95, -0.6), *CORNERS), True),
-        (("photo",), BACK, True),
-    ),
-    "dressing_table": (
-        (("vase", "flowers"), CORNERS, False),
-        (("candles", "tray"), BACK, False),
-        (("photo",), CORNERS, True),
-        (("cup", "clock"), FRONT, True),
-    ),
-    "worktop": (
-        (("bottles", "small_plant"), BACK, False),
-        (("bowl", "tray"), ENDS, False),
-        (("plates", "cup"), OTHER, False),
-        (("glass", "cup"), CORNERS, True),
-    ),
-    "kids_table": ((("blocks", "pens"), MIDDLE, False), (("notebook",), FRONT, False)),
-    "toy_box": ((("bear", "blocks"), MIDDLE, False),),
-    "hall": ((("bowl", "vase"), ENDS, False), (("photo", "small_plant"), OTHER, False)),
-    "washbasin": ((("bottles", "glass"), ((-0.85, -0.6), (0.85, -0.6)), False), (("candles",), CORNERS, True)),
-    "dining_table": ((("flowers", "bowl", "candles"), MIDDLE, False), (("candles",), ENDS, True)),
-    "sideboard": (
-        (("flowers", "vase"), ENDS, False),
-        (("book_stack", "bowl", "candles"), OTHER, False),
-        (("photo",), ((0.45, -0.4), (-0.45, -0.4), *BACK), False),
-        (("small_plant",), ((-0.35, 0.0), *MIDDLE), True),
-        (("candles", "clock"), MIDDLE, True),
-        (("tray", "bowl"), MIDDLE, True),
-        (("photo",), BACK, True),
-    ),
-    "tv_stand": (
-        (("small_plant", "vase"), ENDS, False),
-        (("book_stack", "candles"), OTHER, False),
-        (("remote",), FRONT, True),
-        (("photo",), ENDS, True),
-    ),
-}
+Places = Sequence[tuple[float, float]]
+
+
+class Wish(NamedTuple):
+    """A row of `tops.toml`."""
+
+    of: tuple[str, ...]
+    at: Places
+    full: bool
+
+
+def _tops() -> dict[str, list[Wish]]:
+    """What is put on a top, by what a row calls `top`."""
+    table = tomllib.loads(resources.files(__package__).joinpath("tops.toml").read_text("utf-8"))
+    named = table["places"]
+
+    def wish(row: dict[str, Any]) -> Wish:
+        spots = [spot for at in row["at"] for spot in (named[at] if isinstance(at, str) else [at])]
+        return Wish(tuple(row["of"]), spots, row.get("full", False))
+
+    return {top: [wish(row) for row in rows] for top, rows in table["tops"].items()}
+
+
+TOPS = _tops()
 WARE = ("plates", "bowl", "glass", "cup", "bottles")  # in kitchens
 LINEN = ("folded_throw", "basket", "bottles", "folded_throw")  # in baths and laundries
 BARE = ("coat_rack", "toy_box", "hall")  # tops whose shelves and seats hold no books
@@ -229,14 +182,14 @@ def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
     taken: set[str] = set()
     if name == "tv_stand" and not setting.of("screen"):
         _television(setting, host, surface)
-    for number, (kinds, places, only_full) in enumerate(TOPS[name]):
-        order = [str(k) for k in rng.permutation(kinds)]
+    for number, wish in enumerate(TOPS[name]):
+        order = [str(k) for k in rng.permutation(wish.of)]
         turn = float(rng.uniform(-0.12, 0.12))
-        if only_full and not setting.full:
+        if wish.full and not setting.full:
             continue
         for kind in [k for k in order if k not in taken] or order:
             straight = kind in ("laptop", "tray") or surface.area.area < 0.1
-            if surface.put(setting, kind, places, turn=0.0 if straight else turn, word=str(number)):
+            if surface.put(setting, kind, wish.at, turn=0.0 if straight else turn, word=str(number)):
                 taken.add(kind)
                 break
 
