@@ -8,8 +8,10 @@ A kind is told by one number per word, +1 for the one that holds; a proportion o
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import resources
 from itertools import accumulate
 from typing import Any, TypeVar
 
@@ -18,60 +20,9 @@ import numpy as np
 from echomodel.rows import RoomStyle
 from echomodel.sizes import Z95, size_statistics
 
-# Per family: how often each kind occurs. Missing kinds do not occur in that family.
-FAMILIES: dict[str, dict[str, dict[str, float]]] = {
-    "modern": {
-        "legs": {"straight": 3, "tapered": 2, "sled": 2, "plinth": 3, "hairpin": 1},
-        "profile": {"square": 3, "round": 2},
-        "back": {"panel": 3, "cushion": 3, "shell": 4, "frame": 1},
-        "arms": {"box": 4, "slim": 3, "shell": 2, "none": 1},
-        "headboard": {"panel": 4, "channels": 3, "low": 2, "cushions": 2},
-        "fronts": {"flat": 5, "recessed": 2, "open": 2},
-        "handles": {"none": 4, "bar": 3, "edge": 2},
-        "shade": {"drum": 3, "sphere": 3, "dome": 2, "cylinder": 2, "ring": 2},
-    },
-    "scandinavian": {
-        "legs": {"splayed": 5, "tapered": 4, "straight": 1},
-        "profile": {"round": 5, "square": 1},
-        "back": {"spindles": 3, "frame": 2, "shell": 4, "panel": 2, "rails": 2},
-        "arms": {"slim": 5, "none": 2, "box": 1},
-        "headboard": {"panel": 3, "slats": 3, "low": 2, "cushions": 1},
-        "fronts": {"flat": 5, "open": 3},
-        "handles": {"knob": 4, "none": 3, "edge": 1},
-        "shade": {"cone": 4, "dome": 3, "sphere": 2, "drum": 2},
-    },
-    "industrial": {
-        "legs": {"straight": 3, "sled": 4, "hairpin": 3, "trestle": 2},
-        "profile": {"square": 5, "round": 1},
-        "back": {"panel": 3, "rails": 4, "frame": 3},
-        "arms": {"slim": 4, "box": 2, "none": 2},
-        "headboard": {"slats": 4, "panel": 3, "low": 1},
-        "fronts": {"flat": 3, "open": 4},
-        "handles": {"bar": 4, "edge": 2, "none": 1},
-        "shade": {"dome": 4, "cone": 3, "cylinder": 2, "sphere": 1},
-    },
-    "classic": {
-        "legs": {"turned": 4, "tapered": 3, "bun": 2},
-        "profile": {"round": 3, "square": 2},
-        "back": {"frame": 3, "spindles": 2, "cushion": 3, "oval": 3},
-        "arms": {"rolled": 5, "box": 2, "slim": 1},
-        "headboard": {"arched": 4, "channels": 2, "panel": 2, "posts": 2},
-        "fronts": {"framed": 6, "flat": 1},
-        "handles": {"knob": 5, "bar": 2},
-        "shade": {"cone": 4, "drum": 2, "arms": 3},
-    },
-    "rustic": {
-        "legs": {"straight": 4, "trestle": 3, "plinth": 2, "bun": 1},
-        "profile": {"square": 5, "round": 1},
-        "back": {"rails": 4, "spindles": 2, "panel": 2},
-        "arms": {"box": 3, "rolled": 2, "slim": 1},
-        "headboard": {"slats": 3, "panel": 3, "posts": 3},
-        "fronts": {"framed": 5, "flat": 2, "open": 2},
-        "handles": {"knob": 4, "bar": 3},
-        "shade": {"cone": 3, "cylinder": 2, "arms": 2, "dome": 1},
-    },
-}
-
+_ROWS = tomllib.loads(resources.files(__package__).joinpath("families.toml").read_text("utf-8"))
+BUILD: dict[str, tuple[float, float]] = {name: (row.pop("bulk"), row.pop("soft")) for name, row in _ROWS.items()}
+FAMILIES: dict[str, dict[str, dict[str, float]]] = _ROWS  # per family and part: how often each kind occurs
 KINDS: dict[str, tuple[str, ...]] = {
     part: tuple(dict.fromkeys(kind for family in FAMILIES.values() for kind in family[part]))
     for part in FAMILIES["modern"]
@@ -132,8 +83,7 @@ class Style:
         """Draw a style: first a family, then its kinds and proportions."""
         family = str(rng.choice(list(FAMILIES)))
         kinds = {name: weighted(rng, odds) for name, odds in FAMILIES[family].items()}
-        slender = {"modern": 0.9, "scandinavian": 0.85, "industrial": 0.9, "classic": 1.1, "rustic": 1.3}[family]
-        soft = {"modern": 0.35, "scandinavian": 0.5, "industrial": 0.25, "classic": 0.7, "rustic": 0.45}[family]
+        slender, soft = BUILD[family]
         numbers = {name: float(rng.uniform(*ends)) for name, ends in DRAWN.items()}
         shift = tuple(rng.normal(0, 1, 3).tolist())
         numbers |= {name: float(rng.uniform(*ends)) for name, ends in DRAWN_LAST.items()}
