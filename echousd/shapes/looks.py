@@ -41,7 +41,7 @@ def look(palette: str, slot: str, voice: int = 0) -> Look:
     """
     harmony, made = HARMONIES[palette], SLOTS[slot]
     word = SECOND.get(made.color, made.color) if voice % 2 else made.color
-    color = mixed(getattr(harmony, word, word), *made.mix)
+    color = mixed(getattr(harmony, word, word), made.mix, made.share)
     emissive = (GLOW[0], GLOW[1], GLOW[2]) if slot == "shade" else (0.0, 0.0, 0.0)
     return Look(color, made.roughness, made.metallic, made.opacity, emissive, made.pattern, made.metres)
 

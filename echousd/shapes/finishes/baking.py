@@ -7,7 +7,6 @@ import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache, partial, wraps
-from pathlib import Path
 from typing import TypeVar, cast
 
 import numpy as np
@@ -19,7 +18,7 @@ from echomodel.files import cache_folder, digest
 from echousd.shapes.finishes import patterns
 from echousd.shapes.finishes.patterns import SIZE, Relief, noise
 from echousd.shapes.finishes.pictures import picture, woven
-from echousd.shapes.finishes.slots import HARMONIES, TABLE, Color, linear
+from echousd.shapes.finishes.slots import HARMONIES, HERE, Color, linear
 from echousd.srgb import from_linear
 
 Bake = TypeVar("Bake", bound=Callable[..., "bytes | None"])
@@ -73,7 +72,7 @@ def kept(bake: Bake) -> Bake:
 @cache
 def _code() -> str:
     """What decides on the bytes of an image besides its arguments: the programs here and the libraries."""
-    sources = [*sorted(Path(__file__).parent.glob("*.py")), TABLE, Path(__file__).parents[2] / "srgb.py"]
+    sources = [*sorted(HERE.glob("*.py")), *sorted(HERE.glob("*.toml")), HERE.parents[1] / "srgb.py"]
     return digest(b"".join([*(f.read_bytes() for f in sources), np.__version__.encode(), PIL.__version__.encode()]))
 
 
