@@ -183,17 +183,17 @@ class GraphBatch:
         categories, predicates, room_types = len(words.categories), len(words.predicates), len(words.room_types)
         if not self.num_nodes:
             raise ValueError("graph has no nodes, at least one is needed")
-        _within("category of node", self.category, categories)
-        _within("room type of scene", self.room_type, room_types)
-        _within("scene of node", self.scene, self.num_scenes)
+        within("category of node", self.category, categories)
+        within("room type of scene", self.room_type, room_types)
+        within("scene of node", self.scene, self.num_scenes)
         if bool((self.scene[1:] < self.scene[:-1]).any()):
             raise ValueError("GraphBatch.scene decreases: the nodes of a scene must stand together, in scene order")
-        _within("predicate of triplet", self.triplets[:, 1], predicates)
-        _within("subject of triplet", self.triplets[:, 0], self.num_nodes)
-        _within("object of triplet", self.triplets[:, 2], self.num_nodes)
-        _within("subject of placement", self.placements[:, 0], self.num_nodes)
-        _within("word of placement", self.placements[:, 1], len(words.placements))
-        _within("other object of placement", self.placements[:, 2:].clamp_min(0), self.num_nodes)
+        within("predicate of triplet", self.triplets[:, 1], predicates)
+        within("subject of triplet", self.triplets[:, 0], self.num_nodes)
+        within("object of triplet", self.triplets[:, 2], self.num_nodes)
+        within("subject of placement", self.placements[:, 0], self.num_nodes)
+        within("word of placement", self.placements[:, 1], len(words.placements))
+        within("other object of placement", self.placements[:, 2:].clamp_min(0), self.num_nodes)
         subject, target = self.triplets[:, 0], self.triplets[:, 2]
         for text, wrong in (
             ("relates a node to itself", subject == target),
@@ -225,7 +225,8 @@ def _there(rows: Tensor) -> Tensor:
     return rows[:, : int(torch.isfinite(rows[0, :, 0]).sum())]
 
 
-def _within(what: str, values: Tensor, size: int) -> None:
+def within(what: str, values: Tensor, size: int) -> None:
+    """Raises ValueError naming the first of `values` (n,) that lies outside 0..size-1."""
     wrong = (values < 0) | (values >= size)
     if bool(wrong.any()):
         at = int(wrong.nonzero()[0])

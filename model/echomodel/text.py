@@ -88,8 +88,6 @@ class ClipTextEncoder:
                 f"open_clip_torch is there and cannot be imported ({reason}); torch {torch.__version__} and "
                 "torchvision must be of one release and one source"
             ) from None
-        if self.weights != PUBLISHED_WEIGHTS and not Path(self.weights).is_file():
-            raise TextEncoderError(f"{self.weights}: no such weights file for the text encoder")
         try:
             return open_clip.create_model(PUBLISHED_MODEL, pretrained=self.weights).eval()
         except (OSError, RuntimeError, ValueError) as error:
@@ -107,17 +105,7 @@ class RandomTextEncoder:
     """
 
     def __init__(self, width: int = 512) -> None:
-        self._width = width
-
-    @property
-    def name(self) -> str:
-        """Kind and width."""
-        return f"random-{self._width}"
-
-    @property
-    def width(self) -> int:
-        """Length of the vectors."""
-        return self._width
+        self.name, self.width = f"random-{width}", width
 
     def __call__(self, texts: Sequence[str]) -> Tensor:
         """n texts -> (n, width) float32, each of about unit length."""
@@ -139,19 +127,9 @@ class CachedTextEncoder:
     """
 
     def __init__(self, encoder: TextEncoder, folder: str | os.PathLike[str] | None = None) -> None:
-        self.encoder = encoder
-        self.path = Path(folder or cache_folder()) / f"text-{encoder.name}.safetensors"
+        self.encoder, self.name, self.width = encoder, encoder.name, encoder.width
+        self.path = Path(folder or cache_folder()) / f"text-{self.name}.safetensors"
         self._known: dict[str, Tensor] | None = None
-
-    @property
-    def name(self) -> str:
-        """Name of the encoder behind."""
-        return self.encoder.name
-
-    @property
-    def width(self) -> int:
-        """Length of the vectors."""
-        return self.encoder.width
 
     def __call__(self, texts: Sequence[str]) -> Tensor:
         """n texts -> (n, width) float32; encodes and stores what is new."""
@@ -164,7 +142,9 @@ class CachedTextEncoder:
                 raise TextEncoderError(f"{self.name}: {tuple(features.shape)} for {len(new)} texts")
             # Another process may have written meanwhile: keep its texts too.
             self._known = {**self._read(), **self._known, **{t: f.clone() for t, f in zip(new, features, strict=True)}}
-            self._write(self._known)
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with whole_file(self.path) as beside:
+                save_file(self._known, beside)
         if not texts:
             return torch.zeros(0, self.width)
         return torch.stack([self._known[text] for text in texts])
@@ -175,11 +155,6 @@ class CachedTextEncoder:
         except (OSError, SafetensorError):
             return {}
         return {text: vector for text, vector in known.items() if tuple(vector.shape) == (self.width,)}
-
-    def _write(self, known: dict[str, Tensor]) -> None:
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(self.path) as beside:
-            save_file(known, beside)
 
 
 def encoder_named(name: str | None) -> TextEncoder:

@@ -9,6 +9,7 @@ from itertools import pairwise
 import torch
 from torch import Tensor, nn
 
+from echomodel.graph import within
 from echomodel.randomness import normal
 from echoscene.config import EncoderConfig
 
@@ -95,14 +96,6 @@ class TripletGCN(nn.Module):
         return x, e
 
 
-def check_range(name: str, values: Tensor, size: int) -> None:
-    """Raises ValueError naming the first of `values` (n,) that lies outside 0..size-1."""
-    wrong = (values < 0) | (values >= size)
-    if bool(wrong.any()):
-        at = int(wrong.nonzero()[0])
-        raise ValueError(f"{name} {at} is {int(values[at])}, allowed: 0..{size - 1}")
-
-
 @dataclass(frozen=True, eq=False)
 class SceneGraphTensors:
     """A labelled graph as the published model takes it.
@@ -129,10 +122,10 @@ class SceneGraphTensors:
         nodes = len(self.classes)
         if not nodes:
             raise ValueError("graph has no nodes, at least one is needed")
-        check_range("class of node", self.classes, config.classes)
-        check_range("subject of triplet", self.triples[:, 0], nodes)
-        check_range("predicate of triplet", self.triples[:, 1], config.predicates)
-        check_range("object of triplet", self.triples[:, 2], nodes)
+        within("class of node", self.classes, config.classes)
+        within("subject of triplet", self.triples[:, 0], nodes)
+        within("predicate of triplet", self.triples[:, 1], config.predicates)
+        within("object of triplet", self.triples[:, 2], nodes)
         for name, text, count in (("node", self.node_text, nodes), ("edge", self.edge_text, len(self.triples))):
             if text is None:
                 continue
