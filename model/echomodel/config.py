@@ -34,32 +34,42 @@ class LatentConfig:
 
 
 @dataclass(frozen=True)
-class LayoutConfig:
-    """Layout denoiser (EchoScene 3.3).
+class BranchConfig:
+    """What every branch has.
 
     Arguments:
-        width: channels of a node.
-        layers: echo layers.
-        drafts: how often the prediction so far is measured and told to the next layers.
-        measures: which set of measures that is: 2, with openings, headings and both ends of a pair.
-        echo: exchange information between the objects at every step (the ablation: off = every object alone).
-        frequencies: octaves of the Fourier features of the noisy box.
+        width: channels of a node or token.
+        layers: echo layers or transformer blocks.
+        echo: exchange information between the objects at every step (Table 4: off = every object alone).
         objective: what the network is trained to predict; `flow` is rectified flow.
         steps: default number of sampling steps.
         sampler: default sampler.
-        guidance: default of the first step of the guidance, metres and radians, 0 = off (see `echomodel.guidance`).
-        guidance_rounds: its steps per call of the denoiser in the last part of the sampling.
     """
 
     width: int = 192
     layers: int = 8
-    drafts: int = 3
-    measures: int = 2
     echo: bool = True
-    frequencies: int = 4
-    objective: Objective = "velocity"
+    objective: Objective = "flow"
     steps: int = 20
     sampler: Sampler = "ancestral"
+
+
+@dataclass(frozen=True)
+class LayoutConfig(BranchConfig):
+    """Layout denoiser (EchoScene 3.3).
+
+    Arguments:
+        drafts: how often the prediction so far is measured and told to the next layers.
+        measures: which set of measures that is: 2, with openings, headings and both ends of a pair.
+        frequencies: octaves of the Fourier features of the noisy box.
+        guidance: default of the first step of the guidance, metres and radians, 0 = off (see `echomodel.guidance`).
+        guidance_rounds: its steps per call of the denoiser in the last part of the sampling.
+    """
+
+    drafts: int = 3
+    measures: int = 2
+    frequencies: int = 4
+    objective: Objective = "velocity"
     guidance: float = 0.1
     guidance_rounds: int = 4
     GONE: ClassVar = ("start", "sides")  # files of before name them: beginning on an arrangement, hearing each wall
@@ -84,23 +94,19 @@ class AutoencoderConfig:
 
 
 @dataclass(frozen=True)
-class ShapeConfig:
+class ShapeConfig(BranchConfig):
     """Latent shape denoiser (EchoScene 3.4).
 
     Arguments:
-        width: channels of a token.
-        layers: transformer blocks.
         heads: attention heads.
         components: principal components of whole latents that the denoiser works in.
         tokens: tokens that share the components, the strongest first.
         echo_width: channels of a node in the shape echo.
         echo_layers: triplet-GCN layers of the shape echo.
-        echo: exchange information between the objects at every step (Table 4: off = no shape echo).
         echo_time: give the echo the noise level (Table 4: off = no time embedding).
         conditioning: how the echo reaches the tokens, `cross` attention or `concat` (Table 4).
         temperature: scale of the starting noise; below one, fewer stray pieces and less variety.
         candidates: draws per object, of which the most whole is kept.
-        objective, steps, sampler: as in `LayoutConfig`.
     """
 
     width: int = 256
@@ -110,30 +116,23 @@ class ShapeConfig:
     tokens: int = 4
     echo_width: int = 128
     echo_layers: int = 2
-    echo: bool = True
     echo_time: bool = True
     conditioning: Literal["cross", "concat"] = "cross"
-    objective: Objective = "flow"
     prediction: Prediction = "sample"
     temperature: float = 1.0
     candidates: int = 8
     steps: int = 10
-    sampler: Sampler = "ancestral"
 
 
 @dataclass(frozen=True)
-class FurnitureConfig:
-    """Denoiser of descriptions of furniture (`echomodel.furniture.style`).
+class FurnitureConfig(BranchConfig):
+    """Denoiser of descriptions of furniture (`echomodel.furniture.style`); the network says the clean description.
 
     Arguments:
         kinds: words of every kind that a description tells, in order.
         numbers: its proportions and open choices.
-        width: channels of a node.
-        layers: echo layers.
         voices: weighted means of the others' descriptions that a node hears at every step.
-        echo: exchange information between the objects at every step.
         temperature: scale of the starting noise.
-        objective, steps, sampler: as in `LayoutConfig`; the network says the clean description.
     """
 
     kinds: tuple[int, ...] = (5, 9, 2, 7, 5, 7, 4, 4, 7)
@@ -141,11 +140,8 @@ class FurnitureConfig:
     width: int = 160
     layers: int = 3
     voices: int = 4
-    echo: bool = True
     temperature: float = 1.0
-    objective: Objective = "flow"
     steps: int = 16
-    sampler: Sampler = "ancestral"
 
 
 def names_of(kind: str) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
@@ -12,9 +12,10 @@ from scipy import ndimage
 from torch import Tensor
 
 from echomodel.boxes import Boxes
+from echomodel.boxes2d import seen
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import Pairs, pairs_of
-from echomodel.config import Objective, Sampler
+from echomodel.config import BranchConfig, Sampler
 from echomodel.graph import GraphBatch
 from echomodel.guidance import AFTER, guided, mended, plan_of_graph
 from echomodel.protocols import GraphEdit, Sampling
@@ -108,9 +109,7 @@ def bearing(grids: Tensor, boxes: Boxes, triplets: Tensor) -> Tensor:
         gap = boxes.position[above, 1] - boxes.position[below, 1] - boxes.size[below, 1]
         if above == below or abs(float(gap)) > PLAY:
             continue
-        x, z = (boxes.position[above] - boxes.position[below])[[0, 2]].tolist()
-        sin, cos = float(boxes.yaw[below].sin()), float(boxes.yaw[below].cos())
-        place = np.array([cos * x - sin * z, sin * x + cos * z])
+        place = seen((boxes.position[above] - boxes.position[below])[[0, 2]], boxes.yaw[below]).cpu().numpy()
         extent = boxes.size[below][[0, 2]].cpu().numpy()
         foot = float(boxes.size[above][[0, 2]].min()) / 4
         first = np.round((place - foot) / extent * FILLED + 31.5).clip(2, 61).astype(int)
@@ -130,17 +129,6 @@ def group_means(values: Tensor, groups: Tensor) -> Tensor:
     total = torch.zeros_like(values).index_add(0, groups, values)
     count = torch.zeros_like(values).index_add(0, groups, torch.ones_like(values))
     return (total / count.clamp_min(1))[groups]
-
-
-class SamplerSettings(Protocol):
-    """What the configuration of every branch says of its sampling."""
-
-    @property
-    def sampler(self) -> Sampler: ...
-    @property
-    def steps(self) -> int: ...
-    @property
-    def objective(self) -> Objective: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +153,7 @@ class CompactSampling(Sampling):
     candidates: int | None = None
     styles: Tensor | None = None
 
-    def denoised(self, predict: Predict, noise: Tensor, settings: SamplerSettings) -> Tensor:
+    def denoised(self, predict: Predict, noise: Tensor, settings: BranchConfig) -> Tensor:
         """What becomes of `noise` (N, ...), by the branch's sampler and steps where none are asked for."""
         return sample(
             self.sampler or settings.sampler, predict, noise, self.steps or settings.steps, settings.objective,

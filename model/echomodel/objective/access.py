@@ -50,8 +50,7 @@ def at_wall(plan: Plan) -> Found:
 
 def _deep(plan: Plan, who: Tensor) -> Tensor:
     """(P,) bool: the room is so long where boxes look that at the wall they would be far from all else."""
-    front = torch.stack([plan.yaw[who].sin(), plan.yaw[who].cos()], -1)
-    along = (plan.floor[plan.scene[who]] * front[:, None]).sum(-1).detach()
+    along = (plan.floor[plan.scene[who]] * plan.axes(who)[1][:, None]).sum(-1).detach()
     there = torch.isfinite(along)
     least = torch.where(there, along, torch.inf).amin(1)
     return torch.where(there, along, -torch.inf).amax(1) - least >= DEEP
@@ -99,8 +98,7 @@ def before_fronts(plan: Plan, opens: Tensor, depth: Tensor) -> Found:
 
 def _clear_of_walls(plan: Plan, who: Tensor, depth: Tensor) -> Tensor:
     """(P,): how far the far side of the space before each front is inside the room; 9 where there are no walls."""
-    cos, sin = plan.turn[0][who], plan.turn[1][who]
-    side, front = torch.stack([cos, -sin], -1), torch.stack([sin, cos], -1)
+    side, front = plan.axes(who)
     ahead = plan.position[who][:, [0, 2]] + front * (plan.size[who, 2] / 2 + depth)[:, None]
     across = plan.size[who, 0, None] * plan.numbers([-0.25, 0.0, 0.25])
     return plan.inside(ahead[:, None] + side[:, None] * across[..., None], who).median(1).values
@@ -123,8 +121,7 @@ def bed_side_free(plan: Plan) -> Found:
     for sign in (1.0, -1.0):
         margin = torch.maximum(torch.where(sign * lateral > 0, aside, FAR), 0.4 * length - along)
         least, _ = plan.worst(i, margin, j)
-        side = torch.stack([plan.turn[0][who], -plan.turn[1][who]], -1) * sign
-        points = plan.position[who][:, [0, 2]] + side * (plan.size[who, 0] / 2 + BEDSIDE)[:, None]
+        points = plan.position[who][:, [0, 2]] + sign * plan.axes(who)[0] * (plan.size[who, 0] / 2 + BEDSIDE)[:, None]
         out.append(torch.minimum(least[who], plan.inside(points[:, None], who)[:, 0]))
     margin = torch.maximum(*out)
     return found(who, margin, measure=margin + BEDSIDE)
@@ -176,8 +173,7 @@ def _clearance(plan: Plan, who: Tensor, polygon, opening: Opening) -> Tensor:  #
     swings = opening.kind == "door" and opening.swing == "in"
     depth = WINDOW_DEPTH if opening.kind == "window" else opening.width if swings else STEP
     offset = plan.position[who][:, [0, 2]] - near
-    side = torch.stack([plan.yaw[who].cos(), -plan.yaw[who].sin()], -1)
-    front = torch.stack([plan.yaw[who].sin(), plan.yaw[who].cos()], -1)
+    side, front = plan.axes(who)
     width, length = plan.size[who, 0] / 2, plan.size[who, 2] / 2
 
     def reach(axis: Tensor) -> Tensor:

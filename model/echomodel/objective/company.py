@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from echomodel.boxes2d import turned
 from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, joined, nobody, worst
 from echomodel.vocabulary import vocabulary
 
@@ -38,7 +39,7 @@ def seat_faces(plan: Plan) -> Found:
     lateral, forward = plan.nearest_point(i, j)
     inside = (lateral.square() + forward.square()).detach() < 1e-6
     centre = plan.local(j, i)
-    lateral, forward = _turned(lateral, forward, plan.yaw[j] - plan.yaw[i])
+    lateral, forward = turned(torch.stack([lateral, forward], -1), plan.yaw[j] - plan.yaw[i]).unbind(-1)
     off = facing_angle(torch.where(inside, centre[0], lateral), torch.where(inside, centre[1], forward))
     return found(i, LOOK - off, other=j, measure=torch.rad2deg(off))
 
@@ -102,10 +103,7 @@ def nightstand_at_head(plan: Plan) -> Found:
     i, j = plan.attended("head")
     if not len(i):
         return nobody(plan.size)
-    lateral, forward = plan.local(i, j)
-    half_width, half_depth = plan.reach(i, j)
-    beside = lateral.abs() - half_width - plan.size[j, 0] / 2
-    back = (forward - half_depth) + plan.size[j, 2] / 2
+    _, beside, back = _at_bed(plan, i, j)
     rank = _rank_at(j, plan.gap(i, j).detach())
     turn = plan.yaw[i] - plan.yaw[j]
     off = facing_angle(turn.sin(), turn.cos())
@@ -120,11 +118,8 @@ def nightstands_alike(plan: Plan) -> Found:
     i, j = plan.attended("head")
     if not len(i):
         return nobody(plan.size)
-    lateral, forward = plan.local(i, j)
-    half_width, half_depth = plan.reach(i, j)
-    beside = lateral.abs() - half_width - plan.size[j, 0] / 2
-    at_head = ((forward - half_depth + plan.size[j, 2] / 2).abs() < HEAD) & (beside < BESIDE) & (beside > -IN_BED)
-    right = lateral > 0
+    lateral, beside, back = _at_bed(plan, i, j)
+    at_head, right = (back.abs() < HEAD) & (beside < BESIDE) & (beside > -IN_BED), lateral > 0
     pairs = (j[:, None] == j[None]) & (at_head & right)[:, None] & (at_head & ~right)[None]
     one, other = pairs.nonzero(as_tuple=True)
     apart = (beside[one] - beside[other]).abs()
@@ -132,6 +127,13 @@ def nightstands_alike(plan: Plan) -> Found:
     return found(
         torch.where(swap, i[other], i[one]), PAIR - apart, other=torch.where(swap, i[one], i[other]), measure=apart
     )
+
+
+def _at_bed(plan: Plan, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """(P,) each, metres: how far i lies to the side of bed j, how far beside its edge, and before the head's level."""
+    lateral, forward = plan.local(i, j)
+    half_width, half_depth = plan.reach(i, j)
+    return lateral, lateral.abs() - half_width - plan.size[j, 0] / 2, forward - half_depth + plan.size[j, 2] / 2
 
 
 def bench_at_foot(plan: Plan) -> Found:
@@ -159,12 +161,6 @@ def _first_of(i: Tensor, j: Tensor, margin: Tensor, measure: Tensor) -> Found:
     """Of several demands (P, Q) the one that is missed by most."""
     least, which = margin.min(1)
     return found(i, least, other=j, measure=measure.gather(1, which[:, None])[:, 0], words=which)
-
-
-def _turned(lateral: Tensor, forward: Tensor, turn: Tensor) -> tuple[Tensor, Tensor]:
-    """A direction in a frame that is turned by `turn` to another one, in that other one."""
-    cos, sin = turn.cos(), turn.sin()
-    return cos * lateral + sin * forward, cos * forward - sin * lateral
 
 
 EVEN = 0.16  # metres between a table's middle and the middle of its chairs, one chair pulled out is less
@@ -309,12 +305,8 @@ def sofas_in_circle(plan: Plan) -> Found:
         return nobody(plan.size)
     near = plan.apart(i, j).detach() < NEAR
     i, j = i[near], j[near]
-    ahead = plan.size[j, 2] / 2 + BEFORE
-    middle = plan.position[j][:, [0, 2]] + torch.stack([plan.yaw[j].sin(), plan.yaw[j].cos()], -1) * ahead[:, None]
-    away = middle - plan.position[i][:, [0, 2]]
-    forward = away[:, 0] * plan.yaw[i].sin() + away[:, 1] * plan.yaw[i].cos()
-    lateral = away[:, 0] * plan.yaw[i].cos() - away[:, 1] * plan.yaw[i].sin()
-    off = torch.atan2((lateral.square() + 1e-12).sqrt(), forward)
+    middle = plan.position[j][:, [0, 2]] + plan.axes(j)[1] * (plan.size[j, 2] / 2 + BEFORE)[:, None]
+    off = facing_angle(*plan.seen(i, middle))
     return found(i, CIRCLE - off, other=j, measure=torch.rad2deg(off))
 
 

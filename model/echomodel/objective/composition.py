@@ -100,11 +100,10 @@ def _floor_gaps(plan: Plan, there: Tensor, points: Tensor) -> tuple[Tensor, Tens
 
 
 def _nearest(plan: Plan, who: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
-    position, size = plan.position[who][:, None], plan.size[who][:, None]
-    away = points[:, None] - position[..., [0, 2]]
-    cos, sin = plan.turn[0][who][:, None], plan.turn[1][who][:, None]
-    lateral = ((cos * away[..., 0] - sin * away[..., 1]).abs() - size[..., 0] / 2).clamp_min(0)
-    forward = ((sin * away[..., 0] + cos * away[..., 1]).abs() - size[..., 2] / 2).clamp_min(0)
+    size = plan.size[who][:, None]
+    aside, ahead = plan.seen(who[:, None], points[:, None])
+    lateral = (aside.abs() - size[..., 0] / 2).clamp_min(0)
+    forward = (ahead.abs() - size[..., 2] / 2).clamp_min(0)
     squares, which = (lateral.square() + forward.square()).min(-1)
     return squares.clamp_min(1e-12).sqrt(), which
 
@@ -208,8 +207,7 @@ def bench_fits(plan: Plan) -> Found:
 
 def _free_beside(plan: Plan, who: Tensor) -> Tensor:
     """(P, 4): metres free left, right, behind and before of tables, to walls and to what is no seat."""
-    cos, sin = plan.turn[0][who], plan.turn[1][who]
-    right, front = torch.stack([cos, -sin], -1), torch.stack([sin, cos], -1)
+    right, front = plan.axes(who)
     out = torch.stack([-right, right, -front, front], 1)
     half = plan.size[who][:, [0, 0, 2, 2]] / 2
     edge = plan.position[who][:, None, [0, 2]] + out * half[..., None]

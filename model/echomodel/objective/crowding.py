@@ -203,7 +203,7 @@ def _clear(
     least, about = plan.worst(i, margin, j)
     least, about, needed, needed_wall = least[who], about[who], needed[who], needed_wall[who]
     if bool((needed_wall > 0).any()):
-        front = torch.stack([plan.turn[1][who], plan.turn[0][who]], -1) * sign
+        front = plan.axes(who)[1] * sign
         points = plan.position[who][:, [0, 2]] + front * (plan.size[who, 2] / 2 + needed_wall)[:, None]
         wall = plan.inside(points[:, None], who)[:, 0]
         by_wall = wall < least

@@ -94,10 +94,8 @@ def work_triangle(plan: Plan) -> Found:
     keep = torch.isin(i, cook)
     i, j = i[keep], j[keep]
     number = torch.full((len(plan),), -1).index_put((cook,), torch.arange(len(cook)))
-    off = walked[number[i]] - plan.position[j][:, None, [0, 2]]
-    cos, sin = plan.turn[0][j, None], plan.turn[1][j, None]
-    beside = (cos * off[..., 0] - sin * off[..., 1]).abs() - plan.size[j, None, 0] / 2
-    ahead = (sin * off[..., 0] + cos * off[..., 1]).abs() - plan.size[j, None, 2] / 2
+    lateral, forward = plan.seen(j[:, None], walked[number[i]])
+    beside, ahead = lateral.abs() - plan.size[j, None, 0] / 2, forward.abs() - plan.size[j, None, 2] / 2
     least, about = worst(i, torch.maximum(beside, ahead).amin(1), j, len(plan), FAR)
     blocked = found(cook, least[cook], other=about[cook], measure=-least[cook], words=torch.full_like(cook, 2))
     return joined(out, blocked)
@@ -105,8 +103,7 @@ def work_triangle(plan: Plan) -> Found:
 
 def _front(plan: Plan, who: Tensor) -> Tensor:
     """(P, 2): where one stands before boxes."""
-    front = torch.stack([plan.turn[1][who], plan.turn[0][who]], -1)
-    return plan.position[who][:, [0, 2]] + front * (plan.size[who, 2] / 2 + WALKED)[:, None]
+    return plan.position[who][:, [0, 2]] + plan.axes(who)[1] * (plan.size[who, 2] / 2 + WALKED)[:, None]
 
 
 def hob_safe(plan: Plan) -> Found:
@@ -128,7 +125,7 @@ def hob_safe(plan: Plan) -> Found:
     inner = torch.maximum(lateral.abs() - half_width - plan.size[i, 0] / 2, forward - half_depth - plan.size[i, 2] / 2)
     least, about = worst(i, torch.where(across, inner, FAR), j, len(plan), FAR)
     start, along_wall, normal, length = (of[plan.scene[who]] for of in plan.walls)
-    side = torch.stack([plan.turn[0][who], -plan.turn[1][who]], -1)[:, None]
+    side = plan.axes(who)[0][:, None]
     off = plan.position[who][:, None, [0, 2]] - start
     gap = (off * normal).sum(-1) - plan.size[who, None, 0] / 2
     at = (off * along_wall).sum(-1)
@@ -146,9 +143,7 @@ def _under_windows(plan: Plan, who: Tensor) -> Found:
         here = torch.isin(plan.scene[who], scenes)
         for one in (opening for opening in openings if opening.kind == "window" and opening.edge < len(polygon)):
             ends = plan.numbers(segment(polygon, one).tolist())
-            off = ends[None] - plan.position[who][:, None, [0, 2]]
-            cos, sin = plan.turn[0][who, None], plan.turn[1][who, None]
-            lateral, forward = cos * off[..., 0] - sin * off[..., 1], sin * off[..., 0] + cos * off[..., 1]
+            lateral, forward = plan.seen(who[:, None], ends)
             behind = (forward < -plan.size[who, None, 2] / 4).all(1) & (forward > -plan.size[who, None, 2]).all(1)
             beside = torch.maximum(lateral.amin(1) - plan.size[who, 0] / 2, -lateral.amax(1) - plan.size[who, 0] / 2)
             margin = torch.where(here & behind, torch.minimum(margin, beside), margin)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
-from echomodel.floors import SIDES, edges, signed_area
+from echomodel.floors import edges, footprint, signed_area
 from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody
 from echomodel.objective.support import ON_CEILING, ON_FLOOR
 from echomodel.rules import RULE_SETS, rule_set
@@ -37,12 +37,7 @@ def on_floor(plan: Plan) -> Found:
     who = plan.those(plan.walled & plan.moved)
     if not len(who):
         return nobody(plan.size)
-    signs = plan.numbers(SIDES)
-    half = plan.size[who][:, None, [0, 2]] / 2 * signs
-    cos, sin = plan.turn[0][who, None], plan.turn[1][who, None]
-    x, z = cos * half[..., 0] + sin * half[..., 1], cos * half[..., 1] - sin * half[..., 0]
-    points = torch.stack([x, z], -1) + plan.position[who][:, None, [0, 2]]
-    inside = plan.inside(points, who).amin(1)
+    inside = plan.inside(footprint(plan.size[who], plan.position[who], plan.yaw[who]), who).amin(1)
     clear = inside if plan.first.rectangle is not None else torch.minimum(inside, _off_corners(plan, who))
     return found(who, clear + TOUCH, measure=-inside)
 
@@ -57,9 +52,7 @@ def _off_corners(plan: Plan, who: Tensor) -> Tensor:
     if not bool(reflex.any()):
         return plan.size.new_full((len(who),), FAR)
     looks = (turn < -1e-6)[plan.scene[who]][:, reflex]
-    off = start[plan.scene[who]][:, reflex] - plan.position[who][:, None, [0, 2]]
-    cos, sin = plan.turn[0][who, None], plan.turn[1][who, None]
-    local = torch.stack([cos * off[..., 0] - sin * off[..., 1], sin * off[..., 0] + cos * off[..., 1]], -1)
+    local = torch.stack(plan.seen(who[:, None], start[plan.scene[who]][:, reflex]), -1)
     outside = (local.abs() - plan.size[who][:, None, [0, 2]] / 2).amax(-1)
     return torch.where(looks, outside, FAR).amin(1)
 

@@ -311,6 +311,17 @@ class Plan:
         """(N,) and (N,) float, cosine and sine of the headings."""
         return self.yaw.cos(), self.yaw.sin()
 
+    def axes(self, who: Tensor) -> tuple[Tensor, Tensor]:
+        """(P, 2) each, x and z: unit vectors to the +x side and to the front of boxes (P,)."""
+        cos, sin = self.turn[0][who], self.turn[1][who]
+        return torch.stack([cos, -sin], -1), torch.stack([sin, cos], -1)
+
+    def seen(self, who: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
+        """(...,) and (...,): how far points (..., 2) lie to the +x side of boxes (...,) and before them, metres."""
+        off = points - self.position[who][..., [0, 2]]
+        cos, sin = self.turn[0][who], self.turn[1][who]
+        return cos * off[..., 0] - sin * off[..., 1], sin * off[..., 0] + cos * off[..., 1]
+
     def reach(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
         """(P,) and (P,): half extents of i along j's width and along j's front, metres."""
         turn = self.yaw[i] - self.yaw[j]
@@ -475,8 +486,7 @@ class Plan:
     def back_gaps(self, who: Tensor) -> Tensor:
         """(P,): metres between the backs of some boxes and the wall behind them; `FAR` where there is none."""
         start, along, normal, length = (of[self.scene[who]] for of in self.walls)
-        cos, sin = self.turn[0][who], self.turn[1][who]
-        front, side = torch.stack([sin, cos], -1)[:, None], torch.stack([cos, -sin], -1)[:, None]
+        side, front = (axis[:, None] for axis in self.axes(who))
         offset = self.position[who][:, None, [0, 2]] - start
         reach = (normal * side).sum(-1).abs() * self.size[who, None, 0] / 2
         reach = reach + (normal * front).sum(-1).abs() * self.size[who, None, 2] / 2

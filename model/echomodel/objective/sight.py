@@ -206,8 +206,6 @@ def _clear(plan: Plan, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
     pair, block = pair[keep], block[keep]
     share = torch.linspace(0.1, 0.9, STEPS, dtype=plan.size.dtype)[:, None, None]
     start, end = plan.position[i[pair]][:, [0, 2]], plan.position[j[pair]][:, [0, 2]]
-    offset = start + share * (end - start) - plan.position[block][:, [0, 2]]
-    cos, sin = plan.turn[0][block], plan.turn[1][block]
-    lateral = (cos * offset[..., 0] - sin * offset[..., 1]).abs() - plan.size[block, 0] / 2
-    forward = (sin * offset[..., 0] + cos * offset[..., 1]).abs() - plan.size[block, 2] / 2
-    return worst(pair, torch.maximum(lateral, forward).amin(0) - GRAZE, block, len(i), FAR)
+    lateral, forward = plan.seen(block, start + share * (end - start))
+    beside, ahead = lateral.abs() - plan.size[block, 0] / 2, forward.abs() - plan.size[block, 2] / 2
+    return worst(pair, torch.maximum(beside, ahead).amin(0) - GRAZE, block, len(i), FAR)

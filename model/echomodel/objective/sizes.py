@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import torch
 
+from echomodel.boxes2d import seen
 from echomodel.objective.plan import Found, Plan, found, kind_of
 from echomodel.sizes import size_statistics, usual_range
 
@@ -167,8 +168,7 @@ def hung_lamps(
     out, kinds = size.copy(), [kind_of(word) for word in categories]
     lit = np.array([kind.role in ("board", "bed", "sofa") and kind.support == "floor" for kind in kinds], bool)
     for lamp in (i for i, kind in enumerate(kinds) if kind.role == "light" and kind.support == "ceiling" and free[i]):
-        x, z = (position[lamp] - position)[:, [0, 2]].T
-        local = np.stack([np.cos(yaw) * x - np.sin(yaw) * z, np.sin(yaw) * x + np.cos(yaw) * z], 1)
+        local = seen((position[lamp] - position)[:, [0, 2]], yaw)
         under = lit & (np.abs(local) <= size[:, [0, 2]] / 2).all(1)
         if under.any():
             out[lamp, [0, 2]] *= min(1.0, size[under][:, [0, 2]].min() / size[lamp, [0, 2]].max())

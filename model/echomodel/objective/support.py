@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from echomodel.boxes2d import seen
 from echomodel.vocabulary import Category, vocabulary
 
 ON_FLOOR, ON_CEILING, FREE = -1, -2, -3
@@ -30,13 +31,12 @@ def carriers(
     for subject, _, target in triplets[np.isin(triplets[:, 1], resting)]:
         if subject != target and not _reaches(out, int(target), int(subject)):
             out[subject] = target
-    cos, sin = np.cos(yaw), np.sin(yaw)
     for i in range(n):
         if kinds[i].support != "table" or out[i] >= 0:
             continue
-        x, z = (position[i] - position)[:, [0, 2]].T
-        local = np.abs(np.stack([cos * x - sin * z, sin * x + cos * z], 1)) - 0.5 * size[:, [0, 2]]
-        distance = np.linalg.norm(np.maximum(local, 0.0), axis=1) + 1e-3 * np.hypot(x, z)
+        away = (position[i] - position)[:, [0, 2]]
+        local = np.abs(seen(away, yaw)) - 0.5 * size[:, [0, 2]]
+        distance = np.linalg.norm(np.maximum(local, 0.0), axis=1) + 1e-3 * np.hypot(*away.T)
         for k in range(n):
             if k == i or not kinds[k].carries or _reaches(out, k, i):
                 distance[k] = np.inf
