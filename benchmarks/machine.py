@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import torch
 
-from echomodel.packed import PackedLinear
+from echomodel.packed import PackedLayer
 
 CLOCKS = {"wall": time.perf_counter, "cpu": time.process_time}
 clock = "wall"  # "cpu" with one thread counts this process alone, whatever else runs on the machine
@@ -31,7 +31,9 @@ def alternate(runs: dict[str, Callable[[], object]], repeats: int, warm: bool = 
 def matmul_rate(side: int = 2048) -> float:
     """FLOP/s of a large float32 matrix product, the better of torch's own and oneDNN's packed one."""
     a, b = torch.randn(side, side), torch.randn(side, side)
-    packed = PackedLinear(b)
+    layer = torch.nn.Linear(side, side, bias=False)
+    layer.weight = torch.nn.Parameter(b)
+    packed = PackedLayer(layer)
     best = alternate({"own": lambda: a @ b, "packed": lambda: packed(a)}, repeats=5)
     return 2 * side**3 / min(best.values())
 

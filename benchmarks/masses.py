@@ -20,7 +20,7 @@ from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.objective.sizes import usual_sizes
-from echomodel.rooms.generator import iterate_rooms
+from echomodel.rooms.generator import generate_rooms
 from echomodel.vocabulary import vocabulary
 from echousd.shapes.matter import weighed
 from echousd.stage.boxes import graph_of
@@ -32,7 +32,7 @@ AT_ONCE = 50  # rooms in one batch
 def main(count: int) -> None:
     """Print a line for each category: pieces, range, quantiles, and how many lie outside of the range."""
     found: dict[str, list[float]] = defaultdict(list)
-    graphs = [graph_of(room) for room in iterate_rooms(count, 11)]
+    graphs = [graph_of(room) for room in generate_rooms(count, 11)]
     model = load_model(None)
     for start in range(0, count, AT_ONCE):
         some = graphs[start : start + AT_ONCE]

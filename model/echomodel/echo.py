@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from importlib import resources
@@ -52,12 +51,10 @@ class EchoModel:
         hash: short hash of the weights it came from.
         packed: on a CPU, lay the shape denoiser's linear maps out for oneDNN, equal but for rounding and 1.5 times as
             fast (`benchmarks/inference_modes.py`); do not train the model on then.
-        half_decode: decode shapes in bfloat16, which is faster where the processor has it (AVX-512 BF16, AMX) and
-            slower elsewhere.
     """
 
-    def __init__(self, model: CompactModel, hash: str = "", *, packed: bool = True, half_decode: bool = False) -> None:
-        self.model, self.hash, self.half_decode = model.eval(), hash, half_decode
+    def __init__(self, model: CompactModel, hash: str = "", *, packed: bool = True) -> None:
+        self.model, self.hash = model.eval(), hash
         if packed and "shape" in model.parts and self.device.type == "cpu":
             if "shape" in model.later:
                 model.later["shape"] = partial(_packed, model.later["shape"])
@@ -65,13 +62,11 @@ class EchoModel:
                 pack_linear_maps(model.shape)
 
     @classmethod
-    def load(
-        cls, path: str | Path | None = None, *, device: torch.device | str = "cpu", half_decode: bool = False
-    ) -> EchoModel:
+    def load(cls, path: str | Path | None = None, *, device: torch.device | str = "cpu") -> EchoModel:
         """Load the weights that ship with the package, a weights file, a folder of such, or that of a training.
 
         Arguments:
-            path: file or folder, None = the shipped weights. device: where to. half_decode: as in the class.
+            path: file or folder, None = the shipped weights. device: where to.
 
         Raises WeightsError where there are none, or they are damaged or do not belong together.
         """
@@ -81,7 +76,7 @@ class EchoModel:
             files = sorted(file for file in source.glob("*.safetensors") if file.name != CHECKPOINT)
         if path is not None and not files:
             raise WeightsError(f"{source}: holds no weights files (.safetensors)")
-        return cls(*load_weights(files, device, LATER if path is None else ()), half_decode=half_decode)
+        return cls(*load_weights(files, device, LATER if path is None else ()))
 
     @property
     def preset(self) -> str:
@@ -211,8 +206,7 @@ class EchoModel:
     def _decoded(self, codes: Tensor) -> Tensor:
         """Signed distances (N, 64, 64, 64) float32 of codes, a few objects at a time; both are rounded."""
         latents, decode = self.model.shape.latents, self.model.autoencoder.decode
-        with torch.autocast(self.device.type, torch.bfloat16) if self.half_decode else nullcontext():
-            grids = torch.cat([decode(latents(part)).float() for part in _rounded(codes, CODE).split(4)])
+        grids = torch.cat([decode(latents(part)).float() for part in _rounded(codes, CODE).split(4)])
         return _rounded(grids, DISTANCE)
 
     def _how(self, graph: GraphBatch, told: dict[str, Any]) -> CompactSampling:

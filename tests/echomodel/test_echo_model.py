@@ -193,17 +193,12 @@ def test_draws_side_by_side_are_draws_one_by_one(model: EchoModel, monkeypatch: 
     assert done == [(k, 6) for k in range(1, 7)]
 
 
-def test_packed_weights_and_half_decoding_change_little(model: EchoModel) -> None:
+def test_packed_weights_change_little(model: EchoModel) -> None:
     noise = torch.randn(3, 8, generator=seeded())
     plain = EchoModel(CompactModel(model.config, STATISTICS), packed=False)
     plain.model.load_state_dict(model.model.state_dict())
-    half = EchoModel(plain.model, packed=False, half_decode=True)
-    packed, exact, rough = (
-        one.sample_shapes(bedroom(), boxes(), generator=seeded(), noise=noise) for one in (model, plain, half)
-    )
+    packed, exact = (one.sample_shapes(bedroom(), boxes(), generator=seeded(), noise=noise) for one in (model, plain))
     torch.testing.assert_close(packed, exact, rtol=1e-4, atol=1e-4)
-    assert 0 < float((rough - exact).abs().max()) < 0.05
-    assert rough.dtype == torch.float32
 
 
 def test_a_batch_gives_what_single_runs_give(model: EchoModel) -> None:

@@ -196,14 +196,13 @@ class CompactModel(nn.Module):
         save_weights(path, self, parts)
 
 
-def save_weights(path: Path, model: CompactModel, parts: Sequence[str], *, half: bool = True) -> None:
-    """Write parts of a model with everything needed to use them; `half` stores floats as float16, some in 8 bits."""
+def save_weights(path: Path, model: CompactModel, parts: Sequence[str]) -> None:
+    """Write parts of a model with everything needed to use them; floats as float16, some in 8 bits."""
     tensors: dict[str, Tensor] = {}
     for part in parts:
         for key, value in model.part_tensors(part).items():
-            stored = value.half() if half and value.is_floating_point() else value
+            stored = value.half() if value.is_floating_point() else value
             tensors[key] = stored.detach().cpu().contiguous()
-    tensors = rounded(tensors) if half else tensors
     metadata = {
         "format": FORMAT,
         "config": to_json(model.config),
@@ -211,7 +210,7 @@ def save_weights(path: Path, model: CompactModel, parts: Sequence[str], *, half:
         "parts": json.dumps(list(parts)),
     }
     with whole_file(path) as beside:
-        save_file(tensors, beside, metadata=metadata)
+        save_file(rounded(tensors), beside, metadata=metadata)
 
 
 class _Undrawn(TorchFunctionMode):

@@ -101,7 +101,7 @@ def small(tmp_path):
     torch.manual_seed(0)
     boxes = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3)
     model = CompactModel(from_dict(CompactConfig, SIZES), boxes, ("latent", "furniture"))
-    save_weights(tmp_path / "small.safetensors", model, model.parts, half=False)
+    save_weights(tmp_path / "small.safetensors", model, model.parts)
     return tmp_path / "small.safetensors"
 
 
