@@ -9,17 +9,12 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
-from echomodel.boxes2d import CORNERS, axes, outline
-from echomodel.openings import STEP, WINDOW_DEPTH, Opening, inward_normal, segment
+from echomodel.boxes2d import axes, outline
+from echomodel.openings import STEP, WINDOW_DEPTH, Opening, inward_normal, rectangle, segment
 
 GRID = 6  # the floor's plan is told as signed distances at GRID x GRID places of its bounding box
 FAR = 1e3  # metres: no wall is so far away
 SIDES = ((-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0))  # corners and middles of a footprint
-
-
-def rectangle(width: float, depth: float) -> Tensor:
-    """(4, 2) float32, corners (x, z) of a rectangular floor about the origin, metres."""
-    return torch.tensor(CORNERS) * torch.tensor([width, depth]) / 2
 
 
 def centred(floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | None) -> Tensor:
@@ -33,7 +28,7 @@ def centred(floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | No
         return torch.full((4, 2), torch.nan)
     given = torch.as_tensor(np.asarray(floor, np.float64))
     if given.shape == (2,):
-        return rectangle(*given.tolist())
+        return torch.from_numpy(rectangle(*given.tolist())).float()
     if given.ndim != 2 or given.shape[1] != 2 or len(given) < 3:
         raise ValueError(f"floor has shape {tuple(given.shape)}, expected (2,) extents or (k, 2) corners, k >= 3")
     return (given - (given.amax(0) + given.amin(0)) / 2).float()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
 from echomodel.data.roomset import RoomSet, build_rooms
@@ -12,26 +11,8 @@ from echomodel.files import write_json
 from echomodel.progress import StageListener, StepListener
 from echomodel.rooms.generator import STYLES
 
-
-@dataclass(frozen=True)
-class DataRecipe:
-    """What a data set holds: `rooms` labelled rooms, a share of them `halls`; all categories in `styles`
-    styles."""
-
-    name: str
-    rooms: int
-    styles: int
-    halls: float = 0.0
-
-
-RECIPES = {
-    recipe.name: recipe
-    for recipe in (
-        DataRecipe("smoke", 64, 2),
-        DataRecipe("packed", 12_000, 160),
-        DataRecipe("full", 30_000, STYLES, halls=0.12),
-    )
-}
+# labelled rooms, styles in which the set has all categories, and the share of the rooms that are halls
+RECIPES = {"smoke": (64, 2, 0.0), "packed": (12_000, 160, 0.0), "full": (30_000, STYLES, 0.12)}
 
 
 def build_data(
@@ -49,13 +30,13 @@ def build_data(
     """
     if recipe not in RECIPES:
         raise ValueError(f"unknown recipe {recipe!r}: allowed are {', '.join(RECIPES)}")
-    chosen, folder = RECIPES[recipe], Path(directory)
+    (count, styles, halls), folder = RECIPES[recipe], Path(directory)
 
     def report(part: str) -> StepListener | None:
         return None if progress is None else lambda done, total: progress(part, done, total)
 
-    rooms = build_rooms(folder / "rooms", chosen.rooms, seed, chosen.styles, report("rooms"), halls=chosen.halls)
-    shapes = build_shapes(folder / "shapes", chosen.styles, seed, report("shapes"))
-    note = {"recipe": chosen.name, "seed": seed, "rooms": len(rooms), "shapes": len(shapes), "styles": chosen.styles}
+    rooms = build_rooms(folder / "rooms", count, seed, styles, report("rooms"), halls=halls)
+    shapes = build_shapes(folder / "shapes", styles, seed, report("shapes"))
+    note = {"recipe": recipe, "seed": seed, "rooms": len(rooms), "shapes": len(shapes), "styles": styles}
     write_json(folder / "data.json", note)
     return rooms, shapes

@@ -85,19 +85,19 @@ class Floor:
             x0 < c[2] - play and x1 > c[0] + play and z0 < c[3] - play and z1 > c[1] + play for c in self.cuts
         )
 
-    def opposite(self, wall: Wall, along: float) -> tuple[float, Wall | None]:
-        """Distance from a point of a wall straight across the room, and the wall that is met there."""
+    def opposite(self, wall: Wall, along: float) -> float:
+        """Distance from a point of a wall straight across the room, metres, inf where no wall is met."""
         x, z = wall.point(along, 0.0)
         nx, nz = math.sin(wall.yaw), math.cos(wall.yaw)
-        best, met = math.inf, None
+        best = math.inf
         for other in self.walls:
             if math.cos(other.yaw - wall.yaw) > -0.5:
                 continue
             distance = (other.x - x) * nx + (other.z - z) * nz
             reach = (x - other.x) * other.dx + (z - other.z) * other.dz
             if 0.1 < distance < best and -1e-6 <= reach <= other.length + 1e-6:
-                best, met = distance, other
-        return best, met
+                best = distance
+        return best
 
 
 def sample_floor(statistics: RoomTypeStatistics, rng: np.random.Generator) -> Floor:

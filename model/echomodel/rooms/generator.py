@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -70,18 +70,16 @@ def generate_room(
 def generate_rooms(
     count: int, seed: int, *, room_type: str | None = None, styles: int = STYLES, start: int = 0, halls: float = 0.0
 ) -> list[RoomBoxes]:
-    """Draw `count` rooms; room number i depends on (seed, i) alone, so that sets can be made in pieces."""
-    return list(iterate_rooms(count, seed, room_type=room_type, styles=styles, start=start, halls=halls))
+    """Draw `count` rooms; room number i depends on (seed, i) alone, so that sets can be made in pieces.
 
-
-def iterate_rooms(
-    count: int, seed: int, *, room_type: str | None = None, styles: int = STYLES, start: int = 0, halls: float = 0.0
-) -> Iterator[RoomBoxes]:
-    """`generate_rooms` one by one; `halls` is the share of large rooms of several zones."""
+    `halls`: the share of large rooms of several zones.
+    """
+    out = []
     for number in range(start, start + count):
         rng = np.random.Generator(np.random.PCG64([seed, number]))
         hall = halls > 0 and np.random.Generator(np.random.PCG64([seed, number, 3])).random() < halls
-        yield generate_room(rng, room_type, styles=styles, name=f"room_{seed}_{number:06d}", hall=hall)
+        out.append(generate_room(rng, room_type, styles=styles, name=f"room_{seed}_{number:06d}", hall=hall))
+    return out
 
 
 def _boxes(builder: Builder, name: str, room_type: str) -> RoomBoxes:

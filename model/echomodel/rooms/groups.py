@@ -56,7 +56,7 @@ def sofa_group(room: Builder, category: str) -> Item | None:
         if spare > 2.5 and attempt < 20 and room.chance(0.6):  # towards one end of a long wall, with room for a seat
             end = 0.3 + abs(room.rng.normal(0.0, 0.9))
             along = size[0] / 2 + (min(end, spare) if room.chance(0.5) else max(spare - end, 0.0))
-        distance, _ = room.floor.opposite(wall, along)
+        distance = room.floor.opposite(wall, along)
         gap = room.wall_gap(category)
         low, high = (2.8, 4.3) if wants_tv else (2.0, 5.5)
         if attempt < 14 and not (low < distance < high):

@@ -54,7 +54,7 @@ def bed_group(room: Builder, category: str) -> Item | None:
         wall, along = spot
         if room.chance(0.35) and wall.length > width:  # in the middle of its wall
             along = wall.length / 2 + room.rng.normal(0.0, 0.12)
-        across, _ = room.floor.opposite(wall, along)
+        across = room.floor.opposite(wall, along)
         shy = 0.85 if room.wanted.get("tv_stand") else 0.5
         if across > LOW_ROOM and attempt < 10 and room.chance(shy):  # beds stand across the room rather than along it
             continue

@@ -7,7 +7,7 @@ import torch
 from echomodel.boxes import Boxes
 from echomodel.compact.draft import PAIR_FEATURES, WALL_FEATURES, pair_features, wall_features
 from echomodel.compact.pairs import pairs_of
-from echomodel.floors import padded, rectangle
+from echomodel.floors import centred, padded
 from echomodel.graph import GraphBatch
 
 
@@ -18,7 +18,7 @@ def boxes() -> Boxes:
 
 
 def test_gaps_to_the_walls() -> None:
-    features = wall_features(boxes(), padded([rectangle(4, 3)[None], torch.full((1, 4, 2), torch.nan)]))
+    features = wall_features(boxes(), padded([centred((4, 3))[None], torch.full((1, 4, 2), torch.nan)]))
     assert features.shape == (2, WALL_FEATURES)
     gaps = torch.atanh(features[0, :12]) * 3
     torch.testing.assert_close(gaps[:4], torch.tensor([1.0, 1.0, 2.0, 0.0]), atol=1e-4, rtol=0)  # +x, -x, +z, -z
@@ -46,7 +46,7 @@ def test_pairs_are_measured_from_the_receiver() -> None:
 def test_gradients_are_finite_where_the_floor_is_unknown() -> None:
     own = boxes()
     position = own.position.clone().requires_grad_()
-    floor = padded([rectangle(4, 3)[None], torch.full((1, 4, 2), torch.nan)])
+    floor = padded([centred((4, 3))[None], torch.full((1, 4, 2), torch.nan)])
     wall_features(Boxes(own.size, position, own.yaw), floor).square().sum().backward()
     assert position.grad is not None
     assert torch.isfinite(position.grad).all()
