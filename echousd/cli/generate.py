@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
+
 def generate(
     graph: Annotated[Path, typer.Argument(help="Scene graph: a stage, YAML or JSON.", show_default=False)],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the room.", show_default=False)],

@@ -62,7 +62,12 @@ def _showing(path: str | Path, layout: int | str | None, light: str | None) -> I
 
 
 def render_cameras(
-    path: str | Path, *, size: int = 512, colors: str = "materials", rays: int = FINE, layout: int | str | None = None,
+    path: str | Path,
+    *,
+    size: int = 512,
+    colors: str = "materials",
+    rays: int = FINE,
+    layout: int | str | None = None,
     light: str | None = None,
 ) -> dict[str, Image.Image]:
     """A picture of the room in a file through each of its cameras, by the camera's name; see `render`.

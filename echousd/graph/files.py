@@ -155,9 +155,7 @@ def _node(category: str, position: int, count: int, place: str | None) -> Node:
     return Node(f"{category}_{position + 1}", category, place=place, **fields)
 
 
-def _related(
-    habit: Habit, nodes: list[Node], anchors: list[Node], served: Counter[tuple[str, str]]
-) -> list[Relation]:
+def _related(habit: Habit, nodes: list[Node], anchors: list[Node], served: Counter[tuple[str, str]]) -> list[Relation]:
     """Objects are dealt to anchors in turn where each serves one (a lamp its nightstand, a chair its desk).
 
     What keeps a sofa company or goes into a wall's row all goes to the first.

@@ -200,10 +200,7 @@ def write_procthor(plan: Plan, path: Path) -> None:
     found: dict[str, Any] = {"rooms": rooms, "walls": walls, "doors": [], "windows": [], "objects": []}
     inner = [(one, opening) for (one, _), opening in ways(plan)]
     outer = [
-        (name, opening)
-        for name in plan.floors
-        for opening in plan.openings[name]
-        if plan.behind(name, opening) is None
+        (name, opening) for name in plan.floors for opening in plan.openings[name] if plan.behind(name, opening) is None
     ]
     for name, opening in (*inner, *outer):
         behind = plan.behind(name, opening)

@@ -50,9 +50,7 @@ def write_hinge(pen: Pen, leaf: str, joint: Joint, mass: Mass) -> None:
     _joint(pen, f"{leaf}_joint", door, leaf, joint, (joint.anchor, (0.0, 0.0, 0.0)), mass)
 
 
-def _joint(
-    pen: Pen, path: str, still: str, moving: str, joint: Joint, places: tuple[Point, Point], mass: Mass
-) -> None:
+def _joint(pen: Pen, path: str, still: str, moving: str, joint: Joint, places: tuple[Point, Point], mass: Mass) -> None:
     """A joint between two prims, with friction; `places`: its anchor in the frame of each, `mass`: of what moves."""
     slides = joint.kind == "prismatic"
     turn = Gf.Rotation(Gf.Vec3d(1, 0, 0), Gf.Vec3d(*joint.axis)).GetQuat()

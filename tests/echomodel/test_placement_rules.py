@@ -52,6 +52,14 @@ def test_between_is_the_space_that_two_others_span():
         assert (found >= 0) is kept, (x, z, found)
 
 
+@pytest.mark.parametrize("away", [(3.0, 2.5), (-3.0, 2.5), (-9.0, -9.0)])
+def test_a_room_may_lie_anywhere(away):
+    x, z = away
+    floor = NOTCHED * [1.0, 0.5] + away
+    assert margin("in_corner", [(0.4, 0.4, x - 1.75, z + 0.75, 0.0)], ["plant"], floor) > 0.1
+    assert margin("in_corner", [(0.4, 0.4, x - 0.3, z - 0.3, 0.0)], ["plant"], floor) < 0
+
+
 def test_walls_that_nobody_knows_leave_a_placement_unmeasured():
     assert np.isnan(margin("in_corner", [(0.4, 0.4, 0, 0, 0.0)], ["plant"], floor=None))
 

@@ -16,6 +16,7 @@ from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import fronts, label_relations, label_rooms, margins, measured, rule_set, verdicts
 from echomodel.rules.geometry import pairs
+from echomodel.rules.margins import pair_margins
 from echomodel.rules.telling import told_relations
 from echomodel.vocabulary import vocabulary
 
@@ -134,6 +135,8 @@ def test_symmetry_of_what_has_a_front_includes_its_heading():
     assert verdicts(boxes, triplets, fronts=tables).tolist() == [1, 1, 1]
     assert verdicts(boxes, triplets, fronts=beds).tolist() == [0, 1, 1]  # at right angles; mirrored; 23 degrees off
     assert verdicts(boxes, triplets, fronts=beds, rules="sgfront").tolist() == [1, 1, 1]
+    askew = torch.tensor([1.3, math.pi - 0.6, math.pi - 1.2, 0.0])  # the image of 0 looks along pi - 1.3
+    assert verdicts(Boxes(boxes.size, boxes.position, askew), triplets[:2], fronts=beds).tolist() == [0, 1]
 
 
 def test_symmetry_is_about_the_axes_of_the_rooms_centre():
@@ -175,12 +178,22 @@ def test_margins_are_finite_and_their_gradient_improves_them(rules):
 
 
 @pytest.mark.parametrize("rules", ["strict", "sgfront"])
+def test_margins_of_pairs_are_those_of_their_boxes(rules):
+    boxes = random_boxes(6, 9)
+    triplets = all_triplets(6, [*sorted(measured(rules)), P["same_style_as"]])
+    subject, predicate, object_ = triplets.unbind(1)
+    pair = pairs(boxes, subject, object_, torch.zeros(6, 3), oriented=rule_set(rules).oriented)
+    assert torch.allclose(pair_margins(pair, predicate, rule_set(rules)), margins(boxes, triplets, rules=rules))
+
+
+@pytest.mark.parametrize("rules", ["strict", "sgfront"])
 def test_labels_are_exactly_what_the_rules_accept(rules):
     boxes = random_boxes(9, 7)
     room = room_of(["chair"] * 9, boxes.size.numpy(), boxes.position.numpy(), boxes.yaw.numpy())
     labels = label_relations(room, rules=rules)
     kept = verdicts(room, torch.from_numpy(labels), rules=rules)
     assert (kept != 0).all()
+    assert labels.tolist() == sorted(labels.tolist(), key=lambda row: (row[0], row[2], row[1]))
     if rules == "strict":
         every = all_triplets(9, sorted(rule_set(rules).labels))
         satisfied = {tuple(t) for t, m in zip(every.tolist(), margins(room, every).tolist(), strict=True) if m > 3e-4}

@@ -29,6 +29,10 @@ def test_facing():
     assert kept("facing", (0.45, -0.7), 0.0)  # at the end of a table's side, 33 degrees beside its middle
     assert not kept("facing", (0.55, -0.7), 0.0)
     assert not kept("facing", (0.45, 0.7), 0.0)
+    bench = Boxes(torch.tensor([[1.0, 1.0, 1.0], [2.4, 1.0, 0.4]]), torch.tensor([[1.0, 0, -0.8], [0, 0, 0]]),
+                  torch.zeros(2))  # fmt: skip
+    rows = torch.tensor([[0, WORDS.predicate_id("facing"), 1]])
+    assert verdicts(bench, rows).tolist() == [1]  # straight ahead at one end of what is long
 
 
 def test_opposite_asks_both():

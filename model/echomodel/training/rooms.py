@@ -125,9 +125,7 @@ def draw_batch(rooms: PackedRooms, node_budget: int, generator: torch.Generator)
     return make_batch(rooms, picked[fits], generator)
 
 
-def make_batch(
-    rooms: PackedRooms, picked: Tensor, generator: torch.Generator, *, train: bool = True
-) -> LayoutBatch:
+def make_batch(rooms: PackedRooms, picked: Tensor, generator: torch.Generator, *, train: bool = True) -> LayoutBatch:
     """The batch of the picked rooms (K,); without `train` nothing is mirrored and half of the relations is dropped."""
     counts = rooms.count[picked]
     nodes = _ranges(rooms.count.cumsum(0)[picked] - counts, counts)
