@@ -15,7 +15,7 @@ import numpy as np
 import torch
 
 from echomodel.compact.pairs import pairs_of
-from echomodel.compact.sampling import shape_predictor
+from echomodel.compact.shape import shape_predictor
 from echomodel.data.shapeset import ShapeSet
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.compact.sampling import wholeness
+from echomodel.compact.shape import wholeness
 from echomodel.data.roomset import with_known_words
 from echomodel.data.shapeset import ShapeSet
 from echomodel.echo import EchoModel

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from echousd.assets.record import STRETCH
+from echousd.assets.reference import STRETCH
 from echousd.graph.fields import SHAPES
 from echousd.graph.nodes import PlainModel
 

@@ -24,6 +24,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from echomodel.files import flush, read_json, write_json
+from echousd.graph.files import CRATE
 from echousd.pending import STAGING
 
 MARK = "echousd_store.json"
@@ -35,7 +36,6 @@ GRACE = 3600.0  # seconds for which a folder that nobody refers to stays: its ro
 NAMING = (".usda", ".json", ".mtlx", ".yaml", ".yml")  # texts in which a key can be read as it is
 LAYERS = (".usd", ".usdc")
 ARCHIVES = (".zip", ".usdz")
-CRATE = b"PXR-USDC"
 LARGEST = 4 * 2**30  # bytes of one folder, and of what is unpacked from one file
 BLOCK = 2**20
 NESTED = 8  # archives within each other: an edit taken back holds that of the edit, with usdz in it
@@ -220,6 +220,14 @@ def store_above(real: Path) -> Store | None:
             root = place.parent.parent
             return Store(root) if (root / MARK).is_file() else None
     return None
+
+
+def stored(path: Path) -> bool:
+    """Whether a store holds a file under the key of what it is."""
+    store = store_of(path)
+    with suppress(ValueError):
+        return store is not None and any(KEY.fullmatch(name) and store.whole(name) for name in path.resolve().parts)
+    return False
 
 
 def keys_named(folders: Iterable[Path]) -> set[str]:

@@ -2,6 +2,8 @@
 
 import ast
 import re
+from importlib import import_module
+from operator import attrgetter
 from pathlib import Path
 
 import networkx
@@ -117,6 +119,21 @@ def test_packages_know_only_those_below(imports, package):
         if f"{name}.".startswith(tuple(f"{other}." for other in FORBIDDEN[package]))
     ]
     assert wrong == []
+
+
+def test_functions_that_tables_name_are_there():
+    places = [
+        node.args[0].value
+        for path in modules().values()
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Call)
+        and getattr(node.func, "id", "") == "Late"
+        and isinstance(node.args[0], ast.Constant)
+    ]
+    assert len(places) > 5
+    for place in places:
+        module, name = place.split(":")
+        assert callable(attrgetter(name)(import_module(module))), place
 
 
 def test_a_hint_is_no_import_and_a_function_hides_none(tmp_path):

@@ -23,8 +23,9 @@ from pxr import Sdf, Tf
 
 from echomodel.files import read_bounded, within_memory
 from echousd.assets.licences import licence_beside
-from echousd.assets.model_file import MODELS, ModelFile
+from echousd.assets.model_file import ModelFile
 from echousd.assets.naming import class_by_name, fitted
+from echousd.assets.reference import MODELS
 from echousd.assets.sweethome import read_library
 from echousd.stage.apart import fatal
 

@@ -18,7 +18,8 @@ from echousd.assets.colors import MOST, apart, main_colors, oklab, told_colors
 from echousd.assets.colors import costs as color_costs
 from echousd.assets.colors import table as color_table
 from echousd.assets.licences import allowed
-from echousd.assets.record import STRETCH, AssetRecord
+from echousd.assets.record import AssetRecord
+from echousd.assets.reference import STRETCH
 from echousd.assets.table import Library
 
 if TYPE_CHECKING:

@@ -15,9 +15,10 @@ from echousd.assets.catalogues import Entry
 from echousd.assets.colors import dominant
 from echousd.assets.licences import UNKNOWN, spdx
 from echousd.assets.measure import Measured, measure
-from echousd.assets.model_file import ModelFile, relative
+from echousd.assets.model_file import ModelFile
 from echousd.assets.naming import category_of, likely_unit
 from echousd.assets.record import UPRIGHT, Z_UP, AssetRecord, vector
+from echousd.assets.reference import relative
 from echousd.assets.shape import sampled, supports, thumbnail
 
 PLACEMENT = {"floor": "floor", "table": "surface", "wall": "wall", "ceiling": "ceiling"}

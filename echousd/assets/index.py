@@ -24,9 +24,9 @@ from echomodel.vocabulary import vocabulary
 from echousd.assets.catalogues import Entry, entries_of
 from echousd.assets.colors import swatches
 from echousd.assets.describe import PLACEMENT, described, left_out, relative, stamp
-from echousd.assets.model_file import STAGES
 from echousd.assets.record import AssetRecord, vector
 from echousd.assets.table import OldIndex, arrow, read_library, write_library
+from echousd.graph.files import STAGE_FORMS
 from echousd.stage.apart import fatal
 
 PACK = 8  # models that a worker reads in one go
@@ -95,7 +95,7 @@ def index(
         else:
             fresh.append(entry)
     saved = time.monotonic()
-    deadly = fatal(entry.file.path for entry in fresh if entry.file.suffix in STAGES)
+    deadly = fatal(entry.file.path for entry in fresh if entry.file.suffix in STAGE_FORMS)
     for entry in (entry for entry in fresh if entry.file.path in deadly):
         done[entry.key] = left_out(entry, file, deadly[entry.file.path])
     readable = [entry for entry in fresh if entry.file.path not in deadly]

@@ -16,8 +16,9 @@ from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdUtils
 from echomodel.files import within_memory
 from echomodel.triangles import area_normals
 from echousd.assets.colors import Coat, flat, pixels, texels
-from echousd.assets.model_file import STAGES, ModelFile
+from echousd.assets.model_file import ModelFile
 from echousd.draw.drawables import Paint, fans, paints_of
+from echousd.graph.files import STAGE_FORMS
 from echousd.srgb import to_linear
 from echousd.stage.contents import triangles_of
 from echousd.stage.encoding import StageError
@@ -96,7 +97,7 @@ def measure(model: ModelFile, *, painted: bool = False) -> Measured:
 
 
 def _measured(model: ModelFile, painted: bool) -> Measured:
-    if model.suffix not in STAGES:
+    if model.suffix not in STAGE_FORMS:
         return _mesh(model, painted)
     with model.opened():
         pass

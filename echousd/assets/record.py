@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-STRETCH = 1.15  # largest factor by which a model may be made longer or shorter along an axis
-Vector = tuple[float, float, float]
+from echousd.assets.reference import Vector
+
 UPRIGHT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 Z_UP = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0)  # (x, y, z) -> (x, z, -y)
 

@@ -14,8 +14,8 @@ from typing import Any
 from echomodel.files import whole_file, within_memory
 from echomodel.vocabulary import vocabulary
 from echousd.assets.colors import MOST
-from echousd.assets.model_file import check_reach
 from echousd.assets.record import AssetRecord
+from echousd.assets.reference import check_reach
 
 VERSION = 2
 OLDER = {1: ("colors",)}  # version of an index that can still be used -> columns that it has not

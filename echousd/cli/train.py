@@ -51,7 +51,6 @@ def train(
 data_app = typer.Typer(help="Rooms and furniture to learn from.", no_args_is_help=True)
 app.add_typer(data_app, name="data")
 
-USD_FILES = (".usd", ".usda", ".usdc", ".usdz")
 Seed = Annotated[int, typer.Option(help="Seed of the world; equal seeds give equal bytes.")]
 Rooms = Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")]
 
@@ -272,6 +271,7 @@ def import_rooms(
     from echomodel.data.sgfront import SGFront
     from echomodel.roomboxes import write_rooms
     from echousd.cli.terminal import Terminal
+    from echousd.graph.files import STAGE_FORMS
     from echousd.stage.boxes import read_stages
 
     if out.suffix not in (".npz", ".json"):
@@ -280,7 +280,7 @@ def import_rooms(
     for source in sources:
         if (source / "classes_all.txt").exists():
             found += SGFront(source, room, split).rooms()
-        elif source.suffix in USD_FILES or (source.is_dir() and not any(source.rglob("rooms*.json"))):
+        elif source.suffix in STAGE_FORMS or (source.is_dir() and not any(source.rglob("rooms*.json"))):
             found += read_stages([source])
         else:
             found += load_rooms(source)

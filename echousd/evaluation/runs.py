@@ -30,6 +30,7 @@ from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.assets.naming import category_of
 from echousd.evaluation.systems import System, drawn, finished
 from echousd.folder.found import rooms_at
+from echousd.graph.files import STAGE_FORMS
 from echousd.stage.boxes import room_of
 from echousd.stage.files import open_stage
 from echousd.stage.foreign import boxed_graph
@@ -232,7 +233,6 @@ def figures(
     }
 
 
-USD = (".usda", ".usdc", ".usd", ".usdz")
 ASSETS = ("_data", "assets")  # folders beside SceneEval's states, or above, in which its models lie
 HEIGHT = 2.8  # metres, of walls that nobody tells
 BUFFER = 0.1  # metres that Holodeck adds to what an object covers
@@ -249,13 +249,13 @@ def foreign_rooms(path: Path) -> list[RoomBoxes]:
         found = [room for file in files for room in _from_json(file)]
         if found:
             return found
-        stages = [(file, file.stem) for file in sorted(path.iterdir()) if file.suffix in USD]
+        stages = [(file, file.stem) for file in sorted(path.iterdir()) if file.suffix in STAGE_FORMS]
         with suppress(ValueError):
             stages = [(file, file.parent.name) for file in rooms_at(path)]
         if not stages:
             raise ValueError(f"{path}: no room in this folder, allowed: rooms of ours, USD, rooms or scene JSON")
         return [room for file, name in stages for room in _from_usd(file, name)]
-    if path.suffix in USD:
+    if path.suffix in STAGE_FORMS:
         return _from_usd(path, path.parent.name)
     rooms = load_rooms(path) if path.suffix == ".npz" else _from_json(path)
     if not rooms:

@@ -21,6 +21,7 @@ from echomodel.files import digest, flush
 from echousd.folder.lock import LOCK, locked, run_of
 from echousd.folder.manifest import LARGEST, Digest, find_manifest
 from echousd.folder.within import check_links, inside
+from echousd.graph.files import STAGE_FORMS
 from echousd.naming import free_name
 from echousd.pending import JOURNAL, STAGING, half_written
 from echousd.stage.files import check_path
@@ -354,7 +355,7 @@ def check_output(output: Path, *, flat: bool, force: bool) -> None:
         if output.exists() and not force:
             raise ValueError(f"{output}: exists; choose another file or use --force")
         return
-    if output.suffix in (".usda", ".usdc", ".usd", ".usdz"):
+    if output.suffix in STAGE_FORMS:
         raise ValueError(f"{output}: the output is a folder; --flat writes one file")
     if output.exists() and not output.is_dir():
         raise ValueError(f"{output}: is a file, the output must be a folder")

@@ -11,6 +11,7 @@ from pxr import Sdf, Tf, UsdUtils
 from echousd.draw.pictures import is_ours
 from echousd.folder.folder import backup_name, digest, digest_of
 from echousd.folder.within import inside
+from echousd.graph.files import STAGE_FORMS
 from echousd.naming import free_name
 from echousd.pending import STAGING
 from echousd.stage.apart import check_harmless
@@ -19,7 +20,6 @@ from echousd.stage.paths import coarse_file, component_file, payload_file
 if TYPE_CHECKING:
     from echousd.room import RoomData
 
-LAYER_ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
 
 
 def free_assets(folder: Path, room: RoomData, recorded: Mapping[str, str]) -> dict[str, str]:
@@ -79,7 +79,7 @@ def referenced(
     needed: dict[str, str] = {}
     top = folder.resolve()
     for layer in sorted((*folder.rglob("*.usd*"), *folder.parent.glob("*.usd*"))):
-        if layer.suffix not in LAYER_ENDINGS or not layer.is_file() or STAGING in layer.parts:
+        if layer.suffix not in STAGE_FORMS or not layer.is_file() or STAGING in layer.parts:
             continue
         own = layer.relative_to(folder).as_posix() if layer.is_relative_to(folder) else ""
         if own in replaced or (own in recorded and digest_of(layer) == recorded[own]):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import os
 import stat
@@ -12,15 +11,19 @@ from pathlib import Path
 from typing import Any, Literal
 
 from echomodel.files import whole_file, within_memory
+from echomodel.late import Late
 from echomodel.rows import Habit
 from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError, triple_faults
 from echousd.graph.nodes import Node, Relation, RoomSpec
-from echousd.graph.scene import SceneGraph
+from echousd.graph.scene import SceneGraph, graph_from_text
 
 TEXT_FORMS: dict[str, Literal["yaml", "json"]] = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
 STAGE_FORMS = (".usda", ".usdc", ".usd", ".usdz")
+CRATE = b"PXR-USDC"  # how a binary stage begins
 MAX_BYTES = 8 * 2**20
+# what builds on this package
+read_graph, write_graph = Late("echousd.stage.graphs:read_graph"), Late("echousd.stage.graphs:write_graph")
 
 
 def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGraph:
@@ -36,9 +39,9 @@ def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGr
     if path.is_dir():
         raise GraphError(f"{path}: is a directory, allowed: a {', '.join((*TEXT_FORMS, *STAGE_FORMS))} file")
     if path.suffix.lower() in STAGE_FORMS:
-        graph: SceneGraph = _stages("graphs").read_graph(path, room=room)
+        graph: SceneGraph = read_graph(path, room=room)
         return graph
-    return read_file(path, lambda *text: _texts().graph_from_text(SceneGraph, *text))
+    return read_file(path, lambda *text: graph_from_text(SceneGraph, *text))
 
 
 def read_file(path: Path, build: Callable[[str, Any, str], Any]) -> Any:
@@ -74,7 +77,7 @@ def save_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:
         if path.suffix.lower() not in STAGE_FORMS[:-1]:
             allowed = ", ".join((*TEXT_FORMS, *STAGE_FORMS[:-1]))
             raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {allowed}")
-        _stages("graphs").write_graph(graph, path)
+        write_graph(graph, path)
         return
     write_text(path, graph.to_json() if form == "json" else graph.to_yaml())
 
@@ -87,17 +90,6 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
             beside.write_text(text, "utf-8")
     except OSError as error:
         raise GraphError(f"{path}: cannot be written ({(error.strerror or str(error)).lower()})") from None
-
-
-def _texts() -> Any:
-    from echousd.graph import text  # which knows scene graphs, too
-
-    return text
-
-
-def _stages(module: str) -> Any:
-    """A module of `echousd.stage`, which builds on this package and is therefore found by name, when it is needed."""
-    return importlib.import_module(f"echousd.stage.{module}")
 
 
 MAX_COUNT = 100

@@ -6,6 +6,7 @@ import numpy as np
 
 from echomodel.openings import signed_area, swing_area
 from echomodel.roomboxes import footprints
+from echomodel.sizes import footprint
 from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError
 from echousd.graph.scene import SceneGraph
@@ -30,10 +31,10 @@ def with_floor(graph: SceneGraph, seed: int) -> SceneGraph:
     The same seed and graph give the same floor. More objects in a row to the left and right than to the front and
     behind make the room wider than deep. Some floors are L-shaped, as real ones are, where no opening counts walls.
     """
-    from echomodel.plans import floor_extents, floor_outline, longest_side
-
     if graph.room.extents is not None or any(node.position is not None for node in graph.nodes):
         return graph
+    from echomodel.plans import floor_extents, floor_outline, longest_side
+
     said = [relation.predicate for relation in graph.relations]
     aside = sum(predicate in ("left", "right") for predicate in said)
     ahead = sum(predicate in ("front", "behind") for predicate in said)
@@ -147,8 +148,6 @@ def check_space(graph: SceneGraph) -> tuple[str, ...]:
     Raises `GraphError` for a floor that is too large, and where the furniture cannot fit: its least footprint covers
     more than the floor, or one piece of a stated size is longer than the room.
     """
-    from echomodel.plans import footprint
-
     corners, extents = graph.room.corners, graph.room.extents
     if corners is None or extents is None:
         return ()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import MISSING, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -64,24 +63,6 @@ def opening_from_words(entry: Any, kind: str, room: RoomSpec, taken: Iterable[st
         return Opening(name, kind, edge, **values)
     except ValueError as error:
         raise GraphError(str(error)) from None
-
-
-def stated(opening: Opening) -> dict[str, Any]:
-    """The fields of an opening as plain data, those at their default left out."""
-    known = {field.name: field.default for field in fields(Opening)}
-    values = opening.to_json()
-    return {key: value for key, value in values.items() if known[key] is MISSING or value != known[key]}
-
-
-def sentence(opening: Opening) -> str:
-    """What an opening is, for a person: `door 'door' in wall 0 at 0.6 m, 0.9 x 2 m`."""
-    text = f"{opening.kind} {opening.name!r} in wall {opening.edge} at {opening.offset:.4g} m"
-    text += f", {opening.width:.4g} x {opening.height:.4g} m"
-    if opening.sill:
-        text += f", sill {opening.sill:.4g} m"
-    if opening.kind == "door":
-        text += f", hinge {opening.hinge}, swings {opening.swing}"
-    return text
 
 
 def _read(entry: Any, kind: str) -> dict[str, Any]:

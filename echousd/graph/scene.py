@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
 from typing import Any
 
 from pydantic import model_validator
 
+from echomodel.late import Late
 from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
 from echousd.graph import fields as field
 from echousd.graph.consistency import GraphError, listed, name_faults, raise_all, triple_faults
 from echousd.graph.nodes import Node, Placed, PlainModel, Relation, RoomSpec
-from echousd.graph.openings import sentence, stated
 from echousd.graph.titles import name_of
+
+graph_from_text = Late("echousd.graph.text:graph_from_text")
 
 
 class SceneGraph(PlainModel):
@@ -140,9 +142,8 @@ class SceneGraph(PlainModel):
     @classmethod
     def from_json(cls, text: str) -> SceneGraph:
         """Read the canonical JSON form (or the short form, as JSON); raises `GraphError` with the line at fault."""
-        from echousd.graph.text import graph_from_text
-
-        return graph_from_text(cls, text, "json")
+        graph: SceneGraph = graph_from_text(cls, text, "json")
+        return graph
 
     def to_json(self) -> str:
         """The canonical JSON form: fields in a fixed order, one node and one relation a line, defaults left out."""
@@ -162,9 +163,8 @@ class SceneGraph(PlainModel):
     @classmethod
     def from_yaml(cls, text: str) -> SceneGraph:
         """Read the short YAML form (or the canonical form, as YAML); raises `GraphError` with the line at fault."""
-        from echousd.graph.text import graph_from_text
-
-        return graph_from_text(cls, text, "yaml")
+        graph: SceneGraph = graph_from_text(cls, text, "yaml")
+        return graph
 
     def to_yaml(self) -> str:
         """The short YAML form that a person would write."""
@@ -202,8 +202,15 @@ def _stated(model: RoomSpec | Node | Relation) -> dict[str, Any]:
 
 def _lists(value: Any) -> Any:
     if isinstance(value, Opening):
-        return stated(value)
+        return _of_opening(value)
     return [_lists(entry) for entry in value] if isinstance(value, tuple) else value
+
+
+def _of_opening(opening: Opening) -> dict[str, Any]:
+    """The fields of an opening as plain data, those at their default left out."""
+    known = {field.name: field.default for field in fields(Opening)}
+    values = opening.to_json()
+    return {key: value for key, value in values.items() if known[key] is MISSING or value != known[key]}
 
 
 def _flow(value: Any) -> str:
@@ -214,6 +221,17 @@ def _flow(value: Any) -> str:
 
     text = yaml.dump(value, Dumper=Dumper, default_flow_style=True, width=10**9, sort_keys=False, allow_unicode=True)
     return text.removesuffix("\n").removesuffix("\n...").strip()
+
+
+def sentence(opening: Opening) -> str:
+    """What an opening is, for a person: `door 'door' in wall 0 at 0.6 m, 0.9 x 2 m`."""
+    text = f"{opening.kind} {opening.name!r} in wall {opening.edge} at {opening.offset:.4g} m"
+    text += f", {opening.width:.4g} x {opening.height:.4g} m"
+    if opening.sill:
+        text += f", sill {opening.sill:.4g} m"
+    if opening.kind == "door":
+        text += f", hinge {opening.hinge}, swings {opening.swing}"
+    return text
 
 
 @dataclass(frozen=True)

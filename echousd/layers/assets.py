@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Kind, Sdf
 
+from echomodel.late import Late
 from echousd.layers.materials import write_looks, write_palettes
 from echousd.layers.physics import write_asset_physics
 from echousd.options import Look
@@ -27,6 +28,7 @@ from echousd.stage.paths import (
     DESCRIPTION,
     GEO,
     MTL,
+    ROOM,
     class_path,
     coarse_name,
     component_file,
@@ -38,8 +40,10 @@ from echousd.stage.paths import (
 )
 from echousd.stage.pen import Pen, ops, say
 from echousd.stage.taxonomy import ade20k
-from echousd.stage.turning import move_room, rescale, turn_up
+from echousd.stage.units import METRES
 
+rescale, turn_up = Late("echousd.stage.turning:rescale"), Late("echousd.stage.turning:turn_up")
+move_room = Late("echousd.stage.turning:move_room")
 LOD, HIGH, LOW, PROXY = "LOD", "high", "low", "proxy"  # a variant set and its variants, the default first
 
 
@@ -55,6 +59,9 @@ def as_asked(layer: Sdf.Layer, look: Look, theirs: Callable[[str], bool] = lambd
 
     `theirs`: as for `turn_up`.
     """
+    metres = layer.pseudoRoot.GetInfo(METRES) if layer.pseudoRoot.HasInfo(METRES) else 1.0
+    if (metres, "Y", ROOM) == (look.meters_per_unit, look.up_axis, look.room_path):
+        return layer
     rescale(layer, look.meters_per_unit, theirs)
     return move_room(turn_up(layer, theirs) if look.up_axis == "Z" else layer, look.room_path)
 

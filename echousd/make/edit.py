@@ -14,7 +14,7 @@ from echomodel.boxes import Boxes
 from echomodel.progress import StageListener
 from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.vocabulary import vocabulary
-from echousd.assets.record import Vector
+from echousd.assets.reference import Vector
 from echousd.graph import Node, SceneGraph
 from echousd.graph.floors import with_plan_of
 from echousd.make.clearing import cleared_layouts

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 from pxr import Sdf, Usd
 
 import echousd
+from echomodel.late import Late
 from echousd.draw.pictures import is_ours, png
 from echousd.folder import folder as folders
 from echousd.folder import ownership
-from echousd.folder.history import remembered, undone
 from echousd.folder.manifest import MANIFEST_KEY
 from echousd.graph import SceneGraph
 from echousd.layers.compose import LAYERS, room_files
@@ -32,6 +32,9 @@ from echousd.stage.paths import UNFIT, layer_file
 
 if TYPE_CHECKING:
     from echousd.folder.stored import Shelf
+
+# of rooms that are there already
+remembered, undone = Late("echousd.folder.history:remembered"), Late("echousd.folder.history:undone")
 
 
 def save_room(
@@ -116,7 +119,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     layers = [layer_file(name, crate=room.options.crate) for name in reversed(LAYERS)]
     last = [*layers, UNFIT, root, manifest]
     drawn = ownership.pictures(folder, room.name)
-    remove = [*stale, *undone(folder), *drawn]
+    remove = [*stale, *(undone(folder) if old else ()), *drawn]
     told_kept = {path: name for path, name in kept.items() if name}
     changed = folders.write_together(folder, files, last=last, remove=remove, kept=told_kept)
     for fault in unfit:

@@ -7,15 +7,18 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from echomodel.boxes import Boxes
+from echomodel.late import Late
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.graph.consistency import GraphError
+from echousd.graph.files import STAGE_FORMS
 from echousd.graph.floors import check_space
 from echousd.make.verdicts import colliding
 from echousd.place.living import living_faults
-from echousd.stage.contents import read_contents
 from echousd.stage.files import opened
 from echousd.stage.read import find_rooms
+
+read_contents = Late("echousd.stage.contents:read_contents")  # of a stage where something is locked
 
 
 def with_own_boxes(graph: SceneGraph, boxes: Boxes | None) -> SceneGraph:
@@ -39,7 +42,6 @@ def with_own_pieces(graph: SceneGraph, meshes: Mapping[str, str | Path]) -> Scen
     return graph
 
 
-STAGES = (".usd", ".usda", ".usdc", ".usdz")
 
 
 def with_locked_places(graph: SceneGraph, *files: Path | None) -> tuple[SceneGraph, tuple[str, ...]]:
@@ -96,7 +98,7 @@ def _stage_of(file: Path) -> Path | None:
 
         manifest = find_manifest(file, file.resolve().name)
         file = file / f"{manifest['name']}.usda" if manifest else file
-    return file if file.is_file() and file.suffix in STAGES else None
+    return file if file.is_file() and file.suffix in STAGE_FORMS else None
 
 
 def _filled(graph: SceneGraph, file: Path, wanted: set[str]) -> tuple[SceneGraph, set[str]]:

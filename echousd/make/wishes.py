@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
-from echousd.assets.model_file import joined
+from echousd.assets.reference import joined
 from echousd.graph import GraphError, Node, SceneGraph
 from echousd.graph.text import stating, without
 from echousd.graph.titles import composed, identifier_of, is_title, name_of

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echomodel.late import Late
 from echomodel.objective import TERMS
 from echomodel.objective.sizes import (
     fitting_loads,
@@ -22,7 +23,6 @@ from echomodel.objective.sizes import (
 from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
-from echousd.place.fitted import fitted
 from echousd.place.geometry import DEFAULT_HEIGHT
 from echousd.place.overhead import lamps_along
 from echousd.place.report import collisions, outside
@@ -41,6 +41,7 @@ BAD = 1.5  # cost of a room in which something is broken
 WORTH = 1.0  # that smaller furniture must save of what an arrangement costs
 UPRIGHT = np.array([False, True, False])  # the side that taller and shorter are about
 SMALLEST = 0.02  # metres: no side of a sampled box is shorter
+fitted = Late("echousd.place.fitted:fitted")  # a kitchen's units
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +222,7 @@ def place_boxes(
         usual = usual_sizes(drawn.categories, drawn.size, lenient=lenient)
         kept = rigid | (has_proportions(drawn.categories) & ~np.isin(np.arange(n), told))
         at = posed(np.where(rigid[:, None], size, usual), position, yaw, kept)
-        at, planned = fitted(at, rigid)
+        at, planned = fitted(at, rigid) if any(kind.stands == "row" for kind in at.kinds) else (at, none)
         if planned.any():
             held, rigid, kept = fixed | planned, rigid | planned, kept | planned
             at = posed(at.size, at.position, at.yaw, kept)

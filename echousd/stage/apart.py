@@ -15,13 +15,15 @@ from functools import lru_cache
 from pathlib import Path
 
 from echomodel import files
+from echomodel.late import Late
+from echousd.graph.files import CRATE
 from echousd.pending import DEEP
 from echousd.stage.encoding import StageError
-from echousd.store import CRATE, KEY, store_of
 
 READER = Path(__file__).with_name("reader.py")
 PATIENCE = 600.0  # seconds for all files of one call
 NESTED = 4_000  # brackets that a text may open: OpenUSD is at its end where some 10,000 stand within each other
+stored = Late("echousd.store:stored")
 LARGE = 64 * 2**20  # bytes of a file that is looked at here, before it is read
 
 # Path, size and time of files -> why they cannot be read, "" where they can with all that they name.
@@ -58,7 +60,7 @@ def _harmless(path: Path) -> bool:
         return True
     packed = content.startswith((CRATE, b"PK"))
     text = not packed and sum(content.count(mark) for mark in (b"{", b"[", b"(")) <= NESTED
-    if not (text or _listed(path, files.digest(content)) or _stored(path)):
+    if not (text or _listed(path, files.digest(content)) or stored(path)):
         return False
     _read_here.add(stamp)
     return True
@@ -77,14 +79,6 @@ def _listed(path: Path, digest: str) -> bool:
 @lru_cache(maxsize=16)
 def _digests(listing: Path, changed: int) -> frozenset[str]:
     return frozenset(files.read_json(listing, LARGE)["files"].values())
-
-
-def _stored(path: Path) -> bool:
-    """Whether a store holds a file under the key of what it is."""
-    store = store_of(path)
-    with suppress(ValueError):
-        return store is not None and any(KEY.fullmatch(name) and store.whole(name) for name in path.resolve().parts)
-    return False
 
 
 def just_written(paths: Iterable[Path]) -> None:

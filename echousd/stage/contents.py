@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 
 import numpy as np
-import trimesh
 from pxr import Kind, Sdf, Usd, UsdGeom
 
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import LABELS
-from echousd.stage.files import open_stage
 from echousd.stage.forms import Polygons, forms, polygons
 from echousd.stage.read import RoomPrims, node_names, read_node, relation_of, room_spec
-from echousd.stage.units import Z_TO_Y, metres_per_unit, to_metres, upwards
+from echousd.stage.units import Z_TO_Y, metres_per_unit, upwards
 from echousd.stage.values import fans, matrix, readable, texts
 
 NOTHING = (np.zeros((0, 3)), np.zeros((0, 3), int))  # points and triangles of what has no surface
@@ -236,12 +233,3 @@ def surface_of(
             faces.append(triangles + count)
             count += len(vertices)
     return np.concatenate(points), np.concatenate(faces)
-
-
-def stage_mesh(path: Path) -> trimesh.Trimesh:
-    """Everything with a surface on a stage as triangles; raises ValueError where there is none."""
-    stage = open_stage(path)
-    points, faces = surface_of(stage.GetPseudoRoot(), UsdGeom.XformCache(), to_metres(stage))
-    if not len(faces):
-        raise ValueError("the stage holds no visible surfaces")
-    return trimesh.Trimesh(points, faces, process=False)

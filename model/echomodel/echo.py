@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from importlib import resources
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.compact.learned import unlearned
@@ -18,29 +17,20 @@ from echomodel.compact.model import CompactModel, WeightsError, branches, load_w
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.sampling import (
     CompactSampling,
-    agreeing,
-    group_means,
     known_values,
-    merit,
-    repeated,
     sample_boxes,
     sample_descriptions,
-    shape_predictor,
     with_whole_styles,
 )
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
-from echomodel.packed import pack_linear_maps
-from echomodel.progress import part_of
+from echomodel.late import Late
 from echomodel.protocols import GraphEdit, touched_nodes
-from echomodel.samplers import Predict
 from echomodel.vocabulary import vocabulary
 
-TOGETHER = 256  # objects that are denoised at a time when several draws are made: larger products, bounded memory
-# Steps of what one stage hands to the next, coarser than the noise of sums in another order: equal bytes follow.
 CHECKPOINT = "checkpoint.safetensors"  # beside the weights in the folder of a training
 LATER = ("autoencoder", "shape")  # shipped parts that few rooms need: three quarters of the bytes
-CODE, DISTANCE = 1e-3, 1e-4
+sample_shapes, packed_shape = Late("echomodel.compact.shape:sample_shapes"), Late("echomodel.packed:packed")
 
 
 class EchoModel:
@@ -57,9 +47,9 @@ class EchoModel:
         self.model, self.hash = model.eval(), hash
         if packed and "shape" in model.parts and self.device.type == "cpu":
             if "shape" in model.later:
-                model.later["shape"] = partial(_packed, model.later["shape"])
+                model.later["shape"] = partial(packed_shape, model.later["shape"])
             else:
-                pack_linear_maps(model.shape)
+                packed_shape(lambda: model.shape)
 
     @classmethod
     def load(cls, path: str | Path | None = None, *, device: torch.device | str = "cpu") -> EchoModel:
@@ -139,42 +129,10 @@ class EchoModel:
 
         Returns (N, 64, 64, 64) float32 truncated signed distances on the box-normalised grid, negative inside.
         """
-        settings, coder = self.config.shape, self.model.autoencoder
         graph, boxes = self._checked(graph), self._of(graph, boxes)
-        by = self._how(graph, how)
-        given = None if by.known is None else self.model.shape.codes(coder.encode(by.known))
-        equal = equal_furniture(graph)
-        tries = 1 if by.noise is not None else by.candidates or settings.candidates
-        width = max(1, min(tries, TOGETHER // graph.num_nodes))
-        rounds = [min(width, tries - start) for start in range(0, tries, width)]
-        grids, best = torch.empty(0), torch.empty(0)
-        for number, count in enumerate(rounds):
-            starts = [by.start(graph.num_nodes, settings.components, self.device) for _ in range(count)]
-            if by.noise is None:
-                starts = [settings.temperature * x[equal] for x in starts]
-            masks, told = repeated(by.known_mask, count), part_of(by.progress, number, len(rounds))
-            here = replace(by, known=repeated(given, count), known_mask=masks, progress=told)
-            predict = self._shape_predictor(graph, boxes.size, equal, by, count)
-            codes = here.denoised(predict, torch.cat(starts), settings)
-            for draw in codes.chunk(count):
-                drawn = self._decoded(draw)
-                whole = group_means(merit(drawn, boxes, graph.triplets), equal) if tries > 1 else best
-                if not len(grids):
-                    grids, best = drawn, whole
-                    continue
-                better = whole > best
-                grids, best = torch.where(better[:, None, None, None], drawn, grids), torch.maximum(best, whole)
-        if by.known is None or by.known_mask is None:
-            return grids
-        return torch.where(by.known_mask[:, None, None, None], by.known, grids)
-
-    @torch.no_grad()
-    def reconstruct(self, grids: Tensor) -> Tensor:
-        """Grids (N, 64, 64, 64) in [-1, 1] through the autoencoder and back."""
-        if "autoencoder" not in self.model.parts:
-            raise ValueError(f"the weights ({self.hash}) hold no autoencoder")
-        coder = self.model.autoencoder
-        return coder.decode(coder.encode(grids.to(self.device))).float()
+        found: Tensor = sample_shapes(self.model, self.graph_latent, graph, boxes, equal_furniture(graph),
+                                      self._how(graph, how))  # fmt: skip
+        return found
 
     @torch.no_grad()
     def sample_furniture(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Tensor:
@@ -193,22 +151,6 @@ class EchoModel:
             self.config.furniture.temperature * start[equal] if by.noise is None else start, by,
         )  # fmt: skip
 
-    def _shape_predictor(
-        self, graph: GraphBatch, size: Tensor, equal: Tensor, by: CompactSampling, count: int
-    ) -> Predict:
-        """The denoiser of `count` draws behind one another, each of all objects of the graph."""
-        many, latent = GraphBatch.pack([graph] * count), self.graph_latent(graph, by.edit)
-        pairs = pairs_of(many, self.config.predicates)
-        predict = shape_predictor(self.model, many, size.repeat(count, 1), pairs, latent.repeat(count, 1))
-        first = torch.arange(count, device=equal.device).repeat_interleave(len(equal)) * len(equal)
-        return agreeing(predict, equal.repeat(count) + first)
-
-    def _decoded(self, codes: Tensor) -> Tensor:
-        """Signed distances (N, 64, 64, 64) float32 of codes, a few objects at a time; both are rounded."""
-        latents, decode = self.model.shape.latents, self.model.autoencoder.decode
-        grids = torch.cat([decode(latents(part)).float() for part in _rounded(codes, CODE).split(4)])
-        return _rounded(grids, DISTANCE)
-
     def _how(self, graph: GraphBatch, told: dict[str, Any]) -> CompactSampling:
         """What a caller asks for, with what is known checked and on the model's device."""
         how = CompactSampling(**told)
@@ -225,16 +167,6 @@ class EchoModel:
         boxes = boxes.to(self.device)
         boxes.check()
         return boxes
-
-
-def _rounded(values: Tensor, step: float) -> Tensor:
-    return (values / step).round() * step
-
-
-def _packed(read: Callable[[], nn.Module]) -> nn.Module:
-    module = read()
-    pack_linear_maps(module)
-    return module
 
 
 def equal_furniture(graph: GraphBatch) -> Tensor:

@@ -7,16 +7,18 @@ the last models that it loaded.
 from __future__ import annotations
 
 from functools import lru_cache
-from importlib import import_module
 from pathlib import Path
 
 from safetensors import SafetensorError, safe_open
 
+from echomodel.late import Late
 from echomodel.protocols import RoomModel
 
 COMPACT, RUN = "echousd-compact-1", "weights.safetensors"  # a format, and what a training calls its weights
-# format of a weights file -> class whose `load(path, device=...)` gives the model; imported when asked for
-LOADERS = {COMPACT: "echomodel.echo:EchoModel", "echousd-released-1": "echoscene.echo:ReleasedEcho"}
+# format of a weights file -> what gives the model of a path, on a `device`
+LOADERS = {
+    COMPACT: Late("echomodel.echo:EchoModel.load"), "echousd-released-1": Late("echoscene.echo:ReleasedEcho.load"),
+}  # fmt: skip
 
 
 def load_model(weights: str | Path | None = None, *, device: str = "cpu") -> RoomModel:
@@ -36,8 +38,7 @@ def load_model(weights: str | Path | None = None, *, device: str = "cpu") -> Roo
 def _loaded(path: Path | None, stamp: tuple[tuple[str, int, int], ...], device: str) -> RoomModel:
     if path is not None and _format(path / RUN) in LOADERS.keys() - {COMPACT}:
         path = path / RUN  # a training of published networks; a folder of compact weights is read as a whole
-    module, name = LOADERS.get(_format(path), LOADERS[COMPACT]).split(":")
-    found: RoomModel = getattr(import_module(module), name).load(path, device=device)
+    found: RoomModel = LOADERS.get(_format(path), LOADERS[COMPACT])(path, device=device)
     return found
 
 

@@ -3,55 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from echomodel.openings import Opening
 from echomodel.rooms.statistics import quantile, room_type_statistics
-from echomodel.sizes import size_statistics, usual_range
+from echomodel.sizes import filled_area, footprint, pieces
 from echomodel.vocabulary import Category, vocabulary
 
 FULL = 0.55  # of the floor at most in what is proposed: beyond it nobody can walk
 WAY = 0.9  # metres beside the longest piece
-TUCKED = 0.5  # share of a seat's footprint that counts: the rest is below its table
 # What use takes beside a piece, metres: people pull chairs out by 0.75 m and walk round beds at 0.5 to 0.6 m.
 BEDSIDE, FOOT, PULL, KNEES, VIEW, HANDS = 0.5, 0.5, 0.75, 0.5, 2.1, 0.1
 BEHIND = 0.4  # metres between chairs that are pulled out and a sideboard
 DESK_CHAIR = 0.9  # metres before a desk
 SPREAD = 0.12  # of the logarithm of what is more than needed
 DOOR_AREA = 1.0  # square metres
-REACH = 0.5  # metres that a piece fills around it
 SPARSE = 0.8  # share of the floor are filled so at least in nine of ten real rooms
 WALLED = 0.58  # share of the walls that furniture can stand at: the rest are doors, low windows and corners
 LEAST_CUT_AREA = 14.0  # square metres of a floor that can spare a corner
 ARM = 2.4  # metres that each arm of a cut floor is wide at least
-
-
-@dataclass(frozen=True)
-class _Piece:
-    """A piece on the floor: its row, width and depth in metres."""
-
-    kind: Category
-    width: float
-    depth: float
-
-
-def footprint(categories: Sequence[str], sizes: Sequence[Sequence[float] | None], *, least: bool = False) -> float:
-    """Square metres that furniture covers; pieces without a size count with the median of their class.
-
-    Arguments:
-        categories: words of the vocabulary; what hangs or stands on other things does not count.
-        sizes: (x, y, z) extents in metres, or None.
-        least: take the 5th percentile of the class instead of the median.
-    """
-    pieces = _pieces(categories, sizes, least=least)
-    return sum(p.width * p.depth * (TUCKED if p.kind.role == "seat" else 1.0) for p in pieces)
-
-
-def filled_area(width: Sequence[float], depth: Sequence[float]) -> float:
-    """Square metres that n pieces of these widths and depths, metres, fill with half a metre around them."""
-    return sum((w + 2 * REACH) * (d + 2 * REACH) for w, d in zip(width, depth, strict=True))
 
 
 def used_area(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]) -> float:
@@ -59,15 +30,15 @@ def used_area(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]
 
     `categories`, `sizes`: as `footprint`.
     """
-    pieces = _pieces(categories, sizes)
-    chairs = sum(p.kind.stands == "at" for p in pieces)
-    desks = [p for p in pieces if p.kind.role == "board" and p.kind.access]
-    tables = [p for p in pieces if _dines(p.kind)]
-    screen = any(p.kind.stands == "opposite" or p.kind.role == "screen" for p in pieces)
-    served = max((p for p in pieces if p.kind.role == "sofa" and p.kind.wall), key=lambda p: p.width, default=None)
+    there = pieces(categories, sizes)
+    chairs = sum(p.kind.stands == "at" for p in there)
+    desks = [p for p in there if p.kind.role == "board" and p.kind.access]
+    tables = [p for p in there if _dines(p.kind)]
+    screen = any(p.kind.stands == "opposite" or p.kind.role == "screen" for p in there)
+    served = max((p for p in there if p.kind.role == "sofa" and p.kind.wall), key=lambda p: p.width, default=None)
     at_table = max(chairs - len(desks), 0) / max(len(tables), 1)
     area = 0.0
-    for piece in pieces:
+    for piece in there:
         kind, width, depth = piece.kind, piece.width, piece.depth
         if kind.role == "bed":
             area += (width + 2 * BEDSIDE) * (depth + FOOT)
@@ -91,8 +62,8 @@ def wall_length(categories: Sequence[str], sizes: Sequence[Sequence[float] | Non
 
     `categories`, `sizes`: as `footprint`.
     """
-    pieces = _pieces(categories, sizes)
-    return sum(p.width + HANDS for p in pieces if p.kind.wall or (p.kind.role == "board" and p.kind.access))
+    there = pieces(categories, sizes)
+    return sum(p.width + HANDS for p in there if p.kind.wall or (p.kind.role == "board" and p.kind.access))
 
 
 def longest_side(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]) -> float:
@@ -100,7 +71,7 @@ def longest_side(categories: Sequence[str], sizes: Sequence[Sequence[float] | No
 
     `categories`, `sizes`: as `footprint`.
     """
-    return max((max(p.width, p.depth) for p in _pieces(categories, sizes)), default=0.0)
+    return max((max(p.width, p.depth) for p in pieces(categories, sizes)), default=0.0)
 
 
 def floor_extents(
@@ -123,8 +94,8 @@ def floor_extents(
     usual = covered / row.cover * float(np.exp(0.12 * rng.standard_normal()))
     area = float(np.clip(usual, quantile(statistics.area, -0.9), quantile(statistics.area, 1.3)))
     used = used_area(categories, sizes) / row.used * float(np.exp(SPREAD * abs(rng.standard_normal())))
-    pieces = _pieces(categories, sizes)
-    most = filled_area([p.width for p in pieces], [p.depth for p in pieces]) / SPARSE
+    there = pieces(categories, sizes)
+    most = filled_area([p.width for p in there], [p.depth for p in there]) / SPARSE
     area = max(min(area, most), covered / FULL, used + DOOR_AREA)
     longest = longest_side(categories, sizes)
     least = max(statistics.short[0], WAY + longest / 2, _across(categories, sizes))
@@ -170,27 +141,6 @@ def floor_outline(
     return np.array(points).round(3)
 
 
-def _pieces(categories: Sequence[str], sizes: Sequence[Sequence[float] | None], *, least: bool = False) -> list[_Piece]:
-    """What stands on the floor, in its usual size where none is stated."""
-    out = []
-    for category, size in zip(categories, sizes, strict=True):
-        row = vocabulary().category(category)
-        if row.support != "floor":
-            continue
-        if size is None:
-            size = _usual(row, least)
-        out.append(_Piece(row, float(size[0]), float(size[2])))
-    return out
-
-
-def _usual(row: Category, least: bool) -> list[float]:
-    """(3,) metres: the usual size of a class, or the least one."""
-    if usual := usual_range(row.name):
-        return [low if least else float(np.sqrt(low * high)) for low, high in usual]
-    statistics = size_statistics(row.name)
-    return (statistics.low if least else statistics.median).tolist()
-
-
 def _dines(kind: Category) -> bool:
     """Whether people sit round such a table."""
     return kind.role == "board" and not (kind.access or kind.belongs_to or kind.wall)
@@ -198,19 +148,19 @@ def _dines(kind: Category) -> bool:
 
 def _across(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]) -> float:
     """Metres that the short side of the room has at least, so that the deepest group fits between two walls."""
-    pieces = _pieces(categories, sizes)
-    chairs = sum(p.kind.stands == "at" for p in pieces)
-    at_wall = [p.depth for p in pieces if p.kind.wall and p.kind.role == "storage" and p.kind.access > 0.35]
+    there = pieces(categories, sizes)
+    chairs = sum(p.kind.stands == "at" for p in there)
+    at_wall = [p.depth for p in there if p.kind.wall and p.kind.role == "storage" and p.kind.access > 0.35]
     storage = max(at_wall, default=0.0)
     out = 0.0
-    for piece in pieces:
+    for piece in there:
         if piece.kind.role == "bed":
             out = max(out, piece.depth + FOOT + 0.4 * bool(storage))
         elif _dines(piece.kind):
             behind = BEHIND * bool(storage and chairs > 1)
             out = max(out, min(piece.width, piece.depth) + 2 * PULL * (chairs > 1) + storage + behind)
         elif piece.kind.role == "sofa":
-            screens = [p.depth for p in pieces if p.kind.stands == "opposite"]
+            screens = [p.depth for p in there if p.kind.stands == "opposite"]
             out = max(out, piece.depth + (VIEW + screens[0] if screens else 2 * KNEES + storage))
         elif piece.kind.role == "board" and piece.kind.access:
             out = max(out, piece.depth + DESK_CHAIR + storage)

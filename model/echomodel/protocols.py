@@ -94,11 +94,6 @@ class RoomModel(Protocol):
         """
         ...
 
-    def reconstruct(self, grids: Tensor) -> Tensor:
-        """Grids (N, 64, 64, 64) float32 in [-1, 1] through the autoencoder and back; raises ValueError where it takes
-        others."""
-        ...
-
 
 class FurnitureModel(RoomModel, Protocol):
     """A model of rooms that also describes furniture."""

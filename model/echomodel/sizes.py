@@ -1,8 +1,9 @@
-"""Sizes of furniture: the percentiles and correlations of each class in real rooms."""
+"""Sizes of furniture: those of each class in real rooms, what pieces cover, what fitted units are built by."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -10,9 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.vocabulary import vocabulary
+from echomodel.vocabulary import Category, vocabulary
 
 Z95 = 1.6449  # standard score of the 95th percentile
+TUCKED = 0.5  # share of a seat's footprint that counts: the rest is below its table
+REACH = 0.5  # metres that a piece fills around it
+TALL = 1.3  # metres: what is higher has no worktop
+AISLE = 1.2  # metres between fronts that face each other, and before them
+LANDING = 0.4  # metres of worktop beside a hob
+TRIANGLE = (3.6, 8.0)  # metres, sum of the ways between hob, sink and fridge
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +68,53 @@ def size_score(category: str, size: np.ndarray) -> np.ndarray:
     deviation = np.log(size / statistics.median)
     below, above = np.log(statistics.median / statistics.low), np.log(statistics.high / statistics.median)
     return Z95 * deviation / np.where(deviation < 0, below, above)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A piece on the floor: its row, width and depth in metres."""
+
+    kind: Category
+    width: float
+    depth: float
+
+
+def footprint(categories: Sequence[str], sizes: Sequence[Sequence[float] | None], *, least: bool = False) -> float:
+    """Square metres that furniture covers; pieces without a size count with the median of their class.
+
+    Arguments:
+        categories: words of the vocabulary; what hangs or stands on other things does not count.
+        sizes: (x, y, z) extents in metres, or None.
+        least: take the 5th percentile of the class instead of the median.
+    """
+    there = pieces(categories, sizes, least=least)
+    return sum(p.width * p.depth * (TUCKED if p.kind.role == "seat" else 1.0) for p in there)
+
+
+def filled_area(width: Sequence[float], depth: Sequence[float]) -> float:
+    """Square metres that n pieces of these widths and depths, metres, fill with half a metre around them."""
+    return sum((w + 2 * REACH) * (d + 2 * REACH) for w, d in zip(width, depth, strict=True))
+
+
+def pieces(categories: Sequence[str], sizes: Sequence[Sequence[float] | None], *, least: bool = False) -> list[Piece]:
+    """What stands on the floor, in its usual size where none is stated."""
+    out = []
+    for category, size in zip(categories, sizes, strict=True):
+        row = vocabulary().category(category)
+        if row.support != "floor":
+            continue
+        if size is None:
+            size = _usual(row, least)
+        out.append(Piece(row, float(size[0]), float(size[2])))
+    return out
+
+
+def _usual(row: Category, least: bool) -> list[float]:
+    """(3,) metres: the usual size of a class, or the least one."""
+    if usual := usual_range(row.name):
+        return [low if least else float(np.sqrt(low * high)) for low, high in usual]
+    statistics = size_statistics(row.name)
+    return (statistics.low if least else statistics.median).tolist()
 
 
 def _correlation(xy: float, xz: float, yz: float) -> np.ndarray:

@@ -184,7 +184,7 @@ def test_configurations_survive_json_and_settings() -> None:
 
 def test_draws_side_by_side_are_draws_one_by_one(model: EchoModel, monkeypatch: pytest.MonkeyPatch) -> None:
     together = model.sample_shapes(bedroom(), boxes(), generator=seeded(), candidates=3)
-    monkeypatch.setattr("echomodel.echo.TOGETHER", 1)
+    monkeypatch.setattr("echomodel.compact.shape.TOGETHER", 1)
     done: list[tuple[int, int]] = []
     alone = model.sample_shapes(
         bedroom(), boxes(), generator=seeded(), candidates=3, progress=lambda *part: done.append(part)

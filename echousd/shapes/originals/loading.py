@@ -23,10 +23,12 @@ from echomodel.files import within_memory
 from echousd.assets.catalogues import Entry
 from echousd.assets.describe import described, digest_of
 from echousd.assets.measure import Measured, measure
-from echousd.assets.model_file import STAGES, Beside, ModelFile, check_reach, checked_image, joined, split
-from echousd.assets.record import AssetRecord, Vector
+from echousd.assets.model_file import Beside, ModelFile, checked_image
+from echousd.assets.record import AssetRecord
+from echousd.assets.reference import Vector, check_reach, joined, split
 from echousd.assets.table import Library
 from echousd.exporting.packing import PACKED, LeftOut, asset_paths
+from echousd.graph.files import STAGE_FORMS
 from echousd.shapes.colliders import hull_of
 from echousd.shapes.geometry import CONVERTED, Geometry, Origin, Original, Part
 from echousd.shapes.surface import box_projection, creased_normals
@@ -85,7 +87,7 @@ def geometry_of(
 
 
 def _original(model: ModelFile, found: Measured, pose: np.ndarray, collect: bool) -> Original:
-    if model.suffix not in STAGES:
+    if model.suffix not in STAGE_FORMS:
         return Original(pose, ROOT, files=converted(model))
     # a payload brings the prim's own transform, and none of those above it
     main, files = collected(model) if collect else (CONVERTED, {})
@@ -93,7 +95,7 @@ def _original(model: ModelFile, found: Measured, pose: np.ndarray, collect: bool
     return Original(pose @ found.above, found.prim, layer, files, main, found.bodies, found.colliders)
 
 
-TAKEN = (*STAGES, *PACKED, *READABLE, ".mdl", ".mtlx", ".hdr")
+TAKEN = (*STAGE_FORMS, *PACKED, *READABLE, ".mdl", ".mtlx", ".hdr")
 MAX_TOTAL = 4 * 2**30  # bytes of one model with all that it needs
 
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
-from echousd.assets.model_file import ModelFile, check_reach, is_file, joined, relative, split
-from echousd.assets.record import AssetRecord, Vector
+from echousd.assets.reference import Vector, check_reach, is_file, joined, relative, split
 from echousd.graph import Node, SceneGraph
 from echousd.progress import StageTimer
 from echousd.shapes.finishes.slots import HARMONIES, linear
@@ -21,6 +20,8 @@ from echousd.shapes.styles import ALIKE, ROOM_STYLE
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
     from echousd.assets.choose import Asked, AssetWishes
+    from echousd.assets.model_file import ModelFile
+    from echousd.assets.record import AssetRecord
 
     Wanted = Callable[[], AssetWishes]  # what is asked of a library, made where it is needed
 

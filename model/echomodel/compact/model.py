@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -27,9 +27,12 @@ from echomodel.compact.furniture import FurnitureDenoiser
 from echomodel.compact.layout import LayoutDenoiser
 from echomodel.compact.learned import WordTable, places
 from echomodel.compact.pairs import EchoLayer, Pairs
-from echomodel.compact.shape import Autoencoder, ShapeDenoiser
 from echomodel.config import CompactConfig, FurnitureConfig, check_numbers, from_dict, to_json
 from echomodel.files import whole_file
+from echomodel.late import Late
+
+if TYPE_CHECKING:
+    from echomodel.compact.shape import Autoencoder, ShapeDenoiser
 
 
 class LatentGraph(nn.Module):
@@ -122,8 +125,8 @@ def _outdated_furniture(settings: Mapping[str, Any]) -> str | None:
 PARTS: dict[str, Part] = {
     "latent": Part(LatentGraph),
     "layout": Part(LayoutDenoiser, ("latent",), branch=True, outdated=_outdated_layout),
-    "autoencoder": Part(Autoencoder),
-    "shape": Part(ShapeDenoiser, ("latent", "autoencoder"), branch=True),
+    "autoencoder": Part(Late("echomodel.compact.shape:Autoencoder")),
+    "shape": Part(Late("echomodel.compact.shape:ShapeDenoiser"), ("latent", "autoencoder"), branch=True),
     "furniture": Part(FurnitureDenoiser, ("latent",), branch=True, outdated=_outdated_furniture),
 }
 

@@ -1,4 +1,4 @@
-"""Shapes: an autoencoder of signed distances, and the denoiser of its latents, joined by an echo (EchoScene 3.4).
+"""Shapes: an autoencoder of signed distances, the denoiser of its latents, joined by an echo (EchoScene 3.4), draws.
 
 The autoencoder is a PCA of 4^3 patches, refined by convolutions over the latent grid; the denoiser a small transformer
 per object on principal components.
@@ -6,17 +6,29 @@ per object on principal components.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
 import torch
+from scipy import ndimage
 from torch import Tensor, nn
 
+from echomodel.boxes import Boxes
+from echomodel.boxes2d import seen
 from echomodel.compact.learned import WordTable
-from echomodel.compact.pairs import EchoLayer, Pairs, level_features
+from echomodel.compact.model import CompactModel
+from echomodel.compact.pairs import EchoLayer, Pairs, level_features, pairs_of
+from echomodel.compact.sampling import CompactSampling, Latent, agreeing, group_means
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
+from echomodel.progress import part_of
+from echomodel.samplers import Predict, clean_from
+from echomodel.vocabulary import vocabulary
 
 GRID = 64
+TOGETHER = 256  # objects that are denoised at a time when several draws are made: larger products, bounded memory
+# Steps of what one stage hands to the next, coarser than the noise of sums in another order: equal bytes follow.
+CODE, DISTANCE = 1e-3, 1e-4
 
 
 class Autoencoder(nn.Module):
@@ -281,3 +293,133 @@ class _Block(nn.Module):
     def _merge(self, x: Tensor) -> Tensor:
         n, heads, t, width = x.shape
         return x.transpose(1, 2).reshape(n, t, heads * width)
+
+
+def shape_predictor(model: CompactModel, graph: GraphBatch, size: Tensor, pairs: Pairs, latent: Tensor) -> Predict:
+    """Clean codes (N, K) in noisy ones; arguments as for `ShapeDenoiser.context`."""
+    context = model.shape.context(graph, size, pairs, latent)
+    settings = model.config.shape
+
+    def predict(x: Tensor, level: Tensor) -> Tensor:
+        output = model.shape(x, level, context)
+        return output if settings.prediction == "sample" else clean_from(output, x, level, settings.objective)
+
+    return predict
+
+
+FILLED = 60  # voxels that a shape spans on every axis of its box-normalised grid
+TOP = 58  # voxel from which on a column counts as reaching the top of the box
+PLAY = 0.1  # metres between the bottom of one and the top of the other
+
+
+def wholeness(grids: Tensor) -> Tensor:
+    """Share of a shape's volume in its largest piece times the shares of its box's sides that it spans.
+
+    `grids`: (N, 64, 64, 64) float signed distances, negative inside.
+
+    Returns (N,) float32 in [0, 1]: 1 for one piece that fills its box, 0 for an empty grid.
+    """
+    return torch.tensor([_whole(grid.cpu().numpy() < 0) for grid in grids], dtype=torch.float32, device=grids.device)
+
+
+def _whole(inside: np.ndarray) -> float:
+    parts, count = ndimage.label(inside)
+    if not count:
+        return 0.0
+    volume = np.bincount(parts.ravel())[1:]
+    spans = 1.0
+    for axis in range(3):
+        used = np.flatnonzero(inside.any(axis=tuple(other for other in range(3) if other != axis)))
+        spans *= min((used[-1] - used[0] + 1) / FILLED, 1.0)
+    return float(volume.max() / volume.sum() * spans)
+
+
+def bearing(grids: Tensor, boxes: Boxes, triplets: Tensor) -> Tensor:
+    """How much of the ground under what stands on each shape is really there, at the top of its box.
+
+    A desk with a shelf at its back fills its box as well as a plain one, but a lamp in its middle would float.
+
+    Arguments:
+        grids: (N, 64, 64, 64) float signed distances, negative inside.
+        boxes: N boxes.
+        triplets: (E, 3) int64; `standing_on` with the subject at the object's top counts.
+
+    Returns (N,) float32 in [0, 1]; 1 for whatever bears nothing.
+    """
+    out = torch.ones(len(grids), device=grids.device)
+    high = (grids[:, :, TOP:] < 0).any(2)  # (N, x, z): columns that reach the top
+    resting = [predicate.id for predicate in vocabulary().predicates if predicate.rests]
+    for above, _, below in triplets[torch.isin(triplets[:, 1], triplets.new_tensor(resting))].tolist():
+        gap = boxes.position[above, 1] - boxes.position[below, 1] - boxes.size[below, 1]
+        if above == below or abs(float(gap)) > PLAY:
+            continue
+        place = seen((boxes.position[above] - boxes.position[below])[[0, 2]], boxes.yaw[below]).cpu().numpy()
+        extent = boxes.size[below][[0, 2]].cpu().numpy()
+        foot = float(boxes.size[above][[0, 2]].min()) / 4
+        first = np.round((place - foot) / extent * FILLED + 31.5).clip(2, 61).astype(int)
+        last = np.round((place + foot) / extent * FILLED + 31.5).clip(2, 61).astype(int)
+        ground = high[below, first[0] : last[0] + 1, first[1] : last[1] + 1]
+        out[below] = torch.minimum(out[below], ground.float().mean())
+    return out
+
+
+def merit(grids: Tensor, boxes: Boxes, triplets: Tensor) -> Tensor:
+    """What draws are chosen by: (N,), whole shapes that bear what stands on them first."""
+    return wholeness(grids) * (0.1 + 0.9 * bearing(grids, boxes, triplets))
+
+
+def repeated(values: Tensor | None, count: int) -> Tensor | None:
+    """(N, ...) behind itself `count` times."""
+    return None if values is None else torch.cat([values] * count)
+
+
+def sample_shapes(
+    model: CompactModel, latent: Latent, graph: GraphBatch, boxes: Boxes, equal: Tensor, how: CompactSampling
+) -> Tensor:  # fmt: skip
+    """Truncated signed distances (N, 64, 64, 64) float32 of all objects of S scenes, drawn from noise.
+
+    Arguments:
+        model: with a shape branch. latent: the latent graph of some scenes before and after an edit.
+        graph: checked and on the model's device. boxes: N, that the shapes will fill.
+        equal: (N,) int64, number of each object's group in [0, N); a group agrees on one shape.
+        how: to sample; what is known is checked.
+    """
+    settings = model.config.shape
+    given = None if how.known is None else model.shape.codes(model.autoencoder.encode(how.known))
+    tries = 1 if how.noise is not None else how.candidates or settings.candidates
+    width = max(1, min(tries, TOGETHER // graph.num_nodes))
+    rounds = [min(width, tries - start) for start in range(0, tries, width)]
+    grids, best = torch.empty(0), torch.empty(0)
+    for number, count in enumerate(rounds):
+        starts = [how.start(graph.num_nodes, settings.components, model.device) for _ in range(count)]
+        if how.noise is None:
+            starts = [settings.temperature * x[equal] for x in starts]
+        masks, told = repeated(how.known_mask, count), part_of(how.progress, number, len(rounds))
+        here = replace(how, known=repeated(given, count), known_mask=masks, progress=told)
+        many, nodes = GraphBatch.pack([graph] * count), latent(graph, how.edit).repeat(count, 1)
+        pairs = pairs_of(many, model.config.predicates)
+        predict = shape_predictor(model, many, boxes.size.repeat(count, 1), pairs, nodes)
+        first = torch.arange(count, device=equal.device).repeat_interleave(len(equal)) * len(equal)
+        codes = here.denoised(agreeing(predict, equal.repeat(count) + first), torch.cat(starts), settings)
+        for draw in codes.chunk(count):
+            drawn = _decoded(model, draw)
+            whole = group_means(merit(drawn, boxes, graph.triplets), equal) if tries > 1 else best
+            if not len(grids):
+                grids, best = drawn, whole
+                continue
+            better = whole > best
+            grids, best = torch.where(better[:, None, None, None], drawn, grids), torch.maximum(best, whole)
+    if how.known is None or how.known_mask is None:
+        return grids
+    return torch.where(how.known_mask[:, None, None, None], how.known, grids)
+
+
+def _decoded(model: CompactModel, codes: Tensor) -> Tensor:
+    """Signed distances (N, 64, 64, 64) float32 of codes, a few objects at a time; both are rounded."""
+    latents, decode = model.shape.latents, model.autoencoder.decode
+    grids = torch.cat([decode(latents(part)).float() for part in _rounded(codes, CODE).split(4)])
+    return _rounded(grids, DISTANCE)
+
+
+def _rounded(values: Tensor, step: float) -> Tensor:
+    return (values / step).round() * step

@@ -13,8 +13,8 @@ from importlib import resources
 
 import numpy as np
 
-from echomodel.dressing import books, household, textiles, vessels
 from echomodel.furniture.solids import Solid
+from echomodel.late import Late
 
 Program = Callable[[np.ndarray, np.random.Generator], list[Solid]]
 Size3 = tuple[float, float, float]
@@ -46,11 +46,10 @@ class Kind:
 
 def _kinds() -> dict[str, Kind]:
     """The rows of `things.toml` by the names of their programs."""
-    programs = {"books": books, "household": household, "textiles": textiles, "vessels": vessels}
     rows = tomllib.loads(resources.files(__name__).joinpath("things.toml").read_text("utf-8"))
     made = {}
     for name, row in rows.items():
-        program = getattr(programs[row.pop("module")], name)
+        program = Late(f"{__name__}.{row.pop('module')}:{name}")
         made[name] = Kind(program=program, low=tuple(row.pop("low")), high=tuple(row.pop("high")), **row)
     return made
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,6 +12,7 @@ import numpy as np
 from echomodel.furniture.assembly import MATERIALS, box_uv, mesh_of, tsdf_of
 from echomodel.furniture.solids import Joint, Solid
 from echomodel.furniture.style import Choices, Style, sample_size
+from echomodel.late import Late
 from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:
@@ -98,6 +98,5 @@ def _builder(name: str) -> Builder:
     for word in (name, row.like or row.sgfront):
         for module, programs in PROGRAMS.items():
             if word in programs:
-                program: Builder = getattr(importlib.import_module(f"echomodel.furniture.{module}"), word)
-                return program
+                return Late(f"{__name__}.{module}:{word}")
     raise ValueError(f"no furniture is made for {name}")

@@ -14,7 +14,7 @@ from torch import Tensor
 from echomodel.floors import signed_distance
 from echomodel.objective.company import AROUND, BESIDE, seats_at
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
-from echomodel.plans import REACH, filled_area
+from echomodel.sizes import REACH, filled_area
 
 BARE = 1.05  # radius of an empty circle, of the side of a square that is each piece's share of the floor
 AHEAD = 1.0  # metres before a sofa to other groups: 97 % of real ones have them

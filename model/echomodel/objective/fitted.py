@@ -8,7 +8,7 @@ from torch import Tensor
 from echomodel.objective.access import before_fronts
 from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody, worst
 from echomodel.openings import segment
-from echomodel.rooms.runs import AISLE, LANDING, TALL, TRIANGLE
+from echomodel.sizes import AISLE, LANDING, TALL, TRIANGLE
 
 FLUSH = 0.02  # metres between neighbours of a row, and between their backs
 CENTRED = 0.06  # metres between the middles of a hood and its hob, of a mirror and its basin

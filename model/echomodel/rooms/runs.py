@@ -17,20 +17,17 @@ import numpy as np
 from echomodel.openings import Opening, free_area, signed_area
 from echomodel.roomboxes import footprints
 from echomodel.rooms.floor import Wall, walls_of
-from echomodel.sizes import usual_range
+from echomodel.sizes import AISLE, LANDING, TALL, TRIANGLE, usual_range
 from echomodel.vocabulary import Category
 
-WORKTOP, TALL = 0.9, 1.3  # metres: what is higher has no worktop
+WORKTOP = 0.9  # metres
 BEHIND = 0.005  # metres between the backs and their wall
 CASING = 0.06  # metres that units keep from what blocks a wall
 OVER_SILL = 0.3  # metres that a unit may reach over a window's sill: a tap
-AISLE = 1.2  # metres between fronts that face each other, and before them
 BLIND = 0.35  # metres of a corner's unit that stay free beside the run around the corner
 LEAST_LEG = 0.55  # metres of wall that a run is begun at
 WIDEST = 1.5  # metres of a unit that is stretched, where less does not fill the wall
 SLIVER = 0.35  # metres of wall that are not left over beside a run
-LANDING = 0.4  # metres of worktop beside a hob
-TRIANGLE = (3.6, 8.0)  # metres, sum of the ways between hob, sink and fridge
 BUILT = 100  # plans of one room that are looked at with what hangs over them
 Interval = tuple[float, float]
 Obstacle = tuple[np.ndarray, float, float, bool]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from importlib import import_module
 from pathlib import Path
 
 import torch
 
+from echomodel.late import Late
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import Recipe
@@ -23,7 +23,7 @@ STAGES: dict[str, type[CompactStage]] = {
     "parts": PartsStage,
 }  # the stages of the compact model, as recipes name them
 # those of other models -> the module whose `opened` makes their trainer
-ELSEWHERE = {"paper": "echoscene.training", "paper_vqvae": "echoscene.training"}
+ELSEWHERE = dict.fromkeys(("paper", "paper_vqvae"), Late("echoscene.training:opened"))
 
 
 def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Report | None = None) -> Trainer:
@@ -44,9 +44,7 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
         torch.distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
     torch.manual_seed(recipe.seed)
     if recipe.stage in ELSEWHERE:
-        made: Trainer = import_module(ELSEWHERE[recipe.stage]).opened(
-            recipe, folder, device, resume=resume, report=report
-        )
+        made: Trainer = ELSEWHERE[recipe.stage](recipe, folder, device, resume=resume, report=report)
         return made
     kind = STAGES[recipe.stage]
     start = started(kind, recipe, device, resume=resume)

@@ -8,7 +8,8 @@ from dataclasses import replace
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.compact.sampling import bearing, group_means, wholeness
+from echomodel.compact.sampling import group_means
+from echomodel.compact.shape import bearing, wholeness
 
 
 def solid(*boxes: tuple[slice, slice, slice]) -> torch.Tensor:
