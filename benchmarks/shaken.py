@@ -80,7 +80,7 @@ def report(rooms: list[RoomBoxes], noise: float, arguments: argparse.Namespace) 
         n = len(room)
         pairs, hit, clean_hit = pairs + n * (n - 1) // 2, hit + len(done.collisions), clean_hit + clean
         outside, objects = outside + len(done.outside), objects + n
-        moved.append(done.moved.mean())
+        moved.append(np.linalg.norm(done.position - start.position, axis=1).mean())
         edges.append(len(triplets))
     print(
         f"noise {noise:.2f} m: relations kept {before / measured:.4f} -> {kept / measured:.4f} of {measured}, "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -23,9 +24,9 @@ from echousd.graph import SceneGraph
 from echousd.graph.floors import with_placed_openings
 from echousd.make.verdicts import layout_outcome
 from echousd.options import RoomOptions
-from echousd.place.placing import PlaceResult
+from echousd.place.placing import PlacedBoxes
 from echousd.place.placing import place as placed
-from echousd.place.solver import PlaceConfig
+from echousd.place.solver import PlaceConfig, sentence
 from echousd.progress import StageTimer
 from echousd.shapes.styles import equal_sizes, unequal_pairs
 from echousd.shapes.walls import floor_polygon
@@ -182,12 +183,9 @@ def finished_boxes(
         return rounded_boxes(graph, boxes), ()
     from echousd.place.living import living_faults
 
-    judged: dict[int, tuple[int, ...]] = {}
-
-    def wrong(one: PlaceResult) -> tuple[int, ...]:
-        if id(one) not in judged:
-            judged[id(one)] = len(one.broken), len(one.collisions), len(living_faults(graph, one.boxes))
-        return judged[id(one)]
+    @cache
+    def wrong(one: PlacedBoxes) -> tuple[int, ...]:
+        return int((one.verdict == 0).sum()), len(one.collisions), len(living_faults(graph, one.boxes))
 
     graph = _with_homeless_unlocked(graph)
     with timer.stage("place"), one_thread():
@@ -198,11 +196,10 @@ def finished_boxes(
             fixed = with_sizes(graph, same)
             second = placed(fixed, same, config=PlaceConfig(arrange=False))
             if wrong(second) > wrong(found):
-                third = placed(fixed, same)  # both are held, as they are known by their ids
-                second = min(second, third, key=wrong)
+                second = min(second, placed(fixed, same), key=wrong)
             if wrong(second)[:2] <= wrong(found)[:2]:
                 found = second
-    return rounded_boxes(graph, found.boxes), found.conflicts
+    return rounded_boxes(graph, found.boxes), tuple(sentence(conflict, graph) for conflict in found.conflicts)
 
 
 def _with_homeless_unlocked(graph: SceneGraph) -> SceneGraph:

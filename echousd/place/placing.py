@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import torch
 
+from echomodel.boxes import Boxes
 from echomodel.late import Late
 from echomodel.objective import TERMS
 from echomodel.objective.sizes import (
@@ -22,19 +23,19 @@ from echomodel.objective.sizes import (
 )
 from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
+from echomodel.rules import verdicts
 from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import DEFAULT_HEIGHT
 from echousd.place.overhead import lamps_along
 from echousd.place.report import collisions, outside
 from echousd.place.search import ANEW, Arranged, Search
 from echousd.place.setting import Setting, setting_of, stacked
-from echousd.place.solver import Conflict, PlaceConfig, conflicts, sentence, solve, unmet
+from echousd.place.solver import Conflict, PlaceConfig, conflicts, solve, unmet
 from echousd.tensors import stated_placements, triplets_of
 
 if TYPE_CHECKING:
-    from echomodel.boxes import Boxes
     from echomodel.rules.placements import Stated
-    from echousd.graph import Relation, SceneGraph
+    from echousd.graph import SceneGraph
 
 FULL = 0.3  # share of a floor that is covered from which on smaller furniture is tried
 BAD = 1.5  # cost of a room in which something is broken
@@ -53,7 +54,6 @@ class PlacedBoxes:
         verdict: (e,) int8, 1 kept, 0 broken, -1 not measured.
         conflicts: groups of demands that contradict each other.
         collisions: (pair, depth in metres) of boxes that still collide; outside: (object, depth in metres).
-        moved: (n,) float, metres; resized: (n,) float, largest relative change of a side; seconds: time spent.
     """
 
     size: np.ndarray
@@ -63,37 +63,14 @@ class PlacedBoxes:
     conflicts: tuple[Conflict, ...]
     collisions: tuple[tuple[tuple[int, int], float], ...]
     outside: tuple[tuple[int, float], ...]
-    moved: np.ndarray
-    resized: np.ndarray
-    seconds: float
+
+    @property
+    def boxes(self) -> Boxes:
+        """The same boxes as tensors, float32."""
+        return Boxes(*(torch.from_numpy(of).float() for of in (self.size, self.position, self.yaw)))
 
 
-@dataclass(frozen=True, eq=False)
-class PlaceResult:
-    """The placed room in the words of its graph.
-
-    Arguments:
-        boxes: N boxes in the order of the graph's nodes.
-        kept, broken, unmeasured: relations of the graph by verdict.
-        conflicts: for what could not be met, sentences that name the relations and other demands in conflict.
-        collisions: (name, name, depth in metres); outside: (name, depth in metres).
-        moved: name -> metres; resized: name -> largest relative change of a side.
-        seconds: time spent.
-    """
-
-    boxes: Boxes
-    kept: tuple[Relation, ...]
-    broken: tuple[Relation, ...]
-    unmeasured: tuple[Relation, ...]
-    conflicts: tuple[str, ...]
-    collisions: tuple[tuple[str, str, float], ...]
-    outside: tuple[tuple[str, float], ...]
-    moved: dict[str, float]
-    resized: dict[str, float]
-    seconds: float
-
-
-def place(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: PlaceConfig | None = None) -> PlaceResult:
+def place(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: PlaceConfig | None = None) -> PlacedBoxes:
     """Place the sampled boxes of a graph: see `place_boxes`.
 
     Nodes that are locked or have a position stay where they are, nodes with a size keep it, nodes with a yaw keep it.
@@ -106,14 +83,10 @@ def place(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: Pla
     Raises:
         ValueError: as `place_boxes`, or another number of boxes than nodes.
     """
-    import torch
-
-    from echomodel.boxes import Boxes
-
     nodes = graph.nodes
     if len(boxes) != len(nodes):
         raise ValueError(f"{len(boxes)} boxes for a graph of {len(nodes)} objects: need one box per object")
-    done = place_boxes(
+    return place_boxes(
         [node.category for node in nodes],
         np.asarray(boxes.size, float),
         np.asarray(boxes.position, float),
@@ -128,26 +101,6 @@ def place(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: Pla
         turned=np.array([node.locked or node.yaw is not None for node in nodes]),
         rules=rules,
         config=config,
-    )
-    names = graph.names
-    by_verdict = {
-        v: tuple(r for r, found in zip(graph.relations, done.verdict, strict=True) if found == v) for v in (1, 0, -1)
-    }
-    return PlaceResult(
-        boxes=Boxes(
-            torch.as_tensor(done.size, dtype=torch.float32),
-            torch.as_tensor(done.position, dtype=torch.float32),
-            torch.as_tensor(done.yaw, dtype=torch.float32),
-        ),
-        kept=by_verdict[1],
-        broken=by_verdict[0],
-        unmeasured=by_verdict[-1],
-        conflicts=tuple(sentence(conflict, graph) for conflict in done.conflicts),
-        collisions=tuple((names[i], names[j], depth) for (i, j), depth in done.collisions),
-        outside=tuple((names[i], depth) for i, depth in done.outside),
-        moved=dict(zip(names, done.moved.tolist(), strict=True)),
-        resized=dict(zip(names, done.resized.tolist(), strict=True)),
-        seconds=done.seconds,
     )
 
 
@@ -184,12 +137,6 @@ def place_boxes(
     Raises:
         ValueError: a box that is not finite, a floor without area, or unknown rules.
     """
-    import torch
-
-    from echomodel.boxes import Boxes
-    from echomodel.rules import verdicts
-
-    started = time.perf_counter()
     n = len(categories)
     bad = ~(np.isfinite(size).all(1) & np.isfinite(position).all(1) & np.isfinite(yaw))
     if bad.any():
@@ -279,9 +226,6 @@ def place_boxes(
         conflicts=conflicts(at, found, failures),
         collisions=hit,
         outside=beyond,
-        moved=np.linalg.norm(end - position, axis=1),
-        resized=np.abs(size_end / np.maximum(size, SMALLEST) - 1.0).max(1, initial=0.0),
-        seconds=time.perf_counter() - started,
     )
 
 

@@ -39,7 +39,7 @@ def test_units_stand_in_a_row_without_a_fault():
 def test_the_graph_says_where_in_the_row():
     for side in ("left", "right"):
         graph, found = kitchen([f"fridge {side} sink_unit"])
-        assert found.broken == ()
+        assert (found.verdict != 0).all()
         assert {f.rule for f in living_faults(graph, found.boxes)} <= {"work_triangle"}
 
 
