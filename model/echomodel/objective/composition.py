@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from echomodel.floors import signed_distance
-from echomodel.objective.company import AROUND, BESIDE, seats_at
+from echomodel.objective.company import AROUND, BESIDE, Seats, seats_at
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
 from echomodel.sizes import REACH, filled_area
 
@@ -181,16 +181,31 @@ def chairs_at_sides(plan: Plan) -> Found:
     seats = seats_at(plan)
     if seats is None:
         return nobody(plan.size)
-    who = seats.j.unique()
+    who, free = _free_sides(plan, seats)
     side = 4 * who[:, None] + torch.arange(4)
     count = torch.bincount(seats.side, minlength=4 * len(plan))[side]
     edge = plan.size[who][:, [2, 2, 0, 0]]
-    free = _free_beside(plan, who) > SEAT
     each = torch.where(count > 1, edge / count.clamp_min(1), FAR)
     best = torch.where(free, edge / (count + 1), 0.0).amax(1).clamp_max(EASY)
     least = each.amin(1)
     crowded = least < FAR
     return found(who[crowded], (least - best)[crowded], measure=least[crowded])
+
+
+def chairs_balanced(plan: Plan) -> Found:
+    """As many sit at one side of a table as opposite, but for one where their number is odd, or no room is there."""
+    seats = seats_at(plan)
+    if seats is None:
+        return nobody(plan.size)
+    who, free = _free_sides(plan, seats)
+    places = (plan.size[seats.i, 0].detach() / ELBOW).round().clamp_min(1.0)  # a bench counts for several chairs
+    count = places.new_zeros(4 * len(plan)).index_add(0, seats.side, places).reshape(-1, 2, 2)[who]
+    fewer = count.argmin(-1, keepdim=True)
+    room = free.reshape(-1, 2, 2).gather(-1, fewer) | (count.gather(-1, fewer) > 0)
+    more = ((count[..., 0] - count[..., 1]).abs() * room[..., 0]).sum(-1)
+    total = count.sum((1, 2))
+    some = total > 2  # two may sit around a corner
+    return found(who[some], (total % 2 + 0.5 - more)[some], measure=more[some])
 
 
 def bench_fits(plan: Plan) -> Found:
@@ -203,6 +218,15 @@ def bench_fits(plan: Plan) -> Found:
     side = torch.where(seats.ahead, plan.size[seats.j, 0], plan.size[seats.j, 2])
     least, which = torch.stack([own - side, plan.size[seats.i, 0] - own], -1).max(-1)
     return found(seats.i, BEYOND - least, other=seats.j, measure=least, words=which)
+
+
+def _free_sides(plan: Plan, seats: Seats) -> tuple[Tensor, Tensor]:
+    """(P,) int64, the tables with seats, and (P, 4) bool, whether one could sit left, right, behind and before them."""
+    kept: dict[str, tuple[Tensor, Tensor]] = vars(plan)
+    if "free_sides" not in kept:
+        who = seats.j.unique()
+        kept["free_sides"] = who, _free_beside(plan, who) > SEAT
+    return kept["free_sides"]
 
 
 def _free_beside(plan: Plan, who: Tensor) -> Tensor:

@@ -139,6 +139,19 @@ def test_a_side_at_a_wall_or_at_furniture_is_not_free():
     assert seen(composition.chairs_at_sides, seated(*CROWDED), (5.0, 2.0))[0][0] >= 0
 
 
+def test_as_many_sit_at_one_side_of_a_table_as_opposite():
+    front, back = ([((0.33 * x, 0.65 * z), np.pi * (z > 0)) for x in (-1, 1)] for z in (1, -1))
+    end = ((0.85, 0.0), -HALF)
+    assert seen(composition.chairs_balanced, seated(*front, *back))[0] == {0: 0.5}
+    assert seen(composition.chairs_balanced, seated(*front, *back, end))[0] == {0: 0.5}
+    margin, found, _ = seen(composition.chairs_balanced, seated(*front, back[0], end))
+    assert (margin, found.measure.tolist()) == ({0: -1.5}, [2.0])
+    assert seen(composition.chairs_balanced, seated(*front, end))[0] == {0: -1.5}
+    shelf = ("bookshelf", (1.6, 2.0, 0.3), (0.0, -1.0), 0.0)  # nobody could sit there
+    assert seen(composition.chairs_balanced, [*seated(*front, end), shelf])[0] == {0: 0.5}
+    assert seen(composition.chairs_balanced, seated(front[0], end))[0] == {}  # two around a corner
+
+
 @pytest.mark.parametrize(("apart", "margin"), [(2.4, 0.2), (2.0, -0.2)])
 def test_who_works_back_to_back_sits_apart(apart, margin):
     things = []
