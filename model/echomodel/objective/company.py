@@ -70,12 +70,15 @@ def seat_before_desk(plan: Plan) -> Found:
 
 
 def lounger_faces(plan: Plan) -> Found:
-    """An armchair of a group is turned towards it."""
+    """An armchair of a group is turned towards it, and towards the sofa before which it stands."""
     i, j = plan.attended("company")
     if not len(i):
         return nobody(plan.size)
     near = plan.gap(i, j).detach() < COMPANY
-    i, j = i[near], j[near]
+    sofa = plan.group[i]
+    lateral, forward = plan.local(i, sofa)
+    before = plan.of("sofa")[sofa] & (forward > plan.size[sofa, 2] / 2) & (lateral.abs() < plan.size[sofa, 0] / 2)
+    i, j = torch.cat([i[near], i[near & before]]), torch.cat([j[near], sofa[near & before]])
     off = facing_angle(*plan.local(j, i))
     return found(i, LOUNGE - off, other=j, measure=torch.rad2deg(off))
 

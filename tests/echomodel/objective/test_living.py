@@ -148,6 +148,8 @@ FAULTS = [
     (SMALL.moved("plant", at=(-1.3, 0.0)), ("plant", "not_alone"), "plant stands alone in the room, 0.55 m from"),
     (SMALL.moved("plant", at=(0.0, 1.18)), ("plant", "not_alone"), "plant stands alone in the room, 0.20 m from"),
     (SMALL.moved("side", at=(-1.7, -1.1)), ("side", "not_alone"), "side stands alone in the room, 0.37 m from"),
+    (LIVING.moved("coffee", at=(-0.5, -0.4)).moved("armchair", at=(0.75, -0.4), yaw=0.0),
+     ("armchair", "lounger_faces"), "armchair turns its back on sofa"),
     (SOFAS.moved("armchair", at=(1.5, -0.7)), ("armchair", "loungers_apart"), "armchair leaves only 0.00 m to sofa"),
     (BENCH.moved("bench", at=(0.2, 0.8)), ("bench", "bench_at_foot"), "bench stands 0.48 m from the foot of bed"),
     (BENCH.moved("bench", at=(0.9, 0.4)), ("bench", "bench_at_foot"), "bench lies 0.90 m beside the middle of bed"),
@@ -365,7 +367,7 @@ def test_several_rooms_at_once_are_judged_as_one_by_one():
 def test_the_room_generator_rarely_breaks_them():
     rooms = generate_rooms(60, 3)
     found = [f for room in rooms for f in faults(room, room.categories, room.floor_polygon)]
-    assert len(found) < 0.16 * sum(len(room) for room in rooms)
+    assert len(found) < 0.17 * sum(len(room) for room in rooms)
 
 
 def test_the_sofa_that_screen_and_table_are_told_of_is_the_first_whatever_its_size():
