@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from echousd.assets.reference import STRETCH
-from echousd.graph.fields import SHAPES
+from echousd.graph.fields import RESIDENTS, SHAPES
 from echousd.graph.nodes import PlainModel
 
 if TYPE_CHECKING:
@@ -34,21 +34,27 @@ OF_NEW = (
 ROOM, MODELS, LOOK, FILES = GROUPS = "Room", "Models of a library", "Look", "Files"
 
 
-def row(default: Any, group: str, help: str, *, everyday: bool = False, words: str = "", **limits: Any) -> Any:
+def row(
+    default: Any, group: str, help: str, *, everyday: bool = False, words: str = "", flag: str = "", **limits: Any
+) -> Any:
     """A row of the table.
 
     Arguments:
         help: a sentence part, without the default. everyday: on the first page of a command's help.
-        words: what stands for the value there; limits: of numbers, as pydantic calls them.
+        words: what stands for the value there; flag: its name there, where Python takes the word for its own.
+        limits: of numbers, as pydantic calls them.
     """
-    return Field(default, description=help, json_schema_extra={"group": group, "everyday": everyday, "words": words},
-                 **limits)  # fmt: skip
+    extra: Any = {"group": group, "everyday": everyday, "words": words, "flag": flag}
+    return Field(default, description=help, json_schema_extra=extra, **limits)
 
 
-def _source(name: str) -> str:
-    if name not in SHAPES:
-        raise ValueError(f"shapes is {name!r}, allowed: {', '.join(SHAPES)}")
-    return name
+def _one_of(option: str, words: tuple[str, ...]) -> AfterValidator:
+    def check(name: str) -> str:
+        if name not in words:
+            raise ValueError(f"{option} is {name!r}, allowed: {', '.join(words)}")
+        return name
+
+    return AfterValidator(check)
 
 
 def _palette(name: str) -> str:
@@ -109,7 +115,7 @@ class RoomOptions(PlainModel, Look):
     """What is asked of a room beside its graph; frozen, raises ValueError in one line for what is not allowed."""
 
     seed: int = row(0, ROOM, "seed of all randomness", everyday=True, ge=0, le=MAX_SEED)
-    shapes: Annotated[str, AfterValidator(_source)] | None = row(
+    shapes: Annotated[str, _one_of("shapes", SHAPES)] | None = row(
         None, ROOM, "parts, sdf, library, guided or boxes", everyday=True, words="name"
     )  # fmt: skip
     layouts: int = row(1, ROOM, "arrangements, as variants", everyday=True, ge=1, le=1000)
@@ -119,6 +125,10 @@ class RoomOptions(PlainModel, Look):
     steps: int | None = row(None, ROOM, "sampling steps; else the model's", ge=1)
     fit: Literal["keep", "drop"] = row("keep", ROOM, "keep all that is asked for, or leave out what has no place")
     place: bool = row(True, ROOM, "move and size boxes as little as possible until the graph is kept")
+    resident: Annotated[str, _one_of("resident", RESIDENTS)] | None = row(
+        None, ROOM, "who lives there, told by small things; else as the furniture suggests", everyday=True, flag="for",
+        words="|".join(RESIDENTS),
+    )  # fmt: skip
     openings: Literal["kept", "drawn"] = row("kept", ROOM, "doors and windows of the graph, or new ones by the seed")
     settle: bool = row(False, ROOM, "simulate the room, put everything where it rests (extra: sim)")
     assets: File | None = row(None, MODELS, "index of a library of models", everyday=True)

@@ -113,10 +113,10 @@ def _flag(name: str, row: Any) -> Parameter:
     from echousd.options import words_of
 
     kind = next(kind for kind in (bool, int, float, str) if _is(row.annotation, kind))
-    word, said = f"--{name.replace('_', '-')}", f"{row.description[0].upper()}{row.description[1:]}"
+    words, extra = words_of(row), row.json_schema_extra
+    word, said = f"--{extra['flag'] or name.replace('_', '-')}", f"{row.description[0].upper()}{row.description[1:]}"
     if kind is bool and row.default:
         word += f"/--no-{name.replace('_', '-')}"
-    words, extra = words_of(row), row.json_schema_extra
     if len(words) > LONG:
         said, words = f"{said}: {words.replace('|', ', ')}", "word"
     default = f" ({row.default})" if row.default not in (None, "", True, False) else ""

@@ -22,6 +22,7 @@ from echousd.draw.sight import Furniture
 from echousd.dressing import floors, tabletops, upholstery, walls
 from echousd.dressing.floors import CORNER_AIR, GREEN
 from echousd.dressing.setting import Setting, Standing, Thing, standing
+from echousd.dressing.stories import guessed, story
 from echousd.dressing.walls import EYE, Wall, hung_at, walls_of
 from echousd.graph import Relation
 from echousd.graph.titles import DressingGraph, SmallNode
@@ -122,6 +123,7 @@ def setting_of(room: RoomData, layout: int = 0) -> Setting:
     return Setting(
         objects, floor, tuple(room.graph.room.openings), room.height, room.options.walls,
         room.options.dress == "full", room.provenance.seed, vocabulary().room_type(room.graph.room.type).use,
+        story(room.graph.room.resident or guessed(room.graph.room.type, [o.row for o in objects.values()])),
     )  # fmt: skip
 
 
@@ -195,9 +197,9 @@ def bare_corners(setting: Setting) -> None:
 
 RULES = (
     floors.rugs, walls.hung_up, walls.curtains, walls.pictures, upholstery.throws, upholstery.cushions,
-    upholstery.bed_cushions, upholstery.folded, tabletops.tabletops, floors.by_doors, floors.baskets, walls.coats,
-    floors.toys, walls.tall_mirror, walls.shelves, walls.clock, floors.cables, floors.slippers, floors.corner_plants,
-    floors.poufs, bare_walls, bare_corners,
+    upholstery.on_covers, upholstery.bed_cushions, upholstery.folded, tabletops.tabletops, floors.by_doors,
+    floors.clusters, walls.coats, walls.tall_mirror, walls.shelves, walls.clock, floors.cables, floors.corner_plants,
+    bare_walls, bare_corners,
 )  # fmt: skip
 
 

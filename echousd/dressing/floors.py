@@ -1,14 +1,14 @@
-"""What lies and stands on the floor: rugs, shoes, baskets, toys; what stands in corners where nobody walks."""
+"""What lies and stands on the floor: rugs, shoes, clusters by furniture; what stands in corners where nobody walks."""
 
 from __future__ import annotations
 
 import numpy as np
 import shapely
 
-from echomodel.boxes2d import seen
 from echomodel.dressing import KINDS, usual_size
 from echomodel.openings import hinge_point, inward_normal
-from echousd.dressing.setting import Setting, Standing, Thing, rectangle
+from echousd.dressing.setting import Setting, Standing, Thing, around, rectangle
+from echousd.dressing.stories import Wish
 
 PILE = 0.008  # metres; furniture stands on the floor below, through the rug
 FROM_WALL = 0.12
@@ -62,7 +62,7 @@ def _under(setting: Setting, host: Standing) -> tuple[set[str], tuple[float, flo
         tables = [o for o in setting.stands("before") if host.footprint.distance(o.footprint) < AROUND]
         reach = 1.7
         for table in tables[:1]:
-            _, ahead = seen((table.position - host.position)[[0, 2]], host.yaw)
+            _, ahead = host.in_plan(table.position)
             reach = float(np.clip(ahead - front, 0.4, 1.3)) + float(table.size[2]) / 2 + 0.45
         around = {o.name for o in (*setting.of("seat", "sofa", "light", "decor"), *setting.stands("before", "beside"))}
         long = reach + 0.3
@@ -90,7 +90,7 @@ def by_doors(setting: Setting) -> None:
         if door.kind != "door" or not setting.walls or setting.use:
             continue
         rng = setting.rng(door.name, "shoes")
-        if rng.random() > SHOES:
+        if rng.random() > SHOES:  # of rooms, not of doors
             return
         size = usual_size("shoes", rng)
         hinge, closed = hinge_point(setting.floor, door)
@@ -105,40 +105,41 @@ def by_doors(setting: Setting) -> None:
             return
 
 
-def baskets(setting: Setting) -> None:
-    """A basket beside a sofa, a bed or a shelf, in full rooms."""
-    if not setting.full:
-        return
-    for host in setting.inviting("basket"):
-        rng = setting.rng(host.name, "basket")
-        size = usual_size("basket", rng)
-        variant = int(rng.integers(1 << 30))
-        x = host.size[0] / 2 + size[0] / 2 + 0.06
-        back, front = -host.size[2] / 2 + size[2] / 2 + 0.05, host.size[2] / 2 - size[2] / 2
-        spots = [(side * x, z) for side in (1, -1) for z in (back, 0.0, front)]
-        wanted = (Thing("basket", size, host.on_floor(*spot), host.yaw, "", variant) for spot in spots)
-        if setting.put_first(wanted, margin=0.03):
-            return
+def clusters(setting: Setting) -> None:
+    """What lies on the floor beside furniture, as its story has it; nothing alone on bare floor."""
+    rugs = shapely.union_all([t.footprint for t in setting.placed if KINDS[t.kind].name == "rug"])
+    for number, wish in enumerate(setting.story.floor):
+        for host in setting.near(wish.by):
+            rng = setting.rng(host.name, "floor", str(number))
+            if not wish.comes(setting.full, rng):
+                continue
+            near = host.footprint.buffer(NEAR).union(rugs)
+            first = setting.put_first((t for t in _by(host, wish, rng) if near.intersects(t.footprint)), margin=0.03)
+            if first is None:
+                continue
+            for kind in wish.beside:
+                size, turn, variant = usual_size(kind, rng), float(rng.uniform(-3, 3)), int(rng.integers(1 << 30))
+                places = first.position + np.insert(1.15 * around(first, size, rng), 1, 0.0, axis=1)
+                setting.put_first((Thing(kind, size, place, turn, "", variant) for place in places), margin=0.02)
+            break
 
 
-def toys(setting: Setting) -> None:
-    """A ball, blocks and a bear on the floor before a chest of toys."""
-    for host in (o for o in setting.objects.values() if o.row.top == "toy_box"):
-        ahead = float(host.size[2]) / 2
-        for number, kind in enumerate(("toy_ball", "blocks", "bear")):
-            rng = setting.rng(host.name, kind)
-            size, variant = usual_size(kind, rng), int(rng.integers(1 << 30))
-            away = [(x, z) for z in rng.uniform(0.25, 0.9, 4) for x in rng.uniform(-0.8, 0.8, 2)]
-            spots = (host.on_floor(x, ahead + z) for x, z in away)
-            things = (Thing(kind, size, spot, float(rng.uniform(-3, 3)), "", variant) for spot in spots)
-            if number < 2 or setting.full:
-                setting.put_first(things, margin=0.05)
+def _by(host: Standing, wish: Wish, rng: np.random.Generator) -> list[Thing]:
+    """A wished thing at each of its places beside furniture."""
+    kind, variant = str(rng.choice(wish.of)), int(rng.integers(1 << 30))
+    size, lean = usual_size(kind, rng), float(rng.uniform(-3, 3) if wish.turn == "any" else rng.uniform(-0.2, 0.2))
+    out = []
+    for x, z, dx, dz in wish.at:
+        place = host.on_floor(x * host.size[0] / 2 + dx, z * host.size[2] / 2 + dz)
+        away = float(np.sign(dx)) * np.pi / 2 if wish.turn == "out" else 0.0
+        out.append(Thing(kind, size, place, host.yaw + lean + away, "", variant))
+    return out
 
 
 GREEN = 2  # plants that a room has at most, those of the graph counted
 FOOT = 0.1  # metres from a lamp's middle to where its cable leaves the foot
 CORNER_AIR = 0.06  # metres of air around what stands in a corner
-SLIPPERS = 0.4  # share of beds that have some
+NEAR = 0.35  # metres from furniture: nothing else stands on bare floor alone
 
 
 def corner_plants(setting: Setting) -> None:
@@ -158,39 +159,6 @@ def corner_plants(setting: Setting) -> None:
         middles = [setting.floor[corner] + (inside[0] + inside[1]) * (float(size[0]) / 2 + off) for off in (0.1, 0.2)]
         wanted = (Thing(kind, size, np.array([x, 0.0, z]), float(rng.uniform(-3, 3)), "", variant) for x, z in middles)
         green += setting.put_first(wanted, margin=CORNER_AIR) is not None
-
-
-def poufs(setting: Setting) -> None:
-    """A pouf before a corner of the rug that a sofa or an armchair stands on."""
-    if not setting.full:
-        return
-    for host in setting.inviting("pouf"):
-        rng = setting.rng(host.name, "pouf")
-        size, variant = usual_size("pouf", rng), int(rng.integers(1 << 30))
-        w, _, d = host.size
-        spots = [(x, z) for x in (w / 2 + 0.45, -w / 2 - 0.45) for z in (d / 2 + 0.35, d / 2 + 0.8, 0.0)]
-        wanted = (Thing("pouf", size, host.on_floor(x, z), host.yaw, "", variant) for x, z in spots)
-        if setting.put_first(wanted, margin=0.25):
-            return
-
-
-def slippers(setting: Setting) -> None:
-    """Slippers beside a bed, toes away from it."""
-    if not setting.full:
-        return
-    for host in setting.of("bed"):
-        rng = setting.rng(host.name, "slippers")
-        size, variant = usual_size("slippers", rng), int(rng.integers(1 << 30))
-        w, _, d = host.size
-        if rng.random() > SLIPPERS:
-            continue
-        for side in (1, -1):
-            x, yaw = side * (w / 2 + 0.22), host.yaw + side * np.pi / 2
-            wanted = (
-                Thing("slippers", size, host.on_floor(x, z), yaw + float(rng.uniform(-0.2, 0.2)), "", variant)
-                for z in (0.0, 0.15 * d, -0.15 * d, 0.35 * d)
-            )
-            setting.put_first(wanted, margin=0.02)
 
 
 def cables(setting: Setting) -> None:

@@ -10,10 +10,12 @@ from functools import cached_property
 import numpy as np
 import shapely
 
+from echomodel.boxes2d import seen
 from echomodel.dressing import KINDS
 from echomodel.openings import Opening, free_area
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import Category, vocabulary
+from echousd.dressing.stories import Story, story
 from echousd.shapes.geometry import Geometry
 
 SKIN = 1e-4  # metres that count as nothing
@@ -65,6 +67,10 @@ class Standing:
         """(p, 2, 3) lower and upper corner of each of its pieces, metres."""
         return np.array([(piece.min((0, 1)), piece.max((0, 1))) for piece in self.pieces])
 
+    def in_plan(self, position: np.ndarray) -> np.ndarray:
+        """(2,) a point of the room (3,) in the object's frame, x and z."""
+        return seen((position - self.position)[[0, 2]], self.yaw)
+
     @property
     def top(self) -> float:
         """Height of its highest point, metres."""
@@ -95,6 +101,7 @@ class Setting:
     full: bool  # place as much as looks good, not only a little
     seed: int  # of all choices
     use: str = ""  # of the room (`echomodel.rows.RoomType`)
+    story: Story = field(default_factory=story)  # of who lives there
     placed: list[Thing] = field(default_factory=list)  # the things so far
     carriers: dict[str, Standing] = field(default_factory=dict)  # those of them that others stand on
     curtained: set[str] = field(default_factory=set)  # names of the windows that have curtains
@@ -115,6 +122,10 @@ class Setting:
     def inviting(self, *words: str) -> list[Standing]:
         """The objects that some small things go with (`echomodel.rows.INVITES`), in the order of the graph."""
         return [o for o in self.objects.values() if any(word in o.row.invites for word in words)]
+
+    def near(self, word: str) -> list[Standing]:
+        """The objects of a role or a `top`, or that a small thing goes with, in the order of the graph."""
+        return [o for o in self.objects.values() if word in (o.row.role, o.row.top, *o.row.invites)]
 
     @property
     def plants(self) -> int:
@@ -158,6 +169,13 @@ class Setting:
         if found is not None:
             self.placed.append(found)
         return found
+
+
+def around(first: Thing, size: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """(12, 2) ways (x, z) from the middle of a thing to that of another of some extents (3,) that stands beside it."""
+    reach = (max(first.size[[0, 2]]) + max(size[[0, 2]])) / 2 + 0.015
+    angle = rng.uniform(0, 2 * np.pi) + np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    return reach * np.stack([np.cos(angle), np.sin(angle)], 1)
 
 
 def standing(

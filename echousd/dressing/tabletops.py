@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
-from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 
-from echomodel.boxes2d import seen
 from echomodel.dressing import KINDS, usual_size
 from echomodel.dressing.books import BOUND, books_in, bound
 from echomodel.triangles import area_normals
-from echousd.dressing.setting import APART, Setting, Standing, Thing, rectangle
+from echousd.dressing.setting import APART, Setting, Standing, Thing, around, rectangle
 
 LEVEL = 0.006  # metres: what differs less in height is one level
 LEAST = 0.012  # m² of a level
@@ -50,14 +46,15 @@ class Surface:
         return sum(len(self.above.query(line, predicate="intersects")) > 0 for line in lines) > len(lines) / 2
 
     def put(
-        self, setting: Setting, kind: str, at: Sequence[tuple[float, float]], *, size: np.ndarray | None = None,
-        turn: float = 0.0, variant: int | None = None, count: int = 1, word: str = "",
+        self, setting: Setting, kind: str, at: Sequence[tuple[float, float]] = (), *, size: np.ndarray | None = None,
+        turn: float = 0.0, variant: int | None = None, count: int = 1, word: str = "", beside: Thing | None = None,
     ) -> Thing | None:  # fmt: skip
         """Put a thing on the first of some places that is free; None where none is.
 
         `setting`: decides what is free, and learns of the thing. `kind`: what is put there. `at`: places as shares (x,
         z) of the level's half extents from its middle, -1 to 1. `size`: (3,) extents, None for usual ones. `turn`: yaw
         in the object's frame, radians. `variant`, `count`: of the thing; `word`: names its own random numbers.
+        `beside`: a thing on the level around which it is put instead.
         """
         rng = setting.rng(self.host.name, kind, word, f"{self.y:.2f}")
         size = usual_size(kind, rng) if size is None else size
@@ -67,8 +64,10 @@ class Surface:
         half = np.array([x1 - x0, z1 - z0]) / 2
         turned = np.abs(np.array([np.cos(turn), np.sin(turn)]) @ [[size[0], size[2]], [size[2], size[0]]])
         room = np.maximum(half - turned / 2 - EDGE, 0.0)
-        for share in at:
-            place = np.array([(x0 + x1) / 2, (z0 + z1) / 2]) + np.array(share) * room
+        places = [np.array([(x0 + x1) / 2, (z0 + z1) / 2]) + np.array(share) * room for share in at]
+        if beside is not None:
+            places += [self.host.in_plan(beside.position) + way for way in around(beside, size, rng)]
+        for place in places:
             plan = rectangle(place, size[[0, 2]], turn)
             if not self.area.contains(plan.buffer(0.8 * EDGE, join_style="mitre")):
                 continue
@@ -128,34 +127,10 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
 BETWEEN = 0.002  # metres from book to book
 EYE = 1.7  # metres: what is put higher cannot be seen
 CASES = ("cabinet", "shelf")  # looks of what books and baskets stand in and on: no cistern, no fridge
-Places = Sequence[tuple[float, float]]
-
-
-class Wish(NamedTuple):
-    """A row of `tops.toml`."""
-
-    of: tuple[str, ...]
-    at: Places
-    full: bool
-
-
-def _tops() -> dict[str, list[Wish]]:
-    """What is put on a top, by what a row calls `top`."""
-    table = tomllib.loads(resources.files(__package__).joinpath("tops.toml").read_text("utf-8"))
-    named = table["places"]
-
-    def wish(row: dict[str, Any]) -> Wish:
-        spots = [spot for at in row["at"] for spot in (named[at] if isinstance(at, str) else [at])]
-        return Wish(tuple(row["of"]), spots, row.get("full", False))
-
-    return {top: [wish(row) for row in rows] for top, rows in table["tops"].items()}
-
-
-TOPS = _tops()
+STRAIGHT = ("laptop", "tray", "monitor", "keyboard")  # stand parallel to what they stand on
 WARE = ("plates", "bowl", "glass", "cup", "bottles")  # in kitchens
 LINEN = ("folded_throw", "basket", "bottles", "folded_throw")  # in baths and laundries
 BARE = ("coat_rack", "toy_box", "hall")  # tops whose shelves and seats hold no books
-SHELVED = ("book_stack", "vase", "small_plant", "bowl", "photo", "candles", "basket", "clock")
 
 
 def tabletops(setting: Setting) -> None:
@@ -169,11 +144,11 @@ def tabletops(setting: Setting) -> None:
             _laid(setting, host, levels[0])
         footprint = float(host.size[0] * host.size[2])
         tops = [s for s in levels if s.area.area > 0.3 * footprint and s.host.position[1] + s.y < EYE]
-        if name in TOPS and tops:
+        if name in setting.story.tops and tops:
             _top(setting, host, tops[0], name)
         if host.row.role == "storage" and host.row.look in CASES and name not in BARE:
             for surface in levels:
-                if surface is not (tops[0] if tops and name in TOPS else None):
+                if surface is not (tops[0] if tops and name in setting.story.tops else None):
                     _shelf(setting, host, surface)
 
 
@@ -182,15 +157,18 @@ def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
     taken: set[str] = set()
     if name == "tv_stand" and not setting.of("screen"):
         _television(setting, host, surface)
-    for number, wish in enumerate(TOPS[name]):
+    for number, wish in enumerate(setting.story.tops[name]):
         order = [str(k) for k in rng.permutation(wish.of)]
         turn = float(rng.uniform(-0.12, 0.12))
-        if wish.full and not setting.full:
+        if not wish.comes(setting.full, rng):
             continue
         for kind in [k for k in order if k not in taken] or order:
-            straight = kind in ("laptop", "tray") or surface.area.area < 0.1
-            if surface.put(setting, kind, wish.at, turn=0.0 if straight else turn, word=str(number)):
+            straight = kind in STRAIGHT or surface.area.area < 0.1
+            thing = surface.put(setting, kind, wish.at, turn=0.0 if straight else turn, word=str(number))
+            if thing:
                 taken.add(kind)
+                for place, other in enumerate(wish.beside):
+                    surface.put(setting, other, word=f"{number} {place}", beside=thing)
                 break
 
 
@@ -210,7 +188,7 @@ def _laid(setting: Setting, host: Standing, surface: Surface) -> None:
     x0, z0, x1, z1 = surface.bounds
     middle, half = np.array([x0 + x1, z0 + z1]) / 2, np.array([x1 - x0, z1 - z0]) / 2
     for seat in setting.of("seat"):
-        local = seen((seat.position - host.position)[[0, 2]], host.yaw) - middle
+        local = host.in_plan(seat.position) - middle
         beyond = np.abs(local) - half
         if np.max(beyond) > 0.6 or np.min(beyond) > 0:
             continue
@@ -254,7 +232,7 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
                 if setting.full:
                     shelved_books(setting, row, rng)
                 break
-    wanted = [str(kind) for kind in rng.permutation(ware or SHELVED)]
+    wanted = [str(kind) for kind in rng.permutation(ware or setting.story.shelves)]
     for number in range(2 if setting.full else 1):
         if rng.random() < 0.75:
             places = [(x * side, 0.2) for x in (0.75, 0.4, 0.95, 0.1, -0.2, -0.6)]

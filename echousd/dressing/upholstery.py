@@ -62,6 +62,26 @@ def bed_cushions(setting: Setting) -> None:
                 setting.put_first([thing], host=host.name, margin=0.0, floor=False)
 
 
+def on_covers(setting: Setting) -> None:
+    """What somebody left on the largest bed, as the story has it."""
+    for host in sorted(setting.of("bed"), key=lambda o: -float(o.size[0]))[:1]:
+        seat = _Seat.of(host)
+        for number, wish in enumerate(setting.story.beds):
+            rng = setting.rng(host.name, "cover", str(number))
+            if seat is None or not wish.comes(setting.full, rng):
+                continue
+            kind, variant, turn = str(rng.choice(wish.of)), int(rng.integers(1 << 30)), float(rng.uniform(-0.5, 0.5))
+            size = usual_size(kind, rng)
+            for at in wish.at:
+                x, z = (0.0, 0.0) if at == "pillows" else np.array(at) * host.size[[0, 2]] / 2
+                spot = seat.before_pillows(x, size) if at == "pillows" else np.array([x, seat.level, z])
+                spot = None if spot is None else _lying(host, seat, spot, turn, size)
+                if spot is not None:
+                    thing = Thing(kind, size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
+                    if setting.put_first([thing], host=host.name, floor=False):
+                        break
+
+
 def folded(setting: Setting) -> None:
     """A folded blanket on the seat of the largest sofa of a full room."""
     if not setting.full:

@@ -239,7 +239,6 @@ def _companion(setting: Setting, wall: Wall, along: float, first: Thing, host: S
 SHARES = (0.5, 0.3, 0.7, 0.18, 0.82)  # of a wall's length, the middle first
 SHELF = 1.38  # metres from the floor to the board of a wall shelf
 ABOVE = 0.3  # metres over a shelf that stay free
-ON_SHELF = ("small_plant", "photo", "vase", "candles", "bowl", "clock")
 
 
 def shelves(setting: Setting) -> None:
@@ -271,7 +270,7 @@ def _filled(setting: Setting, board: Thing, name: str) -> None:
         row = surface.put(setting, "book_row", [(0.97 * side, 0.3), (-0.97 * side, 0.3)], size=size, word="row")
         if row:
             shelved_books(setting, row, rng)
-        for number, kind in enumerate(rng.permutation(ON_SHELF)[:3]):
+        for number, kind in enumerate(rng.permutation(setting.story.shelves)[:3]):
             places = [(x * side, 0.0) for x in (-0.9, -0.45, 0.0, 0.35)]
             surface.put(setting, str(kind), places, word=str(number))
 

@@ -19,6 +19,15 @@ MAX_NODES = 5000  # of a graph
 MAX_CORNERS = 500  # of a floor: the work on walls and furniture grows with their square
 MAX_NAME = 100  # characters: names become file names of assets
 SHAPES = ("parts", "sdf", "boxes", "library", "guided", "independent", "own")  # of the geometry of one object
+RESIDENTS = (
+    "child",
+    "teen",
+    "couple",
+    "senior",
+    "student",
+    "office",
+    "guest",
+)  # what `echousd.dressing` has stories of
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 Point: TypeAlias = tuple[float, float]
@@ -48,10 +57,15 @@ def title(value: Any) -> str:
     return unicodedata.normalize("NFC", value)
 
 
-def _shapes(value: Any) -> str:
-    if not isinstance(value, str) or value not in SHAPES:
-        raise ValueError(f"found {shown(value)}, allowed: {', '.join(SHAPES)}")
-    return value
+def _one_of(words: tuple[str, ...]) -> tuple[BeforeValidator, WithJsonSchema]:
+    """One of some words, or None."""
+
+    def check(value: Any) -> str:
+        if not isinstance(value, str) or value not in words:
+            raise ValueError(f"found {shown(value)}, allowed: {', '.join(words)}")
+        return value
+
+    return _optional(check), WithJsonSchema({"anyOf": [{"enum": list(words)}, {"type": "null"}]})
 
 
 def _storable(value: str) -> str:
@@ -233,9 +247,9 @@ PredicateWord: TypeAlias = Annotated[str, BeforeValidator(_predicate[0]), _predi
 RoomTypeWord: TypeAlias = Annotated[str, BeforeValidator(_room_type[0]), _room_type[1]]
 Style: TypeAlias = Annotated[str | None, _optional(_text)]
 RoomStyleWord: TypeAlias = Annotated[str | None, _optional(_style[0]), _style[1]]
-Shapes: TypeAlias = Annotated[
-    str | None, _optional(_shapes), WithJsonSchema({"anyOf": [{"enum": list(SHAPES)}, {"type": "null"}]})
-]
+_shapes, _resident = map(_one_of, (SHAPES, RESIDENTS))
+Shapes: TypeAlias = Annotated[str | None, _shapes[0], _shapes[1]]
+Resident: TypeAlias = Annotated[str | None, _resident[0], _resident[1]]
 Place: TypeAlias = Annotated[
     str | None,
     _optional(_place),

@@ -86,6 +86,7 @@ class RoomSpec(PlainModel):
             of a rectangle the one at -z, +x, +z and -x.
         walls: thickness of each wall, metres; of a room of a home, whose openings are all stated.
         style: word of a style, such as industrial, to which furniture, colours, walls, doors and windows keep.
+        resident: who lives there, which small things tell; None = as the furniture suggests.
     """
 
     type: field.RoomTypeWord
@@ -95,6 +96,7 @@ class RoomSpec(PlainModel):
     openings: field.Openings = ()
     walls: field.Thicknesses = ()
     style: field.RoomStyleWord = None
+    resident: field.Resident = None
 
     def __init__(self, type: str, **fields: Any) -> None:
         super().__init__(type=type, **fields)

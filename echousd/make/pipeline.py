@@ -105,6 +105,9 @@ def generate(
     else:
         graph, held = with_earlier_locks(graph, earlier)
         graph, homeless = with_locked_places(graph, earlier)
+    if asked.resident:
+        spoken: SceneGraph = graph.replaced(room=graph.room.replaced(resident=asked.resident))
+        graph = spoken
     graph = anchored(without_openings(graph) if asked.openings == "drawn" else graph, beside)
     if file:  # a graph that was read may come from anybody; one in memory is the caller's own
         check_files(graph, beside, outside, file)

@@ -47,6 +47,7 @@ MATTER: Mapping[str, Matter] = {
     "soil": Matter(900.0), "fruit": Matter(800.0), "wax": Matter(900.0), "paper": Matter(700.0),
     "book": Matter(650.0), "book_a": Matter(650.0), "book_b": Matter(650.0), "book_c": Matter(650.0),
     "book_d": Matter(650.0), "curtain": Matter(120.0), "sheer": Matter(60.0),
+    **dict.fromkeys(("toy_a", "toy_b", "toy_c"), Matter(600.0, 0.006)),
     **dict.fromkeys(RUGS, Matter(250.0)), **dict.fromkeys(PICTURES, Matter(300.0)),
 }  # fmt: skip
 # Role and material of a solid -> what it stands for, where the material alone tells how it looks.

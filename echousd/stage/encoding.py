@@ -34,13 +34,14 @@ VOCABULARY = "echo:vocabulary"
 VOCABULARY_NAME = "echo-1"
 ROOM_TYPE = "echo:roomType"
 ROOM_STYLE = "echo:roomStyle"
+RESIDENT = "echo:roomResident"
 FLOOR_POLYGON = "echo:floorPolygon"
 FLOOR_SIZE = "echo:floorSize"
 HEIGHT = "echo:height"
 WALLS = "echo:wallThickness"
 ROOM_FIELDS = {
     ROOM_TYPE: "type", FLOOR_POLYGON: "floor_polygon", FLOOR_SIZE: "size", HEIGHT: "height", WALLS: "walls",
-    ROOM_STYLE: "style",
+    ROOM_STYLE: "style", RESIDENT: "resident",
 }  # fmt: skip
 
 AREA, RATIO, OUTLINE, ENTRANCE = "echo:area", "echo:ratio", "echo:outline", "echo:entrance"  # of homes
@@ -79,7 +80,10 @@ FREE = "echo:attributes:"  # namespace of a node's free attributes
 
 _TYPES = Sdf.ValueTypeNames
 _NAMES = (
-    (_TYPES.Token, (VOCABULARY, ROOM_TYPE, ROOM_STYLE, KIND, HINGE, SWING, PREDICATE, CATEGORY, STYLE, PLACE, SHAPES)),
+    (
+        _TYPES.Token,
+        (VOCABULARY, ROOM_TYPE, ROOM_STYLE, RESIDENT, KIND, HINGE, SWING, PREDICATE, CATEGORY, STYLE, PLACE, SHAPES),
+    ),
     (_TYPES.Double2Array, (FLOOR_POLYGON, OUTLINE)),
     (_TYPES.Double2, (FLOOR_SIZE,)),
     (_TYPES.Double, (HEIGHT, AREA, RATIO, OFFSET, WIDTH, SILL, CONFIDENCE, YAW)),

@@ -24,7 +24,7 @@ from echousd.batches.batch import batch
 from echousd.checks import check
 from echousd.cli.main import command
 from echousd.dressing.dress import placed
-from echousd.dressing.tabletops import TOPS
+from echousd.dressing.stories import story
 from echousd.dressing.walls import HUNG_OVER
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph, load_graph, starting_graph
 from echousd.graph.picture import draw_graph
@@ -182,7 +182,7 @@ def test_made_of_parts_dressed_weighed_and_made_in_batches(music, tmp_path, monk
 
 
 def test_rows_name_tops_that_there_are():
-    assert {row.top for row in vocabulary().categories} == {"", *TOPS, *HUNG_OVER}
+    assert {row.top for row in vocabulary().categories} == {"", *story().tops, *HUNG_OVER}
 
 
 def test_rows_name_floorings_that_there_are():

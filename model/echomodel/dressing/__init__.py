@@ -13,6 +13,7 @@ from importlib import resources
 
 import numpy as np
 
+from echomodel.dressing.forms import form
 from echomodel.furniture.solids import Solid
 from echomodel.late import Late
 
@@ -49,7 +50,8 @@ def _kinds() -> dict[str, Kind]:
     rows = tomllib.loads(resources.files(__name__).joinpath("things.toml").read_text("utf-8"))
     made = {}
     for name, row in rows.items():
-        program = Late(f"{__name__}.{row.pop('module')}:{name}")
+        parts = row.pop("parts", ())
+        program = form(parts) if parts else Late(f"{__name__}.{row.pop('module')}:{name}")
         made[name] = Kind(program=program, low=tuple(row.pop("low")), high=tuple(row.pop("high")), **row)
     return made
 

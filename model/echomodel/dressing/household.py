@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from echomodel.dressing import household
-from echomodel.dressing.vessels import Lathe
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.solids import Block, Solid, ball, rotation, tube, turned
+from echomodel.furniture.solids import Block, Lathe, Solid, ball, rotation, tube, turned
 
 PICTURES = tuple(f"picture_{number}" for number in range(60))  # what is printed, by its material
 
@@ -114,21 +113,6 @@ def laptop(size: Size, rng: np.random.Generator) -> list[Solid]:
     return parts
 
 
-def television(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A flat television on two feet."""
-    w, h, d = size
-    foot, thick = 0.06, 0.03
-    parts: list[Solid] = [
-        box((-w / 2, foot, -thick / 2), (w / 2, h, thick / 2), "soil", 0.006),
-        box((-w / 2 + 0.012, foot + 0.02, 0), (w / 2 - 0.012, h - 0.012, thick / 2 + 0.001), "screen"),
-    ]
-    for x in (-0.32 * w, 0.32 * w):
-        for z in (-d / 2, d / 2):
-            leg = np.array([[x, foot + 0.02, 0], [x, 0.006, z * 0.97]])
-            parts.append(tube(leg, 0.006, "metal"))
-    return parts
-
-
 def pens(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A pot with pens."""
     w, h, d = size
@@ -142,12 +126,6 @@ def pens(size: Size, rng: np.random.Generator) -> list[Solid]:
         material = ("frame", "book_a", "soil", "metal", "book_c")[number]
         parts.append(tube([foot, tip], 0.0036, material))
     return parts
-
-
-def remote(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A remote control."""
-    w, h, d = size
-    return [box((-w / 2, 0, -d / 2), (w / 2, h, d / 2), "screen", min(0.006, h * 0.4))]
 
 
 def shoes(size: Size, rng: np.random.Generator) -> list[Solid]:

@@ -2,26 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.solids import FINEST, Array, Solid, ball, loft, rotation, superellipse, tube, turned
-
-
-@dataclass(frozen=True, eq=False)
-class Lathe(Solid):
-    """A solid of revolution about +Y: `profile` (k, 2) float holds radius and height from rim to rim, metres.
-
-    A profile that comes back down inside makes a vessel.
-    """
-
-    profile: Array = field(default_factory=lambda: np.array([[1.0, 0.0], [1.0, 1.0]]))
-
-    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        circle = superellipse(2.0, (8, 10, 14, 20)[detail])
-        return loft([np.insert(circle * max(radius, 1e-4), 1, height, axis=1) for radius, height in self.profile])
+from echomodel.furniture.solids import Lathe, Solid, ball, rotation, tube, turned
 
 
 def vessel(outer: np.ndarray, wall: float, material: str, inside: float = 0.1) -> Lathe:
@@ -152,19 +136,6 @@ def glass(size: Size, rng: np.random.Generator) -> list[Solid]:
     return [vessel(_outline([0.82, 0.9, 1.0], size), 0.003, "glass", 0.08)]
 
 
-def tray(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A flat tray with a rim."""
-    w, h, d = size
-    t = 0.008
-    return [
-        box((-w / 2, 0, -d / 2), (w / 2, t, d / 2), "frame", 0.002),
-        box((-w / 2, 0, -d / 2), (-w / 2 + t, h, d / 2), "frame", 0.002),
-        box((w / 2 - t, 0, -d / 2), (w / 2, h, d / 2), "frame", 0.002),
-        box((-w / 2, 0, -d / 2), (w / 2, h, -d / 2 + t), "frame", 0.002),
-        box((-w / 2, 0, d / 2 - t), (w / 2, h, d / 2), "frame", 0.002),
-    ]
-
-
 def basket(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A woven basket with a blanket in it."""
     w, h, d = size
@@ -252,12 +223,6 @@ def floor_vase(size: Size, rng: np.random.Generator) -> list[Solid]:
     return parts
 
 
-def pouf(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A round knitted pouf."""
-    w, h, d = size
-    return [ball((0, h / 2, 0), np.array([w, h, d]) / 2, "accent_cloth", power=2.8)]
-
-
 def slippers(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A pair of open slippers, the toes to the front."""
     w, h, d = size
@@ -281,14 +246,6 @@ def cable(size: Size, rng: np.random.Generator) -> list[Solid]:
     return [tube(line, radius, "screen"), plug]
 
 
-def toy_ball(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A ball with a band of another colour."""
-    half = np.asarray(size, float) / 2
-    rim = (1.01 * half[0], 1.01 * half[2])
-    band = turned((0.0, 0.42 * size[1], 0.0), rim, 0.16 * size[1], material="linen")
-    return [ball((0.0, half[1], 0.0), half, "accent_plain"), band]
-
-
 def blocks(size: Size, rng: np.random.Generator) -> list[Solid]:
     """Three blocks of wood and a fourth on top of them."""
     w, h, d = size
@@ -299,13 +256,3 @@ def blocks(size: Size, rng: np.random.Generator) -> list[Solid]:
         box((x - side / 2, y, -side / 2), (x + side / 2, y + side, side / 2), str(colour), 0.003)
         for (x, y), colour in zip(at, colours, strict=True)
     ]
-
-
-def bear(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A bear that sits: a body, a head with a snout and ears, four paws."""
-    w, h, d = size
-    balls = [(0.0, 0.3, -0.1, 0.3), (0.0, 0.72, -0.05, 0.24), (0.0, 0.67, 0.2, 0.1)]  # x, y, z, radius: shares
-    balls += [(s * x, y, z, r) for x, y, z, r in ((0.2, 0.93, -0.08, 0.07), (0.36, 0.42, 0.05, 0.12),
-                                                  (0.24, 0.12, 0.3, 0.12)) for s in (-1, 1)]  # fmt: skip
-    material = ("leather", "accent_cloth", "wicker")[int(rng.integers(3))]
-    return [ball((x * w, y * h, z * d), np.full(3, r * h), material) for x, y, z, r in balls]

@@ -1,0 +1,69 @@
+"""Who lives in a room, and what therefore lies on its furniture, shelves, beds and floor: rows of `stories.toml`."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from echomodel.vocabulary import Category
+from echousd.graph.fields import RESIDENTS
+
+TABLE = tomllib.loads(resources.files(__package__).joinpath("stories.toml").read_text("utf-8"))
+
+
+@dataclass(frozen=True)
+class Wish:
+    """A row of `stories.toml`, which says what its words mean."""
+
+    of: tuple[str, ...]
+    at: tuple[Any, ...]
+    beside: tuple[str, ...] = ()  # `with`
+    by: str = ""
+    turn: str = ""
+    full: bool = False
+    share: float = 1.0
+
+    def comes(self, full: bool, rng: np.random.Generator) -> bool:
+        """Whether a room that is dressed in full, or not, has it."""
+        return (full or not self.full) and bool(rng.random() < self.share)
+
+
+@dataclass(frozen=True)
+class Story:
+    """What lies where in the room of somebody."""
+
+    tops: Mapping[str, tuple[Wish, ...]]
+    shelves: tuple[str, ...]
+    beds: tuple[Wish, ...]
+    floor: tuple[Wish, ...]
+
+
+@cache
+def story(resident: str = "") -> Story:
+    """The story of one of `RESIDENTS`, of anyone where nobody is told."""
+    rows = TABLE["anyone"] | TABLE.get(resident, {})
+    tops = TABLE["anyone"]["tops"] | TABLE.get(resident, {}).get("tops", {})
+    floor, beds = (tuple(map(_wish, rows[where])) for where in ("floor", "beds"))
+    return Story({top: tuple(map(_wish, wishes)) for top, wishes in tops.items()}, tuple(rows["shelves"]), beds, floor)
+
+
+def _wish(row: dict[str, Any]) -> Wish:
+    at = (spot for one in row["at"] for spot in (TABLE["places"].get(one, [one]) if isinstance(one, str) else [one]))
+    rest = {word: row[word] for word in ("by", "turn", "full", "share") if word in row}
+    return Wish(tuple(row["of"]), tuple(at), tuple(row.get("with", ())), **rest)
+
+
+def guessed(room: str, furniture: Iterable[Category]) -> str:
+    """Who seems to live in a room of some type with some furniture; "" where nothing tells."""
+    words = {word for row in furniture for word in (row.name, row.role)}
+    for resident in RESIDENTS:
+        told = TABLE[resident]
+        if room in told.get("rooms", ()) or any(words.issuperset(signs) for signs in told.get("signs", ())):
+            return resident
+    return ""

@@ -1,0 +1,107 @@
+"""Small things tell who lives in a room: what is asked for, what the furniture suggests, and where it lies."""
+
+import numpy as np
+import pytest
+
+import echousd
+from echomodel.dressing import KINDS
+from echomodel.vocabulary import vocabulary
+from echousd.dressing.dress import dressed
+from echousd.dressing.stories import TABLE, guessed, story
+from echousd.graph import SceneGraph
+from echousd.graph.fields import RESIDENTS
+from echousd.options import RoomOptions
+from echousd.stage.graphs import read_graph
+
+STUDY = """
+room: {type: bedroom, size: [4.2, 3.6]}
+nodes:
+  - {name: bed, category: single_bed}
+  - {name: desk, category: desk}
+  - {name: nightstand, category: nightstand}
+"""
+
+
+@pytest.fixture(scope="module")
+def rooms():
+    """Who is told to live there -> the same room, dressed in full."""
+    graph = SceneGraph.from_yaml(STUDY)
+    options = {"seed": 2, "shapes": "parts", "dress": "full"}
+    told = {who: echousd.generate(graph, options=RoomOptions(resident=who, **options)) for who in ("child", "senior")}
+    return told | {None: echousd.generate(graph, options=RoomOptions(**options))}
+
+
+def kinds_on(room, name):
+    return {thing.kind for thing in dressed(room).placed if thing.on == name}
+
+
+def test_every_resident_has_a_story_of_kinds_and_tops_that_there_are():
+    assert set(TABLE) == {"places", "anyone", *RESIDENTS}
+    tops = {row.top for row in vocabulary().categories}
+    words = {word for row in vocabulary().categories for word in (row.role, row.top, *row.invites)}
+    for who in ("", *RESIDENTS):
+        told = story(who)
+        wishes = [*told.beds, *told.floor, *(wish for top in told.tops.values() for wish in top)]
+        assert {kind for wish in wishes for kind in (*wish.of, *wish.beside)} | {*told.shelves} <= {*KINDS}
+        assert set(told.tops) <= tops
+        assert {wish.by for wish in told.floor} <= words
+        assert all(wish.at for wish in wishes)
+
+
+@pytest.mark.parametrize(
+    ("room", "furniture", "who"),
+    [
+        ("bedroom", ("kids_bed", "desk"), "child"),
+        ("bedroom", ("single_bed", "desk"), "student"),
+        ("bedroom", ("double_bed", "dressing_table"), "couple"),
+        ("study", ("desk",), "office"),
+        ("bedroom", ("double_bed",), ""),
+    ],
+)
+def test_furniture_suggests_who_lives_there(room, furniture, who):
+    assert guessed(room, map(vocabulary().category, furniture)) == who
+
+
+def test_who_lives_there_is_told_by_what_lies_on_desks_beds_and_floors(rooms):
+    assert "drawing" in kinds_on(rooms["child"], "desk")
+    assert "laptop" in kinds_on(rooms[None], "desk")  # a single bed and a desk: a student
+    assert "laptop" not in kinds_on(rooms["child"], "desk") | kinds_on(rooms["senior"], "desk")
+    assert "bear" in kinds_on(rooms["child"], "bed")
+    on_floor = {thing.kind for thing in dressed(rooms["child"]).placed if thing.position[1] == 0.0}
+    assert on_floor & {"train", "dolls_house"}
+    assert "photo" in kinds_on(rooms["senior"], "nightstand")
+
+
+def test_nothing_stands_alone_on_bare_floor(rooms):
+    for room in rooms.values():
+        setting = dressed(room)
+        rugs = [t.footprint for t in setting.placed if KINDS[t.kind].name == "rug"]
+        loose = [t for t in setting.placed if t.position[1] == 0.0 and not KINDS[t.kind].lies]
+        for one in loose:
+            company = [o.footprint for o in setting.objects.values()]
+            company += [t.footprint for t in loose if t is not one] + [setting.room.exterior, *rugs]
+            assert min(one.footprint.distance(other) for other in company) < 0.36, one
+
+
+def test_the_graph_keeps_who_lives_there(rooms, tmp_path):
+    room = rooms["child"]
+    assert room.graph.room.resident == "child"
+    assert rooms[None].graph.room.resident is None
+    assert SceneGraph.from_yaml(room.graph.to_yaml()).room.resident == "child"
+    assert read_graph(room.save(tmp_path / "room", preview=False)).room.resident == "child"
+
+
+def test_nobody_else_lives_there():
+    with pytest.raises(ValueError, match="resident is 'cat', allowed: child, teen"):
+        RoomOptions(resident="cat")
+    with pytest.raises(ValueError, match="found 'cat', allowed: child, teen"):
+        SceneGraph.from_yaml(STUDY.replace("size:", "resident: cat, size:"))
+
+
+def test_what_lies_on_a_bed_lies_within_it(rooms):
+    for room in rooms.values():
+        bed = dressed(room).objects["bed"]
+        for thing in dressed(room).placed:
+            if thing.on == "bed" and not KINDS[thing.kind].lies:
+                assert np.abs(bed.in_plan(thing.position)).max() < bed.size[2] / 2
+                assert bed.position[1] + 0.2 < thing.position[1] < bed.top
