@@ -36,7 +36,7 @@ HELD_OUT_EVERY = 20
 class PublishedRooms:
     """The scans of `trainval`, with the relations that their graphs state; every twentieth is for validation.
 
-    `folder`: of SG-FRONT. Raises `SGFrontError` as `SGFront`, and ValueError for a folder without scans.
+    `folder`: of SG-FRONT. Raises ValueError as `SGFront`, and for a folder without scans.
     """
 
     def __init__(self, folder: Path) -> None:

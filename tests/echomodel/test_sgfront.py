@@ -5,11 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from echomodel.data.sgfront import SGFront, SGFrontError, write_sgfront
+from echomodel.data.sgfront import SGFront, write_sgfront
 from echomodel.graph import GraphBatch
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts
 from echomodel.vocabulary import vocabulary
+
+GRAPHS, BOXES = "relationships_all_trainval.json", "obj_boxes_all_trainval.json"
 
 
 @pytest.fixture(scope="module")
@@ -26,11 +28,10 @@ def folder(tmp_path, rooms):
 
 def test_rooms_come_back(folder, rooms):
     for split, part in (("trainval", rooms[:8]), ("test", rooms[8:])):
-        read = SGFront(folder, split=split)
+        read = SGFront(folder, split=split).rooms()
         assert len(read) == len(part)
         shares = []
-        for scan, true in zip(read.scans, part, strict=True):
-            room = scan.room()
+        for room, true in zip(read, part, strict=True):
             assert room.room_type == true.room_type
             assert room.categories == tuple(vocabulary().category(c).sgfront for c in true.categories)
             assert np.allclose(room.size, true.size)
@@ -52,19 +53,18 @@ def test_the_published_vocabulary(folder):
     read = SGFront(folder)
     assert len(read.classes) == 36
     assert {"_scene_", "floor"} < set(read.classes)
-    scan = read.scans[0]
-    n = len(scan.fine)
-    assert scan.fine[-1] == "floor"
+    scan = json.loads((folder / GRAPHS).read_text())["scans"][0]
+    *things, last = scan["objects"]
+    assert scan["objects"][last] == "floor"
     # every object has its place: on the floor or above it
-    floor = scan.triples[scan.triples[:, 2] == n - 1]
-    assert set(floor[:, 1]) <= {6, 7}
-    assert len(floor) == n - 1
+    floor = {str(subject): words for subject, other, *words in scan["relationships"] if str(other) == last}
+    assert floor.keys() == set(things)
+    assert {tuple(words) for words in floor.values()} <= {(6, "above"), (7, "standing on")}
 
 
 def test_written_graphs_satisfy_the_published_metric(folder):
-    for scan in SGFront(folder).scans:
-        kept = verdicts(scan, scan.triples, rules="sgfront")
-        assert (kept != 0).all()
+    for room in SGFront(folder).rooms():
+        assert (verdicts(room, room.relations, rules="sgfront") != 0).all()
 
 
 def edited(folder, name, change):
@@ -72,9 +72,6 @@ def edited(folder, name, change):
     raw = json.loads(path.read_text())
     change(raw)
     path.write_text(json.dumps(raw))
-
-
-GRAPHS, BOXES = "relationships_all_trainval.json", "obj_boxes_all_trainval.json"
 
 
 def first(raw):
@@ -100,21 +97,21 @@ def first(raw):
 )  # fmt: skip
 def test_malformed_files_name_file_and_scan(folder, file, change, text):
     edited(folder, file, change)
-    with pytest.raises(SGFrontError, match=text) as caught:
-        SGFront(folder)
+    with pytest.raises(ValueError, match=text) as caught:
+        SGFront(folder).rooms()
     assert file in str(caught.value)
     assert "scan" in str(caught.value)
 
 
 def test_other_bad_files(folder):
     (folder / "relationships.txt").write_text("left\nright\n")
-    with pytest.raises(SGFrontError, match=r"relationships.txt: holds 2 relationships, expected 15"):
+    with pytest.raises(ValueError, match=r"relationships.txt: holds 2 relationships, expected 15"):
         SGFront(folder)
     (folder / "relationships.txt").unlink()
-    with pytest.raises(SGFrontError, match=r"relationships.txt: no such file"):
+    with pytest.raises(ValueError, match=r"relationships.txt: no such file"):
         SGFront(folder)
-    with pytest.raises(SGFrontError, match="room 'attic', split 'trainval': allowed are bedroom"):
+    with pytest.raises(ValueError, match="room 'attic', split 'trainval': allowed are bedroom"):
         SGFront(folder, "attic")
     (folder / GRAPHS).write_text("{")
-    with pytest.raises(SGFrontError, match=r"no such file"):
+    with pytest.raises(ValueError, match=r"no such file"):
         SGFront(folder)

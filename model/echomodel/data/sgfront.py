@@ -10,12 +10,11 @@ import json
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from echomodel.files import write_text
+from echomodel.files import read_json, write_text
 from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
@@ -23,62 +22,7 @@ from echomodel.vocabulary import vocabulary
 ROOMS = ("bedroom", "livingroom", "diningroom", "library", "all")
 SPLITS = ("trainval", "test")  # the paper's; test is what its tables are computed on
 SCENE, FLOOR, IN = "_scene_", "floor", 0
-
-
-class SGFrontError(ValueError):
-    """A file of SG-FRONT that is missing or not as published; the message names the file and the scan."""
-
-
-@dataclass(frozen=True, eq=False)
-class Scan:
-    """One room: n objects (the floor among them, last) and its graph, exactly as the files say.
-
-    Arguments:
-        name: name of the scan, `MasterBedroom-33296`.
-        fine: n fine class names. model_ids: n 3D-FUTURE ids, "" where there is none.
-        size: (n, 3) float, extents, metres. position: (n, 3) float, bottom centres relative to `centre`, metres.
-        yaw: (n,) float, radians. centre: (3,) float, the scan's `scene_center`.
-        triples: (e, 3) int64 [subject, predicate 1..15, object], local indices, in the file's order.
-    """
-
-    name: str
-    fine: tuple[str, ...]
-    model_ids: tuple[str, ...]
-    size: np.ndarray
-    position: np.ndarray
-    yaw: np.ndarray
-    centre: np.ndarray
-    triples: np.ndarray
-
-    @property
-    def room_type(self) -> str:
-        """Our room type, told by the scan's name (the name itself where it is of no known kind)."""
-        kind = self.name.split("-")[0]
-        return next((room.name for room in vocabulary().room_types if kind in room.scans), kind)
-
-    def room(self) -> RoomBoxes:
-        """The furniture as a labelled room; the floor becomes the polygon, its relations are left out."""
-        keep = [k for k, name in enumerate(self.fine) if name != FLOOR]
-        place = {k: number for number, k in enumerate(keep)}
-        floor = [k for k, name in enumerate(self.fine) if name == FLOOR]
-        if floor:
-            half, middle = self.size[floor[0]][[0, 2]] / 2, self.position[floor[0]][[0, 2]]
-            low, high = middle - half, middle + half
-        elif keep:
-            reach = np.linalg.norm(self.size[keep][:, [0, 2]], axis=1)[:, None] / 2
-            plan = self.position[keep][:, [0, 2]]
-            low, high = (plan - reach).min(0), (plan + reach).max(0)
-        else:
-            low = high = np.zeros(2)
-        corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
-        triples = [t for t in self.triples.tolist() if t[0] in place and t[2] in place]
-        return RoomBoxes(
-            id=self.name, room_type=self.room_type, floor_polygon=corners,
-            height=float(max([2.6, *(self.position[keep, 1] + self.size[keep, 1])])),
-            categories=tuple(self.fine[k] for k in keep), size=self.size[keep], position=self.position[keep],
-            yaw=self.yaw[keep], models=tuple(self.model_ids[k] for k in keep),
-            relations=np.array([[place[s], p, place[o]] for s, p, o in triples], np.int64).reshape(-1, 3),
-        )  # fmt: skip
+LARGEST = 2**30  # bytes of a file
 
 
 class SGFront:
@@ -91,67 +35,49 @@ class SGFront:
 
     Attributes: `classes`, the fine ones, sorted; `predicates`, names by id (0 is `in`).
 
-    Raises SGFrontError where a file is missing or malformed.
+    Raises ValueError where a file is missing or malformed; names the file and the scan.
     """
 
     def __init__(self, folder: str | os.PathLike[str], room: str = "all", split: str = "trainval") -> None:
         if room not in ROOMS or split not in SPLITS:
-            raise SGFrontError(
-                f"room {room!r}, split {split!r}: allowed are {', '.join(ROOMS)} and {', '.join(SPLITS)}"
-            )
+            raise ValueError(f"room {room!r}, split {split!r}: allowed are {', '.join(ROOMS)} and {', '.join(SPLITS)}")
         self.folder, self.room, self.split = Path(folder), room, split
         self.classes = tuple(sorted(set(self._lines(f"classes_{room}.txt"))))
         self.predicates = ("in", *self._lines("relationships.txt"))
         expected = len(vocabulary().sgfront_predicates)
         if len(self.predicates) != expected:
             path = self.folder / "relationships.txt"
-            raise SGFrontError(f"{path}: holds {len(self.predicates) - 1} relationships, expected {expected - 1}")
-        self.scans = self._scans()
-
-    def __len__(self) -> int:
-        return len(self.scans)
+            raise ValueError(f"{path}: holds {len(self.predicates) - 1} relationships, expected {expected - 1}")
 
     def rooms(self) -> list[RoomBoxes]:
-        """All scans as labelled rooms."""
-        return [scan.room() for scan in self.scans]
+        """All scans as labelled rooms; their floors become polygons, whose relations are left out."""
+        graphs, boxes = (f"{what}_{self.room}_{self.split}.json" for what in ("relationships", "obj_boxes"))
+        raw, boxed = (read_json(self._path(name), LARGEST) for name in (graphs, boxes))
+        if not isinstance(raw, dict) or not isinstance(raw.get("scans"), list):
+            raise ValueError(f"{self.folder / graphs}: no list `scans`")
+        rooms: dict[str, RoomBoxes] = {}
+        for number, entry in enumerate(raw["scans"]):
+            name = entry.get("scan", f"number {number}")
+            if name in rooms:
+                raise ValueError(f"{self.folder / graphs}: scan {name}: appears twice")
+            if name not in boxed:
+                raise ValueError(f"{self.folder / boxes}: scan {name}: missing")
+            rooms[name] = self._room(name, entry, boxed[name], graphs, boxes)
+        return list(rooms.values())
 
     # -- files ---------------------------------------------------------------------------------------------------
 
     def _path(self, name: str) -> Path:
         if not (self.folder / name).exists():
-            raise SGFrontError(f"{self.folder / name}: no such file, SG-FRONT has it")
+            raise ValueError(f"{self.folder / name}: no such file, SG-FRONT has it")
         return self.folder / name
 
     def _lines(self, name: str) -> list[str]:
         return [line.strip() for line in self._path(name).read_text("utf-8").splitlines() if line.strip()]
 
-    def _json(self, name: str) -> dict:
-        path = self._path(name)
-        try:
-            return json.loads(path.read_text("utf-8"))
-        except (json.JSONDecodeError, UnicodeDecodeError) as error:
-            raise SGFrontError(f"{path}: not JSON ({error})") from None
-
-    def _scans(self) -> list[Scan]:
-        graphs = f"relationships_{self.room}_{self.split}.json"
-        boxes = f"obj_boxes_{self.room}_{self.split}.json"
-        raw, boxed = self._json(graphs), self._json(boxes)
-        if not isinstance(raw.get("scans"), list):
-            raise SGFrontError(f"{self.folder / graphs}: no list `scans`")
-        scans, seen = [], set()
-        for number, entry in enumerate(raw["scans"]):
-            name = entry.get("scan", f"number {number}")
-            if name in seen:
-                raise SGFrontError(f"{self.folder / graphs}: scan {name}: appears twice")
-            seen.add(name)
-            if name not in boxed:
-                raise SGFrontError(f"{self.folder / boxes}: scan {name}: missing")
-            scans.append(self._scan(name, entry, boxed[name], graphs, boxes))
-        return scans
-
-    def _scan(self, name: str, entry: dict, boxed: dict, graphs: str, boxes: str) -> Scan:
-        def fault(file: str, text: str) -> SGFrontError:
-            return SGFrontError(f"{self.folder / file}: scan {name}: {text}")
+    def _room(self, name: str, entry: dict, boxed: dict, graphs: str, boxes: str) -> RoomBoxes:
+        def fault(file: str, text: str) -> ValueError:
+            return ValueError(f"{self.folder / file}: scan {name}: {text}")
 
         objects = entry.get("objects")
         if not isinstance(objects, dict) or not objects:
@@ -189,12 +115,34 @@ class SGFront:
                 told = self.predicates[predicate]
                 raise fault(graphs, f"relation {number} {relation}: id {predicate} is {told!r} in relationships.txt")
             triples.append((local[str(subject)], predicate, local[str(object_)]))
-        values = np.array(params, float)
-        return Scan(
-            name=name, fine=tuple(objects.values()), model_ids=tuple(models), size=values[:, :3],
-            position=values[:, 3:6] - np.array(centre, float), yaw=values[:, 6], centre=np.array(centre, float),
-            triples=np.array(triples, np.int64).reshape(-1, 3),
+        values = np.array(params, float) - [0, 0, 0, *centre, 0]
+        there = np.array([category != FLOOR for category in objects.values()])
+        place = np.cumsum(there) - 1
+        size, position, yaw = np.split(values[there], [3, 6], 1)
+        kind = name.split("-")[0]  # a room whose name is of no known kind is of that type
+        return RoomBoxes(
+            id=name, room_type=next((row.name for row in vocabulary().room_types if kind in row.scans), kind),
+            floor_polygon=_outline(values[~there], values[there]),
+            height=float(max([2.6, *(position[:, 1] + size[:, 1])])),
+            categories=tuple(category for category in objects.values() if category != FLOOR), size=size,
+            position=position, yaw=yaw[:, 0], models=tuple(m for m, kept in zip(models, there, strict=True) if kept),
+            relations=np.array(
+                [(place[s], p, place[o]) for s, p, o in triples if there[s] and there[o]], np.int64
+            ).reshape(-1, 3),
         )  # fmt: skip
+
+
+def _outline(floors: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """(4, 2) corners of the first of some floors (k, 7), else of what others (n, 7) reach."""
+    if len(floors):
+        half, middle = floors[0, [0, 2]] / 2, floors[0, [3, 5]]
+        low, high = middle - half, middle + half
+    elif len(others):
+        reach = np.linalg.norm(others[:, [0, 2]], axis=1)[:, None] / 2
+        low, high = (others[:, [3, 5]] - reach).min(0), (others[:, [3, 5]] + reach).max(0)
+    else:
+        low = high = np.zeros(2)
+    return np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
 
 
 def small_mapping() -> dict[str, str]:

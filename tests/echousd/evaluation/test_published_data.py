@@ -43,7 +43,7 @@ def folder(tmp_path):
 
 def test_graphs_are_those_of_the_files(folder):
     rooms, others = rooms_against(SuiteSettings(against=str(folder), count=3))
-    told = {scan.name: scan.room().relations for scan in SGFront(folder, split="test").scans}
+    told = {room.id: room.relations for room in SGFront(folder, split="test").rooms()}
     for task in tasks_of([*rooms, *others], 0, rules="sgfront"):
         assert np.array_equal(task.told, told[task.room.id])
     trained, shapes = opened_data(read_recipe(ROOT / "model/recipes/paper.toml", [f"data={folder}"]))
