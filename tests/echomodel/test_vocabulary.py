@@ -192,6 +192,12 @@ def test_room_types_of_real_rooms():
         (WORDS.room_type, "bedrom", "unknown room type 'bedrom': did you mean bedroom?"),
         (WORDS.room_type, "garage", "unknown room type 'garage' (not supported): allowed: "
          + ", ".join(row.name for row in WORDS.room_types)),
+        # words that are no slips are not taken for one
+        (WORDS.room_type, "guest room",
+         "unknown room type 'guest room' (not supported): nearest by meaning: bedroom"),
+        (WORDS.category, "carpet", "unknown category 'carpet' (not supported): " + WORDS.hints["@small"]),
+        (WORDS.category, "window", "unknown category 'window' (not supported): " + WORDS.hints["@hole"]),
+        (WORDS.category, "monitor", "unknown category 'monitor' (not supported): nearest by meaning: tv"),
     ],
 )  # fmt: skip
 def test_unknown_words_name_the_nearest(ask, word, text):

@@ -28,31 +28,22 @@ def _graph(name: str) -> torch.Tensor:
 
 @pytest.mark.parametrize("graph", TRIPLES)
 @pytest.mark.parametrize("change", [{}, {"time_in_echo": False}, {"residual": False}])
-def test_layout(graph: str, change: dict) -> None:
-    config = replace(LAYOUT, **change)
-    net = LayoutNet(config).eval()
+@pytest.mark.parametrize(
+    ("kind", "sizes", "literal", "shape", "tolerance"),
+    [(LayoutNet, LAYOUT, literal_layout, (6, 8), 1e-4), (ShapeUNet, SHAPE, literal_shape, (5, 3, 8, 8, 8), 5e-5)],
+)
+def test_both_branches(kind, sizes, literal, shape, tolerance: float, graph: str, change: dict) -> None:
+    config = replace(sizes, **change)
+    net = kind(config).eval()
     fill(net, seed=3)
     generator = torch.Generator().manual_seed(1)
-    x, objects = torch.randn(6, 8, generator=generator), torch.randn(6, config.objects, generator=generator)
-    t = torch.tensor([0, 999, 5, 5, 500, 999])
-    expected = literal_layout(net, x, objects, _graph(graph), t)
+    x, objects = torch.randn(shape, generator=generator), torch.randn(shape[0], config.objects, generator=generator)
+    t = torch.tensor([0, 999, 5, 5, 500, 999])[: len(x)]
+    expected = literal(net, x, objects, _graph(graph), t)
     with torch.inference_mode():
-        close(net(x, objects, _graph(graph), t), expected, 1e-4)
-        close(packed(net)(x, objects, _graph(graph), t), expected, 1e-4)
-
-
-@pytest.mark.parametrize("graph", TRIPLES)
-@pytest.mark.parametrize("change", [{}, {"time_in_echo": False}, {"residual": False}])
-def test_shape(graph: str, change: dict) -> None:
-    config = replace(SHAPE, **change)
-    net = ShapeUNet(config).eval()
-    fill(net, seed=4)
-    generator = torch.Generator().manual_seed(2)
-    x = torch.randn(5, 3, 8, 8, 8, generator=generator)
-    objects, t = torch.randn(5, config.objects, generator=generator), torch.tensor([0, 999, 5, 5, 500])
-    expected = literal_shape(net, x, objects, _graph(graph), t)
-    with torch.inference_mode():
-        close(net(x, objects, _graph(graph), t), expected, 5e-5)
+        close(net(x, objects, _graph(graph), t), expected, tolerance)
+        if kind is LayoutNet:
+            close(packed(net)(x, objects, _graph(graph), t), expected, tolerance)
 
 
 def test_one_node_alone() -> None:

@@ -50,6 +50,9 @@ def _encoder(own_table: bool = True) -> GraphEncoder:
     return net.eval()
 
 
+WHOLE = ("objs", "triples", "clip_obj", "clip_rel")
+
+
 def _graph(n: Numbers, classes: str, triples: str, nodes: str, edges: str) -> SceneGraphTensors:
     return SceneGraphTensors(n[classes], n[triples], n[nodes], n[edges])
 
@@ -58,7 +61,7 @@ def _graph(n: Numbers, classes: str, triples: str, nodes: str, edges: str) -> Sc
 def test_encoder() -> None:
     numbers = Numbers("encoder")
     net = _encoder()
-    graph = _graph(numbers, "objs", "triples", "clip_obj", "clip_rel")
+    graph = _graph(numbers, *WHOLE)
     nodes, edges = net.embed(graph)
     close(nodes, numbers["obj_embed"], 1e-6)
     close(edges, numbers["pred_embed_enc"], 1e-6)
@@ -72,7 +75,7 @@ def test_encoder() -> None:
 def test_manipulator_generates(own_table: bool, expected: str) -> None:
     numbers = Numbers("manipulator")
     net = _encoder(own_table)
-    graph = _graph(numbers, "objs", "triples", "clip_obj", "clip_rel")
+    graph = _graph(numbers, *WHOLE)
     latent, edges, keep = net.manipulate(numbers["latent_obj"], graph)
     close(latent, numbers[expected], 1e-4)
     assert keep.all()
@@ -81,38 +84,29 @@ def test_manipulator_generates(own_table: bool, expected: str) -> None:
 
 
 @torch.inference_mode()
-def test_manipulator_adds_a_node() -> None:
+@pytest.mark.parametrize(
+    ("edit", "before", "after", "nodes"),
+    [
+        ("add", ("add_enc_objs", "add_enc_triples", "add_clip_obj", "add_clip_rel"), WHOLE, ("added", "add_index")),
+        ("chg", WHOLE, ("objs", "chg_dec_triples", "clip_obj", "chg_clip_rel"), ("touched", "chg_nodes")),
+    ],
+)
+def test_manipulator_adds_a_node_and_changes_a_relation(edit, before, after, nodes) -> None:
     numbers = Numbers("manipulator")
     net = _encoder()
-    before = _graph(numbers, "add_enc_objs", "add_enc_triples", "add_clip_obj", "add_clip_rel")
-    after = _graph(numbers, "objs", "triples", "clip_obj", "clip_rel")
-    latent, _ = net.encode(before)
-    added = numbers["add_index"].tolist()
-    new, _, keep = net.manipulate(latent, after, added=added, noise=numbers["add_noise"])
-    close(new, numbers["add_c_b"], 1e-4)
-    close(net.embed(after)[0], numbers["add_uc_b"], 1e-6)
-    assert keep.long().tolist() == numbers["add_keep"].tolist()
-
-
-@torch.inference_mode()
-def test_manipulator_changes_a_relation() -> None:
-    numbers = Numbers("manipulator")
-    net = _encoder()
-    before = _graph(numbers, "objs", "triples", "clip_obj", "clip_rel")
-    after = _graph(numbers, "objs", "chg_dec_triples", "clip_obj", "chg_clip_rel")
-    latent, _ = net.encode(before)
-    touched = numbers["chg_nodes"].tolist()
-    new, _, keep = net.manipulate(latent, after, touched=touched, noise=numbers["chg_noise"])
-    close(new, numbers["chg_c_b"], 1e-4)
-    close(net.embed(after)[0], numbers["chg_uc_b"], 1e-6)
-    assert keep.long().tolist() == numbers["chg_keep"].tolist()
+    latent, _ = net.encode(_graph(numbers, *before))
+    graph, (how, which) = _graph(numbers, *after), nodes
+    new, _, keep = net.manipulate(latent, graph, **{how: numbers[which].tolist()}, noise=numbers[f"{edit}_noise"])
+    close(new, numbers[f"{edit}_c_b"], 1e-4)
+    close(net.embed(graph)[0], numbers[f"{edit}_uc_b"], 1e-6)
+    assert keep.long().tolist() == numbers[f"{edit}_keep"].tolist()
 
 
 @torch.inference_mode()
 def test_change_flags_belong_to_the_nodes_in_ascending_order() -> None:
     numbers = Numbers("manipulator")
     net = _encoder()
-    graph = _graph(numbers, "objs", "triples", "clip_obj", "clip_rel")
+    graph = _graph(numbers, *WHOLE)
     latent, _ = net.encode(graph)
     touched = numbers["chg_nodes"].tolist()
     one, _, _ = net.manipulate(latent, graph, touched=touched, noise=numbers["chg_noise"])
