@@ -183,44 +183,6 @@ def meshes(
     console.print(f"{out}: {len(shapes)} shapes, {int(shapes.held_out.sum())} held out")
 
 
-@data_app.command("sheet")
-def sheet(
-    out: Annotated[Path, typer.Option("-o", "--output", help="Picture file.")],
-    categories: Annotated[list[str] | None, typer.Argument(help="Categories; default all.")] = None,
-    count: Annotated[int, typer.Option(help="Samples per category.")] = 12,
-    seed: Annotated[int, typer.Option(help="Seed of the world.")] = 0,
-    shapes: Annotated[Path | None, typer.Option("--set", help="Draw the shapes of this set instead.")] = None,
-    size: Annotated[int, typer.Option(help="Pixels across a picture.")] = 120,
-) -> None:
-    """Draw samples of every category in a grid: parametric pieces of styles 0, 1, ... or the shapes of a set.
-
-    Example: echousd data sheet chair dining_table -o chairs.png
-    """
-    from echomodel.data.shapeset import ShapeSet, piece
-    from echomodel.data.sheet import contact_sheet
-    from echomodel.files import write_picture
-    from echomodel.furniture import mesh_of
-    from echomodel.tsdf import mesh_from_tsdf
-    from echomodel.vocabulary import vocabulary
-
-    words = vocabulary()
-    names = [words.category(word).name for word in categories] if categories else [c.name for c in words.categories]
-    rows: list[tuple[str, list[trimesh.Trimesh]]] = []
-    stored = ShapeSet(shapes) if shapes else None
-    for name in names:
-        if stored is None:
-            pieces = [piece(seed, style, name) for style in range(count)]
-            rows.append((name, [mesh_of(parts, size) for _, size, parts in pieces]))
-            continue
-        found = [i for i in range(len(stored)) if stored.category[i] == words.category_id(name)][:count]
-        drawn = [mesh_from_tsdf(stored[i]) for i in found]
-        for mesh, i in zip(drawn, found, strict=True):
-            mesh.apply_scale(stored.size[i])
-        if drawn:
-            rows.append((f"{name} ({len(drawn)})", drawn))
-    write_picture(out, contact_sheet(rows, size))
-
-
 @data_app.command("to-usd")
 def to_usd(
     rooms: Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")],

@@ -1,4 +1,4 @@
-"""Contact sheets: small shaded pictures of meshes in a grid, drawn point by point, and plans of rooms."""
+"""Small shaded pictures of meshes, drawn point by point, and plans of rooms beside one another."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from PIL import Image, ImageDraw
+from PIL import Image
 
 from echomodel.files import whole_file
 from echomodel.furniture.assembly import MATERIALS
@@ -24,19 +24,21 @@ PALETTE = {
     "mirror": (196, 214, 222), "book": (150, 90, 78), "stem": (118, 104, 66),
 }  # fmt: skip
 PLAIN = (176, 172, 166)
+YAW, PITCH = 0.6, 0.35  # radians, from where meshes are seen; 0, 0 looks at the front (+Z) face
 
 
-def thumbnail(mesh: trimesh.Trimesh, pixels: int = 160, *, yaw: float = 0.6, pitch: float = 0.35) -> Image.Image:
+def thumbnail(mesh: trimesh.Trimesh, pixels: int) -> Image.Image:
     """Shaded orthographic picture of a mesh, seen from its front right above.
 
     Arguments:
         mesh: triangles in the object frame; `face_attributes["material"]` colours them where present.
         pixels: side of the picture.
-        yaw, pitch: direction of view, radians; 0, 0 looks at the front (+Z) face.
     """
     side = pixels * 2  # drawn larger, then averaged down
     points, face = trimesh.sample.sample_surface(mesh, 4 * side * side, seed=0)
-    view = _view(yaw, pitch)
+    toward = np.array([np.sin(YAW) * np.cos(PITCH), np.sin(PITCH), np.cos(YAW) * np.cos(PITCH)])
+    right = np.array([np.cos(YAW), 0, -np.sin(YAW)])
+    view = np.stack([right, np.cross(toward, right), toward])
     seen, corners = points @ view.T, np.asarray(mesh.vertices, float) @ view.T
     low, high = corners.min(0), corners.max(0)
     size = max(high[0] - low[0], high[1] - low[1], 1e-9)
@@ -52,36 +54,11 @@ def thumbnail(mesh: trimesh.Trimesh, pixels: int = 160, *, yaw: float = 0.6, pit
     return image.resize((pixels, pixels), Image.Resampling.BOX)
 
 
-def _view(yaw: float, pitch: float) -> np.ndarray:
-    """Rows: right, up and towards the viewer, in the object's frame."""
-    toward = np.array([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)])
-    right = np.array([np.cos(yaw), 0, -np.sin(yaw)])
-    return np.stack([right, np.cross(toward, right), toward])
-
-
 def _colours(mesh: trimesh.Trimesh) -> np.ndarray:
     if "material" not in mesh.face_attributes:
         return np.tile(np.array(PLAIN, float), (len(mesh.faces), 1))
     table = np.array([PALETTE[name] for name in MATERIALS], float)
     return table[np.asarray(mesh.face_attributes["material"])]
-
-
-def contact_sheet(rows: Sequence[tuple[str, Sequence[trimesh.Trimesh]]], pixels: int = 120) -> Image.Image:
-    """A picture with one labelled row of meshes per entry.
-
-    Arguments:
-        rows: label and meshes of each row, top to bottom.
-        pixels: side of one picture.
-    """
-    columns = max((len(meshes) for _, meshes in rows), default=0)
-    margin = 130
-    sheet = Image.new("RGB", (margin + columns * pixels, max(1, len(rows)) * pixels), (250, 250, 250))
-    pen = ImageDraw.Draw(sheet)
-    for j, (label, meshes) in enumerate(rows):
-        pen.text((6, j * pixels + pixels // 2 - 6), label, fill=(20, 20, 20))
-        for i, mesh in enumerate(meshes):
-            sheet.paste(thumbnail(mesh, pixels), (margin + i * pixels, j * pixels))
-    return sheet
 
 
 CELL = 2.8  # inches

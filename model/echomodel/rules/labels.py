@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import torch
@@ -19,27 +20,9 @@ from echomodel.vocabulary import vocabulary
 SLACK = 3e-4
 
 
-def label_relations(
-    room: RoomBoxes,
-    *,
-    rules: str = "strict",
-    drop: float = 0.0,
-    rng: np.random.Generator | None = None,
-    headings: bool = False,
-) -> np.ndarray:
-    """All relations that hold in a room, less a random share.
-
-    Arguments:
-        room: the boxes; relations are in the room's frame, about the centre of its floor's bounding box.
-        rules: `strict` or `sgfront`.
-        drop: probability with which each directed edge is left out (SG-FRONT itself shows about half of them).
-        rng: source of the dropping; needed where drop > 0.
-        headings: `symmetrical_to` asks how furniture with a front is turned, too (rooms to learn from go by places).
-
-    Returns (E, 3) int64 [subject, predicate id, object], sorted by subject, object, predicate.
-    Raises ValueError for unknown rules, a drop outside 0..1, or drop > 0 without rng.
-    """
-    return label_rooms([room], rules=rules, drop=drop, rng=rng, headings=headings)[0]
+def label_relations(room: RoomBoxes, **how: Any) -> np.ndarray:
+    """What `label_rooms` finds in one room."""
+    return label_rooms([room], **how)[0]
 
 
 def label_rooms(
@@ -50,7 +33,18 @@ def label_rooms(
     rng: np.random.Generator | None = None,
     headings: bool = False,
 ) -> list[np.ndarray]:
-    """`label_relations` for many rooms in one pass (same result, less overhead per room)."""
+    """All relations that hold in each room, less a random share.
+
+    Arguments:
+        rooms: boxes; relations are in each room's frame, about the centre of its floor's bounding box.
+        rules: `strict` or `sgfront`.
+        drop: probability with which each directed edge is left out (SG-FRONT itself shows about half of them).
+        rng: source of the dropping; needed where drop > 0.
+        headings: `symmetrical_to` asks how furniture with a front is turned, too (rooms to learn from go by places).
+
+    Returns (E, 3) int64 [subject, predicate id, object] for each, sorted by subject, object, predicate.
+    Raises ValueError for unknown rules, a drop outside 0..1, or drop > 0 without rng.
+    """
     chosen = rule_set(rules)
     if not 0.0 <= drop <= 1.0:
         raise ValueError(f"drop is {drop}: allowed is a probability, 0 to 1")

@@ -134,7 +134,6 @@ CASES = {
         ("data/**/*",),
         (
             ("data", "plot", "{top}/data/rooms", "-o", "{top}/o.png"),
-            ("data", "sheet", "{top}/data/shapes", "-o", "{top}/o.png"),
             tuple(word.replace("{n}", "2") for word in TRAIN),
         ),
         ran(("data", "build", "--recipe", "smoke", "-o", "{top}/data")),

@@ -146,7 +146,6 @@ WITHOUT_JSON = {
     "rooms",
     "plot",
     "meshes",
-    "sheet",
     "to-usd",
     "to-sgfront",
     "import",
