@@ -16,8 +16,8 @@ import numpy as np
 from echomodel import data
 from echomodel.files import write_text
 from echomodel.rooms.generator import generate_room
-from echomodel.rooms.statistics import RoomTypeStatistics, room_statistics, room_type_statistics
-from echomodel.sizes import size_score
+from echomodel.rooms.statistics import RoomTypeStatistics, room_type_statistics
+from echomodel.sizes import room_statistics, size_score
 
 ROUNDS, ROOMS, SIZE_ROOMS, SEED = 8, 1200, 3000, 20
 FEWEST, FARTHEST = 60, 1.0  # pieces that a median needs, and the largest shift in standard deviations

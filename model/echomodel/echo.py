@@ -43,6 +43,8 @@ class EchoModel:
             fast (`benchmarks/inference_modes.py`); do not train the model on then.
     """
 
+    preset = "compact"  # how this model's preset is called
+
     def __init__(self, model: CompactModel, hash: str = "", *, packed: bool = True) -> None:
         self.model, self.hash = model.eval(), hash
         if packed and "shape" in model.parts and self.device.type == "cpu":
@@ -67,11 +69,6 @@ class EchoModel:
         if path is not None and not files:
             raise WeightsError(f"{source}: holds no weights files (.safetensors)")
         return cls(*load_weights(files, device, LATER if path is None else ()))
-
-    @property
-    def preset(self) -> str:
-        """`compact`: how this model's preset is called."""
-        return "compact"
 
     @property
     def branches(self) -> frozenset[str]:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import Any
 
 import numpy as np
 
@@ -33,24 +32,21 @@ class SizeStatistics:
 
 
 @cache
-def _table() -> dict[str, Any]:
-    """What real rooms tell of sizes, by category."""
-    text = resources.files("echomodel").joinpath("data/room_statistics.json").read_text("utf-8")
-    found: dict[str, Any] = json.loads(text)["sizes"]
-    return found
+def room_statistics() -> dict:
+    """What real rooms look like, as data: `data/room_statistics.json`."""
+    return json.loads(resources.files("echomodel.data").joinpath("room_statistics.json").read_text("utf-8"))
 
 
 @cache
 def size_statistics(category: str) -> SizeStatistics:
     """Statistics of a class, or of the one that its row calls `like` where it has none; raises `UnknownWord`."""
     row = vocabulary().category(category)
-    name = row.name
-    if name not in _table() and not row.sizes:
+    found = room_statistics()["sizes"].get(row.name)
+    if found is None and not row.sizes:
         return size_statistics(row.like or row.sgfront)
-    if name not in _table():
+    if found is None:
         low, median, high = (np.array(values) for values in row.sizes)
         return SizeStatistics(low, median, high, _correlation(0.4, 0.98 if row.round else 0.6, 0.4))
-    found = _table()[name]
     c = found["correlation"]
     low, median, high = (np.array(found[key]) for key in ("p5", "median", "p95"))
     return SizeStatistics(low, median, high, _correlation(c["xy"], c["xz"], c["yz"]))

@@ -12,8 +12,8 @@ from echomodel.rooms.builder import Item, overlaps
 from echomodel.rooms.floor import sample_floor
 from echomodel.rooms.generator import generate_room, generate_rooms
 from echomodel.rooms.recipes import SOFA_KINDS
-from echomodel.rooms.statistics import room_requests, room_statistics, room_type_statistics
-from echomodel.sizes import size_score
+from echomodel.rooms.statistics import room_requests, room_type_statistics
+from echomodel.sizes import room_statistics, size_score
 from echomodel.vocabulary import vocabulary
 
 TYPES = [kind.name for kind in vocabulary().room_types]

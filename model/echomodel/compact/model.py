@@ -85,10 +85,6 @@ class LatentGraph(nn.Module):
 MEASURES = 2  # set of measures of the drafts that this version computes
 
 
-def _usable(settings: Mapping[str, Any]) -> str | None:
-    return None
-
-
 @dataclass(frozen=True)
 class Part:
     """What weights files and the model know of a part.
@@ -97,13 +93,14 @@ class Part:
         module: builds it from the whole configuration.
         needs: other parts without which it gives nothing.
         branch: whether it gives something of a room.
-        outdated: settings as a weights file holds them -> why this version cannot use them, None = it can.
+        outdated: settings as a weights file holds them -> why this version cannot use them, None = it can; None = it
+            can use all.
     """
 
     module: Callable[[CompactConfig], nn.Module]
     needs: tuple[str, ...] = ()
     branch: bool = False
-    outdated: Callable[[Mapping[str, Any]], str | None] = _usable
+    outdated: Callable[[Mapping[str, Any]], str | None] | None = None
 
 
 def _outdated_layout(settings: Mapping[str, Any]) -> str | None:
@@ -333,7 +330,8 @@ def _joined_config(metadata: dict[Path, dict[str, str]]) -> CompactConfig:
     for path, header in metadata.items():
         raw, parts = json.loads(header["config"]), json.loads(header["parts"])
         for part in parts:
-            if reason := PARTS[part].outdated(raw[part]):
+            outdated = PARTS[part].outdated
+            if outdated and (reason := outdated(raw[part])):
                 raise WeightsError(f"{path}: is of an earlier version, {reason}")
         named = words_of(path, header)
         own = from_dict(CompactConfig, {**{key: raw[key] for key in ("rules", *parts)}, **named})

@@ -197,9 +197,9 @@ class Builder:
     def against_wall(
         self, category: str, *, size: Size | None = None, corner: float = 0.3, gap: float | None = None,
         style: int | None = None, tries: int = 12, yaw: float | None = None, margin: float = 0.0,
-        near: Item | None = None,
+        near: Item | None = None, low: float = 0.0,
     ) -> Item | None:  # fmt: skip
-        """Place one item with its back to a wall, for `near` at the nearest of a few free places."""
+        """Place one item with its back to a wall, `low` metres up, for `near` at the nearest of a few free places."""
         size = size or self.size(category)
         style = self.style() if style is None else style
         found: list[Item] = []
@@ -209,7 +209,7 @@ class Builder:
                 return None
             wall, along = spot
             x, z = wall.point(along, (self.wall_gap(category) if gap is None else gap) + size[2] / 2)
-            item = Item(category, size, x, 0.0, z, wall.yaw)
+            item = Item(category, size, x, low, z, wall.yaw)
             if self.free(item):
                 found.append(item)
                 if near is None or len(found) == 4:

@@ -396,16 +396,8 @@ def bathroom(room: Builder) -> None:
                     room.add(mirror, style)
     for category in WALL_HUNG:
         for _ in range(room.take(category)):
-            size, low = room.size(category), vocabulary().category(category).mounted
-            for _ in range(20):
-                spot = room.wall_spot(size[0], 0.2, 0.1)
-                if spot is None:
-                    break
-                x, z = spot[0].point(spot[1], size[2] / 2 + 0.01)
-                item = Item(category, size, x, low, z, spot[0].yaw)
-                if room.free(item):
-                    room.add(item, style)
-                    break
+            low = vocabulary().category(category).mounted
+            room.against_wall(category, corner=0.2, margin=0.1, gap=0.01, style=style, tries=20, low=low)
 
 
 def hallway(room: Builder) -> None:

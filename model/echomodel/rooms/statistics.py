@@ -1,4 +1,4 @@
-"""What real rooms look like, as data: `room_statistics.json` beside this package, and draws from its percentiles."""
+"""What rooms of each type look like in the statistics of real ones, and draws from their percentiles."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from importlib import resources
 import numpy as np
 
 from echomodel.rows import RoomType
+from echomodel.sizes import room_statistics
 from echomodel.vocabulary import vocabulary
 
 AT_WALL = 0.2  # metres: a class with a larger median gap does not belong at a wall
@@ -32,15 +33,8 @@ class RoomTypeStatistics:
     long: tuple[float, ...]
     height: tuple[float, ...]
     rectangular: float
-    objects: tuple[float, ...]
     cuts: tuple[float, ...]
     presence: dict[str, tuple[float, tuple[int, ...], tuple[float, ...]]]
-
-
-@cache
-def room_statistics() -> dict:
-    """The whole table."""
-    return json.loads(resources.files("echomodel.data").joinpath("room_statistics.json").read_text("utf-8"))
 
 
 @cache
@@ -68,7 +62,7 @@ def room_type_statistics(name: str, *, requests: bool = True) -> RoomTypeStatist
         presence[category] = (share, counts, tuple(np.cumsum(weights / weights.sum()).tolist()))
     return RoomTypeStatistics(
         name=name, area=tuple(raw["area"]), short=tuple(raw["short"]), long=tuple(raw["long"]),
-        height=tuple(raw["height"]), rectangular=raw["rectangular"], objects=tuple(raw["objects"]),
+        height=tuple(raw["height"]), rectangular=raw["rectangular"],
         cuts=vocabulary().room_type(name).cuts, presence=presence,
     )  # fmt: skip
 
