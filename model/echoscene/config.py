@@ -97,10 +97,12 @@ class UNetConfig:
             )
 
 
+SHAPE: Mapping[str, Any] = {"channels": 3, "width": 224, "mult": (1, 2, 3), "objects": 1280}
+
+
 def shape_unet(**changes: Any) -> UNetConfig:
     """The shape branch's published sizes, with `changes`."""
-    base: dict[str, Any] = {"channels": 3, "width": 224, "mult": (1, 2, 3), "objects": 1280}
-    return UNetConfig(**{**base, **changes})
+    return UNetConfig(**{**SHAPE, **changes})
 
 
 @dataclass(frozen=True)
@@ -146,59 +148,39 @@ class ReleasedConfig:
         return from_dict(cls, dict(raw))
 
 
-@dataclass(frozen=True)
-class PaperSizes:
-    """Sizes and Table 4 switches of the `paper` preset; the defaults are the paper's.
+# What a recipe's `[paper]` may say -> the field of each part's configuration that it is; `time_in_echo`, `echo` and
+# `conditioning`, of the shape branch, are the switches of table 4.
+BRANCH = {name: name for name in ("hidden", "layers", "context", "code", "heads", "blocks", "grid")}
+SETTINGS = {
+    "encoder": {name: name for name in ("text", "learned", "flag", "hidden", "layers")},
+    "layout": {**BRANCH, "layout_width": "width", "layout_mult": "mult"},
+    "shape": {**BRANCH, "shape_width": "width", "shape_mult": "mult", "time_in_echo": "time_in_echo", "echo": "echo",
+              "conditioning": "conditioning"},
+    "vqvae": {"vq_channels": "channels", "vq_codes": "codes"},
+}  # fmt: skip
 
-    Arguments:
-        text, learned, flag, hidden, layers: as in `EncoderConfig`, for all graph convolutions.
-        context, code, heads: as in `UNetConfig`, for both branches.
-        layout_width, layout_mult, shape_width, shape_mult, blocks: of the two denoisers.
-        grid: voxels along an axis of the shape latents; the autoencoder's resolution is 4 times that.
-        vq_channels, vq_codes: of the autoencoder.
-        time_in_echo, echo, conditioning: of the shape branch (Table 4).
+
+def paper(classes: int = 14, settings: Mapping[str, Any] | None = None) -> ReleasedConfig:
+    """The paper's wiring: latents reach both denoisers, edges carry text features; at the paper's sizes or others.
+
+    `settings`: of `SETTINGS`; what is not said is as the paper has it, the autoencoder's grid 4 times the latents'.
+
+    Raises ValueError naming an unknown or mistyped setting.
     """
-
-    text: int = 512
-    learned: int = 128
-    flag: int = 64
-    hidden: int = 256
-    layers: int = 5
-    context: int = 1280
-    code: int = 64
-    heads: int = 8
-    layout_width: int = 512
-    layout_mult: tuple[int, ...] = (1, 1, 1, 1)
-    shape_width: int = 224
-    shape_mult: tuple[int, ...] = (1, 2, 3)
-    blocks: int = 2
-    grid: int = 16
-    vq_channels: int = 64
-    vq_codes: int = 8192
-    time_in_echo: bool = True
-    echo: bool = True
-    conditioning: str = "crossattn"
-
-
-def paper(classes: int = 14, sizes: PaperSizes | None = None) -> ReleasedConfig:
-    """The paper's wiring: latents reach both denoisers, edges carry text features; at the paper's sizes or others."""
-    s = sizes or PaperSizes()
-    encoder = EncoderConfig(
-        classes=classes, text=s.text, learned=s.learned, flag=s.flag, hidden=s.hidden, layers=s.layers, separated=False
-    )
-    common: dict[str, Any] = {
-        "edge_features": s.text, "predicate": s.learned, "hidden": s.hidden, "layers": s.layers, "code": s.code,
-        "heads": s.heads, "context": s.context, "blocks": s.blocks, "grid": s.grid,
-    }  # fmt: skip
+    known = {name for names in SETTINGS.values() for name in names}
+    for name in settings or {}:
+        if name not in known:
+            raise ValueError(f"unknown field 'paper.{name}', allowed: {', '.join(sorted(known))}")
+    told = {
+        part: {field: settings[name] for name, field in names.items() if settings and name in settings}
+        for part, names in SETTINGS.items()
+    }
+    encoder = from_dict(EncoderConfig, {"classes": classes, "separated": False, **told["encoder"]}, "paper")
+    common = {"edge_features": encoder.text, "predicate": encoder.learned}
+    layout = from_dict(UNetConfig, {"objects": 2 * encoder.node, **common, **told["layout"]}, "paper")
     # the condition of the shapes is as wide as what reaches the U-Net where no echo stands between them
-    volume = s.conditioning == "concat" and not s.echo
-    return ReleasedConfig(
-        preset="paper",
-        encoder=encoder,
-        layout=UNetConfig(objects=2 * encoder.node, width=s.layout_width, mult=s.layout_mult, **common),
-        shape=shape_unet(
-            objects=s.grid**3 if volume else s.context, width=s.shape_width, mult=s.shape_mult, echo=s.echo,
-            time_in_echo=s.time_in_echo, conditioning=s.conditioning, **common,
-        ),
-        vqvae=VQConfig(channels=s.vq_channels, codes=s.vq_codes, resolution=4 * s.grid),
-    )  # fmt: skip
+    volume = told["shape"].get("conditioning") == "concat" and not told["shape"].get("echo", True)
+    objects = layout.grid**3 if volume else layout.context
+    shape = from_dict(UNetConfig, {**SHAPE, "objects": objects, **common, **told["shape"]}, "paper")
+    vqvae = from_dict(VQConfig, {"resolution": 4 * layout.grid, **told["vqvae"]}, "paper")
+    return ReleasedConfig("paper", encoder, layout, shape, vqvae)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.config import from_dict
 from echomodel.data.roomset import RoomSet, with_known_words
 from echomodel.data.sgfront import SGFront
 from echomodel.data.shapeset import ShapeSet
@@ -22,7 +22,7 @@ from echomodel.training.shape_stage import read
 from echomodel.training.start import data_folder
 from echomodel.training.trainer import Report, Trainer
 from echomodel.vocabulary import vocabulary
-from echoscene.config import PaperSizes, paper
+from echoscene.config import paper
 from echoscene.echo import pack_changes, pack_scenes, pseudo_graph, published_grids, published_scene
 from echoscene.encoder import SceneGraphTensors
 from echoscene.model import GraphChange, ReleasedModel
@@ -256,13 +256,13 @@ def grids_of(shapes: ShapeSet | PublishedShapes, numbers: np.ndarray, side: int)
     return published_grids(read(shapes, numbers), side)
 
 
-def paper_model(sizes: PaperSizes, start: tuple[str, ...] = ()) -> PaperModel:
+def paper_model(settings: Mapping[str, Any], start: tuple[str, ...] = ()) -> PaperModel:
     """The `paper` preset, with the autoencoder (or everything that fits) of earlier runs.
 
     Raises ValueError where a file of `start` was trained with other sizes.
     """
     classes = vocabulary().coarse_categories
-    model = PaperModel(paper(len(classes), sizes), classes=classes)
+    model = PaperModel(paper(len(classes), settings), classes=classes)
     for path in start:
         given = load_released(path)
         if getattr(given, "config", None) != model.config:
@@ -286,15 +286,14 @@ def opened(
     recipe: Recipe, folder: Path, device: torch.device, *, resume: bool = False, report: Report | None = None
 ) -> Trainer:
     """The trainer of a recipe of the stages `paper` and `paper_vqvae`; raises ValueError as `open_run` does."""
-    sizes = from_dict(PaperSizes, recipe.paper, "paper")
     autoencoder = recipe.stage == "paper_vqvae"
     if not autoencoder and not recipe.start and not resume:
         raise ValueError("recipe field 'start': stage 'paper' needs the weights of a 'paper_vqvae' run")
     rooms, shapes = opened_data(recipe)
-    model = paper_model(sizes, recipe.start)
+    model = paper_model(recipe.paper, recipe.start)
     if model.statistics is None:
         model.statistics = box_bounds(rooms)
-    text = text_encoder(recipe.text, sizes.text)
+    text = text_encoder(recipe.text, model.encoder_config.text)
     model.text_encoder = text.name  # every weights file says by whom its words were read
     stage = PaperStage(
         rooms, shapes, text, scenes=recipe.scenes, budget=recipe.shapes_per_batch, autoencoder=autoencoder

@@ -82,7 +82,7 @@ class Recipe:
         precision: `float32` or `bfloat16` (autocast).
         threads: CPU threads, 0 = as many as torch likes. workers: processes that draw batches of rooms ahead of a GPU,
             0 = none.
-        model: sizes of the compact model. paper: settings of the `paper` preset (`echoscene.config.PaperSizes`).
+        model: sizes of the compact model. paper: settings of the `paper` preset (`echoscene.config.SETTINGS`).
         optimizer: how to step.
     """
 
