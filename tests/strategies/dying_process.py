@@ -1,7 +1,10 @@
-"""A process that dies at one of its operations on the disk: nothing happens after it, not even cleaning up."""
+"""Processes that die: at one of their operations on the disk, after which nothing happens, or killed at some moment."""
 
 import contextlib
 import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from unittest.mock import patch
 
@@ -23,6 +26,19 @@ class Dying:
             self.died = True
             raise Died
         self.count += 1
+
+
+def killed(code, folder, delay):
+    """Run a program that writes into a folder and says "go" before; kill it so many seconds after that."""
+    variables = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    process = subprocess.Popen([sys.executable, "-c", code, str(folder)], stdout=subprocess.PIPE, env=variables)
+    assert process.stdout.readline() == b"go\n"
+    try:
+        process.wait(delay)
+    except subprocess.TimeoutExpired:
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+    process.stdout.close()
 
 
 @contextlib.contextmanager

@@ -1,13 +1,11 @@
 import errno
 import json
 import os
-import signal
-import subprocess
-import sys
 import textwrap
 from pathlib import Path
 
 import pytest
+from dying_process import killed
 from stopped_disk import stopped_disk
 
 from echousd.folder.folder import check_writable, claim, recover, write_together
@@ -86,14 +84,7 @@ def test_killed_process_leaves_a_room(tmp_path):
             write_together(folder, files, last=["room.usda"], remove=[])
     """)
     for delay in (0.01, 0.03, 0.08):
-        process = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE)
-        assert process.stdout.readline() == b"go\n"
-        try:
-            process.wait(delay)
-        except subprocess.TimeoutExpired:
-            os.kill(process.pid, signal.SIGKILL)
-            process.wait()
-        process.stdout.close()
+        killed(code, tmp_path, delay)
         recover(tmp_path)
         values = set(written(tmp_path).values())
         assert len(values) <= 1, f"a mixture of runs: {values}"

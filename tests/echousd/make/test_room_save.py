@@ -1,12 +1,12 @@
 import hashlib
 import os
-import signal
 import subprocess
 import sys
 import textwrap
 from dataclasses import replace
 
 import pytest
+from dying_process import killed
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 from small_room import BARE, StandIn, small_graph
 from stopped_disk import stopped_disk
@@ -149,18 +149,8 @@ def test_killed_while_saving_leaves_a_room_that_opens(tmp_path):
             rooms[n % 2].save(sys.argv[1], preview=False)
     """)
     folder = tmp_path / "bedroom"
-    paths = os.pathsep.join(p for p in sys.path if p)
     for delay in (0.03, 0.21):
-        process = subprocess.Popen(
-            [sys.executable, "-c", code, str(folder)], stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": paths}
-        )
-        assert process.stdout.readline() == b"go\n"
-        try:
-            process.wait(delay)
-        except subprocess.TimeoutExpired:
-            os.kill(process.pid, signal.SIGKILL)
-            process.wait()
-        process.stdout.close()
+        killed(code, folder, delay)
         stage = opened(folder / "bedroom.usda")
         assert stage.GetCompositionErrors() == []
         assert stage.GetPrimAtPath("/Room/Objects/bed/geo/bed_mesh").IsA(UsdGeom.Mesh)
