@@ -12,6 +12,7 @@ import torch
 from echomodel.boxes import Boxes
 from echomodel.late import Late
 from echomodel.objective import TERMS
+from echomodel.objective.plan import kind_of
 from echomodel.objective.sizes import (
     fitting_loads,
     has_proportions,
@@ -25,8 +26,8 @@ from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
 from echomodel.rules import verdicts
 from echomodel.vocabulary import vocabulary
+from echousd.place.distances import BED_LIT
 from echousd.place.geometry import DEFAULT_HEIGHT
-from echousd.place.overhead import lamps_along
 from echousd.place.report import collisions, outside
 from echousd.place.search import ANEW, Arranged, Search
 from echousd.place.setting import Setting, setting_of, stacked
@@ -41,6 +42,7 @@ FULL = 0.3  # share of a floor that is covered from which on smaller furniture i
 BAD = 1.5  # cost of a room in which something is broken
 WORTH = 1.0  # that smaller furniture must save of what an arrangement costs
 UPRIGHT = np.array([False, True, False])  # the side that taller and shorter are about
+OVER = 0.15  # metres between the middles of a lamp and of the table that it hangs over
 SMALLEST = 0.02  # metres: no side of a sampled box is shorter
 fitted = Late("echousd.place.fitted:fitted")  # a kitchen's units
 
@@ -235,3 +237,32 @@ def fullness(at: Setting) -> float:
     x, z = at.floor.polygon.T
     area = float(abs(x @ np.roll(z, -1) - z @ np.roll(x, -1)) / 2)
     return float((at.size[standing, 0] * at.size[standing, 2]).sum()) / area
+
+
+def lamps_along(
+    categories: Sequence[str], before: np.ndarray, after: np.ndarray, triplets: np.ndarray, fixed: np.ndarray
+) -> np.ndarray:
+    """(n, 3) float: the positions afterwards, lamps over what moved moved with it.
+
+    Arguments:
+        before, after: (n, 3) float, where the boxes stood when the lamps were hung, and where they stand now.
+        triplets: (e, 3) int; a lamp that is told of anything else than what it hangs over stays.
+        fixed: (n,) bool, boxes that must not move.
+    """
+    kinds, out = [kind_of(word) for word in categories], after.copy()
+    above = vocabulary().predicate_id("above")
+    lit = [j for j, kind in enumerate(kinds) if kind.support == "floor" and kind.role in ("board", "bed")]
+    for i, kind in enumerate(kinds):
+        if kind.support != "ceiling" or fixed[i] or not lit:
+            continue
+        off = np.hypot(*(before[lit] - before[i])[:, [0, 2]].T)
+        j = lit[int(off.argmin())]
+        ends = triplets[(triplets[:, [0, 2]] == i).any(1)][:, [0, 2]].ravel().tolist()
+        told = [k for a, predicate, k in triplets.tolist() if a == i and predicate == above and k in lit]
+        if len(told) == 1:  # perhaps in a row with others
+            j = told[0]
+        elif off.min() >= (BED_LIT.most if kinds[j].role == "bed" else OVER):
+            continue
+        if {*ends} <= {i, j}:
+            out[i, [0, 2]] += (after[j] - before[j])[[0, 2]] - (after[i] - before[i])[[0, 2]]
+    return out

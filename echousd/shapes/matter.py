@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import tomllib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import shapely
@@ -24,48 +26,22 @@ from echousd.stage.pen import Pen
 
 @dataclass(frozen=True)
 class Matter:
-    """What a solid stands for."""
+    """What a solid stands for: a row of `matter.toml`, which says what its words mean."""
 
-    density: float  # of what it is made of, kg/m³
-    # how thick that is at most, metres: a tube, a shade, a frame with two boards. What is thinner than twice as much is
-    # massive
+    density: float
     wall: float = np.inf
-    core: float = 0.0  # density of what a wall encloses, kg/m³
+    core: float = 0.0
 
 
-WOOD = Matter(620.0, 0.010)  # particle board and timber; boards of more than about 2 cm are frames with a skin
-STEEL = Matter(7850.0, 0.0015)
-FOAM = Matter(220.0, 0.010, core=45.0)  # upholstery: cloth, webbing and a light frame about the foam
-# Material of a solid -> what it stands for.
-MATTER: Mapping[str, Matter] = {
-    "wood": WOOD, "accent": WOOD, "frame": WOOD, "metal": STEEL, "steel": STEEL, "glass": Matter(2500.0, 0.004),
-    "mirror": Matter(2500.0, 0.003), "ceramic": Matter(2200.0, 0.005),
-    "enamel": Matter(2200.0, 0.005), "worktop": Matter(2400.0, 0.006), "shade": Matter(1200.0, 0.0012),
-    "screen": Matter(1500.0, 0.0015), "fabric": FOAM, "cushion": Matter(40.0), "linen": Matter(50.0),
-    "blanket": Matter(20.0), "accent_cloth": Matter(40.0), "accent_plain": Matter(40.0), "leather": Matter(300.0),
-    "wicker": Matter(400.0, 0.006), "leaf": Matter(120.0), "petal": Matter(120.0), "stem": Matter(500.0),
-    "soil": Matter(900.0), "fruit": Matter(800.0), "wax": Matter(900.0), "paper": Matter(700.0),
-    "book": Matter(650.0), "book_a": Matter(650.0), "book_b": Matter(650.0), "book_c": Matter(650.0),
-    "book_d": Matter(650.0), "curtain": Matter(120.0), "sheer": Matter(60.0),
-    **dict.fromkeys(("toy_a", "toy_b", "toy_c"), Matter(600.0, 0.006)),
-    **dict.fromkeys(RUGS, Matter(250.0)), **dict.fromkeys(PICTURES, Matter(300.0)),
-}  # fmt: skip
-# Role and material of a solid -> what it stands for, where the material alone tells how it looks.
-PARTS: Mapping[tuple[str, str], Matter] = {
-    ("seat", "fabric"): Matter(380.0, 0.010, core=45.0),  # on springs or a board
-    ("rail", "wood"): Matter(620.0, 0.005),  # of a bed: boards about slats
-    ("back", "accent"): Matter(800.0, 0.0025),  # of a case
-    ("foot", "metal"): Matter(7200.0, 0.003),  # of a lamp: cast
-    ("pot", "ceramic"): Matter(2200.0, 0.005, core=400.0),  # half full of damp soil
-    ("stone", "ceramic"): Matter(2200.0, 0.015),  # of a mantel: slabs
-    ("stove", "screen"): Matter(7200.0, 0.004, core=60.0),  # cast, lined with brick
-    ("machine", "enamel"): Matter(7850.0, 0.0008, core=150.0),  # sheet about a drum, a motor and a counterweight
-    ("cold", "steel"): Matter(7850.0, 0.0006, core=45.0),  # sheet about foam, shelves and a compressor
-    ("cold", "enamel"): Matter(7850.0, 0.0006, core=45.0),
-    ("case", "wood"): Matter(620.0, 0.02, core=260.0),  # of a piano: an iron frame, strings and action
-    ("case", "screen"): Matter(620.0, 0.02, core=260.0),
-    ("housing", "metal"): Matter(3000.0, 0.0015),  # of a screen: sheet and plastic about electronics
+_ROWS = {
+    part: {name: Matter(**row) for name, row in rows.items()}
+    for part, rows in tomllib.loads(Path(__file__).with_name("matter.toml").read_text("utf-8")).items()
 }
+# Material of a solid -> what it stands for; role and material -> the same, where the material alone tells how it looks.
+MATTER = _ROWS["materials"] | {
+    name: _ROWS["materials"][row] for row, names in (("rug", RUGS), ("picture", PICTURES)) for name in names
+}
+PARTS = {tuple(words.split()): matter for words, matter in _ROWS["parts"].items()}
 
 
 def weighed(pieces: Iterable[Piece]) -> Mass:

@@ -10,8 +10,9 @@ from manifold3d import Error, Manifold, Mesh
 from scipy import ndimage
 from trimesh import smoothing
 
-from echomodel.tsdf import mesh_from_tsdf
+from echomodel.late import Late
 
+mesh_from_tsdf = Late("echomodel.tsdf:mesh_from_tsdf")
 SMALLEST = 0.004  # solids below this share of the largest one are noise
 ROUNDS, SHRINK, SWELL = 6, 0.5, 0.53  # Taubin (1995): lambda, -mu; low frequencies such as thin legs stay
 FACES, LEAST_FACES = 5000, 100

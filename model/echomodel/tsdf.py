@@ -8,12 +8,14 @@ divided by `TRUNCATION` and clipped to [-1, 1].
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from echomodel.furniture.solids import Solid, Tube
 from echomodel.triangles import area_normals
 
 if TYPE_CHECKING:
@@ -24,6 +26,8 @@ FILLED = 60  # voxels that the object's box covers on each axis
 TRUNCATION = 4.0  # voxels
 SHELL = 0.87  # half the diagonal of a voxel: no smaller distance makes a sheet of voxels without holes
 SHEET = 0.55  # half the thickness, in voxels, that an open sheet is given
+THINNEST = 0.6  # half thickness in voxels below which a part is thickened, so that marching cubes still finds it
+THINNEST_ROD_OR_LEAF = 1.0  # likewise: rods and leaves hold too little volume to be learnt otherwise
 SURFACE_POINTS = 200_000
 POINTS_PER_VOXEL = 8  # samples per voxel of area, at least; fewer leave holes in the shell
 MOST_POINTS = 1_500_000
@@ -64,6 +68,30 @@ def tsdf_from_mesh(mesh: trimesh.Trimesh, *, points: int = SURFACE_POINTS) -> np
     triangles = voxels_from_points(used, lower, upper).reshape(-1, 3, 3)
     distance = _distance_to_triangles(triangles, points)
     return truncated(_signed_by_flood(distance))
+
+
+def tsdf_of(solids: Sequence[Solid]) -> np.ndarray:
+    """Box-normalised TSDF (64, 64, 64) float32 of the solids' union, boards of at least one voxel, rods of two."""
+    boxes = [solid.mesh()[0] for solid in solids]
+    lower = np.min([vertices.min(0) for vertices in boxes], axis=0)
+    upper = np.max([vertices.max(0) for vertices in boxes], axis=0)
+    scale = np.maximum(upper - lower, 1e-6) / FILLED
+    axes = [
+        ((np.arange(RESOLUTION) - (RESOLUTION - 1) / 2) * scale[i] + (upper[i] + lower[i]) / 2).astype(np.float32)
+        for i in range(3)
+    ]
+    margin = int(np.ceil(TRUNCATION))
+    grid = np.full((RESOLUTION,) * 3, TRUNCATION, np.float32)
+    for solid, vertices in zip(solids, boxes, strict=True):
+        reach = voxels_from_points(vertices, lower, upper)
+        start = np.maximum(np.floor(reach.min(0)).astype(int) - margin, 0)
+        stop = np.minimum(np.ceil(reach.max(0)).astype(int) + margin + 1, RESOLUTION)
+        where = tuple(slice(a, b) for a, b in zip(start, stop, strict=True))
+        x, y, z = axes[0][where[0], None, None], axes[1][None, where[1], None], axes[2][None, None, where[2]]
+        thinnest = THINNEST_ROD_OR_LEAF if isinstance(solid, Tube) or solid.material == "leaf" else THINNEST
+        distance = solid.distance(x, y, z, scale) - max(0.0, thinnest - solid.inradius(scale))
+        np.minimum(grid[where], distance, out=grid[where])
+    return truncated(grid)
 
 
 def truncated(voxels: np.ndarray) -> np.ndarray:

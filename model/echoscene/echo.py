@@ -114,16 +114,6 @@ class ReleasedEcho:
         )[objects]
         return turned_back(torch.cat([self.model.vqvae.decode(part) for part in latents.split(DECODED)])) - LEVEL
 
-    @torch.no_grad()
-    def reconstruct(self, grids: Tensor) -> Tensor:
-        """Grids (N, 64, 64, 64) in [-1, 1] through the autoencoder and back, turned as it knows them."""
-        coder = self.model.vqvae
-        if coder.config.resolution != grids.shape[1]:
-            sides = f"{coder.config.resolution} voxels a side, not {grids.shape[1]}"
-            raise ValueError(f"the grids of this model's autoencoder have {sides}")
-        through = [coder(published_grids(part.to(self.model.device), part.shape[1])) for part in grids.split(DECODED)]
-        return turned_back(torch.cat(through)) / DISTANCE
-
     def unlearned(self, graph: GraphBatch) -> tuple[str, ...]:
         """One sentence for every relation of the graph that SG-FRONT lacks; categories have classes, see `labels`."""
         words = vocabulary()

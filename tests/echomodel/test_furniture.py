@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from echomodel.furniture import MATERIALS, Choices, Style, furniture, mesh_of, sample_size, solids, tsdf_of
+from echomodel.furniture import MATERIALS, Choices, Style, furniture, mesh_of, sample_size, solids
 from echomodel.furniture.carpentry import back_rest
 from echomodel.furniture.solids import Ball, Block, Lathe, Shell, Tube, Turned, rotation
 from echomodel.metrics.furniture import loose_solids
 from echomodel.sizes import size_score, size_statistics
-from echomodel.tsdf import mesh_from_tsdf, tsdf_from_mesh
+from echomodel.tsdf import mesh_from_tsdf, tsdf_from_mesh, tsdf_of
 from echomodel.vocabulary import UnknownWord, vocabulary
 
 CATEGORIES = [category.name for category in vocabulary().categories]

@@ -8,7 +8,7 @@ import pytest
 
 from echomodel.data import shapeset
 from echomodel.data.shapeset import LEVELS, ShapeSet, build_shapes, piece, quantised
-from echomodel.furniture import tsdf_of
+from echomodel.tsdf import tsdf_of
 from echomodel.vocabulary import vocabulary
 
 COUNT = len(vocabulary().categories)

@@ -120,13 +120,6 @@ def test_spaced_tables_are_a_schedule_of_their_own(count):
     assert torch.allclose((1 - tables.betas.double()).cumprod(0), tables.alphas_cumprod.double(), rtol=1e-5)
 
 
-def test_the_autoencoder_takes_grids_of_its_own_size_alone():
-    with pytest.raises(ValueError, match="autoencoder have 32 voxels a side, not 64"):
-        echo().reconstruct(torch.ones(1, 64, 64, 64))
-    grids = torch.rand(2, 32, 32, 32, generator=seeded()) - 0.5
-    assert echo().reconstruct(grids).shape == grids.shape
-
-
 def test_fixed_boxes_come_back():
     known = Boxes(torch.full((4, 3), 0.5), torch.full((4, 3), 0.25), torch.full((4,), 0.75))
     mask = torch.tensor([True, False, False, True])

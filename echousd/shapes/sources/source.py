@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from echomodel.boxes import Boxes
 from echousd.graph import SceneGraph
 from echousd.progress import StageTimer
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.meshing import FACES
 from echousd.shapes.sources.retrieval import Retrieved
 from echousd.shapes.styles import shared_assets
+from echousd.tensors import floor_centre
 
 if TYPE_CHECKING:
-    from echomodel.boxes import Boxes
     from echomodel.protocols import GraphEdit, RoomModel
 
 
@@ -44,6 +45,16 @@ class ShapeRequest:
         """Numbers of the wanted objects."""
         names = self.graph.names
         return [i for i, name in enumerate(names) if self.wanted is None or name in self.wanted]
+
+    @property
+    def centred(self) -> Boxes:
+        """The boxes about the middle of the floor, as models know them."""
+        return Boxes(self.boxes.size, self.boxes.position - floor_centre(self.graph), self.boxes.yaw)
+
+    @property
+    def edited(self) -> dict[str, Any]:
+        """What a model is told of an edit."""
+        return {} if self.change is None else {"edit": self.change}
 
 
 @dataclass(frozen=True, eq=False)

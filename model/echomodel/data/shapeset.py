@@ -16,10 +16,10 @@ import numpy as np
 import zstandard
 
 from echomodel.files import claim, read_note, whole_file, write_json
-from echomodel.furniture import Choices, Style, sample_size, solids, tsdf_of
+from echomodel.furniture import Choices, Style, sample_size, solids
 from echomodel.furniture.solids import Solid
 from echomodel.progress import StepListener
-from echomodel.tsdf import RESOLUTION, TRUNCATION
+from echomodel.tsdf import RESOLUTION, TRUNCATION, tsdf_of
 from echomodel.vocabulary import vocabulary
 
 # Magnitudes of the 16 levels in voxels: finest about the surface, where the zero crossing is read off.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echomodel.furniture.assembly import MATERIALS, box_uv, mesh_of, tsdf_of
+from echomodel.furniture.assembly import MATERIALS, box_uv, mesh_of
 from echomodel.furniture.solids import Joint, Solid
 from echomodel.furniture.style import Choices, Style, sample_size
 from echomodel.late import Late
@@ -18,7 +18,7 @@ from echomodel.vocabulary import vocabulary
 if TYPE_CHECKING:
     import trimesh
 
-__all__ = ["MATERIALS", "Choices", "Style", "box_uv", "furniture", "mesh_of", "sample_size", "solids", "tsdf_of"]
+__all__ = ["MATERIALS", "Choices", "Style", "box_uv", "furniture", "mesh_of", "sample_size", "solids"]
 
 Builder = Callable[[np.ndarray, Style, Choices], list[Solid]]
 # Module -> its programs, functions of these names; one is loaded when a category asks for it.

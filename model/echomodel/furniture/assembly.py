@@ -1,4 +1,4 @@
-"""Solids put together: one mesh with materials and texture coordinates, and one signed distance."""
+"""Solids put together: one mesh with materials and texture coordinates."""
 
 from __future__ import annotations
 
@@ -8,15 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echomodel.furniture.solids import FINEST, Joint, Solid, Tube
+from echomodel.furniture.solids import FINEST, Joint, Solid
 from echomodel.triangles import area_normals
-from echomodel.tsdf import FILLED, RESOLUTION, TRUNCATION, truncated, voxels_from_points
 
 if TYPE_CHECKING:
     import trimesh
 
-THINNEST = 0.6  # half thickness in voxels below which a part is thickened, so that marching cubes still finds it
-THINNEST_ROD_OR_LEAF = 1.0  # likewise: rods and leaves hold too little volume to be learnt otherwise
 MATERIALS = (
     "wood", "accent", "fabric", "metal", "glass", "ceramic", "leaf", "soil", "shade", "screen",
     "cushion", "linen", "blanket", "mirror", "book", "stem", "enamel", "worktop", "steel",
@@ -95,27 +92,3 @@ def box_uv(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     rows = np.arange(len(faces))[:, None]
     columns = np.arange(3)[None]
     return np.stack([corners[rows, columns, first[:, None]], corners[rows, columns, second[:, None]]], axis=-1)
-
-
-def tsdf_of(solids: Sequence[Solid]) -> np.ndarray:
-    """Box-normalised TSDF (64, 64, 64) float32 of the solids' union, boards of at least one voxel, rods of two."""
-    boxes = [solid.mesh()[0] for solid in solids]
-    lower = np.min([vertices.min(0) for vertices in boxes], axis=0)
-    upper = np.max([vertices.max(0) for vertices in boxes], axis=0)
-    scale = np.maximum(upper - lower, 1e-6) / FILLED
-    axes = [
-        ((np.arange(RESOLUTION) - (RESOLUTION - 1) / 2) * scale[i] + (upper[i] + lower[i]) / 2).astype(np.float32)
-        for i in range(3)
-    ]
-    margin = int(np.ceil(TRUNCATION))
-    grid = np.full((RESOLUTION,) * 3, TRUNCATION, np.float32)
-    for solid, vertices in zip(solids, boxes, strict=True):
-        reach = voxels_from_points(vertices, lower, upper)
-        start = np.maximum(np.floor(reach.min(0)).astype(int) - margin, 0)
-        stop = np.minimum(np.ceil(reach.max(0)).astype(int) + margin + 1, RESOLUTION)
-        where = tuple(slice(a, b) for a, b in zip(start, stop, strict=True))
-        x, y, z = axes[0][where[0], None, None], axes[1][None, where[1], None], axes[2][None, None, where[2]]
-        thinnest = THINNEST_ROD_OR_LEAF if isinstance(solid, Tube) or solid.material == "leaf" else THINNEST
-        distance = solid.distance(x, y, z, scale) - max(0.0, thinnest - solid.inradius(scale))
-        np.minimum(grid[where], distance, out=grid[where])
-    return truncated(grid)

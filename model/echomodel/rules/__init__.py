@@ -1,9 +1,8 @@
 """Relation rules, defined once: verdicts for labels, checks and metrics, signed margins for placing and guidance."""
 
 from echomodel.late import Late
-from echomodel.rules.facing import aligned, centred, facing, opposite  # registers them
 from echomodel.rules.margins import fronts, margins, measured, verdicts
-from echomodel.rules.sets import RULE_SETS, Rule, RuleSet, rule, rule_set
+from echomodel.rules.sets import RULE_SETS, Rule, RuleSet, aligned, centred, facing, opposite, rule, rule_set
 
 label_rooms = Late("echomodel.rules.labels:label_rooms")
 label_relations = Late("echomodel.rules.labels:label_relations")

@@ -25,7 +25,7 @@ from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.compose import room_files
 from echousd.options import RoomOptions
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
-from echousd.shapes.sources.mixing import solid_geometry
+from echousd.shapes.sources.whole import solid_geometry
 from echousd.shapes.walls import walls
 from echousd.stage.graphs import read_graph
 

@@ -14,7 +14,7 @@ from echousd.shapes.geometry import Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.joinery import part_of, within_budget
 from echousd.shapes.matter import ballasted, hull_volume, mass_of, read_mass
 from echousd.shapes.meshing import box_mesh
-from echousd.shapes.sources.mixing import solid_geometry
+from echousd.shapes.sources.whole import solid_geometry
 from echousd.stage.pen import Pen
 
 SIZE = np.array([1.6, 2.2, 0.6])

@@ -9,8 +9,7 @@ from echomodel.boxes import Boxes
 from echomodel.objective import faults
 from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
-from echousd.place.overhead import lamps_along
-from echousd.place.placing import place_boxes
+from echousd.place.placing import lamps_along, place_boxes
 from echousd.place.solver import PlaceConfig
 
 FLOOR = np.array([(-2.2, -1.9), (2.2, -1.9), (2.2, 1.9), (-2.2, 1.9)])

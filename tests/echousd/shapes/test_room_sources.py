@@ -13,8 +13,8 @@ from echousd.make.reading import read_room
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
 from echousd.shapes.meshing import mesh_from_shape
 from echousd.shapes.sources import mixing
-from echousd.shapes.sources.mixing import solid_geometry, within_budget
 from echousd.shapes.sources.source import Shapes, per_asset
+from echousd.shapes.sources.whole import solid_geometry, within_budget
 from echousd.stage.files import open_stage
 
 ORIGIN = Origin("slabs", "CC-BY-4.0", "A. Joiner")

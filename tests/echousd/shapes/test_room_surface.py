@@ -5,8 +5,9 @@ import trimesh
 from echomodel.furniture.solids import Tube
 from echomodel.vocabulary import vocabulary
 from echousd.shapes.finishes.slots import HARMONIES, metres_of
-from echousd.shapes.looks import BANDS, SHOWN, alternatives, cut, look, material_groups, palette_for
+from echousd.shapes.looks import SHOWN, alternatives, look, palette_for
 from echousd.shapes.meshing import box_mesh
+from echousd.shapes.sources.whole import BANDS, cut, material_groups
 from echousd.shapes.surface import creased_normals, surface, surfaces, unshared
 from echousd.stage.taxonomy import ade20k
 

@@ -1,0 +1,261 @@
+"""Sources whose pieces are one mesh each: boxes, shapes that the network samples, models of a library."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import trimesh
+
+from echomodel.boxes import Boxes
+from echomodel.graph import GraphBatch
+from echomodel.late import Late
+from echomodel.protocols import RoomModel
+from echomodel.vocabulary import vocabulary
+from echousd.graph import SceneGraph
+from echousd.progress import StageTimer
+from echousd.shapes.colliders import colliders_of
+from echousd.shapes.geometry import Geometry, Origin, Part
+from echousd.shapes.meshing import LEAST_FACES, box_mesh, mesh_from_shape
+from echousd.shapes.sources.retrieval import source_of
+from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
+from echousd.shapes.styles import EQUAL, style_groups
+from echousd.tensors import graph_batch, one_thread, rounded_grids, seeded
+
+if TYPE_CHECKING:
+    from echousd.assets.choose import AssetWishes
+
+TRIES = 6  # simplifications until the cut mesh is within its budget
+geometry_of = Late("echousd.shapes.originals.loading:geometry_of")  # of models of others
+descriptors, nearness = Late("echousd.assets.descriptor:descriptors"), Late("echousd.assets.descriptor:nearness")
+
+
+def plain_boxes(request: ShapeRequest) -> Shapes:
+    """Every object is the box that it fills."""
+    size, origin = np.asarray(request.boxes.size, float), Origin("boxes")
+
+    def make(row: int) -> Geometry:
+        return solid_geometry(box_mesh(size[row]), request.graph.nodes[row].category, origin)
+
+    return per_asset(request, make)
+
+
+def solid_geometry(mesh: trimesh.Trimesh, category: str, origin: Origin) -> Geometry:
+    """The geometry of one mesh (object frame, metres) whose category says which materials it has where."""
+    cut, slots = material_groups(mesh, category)
+    return Geometry((Part("mesh", cut, slots),), colliders_of(mesh, category), origin)
+
+
+def needs_shapes(model: RoomModel | None) -> None:
+    """Raises ValueError for a model without a shape branch."""
+    if model is None or "shape" not in model.branches:
+        raise ValueError("these weights have no shape branch; use shapes 'boxes' (--shapes boxes) or other weights")
+
+
+def sampled_shapes(request: ShapeRequest) -> Shapes:
+    """Meshes of shapes from the model's shape branch (EchoScene 3.4).
+
+    Objects of an edited graph that stay are sampled along, the others hear them.
+    """
+    return _meshed(request, sampled_grids(request), within_budget)
+
+
+def lone_shapes(request: ShapeRequest) -> Shapes:
+    """Meshes of shapes that were sampled one by one: no object hears of another.
+
+    For comparisons (the paper's rows of layout + class-to-shape generation).
+    """
+
+    def make(grid: np.ndarray, size: np.ndarray, category: str, faces: int) -> Geometry:
+        return solid_geometry(mesh_from_shape(grid, size, faces=faces), category, Origin("independent"))
+
+    alone = [graph_batch(request.graph.replaced(nodes=(node,), relations=())) for node in request.graph.nodes]
+    return _meshed(request, _grids(request, GraphBatch.pack(alone), "independent"), make, alike=False)
+
+
+def _meshed(request: ShapeRequest, grids: np.ndarray, mesh: Callable[..., Geometry], *, alike: bool = True) -> Shapes:
+    size = np.asarray(request.boxes.size, float)
+
+    def make(row: int) -> Geometry:
+        node = request.graph.nodes[row]
+        try:
+            return mesh(grids[row], size[row], node.category, request.faces)
+        except ValueError as error:
+            raise ValueError(f"shape of {node.name!r}: {error}; try another seed or shapes 'boxes'") from None
+
+    return per_asset(request, make, alike=alike)
+
+
+def within_budget(grid: np.ndarray, size: np.ndarray, category: str, faces: int) -> Geometry:
+    """The geometry of a shape with at most `faces` triangles once it is cut along the borders of its materials.
+
+    Arguments: as for `mesh_from_shape`, raises what it raises. A budget of a few hundred may be too small for the cuts
+    alone; the best that was found is given then.
+    """
+    asked, best = faces, None
+    for _ in range(TRIES):
+        found = solid_geometry(mesh_from_shape(grid, size, faces=asked), category, Origin("sdf"))
+        best = found if best is None or found.faces < best.faces else best
+        if found.faces <= faces or asked == LEAST_FACES:
+            break
+        asked = max(LEAST_FACES, int(0.99 * asked * faces / found.faces))
+    assert best is not None
+    return best
+
+
+def sampled_grids(request: ShapeRequest) -> np.ndarray:
+    """(n, 64, 64, 64) float32 TSDFs of all objects; raises ValueError for a model without a shape branch."""
+    return _grids(request, graph_batch(request.graph), "shapes", request.edited)
+
+
+def _grids(request: ShapeRequest, batch: GraphBatch, stream: str, extra: dict[str, Any] | None = None) -> np.ndarray:
+    """As `sampled_grids`, of any graph with one node for each box; `stream` is that of the random numbers."""
+    needs_shapes(request.model)
+    assert request.model is not None
+    with request.timer.stage("shapes") as tell, one_thread():
+        grids = request.model.sample_shapes(
+            batch, request.centred, generator=seeded(request.seed, stream), steps=request.steps, progress=tell,
+            **(extra or {}),
+        )  # fmt: skip
+        return rounded_grids(grids.numpy(force=True))
+
+
+def chosen_models(request: ShapeRequest, source: str) -> Shapes:
+    """What `ShapeRequest.retrieved` holds, as geometry of a source; objects with one model and size share an asset."""
+    size = np.asarray(request.boxes.size, float)
+    owners: dict[str, str] = {}
+    geometry: dict[str, Geometry] = {}
+    heads: list[int] = []
+    chosen, files = request.retrieved.chosen, request.retrieved.files
+    with request.timer.stage("meshes", len(request.rows)) as tell:
+        for done, row in enumerate(request.rows, 1):
+            node = request.graph.nodes[row]
+            record = chosen[node.name]
+            same = (
+                other
+                for other in heads
+                if chosen[request.graph.nodes[other].name] == record
+                and request.graph.nodes[other].category == node.category
+                and np.abs(size[other] / size[row] - 1).max() <= EQUAL
+            )
+            first = next(same, None)
+            if first is None:
+                heads.append(row)
+                box = (float(size[row][0]), float(size[row][1]), float(size[row][2]))
+                collect = request.retrieved.collect
+                geometry[node.name] = geometry_of(files[node.name], record, node.category, box, source, collect=collect)
+            owners[node.name] = node.name if first is None else request.graph.nodes[first].name
+            tell(done, len(request.rows))
+    return Shapes(owners, geometry)
+
+
+def shape_nearness(
+    graph: SceneGraph, boxes: Boxes, shapes: str, wishes: AssetWishes, seed: int, model: RoomModel | None,
+    steps: int | None, timer: StageTimer,
+) -> Mapping[str, Mapping[str, float]] | None:  # fmt: skip
+    """Object name -> id of a model -> cost of its shape against the generated one; None where nothing is guided.
+
+    Raises ValueError for a library without descriptors. Arguments as for `retrieved` and `ShapeRequest`.
+    """
+    rows = [i for i, node in enumerate(graph.nodes) if source_of(node, shapes) == "guided" and node.asset is None]
+    records = [record for shelf in wishes.shelves.values() for record in shelf.records]
+    if not rows or not records:
+        return None
+    if not any(record.descriptor for record in records):
+        assert wishes.library is not None
+        raise ValueError(f"{wishes.library.file}: holds no descriptors; index the library with --descriptors")
+    grids = sampled_grids(ShapeRequest(graph, boxes, style_groups(graph), seed, model, steps, timer=timer))
+    found = descriptors(model, np.asarray(grids)[rows])
+    return nearness(found, [graph.names[i] for i in rows], records)
+
+
+@dataclass(frozen=True)
+class Band:
+    """A region of the object's box: a row of `bands.toml`, which says what its words mean."""
+
+    group: str
+    top: float = 1.0
+    metres: bool = False
+
+
+BANDS = {
+    kind: tuple(Band(**row) for row in rows)
+    for kind, rows in tomllib.loads(Path(__file__).with_name("bands.toml").read_text("utf-8")).items()
+}
+HEADBOARD = 0.09  # metres at the back of a bed that are wood to the top
+FOLD = 0.42  # share of a bed's length, from the foot, that the blanket covers
+FRONT = 0.012  # metres behind the foremost plane that count as the front of a cabinet
+
+
+def material_groups(mesh: trimesh.Trimesh, category: str) -> tuple[trimesh.Trimesh, dict[str, np.ndarray]]:
+    """Cut a mesh (object frame, metres) along the borders of its materials: (mesh, group -> (m,) face numbers)."""
+    laid = vocabulary().category(category).look
+    lower, upper = mesh.bounds
+    height = upper[1] - lower[1]
+    bands = BANDS[laid]
+    tops = [lower[1] + (min(p.top, 0.5 * height) if p.metres else p.top * height) for p in bands[:-1]]
+    for top in tops:
+        mesh = cut(mesh, 1, top)
+    if laid == "bed":
+        mesh = cut(mesh, 2, lower[2] + HEADBOARD)
+        mesh = cut(mesh, 2, upper[2] - FOLD * (upper[2] - lower[2]))
+    centre = np.asarray(mesh.triangles_center)
+    number = np.searchsorted(np.array(tops), centre[:, 1])
+    group = np.array([p.group for p in bands], dtype=object)[number]
+    if laid == "bed":
+        group[(group == "linen") & (centre[:, 2] > upper[2] - FOLD * (upper[2] - lower[2]))] = "blanket"
+        group[centre[:, 2] < lower[2] + HEADBOARD] = "wood"
+    elif laid == "cabinet":
+        normal = mesh.face_normals
+        group[(normal[:, 2] > 0.8) & (centre[:, 2] > upper[2] - FRONT - 0.04 * (upper[2] - lower[2]))] = "front"
+    return mesh, {str(name): np.flatnonzero(group == name) for name in sorted(set(group))}
+
+
+def cut(mesh: trimesh.Trimesh, axis: int, offset: float) -> trimesh.Trimesh:
+    """Split the triangles that cross the plane `axis = offset`; a closed mesh stays closed.
+
+    Vertices within 2 mm are moved onto the plane first, so that no slivers appear.
+    """
+    vertices, faces = np.array(mesh.vertices), np.asarray(mesh.faces)
+    span = vertices[:, axis].max() - vertices[:, axis].min()
+    distance = vertices[:, axis] - offset
+    near = np.abs(distance) < min(0.002, 0.01 * span)
+    vertices[near, axis] = offset
+    side = np.where(near, 0, np.sign(distance)).astype(int)
+    corner = side[faces]
+    crossing = (corner.min(1) < 0) & (corner.max(1) > 0)
+    if not crossing.any():
+        return trimesh.Trimesh(vertices, faces, process=False)
+    kept, split, corner = faces[~crossing], faces[crossing], corner[crossing]
+    edges = np.sort(np.concatenate([split[:, [0, 1]], split[:, [1, 2]], split[:, [2, 0]]]), axis=1)
+    edges = np.unique(edges[side[edges[:, 0]] * side[edges[:, 1]] < 0], axis=0)
+    a, b = distance[edges[:, 0]], distance[edges[:, 1]]
+    fresh = vertices[edges[:, 0]] + (a / (a - b))[:, None] * (vertices[edges[:, 1]] - vertices[edges[:, 0]])
+    fresh[:, axis] = offset
+    key = edges[:, 0] * len(vertices) + edges[:, 1]
+
+    def middle(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+        wanted = np.minimum(p, q) * len(vertices) + np.maximum(p, q)
+        return len(vertices) + np.searchsorted(key, wanted)
+
+    pieces = [kept]
+    touching = (corner == 0).any(1)
+    if touching.any():  # one corner on the plane: two triangles
+        turned = _roll(split[touching], np.argmax(corner[touching] == 0, axis=1))
+        p, q, r = turned.T
+        m = middle(q, r)
+        pieces += [np.stack([p, q, m], 1), np.stack([p, m, r], 1)]
+    if (~touching).any():  # one corner alone on its side: three triangles
+        alone = corner[~touching] == -np.sign(corner[~touching].sum(1))[:, None]
+        p, q, r = _roll(split[~touching], np.argmax(alone, axis=1)).T
+        m, n = middle(p, q), middle(r, p)
+        pieces += [np.stack([p, m, n], 1), np.stack([m, q, r], 1), np.stack([m, r, n], 1)]
+    return trimesh.Trimesh(np.concatenate([vertices, fresh]), np.concatenate(pieces), process=False)
+
+
+def _roll(faces: np.ndarray, first: np.ndarray) -> np.ndarray:
+    return np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
