@@ -48,10 +48,10 @@ def row(
     return Field(default, description=help, json_schema_extra=extra, **limits)
 
 
-def _one_of(option: str, words: tuple[str, ...]) -> AfterValidator:
+def _one_of(option: str, words: Callable[[], tuple[str, ...]]) -> AfterValidator:
     def check(name: str) -> str:
-        if name not in words:
-            raise ValueError(f"{option} is {name!r}, allowed: {', '.join(words)}")
+        if name not in words():
+            raise ValueError(f"{option} is {name!r}, allowed: {', '.join(words())}")
         return name
 
     return AfterValidator(check)
@@ -115,7 +115,7 @@ class RoomOptions(PlainModel, Look):
     """What is asked of a room beside its graph; frozen, raises ValueError in one line for what is not allowed."""
 
     seed: int = row(0, ROOM, "seed of all randomness", everyday=True, ge=0, le=MAX_SEED)
-    shapes: Annotated[str, _one_of("shapes", SHAPES)] | None = row(
+    shapes: Annotated[str, _one_of("shapes", lambda: SHAPES)] | None = row(
         None, ROOM, "parts, sdf, library, guided or boxes", everyday=True, words="name"
     )  # fmt: skip
     layouts: int = row(1, ROOM, "arrangements, as variants", everyday=True, ge=1, le=1000)
@@ -125,7 +125,7 @@ class RoomOptions(PlainModel, Look):
     steps: int | None = row(None, ROOM, "sampling steps; else the model's", ge=1)
     fit: Literal["keep", "drop"] = row("keep", ROOM, "keep all that is asked for, or leave out what has no place")
     place: bool = row(True, ROOM, "move and size boxes as little as possible until the graph is kept")
-    resident: Annotated[str, _one_of("resident", RESIDENTS)] | None = row(
+    resident: Annotated[str, _one_of("resident", lambda: RESIDENTS)] | None = row(
         None, ROOM, "who lives there, told by small things; else as the furniture suggests", everyday=True, flag="for",
         words="|".join(RESIDENTS),
     )  # fmt: skip
