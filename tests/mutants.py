@@ -75,7 +75,7 @@ def changes(tree: ast.Module) -> Iterator[tuple[ast.AST, str, object]]:
             yield node, "id", NAMES[node.id]
         elif isinstance(node, ast.If | ast.IfExp):
             yield node, "test", ast.UnaryOp(ast.Not(), node.test)
-        elif isinstance(node, ast.Return) and node.value is not None:
+        elif isinstance(node, ast.Return) and not (node.value is None or getattr(node.value, "value", 0) is None):
             yield node, "value", ast.Constant(None)
         for name in ("body", "orelse"):
             for place, one in enumerate(getattr(node, name, ()) if isinstance(node, ast.stmt) else ()):

@@ -62,6 +62,7 @@ def test_walls_of_a_floor_that_is_still_unknown() -> None:
         ("offset: 0.6", "offset: 2.5", "5: room: openings: door 'door': reaches from 2.50 to 3.40 m along wall 3"),
         ("hinge: right", "hinge: top", "5: opening 'door': hinge is 'top', allowed: left, right"),
         ("wall: south", "wall: up", "5: door 'door': wall 'up', allowed: 0 to 3, north (front)"),
+        ("wall: south", "wall: 4", "5: door 'door': wall 4, allowed: 0 to 3, north (front)"),
         ("wall: south, ", "", "5: door 'door': wall is missing, allowed: 0 to 3, north"),
         ("offset: 0.6", "ofset: 0.6", "5: door: unknown field 'ofset', did you mean offset?"),
         ("windows: [north,", "windows: ['south 0.5',", "6: room: openings: window 'window' and door 'door' overlap by 0.90 m on wall 3"),  # noqa: E501

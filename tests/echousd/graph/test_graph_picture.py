@@ -10,7 +10,7 @@ from PIL import Image
 
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, SceneGraph, load_graph, starting_graph
-from echousd.graph.picture import HEIGHT, WIDTH, arrows, draw_graph, places
+from echousd.graph.picture import CELL, HEIGHT, WIDTH, _curves, _forces, _muddle, arrows, draw_graph, places
 
 
 def overlaps(place: np.ndarray) -> int:
@@ -58,6 +58,57 @@ def test_texts_are_drawn_as_they_are(tmp_path):
     nodes = (Node("a", "desk", style="$\\frac{1}$ [red] <b>"), Node("b" * 90, "desk", style="ß" * 300, locked=True))
     draw_graph(SceneGraph("study", nodes), tmp_path / "g.png")
     assert (tmp_path / "g.png").stat().st_size > 1000
+
+
+def test_names_are_whole_but_for_long_ones(tmp_path):
+    nodes = (Node("bed", "double_bed"), Node("n" * 22, "desk"), Node("m" * 23, "desk"))
+    draw_graph(SceneGraph("study", nodes), tmp_path / "g.svg")
+    drawn = (tmp_path / "g.svg").read_text()
+    assert all(f"<!-- {text} -->" in drawn for text in ("bed", "double bed", "n" * 22, "m" * 20 + "…"))
+    assert "m" * 21 not in drawn
+
+
+@pytest.mark.parametrize("far", [(6.0, 0.0), (0.0, 5.0), (-4.0, 3.0)])
+def test_words_of_arrows_between_the_same_boxes_lie_beside_each_other(far):
+    nodes = tuple(Node(name, "chair") for name in "ab")
+    stated = ["a left b", "b close_by a", "a bigger_than b"]
+    joined = arrows(SceneGraph("study", nodes, tuple(Relation(*words.split()) for words in stated)))
+    curves = _curves(joined, {"a": np.zeros(2), "b": np.array(far)})
+    middles = np.array([curve.middle for curve in curves])
+    assert middles.mean(0) == pytest.approx(np.array(far) / 2)
+    way = np.array(far) / np.linalg.norm(far)
+    aside = (middles - middles.mean(0)) @ [-way[1], way[0]]
+    assert np.diff(np.sort(aside)).min() > 0.3  # inches
+
+
+def test_a_placing_is_muddled_by_what_makes_it_hard_to_read():
+    none, across = np.zeros((0, 2)), np.array([[1.0, 0.0]])
+    corners = np.array([[0, 0], [4, 3], [4, 0], [0, 3]]) * CELL
+
+    def muddle(place, *ends, ways=none, directed=none):
+        return _muddle(
+            np.asarray(place, float), np.array(ends, int).reshape(-1, 2), np.array(directed, int).reshape(-1, 2), ways
+        )
+
+    sides, crossed = muddle(corners, (0, 2), (1, 3)), muddle(corners, (0, 1), (2, 3))
+    longer = 0.1 * 2 * (5 - 4)  # arrows of five cells for those of four
+    assert crossed - sides == pytest.approx(1 + longer)
+    over = muddle([*corners, corners[:2].mean(0)], (0, 1)) - muddle([*corners, corners[2:].mean(0) * [1, 0.1]], (0, 1))
+    assert over == pytest.approx(2)  # an arrow that runs over a box
+    told = [muddle(corners, ways=across, directed=[pair]) for pair in ((2, 0), (3, 0), (0, 2))]
+    assert np.diff(told) == pytest.approx([2, 2])  # at the right, above, at the left
+    assert muddle(corners * 2) - muddle(corners) == pytest.approx(0.3 * (48 - 12) / 4)
+
+
+def test_related_boxes_attract_all_others_repel_and_words_pull_to_their_side():
+    place, none = np.array([[0.0, 0.0], [9.0, 0.0]]), np.zeros((0, 2), int)
+    related, alone = _forces(place, np.array([[0, 1]]), none, none), _forces(place, none, none, none)
+    assert related[0, 0] > 0 > related[1, 0]
+    assert alone[0, 0] < 0 < alone[1, 0]
+    pulled = _forces(place, none, np.array([[0, 1]]), np.array([[1.0, 0.0]])) - alone  # 0 shall be right of 1
+    assert pulled[0, 0] > 0 > pulled[1, 0]
+    for move in (related, alone, pulled):
+        assert move.sum(0) == pytest.approx(np.zeros(2), abs=1e-9)
 
 
 def test_relations_of_one_kind_share_an_arrow():
