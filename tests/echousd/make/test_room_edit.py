@@ -1,5 +1,6 @@
 import hashlib
 import json
+import sys
 import warnings
 
 import numpy as np
@@ -11,10 +12,12 @@ from small_room import BARE, StandIn, saved_room, small_graph, small_room
 import echousd
 from echomodel.protocols import GraphEdit
 from echousd.graph import Relation
-from echousd.make.edit import edit, touched
+from echousd.make.edit import edit, graph_edit, touched
 from echousd.make.layouts import repeated
 from echousd.make.reading import read_room
 from echousd.options import RoomOptions
+from echousd.shapes.looks import palette_of_room
+from echousd.shapes.sources.retrieval import retrieved
 
 
 @pytest.fixture
@@ -190,6 +193,34 @@ def test_what_an_edit_touches():
     assert touched(graph, graph.relate("nightstand_left", "left", "bed")) == (set(), {"nightstand_left", "lamp"})
     assert touched(graph, graph.lock("lamp").relate("nightstand_left", "left", "bed"))[1] == {"nightstand_left"}
     assert touched(graph, graph.remove_node("pendant")) == (set(), set())
+    assert touched(graph, graph.update_node("bed", position=(0.5, 0.0, 0.0))) == (set(), {"bed"})
+    assert touched(graph, graph.update_node("wardrobe", place="in_corner")) == (set(), {"wardrobe"})
+    assert touched(graph, graph.update_node("nightstand_left", size=(0.4, 0.4, 0.4))) == ({"nightstand_left"}, {"lamp"})
+
+
+def test_the_model_is_told_of_relations_between_what_stays():
+    graph = small_graph()
+    told = graph_edit(graph, graph.update_node("nightstand_right", category="wardrobe").remove_node("lamp"))
+    names = [name for name in graph.names if name != "lamp"]
+    pairs = {(names[subject], names[object_]) for subject, _, object_ in told.before.tolist()}
+    assert {("nightstand_left", "bed"), ("wardrobe", "bed")} <= pairs
+    assert not any("nightstand_right" in pair for pair in pairs)
+
+
+def test_models_are_chosen_for_what_is_new_in_the_colours_of_the_room(root, monkeypatch):
+    asked = []
+
+    def chosen(*given, among, palette, **more):
+        asked.append((among, palette))
+        return retrieved(*given, among=among, palette=palette, **more)
+
+    monkeypatch.setattr(sys.modules["echousd.make.edit"], "retrieved", chosen)
+    graph = small_graph()
+    edit(root, graph.relate("wardrobe", "left", "bed"), model=StandIn(), shapes="boxes", place=False)
+    assert not asked  # nothing is new
+    graph = graph.add_node("chair", "nightstand")
+    edit(root, graph, model=StandIn(), shapes="boxes", place=False)
+    assert asked == [({"chair"}, palette_of_room(5, graph.room.style))]
 
 
 def test_only_rooms_of_ours_can_be_edited(tmp_path):
