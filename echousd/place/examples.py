@@ -20,7 +20,7 @@ import numpy as np
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.data.roomset import RoomSet, pack_rooms
+from echomodel.data.roomset import RoomSet, kept_out, pack_rooms
 from echomodel.files import claim, write_text
 from echomodel.graph import GraphBatch
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
@@ -38,7 +38,6 @@ GRAPHS, PLAIN = 20, 200  # of a shard: graphs that are searched, and rooms of th
 OTHERS = 1_000_000  # seeds between the two
 HALLS = 0.12  # share of large rooms of several zones
 TOLD = (0.5, 2.0)  # relations an object, as people tell them
-HELD_OUT_EVERY = 20
 NOTHING = np.zeros((0, 3), int)  # that is told
 COLUMNS = ("shard", "graphs", "kept", "from_generator", "faults_generator", "plain", "objects", "cpu_seconds")
 
@@ -138,7 +137,7 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
             numbers.append(first + k)
             own += which == 0
     found = len(kept)
-    held = [n % HELD_OUT_EVERY == HELD_OUT_EVERY - 1 for n in (*numbers, *range(len(plain)))]
+    held = [kept_out(n) for n in (*numbers, *range(len(plain)))]
     kept += plain
     pack_rooms(_shard(folder, number), kept, held, {"kind": "rooms found by search", "seed": plan.seed})
     seconds = round(time.process_time() - started, 1)

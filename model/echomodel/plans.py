@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from echomodel.boxes2d import CORNERS
 from echomodel.openings import Opening
 from echomodel.rooms.statistics import quantile, room_type_statistics
 from echomodel.sizes import filled_area, footprint, pieces
@@ -131,8 +132,8 @@ def floor_outline(
     cut_x, cut_z = round(width * x, 1), round(depth * z, 1)
     if min(x - cut_x, z - cut_z) < ARM or max(x - cut_x, z - cut_z) < longest + WAY / 2:
         return None
-    sx, sz = ((-1, -1), (1, -1), (1, 1), (-1, 1))[corner]
-    points = [(-x / 2, -z / 2), (x / 2, -z / 2), (x / 2, z / 2), (-x / 2, z / 2)]
+    sx, sz = CORNERS[corner]
+    points = [(side_x * x / 2, side_z * z / 2) for side_x, side_z in CORNERS]
     inner = [
         (sx * x / 2, sz * (z / 2 - cut_z)), (sx * (x / 2 - cut_x), sz * (z / 2 - cut_z)),
         (sx * (x / 2 - cut_x), sz * z / 2),

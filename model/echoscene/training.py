@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.data.roomset import RoomSet, with_known_words
+from echomodel.data.roomset import RoomSet, kept_out, with_known_words
 from echomodel.data.sgfront import SGFront
 from echomodel.data.shapeset import ShapeSet
 from echomodel.roomboxes import RoomBoxes
@@ -30,7 +30,6 @@ from echoscene.weights import load_released, write_released
 
 SHAPES, GRID, FIELD = "3D-FUTURE-SDF", "ori_sample_grid.h5", "pc_sdf_sample"
 CLAMP = 0.2  # of the published distances
-HELD_OUT_EVERY = 20
 
 
 class PublishedRooms:
@@ -45,7 +44,7 @@ class PublishedRooms:
         self.rooms = [replace(new, relations=old.relations) for new, old in pairs if len(new) == len(old) > 0]
         if not self.rooms:
             raise ValueError(f"{folder}: no scan of trainval with objects that the vocabulary holds")
-        self.held_out = np.arange(len(self.rooms)) % HELD_OUT_EVERY == HELD_OUT_EVERY - 1
+        self.held_out = kept_out(np.arange(len(self.rooms)))
 
     def __len__(self) -> int:
         return len(self.rooms)
@@ -68,7 +67,7 @@ class PublishedShapes:
                 f"{folder / SHAPES}: no <model>/{GRID}; echoscene's page says where people get 3D-FUTURE-SDF"
             )
         self._numbers = {file.parent.name: number for number, file in enumerate(self.files)}
-        self.held_out = np.arange(len(self.files)) % HELD_OUT_EVERY == HELD_OUT_EVERY - 1
+        self.held_out = kept_out(np.arange(len(self.files)))
 
     def __len__(self) -> int:
         return len(self.files)

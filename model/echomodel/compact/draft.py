@@ -8,11 +8,10 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import hull, seen
 from echomodel.compact.pairs import Pairs
-from echomodel.floors import SIDES, footprint, known, nearest_wall, signed_distance, wall_distances
+from echomodel.floors import NEAR, ROUND_ABOUT, SIDES, footprint, known, nearest_wall, signed_distance, wall_distances
 
-NEAR, ROUND_ABOUT = 0.08, 0.4  # metres: two scales at which a gap is told, beside the gap itself
 FARTHEST = 20.0  # metres
-RATIO = 0.2  # likewise for logarithms of volumes and heights
+RATIO = 0.2  # scale at which logarithms of volumes and heights are told
 WALL_FEATURES = 3 * 12 + 1 + 4
 PAIR_FEATURES = 23 + 24
 BACK = SIDES.index((0, -1))  # middle of the back of a footprint

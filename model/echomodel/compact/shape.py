@@ -23,6 +23,7 @@ from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
 from echomodel.progress import part_of
 from echomodel.samplers import Predict, clean_from
+from echomodel.tsdf import FILLED
 from echomodel.vocabulary import vocabulary
 
 GRID = 64
@@ -307,7 +308,6 @@ def shape_predictor(model: CompactModel, graph: GraphBatch, size: Tensor, pairs:
     return predict
 
 
-FILLED = 60  # voxels that a shape spans on every axis of its box-normalised grid
 TOP = 58  # voxel from which on a column counts as reaching the top of the box
 PLAY = 0.1  # metres between the bottom of one and the top of the other
 

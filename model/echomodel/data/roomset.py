@@ -13,6 +13,7 @@ import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -38,7 +39,6 @@ OPENING = np.dtype(
 )  # fmt: skip
 TABLES = {"rooms": ROOM, "objects": OBJECT, "corners": CORNER, "openings": OPENING}
 ROOMS_PER_SHARD = 1000
-HELD_OUT_EVERY = 20  # every twentieth room is kept out of training
 LABELLED = 200  # rooms at a time
 DIGITS = 4  # a tenth of a millimetre
 MILLIMETRES, STEPS = 1000.0, {"yaw": 1e4}  # steps to the unit of the numbers of a packed set
@@ -223,9 +223,9 @@ class RoomSet:
         return self._labels[rules, first][number - first]
 
 
-def kept_out(number: int) -> bool:
-    """Whether no training may see the room of this number in its set."""
-    return number % HELD_OUT_EVERY == HELD_OUT_EVERY - 1
+def kept_out(number: Any) -> Any:
+    """Whether no training may see the room or style of this number, int or array, in its set: every twentieth."""
+    return number % 20 == 19
 
 
 def _entry(opening: Opening) -> tuple:

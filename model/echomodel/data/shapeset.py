@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import zstandard
 
+from echomodel.data.roomset import kept_out
 from echomodel.files import claim, read_note, whole_file, write_json
 from echomodel.furniture import Choices, Style, sample_size, solids
 from echomodel.furniture.solids import Solid
@@ -35,7 +36,6 @@ ENTRY = np.dtype(
 )  # fmt: skip
 STYLES_PER_SHARD = 8
 COMPRESSION = 12
-HELD_OUT_EVERY = 20  # every twentieth style is kept out of training
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ def _records(styles: range, names: list[str], seed: int, done: Callable[[int], o
     for style in styles:
         for category, name in enumerate(names):
             _, size, parts = piece(seed, style, name)
-            yield ShapeRecord(tsdf_of(parts), category, style, size, style % HELD_OUT_EVERY == HELD_OUT_EVERY - 1)
+            yield ShapeRecord(tsdf_of(parts), category, style, size, kept_out(style))
         done((style + 1) * len(names))
 
 

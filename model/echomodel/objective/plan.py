@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from echomodel.floors import edges, known, padded, signed_distance
+from echomodel.floors import edges, known, padded, signed_area, signed_distance
 from echomodel.objective.support import carriers, shared_fraction
 from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
@@ -459,8 +459,7 @@ class Plan:
         length = along.norm(dim=-1)
         length = torch.where(length > 1e-3, length, torch.zeros_like(length))
         along = along / length.clamp_min(1e-3)[..., None]
-        area = (start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]).sum(1)
-        normal = torch.stack([-along[..., 1], along[..., 0]], -1) * torch.sign(area)[:, None, None]
+        normal = torch.stack([-along[..., 1], along[..., 0]], -1) * torch.sign(signed_area(self.floor))[:, None, None]
         length = length * known(self.floor)[:, None]
         return start, along, normal, length
 

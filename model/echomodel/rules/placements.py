@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes2d import outline, seen
+from echomodel.openings import signed_area
 from echomodel.rules.geometry import BoxesLike
 from echomodel.vocabulary import Category, vocabulary
 
@@ -67,8 +68,7 @@ class Walls:
         edge = self.start.roll(-1, 0) - self.start
         self.length = edge.norm(dim=1).clamp_min(1e-9)
         self.along = edge / self.length[:, None]
-        turn = (self.start[:, 0] * self.start.roll(-1, 0)[:, 1] - self.start[:, 1] * self.start.roll(-1, 0)[:, 0]).sum()
-        sign = 1.0 if float(turn) > 0 else -1.0
+        sign = 1.0 if signed_area(floor) > 0 else -1.0
         self.normal = sign * torch.stack([-self.along[:, 1], self.along[:, 0]], 1)
         before = self.along.roll(1, 0)
         self.inner = sign * (before[:, 0] * self.along[:, 1] - before[:, 1] * self.along[:, 0]) > 0.1
