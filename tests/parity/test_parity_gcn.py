@@ -57,11 +57,15 @@ def _graph(n: Numbers, classes: str, triples: str, nodes: str, edges: str) -> Sc
     return SceneGraphTensors(n[classes], n[triples], n[nodes], n[edges])
 
 
+def _opened(name: str, own_table: bool = True) -> tuple[GraphEncoder, Numbers, SceneGraphTensors]:
+    """Encoder and manipulator, the numbers of one of them and its whole graph."""
+    numbers = Numbers(name)
+    return _encoder(own_table), numbers, _graph(numbers, *WHOLE)
+
+
 @torch.inference_mode()
 def test_encoder() -> None:
-    numbers = Numbers("encoder")
-    net = _encoder()
-    graph = _graph(numbers, *WHOLE)
+    net, numbers, graph = _opened("encoder")
     nodes, edges = net.embed(graph)
     close(nodes, numbers["obj_embed"], 1e-6)
     close(edges, numbers["pred_embed_enc"], 1e-6)
@@ -73,9 +77,7 @@ def test_encoder() -> None:
 @torch.inference_mode()
 @pytest.mark.parametrize(("own_table", "expected"), [(True, "manip_obj"), (False, "manip_obj_echoscene_variant")])
 def test_manipulator_generates(own_table: bool, expected: str) -> None:
-    numbers = Numbers("manipulator")
-    net = _encoder(own_table)
-    graph = _graph(numbers, *WHOLE)
+    net, numbers, graph = _opened("manipulator", own_table)
     latent, edges, keep = net.manipulate(numbers["latent_obj"], graph)
     close(latent, numbers[expected], 1e-4)
     assert keep.all()
@@ -104,9 +106,7 @@ def test_manipulator_adds_a_node_and_changes_a_relation(edit, before, after, nod
 
 @torch.inference_mode()
 def test_change_flags_belong_to_the_nodes_in_ascending_order() -> None:
-    numbers = Numbers("manipulator")
-    net = _encoder()
-    graph = _graph(numbers, *WHOLE)
+    net, numbers, graph = _opened("manipulator")
     latent, _ = net.encode(graph)
     touched = numbers["chg_nodes"].tolist()
     one, _, _ = net.manipulate(latent, graph, touched=touched, noise=numbers["chg_noise"])

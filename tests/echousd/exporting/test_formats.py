@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 import trimesh
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
-from small_room import BARE, OBJECTS, StandIn, small_graph
+from small_room import OBJECTS, small_room
 
 import echousd
 from echousd.exporting.formats import export
-from echousd.options import RoomOptions
 
 
 @pytest.fixture(scope="module")
 def room():
-    return echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
+    return small_room(shapes="boxes", place=False)
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +77,7 @@ def test_usdz_for_arkit_has_one_crate_without_whole_number_doubles(root, tmp_pat
 @pytest.mark.parametrize("up_axis", ["Y", "Z"])
 @pytest.mark.parametrize("physics", [None, True])
 def test_usdz_for_arkit_is_y_up_and_holds_nothing_of_ours_nor_lights(up_axis, physics, tmp_path):
-    options = RoomOptions(up_axis=up_axis, walls=False, dress="none")
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, options=options)
+    room = small_room(shapes="boxes", place=False, up_axis=up_axis)
     root = room.save(tmp_path / "bedroom", preview=False)
     stage = Usd.Stage.Open(str(export(root, tmp_path / "room.usdz", arkit=True, physics=physics)))
     assert UsdGeom.GetStageUpAxis(stage) == "Y"
@@ -88,7 +86,7 @@ def test_usdz_for_arkit_is_y_up_and_holds_nothing_of_ours_nor_lights(up_axis, ph
     assert not [name for name in types if name.startswith("Echo") or "Light" in name]
     assert not [name for prim in prims for name in prim.GetPropertyNames() if name.startswith("echo:")]
     assert {"Mesh", "Material", "Camera", "SemanticsLabelsAPI:category"} <= types
-    straight = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
+    straight = small_room(shapes="boxes", place=False)
     wanted = world_bounds(Usd.Stage.Open(str(straight.save(tmp_path / "straight", preview=False))))
     box = world_bounds(stage)
     np.testing.assert_allclose([box.GetMin(), box.GetMax()], [wanted.GetMin(), wanted.GetMax()], atol=1e-4)
@@ -184,13 +182,7 @@ def test_physics_is_exported_whole_or_not_at_all(root, tmp_path, ending):
 
 
 def test_z_up_rooms_come_out_y_up_where_the_format_says_so(tmp_path):
-    room = echousd.generate(
-        small_graph(),
-        model=StandIn(),
-        shapes="boxes",
-        place=False,
-        options=RoomOptions(up_axis="Z", walls=False, dress="none"),
-    )
+    room = small_room(shapes="boxes", place=False, up_axis="Z")
     root = room.save(tmp_path / "bedroom", preview=False)
     scene = trimesh.load(export(root, tmp_path / "room.glb"))
     assert scene.bounds[1][1] == pytest.approx(2.8, abs=1e-3)

@@ -9,7 +9,7 @@ import trimesh
 import yaml
 from painter import color_at, errors_in_texels, filled, in_room, paint, painted
 from pxr import UsdShade, UsdValidation
-from small_room import BARE, StandIn, small_graph
+from small_room import small_room
 
 import echousd
 from echousd.checks import check
@@ -33,7 +33,7 @@ def room(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory):
-    data = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
+    data = small_room(shapes="boxes", place=False)
     return data.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
 
 
@@ -224,13 +224,7 @@ def test_colours_are_a_function_of_the_place():
 
 
 def test_rooms_with_z_up_are_painted_alike(tmp_path):
-    data = echousd.generate(
-        small_graph(),
-        model=StandIn(),
-        shapes="boxes",
-        place=False,
-        options=RoomOptions(up_axis="Z", walls=True, dress="none"),
-    )
+    data = small_room(shapes="boxes", place=False, up_axis="Z", walls=True)
     root = data.save(tmp_path / "bedroom", preview=False)
     job = export_job(root, tmp_path / "job", "generic", resolution=256)
     paint(tmp_path / "job")
