@@ -24,9 +24,9 @@ from echousd.shapes.colliders import approximation, hull_of
 from echousd.shapes.geometry import LICENCE, Collider, Geometry, Mass, Origin, Original, Part
 from echousd.shapes.joints import read_joints
 from echousd.shapes.matter import read_mass
-from echousd.stage.contents import room_frame, triangulated
+from echousd.stage.contents import room_frame, surface_of
 from echousd.stage.files import open_stage
-from echousd.stage.forms import forms, shown
+from echousd.stage.forms import shown
 from echousd.stage.graphs import read_graph
 from echousd.stage.paths import DESCRIPTION, GEO, OBJECTS, asset_files, component_file, piece_name, piece_of
 from echousd.stage.units import Z_TO_Y, metres_per_unit
@@ -192,17 +192,10 @@ def read_original(root: Usd.Prim, asset: str | None, category: str, manifest: Ma
         return None
     cache = UsdGeom.XformCache()
     away = np.linalg.inv(np.array(cache.GetLocalToWorldTransform(root)).T)
-    points, faces, count = [], [], 0
-    for form in forms(root, cache, shown):
-        vertices, triangles = triangulated(form.prim)
-        if len(triangles):
-            to_root = away @ form.world
-            points.append(vertices @ to_root[:3, :3].T + to_root[:3, 3])
-            faces.append(triangles + count)
-            count += len(vertices)
-    if not points:
+    points, faces = surface_of(root, cache, away, seen=shown)
+    if not len(faces):
         return None
-    mesh = trimesh.Trimesh(np.concatenate(points), np.concatenate(faces), process=False)
+    mesh = trimesh.Trimesh(points, faces, process=False)
     told = manifest["meshes"][asset]
     words = (told.get("shapes", ""), told.get("licence", LICENCE), told.get("credit", ""))
     origin = Origin(*words, asset=told.get("asset", ""), sha256=told.get("sha256", ""))

@@ -217,15 +217,16 @@ def triangles_of(surface: Polygons) -> np.ndarray:
 def surface_of(
     top: Usd.Prim, cache: UsdGeom.XformCache, placed: np.ndarray, others: set | frozenset = frozenset(),
     read: Callable[[Usd.Prim], tuple[np.ndarray, np.ndarray]] = triangulated,
+    seen: Callable[[Usd.Prim], bool] = is_seen,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Points (v, 3) float and triangles (f, 3) int of all that is seen at and below a prim, but for `others`.
+    """Points (v, 3) float and triangles (f, 3) int of all that is `seen` at and below a prim, but for `others`.
 
     Arguments:
         placed: (4, 4) float, column vectors, from the stage's world to where the points are wanted.
         read: what gives the points and triangles of a prim in its own frame.
     """
     points, faces, count = [NOTHING[0]], [NOTHING[1]], 0
-    for form in forms(top, cache, is_seen, others):
+    for form in forms(top, cache, seen, others):
         vertices, triangles = read(form.prim)
         if len(triangles):
             world = placed @ form.world
