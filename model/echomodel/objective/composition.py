@@ -198,13 +198,14 @@ def chairs_balanced(plan: Plan) -> Found:
     if seats is None:
         return nobody(plan.size)
     who, free = _free_sides(plan, seats)
-    places = (plan.size[seats.i, 0].detach() / ELBOW).round().clamp_min(1.0)  # a bench counts for several chairs
-    count = places.new_zeros(4 * len(plan)).index_add(0, seats.side, places).reshape(-1, 2, 2)[who]
+    places = (plan.size[:, 0].detach() / ELBOW).round().clamp_min(1.0)  # a bench counts for several chairs
+    count = places.new_zeros(4 * len(plan)).index_add(0, seats.side, places[seats.i]).reshape(-1, 2, 2)[who]
     fewer = count.argmin(-1, keepdim=True)
     room = free.reshape(-1, 2, 2).gather(-1, fewer) | (count.gather(-1, fewer) > 0)
     more = ((count[..., 0] - count[..., 1]).abs() * room[..., 0]).sum(-1)
-    total = count.sum((1, 2))
-    some = total > 2  # two may sit around a corner
+    i, j = plan.attended("at", "foot")  # who stands far off, too
+    total = places.new_zeros(len(plan)).index_add(0, j, places[i])[who]
+    some = count.sum((1, 2)) > 2  # two may sit around a corner
     return found(who[some], (total % 2 + 0.5 - more)[some], measure=more[some])
 
 
