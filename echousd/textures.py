@@ -6,7 +6,7 @@ import io
 import stat
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pxr import Ar
@@ -87,6 +87,13 @@ def decoded(content: bytes, path: str) -> np.ndarray:
         except Exception as error:  # decoders fail on damaged files in every way there is
             reason = str(error) if not isinstance(error, Image.UnidentifiedImageError) else "of no known format"
             raise TextureError(f"{path}: not an image that can be read ({reason or type(error).__name__})") from None
+
+
+def encoded(picture: Image, form: str = "PNG", **how: Any) -> bytes:
+    """A picture as a file of a form; `how`: as Pillow's writer of that form takes it."""
+    out = io.BytesIO()
+    picture.save(out, form, **how)
+    return out.getvalue()
 
 
 def _rgb(image: Image) -> np.ndarray:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echousd.stage.paths import component_file, thumbnail_file
+from echousd.textures import encoded
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -21,18 +21,16 @@ def png(picture: Image.Image) -> bytes:
     """A PNG of a picture, which says that it is ours."""
     from PIL.PngImagePlugin import PngInfo
 
-    buffer, mark = io.BytesIO(), PngInfo()
+    mark = PngInfo()
     mark.add_text(*MARK)
-    picture.save(buffer, "PNG", pnginfo=mark)
-    return buffer.getvalue()
+    return encoded(picture, pnginfo=mark)
 
 
 def gif(pictures: Sequence[Image.Image]) -> bytes:
     """A GIF that shows pictures one after the other and begins again, and says that it is ours."""
-    buffer, small = io.BytesIO(), [picture.quantize(128) for picture in pictures]
+    first, *rest = (picture.quantize(128) for picture in pictures)
     comment = MARK[1].encode()
-    small[0].save(buffer, "GIF", save_all=True, append_images=small[1:], duration=TENTH, loop=0, comment=comment)
-    return buffer.getvalue()
+    return encoded(first, "GIF", save_all=True, append_images=rest, duration=TENTH, loop=0, comment=comment)
 
 
 def is_ours(path: Path) -> bool:
@@ -72,6 +70,4 @@ def picture(asset: Path) -> bytes:
     """A PNG of a stage with one piece on it, from a corner; raises ValueError where there is nothing to see."""
     from echousd.draw.rendering import QUICK, render
 
-    out = io.BytesIO()
-    render(asset, size=SIZE, rays=QUICK).save(out, "PNG")
-    return out.getvalue()
+    return encoded(render(asset, size=SIZE, rays=QUICK))

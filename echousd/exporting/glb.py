@@ -6,7 +6,6 @@ and knows neither lights nor several materials in one mesh.
 
 from __future__ import annotations
 
-import io
 import json
 import struct
 from collections.abc import Mapping
@@ -21,7 +20,7 @@ from echousd.exporting.packing import Reach
 from echousd.stage import values
 from echousd.stage.layouts import selected_layout
 from echousd.stage.read import facts, find_rooms, node_names, room_spec
-from echousd.textures import texture_bytes
+from echousd.textures import encoded, texture_bytes
 
 ENCODED = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}  # what glTF takes, by how it begins
 COMPONENT = {"f": 5126, "H": 5123, "I": 5125}
@@ -228,6 +227,8 @@ class _Tree:
 
     def _texture(self, texture: Texture, metal: bool | None = None) -> dict[str, int]:
         """Reference to an image; with `metal` to its roughness in green and, in blue, what metal there is."""
+        from PIL import Image
+
         key = (texture, metal)
         if ("images", key) not in self.known:
             self.reach.check(texture.path, f"<{texture.prim}>")
@@ -238,7 +239,7 @@ class _Tree:
                 grey = pixels[..., "rgb".index(texture.channel)]
                 pixels, kind = np.stack([grey * 0, grey, grey * 0 + 255], -1), ""
             if not kind:
-                content, kind = _png(pixels), "image/png"
+                content, kind = encoded(Image.fromarray(pixels)), "image/png"
             self.add("images", {"bufferView": self._view(content), "mimeType": kind}, key)
         image = self.known["images", key]
         return {"index": self.add("textures", {"source": image})}
@@ -309,14 +310,6 @@ def _rows(corners: np.ndarray) -> np.ndarray:
 
 def _is_grey(pixels: np.ndarray) -> bool:
     return bool(np.ptp(pixels.astype(np.int16), axis=-1).max(initial=0) <= 3)  # JPEG rounds
-
-
-def _png(pixels: np.ndarray) -> bytes:
-    from PIL import Image
-
-    out = io.BytesIO()
-    Image.fromarray(pixels).save(out, "PNG")
-    return out.getvalue()
 
 
 def _camera(found: Gf.Camera, metres: float) -> dict[str, Any] | None:

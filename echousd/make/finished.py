@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import io
 import tempfile
 import weakref
 from dataclasses import dataclass
@@ -63,13 +62,13 @@ class Room(RoomData):
         return render_stage(self.stage, view=view, size=size)
 
     def _repr_png_(self) -> bytes | None:
+        from echousd.textures import encoded
+
         try:
             picture = self.image(size=360)
         except ValueError:  # without embreex a notebook shows the table alone
             return None
-        out = io.BytesIO()
-        picture.save(out, "PNG")
-        return out.getvalue()
+        return encoded(picture)
 
     def _repr_html_(self) -> str:
         kept = sum(v.state == "kept" for v in self.verdicts)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import shutil
@@ -20,6 +19,7 @@ from echousd.stage.files import open_stage
 from echousd.stage.layouts import showing_layout
 from echousd.stage.read import the_room
 from echousd.stage.values import reading
+from echousd.textures import encoded
 from echousd.texturing import scenetex
 from echousd.texturing.atlas import Unwrapped, layout_digest, texels, unwrap
 from echousd.texturing.job import JOB, RESULTS, TOOLS, Job, script_for
@@ -192,9 +192,7 @@ def _picture(stage: Usd.Stage, thing: Painted) -> bytes:
     for prim in alone.GetPrimAtPath(thing.path).GetParent().GetAllChildren():
         if str(prim.GetPath()) != thing.path:
             prim.SetActive(False)
-    out = io.BytesIO()
-    render_stage(alone, size=IMAGE, rays=1).save(out, "PNG")
-    return out.getvalue()
+    return encoded(render_stage(alone, size=IMAGE, rays=1))
 
 
 def _expected(tool: str) -> str:
