@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import base64
 import csv
-import html
 import io
 import re
 import time
+from base64 import b64encode
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import groupby
 from multiprocessing import get_context
 from pathlib import Path, PurePath
 
 import numpy as np
 
-from echomodel.files import read_bounded, whole_file
+from echomodel.files import read_bounded, whole_file, write_text
 from echomodel.vocabulary import vocabulary
 from echousd.assets.catalogues import Entry, entries_of
 from echousd.assets.colors import swatches
@@ -27,6 +25,7 @@ from echousd.assets.describe import PLACEMENT, described, left_out, relative, st
 from echousd.assets.record import AssetRecord, vector
 from echousd.assets.table import OldIndex, arrow, read_library, write_library
 from echousd.graph.files import STAGE_FORMS
+from echousd.pages import template
 from echousd.stage.apart import fatal
 
 PACK = 8  # models that a worker reads in one go
@@ -239,31 +238,15 @@ def corrected(record: AssetRecord, row: Mapping[str, str]) -> AssetRecord:
     return replace(record, fault="") if helped and record.sha256 else record
 
 
-STYLE = """body{font:13px sans-serif;margin:2em}div{display:inline-block;width:11em;vertical-align:top;margin:.4em}
-img{width:96px;height:96px}u{display:block;width:96px;height:8px;text-decoration:none}s{display:inline-block;height:8px}
-b,i,span{display:block;overflow-wrap:anywhere}i{color:#777}.doubt{background:#fff3d6}"""
 OWN = re.compile(r"'[^']*'|\"[^\"]*\"|[/\w.-]*/[/\w.-]+|\d+(\.\d+)?")  # quoted words, paths and numbers in a reason
 DOUBT = 0.7  # confidence below which a row is coloured
 
 
 def write_page(path: Path, records: Sequence[AssetRecord]) -> None:
     """Write an HTML page that stands alone: models by category, those that cannot be used last with the reason."""
-    parts = [f"<!doctype html><meta charset=utf-8><title>Models</title><style>{STYLE}</style>"]
-    parts.append(f"<h1>{sum(r.usable for r in records)} of {len(records)} models usable</h1>")
-    usable = sorted((r for r in records if r.usable), key=lambda record: (record.category, record.id))
-    for category, group in groupby(usable, key=lambda record: record.category):
-        members = list(group)
-        parts.append(f"<h2>{category} ({len(members)})</h2>")
-        parts += map(_card, members)
-    out = by_reason(records)
-    if out:
-        parts.append(f"<h2>not used ({sum(map(len, out.values()))})</h2>")
-    for reason, members in out.items():
-        parts.append(f"<details><summary>{len(members)}: {html.escape(reason)}</summary><ul>")
-        parts += [f"<li>{html.escape(r.id)}: {html.escape(r.fault)}" for r in members]
-        parts.append("</ul></details>")
-    with whole_file(path) as beside:
-        beside.write_text("\n".join(parts) + "\n", "utf-8")
+    usable = sorted((r for r in records if r.usable), key=lambda record: record.id)
+    page = template("echousd.assets", "models.html.j2", base64=lambda png: b64encode(png).decode(), swatches=swatches)
+    write_text(path, page.render(usable=usable, all=len(records), out=by_reason(records), doubt=DOUBT) + "\n")
 
 
 def by_reason(records: Sequence[AssetRecord]) -> dict[str, list[AssetRecord]]:
@@ -274,16 +257,3 @@ def by_reason(records: Sequence[AssetRecord]) -> dict[str, list[AssetRecord]]:
         reason = why if why and PurePath(where).name == PurePath(record.id).name else record.fault
         found.setdefault(OWN.sub("...", reason) or "no size or category", []).append(record)
     return dict(sorted(found.items(), key=lambda entry: (-len(entry[1]), entry[0])))
-
-
-def _card(record: AssetRecord) -> str:
-    picture = base64.b64encode(record.thumbnail).decode()
-    size = " × ".join(f"{length:.2f}" for length in record.dims)
-    doubt = " class=doubt" if min(record.confidence, record.front_confidence) < DOUBT else ""
-    told = f"{size} m<br>category {record.confidence:.2f}, front {record.front_confidence:.2f}"
-    spots = "".join(f"<s style='background:rgb{rgb};width:{share:.0%}'></s>" for share, rgb in swatches(record.colors))
-    whose = html.escape(f"{record.licence} {record.author}")
-    return (
-        f"<div{doubt}><img src='data:image/png;base64,{picture}'><u>{spots}</u><b>{html.escape(record.name)}</b>"
-        f"<span>{html.escape(record.id)}</span><span>{told}</span><i>{whose}</i></div>"
-    )

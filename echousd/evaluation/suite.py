@@ -33,6 +33,8 @@ from echomodel.roomboxes import RoomBoxes
 from echousd.evaluation.runs import HONEST, SECTIONS, Run, SuiteSettings, Table, rooms_against, rooms_of, run_systems
 from echousd.evaluation.sections import RUNNERS
 from echousd.evaluation.systems import System, described
+from echousd.pages import template
+from echousd.textures import encoded
 
 OWN = {"relations", "shapes"}  # sections that ask by tasks of their own
 LIBRARIES = ("numpy", "scipy", "torch", "scikit-learn", "echousd")
@@ -214,14 +216,11 @@ def cell(found: Figure | float | None) -> str:
 
 def rendered(name: str, content: Mapping[str, Any], *, escaped: bool = True) -> str:
     """A template of this package, filled."""
-    from jinja2 import Environment
     from markupsafe import Markup, escape
 
-    environment = Environment(autoescape=escaped)
     code = lambda text: Markup(re.sub("`(.*?)`", r"<code>\1</code>", str(escape(text))))  # noqa: E731
-    environment.filters.update(code=code, cell=cell, plot=plot)
-    text = resources.files("echousd.evaluation").joinpath("templates", name).read_text("utf-8")
-    return environment.from_string(text).render(**content) + "\n"
+    page = template("echousd.evaluation", name, escaped=escaped, code=code, cell=cell, plot=plot)
+    return page.render(**content) + "\n"
 
 
 def plot(table: Table) -> str:
@@ -273,10 +272,8 @@ def pictures(run: Run) -> dict[str, str]:
     out = {"The same rooms by every system": sheet(rows, len(names))} if rows else {}
     if run.shown:
         whole = np.concatenate([np.concatenate(list(shown), 1) for shown in run.shown.values()])
-        text = io.BytesIO()
-        Image.fromarray(whole).save(text, "PNG")
         title = f"From above, top to bottom: {', '.join(run.shown)}"
-        out[title] = base64.b64encode(text.getvalue()).decode()
+        out[title] = base64.b64encode(encoded(Image.fromarray(whole))).decode()
     return out
 
 
