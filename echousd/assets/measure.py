@@ -12,21 +12,23 @@ from typing import Any
 import numpy as np
 import trimesh
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdUtils
+from trimesh.util import append_faces
 
 from echomodel.files import within_memory
 from echomodel.triangles import area_normals
 from echousd.assets.colors import Coat, flat, pixels, texels
 from echousd.assets.model_file import ModelFile
-from echousd.draw.drawables import Paint, fans, paints_of
+from echousd.draw.drawables import Paint, paints_of
 from echousd.graph.files import STAGE_FORMS
 from echousd.srgb import to_linear
-from echousd.stage.contents import triangles_of
+from echousd.stage.contents import NOTHING, triangles_of
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage
 from echousd.stage.foreign import object_box
-from echousd.stage.forms import Form, Polygons, SkippedForms, forms, polygons, shown
+from echousd.stage.forms import Form, Polygons, SkippedForms, forms, polygons
 from echousd.stage.labels import labels
 from echousd.stage.units import metres_per_unit, up_axis
+from echousd.stage.values import fans
 from echousd.textures import TextureError, texture_bytes
 
 
@@ -116,14 +118,11 @@ def _mesh(model: ModelFile, painted: bool) -> Measured:
     parts = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh)]
     if not parts:
         raise ValueError(f"{model}: holds no triangles")
-    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)])
     about = (scene.metadata or {}).get("asset") or {}
     extras = about.get("extras") or {}
     copyright_ = str(about.get("copyright") or "")
     return Measured(
-        np.concatenate([np.asarray(part.vertices, float) for part in parts]),
-        faces,
+        *append_faces([np.asarray(part.vertices, float) for part in parts], [part.faces for part in parts]),
         metres=None if obj else 1.0,  # glTF is in metres, +Y up
         materials=tuple(dict.fromkeys(_material_names(scene) if obj else map(str, scene.geometry))),
         licence=str(extras.get("license") or ""),
@@ -182,19 +181,18 @@ def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) ->
     root = root_prim(stage, path) if not prim_path else named_prim(stage, path, prim_path)
     cache = UsdGeom.XformCache()
     box = object_box(root) if prim_path else None
-    points, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), int)], 0
+    points, faces = [NOTHING[0]], [NOTHING[1]]
     coats: list[Coat] = []
     known: dict[str, Paint] = {}
     covers: dict[Paint, np.ndarray] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SkippedForms)
-        for form in forms(root, cache, shown):
+        for form in forms(root, cache):
             surface = polygons(form.prim)
             triangles = triangles_of(surface)
             if len(triangles):
                 points.append(surface.points @ form.world[:3, :3].T + form.world[:3, 3])
-                faces.append(triangles + count)
-                count += len(surface.points)
+                faces.append(triangles)
                 coats += _stage_coats(form, surface, known, covers) if painted else ()
     prims = [root, *Usd.PrimRange(root, Usd.TraverseInstanceProxies())]
     layer = stage.GetRootLayer()
@@ -205,8 +203,7 @@ def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) ->
         f"{name}={root.GetVariantSet(name).GetVariantSelection()}" for name in root.GetVariantSets().GetNames()
     )
     return Measured(
-        np.concatenate(points),
-        np.concatenate(faces),
+        *append_faces(points, faces),
         metres=metres_per_unit(stage) if _says_unit(stage) else None,
         z_up=up_axis(stage) == UsdGeom.Tokens.z,
         prim=str(root.GetPath()),

@@ -16,8 +16,9 @@ from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.joints import FRICTION_API
 from echousd.stage import encoding as usd
 from echousd.stage.boxes import read_small
-from echousd.stage.contents import components, is_seen, room_frame, words_of
+from echousd.stage.contents import components, room_frame, words_of
 from echousd.stage.encoding import StageError
+from echousd.stage.forms import shown
 from echousd.stage.labels import is_structure, known_category, spaced
 from echousd.stage.read import RoomPrims, StatedTwice, find_rooms, node_names, relation_of, room_graph, value
 from echousd.stage.taxonomy import SHELL, ade20k
@@ -159,7 +160,7 @@ def _kind(prim: Usd.Prim) -> str:
 def hidden(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """Something is seen of an object that has surfaces at all."""
     surfaces = [found for found in below(prim) if found.IsA(UsdGeom.Gprim)]
-    if surfaces and not any(map(is_seen, surfaces)):
+    if surfaces and not any(map(shown, surfaces)):
         yield "nothing of it is seen: its surfaces are invisible or guides"
 
 

@@ -109,7 +109,7 @@ class Reading:
 
     def corners(self, mesh: UsdGeom.Mesh) -> np.ndarray:
         """(t, 3) int: fan triangles of a mesh's faces, as positions in its indices; raises as `mesh` does."""
-        return self.once("corners", mesh.GetPrim(), lambda: fans(self.mesh(mesh).counts))
+        return self.once("corners", mesh.GetPrim(), lambda: fans(self.mesh(mesh).counts)[1])
 
     def is_guide(self, prim: Usd.Prim) -> bool:
         """Whether a prim is there for tools rather than for the eye (purpose guide or proxy)."""

@@ -12,7 +12,7 @@ from pxr import Usd, UsdGeom, UsdShade
 from echomodel.triangles import area_normals
 from echousd.stage import values
 from echousd.stage.encoding import LABELS, StageError
-from echousd.stage.forms import forms, polygons, shown
+from echousd.stage.forms import forms, polygons
 from echousd.stage.units import metres_per_unit, up_axis
 from echousd.textures import TextureError, read_image
 
@@ -82,7 +82,7 @@ def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
     cache = UsdGeom.XformCache()
     known: dict[str, Paint] = {}
     shapes: dict[Usd.Prim, tuple | None] = {}  # of what an instancer places often
-    for form in forms(stage.GetPseudoRoot(), cache, shown):
+    for form in forms(stage.GetPseudoRoot(), cache):
         prim = form.prim
         part = shapes[prim] if prim in shapes else _part(prim, known)
         if form.above is not None:
@@ -110,11 +110,7 @@ def image_of(prim: str, file: str) -> np.ndarray:
 
 
 def _category(prim: Usd.Prim) -> str:
-    while prim and not prim.IsPseudoRoot():
-        if label := own_category(prim):
-            return label
-        prim = prim.GetParent()
-    return ""
+    return next(filter(None, map(own_category, values.lineage(prim))), "")
 
 
 def own_category(prim: Usd.Prim) -> str:
@@ -123,21 +119,8 @@ def own_category(prim: Usd.Prim) -> str:
 
 
 def _component(prim: Usd.Prim) -> str:
-    above = prim
-    while above and not above.IsPseudoRoot():
-        if Usd.ModelAPI(above).GetKind() == "component":
-            return above.GetName()
-        above = above.GetParent()
-    return prim.GetName()
-
-
-def fans(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Polygons with `counts` (f,) int corners as triangles: (t,) int polygon and (t, 3) int corners of each."""
-    first = np.cumsum(counts) - counts
-    many = np.clip(counts - 2, 0, None)
-    face = np.repeat(np.arange(len(counts)), many)
-    step = np.arange(len(face)) - np.repeat(np.cumsum(many) - many, many)
-    return face, np.stack([first[face], first[face] + step + 1, first[face] + step + 2], 1)
+    above = (each for each in values.lineage(prim) if Usd.ModelAPI(each).GetKind() == "component")
+    return next(above, prim).GetName()
 
 
 def _part(
@@ -148,7 +131,7 @@ def _part(
     points, counts, index = surface.points, surface.counts, surface.indices
     if not (counts > 2).any():
         return None
-    face, corner = fans(counts)
+    face, corner = values.fans(counts)
     if UsdGeom.Gprim(prim).GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         corner = corner[:, ::-1]
     triangles = points[index[corner]]

@@ -10,12 +10,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from pxr import Tf, Usd, UsdGeom, UsdShade
 
-from echousd.draw.drawables import Drawable, fans, read_drawables
+from echousd.draw.drawables import Drawable, read_drawables
 from echousd.graph import SceneGraph
 from echousd.naming import free_name
 from echousd.stage.forms import SkippedForms, is_subdivision
 from echousd.stage.read import RoomPrims, node_names, room_graph, the_room
-from echousd.stage.values import mesh_arrays
+from echousd.stage.values import fans, lineage, mesh_arrays
 
 STUFF = ("floor", "wall", "ceiling")
 DRESSING_NAME = "Dressing"
@@ -173,9 +173,5 @@ def _piece(stage: Usd.Stage, drawable: Drawable) -> Piece:
 
 def _instances(prim: Usd.Prim) -> tuple[str, ...]:
     """The instances that a prim is seen through."""
-    found = []
-    while prim and not prim.IsPseudoRoot():
-        if prim.IsInstance() or (prim.IsInstanceProxy() and prim.IsInstanceable()):
-            found.append(str(prim.GetPath()))
-        prim = prim.GetParent()
-    return tuple(reversed(found))
+    found = [p for p in lineage(prim) if p.IsInstance() or (p.IsInstanceProxy() and p.IsInstanceable())]
+    return tuple(str(each.GetPath()) for each in reversed(found))

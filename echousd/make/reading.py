@@ -26,7 +26,6 @@ from echousd.shapes.joints import read_joints
 from echousd.shapes.matter import read_mass
 from echousd.stage.contents import room_frame, surface_of
 from echousd.stage.files import open_stage
-from echousd.stage.forms import shown
 from echousd.stage.graphs import read_graph
 from echousd.stage.paths import DESCRIPTION, GEO, OBJECTS, asset_files, component_file, piece_name, piece_of
 from echousd.stage.units import Z_TO_Y, metres_per_unit
@@ -191,8 +190,7 @@ def read_original(root: Usd.Prim, asset: str | None, category: str, manifest: Ma
     if not root or not asset:
         return None
     cache = UsdGeom.XformCache()
-    away = np.linalg.inv(np.array(cache.GetLocalToWorldTransform(root)).T)
-    points, faces = surface_of(root, cache, away, seen=shown)
+    points, faces = surface_of(root, cache, np.linalg.inv(matrix(cache.GetLocalToWorldTransform(root), root)))
     if not len(faces):
         return None
     mesh = trimesh.Trimesh(points, faces, process=False)

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 from pxr import Kind, Sdf, Usd, UsdGeom
+from trimesh.util import append_faces
 
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import LABELS
@@ -197,12 +198,6 @@ def shape_of(
     return Shape(vertices, faces, high - low, position, yaw)
 
 
-def is_seen(prim: Usd.Prim) -> bool:
-    """Whether a surface is one that people see: no guide, no proxy, not invisible."""
-    image = UsdGeom.Imageable(prim)
-    return image.ComputePurpose() not in HIDDEN and image.ComputeVisibility() != UsdGeom.Tokens.invisible
-
-
 def triangulated(prim: Usd.Prim) -> tuple[np.ndarray, np.ndarray]:
     """Points (v, 3) float in the prim's own frame and unit, and triangles (f, 3) int."""
     surface = polygons(prim)
@@ -211,26 +206,24 @@ def triangulated(prim: Usd.Prim) -> tuple[np.ndarray, np.ndarray]:
 
 def triangles_of(surface: Polygons) -> np.ndarray:
     """(f, 3) int points of the triangles of polygons."""
-    return surface.indices[fans(surface.counts)]
+    return surface.indices[fans(surface.counts)[1]]
 
 
 def surface_of(
     top: Usd.Prim, cache: UsdGeom.XformCache, placed: np.ndarray, others: set | frozenset = frozenset(),
     read: Callable[[Usd.Prim], tuple[np.ndarray, np.ndarray]] = triangulated,
-    seen: Callable[[Usd.Prim], bool] = is_seen,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Points (v, 3) float and triangles (f, 3) int of all that is `seen` at and below a prim, but for `others`.
+    """Points (v, 3) float and triangles (f, 3) int of all that is seen at and below a prim, but for `others`.
 
     Arguments:
         placed: (4, 4) float, column vectors, from the stage's world to where the points are wanted.
         read: what gives the points and triangles of a prim in its own frame.
     """
-    points, faces, count = [NOTHING[0]], [NOTHING[1]], 0
-    for form in forms(top, cache, seen, others):
+    points, faces = [NOTHING[0]], [NOTHING[1]]
+    for form in forms(top, cache, others):
         vertices, triangles = read(form.prim)
         if len(triangles):
             world = placed @ form.world
             points.append(vertices @ world[:3, :3].T + world[:3, 3])
-            faces.append(triangles + count)
-            count += len(vertices)
-    return np.concatenate(points), np.concatenate(faces)
+            faces.append(triangles)
+    return append_faces(points, faces)

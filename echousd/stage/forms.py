@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -51,15 +51,11 @@ def shown(prim: Usd.Prim) -> bool:
 
 
 def forms(
-    root: Usd.Prim,
-    cache: UsdGeom.XformCache,
-    wanted: Callable[[Usd.Prim], bool],
-    others: set[Sdf.Path] | frozenset[Sdf.Path] = frozenset(),
+    root: Usd.Prim, cache: UsdGeom.XformCache, others: set[Sdf.Path] | frozenset[Sdf.Path] = frozenset()
 ) -> Iterator[Form]:
-    """The surfaces at and below a prim, through instances and instancers.
+    """The surfaces at and below a prim that are `shown`, through instances and instancers.
 
     Arguments:
-        wanted: whether a prim is visible and of a purpose that counts.
         others: prims that are left out with all below them.
 
     Warns `SkippedForms` of curves, points, volumes and the like. Raises StageError for an instancer that holds more
@@ -73,9 +69,9 @@ def forms(
             prims.PruneChildren()
         elif prim.IsA(UsdGeom.PointInstancer):
             prims.PruneChildren()  # prototypes are seen where they are placed
-            if wanted(prim):
-                yield from _instances(UsdGeom.PointInstancer(prim), cache, wanted)
-        elif prim.IsA(UsdGeom.Boundable) and prim.IsA(UsdGeom.Gprim) and wanted(prim):
+            if shown(prim):
+                yield from _instances(UsdGeom.PointInstancer(prim), cache)
+        elif prim.IsA(UsdGeom.Boundable) and prim.IsA(UsdGeom.Gprim) and shown(prim):
             if prim.IsA(UsdGeom.Mesh) or prim.GetTypeName() in SOLIDS:
                 yield Form(prim, str(prim.GetPath()), values.matrix(cache.GetLocalToWorldTransform(prim), prim))
             else:
@@ -86,9 +82,7 @@ def forms(
         warnings.warn(f"left out, as they have no polygons: {told}", SkippedForms, stacklevel=2)
 
 
-def _instances(
-    instancer: UsdGeom.PointInstancer, cache: UsdGeom.XformCache, wanted: Callable[[Usd.Prim], bool]
-) -> Iterator[Form]:
+def _instances(instancer: UsdGeom.PointInstancer, cache: UsdGeom.XformCache) -> Iterator[Form]:
     prim = instancer.GetPrim()
     which = values.array(instancer.GetProtoIndicesAttr(), whole=True)
     if len(which) > MAX_INSTANCES:
@@ -111,7 +105,7 @@ def _instances(
             continue
         if kind not in known:  # below the prototype, relative to it
             base = np.linalg.inv(values.matrix(cache.GetLocalToWorldTransform(prototypes[kind]), prototypes[kind]))
-            known[kind] = [(form, base @ form.world) for form in forms(prototypes[kind], cache, wanted)]
+            known[kind] = [(form, base @ form.world) for form in forms(prototypes[kind], cache)]
         for form, local in known[kind]:
             world = own @ values.matrix(place, prim) @ local
             yield Form(form.prim, f"{prim.GetPath()}[{number}]{form.path}", world, prim)

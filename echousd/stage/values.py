@@ -151,12 +151,12 @@ def mesh_arrays(mesh: UsdGeom.Mesh) -> MeshArrays:
     return MeshArrays(points, counts, indices)
 
 
-def fans(counts: np.ndarray) -> np.ndarray:
-    """(t, 3) int: fan triangles of faces of so many corners each, as positions among all corners."""
+def fans(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Faces of `counts` (f,) int corners as triangles: (t,) int face, and (t, 3) int positions among all corners."""
     first, triangles = np.cumsum(counts) - counts, np.clip(counts - 2, 0, None)
-    start = np.repeat(first, triangles)
-    step = np.arange(len(start)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
-    return np.stack([start, start + step + 1, start + step + 2], 1)
+    face = np.repeat(np.arange(len(counts)), triangles)
+    start, step = first[face], np.arange(len(face)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    return face, np.stack([start, start + step + 1, start + step + 2], 1)
 
 
 def misfit(kind: Sdf.ValueTypeName, found: Any) -> bool:
