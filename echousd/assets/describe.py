@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from trimesh.sample import sample_surface
 
 from echomodel.files import within_memory
 from echomodel.vocabulary import vocabulary
@@ -19,7 +20,7 @@ from echousd.assets.model_file import ModelFile
 from echousd.assets.naming import category_of, likely_unit
 from echousd.assets.record import UPRIGHT, Z_UP, AssetRecord, vector
 from echousd.assets.reference import relative
-from echousd.assets.shape import sampled, supports, thumbnail
+from echousd.assets.shape import supports, thumbnail
 
 PLACEMENT = {"floor": "floor", "table": "surface", "wall": "wall", "ceiling": "ceiling"}
 BLOCK = 2**20
@@ -62,7 +63,9 @@ def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool, encode
     if found.yaw:
         c, s = np.cos(found.yaw), np.sin(found.yaw)
         turn = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]) @ turn
-    extents = np.ptp(found.points @ turn.T, axis=0)
+    placed = found.points @ turn.T
+    low, high = placed.min(0), placed.max(0)
+    extents = high - low
     metres = entry.metres or found.metres
     known = extents * metres if metres else entry.dims
     category, confidence = entry.category, 1.0
@@ -90,7 +93,6 @@ def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool, encode
     fault = "" if category else f"{entry.file}: {entry.name!r} is of no known category; set `category` in the table"
     if metres is None and entry.dims is None and category:
         return replace(record, fault=f"{entry.file}: says no unit, and its size tells none; set `metres` in the table")
-    low, high = _bounds(found, turn)
     dims = entry.dims if entry.dims is not None else (high - low) * float(metres or 1.0)
     record = replace(record, low=vector(low), high=vector(high), dims=vector(np.maximum(dims, 1e-4)))
     record = _faced(record, entry, found)
@@ -126,11 +128,6 @@ def _faced(record: AssetRecord, entry: Entry, found: Measured) -> AssetRecord:
     return replace(record, front_confidence=round(min(0.5 + evidence, 0.95) if not quarters else 0.5, 3))
 
 
-def _bounds(found: Measured, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    points = found.points @ turn.T
-    return points.min(0), points.max(0)
-
-
 def digest_of(file: ModelFile) -> str:
     """sha256 of a model's file (of its member in an archive)."""
     sha = hashlib.sha256()
@@ -163,15 +160,14 @@ def front_by_shape(mesh: trimesh.Trimesh, category: str) -> tuple[int, float]:
     wide side, to the wall. Evidence is 0 where nothing tells, and near 1 where all does.
     """
     role = vocabulary().category(category).role
-    points, normals, _ = sampled(mesh, SAMPLES)
-    weight = np.full(SAMPLES, 1 / SAMPLES)
+    points, face = sample_surface(mesh, SAMPLES, seed=0)
     low, high = points.min(0), points.max(0)
     size = np.maximum(high - low, 1e-9)
     at = (points - low) / size  # 0 to 1
     if role in ("seat", "sofa", "bed"):
-        scores = _heights(at, weight)
+        scores = _heights(at)
     elif role in ("storage", "screen"):
-        scores = _plainness(at, normals, weight, size)
+        scores = _plainness(at, mesh.face_normals[face], size)
     else:
         return 0, 0.0
     # scores: how much each side, +Z, +X, -Z, -X in the order of quarter turns, looks like a back
@@ -183,17 +179,16 @@ def front_by_shape(mesh: trimesh.Trimesh, category: str) -> tuple[int, float]:
     return (4 - back_to_front) % 4, evidence
 
 
-def _heights(at: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _heights(at: np.ndarray) -> np.ndarray:
     """Of the surface in the upper part, how much lies near each side, as shares of what lies there."""
     upper = at[:, 1] > 0.62
     if upper.sum() < 20:
         upper = at[:, 1] > 0.5
-    total = max(float(weight[upper].sum()), 1e-9)
     lean = [at[:, 2], at[:, 0], 1 - at[:, 2], 1 - at[:, 0]]
-    return np.array([float((weight * upper * (side > 0.68)).sum()) / total for side in lean])
+    return np.array([(upper & (side > 0.68)).sum() / max(upper.sum(), 1) for side in lean])
 
 
-def _plainness(at: np.ndarray, normals: np.ndarray, weight: np.ndarray, size: np.ndarray) -> np.ndarray:
+def _plainness(at: np.ndarray, normals: np.ndarray, size: np.ndarray) -> np.ndarray:
     """How much of each side is one plane at its very end, weighted by how wide the side is."""
     axes = ((2, 1.0), (0, 1.0), (2, -1.0), (0, -1.0))
     wide = max(size[0], size[2])
@@ -202,10 +197,8 @@ def _plainness(at: np.ndarray, normals: np.ndarray, weight: np.ndarray, size: np
         end = at[:, axis] > 0.99 if sign > 0 else at[:, axis] < 0.01
         facing = np.abs(normals[:, axis]) > 0.9
         across = size[0] if axis == 2 else size[2]
-        flat = float((weight * (end & facing)).sum())
         near = at[:, axis] > 0.6 if sign > 0 else at[:, axis] < 0.4
-        around = max(float((weight * (near & facing)).sum()), 1e-9)
-        found.append(flat / around * (across / wide) ** 2)
+        found.append((end & facing).sum() / max((near & facing).sum(), 1) * (across / wide) ** 2)
     return np.array(found)
 
 
@@ -233,11 +226,10 @@ def named_by_shape(category: str, mesh: trimesh.Trimesh, dims: np.ndarray) -> st
     return category
 
 
-def _places(mesh: trimesh.Trimesh) -> np.ndarray:
-    """(n, 3) float, 0 to 1 in the mesh's box."""
-    points = sampled(mesh, SAMPLES)[0]
+def _places(mesh: trimesh.Trimesh, count: int = SAMPLES) -> np.ndarray:
+    """(n, 3) float, 0 to 1 in the mesh's box, of places on its surface."""
     low, high = mesh.bounds
-    return (points - low) / np.maximum(high - low, 1e-9)
+    return (sample_surface(mesh, count, seed=0)[0] - low) / np.maximum(high - low, 1e-9)
 
 
 def _has_empty_corner(mesh: trimesh.Trimesh) -> bool:
@@ -249,9 +241,7 @@ def _has_empty_corner(mesh: trimesh.Trimesh) -> bool:
 
 def _front_filled(mesh: trimesh.Trimesh, cells: int = 16) -> float:
     """Share of the front, seen squarely, behind which something stands in the first quarter of the depth."""
-    at = sampled(mesh, 12_000)[0]
-    low, high = mesh.bounds
-    at = (at - low) / np.maximum(high - low, 1e-9)
+    at = _places(mesh, 12_000)
     near = at[at[:, 2] > 0.8]
     seen = np.zeros((cells, cells), bool)
     seen[tuple((near[:, :2] * cells).astype(int).clip(0, cells - 1).T)] = True

@@ -75,7 +75,7 @@ def class_by_name(name: str, group: str, size: Sequence[float] | np.ndarray) -> 
 
 def _abroad(text: str, group: str, size: Sequence[float] | np.ndarray) -> str:
     """The category of a name that is no English one, "" where it is one or means nothing of ours."""
-    word = english(text) if from_abroad(text) or not _within(text) else ""
+    word = english(text) if ABROAD.search(text) or not _within(text) else ""
     return (known_word(word) or class_by_name(word, group, size)) if word else ""
 
 
@@ -96,12 +96,7 @@ def known_word(text: str) -> str:
     """The category that a text is the name or an alias of, "" where it is none."""
     words = _words()
     word = re.sub(r"_?\d+$", "", normalised(text))
-    for form in (word, word.removesuffix("s")):
-        try:
-            return words[form]
-        except KeyError:
-            continue
-    return ""
+    return words.get(word) or words.get(word.removesuffix("s"), "")
 
 
 def _within(text: str, least: int = 1) -> str:
@@ -172,8 +167,3 @@ def _patterns(table: str) -> list[tuple[str, str]]:
     """(word, pattern on a name) of a table, of which the first that matches counts; "" = nothing of ours."""
     rows = Path(__file__).with_name(table).read_text("utf-8").splitlines()
     return [(word, pattern) for word, _, pattern in (row.partition("\t") for row in rows)]
-
-
-def from_abroad(text: str) -> bool:
-    """Whether a name looks like none of English words, so that it is looked up here first."""
-    return bool(ABROAD.search(text))

@@ -96,16 +96,12 @@ class AssetRecord:
 
     def turned(self, quarters: int) -> AssetRecord:
         """The record with the model turned by quarters of a circle about +Y, counter-clockwise seen from above."""
-        out, low, high = np.array(self.turn).reshape(3, 3), np.array(self.low), np.array(self.high)
-        quarter = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
-        dims = np.array(self.dims)
-        for _ in range(quarters % 4):
-            out = quarter @ out
-            ends = np.stack([quarter @ low, quarter @ high])
-            low, high, dims = ends.min(0), ends.max(0), dims[[2, 1, 0]]
+        turn = np.linalg.matrix_power(np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]), quarters % 4)
+        ends = np.array([self.low, self.high]) @ turn.T
+        own, dims = turn @ np.reshape(self.turn, (3, 3)), np.abs(turn @ self.dims)
         return replace(
-            self, turn=tuple(out.ravel().tolist()), low=vector(low), high=vector(high), dims=vector(dims)
-        )  # fmt: skip
+            self, turn=tuple(own.ravel().tolist()), low=vector(ends.min(0)), high=vector(ends.max(0)), dims=vector(dims)
+        )
 
 
 def vector(values: np.ndarray) -> Vector:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import io
-
 import numpy as np
 import trimesh
+
+from echousd.textures import encoded
 
 LEVEL = 0.95  # least upward part of a normal
 CARRIES = 0.2  # least share of the footprint at one height that things can stand on
@@ -37,23 +37,4 @@ def thumbnail(mesh: trimesh.Trimesh) -> bytes:
     """PNG of a mesh in the object frame, seen from its front right above."""
     from echomodel.data.sheet import thumbnail as drawn
 
-    out = io.BytesIO()
-    drawn(mesh, SIDE).save(out, "PNG")
-    return out.getvalue()
-
-
-def sampled(mesh: trimesh.Trimesh, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(points, normals, faces) of evenly chosen places on the surface, the same for the same mesh."""
-    area = np.nan_to_num(np.asarray(mesh.area_faces, float))
-    total = float(area.sum())
-    rng = np.random.default_rng(0)
-    where = (np.arange(count) + 0.5) / count
-    even = np.arange(count) % len(area)
-    face = np.searchsorted(np.cumsum(area) / total, where).clip(0, len(area) - 1) if total > 0 else even
-    share = rng.random((count, 2))
-    share = np.where(share.sum(1, keepdims=True) > 1, 1 - share, share)
-    corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)[face]]
-    points = (
-        corners[:, 0] + share[:, :1] * (corners[:, 1] - corners[:, 0]) + share[:, 1:] * (corners[:, 2] - corners[:, 0])
-    )
-    return points, np.asarray(mesh.face_normals)[face], face
+    return encoded(drawn(mesh, SIDE))

@@ -8,9 +8,8 @@ from functools import cached_property
 
 import numpy as np
 import trimesh
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
+from trimesh.graph import connected_component_labels
 from trimesh.triangles import closest_point
 
 from echomodel.dressing import SMALL
@@ -382,8 +381,7 @@ def inside_solid(points: np.ndarray, solid: Shape) -> np.ndarray:
     faces = solid.faces
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     count = len(solid.points)
-    graph = sparse.coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), (count, count))
-    piece = connected_components(graph, directed=False)[1][faces[:, 0]]
+    piece = connected_component_labels(edges, count)[faces[:, 0]]
     low, high = edges.min(1), edges.max(1)
     _, where = np.unique(low * count + high, return_inverse=True)
     balance = np.bincount(where, np.where(edges[:, 0] < edges[:, 1], 1, -1))

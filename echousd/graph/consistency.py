@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
 
 from echomodel.vocabulary import vocabulary
 
@@ -137,29 +138,12 @@ def find_cycle(edges: Mapping[tuple[str, str], object]) -> list[tuple[str, str]]
     try:
         TopologicalSorter(after).prepare()
     except CycleError as error:
+        import networkx  # graphs without a fault do without
+
         start = next(node for node in after if node in error.args[1])
-        return _shortest_return(start, after)
-    return []
-
-
-def _shortest_return(start: str, after: Mapping[str, list[str]]) -> list[tuple[str, str]]:
-    """Breadth-first search from `start` back to itself."""
-    came_from: dict[str, str] = {}
-    level = [start]
-    while level:
-        following = []
-        for node in level:
-            for other in after.get(node, ()):
-                if other == start:
-                    path = [(node, start)]
-                    while node != start:
-                        path.append((came_from[node], node))
-                        node = came_from[node]
-                    return path[::-1]
-                if other not in came_from:
-                    came_from[other] = node
-                    following.append(other)
-        level = following
+        back = networkx.single_target_shortest_path(networkx.DiGraph(list(edges)), start)
+        way = [start, *min((back[other] for other in after[start] if other in back), key=len)]
+        return list(pairwise(way))
     return []
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull, QhullError
+from trimesh.util import append_faces
 
 from echomodel.furniture.assembly import Piece, pieces_of
 from echomodel.furniture.solids import FINEST, Solid
@@ -102,9 +103,7 @@ def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int, *, roun
 
 def part_of(name: str, pieces: Sequence[Piece], body: str = "") -> Part:
     """Some meshed solids as one part with a slot per material."""
-    offsets = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
-    faces = np.concatenate([piece.faces + offset for piece, offset in zip(pieces, offsets, strict=False)])
-    mesh = trimesh.Trimesh(np.concatenate([piece.vertices for piece in pieces]), faces, process=False)
+    mesh = trimesh.Trimesh(*append_faces([p.vertices for p in pieces], [p.faces for p in pieces]), process=False)
     words = [SLOTS.get(piece.solid.material, piece.solid.material) for piece in pieces]
     slot = np.repeat(words, [len(piece.faces) for piece in pieces])
     return Part(name, mesh, {word: np.flatnonzero(slot == word) for word in sorted(set(words))}, CREASE, body)

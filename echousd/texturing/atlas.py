@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from trimesh.graph import connected_component_labels
 
 Mesh = tuple[np.ndarray, np.ndarray]
 PADDING = 4  # texels between charts
@@ -95,8 +94,7 @@ def _boards(meshes: Sequence[Mesh]) -> list[_Board]:
         _, first, index = np.unique(flat, return_index=True, return_inverse=True)
         faces = index.reshape(-1, 3)
         pairs = np.concatenate([faces[:, :2], faces[:, 1:]])
-        links = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(len(first), len(first)))
-        label = connected_components(links, directed=False)[1][faces[:, 0]]
+        label = connected_component_labels(pairs, len(first))[faces[:, 0]]
         for board in np.unique(label):
             own = np.flatnonzero(label == board)
             used, local = np.unique(faces[own].ravel(), return_inverse=True)

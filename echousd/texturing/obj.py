@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import stat
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +12,9 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from trimesh.util import append_faces
 
+from echomodel.files import read_bounded
 from echousd.texturing.atlas import DIGITS, Unwrapped
 
 LARGEST = 256 * 2**20  # bytes of a mesh that is read
@@ -32,12 +33,7 @@ def obj_bytes(mesh: Unwrapped, name: str, *, material: bool = True) -> bytes:
 def read_file(path: Path) -> bytes:
     """The bytes of a mesh's file; raises ValueError for what is no regular file, or larger than `LARGEST`."""
     try:
-        found = path.stat()
-        if not stat.S_ISREG(found.st_mode):
-            raise ValueError(f"{path}: not a regular file, allowed: a mesh")
-        if found.st_size > LARGEST:
-            raise ValueError(f"{path}: {found.st_size} bytes, allowed for a mesh: {LARGEST}")
-        return path.read_bytes()
+        return read_bounded(path, LARGEST)
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error.strerror or error})") from None
 
@@ -57,9 +53,8 @@ def _unwrapped(path: Path, content: bytes, form: str, **how: Any) -> Unwrapped:
         laid = [st for part in parts if (st := getattr(part.visual, "uv", None)) is not None]
         if [len(st) for st in laid] != [len(part.vertices) for part in parts]:
             raise ValueError("a part without texture coordinates (TEXCOORD_0, vt)")
-        starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-        faces = np.concatenate([np.asarray(part.faces, int) + n for part, n in zip(parts, starts, strict=False)])
-        mesh = Unwrapped(np.concatenate([part.vertices for part in parts]), np.concatenate(laid).astype(float), faces)
+        points, faces = append_faces([part.vertices for part in parts], [np.asarray(part.faces, int) for part in parts])
+        mesh = Unwrapped(points, np.concatenate(laid).astype(float), faces)
         if not (np.isfinite(mesh.points).all() and np.isfinite(mesh.st).all()):
             raise ValueError("numbers that are not finite")
     except ValueError as error:

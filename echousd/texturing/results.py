@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,12 +9,11 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
+from trimesh.graph import connected_component_labels
 
 from echousd.folder.within import check_links
-from echousd.textures import TextureError, decoded, texture_bytes
+from echousd.textures import TextureError, decoded, encoded, texture_bytes
 from echousd.texturing.atlas import Unwrapped
 from echousd.texturing.job import JOB, RESULTS, Job, JobObject, job_mesh
 from echousd.texturing.obj import read_glb, read_obj
@@ -137,9 +135,7 @@ def image_of(content: bytes, where: str, stem: str) -> tuple[str, bytes]:
         return f"{stem}.png", content
     if content.startswith(b"\xff\xd8"):
         return f"{stem}.jpg", content
-    out = io.BytesIO()
-    Image.fromarray(pixels).save(out, "PNG")
-    return f"{stem}.png", out.getvalue()
+    return f"{stem}.png", encoded(Image.fromarray(pixels))
 
 
 def _beside(folder: Path, stem: str, endings: tuple[str, ...]) -> Path | None:
@@ -268,5 +264,4 @@ def _places(points: np.ndarray, near: float) -> np.ndarray:
     pairs = cKDTree(unique * (near / 4)).query_pairs(near, output_type="ndarray")
     if not len(pairs):
         return index.reshape(-1)
-    links = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(len(unique), len(unique)))
-    return connected_components(links, directed=False)[1][index.reshape(-1)]
+    return connected_component_labels(pairs, len(unique))[index.reshape(-1)]

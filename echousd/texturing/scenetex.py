@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import yaml
+from trimesh.util import append_faces
 
 from echousd.draw.surfaces import Painted
 from echousd.texturing.atlas import Unwrapped
@@ -65,13 +66,8 @@ def scenetex_files(
 
 
 def _joined(laid: Sequence[Unwrapped]) -> Unwrapped:
-    starts = np.cumsum([0, *(len(mesh.points) for mesh in laid)])
-    faces = [mesh.faces + start for mesh, start in zip(laid, starts, strict=False)]
-    return Unwrapped(
-        np.concatenate([mesh.points for mesh in laid]),
-        np.concatenate([mesh.st for mesh in laid]),
-        np.concatenate(faces),
-    )
+    points, faces = append_faces([mesh.points for mesh in laid], [mesh.faces for mesh in laid])
+    return Unwrapped(points, np.concatenate([mesh.st for mesh in laid]), faces)
 
 
 def _sphere(at: np.ndarray, distance: float) -> bytes:

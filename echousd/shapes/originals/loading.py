@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import os
 import re
 import tempfile
@@ -16,8 +15,7 @@ from typing import Any
 import numpy as np
 import trimesh
 from pxr import Sdf, Tf, UsdUtils
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from trimesh.graph import connected_component_labels
 
 from echomodel.files import within_memory
 from echousd.assets.catalogues import Entry
@@ -36,7 +34,7 @@ from echousd.srgb import to_linear
 from echousd.stage.files import layer_bytes, said
 from echousd.stage.pen import Pen
 from echousd.stage.shading import Image, preview_surface
-from echousd.textures import READABLE
+from echousd.textures import READABLE, encoded
 
 
 def own_file(asset: str) -> ModelFile:
@@ -166,9 +164,8 @@ class Images:
         content = self.beside.images.get(said, b"") if said else b""
         found = checked_image(content) if content else None
         if found is None or not found[0]:
-            out = io.BytesIO()
-            image.convert("RGBA" if "A" in image.getbands() or image.mode == "P" else "RGB").save(out, "PNG")
-            content, ending = out.getvalue(), ".png"
+            mode = "RGBA" if "A" in image.getbands() or image.mode == "P" else "RGB"
+            content, ending = encoded(image.convert(mode)), ".png"
         else:
             ending = found[0]
         stem = re.sub(r"[^A-Za-z0-9_\-]+", "_", PurePosixPath(said.replace("\\", "/")).stem) or "image"
@@ -350,9 +347,7 @@ def outward(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     corner = place[faces]
     count = int(place.max()) + 1
     start, end = corner[:, [0, 1, 2]].ravel(), corner[:, [1, 2, 0]].ravel()
-    piece = connected_components(coo_array((np.ones(len(start)), (start, end)), shape=(count, count)), directed=False)[
-        1
-    ]
+    piece = connected_component_labels(np.stack([start, end], 1), count)
     forth, back = start * count + end, end * count + start
     known, often = np.unique(forth, return_counts=True)
     once = often[np.searchsorted(known, forth)] == 1

@@ -73,10 +73,9 @@ def mesh_of(solids: Sequence[Solid], size: np.ndarray | None = None, *, round: b
     import trimesh
 
     pieces = pieces_of(solids, size, round=round)
-    offsets = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
-    faces = [piece.faces + offset for piece, offset in zip(pieces, offsets, strict=False)]
     counts = [len(piece.faces) for piece in pieces]
-    mesh = trimesh.Trimesh(np.concatenate([p.vertices for p in pieces]), np.concatenate(faces), process=False)
+    joined = trimesh.util.append_faces([p.vertices for p in pieces], [p.faces for p in pieces])
+    mesh = trimesh.Trimesh(*joined, process=False)
     mesh.face_attributes["part"] = np.repeat(np.arange(len(pieces)), counts)
     mesh.face_attributes["material"] = np.repeat([MATERIALS.index(p.solid.material) for p in pieces], counts)
     mesh.face_attributes["uv"] = box_uv(mesh.vertices, mesh.faces)
