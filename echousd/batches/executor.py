@@ -176,11 +176,7 @@ class LocalWorkers:
             return Outcome(worker.task, "died", error=_ending(worker.process.exitcode))
         if not worker.process.is_alive():
             return Outcome(worker.task, "died", error=_ending(worker.process.exitcode))
-        error = ""
-        if self._timeout is not None and time.monotonic() - worker.since > self._timeout:
-            error = f"took longer than {self._timeout:g} s"
-        elif self._memory is not None and (held := resident(worker.process.pid)) > self._memory:
-            error = f"held {held:.0f} MiB of memory, allowed: {self._memory} MiB"
+        error = _beyond(worker.process.pid, worker.since, self._memory, self._timeout)
         if not error:
             return None
         worker.process.kill()
@@ -244,6 +240,14 @@ def resident(process: int | None) -> float:
         return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
     except (OSError, ValueError, IndexError):
         return 0.0
+
+
+def _beyond(process: int, since: float, memory: int | None, seconds: float | None) -> str:
+    """Which of its limits a process is beyond, MiB and seconds since it began; "" for neither."""
+    if seconds is not None and time.monotonic() - since > seconds:
+        return f"took longer than {seconds:g} s"
+    held = resident(process) if memory is not None else 0.0
+    return f"held {held:.0f} MiB of memory, allowed: {memory} MiB" if memory is not None and held > memory else ""
 
 
 def _ending(code: int | None) -> str:
@@ -394,12 +398,7 @@ def watched(call: Any, given: Any, memory: int | None, seconds: float | None = N
     thread = threading.Thread(target=work, daemon=True)
     thread.start()
     while not done.wait(DYING):
-        held, told = resident(os.getpid()), ""
-        if memory is not None and held > memory:
-            told = f"held {held:.0f} MiB of memory, allowed: {memory} MiB"
-        elif seconds is not None and time.monotonic() - began > seconds:
-            told = f"took longer than {seconds:g} s"
-        if told:
+        if told := _beyond(os.getpid(), began, memory, seconds):
             threading.Timer(1.0, os._exit, (1,)).start()  # after this answer is on its way: the thread cannot be ended
             return "limit", told
     return found[0]

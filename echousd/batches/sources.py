@@ -13,7 +13,7 @@ import numpy as np
 from echomodel.files import within_memory
 from echomodel.vocabulary import vocabulary
 from echousd.assets.table import LARGEST, unpacked
-from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
+from echousd.graph import GraphError, Node, RoomSpec, SceneGraph
 from echousd.graph.files import MAX_BYTES, STAGE_FORMS, TEXT_FORMS, load_graph
 
 MANY = (".jsonl", ".parquet")
@@ -79,31 +79,19 @@ def sampled_graph(room_type: str, seed: int, number: int, relations: float) -> S
     from echomodel.rooms.generator import generate_room
     from echomodel.rules import label_relations
     from echomodel.rules.telling import told_relations
+    from echousd.stage.boxes import graph_of
 
     types = [row.name for row in sorted(vocabulary().room_types, key=lambda row: -row.share)]
     if room_type not in types:
         raise ValueError(f"sample: no rooms of type {room_type!r} are drawn, allowed: {', '.join(types)}")
     kind = types.index(room_type)
     room = generate_room(np.random.Generator(np.random.PCG64([seed, kind, number])), room_type)
-    words, times = vocabulary(), dict.fromkeys(room.categories, 0)
-    names = []
-    for category in room.categories:
-        times[category] += 1
-        names.append(f"{category}_{times[category]}" if room.categories.count(category) > 1 else category)
-    nodes = tuple(
-        Node(name, category, style=f"style_{style}" if style >= 0 else None)
-        for name, category, style in zip(names, room.categories, room.styles or [-1] * len(room), strict=True)
-    )
-    edges = told_relations(
-        torch.from_numpy(label_relations(room, headings=True)),
-        Boxes.from_room(room),
-        relations,
-        torch.Generator().manual_seed(number),
-    ).tolist()
-    told = tuple(Relation(names[s], words.predicates[p].name, names[o]) for s, p, o in edges)
-    floor = tuple((round(float(x), 4), round(float(z), 4)) for x, z in room.floor_polygon)
+    labelled, luck = torch.from_numpy(label_relations(room, headings=True)), torch.Generator().manual_seed(number)
+    edges = told_relations(labelled, Boxes.from_room(room), relations, luck).numpy()
+    made = graph_of(replace(room, relations=edges))
+    floor = tuple(map(tuple, room.floor_polygon.round(4).tolist()))
     spec = RoomSpec(room_type, floor_polygon=floor, height=round(room.height, 4), openings=room.openings)
-    return SceneGraph(spec, nodes, told)
+    return SceneGraph(spec, tuple(Node(n.name, n.category, style=n.style) for n in made.nodes), made.relations)
 
 
 def _files(source: str) -> list[Path]:

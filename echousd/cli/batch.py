@@ -10,25 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
-from echousd.cli.options import AsJson, Outside, add_room_command
+from echousd.cli.options import AsJson, Outside, add_room_command, group_of
 from echousd.cli.output import one_line, say, say_error, say_json
 
 if TYPE_CHECKING:
     from echousd.batches.batch import BatchProgress
 
 
-class _RunByDefault(TyperGroup):
-    """`echousd batch SOURCES` is `echousd batch run SOURCES`."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        if args and args[0] not in (*self.commands, "--help"):
-            args = ["run", *args]
-        return super().parse_args(ctx, args)
-
-
-batch_app = typer.Typer(cls=_RunByDefault, no_args_is_help=True)
+batch_app = typer.Typer(cls=group_of("run"), no_args_is_help=True)
 app = typer.Typer()
 app.add_typer(batch_app, name="batch", help="Many rooms: a plan, workers, a journal, a manifest.")
 

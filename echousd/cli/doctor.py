@@ -39,6 +39,7 @@ def doctor(as_json: bool = typer.Option(False, "--json", help="Print JSON.")) ->
 
 
 def _show(findings: list[Diagnosis]) -> None:
+    from rich.markup import escape
     from rich.table import Table
 
     from echousd.cli.terminal import Terminal
@@ -49,14 +50,10 @@ def _show(findings: list[Diagnosis]) -> None:
         table.add_column(heading, overflow="fold")
     for diagnosis in findings:
         state = f"[{colours[diagnosis.state]}]{diagnosis.state}[/]"
-        table.add_row(diagnosis.name, state, _plain(diagnosis.found), _plain(diagnosis.remedy))
+        table.add_row(diagnosis.name, state, escape(diagnosis.found), escape(diagnosis.remedy))
     console = Terminal(markup=True)
     if not console.is_terminal:
         console.width = 200  # nobody's window: keep paths on one line
     console.print(table)
 
 
-def _plain(text: str) -> str:
-    from rich.markup import escape
-
-    return escape(text)

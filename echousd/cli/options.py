@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 Room = Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz) or its folder.", show_default=False)]
 Layout = Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)]
@@ -27,6 +27,22 @@ Outside = Annotated[
         hidden=True,
     ),
 ]
+
+
+def group_of(usual: str) -> type[TyperGroup]:
+    """A group of commands of which one may be left out: `echousd batch SOURCES` is `echousd batch run SOURCES`."""
+
+    class WithUsual(TyperGroup):
+        """The group."""
+
+        def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+            """The arguments with the command that they leave out."""
+            named = not args or args[0] in (*self.commands, *ctx.help_option_names)
+            return super().parse_args(ctx, args if named else [usual, *args])
+
+    return WithUsual
+
+
 LONG = 8  # characters in place of a value; longer ones would leave no room for help
 
 

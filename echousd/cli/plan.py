@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperGroup
 
-from echousd.cli.options import Force, Written
+from echousd.cli.options import Force, Written, group_of
 from echousd.cli.output import say_done
 
 EXAMPLES = """Examples:
@@ -28,16 +27,7 @@ IMPORT_EXAMPLES = """Examples:
     echousd plan import scan.json -o scan.usda        (RoomPlan, ProcTHOR, Holodeck, SceneSmith, SAGE or Infinigen)"""
 
 
-class _ExportsByItself(TyperGroup):
-    """`echousd plan HOME -o ...` is `echousd plan export HOME -o ...`."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """The arguments with the command that they leave out."""
-        named = bool(args) and (args[0] in self.commands or args[0] in ctx.help_option_names)
-        return super().parse_args(ctx, args if named or not args else ["export", *args])
-
-
-plan_app = typer.Typer(cls=_ExportsByItself, no_args_is_help=True, epilog=EXAMPLES)
+plan_app = typer.Typer(cls=group_of("export"), no_args_is_help=True, epilog=EXAMPLES)
 app = typer.Typer()
 app.add_typer(plan_app, name="plan", help="Plan a home, draw or write its plan; read somebody's floor plan.")
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    import numpy as np
     import trimesh
 
     from echomodel.roomboxes import RoomBoxes
@@ -199,21 +199,14 @@ def to_usd(
     from echousd.stage.boxes import write_stages
 
     found = load_rooms(rooms, limit)
-    given = [room.relations for room in found]
     if known:
         kept = with_known_words(found)
         # Relations speak of places in the list: they stay valid only where nothing was left out.
         found = [
-            room if len(room) < len(old) else _with_relations(room, edges)
-            for room, old, edges in zip(kept, found, given, strict=True)
+            room if len(room) < len(old) else replace(room, relations=old.relations)
+            for room, old in zip(kept, found, strict=True)
         ]
     write_stages(found, out, None if rules == "none" else rules)
-
-
-def _with_relations(room: RoomBoxes, relations: np.ndarray | None) -> RoomBoxes:
-    from dataclasses import replace
-
-    return replace(room, relations=relations)
 
 
 @data_app.command("import")

@@ -39,7 +39,7 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
     sun = scenery.lights.sun
     sun = np.float32(SUN / np.pi) * (0 * SUN_LIGHT if sun is None else sun[1]) if view.inside else 0.55 * SUN_LIGHT
     glow = float(np.interp(scenery.lights.day, (0, 1), (GLOWING, 1))) if view.inside else 1.0
-    world = World(_embree(scenery), scenery, view, size, shift, thrown_back(scenery), sun, glow)
+    world = World(embree(scenery.triangles), scenery, view, size, shift, thrown_back(scenery), sun, glow)
     mixed = _radiance(world, height, rays)
     return (exposed(mixed, world.thrown, scenery.lights.day) if view.inside else _tone(mixed)) ** (1 / 2.2)
 
@@ -328,14 +328,15 @@ LATTICE = np.array([(0.75487767, 0.81917251, 0.54970048, 0.73389190), (0.5698402
 R2 = np.array([0.7548776662, 0.5698402910], np.float32)
 
 
-def _embree(scenery: Scenery) -> Any:
+def embree(triangles: np.ndarray) -> Any:
+    """The tree of Embree of triangles (f, 3, 3), which rays are run through; raises RenderUnavailable without it."""
     try:
         from embreex import rtcore_scene
         from embreex.mesh_construction import TriangleMesh
     except ImportError as error:
         raise RenderUnavailable(f'drawing needs Embree ({error}): pip install "echousd[render]"') from None
     scene = rtcore_scene.EmbreeScene()
-    TriangleMesh(scene, np.ascontiguousarray(scenery.triangles, np.float32))
+    TriangleMesh(scene, _f32(triangles))
     return scene
 
 

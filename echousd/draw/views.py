@@ -79,11 +79,6 @@ def shifted(view: np.ndarray, slope: np.ndarray | float) -> np.ndarray:
     return view
 
 
-def perspective_view(points: np.ndarray, furniture: Furniture) -> np.ndarray:
-    """(4, 4) float camera to world: the first of `perspective_views`."""
-    return perspective_views(points, furniture)[0]
-
-
 def perspective_views(points: np.ndarray, furniture: Furniture) -> list[np.ndarray]:
     """(4, 4) float camera to world of the views from the four corners, least hidden first, fronts preferred.
 

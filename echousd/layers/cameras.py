@@ -12,7 +12,7 @@ from echomodel.openings import inward_normal, segment
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.draw.sight import ASPECT, Furniture
-from echousd.draw.views import APERTURE, FOCAL_LENGTH, MARGIN, inside_view, perspective_view, shifted
+from echousd.draw.views import APERTURE, FOCAL_LENGTH, MARGIN, inside_view, perspective_views, shifted
 from echousd.room import RoomData
 from echousd.shapes import walls
 from echousd.stage.pen import Pen, ops
@@ -50,7 +50,7 @@ def write_cameras(
 
     Arguments:
         pen: writes the cameras.
-        volume: of the room. points, furniture: see `perspective_view`.
+        volume: of the room. points, furniture: see `perspective_views`.
         walled: corners of the floor of a room with walls; its perspective camera stands inside.
         hung: what hangs or stands at the walls and must not fill that camera's picture. openings: doors and windows.
         main: row of the furniture that this camera has whole in its picture.
@@ -70,7 +70,7 @@ def write_cameras(
     if walled is not None:
         matrix, lens = inside_view(walled, furniture, float(volume.upper[1]), hung, openings, main)
     else:
-        matrix, lens = perspective_view(points, furniture), FOCAL_LENGTH
+        matrix, lens = perspective_views(points, furniture)[0], FOCAL_LENGTH
     slope = float(matrix[:3, 1] @ matrix[:3, 2])  # 0 of a camera that has no shift
     sharp = volume.centre if main is None else furniture.corners[main].mean(0)
     camera = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-import stat
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from echomodel.files import read_bounded
 from echousd.folder.within import inside
 from echousd.texturing.atlas import Unwrapped, layout_digest
 from echousd.texturing.obj import read_obj
@@ -94,10 +94,7 @@ def read_job(folder: Path) -> Job:
     """The job in a folder; raises ValueError that names the file and the field."""
     path = folder / JOB
     try:
-        found = path.stat()
-        if not stat.S_ISREG(found.st_mode) or found.st_size > LARGEST:
-            raise ValueError(f"{path}: not a regular file of at most {LARGEST} bytes, allowed: a job of texture export")
-        job = Job.model_validate_json(path.read_bytes())
+        job = Job.model_validate_json(read_bounded(path, LARGEST))
     except OSError as error:
         raise ValueError(
             f"{path}: cannot be read ({error.strerror or error}), allowed: the folder of texture export"

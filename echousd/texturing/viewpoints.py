@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from echomodel.triangles import area_normals
 from echousd.draw.surfaces import Painted, Surfaces
+from echousd.draw.tracing import RenderUnavailable, embree
 from echousd.draw.views import view_matrix
 from echousd.texturing.atlas import Unwrapped, texel_faces
 
@@ -79,12 +80,9 @@ def visible_shares(
 ) -> list[float] | None:
     """For every object the share of its texels that a camera sees past all others; None where Embree is missing."""
     try:
-        from embreex import rtcore_scene
-        from embreex.mesh_construction import TriangleMesh
-    except ImportError:
+        scene = embree(np.concatenate([t.triangles for t in objects]))
+    except RenderUnavailable:
         return None
-    scene = rtcore_scene.EmbreeScene()
-    TriangleMesh(scene, np.ascontiguousarray(np.concatenate([t.triangles for t in objects]), np.float32))
     shares = []
     for thing, mesh in zip(objects, laid, strict=True):
         points, normals = _samples(thing.triangles, mesh.corners)

@@ -8,7 +8,7 @@ from small_room import BARE, OBJECTS, StandIn, small_graph
 
 import echousd
 from echousd.draw.sight import Furniture
-from echousd.draw.views import perspective_view
+from echousd.draw.views import perspective_views
 from echousd.options import RoomOptions
 from echousd.stage.graphs import read_graph
 
@@ -279,7 +279,7 @@ def test_camera_stands_where_no_tall_piece_hides_the_others():
         cos, sin = np.cos(turn * np.pi / 2), np.sin(turn * np.pi / 2)
         rotate = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
         turned = Furniture(size, position @ rotate.T, furniture.yaw + turn * np.pi / 2)
-        eye = perspective_view(corners @ rotate.T, turned)[:3, 3]
+        eye = perspective_views(corners @ rotate.T, turned)[0][:3, 3]
         assert turned.hidden(eye) < 1.0
         assert (rotate.T @ eye)[2] < 0
 
