@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module, metadata, resources, util
@@ -10,23 +11,7 @@ from pathlib import Path
 
 from echousd import plugin
 
-# Optional extra of the distribution, the modules it brings, what needs it.
-EXTRAS = (
-    ("render", ("embreex",), "fast ray casting for pictures"),
-    ("sim", ("mujoco",), "simulating rooms (check --settle)"),
-    ("texture", ("xatlas",), "texture coordinates without overlaps (generate --atlas)"),
-    ("validate", ("usd_validation_nvidia",), "NVIDIA's validator, by which our tests check rooms"),
-    ("home", ("ortools",), "plans of homes of several rooms"),
-    ("dxf", ("ezdxf",), "plans as DXF"),
-    ("svg", ("svgelements",), "floor plans in SVG"),
-    ("ifc", ("ifcopenshell",), "floor plans in IFC"),
-    ("eval", ("sklearn", "fcl", "jinja2", "embreex"), "`echousd eval suite`"),
-    ("batch", ("pyarrow",), "Parquet tables of `echousd batch`"),
-    ("assets", ("pyarrow",), "libraries of furniture, `echousd assets`"),
-    ("ray", ("ray",), "`echousd batch` on a Ray cluster"),
-    ("sgfront", ("h5py",), "shapes of 3D-FUTURE-SDF to train the paper preset on"),
-    ("text", ("open_clip",), "text features of the released models"),
-)
+EXTRAS = tomllib.loads(Path(__file__).with_name("extras.toml").read_text("utf-8"))
 GPUS = ("/dev/nvidiactl", "/dev/dxg", "/dev/kfd", "/dev/accel")  # on Linux; without one torch finds the processor alone
 OLDEST = (0, 24, 11)  # the first OpenUSD with UsdSemantics
 
@@ -110,10 +95,9 @@ def _weights() -> Iterator[Diagnosis]:
 
 
 def _extras() -> Iterator[Diagnosis]:
-    for extra, modules, purpose in EXTRAS:
-        missing = [module for module in modules if util.find_spec(module) is None]
-        if missing:
+    for extra, row in EXTRAS.items():
+        if any(util.find_spec(module) is None for module in row["modules"]):
             remedy = f"pip install 'echousd[{extra}]'"
-            yield Diagnosis(f"extra {extra}", "optional", f"not installed ({purpose})", remedy)
+            yield Diagnosis(f"extra {extra}", "optional", f"not installed ({row['for']})", remedy)
         else:
-            yield Diagnosis(f"extra {extra}", "ok", f"installed ({purpose})")
+            yield Diagnosis(f"extra {extra}", "ok", f"installed ({row['for']})")

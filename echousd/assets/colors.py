@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import io
 import re
+import tomllib
 import warnings
 from collections.abc import Sequence
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -123,29 +125,20 @@ TOLD = 4.0  # cost of another colour than the one that the graph tells
 TOGETHER = 0.5  # cost of the distance of two models' main colours
 MAIN = 0.2  # share from which on a colour is one that people name a model by
 LIVELY = ("plant",)  # looks that may have any colour
-NAMED = {  # sRGB of words for colours, of woods and cloths too
-    "red": "b3261e", "crimson": "a0152a", "burgundy": "6d1f2e", "orange": "d9761f", "terracotta": "b9623f",
-    "yellow": "e3b92b", "mustard": "c9962b", "gold": "c9a24a", "green": "4f7d4a", "olive": "6f7040", "sage": "a3ad90",
-    "mint": "a9d3bd", "teal": "2f7377", "turquoise": "3fa7a3", "blue": "3a5f9a", "navy": "24324f", "purple": "6a4a86",
-    "violet": "7353a0", "lilac": "b7a3cc", "pink": "d99aa6", "rose": "c98a8e", "magenta": "b03a86", "brown": "6f4b32",
-    "tan": "b8946a", "beige": "d8c8ab", "cream": "efe6d2", "ivory": "f2ecdc", "white": "f2f2f0", "grey": "8c8c8c",
-    "gray": "8c8c8c", "silver": "c0c2c4", "charcoal": "3c4044", "black": "1d1d1e", "oak": "b98f5f", "walnut": "77502f",
-    "ash": "d3b88f", "birch": "dcc39a", "pine": "d2a96c", "beech": "cfa177", "maple": "d6b184", "cherry": "83523a",
-    "mahogany": "5f2f22", "teak": "9a6b3f", "ebony": "2f2622", "rattan": "c39e6b", "bamboo": "d0b176",
-    "brass": "b08d57", "copper": "a86a48", "chrome": "b9bcbf", "steel": "9ea3a8",
-}  # fmt: skip
 
 
 @cache
 def told_colors(text: str) -> tuple[tuple[float, float, float], ...]:
     """OKLab of the words for colours in a text (a style, a name), as they come."""
-    words = re.findall(r"[a-z]+", text.lower())
-    return tuple(_of(NAMED[word]) for word in dict.fromkeys(words) if word in NAMED)
+    return tuple(_named()[word] for word in dict.fromkeys(re.findall(r"[a-z]+", text.lower())) if word in _named())
 
 
-def _of(hexadecimal: str) -> tuple[float, float, float]:
-    light, a, b = oklab(of_hexadecimal(hexadecimal)[None])[0].tolist()
-    return light, a, b
+@cache
+def _named() -> dict[str, tuple[float, float, float]]:
+    """Word for a colour -> OKLab."""
+    rows = tomllib.loads(Path(__file__).with_name("colors.toml").read_text("utf-8"))
+    found = oklab(np.array([of_hexadecimal(row) for row in rows.values()]))
+    return dict(zip(rows, map(tuple, found.tolist()), strict=True))
 
 
 def table(rows: Sequence[tuple[float, ...]], most: int) -> np.ndarray:
