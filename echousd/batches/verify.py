@@ -20,7 +20,7 @@ from echousd.folder.manifest import LARGEST
 from echousd.folder.within import inside
 from echousd.pages import template
 from echousd.stage.apart import check_apart
-from echousd.stage.files import layer_bytes, write_whole
+from echousd.stage.files import layer_bytes, write_all
 from echousd.textures import MAX_BYTES
 
 SHEET = "index.html"
@@ -168,7 +168,7 @@ def write_index(folder: Path, rows: Iterable[dict[str, Any]]) -> Path:
             move.default = at
             order = Sdf.AttributeSpec(prim, "xformOpOrder", Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
             order.default = ["xformOp:translate:grid"]
-    write_whole(folder / INDEX, layer_bytes(layer, ".usda"))
+    write_all({folder / INDEX: layer_bytes(layer, ".usda")})
     return folder / INDEX
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,7 +14,6 @@ from echousd.cli.output import report, say, say_done, say_written, telling_fault
 
 if TYPE_CHECKING:
     from echousd.home.graph import HomeGraph
-    from echousd.make.finished import Written
     from echousd.options import RoomOptions
 
 app = typer.Typer()
@@ -55,36 +53,22 @@ def generate(
     if home is not None:
         generate_home(graph, home, output, options, outside or (), force=force, json=json)
         return
-    with ExitStack() as held:
-        held.enter_context(writing(output, flat=flat, force=force, wait=wait))
-        held.enter_context(telling_faults())
-        listen = held.enter_context(progress_bar())
+    with writing(output, flat=flat, force=force, wait=wait), telling_faults(), progress_bar() as listen:
         from echousd.make.finished import write_room
         from echousd.make.pipeline import generate as make
         from echousd.progress import StageTimer
 
         spent = {"imports": time.perf_counter() - started}
-
-        def one(path: str | None, folder: Path) -> Written:
-            room = make(
-                graph,
-                room=path,
-                options=options,
-                outside=outside or (),
-                earlier=None if flat else folder,
-                progress=listen,
-            )
-            timer = StageTimer(listen)
-            written = write_room(room, folder, timer, flat=flat, force=force, store=store)
-            for stage, seconds in (*timer.seconds.items(), *room.timings.items()):
-                spent[stage] = spent.get(stage, 0.0) + seconds
-            return written
-
-        made = [one(room, output)]
+        earlier = None if flat else output
+        made = make(graph, room=room, options=options, outside=outside or (), earlier=earlier, progress=listen)
+        timer = StageTimer(listen)
+        written = write_room(made, output, timer, flat=flat, force=force, store=store)
+    for stage, seconds in (*timer.seconds.items(), *made.timings.items()):
+        spent[stage] = spent.get(stage, 0.0) + seconds
     total = time.perf_counter() - started
     spent |= {"other": total - sum(spent.values()), "total": total}
     more = {"timings": {stage: round(seconds, 3) for stage, seconds in spent.items()}}
-    report(made, json=json, more=more)
+    report([written], json=json, more=more)
 
 
 def home_of(graph: Path) -> HomeGraph | None:

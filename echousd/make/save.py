@@ -26,7 +26,7 @@ from echousd.room import LayoutOutcome, RoomData
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.sources.retrieval import beside
 from echousd.stage.apart import check_harmless
-from echousd.stage.files import open_stage, write_whole
+from echousd.stage.files import open_stage, write_all
 from echousd.stage.layouts import layout_names, showing_layout
 from echousd.stage.paths import UNFIT, layer_file
 
@@ -162,7 +162,7 @@ def write_preview(root: Path, stage: Usd.Stage | None = None) -> Path | None:
         kept = folders.backup_name(out.parent, out.name)
         out.replace(out.with_name(kept))
         folders.tell_kept(out.parent, out.name, kept)
-    write_whole(out, png(picture), left="the room itself is complete")
+    write_all({out: png(picture)}, left="the room itself is complete")
     return out
 
 
@@ -196,7 +196,7 @@ def write_sheet(root: Path, stage: Usd.Stage) -> Path | None:
             return None
         ImageDraw.Draw(picture).text((8, 6), name, fill="black")
         sheet.paste(picture, (number % wide * SHEET, number // wide * SHEET))
-    write_whole(out, png(sheet), left="the room itself is complete")
+    write_all({out: png(sheet)}, left="the room itself is complete")
     return out
 
 

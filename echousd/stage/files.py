@@ -223,19 +223,13 @@ def layer_bytes(layer: Sdf.Layer, suffix: str) -> bytes:
         return path.read_bytes()
 
 
-def write_whole(path: Path, content: bytes, *, left: str = "nothing was changed") -> None:
-    """Write a file so that it is there as a whole or not at all; raises ValueError where that is impossible.
-
-    Arguments:
-        left: what the error says about the state in which everything else is left.
-    """
-    write_all({path: content}, left=left)
-
-
 def write_all(files: Mapping[Path, bytes], *, left: str = "nothing was changed") -> None:
     """Write files, none of which appears before all have found their room on the disk; the first appears last.
 
     Raises ValueError where that is impossible, and takes folders that it made away again.
+
+    Arguments:
+        left: what the error says about the state in which everything else is left.
     """
     path, made = Path(), list[Path]()
     for taken in (path for path in files if path.is_dir()):  # found out by the rename alone, after others
