@@ -18,6 +18,7 @@ from echousd.graph.scene import SceneGraph
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 LABELLED = 80  # arrows that still carry their words; more would cover each other
 
@@ -51,8 +52,6 @@ def arrows(graph: SceneGraph) -> list[Arrow]:
 
 def draw_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:
     """Write a picture of `graph` to `path`; its extension (.png, .svg, .pdf) chooses the form. Raises OSError."""
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     place = places(graph)
@@ -67,7 +66,6 @@ def draw_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:
     low, high = (low + high - span) / 2, (low + high + span) / 2
     shrink = min(1.0, 40 / span.max())  # a thousand objects still make a picture that opens
     figure = Figure(figsize=(span[0] * shrink, span[1] * shrink + 1.05), dpi=160)
-    FigureCanvasAgg(figure)
     tall = figure.get_figheight()
     axes = figure.add_axes((0, 0.45 / tall, 1, 1 - 1.05 / tall))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -81,11 +79,20 @@ def draw_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:
     title = f"{room.type.replace('_', ' ')}{size}: {len(graph.nodes)} objects, {len(graph.relations)} relations"
     figure.text(0.5, 1 - 0.34 / tall, title, ha="center", va="center", fontsize=13, weight="bold", color="#2b2f36")
     _draw_legend(figure, {arrow.kind for arrow in joined}, tall)
-    suffix = Path(path).suffix.lower().lstrip(".")
-    metadata: dict[str, Any] = {"Date": None} if suffix == "svg" else {}
-    metadata |= {"Creator" if suffix in ("svg", "pdf") else "Software": "echousd"}
-    with rc_context({"svg.hashsalt": "echousd"}), whole_file(path) as beside:  # the same graph, the same bytes
-        figure.savefig(beside, format=suffix, facecolor="white", metadata=metadata)
+    save_figure(figure, path)
+
+
+DATES = {"svg": "Date", "pdf": "CreationDate"}
+
+
+def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a drawing in the form of its extension (.png, .svg, .pdf); the same drawing is the same bytes."""
+    from matplotlib import rc_context
+
+    form = Path(path).suffix.lower().lstrip(".")
+    metadata = {DATES[form]: None, "Creator": "echousd"} if form in DATES else {"Software": "echousd"}
+    with rc_context({"svg.hashsalt": "echousd"}), whole_file(path) as beside:
+        figure.savefig(beside, format=form, metadata=metadata)
 
 
 def _draw_node(axes: Axes, node: Node, place: np.ndarray, shrink: float) -> None:

@@ -14,6 +14,7 @@ from echomodel.files import whole_file, write_json
 from echomodel.openings import Opening, direction, hinge_point, inward_normal, segment, signed_area, swing_area
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError
+from echousd.graph.picture import save_figure
 from echousd.home.plan import Plan, ways
 from echousd.home.stages import Standing
 from echousd.naming import free_name
@@ -97,14 +98,11 @@ def draw_plans(
     Arguments:
         over: (k, 2) float each, lines (x, z) of a drawing that the plans were taken from. things: that stand in them.
     """
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     wide = min(len(plans), 3)
     high = -(-len(plans) // wide)
     figure = Figure(figsize=(ACROSS * wide, ACROSS * high), dpi=140, layout="tight")
-    FigureCanvasAgg(figure)
     for number, plan in enumerate(plans):
         axes = figure.add_subplot(high, wide, number + 1)
         axes.set_aspect("equal")
@@ -138,10 +136,7 @@ def draw_plans(
         for points in over:
             axes.plot(*on_paper(points).T, color="#d02f2f", linewidth=0.5, alpha=0.8)
         axes.set_title(f"{plan.area:.1f} m²", fontsize=8)
-    form = path.suffix.lower().removeprefix(".")
-    dated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {"Software": "echousd"}}[form]
-    with whole_file(path) as beside, rc_context({"svg.hashsalt": "echousd"}):
-        figure.savefig(beside, format=form, metadata=dated)
+    save_figure(figure, path)
 
 
 def write_dxf(plan: Plan, path: Path, things: Sequence[Standing] = ()) -> None:

@@ -80,13 +80,11 @@ def plot_rooms(
     if not rooms:
         raise ValueError("no rooms to plot")
     from matplotlib import colormaps
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     columns = min(columns, len(rooms))
     lines = -(-len(rooms) // columns)
     figure = Figure(figsize=(columns * CELL, lines * CELL))
-    FigureCanvasAgg(figure)
     palette, words = colormaps["tab20"], vocabulary().coarse_categories
     for k, room in enumerate(rooms):
         axes = figure.add_subplot(lines, columns, k + 1)
