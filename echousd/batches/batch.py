@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from echousd.batches import work
 from echousd.batches.executor import Executor, LocalWorkers, Outcome, RayCluster, Task
-from echousd.batches.options import BatchRequest, as_paths, request_of
+from echousd.batches.options import BatchRequest, request_of
 from echousd.batches.plan import (
     STATE,
     STORE,
@@ -90,10 +90,10 @@ def batch(
 
     Raises ValueError for what is not allowed, a folder in use or with another plan, and says the difference.
     """
-    given = [sources] if isinstance(sources, str | Path) else list(sources)
+    given = [sources] if isinstance(sources, str | Path) else sources
     how = {field.name: options.pop(field.name) for field in fields(RunOptions) if field.name in options}
     raw = {
-        "sources": as_paths(given), "sample": dict(sample or {}), "count": count, "seed": seed,
+        "sources": [Path(one).as_posix() for one in given], "sample": dict(sample or {}), "count": count, "seed": seed,
         "options": options, "variations": {key: list(values) for key, values in (variations or {}).items()},
     }  # fmt: skip
     return run_batch(request_of(raw, "batch"), Path(out), RunOptions(**how))

@@ -119,8 +119,3 @@ def parse_sample(text: str) -> dict[str, int]:
         kind = vocabulary().room_type(word.strip()).name
         found[kind] = found.get(kind, 0) + int(number)
     return found
-
-
-def as_paths(sources: Sequence[str | Path]) -> list[str]:
-    """Sources as texts with forward slashes."""
-    return [Path(source).as_posix() for source in sources]

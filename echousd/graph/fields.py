@@ -217,7 +217,7 @@ def _optional(check: Callable[[Any], Any]) -> BeforeValidator:
     return BeforeValidator(lambda value: None if value is None else check(value))
 
 
-def _word(kind: str) -> tuple[Callable[[Any], str], WithJsonSchema]:
+def _word(kind: str, table: str) -> tuple[Callable[[Any], str], WithJsonSchema]:
     """A word of the vocabulary, canonicalised; the JSON schema offers the names and lets aliases pass."""
 
     def check(value: Any) -> str:
@@ -225,19 +225,13 @@ def _word(kind: str) -> tuple[Callable[[Any], str], WithJsonSchema]:
             raise ValueError(f"found {shown(value)}, allowed: the name of a {kind.replace('_', ' ')}")
         return getattr(vocabulary(), kind)(value).name
 
-    words = vocabulary()
-    entries: tuple[Any, ...] = {
-        "category": words.categories,
-        "predicate": words.predicates,
-        "room_type": words.room_types,
-        "style": words.styles,
-    }[kind]
-    names = [entry.name for entry in entries]
+    names = [entry.name for entry in getattr(vocabulary(), table)]
     known = {"enum": names, "description": f"{kind.replace('_', ' ')} of the vocabulary"}
     return check, WithJsonSchema({"anyOf": [known, {"type": "string", "description": "or an alias"}]})
 
 
-_category, _predicate, _room_type, _style = map(_word, ("category", "predicate", "room_type", "style"))
+_category, _predicate = _word("category", "categories"), _word("predicate", "predicates")
+_room_type, _style = _word("room_type", "room_types"), _word("style", "styles")
 
 Name: TypeAlias = Annotated[
     str, BeforeValidator(checked_identifier), Field(pattern=f"^{IDENTIFIER.pattern}$", max_length=MAX_NAME)

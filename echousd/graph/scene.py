@@ -276,9 +276,7 @@ class GraphDiff:
         )
 
     def __bool__(self) -> bool:
-        return bool(
-            self.room or self.added or self.removed or self.changed or self.related or self.unrelated or self.reweighted
-        )
+        return self != GraphDiff()
 
     @property
     def touched(self) -> frozenset[str]:

@@ -96,7 +96,10 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
         files.update(made[name].files)
     files |= attribution_files(room)
     dressing = dress(room)
-    small = {name: _small_asset(room, name, dressing) for name in dressing.geometry}
+    small = {
+        name: _written(room, name, KINDS[dressing.kinds[name]].name, ROOM_STYLE, geometry)
+        for name, geometry in dressing.geometry.items()
+    }
     for asset in small.values():
         files.update(asset.files)
     if room.options.thumbnails:
@@ -283,10 +286,6 @@ def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Pa
         carried = {piece_path("", name, part.name, part.body): tuple(part.slots) for part in geometry.parts}
         return Asset(name, carried, room.carried[name])
     return _written(room, name, word_of(room.graph.node(user)), room.styles[user], geometry)
-
-
-def _small_asset(room: RoomData, name: str, dressing: Dressing) -> Asset:
-    return _written(room, name, KINDS[dressing.kinds[name]].name, ROOM_STYLE, dressing.geometry[name])
 
 
 def _written(room: RoomData, name: str, category: str, style: str, geometry: Geometry) -> Asset:

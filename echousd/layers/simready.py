@@ -53,7 +53,8 @@ def pack(root: Path, out: Path, *, names: Sequence[str] = (), author: str = "Ech
         raise ValueError(f"{root}: no asset {unknown[0]!r}, allowed: {', '.join(known)}")
     source = manifest.get("source") or "none"
     assets = {name: _files(root, manifest, name) for name in names or known}
-    ours = [name for name, own in assets.items() if payload_file(name) in own and not any(map(_of_others, own))]
+    # Not those that hold a model as somebody else made it.
+    ours = [n for n, own in assets.items() if payload_file(n) in own and not any("/original/" in path for path in own)]
     there = [place for name in ours if (place := out / name / INSIDE).exists()]
     if there and not force:
         raise ValueError(f"{there[0]}: exists; choose another folder or use --force")
@@ -115,11 +116,6 @@ def _facts(main: Path, author: str, source: str) -> dict[str, Any]:
         "usd_date_generated": DATE, "generator": f"echousd {echousd.__version__}", "qcode": FURNITURE,
         "rigid_body_count": len(bodies), "asset_extents": Gf.Vec3f(*map(float, size)), "mass": float(sum(masses)),
     }  # fmt: skip
-
-
-def _of_others(path: str) -> bool:
-    """Whether a file of an asset is a model as somebody else made it."""
-    return "/original/" in path
 
 
 def _files(root: Path, manifest: Mapping[str, Any], name: str) -> Mapping[str, bytes]:

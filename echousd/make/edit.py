@@ -202,17 +202,13 @@ def _pinned(
     nodes = []
     for node in graph.nodes:
         if node.name not in fresh:
-            size, position, yaw = (v[row[node.name]].tolist() for v in _arrays(boxes))
+            size, position, yaw = (v[row[node.name]].tolist() for v in (boxes.size, boxes.position, boxes.yaw))
             fields: dict[str, Any] = {"size": node.size or tuple(size)}
             if node.name not in moving:
                 fields |= {"position": node.position or tuple(position), "yaw": yaw if node.yaw is None else node.yaw}
             node = node.replaced(**fields)
         nodes.append(node)
     return graph.replaced(nodes=tuple(nodes))
-
-
-def _arrays(boxes: Boxes) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    return boxes.size, boxes.position, boxes.yaw
 
 
 def _boxes_of(graph: SceneGraph) -> Boxes:

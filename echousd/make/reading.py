@@ -141,13 +141,8 @@ def _geometry(root: Usd.Prim, asset: str | None, category: str, manifest: Mappin
     origin = Origin(told.get("shapes", manifest["shapes"]), told.get("licence", LICENCE), told.get("credit", ""))
     return Geometry(
         tuple(parts), tuple(colliders), origin, read_mass(root), read_joints(root, asset or ""),
-        description=_description(root),
+        description=tuple(root.GetAttribute(DESCRIPTION).Get() or ()),
     )  # fmt: skip
-
-
-def _description(root: Usd.Prim) -> tuple[float, ...]:
-    """What the furniture branch said of a piece, empty where it was not asked."""
-    return tuple(root.GetAttribute(DESCRIPTION).Get() or ())
 
 
 def _pieces(root: Usd.Prim, asset: str) -> Iterator[tuple[Usd.Prim, str, str]]:

@@ -208,13 +208,9 @@ class Search:
         if self.walked and there.all():  # a walk takes as long as many poses
             for k in {0, *np.argsort(cost, kind="stable")[:WALKS].tolist()}:
                 cost[k] -= GRAIN * 10.0
-                cost[k] += GRAIN * PRICE["living"][0] * self._lost(position[k], yaw[k])
+                cost[k] += GRAIN * PRICE["living"][0] * len(self._unreached(position[k], yaw[k]))
         best = int(cost.argmin())
         return best if cost[best] < cost[0] - GAIN * GRAIN else 0
-
-    def _lost(self, position: np.ndarray, yaw: np.ndarray) -> int:
-        """How many pieces cannot be walked to."""
-        return len(self._unreached(position, yaw))
 
     def _unreached(self, position: np.ndarray, yaw: np.ndarray) -> list[int]:
         return [fault.object for fault in unreached(self._plan(position, yaw))]

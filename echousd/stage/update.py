@@ -33,8 +33,8 @@ def update_graph(target: Usd.Stage | Sdf.Layer, graph: SceneGraph, room: str | N
     stage = target if isinstance(target, Usd.Stage) else Usd.Stage.Open(target)
     prims = the_room(stage, room)
     editor = _Editor(stage, prims)
-    edits = [*editor.room_edits(graph), *editor.opening_edits(graph)]
-    edits += [*editor.node_edits(graph), *editor.relation_edits(graph)]
+    edits = editor.value_edits(prims.graph, usd.room_values(graph.room), tuple(usd.ROOM_FIELDS))
+    edits += [*editor.opening_edits(graph), *editor.node_edits(graph), *editor.relation_edits(graph)]
     with Sdf.ChangeBlock():
         for edit in edits:
             edit()
@@ -69,9 +69,6 @@ class _Editor:
         return Sdf.CreatePrimInLayer(self.layer, self.spec_path(path))
 
     # -- the room and its nodes ----------------------------------------------------------------------------------------
-
-    def room_edits(self, graph: SceneGraph) -> list[Edit]:
-        return self.value_edits(self.prims.graph, usd.room_values(graph.room), tuple(usd.ROOM_FIELDS))
 
     def opening_edits(self, graph: SceneGraph) -> list[Edit]:
         wanted = {opening.name: opening for opening in graph.room.openings}
