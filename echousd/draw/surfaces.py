@@ -6,6 +6,7 @@ import hashlib
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import takewhile
 
 import numpy as np
 from pxr import Tf, Usd, UsdGeom, UsdShade
@@ -135,13 +136,11 @@ def _owner(stage: Usd.Stage, path: str, prims: RoomPrims, nodes: Mapping[str, st
         each = str(below.AppendPath(inner)) if inner else str(below)
         return {"none": "", "grouped": str(below), "each": each}[dressing]
     component = ""
-    above = prim
-    while above and above.GetPath() != room:
+    for above in takewhile(lambda one: one.GetPath() != room, lineage(prim)):
         if str(above.GetPath()) in nodes:
             return str(above.GetPath())
         if not component and Usd.ModelAPI(above).GetKind() == "component":
             component = str(above.GetPath())
-        above = above.GetParent()
     return component or str(prim.GetPath())
 
 

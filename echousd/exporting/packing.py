@@ -13,6 +13,7 @@ from pathlib import Path, PurePosixPath
 
 from pxr import Ar, Sdf, Usd, UsdUtils
 
+from echousd.naming import free_name
 from echousd.stage.encoding import StageError
 from echousd.stage.files import assets_in, specs
 from echousd.store import store_above
@@ -133,10 +134,7 @@ class Package:
             PurePosixPath(used).name.casefold() for used in self.names.values()
         }
         stem, ending = os.path.splitext(name)  # noqa: PTH122  # a name with `<UDIM>`, no path
-        free, number = name, 2
-        while free.casefold() in taken:
-            free, number = f"{stem}_{number}{ending}", number + 1
-        return free
+        return free_name(stem, lambda one: f"{one}{ending}".casefold() in taken) + ending
 
     def files(self, folder: Path) -> dict[Path, bytes]:
         """What is packed, as files below `folder`."""

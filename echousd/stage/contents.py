@@ -10,6 +10,7 @@ import numpy as np
 from pxr import Kind, Sdf, Usd, UsdGeom
 from trimesh.util import append_faces
 
+from echomodel.boxes2d import seen, turned
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import LABELS
 from echousd.stage.forms import Polygons, forms, polygons
@@ -188,13 +189,11 @@ def shape_of(
     # The front is horizontal in our rooms; in a prim whose own up is +Z it is not, then the width tells the heading.
     level = np.hypot(front[0], front[2]) > np.hypot(width[0], width[2]) * 1e-3
     yaw = float(np.arctan2(front[0], front[2])) if level else float(np.arctan2(-width[2], width[0]))
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    turned = np.stack(
-        (cos * vertices[:, 0] - sin * vertices[:, 2], vertices[:, 1], sin * vertices[:, 0] + cos * vertices[:, 2]), 1
-    )
-    low, high = turned.min(0), turned.max(0)
-    x, z = (low[0] + high[0]) / 2, (low[2] + high[2]) / 2
-    position = np.array([cos * x + sin * z, low[1], cos * z - sin * x])
+    ahead = vertices.copy()
+    ahead[:, [0, 2]] = seen(vertices[:, [0, 2]], yaw)
+    low, high = ahead.min(0), ahead.max(0)
+    position = low.copy()
+    position[[0, 2]] = turned((low + high)[[0, 2]] / 2, yaw)
     return Shape(vertices, faces, high - low, position, yaw)
 
 

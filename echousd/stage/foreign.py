@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade
 
+from echomodel.boxes2d import seen
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.graph import GraphError, Node, RoomSpec, SceneGraph
@@ -248,10 +249,9 @@ def _room_above(prim: Usd.Prim) -> str:
 def _over(node: Node, floor: Box) -> bool:
     """Whether the middle of a node is above a floor and no storey higher."""
     assert node.position is not None
-    x, y, z = np.subtract(node.position, floor.position)
-    cos, sin = math.cos(floor.yaw), math.sin(floor.yaw)
-    along = (abs(cos * x - sin * z), abs(sin * x + cos * z))
-    return along[0] <= floor.size[0] / 2 and along[1] <= floor.size[2] / 2 and -0.5 < y < STOREY
+    away = np.subtract(node.position, floor.position)
+    width, depth = np.abs(seen(away[[0, 2]], floor.yaw))
+    return bool(width <= floor.size[0] / 2 and depth <= floor.size[2] / 2 and -0.5 < away[1] < STOREY)
 
 
 def object_box(prim: Usd.Prim) -> Box | None:
