@@ -28,8 +28,7 @@ from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd import check, generate
 from echousd.draw.rendering import render_stage
-from echousd.graph import SceneGraph, load_graph
-from echousd.graph.files import starting_graph
+from echousd.graph import SceneGraph, load_graph, starting_graph
 from echousd.make.finished import Room
 from echousd.place.living import living_faults
 

@@ -70,16 +70,6 @@ class AssetRecord:
     fault: str = ""
 
     @property
-    def up(self) -> Vector:
-        """The model's own axis that points up."""
-        return self.turn[3], self.turn[4], self.turn[5]
-
-    @property
-    def front(self) -> Vector:
-        """The model's own axis that points to its front."""
-        return self.turn[6], self.turn[7], self.turn[8]
-
-    @property
     def usable(self) -> bool:
         """Whether it may be chosen: read, measured, and of a known category."""
         return not self.fault and bool(self.category) and min(self.dims) > 0

@@ -3,12 +3,14 @@
 Nothing here imports pxr or torch; `load_graph` and `save_graph` load `echousd.stage` for a stage.
 """
 
+from echomodel.late import Late
 from echousd.graph.consistency import GraphError
 from echousd.graph.fields import MAX_TEXT
-from echousd.graph.files import load_graph, save_graph, starting_graph
+from echousd.graph.files import load_graph, save_graph
 from echousd.graph.nodes import Node, Placed, Relation, RoomSpec
 from echousd.graph.scene import GraphDiff, SceneGraph
 
+starting_graph = Late("echousd.graph.starting:starting_graph")
 __all__ = [
     "MAX_TEXT", "GraphDiff", "GraphError", "Node", "Placed", "Relation", "RoomSpec", "SceneGraph", "load_graph",
     "save_graph", "starting_graph",

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 if TYPE_CHECKING:
-    from PIL.Image import Image
+    pass
 
 HELD = 512 * 2**20  # bytes of memory that reading any file of somebody's may take
 EACH = 16  # and for each of its bytes: plain data takes more than its text
@@ -91,12 +91,6 @@ def write_text(path: Path, text: str) -> None:
     """Write a text as UTF-8; the file appears whole."""
     with whole_file(path) as beside:
         beside.write_text(text, "utf-8")
-
-
-def write_picture(path: Path, picture: Image) -> None:
-    """Write a picture in the format of the path's ending; the file appears whole."""
-    with whole_file(path, path.suffix) as beside:
-        picture.save(beside)
 
 
 def write_json(path: Path, content: object) -> None:

@@ -31,7 +31,7 @@ PROGRAMS = {
                "desk", "dressing_table"),
     "storage": ("nightstand", "dresser", "sideboard", "cabinet", "children_cabinet", "wardrobe", "tv_stand"),
     "shelving": ("bookshelf", "shelf", "wine_cabinet"),
-    "beds": ("double_bed", "single_bed", "kids_bed"),
+    "beds": ("double_bed", "single_bed"), "kids_beds": ("kids_bed",),
     "lamps": ("pendant_lamp", "ceiling_lamp", "floor_lamp", "table_lamp", "wall_lamp"),
     "decor": ("plant", "tv"),
     "kitchens": ("base_unit", "wall_unit", "tall_unit", "sink_unit", "hob_unit", "dishwasher", "fridge", "range_hood",

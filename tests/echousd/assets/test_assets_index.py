@@ -27,7 +27,7 @@ def test_models_of_all_kinds_become_rows(tmp_path):
     }
     bed, wardrobe = found["beds/double_bed.usda"], found["storage/thing_17.usda"]
     assert bed.dims == pytest.approx((1.8, 1.0, 2.1), abs=1e-3)
-    assert (bed.up, bed.front) == ((0, 0, 1), (0, -1, 0))  # Z-up: its front, +Z of ours, is its -Y
+    assert (bed.turn[3:6], bed.turn[6:]) == ((0, 0, 1), (0, -1, 0))  # Z-up: its front, +Z of ours, is its -Y
     assert (bed.uri, bed.licence, bed.prim) == ("models/beds/double_bed.usda", "CC0-1.0", "/piece")
     assert (wardrobe.licence, wardrobe.author, wardrobe.confidence) == ("CC0-1.0", "A. Joiner", pytest.approx(0.97))
     assert found["lamps/pendant_lamp.obj"].placement == "ceiling"
@@ -120,7 +120,7 @@ def test_the_transform_of_a_root_prim_counts(tmp_path):
     _, found = records(tmp_path, tmp_path / "models")
     record = found["dresser.usda"]
     assert record.dims == pytest.approx((2.4, 1.6, 0.9), abs=1e-3)  # twice as large, its front found at +X
-    assert record.front == pytest.approx((1, 0, 0), abs=1e-9)
+    assert record.turn[6:] == pytest.approx((1, 0, 0), abs=1e-9)
 
 
 def test_what_is_no_index_is_said(tmp_path, monkeypatch):

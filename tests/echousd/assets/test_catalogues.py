@@ -81,7 +81,7 @@ def test_hssd(tmp_path):
     assert kind == "hssd"
     assert (found["a1"].category, found["a1"].licence) == ("wardrobe", "CC-BY-NC-4.0")
     assert found["a1"].dims == pytest.approx((1.6, 2.2, 0.6), abs=1e-3)
-    assert (found["a1"].up, found["a1"].front) == ((0, 0, 1), (0, -1, 0))
+    assert (found["a1"].turn[3:6], found["a1"].turn[6:]) == ((0, 0, 1), (0, -1, 0))
 
 
 def test_3d_future(tmp_path):

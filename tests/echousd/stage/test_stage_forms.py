@@ -9,8 +9,9 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echousd.draw.drawables import read_drawables
 from echousd.stage.contents import read_contents
-from echousd.stage.forms import SkippedForms, polygons, refined
+from echousd.stage.forms import SkippedForms, polygons
 from echousd.stage.read import find_rooms
+from echousd.stage.subdivision import refined
 
 
 def empty():

@@ -1,0 +1,82 @@
+"""Subdivision surfaces as the quads that a few levels of Catmull and Clark's rules make of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+LEVELS = 2
+MAX_FACES = 400_000  # beyond which a level less is made
+
+
+def refined(
+    points: np.ndarray, counts: np.ndarray, indices: np.ndarray, levels: int = LEVELS
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Points, counts and indices after some levels, and the face that each of the new faces came from.
+
+    Arguments:
+        points: (v, 3) float; counts: (f,) int, at least 3 each; indices: (c,) int.
+    """
+    face = np.arange(len(counts))
+    for _ in range(levels):
+        if len(indices) > MAX_FACES:
+            break
+        owner = np.repeat(np.arange(len(counts)), counts)
+        points, indices = _once(points, counts, indices, owner)
+        face, counts = face[owner], np.full(len(owner), 4)
+    return points, counts, indices, face
+
+
+def _once(
+    points: np.ndarray, counts: np.ndarray, indices: np.ndarray, owner: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """One level: each corner of a face becomes a quad (corner, edge after it, middle, edge before it)."""
+    v, corners = len(points), np.arange(len(indices))
+    start = np.cumsum(counts) - counts
+    after = np.where(corners + 1 < (start + counts)[owner], corners + 1, start[owner])
+    before = np.empty_like(corners)
+    before[after] = corners
+    middle = np.zeros((len(counts), 3))
+    np.add.at(middle, owner, points[indices])
+    middle /= counts[:, None]
+
+    ends = np.sort(np.stack((indices, indices[after]), 1), 1)
+    edges, edge = np.unique(ends, axis=0, return_inverse=True)
+    edge = edge.ravel()
+    uses = np.bincount(edge, minlength=len(edges))
+    across = np.zeros((len(edges), 3))
+    np.add.at(across, edge, middle[owner])
+    half = points[edges].mean(1)
+    border = uses != 2
+    on_edge = np.where(border[:, None], half, (points[edges].sum(1) + across) / 4)
+
+    valence, faces_at = np.zeros(v), np.zeros(v)
+    np.add.at(valence, edges.ravel(), 1)
+    np.add.at(faces_at, indices, 1)
+    mean_half, mean_face = np.zeros((v, 3)), np.zeros((v, 3))
+    for end in (0, 1):
+        np.add.at(mean_half, edges[:, end], half)
+    np.add.at(mean_face, indices, middle[owner])
+    n = np.maximum(valence, 1)[:, None]
+    moved = (mean_face / np.maximum(faces_at, 1)[:, None] + 2 * mean_half / n + (n - 3) * points) / n
+    rim, rim_edges = np.zeros((v, 3)), np.zeros(v)
+    for end in (0, 1):
+        np.add.at(rim, edges[border, end], half[border])
+        np.add.at(rim_edges, edges[border, end], 1)
+    spline = (rim + 2 * points) / 4
+    moved = np.where(
+        (rim_edges == 2)[:, None], spline, np.where(((rim_edges > 0) | (valence < 1))[:, None], points, moved)
+    )
+
+    whole = np.concatenate((moved, on_edge, middle))
+    quads = np.stack((indices, v + edge, v + len(edges) + owner, v + edge[before]), 1)
+    return whole, quads.ravel()
+
+
+def smooth_normals(points: np.ndarray, indices: np.ndarray) -> np.ndarray:
+    """(v, 3) float unit normals of a surface of quads, weighted by area."""
+    quads = indices.reshape(-1, 4)
+    cross = np.cross(points[quads[:, 2]] - points[quads[:, 0]], points[quads[:, 3]] - points[quads[:, 1]])
+    out = np.zeros_like(points)
+    for corner in range(4):
+        np.add.at(out, quads[:, corner], cross)
+    return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
