@@ -191,7 +191,7 @@ class _Seat:
         if not under.size or not np.isfinite(under).any():
             return None
         top = float(under.max())
-        return top if (under > top - 2 * LEVEL).mean() > 0.6 else None
+        return top if (under > top - 4 * LEVEL).mean() > 0.6 else None
 
     def resting(self, end: float, size: np.ndarray) -> np.ndarray | None:
         """(3,) a place on the seat against the back, towards one end (-1 to 1); None where there is none."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.solids import FINEST, Array, Solid, ball, turned
+from echomodel.furniture.cloth import folds, pillow
+from echomodel.furniture.solids import FINEST, Array, Solid, turned
 
 DESIGNS = (
     "bordered", "striped", "latticed", "medallion", "checked", "chevrons", "dotted", "scalloped", "broken", "ringed",
@@ -131,12 +132,11 @@ def roman_blind(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 
 def cushion(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A cushion that leans back: square or rounded, full or flat, of one of four cloths."""
+    """A cushion on one of its sides, of one of five cloths."""
     w, h, d = size
-    half = np.array([w / 2, h / 2, d / 2])
-    # A pillow is thick in the middle and thin at its seams: a flat superellipsoid, drawn in at the sides.
-    material = str(rng.choice(("accent_cloth", "accent_plain", "blanket", "curtain"), p=(0.35, 0.35, 0.15, 0.15)))
-    return [ball((0, h / 2, 0), half, material, power=float(rng.uniform(2.3, 3.2)))]
+    cloths = ("accent_cloth", "accent_plain", "blanket", "curtain", "linen")
+    material = str(rng.choice(cloths, p=(0.3, 0.25, 0.2, 0.15, 0.1)))
+    return [pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), material)]
 
 
 def throw(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -147,17 +147,20 @@ def throw(size: Size, rng: np.random.Generator) -> list[Solid]:
     turn = np.linspace(0, np.pi / 2, 4)
     corner = np.stack([flat + round_off * np.sin(turn), h - round_off * (1 - np.cos(turn))], 1)
     hang = np.stack([np.full(3, w / 2), np.linspace(h - round_off, 0, 4)[1:]], 1)
-    side = np.concatenate([[[flat * 0.5, h]], corner, hang])
+    flats = [[share * flat, h] for share in (0.12, 0.25, 0.37, 0.5, 0.62, 0.75, 0.87)]
+    side = np.concatenate([flats, corner, hang])
     profile = np.concatenate([side[::-1] * (-1, 1), [[0.0, h]], side])
     inner = np.stack([profile[:, 0] * (1 - 2 * thick / w), profile[:, 1] - thick * (profile[:, 1] > h - round_off)], 1)
-    z = np.linspace(-d / 2, d / 2, 7)
-    ripple = 0.006 * np.sin(np.linspace(0, 9, len(z)) + rng.uniform(0, 6))
+    z = np.linspace(-d / 2, d / 2, 11)
+    ripple = 0.012 * np.sin(np.linspace(0, 9, len(z)) + rng.uniform(0, 6))
+    phase = rng.uniform(0, 6, 3)
 
     def spread(line: np.ndarray) -> np.ndarray:
         rows = [np.stack([line[:, 0], line[:, 1], np.full(len(line), at)], 1) for at in z]
         out = np.stack(rows)
         hanging = np.clip((h - line[:, 1]) / max(h, 1e-6), 0, 1)
         out[..., 0] += np.sign(line[:, 0]) * hanging * ripple[:, None]
+        out[..., 1] -= 0.01 * folds(out[..., 0], 2.5 * out[..., 2], phase) * (hanging < 0.1)
         return out
 
     return [Sheet(front=spread(profile), back=spread(inner), material="accent_cloth")]

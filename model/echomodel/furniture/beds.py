@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, both, box, core, cushion, of_role
+from echomodel.furniture.cloth import cover, pillow
 from echomodel.furniture.solids import Block, Solid, ball, rotation, turned
 from echomodel.furniture.style import Choices, Style
 
@@ -61,18 +62,22 @@ def bedding(w: float, z0: float, z1: float, low: float, choices: Choices, style:
     """Mattress, pillows and a cover from z0 (head) to z1."""
     thick = 0.2
     parts: list[Solid] = [box((-w / 2, low, z0), (w / 2, low + thick, z1), "linen", 0.05, "mattress")]
-    each = w / pillows
+    each, rng = w / pillows, choices.stream("pattern")
     for i in range(pillows):
-        place, half = (-w / 2 + each * (i + 0.5), low + thick + 0.06, z0 + 0.26), (min(each * 0.44, 0.38), 0.09, 0.22)
-        parts.append(ball(place, half, "linen", "pillow", power=2.8, turn=rotation(x=-0.25)))
-    if choices.chance("cover", 0.75):
-        start = z0 + (z1 - z0) * choices.between("spread", 0.28, 0.55)
-        over = 0.02 + 0.05 * style.softness
-        x, y, top = w / 2 + over, low + thick * 0.35, low + thick + 0.045
-        parts.append(box((-x, y, start), (x, top, z1 + over * 0.5), "blanket", 0.035, "cover"))
-        fold = 0.1 + 0.08 * style.softness  # the sheet turned back over it
-        x, y, top = x + 0.004, low + thick * 0.4, low + thick + 0.056
-        parts.append(box((-x, y, start - 0.01), (x, top, start + fold), "linen", 0.03, "cover"))
+        half = (min(each * 0.44, 0.38), 0.115, 0.24)
+        place, lean = (
+            (-w / 2 + each * (i + 0.5), low + thick + 0.11, z0 + 0.23),
+            rotation(x=-0.5, y=rng.uniform(-0.06, 0.06)),
+        )
+        parts.append(pillow(place, half, "linen", "pillow", lean))
+    if choices.chance("cover", 0.85):
+        start = z0 + (z1 - z0) * choices.between("spread", 0.28, 0.48)
+        over, top = 0.03 + 0.05 * style.softness, low + thick + 0.08
+        x, y = w / 2 + over, low + thick * 0.25
+        parts.append(cover((-x, y, start), (x, top, z1 + 0.035), "blanket", 0.05, 0.045, rng))
+        fold = 0.14 + 0.1 * style.softness  # the sheet turned back over it
+        x, y = x + 0.004, low + thick * 0.4
+        parts.append(cover((-x, y, start - 0.01), (x, top + 0.006, start + fold), "linen", 0.04, 0.02, rng))
     return parts
 
 

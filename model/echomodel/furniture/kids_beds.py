@@ -6,8 +6,9 @@ import numpy as np
 
 from echomodel.furniture.beds import bed
 from echomodel.furniture.carpentry import Size, both, box, four, of_role, post
+from echomodel.furniture.cloth import cover, pillow
 from echomodel.furniture.fronts import front
-from echomodel.furniture.solids import Block, Solid, ball, rotation
+from echomodel.furniture.solids import Block, Solid, rotation
 from echomodel.furniture.style import Choices, Style
 
 
@@ -36,14 +37,16 @@ def kids_bed(size: Size, style: Style, choices: Choices) -> list[Solid]:
 
 def _made_up(x0: float, x1: float, y: float, d: float, inset: float) -> list[Solid]:
     """A thin mattress on a deck at y from x0 to x1, a pillow at its rear end and a blanket over the rest."""
-    thick = 0.14
+    thick, rng = 0.14, np.random.default_rng(int(1000 * y))
     middle, wide = (x0 + x1) / 2, x1 - x0
     rear, near = -d / 2 + inset, d / 2 - inset
     place, half = (middle, y + thick + 0.045, rear + 0.22), (min(0.32, 0.36 * wide), 0.075, 0.18)
     return [
         box((x0 + 0.05, y, rear), (x1 - 0.05, y + thick, near), "linen", 0.04, "mattress"),
-        ball(place, half, "linen", "pillow", power=2.8),
-        box((x0 + 0.045, y + 0.05, -d * 0.12), (x1 - 0.045, y + thick + 0.03, near + 0.01), "blanket", 0.03, "cover"),
+        pillow(place, half, "linen", "pillow"),
+        cover(
+            (x0 + 0.045, y + 0.05, -d * 0.12), (x1 - 0.045, y + thick + 0.04, near + 0.01), "blanket", 0.04, 0.025, rng
+        ),
     ]
 
 

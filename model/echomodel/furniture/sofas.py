@@ -197,16 +197,7 @@ def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_dept
         t = 0.05 * style.bulk
         z = reach - 0.12
         parts += [box((x - t / 2, 0, z), (x + t / 2, foot, z + t), role="leg") for x in (x0 + 0.08, x1 - 0.08)]
-    if style.tufting > 0.75:
-        parts += _throw_pillows(inner, seat, h, z0 + frame + 0.14, style)
     return parts
-
-
-def _throw_pillows(inner: float, seat: float, h: float, z: float, style: Style) -> list[Solid]:
-    a = min(0.22, (h - seat) * 0.5, inner * 0.32)
-    place, turn = (inner - a * 1.05, seat + a * 0.85, z + 0.06), rotation(x=-0.35)
-    one = ball(place, (a, a, 0.07), "cushion", "cushion", power=2.8, turn=turn)
-    return both(one) if style.contrast > 0.4 else [one]
 
 
 def multi_seat_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
