@@ -88,7 +88,7 @@ def tsdf_of(solids: Sequence[Solid]) -> np.ndarray:
         stop = np.minimum(np.ceil(reach.max(0)).astype(int) + margin + 1, RESOLUTION)
         where = tuple(slice(a, b) for a, b in zip(start, stop, strict=True))
         x, y, z = axes[0][where[0], None, None], axes[1][None, where[1], None], axes[2][None, None, where[2]]
-        thinnest = THINNEST_ROD_OR_LEAF if isinstance(solid, Tube) or solid.material == "leaf" else THINNEST
+        thinnest = THINNEST_ROD_OR_LEAF if isinstance(solid, Tube) or solid.role == "leaf" else THINNEST
         distance = solid.distance(x, y, z, scale) - max(0.0, thinnest - solid.inradius(scale))
         np.minimum(grid[where], distance, out=grid[where])
     return truncated(grid)

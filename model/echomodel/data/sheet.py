@@ -21,7 +21,8 @@ PALETTE = {
     "glass": (170, 205, 214), "ceramic": (214, 206, 196), "enamel": (244, 243, 239), "worktop": (170, 164, 156),
     "steel": (178, 180, 182), "leaf": (94, 140, 82), "soil": (90, 70, 55), "shade": (240, 230, 200),
     "screen": (40, 44, 54), "cushion": (150, 165, 176), "linen": (232, 226, 214), "blanket": (150, 120, 104),
-    "mirror": (196, 214, 222), "book": (150, 90, 78), "stem": (118, 104, 66),
+    "mirror": (196, 214, 222), "book": (150, 90, 78), "stem": (118, 104, 66), "leaf_dark": (58, 104, 64),
+    "leaf_silver": (146, 168, 140), "fruit": (201, 134, 46), "petal": (240, 223, 213),
 }  # fmt: skip
 PLAIN = (176, 172, 166)
 YAW, PITCH = 0.6, 0.35  # radians, from where meshes are seen; 0, 0 looks at the front (+Z) face

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, box
+from echomodel.furniture.plants import grown, species
 from echomodel.furniture.solids import Lathe, Solid, ball, rotation, tube, turned
 
 
@@ -28,6 +29,10 @@ SHAPES = (
     [0.8, 0.85, 0.9, 0.95, 1.0],
     [0.6, 1.0, 0.8, 0.45, 0.35, 0.35, 0.4],
 )
+
+
+POTS = ([0.78, 0.9, 1.0], [0.95, 1.0, 1.0], [0.7, 1.0, 0.92], [0.6, 0.95, 1.0, 0.86], [1.0, 0.86, 0.8])
+POTTERY = ("ceramic", "ceramic", "enamel", "wicker", "soil", "metal")
 
 
 def vase(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -58,24 +63,20 @@ def flowers(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 
 def small_plant(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """Leaves on arching stems in a pot."""
-    w, h, d = size
-    pot_h, pot_r = h * 0.36, min(w, d) * 0.27
-    pot = vessel(_outline([0.78, 0.9, 1.0], np.array([2 * pot_r, pot_h, 2 * pot_r])), 0.006, "ceramic", 0.8)
-    parts: list[Solid] = [pot, Lathe(profile=np.array([[pot_r * 0.9, pot_h * 0.7], [pot_r * 0.9, pot_h * 0.9]]),
-                                     material="soil")]  # fmt: skip
-    count = int(rng.integers(10, 15))
-    for number in range(count):
-        yaw = 2 * np.pi * 0.382 * number
-        share = (number + 1) / count
-        length = (h - pot_h) * (0.35 + 0.35 * share)
-        lift = 0.35 + 0.9 * share
-        out = np.array([np.sin(yaw) * np.cos(lift), np.sin(lift), np.cos(yaw) * np.cos(lift)])
-        root = np.array([0, pot_h * 0.85, 0])
-        turn = rotation(y=yaw) @ rotation(x=-lift)
-        half = np.array([0.2 * length, 0.035 * length, 0.55 * length])
-        parts.append(ball(root + out * length * 0.75, half, "leaf", turn=turn))
-    return parts
+    """A plant of a table in a pot."""
+    return _potted(size, str(rng.choice(species("table"))), rng.uniform(0.3, 0.42) * size[1], 0.27, rng)
+
+
+def _potted(size: Size, kind: str, tall: float, share: float, rng: np.random.Generator) -> list[Solid]:
+    """A species in a pot that is `tall` metres high and whose rim's radius is a share of the plant's width."""
+    radius = share * min(size[0], size[2])
+    shape = POTS[int(rng.integers(len(POTS)))]
+    pot = vessel(_outline(shape, np.array([2 * radius, tall, 2 * radius])), 0.006, str(rng.choice(POTTERY)), 0.8)
+    soil = Lathe(
+        profile=np.array([[0.9 * radius * shape[-1], 0.7 * tall], [0.9 * radius * shape[-1], 0.9 * tall]]),
+        material="soil",
+    )
+    return [pot, soil, *grown(kind, 0.88 * tall, size, radius, rng)]
 
 
 def bowl(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -177,32 +178,8 @@ def bottles(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 
 def floor_plant(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A tall plant in a pot: large leaves on stems that lean outwards (rubber tree, bird of paradise)."""
-    w, h, d = size
-    wide = min(w, d)
-    tall, radius = float(np.clip(0.24 * h, 0.2, 0.34)), 0.3 * wide
-    pot = np.array([[0.74, 0.0], [0.86, 0.4], [1.0, 1.0]]) * (radius, tall)
-    parts: list[Solid] = [
-        vessel(pot, 0.012, "ceramic", 0.85),
-        Lathe(profile=np.array([[radius * 0.92, tall * 0.7], [radius * 0.92, tall * 0.9]]), material="soil"),
-    ]
-    stems = int(rng.integers(4, 7))
-    for number in range(stems):
-        yaw = 2 * np.pi * (number + rng.uniform(-0.2, 0.2)) / stems
-        out = np.array([np.sin(yaw), 0.0, np.cos(yaw)])
-        top = tall + (h - tall) * rng.uniform(0.6, 0.85)
-        reach = wide * rng.uniform(0.1, 0.22)
-        foot, knee, tip = out * 0.03 + (0, tall * 0.8, 0), out * reach * 0.4 + (0, 0.6 * top, 0), out * reach
-        tip = tip + np.array([0, top, 0])
-        parts.append(tube(np.stack([foot, knee, tip]), 0.007, "stem"))
-        for at, side in ((0.45, -0.9), (0.7, 0.9), (1.0, 0.0)):
-            place = knee + (tip - knee) * at
-            lift = rng.uniform(0.35, 0.9)
-            turn = rotation(y=yaw + side + rng.uniform(-0.25, 0.25)) @ rotation(x=-lift)
-            length = min(0.26, wide * 0.3) * rng.uniform(0.8, 1.1)
-            half = np.array([0.36 * length, 0.02 * length, 0.62 * length])
-            parts.append(ball(place + turn @ (0, 0, 0.55 * length), half, "leaf", turn=turn))
-    return parts
+    """A tall plant in a pot."""
+    return _potted(size, str(rng.choice(species("floor"))), float(np.clip(0.24 * size[1], 0.2, 0.34)), 0.3, rng)
 
 
 def floor_vase(size: Size, rng: np.random.Generator) -> list[Solid]:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 MATERIALS = (
     "wood", "accent", "fabric", "metal", "glass", "ceramic", "leaf", "soil", "shade", "screen",
     "cushion", "linen", "blanket", "mirror", "book", "stem", "enamel", "worktop", "steel",
+    "leaf_dark", "leaf_silver", "fruit", "petal",
 )  # fmt: skip
 
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, both, box, of_role
-from echomodel.furniture.solids import Blade, Solid, ball, rotation, tube, turned
+from echomodel.furniture.plants import grown, species
+from echomodel.furniture.solids import Solid, tube, turned
 from echomodel.furniture.style import Choices, Style
 
+SMALL = 0.55  # metres: lower plants are those of tables
 PANEL = (16 / 9, 21 / 9)  # width over height of a screen with its bezel
 
 
 def plant(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """A pot, perhaps on a stand, with a tree crown, arching blades, broad leaves on stems or a cactus."""
+    """A pot, perhaps on a stand, with one of the species of `plants.toml`."""
     w, h, d = size
     reach = min(w, d) / 2
     pot_h = float(np.clip(h * choices.between("share", 0.18, 0.32), 0.12, 0.5))
@@ -27,94 +29,10 @@ def plant(size: Size, style: Style, choices: Choices) -> list[Solid]:
             parts.append(tube([[x, 0, z], [x * 0.9, foot + pot_h * 0.5, z * 0.9]], 0.014, role="leg"))
     waist = 0.6 + 0.35 * style.taper
     parts.append(turned((0, foot, 0), pot_r * waist, pot_h, pot_r, power=power, material="ceramic", role="pot"))
-    y0, level = foot + pot_h, (0, foot + pot_h * 0.98, 0)
+    level = (0, foot + pot_h * 0.98, 0)
     parts.append(turned(level, pot_r * 0.9, pot_h * 0.04, power=power, material="soil", role="soil"))
-    kind = choices.pick("kind", ["tree", "blades", "leaves", "cactus"], [0.38, 0.22, 0.32, 0.08])
-    grow = {"tree": _tree, "blades": _blades, "leaves": _leaves, "cactus": _cactus}[kind]
-    return parts + grow(y0, h, w / 2, d / 2, choices)
-
-
-def _tree(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Solid]:
-    """A trunk that forks into bent branches with leaves along them, a round crown altogether."""
-    rng = choices.stream("detail")
-    crown = (h - y0) * choices.between("split", 0.5, 0.7)
-    middle, fork = h - crown / 2, max(y0 + 0.05, h - crown * 1.02)
-    trunk = np.array([[0, y0 - 0.02, 0], [0.015, (y0 + fork) / 2, 0.01], [0, fork, 0]])
-    parts: list[Solid] = [tube(trunk, 0.016, "stem", "stem")]
-    count, reach = choices.whole("count", 8, 11), np.array([a, crown / 2, b])
-    for i in range(count):
-        around, level = 2 * np.pi * (i * 0.382 + rng.uniform(-0.05, 0.05)), 2 * (i + 0.5) / count - 0.9
-        flat = np.sqrt(max(1 - level**2, 0.05))
-        out = np.array([np.sin(around) * flat, min(level, 1.0), np.cos(around) * flat])
-        start, tip = np.array([0, fork - 0.02, 0]), np.array([0, middle, 0]) + out * reach * rng.uniform(0.6, 0.75)
-        bend = (start + tip) / 2 + np.array([out[0], -0.3, out[2]]) * 0.12 * crown
-        branch = np.array([start, bend, tip])
-        parts.append(tube(branch, 0.006, "stem", "stem"))
-        length = float(np.clip(0.42 * min(a, b, crown / 2), 0.05, 0.16))
-        for k in range(8):
-            share = 0.35 + 0.65 * k / 7
-            place = bend + (tip - bend) * (2 * share - 1) if share > 0.5 else start + (bend - start) * 2 * share
-            yaw = around + (-1) ** k * rng.uniform(0.5, 1.5)
-            parts.append(_leaf(place, yaw, rng.uniform(-0.3, 0.7), length, 0.5 * length, bend=0.7))
-        parts.append(_leaf(tip, around, 0.4 + 0.6 * level, length, 0.5 * length, bend=0.7))
-    return parts
-
-
-def _leaf(base: np.ndarray, yaw: float, lift: float, length: float, wide: float, bend: float = 0.6) -> Blade:
-    """A leaf that starts at `base`, points to `yaw` and rises by the angle `lift`, its tip bent down by `bend`."""
-    turn, thick = rotation(y=yaw) @ rotation(x=-lift), max(0.003, 0.012 * length)
-    return Blade(base, turn, "leaf", "leaf", length=length, width=wide, thick=thick, bend=bend)
-
-
-def _blades(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Solid]:
-    """Long blades that rise from the pot and arch outward."""
-    parts: list[Solid] = []
-    rng = choices.stream("detail")
-    count = 2 * choices.whole("count", 7, 11)
-    for i in range(count):
-        yaw = 2 * np.pi * (i * 0.382 + rng.uniform(-0.04, 0.04))
-        inner = i / count  # the last ones stand in the middle, upright
-        spread = float(np.hypot(np.sin(yaw) * a, np.cos(yaw) * b)) * (1.0 - 0.75 * inner)
-        tall = (h - y0) * (0.72 + 0.28 * inner) * rng.uniform(0.85, 1.0)
-        lift, length = np.pi / 2 - 0.35 * (1 - inner), float(np.hypot(spread, tall)) * 1.08
-        start = np.array([np.sin(yaw), 0, np.cos(yaw)]) * 0.03 * (1 - inner) + [0, y0 - 0.02, 0]
-        bend = 2.0 * float(np.arctan2(spread, tall)) * (1.2 - 0.4 * inner)
-        wide = max(0.03, 0.085 * length)
-        parts.append(_leaf(start, yaw, lift, length, wide, bend=bend))
-    return parts
-
-
-def _leaves(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Solid]:
-    """Broad leaves at the ends of stems."""
-    parts: list[Solid] = []
-    rng = choices.stream("detail")
-    count = choices.whole("count", 8, 13)
-    for i in range(count):
-        yaw = 2 * np.pi * (i * 0.382 + rng.uniform(-0.03, 0.03))
-        tall = (h - y0) * (0.3 + 0.65 * i / count)
-        out = np.array([np.sin(yaw) * a, 0, np.cos(yaw) * b]) * rng.uniform(0.4, 0.5) * (1 - 0.35 * i / count)
-        end = np.array([0, y0 + tall, 0]) + out
-        stem = np.array([[0, y0 - 0.02, 0], [out[0] * 0.4, y0 + tall * 0.65, out[2] * 0.4], end])
-        parts.append(tube(stem, 0.007, "leaf", "stem"))
-        length = min(a, b) * rng.uniform(0.75, 0.95)
-        parts.append(_leaf(end, yaw, rng.uniform(-0.1, 0.45), length, length * 0.68, bend=0.9))
-    return parts
-
-
-def _cactus(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Solid]:
-    """A column with bent arms."""
-    rng = choices.stream("detail")
-    r = min(a, b) * 0.26
-    parts: list[Solid] = [tube([[0, y0 - 0.02, 0], [0, h - r, 0]], r, "leaf", "stem")]
-    parts.append(ball((0, h - r, 0), r, "leaf", "stem"))
-    for s in (-1, 1):
-        y = y0 + (h - y0) * rng.uniform(0.3, 0.5)
-        tip = y + (h - y0) * rng.uniform(0.2, 0.4)
-        x = s * (a - r * 0.6)
-        arm = np.array([[0, y, 0], [x * 0.75, y + r * 0.1, 0], [x, y + r * 0.8, 0], [x, tip, 0]])
-        parts.append(tube(arm, r * 0.6, "leaf", "stem"))
-        parts.append(ball(arm[-1], r * 0.6, "leaf", "stem"))
-    return parts
+    kind = choices.pick("kind", species("floor" if h > SMALL else "table"))
+    return parts + grown(kind, foot + 0.98 * pot_h, size, pot_r, choices.stream("detail"))
 
 
 def tv(size: Size, style: Style, choices: Choices) -> list[Solid]:
