@@ -238,6 +238,7 @@ def _companion(setting: Setting, wall: Wall, along: float, first: Thing, host: S
 
 SHARES = (0.5, 0.3, 0.7, 0.18, 0.82)  # of a wall's length, the middle first
 SHELF = 1.38  # metres from the floor to the board of a wall shelf
+WALL_SHELVES = ("wall_shelf", "ledge", "box_shelf")  # of a room both are alike
 ABOVE = 0.3  # metres over a shelf that stay free
 
 
@@ -245,11 +246,11 @@ def shelves(setting: Setting) -> None:
     """Up to two shelves on walls that have room, with books and small things on them."""
     if not (setting.full and setting.walls):
         return
-    done = 0
+    done, kind = 0, str(setting.rng("shelves").choice(WALL_SHELVES))
     for wall in _roomiest(setting):
         rng = setting.rng(f"wall {wall.edge}", "shelf")
-        size, variant = usual_size("wall_shelf", rng), int(rng.integers(4))
-        one, spots = Thing("wall_shelf", size, np.zeros(3), 0.0, "", variant), [(wall, share) for share in SHARES]
+        size, variant = usual_size(kind, rng), int(rng.integers(4))
+        one, spots = Thing(kind, size, np.zeros(3), 0.0, "", variant), [(wall, share) for share in SHARES]
         board = _hang_first(setting, one, spots, SHELF - float(size[1]), ABOVE)
         if board:
             _filled(setting, board, f"wall shelf {wall.edge}")
@@ -263,7 +264,7 @@ def _filled(setting: Setting, board: Thing, name: str) -> None:
     rng = setting.rng(name, "filled")
     carrier = standing(name, "shelf", board.size, board.position, board.yaw, _geometry(board))
     setting.carriers[name] = carrier
-    for surface in surfaces(carrier)[:1]:
+    for surface in sorted(surfaces(carrier), key=lambda level: -level.area.area)[:1]:
         side = float(rng.choice((-1.0, 1.0)))
         tall = 0.25
         size = np.array([round(float(board.size[0]) * rng.uniform(0.25, 0.4), 3), tall, 0.16])

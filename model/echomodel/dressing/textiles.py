@@ -164,27 +164,3 @@ def throw(size: Size, rng: np.random.Generator) -> list[Solid]:
         return out
 
     return [Sheet(front=spread(profile), back=spread(inner), material="accent_cloth")]
-
-
-def folded_throw(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A blanket folded twice: soft layers, each a little shorter than the one below."""
-    w, h, d = size
-    thick = h / 3
-    parts: list[Solid] = []
-    for layer in range(3):
-        share = 1.0 - 0.025 * layer
-        low, high = (-w / 2 * share, thick * layer, -d / 2), (w / 2 * share, thick * (layer + 1), d / 2 * share)
-        parts.append(box(low, high, "blanket", thick * 0.45))
-    return parts
-
-
-def towel(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A towel over a rung: a long fall before it, a shorter one behind, a band near the hem."""
-    w, h, d = size
-    material = ("linen", "accent_plain", "blanket")[int(rng.integers(3))]
-    parts: list[Solid] = [
-        box((-w / 2, 0.0, d / 2 - 0.014), (w / 2, h, d / 2), material, 0.006),
-        box((-w / 2, 0.3 * h, -d / 2), (w / 2, h, 0.014 - d / 2), material, 0.006),
-        box((-w / 2, h - 0.016, -d / 2), (w / 2, h, d / 2), material, 0.007),
-    ]
-    return [*parts, box((-w / 2, 0.08 * h, d / 2 - 0.004), (w / 2, 0.12 * h, d / 2 + 0.001), "cushion", 0.0)]

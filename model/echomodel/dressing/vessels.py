@@ -6,7 +6,7 @@ import numpy as np
 
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.plants import grown, species
-from echomodel.furniture.solids import Lathe, Solid, ball, rotation, tube, turned
+from echomodel.furniture.solids import Lathe, Solid, ball, rotation, tube
 
 
 def vessel(outer: np.ndarray, wall: float, material: str, inside: float = 0.1) -> Lathe:
@@ -123,20 +123,6 @@ def cup(size: Size, rng: np.random.Generator) -> list[Solid]:
     return [_moved(part, (centre, 0, 0)) for part in parts]
 
 
-def plate(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A dinner plate with a smaller one on it."""
-    w, h, _ = size
-    r = w / 2
-    large = np.array([[r * 0.6, 0], [r, h * 0.55], [r, h * 0.62], [r * 0.66, h * 0.2], [r * 0.1, h * 0.2]])
-    small = large * (0.72, 1.0) + (0, h * 0.38)
-    return [Lathe(profile=large, material="ceramic"), Lathe(profile=small, material="ceramic")]
-
-
-def glass(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A drinking glass."""
-    return [vessel(_outline([0.82, 0.9, 1.0], size), 0.003, "glass", 0.08)]
-
-
 def basket(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A woven basket with a blanket in it."""
     w, h, d = size
@@ -163,20 +149,6 @@ def plates(size: Size, rng: np.random.Generator) -> list[Solid]:
     return [*(_moved(one, (0.0, 0.012 * number, 0.0)) for number in range(count)), _moved(cups, (0.0, top, 0.0))]
 
 
-def bottles(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """Oil, vinegar and salt, or soap and cream: three vessels of different heights."""
-    w, h, d = size
-    parts: list[Solid] = []
-    for number, (tall, material) in enumerate(zip((1.0, 0.78, 0.45), rng.permutation(["glass", "leather", "enamel"]),
-                                                  strict=True)):  # fmt: skip
-        radius = min(w / 3, d) / 2 * 0.92
-        outline = np.array([[radius, 0.0], [radius, 0.62 * tall * h], [0.4 * radius, 0.78 * tall * h],
-                            [0.4 * radius, tall * h]])  # fmt: skip
-        centre = np.array([(number - 1) * w / 3, 0.0, 0.0])
-        parts.append(Lathe(centre=centre, profile=outline, material=str(material)))
-    return parts
-
-
 def floor_plant(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A tall plant in a pot."""
     return _potted(size, str(rng.choice(species("floor"))), float(np.clip(0.24 * size[1], 0.2, 0.34)), 0.3, rng)
@@ -200,17 +172,6 @@ def floor_vase(size: Size, rng: np.random.Generator) -> list[Solid]:
     return parts
 
 
-def slippers(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A pair of open slippers, the toes to the front."""
-    w, h, d = size
-    parts: list[Solid] = []
-    for side in (-1, 1):
-        x, wide, slip = side * w * 0.27, w * 0.2, float(rng.uniform(-0.04, 0.04)) * d
-        parts.append(turned((x, 0, slip), (wide, d * 0.45), h * 0.28, power=2.6, material="paper"))
-        parts.append(ball((x, h * 0.45, slip + d * 0.18), (wide, h * 0.5, d * 0.25), "accent_plain", power=2.4))
-    return parts
-
-
 def cable(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A lamp's cable on the floor, from the lamp (its front, +Z) to the plug at the wall."""
     w, h, d = size
@@ -221,15 +182,3 @@ def cable(size: Size, rng: np.random.Generator) -> list[Solid]:
     line = np.stack([x, np.full_like(x, radius), (along - 0.5) * (d - h)], 1)
     plug = box((-0.011, 0, -d / 2), (0.011, h, -d / 2 + 0.04), "screen", h * 0.3)
     return [tube(line, radius, "screen"), plug]
-
-
-def blocks(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """Three blocks of wood and a fourth on top of them."""
-    w, h, d = size
-    side = min(h / 2, w / 3 - 0.006, d)
-    at = [(-1.02 * side, 0.0), (0.0, 0.0), (1.02 * side, 0.0), (0.4 * side, side)]
-    colours = rng.permutation(["accent_plain", "blanket", "frame", "fruit"])
-    return [
-        box((x - side / 2, y, -side / 2), (x + side / 2, y + side, side / 2), str(colour), 0.003)
-        for (x, y), colour in zip(at, colours, strict=True)
-    ]

@@ -127,3 +127,16 @@ def test_all_windows_of_a_room_have_the_same_curtains_and_rooms_differ():
         assert len(hung) <= 2  # curtains, and a blind where there is no place for them
         found |= hung
     assert found >= set(walls.CURTAINS)
+
+
+@pytest.mark.parametrize("kind", walls.WALL_SHELVES)
+def test_shelves_on_walls_carry_books_and_something_beside(kind, monkeypatch):
+    monkeypatch.setattr(walls, "WALL_SHELVES", (kind,))
+    room = setting()
+    room.full = True
+    walls.shelves(room)
+    board = next(thing for thing in room.placed if thing.kind == kind)
+    borne = [thing for thing in room.placed if thing.on]
+    assert sum(thing.kind == "book" for thing in borne) >= 3
+    assert {thing.kind for thing in borne} - {"book"}
+    assert all(board.position[1] < thing.position[1] <= board.position[1] + board.size[1] + 1e-3 for thing in borne)
