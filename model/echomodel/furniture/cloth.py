@@ -91,6 +91,29 @@ def cover(low: Vector, high: Vector, material: str, radius: float, depth: float,
     return replace(made, material=material, role="cover")
 
 
+@dataclass(frozen=True, eq=False)
+class Tufted(Block):
+    """A padded panel whose front (+z) is drawn in every `apart` metres, in diamonds or upright channels."""
+
+    apart: float = 0.2
+    channels: bool = False
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        w, h, d = self.half
+        step = self.apart / (3, 4, 4, 4)[detail]  # so that creases run through corners
+        across, up = (max(4, round(2 * side / step)) for side in (w, h))
+        j, rings = np.arange(up + 1), []
+        y = np.linspace(-h, h, up + 1)
+        for i, x in enumerate(np.linspace(-w, w, across + 1)):
+            lines = (2 * i, 2 * i) if self.channels else (i + j, i - j)
+            first, second = (np.abs(np.cos(np.pi * line * step / self.apart)) for line in lines)
+            edge = np.minimum(1.0, 6 * np.minimum(1 - abs(x) / w, 1 - np.abs(y) / h) + 0.1) ** 0.5
+            front = d * (2 * edge * (0.45 + 0.55 * (first * second) ** 0.5) - 1)
+            rings.append(np.stack([np.full(up + 3, x), [*y, h, -h], [*front, -d, -d]], 1))
+        vertices, faces = loft(rings)
+        return vertices, _outward(vertices, faces)
+
+
 def _outward(vertices: Array, faces: Array) -> Array:
     """The faces of a closed surface, turned where its volume is negative."""
     a, b, c = vertices[faces].transpose(1, 0, 2)

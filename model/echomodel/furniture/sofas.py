@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 from functools import partial
+from importlib import resources
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, both, box, chair_legs, cushion, leaning, of_role, slim_arms
+from echomodel.furniture.cloth import Tufted
 from echomodel.furniture.solids import Block, Lathe, Solid, ball, bent, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
 
+BODIES: list[dict[str, Any]] = list(
+    tomllib.loads(resources.files(__package__).joinpath("bodies.toml").read_text("utf-8")).values()
+)
 padded = partial(turned, material="fabric")
 
 
@@ -158,22 +165,27 @@ def _backs(x0: float, x1: float, y0: float, y1: float, z0: float, count: int, st
     return parts
 
 
-def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_depth: float = 0.0) -> list[Solid]:
+def _couch(
+    size: Size, style: Style, choices: Choices, seats: int, *, chaise: int = 0, chaise_depth: float = 0.0
+) -> list[Solid]:
     """A sofa along x whose back stands at -z; with `chaise` -1 or +1 its last seat at that side reaches forward.
 
-    `chaise_depth` is the full depth there; size[2] is the depth of the rest.
+    `chaise_depth` is the full depth there; size[2] is the depth of the rest. Its body is one of `BODIES`.
     """
     w, h, d = size
+    body = choices.pick("cover", BODIES, [row["odds"].get(style.family, 0) for row in BODIES])
+    style = replace(style, **body["style"])
     foot = _foot(style)
     seat = float(np.clip(0.43, 0.4 * h, 0.62 * h))
     armless = style.arms == "none"
     arm = 0.0 if armless else float(np.clip(w * 0.075 * (0.7 + 0.7 * style.softness), 0.07, 0.26))
-    y_arm = seat + (h - seat) * (0.2 + 0.55 * style.arm_height)
+    y_arm = seat + (h - seat) * body.get("level", 0.2 + 0.55 * style.arm_height)
     frame = 0.1 + 0.06 * style.softness
     pad = 0.12 + 0.06 * style.softness
     z0, z1 = -d / 2, d / 2
     parts: list[Solid] = _legs(style, w, d, foot)
-    low, high = (-w / 2 + arm * 0.5, foot, z0 + 0.02), (w / 2 - arm * 0.5, seat - pad, z1 - 0.015)
+    inset, under = (0.012, 0.006) if body.get("skirt") else (arm * 0.5, foot)
+    low, high = (-w / 2 + inset, under, z0 + 0.02), (w / 2 - inset, seat - pad, z1 - 0.015)
     parts.append(box(low, high, "fabric", 0.015, "base"))
     tall = h - (0.06 if seats > 1 and style.contrast < 0.6 else 0.0)
     low, high = (-w / 2 + arm * 0.4, foot + 0.02, z0), (w / 2 - arm * 0.4, tall, z0 + frame)
@@ -187,8 +199,19 @@ def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_dept
     inner = w / 2 - arm
     front_z = z1 + 0.01
     xs = np.linspace(-inner, inner, seats + 1)
-    parts += _cushions(-inner, inner, seat - pad, seat, z0 + frame * 0.9, front_z, seats, style)
-    parts += _backs(-inner, inner, seat - 0.02, h, z0 + frame, seats, style)
+    pads = 1 if body.get("seat") == "one" and not chaise else seats
+    parts += _cushions(-inner, inner, seat - pad, seat, z0 + frame * 0.9, front_z, pads, style)
+    back = body.get("back", "pads")
+    if back in ("tufted", "channels"):
+        middle, half = (0.0, (seat + tall) / 2, z0 + frame + 0.03), (inner, (tall - seat) / 2, 0.06)
+        turn = rotation(x=-0.08 - 0.2 * style.rake)
+        form = {"channels": back == "channels", "apart": (tall - seat) / 1.5}
+        parts.append(Tufted(np.array(middle), turn, "fabric", "back", half=np.array(half), **form))
+    else:
+        parts += _backs(-inner, inner, seat - 0.02, h if back == "pads" else 0.94 * h, z0 + frame, seats, style)
+    if back == "roll" and not chaise:
+        place, turn = (inner - 0.085, seat + 0.08, z0 + 0.7 * frame), rotation(x=np.pi / 2)
+        parts += both(padded(place, 0.08, min(0.52, 0.6 * d), rounding=0.02, turn=turn, role="cushion"))
     if chaise:
         x0, x1 = (xs[0] - arm, xs[1]) if chaise < 0 else (xs[-2], xs[-1] + arm)
         reach = z0 + chaise_depth
@@ -203,14 +226,14 @@ def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_dept
 def multi_seat_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Two to four seat cushions, or one long one."""
     count = int(np.clip(round(size[0] / choices.between("count", 0.6, 0.85)), 2, 4))
-    return _couch(size, style, 1 if choices.chance("form", 0.12) else count)
+    return _couch(size, style, choices, 1 if choices.chance("form", 0.12) else count)
 
 
 def loveseat_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Two seats, or one cushion across."""
     if style.back == "shell" and choices.chance("kind", 0.5):
         return _curved(size, style)
-    return _couch(size, style, 1 if choices.chance("form", 0.2) or size[0] < 1.0 else 2)
+    return _couch(size, style, choices, 1 if choices.chance("form", 0.2) or size[0] < 1.0 else 2)
 
 
 def sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -243,7 +266,7 @@ def l_shaped_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
     d = float(np.clip(0.95, 0.5 * depth, 0.7 * depth))
     side = -1 if choices.chance("side", 0.5) else 1
     count = int(np.clip(round(w / 0.85), 3, 5))
-    parts = _couch(np.array([w, h, d]), style, count, chaise=side, chaise_depth=depth)
+    parts = _couch(np.array([w, h, d]), style, choices, count, chaise=side, chaise_depth=depth)
     if choices.chance("extra", 0.35):
         foot, seat, frame = _foot(style), 0.43, 0.14
         y1 = h - 0.06

@@ -1,0 +1,58 @@
+"""Pillows, covers and tufted panels: closed at every detail, within their boxes, and no plain blocks."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from echomodel.furniture import Choices, Style, solids
+from echomodel.furniture.cloth import Tufted, cover, pillow
+from echomodel.furniture.sofas import BODIES
+from echomodel.furniture.style import FAMILIES
+
+HALF = np.array([0.4, 0.1, 0.25])
+MADE = {
+    "pillow": pillow((0, 0, 0), HALF, "linen"),
+    "cover": cover(-HALF, HALF, "blanket", 0.04, 0.03, np.random.default_rng(1)),
+    "tufted": Tufted(half=HALF[[0, 2, 1]]),
+    "channels": Tufted(half=HALF[[0, 2, 1]], channels=True),
+}
+
+
+@pytest.mark.parametrize("detail", range(4))
+@pytest.mark.parametrize("name", MADE)
+def test_cloth_is_closed_and_within_its_box(name, detail):
+    made = MADE[name]
+    mesh = trimesh.Trimesh(*made.mesh(detail))
+    assert mesh.is_watertight
+    assert mesh.volume > 0.25 * np.prod(2 * made.half)
+    assert (abs(mesh.vertices) <= made.half + 1e-6).all()
+
+
+def test_corners_of_a_pillow_stand_out_and_its_seams_are_thin():
+    points = MADE["pillow"].mesh()[0]
+    corner = points[np.argmax(points[:, 0] + points[:, 2])]
+    middle = points[abs(points[:, 2]) < 0.02]
+    assert corner[0] == pytest.approx(HALF[0])
+    assert middle[:, 0].max() < 0.93 * HALF[0]
+    assert abs(corner[1]) < 0.1 * HALF[1]
+
+
+def test_a_cover_has_folds_and_two_covers_differ():
+    def tops(seed):
+        points = cover(-HALF, HALF, "blanket", 0.04, 0.03, np.random.default_rng(seed)).mesh()[0]
+        inner = (abs(points[:, 0]) < 0.3) & (abs(points[:, 2]) < 0.2) & (points[:, 1] > 0)
+        return points[inner, 1]
+
+    assert 0.008 < np.ptp(tops(1)) < 0.031
+    assert not np.allclose(tops(1), tops(2))
+
+
+def test_sofas_have_eight_bodies_and_each_family_builds_several():
+    assert len(BODIES) == 8
+    for family in FAMILIES:
+        assert sum(row["odds"].get(family, 0) > 0 for row in BODIES) >= 4
+    rng, size, made = np.random.default_rng(0), np.array([2.1, 0.82, 0.92]), set()
+    for _ in range(40):
+        parts = solids("multi_seat_sofa", Style.draw(rng), Choices.draw(rng), size)
+        made.add(tuple(sorted((type(part).__name__, part.role) for part in parts)))
+    assert len(made) >= 12
