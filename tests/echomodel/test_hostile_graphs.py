@@ -15,7 +15,7 @@ from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.samplers import clean_from
 from echomodel.text import ClipTextEncoder, TextEncoderError
-from echoscene.config import PaperSizes, paper
+from echoscene.config import paper
 from echoscene.encoder import SceneGraphTensors
 from echoscene.model import ReleasedModel, Schedule
 
@@ -45,7 +45,7 @@ def compact() -> EchoModel:
 @pytest.fixture(scope="module")
 def published() -> ReleasedModel:
     torch.manual_seed(0)
-    sizes = PaperSizes(
+    sizes = dict(
         text=12, learned=4, flag=4, hidden=16, layers=2, context=32, code=8, heads=2, layout_width=128,
         layout_mult=(1, 1), shape_width=32, shape_mult=(1, 1), blocks=1, grid=8, vq_channels=4, vq_codes=16,
     )  # fmt: skip

@@ -14,11 +14,11 @@ from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit
 from echomodel.text import RandomTextEncoder
 from echomodel.vocabulary import vocabulary
-from echoscene.config import PaperSizes, paper
+from echoscene.config import paper
 from echoscene.echo import ReleasedEcho, pack_changes, pack_scenes, published_scene
 from echoscene.model import GraphChange, ReleasedModel, Schedule
 
-SIZES = PaperSizes(
+SIZES = dict(
     text=12, learned=4, flag=4, hidden=16, layers=2, context=32, code=8, heads=2, layout_width=128,
     layout_mult=(1, 1), shape_width=32, shape_mult=(1, 1), blocks=1, vq_channels=4, vq_codes=16, grid=8,
 )  # fmt: skip
