@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -9,7 +10,13 @@ from small_room import BARE, OBJECTS, StandIn, small_graph
 import echousd
 from echousd.draw.sight import Furniture
 from echousd.draw.views import perspective_views
+from echousd.layers.cameras import room_points
+from echousd.layers.compose import text
+from echousd.layers.materials import tint_factor
 from echousd.options import RoomOptions
+from echousd.shapes import walls
+from echousd.shapes.geometry import Origin
+from echousd.shapes.looks import Look
 from echousd.stage.graphs import read_graph
 
 
@@ -37,6 +44,32 @@ def test_files_are_those_of_the_design(root):
     images = {path for path in found if path.startswith("textures/") and path.endswith(".jpg")}
     assert any(path.startswith("textures/planks_") for path in images)
     assert found == {"bedroom.usda", "bedroom.json"} | images | layers | assets
+
+
+def test_assets_of_ours_name_nobody_and_those_of_others_their_author(stage, root):
+    for path in root.parent.glob("assets/*/*.usda"):
+        data = Sdf.Layer.FindOrOpen(str(path)).customLayerData
+        assert data["asset_license"] == "Apache-2.0"
+        assert "asset_credit" not in data
+    origins = {"sofa": Origin("library", "CC-BY-4.0", "A Person", "sofa.glb"), "bed": Origin("library", "CC0-1.0")}
+    assert text("bedroom", origins).splitlines()[-2:] == [
+        "| sofa | sofa.glb | CC-BY-4.0 | A Person |",
+        "| bed |  | CC0-1.0 | unknown |",
+    ]
+
+
+def test_the_volume_of_a_room_holds_floor_and_furniture(room):
+    points, position, size = room_points(room), room.boxes.position.numpy(), room.boxes.size.numpy()
+    tops = position[:, 1] + size[:, 1]
+    heights = {round(float(y), 4) for y in points[:, 1]}
+    assert {round(float(y), 4) for y in (*position[:, 1], *tops, 0.0)} <= heights
+    assert (points[:, 1].min(), points[:, 1].max()) == pytest.approx((-walls.THICKNESS, tops.max()))
+
+
+def test_paintings_keep_their_colours():
+    base, look = Look((0.5, 0.4, 0.2)), Look((0.25, 0.4, 0.1))
+    assert tint_factor(base, look) == [0.5, 1.0, 0.5]
+    assert tint_factor(replace(base, pattern="picture_1"), look) == [1.0, 1.0, 1.0]
 
 
 def test_stage_opens_whole_and_carries_its_graph(stage, room):

@@ -14,6 +14,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.graph import RoomSpec
+from echousd.layers.lights import ASIDE
 from echousd.options import RoomOptions
 
 WINDOW = Opening("window", "window", 0, 0.8, 1.4, 1.3, 0.9)  # in the wall at -z
@@ -52,6 +53,7 @@ def test_the_sun_falls_in_through_the_window(stage) -> None:
     assert np.linalg.norm(way) == pytest.approx(1)
     assert way[1] < -0.5
     assert way[2] > 0.5
+    assert abs(way[0]) / way[2] == pytest.approx(ASIDE, abs=1e-4)  # however wide the window is
 
 
 def test_there_is_a_sky_to_look_at_and_a_sun_that_blanks_no_wall(stage, tmp_path) -> None:

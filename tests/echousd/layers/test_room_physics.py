@@ -8,7 +8,7 @@ from pxr import Usd, UsdGeom
 from echomodel.dressing import KINDS
 from echomodel.dressing import thing as solids_of
 from echomodel.vocabulary import vocabulary
-from echousd.layers.physics import write_asset_physics
+from echousd.layers.physics import CONTACT, WOODEN, write_asset_physics
 from echousd.shapes.colliders import collider, colliders_of, standing_hull
 from echousd.shapes.geometry import Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.joinery import part_of, within_budget
@@ -128,6 +128,13 @@ def test_what_is_hollow_collides_by_convex_pieces():
     again = colliders_of(table, "dining_table")
     assert all((a.mesh.vertices == b.mesh.vertices).all() for a, b in zip(found, again, strict=True))
     assert [piece.name for piece in colliders_of(top, "dining_table")] == ["collider"]
+
+
+@pytest.mark.parametrize("material", [*CONTACT, "wood"])
+def test_what_slides_is_held_less_than_what_rests_and_nothing_sticks(material):
+    static, dynamic, bounce = CONTACT.get(material, WOODEN)
+    assert 0.3 <= dynamic < static <= 1
+    assert 0 <= bounce < 0.5
 
 
 def test_volume_of_a_hull():
