@@ -12,6 +12,7 @@ from small_room import BARE, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
+from echomodel.compact.shape import _decoded
 from echomodel.loading import load_model
 from echousd.tensors import one_thread, rounded_boxes, rounded_descriptions, rounded_grids
 
@@ -120,7 +121,7 @@ def test_codes_are_rounded_before_they_are_decoded(monkeypatch):
     coder = echo.model.autoencoder
     monkeypatch.setattr(coder, "decode", lambda x, f=coder.decode: seen.append(x) or f(x))
     codes = torch.randn(2, echo.config.shape.components, generator=torch.Generator().manual_seed(0)).round(decimals=3)
-    one, two = (echo._decoded(codes + noise) for noise in (0.0, 4e-6))
+    one, two = (_decoded(echo.model, codes + noise) for noise in (0.0, 4e-6))
     assert torch.equal(seen[0], seen[1])
     assert torch.equal(one, two)
     assert torch.equal(one, (one / 1e-4).round() * 1e-4)
