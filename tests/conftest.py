@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -38,6 +39,20 @@ def models_are_loaded_anew(request: pytest.FixtureRequest) -> Iterator[None]:
     loading = sys.modules.get("echomodel.loading")
     if replaces and loading is not None:
         loading._loaded.cache_clear()
+
+
+@pytest.fixture(scope="session")
+def loaded_by() -> Callable[..., set[str]]:
+    """Names of all modules that some code loads in a process of its own: `loaded_by("import echousd")`."""
+
+    def call(code: str, *words: object) -> set[str]:
+        told = f"{code}\nimport sys; print(*sys.modules)"
+        command = [sys.executable, "-c", told, *map(str, words)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return set(done.stdout.splitlines()[-1].split())
+
+    return call
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,10 @@ WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it sta
 WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's normal does not lean on it
 
 
+def _of_plan(name: str) -> cached_property[np.ndarray]:
+    return cached_property(lambda setting: np.asarray(getattr(setting.plan, name).numpy()))
+
+
 @dataclass(frozen=True, eq=False)
 class Setting:
     """Everything about one room that stays the same while its boxes move, and where they start from.
@@ -72,40 +76,13 @@ class Setting:
 
     # -- what the plan says, as arrays -------------------------------------------------------------------------------
 
-    @cached_property
-    def size(self) -> np.ndarray:
-        """(n, 3) float, metres."""
-        return np.asarray(self.plan.size.numpy())
-
-    @cached_property
-    def position(self) -> np.ndarray:
-        """(n, 3) float, metres, of the middles of the bottoms."""
-        return np.asarray(self.plan.position.numpy())
-
-    @cached_property
-    def yaw(self) -> np.ndarray:
-        """(n,) float, radians."""
-        return np.asarray(self.plan.yaw.numpy())
-
-    @cached_property
-    def triplets(self) -> np.ndarray:
-        """(e, 3) int, [subject, predicate id, object], those that the rules measure."""
-        return np.asarray(self.plan.triplets.numpy())
-
-    @cached_property
-    def fixed(self) -> np.ndarray:
-        """(n,) bool, boxes that must not move."""
-        return np.asarray(self.plan.given.numpy())
-
-    @cached_property
-    def anchor(self) -> np.ndarray:
-        """(n,) int, whom each attends, -1 = nobody."""
-        return np.asarray(self.plan.anchor.numpy())
-
-    @cached_property
-    def fronts(self) -> np.ndarray:
-        """(n,) bool, which of the boxes have a front."""
-        return np.asarray(self.plan.fronts.numpy())
+    size = _of_plan("size")  # (n, 3) float, metres
+    position = _of_plan("position")  # (n, 3) float, metres, of the middles of the bottoms
+    yaw = _of_plan("yaw")  # (n,) float, radians
+    triplets = _of_plan("triplets")  # (e, 3) int, [subject, predicate id, object], those that the rules measure
+    fixed = _of_plan("given")  # (n,) bool, boxes that must not move
+    anchor = _of_plan("anchor")  # (n,) int, whom each attends, -1 = nobody
+    fronts = _of_plan("fronts")  # (n,) bool, which of the boxes have a front
 
     @property
     def kinds(self) -> tuple[Category, ...]:

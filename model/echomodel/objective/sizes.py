@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 
 import numpy as np
@@ -11,6 +11,7 @@ import torch
 from echomodel.boxes2d import seen
 from echomodel.objective.plan import Found, Plan, found, kind_of
 from echomodel.sizes import size_statistics, usual_range
+from echomodel.vocabulary import Category
 
 LARGEST, SMALLEST = 1.2, 0.5  # times the 95th and 5th percentile of the class: 97 % of real pieces lie between
 SHORTER = 0.85  # times the least usual side, where the row of a category names usual sizes
@@ -68,8 +69,7 @@ def in_proportion(categories: Sequence[str], size: np.ndarray, free: np.ndarray)
         categories: n words. size: (n, 3) float, metres. free: (n,) bool, sizes that may change.
     """
     out = size.copy()
-    for i in np.flatnonzero(free).tolist():
-        kind = kind_of(categories[i])
+    for i, kind in _kinds(categories, free):
         if kind.round:
             out[i, [0, 2]] = np.sqrt(size[i, 0] * size[i, 2])
         if kind.aspect:
@@ -90,8 +90,7 @@ def smaller_sizes(categories: Sequence[str], size: np.ndarray, free: np.ndarray)
         categories: n words. size: (n, 3) float, metres. free: (n,) bool, sizes that may change.
     """
     out = size.copy()
-    for i in np.flatnonzero(free).tolist():
-        kind = kind_of(categories[i])
+    for i, kind in _kinds(categories, free):
         if kind.name and kind.support == "floor":
             table, usual = size_statistics(kind.name), usual_range(kind.name)
             least = np.array([side[0] for side in usual]) if usual else np.sqrt(table.low * table.median)
@@ -186,3 +185,7 @@ def scale(plan: Plan) -> Found:
     margin = torch.minimum((size / low).log(), (high / size).log())
     least, axis = margin.min(1)
     return found(who, least, measure=size.gather(1, axis[:, None])[:, 0], words=axis)
+
+
+def _kinds(categories: Sequence[str], some: np.ndarray) -> Iterator[tuple[int, Category]]:
+    return ((i, kind_of(categories[i])) for i in np.flatnonzero(some).tolist())

@@ -9,17 +9,8 @@ from pathlib import Path
 import pytest
 
 from echomodel.vocabulary import vocabulary
+from echousd.batches import plan as plans
 from echousd.batches.options import parse_sample, read_toml, request_of
-from echousd.batches.plan import (
-    Journal,
-    difference,
-    load_plan,
-    make_plan,
-    read_journals,
-    room_digest,
-    save_plan,
-    shard_folder,
-)
 from echousd.batches.sources import find_graphs, sampled_graph
 from echousd.batches.verify import verify
 
@@ -27,7 +18,7 @@ SAMPLES = Path(__file__).parents[3] / "samples"
 
 
 def plan_of(**raw):
-    return make_plan(request_of(raw, "test"), "abc")
+    return plans.make_plan(request_of(raw, "test"), "abc")
 
 
 def test_a_plan_is_the_same_every_time_and_comes_back_from_the_disk(tmp_path):
@@ -36,8 +27,8 @@ def test_a_plan_is_the_same_every_time_and_comes_back_from_the_disk(tmp_path):
     assert len(plan.entries) == 2 * len(list(SAMPLES.glob("*.yaml"))) + 3
     assert len({entry.id for entry in plan.entries}) == len(plan.entries)
     assert plan.entries[1].seed == 1
-    save_plan(plan, tmp_path)
-    assert difference(load_plan(tmp_path), plan_of(**raw)) == ""
+    plans.save_plan(plan, tmp_path)
+    assert plans.difference(plans.load_plan(tmp_path), plan_of(**raw)) == ""
 
 
 def test_shards_share_the_plan_out():
@@ -49,10 +40,10 @@ def test_shards_share_the_plan_out():
 
 def test_a_difference_is_told():
     old, new = plan_of(sample={"bedroom": 2}), plan_of(sample={"bedroom": 2}, options={"walls": False})
-    assert difference(old, new) == "options.walls was true, now false"
-    assert "seed was 0, now 3" in difference(old, plan_of(sample={"bedroom": 2}, seed=3))
+    assert plans.difference(old, new) == "options.walls was true, now false"
+    assert "seed was 0, now 3" in plans.difference(old, plan_of(sample={"bedroom": 2}, seed=3))
     changed = replace(old, entries=(replace(old.entries[0], graph="beef"), *old.entries[1:]))
-    assert difference(old, changed) == "1 graphs changed, the first of sample:bedroom:0"
+    assert plans.difference(old, changed) == "1 graphs changed, the first of sample:bedroom:0"
 
 
 def test_variations_are_taken_in_turn():
@@ -120,32 +111,32 @@ def test_rooms_of_every_type_are_sampled(kind):
 
 
 def test_a_torn_line_is_no_room(tmp_path):
-    place = shard_folder(tmp_path, (0, 1))
-    journal = Journal(place)
+    place = plans.shard_folder(tmp_path, (0, 1))
+    journal = plans.Journal(place)
     done = {"room": "a", "when": 1, "state": "done", "root": "a.usda", "bounds": [0.0] * 6, "sha256": "12"}
     journal.append(done)
     journal.close()
     with (place / "journal.jsonl").open("a") as file:
         file.write('{"room": "b", "wh')
-    journal = Journal(place)
+    journal = plans.Journal(place)
     journal.append({"room": "c", "when": 2, "state": "failed", "error": "no floor"})
     hostile = {"root": "../../secret.usda"}, {"bounds": [0.0, float("nan"), 0, 0, 0, 0]}, {"sha256": 7}, {"faces": "x"}
     for wrong in (*hostile, {"when": []}, {"state": 3}, {"categories": {"bed": []}}):
         journal.append({**done, "when": 3, **wrong})
     journal.close()
-    assert {name: row["state"] for name, row in read_journals(tmp_path).items()} == {"a": "done", "c": "failed"}
+    assert {name: row["state"] for name, row in plans.read_journals(tmp_path).items()} == {"a": "done", "c": "failed"}
 
 
 def test_a_room_s_digest_is_of_its_files(tmp_path):
     room = tmp_path / "room"
     (room / "layers").mkdir(parents=True)
     (room / "layers" / "a.usda").write_text("a")
-    before = room_digest(room)
+    before = plans.room_digest(room)
     (room / ".echousd.lock").write_text("x")
-    assert room_digest(room) == before
+    assert plans.room_digest(room) == before
     (room / "layers" / "a.usda").write_text("b")
-    assert room_digest(room) != before
-    assert room_digest(tmp_path / "none") == ""
+    assert plans.room_digest(room) != before
+    assert plans.room_digest(tmp_path / "none") == ""
 
 
 @pytest.mark.parametrize(
@@ -158,17 +149,17 @@ def test_a_room_s_digest_is_of_its_files(tmp_path):
     ],
 )
 def test_a_plan_is_read_with_doubt(tmp_path, change, text):
-    save_plan(plan_of(sample={"bedroom": 1}), tmp_path)
+    plans.save_plan(plan_of(sample={"bedroom": 1}), tmp_path)
     path = tmp_path / ".batch/plan.jsonl"
     head, line = path.read_text().splitlines()
     path.write_text(f"{head}\n{json.dumps({**json.loads(line), **change})}\n")
     with pytest.raises(ValueError, match=re.escape(text)):
-        load_plan(tmp_path)
+        plans.load_plan(tmp_path)
 
 
 def test_no_link_leads_out_of_a_run(tmp_path):
     run, outside = tmp_path / "run", tmp_path / "outside"
-    save_plan(plan_of(sample={"bedroom": 1}), run)
+    plans.save_plan(plan_of(sample={"bedroom": 1}), run)
     outside.mkdir()
     (run / "rooms").mkdir()
     (run / "rooms/0000").symlink_to(outside)
@@ -177,4 +168,4 @@ def test_no_link_leads_out_of_a_run(tmp_path):
     (run / ".batch").rename(outside / "batch")
     (run / ".batch").symlink_to(outside / "batch")
     with pytest.raises(ValueError, match=r"is a link to .*outside/batch, outside of"):
-        load_plan(run)
+        plans.load_plan(run)
