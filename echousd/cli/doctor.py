@@ -55,5 +55,3 @@ def _show(findings: list[Diagnosis]) -> None:
     if not console.is_terminal:
         console.width = 200  # nobody's window: keep paths on one line
     console.print(table)
-
-

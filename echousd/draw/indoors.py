@@ -1,7 +1,8 @@
-"""Light in a room with walls: what comes in at the windows, lamps, and what the walls throw back."""
+"""Light in a room with walls: what comes in at the windows, lamps, and how bright a picture of it is."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -14,16 +15,17 @@ if TYPE_CHECKING:
     from echousd.draw.scenery import Scenery
 
 SKY = 4.0  # radiance of the sky in a window for a dome of intensity 1, whose light else comes from above as well
-SUN = 6.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
+SUN = 9.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
 CEILING = np.array([0.80, 0.79, 0.77], np.float32)
-VIEW = 1.1  # of the sky's radiance, what is seen of it through a window: eyes adapt
-THROWN = 0.6  # of the light that meets a surface, what furnished rooms throw back
+VIEW = 1.4  # of the sky's radiance, what is seen of it through a window: eyes adapt
 DIM = 0.05  # radiance at every place of a room without lamps and windows, so that one sees it
-# To the colour of the light, by night and by day: lamps stay warm. What the picture's middle tone becomes, by night and
-# by day, and how much at most it is brightened for that.
-ADAPTED, GREY, BRIGHTEST = (0.25, 0.7), (0.12, 0.24), 6.0
+# To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
+# darker than comes to, by night and by day, and how much at most it is brightened for that.
+ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.3, 0.75), (0.35, 0.62), 70, 15.0
+CONTRAST, KNEE = 1.3, 0.6  # power about what is bright, and from where on highlights are rolled off
+HUE = 0.6  # share of colours that keep their hue where they are bright; film bleaches them
+LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 DAY, GLOWING = 0.5, 5.0  # radiance of the sky by day; by night a shade glows so much more, as eyes see it
-FILMIC = (2.51, 0.03, 2.43, 0.59, 0.14)  # Narkowicz's fit of the ACES curve, 2015
 OWN = 0.25  # metres around a bulb where its own shade throws no shadow
 
 
@@ -91,30 +93,30 @@ def with_ceiling(scenery: Scenery) -> Scenery:
     return replace(scenery, **joined)
 
 
-def thrown_back(scenery: Scenery) -> np.ndarray:
-    """(3,) radiance that is everywhere in a room, as in a sphere whose walls throw back a part of what comes in."""
-    lights, size = scenery.lights, np.ptp(np.array(scenery.bounds), axis=0)
-    around = 2 * (size[0] * size[2] + size[1] * (size[0] + size[2]))
-    total = np.zeros(3)
-    for _, side, rise in scenery.panes:
-        across = 4 * np.cross(side, rise)
-        total += np.linalg.norm(across) * SKY * lights.sky * np.pi / 2  # the ground below sends little
-        if lights.sun is not None:
-            total += abs(float(across @ lights.sun[0])) * SUN * lights.sun[1]
-    total += 4 * np.pi * lights.power.sum(0)
-    return np.asarray(total / np.pi / around * THROWN / (1 - THROWN) + DIM * max(lights.sky, 0.1), np.float32)
+def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable[[np.ndarray], np.ndarray]:
+    """How a picture's linear colours (..., 3) come to [0, 1]: what is bright in the room comes to `BRIGHT`, with
+    contrast about it, and what is brighter is rolled off as film does.
 
-
-def exposed(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> np.ndarray:
-    """(h, w, 3) linear colours in [0, 1]: brightened or darkened to a middle tone, and rolled off as film does.
-
-    `color`: (h, w, 3) linear radiance. `light`: (3,) that of the room, to whose colour the eye adapts in part. `day`: 1
-    by day, 0 by night, see `Lights.day`.
+    `color`: (n, 3) linear radiance of the picture. `light`: (3,) that of the room, to whose colour the eye adapts in
+    part. `day`: 1 by day, 0 by night, see `Lights.day`.
     """
-    adapted, grey = (np.interp(day, (0, 1), ends) for ends in (ADAPTED, GREY))
-    color = color / (np.maximum(light, 1e-6) / max(float(light.mean()), 1e-6)) ** adapted
-    bright = np.log(np.maximum(color.mean(-1), 1e-4))
-    scale = min(grey / float(np.exp(bright.mean())), BRIGHTEST)
-    a, b, c, d, e = FILMIC
-    x = color * scale
-    return np.clip(x * (a * x + b) / (x * (c * x + d) + e), 0, 1)
+    adapted, bright = (np.interp(day, (0, 1), ends) for ends in (ADAPTED, BRIGHT))
+    white = (np.maximum(light, 1e-6) / max(float(light.mean()), 1e-6)) ** adapted
+    seen = float(np.percentile(color / white @ LUMA, SHARE))
+    scale = (min(bright / max(seen, 1e-4), BRIGHTEST) / white).astype(np.float32)
+
+    def shown(color: np.ndarray) -> np.ndarray:
+        color = color * scale
+        level = np.maximum(color @ LUMA, np.float32(1e-6))[..., None]
+        mapped = _filmic(level, bright)
+        kept = HUE * np.sqrt(1 - mapped)
+        return np.clip(kept * color * mapped / level + (1 - kept) * _filmic(color, bright), 0, 1)
+
+    return shown
+
+
+def _filmic(level: np.ndarray, middle: float) -> np.ndarray:
+    """Contrast about a middle tone, and a shoulder from `KNEE` on."""
+    level = middle * (np.maximum(level, 0) / middle) ** CONTRAST
+    over = np.maximum(level - KNEE, 0)
+    return np.where(level > KNEE, KNEE + (1 - KNEE) * over / (over + 1 - KNEE), level)

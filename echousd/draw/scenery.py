@@ -145,7 +145,8 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
                 if key not in images:
                     pixels = image_of(paint.image, paint.texture)
                     images[key] = (len(images), (pixels, np.array(paint.tint, np.float32)))
-                part["texture"][faces] = images[key][0]
+                part["texture"][faces], (pixels, tint) = images[key]
+                part["flat_colors"][faces] = LINEAR[pixels[::16, ::16]].mean((0, 1)) * tint
         parts.append(part)
         words.append(mesh.category)
         if mesh.category not in (*SHELL, *HUNG, "rug"):

@@ -1,4 +1,4 @@
-"""Light in a picture: rays through Embree, soft sun, occluded sky, one bounce, and the noise smoothed away."""
+"""Light in a picture: rays through Embree, soft sun, occluded sky, what surfaces throw on, the noise smoothed away."""
 
 from __future__ import annotations
 
@@ -9,12 +9,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from echousd.draw.indoors import GLOWING, OWN, SKY, SUN, THROWN, VIEW, exposed, thrown_back
+from echousd.draw.bounced import Bounced
+from echousd.draw.indoors import DIM, GLOWING, OWN, SKY, SUN, VIEW, exposure
 from echousd.draw.scenery import LINEAR, Scenery
 from echousd.draw.views import View
 
 FINE, QUICK = 3, 2  # squared: rays per pixel
 SKY_RAYS, AROUND = 3, 3  # per ray: rays towards the sky; inside a room, to what stands around
+# Places at which a room's light is found, rays of each kind from each, and how often light is thrown on.
+PLACES, OFTEN, TURNS = (600, 1200), 3, 3
+NEAR, CREVICE = 0.1, 1.5  # what of the light around comes where something touches, and from how many metres on all
 
 
 class RenderUnavailable(ImportError, ValueError):
@@ -39,13 +43,15 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
     sun = scenery.lights.sun
     sun = np.float32(SUN / np.pi) * (0 * SUN_LIGHT if sun is None else sun[1]) if view.inside else 0.55 * SUN_LIGHT
     glow = float(np.interp(scenery.lights.day, (0, 1), (GLOWING, 1))) if view.inside else 1.0
-    world = World(embree(scenery.triangles), scenery, view, size, shift, thrown_back(scenery), sun, glow)
-    mixed = _radiance(world, height, rays)
-    return (exposed(mixed, world.thrown, scenery.lights.day) if view.inside else _tone(mixed)) ** (1 / 2.2)
+    world = World(embree(scenery.triangles), scenery, view, size, shift, Bounced.dark(*scenery.bounds), sun, glow)
+    white = None
+    if view.inside:
+        world, white = _lit(world)
+    return _drawn(world, height, rays, white) ** (1 / 2.2)
 
 
-def _radiance(world: World, height: int, rays: int) -> np.ndarray:
-    """(height, size, 3) linear colours of the picture."""
+def _drawn(world: World, height: int, rays: int, white: np.ndarray | None) -> np.ndarray:
+    """(height, size, 3) linear colours of the picture, of each ray as it is shown: so edges of what glares are even."""
     size, many = world.size, rays**2
     places = [((inner % rays + 0.5) / rays, (inner // rays + 0.5) / rays) for inner in range(many)]
     _, seen = _met(world, np.arange(height * size), places[0])
@@ -59,12 +65,14 @@ def _radiance(world: World, height: int, rays: int) -> np.ndarray:
     everywhere = np.flatnonzero(seen.face >= 0)
     for met in (everywhere[start : start + BLOCK] for start in range(0, len(everywhere), BLOCK)):
         color[met] = _colored(world, seen.face[met], st[met], light[met])
+    tone = _tone if white is None else exposure(color, white, world.scenery.lights.day)
+    color = tone(color)
     mixed = color.copy()
     for pixel, more in finer:
         met = np.flatnonzero(more.face >= 0)
         lent = _lent(world, more.of(met), pixel[met], seen, light)
         more.glow[met] = _colored(world, more.face[met], more.st[met, None], lent)
-        mixed[pixel] += (more.glow - color[pixel]) / many
+        mixed[pixel] += (tone(more.glow) - color[pixel]) / many
     return mixed.reshape(height, size, 3)
 
 
@@ -86,7 +94,7 @@ class World(NamedTuple):
     view: View
     size: int
     shift: np.ndarray
-    thrown: np.ndarray
+    thrown: Bounced
     sun: np.ndarray
     glow: float
 
@@ -411,9 +419,20 @@ def _light(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarr
 
 def _light_inside(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarray:
     """As `_light`, in a closed room: sky in the windows, sun through them, lamps, and what the room throws back."""
+    light, shine, sun = _direct(world, hits, *(_even(sample, part) for part in (shift[:, :2], shift[:, 2:])))
+    light += DIM * max(world.scenery.lights.sky, 0.1)
+    for ray in range(AROUND):
+        light += _gathered(world, hits, _even(sample * AROUND + ray, shift[:, 2:])) / AROUND
+    return np.column_stack([light, shine, sun])
+
+
+def _direct(world: World, hits: Hits, spot: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, ...]:
+    """(n, 3) what comes from windows and lamps, (n,) what of it is mirrored to the eye, (n,) the sun's share.
+
+    `spot`, `turn`: (n, 2) in [0, 1), which place in which window and lamp is asked.
+    """
     scene, scenery = world.scene, world.scenery
     lights, point, normal, count = scenery.lights, hits.point, hits.normal, len(hits.point)
-    spot, turn = _even(sample, shift[:, :2]), _even(sample, shift[:, 2:])
     light, shine, sun = np.zeros((count, 3), np.float32), np.zeros(count, np.float32), np.zeros(count, np.float32)
     if len(scenery.panes):  # one place in one window for each ray
         pane = scenery.panes[np.minimum((turn[:, 0] * len(scenery.panes)).astype(int), len(scenery.panes) - 1)]
@@ -436,14 +455,47 @@ def _light_inside(world: World, hits: Hits, sample: int, shift: np.ndarray) -> n
         facing = np.clip(_dot(normal, way), 0, None) * len(lights.bulbs) / np.maximum(away, OWN) ** 2
         lit = _free(scene, point, way, away - OWN, facing > 0) * facing
         light += lit[:, None] * lights.power[which] / np.float32(np.pi)
-    around = np.zeros((count, 3), np.float32)
-    for ray in range(AROUND):
-        way = _unit(normal + _on_sphere(_even(sample * AROUND + ray, shift[:, 2:])))  # cosine-weighted
-        other = scene.run(_f32(point), _f32(way), output=1)
-        near = np.clip(other["tfar"] / 1.5, 0, 1)[:, None]
-        hue = scenery.flat_colors[np.clip(other["primID"], 0, None)] / np.float32(THROWN)
-        around += np.where(other["primID"][:, None] >= 0, (0.4 + 0.6 * hue) * (0.12 + 0.88 * near), 1.0)
-    return np.column_stack([light + around / AROUND * world.thrown, shine, sun])
+    return light, shine, sun
+
+
+def _gathered(world: World, hits: Hits, square: np.ndarray) -> np.ndarray:
+    """(n, 3) what surfaces around throw on the points, by one ray each; `square`: (n, 2) in [0, 1), where it goes."""
+    way = _unit(hits.normal + _on_sphere(square))  # cosine-weighted
+    other = world.scene.run(_f32(hits.point), _f32(way), output=1)
+    near = NEAR + (1 - NEAR) * np.clip(other["tfar"][:, None] / CREVICE, 0, 1)
+    normal = world.scenery.normals[np.maximum(other["primID"], 0), 0]
+    rows = world.thrown.rows(hits.point, way, np.minimum(other["tfar"], 100), normal)
+    return np.asarray((other["primID"] >= 0)[:, None] * near * world.thrown.radiance[rows])
+
+
+def _lit(world: World) -> tuple[World, np.ndarray]:
+    """A closed room that knows how bright its surfaces are, and (3,) the mean light on them.
+
+    Light is found at places that an eye in it and those places see, and thrown on `TURNS` times.
+    """
+    rng, normals = np.random.default_rng(0), world.scenery.normals[:, 0]
+    point, normal = world.view.matrix[None, :3, 3].astype(np.float32), np.zeros((1, 3), np.float32)
+    met: list[tuple[np.ndarray, ...]] = []
+    for count in PLACES:  # from the eye all around, then from what it sees
+        origin = np.resize(point, (count, 3))
+        way = _unit(np.resize(normal, (count, 3)) + _on_sphere(rng.random((count, 2), np.float32)))
+        hit = world.scene.run(_f32(origin), _f32(way), output=1)
+        there = np.flatnonzero(hit["primID"] >= 0)
+        origin, way, face, far = origin[there], way[there], hit["primID"][there], hit["tfar"][there]
+        normal = -np.sign(_dot(normals[face], way))[:, None] * normals[face]
+        point = origin + far[:, None] * way + np.float32(2e-3) * normal
+        met.append((point, normal, world.thrown.rows(origin, way, far, normal), world.scenery.flat_colors[face]))
+    point, normal, rows, albedo = (np.concatenate(values) for values in zip(*met, strict=True))
+    hits = Hits(point, normal, normal, np.zeros(len(point), np.float32))
+    direct, light = np.zeros_like(point), np.zeros_like(point)
+    for _ in range(OFTEN):
+        some, _, sun = _direct(world, hits, *rng.random((2, len(point), 2), np.float32))
+        direct += (some + sun[:, None] * world.sun) / OFTEN
+    for _ in range(TURNS):
+        world = world._replace(thrown=world.thrown.lit(rows, albedo * (direct + light)))
+        squares = rng.random((OFTEN, len(point), 2), np.float32)
+        light = np.mean([_gathered(world, hits, square) for square in squares], 0)
+    return world, (direct + light).mean(0)
 
 
 def _way(point: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from echousd.room import RoomData
 
 
-
 def free_assets(folder: Path, room: RoomData, recorded: Mapping[str, str]) -> dict[str, str]:
     """Object name -> asset name, where new assets keep off names whose files in `folder` are somebody else's."""
     renamed: dict[str, str] = {}

@@ -42,8 +42,6 @@ def with_own_pieces(graph: SceneGraph, meshes: Mapping[str, str | Path]) -> Scen
     return graph
 
 
-
-
 def with_locked_places(graph: SceneGraph, *files: Path | None) -> tuple[SceneGraph, tuple[str, ...]]:
     """The graph with size, position and yaw of locked objects that lack one, and a sentence for each without a place.
 

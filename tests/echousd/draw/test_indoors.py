@@ -10,7 +10,7 @@ from pxr import Gf, Usd, UsdGeom, UsdLux
 from small_room import BARE, StandIn, small_graph
 
 import echousd
-from echousd.draw.indoors import GREY, exposed, read_lights, thrown_back, with_ceiling
+from echousd.draw.indoors import BRIGHT, SHARE, exposure, read_lights, with_ceiling
 from echousd.draw.rendering import render, render_stage
 from echousd.draw.scenery import read_scenery
 from echousd.draw.tracing import trace
@@ -84,16 +84,6 @@ def test_lights_are_read_in_any_unit_and_axis():
     assert read_lights(lights_of()).sky == 1.0  # a stage that tells nothing of light is seen by day
 
 
-def test_what_a_room_throws_back_grows_with_windows_sun_and_lamps(stage):
-    scenery = read_scenery(stage)
-    assert len(scenery.panes)
-    day = thrown_back(scenery).sum()
-    assert thrown_back(replace(scenery, panes=scenery.panes[:0])).sum() < day
-    assert thrown_back(replace(scenery, lights=replace(scenery.lights, sun=None))).sum() < day
-    lamps = replace(scenery.lights, power=100 * np.ones((1, 3), np.float32))
-    assert thrown_back(replace(scenery, lights=lamps)).sum() > 2 * day
-
-
 def box_room(**lights) -> tuple:
     """The camera on a floor of a closed box without furniture, and the scenery, lit as told."""
     import trimesh
@@ -129,18 +119,45 @@ def test_a_lamp_lights_what_is_near_it_and_a_window_what_is_before_it():
     assert near.mean() > far.mean() + 0.02
 
 
-def test_exposure_brings_dark_and_bright_rooms_to_one_middle_tone():
+def test_what_a_wall_throws_back_has_its_colour_and_corners_are_darker_than_open_walls():
+    lamp = {"bulbs": np.array([(0.0, 1.5, 0.0)], np.float32), "power": np.ones((1, 3), np.float32)}
+    scenery, down = box_room(sky=0.0, **lamp)
+    right = (scenery.triangles[..., 0] > 1.9).all(1)
+    red = np.where(right[:, None], np.float32([0.7, 0.05, 0.05]), np.float32(0.6))
+    picture = trace(replace(scenery, flat_colors=red), down, 96, rays=2)
+    axis = 0 if abs(down.matrix[0, 1]) > 0.5 else 1
+    ends = [np.take(picture, part, axis).reshape(-1, 3).mean(0) for part in (range(12), range(84, 96))]
+    hue = sorted(float(end[0] / end[2]) for end in ends)
+    assert hue[1] > 1.03 * hue[0]  # the floor before the red wall is redder than the one before the white wall
+    middle, corner = picture[40:56, 40:56].mean(), picture[:6, :6].mean()
+    assert corner < 0.9 * middle
+
+
+def exposed(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> np.ndarray:
+    return exposure(color.astype(np.float32), light, day)(color.astype(np.float32))
+
+
+def test_exposure_brings_dark_and_bright_rooms_to_one_tone():
     rng = np.random.default_rng(0)
-    room = rng.uniform(0.2, 1.0, (20, 20, 3))
+    room = rng.uniform(0.2, 1.0, (20, 20, 1)) * np.ones(3)
     white = np.ones(3)
     dark, bright = (exposed(scale * room, white) for scale in (0.2, 5.0))
-    np.testing.assert_allclose(dark, bright, atol=1e-6)
-    assert 0.6 * GREY[1] < np.median(bright) < 1.8 * GREY[1]
+    np.testing.assert_allclose(dark, bright, atol=1e-5)
+    assert np.percentile(bright, SHARE) == pytest.approx(BRIGHT[1], abs=0.02)
     assert np.median(exposed(room, white, day=0.0)) < 0.8 * np.median(bright)  # the evening is darker
     assert exposed(1e-3 * room, white).mean() < 0.1  # night stays night
     warm = np.array([1.0, 0.7, 0.4])
     left = exposed(warm * room, warm).mean((0, 1)) / exposed(room, white).mean((0, 1))
     assert 1.0 < left[0] / left[2] < 1.6  # of 2.5: the eye adapts to most of a lamp's colour
+
+
+def test_what_glares_is_bleached_and_what_does_not_keeps_its_hue():
+    room, white = np.full((10, 10, 3), 0.5), np.ones(3)
+    shown = exposure(room.astype(np.float32), white)
+    colour = np.array([[0.4, 0.15, 0.1]], np.float32)
+    dim, glare = shown(colour), shown(100 * colour)
+    assert glare.min() > 0.9
+    assert dim.max() / dim.min() > 3.5
 
 
 def test_a_room_is_drawn_in_the_light_that_is_asked_for(stage):

@@ -1,0 +1,48 @@
+"""What the surfaces of a room throw on to one another: a coarse table of how bright they are, by place and side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+CELL = 0.5  # metres
+THROWN = 0.6  # of what surfaces of their colours would: so rooms have the contrast that photographs have
+
+
+@dataclass(frozen=True, eq=False)
+class Bounced:
+    """How bright the surfaces of a room are: (cells * 6, 3) radiance by cell of `CELL` metres and side.
+
+    `low`: (3,) the room's corner, metres. `shape`: (3,) int, cells along x, y and z.
+    """
+
+    low: np.ndarray
+    shape: np.ndarray
+    radiance: np.ndarray
+
+    @classmethod
+    def dark(cls, low: np.ndarray, high: np.ndarray) -> Bounced:
+        """The table of a room between two corners (3,), metres, without light."""
+        shape = np.maximum(np.ceil((high - low) / CELL), 1).astype(int)
+        return cls(low.astype(np.float32), shape, np.zeros((6 * shape.prod(), 3), np.float32))
+
+    def rows(self, origin: np.ndarray, way: np.ndarray, far: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """(n,) int, the rows of `radiance` where rays, `origin` and `way` (n, 3), met surfaces after `far` (n,) metres.
+
+        `normal`: (n, 3) of the surfaces, on either side of them.
+        """
+        axis = np.abs(normal).argmax(1)
+        side = 2 * axis + (way[np.arange(len(way)), axis] < 0)
+        before = origin + np.maximum(far - 0.05, 0)[:, None] * way - self.low
+        x, y, z = np.clip((before / CELL).astype(int), 0, self.shape - 1).T
+        return np.asarray(((x * self.shape[1] + y) * self.shape[2] + z) * 6 + side)
+
+    def lit(self, rows: np.ndarray, thrown: np.ndarray) -> Bounced:
+        """The table where surfaces throw back what some of them do, (n, 3); where none is in a row, the mean of its
+        side."""
+        total = np.stack([np.bincount(rows, channel, len(self.radiance)) for channel in thrown.T], 1)
+        count = np.bincount(rows, minlength=len(total))[:, None]
+        even = total.reshape(-1, 6, 3).sum(0) / np.maximum(count.reshape(-1, 6, 1).sum(0), 1)
+        mean = np.where(count > 0, total / np.maximum(count, 1), np.tile(even, (len(total) // 6, 1)))
+        return replace(self, radiance=(THROWN * mean).astype(np.float32))

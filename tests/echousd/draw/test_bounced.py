@@ -1,0 +1,42 @@
+"""The coarse table of a room's light: what surfaces throw on to one another, by place and side."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echousd.draw.bounced import THROWN, Bounced
+
+TABLE = Bounced.dark(np.zeros(3), np.array([4.0, 3.0, 2.0]))
+
+
+def rows(*ways: tuple[float, float, float], origin: tuple[float, float, float] = (2.0, 1.5, 1.0)) -> np.ndarray:
+    """Rows of surfaces that rays from the middle meet head on after 0.9 m."""
+    way = np.array(ways, float)
+    return TABLE.rows(np.array([origin] * len(way)), way, np.full(len(way), 0.9), -way)
+
+
+def test_each_of_the_six_sides_of_a_place_has_a_row_of_its_own():
+    axes = np.concatenate([s * np.eye(3) for s in (-1, 1)])
+    place = TABLE.rows(np.tile([1.1, 1.1, 1.1], (6, 1)) - 0.05 * axes, axes, np.full(6, 0.1), axes)
+    assert len(set(place.tolist())) == 6
+    assert len(set((place // 6).tolist())) == 1
+    both = TABLE.rows(
+        np.full((2, 3), 1.2), np.tile([0.0, -1.0, 0.0], (2, 1)), np.full(2, 0.1), np.eye(3)[[1, 1]] * [[1], [-1]]
+    )
+    assert both[0] == both[1]  # of a sheet the side counts that the ray comes from
+
+
+def test_a_place_is_as_bright_as_what_was_found_there_and_others_as_their_side():
+    far = rows((1, 0, 0), (1, 0, 0), (1, 0, 0), (0, 1, 0))
+    far[1] = rows((1, 0, 0), origin=(0.2, 1.5, 1.0))[0]
+    light = np.array([(1.0, 0.5, 0.0), (0.2, 0.2, 0.2), (3.0, 0.5, 0.0), (9.0, 9.0, 9.0)])
+    lit = TABLE.lit(far, light)
+    np.testing.assert_allclose(lit.radiance[far[0]], THROWN * np.array([2.0, 0.5, 0.0]), rtol=1e-6)
+    np.testing.assert_allclose(lit.radiance[far[1]], THROWN * 0.2, rtol=1e-6)
+    unknown = rows((1, 0, 0), origin=(2.0, 0.2, 0.2))
+    assert unknown[0] not in far
+    np.testing.assert_allclose(lit.radiance[unknown[0]], THROWN * light[:3].mean(0), rtol=1e-6)
+
+
+def test_places_outside_of_a_room_are_those_at_its_border():
+    assert np.isfinite(TABLE.radiance[rows((1, 0, 0), origin=(50.0, -9.0, 3.0))]).all()
