@@ -116,9 +116,10 @@ class Grids:
 
 
 @pytest.fixture(autouse=True)
-def _few_styles(monkeypatch):
+def few_styles_and_steps(monkeypatch):
     monkeypatch.setattr(parts_stage, "STYLES", 20)
     monkeypatch.setattr(parts_stage, "HELD", 5)
+    monkeypatch.setattr("echomodel.compact.sampling.AFTER", 2)  # of forty equal steps
 
 
 def stages(packed: PackedRooms, model: CompactModel) -> dict:

@@ -130,6 +130,7 @@ def test_bad_files_are_named(name, text, told, tmp_path):
 def test_they_stand_in_the_tables_with_what_was_left_out(rooms, tmp_path, monkeypatch):
     monkeypatch.setattr(runs, "HONEST", ("random", "real"))
     monkeypatch.setattr("echousd.evaluation.suite.HONEST", ("random", "real"))
+    monkeypatch.setattr("echomodel.metrics.sets.TREES", 8)
     raw = [room.to_json() for room in rooms]
     raw[0]["objects"][0]["category"] = "sculpture"
     raw[1]["floor_polygon"] = []

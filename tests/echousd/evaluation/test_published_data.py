@@ -13,6 +13,7 @@ from echomodel.data.sgfront import SGFront, write_sgfront
 from echomodel.metrics.layouts import tasks_of
 from echomodel.rooms.generator import generate_rooms
 from echomodel.training.recipe import read_recipe
+from echoscene.model import ReleasedModel, Schedule
 from echoscene.training import PublishedRooms, PublishedShapes, opened_data
 from echousd.cli.main import run
 from echousd.evaluation.runs import SuiteSettings, rooms_against
@@ -67,6 +68,11 @@ def test_one_command_trains_and_fills_our_column(folder, tmp_path, monkeypatch):
     monkeypatch.setattr("echousd.evaluation.suite.HONEST", ("random", "real"))
     for name in ("PUBLISHED", "CONSISTENT"):  # ten classes take minutes
         monkeypatch.setattr(f"echousd.evaluation.sections.{name}", ("wardrobe",))
+    for name, few in {"POINTS": 128, "SUITES": 4, "PAIRS": 2, "DISTANCES": {"Chamfer": 0, "EMD": 16}}.items():
+        monkeypatch.setattr(f"echousd.evaluation.sections.{name}", few)
+    whole = Schedule.ddim  # a thousand steps and a hundred are for tests/parity
+    monkeypatch.setattr(Schedule, "ddim", lambda tables, count: whole(tables, 4))
+    monkeypatch.setattr(ReleasedModel, "layout_tables", Schedule.linear(1e-3, 0.2, 10))
     small = [f"paper.{name}={json.dumps(value).replace(' ', '')}" for name, value in SIZES.items()]
     settings = " ".join(f"--set {shlex.quote(word)}" for word in [*RUN, *small])
     given = [f"SGFRONT={folder}", f"PAPER={tmp_path / 'paper'}", f"SETTINGS={settings}", "BIN=bin"]
