@@ -185,7 +185,7 @@ class Loop:
             return True
         sys.settrace(None)
         notes = self.copy / "record.json"
-        if _forked(lambda: self.first(session, notes)):
+        if _forked(lambda: self.first(session, notes), 6 * SECONDS):
             self.broken = "the tests fail without any change"
             return True
         self.record, found = None, json.loads(notes.read_text())
@@ -285,12 +285,12 @@ def _put(tree: ast.Module, file: str) -> None:
             one.__code__ = new.get((one.__code__.co_qualname, one.__code__.co_firstlineno), one.__code__)
 
 
-def _forked(run: Any) -> bool:
-    """Whether `run` says yes, fails or takes too long, in a fork whose words nobody reads."""
+def _forked(run: Any, seconds: int = SECONDS) -> bool:
+    """Whether `run` says yes, fails or takes longer than some seconds, in a fork whose words nobody reads."""
     child = os.fork()
     if child == 0:
         os.setpgid(0, 0)
-        signal.alarm(SECONDS)
+        signal.alarm(seconds)
         failed = True
         try:
             failed = run()

@@ -8,7 +8,8 @@ import pytest
 from dying_process import killed
 from stopped_disk import stopped_disk
 
-from echousd.folder.folder import check_writable, claim, recover, write_together
+from echousd.folder.folder import check_output, check_writable, claim, recover, write_together
+from echousd.folder.found import room_at
 from echousd.folder.lock import LOCK
 from echousd.pending import STAGING
 
@@ -135,3 +136,32 @@ def test_places_where_nothing_can_be_written(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write anywhere
     with pytest.raises(ValueError, match="is not writable"):
         check_writable(tmp_path / "room")
+
+
+def test_an_output_that_cannot_be_is_refused_before_the_work(tmp_path):
+    (tmp_path / "there.usda").write_text("mine")
+    (tmp_path / "word").write_text("mine")
+    (tmp_path / "folder").mkdir()
+    refused = [
+        ("there.usda", True, False, "exists; choose another file or use --force$"),
+        ("room.usdz", True, True, r"with --flat the output is a file that ends in .usda or .usdc$"),
+        ("room.usdc", False, True, "the output is a folder; --flat writes one file$"),
+        ("word", False, True, "is a file, the output must be a folder$"),
+    ]
+    for name, flat, force, text in refused:
+        with pytest.raises(ValueError, match=f"{name}: {text}"):
+            check_output(tmp_path / name, flat=flat, force=force)
+    for name, flat, force in (("there.usda", True, True), ("new.usdc", True, False), ("new", False, False)):
+        check_output(tmp_path / name, flat=flat, force=force)
+    assert (tmp_path / "there.usda").read_text() == "mine"
+
+
+@pytest.mark.parametrize(("count", "more"), [(2, False), (8, False), (9, True)])
+def test_a_folder_of_several_rooms_names_the_first_eight(tmp_path, count, more):
+    for number in range(count):
+        save(tmp_path / f"home/room_{number}", {"room.usda": b"#usda 1.0\n"})
+    with pytest.raises(ValueError, match=f"home: a folder of {count} rooms, name one file: room_0/room.usda, ") as told:
+        room_at(tmp_path / "home")
+    assert str(told.value).endswith(", ...") == more
+    assert str(told.value).count(".usda") == min(count, 8)
+    assert room_at(tmp_path / "home/room_1") == tmp_path / "home/room_1/room.usda"

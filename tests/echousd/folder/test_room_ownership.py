@@ -13,6 +13,7 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echousd.folder.folder import recover, write_together
 from echousd.folder.manifest import MAX_SEED, find_manifest
+from echousd.folder.ownership import merged_root
 from echousd.make.edit import edit
 from echousd.make.save import save_room, write_preview
 from echousd.pending import STAGING
@@ -224,3 +225,36 @@ def test_largest_seed_is_stored(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         save_room(make(1), tmp_path / "room", preview=False)
+
+
+ROOT = '#usda 1.0\n(\n    defaultPrim = "Room"\n    metersPerUnit = 1\n    upAxis = "Y"\n)\n'
+
+
+@pytest.mark.parametrize(
+    ("line", "other", "text"),
+    [
+        ('upAxis = "Y"', 'upAxis = "Z"', "edited by hand, upAxis Z; a room with Y needs another folder$"),
+        ("metersPerUnit = 1", "metersPerUnit = 0.01", "edited by hand, metersPerUnit 0.01; a room with 1.0 needs"),
+        ('defaultPrim = "Room"', 'defaultPrim = "Loft"', "edited by hand, defaultPrim Loft; a room with Room needs"),
+        ('upAxis = "Y"', "upAxis", "edited by hand and no longer readable as USD; repair it or delete it$"),
+    ],
+)
+def test_a_root_in_another_frame_is_not_merged(tmp_path, line, other, text):
+    path = tmp_path / "room.usda"
+    with pytest.raises(ValueError, match=f"{path}: {text}"):
+        merged_root(path, ROOT.replace(line, other).encode(), ROOT.encode())
+
+
+def test_merged_roots_keep_what_is_theirs_and_get_what_is_ours(tmp_path):
+    def root(layers, data):
+        layer = Sdf.Layer.CreateAnonymous(".usda")
+        layer.ImportFromString(ROOT)
+        layer.subLayerPaths, layer.customLayerData = layers, data
+        return layer.ExportToString().encode()
+
+    theirs = root(["./mine.usda", "./layers/look.usdc", "./layers/old.usdc"], {"mine": 1, "seed": 1})
+    ours = root(["./layers/look.usdc", "./layers/new.usdc"], {"seed": 2})
+    merged = Sdf.Layer.CreateAnonymous(".usda")
+    merged.ImportFromString(merged_root(tmp_path / "room.usda", theirs, ours).decode())
+    assert list(merged.subLayerPaths) == ["./mine.usda", "./layers/look.usdc", "./layers/new.usdc"]
+    assert merged.customLayerData == {"mine": 1, "seed": 2}

@@ -11,8 +11,10 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSemantics
 from echousd.graph import Node, Relation, SceneGraph
 from echousd.stage.boxes import relations_from_boxes, room_boxes
 from echousd.stage.encoding import StageError
-from echousd.stage.foreign import SkippedPrims, foreign_graph
+from echousd.stage.foreign import SkippedPrims, boxed_graph, foreign_graph, foreign_pieces
 from echousd.stage.graphs import read_graph
+from echousd.stage.read import the_room
+from echousd.stage.update import update_graph
 from echousd.stage.write import graph_layer
 
 CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
@@ -276,3 +278,53 @@ def test_a_node_without_a_box_is_named():
     graph = boxed().add_node("lamp", "pendant_lamp")
     with pytest.raises(StageError, match=r"object 'lamp' has no size, position and yaw, allowed: a box for every"):
         room_boxes(graph)
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "stands"),
+    [
+        ("pillar", (0.3, 2.5, 0.3), True),
+        ("pillar", (0.11, 1.21, 1.19), True),
+        ("pillar", (0.3, 1.1, 0.3), False),  # low
+        ("pillar", (0.05, 2.5, 0.3), False),  # a pipe
+        ("pillar", (0.3, 2.5, 1.3), False),  # a wall by its plan
+        ("wall_3", (0.3, 2.5, 0.3), False),  # a wall by its name
+    ],
+)
+def test_what_is_high_and_no_wall_is_in_the_way_without_a_label(name, size, stands):
+    stage = stage_of("Y", 1.0)
+    label(box_mesh(stage, "/World/bed", (0, 0, 0), (1.6, 0.5, 2)).GetPrim(), "bed")
+    box_mesh(stage, f"/World/{name}", (4, 0, 4), np.add((4, 0, 4), size))
+    graph, paths = foreign_pieces(stage)
+    assert (name in graph.names) == stands
+    if stands:
+        node = graph.node(name)
+        assert (node.locked, node.attributes) == (True, {"obstacle": "pillar"})
+        assert paths[name] == "/World/pillar"
+
+
+@pytest.mark.parametrize(
+    ("size", "stands"), [((0.3, 0.3, 0.02), True), ((0.3, 0.29, 0.02), False), ((0.0, 2.0, 2.0), False)]
+)
+def test_an_unknown_label_is_in_the_way_where_two_sides_are_long(size, stands):
+    stage = stage_of("Y", 1.0)
+    label(box_mesh(stage, "/World/bed", (0, 0, 0), (1.6, 0.5, 2)).GetPrim(), "bed")
+    label(box_mesh(stage, "/World/thing", (4, 0, 4), np.add((4, 0, 4), size)).GetPrim(), "astrolabe")
+    with pytest.warns(SkippedPrims, match="fixed obstacles: 'astrolabe'" if stands else "unknown label 'astrolabe'"):
+        graph = foreign_graph(stage)
+    assert ("thing" in graph.names) == stands
+
+
+@pytest.mark.parametrize("untold", ["size", "position", "yaw"])
+def test_nodes_get_the_boxes_of_their_prims_where_one_number_is_not_told(untold):
+    told = {"size": (1.0, 1.0, 1.0), "position": (5.0, 0.0, 5.0), "yaw": 1.0}
+    boxes = {name: None if name == untold else value for name, value in told.items()}
+    stage = Usd.Stage.Open(graph_layer(SceneGraph("bedroom", (Node("bed", "bed", **boxes),))))
+    prims = the_room(stage, None)
+    with pytest.raises(StageError, match="/Room/Objects/bed: has no bounds, allowed: a box or geometry"):
+        boxed_graph(prims)
+    box_mesh(stage, "/Room/Objects/bed/mesh", (-0.8, 0, -1), (0.8, 0.5, 1))
+    (node,) = boxed_graph(prims).nodes
+    assert node.size == pytest.approx((1.6, 0.5, 2.0))
+    update_graph(stage, SceneGraph("bedroom", (Node("bed", "bed", **told),)))
+    assert boxed_graph(the_room(stage, None)).nodes[0].size == (1.0, 1.0, 1.0)

@@ -230,3 +230,18 @@ def test_a_usdc_on_disk(tmp_path):
     update_graph(stage, GRAPH.lock("closet"))
     stage.Save()
     assert read_graph(path) == GRAPH.lock("closet")
+
+
+@pytest.mark.parametrize(("specifier", "kind"), [("over", "Xform"), ("over", ""), ("def", "")])
+def test_a_prim_that_is_no_xform_yet_becomes_one_with_what_it_holds(specifier, kind):
+    layer = graph_layer(GRAPH.remove_node("bed"))
+    prim = Sdf.CreatePrimInLayer(layer, "/Room/Objects/bed")
+    prim.specifier = Sdf.SpecifierDef if specifier == "def" else Sdf.SpecifierOver
+    if kind:
+        prim.typeName = kind
+    Sdf.AttributeSpec(prim, "mine", Sdf.ValueTypeNames.Int).default = 3
+    stage = Usd.Stage.Open(layer)
+    update_graph(stage, GRAPH)
+    bed = stage.GetPrimAtPath("/Room/Objects/bed")
+    assert (bed.IsDefined(), bed.GetTypeName(), bed.GetAttribute("mine").Get()) == (True, "Xform", 3)
+    assert set(read_graph(stage).names) == set(GRAPH.names)

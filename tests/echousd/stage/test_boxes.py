@@ -1,0 +1,38 @@
+"""Rooms of boxes become graphs: whose relations they have, and which they get."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from echomodel.roomboxes import RoomBoxes
+from echomodel.vocabulary import vocabulary
+from echousd.stage.boxes import graph_of
+
+ROOM = RoomBoxes(
+    "one", "bedroom", np.array([(-2, -2), (2, -2), (2, 2), (-2, 2.0)]), 2.6, ("double_bed", "nightstand", "nightstand"),
+    np.array([(1.6, 0.5, 2.0), (0.5, 0.5, 0.4), (0.5, 0.5, 0.4)]),
+    np.array([(0, 0, -0.9), (1.1, 0, -1.7), (-1.1, 0, -1.7)]), np.zeros(3), ("a", "", "b"), (4, -1, 4),
+)  # fmt: skip
+TOLD = np.array([(1, vocabulary().predicate_id("close_by"), 0)])
+
+
+@pytest.mark.parametrize("rules", [None, "strict", "sgfront"])
+def test_relations_of_the_room_are_kept_by_whatever_rules(rules):
+    graph = graph_of(replace(ROOM, relations=TOLD), rules)
+    assert [str(relation) for relation in graph.relations] == ["nightstand_1 close_by double_bed"]
+
+
+def test_a_room_without_relations_is_labelled_by_rules_alone():
+    assert graph_of(ROOM, None).relations == ()
+    labelled = {str(relation) for relation in graph_of(ROOM, "strict").relations}
+    assert {"nightstand_1 close_by double_bed", "double_bed bigger_than nightstand_2"} <= labelled
+
+
+def test_names_styles_and_models_of_the_nodes():
+    graph = graph_of(ROOM, None)
+    assert graph.names == ("double_bed", "nightstand_1", "nightstand_2")
+    assert [node.style for node in graph.nodes] == ["style_4", None, "style_4"]
+    assert [node.attributes.get("model") for node in graph.nodes] == ["a", None, "b"]
+    assert graph.room.floor_polygon == tuple(map(tuple, ROOM.floor_polygon.tolist()))
+    assert graph_of(replace(ROOM, floor_polygon=np.zeros((0, 2))), None).room.floor_polygon is None
