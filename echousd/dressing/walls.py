@@ -8,10 +8,10 @@ from itertools import islice
 
 import numpy as np
 
+from echomodel.dressing import KINDS, usual_size
 from echomodel.dressing import thing as solids_of
-from echomodel.dressing import usual_size
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal
-from echousd.dressing.setting import Setting, Standing, Thing, standing
+from echousd.dressing.setting import Setting, Standing, Thing, rectangle, standing
 from echousd.dressing.tabletops import shelved_books, surfaces
 from echousd.shapes.fittings import RAIL
 from echousd.shapes.geometry import Geometry, Origin
@@ -21,9 +21,9 @@ EYE = 1.52  # metres, height of a picture's middle on an empty wall
 OVER = 0.22  # metres between furniture and what hangs over it
 NEAR = 0.45  # metres: furniture whose back is so near to a wall stands at it
 SIDE = 0.32  # metres that curtains take beside a window
-BLIND = 0.016  # metres, thickness of a blind, which hangs between a window's jambs
 CURTAINS = ("curtain", "eyelet_curtain", "pleated_curtain", "sheer_curtain")  # of a room all are alike
-BLINDS = ("blind", "roman_blind")  # where it is wet, the first
+BLINDS = ("blind", "roman_blind", "cafe_curtain")  # as well; where it is wet, the first
+BEFORE = 0.35  # metres from a window: what stands so near is under it
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +58,9 @@ def walls_of(setting: Setting) -> list[Wall]:
 
 
 def curtains(setting: Setting) -> None:
-    """A curtain on either side of every window, down to the floor, the sill or what stands there.
+    """A curtain on either side of every window down to the floor; where there is no room for two, a blind in it.
 
-    Where there is no room for two, a roller blind in the window.
+    Over what stands under a window curtains may end at its sill: in half of the rooms, in the others it has a blind.
     """
     if not setting.walls:
         return
@@ -73,12 +73,15 @@ def curtains(setting: Setting) -> None:
             if setting.use == "wet" or rail > setting.height - 0.05:
                 _blind(setting, wall, window)
                 continue
-            rng, kind = setting.rng(window.name, "curtain"), CURTAINS[setting.rng("curtains").integers(len(CURTAINS))]
-            wide, variant = round(min(0.45, 0.16 + 0.14 * window.width), 3), int(rng.integers(4))
+            rng = setting.rng("curtains")
+            kind, variant, short = str(rng.choice(CURTAINS)), int(rng.integers(1 << 30)), rng.random() < 0.5
+            wide = round(min(0.45, 0.16 + 0.14 * window.width), 3)
+            over = [max(0.3, window.sill - 0.12), window.sill - 0.01]
+            feet = [0.015, *(over if short and _under(setting, wall, window) else ())]
             left = max(window.offset - beyond + wide / 2, 0.02 + wide / 2)
             right = min(window.end + beyond - wide / 2, wall.length - 0.02 - wide / 2)
             inner = np.linspace(0.0, 0.5 * (right - left) - wide / 2, 4)  # over the pane where something is beside
-            for foot in (0.015, max(0.3, window.sill - 0.15), window.sill - 0.02, window.sill + 0.2):
+            for foot in feet:
                 size = np.array([wide, round(rail + 0.005 - foot, 3), 0.085])
                 sides: list[Thing] = []
                 for ends in (left + inner, right - inner):
@@ -92,15 +95,24 @@ def curtains(setting: Setting) -> None:
                 _blind(setting, wall, window)
 
 
+def _under(setting: Setting, wall: Wall, window: Opening) -> bool:
+    """Whether something stands under a window or right before it."""
+    middle = wall.at((window.offset + window.end) / 2, BEFORE / 2, 0.0)
+    strip = rectangle(middle[[0, 2]], np.array([0.8 * window.width, BEFORE]), wall.yaw)
+    return any(one.position[1] < window.sill and one.footprint.intersects(strip) for one in setting.objects.values())
+
+
 def _blind(setting: Setting, wall: Wall, window: Opening) -> None:
-    """A roller blind, let down over a part of the pane."""
-    rng = setting.rng(window.name, "blind")
-    kind = BLINDS[int(setting.use != "wet" and setting.rng("blinds").integers(len(BLINDS)))]
-    tall = round(window.height * float(rng.choice((0.2, 0.3, 0.4))), 3)
-    size = np.array([round(window.width - 0.012, 3), tall, BLIND])
-    middle = (window.offset + window.end) / 2
-    place = wall.at(middle, -BLIND / 2 - 0.003, window.sill + window.height - 0.004 - tall)
-    setting.placed.append(Thing(kind, size, place, wall.yaw))
+    """A blind, let down over a part of the pane, or a curtain on a rod before its lower half."""
+    rng, alike = setting.rng(window.name, "blind"), setting.rng("blinds")
+    kind, variant = BLINDS[0 if setting.use == "wet" else alike.integers(len(BLINDS))], int(alike.integers(1 << 30))
+    half = kind == "cafe_curtain"
+    tall = round(window.height * float(0.52 if half else rng.choice((0.2, 0.3, 0.4))), 3)
+    thick = KINDS[kind].low[2]
+    size = np.array([round(window.width - 0.012, 3), tall, thick])
+    low = 0.012 if half else window.height - 0.004 - tall
+    place = wall.at((window.offset + window.end) / 2, thick / 2 - 0.019, window.sill + low)
+    setting.placed.append(Thing(kind, size, place, wall.yaw, "", variant))
 
 
 def pictures(setting: Setting) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.cloth import folds, pillow
-from echomodel.furniture.solids import FINEST, Array, Solid, turned
+from echomodel.furniture.solids import FINEST, Array, Solid, rotation, tube, turned
 
 DESIGNS = (
     "bordered", "striped", "latticed", "medallion", "checked", "chevrons", "dotted", "scalloped", "broken", "ringed",
@@ -17,6 +17,7 @@ DESIGNS = (
 ROUND = ("dotted", "scalloped", "broken", "ringed", "berber", "carved")  # designs that a round one has, too
 RUGS = {f"rug_{design}_{variant}": (design, variant) for design in DESIGNS for variant in range(2)}  # by material
 FOLD = 0.14  # metres of curtain from one fold to the next
+DRAPES = {"curtain": 0.3, "linen": 0.15, "drape": 0.3, "velvet": 0.25}  # what curtains are of, how often
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +69,13 @@ def _woven(designs: tuple[str, ...], rng: np.random.Generator) -> str:
 
 
 def curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """One curtain in loose folds, which spread towards its foot."""
-    return _hung(size, rng, FOLD, top=0.65, drift=0.4)
+    """One curtain in loose folds below rings, which spread towards its foot."""
+    return [*_hung(size, rng, FOLD, top=0.65, drift=0.4, head=0.03), *_rings(size, FOLD)]
 
 
 def eyelet_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     """One curtain in even waves from its rod to its foot, as eyelets make them."""
-    return _hung(size, rng, 1.3 * FOLD, top=1.0, drift=0.0)
+    return [*_hung(size, rng, 1.3 * FOLD, top=1.0, drift=0.0), *_rings(size, 0.65 * FOLD, below=0.02)]
 
 
 def pleated_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -87,12 +88,37 @@ def sheer_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     return _hung(size, rng, 0.6 * FOLD, top=0.5, drift=0.5, material="sheer")
 
 
+def cafe_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A curtain on a rod across a window, below eye level."""
+    w, h, d = size
+    rod = tube([(-w / 2, h - 0.012, 0), (w / 2, h - 0.012, 0)], 0.006, "metal")
+    within = np.array([0.97 * w, h - 0.02, d])
+    return [*_hung(within, rng, 0.5 * FOLD, top=0.7, drift=0.3, narrow=0.0), *_rings(np.array([w, h, d]), FOLD), rod]
+
+
+def _drape(rng: np.random.Generator) -> str:
+    return str(rng.choice(list(DRAPES), p=list(DRAPES.values())))
+
+
+def _rings(size: Size, apart: float, below: float = 0.0) -> list[Solid]:
+    """Rings on a rod, about `apart` metres from one to the next, their highest points `below` the head of a curtain."""
+    w, h, d = size
+    r = min(0.018, 0.45 * d)
+    across = np.linspace(0.03 - w / 2, w / 2 - 0.03, max(2, round(w / apart)))
+    on_edge, high = rotation(z=np.pi / 2), h - below - r
+    return [turned((x, high, 0), (r, r), 0.005, turn=on_edge, material="metal") for x in across]
+
+
 def _hung(
     size: Size, rng: np.random.Generator, fold: float, *, top: float, drift: float, narrow: float = 0.04,
-    material: str = "curtain",
+    material: str = "", head: float = 0.0,
 ) -> list[Solid]:  # fmt: skip
-    """Cloth in folds of `fold` metres, at its head `top` times as deep and by `narrow` of its width less wide."""
+    """Cloth in folds of `fold` metres, at its head `top` times as deep and by `narrow` of its width less wide.
+
+    `head`: metres from the top of `size` to that of the cloth, which is one of `DRAPES` where no `material` is told.
+    """
     w, h, d = size
+    cloth = material or _drape(rng)
     folds = max(2, round(w / fold))
     x = np.linspace(-w / 2, w / 2, 6 * folds + 1)
     phase, wander = rng.uniform(0, 2 * np.pi), drift * rng.uniform(-1, 1, 3)
@@ -101,32 +127,32 @@ def _hung(
         depth = (d - 0.012) / 2 * (1.0 - (1.0 - top) * share)
         bend = wander[0] * np.sin(2.1 * x / w + wander[1]) * (1 - share)
         z = depth * np.sin(2 * np.pi * folds * (x + w / 2) / w + phase + bend)
-        rows.append(np.stack([x * (1.0 - narrow * share), np.full_like(x, share * h), z], 1))
+        rows.append(np.stack([x * (1.0 - narrow * share), np.full_like(x, share * (h - head)), z], 1))
     front, thick = np.stack(rows), np.array([0, 0, 0.004])
-    return [Sheet(front=front + thick, back=front - thick, material=material)]
+    return [Sheet(front=front + thick, back=front - thick, material=cloth)]
 
 
 def blind(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A roller blind let down: cloth from the roller at its top to the bar at its foot."""
-    w, h, d = size
+    (w, h, d), cloth = size, _drape(rng)
     roller, bar = min(0.03, 0.2 * h), min(0.02, 0.1 * h)
     return [
         box((-w / 2, h - roller, -d / 2), (w / 2, h, d / 2), "frame", 0.3 * d),
-        box((-0.49 * w, bar, -0.001), (0.49 * w, h - roller, 0.001), "curtain"),
+        box((-0.49 * w, bar, -0.001), (0.49 * w, h - roller, 0.001), cloth),
         box((-0.49 * w, 0, -0.3 * d), (0.49 * w, bar, 0.3 * d), "frame", 0.1 * d),
     ]
 
 
 def roman_blind(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A blind drawn up: cloth that falls flat from its head, and below in folds one before the other."""
-    w, h, d = size
+    (w, h, d), cloth = size, _drape(rng)
     stack = min(0.16, 0.5 * h)
-    solids: list[Solid] = [box((-w / 2, h - 0.03, -d / 2), (w / 2, h, d / 2), "curtain", 0.2 * d)]
-    solids.append(box((-0.495 * w, 0.8 * stack, -0.002), (0.495 * w, h - 0.03, 0.002), "curtain"))
+    solids: list[Solid] = [box((-w / 2, h - 0.03, -d / 2), (w / 2, h, d / 2), cloth, 0.2 * d)]
+    solids.append(box((-0.495 * w, 0.8 * stack, -0.002), (0.495 * w, h - 0.03, 0.002), cloth))
     for number in range(3):
         low = 0.2 * stack * number
         solids.append(
-            box((-0.495 * w, low, -d / 2), (0.495 * w, low + 0.5 * stack, d * (0.5 - 0.2 * number)), "curtain", 0.3 * d)
+            box((-0.495 * w, low, -d / 2), (0.495 * w, low + 0.5 * stack, d * (0.5 - 0.2 * number)), cloth, 0.3 * d)
         )
     return solids
 

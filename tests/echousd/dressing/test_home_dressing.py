@@ -124,7 +124,7 @@ def test_all_windows_of_a_room_have_the_same_curtains_and_rooms_differ():
         room = setting(seed=seed, openings=windows)
         walls.curtains(room)
         hung = {thing.kind for thing in room.placed}
-        assert len(hung) <= 2  # curtains, and a blind where there is no place for them
+        assert len({(thing.kind, thing.variant) for thing in room.placed if thing.kind in walls.CURTAINS}) == 1
         found |= hung
     assert found >= set(walls.CURTAINS)
 
@@ -140,3 +140,19 @@ def test_shelves_on_walls_carry_books_and_something_beside(kind, monkeypatch):
     assert sum(thing.kind == "book" for thing in borne) >= 3
     assert {thing.kind for thing in borne} - {"book"}
     assert all(board.position[1] < thing.position[1] <= board.position[1] + board.size[1] + 1e-3 for thing in borne)
+
+
+@pytest.mark.parametrize("word", ["", "toy_box"])
+def test_curtains_end_at_the_sill_only_over_what_stands_under_the_window(word):
+    """Something beside the window is no reason: there it has a blind, or curtains further in."""
+    low, kinds = set(), set()
+    for seed in range(24):
+        room = setting(word, seed=seed, openings=[WINDOW])
+        sides = (-1.5, 1.5) if word else (-1.2, 1.2)
+        room.placed = [walls.Thing("tent", np.array([2.2, 0.6, 0.3]), np.array([x, 0.0, -1.3]), 0.0) for x in sides]
+        walls.curtains(room)
+        hung = [thing for thing in room.placed if KINDS[thing.kind].name in ("curtain", "blind")]
+        kinds |= {thing.kind for thing in hung}
+        low |= {thing.position[1] > 0.1 for thing in hung if thing.kind in walls.CURTAINS}
+    assert low == ({True} if word else set())
+    assert kinds & set(walls.BLINDS)
