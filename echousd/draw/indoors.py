@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 SKY = 4.0  # radiance of the sky in a window for a dome of intensity 1, whose light else comes from above as well
 SUN = 9.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
 CEILING = np.array([0.80, 0.79, 0.77], np.float32)
-VIEW = 1.4  # of the sky's radiance, what is seen of it through a window: eyes adapt
+VIEW = 0.8  # of the sky's radiance, what is seen of it through a window: eyes adapt
 DIM = 0.05  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
@@ -37,6 +37,7 @@ class Lights:
     sun: np.ndarray | None  # (2, 3) float32, direction towards it and irradiance by colour
     bulbs: np.ndarray  # (n, 3) float32 places of lamps
     power: np.ndarray  # (n, 3) float32, radiant intensity by colour
+    tint: np.ndarray  # (3,) float32, colour of the dome
     view: np.ndarray | None  # (h, w, 3) uint8 sRGB, what lies around by latitude and longitude, the zenith first
 
     @property
@@ -48,7 +49,7 @@ class Lights:
 def read_lights(stage: Usd.Stage) -> Lights:
     """The lights of a stage: domes, the brightest distant light, spheres; panels of light are for other renderers."""
     frame, cache = world_frame(stage), UsdGeom.XformCache()
-    sky, suns, bulbs, power = 0.0, [], [], []
+    sky, suns, bulbs, power, tint = 0.0, [], [], [], np.ones(3, np.float32)
     domes, view = 0, None
     for prim in stage.Traverse():
         if not prim.HasAPI(UsdLux.LightAPI) or UsdGeom.Imageable(prim).ComputeVisibility() == "invisible":
@@ -58,7 +59,7 @@ def read_lights(stage: Usd.Stage) -> Lights:
         color = strength * np.array(light.GetColorAttr().Get() or Gf.Vec3f(1.0), np.float32)
         world = frame @ np.array(cache.GetLocalToWorldTransform(prim)).T
         if prim.IsA(UsdLux.DomeLight):
-            domes, sky = domes + 1, sky + strength
+            domes, sky, tint = domes + 1, sky + strength, color / max(strength, 1e-9)
             picture = UsdLux.DomeLight(prim).GetTextureFileAttr().Get()
             view = view if picture is None else image_of(str(prim.GetPath()), picture.resolvedPath)
         elif prim.IsA(UsdLux.DistantLight):
@@ -71,7 +72,7 @@ def read_lights(stage: Usd.Stage) -> Lights:
     return Lights(
         sky=sky if domes else 1.0, sun=None if sun is None else sun.astype(np.float32),
         bulbs=np.array(bulbs, np.float32).reshape(-1, 3), power=np.array(power, np.float32).reshape(-1, 3),
-        view=view,
+        tint=tint, view=view,
     )  # fmt: skip
 
 

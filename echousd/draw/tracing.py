@@ -179,7 +179,7 @@ def _seen(world: World, origin: np.ndarray, direction: np.ndarray, hit: Mapping[
     missed = np.flatnonzero(face < 0)
     glow = np.zeros((len(face), 3), np.float32)
     glow[missed] = outside(scenery, origin[missed], direction[missed])
-    glow *= np.float32(VIEW * scenery.lights.sky if world.view.inside else 1.0)
+    glow *= np.float32(VIEW * scenery.lights.sky) * scenery.lights.tint if world.view.inside else np.float32(1)
     u, v, far = (np.where(face < 0, np.float32(0), hit[key]) for key in ("u", "v", "tfar"))
     bary = np.stack([1 - u - v, u, v], 1)
     normal = _unit(np.einsum("ncx,nc->nx", scenery.normals[face], bary))
@@ -442,7 +442,7 @@ def _direct(world: World, hits: Hits, spot: np.ndarray, turn: np.ndarray) -> tup
         seen = np.clip(_dot(way, normal), 0, None) * 4 * np.abs(_dot(way, area)) / np.maximum(away, 0.2) ** 2
         seen *= 0.3 + 0.7 * np.clip(0.5 + 2 * way[:, 1], 0, 1)  # sky above, ground below
         share = _free(scene, point, way, away, seen > 1e-4) * seen
-        light += share[:, None] * (len(scenery.panes) * SKY * lights.sky / np.pi) * SKY_LIGHT
+        light += share[:, None] * (len(scenery.panes) * SKY * lights.sky / np.pi) * SKY_LIGHT * lights.tint
         grazing = 0.2 + 0.8 * (1 - np.clip(_dot(hits.toward, normal), 0, 1)) ** 3
         shine = hits.shine(way) * grazing * (share > 0) * np.float32(0.4 * SKY * lights.sky)
     if lights.sun is not None and len(scenery.panes):

@@ -6,7 +6,7 @@ as a light's own opinion would be stronger than theirs.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,25 +24,27 @@ from echousd.stage.pen import Pen, ops
 
 LIGHTS = "/Room/Lights"
 NITS = 30.0  # cd/m² of a surface that comes to 1 in the picture: a camera in a lit room
-LUMENS = {"ceiling": 1500.0, "floor": 1000.0, "table": 450.0, "wall": 400.0}  # of a lamp, by what it rests on
+# Lumens and kelvin of a lamp, by what it rests on. White is 6504 to a renderer, which adapts to nothing as eyes do:
+# lamps of 2,900 K would turn a room orange. They are written as colours, as Blender reads no temperatures.
+LAMPS = {"ceiling": (1500.0, 4300.0), "floor": (1000.0, 3700.0), "table": (450.0, 3500.0), "wall": (400.0, 3500.0)}
 # Of sky and panel: without walls, with walls, which throw back what they get, and below a ceiling, where the sky is
 # seen through the windows alone.
 SHARES = {"open": (1.0, 1.0), "walls": (1.4, 0.12), "ceiling": (3.6, 0.95)}
 SKY = "textures/sky.jpg"
 BULB = 0.04  # metres, radius
-# Kelvin, written as colours, as Blender reads no temperatures. White is 6504 to a renderer, which adapts to nothing as
-# eyes do: lamps of 2,900 K would turn a room orange.
-DAYLIGHT, BULBS = 6500.0, 4700.0
+DAYLIGHT = 6500.0  # kelvin
 # Irradiance of the sun: through windows alone a white surface that faces it gains 0.45, about what the sky gives; over
 # walls without a ceiling, which have the sky already, so much would leave them blank.
 SUN, OVERHEAD = 1.4, 0.55
-ELEVATION, ASIDE = np.radians(38.0), 0.35  # of the sun over the horizon, and how far it comes from the side
-# What is left of sky, sun and lamps.
+# Degrees of the sun over the horizon, how far it comes from the side, and kelvin at these ends.
+ELEVATION, ASIDE, WARM = (26.0, 46.0), (0.2, 0.8), (5200.0, 6000.0)
+# What is left of sky, sun and lamps; the sky's colour.
 TIMES: Mapping[str, tuple[float, float, float]] = {
-    "day": (1.0, 1.0, 0.15),
+    "day": (1.0, 1.0, 0.3),
     "evening": (0.16, 0.0, 1.0),
     "night": (0.02, 0.0, 1.0),
 }
+HUES = {"day": (1.0, 0.97, 0.93), "evening": (0.40, 0.58, 1.0), "night": (0.30, 0.42, 0.90)}
 # Lumens on a square metre of floor: what people have on at a time (the panel gives what the lamps do not, at least
 # `FILL`), and from where on a camera would expose less.
 LIT, FILL, BRIGHT = {"evening": 85.0, "night": 75.0}, 20.0, 160.0
@@ -58,7 +60,7 @@ def write_lights(pen: Pen, room: RoomData, volume: Volume) -> None:
     `room`: whose lamps and windows these are. `volume`: of the room, metres.
     """
     pen.define(LIGHTS, "Scope")
-    sky: dict[str, Any] = {"color3f inputs:color": (1.0, 0.97, 0.93) if room.options.walls else (0.95, 0.98, 1.0)}
+    sky: dict[str, Any] = {}
     if room.options.walls:  # who looks out of a window or over a wall sees something
         sky |= {"asset inputs:texture:file": f"./{SKY}", "token inputs:texture:format": "latlong"}
     pen.define(f"{LIGHTS}/sky", "DomeLight", sky)
@@ -81,11 +83,18 @@ def write_lights(pen: Pen, room: RoomData, volume: Volume) -> None:
         shining |= {light: intensity * TIMES[name][column] * exposed for light, (column, intensity) in full.items()}
         for light, intensity in shining.items():
             inside.over(f"{LIGHTS}/{light}", {"float inputs:intensity": round(float(intensity), 4)})
+        inside.over(f"{LIGHTS}/sky", {"color3f inputs:color": HUES[name]})
 
 
 def image_files(room: RoomData) -> dict[str, bytes]:
     """Path in the room's folder -> image that its lights name."""
-    return {SKY: baking.sky_image()} if room.options.walls else {}
+    return {SKY: baking.sky_image(_drawn(room, list(baking.SKIES)))} if room.options.walls else {}
+
+
+def _drawn(room: RoomData, among: Sequence[Any]) -> Any:
+    """One of some, as the seed of a room draws it; in a home all have the first."""
+    rng = np.random.default_rng([room.provenance.seed, len(among)])
+    return among[0 if room.graph.room.walls else int(rng.integers(len(among)))]
 
 
 def _panel(pen: Pen, volume: Volume, height: float) -> float:
@@ -110,15 +119,18 @@ def _sun(pen: Pen, room: RoomData) -> Intensities:
         return {}
     window = max(windows, key=lambda opening: opening.width * opening.height)
     near, far = segment(corners, window)
-    level = inward_normal(corners, window.edge) + ASIDE * (far - near) / window.width
-    level = level / np.linalg.norm(level) * np.cos(ELEVATION)
-    way = np.array([level[0], -np.sin(ELEVATION), level[1]])
+    side = _drawn(room, (*np.linspace(*ASIDE, 5), *-np.linspace(*ASIDE, 5)))
+    high = _drawn(room, (0.0, 0.15, 0.3, 0.4, 0.5, 0.7, 1.0))
+    level = inward_normal(corners, window.edge) + side * (far - near) / window.width
+    elevation, kelvin = np.radians(np.interp(high, (0, 1), ELEVATION)), np.interp(high, (0, 1), WARM)
+    level = level / np.linalg.norm(level) * np.cos(elevation)
+    way = np.array([level[0], -np.sin(elevation), level[1]])
     matrix = view_matrix(-way, np.zeros(3))
     matrix[:3, 3] = 0.0
     values = {
         "float inputs:angle": 0.53,
         "bool inputs:normalize": True,  # intensity is irradiance, whatever the disc's size
-        "color3f inputs:color": UsdLux.BlackbodyTemperatureAsRgb(DAYLIGHT - 700),
+        "color3f inputs:color": UsdLux.BlackbodyTemperatureAsRgb(float(kelvin)),
         **ops(transform=("matrix4d", Gf.Matrix4d(np.ascontiguousarray(matrix.T)))),
     }
     pen.define(f"{LIGHTS}/sun", "DistantLight", values)
@@ -132,15 +144,15 @@ def _lamps(pen: Pen, room: RoomData) -> Intensities:
     values = {
         "float inputs:radius": BULB,
         "bool inputs:normalize": True,  # intensity is radiance times area; Blender reads it so whatever stands here
-        "color3f inputs:color": UsdLux.BlackbodyTemperatureAsRgb(BULBS),
         **ops(translate=("double3", None)),
     }
-    for bulb in bulbs.values():
-        pen.define(f"{LIGHTS}/{bulb}", "SphereLight", values)
+    for number, bulb in bulbs.items():
+        colour = UsdLux.BlackbodyTemperatureAsRgb(LAMPS[rows[number].support][1])
+        pen.define(f"{LIGHTS}/{bulb}", "SphereLight", {**values, "color3f inputs:color": colour})
     for layout, inside in enumerate(layout_pens(pen, max(len(room.layouts), 1))):
         boxes = room.layouts[layout] if len(room.layouts) > 1 else room.boxes
         for number, bulb in bulbs.items():
             x, y, z = (float(v) for v in boxes.position[number])
             height = y - 0.06 if rows[number].support == "ceiling" else y + float(boxes.size[number][1]) + 0.06
             inside.over(f"{LIGHTS}/{bulb}", {"double3 xformOp:translate": (x, height, z)})
-    return {bulb: (2, LUMENS[rows[number].support] / (np.pi * NITS)) for number, bulb in bulbs.items()}
+    return {bulb: (2, LAMPS[rows[number].support][0] / (np.pi * NITS)) for number, bulb in bulbs.items()}

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import io
 import os
+import tomllib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache, partial, wraps
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import PIL
@@ -115,9 +116,9 @@ def rough_image(pattern: str, roughness: float) -> bytes | None:
 
 
 @kept
-def sky_image() -> bytes:
-    """What lies around a room, for its dome light, as JPEG."""
-    return _jpeg(sky())
+def sky_image(kind: str) -> bytes:
+    """What lies around a room, a row of `SKIES`, for its dome light, as JPEG."""
+    return _jpeg(sky(kind))
 
 
 def _jpeg(value: np.ndarray) -> bytes:
@@ -132,34 +133,36 @@ def _encoded(value: np.ndarray, quality: int) -> bytes:
 
 
 SKY_SIZE = (512, 1024)  # pixels: a window some metres away shows about a hundred of them
-SKY = (  # elevation in degrees, linear RGB: a near lawn, fields, haze, a bright horizon, blue
-    (-90.0, -25.0, -7.0, -1.5, 2.0, 12.0, 35.0, 90.0),
-    ((0.14, 0.19, 0.08), (0.18, 0.24, 0.10), (0.24, 0.30, 0.14), (0.38, 0.44, 0.26), (0.84, 0.90, 0.95),
-     (0.68, 0.81, 0.95), (0.58, 0.74, 0.94), (0.54, 0.71, 0.93)),
-)  # fmt: skip
-HILLS = (
-    (3.2, 1.3, (0.40, 0.50, 0.55)),
-    (1.6, 0.9, (0.30, 0.40, 0.30)),
-)  # degrees high and how uneven, colour; far, near
-TREES, LEAVES = (2.2, 3.4), (0.075, 0.125, 0.045)  # degrees that trees rise over the horizon, and how unevenly
+SKIES: Mapping[str, Any] = tomllib.loads((HERE / "skies.toml").read_text("utf-8"))
+SOFT = 0.5  # degrees that outlines take
 
 
-def sky() -> np.ndarray:
-    """`SKY_SIZE` + (3,) linear RGB by latitude and longitude, the zenith first: clouds, hills and trees over a lawn."""
+def sky(kind: str) -> np.ndarray:
+    """`SKY_SIZE` + (3,) linear RGB by latitude and longitude, the zenith first: clouds, and a row of `SKIES`."""
     height, width = SKY_SIZE
-    elevation = (90 - (np.arange(height) + 0.5) / height * 180)[:, None]
-    level, tones = SKY[0], np.array(SKY[1])
-    out = np.stack([np.interp(elevation, level, tone) for tone in tones.T], -1) * np.ones((1, width, 1))
+    elevation, around = 90 - (np.arange(height) + 0.5)[:, None] / height * 180, np.arange(width) / width * 360
+    level, *tones = np.array(SKIES[kind]["tones"]).T
+    out = np.stack([np.interp(elevation, level, tone) for tone in tones], -1) * np.ones((1, width, 1))
     grain, puff = (np.tile(noise(141 + n, *scale), (1, 2)) for n, scale in enumerate(((60.0, 60.0), (3.0, 9.0))))
     cloud = np.clip(0.55 * puff - 0.25, 0, 0.75) * np.clip((elevation - 5) / 12, 0, 1)
     out += cloud[..., None] * (np.array([0.95, 0.96, 0.97]) - out)
     out *= np.where(elevation < 0, 1 + 0.06 * grain, 1.0)[..., None]
-    ridge = noise(151, 14.0, 14.0)[:3].repeat(2, axis=1)  # smooth rows of noise, all around
-    for row, (rise, uneven, color) in enumerate(HILLS):
-        line = rise + uneven * ridge[row]
-        out[(elevation > -2) & (elevation < line)] = color
-    crown = TREES[0] + TREES[1] * np.clip(ridge[2], -1.2, 1.5) + 0.5 * grain[0]
-    leaves = np.array(LEAVES) * (1 + 0.35 * grain + 0.25 * np.clip(elevation / 4, -1, 1))[..., None]
-    wood = (elevation > -2.5) & (elevation < crown)
-    out[wood] = np.clip(leaves, 0.01, 1)[wood]
+    ridge = noise(151, 14.0, 14.0).repeat(2, axis=1)  # smooth rows of noise, all around
+    rng = np.random.default_rng(7)
+    for row, form in enumerate(SKIES[kind]["forms"]):
+        wide, leaves = form.get("wide", 360), form.get("grain", 0)
+        own = rng.integers(len(form["colors"]), size=360 // wide), rng.uniform(-1, 1, 360 // wide)
+        hue, tall = (values[(around / wide).astype(int)] for values in own)
+        top = form["rise"] + form["uneven"] * (tall if "wide" in form else np.clip(ridge[row], -1.2, 1.5))
+        here = slice(*np.searchsorted(-elevation[:, 0], (-top.max() - 3 * leaves, -form.get("foot", -2.5))))
+        up, leaf = elevation[here], leaves * grain[here]
+        shade = 1 + 0.45 * np.clip(leaf, -2, 2) + 0.1 * tall
+        if "wide" in form:
+            pane, eaves = form["pane"], top - form["roof"]
+            top = top - form["roof"] * np.abs(2 * (around / wide % 1) - 1)
+            across, level = around / pane % 1, (eaves - up) / (1.4 * pane) % 1
+            panes = (np.abs(across - 0.5) < 0.2) & (np.abs(level - 0.55) < 0.25) & (up < eaves)
+            shade = np.where(panes, 0.35, np.where((up > eaves) & (form["roof"] > 0), 0.4, shade))
+        share = np.clip((top + leaf - up) / SOFT, 0, 1)[..., None]
+        out[here] += share * (np.array(form["colors"])[hue] * np.clip(shade, 0.1, 2)[..., None] - out[here])
     return np.clip(out, 0, 1)

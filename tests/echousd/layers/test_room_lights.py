@@ -14,7 +14,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.graph import RoomSpec
-from echousd.layers.lights import ASIDE
+from echousd.layers.lights import ASIDE, ELEVATION, image_files
 from echousd.options import RoomOptions
 
 WINDOW = Opening("window", "window", 0, 0.8, 1.4, 1.3, 0.9)  # in the wall at -z
@@ -51,9 +51,41 @@ def test_the_sun_falls_in_through_the_window(stage) -> None:
     matrix = UsdGeom.Xformable(stage.GetPrimAtPath("/Room/Lights/sun")).ComputeLocalToWorldTransform(0)
     way = np.array(matrix.TransformDir(Gf.Vec3d(0, 0, -1)))
     assert np.linalg.norm(way) == pytest.approx(1)
-    assert way[1] < -0.5
+    low, high = np.sin(np.radians(ELEVATION))
+    assert low - 1e-4 <= -way[1] <= high + 1e-4
     assert way[2] > 0.5
-    assert abs(way[0]) / way[2] == pytest.approx(ASIDE, abs=1e-4)  # however wide the window is
+    assert ASIDE[0] - 1e-4 <= abs(way[0]) / way[2] <= ASIDE[1] + 1e-4  # however wide the window is
+
+
+def test_rooms_differ_in_their_sun_and_in_what_lies_outside_by_their_seed() -> None:
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(WINDOW,)))
+    skies, suns = set(), set()
+    for seed in range(6):
+        room = echousd.generate(
+            graph, model=StandIn(), place=False, shapes="boxes", seed=seed, options=RoomOptions(dress="none")
+        )
+        again = image_files(room)
+        assert again == image_files(room)
+        skies.update(again.values())
+        sun = UsdGeom.Xformable(room.stage.GetPrimAtPath("/Room/Lights/sun")).ComputeLocalToWorldTransform(0)
+        suns.add(tuple(np.round(sun.TransformDir(Gf.Vec3d(0, 0, 1)), 3)))
+    assert len(skies) > 2
+    assert len(suns) > 2
+
+
+def test_evenings_are_blue_outside_and_lamps_are_warmer_the_nearer_one_sits(stage) -> None:
+    times, hues = stage.GetPrimAtPath("/Room").GetVariantSets().GetVariantSet("light"), {}
+    for name in ("day", "evening"):
+        times.SetVariantSelection(name)
+        hues[name] = UsdLux.LightAPI(stage.GetPrimAtPath("/Room/Lights/sky")).GetColorAttr().Get()
+    times.SetVariantSelection("day")
+    assert hues["day"][0] > hues["day"][2]
+    assert hues["evening"][2] > 2 * hues["evening"][0]
+    hanging, standing = (
+        UsdLux.LightAPI(stage.GetPrimAtPath(f"/Room/Lights/lamp_{name}")).GetColorAttr().Get()
+        for name in ("pendant", "lamp")
+    )
+    assert standing[2] / standing[0] < hanging[2] / hanging[0] < 1
 
 
 def test_there_is_a_sky_to_look_at_and_a_sun_that_blanks_no_wall(stage, tmp_path) -> None:
