@@ -78,14 +78,12 @@ def sample_boxes(
     centre, nodes = floor_centre(graph), graph.nodes
     batch = GraphBatch.pack([graph_batch(graph)] * count)
     given = torch.tensor([None not in (n.size, n.position, n.yaw) for n in nodes])
-    known = Boxes(
+    known = Boxes.cat([Boxes(
         torch.tensor([n.size or (1.0, 1.0, 1.0) for n in nodes], dtype=torch.float32),
         torch.tensor([n.position or (0.0, 0.0, 0.0) for n in nodes], dtype=torch.float32) - centre,
         torch.tensor([n.yaw or 0.0 for n in nodes], dtype=torch.float32),
-    )
-    extra: dict[str, Any] = {}
-    if bool(given.any()):
-        extra = {"known": Boxes.cat([known] * count), "known_mask": given.repeat(count)}
+    )] * count)  # fmt: skip
+    extra: dict[str, Any] = {"known": known, "known_mask": given.repeat(count)} if bool(given.any()) else {}
     if draws.steps is not None:
         extra["steps"] = draws.steps
     if not draws.guided and isinstance(model, EchoModel):
@@ -94,7 +92,8 @@ def sample_boxes(
         extra["edit"] = repeated(draws.change, len(nodes), count)
     generator = seeded(draws.seed, "layout", draws.number)
     with timer.stage("layout") as tell, one_thread():
-        found = model.sample_layout(batch, generator=generator, progress=tell, **extra).to("cpu")
+        drawn = not bool(given.all())  # else nothing is left to draw
+        found = model.sample_layout(batch, generator=generator, progress=tell, **extra).to("cpu") if drawn else known
     return [
         rounded_boxes(graph, Boxes(found.size[rows], found.position[rows] + centre, found.yaw[rows]))
         for rows in torch.arange(count * len(nodes)).chunk(count)

@@ -203,6 +203,17 @@ def test_what_is_locked_stays_where_the_last_generation_put_it(tmp_path: Path) -
     assert with_locked_places(locked.update_node("wardrobe", position=(0.5, 0.0, 0.5)))[1] == ()
 
 
+def test_where_every_box_is_given_none_is_drawn() -> None:
+    class Silent(StandIn):
+        def sample_layout(self, graph, **kwargs):
+            raise AssertionError("asked for boxes")
+
+    given = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", **BARE).boxes
+    room = echousd.generate(small_graph(), model=Silent(), boxes=given, shapes="boxes", **BARE)
+    assert torch.equal(room.boxes.position, given.position)
+    assert torch.equal(room.boxes.size, given.size)
+
+
 def test_what_cannot_fit_is_said_or_left_out() -> None:
     nodes = tuple(Node(f"wardrobe_{i}", "wardrobe", size=(1.4, 2.0, 0.5)) for i in range(8))
     nodes += (Node("bed", "double_bed", size=(1.8, 1.0, 2.1)),)
