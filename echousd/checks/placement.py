@@ -319,12 +319,12 @@ def mesh_depth(first: Shape, second: Shape) -> float:
 
 def _reach(surface: Shape, solid: Shape) -> float:
     points = surface_points(surface, solid)
-    if not len(points):
-        return 0.0
-    within = points[inside_solid(points, solid)]
+    within = points[inside_solid(points, solid)] if len(points) else points
     if not len(within):
         return 0.0
     triangles = solid.points[solid.faces]
+    middle = triangles.mean(1)
+    around = np.linalg.norm(triangles - middle[:, None], axis=2).max(1)
     skin = np.concatenate((solid.points, _scatter(solid.points, solid.faces, 4000)))
     deepest = 0.0
     # A sample of the skin is further away than the skin itself: deepest first, until no point can be deeper.
@@ -332,7 +332,8 @@ def _reach(surface: Shape, solid: Shape) -> float:
     for number in np.argsort(-at_most):
         if at_most[number] <= max(deepest, DEEP):
             break
-        near = closest_point(triangles, np.broadcast_to(within[number], (len(triangles), 3)))
+        close = triangles[np.linalg.norm(middle - within[number], axis=1) <= around + at_most[number] + 1e-9]
+        near = closest_point(close, np.broadcast_to(within[number], (len(close), 3)))
         far = np.linalg.norm(near - within[number], axis=1)  # NaN where a triangle has no area
         deepest = max(deepest, float(np.fmin.reduce(far, initial=at_most[number])))
     return deepest
@@ -382,8 +383,7 @@ def inside_solid(points: np.ndarray, solid: Shape) -> np.ndarray:
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     count = len(solid.points)
     piece = connected_component_labels(edges, count)[faces[:, 0]]
-    low, high = edges.min(1), edges.max(1)
-    _, where = np.unique(low * count + high, return_inverse=True)
+    _, where = np.unique(edges.min(1) * count + edges.max(1), return_inverse=True)
     balance = np.bincount(where, np.where(edges[:, 0] < edges[:, 1], 1, -1))
     open_pieces = np.unique(np.tile(piece, 3)[balance[where] != 0])
     loose = np.isin(piece, open_pieces)
