@@ -130,6 +130,7 @@ def made_elsewhere(name):
     done = subprocess.run([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, check=True)
     return json.loads(done.stdout.splitlines()[-1])
 
+
 @pytest.mark.parametrize("sample", SAMPLES, ids=lambda path: path.stem)
 def test_the_samples_come_out_as_before(sample, kept):
     exact = kept["made_with"] == machine()

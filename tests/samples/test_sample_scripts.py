@@ -28,6 +28,8 @@ def model(monkeypatch):
     from echomodel.echo import EchoModel
 
     monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: Anything()))
+    monkeypatch.setattr("echousd.make.layouts.DRAFTS", 1)  # all of them are equal
+    monkeypatch.setattr("echousd.make.save.PREVIEW", 96)
 
 
 def run(monkeypatch, name, *words):

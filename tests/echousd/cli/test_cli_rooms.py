@@ -6,6 +6,7 @@ from pxr import Usd
 from small_room import StandIn, small_graph
 
 import echousd
+from echousd.make import save
 
 
 @pytest.fixture
@@ -30,7 +31,7 @@ def test_generate_render_and_export(graph, tmp_path, echousd_command):
     assert f"preview  {folder / 'bedroom.png'}" in done.out
     assert "6 objects, 4 of 4 measured relations kept" in done.out
     assert "Shaping the furniture" in done.err
-    assert Image.open(folder / "bedroom.png").size == (640, 400)
+    assert Image.open(folder / "bedroom.png").size == (save.PREVIEW, save.PREVIEW * 5 // 8)
     assert json.loads((folder / "bedroom.json").read_text())["seed"] == 7
 
     picture = tmp_path / "top.png"

@@ -11,6 +11,7 @@ from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.checks import check
 from echousd.exporting.formats import export
+from echousd.make import save
 from echousd.make.verdicts import RoomWarning
 
 
@@ -86,7 +87,7 @@ def test_every_layout_is_checked_listed_and_drawn(later, echousd_command):
     assert not check(later, layout=1).ok
     manifest = json.loads(later.with_suffix(".json").read_text())
     assert [bool(entry["collisions"]) for entry in manifest["layouts"]] == [False, True]
-    assert Image.open(later.with_name("room_layouts.png")).size == (560, 280)
+    assert Image.open(later.with_name("room_layouts.png")).size == (2 * save.SHEET, save.SHEET)
     done = echousd_command("check", later)
     assert done.code == 1
     assert "layout_1: bed and wardrobe" in done.out
@@ -112,7 +113,9 @@ def test_exports_hold_the_layout_that_was_asked_for_and_say_so(later, tmp_path):
         export(later, tmp_path / "5.usda", layout=5)
 
 
-def test_more_layouts_are_drawn_again_where_the_first_try_fails():
+def test_more_layouts_are_drawn_again_where_the_first_try_fails(monkeypatch):
+    monkeypatch.setattr("echousd.make.layouts.DRAFTS", 4)  # three rounds
+
     class Counting(StandIn):
         drawn = 0
 

@@ -58,8 +58,7 @@ def alone(tmp_path_factory):
     return {shapes: run(tmp_path_factory.mktemp("alone"), shapes=shapes) for shapes in ("parts", "sdf")}
 
 
-@pytest.mark.parametrize("shapes", ["parts", "sdf"])
-@pytest.mark.parametrize("threads", [2, 4])
+@pytest.mark.parametrize(("threads", "shapes"), [(2, "parts"), (4, "sdf")])
 def test_threads_do_not_show(tmp_path, alone, threads, shapes):
     found = run(tmp_path, shapes=shapes, threads=threads, warm="warm")
     assert len(found) > 10

@@ -56,10 +56,10 @@ def missed():
         )  # fmt: skip
         stated = (Stated("against_wall", 0),)
         plan = plan_of(shaken, room.categories, room.floor_polygon, room.openings, told, height=2.5, stated=stated)
-        for term in TERMS:
+        for term in (term for term in TERMS if term.name not in found):
             seen = term.find(plan)
             if bool((seen.margin < 0).any()):
-                found.setdefault(term.name, (seen, plan))
+                found[term.name] = seen, plan
     return found
 
 

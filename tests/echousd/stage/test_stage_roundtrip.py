@@ -38,7 +38,7 @@ BEDROOM = SceneGraph(
 
 
 @given(graph=scene_graphs(), extension=st.sampled_from(["usda", "usdc"]))
-@settings(max_examples=60, deadline=None)
+@FEW
 def test_files(graph, extension, tmp_path_factory):
     path = tmp_path_factory.mktemp("stage") / f"room.{extension}"
     save_layer(graph_layer(graph), path)
@@ -59,7 +59,7 @@ def bare_process():
 
 
 @given(first=scene_graphs(), second=scene_graphs(), extension=st.sampled_from(["usda", "usdc"]))
-@settings(max_examples=60, deadline=None)
+@FEW
 def test_without_the_plugin(first, second, extension, bare_process, tmp_path_factory):
     folder = tmp_path_factory.mktemp("bare")
     given, made = folder / f"given.{extension}", folder / f"made.{extension}"

@@ -14,7 +14,7 @@ from echousd.stage.graphs import read_graph, write_graph
 from echousd.stage.update import update_graph
 from echousd.stage.write import graph_layer
 
-SOME = settings(max_examples=40, deadline=None)
+SOME = settings(max_examples=20, deadline=None)
 
 GRAPH = SceneGraph(
     "bedroom",
