@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import subprocess
+import os
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -26,6 +28,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     slow = collection_path.is_file() and collection_path.relative_to(Path(__file__).parent).as_posix() in SLOW
     return True if slow and config.getoption("--quick") else None
+
+
+@pytest.fixture(autouse=True, scope="session")
+def disks_are_not_waited_for() -> Iterator[None]:
+    """Files reach the disk when the system likes: a machine that loses its power is no part of a test."""
+    with patch.object(os, "fsync", lambda file: None):
+        yield
 
 
 @pytest.fixture(autouse=True)

@@ -4,28 +4,51 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import traceback
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from echousd.cli.main import run
 from echousd.cli.output import say_json
 from echousd.cli.terminal import Terminal
 
 GRAPH = "room: {type: bedroom, size: [4.0, 3.4]}\nobjects: {bed: double_bed, pendant: pendant_lamp}\n"
-CODE = (
-    "import sys; sys.path[:0] = sys.argv[1].split('|'); import resource, signal\n"
-    "from echousd.cli.main import run\n"
-    "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-    "resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), int(sys.argv[2])))\n"
-    "sys.exit(run(sys.argv[3:]))"
-)
 
 
 def full(most, *words):
-    """Run a command that may write no file larger than so many bytes; what the system says is what a full disk says."""
-    command = [sys.executable, "-c", CODE, "|".join(p for p in sys.path if p), str(most), *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    """Run a command that may write no file larger than so many bytes; what the system says is what a full disk says.
+
+    The limit is of a process: a fork of this one, that need not import everything again.
+    """
+    ends = [os.pipe(), os.pipe()]
+    child = os.fork()
+    if not child:
+        code, sys.dont_write_bytecode = 70, True  # Python would keep modules cut at the limit
+        try:
+            for number, (_, into) in enumerate(ends, 1):
+                os.dup2(into, number)
+            sys.stdout, sys.stderr = (os.fdopen(number, "w", encoding="utf-8", closefd=False) for number in (1, 2))
+            import resource
+
+            os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+            code = run([str(word) for word in words])
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(code)
+    for _, into in ends:
+        os.close(into)
+    with ThreadPoolExecutor(2) as readers:
+        said = list(readers.map(lambda end: os.fdopen(end[0], encoding="utf-8").read(), ends))
+    return subprocess.CompletedProcess(words, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), *said)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="this system limits no file's size")
