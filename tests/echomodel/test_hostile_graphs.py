@@ -36,6 +36,11 @@ HOSTILE = {
 }
 
 
+@pytest.fixture(autouse=True)
+def few_mending_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("echomodel.compact.sampling.AFTER", 3)
+
+
 @pytest.fixture(scope="module")
 def compact() -> EchoModel:
     torch.manual_seed(0)

@@ -90,7 +90,8 @@ def test_their_distances_have_closed_forms():
     assert picture_figures(wide, other, ("FID",), 0)["FID"].value == pytest.approx(apart - 2 * root, rel=1e-4)
 
 
-def test_a_small_network_tells_what_differs_and_nothing_else():
+def test_a_small_network_tells_what_differs_and_nothing_else(monkeypatch):
+    monkeypatch.setattr("echomodel.metrics.pictures.STEPS", 30)
     shown = np.stack([picture(room, 0) for room in generate_rooms(12, 4)])
     assert told_by_pictures(shown, 255 - shown, 0).value > 0.95
     same = told_by_pictures(shown, shown, 0)

@@ -7,15 +7,25 @@ from importlib.util import find_spec
 from unittest.mock import patch
 
 import pytest
+from small_room import StandIn
+
+from echomodel.protocols import RoomModel
+from echousd.make import layouts
 
 
 @pytest.fixture(autouse=True, scope="session")
 def fine_things_are_coarse() -> Iterator[None]:
-    """Previews of few pixels, two drafts of eight, and three of the forty steps that mend what is drawn, not placed."""
+    """Previews of few pixels, two drafts of a stand-in, three of forty steps that mend what is drawn and not placed."""
+    most = layouts.most_drafts
+
+    def drafts(model: RoomModel, objects: int) -> int:
+        return 2 if isinstance(model, StandIn) else most(model, objects)
+
     with (
         patch("echousd.make.save.PREVIEW", 96),
         patch("echousd.make.save.SHEET", 64),
-        patch("echousd.make.layouts.DRAFTS", 2),
+        patch("echousd.make.pipeline.most_drafts", drafts),
+        patch("echousd.make.edit.most_drafts", drafts),
         patch("echomodel.compact.sampling.AFTER", 3),
     ):
         yield

@@ -123,8 +123,9 @@ def test_smoke_recipe_trains_everything(data: Path, tmp_path: Path, monkeypatch:
     }
     for stage, start in starts.items():
         names = ",".join(f'"{path}"' for path in start)
-        few = ["steps=5", "validate_every=5"] if stage == "joint" else ["shapes_per_batch=3"]
-        trainer = open_run(smoke(stage, data, f"start=[{names}]", *few), tmp_path / stage)
+        few = {"joint": 5, "vqvae": 24}.get(stage, 40)
+        steps = f"steps={few}", f"validate_every={few}"
+        trainer = open_run(smoke(stage, data, f"start=[{names}]", "shapes_per_batch=3", *steps), tmp_path / stage)
         trainer.run()
         losses = [value for _, name, value in read_log(tmp_path / stage / "log.csv") if name == "loss"]
         assert (tmp_path / stage / "curves.png").stat().st_size > 5000

@@ -1,6 +1,7 @@
 """A room folder that somebody sent: nothing in it makes us read, write or delete anything outside of it."""
 
 import json
+import shutil
 import warnings
 
 import pytest
@@ -20,9 +21,14 @@ def make(seed=0, graph=None):
     return echousd.generate(graph or small_graph(), seed=seed, model=StandIn(0.5), shapes="boxes", place=False, **BARE)
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    return make().save(tmp_path_factory.mktemp("made") / "bedroom", preview=False).parent
+
+
 @pytest.fixture
-def folder(tmp_path):
-    make().save(tmp_path / "bedroom", preview=False)
+def folder(made, tmp_path):
+    shutil.copytree(made, tmp_path / "bedroom")
     (tmp_path / "data.json").write_text(OUTSIDE)
     (tmp_path / "outside").mkdir()
     (tmp_path / "outside/data.json").write_text(OUTSIDE)

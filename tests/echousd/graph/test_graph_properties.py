@@ -21,7 +21,7 @@ def types(graph: SceneGraph) -> list[list[type]]:
     return [[type(value) for value in node.attributes.values()] for node in graph.nodes]
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(graphs())
 def test_text_forms_are_lossless(graph):
     for read, text in (
@@ -36,7 +36,7 @@ def test_text_forms_are_lossless(graph):
     assert SceneGraph.from_yaml(graph.to_yaml()).to_yaml() == graph.to_yaml()
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(st.data())
 def test_edits_give_valid_graphs_or_raise(data):
     graph = data.draw(graphs())
@@ -67,7 +67,7 @@ def test_edits_give_valid_graphs_or_raise(data):
         graph = after
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(graphs(min_nodes=2), st.data())
 def test_a_relation_is_refused_exactly_when_its_order_gets_a_cycle(graph, data):
     subject, object_ = data.draw(st.permutations(graph.names))[:2]
@@ -86,7 +86,7 @@ def test_a_relation_is_refused_exactly_when_its_order_gets_a_cycle(graph, data):
         assert graph.relate(*stated).relations[-1].triple == stated
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=60)
 @given(st.lists(st.tuples(st.sampled_from("abcdef"), st.sampled_from("abcdef")).filter(lambda e: e[0] != e[1])))
 def test_the_cycle_found_is_one(edges):
     graph = networkx.DiGraph(edges)

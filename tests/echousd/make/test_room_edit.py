@@ -12,6 +12,7 @@ from small_room import BARE, StandIn, saved_room, small_graph, small_room
 import echousd
 from echomodel.protocols import GraphEdit
 from echousd.graph import Relation
+from echousd.make import layouts
 from echousd.make.edit import edit, graph_edit, touched
 from echousd.make.layouts import repeated
 from echousd.make.reading import read_room
@@ -141,6 +142,7 @@ def test_an_edit_draws_several_layouts_and_keeps_the_best(root, monkeypatch):
         return (0, 0, 1 if len(seen) == 3 else 2)
 
     monkeypatch.setattr("echousd.make.layouts._wishes", wishes)
+    monkeypatch.setattr("echousd.make.edit.most_drafts", layouts.most_drafts)
     room = edit(root, graph, model=model, seed=9, shapes="boxes")
     assert len(seen) == 8  # none was perfect
     assert room.boxes is seen[2]

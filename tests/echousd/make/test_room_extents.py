@@ -27,7 +27,7 @@ def graph_of(room):
 def test_a_hall_of_twenty_and_more_is_furnished_without_a_collision():
     halls = [hall for hall in generate_rooms(40, 11, halls=1.0) if 20 <= len(hall) <= 28]
     graph = graph_of(min(halls, key=len))
-    room = echousd.generate(graph, shapes="boxes", seed=1, **BARE)
+    room = echousd.generate(graph, shapes="boxes", seed=1, drafts=2, **BARE)
     assert room.faults == ()
     assert len(living_faults(room.graph, room.boxes)) <= 0.08 * len(graph.nodes)
 
