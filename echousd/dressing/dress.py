@@ -23,7 +23,7 @@ from echousd.dressing import floors, tabletops, upholstery, walls
 from echousd.dressing.floors import CORNER_AIR, GREEN
 from echousd.dressing.setting import Setting, Standing, Thing, standing
 from echousd.dressing.stories import guessed, story
-from echousd.dressing.walls import EYE, Wall, hung_at, walls_of
+from echousd.dressing.walls import EYE, Wall, hung_at, shown, walls_of
 from echousd.graph import Relation
 from echousd.graph.titles import DressingGraph, SmallNode
 from echousd.naming import free_name
@@ -120,10 +120,11 @@ def setting_of(room: RoomData, layout: int = 0) -> Setting:
     }
     corners = room.graph.room.corners
     floor = np.asarray(room.floor if corners is None else corners, float)
+    who = room.graph.room.resident or guessed(room.graph.room.type, [o.row for o in objects.values()])
     return Setting(
         objects, floor, tuple(room.graph.room.openings), room.height, room.options.walls,
         room.options.dress == "full", room.provenance.seed, vocabulary().room_type(room.graph.room.type).use,
-        story(room.graph.room.resident or guessed(room.graph.room.type, [o.row for o in objects.values()])),
+        story(who), who if any(o.row.role == "bed" for o in objects.values()) else "",
     )  # fmt: skip
 
 
@@ -158,7 +159,10 @@ def bare_walls(setting: Setting) -> None:
             spots = [middle + step * 0.66 for step in (-1, 0, 1)]
         variant = int(rng.integers(1 << 30))
         low = EYE - float(size[1]) / 2
-        row = [hung_at(setting, wall, spot, "picture", size, low, variant + n, "") for n, spot in enumerate(spots)]
+        series = shown(setting, size, len(spots), f"wall {wall.edge}")
+        row = [
+            hung_at(setting, wall, spot, kind, size, low, variant, "") for kind, spot in zip(series, spots, strict=True)
+        ]
         setting.placed += [one for one in row if one is not None] if None not in row else []
 
 

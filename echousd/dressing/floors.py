@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 
 from echomodel.dressing import KINDS, usual_size
+from echomodel.dressing.prints import printed
 from echomodel.openings import hinge_point, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, around, rectangle
 from echousd.dressing.stories import Wish
@@ -14,6 +15,8 @@ PILE = 0.008  # metres; furniture stands on the floor below, through the rug
 FROM_WALL = 0.12
 SHOES = 0.25  # share of rooms with a door that somebody leaves shoes at
 LARGEST = (4.0, 3.0)
+RUNNER = 2.1  # times as long as wide
+OVALS, ROUNDS = 0.1, 0.25  # shares of rugs, of those that are about square
 AROUND = 1.2  # metres from a table: a seat that belongs to it
 SHARES = (1.0, 0.9, 0.8, 0.7, 0.6)  # of its wished width and depth that a rug may have, the largest area first
 SHRUNK = sorted(((x, z) for x in SHARES for z in SHARES), key=lambda share: -share[0] * share[1])
@@ -30,8 +33,6 @@ def rugs(setting: Setting) -> None:
     shared = [o for o in setting.stands("before") if near[o.name] > 1]
     groups = [o for o in hosts if o not in seats and o not in desks] or shared or seats or desks
     for host in sorted(groups, key=lambda o: -float(o.size[0] * o.size[2])):
-        rng = setting.rng(host.name, "rug")
-        variant = int(rng.integers(1 << 30))
         group, centre, size = _under(setting, host)
         if np.prod(size) < 1.2:
             continue
@@ -41,9 +42,20 @@ def rugs(setting: Setting) -> None:
             plan = rectangle(spot[[0, 2]], extents, host.yaw)
             if _lies(setting, plan, group) and not any(plan.intersects(other) for other in done):
                 done.append(plan.buffer(0.1))
-                whole = np.array([extents[0], PILE, extents[1]])
-                setting.placed.append(Thing("rug", whole, spot, host.yaw, host.name, variant))
+                setting.placed.append(_rug(setting, host, spot, extents))
                 break
+
+
+def _rug(setting: Setting, host: Standing, spot: np.ndarray, extents: np.ndarray) -> Thing:
+    """A rug of a design new to the room, along its longer side; below a seat and on some squares round."""
+    rng, (short, long) = setting.rng(host.name, "rug"), np.sort(extents)
+    form = "runner" if long > RUNNER * short else "oval" if rng.random() < OVALS else "rug"
+    if long < 1.3 * short and (host.row.role == "seat" or rng.random() < ROUNDS):
+        form, long = "round", short
+    names = [name for names in printed("rug", form, rng.choice((setting.resident, ""))).values() for name in names]
+    new = [name for name in names if all(thing.kind != name for thing in setting.placed)]
+    yaw = host.yaw if extents[0] >= extents[1] else host.yaw + np.pi / 2
+    return Thing(str(rng.choice(new or names)), np.array([long, PILE, short]), spot, yaw, host.name)
 
 
 def _under(setting: Setting, host: Standing) -> tuple[set[str], tuple[float, float], tuple[float, float]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from echomodel.dressing import KINDS, usual_size
 from echomodel.dressing import thing as solids_of
+from echomodel.dressing.prints import printed
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, rectangle, standing
 from echousd.dressing.tabletops import shelved_books, surfaces
@@ -129,6 +130,8 @@ def pictures(setting: Setting) -> None:
         for kind, size in _over(host, setting, rng):
             if setting.full and kind == "picture" and _group(setting, wall, along, host, rng):
                 break
+            if kind == "picture":
+                (kind,) = shown(setting, size, 1, host.name)
             thing = _hung(setting, wall, along, kind, size, host.top + OVER, int(rng.integers(1 << 30)), host.name)
             if thing:
                 setting.placed.append(thing)
@@ -138,13 +141,23 @@ def pictures(setting: Setting) -> None:
         for wall in every:
             rng = setting.rng(f"wall {wall.edge}", "picture")
             size = np.array([0.5, 0.7, 0.03]) if rng.random() < 0.5 else np.array([0.7, 0.5, 0.03])
+            (kind,), variant = shown(setting, size, 1, f"wall {wall.edge}"), int(rng.integers(1 << 30))
+            others = [t.position for t in setting.placed if KINDS[t.kind].name == "picture"]
             for share in (0.5, 0.3, 0.7):
-                thing = _hung(setting, wall, share * wall.length, "picture", size, EYE - size[1] / 2,
-                              int(rng.integers(1 << 30)), "")  # fmt: skip
-                if thing and not any(t.kind == "picture" and np.linalg.norm(t.position - thing.position) < 1.2
-                                     for t in setting.placed):  # fmt: skip
+                thing = _hung(setting, wall, share * wall.length, kind, size, EYE - size[1] / 2, variant, "")
+                if thing and not any(np.linalg.norm(other - thing.position) < 1.2 for other in others):
                     setting.placed.append(thing)
                     break
+
+
+def shown(setting: Setting, size: np.ndarray, count: int, *words: str) -> list[str]:
+    """Pictures of one kind that hang together, for who lives there; new to the room while there are enough."""
+    hung, rng = {thing.kind for thing in setting.placed}, setting.rng(*words, "shown")
+    kinds = list(printed("picture", "wide" if size[0] > size[1] else "tall", setting.resident).values())
+    series = [kinds[k] for k in rng.permutation(len(kinds))]
+    new = ([name for name in names if name not in hung] for names in series)
+    names = next((names for names in new if len(names) >= count), max(series, key=len) * count)
+    return [names[k] for k in rng.permutation(len(names))[:count]]
 
 
 def _group(setting: Setting, wall: Wall, along: float, host: Standing, rng: np.random.Generator) -> bool:
@@ -158,14 +171,15 @@ def _group(setting: Setting, wall: Wall, along: float, host: Standing, rng: np.r
     h = round(min(w * 1.3, (free - 0.08 * (rows - 1)) / rows), 2)
     if h < 0.3:
         return False
-    size, before = np.array([round(w, 2), h, 0.03]), len(setting.placed)
+    size, before, variant = np.array([round(w, 2), h, 0.03]), len(setting.placed), int(rng.integers(1 << 30))
+    series = iter(shown(setting, size, 3 * rows, host.name))
     for row in range(rows):
         for column in (-1, 0, 1):
             least = max(host.top + OVER, 1.15) + row * (h + 0.08)
             if rows == 2:
                 least = host.top + OVER + row * (h + 0.08)
             spot = along + column * (float(size[0]) + 0.08)
-            one = hung_at(setting, wall, spot, "picture", size, least, int(rng.integers(1 << 30)), host.name)
+            one = hung_at(setting, wall, spot, next(series), size, least, variant, host.name)
             if one is None:
                 del setting.placed[before:]
                 return False
@@ -238,12 +252,13 @@ def meets(opening: Opening, along: float, half: float, low: float, high: float) 
 def _companion(setting: Setting, wall: Wall, along: float, first: Thing, host: Standing) -> None:
     """A second picture of the same size beside one that leaves room over a long piece, in full rooms."""
     wide = float(host.size[0])
-    if not setting.full or first.kind != "picture" or wide < 1.8 or first.size[0] > 0.55 * wide:
+    if not setting.full or KINDS[first.kind].name != "picture" or wide < 1.8 or first.size[0] > 0.55 * wide:
         return
     for side in (1, -1):
         size = np.round([first.size[0] * 0.5, first.size[1] * 0.75, 0.03], 2)
         spot = along + side * (first.size[0] / 2 + size[0] / 2 + 0.1)
-        thing = _hung(setting, wall, spot, "picture", size, float(first.position[1]), first.variant + side, host.name)
+        (kind,) = shown(setting, size, 1, host.name, "beside")
+        thing = _hung(setting, wall, spot, kind, size, float(first.position[1]), first.variant, host.name)
         if thing:
             setting.put_first([thing], margin=0.02, floor=False, host=host.name)
 

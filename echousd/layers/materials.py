@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from echomodel.dressing.prints import PRINTS
 from echousd.shapes.finishes import baking
 from echousd.shapes.finishes.slots import material_of
 from echousd.shapes.looks import Look
@@ -33,7 +34,7 @@ def look_images(look: Look, harmony: str) -> dict[str, tuple[str, bytes]]:
     """Input of a UsdPreviewSurface -> (path in the room's folder, image) of a look with a pattern; {} without one."""
     if not look.pattern:
         return {}
-    tint = harmony if look.pattern.startswith("picture_") else baking.hexadecimal(look.color)
+    tint = harmony if look.pattern in PRINTS else baking.hexadecimal(look.color)
     found = {"diffuseColor": (f"{look.pattern}_{tint}", baking.color_image(look.pattern, look.color, harmony))}
     normal, rough = baking.normal_image(look.pattern, look.metres), baking.rough_image(look.pattern, look.roughness)
     if normal is not None:

@@ -14,8 +14,7 @@ from pxr import Gf, Usd, UsdPhysics
 from scipy.spatial import ConvexHull, QhullError
 from shapely.affinity import scale
 
-from echomodel.dressing.household import PICTURES
-from echomodel.dressing.textiles import RUGS
+from echomodel.dressing.prints import PRINTS
 from echomodel.furniture.assembly import Piece
 from echomodel.triangles import cross
 from echomodel.vocabulary import vocabulary
@@ -38,9 +37,7 @@ _ROWS = {
     for part, rows in tomllib.loads(Path(__file__).with_name("matter.toml").read_text("utf-8")).items()
 }
 # Material of a solid -> what it stands for; role and material -> the same, where the material alone tells how it looks.
-MATTER = _ROWS["materials"] | {
-    name: _ROWS["materials"][row] for row, names in (("rug", RUGS), ("picture", PICTURES)) for name in names
-}
+MATTER = _ROWS["materials"] | {name: _ROWS["materials"][name.partition("_")[0]] for name in PRINTS}
 PARTS = {tuple(words.split()): matter for words, matter in _ROWS["parts"].items()}
 
 

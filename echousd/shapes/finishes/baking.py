@@ -7,19 +7,19 @@ import os
 import tomllib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import cache, partial, wraps
+from functools import cache, wraps
 from typing import Any, TypeVar, cast
 
 import numpy as np
 import PIL
 from PIL import Image
 
-from echomodel.dressing.textiles import RUGS
+from echomodel.dressing.prints import PRINTS, TABLE
 from echomodel.files import cache_folder, digest
 from echousd.shapes.finishes import patterns
 from echousd.shapes.finishes.patterns import SIZE, Relief, noise
-from echousd.shapes.finishes.pictures import picture, woven
-from echousd.shapes.finishes.slots import HARMONIES, HERE, Color, linear
+from echousd.shapes.finishes.pictures import printed
+from echousd.shapes.finishes.slots import HERE, Color
 from echousd.srgb import from_linear
 
 Bake = TypeVar("Bake", bound=Callable[..., "bytes | None"])
@@ -32,7 +32,7 @@ PATTERNS: Mapping[str, Callable[[], Relief]] = {
         patterns.carpet, patterns.tiles, patterns.brushed, patterns.bound,
         patterns.herringbone, patterns.terrazzo, patterns.boarded, patterns.brick,
     )
-} | {material: partial(woven, *woven_in) for material, woven_in in RUGS.items()}  # fmt: skip
+}  # fmt: skip
 QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
 
 
@@ -73,7 +73,7 @@ def kept(bake: Bake) -> Bake:
 @cache
 def _code() -> str:
     """What decides on the bytes of an image besides its arguments: the programs here and the libraries."""
-    sources = [*sorted(HERE.glob("*.py")), *sorted(HERE.glob("*.toml")), HERE.parents[1] / "srgb.py"]
+    sources = [*sorted(HERE.glob("*.py")), *sorted(HERE.glob("*.toml")), HERE.parents[1] / "srgb.py", TABLE]
     return digest(b"".join([*(f.read_bytes() for f in sources), np.__version__.encode(), PIL.__version__.encode()]))
 
 
@@ -84,11 +84,9 @@ def hexadecimal(color: Color) -> str:
 
 @kept
 def color_image(pattern: str, color: Color, harmony: str) -> bytes:
-    """A pattern in a colour (linear RGB), or a painting in the colours of a harmony, as JPEG."""
-    if pattern.startswith("picture_"):
-        tones = HARMONIES[harmony]
-        named = ("f4efe6", tones.accent, tones.cloth, tones.wood, "2d3136")
-        return _jpeg(picture([linear(c) for c in named], int(pattern.rsplit("_", 1)[1])))
+    """A pattern in a colour (linear RGB), or what is printed in those of a harmony, as JPEG."""
+    if pattern in PRINTS:
+        return _jpeg(printed(pattern, harmony))
     tone = relief(pattern).tone
     tone = tone[..., None] if tone.ndim == 2 else tone
     return _jpeg(np.clip(tone * np.asarray(color), 0, 1))
@@ -97,7 +95,7 @@ def color_image(pattern: str, color: Color, harmony: str) -> bytes:
 @kept
 def normal_image(pattern: str, metres: float) -> bytes | None:
     """Tangent-space normals of a pattern that covers `metres`, +Y up as UsdPreviewSurface takes it; None if flat."""
-    height = None if pattern.startswith("picture_") else relief(pattern).height
+    height = None if pattern in PRINTS else relief(pattern).height
     if height is None:
         return None
     step = 2 * max(metres, 0.4) / SIZE
@@ -111,7 +109,7 @@ def normal_image(pattern: str, metres: float) -> bytes | None:
 @kept
 def rough_image(pattern: str, roughness: float) -> bytes | None:
     """Roughness about a mean, grey; None where it is even."""
-    rough = None if pattern.startswith("picture_") else relief(pattern).rough
+    rough = None if pattern in PRINTS else relief(pattern).rough
     return None if rough is None else _encoded(np.clip(roughness + rough, 0.05, 1), 70)
 
 

@@ -10,8 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echomodel.dressing.household import PICTURES
-from echomodel.dressing.textiles import RUGS
+from echomodel.dressing.prints import PRINTS
 from echousd.srgb import of_hexadecimal
 
 
@@ -32,9 +31,7 @@ class Slot:
 
 HERE = Path(__file__).parent
 _ROWS = {name: Slot(**row) for name, row in tomllib.loads((HERE / "slots.toml").read_text("utf-8")).items()}
-SLOTS: Mapping[str, Slot] = _ROWS | {
-    name: replace(_ROWS[row], pattern=name) for row, names in (("rug", RUGS), ("picture", PICTURES)) for name in names
-}
+SLOTS: Mapping[str, Slot] = _ROWS | {name: replace(_ROWS[name.partition("_")[0]], pattern=name) for name in PRINTS}
 # What every other style group takes instead.
 SECOND = {"wood": "wood2", "cloth": "cloth2", "accent": "blanket", "metal": "metal2"}
 SHELL = {"ceiling": "plaster", "trim": "wood", "door_leaf": "wood", "rail": "metal"}  # of the shell alone

@@ -9,15 +9,17 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import resources
 
 import numpy as np
 
 from echomodel.dressing.forms import form
+from echomodel.dressing.prints import PRINTS
 from echomodel.furniture.solids import Solid
 from echomodel.late import Late
 
-Program = Callable[[np.ndarray, np.random.Generator], list[Solid]]
+Program = Callable[..., list[Solid]]  # of extents (3,) and a generator; `shown`, a row of `prints.toml`, by name
 Size3 = tuple[float, float, float]
 
 
@@ -46,13 +48,16 @@ class Kind:
 
 
 def _kinds() -> dict[str, Kind]:
-    """The rows of `things.toml` by the names of their programs."""
+    """Rows of `things.toml` by the names of their programs, and those of `prints.toml` as things that show them."""
     rows = tomllib.loads(resources.files(__name__).joinpath("things.toml").read_text("utf-8"))
     made = {}
     for name, row in rows.items():
         parts = row.pop("parts", ())
         program = form(parts) if parts else Late(f"{__name__}.{row.pop('module')}:{name}")
         made[name] = Kind(program=program, low=tuple(row.pop("low")), high=tuple(row.pop("high")), **row)
+    for name, row in PRINTS.items():
+        kind = made["round_rug" if row["form"] in ("round", "oval") else name.partition("_")[0]]
+        made[name] = replace(kind, program=partial(kind.program, shown=name))
     return made
 
 

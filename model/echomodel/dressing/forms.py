@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.dressing.household import PICTURES
 from echomodel.furniture.carpentry import Size, both
 from echomodel.furniture.solids import Block, Lathe, Solid, ball, rotation, tube
 
@@ -19,11 +18,10 @@ def form(rows: Sequence[Row]) -> Callable[[Size, np.random.Generator], list[Soli
 
     def built(size: Size, rng: np.random.Generator) -> list[Solid]:
         parts: list[Solid] = []
-        luck, picture = rng.random(), str(rng.choice(PICTURES))
+        luck = rng.random()
         for row in rows:
             among = [row["of"]] if isinstance(row["of"], str) else row["of"]
-            material = among[int(luck * len(among))]
-            solid = _solid(row, np.asarray(size, float), picture if material == "picture" else material)
+            solid = _solid(row, np.asarray(size, float), among[int(luck * len(among))])
             parts += both(solid) if row.get("both") else [solid]
         return parts
 

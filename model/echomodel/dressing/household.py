@@ -5,36 +5,38 @@ from __future__ import annotations
 import numpy as np
 
 from echomodel.dressing import household
+from echomodel.dressing.prints import any_of
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.solids import Block, Solid, rotation, turned
 
-PICTURES = tuple(f"picture_{number}" for number in range(60))  # what is printed, by its material
+FRAMES = ("frame", "frame", "ebony", "ebony", "enamel", "metal", "")  # of what; "" = canvas without a frame
 
 
-def picture(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A framed picture behind a mount; its back is at the wall."""
+def picture(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
+    """A picture, framed behind a mount or on canvas, with its back at the wall; `shown`: a row of `prints.toml`."""
     w, h, d = size
-    bar = float(np.clip(0.035 * max(w, h), 0.012, 0.028))
-    mount = float(np.clip(0.11 * min(w, h), 0.02, 0.09)) if rng.random() < 0.7 else 0.0
+    of, slim, mounted = str(rng.choice(FRAMES)), float(rng.choice((0.6, 1.0))), rng.random() < 0.6
+    shown = shown or any_of("picture", "wide" if w > h else "tall", rng)
     x, back, front = w / 2, -d / 2, d / 2
-    parts = _frame(w, h, d, bar)
+    if not of:
+        canvas = box((-x, 0, back), (x, h, front - 0.001), "linen")
+        return [canvas, box((-x, 0, front - 0.001), (x, h, front), shown)]
+    bar = slim * float(np.clip(0.035 * max(w, h), 0.014, 0.028))
+    mount = float(np.clip(0.11 * min(w, h), 0.02, 0.09)) if mounted else 0.0
+    parts = _frame(w, h, d, bar, of)
     parts.append(box((-x + bar / 2, bar / 2, back), (x - bar / 2, h - bar / 2, front - 0.012), "paper"))
     inset = bar + mount
-    parts.append(box((-x + inset, inset, back), (x - inset, h - inset, front - 0.0105), _painting(rng)))
+    parts.append(box((-x + inset, inset, back), (x - inset, h - inset, front - 0.0105), shown))
     return parts
 
 
-def _painting(rng: np.random.Generator) -> str:
-    return PICTURES[int(rng.integers(len(PICTURES)))]
-
-
-def _frame(w: float, h: float, d: float, bar: float) -> list[Solid]:
+def _frame(w: float, h: float, d: float, bar: float, of: str = "frame") -> list[Solid]:
     x, z = w / 2, d / 2
     return [
-        box((-x, 0, -z), (x, bar, z), "frame", 0.002),
-        box((-x, h - bar, -z), (x, h, z), "frame", 0.002),
-        box((-x, 0, -z), (-x + bar, h, z), "frame", 0.002),
-        box((x - bar, 0, -z), (x, h, z), "frame", 0.002),
+        box((-x, 0, -z), (x, bar, z), of, 0.002),
+        box((-x, h - bar, -z), (x, h, z), of, 0.002),
+        box((-x, 0, -z), (-x + bar, h, z), of, 0.002),
+        box((x - bar, 0, -z), (x, h, z), of, 0.002),
     ]
 
 

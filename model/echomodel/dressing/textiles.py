@@ -6,16 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from echomodel.dressing.prints import any_of
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.cloth import folds, pillow
 from echomodel.furniture.solids import FINEST, Array, Solid, rotation, tube, turned
 
-DESIGNS = (
-    "bordered", "striped", "latticed", "medallion", "checked", "chevrons", "dotted", "scalloped", "broken", "ringed",
-    "berber", "shaded", "carved",
-)  # fmt: skip
-ROUND = ("dotted", "scalloped", "broken", "ringed", "berber", "carved")  # designs that a round one has, too
-RUGS = {f"rug_{design}_{variant}": (design, variant) for design in DESIGNS for variant in range(2)}  # by material
 FOLD = 0.14  # metres of curtain from one fold to the next
 DRAPES = {"curtain": 0.3, "linen": 0.15, "drape": 0.3, "velvet": 0.25}  # what curtains are of, how often
 
@@ -51,21 +46,16 @@ def _quads(a: Array, b: Array, c: Array, d: Array) -> Array:
     return np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
 
 
-def rug(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A rectangle of pile."""
+def rug(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
+    """A rectangle of pile; `shown`: a row of `prints.toml` that is woven into it."""
     w, h, d = size
-    return [box((-w / 2, 0, -d / 2), (w / 2, h, d / 2), _woven(DESIGNS, rng), h * 0.45)]
+    return [box((-w / 2, 0, -d / 2), (w / 2, h, d / 2), shown or any_of("rug", "rug", rng), h * 0.45)]
 
 
-def round_rug(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A round of pile."""
+def round_rug(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
+    """A round or oval of pile, as `rug`."""
     w, h, d = size
-    return [turned((0, 0, 0), (w / 2, d / 2), h, rounding=h * 0.45, material=_woven(ROUND, rng))]
-
-
-def _woven(designs: tuple[str, ...], rng: np.random.Generator) -> str:
-    """What is woven into a rug: one of some designs, in one of two variants."""
-    return f"rug_{rng.choice(designs)}_{int(rng.integers(2))}"
+    return [turned((0, 0, 0), (w / 2, d / 2), h, rounding=h * 0.45, material=shown or any_of("rug", "round", rng))]
 
 
 def curtain(size: Size, rng: np.random.Generator) -> list[Solid]:

@@ -148,8 +148,11 @@ FAULTS = [
     (SMALL.moved("plant", at=(-1.3, 0.0)), ("plant", "not_alone"), "plant stands alone in the room, 0.55 m from"),
     (SMALL.moved("plant", at=(0.0, 1.18)), ("plant", "not_alone"), "plant stands alone in the room, 0.20 m from"),
     (SMALL.moved("side", at=(-1.7, -1.1)), ("side", "not_alone"), "side stands alone in the room, 0.37 m from"),
-    (LIVING.moved("coffee", at=(-0.5, -0.4)).moved("armchair", at=(0.75, -0.4), yaw=0.0),
-     ("armchair", "lounger_faces"), "armchair turns its back on sofa"),
+    (
+        LIVING.moved("coffee", at=(-0.5, -0.4)).moved("armchair", at=(0.75, -0.4), yaw=0.0),
+        ("armchair", "lounger_faces"),
+        "armchair turns its back on sofa",
+    ),
     (SOFAS.moved("armchair", at=(1.5, -0.7)), ("armchair", "loungers_apart"), "armchair leaves only 0.00 m to sofa"),
     (BENCH.moved("bench", at=(0.2, 0.8)), ("bench", "bench_at_foot"), "bench stands 0.48 m from the foot of bed"),
     (BENCH.moved("bench", at=(0.9, 0.4)), ("bench", "bench_at_foot"), "bench lies 0.90 m beside the middle of bed"),

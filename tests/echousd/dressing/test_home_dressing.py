@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from echomodel.dressing import KINDS
+from echomodel.dressing.prints import PRINTS
 from echomodel.furniture import Choices, Style, solids
 from echomodel.openings import Opening
 from echousd.dressing import floors, tabletops, walls
@@ -103,7 +104,7 @@ def test_pictures_and_shoes_stay_out_of_baths_and_off_balconies(use, monkeypatch
     room = setting(use=use, openings=[Opening("door", "door", 1, 0.2, 0.9, 2.0)])
     floors.by_doors(room)
     bare_walls(room)
-    assert {thing.kind for thing in room.placed} == ({"shoes", "picture"} if not use else set())
+    assert {KINDS[thing.kind].name for thing in room.placed} == ({"shoes", "picture"} if not use else set())
 
 
 @pytest.mark.parametrize("doors", [1, 2])
@@ -156,3 +157,36 @@ def test_curtains_end_at_the_sill_only_over_what_stands_under_the_window(word):
         low |= {thing.position[1] > 0.1 for thing in hung if thing.kind in walls.CURTAINS}
     assert low == ({True} if word else set())
     assert kinds & set(walls.BLINDS)
+
+
+@pytest.mark.parametrize("resident", ["", "child"])
+def test_pictures_of_one_wall_are_of_one_kind_and_a_childs_are_a_childs(resident):
+    walls_seen = set()
+    for seed in range(12):
+        room = setting(seed=seed)
+        room.resident = resident
+        bare_walls(room)
+        names = [thing.kind for thing in room.placed]
+        assert len(set(names)) == len(names)
+        kinds = {PRINTS[name]["kind"] for name in names if room.placed[0].yaw == room.placed[names.index(name)].yaw}
+        assert len(kinds) == 1
+        walls_seen |= {PRINTS[name]["kind"] for name in names}
+    assert (walls_seen == {"childs"}) == (resident == "child")
+    assert resident or len(walls_seen) > 4
+
+
+def test_long_rugs_are_runners_and_rugs_of_one_room_differ():
+    host = setting("toy_box").objects["toy_box"]
+    forms = set()
+    for seed in range(30):
+        room = setting(seed=seed)
+        for extents in ((2.4, 0.8), (0.8, 2.4), (2.0, 1.9), (2.4, 1.7)):
+            rug = floors._rug(room, host, np.zeros(3), np.array(extents))
+            form = PRINTS[rug.kind]["form"]
+            forms.add(form)
+            assert (form == "runner") == (max(extents) > 2 * min(extents))
+            assert rug.size[0] >= rug.size[2]
+            assert form != "round" or rug.size[0] == rug.size[2] == 1.9
+            room.placed.append(rug)
+        assert len({rug.kind for rug in room.placed}) == 4
+    assert forms == {"runner", "round", "oval", "rug"}

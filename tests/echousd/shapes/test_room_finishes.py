@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,7 @@ from pxr import Usd, UsdShade
 from small_room import BARE, StandIn, small_graph
 
 import echousd
-from echomodel.dressing import textiles
-from echomodel.dressing.household import PICTURES
-from echomodel.dressing.textiles import ROUND, RUGS
+from echomodel.dressing.prints import ASPECTS, PRINTS
 from echomodel.furniture.solids import Block
 from echousd.checks.validity import find_faults
 from echousd.exporting.formats import export
@@ -21,7 +20,7 @@ from echousd.options import RoomOptions
 from echousd.shapes.finishes import baking
 from echousd.shapes.finishes.baking import PATTERNS, relief
 from echousd.shapes.finishes.patterns import SIZE
-from echousd.shapes.finishes.pictures import DESIGNS, picture
+from echousd.shapes.finishes.pictures import PROGRAMS, STOCK, printed
 from echousd.shapes.finishes.slots import HARMONIES, SHELL, SLOTS, linear, material_of
 from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
@@ -145,7 +144,7 @@ def _tint_of(stage, harmony):
 
 
 def test_labels_say_what_things_are_made_of():
-    told = {"a_b_book_b": "paper", "room_rug_latticed_1": "wool", "picture_0": "print", "style_accent_plain": "fabric"}
+    told = {"a_b_book_b": "paper", "room_rug_lattice": "wool", "picture_fern": "print", "style_accent_plain": "fabric"}
     told |= {"door_leaf": "wood", "plant_leaf": "foliage", "wallpaper": "paper", "wall": "plaster", "glass": "glass"}
     assert {name: material_of(name) for name in told} == told
     words = {material_of(f"suite_{slot}") for slot in (*SLOTS, *SHELL)}
@@ -184,20 +183,32 @@ def test_a_baked_image_is_kept_for_later_processes(tmp_path, monkeypatch):
     assert len(baked) == 5
 
 
-def test_pictures_are_sixty_unlike_ones_and_rugs_twenty_six():
-    """What hangs or lies in fifty rooms is not met all the time: no two are nearly the same."""
-    paper = [linear(color) for color in ("f4efe6", "c47f4f", "7d8b91", "b98f5f", "2d3136")]
-    drawn = [picture(paper, number)[::16, ::16] for number in range(len(PICTURES))]
-    rugs = [relief(name).tone[::16, ::16] for name in RUGS]
-    assert (len(drawn), len(rugs)) == (60, 26)
-    for which, least in ((drawn, 0.02), (rugs, 0.01)):
-        apart = [float(np.abs(one - other).mean()) for k, one in enumerate(which) for other in which[:k]]
-        assert min(apart) > least
-    for image in drawn:
+@pytest.mark.parametrize("what", ["picture", "rug"])
+def test_no_two_prints_are_nearly_the_same(what):
+    """What hangs or lies in fifty rooms is not met all the time, and can be read where it is."""
+    names = [name for name in PRINTS if name.startswith(f"{what}_")]
+    drawn = [printed(name, "clay")[::8, ::8] for name in names]
+    apart = [float(np.abs(one - other).mean()) for k, one in enumerate(drawn) for other in drawn[:k]]
+    assert min(apart) > 0.02
+    for name, image in zip(names, drawn, strict=True):
+        assert image.shape == (SIZE // 8, SIZE // 8, 3)
         assert 0 <= image.min() <= image.max() <= 1
-        assert image.std() > 0.02
+        assert image.std((0, 1)).max() > 0.025, name
 
 
-def test_what_is_woven_into_rugs_has_a_program_each():
-    assert set(textiles.DESIGNS) == DESIGNS.keys()
-    assert set(ROUND) < set(textiles.DESIGNS)
+@pytest.mark.parametrize("harmony", HARMONIES)
+def test_what_is_printed_names_colours_and_programs_that_there_are(harmony):
+    tones = HARMONIES[harmony]._asdict().keys() | STOCK.keys()
+    for name, row in PRINTS.items():
+        words = [row.get("on", "paper"), *(word for one in row["of"] for word in one.get("colors", [one.get("color")]))]
+        assert all(word in tones or re.fullmatch("[0-9a-f]{6}", word) for word in words), name
+        assert {next(iter(one)) for one in row["of"]} <= PROGRAMS.keys(), name
+        assert row["form"] in ASPECTS
+
+
+def test_a_print_is_in_the_colours_of_the_harmony_and_round_things_are_round():
+    assert np.abs(printed("rug_checked", "coast") - printed("rug_checked", "terra")).mean() > 0.05
+    ink = (np.abs(printed("picture_dots", "oak") - linear("2d3136")) < 0.02).all(-1)
+    rows, columns = np.argwhere(ink).T
+    one = (rows < SIZE / 7) & (columns < SIZE / 5)
+    assert np.ptp(columns[one]) * ASPECTS["tall"] == pytest.approx(np.ptp(rows[one]), rel=0.1)

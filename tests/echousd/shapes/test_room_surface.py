@@ -130,7 +130,7 @@ def test_boards_that_meet_share_no_point_and_stay_closed():
 def test_surfaces_of_several_meshes_are_those_of_each():
     meshes = [box_mesh((1, 2, 3)), trimesh.creation.icosphere(subdivisions=2), box_mesh((1, 2, 3))]
     meshes.append(trimesh.util.concatenate([meshes[0], box_mesh((0.1, 0.1, 0.1))]))
-    slots = ("wood", "picture_3", "fabric", "wood")
+    slots = ("wood", "picture_fern", "fabric", "wood")
     forms = [(m, {w: np.arange(len(m.faces))}, c) for m, w, c in zip(meshes, slots, (0.7, 0.2, 1.0, 0.7), strict=True)]
     for together, (mesh, groups, crease) in zip(surfaces(forms), forms, strict=True):
         alone = surface(mesh, groups, crease=crease)

@@ -1,0 +1,32 @@
+"""Rows of `prints.toml`: what is printed on pictures and cloths and woven into rugs, by the name of its material."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ASPECTS = {"tall": 0.74, "wide": 1.45, "rug": 1.5, "round": 1.0, "oval": 1.5, "runner": 3.0, "square": 1.0}  # of sheets
+TABLE = Path(__file__).with_name("prints.toml")
+PRINTS: Mapping[str, Mapping[str, Any]] = tomllib.loads(TABLE.read_text("utf-8"))
+
+
+def printed(what: str, form: str, resident: str = "") -> dict[str, list[str]]:
+    """Kind -> names of what is printed on sheets of a form, for somebody who has rows of their own, else for anyone.
+
+    `what`: the word that names begin with.
+    """
+    fit = {name: row for name, row in PRINTS.items() if name.startswith(f"{what}_") and row["form"] == form}
+    own = {name: row for name, row in fit.items() if resident in row.get("for", ())}
+    found: dict[str, list[str]] = {}
+    for name, row in (own or {name: row for name, row in fit.items() if "for" not in row}).items():
+        found.setdefault(row.get("kind", name), []).append(name)
+    return found
+
+
+def any_of(what: str, form: str, rng: np.random.Generator) -> str:
+    """The name of a row that anybody has."""
+    return str(rng.choice([name for names in printed(what, form).values() for name in names]))
