@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import torch
 from torch import Tensor
@@ -40,13 +41,13 @@ def pendant_over(plan: Plan) -> Found:
 
 
 def pendant_centred(plan: Plan) -> Found:
-    """What hangs over a table hangs over its middle; several pendants do so together."""
+    """What hangs over a table, or shall, hangs over its middle; several pendants do so together."""
     lamps = plan.which(lambda kind: kind.look == "pendant_lamp")
     tables = plan.which(lambda kind: kind.role == "board" and not kind.access) & plan.standing
     i, j = plan.pairs(lamps, tables)
     if not len(i):
         return nobody(plan.size)
-    over = (plan.gap(i, j) < 1e-3).to(plan.size)
+    over = ((plan.gap(i, j) < 1e-3) | _told(plan, i, j, ("above",))).to(plan.size)
     away = (plan.position[i] - plan.position[j])[:, [0, 2]] * over[:, None]
     count = over.new_zeros(len(plan)).index_add(0, j, over)
     mean = away.new_zeros(len(plan), 2).index_add(0, j, away) / count.clamp_min(1.0)[:, None]
@@ -184,9 +185,9 @@ def _viewers(plan: Plan) -> Watched:
     return i[rows], j[rows], margin[rows], measure[rows], clear[rows], about[rows]
 
 
-def _told(plan: Plan, i: Tensor, j: Tensor) -> Tensor:
-    """(P,) bool: the graph says that j watches i."""
-    ends = [plan.told(word) for word in TOLD]
+def _told(plan: Plan, i: Tensor, j: Tensor, words: Sequence[str] = TOLD) -> Tensor:
+    """(P,) bool: the graph says one of these words of i and j, or of j and i."""
+    ends = [plan.told(word) for word in words]
     said = torch.cat([one * len(plan) + other for a, b in ends for one, other in ((a, b), (b, a))])
     return torch.isin(i * len(plan) + j, said)
 

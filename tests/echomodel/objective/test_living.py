@@ -387,6 +387,16 @@ def test_the_sofa_that_screen_and_table_are_told_of_is_the_first_whatever_its_si
     assert plan_of(Boxes, words, None, (), told).joins.tolist() == [1, -1, -1, -1]
 
 
+def test_a_pendant_that_is_told_to_hang_above_a_table_hangs_over_its_middle_even_beside_it():
+    names = list(DINING.things)
+    above = np.array([(names.index("pendant"), vocabulary().predicate_id("above"), names.index("table"))])
+    beside = DINING.moved("pendant", at=(0.9, 0.0))  # 0.2 m beside the edge: in a room it may hang so
+    assert ("pendant", "pendant_centred") not in beside.found()
+    told = beside.found(relations=above)["pendant", "pendant_centred"]
+    assert "pendant hangs 0.90 m off the middle of table" in told
+    assert ("pendant", "pendant_centred") not in DINING.found(relations=above)
+
+
 def told_near(*pairs):
     near = vocabulary().predicate_id("close_by")
     return np.array([(a, near, b) for a, b in pairs])
