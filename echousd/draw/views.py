@@ -35,6 +35,7 @@ BARE, BAREST, DEEP = 60.0, 0.28, 0.02
 BEFORE, WALLED = 2.0, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
 FILLED = 170.0  # metres of depth that a picture full of what is near is worth
 BEHIND, ASKANCE = 25.0, 0.0  # metres of depth that the main piece from behind costs, and from which cosine on
+HALVED = 40.0  # four times the metres of depth that a lamp half in the picture costs
 UNSEEN = 3.0  # metres of depth that each piece in the picture is worth
 SHOWN, FAR = 30.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
 TOUCHED = 0.86  # nearness of what the eye must not be at: a quarter of a metre
@@ -171,7 +172,10 @@ def inside_view(
         eye, half = view[:3, 3], APERTURE / 2 / lens
         merit = min(_depth(room, eye[[0, 2]], -view[[0, 2], 2]), FAR) - first
         if len(furniture.size):
-            unseen = blocked | (_aside(points, view) > half)
+            out = _aside(points, view) > half
+            shade = out.reshape(-1, 3, 3, 3)[:, :, :2].mean((1, 2, 3))  # of what hangs; the rest is cord
+            merit -= HALVED * float((shade * (1 - shade))[furniture.position[:, 1] > LOW].sum())
+            unseen = blocked | out
             merit += float((eye[[0, 2]] - middle) @ furniture.facing - UNSEEN * unseen.mean(1).sum())
         if merit + SHOWN <= most:  # the rest only takes away
             continue

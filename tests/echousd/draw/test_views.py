@@ -100,3 +100,16 @@ def test_only_what_is_near_and_in_the_picture_fills_it() -> None:
     assert ahead.filled(view, 1.0, 1.0) > 0.05
     assert behind.filled(view, 1.0, 1.0) == far.filled(view, 1.0, 1.0) == 0
     assert beside.filled(view, 0.5, 1.0) == 0  # a narrow picture does not reach so far
+
+
+@pytest.mark.parametrize("at", [(1.2, 1.0), (1.2, 2.2), (2.5, 1.0), (3.9, 2.2)])
+def test_the_shade_of_a_pendant_is_whole_in_the_picture_or_not_in_it(at: tuple[float, float]) -> None:
+    lamp = boxes((0.5, 0.9, 0.5, at[0], 1.6, at[1], 0.0))
+    both = Furniture(
+        *(np.concatenate([getattr(one, key) for one in (BED, lamp)]) for key in ("size", "position", "yaw"))
+    )
+    view, lens = inside_view(FLOOR, both, 2.5)
+    shade = np.minimum(lamp.corners[0], (9.0, 2.05, 9.0))  # below the middle of its box; over it is its cord
+    x, y, z = np.linalg.inv(view[:3, :3]) @ (shade - view[:3, 3]).T
+    inside = np.maximum(np.abs(x), ASPECT * np.abs(y)) < -z * APERTURE / 2 / lens
+    assert inside.mean() in (0.0, 1.0)
