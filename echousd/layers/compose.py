@@ -71,6 +71,7 @@ def _cell(words: str) -> str:
     return " ".join(words.split()).replace("|", "\\|")[:200]
 
 
+OTHERS = "room_others"  # what the names of a room's second materials begin with
 LAYERS = ("dressing", "materials", "physics", "layout", "graph", "geometry", "shell")  # strongest first
 
 
@@ -210,8 +211,9 @@ def room_looks(
     voices, slugs, alike = {ROOM_STYLE: 0}, _slugs(room), instanced(room)
     for node in room.graph.nodes:
         asset, style = room.assets[node.name], room.styles[node.name]
-        slug = slugs[style]
-        voice = voices.setdefault(style, len(voices))
+        slug, voice = slugs[style], voices.setdefault(style, len(voices))
+        if style == ROOM_STYLE and looks.second(room.provenance.seed, node.category):
+            slug, voice = OTHERS, 1
         above = class_path(asset) if node.name in alike else f"{OBJECTS}/{node.name}"
         for path, slot in assets.slot_paths(above, made[asset].slots).items():
             name = f"{slug}_{slot}"
@@ -219,8 +221,9 @@ def room_looks(
             bindings[path] = name
     table |= {f"{ROOM_STYLE}_{slot}": looks.look(harmony, slot) for slot in small}
     covered = {f"{SHELL}/{name}": slot for name, slot in structure.covered_walls(room).items()}
-    table |= {slot: looks.look(harmony, slot) for slot in ("wall", *covered.values())} | structure.LOOKS
-    table["floor"] = looks.look(harmony, structure.floor_slot(room))
+    shell = {mesh.look: mesh.look for part in built for mesh in part.meshes} | {slot: slot for slot in covered.values()}
+    shell |= {"floor": structure.floor_slot(room), "glass": "pane"}
+    table |= {name: looks.look(harmony, slot) for name, slot in shell.items()}
     for part in built:
         own = {"wall": covered.get(part.path, "wall")}
         bindings |= {mesh.path: own.get(mesh.look, mesh.look) for mesh in part.meshes}
@@ -331,7 +334,7 @@ def _slugs(room: RoomData) -> dict[str, str]:
         if style not in out:
             word = "".join(c if Sdf.Path.IsValidIdentifier(f"a{c}") else "_" for c in style)
             word = word if word[:1].isalpha() else f"style_{word}"
-            out[style] = free_name(word, {ROOM_STYLE, *out.values()} - {style})
+            out[style] = free_name(word, {ROOM_STYLE, OTHERS, *out.values()} - {style})
     return out
 
 

@@ -16,10 +16,8 @@ from echomodel.openings import Opening, direction, edge_lengths, inward_normal
 from echomodel.vocabulary import Category, vocabulary
 from echousd.layers import assets
 from echousd.room import RoomData
-from echousd.shapes.finishes.slots import linear
 from echousd.shapes.fittings import PLAIN, Millwork, millwork_of
 from echousd.shapes.geometry import Mass
-from echousd.shapes.looks import Look
 from echousd.shapes.surface import CREASE, Surface, surfaces
 from echousd.shapes.walls import Piece, ShellPart, ceiling, floor, wall_name, walls
 from echousd.stage import encoding
@@ -27,8 +25,12 @@ from echousd.stage.paths import OPENINGS, SHELL, piece_name
 from echousd.stage.pen import Pen, ops
 from echousd.stage.taxonomy import ade20k
 
-THIRD = 3  # one room in so many has the flooring of its type, or of the others blocks instead of boards
-FLOORS = {"tiles": ("tiles", "terrazzo")}  # floorings that come in several kinds, equally often
+THIRD = 3  # one room in so many has the flooring of its type
+# Slots of the floorings that come in several kinds, equally often; wood where nothing else is.
+FLOORS = {
+    "tiles": ("tiles", "terrazzo"),
+    "wood": ("floor", "floor", "herringbone", "boards_walnut", "boards_ash", "boards_grey", "herringbone_walnut"),
+}
 # What one wall may have behind its bed or sofa, and of how many parts of all rooms; the rest has plain walls.
 COVERS = {"wallpaper": 2, "paint": 2, "boarding": 1, "brick": 1, "": 6}
 NEAR = 0.45  # metres between a wall and the back of what stands at it
@@ -37,11 +39,10 @@ HOSTS = ("bed", "sofa")  # roles of what stands before such a wall
 
 def floor_slot(room: RoomData) -> str:
     """The material slot of the room's floor."""
-    row = vocabulary().room_type(room.graph.room.type)
-    if row.flooring and (row.use or _drawn(room, "floor", THIRD) == 0):
-        kinds = FLOORS.get(row.flooring, (row.flooring,))
-        return kinds[_drawn(room, "kind of floor", len(kinds))]
-    return "floor" if _drawn(room, "blocks", THIRD) else "herringbone"
+    row, style = vocabulary().room_type(room.graph.room.type), vocabulary().known_style(room.graph.room.style)
+    typical = row.flooring and (row.use or _drawn(room, "floor", THIRD) == 0)
+    kinds = FLOORS.get(row.flooring, (row.flooring,)) if typical else style.floors if style else FLOORS["wood"]
+    return kinds[_drawn(room, "kind of floor", len(kinds))]
 
 
 def covered_walls(room: RoomData) -> dict[str, str]:
@@ -87,13 +88,6 @@ def _drawn(room: RoomData, what: str, among: int) -> int:
 
 
 LEAF = 320.0  # kg/m³ of a door's leaf
-LOOKS = {
-    "ceiling": Look(linear("f6f4f0"), 0.95),
-    "trim": Look(linear("f7f5f1"), 0.4),
-    "door_leaf": Look(linear("efebe3"), 0.4),
-    "rail": Look(linear("8e9194"), 0.35, metallic=0.85),
-    "glass": Look(linear("d6e6ee"), 0.05, opacity=0.06),
-}
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,6 +43,11 @@ def look(palette: str, slot: str, voice: int = 0) -> Look:
     return Look(color, made.roughness, made.metallic, made.opacity, emissive, made.pattern, made.metres)
 
 
+def second(seed: int, category: str) -> bool:
+    """Whether pieces of a category are of a room's second wood and cloth: a third of what belongs to no set is."""
+    return hashlib.blake2b(f"{seed} {category}".encode(), digest_size=4).digest()[0] % 3 == 0
+
+
 def palette_for(key: str, among: Iterable[str] = HARMONIES) -> str:
     """A palette for a style's name, the same in every run."""
     names = sorted(among)

@@ -230,7 +230,7 @@ class RoomStyle:
     Arguments:
         family: of furniture making. kinds: (part, kinds of it) where the style has others than its family.
         palettes: harmonies. windows, doors, cornices: of the millwork (metres of a cornice's height, 0 = none).
-        covers: what a wall behind a bed or sofa has, "" = nothing.
+        covers: what a wall behind a bed or sofa has, "" = nothing. floors: slots of those of wood or the like.
         aliases: other words for it.
     """
 
@@ -240,6 +240,7 @@ class RoomStyle:
     windows: tuple[str, ...]
     doors: tuple[str, ...]
     covers: tuple[str, ...]
+    floors: tuple[str, ...]
     cornices: tuple[float, ...] = (0.0,)
     kinds: tuple[tuple[str, tuple[str, ...]], ...] = ()
     aliases: tuple[str, ...] = ()

@@ -34,15 +34,14 @@ _ROWS = {name: Slot(**row) for name, row in tomllib.loads((HERE / "slots.toml").
 SLOTS: Mapping[str, Slot] = _ROWS | {name: replace(_ROWS[name.partition("_")[0]], pattern=name) for name in PRINTS}
 # What every other style group takes instead.
 SECOND = {"wood": "wood2", "cloth": "cloth2", "accent": "blanket", "metal": "metal2"}
-SHELL = {"ceiling": "plaster", "trim": "wood", "door_leaf": "wood", "rail": "metal"}  # of the shell alone
 
 
 def material_of(name: str) -> str:
     """The word of the material that a look is of, by its name, which ends in a slot; raises KeyError for others."""
     words = name.split("_")
     slots = ["_".join(words[start:]) for start in range(len(words))]
-    slot = next((slot for slot in slots if slot in SHELL or slot in SLOTS), "")
-    return SHELL[slot] if slot in SHELL else SLOTS[slot].material or slot
+    slot = next((slot for slot in slots if slot in SLOTS), "")
+    return SLOTS[slot].material or slot
 
 
 def metres_of(slot: str) -> float:

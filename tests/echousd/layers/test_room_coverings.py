@@ -11,10 +11,13 @@ from small_room import StandIn, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
+from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.layers.structure import COVERS, covered_walls, floor_slot
+from echousd.layers.structure import COVERS, FLOORS, covered_walls, floor_slot
 from echousd.options import RoomOptions
 from echousd.room import Provenance
+from echousd.shapes.finishes.slots import HARMONIES, SLOTS
+from echousd.shapes.looks import palette_of_room
 
 
 @pytest.fixture(scope="module")
@@ -31,9 +34,10 @@ def seeded(room, seed):
 def test_floors_and_the_wall_behind_the_bed_differ_from_room_to_room(room):
     floors = [floor_slot(seeded(room, seed)) for seed in range(120)]
     covers = [covered_walls(seeded(room, seed)) for seed in range(120)]
-    assert set(floors) == {"floor", "herringbone", "carpet"}
+    assert set(floors) == {"carpet", *FLOORS["wood"]}
     assert 24 < floors.count("carpet") < 56
-    assert 14 < floors.count("herringbone") < 42
+    assert 10 < floors.count("floor") < 40
+    assert 3 < floors.count("boards_walnut") < 26
     assert {slot for cover in covers for slot in cover.values()} == {*COVERS} - {""}
     assert 48 < covers.count({}) < 84
     assert len({wall for cover in covers for wall in cover}) == 1  # the one behind the bed
@@ -70,6 +74,27 @@ def test_coverings_are_bound_and_have_their_images(room, tmp_path):
     names = {path.name.split("_")[0] for path in (root.parent / "textures").iterdir()}
     assert {"carpet", "papered"} <= names
     assert "planks" not in names
+
+
+def test_a_style_has_floors_of_its_own(room):
+    graph = room.graph.replaced(room=room.graph.room.replaced(style="art_deco"))
+    floors = {floor_slot(replace(seeded(room, seed), graph=graph)) for seed in range(60)}
+    assert floors == {"carpet", "herringbone_smoked", "herringbone_walnut", "boards_smoked"}
+    for style in vocabulary().styles:
+        assert set(style.floors) <= set(SLOTS)
+
+
+def test_pieces_of_no_set_are_of_two_woods_at_most_and_not_all_of_one(room):
+    woods = set()
+    for seed in range(6):
+        stage = seeded(room, seed).stage
+        looks = {prim.GetName() for prim in stage.GetPrimAtPath("/Room/Looks").GetChildren()}
+        woods |= {name for name in looks if name.endswith("_wood")}
+        if "room_others_wood" in looks:
+            shader = UsdShade.Shader(stage.GetPrimAtPath("/Room/Looks/room_others_wood/image"))
+            file = str(shader.GetInput("file").Get().path)
+            assert file.endswith(f"wood_{HARMONIES[palette_of_room(seed)].wood2}.jpg")
+    assert {"room_wood", "room_others_wood"} <= woods
 
 
 def wet(room, kind, word, walls=True):

@@ -42,7 +42,7 @@ def test_files_are_those_of_the_design(root):
     names = set(OBJECTS) - {"nightstand_left", "nightstand_right"} | {"nightstand"}
     assets = {f"assets/{n}/{n}{end}" for n in names for end in (".usda", "_geo.usdc")}
     images = {path for path in found if path.startswith("textures/") and path.endswith(".jpg")}
-    assert any(path.startswith("textures/planks_") for path in images)
+    assert any(path.startswith(("textures/planks_", "textures/herringbone_")) for path in images)
     assert found == {"bedroom.usda", "bedroom.json"} | images | layers | assets
 
 
