@@ -15,7 +15,7 @@ from echomodel.dressing import KINDS
 from echomodel.openings import Opening, free_area
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import Category, vocabulary
-from echousd.dressing.stories import Story, story
+from echousd.dressing.stories import TABLE, Story, story
 from echousd.shapes.geometry import Geometry
 
 SKIN = 1e-4  # metres that count as nothing
@@ -166,7 +166,9 @@ class Setting:
 
         `things`: taken one by one, those after the first clear one not at all. Others: as `clear`.
         """
-        found = next((one for one in things if self.clear(one, host=host, margin=margin, floor=floor)), None)
+        had = {thing.kind for thing in self.placed}.intersection(TABLE["once"])
+        wanted = (one for one in things if one.kind not in had)
+        found = next((one for one in wanted if self.clear(one, host=host, margin=margin, floor=floor)), None)
         if found is not None:
             self.placed.append(found)
         return found

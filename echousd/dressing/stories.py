@@ -28,6 +28,7 @@ class Wish:
     turn: str = ""
     full: bool = False
     share: float = 1.0
+    needs: str = ""
 
     def comes(self, full: bool, rng: np.random.Generator) -> bool:
         """Whether a room that is dressed in full, or not, has it."""
@@ -55,7 +56,7 @@ def story(resident: str = "") -> Story:
 
 def _wish(row: dict[str, Any]) -> Wish:
     at = (spot for one in row["at"] for spot in (TABLE["places"].get(one, [one]) if isinstance(one, str) else [one]))
-    rest = {word: row[word] for word in ("by", "turn", "full", "share") if word in row}
+    rest = {word: row[word] for word in ("by", "turn", "full", "share", "needs") if word in row}
     return Wish(tuple(row["of"]), tuple(at), tuple(row.get("with", ())), **rest)
 
 

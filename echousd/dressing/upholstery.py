@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 
 from echomodel.dressing import usual_size
+from echomodel.dressing.prints import printed
 from echomodel.triangles import area_normals
 from echousd.dressing.setting import Setting, Standing, Thing
 from echousd.shapes.nofit import forbidden_moves
@@ -20,45 +21,49 @@ RAISED = 0.04  # metres that a flat thing is raised at most so that it lies on t
 
 
 def cushions(setting: Setting) -> None:
-    """Cushions in the corners of sofas, one on an armchair."""
+    """Cushions in the corners of sofas, a pair or two that differ, and an odd one beside them; one on an armchair."""
     for host in setting.inviting("cushions"):
-        rng = setting.rng(host.name, "cushion")
-        size = usual_size("cushion", rng)
-        wide = float(host.size[0])
-        ends = [-1.0, 1.0] if wide > 1.3 else [float(rng.choice([-0.6, 0.6]))]
-        if setting.full and wide > 1.7:
-            ends.append(-0.62)
-        variant = int(rng.integers(1 << 30))
-        seat = _Seat.of(host)
+        rng, seat = setting.rng(host.name, "cushion"), _Seat.of(host)
         if seat is None:
             continue
-        for end in ends:
+        wide, pair, odd = float(host.size[0]), *_designs(setting, rng)
+        ends = [(-1.0, pair), (1.0, pair if rng.random() < 0.6 else odd)]
+        if wide > 1.7 and (setting.full or rng.random() < 0.6):
+            ends.append((float(rng.choice((-0.62, 0.62))), odd))
+        for end, (kind, size, variant) in ends if wide > 1.3 else [(float(rng.choice([-0.6, 0.6])), odd)]:
             spot = seat.resting(end, size)
-            if spot is None:
-                continue
             turn = -0.12 * end * float(rng.uniform(0.3, 1.6))
-            spot = _clear_of(host, spot, turn, size)
-            if spot is None:
-                continue
-            place, yaw = host.to_room(spot[None])[0], host.yaw + turn
-            thing = Thing("cushion", size, place, yaw, host.name, variant)
-            setting.put_first([thing], host=host.name, margin=0.0, floor=False)
+            spot = None if spot is None else _clear_of(host, spot, turn, size)
+            if spot is not None:
+                thing = Thing(kind, size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
+                setting.put_first([thing], host=host.name, margin=0.0, floor=False)
+
+
+Design = tuple[str, np.ndarray, int]  # kind, extents and variant of a cushion
+
+
+def _designs(setting: Setting, rng: np.random.Generator) -> tuple[Design, Design]:
+    """Two cushions that go together: one plain, one of a print, either of them first; the second often a long one."""
+    form = str(rng.choice(("square", "lumbar")))
+    prints = [name for names in printed("cushion", form, setting.resident).values() for name in names]
+    kinds = [str(rng.choice(prints or ["cushion"])), "cushion"]
+    made = [(kind, usual_size(kind, rng), int(rng.integers(1 << 30))) for kind in kinds]
+    return (made[0], made[1]) if form == "square" and rng.random() < 0.5 else (made[1], made[0])
 
 
 def bed_cushions(setting: Setting) -> None:
-    """Two cushions before the pillows of a wide bed; in full rooms one on a narrow bed, too."""
+    """Two cushions before the pillows of a wide bed, or one; in full rooms one on a narrow bed, too."""
     for host in setting.of("bed"):
-        rng = setting.rng(host.name, "bed cushion")
-        size, variant, seat = usual_size("cushion", rng), int(rng.integers(1 << 30)), _Seat.of(host)
-        wide = float(host.size[0])
+        rng, seat = setting.rng(host.name, "bed cushion"), _Seat.of(host)
+        wide, (kind, size, variant) = float(host.size[0]), _designs(setting, rng)[int(rng.integers(2))]
         if seat is None or not (setting.full or wide > WIDE_BED):
             continue
-        for side in (-1.0, 1.0) if wide > WIDE_BED else (0.0,):
+        for side in (-1.0, 1.0) if wide > WIDE_BED and size[0] < 1.3 * size[1] else (0.0,):
             turn = float(rng.uniform(-0.12, 0.12))
             spot = seat.before_pillows(side * 0.21 * wide, size)
             spot = None if spot is None else _lying(host, seat, spot, turn, size)
             if spot is not None:
-                thing = Thing("cushion", size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
+                thing = Thing(kind, size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
                 setting.put_first([thing], host=host.name, margin=0.0, floor=False)
 
 

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from echomodel.furniture import Choices, Style, solids
-from echomodel.furniture.cloth import Tufted, cover, pillow
+from echomodel.furniture.cloth import Tufted, cover, pillow, seam
 from echomodel.furniture.sofas import BODIES
 from echomodel.furniture.style import FAMILIES
 
@@ -35,6 +35,13 @@ def test_corners_of_a_pillow_stand_out_and_its_seams_are_thin():
     assert corner[0] == pytest.approx(HALF[0])
     assert middle[:, 0].max() < 0.93 * HALF[0]
     assert abs(corner[1]) < 0.1 * HALF[1]
+
+
+def test_a_cord_runs_along_the_seam_of_its_cushion():
+    cushion = trimesh.Trimesh(*pillow((0, 0, 0), (0.25, 0.24, 0.08), "linen").mesh())
+    line = seam(0.25, 0.24)
+    assert np.linalg.norm(line[1:] - line[:-1], axis=1).max() < 0.07
+    assert np.abs(trimesh.proximity.signed_distance(cushion, line)).max() < 0.004
 
 
 def test_a_cover_has_folds_and_two_covers_differ():

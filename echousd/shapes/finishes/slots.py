@@ -31,7 +31,9 @@ class Slot:
 
 HERE = Path(__file__).parent
 _ROWS = {name: Slot(**row) for name, row in tomllib.loads((HERE / "slots.toml").read_text("utf-8")).items()}
-SLOTS: Mapping[str, Slot] = _ROWS | {name: replace(_ROWS[name.partition("_")[0]], pattern=name) for name in PRINTS}
+SLOTS: Mapping[str, Slot] = _ROWS | {
+    name: replace(_ROWS[name.partition("_")[0]], pattern=name, metres=0.0) for name in PRINTS
+}
 # What every other style group takes instead.
 SECOND = {"wood": "wood2", "cloth": "cloth2", "accent": "blanket", "metal": "metal2"}
 

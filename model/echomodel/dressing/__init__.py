@@ -47,6 +47,9 @@ class Kind:
     faces: int = 1200
 
 
+BUILT = {"round": "round_rug", "oval": "round_rug", "lumbar": "lumbar_cushion"}  # form of a print -> what shows it
+
+
 def _kinds() -> dict[str, Kind]:
     """Rows of `things.toml` by the names of their programs, and those of `prints.toml` as things that show them."""
     rows = tomllib.loads(resources.files(__name__).joinpath("things.toml").read_text("utf-8"))
@@ -56,7 +59,7 @@ def _kinds() -> dict[str, Kind]:
         program = form(parts) if parts else Late(f"{__name__}.{row.pop('module')}:{name}")
         made[name] = Kind(program=program, low=tuple(row.pop("low")), high=tuple(row.pop("high")), **row)
     for name, row in PRINTS.items():
-        kind = made["round_rug" if row["form"] in ("round", "oval") else name.partition("_")[0]]
+        kind = made[BUILT.get(row["form"], name.partition("_")[0])]
         made[name] = replace(kind, program=partial(kind.program, shown=name))
     return made
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from echomodel.dressing.prints import any_of
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.cloth import folds, pillow
+from echomodel.furniture.cloth import folds, pillow, seam
 from echomodel.furniture.solids import FINEST, Array, Solid, rotation, tube, turned
 
 FOLD = 0.14  # metres of curtain from one fold to the next
@@ -147,12 +147,22 @@ def roman_blind(size: Size, rng: np.random.Generator) -> list[Solid]:
     return solids
 
 
-def cushion(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A cushion on one of its sides, of one of five cloths."""
+CLOTHS = {"accent_cloth": 0.25, "accent_plain": 0.2, "blanket": 0.15, "velvet": 0.15, "linen": 0.15, "drape": 0.1}
+PIPED = 0.35  # share of cushions with a cord in their seam
+
+
+def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
+    """A cushion on one of its sides, of one of some cloths or of a print, now and then with a cord in its seam."""
     w, h, d = size
-    cloths = ("accent_cloth", "accent_plain", "blanket", "curtain", "linen")
-    material = str(rng.choice(cloths, p=(0.3, 0.25, 0.2, 0.15, 0.1)))
-    return [pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), material)]
+    cloth = str(rng.choice(list(CLOTHS), p=list(CLOTHS.values())))
+    cord = str(rng.choice(("linen", "ebony", "blanket", "accent_plain"))) if rng.random() < PIPED else ""
+    made: list[Solid] = [pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), shown or cloth)]
+    return [*made, tube(seam(w / 2, h / 2) + np.array([0, h / 2, 0]), 0.004, cord)] if cord else made
+
+
+def lumbar_cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
+    """A long low cushion for the small of the back, as `cushion`."""
+    return cushion(size, rng, shown)
 
 
 def throw(size: Size, rng: np.random.Generator) -> list[Solid]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from echomodel.furniture.solids import FINEST, IDENTITY, Array, Ball, Block, Solid, Vector, loft
 
-PINCH = 0.12  # of half a pillow's side that its middle stands back behind the corners
+PINCH = 0.09  # of half a pillow's side that its middle stands back behind the corners
 SEAM = 0.04  # of half a pillow's thickness that is left at its seams
 
 
@@ -20,7 +20,7 @@ class Pillow(Ball):
         count = (4, 6, 8, 12)[detail]
         line = np.sin(np.linspace(-1, 1, count + 1) * np.pi / 2)
         u, v = np.meshgrid(line, line, indexing="ij")
-        full = ((1 - u**2) * (1 - v**2)) ** 0.3 * (1 - 0.07 * np.cos(9 * np.arctan2(v, u)) * (u**2 + v**2))
+        full = ((1 - u**2) * (1 - v**2)) ** 0.26 * (1 - 0.07 * np.cos(9 * np.arctan2(v, u)) * (u**2 + v**2))
         thin = int(np.argmin(self.half))
         rings = []
         # a ring is one loop around the pillow at one u: over its front, back behind
@@ -40,6 +40,16 @@ class Pillow(Ball):
 def pillow(centre: Vector, half: Vector, material: str, role: str = "", turn: Array = IDENTITY) -> Pillow:
     """A pillow about `centre` (3,) with half axes `half` (3,), metres."""
     return Pillow(np.array(centre, float), turn, material, role, half=np.array(half, float), power=4.0)
+
+
+def seam(wide: float, tall: float) -> Array:
+    """(k, 3): a line around the seam of a pillow that is thin on z, of half sides in metres."""
+    t = np.linspace(-1, 1, 9)[:-1]
+    u, v = (
+        np.concatenate([t, np.ones(8), -t, -np.ones(8), t[:1]]),
+        np.concatenate([-np.ones(8), t, np.ones(8), -t, -np.ones(1)]),
+    )
+    return np.stack([wide * u * (1 - PINCH * (1 - v**2)), tall * v * (1 - PINCH * (1 - u**2)), 0 * u], 1)
 
 
 def folds(x: Array, z: Array, phase: Array) -> Array:

@@ -136,7 +136,7 @@ def test_nothing_stands_over_an_edge_or_in_the_air(room):
     for rule in RULES:
         rule(setting)
     objects = {**setting.objects, **setting.carriers}
-    standing = [t for t in placed(room) if not KINDS[t.kind].fixed and t.on and t.kind != "cushion"]
+    standing = [t for t in placed(room) if not KINDS[t.kind].fixed and t.on and KINDS[t.kind].name != "cushion"]
     assert standing
     for thing in standing:
         host = objects[thing.on]
@@ -152,7 +152,7 @@ def test_full_rooms_are_full_and_clean(name, least, tmp_path):
     assert len({thing.kind for thing in things}) >= 15
     assert len(dress(room).geometry) < 50  # single books share their assets
     setting = setting_of(room)
-    upright = [t for t in things if not KINDS[t.kind].lies and t.kind not in ("cushion", "folded_throw")]
+    upright = [t for t in things if not KINDS[t.kind].lies and KINDS[t.kind].name not in ("cushion", "folded_blanket")]
     for number, one in enumerate(upright):
         assert setting.room.buffer(0.02).contains(one.footprint), one
         low, high = one.position[1] + 2e-3, one.position[1] + one.size[1]
@@ -288,15 +288,20 @@ def test_cushions_lie_before_the_pillows_of_wide_beds():
     board.apply_translation((0, tall / 2, -deep / 2 + 0.02))
     whole = solid_geometry(trimesh.util.concatenate([mattress, pillow, board]), "double_bed", Origin("boxes"))
     geometry = {**room.geometry, "bed": replace(whole, colliders=(Collider("collider", board, "convexHull"),))}
-    setting = setting_of(replace(room, geometry=geometry))
-    upholstery.bed_cushions(setting)
-    assert [thing.kind for thing in setting.placed] == ["cushion", "cushion"]
+    setting, counts = setting_of(replace(room, geometry=geometry)), set()
     bed = setting.objects["bed"]
-    for thing in setting.placed:
-        x, y, z = (thing.position - bed.position).tolist()
-        assert abs(abs(x) - 0.21 * wide) < 0.16
-        assert y == pytest.approx(0.45, abs=0.01)
-        assert z > -deep / 2 + 0.5  # not in the pillow
+    for setting.seed in range(12):
+        setting.placed.clear()
+        upholstery.bed_cushions(setting)
+        counts.add(len(setting.placed))
+        assert {KINDS[thing.kind].name for thing in setting.placed} == {"cushion"}
+        aside = 0.21 * wide if len(setting.placed) == 2 else 0.0  # a long one alone
+        for thing in setting.placed:
+            x, y, z = (thing.position - bed.position).tolist()
+            assert abs(abs(x) - aside) < 0.16
+            assert y == pytest.approx(0.45, abs=0.01)
+            assert z > -deep / 2 + 0.5  # not in the pillow
+    assert counts == {1, 2}
 
 
 def test_what_stands_at_a_height_reaches_there_with_its_foot():
@@ -347,3 +352,17 @@ def test_a_folded_blanket_lies_on_the_solids_of_its_seat():
     np.testing.assert_allclose(upholstery._upon(host, np.array([0.3, 0.385, 0.1]), size), (0.3, 0.4, 0.1), atol=1e-9)
     assert upholstery._upon(host, np.array([0.3, 0.4, -0.12]), size) is None  # its back edge is in the back
     assert upholstery._upon(host, np.array([0.3, 0.35, 0.1]), size) is None  # as high as no seat is above what one sees
+
+
+def test_cushions_of_a_sofa_are_a_pair_or_go_together():
+    """One plain and one of a print; a child's bed has a child's."""
+    floor = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
+    seen = {"": set(), "child": set()}
+    for who in seen:
+        for seed in range(40):
+            setting = Setting({}, floor, (), 2.7, True, False, seed, resident=who)
+            both = upholstery._designs(setting, setting.rng("sofa"))
+            assert sum(kind == "cushion" for kind, _, _ in both) == 1
+            seen[who] |= {kind for kind, _, _ in both} - {"cushion"}
+    assert len(seen[""]) >= 14
+    assert {"cushion_bear", "cushion_smile"} <= seen["child"] - seen[""]

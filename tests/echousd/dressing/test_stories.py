@@ -6,7 +6,9 @@ import pytest
 import echousd
 from echomodel.dressing import KINDS
 from echomodel.vocabulary import vocabulary
-from echousd.dressing.dress import dressed
+from echousd.dressing import tabletops
+from echousd.dressing.dress import dressed, setting_of
+from echousd.dressing.setting import Thing
 from echousd.dressing.stories import TABLE, guessed, story
 from echousd.graph import SceneGraph
 from echousd.graph.fields import RESIDENTS
@@ -36,7 +38,8 @@ def kinds_on(room, name):
 
 
 def test_every_resident_has_a_story_of_kinds_and_tops_that_there_are():
-    assert set(TABLE) == {"places", "anyone", *RESIDENTS}
+    assert set(TABLE) == {"places", "once", "anyone", *RESIDENTS}
+    assert set(TABLE["once"]) <= {*KINDS}
     tops = {row.top for row in vocabulary().categories}
     words = {word for row in vocabulary().categories for word in (row.role, row.top, *row.invites)}
     for who in ("", *RESIDENTS):
@@ -105,3 +108,22 @@ def test_what_lies_on_a_bed_lies_within_it(rooms):
             if thing.on == "bed" and not KINDS[thing.kind].lies:
                 assert np.abs(bed.in_plan(thing.position)).max() < bed.size[2] / 2
                 assert bed.position[1] + 0.2 < thing.position[1] < bed.top
+
+
+@pytest.mark.parametrize("blocked", [False, True])
+def test_a_keyboard_lies_before_a_monitor_only(rooms, blocked):
+    setting = setting_of(rooms[None])
+    setting.story, desk = story("teen"), setting.objects["desk"]
+    behind = desk.to_room(np.array([[0, desk.size[1], -0.3 * desk.size[2]]]))[0]
+    if blocked:
+        setting.placed = [Thing("mirror", np.array([desk.size[0], 0.5, 0.1]), behind, desk.yaw)]
+    tabletops.tabletops(setting)
+    on = {thing.kind for thing in setting.placed if thing.on == "desk"}
+    assert on & {"monitor", "keyboard"} == (set() if blocked else {"monitor", "keyboard"})
+
+
+def test_a_room_has_one_knitting(rooms):
+    setting = setting_of(rooms[None])
+    size, far = np.array([0.26, 0.1, 0.17]), np.array([1.0, 0.0, 0.0])
+    put = [setting.put_first([Thing("knitting", size, side * far, 0.0)], floor=False, margin=-9.0) for side in (-1, 1)]
+    assert [one is None for one in put] == [False, True]

@@ -183,7 +183,7 @@ def test_a_baked_image_is_kept_for_later_processes(tmp_path, monkeypatch):
     assert len(baked) == 5
 
 
-@pytest.mark.parametrize("what", ["picture", "rug"])
+@pytest.mark.parametrize("what", ["picture", "rug", "cushion"])
 def test_no_two_prints_are_nearly_the_same(what):
     """What hangs or lies in fifty rooms is not met all the time, and can be read where it is."""
     names = [name for name in PRINTS if name.startswith(f"{what}_")]
