@@ -6,11 +6,15 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from unittest.mock import patch
 
+import numpy as np
 import pytest
 from small_room import StandIn
 
+from echomodel.files import digest
 from echomodel.protocols import RoomModel
 from echousd.make import layouts
+from echousd.shapes.geometry import Geometry
+from echousd.shapes.sources import whole
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -28,6 +32,21 @@ def fine_things_are_coarse() -> Iterator[None]:
         patch("echousd.make.edit.most_drafts", drafts),
         patch("echomodel.compact.sampling.AFTER", 3),
     ):
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def shapes_are_meshed_once() -> Iterator[None]:
+    """The grids of stand-ins are the same ones in hundreds of rooms: of each there is one mesh with its colliders."""
+    mesh, known = whole.within_budget, {}
+
+    def meshed(grid: np.ndarray, size: np.ndarray, category: str, faces: int) -> Geometry:
+        key = digest(grid.tobytes()), size.tobytes(), category, faces
+        if key not in known:
+            known[key] = mesh(grid, size, category, faces)
+        return known[key]
+
+    with patch.object(whole, "within_budget", meshed):
         yield
 
 

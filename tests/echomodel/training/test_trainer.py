@@ -113,7 +113,9 @@ def test_pseudo_edits_leave_out_added_nodes(packed: PackedRooms) -> None:
 
 def test_smoke_recipe_trains_everything(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Autoencoder, layout, shapes and both branches together; losses fall and a room with shapes can be sampled."""
-    monkeypatch.setattr(AutoencoderStage.validate, "__defaults__", (4,))  # held-out shapes
+    whole = AutoencoderStage.validate
+    monkeypatch.setattr(AutoencoderStage, "validate", lambda stage, model: whole(stage, model, 4))  # held-out shapes
+    few = "shapes_per_batch=3", "model.autoencoder.width=8"
     weights = {name: str(tmp_path / name / "weights.safetensors") for name in ("vqvae", "layout", "shape", "joint")}
     starts = {
         "vqvae": [],
@@ -123,16 +125,17 @@ def test_smoke_recipe_trains_everything(data: Path, tmp_path: Path, monkeypatch:
     }
     for stage, start in starts.items():
         names = ",".join(f'"{path}"' for path in start)
-        few = {"joint": 5, "vqvae": 24}.get(stage, 40)
-        steps = f"steps={few}", f"validate_every={few}"
-        trainer = open_run(smoke(stage, data, f"start=[{names}]", "shapes_per_batch=3", *steps), tmp_path / stage)
+        count = {"joint": 5, "vqvae": 24}.get(stage, 40)
+        steps = f"steps={count}", f"validate_every={count}"
+        trainer = open_run(smoke(stage, data, f"start=[{names}]", *few, *steps), tmp_path / stage)
         trainer.run()
         losses = [value for _, name, value in read_log(tmp_path / stage / "log.csv") if name == "loss"]
         assert (tmp_path / stage / "curves.png").stat().st_size > 5000
         if stage != "joint":  # starts from trained parts
             assert np.median(losses[-4:]) < 0.97 * losses[0], stage
     names = ",".join(f'"{weights[stage]}"' for stage in ("vqvae", "shape"))  # the decoder, on what the denoiser can say
-    decoder = open_run(smoke("vqvae", data, f"start=[{names}]", "steps=6", "validate_every=6"), tmp_path / "decoder")
+    recipe = smoke("vqvae", data, f"start=[{names}]", *few, "steps=6", "validate_every=6")
+    decoder = open_run(recipe, tmp_path / "decoder")
     basis = decoder.model.autoencoder.basis.clone()
     decoder.run()
     logged = {name: value for _, name, value in read_log(tmp_path / "decoder" / "log.csv")}
