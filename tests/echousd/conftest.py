@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import wraps
 from importlib.util import find_spec
 from unittest.mock import patch
 
@@ -40,6 +41,7 @@ def shapes_are_meshed_once() -> Iterator[None]:
     """The grids of stand-ins are the same ones in hundreds of rooms: of each there is one mesh with its colliders."""
     mesh, known = whole.within_budget, {}
 
+    @wraps(mesh)
     def meshed(grid: np.ndarray, size: np.ndarray, category: str, faces: int) -> Geometry:
         key = digest(grid.tobytes()), size.tobytes(), category, faces
         if key not in known:

@@ -13,7 +13,7 @@ from dying_process import dying
 from inline_batches import QUICK, Inline
 from painter import paint
 from plain_rooms import plain_files, plain_room
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echomodel.files import sweep
@@ -125,7 +125,7 @@ def test_import_of_a_look(tmp_path, monkeypatch):
     graph = small_graph()
     for name in ("nightstand_left", "nightstand_right", "lamp", "pendant", "wardrobe"):
         graph = graph.remove_node(name)
-    made = echousd.generate(graph, model=StandIn(), shapes="boxes", place=False)
+    made = echousd.generate(graph, model=StandIn(), shapes="boxes", place=False, **BARE)
     root = made.save(tmp_path / "made/bedroom", preview=False)
     export_job(root, tmp_path / "job", "generic", resolution=64)
     paint(tmp_path / "job")
