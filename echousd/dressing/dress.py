@@ -200,8 +200,8 @@ def bare_corners(setting: Setting) -> None:
 
 
 RULES = (
-    floors.rugs, walls.hung_up, walls.curtains, walls.pictures, upholstery.throws, upholstery.cushions,
-    upholstery.on_covers, upholstery.bed_cushions, upholstery.folded, tabletops.tabletops, floors.by_doors,
+    floors.rugs, walls.hung_up, walls.curtains, walls.pictures, upholstery.throws, upholstery.folded,
+    upholstery.cushions, upholstery.on_covers, upholstery.bed_cushions, tabletops.tabletops, floors.by_doors,
     floors.clusters, walls.coats, walls.tall_mirror, walls.shelves, walls.clock, floors.cables, floors.corner_plants,
     bare_walls, bare_corners,
 )  # fmt: skip

@@ -17,6 +17,7 @@ STEP = 0.02  # metres from place to place
 WIDE_BED = 1.3  # metres
 LEVEL = 0.005  # metres: what is as high as that is one height
 AHEAD = (0.0, 0.04, 0.08)  # metres that a blanket lies before where the back seems to begin
+FOLDED = 0.45  # share of rooms dressed in full whose sofa has a folded blanket
 RAISED = 0.04  # metres that a flat thing is raised at most so that it lies on the solids of a seat
 
 
@@ -88,15 +89,16 @@ def on_covers(setting: Setting) -> None:
 
 
 def folded(setting: Setting) -> None:
-    """A folded blanket on the seat of the largest sofa of a full room."""
+    """A folded blanket at an end of the largest sofa of some full rooms, before cushions take both."""
     if not setting.full:
         return
     for host in sorted(setting.of("sofa"), key=lambda o: -float(o.size[0]))[:1]:
         rng = setting.rng(host.name, "folded")
         size, variant, seat = usual_size("folded_throw", rng), int(rng.integers(1 << 30)), _Seat.of(host)
-        if seat is None:
+        if seat is None or rng.random() > FOLDED:
             continue
-        seen = (spot for end in (0.25, -0.3, 0.0) if (spot := seat.resting(end, size)) is not None)
+        side = float(rng.choice((-0.95, 0.95)))
+        seen = (spot for end in (side, -side, 0.7 * side) if (spot := seat.resting(end, size)) is not None)
         fronts = (spot + np.array([0.0, 0.0, ahead]) for spot in seen for ahead in AHEAD)
         spots = (spot for place in fronts if (spot := _upon(host, place, size)) is not None)
         places = (host.to_room(spot[None] + np.array([0.0, 0.002, 0.0]))[0] for spot in spots)

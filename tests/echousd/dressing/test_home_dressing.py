@@ -9,7 +9,7 @@ from echomodel.dressing import KINDS
 from echomodel.dressing.prints import PRINTS
 from echomodel.furniture import Choices, Style, solids
 from echomodel.openings import Opening
-from echousd.dressing import floors, tabletops, walls
+from echousd.dressing import floors, tabletops, upholstery, walls
 from echousd.dressing.dress import RULES, bare_walls
 from echousd.dressing.setting import Setting, standing
 from echousd.shapes.geometry import Origin
@@ -20,6 +20,7 @@ WINDOW = Opening("window", "window", 0, 1.2, 1.4, 1.2, 0.9)
 SIZES = {
     "base_unit": (1.2, 0.9, 0.6), "wall_unit": (1.2, 0.7, 0.35), "coat_rack": (1.3, 1.9, 0.4),
     "towel_radiator": (0.5, 1.2, 0.09), "toy_box": (0.8, 0.45, 0.45), "shoe_cabinet": (0.8, 1.1, 0.25),
+    "multi_seat_sofa": (2.1, 0.82, 0.92),
 }  # fmt: skip
 
 
@@ -190,3 +191,15 @@ def test_long_rugs_are_runners_and_rugs_of_one_room_differ():
             room.placed.append(rug)
         assert len({rug.kind for rug in room.placed}) == 4
     assert forms == {"runner", "round", "oval", "rug"}
+
+
+def test_a_folded_blanket_lies_near_an_end_of_its_sofa():
+    found = []
+    for seed in range(16):
+        room = setting("multi_seat_sofa", seed=seed)
+        room.full = True
+        for rule in (rule for rule in RULES if rule in (upholstery.cushions, upholstery.folded)):
+            rule(room)
+        found += [abs(thing.position[0]) for thing in room.placed if thing.kind == "folded_throw"]
+    assert len(found) >= 4
+    assert min(found) > 0.3
