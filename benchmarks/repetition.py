@@ -1,4 +1,4 @@
-"""How often the same thing is met in many rooms: small things by their shape, pictures and rugs by what is on them.
+"""How often the same thing is met in many rooms: small things by shape, pictures, rugs and cushions by their prints.
 
     python benchmarks/repetition.py ROOMS... [--top 15]
 
@@ -17,6 +17,8 @@ from pxr import Usd, UsdGeom, UsdSemantics, UsdShade
 
 from echousd.folder.found import room_at
 
+PRINTED = ("picture_", "rug_", "cushion_")  # what the names of prints begin with
+
 
 def things(stage: Usd.Stage) -> set[tuple[object, ...]]:
     """Label, shape and what is woven or printed of everything below `/Room/Dressing`."""
@@ -31,7 +33,7 @@ def things(stage: Usd.Stage) -> set[tuple[object, ...]]:
             bound = [mesh, *(subset.GetPrim() for subset in UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Mesh(mesh)))]
             looks = [UsdShade.MaterialBindingAPI(one).ComputeBoundMaterial()[0] for one in bound]
             names = [look.GetPrim().GetName() for look in looks if look]
-            printed |= {name[name.index(word) :] for name in names for word in ("picture_", "rug_") if word in name}
+            printed |= {name[name.index(word) :] for name in names for word in PRINTED if word in name}
         if points:
             cloud = np.concatenate(points)
             low, extent = cloud.min(0), np.maximum(np.ptp(cloud, axis=0), 1e-6)
