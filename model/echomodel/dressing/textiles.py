@@ -79,11 +79,12 @@ def sheer_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 
 def cafe_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A curtain on a rod across a window, below eye level."""
+    """A thin curtain on a rod across a window, below eye level: thick cloth before the light would be a dark fence."""
     w, h, d = size
     rod = tube([(-w / 2, h - 0.012, 0), (w / 2, h - 0.012, 0)], 0.006, "metal")
     within = np.array([0.97 * w, h - 0.02, d])
-    return [*_hung(within, rng, 0.5 * FOLD, top=0.7, drift=0.3, narrow=0.0), *_rings(np.array([w, h, d]), FOLD), rod]
+    cloth = _hung(within, rng, 0.5 * FOLD, top=0.7, drift=0.3, narrow=0.0, material="sheer")
+    return [*cloth, *_rings(np.array([w, h, d]), FOLD), rod]
 
 
 def _drape(rng: np.random.Generator) -> str:
