@@ -328,3 +328,14 @@ def test_nodes_get_the_boxes_of_their_prims_where_one_number_is_not_told(untold)
     assert node.size == pytest.approx((1.6, 0.5, 2.0))
     update_graph(stage, SceneGraph("bedroom", (Node("bed", "bed", **told),)))
     assert boxed_graph(the_room(stage, None)).nodes[0].size == (1.0, 1.0, 1.0)
+
+
+@pytest.mark.parametrize(("deep", "known"), [(4.0, True), (1e-7, False)])
+def test_a_floor_without_an_area_bounds_no_room(deep, known):
+    stage = stage_of("Y", 1.0)
+    label(box_mesh(stage, "/World/bed", (0, 0, 0), (1.6, 0.5, 2)).GetPrim(), "bed")
+    label(box_mesh(stage, "/World/ground", (0, -0.1, 0), (3, 0, deep)).GetPrim(), "floor")
+    corners = foreign_graph(stage).room.floor_polygon
+    assert (corners is not None) == known
+    if known:
+        assert sorted(np.round(corners, 3).tolist()) == [[0, 0], [0, 4], [3, 0], [3, 4]]

@@ -245,3 +245,29 @@ def test_a_prim_that_is_no_xform_yet_becomes_one_with_what_it_holds(specifier, k
     bed = stage.GetPrimAtPath("/Room/Objects/bed")
     assert (bed.IsDefined(), bed.GetTypeName(), bed.GetAttribute("mine").Get()) == (True, "Xform", 3)
     assert set(read_graph(stage).names) == set(GRAPH.names)
+
+
+def test_new_objects_come_to_those_that_are_there():
+    stage = Usd.Stage.CreateInMemory()
+    write_graph(GRAPH, stage, room="/Room")
+    layer = stage.GetRootLayer()
+    moves = Sdf.BatchNamespaceEdit()
+    moves.Add("/Room/Objects", "/Room/Furniture")
+    assert layer.Apply(moves)
+    for prim in layer.GetPrimAtPath("/Room/SceneGraph").nameChildren:
+        for end in prim.relationships:
+            end.targetPathList.explicitItems = [
+                path.ReplacePrefix("/Room/Objects", "/Room/Furniture") for path in end.targetPathList.explicitItems
+            ]
+    update_graph(stage, GRAPH.add_node("plant", "plant"))
+    assert stage.GetPrimAtPath("/Room/Furniture/plant")
+    assert not stage.GetPrimAtPath("/Room/Objects")
+
+
+def test_the_first_objects_of_a_graph_get_a_place():
+    layer = graph_layer(GRAPH)
+    del layer.GetPrimAtPath("/Room").nameChildren["Objects"]
+    for prim in list(layer.GetPrimAtPath("/Room/SceneGraph").nameChildren):
+        del layer.GetPrimAtPath("/Room/SceneGraph").nameChildren[prim.name]
+    update_graph(layer, GRAPH)
+    assert read_graph(Usd.Stage.Open(layer)) == GRAPH

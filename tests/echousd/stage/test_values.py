@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom
 
+from echousd.graph import Node, SceneGraph
 from echousd.stage import values
 from echousd.stage.encoding import StageError
+from echousd.stage.graphs import write_graph
+from echousd.stage.units import conventions
 
 NAMES = Sdf.ValueTypeNames
 STAGES: list[Usd.Stage] = []  # a prim does not keep its stage
@@ -87,3 +90,29 @@ def test_faces_that_points_cannot_make_are_refused(monkeypatch, counts, indices,
     monkeypatch.setattr(values, "MAX_CORNERS", 4)
     with pytest.raises(StageError, match=text):
         values.mesh_arrays(mesh(counts, indices))
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "allowed"),
+    [
+        (NAMES.Double, 1e10, "-1e\\+09 to 1e\\+09"),
+        (NAMES.Double, -1e10, "-1e\\+09 to 1e\\+09"),
+        (NAMES.Double, float("nan"), "-1e\\+09 to 1e\\+09"),
+        (NAMES.Bool, True, "one number"),
+        (NAMES.String, "3", "one number"),
+    ],
+)
+def test_a_number_is_one_and_within_reach(kind, value, allowed):
+    with pytest.raises(StageError, match=f"</a>: a is .*, allowed: {allowed}$"):
+        values.number(attribute(kind, value))
+    assert values.number(attribute(NAMES.Double, -1e9)) == -1e9
+    assert values.number(attribute(NAMES.Int, 3)) == 3.0
+
+
+def test_conventions_of_several_rooms_ask_for_one():
+    stage = Usd.Stage.CreateInMemory()
+    for name in ("/one", "/two"):
+        write_graph(SceneGraph("bedroom", (Node("bed", "bed"),)), stage, room=name)
+    with pytest.raises(ValueError, match=r": 2 rooms, name one \(room_path\): /one, /two$"):
+        conventions(stage)
+    assert conventions(stage, "/two")["room_path"] == "/two"
