@@ -1,5 +1,6 @@
 """One writer per folder: the second is refused by name or waits, and a dead writer's lock is taken over."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -171,3 +172,11 @@ def test_write_together_alone_takes_the_lock_where_it_moves_files(tmp_path):
     holder.kill()
     holder.communicate()
     assert not (tmp_path / "a.usda").exists()
+
+
+def test_a_folder_that_cannot_be_made_says_why(tmp_path):
+    (tmp_path / "word").write_text("mine")
+    told = rf"word/room: cannot be written \({os.strerror(errno.ENOTDIR)}\); nothing was changed$"
+    with pytest.raises(ValueError, match=told), locked(tmp_path / "word/room"):
+        pass
+    assert (tmp_path / "word").read_text() == "mine"
