@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from echomodel.dressing import KINDS, usual_size
-from echomodel.dressing.prints import printed
+from echomodel.dressing.prints import names_of
 from echomodel.openings import hinge_point, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, around, rectangle
 from echousd.dressing.stories import Wish
@@ -52,7 +52,7 @@ def _rug(setting: Setting, host: Standing, spot: np.ndarray, extents: np.ndarray
     form = "runner" if long > RUNNER * short else "oval" if rng.random() < OVALS else "rug"
     if long < 1.3 * short and (host.row.role == "seat" or rng.random() < ROUNDS):
         form, long = "round", short
-    names = [name for names in printed("rug", form, rng.choice((setting.resident, ""))).values() for name in names]
+    names = names_of("rug", form, rng.choice((setting.resident, "")))
     new = [name for name in names if all(thing.kind != name for thing in setting.placed)]
     yaw = host.yaw if extents[0] >= extents[1] else host.yaw + np.pi / 2
     return Thing(str(rng.choice(new or names)), np.array([long, PILE, short]), spot, yaw, host.name)

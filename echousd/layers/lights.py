@@ -17,6 +17,7 @@ from echomodel.openings import inward_normal, segment
 from echomodel.vocabulary import vocabulary
 from echousd.draw.views import view_matrix
 from echousd.layers.cameras import Volume
+from echousd.layers.structure import drawn
 from echousd.room import RoomData
 from echousd.shapes.finishes import baking
 from echousd.stage.layouts import layout_pens
@@ -88,13 +89,12 @@ def write_lights(pen: Pen, room: RoomData, volume: Volume) -> None:
 
 def image_files(room: RoomData) -> dict[str, bytes]:
     """Path in the room's folder -> image that its lights name."""
-    return {SKY: baking.sky_image(_drawn(room, list(baking.SKIES)))} if room.options.walls else {}
+    return {SKY: baking.sky_image(_own(room, "sky", list(baking.SKIES)))} if room.options.walls else {}
 
 
-def _drawn(room: RoomData, among: Sequence[Any]) -> Any:
+def _own(room: RoomData, what: str, among: Sequence[Any]) -> Any:
     """One of some, as the seed of a room draws it; in a home all have the first."""
-    rng = np.random.default_rng([room.provenance.seed, len(among)])
-    return among[0 if room.graph.room.walls else int(rng.integers(len(among)))]
+    return among[0 if room.graph.room.walls else drawn(room, what, len(among))]
 
 
 def _panel(pen: Pen, volume: Volume, height: float) -> float:
@@ -119,8 +119,8 @@ def _sun(pen: Pen, room: RoomData) -> Intensities:
         return {}
     window = max(windows, key=lambda opening: opening.width * opening.height)
     near, far = segment(corners, window)
-    side = _drawn(room, (*np.linspace(*ASIDE, 5), *-np.linspace(*ASIDE, 5)))
-    high = _drawn(room, (0.0, 0.15, 0.3, 0.4, 0.5, 0.7, 1.0))
+    side = _own(room, "side of the sun", (*np.linspace(*ASIDE, 5), *-np.linspace(*ASIDE, 5)))
+    high = _own(room, "height of the sun", (0.0, 0.15, 0.3, 0.4, 0.5, 0.7, 1.0))
     level = inward_normal(corners, window.edge) + side * (far - near) / window.width
     elevation, kelvin = np.radians(np.interp(high, (0, 1), ELEVATION)), np.interp(high, (0, 1), WARM)
     level = level / np.linalg.norm(level) * np.cos(elevation)

@@ -40,9 +40,9 @@ HOSTS = ("bed", "sofa")  # roles of what stands before such a wall
 def floor_slot(room: RoomData) -> str:
     """The material slot of the room's floor."""
     row, style = vocabulary().room_type(room.graph.room.type), vocabulary().known_style(room.graph.room.style)
-    typical = row.flooring and (row.use or _drawn(room, "floor", THIRD) == 0)
+    typical = row.flooring and (row.use or drawn(room, "floor", THIRD) == 0)
     kinds = FLOORS.get(row.flooring, (row.flooring,)) if typical else style.floors if style else FLOORS["wood"]
-    return kinds[_drawn(room, "kind of floor", len(kinds))]
+    return kinds[drawn(room, "kind of floor", len(kinds))]
 
 
 def covered_walls(room: RoomData) -> dict[str, str]:
@@ -54,7 +54,7 @@ def covered_walls(room: RoomData) -> dict[str, str]:
         return dict.fromkeys(_behind(room, lambda row: row.stands == "row"), "wall_tiles")
     row = vocabulary().known_style(room.graph.room.style)
     words = row.covers if row else [word for word, often in COVERS.items() for _ in range(often)]
-    cover = words[_drawn(room, "cover", len(words))] if room.options.walls else ""
+    cover = words[drawn(room, "cover", len(words))] if room.options.walls else ""
     behind = _behind(room, lambda row: row.role in HOSTS)[:1] if cover else []
     return dict.fromkeys(behind, cover)
 
@@ -81,7 +81,7 @@ def _behind(room: RoomData, asked: Callable[[Category], bool]) -> list[str]:
     return out
 
 
-def _drawn(room: RoomData, what: str, among: int) -> int:
+def drawn(room: RoomData, what: str, among: int) -> int:
     """A number below `among` that the seed draws for a room."""
     key = f"{room.provenance.seed} {what} {room.graph.room.type}".encode()
     return int.from_bytes(hashlib.blake2b(key, digest_size=4).digest(), "big") % among

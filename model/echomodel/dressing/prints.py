@@ -36,6 +36,11 @@ def printed(what: str, form: str, resident: str = "") -> dict[str, list[str]]:
     return found
 
 
+def names_of(what: str, form: str, resident: str = "") -> list[str]:
+    """The names of all kinds that are `printed` so."""
+    return [name for names in printed(what, form, resident).values() for name in names]
+
+
 def any_of(what: str, form: str, rng: np.random.Generator) -> str:
     """The name of a row that anybody has."""
-    return str(rng.choice([name for names in printed(what, form).values() for name in names]))
+    return str(rng.choice(names_of(what, form)))
