@@ -69,7 +69,9 @@ def _backed(plan: Plan, who: Tensor, gap: Tensor) -> Tensor:
 NEEDED = 0.45  # share of the vocabulary's access depth below which a front counts as blocked
 SHARE = 0.3  # share of a front's width that may be covered
 BEDSIDE = 0.3  # metres beside a bed
+INTO_BED, OF_LAMPS = 0.4, 0.6  # metres between a plant and a bed's side, 0.45 in real rooms, or a lamp, 1.1 there
 GRAZE = 0.05  # metres that furniture may reach into a door's way
+WALKED = 0.6  # metres, the width of a way on which one walks in, straight ahead through an open door
 TALL = 0.3  # metres over a window's sill: what is higher takes its light
 HEADBOARD = 0.3  # metres: of a bed only the head is so high
 CLEARANCE = 1.9  # metres: what hangs higher is in nobody's way
@@ -111,20 +113,33 @@ def bed_side_free(plan: Plan) -> Found:
     if not len(who):
         return nobody(plan.size)
     i, j = plan.pairs(beds, plan.standing & ~plan.stands("head") & ~plan.movable, least=True)
-    lateral, forward = plan.local(j, i)
-    half_width, half_depth = plan.reach(j, i)
-    # only what stands between the shoulders and the foot is in the way
-    length = plan.size[i, 2]
-    along = torch.minimum(forward + half_depth, length / 2) - torch.maximum(forward - half_depth, -length / 5)
-    aside = lateral.abs() - half_width - plan.size[i, 0] / 2 - BEDSIDE
+    lateral, aside, along = _at_side(plan, j, i)
     out = []
     for sign in (1.0, -1.0):
-        margin = torch.maximum(torch.where(sign * lateral > 0, aside, FAR), 0.4 * length - along)
+        margin = torch.where(sign * lateral > 0, aside - BEDSIDE, FAR)
+        margin = torch.maximum(margin, 0.4 * plan.size[i, 2] - along)
         least, _ = plan.worst(i, margin, j)
         points = plan.position[who][:, [0, 2]] + sign * plan.axes(who)[0] * (plan.size[who, 0] / 2 + BEDSIDE)[:, None]
         out.append(torch.minimum(least[who], plan.inside(points[:, None], who)[:, 0]))
     margin = torch.maximum(*out)
     return found(who, margin, measure=margin + BEDSIDE)
+
+
+def _at_side(plan: Plan, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """(P,) each, metres: how far i lies to the side of bed j, from its edge, and along it from shoulders to foot."""
+    lateral, forward = plan.local(i, j)
+    half_width, half_depth = plan.reach(i, j)
+    length = plan.size[j, 2]
+    along = torch.minimum(forward + half_depth, length / 2) - torch.maximum(forward - half_depth, -length / 5)
+    return lateral, lateral.abs() - half_width - plan.size[j, 0] / 2, along
+
+
+def plant_aside(plan: Plan) -> Found:
+    """A plant does not crowd a floor lamp, nor stand where one gets into bed."""
+    i, j = plan.pairs(plan.of("decor") & plan.standing, plan.of("light", "bed") & plan.standing, least=True)
+    _, aside, along = _at_side(plan, i, j)
+    margin = torch.where(plan.of("bed")[j], torch.maximum(aside - INTO_BED, -along), plan.apart(i, j) - OF_LAMPS)
+    return plan.nearest(i, j, margin, 0.0)
 
 
 def door_free(plan: Plan) -> Found:
@@ -186,10 +201,12 @@ def _clearance(plan: Plan, who: Tensor, polygon, opening: Opening) -> Tensor:  #
         headboard = HEADBOARD * plan.of("bed")[who].to(plan.size)
         low = opening.sill + TALL + headboard - (plan.position[who, 1] + plan.size[who, 1])
         return torch.maximum(out + 0.15, low)
-    if swings:  # the corner of the square that the leaf does not sweep
+    if swings:  # of the corner of the square that the leaf does not sweep what one walks through
         hinge, closed = (plan.numbers(point.tolist()) for point in hinge_point(polygon, opening))
         off = plan.position[who][:, [0, 2]] - hinge
         x = ((off @ closed).abs() - reach(closed)).clamp_min(0)
         z = ((off @ inward).abs() - reach(inward)).clamp_min(0)
-        out = torch.maximum(out, (x.square() + z.square()).clamp_min(1e-12).sqrt() - opening.width)
+        walked = torch.maximum(beside + max(opening.width - WALKED, 0.0) / 2, deep - reach(inward) - depth)
+        swept = (x.square() + z.square()).clamp_min(1e-12).sqrt() - opening.width
+        out = torch.minimum(walked, torch.maximum(out, swept))
     return out + GRAZE

@@ -32,9 +32,7 @@ TURNED = math.radians(45.0)  # 94 % of real nightstands look the same way as the
 def seat_faces(plan: Plan) -> Found:
     """A seat that stands at a table or desk looks at it."""
     i, j = plan.attended("at")
-    if not len(i):
-        return nobody(plan.size)
-    looks = (plan.gap(i, j).detach() < NEAR_TABLE) & ~plan.which(lambda kind: kind.solid)[i]  # stools have no front
+    looks = (plan.gap(i, j).detach() < NEAR_TABLE) & ~plan.solid[i]  # stools have no front
     i, j = i[looks], j[looks]
     lateral, forward = plan.nearest_point(i, j)
     inside = (lateral.square() + forward.square()).detach() < 1e-6
@@ -45,12 +43,10 @@ def seat_faces(plan: Plan) -> Found:
 
 
 def seat_in_reach(plan: Plan) -> Found:
-    """A seat whose work is at a table or desk stands at it, a stool at its dressing table."""
-    i, j = plan.attended("at")
-    if not len(i):
-        return nobody(plan.size)
+    """A seat whose work is at a table or desk stands at it, a stool at its dressing table, a bench at its table."""
+    i, j = plan.attended("at", "foot")
     works = plan.which(lambda kind: kind.access > 0 or kind.wall)  # at a dinner table stools go anywhere
-    bound = ~plan.which(lambda kind: kind.solid)[i] | works[j]
+    bound = plan.of("board")[j] & (~plan.solid[i] | works[j])
     i, j = i[bound], j[bound]
     off = plan.gap(i, j) - plan.size[i, 2] / 2
     return found(i, REACH - off, other=j, measure=off)
@@ -72,8 +68,6 @@ def seat_before_desk(plan: Plan) -> Found:
 def lounger_faces(plan: Plan) -> Found:
     """An armchair of a group is turned towards it, and towards the sofa before which it stands."""
     i, j = plan.attended("company")
-    if not len(i):
-        return nobody(plan.size)
     near = plan.gap(i, j).detach() < COMPANY
     sofa = plan.group[i]
     lateral, forward = plan.local(i, sofa)
@@ -86,8 +80,6 @@ def lounger_faces(plan: Plan) -> Found:
 def table_before_sofa(plan: Plan) -> Found:
     """A coffee table lies before its sofa, within its width and a hand's reach; of several one does."""
     i, j = plan.attended("before")
-    if not len(i):
-        return nobody(plan.size)
     lateral, forward = plan.local(i, j)
     _, half_depth = plan.reach(i, j)
     gap = forward - half_depth - plan.size[j, 2] / 2
@@ -104,8 +96,6 @@ def table_before_sofa(plan: Plan) -> Found:
 def nightstand_at_head(plan: Plan) -> Found:
     """Nightstands stand beside the bed at its head; of more than two the nearest two."""
     i, j = plan.attended("head")
-    if not len(i):
-        return nobody(plan.size)
     _, beside, back = _at_bed(plan, i, j)
     rank = _rank_at(j, plan.gap(i, j).detach())
     turn = plan.yaw[i] - plan.yaw[j]
@@ -119,8 +109,6 @@ def nightstand_at_head(plan: Plan) -> Found:
 def nightstands_alike(plan: Plan) -> Found:
     """The nightstands at both sides of a bed are as far from it as each other."""
     i, j = plan.attended("head")
-    if not len(i):
-        return nobody(plan.size)
     lateral, beside, back = _at_bed(plan, i, j)
     at_head, right = (back.abs() < HEAD) & (beside < BESIDE) & (beside > -IN_BED), lateral > 0
     pairs = (j[:, None] == j[None]) & (at_head & right)[:, None] & (at_head & ~right)[None]
@@ -143,8 +131,6 @@ def bench_at_foot(plan: Plan) -> Found:
     """A bench or ottoman at the foot of a bed stands close to it, within its width."""
     i, j = plan.attended("foot")
     i, j = (of[plan.of("bed")[j]] for of in (i, j))
-    if not len(i):
-        return nobody(plan.size)
     lateral, forward = plan.local(i, j)
     _, half_depth = plan.reach(i, j)
     gap = forward - half_depth - plan.size[j, 2] / 2
@@ -181,8 +167,9 @@ SIDE = 0.6  # metres: what is further from its seat stands for itself
 ELBOW, KNEES = 0.2, 0.3  # share of a sofa's width that an armchair may stand before, and metres from which on all of it
 LEFT, OWN = 1.8, 0.6  # metres from its group from which on an armchair stands apart, and to what is its own: all real
 ALONE = 0.45  # metres from everything: nothing small stands so in a room
-# Metres less from furniture: 98 % of real plants are at a wall, the others touch something; of side tables within 0.3.
-OF_PLANTS, OF_TABLES = 0.35, 0.15
+# Metres less from furniture: 98 % of real plants are at a wall, the others touch something; of side tables and floor
+# lamps within 0.3, and these of what one sits, lies or works at.
+OF_PLANTS, OF_SMALL = 0.35, 0.15
 EDGE = 0.8  # metres between a wall and an armchair that belongs to no group
 
 
@@ -304,8 +291,6 @@ def chairs_level(plan: Plan) -> Found:
 def sofas_in_circle(plan: Plan) -> Found:
     """A second sofa looks into the group of the first."""
     i, j = plan.attended("with")
-    if not len(i):
-        return nobody(plan.size)
     near = plan.apart(i, j).detach() < NEAR
     i, j = i[near], j[near]
     middle = plan.position[j][:, [0, 2]] + plan.axes(j)[1] * (plan.size[j, 2] / 2 + BEFORE)[:, None]
@@ -319,8 +304,6 @@ def at_its_side(plan: Plan) -> Found:
     keep = (plan.apart(i, j).detach() < SIDE) & plan.of("sofa", "bed")[j]
     chairs = plan.those(plan.stands("company") & plan.of("sofa")[plan.group] & ~plan.of("sofa"))
     i, j = torch.cat([i[keep], chairs]), torch.cat([j[keep], plan.group[chairs]])
-    if not len(i):
-        return nobody(plan.size)
     armchair = plan.stands("company")[i]
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)
@@ -342,12 +325,13 @@ def not_alone(plan: Plan) -> Found:
     loner = plan.stands("company") & (plan.anchor < 0)
     small = (plan.of("light", "decor") | plan.stands("beside") | loner) & plan.standing
     company = plan.stands("company") & plan.of("seat") & plan.standing & ~loner
+    lit = plan.of("seat", "sofa", "bed", "board")
     i, j = plan.pairs(small, plan.standing, least=True)
-    gap, _ = plan.worst(i, plan.apart(i, j), j)
+    gap, _ = plan.worst(i, torch.where(plan.of("light")[i] & ~lit[j], FAR, plan.apart(i, j)), j)
     who = plan.those(small & plan.walled)
     half = plan.size[who][:, [0, 2]].amax(1) / 2
     wall = plan.inside(plan.position[who][:, None, [0, 2]], who)[:, 0] - half
-    free = torch.where(plan.of("decor"), OF_PLANTS, torch.where(plan.stands("beside"), OF_TABLES, 0.0))[who]
+    free = torch.where(plan.of("decor"), OF_PLANTS, torch.where(plan.stands("beside"), OF_SMALL, 0.0))[who]
     away = torch.minimum(gap[who] + free, wall)
     away = torch.where(loner[who], wall - (EDGE - ALONE), away)
     lonely = found(who, ALONE - away, measure=torch.where(loner[who], wall, torch.minimum(gap[who], wall)))

@@ -268,8 +268,6 @@ def wardrobe_opens(plan: Plan) -> Found:
     """One can stand before an open wardrobe, also at the foot of a bed, and nobody sits there."""
     wardrobes = plan.of("storage") & plan.standing & plan.which(lambda kind: kind.access > 0.6)
     i, j = plan.pairs(wardrobes, (plan.of("bed") | plan.stands("company")) & plan.standing, least=True)
-    if not len(i):
-        return nobody(plan.size)
     return plan.nearest(i, j, plan.more_ahead(i, j, OPENS, FACED), OPENS)
 
 

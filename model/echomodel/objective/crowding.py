@@ -151,8 +151,6 @@ def lamp_aside(plan: Plan) -> Found:
     """Lamps and plants do not stand before shelves, cupboards and drawers, nor before who sits."""
     fronts = (plan.of("storage") & plan.standing & plan.works) | _loungers(plan)
     i, j = plan.pairs(plan.of("light", "decor") & plan.standing, fronts, least=True)
-    if not len(i):
-        return nobody(plan.size)
     free = torch.where(_loungers(plan), AT_SEAT, torch.where(plan.stands("head"), AT_BED, LAMP)).to(plan.size)
     least, about = plan.worst(i, plan.more_ahead(j, i, free[j], EDGE), j)
     who = (least < FAR).nonzero()[:, 0]
@@ -181,8 +179,6 @@ def loungers_apart(plan: Plan) -> Found:
     i, j = plan.pairs(lounging, lounging, least=True)
     keep = (plan.smaller[i] < plan.smaller[j]) & plan.kin(i, j)
     i, j = i[keep], j[keep]
-    if not len(i):
-        return nobody(plan.size)
     return plan.nearest(i, j, plan.apart(i, j) - HAND, HAND)
 
 

@@ -21,8 +21,6 @@ def row_flush(plan: Plan) -> Found:
     """Fitted units stand in a row: no gap to the next one, backs in one line, or corner to corner."""
     units = plan.stands("row") & plan.standing
     i, j = plan.pairs(units, units)
-    if not len(i):
-        return nobody(plan.size)
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)
     level = (forward - half_depth + plan.size[j, 2] / 2).abs()

@@ -45,8 +45,6 @@ def pendant_centred(plan: Plan) -> Found:
     lamps = plan.which(lambda kind: kind.look == "pendant_lamp")
     tables = plan.which(lambda kind: kind.role == "board" and not kind.access) & plan.standing
     i, j = plan.pairs(lamps, tables)
-    if not len(i):
-        return nobody(plan.size)
     over = ((plan.gap(i, j) < 1e-3) | _told(plan, i, j, ("above",))).to(plan.size)
     away = (plan.position[i] - plan.position[j])[:, [0, 2]] * over[:, None]
     count = over.new_zeros(len(plan)).index_add(0, j, over)
@@ -106,8 +104,6 @@ BACK = math.radians(125.0)  # 95 of 100 real armchairs of a group are turned les
 def screen_in_view(plan: Plan) -> Found:
     """A television lies ahead of the sofa, seat or bed that it is watched from, not too near and not too far."""
     who, viewer, margin, measure, _, _ = _watched(plan)
-    if not len(who):
-        return nobody(plan.size)
     least, which = margin.min(1)
     return found(who, least, other=viewer, measure=measure.gather(1, which[:, None])[:, 0], words=which)
 
@@ -117,8 +113,6 @@ def screen_on_axis(plan: Plan) -> Found:
     screen, viewer, margin, *_ = _watched(plan)
     ahead = margin.detach()[:, 0] >= 0
     screen, viewer = screen[ahead], viewer[ahead]
-    if not len(screen):
-        return nobody(plan.size)
     aside = plan.local(screen, viewer)[0].abs()
     return found(screen, ON_AXIS - aside, other=viewer, measure=aside)
 
@@ -132,8 +126,6 @@ def view_free(plan: Plan) -> Found:
 def screen_not_behind(plan: Plan) -> Found:
     """Who sits in the group that watches a screen does not turn the back on it."""
     screen, viewer, *_ = _watched(plan)
-    if not len(screen):
-        return nobody(plan.size)
     chairs = plan.stands("company", "with") & plan.standing & plan.of("seat", "sofa")
     at, i = ((plan.group[None] == plan.group[viewer][:, None]) & chairs[None]).nonzero(as_tuple=True)
     keep = i != viewer[at]
