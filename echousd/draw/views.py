@@ -35,7 +35,8 @@ BARE, BAREST, DEEP = 60.0, 0.28, 0.02
 BEFORE, WALLED = 2.0, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
 FILLED = 170.0  # metres of depth that a picture full of what is near is worth
 BEHIND, ASKANCE = 25.0, 0.0  # metres of depth that the main piece from behind costs, and from which cosine on
-HALVED = 40.0  # four times the metres of depth that a lamp half in the picture costs
+HALVED, LACKED = 60.0, 12.0  # metres of depth that a lamp costs which the border cuts, or which is beyond it
+SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width over which it is cord; metres
 UNSEEN = 3.0  # metres of depth that each piece in the picture is worth
 SHOWN, FAR = 30.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
 TOUCHED = 0.86  # nearness of what the eye must not be at: a quarter of a metre
@@ -147,6 +148,7 @@ def inside_view(
     aim = middle if main is None else furniture.position[main, [0, 2]]
     around = 0.5 * aim + 0.5 * (furniture.centre if len(furniture.size) else middle)
     corners = np.empty((0, 3)) if main is None else furniture.corners[main]
+    shades = _shades(furniture, height)
     front = np.zeros(2) if main is None else np.array([np.sin(furniture.yaw[main]), np.cos(furniture.yaw[main])])
     best, most = (_view(middle + 0.1, middle, EYES[0] * height, SLOPES[-1]), LENSES[0]), -np.inf
     wider = room.buffer(0.05)
@@ -162,7 +164,8 @@ def inside_view(
         cut = (_aside(corners, views)[..., None] > halves / MARGIN).mean(-2) if len(corners) else np.zeros(len(LENSES))
         before = float((spot - aim) @ front) / max(float(np.linalg.norm(spot - aim)), 1e-9)
         hidden = CLEAR * hidden + (BEHIND * max(0.0, ASKANCE - before) if main is not None else 0.0)
-        cost = WHOLE * cut + hidden + np.abs(PANS)[:, None, None] + 0.1 * np.arange(len(LENSES))
+        cost = WHOLE * cut + _shown(shades, views, halves) + hidden
+        cost = cost + np.abs(PANS)[:, None, None] + 0.1 * np.arange(len(LENSES))
         cost = cost.transpose(0, 1, 3, 2).reshape(-1, len(SLOPES))  # of each slope the first that costs least
         for slope, row in sorted(enumerate(cost.argmin(0)), key=lambda found: (found[1] // len(LENSES), found[0])):
             heading, number = divmod(int(row), len(LENSES))
@@ -172,10 +175,7 @@ def inside_view(
         eye, half = view[:3, 3], APERTURE / 2 / lens
         merit = min(_depth(room, eye[[0, 2]], -view[[0, 2], 2]), FAR) - first
         if len(furniture.size):
-            out = _aside(points, view) > half
-            shade = out.reshape(-1, 3, 3, 3)[:, :, :2].mean((1, 2, 3))  # of what hangs; the rest is cord
-            merit -= HALVED * float((shade * (1 - shade))[furniture.position[:, 1] > LOW].sum())
-            unseen = blocked | out
+            unseen = blocked | (_aside(points, view) > half)
             merit += float((eye[[0, 2]] - middle) @ furniture.facing - UNSEEN * unseen.mean(1).sum())
         if merit + SHOWN <= most:  # the rest only takes away
             continue
@@ -228,6 +228,21 @@ def _aside(points: np.ndarray, view: np.ndarray) -> np.ndarray:
     into = np.linalg.inv(view[..., :3, :3]).swapaxes(-1, -2)
     x, y, z = np.moveaxis((points - view[..., None, :3, 3]) @ into, -1, 0)
     return np.asarray(np.where(z < 0, np.maximum(np.abs(x), ASPECT * np.abs(y)) / np.maximum(-z, 1e-9), np.inf))
+
+
+def _shades(furniture: Furniture, height: float) -> np.ndarray:
+    """(n, 8, 3) float: corners of what hangs from a ceiling at this height, without its cords, metres."""
+    tall, wide = furniture.size[:, 1], furniture.size[:, [0, 2]].max(1)
+    hangs = (furniture.position[:, 1] > LOW) & (furniture.position[:, 1] + tall > height - AT_CEILING)
+    size = np.insert(furniture.size[:, [0, 2]], 1, np.minimum(SHADE[0] * tall, SHADE[1] * wide), axis=1)
+    return replace(furniture, size=size).corners[hangs]
+
+
+def _shown(shades: np.ndarray, views: np.ndarray, halves: np.ndarray) -> np.ndarray:
+    """(..., k) float: what lamps cost, boxes (n, 8, 3), in pictures whose half widths are `halves` (k,)."""
+    aside = _aside(shades.reshape(-1, 3), views).reshape(*views.shape[:-2], 1, -1, 8)
+    beyond, within = aside.max(-1) > (halves / MARGIN)[:, None], aside.min(-1) < halves[:, None]
+    return np.asarray((beyond * np.where(within, HALVED, LACKED)).sum(-1))
 
 
 def _walls(floor: np.ndarray, height: float) -> Furniture:

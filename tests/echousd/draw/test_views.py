@@ -102,14 +102,29 @@ def test_only_what_is_near_and_in_the_picture_fills_it() -> None:
     assert beside.filled(view, 0.5, 1.0) == 0  # a narrow picture does not reach so far
 
 
-@pytest.mark.parametrize("at", [(1.2, 1.0), (1.2, 2.2), (2.5, 1.0), (3.9, 2.2)])
-def test_the_shade_of_a_pendant_is_whole_in_the_picture_or_not_in_it(at: tuple[float, float]) -> None:
-    lamp = boxes((0.5, 0.9, 0.5, at[0], 1.6, at[1], 0.0))
+def lit(at: tuple[float, float], wide: float, tall: float) -> tuple[Furniture, np.ndarray]:
+    """The bed below a pendant that hangs from 2.5 m, and (8, 3) corners of its shade; over it is its cord."""
+    lamp = boxes((wide, tall, wide, at[0], 2.5 - tall, at[1], 0.0))
     both = Furniture(
         *(np.concatenate([getattr(one, key) for one in (BED, lamp)]) for key in ("size", "position", "yaw"))
     )
-    view, lens = inside_view(FLOOR, both, 2.5)
-    shade = np.minimum(lamp.corners[0], (9.0, 2.05, 9.0))  # below the middle of its box; over it is its cord
-    x, y, z = np.linalg.inv(view[:3, :3]) @ (shade - view[:3, 3]).T
-    inside = np.maximum(np.abs(x), ASPECT * np.abs(y)) < -z * APERTURE / 2 / lens
-    assert inside.mean() in (0.0, 1.0)
+    return both, np.minimum(lamp.corners[0], (9.0, 2.5 - tall + min(0.55 * tall, 0.8 * wide), 9.0))
+
+
+def within(points: np.ndarray, view: np.ndarray, lens: float) -> float:
+    """Share of points (n, 3) in a picture from inside."""
+    x, y, z = np.linalg.inv(view[:3, :3]) @ (points - view[:3, 3]).T
+    return float((np.maximum(np.abs(x), ASPECT * np.abs(y)) < -z * APERTURE / 2 / lens).mean())
+
+
+@pytest.mark.parametrize("at", [(1.2, 1.0), (1.2, 2.2), (2.5, 1.0), (3.9, 2.2), (0.75, 1.72), (2.85, 1.16), (4.2, 1.7)])
+@pytest.mark.parametrize(("wide", "tall"), [(0.5, 0.9), (0.7, 0.6), (0.3, 1.1)])
+def test_the_shade_of_a_pendant_is_whole_in_the_picture_or_not_in_it(at, wide, tall) -> None:
+    both, shade = lit(at, wide, tall)
+    assert within(shade, *inside_view(FLOOR, both, 2.5)) in (0.0, 1.0)
+
+
+def test_a_lamp_that_the_picture_has_room_for_is_in_it_and_the_bed_whole() -> None:
+    both, shade = lit((2.5, 1.0), 0.5, 0.9)
+    view = inside_view(FLOOR, both, 2.5)
+    assert within(shade, *view) == within(both.corners[0], *view) == 1.0
