@@ -115,6 +115,10 @@ def best_boxes(
     """
     best: tuple[Boxes, tuple[str, ...]] | None = None
     worth: tuple[float, ...] = ()
+    ways = [(graph, PlaceConfig())]
+    if proposed and graph.room.openings:  # which make way for what is found quickly, or else for all
+        bare = graph.replaced(room=graph.room.replaced(openings=()))
+        ways = [(graph, PlaceConfig(anew=0)), *ways, (bare, PlaceConfig())]
     for start, count in draft_rounds(drafts):
         if best is not None and not any(worth):
             break
@@ -123,13 +127,16 @@ def best_boxes(
         ):
             if sized is not None:
                 draft = Boxes(sized.size, draft.position, draft.yaw)
-            found = finished_boxes(graph, draft, styles, place, timer)
-            if drafts == 1 or not place:
-                return found
-            with timer.stage("place"), one_thread():
-                wrong = _wishes(graph, found, draws.seed if proposed else None)
-            if best is None or wrong < worth:
-                best, worth = found, wrong
+            for room, config in ways:
+                found = finished_boxes(room, draft, styles, place, timer, config)
+                if drafts == 1 or not place:
+                    return found
+                with timer.stage("place"), one_thread():
+                    wrong = _wishes(graph, found, draws.seed if proposed else None)
+                if best is None or wrong < worth:
+                    best, worth = found, wrong
+                if not any(worth):
+                    break
             if not any(worth):
                 break
     assert best is not None
@@ -174,7 +181,7 @@ def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int |
 
 
 def finished_boxes(
-    graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], place: bool, timer: StageTimer
+    graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], place: bool, timer: StageTimer, config: PlaceConfig
 ) -> tuple[Boxes, tuple[str, ...]]:
     """Sampled boxes after equal sizes within style groups and, if wanted, placing; and demands in conflict."""
     boxes = _alike(graph, _mounted(graph, boxes), styles)
@@ -188,14 +195,14 @@ def finished_boxes(
 
     graph = _with_homeless_unlocked(graph)
     with timer.stage("place"), one_thread():
-        found = placed(graph, boxes)
+        found = placed(graph, boxes, config=config)
         same = _alike(graph, found.boxes, styles)
         if not torch.equal(same.size, found.boxes.size):
             # chairs of one set that had to shrink: all of them, if it fits; else at other places
             fixed = with_sizes(graph, same)
-            second = placed(fixed, same, config=PlaceConfig(arrange=False))
+            second = placed(fixed, same, config=replace(config, arrange=False))
             if wrong(second) > wrong(found):
-                second = min(second, placed(fixed, same), key=wrong)
+                second = min(second, placed(fixed, same, config=config), key=wrong)
             if wrong(second)[:2] <= wrong(found)[:2]:
                 found = second
     return rounded_boxes(graph, found.boxes), tuple(sentence(conflict, graph) for conflict in found.conflicts)

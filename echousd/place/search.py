@@ -15,6 +15,7 @@ import torch
 from scipy.optimize import linear_sum_assignment
 
 from echomodel.boxes import Boxes
+from echomodel.boxes2d import axes
 from echomodel.objective import TERMS, Plan, Term, unreached
 from echomodel.objective.copies import copies_of, looks_at
 from echomodel.objective.plan import Found, found, nobody
@@ -26,7 +27,6 @@ from echousd.place.setting import Setting
 
 JUDGED = 48  # poses that are judged at once
 SWEEPS = 3  # times that what misses something is looked at after the first time
-ANEW = 3  # times that pieces are taken out and put in again
 BUDGET = 4500  # poses that are judged in all; each is a whole room
 GAIN = 1e-3  # by which a move must be better
 WORTH = 0.5  # that a sweep must gain for another one
@@ -39,6 +39,7 @@ HIT, DEEP, MISSED = 1.0, 4.0, 3.0  # before anything is judged: for running into
 WALKS = 6  # states of those judged at once that are walked through, where something cannot be walked to
 ASKEW = np.radians(20.0)  # what is turned less against the walls is meant to be parallel to them
 ALIKE, REGRET = 0.8, 2.0  # metres within which a pose is the one that is regretted, and for that
+ASIDE = 0.1  # metres from its axis of a group within which nobody stands to one side
 LIT = 0.35  # metres between the middles of a lamp and of what it hangs over
 
 
@@ -160,7 +161,7 @@ class Search:
         near = aside(setting, state.position, state.yaw, i)
         taste = np.concatenate([self._taste(i, rows), state.taste[i] + 0.3 * near[:, 3]])
         rows = np.concatenate([rows, near])
-        keep = self._promising(state, there, i, group, rows, taste)
+        keep = self._promising(state, there, i, group, rows, taste + self._regret(i, rows))
         rows, taste = rows[keep], taste[keep]
         states = [(state.position[None], state.yaw[None]), self._carried(state, i, group, rows)]
         tastes = [state.taste[i : i + 1], taste]
@@ -168,6 +169,11 @@ class Search:
         if screens:  # it takes them along to the wall ahead
             states.append(self._carried(state, i, group, rows, screens))
             tastes.append(taste)
+        mirrored = self._mirrored(state, i, group)
+        if mirrored is not None:  # who attends it changes sides
+            here = np.array([[*state.position[i, ::2], state.yaw[i], 0.0]])
+            states.append(self._carried(mirrored, i, group, np.concatenate([here, rows])))
+            tastes += [state.taste[i : i + 1], taste]
         changed = np.zeros(len(state.yaw), bool)
         for stand, beds in self._beside_twin(state, there, i):
             states.append(beds)
@@ -176,12 +182,25 @@ class Search:
         position, yaw = (np.concatenate(part) for part in zip(*states, strict=True))
         every = np.concatenate(tastes)
         changed[[*group, *(m for k in screens for m in self.group(k, there, state))]] = True
-        best = self._best(there, position, yaw, changed, every)
+        poses = np.concatenate([position[:, i, ::2], yaw[:, i, None]], 1)
+        best = self._best(there, position, yaw, changed, every + self._regret(i, poses))
         if best == 0:
             return state
         own = state.taste.copy()
         own[i] = every[best]
         return State(position[best], yaw[best], own)
+
+    def _mirrored(self, state: State, i: int, group: list[int]) -> State | None:
+        """The state with a box's group on its other sides; None where nobody of it stands to one side."""
+        side, front = axes(state.yaw[i])
+        others = [k for k in group if k != i and not self.setting.turned[k]]
+        away = (state.position[others] - state.position[i])[:, ::2]
+        if not (abs(away @ side) > ASIDE).any():
+            return None
+        position, yaw = state.position.copy(), state.yaw.copy()
+        position[others, ::2] = state.position[i, ::2] + 2 * (away @ front)[:, None] * front - away
+        yaw[others] = 2 * state.yaw[i] - state.yaw[others]
+        return State(position, yaw, state.taste)
 
     def _beside_twin(self, state: State, there: np.ndarray, i: int) -> list[tuple[int, tuple[np.ndarray, np.ndarray]]]:
         """For a bed that shares a nightstand: that one, and the states with it between both, side by side."""
@@ -247,12 +266,15 @@ class Search:
         off = np.minimum(np.hypot(rows[:, 0] - setting.position[i, 0], rows[:, 1] - setting.position[i, 2]), FARTHEST)
         turned = 0.5 * (1 - np.cos(rows[:, 2] - setting.yaw[i]))
         share = ATTENDING if setting.anchor[i] >= 0 or setting.hanging[i] else 1.0
-        if i in self.regrets:
-            x, z, yaw = self.regrets[i]
-            near = (np.hypot(rows[:, 0] - x, rows[:, 1] - z) < ALIKE) & (np.cos(rows[:, 2] - yaw) > 0.9)
-            off = off + near * REGRET / PULL
         taste: np.ndarray = share * (PULL * off + TURN * turned) + 0.3 * rows[:, 3]
         return taste
+
+    def _regret(self, i: int, rows: np.ndarray) -> np.ndarray:
+        """(K,) float: how much others are liked better than poses like the one that a box is to leave."""
+        if i not in self.regrets:
+            return np.zeros(len(rows))
+        x, z, yaw = self.regrets[i]
+        return REGRET * ((np.hypot(rows[:, 0] - x, rows[:, 1] - z) < ALIKE) & (np.cos(rows[:, 2] - yaw) > 0.9))
 
     def _carried(
         self, state: State, i: int, group: list[int], rows: np.ndarray, screens: Sequence[int] = ()
@@ -400,23 +422,23 @@ class Search:
     def _expecting(self, state: State, there: np.ndarray, i: int) -> State:
         """The state with those who attend box i, and are not there, at their slots; they are there then."""
         setting = self.setting
-        position, yaw = state.position.copy(), state.yaw.copy()
         for k in [*self.children[i], *self.screens[i]]:
             if there[k]:
                 continue
             slots = sorted(slots_at(setting, k, i), key=lambda slot: slot[3])
             if not slots and k not in self.screens[i]:
                 continue
-            rows = np.array([out_of(position[i], float(yaw[i]), slot) for slot in slots]).reshape(-1, 4)
+            rows = np.array([out_of(state.position[i], float(state.yaw[i]), slot) for slot in slots]).reshape(-1, 4)
             if len(rows):
-                at = np.stack([rows[:, 0], np.full(len(rows), height_of(setting, position, k)), rows[:, 1]], 1)
+                at, turn = self._carried(state, k, self.group(k, there, state), rows)
                 others = [m for m in np.flatnonzero(there).tolist() if setting.anchor[m] == i or m == i]
-                deep = depths(setting.size[k], at, rows[:, 2], setting.size[others], position[others], yaw[others])
+                deep = depths(setting.size[k], at[:, k], turn[:, k], setting.size[others], state.position[others],
+                              state.yaw[others])  # fmt: skip
                 hit = np.maximum(deep - setting.shared[k, others], 0.0).max(1, initial=0.0)
                 best = int(np.round(hit * 100).argmin())
-                position[k], yaw[k] = at[best], rows[best, 2]
+                state = State(at[best], turn[best], state.taste)
             there[k] = True
-        return State(position, yaw, state.taste)
+        return state
 
     def squared(self, state: State) -> State:
         """The state with all that stands nearly parallel to the walls parallel to them."""
@@ -455,7 +477,7 @@ class Search:
                 break
         return state, total, wrong
 
-    def run(self, anew: int = ANEW) -> Arranged:
+    def run(self, anew: int) -> Arranged:
         """The best state that the budget finds, pieces taken out and put in again so many times."""
         setting = self.setting
         n = len(setting.size)

@@ -10,8 +10,10 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+from echousd.make import layouts
 from echousd.make.stated import with_locked_places
 from echousd.make.verdicts import relation_verdicts
+from echousd.progress import StageTimer
 from echousd.shapes.styles import asset_names, equal_sizes, shared_assets, style_groups
 from echousd.tensors import graph_batch
 
@@ -330,3 +332,29 @@ def test_options_that_are_stated_are_not_those_of_the_other_stage(tmp_path):
     assert echousd.RoomOptions(like=two, room_path="/World/Study").meters_per_unit == 0.01
     with pytest.raises(ValueError, match="room_path is 'World', allowed: a path of names of letters, digits and _"):
         echousd.RoomOptions(room_path="World")
+
+
+@pytest.mark.parametrize(
+    ("proposed", "kept", "tried"),
+    [
+        (True, 0, [(1, 0)]),  # what is found quickly is good
+        (True, 1, [(1, 0), (1, 3)]),
+        (True, 9, [(1, 0), (1, 3), (0, 3)]),
+        (False, 9, [(1, 3)]),  # openings that somebody stated do not make way
+    ],
+)
+def test_openings_that_nobody_stated_make_way_for_furniture(monkeypatch, proposed, kept, tried):
+    graph = small_graph()
+    window = Opening("window", "window", 1, 1.0, 0.9, 1.2, 0.9)
+    graph = graph.replaced(room=graph.room.replaced(size=(4.0, 3.4), floor_polygon=None, openings=(window,)))
+    asked = []
+
+    def finished(graph, boxes, styles, place, timer, config):
+        asked.append((len(graph.room.openings), config.anew))
+        return boxes, ()
+
+    monkeypatch.setattr(layouts, "finished_boxes", finished)
+    monkeypatch.setattr(layouts, "_wishes", lambda *_: (len(asked) <= kept, 0, 0, 0))
+    monkeypatch.setattr(layouts, "draft_rounds", lambda drafts: [(0, 1)])
+    layouts.best_boxes(StandIn(), graph, {}, layouts.Draws(seed=1), drafts=2, proposed=proposed, timer=StageTimer())
+    assert asked == tried

@@ -132,11 +132,57 @@ def test_two_pieces_change_places():
     assert search.faults(after)[0] < search.faults(state)[0] - 5
 
 
+BED = (["double_bed", "nightstand", "nightstand", "table_lamp"],
+       [(1.8, 1.0, 2.1), (0.5, 0.55, 0.45), (0.5, 0.55, 0.45), (0.3, 0.5, 0.3)])  # fmt: skip
+
+
+def test_who_attends_a_bed_changes_sides_with_it():
+    at = [(1.4, 0, 0.1), (2.2, 0, -1.1), (2.2, 0, 1.3), (2.2, 0.55, -1.1)]
+    told = [(1, "left", 0), (2, "right", 0), (3, "standing_on", 1)]
+    search, state = searched(*BED, at, [-np.pi / 2] * 4, told)
+    mirrored = search._mirrored(state, 0, [0, 1, 2, 3])
+    assert mirrored.position[:, 2] == pytest.approx([0.1, 1.3, -1.1, 1.3])
+    assert mirrored.position[:, 0] == pytest.approx(state.position[:, 0])
+    search.regrets = {0: (1.4, 0.1, -np.pi / 2)}  # it shall stand elsewhere: at the other wall, left stays left
+    after = search.moved(state, np.ones(4, bool), 0)
+    assert np.cos(after.yaw[0] + np.pi / 2) < 0.5
+    assert after.position[1, 2] < after.position[0, 2] < after.position[2, 2]
+    assert after.position[3, [0, 2]] == pytest.approx(after.position[1, [0, 2]], abs=0.01)
+
+
+def test_one_alone_has_no_sides():
+    search, state = searched(
+        ["sofa", "coffee_table"], [(2.0, 0.8, 0.9), (1.0, 0.4, 0.6)], [(0, 0, -1), (0.05, 0, 0.4)], [0.0, 0.0]
+    )
+    assert search._mirrored(state, 0, [0]) is None
+    assert search._mirrored(state, 0, [0, 1]) is None  # as good as in the middle
+
+
+def test_what_is_regretted_is_left_even_where_nothing_is_wrong():
+    search, state = searched(["wardrobe"], [(1.2, 2.0, 0.6)], [(0.0, 0, -1.7)], [0.0])
+    every = np.ones(1, bool)
+    assert search.moved(state, every, 0) is state
+    search.regrets = {0: (0.0, -1.7, 0.0)}
+    after = search.moved(state, every, 0)
+    assert np.hypot(*(after.position[0] - state.position[0])[[0, 2]]) >= 0.8 or np.cos(after.yaw[0]) < 0.9
+    assert after.taste[0] < 2.0  # what it regrets is no habit
+
+
+def test_what_stands_on_a_nightstand_comes_with_it_to_its_bed():
+    at = [(0.0, 0, -0.9), (2.0, 0, 1.0), (-2.0, 0, 1.0), (2.0, 0.55, 1.0)]
+    search, state = searched(*BED, at, np.zeros(4), [(3, "standing_on", 1)])
+    there = np.array([True, False, False, True])
+    after = search._expecting(state, there, 0)
+    assert there.all()
+    assert abs(after.position[1, 0]) == pytest.approx(1.2, abs=0.2)
+    assert after.position[3, [0, 2]] == pytest.approx(after.position[1, [0, 2]], abs=0.01)
+
+
 def test_what_is_fixed_or_turned_is_not_moved():
     words = ["double_bed", "nightstand", "wardrobe"]
     size, drawn = [(1.6, 1.0, 2.0), (0.5, 0.5, 0.4), (1.5, 2.2, 0.6)], [(0, 0, 0.3), (1.0, 0, 1.5), (0.5, 0, 0.2)]
     search, _ = searched(words, size, drawn, [0.7, 1.0, 1.5], fixed=[0], turned=[2])
-    found = search.run()
+    found = search.run(3)
     assert found.position[0].tolist() == [0, 0, 0.3]
     assert found.yaw[[0, 2]].tolist() == [0.7, 1.5]
 
@@ -147,7 +193,7 @@ def test_no_more_poses_are_judged_than_were_allowed():
         words, [(2.0, 1, 2.2), *[(1.8, 2.2, 0.6)] * 5], np.zeros((6, 3)), np.zeros(6), floor=0.6 * FLOOR
     )
     search.budget = 100
-    found = search.run()
+    found = search.run(3)
     assert found.judged < 100 + 150  # the move that was begun
     assert search.faults(State(found.position, found.yaw, np.zeros(6)))[0] == pytest.approx(found.cost)
 
