@@ -327,8 +327,7 @@ def _moved_apart(
 
     `holds`: numbers of the relations that must hold afterwards as well.
     """
-    best: tuple[float, ...] | None = None
-    found = None
+    trials: list[tuple[int, float, np.ndarray]] = []  # relations that hold, what it costs, and the moves
     for mover in pair:
         if mover >= len(graph.nodes) or scene.fixed[mover]:
             continue
@@ -344,20 +343,20 @@ def _moved_apart(
             for way in ways:
                 trial = moves.copy()
                 trial[group] += way
-                tried = _at(boxes, trial)
-                kept = _unbroken(graph, tried)
+                kept = _unbroken(graph, _at(boxes, trial))
                 broken = holds - kept
-                if broken:
-                    more = _with_partners(scene, graph, group, broken)
-                    if more not in groups and len(groups) <= GROUPS:
-                        groups.append(more)
-                    continue
-                if best is not None and -len(kept) > best[0]:
-                    continue
-                price = scene.price(mover, way) * (1 + len(group) - len(groups[0]))
-                score = (-len(kept), len(living_faults(graph, tried, floor)), price)
-                if best is None or score < best:
-                    best, found = score, trial
+                if not broken:
+                    trials.append((len(kept), scene.price(mover, way) * (1 + len(group) - len(groups[0])), trial))
+                elif (more := _with_partners(scene, graph, group, broken)) not in groups and len(groups) <= GROUPS:
+                    groups.append(more)
+    most = max((kept for kept, _, _ in trials), default=0)
+    found, fewest = None, np.inf
+    for _, _, trial in sorted((one for one in trials if one[0] == most), key=lambda one: one[1]):
+        faults = len(living_faults(graph, _at(boxes, trial), floor))
+        if faults < fewest:
+            found, fewest = trial, faults
+        if not faults:
+            break
     return found
 
 

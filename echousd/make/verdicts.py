@@ -8,7 +8,8 @@ import numpy as np
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.rules import fronts, margins, verdicts
+from echomodel.rules import fronts, judged, margins
+from echomodel.rules.margins import tensors
 from echomodel.rules.placements import placement_margins
 from echousd.graph import SceneGraph
 from echousd.place.geometry import pair_indices
@@ -51,8 +52,8 @@ def relation_verdicts(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict")
         return _placement_verdicts(graph, boxes)
     triplets, centre = torch.from_numpy(triplets_of(graph)), floor_centre(graph)[[0, 2]]
     headed = fronts(node.category for node in graph.nodes)
-    state = verdicts(boxes, triplets, rules=rules, center=centre, fronts=headed).tolist()
-    margin = margins(boxes, triplets, rules=rules, center=centre, fronts=headed).tolist()
+    found = margins(tensors(boxes, torch.float64), triplets, rules=rules, center=centre, fronts=headed)
+    state, margin = judged(found, triplets, rules).tolist(), found.tolist()
     return tuple(
         Verdict(r.subject, r.predicate, r.object, STATES[s or int(m > -ROUNDING)], None if s < 0 else m)
         for r, s, m in zip(graph.relations, state, margin, strict=True)

@@ -78,11 +78,14 @@ def fronts(categories: Iterable[str]) -> Tensor:
 
 def verdicts(boxes: BoxesLike, triplets: Tensor, *, rules: str = "strict", **about: Any) -> Tensor:
     """Hard verdict of every relation: (E,) int8, 1 kept, 0 broken, -1 not measured. Arguments as for `margins`."""
-    chosen = rule_set(rules)
     triplets = torch.as_tensor(triplets)
     with torch.no_grad():
-        margin = margins(tensors(boxes, torch.float64), triplets, rules=rules, **about)
-    predicate = triplets[:, 1]
+        return judged(margins(tensors(boxes, torch.float64), triplets, rules=rules, **about), triplets, rules)
+
+
+def judged(margin: Tensor, triplets: Tensor, rules: str) -> Tensor:
+    """The `verdicts` (E,) int8 on relations (E, 3) int64 with these margins (E,) float."""
+    chosen, predicate = rule_set(rules), triplets[:, 1]
     kept = torch.where(_among(predicate, chosen.open), margin > 0, margin >= 0)
     unmeasured = torch.full_like(kept, -1, dtype=torch.int8)
     return torch.where(_among(predicate, frozenset(chosen.margins)), kept.to(torch.int8), unmeasured)
