@@ -36,6 +36,12 @@ class Watched(Plan):
         i, j = super().told(predicate)
         return self._noted(i), self._noted(j)
 
+    def rows_of(self, predicate: str) -> Tensor:
+        rows = super().rows_of(predicate)
+        for ends in self.stated_pairs[::2]:
+            self._noted(ends[rows])
+        return rows
+
     def everywhere(self, number: int) -> Tensor:
         return self._noted(super().everywhere(number))
 
@@ -151,6 +157,13 @@ class Copies(Plan):
     def told(self, predicate: str) -> tuple[Tensor, Tensor]:
         one, other = self.template.told(predicate)
         return self._tiled(one), self._tiled(other)
+
+    @cached_property
+    def stated_pairs(self) -> tuple[Tensor, Tensor, Tensor]:
+        """As `Plan.stated_pairs`; without pairs that stand alike in all copies."""
+        i, predicate, j = self.template.stated_pairs
+        differ = self.apart_in[i] | self.apart_in[j]
+        return self._tiled(i[differ]), predicate[differ].repeat(self.count), self._tiled(j[differ])
 
     def everywhere(self, number: int) -> Tensor:
         return number + self._shift[:, 0]

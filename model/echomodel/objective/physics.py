@@ -12,7 +12,6 @@ from echomodel.floors import edges, footprint, signed_area
 from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody
 from echomodel.objective.support import ON_CEILING, ON_FLOOR
 from echomodel.rules import RULE_SETS, rule_set
-from echomodel.rules.geometry import pairs
 from echomodel.rules.placements import Spread, Walls, margin_of
 from echomodel.vocabulary import vocabulary
 
@@ -91,17 +90,12 @@ def told(predicate: str) -> Callable[[Plan], Found]:
     """The term of a relation: its margins wherever the graph states it, by the plan's own set of rules."""
 
     def find(plan: Plan) -> Found:
-        rules = rule_set(plan.rules)
-        rule = rules.rules.get(predicate)
-        i, j = plan.told(predicate)
-        if rule is None or rule.margin is None or not len(i):
+        rule = rule_set(plan.rules).rules.get(predicate)
+        rows = plan.rows_of(predicate)
+        if rule is None or rule.margin is None or not len(rows):
             return nobody(plan.size)
-        keep = plan.moved[i] | plan.moved[j]
-        i, j = i[keep], j[keep]
-        if not len(i):
-            return nobody(plan.size)
-        of = pairs(plan, i, j, plan.centres, oriented=rules.oriented, fronts=plan.fronts)
-        return found(i, rule.margin(of), other=j)
+        i, _, j = plan.stated_pairs
+        return found(i[rows], rule.margin(plan.pair_geometry)[rows], other=j[rows])
 
     strict = rule_set("strict").rules.get(predicate)
     find.__name__, find.__doc__ = predicate, "" if strict is None else strict.means

@@ -15,8 +15,9 @@ from echomodel.floors import edges, known, padded, signed_area, signed_distance
 from echomodel.objective.support import carriers, shared_fraction
 from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
-from echomodel.rules.geometry import BoxesLike
+from echomodel.rules.geometry import BoxesLike, PairGeometry, pairs
 from echomodel.rules.placements import Stated
+from echomodel.rules.sets import rule_set
 from echomodel.vocabulary import Category, vocabulary
 
 
@@ -268,6 +269,21 @@ class Plan:
         """Subjects (P,) and objects (P,) of the relations of one name that the graphs state."""
         rows = self.triplets[self.triplets[:, 1] == vocabulary().predicate_id(predicate)]
         return rows[:, 0], rows[:, 2]
+
+    @cached_property
+    def stated_pairs(self) -> tuple[Tensor, Tensor, Tensor]:
+        """Subjects, predicates and objects (E,) of all relations that the graphs state."""
+        return self.triplets[:, 0], self.triplets[:, 1], self.triplets[:, 2]
+
+    def rows_of(self, predicate: str) -> Tensor:
+        """Which of the `stated_pairs` have a predicate."""
+        return (self.stated_pairs[1] == vocabulary().predicate_id(predicate)).nonzero()[:, 0]
+
+    @cached_property
+    def pair_geometry(self) -> PairGeometry:
+        """The geometry of the `stated_pairs`, which all relations share."""
+        i, _, j = self.stated_pairs
+        return pairs(self, i, j, self.centres, oriented=rule_set(self.rules).oriented, fronts=self.fronts)
 
     def everywhere(self, number: int) -> Tensor:
         """(1,) int64, a box of the first room; of copies of one room (K,), in each of them."""
