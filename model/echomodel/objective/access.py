@@ -12,6 +12,7 @@ from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_
 
 CROOKED = math.radians(5.0)  # 98 to 100 % of such furniture in real rooms is turned less
 TOUCHING = 0.3  # metres: 93 % of real beds, nightstands and tv stands have a smaller gap behind
+NEAR_WALL, BEHIND = 0.4, 1.5  # metres between a wall and the nearest side of a desk, or its front with who sits there
 PASSAGE = 0.75  # metres: a sofa so far from the wall may stand in the room on purpose, one walks behind it
 DEEP = 6.0  # metres of the room along its axis from which on it does; or something of another group stands behind it
 
@@ -66,10 +67,22 @@ def _backed(plan: Plan, who: Tensor, gap: Tensor) -> Tensor:
     return torch.isin(who, i[behind])
 
 
+def desk_at_wall(plan: Plan) -> Found:
+    """A desk has a side near a wall, or who sits there a wall at the back."""
+    desks = plan.of("board") & plan.works & plan.standing & ~plan.which(lambda kind: kind.wall or kind.task)
+    who = plan.those(desks & plan.walled & plan.moved)
+    side, front = (axis[:, None] for axis in plan.axes(who))
+    side, back = side * plan.size[who, None, :1] / 2, front * plan.size[who, None, 2:] / 2
+    points = plan.position[who][:, None, [0, 2]] + torch.cat([side, -side, back, -back, back + front * BEHIND], 1)
+    *near, seated = plan.inside(points, who).unbind(1)
+    gap = torch.stack(near).amin(0)
+    return found(who, torch.maximum(NEAR_WALL - gap, -seated), measure=gap)
+
+
 NEEDED = 0.45  # share of the vocabulary's access depth below which a front counts as blocked
 SHARE = 0.3  # share of a front's width that may be covered
 BEDSIDE = 0.3  # metres beside a bed
-INTO_BED, OF_LAMPS = 0.4, 0.6  # metres between a plant and a bed's side, 0.45 in real rooms, or a lamp, 1.1 there
+INTO_BED, OF_LAMPS, OF_CHAIRS = 0.4, 0.6, 0.1  # metres between a plant and a bed's side, a floor lamp, a chair
 GRAZE = 0.05  # metres that furniture may reach into a door's way
 WALKED = 0.6  # metres, the width of a way on which one walks in, straight ahead through an open door
 TALL = 0.3  # metres over a window's sill: what is higher takes its light
@@ -135,11 +148,12 @@ def _at_side(plan: Plan, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor, Tensor]:
 
 
 def plant_aside(plan: Plan) -> Found:
-    """A plant does not crowd a floor lamp, nor stand where one gets into bed."""
-    i, j = plan.pairs(plan.of("decor") & plan.standing, plan.of("light", "bed") & plan.standing, least=True)
+    """A plant crowds neither a floor lamp nor a chair, nor stands where one gets into bed."""
+    chairs = plan.stands("at")
+    i, j = plan.pairs(plan.of("decor") & plan.standing, (plan.of("light", "bed") | chairs) & plan.standing, least=True)
     _, aside, along = _at_side(plan, i, j)
-    margin = torch.where(plan.of("bed")[j], torch.maximum(aside - INTO_BED, -along), plan.apart(i, j) - OF_LAMPS)
-    return plan.nearest(i, j, margin, 0.0)
+    apart = plan.apart(i, j) - torch.where(chairs[j], OF_CHAIRS, OF_LAMPS)
+    return plan.nearest(i, j, torch.where(plan.of("bed")[j], torch.maximum(aside - INTO_BED, -along), apart), 0.0)
 
 
 def door_free(plan: Plan) -> Found:

@@ -9,13 +9,14 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes2d import turned
-from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, joined, nobody, worst
+from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, joined, worst
 from echomodel.vocabulary import vocabulary
 
 LOOK = math.radians(60.0)  # chairs at a corner of their table look at it by up to 45 degrees
 LOUNGE = math.radians(100.0)  # an armchair takes part in its group, it does not stare at the table
 NEAR_TABLE = 1.5  # metres: a seat further from its table is judged for its distance alone
 COMPANY = 2.5  # metres: an armchair further away stands for itself
+TOGETHER = 1.5  # metres between armchairs without a sofa: all real ones are nearer
 REACH = 0.25  # metres between a seat's front and its table: 95 % of real chairs are nearer
 BEFORE_SOFA = (0.12, 1.0)  # metres between a sofa and its coffee table: less than 0.3 is tight, a hand is too little
 AT_DESK = 0.33  # share of a desk's width that a seat's middle may lie beside its own: 19 of 20 real ones
@@ -44,9 +45,9 @@ def seat_faces(plan: Plan) -> Found:
 
 def seat_in_reach(plan: Plan) -> Found:
     """A seat whose work is at a table or desk stands at it, a stool at its dressing table, a bench at its table."""
-    i, j = plan.attended("at", "foot")
+    i, j = plan.attended("at", "foot", to=plan.of("board"))
     works = plan.which(lambda kind: kind.access > 0 or kind.wall)  # at a dinner table stools go anywhere
-    bound = plan.of("board")[j] & (~plan.solid[i] | works[j])
+    bound = ~plan.solid[i] | works[j]
     i, j = i[bound], j[bound]
     off = plan.gap(i, j) - plan.size[i, 2] / 2
     return found(i, REACH - off, other=j, measure=off)
@@ -54,11 +55,7 @@ def seat_in_reach(plan: Plan) -> Found:
 
 def seat_before_desk(plan: Plan) -> Found:
     """Who works at a desk or dressing table sits before it, not at its corner."""
-    i, j = plan.attended("at")
-    works = plan.which(lambda kind: kind.role == "board" and (kind.access > 0 or kind.wall))
-    if not len(i) or not bool(works[j].any()):
-        return nobody(plan.size)
-    i, j = i[works[j]], j[works[j]]
+    i, j = plan.attended("at", to=plan.which(lambda kind: kind.role == "board" and (kind.access > 0 or kind.wall)))
     near = plan.gap(i, j).detach() < NEAR_TABLE
     i, j = i[near], j[near]
     aside = plan.local(i, j)[0].abs()
@@ -75,6 +72,17 @@ def lounger_faces(plan: Plan) -> Found:
     i, j = torch.cat([i[near], i[near & before]]), torch.cat([j[near], sofa[near & before]])
     off = facing_angle(*plan.local(j, i))
     return found(i, LOUNGE - off, other=j, measure=torch.rad2deg(off))
+
+
+def loungers_together(plan: Plan) -> Found:
+    """Armchairs without a sofa stand together, none with its back to the next one."""
+    lone = plan.stands("company") & (plan.anchor < 0) & plan.standing
+    i, j = plan.pairs(lone, lone)
+    first = _rank_at(i, plan.apart(i, j).detach()) == 0
+    i, j = i[first], j[first]
+    off, apart = facing_angle(*plan.local(j, i)), plan.apart(i, j)
+    margin = torch.stack([LOUNGE - off, TOGETHER - apart], -1)
+    return _first_of(i, j, margin, torch.stack([torch.rad2deg(off), apart], -1))
 
 
 def table_before_sofa(plan: Plan) -> Found:
@@ -129,8 +137,7 @@ def _at_bed(plan: Plan, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor, Tensor]:
 
 def bench_at_foot(plan: Plan) -> Found:
     """A bench or ottoman at the foot of a bed stands close to it, within its width."""
-    i, j = plan.attended("foot")
-    i, j = (of[plan.of("bed")[j]] for of in (i, j))
+    i, j = plan.attended("foot", to=plan.of("bed"))
     lateral, forward = plan.local(i, j)
     _, half_depth = plan.reach(i, j)
     gap = forward - half_depth - plan.size[j, 2] / 2
@@ -161,6 +168,7 @@ AROUND = 0.7  # metres: chairs further from their table are not at it
 CIRCLE = math.radians(100.0)  # a sofa is turned so far at most from the middle of its group
 BEFORE = 0.8  # metres before the larger sofa, where the middle of the group is
 NEAR = 3.0  # metres: a sofa further away stands for itself
+ROW = 0.7  # metres by which one sofa may stand before another that looks the same way
 COVERS = 0.12  # share of a sofa's width that side tables and lamps may stand before
 AHEAD = 0.1  # metres that their middles may lie before its front: 97 % of real ones lie less
 SIDE = 0.6  # metres: what is further from its seat stands for itself
@@ -205,30 +213,26 @@ class Seats:
         return self._rows(self.side, self.rank + 1)
 
     def _rows(self, side: Tensor, rank: Tensor) -> tuple[Tensor, Tensor]:
-        most = int(self.count.max()) + 1
-        place = torch.full((4 * (int(self.j.max()) + 1) * most,), -1)
+        most = max(self.count.tolist(), default=0) + 1
+        place = torch.full(((max(self.side.tolist(), default=0) // 4 + 1) * 4 * most,), -1)
         place[self.side * most + self.rank] = torch.arange(len(self.i))
         other = place[side * most + rank]
         one = (other >= 0).nonzero()[:, 0]
         return one, other[one]
 
 
-def seats_at(plan: Plan) -> Seats | None:
-    """Seats at the tables that people sit around, None where there are none."""
-    kept: dict[str, Seats | None] = vars(plan)
+def seats_at(plan: Plan) -> Seats:
+    """Seats at the tables that people sit around."""
+    kept: dict[str, Seats] = vars(plan)
     if "seats_at" not in kept:
         kept["seats_at"] = _seats_at(plan)
     return kept["seats_at"]
 
 
-def _seats_at(plan: Plan) -> Seats | None:
-    if not bool(plan.first.dining.any()):
-        return None
-    i, j = plan.attended("at", "foot")
-    keep = plan.dining[j] & (plan.apart(i, j).detach() < AROUND)
-    i, j = i[keep], j[keep]
-    if not len(i):
-        return None
+def _seats_at(plan: Plan) -> Seats:
+    i, j = plan.attended("at", "foot", to=plan.dining)
+    near = plan.apart(i, j).detach() < AROUND
+    i, j = i[near], j[near]
     lateral, forward = plan.local(i, j)
     half = plan.size[j][:, [0, 2]].detach() / 2
     ahead = forward.detach().abs() - half[:, 1] > lateral.detach().abs() - half[:, 0]
@@ -245,8 +249,6 @@ def _seats_at(plan: Plan) -> Seats | None:
 def chairs_even(plan: Plan) -> Found:
     """The chairs of a table stand evenly around it; a bench counts as the chairs that it stands for."""
     seats = seats_at(plan)
-    if seats is None:
-        return nobody(plan.size)
     i, j = seats.i, seats.j
     places = (plan.size[i, 0] / PLACE).round().clamp_min(1.0).detach()
     count = torch.zeros(len(plan), dtype=plan.size.dtype).index_add(0, j, places)
@@ -263,8 +265,6 @@ def chairs_even(plan: Plan) -> Found:
 def chairs_opposite(plan: Plan) -> Found:
     """Where both sides of a table have as many chairs, each has another one opposite."""
     seats = seats_at(plan)
-    if seats is None:
-        return nobody(plan.size)
     one, other = seats.facing()
     margin = STAGGERED - (seats.along[one] - seats.along[other]).abs()
     least, _ = worst(seats.j[one], margin, seats.i[one], len(plan), FAR)
@@ -275,8 +275,6 @@ def chairs_opposite(plan: Plan) -> Found:
 def chairs_level(plan: Plan) -> Found:
     """The chairs of a table are pushed under it alike: neighbours, and those opposite each other."""
     seats = seats_at(plan)
-    if seats is None:
-        return nobody(plan.size)
     half_width, half_depth = plan.reach(seats.i, seats.j)
     out = seats.across.abs() - torch.where(seats.ahead, half_depth, half_width)
     one, other = (torch.cat(rows) for rows in zip(seats.facing(), seats.beside(), strict=True))
@@ -289,13 +287,15 @@ def chairs_level(plan: Plan) -> Found:
 
 
 def sofas_in_circle(plan: Plan) -> Found:
-    """A second sofa looks into the group of the first."""
+    """A second sofa looks into the group of the first, or stands in a row with it."""
     i, j = plan.attended("with")
     near = plan.apart(i, j).detach() < NEAR
     i, j = i[near], j[near]
     middle = plan.position[j][:, [0, 2]] + plan.axes(j)[1] * (plan.size[j, 2] / 2 + BEFORE)[:, None]
-    off = facing_angle(*plan.seen(i, middle))
-    return found(i, CIRCLE - off, other=j, measure=torch.rad2deg(off))
+    off, ahead = facing_angle(*plan.seen(i, middle)), plan.local(i, j)[1].abs()
+    alike = ((plan.yaw[i] - plan.yaw[j]).cos() > 0.7).detach()
+    margin = torch.stack([CIRCLE - off, torch.where(alike, ROW - ahead, FAR)], -1)
+    return _first_of(i, j, margin, torch.stack([torch.rad2deg(off), ahead], -1))
 
 
 def at_its_side(plan: Plan) -> Found:

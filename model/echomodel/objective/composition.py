@@ -16,7 +16,8 @@ from echomodel.objective.company import AROUND, BESIDE, Seats, seats_at
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
 from echomodel.sizes import REACH, filled_area
 
-BARE = 1.05  # radius of an empty circle, of the side of a square that is each piece's share of the floor
+# Radius of an empty circle, of the side of a square of each piece's share of the floor; more a square metre; at most.
+BARE = (0.6, 0.01, 1.05)
 AHEAD = 1.0  # metres before a sofa to other groups: 97 % of real ones have them
 COVERED = 0.25  # share of its width from which on something is before it
 CELL, POINTS = 0.25, 1000  # metres between two points of the floor that are looked at; in a hall so many, farther apart
@@ -25,7 +26,7 @@ NEARBY = 0.5  # metres: a point nearer to a piece is neither bare nor far from e
 
 def bare_limit(area: float, count: int) -> float:
     """Radius in metres from which on an empty circle is bare, in a floor of an area (square metres), so many pieces."""
-    return BARE * math.sqrt(area / max(count, 1))
+    return min(BARE[0] + BARE[1] * area, BARE[2]) * math.sqrt(area / max(count, 1))
 
 
 def floor_used(plan: Plan) -> Found:
@@ -124,7 +125,7 @@ ELBOW = 0.55  # metres of a table's edge a seat: 96 % of real sides with two sea
 FENCE = 0.03  # metres between two chairs of one side: 95 % of real ones
 EASY = 0.6  # metres of edge a seat that are enough for anybody: DIN 68880
 SEAT = 0.7  # metres that a side needs before it to seat somebody
-BEYOND = 0.1  # metres that a seat may reach beyond its side of a table: hardly any real one does at all
+BEYOND, CORNER = 0.1, 0.1  # metres that a seat may reach beyond its side of a table, and more beyond one end of it
 WORKPLACE = 1.0  # metres between the middles of two who work
 OPENS = 0.55  # metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it
 FACED = 0.3  # share of a wardrobe's width from which on something is before it
@@ -158,8 +159,6 @@ def floor_served(plan: Plan) -> Found:
 def elbow_room(plan: Plan) -> Found:
     """Who sits beside others at a table has room for the elbows, and chairs stand apart."""
     seats = seats_at(plan)
-    if seats is None:
-        return nobody(plan.size)
     i, j = seats.i, seats.j
     one, other = seats.beside()
     keep = plan.of("seat")[i[one]] & plan.of("seat")[i[other]]
@@ -179,8 +178,6 @@ def elbow_room(plan: Plan) -> Found:
 def chairs_at_sides(plan: Plan) -> Found:
     """Chairs share the sides of their table: none sits shoulder to shoulder with others while a side is free."""
     seats = seats_at(plan)
-    if seats is None:
-        return nobody(plan.size)
     who, free = _free_sides(plan, seats)
     side = 4 * who[:, None] + torch.arange(4)
     count = torch.bincount(seats.side, minlength=4 * len(plan))[side]
@@ -195,8 +192,6 @@ def chairs_at_sides(plan: Plan) -> Found:
 def chairs_balanced(plan: Plan) -> Found:
     """As many sit at one side of a table as opposite, but for one where their number is odd, or no room is there."""
     seats = seats_at(plan)
-    if seats is None:
-        return nobody(plan.size)
     who, free = _free_sides(plan, seats)
     places = (plan.size[:, 0].detach() / ELBOW).round().clamp_min(1.0)  # a bench counts for several chairs
     count = places.new_zeros(4 * len(plan)).index_add(0, seats.side, places[seats.i]).reshape(-1, 2, 2)[who]
@@ -210,15 +205,14 @@ def chairs_balanced(plan: Plan) -> Found:
 
 
 def bench_fits(plan: Plan) -> Found:
-    """A bench stands along a side of its table that is as long as it, with no end to it."""
+    """A seat stands within its side of a table, a bench along one that is as long as it, with no end to it."""
     seats = seats_at(plan)
-    if seats is None:
-        return nobody(plan.size)
     half_width, half_depth = plan.reach(seats.i, seats.j)
     own = 2 * torch.where(seats.ahead, half_width, half_depth)
     side = torch.where(seats.ahead, plan.size[seats.j, 0], plan.size[seats.j, 2])
-    least, which = torch.stack([own - side, plan.size[seats.i, 0] - own], -1).max(-1)
-    return found(seats.i, BEYOND - least, other=seats.j, measure=least, words=which)
+    beyond = (seats.along.abs() + (own - side) / 2) * ~plan.solid[seats.i]  # a stool stands anywhere
+    least, which = torch.stack([own - side, plan.size[seats.i, 0] - own, beyond - CORNER], -1).max(-1)
+    return found(seats.i, BEYOND - least, other=seats.j, measure=least + CORNER * (which == 2), words=which)
 
 
 def _free_sides(plan: Plan, seats: Seats) -> tuple[Tensor, Tensor]:

@@ -85,8 +85,6 @@ def _massive(plan: Plan) -> Tensor:
 def table_amid(plan: Plan) -> Found:
     """A table is not shoved to one side: chairs are not squeezed where those opposite have room to spare."""
     seats = seats_at(plan)
-    if seats is None or not bool(plan.walled.any()):
-        return nobody(plan.size)
     behind, about = _room_behind(plan, seats)
     least, which = worst(seats.side, behind, about, 4 * len(plan), FAR)
     asked = seats.side.unique()

@@ -460,9 +460,10 @@ class Plan:
             gaps.append(forward.abs() - half_depth - self.size[b, 2] / 2)
         return torch.stack(gaps, -1).amax(-1)
 
-    def attended(self, *stances: str) -> tuple[Tensor, Tensor]:
-        """Numbers (P,), (P,) of the boxes that stand so to what they attend, and of what that is."""
-        i = self.those((self.anchor >= 0) & self.stands(*stances))
+    def attended(self, *stances: str, to: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """Numbers (P,), (P,) of boxes that stand so to what they attend, one of `to` (N,) bool, and of that."""
+        attends = (self.anchor >= 0) & self.stands(*stances)
+        i = self.those(attends if to is None else attends & to[self.anchor])
         return i, self.anchor[i]
 
     # -- walls -------------------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echomodel.furniture.style import sample_size
+from echomodel.objective.access import INTO_BED, OF_CHAIRS, OF_LAMPS
 from echomodel.rooms.floor import Floor, Wall
 from echomodel.rooms.statistics import QUARTILE, back_gaps
 from echomodel.sizes import size_statistics
@@ -127,7 +128,7 @@ class Builder:
         for w, top in self.floor.windows:
             if item.y + item.size[1] > top and x0 < w[2] and x1 > w[0] and z0 < w[3] and z1 > w[1]:
                 return False
-        if any(overlaps(item, other, play) for other in self.items if other not in ignore):
+        if any(overlaps(item, other, play - crowds(item, other)) for other in self.items if other not in ignore):
             return False
         if any(overlaps(item, zone, 0.03) for zone, owner in self.zones if owner not in ignore):
             return False
@@ -258,6 +259,14 @@ def front_zone(item: Item) -> Item | None:
         return None
     x, z = item.local(0.0, item.size[2] / 2 + depth / 2)
     return Item("", (0.9 * item.size[0], BODY, depth), x, 0.0, z, item.yaw)
+
+
+def crowds(a: Item, b: Item) -> float:
+    """Metres that a plant keeps from a bed, a floor lamp or a chair; of others none."""
+    if (a.category == "plant") == (b.category == "plant"):
+        return 0.0
+    other = vocabulary().category(b.category if a.category == "plant" else a.category)
+    return {"bed": INTO_BED, "light": OF_LAMPS}.get(other.role, OF_CHAIRS * (other.stands == "at"))
 
 
 def overlaps(a: Item, b: Item, play: float) -> bool:

@@ -91,6 +91,12 @@ def test_an_emptier_room_may_leave_more_of_its_floor():
     assert composition.served_limit(100.0, one, one) == 1.0
 
 
+def test_a_small_room_has_no_circle_so_bare_as_a_hall_may():
+    assert composition.bare_limit(16.0, 4) == pytest.approx(0.76 * 2)
+    assert composition.bare_limit(36.0, 9) == pytest.approx(0.96 * 2)
+    assert composition.bare_limit(100.0, 25) == pytest.approx(1.05 * 2)
+
+
 def test_no_desk_goes_without_a_chair_while_another_has_two():
     desks = [("desk", (1.2, 0.75, 0.6), (-1.5, 0.0), 0.0), ("desk", (1.2, 0.75, 0.6), (1.5, 0.0), 0.0)]
     chairs = [("office_chair", (0.5, 0.9, 0.5), at, np.pi) for at in ((-1.8, 0.6), (-1.2, 0.6))]
@@ -180,6 +186,15 @@ def test_no_bench_lies_across_the_end_of_its_table(length, margin):
     assert seen(composition.bench_fits, [*seated(), along])[0][1] > 0
     end_on = ("bench", (length, 0.45, 0.4), (0.0, 0.45 + length / 2), HALF)
     assert seen(composition.bench_fits, [*seated(), end_on])[0] == {1: pytest.approx(0.5 - length)}
+
+
+@pytest.mark.parametrize(("along", "margin"), [(0.6, 0.04), (0.68, -0.04)])  # 0.16 and 0.24 m beyond the corner
+def test_nobody_sits_at_the_corner_of_a_table(along, margin):
+    found = seen(composition.bench_fits, seated(((along, 0.65), np.pi)))
+    assert found[0] == {1: pytest.approx(margin)}
+    assert found[1].measure.tolist() == [pytest.approx(along + 0.21 - 0.65)]
+    stool = ("stool", (0.4, 0.45, 0.4), (0.8, 0.6), 0.0)
+    assert seen(composition.bench_fits, [*seated(), stool])[0][1] > 0  # which has no front
 
 
 @pytest.mark.parametrize(("back", "margin"), [(0.05, 0.1), (0.35, -0.2)])

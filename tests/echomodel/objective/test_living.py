@@ -176,6 +176,7 @@ def with_one(room, name, **fields):
     return Room({**room.things, name: fields})
 
 
+ARMCHAIR = {"kind": "armchair", "size": (0.8, 0.8, 0.8), "at": (-1.0, 0.0), "yaw": -HALF}
 MORE = [
     (with_one(LIVING, "desk", kind="desk", size=(1.2, 0.75, 0.6), at=(-1.8, -1.5)), ("desk", "groups_apart"),
      "desk leaves only 0.10 m to sofa, which is no part of its group"),
@@ -213,6 +214,15 @@ MORE = [
      "plant crowds bed"),
     (with_one(DINING, "lamp", kind="floor_lamp", size=(0.3, 1.6, 0.3), at=(-0.9, -1.2)), ("lamp", "not_alone"),
      "lamp stands alone in the room"),  # beside a sideboard, and what one sits at is 0.6 m away
+    (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(0.9, 0.6)), ("plant", "plant_aside"),
+     "plant crowds chair_1_1"),
+    (STUDY.moved("desk", at=(0.0, -0.5)), ("desk", "desk_at_wall"), "desk stands in the open, 1.15 m from the walls"),
+    (Room({"a": ARMCHAIR, "b": {**ARMCHAIR, "at": (1.0, -1.0), "yaw": -HALF}}), ("a", "loungers_together"),
+     "a turns its back on b (153 degrees)"),
+    (Room({"a": {**ARMCHAIR, "yaw": HALF}, "b": {**ARMCHAIR, "at": (1.4, 0.0)}}), ("a", "loungers_together"),
+     "a stands 1.60 m from b"),
+    (SOFAS.moved("other", at=(-1.6, -0.4), yaw=0.0), ("other", "sofas_in_circle"),
+     "other stands 1.13 m before or behind sofa, not in its row"),
 ]  # fmt: skip
 KEPT = [
     (with_one(SET, "bench", kind="bench", size=(1.2, 0.45, 0.4), at=(0.0, 0.8)), ("bench", "seat_in_reach")),
@@ -220,6 +230,11 @@ KEPT = [
     (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.1, 1.7)), ("plant", "plant_aside")),
     (with_one(BEDROOM, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(2.2, 0.4)), ("plant", "plant_aside")),
     (with_one(DINING, "lamp", kind="floor_lamp", size=(0.3, 1.6, 0.3), at=(-0.9, -0.5)), ("lamp", "not_alone")),
+    (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.0, 0.7)), ("plant", "plant_aside")),
+    (STUDY.moved("desk", at=(2.1, -0.5)), ("desk", "desk_at_wall")),
+    (STUDY.moved("desk", at=(0.0, 0.2)), ("desk", "desk_at_wall")),  # who sits there has a wall at the back
+    (Room({"a": ARMCHAIR, "b": {**ARMCHAIR, "at": (-1.0, 1.0)}}), ("a", "loungers_together")),
+    (SOFAS.moved("other", at=(-1.7, -0.9), yaw=0.0), ("other", "sofas_in_circle")),
 ]
 
 
