@@ -125,6 +125,7 @@ def setting_of(room: RoomData, layout: int = 0) -> Setting:
         objects, floor, tuple(room.graph.room.openings), room.height, room.options.walls,
         room.options.dress == "full", room.provenance.seed, vocabulary().room_type(room.graph.room.type).use,
         story(who), who if any(o.row.role == "bed" for o in objects.values()) else "",
+        room.graph.room.style,
     )  # fmt: skip
 
 
@@ -200,10 +201,10 @@ def bare_corners(setting: Setting) -> None:
 
 
 RULES = (
-    floors.rugs, walls.hung_up, walls.curtains, walls.pictures, upholstery.throws, upholstery.folded,
-    upholstery.cushions, upholstery.on_covers, upholstery.bed_cushions, tabletops.tabletops, floors.by_doors,
-    floors.clusters, walls.coats, walls.tall_mirror, walls.shelves, walls.clock, floors.cables, floors.corner_plants,
-    bare_walls, bare_corners,
+    floors.rugs, walls.hung_up, walls.curtains, walls.radiators, walls.sockets, walls.pictures, upholstery.throws,
+    upholstery.folded, upholstery.cushions, upholstery.on_covers, upholstery.bed_cushions, tabletops.tabletops,
+    floors.by_doors, floors.clusters, walls.coats, walls.tall_mirror, walls.shelves, walls.clock, floors.cables,
+    floors.corner_plants, bare_walls, bare_corners,
 )  # fmt: skip
 
 

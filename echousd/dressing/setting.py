@@ -103,6 +103,7 @@ class Setting:
     use: str = ""  # of the room (`echomodel.rows.RoomType`)
     story: Story = field(default_factory=story)  # of who lives there
     resident: str = ""  # who sleeps there (`echousd.graph.fields.RESIDENTS`)
+    style: str | None = None  # of the room, a word of `RoomStyle`
     placed: list[Thing] = field(default_factory=list)  # the things so far
     carriers: dict[str, Standing] = field(default_factory=dict)  # those of them that others stand on
     curtained: set[str] = field(default_factory=set)  # names of the windows that have curtains

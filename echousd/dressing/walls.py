@@ -12,6 +12,7 @@ from echomodel.dressing import KINDS, usual_size
 from echomodel.dressing import thing as solids_of
 from echomodel.dressing.prints import printed
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal
+from echomodel.vocabulary import vocabulary
 from echousd.dressing.setting import Setting, Standing, Thing, rectangle, standing
 from echousd.dressing.tabletops import shelved_books, surfaces
 from echousd.shapes.fittings import RAIL
@@ -22,6 +23,9 @@ EYE = 1.52  # metres, height of a picture's middle on an empty wall
 OVER = 0.22  # metres between furniture and what hangs over it
 NEAR = 0.45  # metres: furniture whose back is so near to a wall stands at it
 SIDE = 0.32  # metres that curtains take beside a window
+RADIATORS = ("panel_radiator", "panel_radiator", "flat_radiator", "column_radiator")  # without a style
+BELOW, BEHIND = 0.14, 0.03  # metres of air between a window's sill and a radiator, and behind it
+PLUGGED = ("bed", "desk", "tv_stand")  # words of what has a socket beside it
 CURTAINS = ("curtain", "eyelet_curtain", "pleated_curtain", "sheer_curtain")  # of a room all are alike
 BLINDS = ("blind", "roman_blind", "cafe_curtain")  # as well; where it is wet, the first
 BEFORE = 0.35  # metres from a window: what stands so near is under it
@@ -114,6 +118,34 @@ def _blind(setting: Setting, wall: Wall, window: Opening) -> None:
     low = 0.012 if half else window.height - 0.004 - tall
     place = wall.at((window.offset + window.end) / 2, thick / 2 - 0.019, window.sill + low)
     setting.placed.append(Thing(kind, size, place, wall.yaw, "", variant))
+
+
+def radiators(setting: Setting) -> None:
+    """A radiator under every window where nothing stands, as wide as curtains leave it; in a room all are alike."""
+    if not setting.walls or setting.use == "outdoor":
+        return
+    style, rng = vocabulary().known_style(setting.style), setting.rng("radiators")
+    kind, variant = str(rng.choice(style.radiators if style else RADIATORS)), int(rng.integers(1 << 30))
+    low, high = np.array(KINDS[kind].low), np.array(KINDS[kind].high)
+    for wall in walls_of(setting):
+        for window in (o for o in setting.openings if o.kind == "window" and o.edge == wall.edge):
+            tall = round(min(float(high[1]), window.sill - BELOW), 2)
+            wide = [round(share * window.width, 2) for share in (0.95, 0.8, 0.65, 0.5)] if tall >= low[1] else ()
+            place = wall.at((window.offset + window.end) / 2, low[2] / 2 + BEHIND, 0.0)
+            sizes = (np.array([w, tall, low[2]]) for w in wide if low[0] <= w <= high[0])
+            setting.put_first((Thing(kind, size, place, wall.yaw, "", variant) for size in sizes), margin=0.02)
+
+
+def sockets(setting: Setting) -> None:
+    """A socket in the wall beside every bed, desk and screen that stands at one."""
+    every, rng = walls_of(setting) if setting.walls else [], setting.rng("sockets")
+    size, variant = np.array(rng.choice([KINDS["socket"].low, KINDS["socket"].high])), int(rng.integers(1 << 30))
+    for host in (one for word in PLUGGED for one in setting.near(word)):
+        wall, along = _behind(host, every) or (None, 0.0)
+        if wall is not None:
+            ways = [side * (float(host.size[0]) / 2 + off) for off in (0.15, 0.3, 0.6, 0.8) for side in (1, -1)]
+            spots = [(wall, (along + way) / wall.length) for way in ways]
+            _hang_first(setting, Thing("socket", size, np.zeros(3), 0.0, "", variant), spots, 0.3, 0.0)
 
 
 def pictures(setting: Setting) -> None:

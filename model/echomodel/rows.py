@@ -231,6 +231,7 @@ class RoomStyle:
         family: of furniture making. kinds: (part, kinds of it) where the style has others than its family.
         palettes: harmonies. windows, doors, cornices: of the millwork (metres of a cornice's height, 0 = none).
         covers: what a wall behind a bed or sofa has, "" = nothing. floors: slots of those of wood or the like.
+        radiators: small things that stand under windows.
         aliases: other words for it.
     """
 
@@ -242,6 +243,7 @@ class RoomStyle:
     covers: tuple[str, ...]
     floors: tuple[str, ...]
     cornices: tuple[float, ...] = (0.0,)
+    radiators: tuple[str, ...] = ("panel_radiator",)
     kinds: tuple[tuple[str, tuple[str, ...]], ...] = ()
     aliases: tuple[str, ...] = ()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,11 @@ def form(rows: Sequence[Row]) -> Callable[[Size, np.random.Generator], list[Soli
         luck = rng.random()
         for row in rows:
             among = [row["of"]] if isinstance(row["of"], str) else row["of"]
-            solid = _solid(row, np.asarray(size, float), among[int(luck * len(among))])
-            parts += both(solid) if row.get("both") else [solid]
+            count = max(1, round(size[0] / row["every"])) if "every" in row else 1
+            solid = _solid(row, np.asarray(size, float) / (count, 1, 1), among[int(luck * len(among))])
+            for step in size[0] * ((np.arange(count) + 0.5) / count - 0.5):
+                copy = replace(solid, centre=solid.centre + np.array([step, 0, 0]))
+                parts += both(copy) if row.get("both") else [copy]
         return parts
 
     return built

@@ -14,20 +14,24 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.dressing import KINDS, SMALL
 from echomodel.openings import Opening
+from echomodel.vocabulary import vocabulary
 from echousd.checks import check
 from echousd.dressing import upholstery
 from echousd.dressing.dress import RULES, dress, placed, setting_of
 from echousd.dressing.setting import Setting, Thing, meets, standing
 from echousd.dressing.tabletops import surfaces
 from echousd.dressing.upholstery import STEP, _Seat
-from echousd.dressing.walls import curtains
+from echousd.dressing.walls import RADIATORS, curtains, radiators, sockets
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.compose import room_files
 from echousd.options import RoomOptions
+from echousd.shapes.fittings import SKIRTING
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
 from echousd.shapes.sources.whole import solid_geometry
 from echousd.shapes.walls import walls
 from echousd.stage.graphs import read_graph
+
+SQUARE = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +108,7 @@ def test_things_stay_in_the_room_and_out_of_each_other(room):
 
 
 def test_a_window_without_room_for_curtains_has_a_blind_and_no_rail():
-    floor = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
+    floor = SQUARE
     window = Opening("window", "window", 0, 1.1, 1.8, 1.3, 0.9)
     setting = Setting({}, floor, (window,), 2.7, True, False, 0)
     setting.placed = [Thing("floor_vase", np.array([3.4, 2.4, 0.35]), np.array([0.0, 0.0, -1.8]), 0.0)]
@@ -119,6 +123,50 @@ def test_a_window_without_room_for_curtains_has_a_blind_and_no_rail():
         pieces = [piece.name for part in walls(floor, 2.7, (window,), bare)[0].inner for piece in part.pieces]
         assert len(pieces) == 3 + rails
         assert sum(name.endswith("rail") for name in pieces) == rails
+
+
+@pytest.mark.parametrize("style", [None, "industrial", "modern"])
+def test_a_radiator_stands_under_a_window_between_its_curtains(style):
+    window = Opening("window", "window", 0, 1.1, 1.8, 1.3, 0.9)
+    setting = Setting({}, SQUARE, (window,), 2.7, True, False, 0, style=style)
+    curtains(setting)
+    hung = len(setting.placed)
+    radiators(setting)
+    (found,) = setting.placed[hung:]
+    allowed = vocabulary().known_style(style).radiators if style else RADIATORS
+    assert found.kind in allowed
+    assert all(KINDS[kind].fixed and KINDS[kind].name == "radiator" for kind in allowed)
+    assert found.position[1] == 0 < 0.45 < found.size[1] < window.sill - 0.1
+    low, high = found.footprint.bounds[::2], found.footprint.bounds[1::2]
+    assert -0.9 < low[0] < -0.3 < 0.3 < low[1] < 0.9  # below the pane
+    assert -2.0 + SKIRTING < high[0] < high[1] < -1.8
+    assert not any(found.footprint.intersects(one.footprint) for one in setting.placed[:hung])
+
+
+def block(category, size, z):
+    """A piece of these extents that stands in the middle of `SQUARE`'s first wall, as one solid."""
+    box = trimesh.creation.box(size, trimesh.transformations.translation_matrix((0, size[1] / 2, 0)))
+    whole = solid_geometry(box, category, Origin("boxes"))
+    return standing(category, category, np.array(size), np.array([0.0, 0.0, z]), 0.0, whole)
+
+
+def test_no_radiator_stands_behind_furniture_or_below_a_window_that_reaches_down():
+    sofa = block("sofa", (2.0, 0.8, 0.9), -1.5)
+    for objects, sill in (({"sofa": sofa}, 0.9), ({}, 0.3)):
+        setting = Setting(objects, SQUARE, (Opening("window", "window", 0, 1.1, 1.8, 1.3, sill),), 2.7, True, False, 0)
+        radiators(setting)
+        assert setting.placed == []
+
+
+def test_a_bed_has_a_socket_in_its_wall_that_nothing_hides():
+    bed = block("double_bed", (1.8, 0.5, 2.0), -0.99)
+    setting = Setting({"bed": bed}, SQUARE, (), 2.7, True, False, 0)
+    sockets(setting)
+    (found,) = setting.placed
+    assert KINDS[found.kind].fixed
+    assert found.footprint.bounds[1] == pytest.approx(-1.998)
+    assert 0.9 < abs(found.position[0]) < 1.8
+    assert 0.2 < found.position[1] < 0.4
 
 
 def test_an_undressed_room_has_a_rail_only_where_curtains_would_hang(bare):
