@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 import shapely
@@ -124,6 +125,7 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
     return np.array([*lines, *areas], object)
 
 
+VOLUMES = 9  # kinds of single books that a row is of
 BETWEEN = 0.002  # metres from book to book
 EYE = 1.7  # metres: what is put higher cannot be seen
 CASES = ("cabinet", "shelf")  # looks of what books and baskets stand in and on: no cistern, no fridge
@@ -184,7 +186,7 @@ def _television(setting: Setting, host: Standing, surface: Surface) -> None:
 def _laid(setting: Setting, host: Standing, surface: Surface) -> None:
     """A plate and a glass before every seat at a table."""
     rng = setting.rng(host.name, "laid")
-    plate, glass = usual_size("plate", rng), usual_size("glass", rng)
+    plate, glass, variant = usual_size("plate", rng), usual_size("glass", rng), int(rng.integers(1 << 30))
     x0, z0, x1, z1 = surface.bounds
     middle, half = np.array([x0 + x1, z0 + z1]) / 2, np.array([x1 - x0, z1 - z0]) / 2
     for seat in setting.of("seat"):
@@ -201,11 +203,11 @@ def _laid(setting: Setting, host: Standing, surface: Surface) -> None:
         room = half[1 - side] - plate[0] / 2
         spot = share.copy()
         spot[1 - side] = np.clip(along * half[1 - side] / max(room, 1e-6), -0.98, 0.98)
-        if surface.put(setting, "plate", [(spot[0], spot[1])], size=plate, turn=turn, variant=1, word=seat.name):
+        if surface.put(setting, "plate", [(spot[0], spot[1])], size=plate, turn=turn, variant=variant, word=seat.name):
             beside = spot.copy()
             beside[1 - side] += 0.2 / max(room, 1e-6) * (1 if edge[side] * (1 if side == 1 else -1) > 0 else -1)
             beside[side] *= 0.72
-            surface.put(setting, "glass", [(beside[0], beside[1])], size=glass, variant=1, word=seat.name)
+            surface.put(setting, "glass", [(beside[0], beside[1])], size=glass, variant=variant, word=seat.name)
 
 
 def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
@@ -247,7 +249,8 @@ def shelved_books(setting: Setting, row: Thing, rng: np.random.Generator) -> Non
     wide, tall, deep = (float(v) for v in row.size)
     at, front = -wide / 2, deep / 2
     cos, sin = np.cos(row.yaw), np.sin(row.yaw)
-    fitting = [n for n in range(BOUND) if bound(n)[1] <= tall and bound(n)[2] <= deep]
+    order = setting.rng("books").permutation(BOUND).tolist()
+    fitting = list(islice((n for n in order if bound(n)[1] <= tall and bound(n)[2] <= deep), VOLUMES))
     while fitting:
         number = int(rng.choice(fitting))
         size = bound(number)

@@ -305,10 +305,10 @@ def shelves(setting: Setting) -> None:
     """Up to two shelves on walls that have room, with books and small things on them."""
     if not (setting.full and setting.walls):
         return
-    done, kind = 0, str(setting.rng("shelves").choice(WALL_SHELVES))
+    done, rng = 0, setting.rng("shelves")
+    kind, variant = str(rng.choice(WALL_SHELVES)), int(rng.integers(1 << 30))
     for wall in _roomiest(setting):
-        rng = setting.rng(f"wall {wall.edge}", "shelf")
-        size, variant = usual_size(kind, rng), int(rng.integers(4))
+        size = usual_size(kind, setting.rng(f"wall {wall.edge}", "shelf"))
         one, spots = Thing(kind, size, np.zeros(3), 0.0, "", variant), [(wall, share) for share in SHARES]
         board = _hang_first(setting, one, spots, SHELF - float(size[1]), ABOVE)
         if board:

@@ -55,8 +55,8 @@ def _kinds() -> dict[str, Kind]:
     rows = tomllib.loads(resources.files(__name__).joinpath("things.toml").read_text("utf-8"))
     made = {}
     for name, row in rows.items():
-        parts = row.pop("parts", ())
-        program = form(parts) if parts else Late(f"{__name__}.{row.pop('module')}:{name}")
+        forms = row.pop("forms", None) or [parts for parts in (row.pop("parts", ()),) if parts]
+        program = form(forms) if forms else Late(f"{__name__}.{row.pop('module')}:{name}")
         made[name] = Kind(program=program, low=tuple(row.pop("low")), high=tuple(row.pop("high")), **row)
     for name, row in PRINTS.items():
         kind = made[BUILT.get(row["form"], name.partition("_")[0])]

@@ -28,19 +28,29 @@ def book_row(size: Size, rng: np.random.Generator) -> list[Solid]:
     return parts
 
 
-BOUND = 12  # kinds of single books, so that a wall of them shares few assets
-THICK, TALL, DEEP = (0.018, 0.024, 0.03, 0.038), (0.19, 0.22, 0.25), (0.13, 0.145, 0.16)
+BOUND = 400  # kinds of single books, of which a room has a few, so that a wall of them shares few assets
 
 
 def bound(number: int) -> np.ndarray:
     """(3,) float, metres: extents of single book `number`, 0 to `BOUND` - 1."""
-    return np.array([THICK[number % 4], TALL[number % 3], DEEP[(number // 4) % 3]])
+    thick, tall, deep = np.random.default_rng(number).uniform((0.014, 0.17, 0.62), (0.044, 0.26, 0.75))
+    return np.round([thick, tall, tall * deep], 3)
 
 
 def book(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """One book upright, its spine to the front."""
-    w, h, d = size
-    return _upright(-w / 2, w, h, d, d, str(rng.choice(COVERS)))
+    """One book upright, its spine to the front: in paper, between boards, or these with a round back."""
+    (w, h, d), cover, kind = size, str(rng.choice(COVERS)), rng.random()
+    if kind < 0.4:
+        edge, spine = float(rng.uniform(0.001, 0.002)), float(rng.uniform(0.0005, 0.002))
+        inner = box((edge - w / 2, 0, -d / 2), (w / 2 - edge, h, d / 2 - edge), "paper")
+        sides = [box((x - edge, 0, -d / 2), (x, h, d / 2), cover) for x in (edge - w / 2, w / 2)]
+        return [*sides, box((-w / 2, 0, d / 2 - 2 * edge), (w / 2, h, d / 2), cover, spine), inner]
+    if kind < 0.7:
+        return _upright(-w / 2, w, h, d, d, cover)
+    back = float(rng.uniform(0.003, 0.006))
+    whole = _upright(-w / 2, w, h, d - back, d - 2 * back, cover)
+    steps = ((0.43, 0.6), (0.3, 1.0))  # half widths and how far before the boards
+    return whole + [box((-x * w, 0, d / 2 - 2 * back), (x * w, h, d / 2 - (1 - out) * back), cover) for x, out in steps]
 
 
 def books_in(width: float) -> int:

@@ -14,13 +14,13 @@ from echomodel.furniture.solids import Block, Lathe, Solid, ball, rotation, tube
 Row = Mapping[str, Any]  # as `things.toml` says
 
 
-def form(rows: Sequence[Row]) -> Callable[[Size, np.random.Generator], list[Solid]]:
-    """The program that builds a thing of its rows."""
+def form(forms: Sequence[Sequence[Row]]) -> Callable[[Size, np.random.Generator], list[Solid]]:
+    """The program that builds a thing of the rows of one of its forms."""
 
     def built(size: Size, rng: np.random.Generator) -> list[Solid]:
         parts: list[Solid] = []
         luck = rng.random()
-        for row in rows:
+        for row in forms[int(rng.integers(len(forms)))]:
             among = [row["of"]] if isinstance(row["of"], str) else row["of"]
             count = max(1, round(size[0] / row["every"])) if "every" in row else 1
             solid = _solid(row, np.asarray(size, float) / (count, 1, 1), among[int(luck * len(among))])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from echomodel.dressing.prints import any_of
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.cloth import folds, pillow, seam
-from echomodel.furniture.solids import FINEST, Array, Solid, rotation, tube, turned
+from echomodel.furniture.solids import FINEST, Array, Solid, ball, rotation, tube, turned
 
 FOLD = 0.14  # metres of curtain from one fold to the next
 DRAPES = {"curtain": 0.3, "linen": 0.15, "drape": 0.3, "velvet": 0.25}  # what curtains are of, how often
@@ -149,16 +149,22 @@ def roman_blind(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 
 CLOTHS = {"accent_cloth": 0.25, "accent_plain": 0.2, "blanket": 0.15, "velvet": 0.15, "linen": 0.15, "drape": 0.1}
-PIPED = 0.35  # share of cushions with a cord in their seam
+TRIMS = ("", "", "cord", "cord", "button", "tassels")  # of cushions
 
 
 def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
-    """A cushion on one of its sides, of one of some cloths or of a print, now and then with a cord in its seam."""
+    """A cushion on one of its sides, full or slack, of one of some cloths or of a print, trimmed in some way."""
     w, h, d = size
-    cloth = str(rng.choice(list(CLOTHS), p=list(CLOTHS.values())))
-    cord = str(rng.choice(("linen", "ebony", "blanket", "accent_plain"))) if rng.random() < PIPED else ""
-    made: list[Solid] = [pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), shown or cloth)]
-    return [*made, tube(seam(w / 2, h / 2) + np.array([0, h / 2, 0]), 0.004, cord)] if cord else made
+    cloth, trim = str(rng.choice(list(CLOTHS), p=list(CLOTHS.values()))), str(rng.choice(TRIMS))
+    cord = str(rng.choice(("linen", "ebony", "blanket", "accent_plain")))
+    body = pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), shown or cloth)
+    made: list[Solid] = [replace(body, power=float(rng.choice((3.0, 4.0, 5.5))))]
+    if trim == "cord":
+        made.append(tube(seam(w / 2, h / 2) + np.array([0, h / 2, 0]), 0.004, cord))
+    if trim == "button":
+        made.append(ball((0, h / 2, 0), (0.016, 0.016, 0.51 * d), cord))
+    ends = [(x, y) for x in (-0.47 * w, 0.47 * w) for y in (0.03 * h, 0.97 * h)] if trim == "tassels" else ()
+    return made + [ball((x, y, 0), (0.016, 0.022, 0.014), cord) for x, y in ends]
 
 
 def lumbar_cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:

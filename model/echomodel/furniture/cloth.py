@@ -14,13 +14,16 @@ SEAM = 0.04  # of half a pillow's thickness that is left at its seams
 
 @dataclass(frozen=True, eq=False)
 class Pillow(Ball):
-    """Two cloths sewn together at four sides and filled: corners stand out, sides draw in; thin on its least axis."""
+    """Two cloths sewn together at four sides and filled, the fuller the more `power`: corners stand out, sides draw
+    in; thin on its least axis.
+    """
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         count = (4, 6, 8, 12)[detail]
         line = np.sin(np.linspace(-1, 1, count + 1) * np.pi / 2)
         u, v = np.meshgrid(line, line, indexing="ij")
-        full = ((1 - u**2) * (1 - v**2)) ** 0.26 * (1 - 0.07 * np.cos(9 * np.arctan2(v, u)) * (u**2 + v**2))
+        wrinkles = 0.07 * np.cos(9 * np.arctan2(v, u)) * (u**2 + v**2)
+        full = ((1 - u**2) * (1 - v**2)) ** (1.04 / self.power) * (1 - wrinkles)
         thin = int(np.argmin(self.half))
         rings = []
         # a ring is one loop around the pillow at one u: over its front, back behind
