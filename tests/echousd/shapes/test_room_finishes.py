@@ -60,6 +60,14 @@ def test_every_slot_has_a_look_in_every_harmony():
         assert look(harmony, "fabric", 0) != look(harmony, "fabric", 1)
 
 
+@pytest.mark.parametrize("harmony", HARMONIES)
+def test_no_cloth_of_furniture_is_nearly_as_bright_as_the_walls(harmony):
+    """The second one of some was: sofas of it glared white in the sun."""
+    bright, tones = np.array([0.2126, 0.7152, 0.0722]), HARMONIES[harmony]
+    for cloth in (tones.cloth, tones.cloth2):
+        assert bright @ linear(cloth) < 0.7 * bright @ linear(tones.wall)
+
+
 def test_fibres_run_along_the_longer_side_of_a_board():
     boards = [
         Block(centre=np.array([0, 0.5, 0.0]), half=np.array([0.02, 0.5, 0.02])),
