@@ -116,9 +116,9 @@ def best_boxes(
     best: tuple[Boxes, tuple[str, ...]] | None = None
     worth: tuple[float, ...] = ()
     ways = [(graph, PlaceConfig())]
-    if proposed and graph.room.openings:  # which make way for what is found quickly, or else for all
+    if proposed and graph.room.openings:  # which make way for the furniture
         bare = graph.replaced(room=graph.room.replaced(openings=()))
-        ways = [(graph, PlaceConfig(anew=0)), *ways, (bare, PlaceConfig())]
+        ways = [(graph, PlaceConfig(yields=frozenset(OF_OPENINGS))), (bare, PlaceConfig())]
     for start, count in draft_rounds(drafts):
         if best is not None and not any(worth):
             break

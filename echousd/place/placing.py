@@ -29,7 +29,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.place.distances import BED_LIT
 from echousd.place.geometry import DEFAULT_HEIGHT
 from echousd.place.report import collisions, outside
-from echousd.place.search import Arranged, Search
+from echousd.place.search import ANEW, Arranged, Search
 from echousd.place.setting import Setting, setting_of, stacked
 from echousd.place.solver import Conflict, PlaceConfig, conflicts, solve, unmet
 from echousd.tensors import stated_placements, triplets_of
@@ -184,15 +184,15 @@ def place_boxes(
 
         at = suited(at, at.size)
 
-        def searched(of: Setting, anew: int = config.anew) -> Arranged:
-            return Search(of.spread(), terms).run(anew)
+        def searched(of: Setting, anew: int = ANEW) -> Arranged:
+            return Search(of.spread(), terms, yields=config.yields).run(anew)
 
-        less = suited(at, smaller_sizes(at.categories, at.size, free)) if config.anew and fullness(at) > FULL else at
+        less = suited(at, smaller_sizes(at.categories, at.size, free)) if fullness(at) > FULL else at
         shrinks = not np.array_equal(less.size, at.size)
-        chosen = searched(at, 0 if shrinks else config.anew)
-        if chosen.cost > BAD and shrinks:
+        chosen = searched(at, 0 if shrinks else ANEW)
+        if chosen.wrong and chosen.cost > BAD and shrinks:
             other = searched(less)
-            if other.cost > BAD:
+            if other.wrong and other.cost > BAD:
                 chosen = searched(at)
             if other.cost < chosen.cost - WORTH:
                 at, chosen = less, other

@@ -27,6 +27,7 @@ from echousd.place.setting import Setting
 
 JUDGED = 48  # poses that are judged at once
 SWEEPS = 3  # times that what misses something is looked at after the first time
+ANEW = 3  # times that pieces are taken out and put in again
 BUDGET = 4500  # poses that are judged in all; each is a whole room
 GAIN = 1e-3  # by which a move must be better
 WORTH = 0.5  # that a sweep must gain for another one
@@ -54,24 +55,32 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Arranged:
-    """What was found: position (n, 3) float, metres, yaw (n,) float, radians; what it costs; poses judged."""
+    """What was found: position (n, 3) float, metres, yaw (n,) float, radians; what it costs; poses judged.
+
+    `wrong`: boxes that broken terms are about, the worst first.
+    """
 
     position: np.ndarray
     yaw: np.ndarray
     cost: float
     judged: int
+    wrong: tuple[int, ...]
 
 
 class Search:
-    """One search in a setting."""
+    """One search in a setting; for terms that yield it does not begin anew."""
 
-    def __init__(self, setting: Setting, terms: tuple[Term, ...] = TERMS, budget: int = BUDGET) -> None:
+    def __init__(
+        self, setting: Setting, terms: tuple[Term, ...] = TERMS, budget: int = BUDGET,
+        yields: frozenset[str] = frozenset(),
+    ) -> None:  # fmt: skip
         self.setting, self.budget, self.judged, self.walked = setting, budget, 0, False
         said = {int(number) for number in setting.triplets[:, 1]}
         words = {row.name for row in _predicates() if row.id in said}
         sizes = {row.name for row in _predicates() if row.measures == "size"} | {"scale"}  # which no pose changes
         told = words | {"placed"}
         self.terms = tuple(t for t in terms if t.name not in sizes and (t.kind != "relations" or t.name in told))
+        self.firm = torch.tensor([term.name not in yields for term in self.terms])
         self.rooms: dict[bytes, Plan] = {}
         self.looks: list[np.ndarray] = []
         self.urgent: list[int] = []
@@ -125,7 +134,8 @@ class Search:
                 self.looks, every = [looks.numpy() for looks, _ in rows], [found for _, found in rows]
             seen, paid = priced(list(zip(self.terms, every, strict=True)), room)
             total = float(paid.sum())
-            for row in (paid > 0.5).nonzero()[:, 0].tolist():
+            firm = self.firm.repeat_interleave(torch.tensor([len(found.who) for found in every]))
+            for row in (firm & (paid > 0.5)).nonzero()[:, 0].tolist():
                 for box in {int(seen.who[row]), int(seen.other[row])} - {-1}:
                     worst[box] = worst.get(box, 0.0) + float(paid[row])
         lost = self._unreached(state.position, state.yaw)
@@ -477,7 +487,7 @@ class Search:
                 break
         return state, total, wrong
 
-    def run(self, anew: int) -> Arranged:
+    def run(self, anew: int = ANEW) -> Arranged:
         """The best state that the budget finds, pieces taken out and put in again so many times."""
         setting = self.setting
         n = len(setting.size)
@@ -503,7 +513,7 @@ class Search:
             cost, still = self.faults(after)
             if cost < total - GAIN:
                 state, total, wrong = self.mended(after, cost, still)
-        return Arranged(state.position, state.yaw, total, self.judged)
+        return Arranged(state.position, state.yaw, total, self.judged, tuple(wrong))
 
 
 def priced(rows_of: Sequence[tuple[Term, Found]], room: Plan) -> tuple[Found, torch.Tensor]:

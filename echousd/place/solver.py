@@ -46,7 +46,7 @@ class PlaceConfig:
         arrange: first choose for every piece among the places that a person would try; False = only by millimetres.
         rounds: most linearisations in one attempt; patience: how many of them without progress end it.
         budget: most linearisations in all attempts together: what a room may cost, the same on every machine.
-        anew: how often pieces are taken out and put in again where something is still missed; 0 = nor made smaller.
+        yields: names of terms that the search sees, but for which it does not begin anew: doors that may be moved.
         without: names of terms of the objective that the search does not see, so that others can judge by them.
     """
 
@@ -56,9 +56,9 @@ class PlaceConfig:
     slack: float = 0.004
     rounds: int = 16
     arrange: bool = True
-    anew: int = 3
     patience: int = 6
     budget: int = 26
+    yields: frozenset[str] = frozenset()
     without: frozenset[str] = frozenset()
 
 

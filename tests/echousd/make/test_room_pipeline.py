@@ -337,10 +337,9 @@ def test_options_that_are_stated_are_not_those_of_the_other_stage(tmp_path):
 @pytest.mark.parametrize(
     ("proposed", "kept", "tried"),
     [
-        (True, 0, [(1, 0)]),  # what is found quickly is good
-        (True, 1, [(1, 0), (1, 3)]),
-        (True, 9, [(1, 0), (1, 3), (0, 3)]),
-        (False, 9, [(1, 3)]),  # openings that somebody stated do not make way
+        (True, 0, [(1, {"door_free", "window_free"})]),
+        (True, 9, [(1, {"door_free", "window_free"}), (0, set())]),
+        (False, 9, [(1, set())]),  # openings that somebody stated do not make way
     ],
 )
 def test_openings_that_nobody_stated_make_way_for_furniture(monkeypatch, proposed, kept, tried):
@@ -350,7 +349,7 @@ def test_openings_that_nobody_stated_make_way_for_furniture(monkeypatch, propose
     asked = []
 
     def finished(graph, boxes, styles, place, timer, config):
-        asked.append((len(graph.room.openings), config.anew))
+        asked.append((len(graph.room.openings), config.yields))
         return boxes, ()
 
     monkeypatch.setattr(layouts, "finished_boxes", finished)

@@ -10,6 +10,7 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.objective import TERMS, plan_of
+from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, margins
 from echomodel.rules.placements import Stated
@@ -178,11 +179,28 @@ def test_what_stands_on_a_nightstand_comes_with_it_to_its_bed():
     assert after.position[3, [0, 2]] == pytest.approx(after.position[1, [0, 2]], abs=0.01)
 
 
+def test_a_door_that_may_make_way_is_no_reason_to_begin_anew():
+    none, door = np.zeros(1, bool), Opening("door", "door", 0, 0.75, 0.9, 2.0, 0.0)
+    setting = setting_of(
+        ["wardrobe"], np.array([(2.4, 2.2, 0.6)]), np.zeros((1, 3)), np.zeros(1), np.zeros((0, 3), int),
+        floor_polygon=FLOOR * (0.5, 0.3), height=2.7, fixed=none, rigid=~none, turned=none, openings=(door,),
+    )  # fmt: skip
+    firm = Search(setting.spread(), tuple(term for term in TERMS if term.name in ("door_free", "on_floor")))
+    found = firm.run()
+    assert found.wrong == (0,)
+    late = Search(setting.spread(), firm.terms, yields=frozenset({"door_free"}))
+    sooner = late.run()
+    assert sooner.wrong == ()
+    assert sooner.cost > 1.0  # it is seen all the same
+    assert late.faults(State(sooner.position, sooner.yaw, np.zeros(1)))[0] == pytest.approx(sooner.cost)
+    assert sooner.judged < found.judged
+
+
 def test_what_is_fixed_or_turned_is_not_moved():
     words = ["double_bed", "nightstand", "wardrobe"]
     size, drawn = [(1.6, 1.0, 2.0), (0.5, 0.5, 0.4), (1.5, 2.2, 0.6)], [(0, 0, 0.3), (1.0, 0, 1.5), (0.5, 0, 0.2)]
     search, _ = searched(words, size, drawn, [0.7, 1.0, 1.5], fixed=[0], turned=[2])
-    found = search.run(3)
+    found = search.run()
     assert found.position[0].tolist() == [0, 0, 0.3]
     assert found.yaw[[0, 2]].tolist() == [0.7, 1.5]
 
@@ -193,7 +211,7 @@ def test_no_more_poses_are_judged_than_were_allowed():
         words, [(2.0, 1, 2.2), *[(1.8, 2.2, 0.6)] * 5], np.zeros((6, 3)), np.zeros(6), floor=0.6 * FLOOR
     )
     search.budget = 100
-    found = search.run(3)
+    found = search.run()
     assert found.judged < 100 + 150  # the move that was begun
     assert search.faults(State(found.position, found.yaw, np.zeros(6)))[0] == pytest.approx(found.cost)
 
