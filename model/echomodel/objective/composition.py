@@ -34,7 +34,8 @@ def floor_used(plan: Plan) -> Found:
     out = nobody(plan.size)
     for scenes, area, points, walls in floor_points(plan):
         there, far, gap, nearest = floor_gaps(plan, scenes, points)
-        limit = bare_limit(area, there.shape[1])
+        rows = int(plan.stands("row")[there[0]].sum())  # a row of units is one piece
+        limit = bare_limit(area, there.shape[1] - max(rows - 1, 0))
         inner = walls[far] > limit
         if not bool(inner.any()):  # no circle of that size fits in
             continue
