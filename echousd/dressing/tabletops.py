@@ -125,7 +125,7 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
     return np.array([*lines, *areas], object)
 
 
-VOLUMES = 9  # kinds of single books that a row is of
+VOLUMES = 7  # kinds of single books that a row is of
 BETWEEN = 0.002  # metres from book to book
 EYE = 1.7  # metres: what is put higher cannot be seen
 CASES = ("cabinet", "shelf")  # looks of what books and baskets stand in and on: no cistern, no fridge
@@ -176,10 +176,12 @@ def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
 
 def _television(setting: Setting, host: Standing, surface: Surface) -> None:
     """A television in the middle of its stand, as wide as looks good on it."""
+    variant = int(setting.rng("television").integers(1 << 30))
+    spots = ((0.0, -0.3), (0.0, 0.0), (0.2, 0.0), (-0.2, 0.0))
     for share in (0.6, 0.5, 0.4):
         wide = round(min(share * float(host.size[0]), KINDS["television"].high[0]), 2)
         size = np.array([wide, round(0.56 * wide + 0.045, 3), 0.2])
-        if surface.put(setting, "television", ((0.0, -0.3), (0.0, 0.0), (0.2, 0.0), (-0.2, 0.0)), size=size, variant=0):
+        if surface.put(setting, "television", spots, size=size, variant=variant):
             return
 
 

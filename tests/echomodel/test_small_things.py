@@ -5,6 +5,7 @@ import pytest
 import trimesh
 
 from echomodel.dressing import KINDS, thing, usual_size
+from echomodel.dressing.books import bound
 from echomodel.furniture.assembly import pieces_of
 
 
@@ -27,3 +28,17 @@ def test_programs_draw_in_about_the_size_that_was_asked_for(kind):
     size = usual_size(kind, rng)
     points = np.concatenate([piece.vertices for piece in pieces_of(thing(kind, size, rng))])
     assert np.ptp(points, axis=0) == pytest.approx(size, rel=0.35), "stretched by a third"
+
+
+@pytest.mark.parametrize(
+    ("kind", "least"),
+    [("book", 30), ("glass", 6), ("remote", 4), ("television", 3), ("socket", 4), ("cushion", 8), ("ledge", 4)],
+)
+def test_what_many_rooms_have_is_of_many_forms(kind, least):
+    """Forms differ in a box of one metre, to 2 %, as repetition is counted."""
+    found = set()
+    for seed in range(48):
+        size = bound(seed) if kind == "book" else np.array(KINDS[kind].low)
+        points = np.concatenate([p.vertices for p in pieces_of(thing(kind, size, np.random.default_rng(seed)), size)])
+        found.add(np.round((points - points.min(0)) / np.ptp(points, axis=0) / 0.02).astype(int).tobytes())
+    assert len(found) >= least

@@ -33,22 +33,23 @@ BOUND = 400  # kinds of single books, of which a room has a few, so that a wall 
 
 def bound(number: int) -> np.ndarray:
     """(3,) float, metres: extents of single book `number`, 0 to `BOUND` - 1."""
-    thick, tall, deep = np.random.default_rng(number).uniform((0.014, 0.17, 0.62), (0.044, 0.26, 0.75))
+    thick, tall, deep = np.random.default_rng([number, 1]).uniform((0.014, 0.17, 0.62), (0.044, 0.26, 0.75))
     return np.round([thick, tall, tall * deep], 3)
 
 
 def book(size: Size, rng: np.random.Generator) -> list[Solid]:
     """One book upright, its spine to the front: in paper, between boards, or these with a round back."""
     (w, h, d), cover, kind = size, str(rng.choice(COVERS)), rng.random()
-    if kind < 0.4:
-        edge, spine = float(rng.uniform(0.001, 0.002)), float(rng.uniform(0.0005, 0.002))
+    if kind < 0.3:
+        edge, spine = float(rng.uniform(0.0006, 0.0045)), float(rng.uniform(0.0005, 0.004))
         inner = box((edge - w / 2, 0, -d / 2), (w / 2 - edge, h, d / 2 - edge), "paper")
         sides = [box((x - edge, 0, -d / 2), (x, h, d / 2), cover) for x in (edge - w / 2, w / 2)]
         return [*sides, box((-w / 2, 0, d / 2 - 2 * edge), (w / 2, h, d / 2), cover, spine), inner]
-    if kind < 0.7:
-        return _upright(-w / 2, w, h, d, d, cover)
+    board, over = rng.uniform((0.0016, 0.002), (0.005, 0.008))
+    if kind < 0.65:
+        return _upright(-w / 2, w, h, d, d, cover, board, over)
     back = float(rng.uniform(0.003, 0.006))
-    whole = _upright(-w / 2, w, h, d - back, d - 2 * back, cover)
+    whole = _upright(-w / 2, w, h, d - back, d - 2 * back, cover, board, over)
     steps = ((0.43, 0.6), (0.3, 1.0))  # half widths and how far before the boards
     return whole + [box((-x * w, 0, d / 2 - 2 * back), (x * w, h, d / 2 - (1 - out) * back), cover) for x, out in steps]
 
@@ -58,14 +59,16 @@ def books_in(width: float) -> int:
     return max(1, int(width / 0.03))
 
 
-def _upright(at: float, thick: float, tall: float, deep: float, d: float, cover: str) -> list[Solid]:
+def _upright(
+    at: float, thick: float, tall: float, deep: float, d: float, cover: str, board: float = COVER, over: float = 0.003
+) -> list[Solid]:
+    """A book between boards that reach `over` metres beyond its pages, spine and boards in one."""
     front = d / 2
-    # the block of pages stands back from the covers; spine and covers are one board bent round it
-    pages = box((at + COVER, 0.003, front - deep + 0.003), (at + thick - COVER, tall - 0.004, front - COVER), "paper")
+    pages = box((at + board, over, front - deep + over), (at + thick - board, tall - over, front - board), "paper")
     return [
-        box((at, 0, front - deep), (at + COVER, tall, front), cover),
-        box((at + thick - COVER, 0, front - deep), (at + thick, tall, front), cover),
-        box((at, 0, front - COVER), (at + thick, tall, front), cover, 0.0012),
+        box((at, 0, front - deep), (at + board, tall, front), cover),
+        box((at + thick - board, 0, front - deep), (at + thick, tall, front), cover),
+        box((at, 0, front - board), (at + thick, tall, front), cover, 0.0012),
         pages,
     ]
 

@@ -131,10 +131,12 @@ def test_all_windows_of_a_room_have_the_same_curtains_and_rooms_differ():
     assert found >= set(walls.CURTAINS)
 
 
+@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("kind", walls.WALL_SHELVES)
-def test_shelves_on_walls_carry_books_and_something_beside(kind, monkeypatch):
+def test_shelves_on_walls_carry_books_and_something_beside(kind, seed, monkeypatch):
+    """Of whichever form they are."""
     monkeypatch.setattr(walls, "WALL_SHELVES", (kind,))
-    room = setting()
+    room = setting(seed=seed)
     room.full = True
     walls.shelves(room)
     board = next(thing for thing in room.placed if thing.kind == kind)
