@@ -168,7 +168,6 @@ AROUND = 0.7  # metres: chairs further from their table are not at it
 CIRCLE = math.radians(100.0)  # a sofa is turned so far at most from the middle of its group
 BEFORE = 0.8  # metres before the larger sofa, where the middle of the group is
 NEAR = 3.0  # metres: a sofa further away stands for itself
-ROW = 0.7  # metres by which one sofa may stand before another that looks the same way
 COVERS = 0.12  # share of a sofa's width that side tables and lamps may stand before
 AHEAD = 0.1  # metres that their middles may lie before its front: 97 % of real ones lie less
 SIDE = 0.6  # metres: what is further from its seat stands for itself
@@ -287,15 +286,13 @@ def chairs_level(plan: Plan) -> Found:
 
 
 def sofas_in_circle(plan: Plan) -> Found:
-    """A second sofa looks into the group of the first, or stands in a row with it."""
+    """A second sofa looks into the group of the first."""
     i, j = plan.attended("with")
     near = plan.apart(i, j).detach() < NEAR
     i, j = i[near], j[near]
     middle = plan.position[j][:, [0, 2]] + plan.axes(j)[1] * (plan.size[j, 2] / 2 + BEFORE)[:, None]
-    off, ahead = facing_angle(*plan.seen(i, middle)), plan.local(i, j)[1].abs()
-    alike = ((plan.yaw[i] - plan.yaw[j]).cos() > 0.7).detach()
-    margin = torch.stack([CIRCLE - off, torch.where(alike, ROW - ahead, FAR)], -1)
-    return _first_of(i, j, margin, torch.stack([torch.rad2deg(off), ahead], -1))
+    off = facing_angle(*plan.seen(i, middle))
+    return found(i, CIRCLE - off, other=j, measure=torch.rad2deg(off))
 
 
 def at_its_side(plan: Plan) -> Found:
