@@ -83,7 +83,7 @@ def cafe_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     w, h, d = size
     rod = tube([(-w / 2, h - 0.012, 0), (w / 2, h - 0.012, 0)], 0.006, "metal")
     within = np.array([0.97 * w, h - 0.02, d])
-    cloth = _hung(within, rng, 0.5 * FOLD, top=0.7, drift=0.3, narrow=0.0, material="sheer")
+    cloth = _hung(within, rng, 0.75 * FOLD, top=0.7, drift=0.3, narrow=0.0, material="sheer")
     return [*cloth, *_rings(np.array([w, h, d]), FOLD), rod]
 
 
