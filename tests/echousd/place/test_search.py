@@ -253,3 +253,13 @@ def test_margins_of_many_poses_are_those_of_one_after_the_other():
             fronts=torch.from_numpy(setting.fronts),
         )  # fmt: skip
         np.testing.assert_allclose(found[k], alone.numpy(), atol=1e-9)
+
+
+def test_what_stands_at_a_leafs_edge_is_moved_a_hand_away_from_it():
+    door = Opening("door", "door", 3, 0.3, 0.9, 2.0)  # the left wall, z from 0.8 to 1.7; the leaf reaches x = -1.6
+    done = place_boxes(
+        ["sideboard"], np.array([(1.2, 0.9, 0.4)]), np.array([(-1.0, 0.0, 1.78)]), np.array([np.pi]), np.zeros((0, 3)),
+        floor_polygon=FLOOR, height=2.7, openings=(door,),
+    )  # fmt: skip
+    assert done.position[0, 0] - done.size[0, 0] / 2 > -1.5
+    assert done.position[0, 0] < 0.5  # no further than it must
