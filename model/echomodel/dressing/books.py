@@ -1,4 +1,4 @@
-"""Books: single ones, rows, stacks, magazines, a notebook."""
+"""Books: single ones, rows, stacks, a notebook."""
 
 from __future__ import annotations
 
@@ -88,21 +88,11 @@ def book_stack(size: Size, rng: np.random.Generator) -> list[Solid]:
     return parts
 
 
-def magazine(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """One or two magazines."""
-    w, h, d = size
-    turn = rotation(y=float(rng.uniform(0.1, 0.3)))
-    return [
-        Block(centre=np.array([0, h / 4, 0]), half=np.array([w, h / 2, d]) / 2, material="paper"),
-        Block(centre=np.array([0, 3 * h / 4, 0]), half=np.array([w, h / 2, d]) / 2, turn=turn, material="book_b"),
-    ]
-
-
 def notebook(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A closed notebook, thick or thin, with a pencil on it."""
     w, h, d = size
     book = h * float(rng.uniform(0.45, 0.7))
-    parts = _flat(0.0, book, w, d, rotation(), str(rng.choice(("book_a", "book_b", "book_c", "book_d"))))
+    parts = _flat(0.0, book, w, d, rotation(), str(rng.choice(COVERS)))
     r, turn = (h - book) / 2, rotation(y=float(rng.uniform(-0.5, 0.5)))
     return [*parts, Block(np.array([w * 0.12, book + r, 0]), turn, "frame", half=np.array([r, r, d * 0.36]))]
 

@@ -1,4 +1,4 @@
-"""What is turned or thrown (vases, bowls, cups, baskets), and what stands and lies on floors: tall plants, toys."""
+"""What is turned or thrown (vases, bowls, cups), and what stands and lies on floors: tall plants, toys."""
 
 from __future__ import annotations
 
@@ -123,30 +123,10 @@ def cup(size: Size, rng: np.random.Generator) -> list[Solid]:
     return [_moved(part, (centre, 0, 0)) for part in parts]
 
 
-def basket(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A woven basket with a blanket in it."""
-    w, h, d = size
-    parts: list[Solid] = [vessel(_outline([0.8, 0.95, 1.0, 0.97], np.array([w, h * 0.9, d])), 0.012, "wicker")]
-    for x, z, tall in ((-0.1, 0.06, 1.0), (0.12, -0.05, 0.94)):
-        half = np.array([w * 0.24, h * 0.22, d * 0.26])
-        centre = np.array([x * w, h * tall - half[1], z * d])
-        parts.append(ball(centre, half, "accent_cloth", power=2.6))
-    return parts
-
-
 def _moved(part: Solid, by: tuple[float, float, float]) -> Solid:
     from dataclasses import replace
 
     return replace(part, centre=part.centre + np.array(by))
-
-
-def plates(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A pile of plates, a bowl or two on top."""
-    w, h, d = size
-    count = max(2, int(h * 0.6 / 0.012))
-    one, top = vessel(_outline([0.55, 0.7, 0.95, 1.0], np.array([w, 0.016, d])), 0.004, "enamel", 0.25), 0.012 * count
-    cups = vessel(_outline([0.42, 0.7, 0.9, 1.0], np.array([0.6 * w, h - top, 0.6 * d])), 0.005, "ceramic")
-    return [*(_moved(one, (0.0, 0.012 * number, 0.0)) for number in range(count)), _moved(cups, (0.0, top, 0.0))]
 
 
 def floor_plant(size: Size, rng: np.random.Generator) -> list[Solid]:
