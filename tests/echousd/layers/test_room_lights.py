@@ -14,8 +14,10 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.graph import RoomSpec
-from echousd.layers.lights import ASIDE, ELEVATION, image_files
+from echousd.layers.cameras import room_volume
+from echousd.layers.lights import ASIDE, ELEVATION, image_files, write_lights
 from echousd.options import RoomOptions
+from echousd.stage.pen import Pen
 
 WINDOW = Opening("window", "window", 0, 0.8, 1.4, 1.3, 0.9)  # in the wall at -z
 
@@ -129,6 +131,63 @@ def test_lamps_shine_where_they_are(stage) -> None:
     candela = light.GetIntensityAttr().Get() * 30 / 4
     stage.GetPrimAtPath("/Room").GetVariantSets().SetSelection("light", "day")
     assert candela == pytest.approx(1500 / (4 * np.pi), rel=1e-3)  # 1,500 lumens all round
+
+
+@pytest.mark.parametrize(
+    ("lamps", "lit"),
+    [
+        (("lamp",), {"evening": 85.0, "night": 75.0}),  # the panel gives what one lamp does not
+        (("lamp", "pendant"), {"evening": 1950 / 13.6 + 20, "night": 1950 / 13.6 + 20}),  # and a little in any case
+    ],
+)
+def test_evenings_and_nights_are_as_bright_as_people_have_them(lamps, lit) -> None:
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), height=2.5, openings=(WINDOW,)))
+    for name in {"lamp", "pendant"} - {*lamps}:
+        graph = graph.remove_node(name)
+    stage = lights_of(graph)
+    fallen = {name: lumens(stage, name) for name in ("day", "evening", "night")}
+    assert {name: fallen[name] for name in lit} == pytest.approx(lit, rel=1e-3)
+    panel = UsdLux.RectLight(stage.GetPrimAtPath("/Room/Lights/ceiling"))
+    size = panel.GetWidthAttr().Get() * panel.GetHeightAttr().Get()
+    height = panel.GetPrim().GetAttribute("xformOp:translate").Get()[1] + 0.02
+    assert intensity(stage, "ceiling") == pytest.approx(0.12 * 1.6 * height**2 / size, rel=1e-3)
+
+
+def test_where_many_lamps_shine_a_camera_exposes_less() -> None:
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), height=2.5, openings=(WINDOW,)))
+    one = intensity(evening(lights_of(graph)), "lamp_pendant")
+    for number in range(3):
+        graph = graph.add_node(f"more_{number}", "pendant_lamp")
+    stage = evening(lights_of(graph))
+    told = 4 * 1500 + 450  # lumens
+    assert intensity(stage, "lamp_pendant") == pytest.approx(one * 160 / (told / 13.6), rel=1e-3)
+    assert intensity(stage, "sky") == pytest.approx(0.5 * 1.4 * 0.16 * 160 / (told / 13.6), rel=1e-2)
+
+
+def lights_of(graph) -> Usd.Stage:
+    """A stage of the lights of a room that is not drawn by a network."""
+    options = RoomOptions(walls=True, ceiling=False, dress="none")
+    room = echousd.generate(graph, model=StandIn(), place=False, shapes="boxes", options=options)
+    stage = Usd.Stage.CreateInMemory()
+    write_lights(Pen(stage.GetRootLayer()), room, room_volume(room))
+    return stage
+
+
+def evening(stage: Usd.Stage) -> Usd.Stage:
+    stage.GetPrimAtPath("/Room").GetVariantSets().SetSelection("light", "evening")
+    return stage
+
+
+def lumens(stage: Usd.Stage, time: str) -> float:
+    """What panel and lamps throw on a square metre of a floor of 4 x 3.4 m; the variant of the day is left chosen."""
+    times = stage.GetPrimAtPath("/Room").GetVariantSets().GetVariantSet("light")
+    times.SetVariantSelection(time)
+    panel = UsdLux.RectLight(stage.GetPrimAtPath("/Room/Lights/ceiling"))
+    size = panel.GetWidthAttr().Get() * panel.GetHeightAttr().Get()
+    lamps = [prim.GetName() for prim in stage.GetPrimAtPath("/Room/Lights").GetChildren() if "lamp_" in prim.GetName()]
+    total = intensity(stage, "ceiling") * size + sum(intensity(stage, lamp) for lamp in lamps)
+    times.SetVariantSelection("day")
+    return total * np.pi * 30 / 13.6
 
 
 def test_bulbs_are_where_their_lamps_are_in_every_layout(tmp_path) -> None:
