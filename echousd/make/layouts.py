@@ -37,6 +37,7 @@ ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or
 CROWD = 160  # objects of all drafts together, unless somebody says how many drafts
 MAX_OBJECTS = 200  # of one room: up to here time grows no faster than their number, 400 take six times that of 200
 TALL, GLARE = 2.0, 0.03  # metres a screen counts as high before a window, and square metres of it that are too much
+DEFAULTS = PlaceConfig()
 OF_OPENINGS = ("door_free", "window_free")  # living rules
 DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
 
@@ -115,10 +116,10 @@ def best_boxes(
     """
     best: tuple[Boxes, tuple[str, ...]] | None = None
     worth: tuple[float, ...] = ()
-    ways = [(graph, PlaceConfig())]
+    ways = [(graph, DEFAULTS)]
     if proposed and graph.room.openings:  # which make way for the furniture
         bare = graph.replaced(room=graph.room.replaced(openings=()))
-        ways = [(graph, PlaceConfig(yields=frozenset(OF_OPENINGS))), (bare, PlaceConfig())]
+        ways = [(graph, PlaceConfig(yields=frozenset(OF_OPENINGS))), (bare, DEFAULTS)]
     for start, count in draft_rounds(drafts):
         if best is not None and not any(worth):
             break
@@ -181,8 +182,9 @@ def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int |
 
 
 def finished_boxes(
-    graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], place: bool, timer: StageTimer, config: PlaceConfig
-) -> tuple[Boxes, tuple[str, ...]]:
+    graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], place: bool, timer: StageTimer,
+    config: PlaceConfig = DEFAULTS,
+) -> tuple[Boxes, tuple[str, ...]]:  # fmt: skip
     """Sampled boxes after equal sizes within style groups and, if wanted, placing; and demands in conflict."""
     boxes = _alike(graph, _mounted(graph, boxes), styles)
     if not place:
