@@ -128,16 +128,18 @@ def best_boxes(
         ):
             if sized is not None:
                 draft = Boxes(sized.size, draft.position, draft.yaw)
+            tried = []
             for room, config in ways:
                 found = finished_boxes(room, draft, styles, place, timer, config)
                 if drafts == 1 or not place:
                     return found
                 with timer.stage("place"), one_thread():
-                    wrong = _wishes(graph, found, draws.seed if proposed else None)
-                if best is None or wrong < worth:
-                    best, worth = found, wrong
+                    tried.append(_wishes(graph, found, draws.seed if proposed else None))
+                if best is None or tried[-1] < worth:
+                    best, worth = found, tried[-1]
                 if not any(worth):
                     break
+            ways = ways[: 1 + (tried[-1] < tried[0])]  # if the second is no better, it is not tried again
             if not any(worth):
                 break
     assert best is not None

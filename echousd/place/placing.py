@@ -192,10 +192,10 @@ def place_boxes(
         chosen = searched(at, 0 if shrinks else ANEW)
         if chosen.wrong and chosen.cost > BAD and shrinks:
             other = searched(less)
-            if other.wrong and other.cost > BAD:
-                chosen = searched(at)
             if other.cost < chosen.cost - WORTH:
                 at, chosen = less, other
+            elif other.wrong and other.cost > BAD:
+                chosen = searched(at)
         hung = hung_lamps(at.categories, at.size, chosen.position, chosen.yaw, free)
         at = posed(hung, chosen.position, chosen.yaw, kept)
     found = solve(at, config)

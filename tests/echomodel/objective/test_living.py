@@ -230,8 +230,10 @@ KEPT = [
     (with_one(DINING, "lamp", kind="floor_lamp", size=(0.3, 1.6, 0.3), at=(-0.9, -0.5)), ("lamp", "not_alone")),
     (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.0, 0.7)), ("plant", "plant_aside")),
     (STUDY.moved("desk", at=(2.1, -0.5)), ("desk", "desk_at_wall")),
-    (Room({**STUDY.moved("desk", at=(0.0, -0.5)).things, "a": STUDY.things["chair"], "b": STUDY.things["chair"]}),
-     ("desk", "desk_at_wall")),  # three sit around it
+    (
+        Room({**STUDY.moved("desk", at=(0.0, -0.5)).things, "a": STUDY.things["chair"], "b": STUDY.things["chair"]}),
+        ("desk", "desk_at_wall"),
+    ),  # three sit around it
     (STUDY.moved("desk", at=(0.0, 0.2)), ("desk", "desk_at_wall")),  # who sits there has a wall at the back
     (Room({"a": ARMCHAIR, "b": {**ARMCHAIR, "at": (-1.0, 1.0)}}), ("a", "loungers_together")),
 ]

@@ -334,15 +334,19 @@ def test_options_that_are_stated_are_not_those_of_the_other_stage(tmp_path):
         echousd.RoomOptions(room_path="World")
 
 
+FIRM, LATE = (1, set()), (1, {"door_free", "window_free"})  # windows, and terms that yield
+
+
 @pytest.mark.parametrize(
-    ("proposed", "kept", "tried"),
+    ("proposed", "faults", "tried"),
     [
-        (True, 0, [(1, {"door_free", "window_free"})]),
-        (True, 9, [(1, {"door_free", "window_free"}), (0, set())]),
-        (False, 9, [(1, set())]),  # openings that somebody stated do not make way
+        (True, [0], [LATE]),
+        (True, [3, 2, 2, 2], [LATE, (0, set()), LATE, (0, set())]),
+        (True, [2, 3, 2], [LATE, (0, set()), LATE]),  # to leave windows out did not help: not once more
+        (False, [3, 2], [FIRM, FIRM]),  # openings that somebody stated do not make way
     ],
 )
-def test_openings_that_nobody_stated_make_way_for_furniture(monkeypatch, proposed, kept, tried):
+def test_openings_that_nobody_stated_make_way_for_furniture(monkeypatch, proposed, faults, tried):
     graph = small_graph()
     window = Opening("window", "window", 1, 1.0, 0.9, 1.2, 0.9)
     graph = graph.replaced(room=graph.room.replaced(size=(4.0, 3.4), floor_polygon=None, openings=(window,)))
@@ -353,7 +357,6 @@ def test_openings_that_nobody_stated_make_way_for_furniture(monkeypatch, propose
         return boxes, ()
 
     monkeypatch.setattr(layouts, "finished_boxes", finished)
-    monkeypatch.setattr(layouts, "_wishes", lambda *_: (len(asked) <= kept, 0, 0, 0))
-    monkeypatch.setattr(layouts, "draft_rounds", lambda drafts: [(0, 1)])
+    monkeypatch.setattr(layouts, "_wishes", lambda *_: (faults[len(asked) - 1],))
     layouts.best_boxes(StandIn(), graph, {}, layouts.Draws(seed=1), drafts=2, proposed=proposed, timer=StageTimer())
     assert asked == tried

@@ -70,7 +70,7 @@ def test_plants_have_no_pose_that_leaves_the_floor(size: tuple[float, float, flo
     assert depth_inside(found.floor, corners.reshape(-1, 2)).min() > -1e-6
 
 
-@pytest.mark.parametrize(("rigid", "times"), [(True, 1), (False, 3)])  # quickly, smaller, then thoroughly as it is
+@pytest.mark.parametrize(("rigid", "times"), [(True, 1), (False, 2)])  # quickly, then smaller, which is better
 def test_a_full_room_is_not_arranged_again_where_nothing_may_shrink(monkeypatch, rigid: bool, times: int) -> None:
     run, calls = Search.run, []
     monkeypatch.setattr(Search, "run", lambda search, anew: calls.append(search) or run(search, anew))
