@@ -32,8 +32,12 @@ def one_thread() -> Iterator[None]:
 
 
 def rounded_boxes(graph: SceneGraph, boxes: Boxes) -> Boxes:
-    """The boxes in tenths of a millimetre and hundredths of a degree; what the graph fixes stays exactly as given."""
-    turn = np.deg2rad(_round(np.rad2deg(np.asarray(boxes.yaw, float)), ANGLE))
+    """The boxes in tenths of a millimetre and hundredths of a degree, turned by half a turn at most.
+
+    What the graph fixes stays exactly as given.
+    """
+    degrees = np.rad2deg(np.asarray(boxes.yaw, float))
+    turn = np.deg2rad(_round(degrees - 360 * np.round(degrees / 360.01), ANGLE))  # half a turn keeps its sign
     size = np.maximum(_round(np.asarray(boxes.size, float), LENGTH), LENGTH)
     position = _round(np.asarray(boxes.position, float), LENGTH)
     for i, node in enumerate(graph.nodes):

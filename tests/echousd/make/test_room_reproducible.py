@@ -88,6 +88,15 @@ def test_stages_hand_on_rounded_numbers():
     assert float(torch.rad2deg(one.yaw)[0]) == pytest.approx(90.0, abs=1e-4)
 
 
+@pytest.mark.parametrize(("drawn", "written"), [(-269.56, 90.44), (450.0, 90.0), (180.0, 180.0), (-180.0, -180.0)])
+def test_nothing_is_turned_by_more_than_half_a_turn(drawn, written):
+    graph = small_graph()
+    graph = graph.replaced(nodes=graph.nodes[:1], relations=())
+    yaw = torch.deg2rad(torch.tensor([drawn]))
+    found = rounded_boxes(graph, Boxes(torch.ones(1, 3), torch.ones(1, 3), yaw))
+    assert float(torch.rad2deg(found.yaw)[0]) == pytest.approx(written, abs=1e-3)
+
+
 def test_what_the_graph_fixes_is_not_rounded():
     graph = small_graph()
     bed = graph.nodes[0].replaced(size=(1.23456, 0.5, 2.0), position=(0.123456, 0.0, 0.0), yaw=0.123456)
