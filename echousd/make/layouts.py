@@ -38,7 +38,7 @@ CROWD = 160  # objects of all drafts together, unless somebody says how many dra
 MAX_OBJECTS = 200  # of one room: up to here time grows no faster than their number, 400 take six times that of 200
 TALL, GLARE = 2.0, 0.03  # metres a screen counts as high before a window, and square metres of it that are too much
 DEFAULTS = PlaceConfig()
-OF_OPENINGS = ("door_free", "window_free")  # living rules
+OF_OPENINGS = frozenset({"door_free", "window_free"})  # terms
 DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
 
 
@@ -119,7 +119,7 @@ def best_boxes(
     ways = [(graph, DEFAULTS)]
     if proposed and graph.room.openings:  # which make way for the furniture
         bare = graph.replaced(room=graph.room.replaced(openings=()))
-        ways = [(graph, PlaceConfig(yields=frozenset(OF_OPENINGS))), (bare, DEFAULTS)]
+        ways = [(graph, PlaceConfig(yields=OF_OPENINGS)), (bare, DEFAULTS)]
     for start, count in draft_rounds(drafts):
         if best is not None and not any(worth):
             break

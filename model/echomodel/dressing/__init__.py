@@ -55,7 +55,7 @@ def _kinds() -> dict[str, Kind]:
     rows = tomllib.loads(resources.files(__name__).joinpath("things.toml").read_text("utf-8"))
     made = {}
     for name, row in rows.items():
-        forms = row.pop("forms", None) or [parts for parts in (row.pop("parts", ()),) if parts]
+        forms = row.pop("forms", [row.pop("parts")] if "parts" in row else [])
         program = form(forms) if forms else Late(f"{__name__}.{row.pop('module')}:{name}")
         made[name] = Kind(program=program, low=tuple(row.pop("low")), high=tuple(row.pop("high")), **row)
     for name, row in PRINTS.items():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, box
@@ -120,13 +122,7 @@ def cup(size: Size, rng: np.random.Generator) -> list[Solid]:
     loop = np.stack([radius * 0.95 + (w - d) * np.cos(turn), h * (0.52 + 0.3 * np.sin(turn)), 0 * turn], 1)
     coffee = Lathe(profile=np.array([[radius * 0.92, h * 0.5], [radius * 0.92, h * 0.78]]), material="soil")
     parts = [body, tube(loop, 0.0045, "ceramic"), coffee]
-    return [_moved(part, (centre, 0, 0)) for part in parts]
-
-
-def _moved(part: Solid, by: tuple[float, float, float]) -> Solid:
-    from dataclasses import replace
-
-    return replace(part, centre=part.centre + np.array(by))
+    return [replace(part, centre=part.centre + np.array([centre, 0, 0])) for part in parts]
 
 
 def floor_plant(size: Size, rng: np.random.Generator) -> list[Solid]:

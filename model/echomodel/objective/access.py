@@ -13,7 +13,7 @@ from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_
 CROOKED = math.radians(5.0)  # 98 to 100 % of such furniture in real rooms is turned less
 TOUCHING = 0.3  # metres: 93 % of real beds, nightstands and tv stands have a smaller gap behind
 NEAR_WALL, BEHIND = 0.4, 1.5  # metres between a wall and the nearest side of a desk, or its front with who sits there
-AROUND = 3  # chairs that make a dining table of a desk
+DINERS = 3  # chairs that make a dining table of a desk
 PASSAGE = 0.75  # metres: a sofa so far from the wall may stand in the room on purpose, one walks behind it
 DEEP = 6.0  # metres of the room along its axis from which on it does; or something of another group stands behind it
 
@@ -72,7 +72,7 @@ def desk_at_wall(plan: Plan) -> Found:
     """A desk has a side near a wall, or who sits there a wall at the back."""
     desks = plan.of("board") & plan.works & plan.standing & ~plan.which(lambda kind: kind.wall or kind.task)
     seats = torch.bincount(plan.anchor[plan.stands("at") & (plan.anchor >= 0)], minlength=len(plan))
-    who = plan.those(desks & plan.walled & plan.moved & (seats < AROUND))
+    who = plan.those(desks & plan.walled & plan.moved & (seats < DINERS))
     side, front = (axis[:, None] for axis in plan.axes(who))
     side, back = side * plan.size[who, None, :1] / 2, front * plan.size[who, None, 2:] / 2
     points = plan.position[who][:, None, [0, 2]] + torch.cat([side, -side, back, -back, back + front * BEHIND], 1)

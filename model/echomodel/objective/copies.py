@@ -32,10 +32,6 @@ class Watched(Plan):
         i, j = super().pairs(first, second)
         return self._noted(i), self._noted(j)
 
-    def told(self, predicate: str) -> tuple[Tensor, Tensor]:
-        i, j = super().told(predicate)
-        return self._noted(i), self._noted(j)
-
     def rows_of(self, predicate: str) -> Tensor:
         rows = super().rows_of(predicate)
         for ends in self.stated_pairs[::2]:

@@ -267,8 +267,8 @@ class Plan:
 
     def told(self, predicate: str) -> tuple[Tensor, Tensor]:
         """Subjects (P,) and objects (P,) of the relations of one name that the graphs state."""
-        rows = self.triplets[self.triplets[:, 1] == vocabulary().predicate_id(predicate)]
-        return rows[:, 0], rows[:, 2]
+        (i, _, j), rows = self.stated_pairs, self.rows_of(predicate)
+        return i[rows], j[rows]
 
     @cached_property
     def stated_pairs(self) -> tuple[Tensor, Tensor, Tensor]:

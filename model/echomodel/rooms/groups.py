@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from echomodel.objective.composition import BEYOND, CORNER
 from echomodel.rooms.builder import HALF_PI, Builder, Item, Size
 from echomodel.rooms.runs import Site, runs
 from echomodel.vocabulary import vocabulary
@@ -256,7 +257,8 @@ def _chairs_around(room: Builder, table: Item, category: str, size: Size, count:
         per_side = 1
     if count == 6 and length > 1.9 and room.chance(0.6):
         per_side = 3
-    while per_side > 1 and (per_side - 1) * (size[0] + 0.02) > length - 0.1:
+    most = length + 2 * (BEYOND + CORNER - 0.03) - size[0]  # they stand a little unevenly
+    while per_side > 1 and (per_side - 1) * (size[0] + 0.02) > most:
         per_side -= 1
     tuck = room.rng.normal(0.085, 0.08)
     spacing = max(length / per_side * room.uniform(0.85, 0.97), size[0] + 0.02)
