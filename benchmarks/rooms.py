@@ -60,7 +60,7 @@ def main() -> None:
         few = [stored.room(k) for k in range(SCENES)]
     packed = PackedRooms.build(few, 0)
     nodes = int(packed.count.sum())
-    statistics = BoxStatistics.from_boxes(packed.boxes, packed.category, CompactConfig().categories)
+    statistics = BoxStatistics.from_boxes(packed.boxes, packed.category, len(CompactConfig().categories))
     model = CompactModel(CompactConfig(), statistics, ("latent", "layout"))
     stage = LayoutStage(packed, packed, Recipe("layout", 1, nodes=nodes, relation_weight=1.0))
     generator = torch.Generator().manual_seed(0)
