@@ -12,11 +12,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from echomodel.triangles import area_normals
+from echousd.shapes.charts import charts
 from echousd.shapes.finishes.slots import metres_of
 
 NUDGE = 4e-6  # metres between points of different boards at one place
 CREASE = np.radians(42.0)  # neighbours that fold more sharply than this keep a hard edge
 MANY_FACES = 1000
+ATLAS = 1024, 2  # texels along a side and between charts, of pieces that are unwrapped without overlaps
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +66,8 @@ def surfaces(
     board = connected_pieces(faces, len(points))
     normals = _indexed(_corner_normals(points, faces, sharpest), 4, np.repeat(owner, 3))
     if atlas:
-        st = [atlas_unwrap(mesh) for mesh, _, _ in forms]
+        laid = charts([[(mesh.vertices, mesh.faces)] for mesh, _, _ in forms], *ATLAS)
+        st = [(places.astype(np.float32), index.astype(np.int32).ravel()) for _, index, places in laid]
     else:
         groups = [(slot, start[n] + members) for n, (_, own, _) in enumerate(forms) for slot, members in own.items()]
         st = _indexed(_laid_out(points, faces, groups, owner, board), 5, np.repeat(owner, 3))
@@ -230,21 +233,6 @@ def _projected(triangles: np.ndarray, axis: np.ndarray, way: np.ndarray) -> np.n
     u = np.choose(axis[:, None], [-z * facing, x, x * facing])
     v = np.choose(axis[:, None], [y, -z * facing, y])
     return np.stack([u, v], -1)
-
-
-def atlas_unwrap(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
-    """Texture coordinates without overlaps in the unit square (xatlas): ((t, 2) float32, (3 f) int32)."""
-    try:
-        import xatlas
-    except ImportError as error:
-        raise ValueError(f'texture atlas needs xatlas ({error}): pip install "echousd[texture]"') from None
-    atlas = xatlas.Atlas()
-    atlas.add_mesh(np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.uint32))
-    pack = xatlas.PackOptions()
-    pack.resolution, pack.padding = 1024, 2
-    atlas.generate(pack_options=pack)
-    _, index, st = atlas[0]  # xatlas keeps the order of the faces
-    return np.asarray(st, np.float32), np.asarray(index, np.int32).ravel()
 
 
 def _indexed(values: np.ndarray, digits: int, owner: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from trimesh.graph import connected_component_labels
+
+from echousd.shapes.charts import charts
 
 Mesh = tuple[np.ndarray, np.ndarray]
 PADDING = 4  # texels between charts
@@ -38,41 +41,30 @@ class Unwrapped:
         return self.points[self.faces]
 
 
-def unwrap(objects: Sequence[Sequence[Mesh]], resolution: int, padding: int = PADDING) -> list[Unwrapped]:
-    """Lay objects out in one picture, charts apart from each other.
+def unwrap(
+    objects: Sequence[Sequence[Mesh]], resolution: int, padding: int = PADDING, *, together: bool = True
+) -> list[Unwrapped]:
+    """Lay objects out, all in one picture or each in its own, charts apart from each other.
 
     Arguments:
         objects: for every object its meshes: (t, 3, 3) float corners of triangles, metres, and (t, 3) int vertices.
         resolution: texels along the picture's sides, roughly: charts may fill a part of it.
         padding: texels between charts.
 
-    Raises ValueError where xatlas is not installed.
+    Raises ValueError where xatlas is not installed, or does not survive the meshes.
     """
-    try:
-        import xatlas
-    except ImportError as error:
-        raise ValueError(f'texture jobs need xatlas ({error}): pip install "echousd[texture]"') from None
-    atlas = xatlas.Atlas()
     boards = [_boards(meshes) for meshes in objects]
-    for board in (board for pieces in boards for board in pieces):
-        # In centimetres: xatlas leaves out triangles of less than 1e-7 square units.
-        atlas.add_mesh((100 * board.points).astype(np.float32), board.faces.astype(np.uint32))
-    pack = xatlas.PackOptions()
-    pack.resolution, pack.padding, pack.bilinear = resolution, padding, True
-    atlas.generate(pack_options=pack)
-    # Charts lie on texels of a picture that is seldom square; the square one has its longer side.
-    width, height = max(atlas.width, 1), max(atlas.height, 1)
-    scale = np.array([width, height]) / max(width, height)
-    out, number = [], 0
+    scaled = [[(100 * board.points, board.faces) for board in pieces] for pieces in boards]  # centimetres, see `charts`
+    laid = iter(charts([list(chain(*scaled))] if together else scaled, resolution, padding))
+    out = []
     for pieces in boards:
         points, st, count = [], [], 0
         faces = np.zeros((sum(len(board.faces) for board in pieces), 3), int)
-        for board in pieces:
-            origin, index, laid = atlas[number]  # xatlas keeps the order of the faces
-            points.append(board.points[np.asarray(origin, int)])
-            st.append(np.clip(np.round(np.asarray(laid, float) * scale, DIGITS), 0.0, 1.0))
-            faces[board.triangles] = np.asarray(index, int).reshape(-1, 3) + count
-            count, number = count + len(points[-1]), number + 1
+        for board, (origin, index, places) in zip(pieces, laid, strict=False):
+            points.append(board.points[origin])
+            st.append(np.clip(np.round(places, DIGITS), 0.0, 1.0))
+            faces[board.triangles] = index + count
+            count += len(origin)
         out.append(Unwrapped(np.concatenate(points), np.concatenate(st), faces))
     return out
 

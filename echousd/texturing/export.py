@@ -97,7 +97,7 @@ def _made(
     texture = scenetex.RESOLUTION if together else resolution or RESOLUTION
     frames = {thing.name: np.eye(4) if together else _frame(stage, thing) for thing in surfaces.objects}
     meshes = [[(_moved(p.world, frames[thing.name]), p.vertices) for p in thing.pieces] for thing in surfaces.objects]
-    laid = unwrap(meshes, texture) if together else [unwrap([each], texture)[0] for each in meshes]
+    laid = unwrap(meshes, texture, together=together)
     kept, left = _whole(surfaces, laid)
     objects, laid = [surfaces.objects[number] for number in kept], [laid[number] for number in kept]
     if not objects:

@@ -354,7 +354,7 @@ def _entry(job, name):
 
 def test_xatlas_is_asked_for(room, tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "xatlas", None)
-    with pytest.raises(ValueError, match=r'texture jobs need xatlas .*: pip install "echousd\[texture\]"'):
+    with pytest.raises(ValueError, match=r'texture coordinates need xatlas: pip install "echousd\[texture\]"'):
         export_job(room, tmp_path / "new", "generic")
     assert not (tmp_path / "new").exists()
 
