@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 from trimesh.sample import sample_surface
 
+from echomodel.data.sheet import thumbnail
 from echomodel.files import within_memory
 from echomodel.vocabulary import vocabulary
 from echousd.assets.catalogues import Entry
@@ -20,10 +21,11 @@ from echousd.assets.model_file import ModelFile
 from echousd.assets.naming import category_of, likely_unit
 from echousd.assets.record import UPRIGHT, Z_UP, AssetRecord, vector
 from echousd.assets.reference import relative
-from echousd.assets.shape import supports, thumbnail
+from echousd.textures import encoded
 
 PLACEMENT = {"floor": "floor", "table": "surface", "wall": "wall", "ceiling": "ceiling"}
 BLOCK = 2**20
+SIDE = 96  # pixels of a thumbnail
 
 
 def described(entry: Entry, library: Path, *, full: bool = True, encoder: object = None) -> AssetRecord:
@@ -32,7 +34,7 @@ def described(entry: Entry, library: Path, *, full: bool = True, encoder: object
     Arguments:
         entry: of a catalogue. library: the index, which its paths become relative to.
         encoder: a model whose encoder makes the descriptor, None = there is none.
-        full: with picture and level surfaces, which a model that is not chosen among others does not need.
+        full: with a picture, which a model that is not chosen among others does not need.
     """
     record = left_out(entry, library, "")
     try:
@@ -106,8 +108,8 @@ def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool, encode
     placement = entry.placement or (PLACEMENT[row.support] if row else "floor")
     shape = found.turned(np.array(record.turn).reshape(3, 3))
     shape.apply_scale(np.array(record.dims) / np.maximum(np.array(record.high) - np.array(record.low), 1e-12))
-    record = replace(record, placement=placement, supports=supports(shape), thumbnail=thumbnail(shape), fault=fault)
-    record = replace(record, colors=dominant(found.coats))
+    record = replace(record, placement=placement, fault=fault, colors=dominant(found.coats))
+    record = replace(record, thumbnail=encoded(thumbnail(shape, SIDE)))
     if encoder is not None and not fault:
         from echomodel.tsdf import tsdf_from_mesh
         from echousd.assets.descriptor import descriptors
@@ -239,10 +241,10 @@ def _has_empty_corner(mesh: trimesh.Trimesh) -> bool:
     return min(share) < CORNER < max(share)
 
 
-def _front_filled(mesh: trimesh.Trimesh, cells: int = 16) -> float:
+def _front_filled(mesh: trimesh.Trimesh) -> float:
     """Share of the front, seen squarely, behind which something stands in the first quarter of the depth."""
     at = _places(mesh, 12_000)
     near = at[at[:, 2] > 0.8]
-    seen = np.zeros((cells, cells), bool)
-    seen[tuple((near[:, :2] * cells).astype(int).clip(0, cells - 1).T)] = True
+    seen = np.zeros((16, 16), bool)
+    seen[tuple((near[:, :2] * 16).astype(int).clip(0, 15).T)] = True
     return float(seen.mean())

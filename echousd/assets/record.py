@@ -28,7 +28,6 @@ class AssetRecord:
         turn: (9) rows of the rotation from the model's axes to the object frame (+Y up, front +Z).
         low, high: (3) of the turned model, in its own unit. dims: (3) width, height, depth in metres.
         placement: what it rests on, `floor`, `wall`, `ceiling` or `surface`.
-        supports: heights in metres of level surfaces that things may stand on.
         joints: how many. rigid: it has colliders, bodies or joints of its own, and must not be stretched unevenly.
         prim: path of its root prim, "" for a model that is no USD. materials: names of its material slots.
         tags: words of its source: style, material, colour. variants: `set=selection` that are there.
@@ -55,7 +54,6 @@ class AssetRecord:
     high: Vector = (0.0, 0.0, 0.0)
     dims: Vector = (0.0, 0.0, 0.0)
     placement: str = "floor"
-    supports: tuple[float, ...] = ()
     joints: int = 0
     rigid: bool = False
     prim: str = ""

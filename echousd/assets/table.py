@@ -172,7 +172,7 @@ def _fault(record: AssetRecord) -> str:
     for name in ("confidence", "front_confidence"):
         if not 0 <= getattr(record, name) <= 1:
             return f"{name} is {getattr(record, name)}, allowed: 0 to 1"
-    for name in ("supports", "descriptor", "colors"):
+    for name in ("descriptor", "colors"):
         if not all(map(math.isfinite, getattr(record, name))):
             return f"{name} is {getattr(record, name)!s:.60}, allowed: finite numbers"
     if len(record.colors) % 4 or len(record.colors) > 4 * MOST or min(record.colors[::4], default=0) < 0:

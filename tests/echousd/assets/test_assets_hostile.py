@@ -154,7 +154,6 @@ def test_bombs_are_not_unpacked(folder, monkeypatch):
         ({"turn": (1.0,) * 4}, "turn is .*allowed: 9 finite numbers"),
         ({"category": "\0"}, "category is .*allowed: text without a zero byte"),
         ({"low": (None, 1.0, 2.0)}, "row 1 has no low"),
-        ({"supports": (None,)}, "row 1 has no supports"),
         ({"tags": (None,)}, "row 1 has no tags"),
         ({"descriptor": (None,)}, "row 1 has no descriptor"),
         ({"descriptor": (math.inf,)}, "descriptor is .*allowed: finite numbers"),
