@@ -35,7 +35,7 @@ def areas(folder: Path) -> dict[str, Callable[[], object]]:
     from echousd.draw.rendering import render
     from echousd.evaluation.systems import BASES, System, finished
     from echousd.exporting.formats import export
-    from echousd.home.graph import home_of_words
+    from echousd.home.graph import HomeGraph
     from echousd.home.plan import plan_home
     from echousd.settle.settle import settle
 
@@ -59,7 +59,7 @@ def areas(folder: Path) -> dict[str, Callable[[], object]]:
         "a room checked": lambda: check(root),
         "a room simulated": lambda: settle(root),
         "a picture": lambda: render(root),
-        "a home of six rooms planned": lambda: plan_home(home_of_words(HOME, area=75)),
+        "a home of six rooms planned": lambda: plan_home(HomeGraph.from_words(HOME, area=75)),
         "a glb": lambda: export(root, folder / "room.glb", force=True),
     }
 

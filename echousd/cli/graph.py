@@ -157,10 +157,10 @@ def home_given(
 ) -> HomeGraph | None:
     """The home that a command line describes, None where its file holds a single room."""
     from echousd.home.files import load_home
-    from echousd.home.graph import home_of_words
+    from echousd.home.graph import HomeGraph as Home
 
     if rooms is not None:
-        home = home_of_words(rooms)
+        home = Home.from_words(rooms)
     else:
         found = load_home(source) if source is not None and source.is_file() else None
         if found is None:

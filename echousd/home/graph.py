@@ -128,7 +128,29 @@ class HomeGraph(PlainModel):
         A room's name is its type with or without a number (`bedroom_2`), it holds what such rooms do; `*2` makes two of
         it, each related so.
         """
-        return home_of_words(text, **fields)
+        names: dict[str, None] = {}
+        relations: list[HomeRelation] = []
+
+        def rooms(word: str) -> list[str]:
+            match = re.fullmatch(r"([A-Za-z_][A-Za-z0-9_]*)(?:\*([1-9]|[1-3][0-9]))?", word)
+            if match is None:
+                raise GraphError(f"rooms: {field.shown(word)}, allowed: a room type, or several of it as in bedroom*2")
+            many = match[2] and match[2] != "1"
+            several = [f"{match[1]}_{i + 1}" for i in range(int(match[2]))] if many else [match[1]]
+            names.update(dict.fromkeys(several))
+            return several
+
+        for part in filter(None, (part.strip() for part in text.split(","))):
+            words = part.split()
+            if len(words) == 1:
+                rooms(part)
+                continue
+            ends = [rooms(words[0]), rooms(words[-1])] if len(words) > 2 else []
+            if not ends:
+                raise GraphError(f"rooms: {field.shown(part)}, allowed: room predicate room, such as hall door bedroom")
+            middle = " ".join(words[1:-1])
+            relations += [relation_of([one, middle, other]) for one in ends[0] for other in ends[1]]
+        return cls([HomeRoom(name, starting_graph(RoomSpec(_type_of(name)))) for name in names], relations, **fields)
 
     def room(self, name: str) -> HomeRoom:
         """The room called `name`; raises `GraphError`."""
@@ -213,32 +235,6 @@ def relation_of(sentence: Any) -> HomeRelation:
     if not isinstance(words, list) or len(words) < 3 or not all(isinstance(word, str) for word in words):
         raise GraphError(f"relation {field.shown(sentence)}: allowed: room predicate room, such as hall door bedroom")
     return HomeRelation(words[0], " ".join(words[1:-1]), words[-1])
-
-
-def home_of_words(text: str, **fields: Any) -> HomeGraph:
-    """As `HomeGraph.from_words`."""
-    names: dict[str, None] = {}
-    relations: list[HomeRelation] = []
-
-    def rooms(word: str) -> list[str]:
-        match = re.fullmatch(r"([A-Za-z_][A-Za-z0-9_]*)(?:\*([1-9]|[1-3][0-9]))?", word)
-        if match is None:
-            raise GraphError(f"rooms: {field.shown(word)}, allowed: a room type, or several of it as in bedroom*2")
-        several = [f"{match[1]}_{i + 1}" for i in range(int(match[2]))] if match[2] and match[2] != "1" else [match[1]]
-        names.update(dict.fromkeys(several))
-        return several
-
-    for part in filter(None, (part.strip() for part in text.split(","))):
-        words = part.split()
-        if len(words) == 1:
-            rooms(part)
-            continue
-        ends = [rooms(words[0]), rooms(words[-1])] if len(words) > 2 else []
-        if not ends:
-            raise GraphError(f"rooms: {field.shown(part)}, allowed: room predicate room, such as hall door bedroom")
-        middle = " ".join(words[1:-1])
-        relations += [relation_of([one, middle, other]) for one in ends[0] for other in ends[1]]
-    return HomeGraph([HomeRoom(name, starting_graph(RoomSpec(_type_of(name)))) for name in names], relations, **fields)
 
 
 def _type_of(name: str) -> str:

@@ -3,7 +3,7 @@
 from hypothesis import strategies as st
 from inline_batches import Inline
 
-from echousd.home.graph import home_of_words
+from echousd.home.graph import HomeGraph
 
 QUICK = ("--shapes", "boxes", "--dress", "none", "--no-preview", "--drafts", "1", "--steps", "2")
 OTHERS = ("bedroom", "study", "childrens_room", "bathroom", "utility_room", "balcony", "dining_room")
@@ -29,7 +29,7 @@ def homes(draw, most=8):
             said.append(
                 f"{one} {draw(st.sampled_from(('adjacent', 'not_adjacent', 'north_of', 'larger_than')))} {other}"
             )
-    return home_of_words(", ".join(said))
+    return HomeGraph.from_words(", ".join(said))
 
 
 def inline(monkeypatch):

@@ -5,13 +5,13 @@ import pytest
 import shapely
 
 from echousd.home.check import ROBOT, _blocked, walked
-from echousd.home.graph import home_of_words
+from echousd.home.graph import HomeGraph
 from echousd.home.plan import Plan, doorways, plan_home
 
 
 @pytest.fixture(scope="module", params=["door", "open_to"])
 def plan(request) -> Plan:
-    return plan_home(home_of_words(f"living {request.param} kitchen", area=40))
+    return plan_home(HomeGraph.from_words(f"living {request.param} kitchen", area=40))
 
 
 def ground(plan, *things):

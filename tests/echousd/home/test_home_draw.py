@@ -9,7 +9,7 @@ import shapely
 from echousd.home.draw import lines_of
 from echousd.home.files import load_home
 from echousd.home.given import plan_there
-from echousd.home.graph import home_of_words
+from echousd.home.graph import HomeGraph
 from echousd.home.plan import plan_home
 
 WORDS = "hall door bedroom, hall open_to kitchen"
@@ -22,7 +22,7 @@ def file(tmp_path, echousd_command):
 
 
 def test_walls_are_what_cells_have_beside_floors_and_holes():
-    plan = plan_home(home_of_words(WORDS, area=30))
+    plan = plan_home(HomeGraph.from_words(WORDS, area=30))
     lines = list(lines_of(plan))
     walls = [shapely.Polygon(line.points) for line in lines if line.layer == "wall"]
     floors = shapely.union_all([shapely.Polygon(line.points) for line in lines if line.layer == "room"])

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 
 from echousd.graph import GraphError
 from echousd.home.files import load_home, save_home
-from echousd.home.graph import HomeGraph, home_of_words, relation_of
+from echousd.home.graph import HomeGraph, relation_of
 
 TEXT = """home: {area: 60, entrance: hall, outline: [[0, 0], [10, 0], [10, 7], [0, 7]]}
 rooms:
@@ -23,7 +23,7 @@ relations:
 
 
 def test_words_make_a_home():
-    home = home_of_words("kitchen open_to living, hall door bedroom*2, hall door bathroom, balcony", area=75)
+    home = HomeGraph.from_words("kitchen open_to living, hall door bedroom*2, hall door bathroom, balcony", area=75)
     names = ["kitchen", "living", "hall", "bedroom_1", "bedroom_2", "bathroom", "balcony"]
     assert [room.name for room in home.rooms] == names
     assert home.room("living").type == "living_room"
@@ -35,7 +35,7 @@ def test_words_make_a_home():
 
 
 def test_every_room_gets_a_way_in():
-    home = home_of_words("kitchen open_to living, hall door bedroom, balcony").connected()
+    home = HomeGraph.from_words("kitchen open_to living, hall door bedroom, balcony").connected()
     assert [str(relation) for relation in home.relations[2:]] == ["hall door living", "hall door balcony"]
 
 
@@ -67,7 +67,7 @@ def test_a_room_is_no_home(tmp_path):
 
 
 def test_another_way_replaces_the_one_before():
-    home = home_of_words("kitchen door living, hall door living").relate("kitchen open to living")
+    home = HomeGraph.from_words("kitchen door living, hall door living").relate("kitchen open to living")
     assert [str(relation) for relation in home.relations] == ["hall door living", "kitchen open_to living"]
 
 
@@ -101,7 +101,7 @@ def test_what_is_wrong_is_told_in_one_line(tmp_path, text, said):
 @pytest.mark.parametrize("text", ["kitchen living", "kitchen*0 door hall", "kitchen door dungeon"])
 def test_words_that_say_no_home(text):
     with pytest.raises(ValueError, match=r"rooms: |unknown room type"):
-        home_of_words(text)
+        HomeGraph.from_words(text)
 
 
 def test_relations_in_other_words():

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 
 from echomodel.openings import segment, signed_area, swing_area
 from echousd.graph import GraphError
-from echousd.home.graph import home_of_words
+from echousd.home.graph import HomeGraph
 from echousd.home.plan import INNER, OUTER, conflicts, plan_home, plans, ways
 
 FLAT = "kitchen open_to living, hall door living, hall door bedroom*2, hall door bathroom"
@@ -18,7 +18,7 @@ FLAT = "kitchen open_to living, hall door living, hall door bedroom*2, hall door
 
 @pytest.fixture(scope="module")
 def flat():
-    return plan_home(home_of_words(FLAT, area=75))
+    return plan_home(HomeGraph.from_words(FLAT, area=75))
 
 
 @settings(max_examples=12)
@@ -78,27 +78,27 @@ def test_windows_look_outside(flat):
 
 
 def test_the_same_seed_gives_the_same_plan(flat):
-    again = plan_home(home_of_words(FLAT, area=75))
+    again = plan_home(HomeGraph.from_words(FLAT, area=75))
     assert all(np.array_equal(flat.cells[name], again.cells[name]) for name in flat.cells)
     assert flat.openings == again.openings
 
 
 def test_plans_differ(flat):
-    found = plans(home_of_words(FLAT, area=75), 3)
+    found = plans(HomeGraph.from_words(FLAT, area=75), 3)
     assert len(found) == 3
     assert all(np.array_equal(found[0].cells[name], flat.cells[name]) for name in flat.cells)
 
 
 def test_a_given_outline_is_filled():
     outline = ((0.0, 0.0), (9.0, 0.0), (9.0, 5.0), (6.0, 5.0), (6.0, 8.4), (0.0, 8.4))
-    plan = plan_home(home_of_words("hall door living, hall door bedroom, hall door kitchen", outline=outline))
+    plan = plan_home(HomeGraph.from_words("hall door living, hall door bedroom, hall door kitchen", outline=outline))
     whole = shapely.union_all([shapely.Polygon(cell) for cell in plan.cells.values()])
     assert whole.symmetric_difference(shapely.Polygon(outline)).area < 0.01
     assert plan.broken() == ()
 
 
 def test_an_edit_begins_with_the_plan_of_before(flat):
-    home = home_of_words(FLAT, area=75)
+    home = HomeGraph.from_words(FLAT, area=75)
     after = plan_home(home.relate("kitchen adjacent hall"), before=flat)
     assert after.broken() == ()
     moved = sum(not np.array_equal(flat.cells[name], after.cells[name]) for name in flat.cells)
@@ -117,17 +117,17 @@ def test_an_edit_begins_with_the_plan_of_before(flat):
     ],
 )  # fmt: skip
 def test_conflicts_are_named_before_solving(words, fields, said):
-    told = conflicts(home_of_words(words, **fields))
+    told = conflicts(HomeGraph.from_words(words, **fields))
     assert said in told[0]
     with pytest.raises(GraphError) as raised:
-        plan_home(home_of_words(words, **fields))
+        plan_home(HomeGraph.from_words(words, **fields))
     assert str(raised.value) == told[0]
 
 
 def test_ways_that_would_cross_are_named():
     rooms = ["bedroom_1", "bedroom_2", "bedroom_3", "study_1", "study_2"]
     words = ", ".join(f"{one} door {other}" for one, other in combinations(rooms, 2))
-    (told,) = conflicts(home_of_words(words))
+    (told,) = conflicts(HomeGraph.from_words(words))
     assert told.startswith("no flat plan has all of 'bedroom_1 door bedroom_2'")
 
 
@@ -145,16 +145,16 @@ BETWEEN = ["hall north_of living", "living north_of kitchen", "hall door kitchen
 )
 def test_what_no_plan_keeps_is_a_smallest_set(kept, more):
     with pytest.raises(GraphError) as raised:
-        plan_home(home_of_words(", ".join([*more, *kept])))
+        plan_home(HomeGraph.from_words(", ".join([*more, *kept])))
     said = str(raised.value)
     named = said.partition(" has all of ")[2].partition("; ")[0]
     assert {*named.strip("'").split("', '")} == {*kept}
     for left_out in kept:
         rest = [one for one in kept if one != left_out]
-        assert plan_home(home_of_words(", ".join([*more, *rest]))).broken() == (), f"without {left_out}"
+        assert plan_home(HomeGraph.from_words(", ".join([*more, *rest]))).broken() == (), f"without {left_out}"
 
 
 def test_without_the_solver_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "ortools.sat.python", None)
     with pytest.raises(GraphError, match=r'pip install "echousd\[home\]"'):
-        plan_home(home_of_words("hall door bedroom"))
+        plan_home(HomeGraph.from_words("hall door bedroom"))
