@@ -77,10 +77,10 @@ def collider(mesh: trimesh.Trimesh, category: str) -> Collider:
     return Collider("collider", flush(_reduced(mesh, FACES), mesh.bounds), kind)
 
 
-def standing_hull(mesh: trimesh.Trimesh, name: str = "collider") -> Collider:
+def standing_hull(mesh: trimesh.Trimesh) -> Collider:
     """One hull of a mesh (metres) that stands on a plane, however its base is rounded."""
     light = flush(_reduced(mesh.convex_hull, HULL_FACES), mesh.bounds)
-    return Collider(name, _hull(np.concatenate([light.vertices, soles(mesh)])), "convexHull")
+    return Collider("collider", _hull(np.concatenate([light.vertices, soles(mesh)])), "convexHull")
 
 
 def flush(mesh: trimesh.Trimesh, bounds: np.ndarray) -> trimesh.Trimesh:
@@ -103,11 +103,11 @@ def snapped(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
     return np.column_stack([points[:, 0], height, points[:, 2]])
 
 
-def soles(mesh: trimesh.Trimesh, directions: int = 16) -> np.ndarray:
-    """(2 * directions, 3) float: outlines of what a mesh stands on and of its top, each in one plane."""
+def soles(mesh: trimesh.Trimesh) -> np.ndarray:
+    """(32, 3) float: outlines of what a mesh stands on and of its top, each in one plane."""
     points, (low, high) = np.asarray(mesh.vertices), mesh.bounds[:, 1]
     reach = min(FLAT, 0.1 * (high - low))
-    angle = np.arange(directions) * 2 * np.pi / directions
+    angle = np.arange(16) * np.pi / 8
     rays = np.stack([np.cos(angle), np.sin(angle)])
     found = []
     for level in (low, high):

@@ -129,14 +129,14 @@ def covering(plain: np.ndarray, shown: np.ndarray) -> np.ndarray:
     return corners
 
 
-def convex_pieces(points: Sequence[np.ndarray], box: float, most: int = COLLIDERS) -> list[trimesh.Trimesh]:
+def convex_pieces(points: Sequence[np.ndarray], box: float) -> list[trimesh.Trimesh]:
     """Convex hulls (each a closed mesh) around solids; a small one joins the one that it wastes the least room with.
 
     Where all of them would waste more than a small one is, and hulls are few enough, it stays alone: on a wedge from a
     panel to the mirror above it nothing could stand.
 
     `points`: vertices (n, 3) of each solid, metres. `box`: volume of the whole piece's box, m³; what is far smaller is
-    no obstacle of its own. `most`: number of hulls.
+    no obstacle of its own.
     """
     groups = list(points)
     low, high = np.array([p.min(0) for p in points]), np.array([p.max(0) for p in points])
@@ -144,7 +144,7 @@ def convex_pieces(points: Sequence[np.ndarray], box: float, most: int = COLLIDER
         volume = _volume(low, high)
         union = _volume(np.minimum(low[:, None], low), np.maximum(high[:, None], high))
         wasted = union - volume - volume[:, None] + np.diag(np.full(len(groups), np.inf))
-        if len(groups) <= most:
+        if len(groups) <= COLLIDERS:
             small = np.minimum(volume, volume[:, None]) < SMALL * box
             wasted[~small | (wasted > SMALL * box)] = np.inf
         one, other = sorted(map(int, np.unravel_index(np.argmin(wasted), wasted.shape)))

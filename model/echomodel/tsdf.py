@@ -28,7 +28,7 @@ SHELL = 0.87  # half the diagonal of a voxel: no smaller distance makes a sheet 
 SHEET = 0.55  # half the thickness, in voxels, that an open sheet is given
 THINNEST = 0.6  # half thickness in voxels below which a part is thickened, so that marching cubes still finds it
 THINNEST_ROD_OR_LEAF = 1.0  # likewise: rods and leaves hold too little volume to be learnt otherwise
-SURFACE_POINTS = 200_000
+SURFACE_POINTS = 200_000  # at least
 POINTS_PER_VOXEL = 8  # samples per voxel of area, at least; fewer leave holes in the shell
 MOST_POINTS = 1_500_000
 
@@ -47,15 +47,13 @@ def voxels_from_points(points: np.ndarray, lower: np.ndarray, upper: np.ndarray)
     return (np.asarray(points, float) - centre) / extent * FILLED + (RESOLUTION - 1) / 2
 
 
-def tsdf_from_mesh(mesh: trimesh.Trimesh, *, points: int = SURFACE_POINTS) -> np.ndarray:
+def tsdf_from_mesh(mesh: trimesh.Trimesh) -> np.ndarray:
     """Signed distances of any triangle mesh, closed or not, by flood fill from outside.
 
     Voxels nearer to the surface than `SHELL` stop the flood; what it does not reach is inside. A sheet without an
     inside becomes a solid about one voxel thick.
 
-    Arguments:
-        mesh: triangles in the object frame, any unit; its axis-aligned box becomes the normalised box.
-        points: least number of surface samples; more are taken where the surface is large.
+    `mesh`: triangles in the object frame, any unit; its axis-aligned box becomes the normalised box.
 
     Returns (64, 64, 64) float32. Raises ValueError for a mesh without area.
     """
@@ -66,8 +64,7 @@ def tsdf_from_mesh(mesh: trimesh.Trimesh, *, points: int = SURFACE_POINTS) -> np
     if (upper - lower).max() <= 0:
         raise ValueError("mesh is a single point, need triangles with an area")
     triangles = voxels_from_points(used, lower, upper).reshape(-1, 3, 3)
-    distance = _distance_to_triangles(triangles, points)
-    return truncated(_signed_by_flood(distance))
+    return truncated(_signed_by_flood(_distance_to_triangles(triangles)))
 
 
 def tsdf_of(solids: Sequence[Solid]) -> np.ndarray:
@@ -128,7 +125,7 @@ def mesh_from_tsdf(grid: Any) -> trimesh.Trimesh:
     return mesh
 
 
-def _distance_to_triangles(triangles: np.ndarray, points: int) -> np.ndarray:
+def _distance_to_triangles(triangles: np.ndarray) -> np.ndarray:
     """Unsigned distance of every voxel centre to the triangles, exact near the surface, `inf` beyond the truncation."""
     import trimesh
 
@@ -138,7 +135,7 @@ def _distance_to_triangles(triangles: np.ndarray, points: int) -> np.ndarray:
         raise ValueError("mesh has no area")
     keep = area > 1e-9
     triangles, area = triangles[keep], area[keep]
-    points = min(max(points, int(POINTS_PER_VOXEL * area.sum())), MOST_POINTS)
+    points = min(max(SURFACE_POINTS, int(POINTS_PER_VOXEL * area.sum())), MOST_POINTS)
     # Evenly along the summed area and on a low-discrepancy sequence inside: random points leave holes to leak through.
     step = np.arange(points)
     face = np.searchsorted(np.cumsum(area) / area.sum(), (step + 0.5) / points).clip(0, len(area) - 1)

@@ -224,9 +224,9 @@ def scene_boxes(room: RoomBoxes, statistics: BoxStatistics) -> Tensor:
     return torch.cat([_with_floor(room).encode(statistics.scale()), scene[None]])
 
 
-def box_bounds(rooms: RoomSet | PublishedRooms, count: int = 2000) -> BoxStatistics:
+def box_bounds(rooms: RoomSet | PublishedRooms) -> BoxStatistics:
     """Lowest and highest sizes and positions of a set's first rooms, floors included, as the published bounds file."""
-    every = Boxes.cat([_with_floor(rooms.room(number)) for number in range(min(count, len(rooms)))])
+    every = Boxes.cat([_with_floor(rooms.room(number)) for number in range(min(2000, len(rooms)))])
     ends = (end for part in (every.size, every.position) for end in (part.amin(0), part.amax(0)))
     low, high, start, stop = (tuple(end.tolist()) for end in ends)
     return BoxStatistics(low, high, start, stop)

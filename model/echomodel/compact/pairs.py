@@ -184,8 +184,8 @@ def pair_messages(a: Tensor, b: Tensor, e: Tensor, receiver: Tensor, sender: Ten
     return torch.zeros_like(a).index_add_(0, receiver, nn.functional.silu(u, inplace=True))
 
 
-def level_features(level: Tensor, count: int = 32) -> Tensor:
-    """Sinusoids of a noise level in [0, 1]: (N,) -> (N, 2 count)."""
-    frequencies = torch.exp(torch.linspace(math.log(1.0), math.log(200.0), count, device=level.device))
+def level_features(level: Tensor) -> Tensor:
+    """Sinusoids of a noise level in [0, 1]: (N,) -> (N, 64)."""
+    frequencies = torch.exp(torch.linspace(math.log(1.0), math.log(200.0), 32, device=level.device))
     angles = level[:, None] * frequencies
     return torch.cat([torch.cos(angles), torch.sin(angles)], dim=1)

@@ -96,14 +96,14 @@ def leg(foot: tuple, head: tuple, thick: float, style: Style, material: str = "w
     return turned(bottom, half * taper, length, half, power=power, turn=turn, material=material)
 
 
-def turned_leg(x: float, z: float, height: float, thick: float, material: str = "wood") -> list[Solid]:
+def turned_leg(x: float, z: float, height: float, thick: float) -> list[Solid]:
     """A leg off the lathe: a slim foot, a swelling shaft, a ring and a square head."""
     r = thick / 2
 
     def section(y0: float, y1: float, low: float, high: float, power: float = 2.0) -> Turned:
-        return turned((x, y0 * height, z), low * r, (y1 - y0) * height, high * r, power=power, material=material)
+        return turned((x, y0 * height, z), low * r, (y1 - y0) * height, high * r, power=power)
 
-    ring = ball((x, 0.68 * height, z), (1.25 * r, 0.45 * r, 1.25 * r), material)
+    ring = ball((x, 0.68 * height, z), (1.25 * r, 0.45 * r, 1.25 * r))
     return [section(0, 0.08, 0.9, 0.55), section(0.08, 0.7, 0.55, 1.0), ring, section(0.7, 1, 1.05, 1.05, np.inf)]
 
 
@@ -203,16 +203,12 @@ def _column(width: float, depth: float, height: float, style: Style) -> list[Sol
     return [disc, column]
 
 
-def seat_of(
-    style: Style, w: float, d: float, y: float, thick: float, z: float = 0.0, material: str | None = None
-) -> Solid:
+def seat_of(style: Style, w: float, d: float, y: float, thick: float, z: float = 0.0) -> Solid:
     """A seat whose upper face lies at y: a board, or a cushion in soft styles."""
-    soft = style.softness > 0.4
-    low, high = (-w / 2, y - thick, z - d / 2), (w / 2, y, z + d / 2)
-    if soft:
-        return cushion(low, high, style, material or "fabric")
+    if style.softness > 0.4:
+        return cushion((-w / 2, y - thick, z - d / 2), (w / 2, y, z + d / 2), style, "fabric")
     shape = "corners" if style.corner > 0.35 else "square"
-    board = top(shape, w, d, y, thick, style, material or "wood")
+    board = top(shape, w, d, y, thick, style, "wood")
     return replace(board, centre=np.array([0, y - thick, z]), role="seat")
 
 

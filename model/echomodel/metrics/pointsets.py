@@ -28,12 +28,10 @@ def surface_points(mesh: trimesh.Trimesh, count: int, seed: int = 0) -> np.ndarr
     return np.asarray(points, np.float32)
 
 
-def surface_scores(ours: np.ndarray, reference: np.ndarray, threshold: float = THRESHOLD) -> dict[str, float]:
+def surface_scores(ours: np.ndarray, reference: np.ndarray) -> dict[str, float]:
     """How well a grid matches another one.
 
-    Arguments:
-        ours, reference: (64, 64, 64) float, signed distances, negative inside; the reference holds a surface.
-        threshold: distance in the box frame that counts as a hit.
+    `ours`, `reference`: (64, 64, 64) float, signed distances, negative inside; the reference holds a surface.
 
     Returns `f_score`, the harmonic mean of `precision` (our points near the reference) and `recall` (its points near
     ours); `chamfer`, the mean distance both ways, averaged; `iou` of the insides. A grid without surface scores 0 with
@@ -47,7 +45,7 @@ def surface_scores(ours: np.ndarray, reference: np.ndarray, threshold: float = T
         return {"f_score": 0.0, "precision": 0.0, "recall": 0.0, "chamfer": 1.0, "iou": iou}
     target = mesh_from_tsdf(reference)
     there, back = _distances(mesh, target), _distances(target, mesh)
-    precision, recall = float((there <= threshold).mean()), float((back <= threshold).mean())
+    precision, recall = float((there <= THRESHOLD).mean()), float((back <= THRESHOLD).mean())
     f_score = 2 * precision * recall / (precision + recall) if precision + recall else 0.0
     chamfer = float(there.mean() + back.mean()) / 2
     return {"f_score": f_score, "precision": precision, "recall": recall, "chamfer": chamfer, "iou": iou}
@@ -62,6 +60,7 @@ def _distances(mesh: trimesh.Trimesh, target: trimesh.Trimesh) -> np.ndarray:
     return np.minimum(found, np.linalg.norm(closest - points, axis=1))
 
 
+LEAST = 4  # shapes of a class that has scores
 CHUNK = 16  # point sets compared at a time
 EXACT = "donot_use_mm_for_euclid_dist"  # zeros for equal points, which the expanded square does not give
 Measure = Callable[[Tensor, Tensor], Tensor]
@@ -124,19 +123,18 @@ def compare_sets(samples: Tensor, references: Tensor, measure: Measure = chamfer
 
 
 def set_scores(
-    generated: Mapping[str, np.ndarray], references: Mapping[str, np.ndarray], least: int = 4, *, points: int = 0
+    generated: Mapping[str, np.ndarray], references: Mapping[str, np.ndarray], *, points: int = 0
 ) -> dict[str, dict[str, float]]:
-    """`compare_sets` of generated and reference shapes, class by class.
+    """`compare_sets` of generated and reference shapes, class by class; those with less than `LEAST` are left out.
 
     Arguments:
         generated, references: class -> (n, p, 3) float32 surface points; both are cut to the smaller number.
-        least: classes with fewer shapes on either side are left out.
         points: by the earth mover's distance of so many points each; 0 = by the Chamfer distance of all.
     """
     scores: dict[str, dict[str, float]] = {}
     for label in sorted(set(generated) & set(references)):
         count = min(len(generated[label]), len(references[label]))
-        if count >= least:
+        if count >= LEAST:
             ours, real = (torch.as_tensor(side[label][:count, : points or None]) for side in (generated, references))
             scores[label] = compare_sets(ours, real, earth_mover if points else chamfer)
     return scores

@@ -229,16 +229,15 @@ class Builder:
         return min(max(gap, SUNK), FAR_BACK)
 
     def somewhere(
-        self, category: str, *, size: Size | None = None, yaw: float | None = None, style: int | None = None,
-        tries: int = 12, clearance: float = 0.1,
-    ) -> Item | None:  # fmt: skip
+        self, category: str, *, size: Size | None = None, style: int | None = None, clearance: float = 0.1
+    ) -> Item | None:
         """Place one item on open floor."""
         size = size or self.size(category)
         style = self.style() if style is None else style
-        for _ in range(tries):
+        for _ in range(12):
             x = self.uniform(-self.floor.half_x, self.floor.half_x)
             z = self.uniform(-self.floor.half_z, self.floor.half_z)
-            turn = yaw if yaw is not None else self.pick([0.0, HALF_PI, math.pi, -HALF_PI], [1, 1, 1, 1])
+            turn = self.pick([0.0, HALF_PI, math.pi, -HALF_PI], [1, 1, 1, 1])
             placed = self.put(category, size, x, z, turn, style, play=-clearance)
             if placed:
                 return placed

@@ -229,7 +229,7 @@ class EncodedShapes:
 
 
 @torch.no_grad()
-def encoded_set(autoencoder: Autoencoder, shapes: ShapeSet, batch: int = 16) -> EncodedShapes:
+def encoded_set(autoencoder: Autoencoder, shapes: ShapeSet) -> EncodedShapes:
     """Encode a whole set once, so that no step of the denoiser's training has to; raises ValueError for real meshes."""
     categories = len(shapes.categories)
     numbers = shapes.style * categories + shapes.category
@@ -238,7 +238,7 @@ def encoded_set(autoencoder: Autoencoder, shapes: ShapeSet, batch: int = 16) -> 
     device = autoencoder.basis.device
     out = [
         autoencoder.encode(read(shapes, part).to(device)).half().cpu()
-        for part in np.array_split(np.arange(len(shapes)), max(1, len(shapes) // batch))
+        for part in np.array_split(np.arange(len(shapes)), max(1, len(shapes) // 16))
     ]
     held = torch.from_numpy(shapes.held_out.reshape(-1, categories)[:, 0])
     if bool(held.all()) or not bool(held.any()):
