@@ -190,10 +190,10 @@ def _wishes(
     return wishes
 
 
-def told(error: ValidationError, model: type[BaseModel]) -> str:
+def told(error: ValidationError, model: type[BaseModel] = BaseModel) -> str:
     """The first fault in one line: the field, what was found and what is allowed."""
     first = error.errors(include_url=False)[0]
-    where = ".".join(str(part) for part in first["loc"])
+    where = ".".join(str(part) for part in first["loc"]) or "the file"
     if first["type"] == "value_error":
         return str(first["ctx"]["error"])
     if first["type"] == "string_pattern_mismatch":

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import os
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, create_model
 
 import echousd
 from echomodel.files import bounded_lines, whole_file
@@ -21,6 +22,7 @@ from echousd.folder.lock import LOCK
 from echousd.folder.manifest import MAX_SEED, find_manifest
 from echousd.folder.within import check_links, inside
 from echousd.naming import as_identifier
+from echousd.options import told
 from echousd.pending import STAGING
 from echousd.store import Store
 
@@ -29,6 +31,9 @@ STORE = "store"  # folder of the assets that the rooms share
 PLAN, GRAPHS = "plan.jsonl", "graphs.jsonl"
 MOST = 1_000_000  # rooms of a run: a plan is held in memory
 SHELF = 1000  # rooms in one folder
+ID = re.compile(r"^[A-Za-z_][A-Za-z0-9_]{0,254}$")  # name of a room's folder and root layer
+Seed = Annotated[int, Field(strict=True, ge=0, le=MAX_SEED)]
+Text = Annotated[str, Field(min_length=0)]  # which UTF-8 can hold: a length is asked of no other
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +48,16 @@ class Entry:
         error: why its graph cannot be read.
     """
 
-    number: int
-    id: str
-    origin: str
-    graph: str
-    seed: int
-    options: int = 0
-    draw: tuple[str, int, int] | None = None
-    error: str = ""
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    number: Seed
+    id: Annotated[str, Field(pattern=ID.pattern)]
+    origin: Text
+    graph: Text
+    seed: Seed
+    options: Seed = 0
+    draw: tuple[Text, Seed, Seed] | None = None
+    error: Text = ""
 
     @property
     def path(self) -> str:
@@ -200,27 +207,16 @@ def _entry(raw: Any, number: int, sets: int) -> Entry:
     """A line of the plan, which anybody may have sent; raises ValueError for one that is not as we write it."""
     if not isinstance(raw, dict):
         raise ValueError(f"line {number + 2} is no room of a plan")
-    draw = raw.pop("draw")
-    entry = Entry(**raw, draw=tuple(draw) if draw else None)
-    if type(entry.number) is not int or entry.number != number:
-        raise ValueError(f"line {number + 2}: number is {entry.number!r:.40}, allowed: {number}")
-    for name in ("origin", "graph", "error"):
-        if not is_text(getattr(entry, name)):
-            raise ValueError(f"line {number + 2}: {name} is {getattr(entry, name)!r:.80}, allowed: a text")
-    if not isinstance(entry.id, str) or not ID.fullmatch(entry.id):
-        raise ValueError(f"line {number + 2}: id is {entry.id!r:.80}, allowed: letters, digits and _")
-    kind, *numbers = entry.draw or ("", 0, 0)
-    if not is_text(kind) or len(numbers) != 2 or not all(map(_is_seed, numbers)):
-        raise ValueError(f"line {number + 2}: draw is {entry.draw!r:.80}, allowed: room type, seed, number")
-    if not _is_seed(entry.seed):
-        raise ValueError(f"line {number + 2}: seed is {entry.seed!r:.40}, allowed: 0 to {MAX_SEED}")
-    if type(entry.options) is not int or not 0 <= entry.options < sets:
-        raise ValueError(f"line {number + 2}: options is {entry.options!r:.40}, allowed: 0 to {sets - 1}")
+    given = {**raw, "draw": tuple(raw["draw"]) if raw["draw"] else None}
+    try:
+        entry = TypeAdapter(Entry).validate_python(given)
+    except ValidationError as error:
+        raise ValueError(f"line {number + 2}: {told(error)}") from None
+    if entry.number != number:
+        raise ValueError(f"line {number + 2}: number is {entry.number}, allowed: {number}")
+    if entry.options >= sets:
+        raise ValueError(f"line {number + 2}: options is {entry.options}, allowed: 0 to {sets - 1}")
     return entry
-
-
-def _is_seed(value: Any) -> bool:
-    return type(value) is int and 0 <= value <= MAX_SEED
 
 
 def _word(name: str) -> str:
@@ -228,9 +224,7 @@ def _word(name: str) -> str:
     return as_identifier(name)[:60]
 
 
-ID = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,254}")  # name of a room's folder and root layer
 ROOTS = (".usda", ".usdc", ".usd")
-SURROGATE = re.compile(r"[\ud800-\udfff]")
 LATEST = 1e11  # seconds since 1970
 LONGEST = 16 * 2**20  # bytes of one line of a run's files
 FARTHEST = 1e6  # metres
@@ -244,43 +238,28 @@ COLUMNS: dict[str, Any] = {
 }  # fmt: skip
 
 
+@cache
+def _row() -> Any:
+    """The model of a journal's line: columns hold what is of their default's type and in its range."""
+    farthest: Any = list[Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]]
+    kinds: dict[type, Any] = {
+        bool: bool, int: Seed, str: Text, float: Annotated[float, Field(ge=0)], list: list[Text],
+        dict: dict[Text, Seed],
+    }  # fmt: skip
+    columns: dict[str, Any] = {name: (kinds[type(default)], default) for name, default in COLUMNS.items()}
+    columns |= {"bounds": (farthest, []), "room": (Text, ...), "when": (Annotated[float, Field(ge=0, lt=LATEST)], ...)}
+    return create_model("Row", __config__=ConfigDict(strict=True, allow_inf_nan=False), **columns)
+
+
 def is_row(row: Any) -> bool:
     """Whether a line of a journal is one that we write; a run's folder may come from anybody."""
-    if not isinstance(row, dict) or not isinstance(row.get("room"), str) or not _is_number(row.get("when")):
+    try:
+        found = _row().model_validate(row)
+    except ValidationError:
         return False
-    if not 0 <= row["when"] < LATEST:
-        return False
-    if not all(_fits(name, row.get(name, default), default) for name, default in COLUMNS.items()):
-        return False
-    if row.get("state") == "failed":
-        return "error" in row and not row.get("root")
-    bounds = row.get("bounds", [])
-    whole = len(bounds) == 6 and all(abs(side) <= FARTHEST for side in bounds) and bool(row.get("sha256"))
-    return row.get("state") == "done" and whole and _is_root(row.get("root", ""))
-
-
-def is_text(value: Any) -> bool:
-    """Whether a value is a text that a file in UTF-8 can hold."""
-    return isinstance(value, str) and not SURROGATE.search(value)
-
-
-def _fits(name: str, value: Any, default: Any) -> bool:
-    """Whether a value is one that a column holds: of its type, in its range."""
-    if isinstance(default, bool):
-        return isinstance(value, bool)
-    if isinstance(default, int):
-        return type(value) is int and 0 <= value <= MAX_SEED
-    if isinstance(default, float):
-        return _is_number(value) and value >= 0
-    if isinstance(default, list):
-        return isinstance(value, list) and all(map(_is_number if name == "bounds" else is_text, value))
-    if isinstance(default, dict):
-        return isinstance(value, dict) and all(is_text(key) and _fits("", count, 0) for key, count in value.items())
-    return is_text(value)
-
-
-def _is_number(value: Any) -> bool:
-    return type(value) is int or (type(value) is float and math.isfinite(value))
+    if found.state == "failed":
+        return "error" in row and not found.root
+    return found.state == "done" and len(found.bounds) == 6 and bool(found.sha256) and _is_root(found.root)
 
 
 def _is_root(name: str) -> bool:

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from echomodel.files import read_bounded
 from echousd.folder.within import inside
+from echousd.options import told
 from echousd.texturing.atlas import Unwrapped, layout_digest
 from echousd.texturing.obj import read_obj
 
@@ -100,9 +101,7 @@ def read_job(folder: Path) -> Job:
             f"{path}: cannot be read ({error.strerror or error}), allowed: the folder of texture export"
         ) from None
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(map(str, first["loc"])) or "the file"
-        raise ValueError(f"{path}: {where}: {first['msg']}, found {first['input']!r:.80}") from None
+        raise ValueError(f"{path}: {told(error)}") from None
     for thing in job.objects:
         inside(folder, thing.mesh, f"{path}: objects.{thing.name}.mesh")
     twice, count = Counter(thing.name for thing in job.objects).most_common(1)[0]

@@ -73,7 +73,7 @@ def test_lines_that_no_artefact_can_hold_are_none(made, extra, tmp_path, echousd
     ("extra", "said"),
     [({"seed": 2**70}, "seed is 1180591620717411303424"), ({"seed": -1}, "seed is -1"),
      ({"origin": "\ud800"}, "origin is"), ({"error": "\ud800"}, "error is"), ({"graph": "\udc80"}, "graph is"),
-     ({"draw": ["bedroom", 2**70, 1]}, "draw is"), ({"draw": ["\ud800", 0, 1]}, "draw is")],
+     ({"draw": ["bedroom", 2**70, 1]}, "draw.1 is"), ({"draw": ["\ud800", 0, 1]}, "draw.0 is")],
 )  # fmt: skip
 def test_rooms_of_a_plan_that_no_artefact_can_hold_are_refused(made, extra, said, tmp_path, echousd_command):
     shutil.copytree(made, tmp_path / "run")

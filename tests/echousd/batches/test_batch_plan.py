@@ -142,9 +142,9 @@ def test_a_room_s_digest_is_of_its_files(tmp_path):
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"id": "../../../outside"}, "line 2: id is '../../../outside', allowed: letters, digits and _"),
-        ({"number": -1}, "line 2: number is -1, allowed: 0"),
-        ({"number": "0"}, "line 2: number is '0', allowed: 0"),
+        ({"id": "../../../outside"}, "line 2: id is '../../../outside', allowed: a name of letters, digits and _"),
+        ({"number": -1}, "line 2: number is -1, allowed: greater than or equal to 0"),
+        ({"number": "0"}, "line 2: number is '0', allowed: a valid integer"),
         ({"options": 9}, "line 2: options is 9, allowed: 0 to 0"),
     ],
 )
