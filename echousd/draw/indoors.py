@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdLux
 
+from echomodel.triangles import area_normals
 from echousd.draw.drawables import image_of, world_frame
 
 if TYPE_CHECKING:
@@ -22,11 +23,15 @@ DIM = 0.05  # radiance at every place of a room without lamps and windows, so th
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
 ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.3, 0.75), (0.35, 0.62), 70, 15.0
+EVEN = 0.3  # power of the light's brightness that eyes and those who photograph rooms take from it
+WHITE, PAPER = 92, 0.95  # what so many of a hundred points are darker than comes to no more than that
 CONTRAST, KNEE = 1.3, 0.6  # power about what is bright, and from where on highlights are rolled off
 HUE = 0.6  # share of colours that keep their hue where they are bright; film bleaches them
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 DAY, GLOWING = 0.5, 5.0  # radiance of the sky by day; by night a shade glows so much more, as eyes see it
-OWN = 0.25  # metres around a bulb where its own shade throws no shadow
+# Metres around a lamp where it throws no shadow of its own, and how far from a bulb its shade may be; its places that
+# light comes from, where it has no shade as far around the bulb.
+OWN, SHADED, SPOTS, BULB = 0.25, 0.5, 24, 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +40,7 @@ class Lights:
 
     sky: float  # radiance of the dome
     sun: np.ndarray | None  # (2, 3) float32, direction towards it and irradiance by colour
-    bulbs: np.ndarray  # (n, 3) float32 places of lamps
+    bulbs: np.ndarray  # (n, k, 3) float32 places all over the shades of lamps
     power: np.ndarray  # (n, 3) float32, radiant intensity by colour
     tint: np.ndarray  # (3,) float32, colour of the dome
     view: np.ndarray | None  # (h, w, 3) uint8 sRGB, what lies around by latitude and longitude, the zenith first
@@ -46,8 +51,11 @@ class Lights:
         return min(1.0, self.sky / DAY)
 
 
-def read_lights(stage: Usd.Stage) -> Lights:
-    """The lights of a stage: domes, the brightest distant light, spheres; panels of light are for other renderers."""
+def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
+    """The lights of a stage: domes, the brightest distant light, spheres; panels of light are for other renderers.
+
+    `shades`: of everything that glows its triangles (f, 3, 3) in the world, metres.
+    """
     frame, cache = world_frame(stage), UsdGeom.XformCache()
     sky, suns, bulbs, power, tint = 0.0, [], [], [], np.ones(3, np.float32)
     domes, view = 0, None
@@ -66,14 +74,30 @@ def read_lights(stage: Usd.Stage) -> Lights:
             towards = world[:3, 2] / max(float(np.linalg.norm(world[:3, 2])), 1e-9)
             suns.append(np.stack([towards, color]))
         elif prim.IsA(UsdLux.SphereLight):
-            bulbs.append(world[:3, 3])
+            bulbs.append(_spots(world[:3, 3], shades))
             power.append(color / 4)  # of what is told as radiance times area, what goes each way
     sun = max(suns, key=lambda one: float(one[1].sum()), default=None)
     return Lights(
         sky=sky if domes else 1.0, sun=None if sun is None else sun.astype(np.float32),
-        bulbs=np.array(bulbs, np.float32).reshape(-1, 3), power=np.array(power, np.float32).reshape(-1, 3),
+        bulbs=np.array(bulbs, np.float32).reshape(-1, SPOTS, 3), power=np.array(power, np.float32).reshape(-1, 3),
         tint=tint, view=view,
     )  # fmt: skip
+
+
+def _spots(bulb: np.ndarray, shades: Sequence[np.ndarray]) -> np.ndarray:
+    """(`SPOTS`, 3) places that a lamp's light comes from: all over the shade at its bulb (3,), else around that."""
+    turn = np.arange(SPOTS) * np.pi * (3 - 5**0.5)
+    height = 1 - (2 * np.arange(SPOTS) + 1) / SPOTS
+    around = np.sqrt(1 - height**2)
+    spots = bulb + BULB * np.stack([around * np.cos(turn), height, around * np.sin(turn)], 1)
+    nearest = SHADED
+    for triangles in shades:
+        middle = triangles.mean(1)
+        away = float(np.linalg.norm(middle - bulb, axis=1).min())
+        if away < nearest:
+            area = np.linalg.norm(area_normals(triangles), axis=1).cumsum()
+            spots, nearest = middle[np.searchsorted(area, area[-1] * (np.arange(SPOTS) + 0.5) / SPOTS)], away
+    return spots
 
 
 def with_ceiling(scenery: Scenery) -> Scenery:
@@ -94,6 +118,16 @@ def with_ceiling(scenery: Scenery) -> Scenery:
     return replace(scenery, **joined)
 
 
+def evened(light: np.ndarray, sun: np.ndarray, white: np.ndarray) -> np.ndarray:
+    """Light on points (n, 5), see `tracing`, less bright where it is brighter than the mean and brighter where it is
+    less: so walls at lamps and windows keep their colour and corners are not black.
+
+    `sun`: (3,) what the sun gives. `white`: (3,) the mean light in the room.
+    """
+    level = (light[:, :3] + light[:, 4:] * sun) @ LUMA / max(float(white @ LUMA), 1e-6)
+    return np.asarray(light * np.maximum(level, np.float32(1e-3))[:, None] ** np.float32(-EVEN))
+
+
 def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable[[np.ndarray], np.ndarray]:
     """How a picture's linear colours (..., 3) come to [0, 1]: what is bright in the room comes to `BRIGHT`, with
     contrast about it, and what is brighter is rolled off as film does.
@@ -103,8 +137,8 @@ def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable
     """
     adapted, bright = (np.interp(day, (0, 1), ends) for ends in (ADAPTED, BRIGHT))
     white = (np.maximum(light, 1e-6) / max(float(light.mean()), 1e-6)) ** adapted
-    seen = float(np.percentile(color / white @ LUMA, SHARE))
-    scale = (min(bright / max(seen, 1e-4), BRIGHTEST) / white).astype(np.float32)
+    seen, most = np.maximum(np.percentile(color / white @ LUMA, (SHARE, WHITE)), 1e-4)
+    scale = (min(bright / seen, bright / BRIGHT[1] * PAPER / most, BRIGHTEST) / white).astype(np.float32)
 
     def shown(color: np.ndarray) -> np.ndarray:
         color = color * scale

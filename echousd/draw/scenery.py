@@ -113,6 +113,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     parts: list[dict[str, np.ndarray]] = []
     images: dict[tuple, tuple[int, tuple[np.ndarray, np.ndarray]]] = {}
     boxes, curtains = [], []
+    shades: dict[str, list[np.ndarray]] = {}  # by component
     hung: list[int] = []
     words: list[str] = []
     walls: dict[str, int] = {}  # component -> number; doors and windows belong to their wall
@@ -147,6 +148,8 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
                     images[key] = (len(images), (pixels, np.array(paint.tint, np.float32)))
                 part["texture"][faces], (pixels, tint) = images[key]
                 part["flat_colors"][faces] = LINEAR[pixels[::16, ::16]].mean((0, 1)) * tint
+        if (glows := part["emissive"].any(1)).any():
+            shades.setdefault(mesh.component, []).append(part["triangles"][glows])
         parts.append(part)
         words.append(mesh.category)
         if mesh.category not in (*SHELL, *HUNG, "rug"):
@@ -166,7 +169,8 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     return Scenery(
         images=tuple(image for _, image in images.values()), furniture=furniture, hung=at_walls,
         panes=np.array([pane for _, pane in panes], np.float32).reshape(-1, 3, 3),
-        pane_wall=np.array([walls.get(wall, -1) for wall, _ in panes], int), lights=read_lights(stage), **joined,
+        pane_wall=np.array([walls.get(wall, -1) for wall, _ in panes], int),
+        lights=read_lights(stage, [np.concatenate(each) for each in shades.values()]), **joined,
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from echousd.draw.bounced import Bounced
-from echousd.draw.indoors import DIM, GLOWING, OWN, SKY, SUN, VIEW, exposure
+from echousd.draw.indoors import DIM, GLOWING, OWN, SKY, SUN, VIEW, evened, exposure
 from echousd.draw.scenery import LINEAR, Scenery
 from echousd.draw.views import View
 
@@ -61,11 +61,13 @@ def _drawn(world: World, height: int, rays: int, white: np.ndarray | None) -> np
     for pixel, _ in finer:
         edge[pixel] = True
     light = _light_of(world, seen, edge, 2 * rays, max(1, (rays - 1) ** 2))
+    light = light if white is None else evened(light, world.sun, white)
     color, st = seen.glow.copy(), _spread(seen.st.reshape(height, size, 2), rays).reshape(-1, many, 2)
     everywhere = np.flatnonzero(seen.face >= 0)
     for met in (everywhere[start : start + BLOCK] for start in range(0, len(everywhere), BLOCK)):
         color[met] = _colored(world, seen.face[met], st[met], light[met])
-    tone = _tone if white is None else exposure(color, white, world.scenery.lights.day)
+    here = color[everywhere] if len(everywhere) else color  # how bright it is outside is nothing to the room
+    tone = _tone if white is None else exposure(here, white, world.scenery.lights.day)
     color = tone(color)
     mixed = color.copy()
     for pixel, more in finer:
@@ -82,6 +84,7 @@ RINGS = (1, 2, 4, 8)  # places between neighbours, pass by pass
 CLOSE, EVEN = 2, 0.4  # from which ring on it matters how bright neighbours are, and the share that they may differ by
 ALIKE, FLAT = 0.95, 0.02  # cosine and metres within which two points lie on one flat piece of surface
 KEPT, NOTHING = ("primID", "u", "v", "tfar"), np.float32(-9)  # of a hit; the material of what is not there
+MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
 TORN = 0.25  # of a texture: where it changes by more from pixel to pixel, it begins anew
 
 
@@ -143,6 +146,13 @@ def _met(
         origin, direction = _rays(world, rows % world.size + place[0], rows // world.size + place[1])
         hit = world.scene.run(_f32(origin), _f32(direction), output=1)
         part = _seen(world, origin, direction, {key: hit[key] for key in KEPT})
+        mirror = np.flatnonzero((part.face >= 0) & (world.scenery.gloss[part.face] > MIRROR))
+        if len(mirror):  # who looks into a mirror sees what is before it
+            way = direction[mirror] - 2 * _dot(direction[mirror], part.normal[mirror])[:, None] * part.normal[mirror]
+            origin = part.point[mirror] + np.float32(2e-3) * part.normal[mirror]
+            before = _seen(world, origin, way, world.scene.run(_f32(origin), _f32(way), output=1))
+            for field in fields(Seen):
+                getattr(part, field.name)[mirror] = getattr(before, field.name)
         if first is not None:
             other = _other(part, first.of(rows))
             part, rows = part.of(other), rows[other]
@@ -451,9 +461,10 @@ def _direct(world: World, hits: Hits, spot: np.ndarray, turn: np.ndarray) -> tup
         sun = _free(scene, point, towards, np.full(count, 1e3, np.float32), facing > 0) * facing
     if len(lights.bulbs):  # one lamp for each ray
         which = np.minimum((turn[:, 1] * len(lights.bulbs)).astype(int), len(lights.bulbs) - 1)
-        way, away = _way(point, lights.bulbs[which] + 0.05 * _on_sphere(spot))
-        facing = np.clip(_dot(normal, way), 0, None) * len(lights.bulbs) / np.maximum(away, OWN) ** 2
-        lit = _free(scene, point, way, away - OWN, facing > 0) * facing
+        way, away = _way(point, lights.bulbs[which, (spot[:, 0] * lights.bulbs.shape[1]).astype(int)])
+        facing = np.clip(_dot(normal, way), 0, None) * len(lights.bulbs) / (away**2 + OWN**2)
+        own = np.maximum(OWN, np.ptp(lights.bulbs, axis=1).max(-1))[which]  # what is so near is its shade
+        lit = _free(scene, point, way, away - own, facing > 0) * facing
         light += lit[:, None] * lights.power[which] / np.float32(np.pi)
     return light, shine, sun
 

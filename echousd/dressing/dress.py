@@ -138,7 +138,7 @@ def geometry_of(kind: str, size: tuple[float, float, float], variant: int) -> Ge
     return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, weighed(pieces))
 
 
-STRETCH, LONG = 1.9, 3.2  # metres of bare wall that ask for a picture, and for three of them
+STRETCH, FULLER, LONG = 1.9, 1.2, 3.2  # metres of bare wall that ask for a picture, in full rooms, and for three
 STEP = 0.1  # metres from spot to spot along a wall
 PROBE = np.array([0.3, 0.8, 0.03])  # a picture that tells whether a spot is bare
 EMPTY = 0.8  # metres around a corner where nothing stands
@@ -175,21 +175,22 @@ def stretches(setting: Setting, wall: Wall) -> list[tuple[float, float]]:
     runs = [[n for n, _ in run] for free, run in groupby(enumerate(bare), key=lambda one: one[1]) if free]
     ends = [(float(spots[run[0]]), float(spots[run[-1]])) for run in runs]
     long = [(last - first + float(PROBE[0]), (first + last) / 2) for first, last in ends]
-    return [one for one in sorted(long)[-1:] if one[0] >= STRETCH]
+    return [one for one in sorted(long)[-1:] if one[0] >= (FULLER if setting.full else STRETCH)]
 
 
 def bare_corners(setting: Setting) -> None:
-    """Plants, then a tall vase, in the emptiest corners of rooms that are large for what stands in them."""
+    """Plants, then a tall vase, in the emptiest corners of rooms that are large for what stands in them; in full rooms
+    in every corner."""
     green = setting.plants
-    wanted = sum(setting.room.area >= area for area in FLOORS) - green
-    if setting.full or wanted <= 0:
-        return
+    wanted = len(setting.floor) if setting.full else sum(setting.room.area >= area for area in FLOORS) - green
     around = [other.footprint for other in setting.objects.values() if other.position[1] < 0.5]
     away = [min((shapely.Point(corner).distance(plan) for plan in around), default=9.0) for corner in setting.floor]
     for number in np.argsort(away)[::-1].tolist():
         inside = [inward_normal(setting.floor, edge) for edge in (number - 1, number)]
-        if wanted <= 0 or away[number] < EMPTY or abs(float(inside[0] @ inside[1])) > 0.5:
+        if abs(float(inside[0] @ inside[1])) > 0.5 or not (setting.full or away[number] >= EMPTY):
             continue
+        if wanted <= 0 or any(thing.kind == "floor_vase" for thing in setting.placed):
+            return
         rng = setting.rng(f"corner {number}", "bare")
         kind = "floor_plant" if green < GREEN else "floor_vase"
         size, variant = usual_size(kind, rng), int(rng.integers(1 << 30))
@@ -204,7 +205,7 @@ RULES = (
     floors.rugs, walls.hung_up, walls.curtains, walls.radiators, walls.sockets, walls.pictures, upholstery.throws,
     upholstery.folded, upholstery.cushions, upholstery.on_covers, upholstery.bed_cushions, tabletops.tabletops,
     floors.by_doors, floors.clusters, walls.coats, walls.tall_mirror, walls.shelves, walls.clock, floors.cables,
-    floors.corner_plants, bare_walls, bare_corners,
+    bare_walls, bare_corners,
 )  # fmt: skip
 
 

@@ -154,25 +154,6 @@ CORNER_AIR = 0.06  # metres of air around what stands in a corner
 NEAR = 0.35  # metres from furniture: nothing else stands on bare floor alone
 
 
-def corner_plants(setting: Setting) -> None:
-    """Tall plants in free corners, a floor vase where there are plants enough."""
-    if not setting.full:
-        return
-    green = setting.plants
-    for corner in range(len(setting.floor)):
-        rng = setting.rng(f"corner {corner}", "plant")
-        kind = "floor_plant" if green < GREEN else "floor_vase"
-        if any(t.kind == "floor_vase" for t in setting.placed):
-            return
-        size, variant = usual_size(kind, rng), int(rng.integers(1 << 30))
-        inside = [inward_normal(setting.floor, edge) for edge in (corner - 1, corner)]
-        if abs(float(inside[0] @ inside[1])) > 0.5:
-            continue
-        middles = [setting.floor[corner] + (inside[0] + inside[1]) * (float(size[0]) / 2 + off) for off in (0.1, 0.2)]
-        wanted = (Thing(kind, size, np.array([x, 0.0, z]), float(rng.uniform(-3, 3)), "", variant) for x, z in middles)
-        green += setting.put_first(wanted, margin=CORNER_AIR) is not None
-
-
 def cables(setting: Setting) -> None:
     """The cable of every lamp that stands on the floor, to the nearest wall, where it lies free."""
     if not (setting.full and setting.walls):

@@ -20,7 +20,7 @@ from echousd.shapes.geometry import Geometry, Origin
 from echousd.shapes.joinery import assembled
 
 EYE = 1.52  # metres, height of a picture's middle on an empty wall
-OVER = 0.22  # metres between furniture and what hangs over it
+OVER, LOWEST = 0.22, 1.15  # metres between furniture and what hangs over it, which hangs no lower
 NEAR = 0.45  # metres: furniture whose back is so near to a wall stands at it
 SIDE = 0.32  # metres that curtains take beside a window
 RADIATORS = ("panel_radiator", "panel_radiator", "flat_radiator", "column_radiator")  # without a style
@@ -149,7 +149,7 @@ def sockets(setting: Setting) -> None:
 
 
 def pictures(setting: Setting) -> None:
-    """A picture or a mirror over what stands at a wall; on an empty wall of a full room, too."""
+    """A picture or a mirror over what stands at a wall."""
     if not setting.walls or setting.use:
         return
     every = walls_of(setting)
@@ -164,22 +164,12 @@ def pictures(setting: Setting) -> None:
                 break
             if kind == "picture":
                 (kind,) = shown(setting, size, 1, host.name)
-            thing = _hung(setting, wall, along, kind, size, host.top + OVER, int(rng.integers(1 << 30)), host.name)
-            if thing:
+            least, variant = host.top + OVER, int(rng.integers(1 << 30))
+            low = min(max(least, LOWEST), setting.height - 0.2 - size[1])
+            thing = hung_at(setting, wall, along, kind, size, low, variant, host.name)
+            if thing and low > least - 0.1:
                 setting.placed.append(thing)
-                _companion(setting, wall, along, thing, host)
                 break
-    if setting.full:
-        for wall in every:
-            rng = setting.rng(f"wall {wall.edge}", "picture")
-            size = np.array([0.5, 0.7, 0.03]) if rng.random() < 0.5 else np.array([0.7, 0.5, 0.03])
-            (kind,), variant = shown(setting, size, 1, f"wall {wall.edge}"), int(rng.integers(1 << 30))
-            others = [t.position for t in setting.placed if KINDS[t.kind].name == "picture"]
-            for share in (0.5, 0.3, 0.7):
-                thing = _hung(setting, wall, share * wall.length, kind, size, EYE - size[1] / 2, variant, "")
-                if thing and not any(np.linalg.norm(other - thing.position) < 1.2 for other in others):
-                    setting.placed.append(thing)
-                    break
 
 
 def shown(setting: Setting, size: np.ndarray, count: int, *words: str) -> list[str]:
@@ -207,7 +197,7 @@ def _group(setting: Setting, wall: Wall, along: float, host: Standing, rng: np.r
     series = iter(shown(setting, size, 3 * rows, host.name))
     for row in range(rows):
         for column in (-1, 0, 1):
-            least = max(host.top + OVER, 1.15) + row * (h + 0.08)
+            least = max(host.top + OVER, LOWEST) + row * (h + 0.08)
             if rows == 2:
                 least = host.top + OVER + row * (h + 0.08)
             spot = along + column * (float(size[0]) + 0.08)
@@ -249,17 +239,6 @@ def _over(host: Standing, setting: Setting, rng: np.random.Generator) -> list[tu
     return out
 
 
-def _hung(
-    setting: Setting, wall: Wall, along: float, kind: str, size: np.ndarray, least: float, variant: int, on: str
-) -> Thing | None:
-    """A thing on a wall whose middle is at eye height or whose lower side is at `least`; None where it does not fit."""
-    low = max(least, EYE - size[1] / 2) if not on else max(least, 1.15)
-    low = min(low, setting.height - 0.2 - size[1])
-    if low < least - 0.1 or low < 0.4:
-        return None
-    return hung_at(setting, wall, along, kind, size, low, variant, on)
-
-
 def hung_at(
     setting: Setting, wall: Wall, along: float, kind: str, size: np.ndarray, low: float, variant: int, on: str
 ) -> Thing | None:
@@ -279,20 +258,6 @@ def meets(opening: Opening, along: float, half: float, low: float, high: float) 
     """Whether an opening lies within `half` metres of a place along its wall, between two heights."""
     beside = opening.end < along - half or opening.offset > along + half
     return not beside and opening.sill - 0.1 < high and opening.sill + opening.height + 0.2 > low
-
-
-def _companion(setting: Setting, wall: Wall, along: float, first: Thing, host: Standing) -> None:
-    """A second picture of the same size beside one that leaves room over a long piece, in full rooms."""
-    wide = float(host.size[0])
-    if not setting.full or KINDS[first.kind].name != "picture" or wide < 1.8 or first.size[0] > 0.55 * wide:
-        return
-    for side in (1, -1):
-        size = np.round([first.size[0] * 0.5, first.size[1] * 0.75, 0.03], 2)
-        spot = along + side * (first.size[0] / 2 + size[0] / 2 + 0.1)
-        (kind,) = shown(setting, size, 1, host.name, "beside")
-        thing = _hung(setting, wall, spot, kind, size, float(first.position[1]), first.variant, host.name)
-        if thing:
-            setting.put_first([thing], margin=0.02, floor=False, host=host.name)
 
 
 SHARES = (0.5, 0.3, 0.7, 0.18, 0.82)  # of a wall's length, the middle first

@@ -10,7 +10,7 @@ from pxr import Gf, Usd, UsdGeom, UsdLux
 from small_room import BARE, StandIn, small_graph
 
 import echousd
-from echousd.draw.indoors import BRIGHT, SHARE, exposure, read_lights, with_ceiling
+from echousd.draw.indoors import BRIGHT, SHARE, evened, exposure, read_lights, with_ceiling
 from echousd.draw.rendering import render, render_stage
 from echousd.draw.scenery import read_scenery
 from echousd.draw.tracing import trace
@@ -76,7 +76,7 @@ def test_lights_are_read_in_any_unit_and_axis():
     lights = read_lights(lights_of(dome=0.5, sun=2.0, lamp=8.0))
     assert lights.sky == 0.5
     np.testing.assert_allclose(lights.sun, [(0, 1, 0), (2.0, 1.0, 0.5)], atol=1e-6)  # straight down from +Z
-    np.testing.assert_allclose(lights.bulbs, [(1, 3, -2)], atol=1e-6)
+    np.testing.assert_allclose(lights.bulbs - np.float32((1, 3, -2)), 0, atol=0.051)
     np.testing.assert_allclose(lights.power, [(2.0, 1.0, 0.5)])
     dark = read_lights(lights_of(dome=0.0))
     assert dark.sky == 0.0
@@ -103,7 +103,7 @@ def box_room(**lights) -> tuple:
 
 
 def test_a_lamp_lights_what_is_near_it_and_a_window_what_is_before_it():
-    lamp = {"bulbs": np.array([(1.0, 0.5, 0.0)], np.float32), "power": np.array([(3.0, 3.0, 3.0)], np.float32)}
+    lamp = {"bulbs": np.array([[(1.0, 0.5, 0.0)]], np.float32), "power": np.array([(3.0, 3.0, 3.0)], np.float32)}
     scenery, down = box_room(sky=0.0, **lamp)
     bright = trace(scenery, down, 96, rays=2).mean(-1)
     assert bright.max() > 1.3 * np.median(bright)
@@ -120,7 +120,7 @@ def test_a_lamp_lights_what_is_near_it_and_a_window_what_is_before_it():
 
 
 def test_what_a_wall_throws_back_has_its_colour_and_corners_are_darker_than_open_walls():
-    lamp = {"bulbs": np.array([(0.0, 1.5, 0.0)], np.float32), "power": np.ones((1, 3), np.float32)}
+    lamp = {"bulbs": np.array([[(0.0, 1.5, 0.0)]], np.float32), "power": np.ones((1, 3), np.float32)}
     scenery, down = box_room(sky=0.0, **lamp)
     right = (scenery.triangles[..., 0] > 1.9).all(1)
     red = np.where(right[:, None], np.float32([0.7, 0.05, 0.05]), np.float32(0.6))
@@ -131,6 +131,72 @@ def test_what_a_wall_throws_back_has_its_colour_and_corners_are_darker_than_open
     assert hue[1] > 1.03 * hue[0]  # the floor before the red wall is redder than the one before the white wall
     middle, corner = picture[40:56, 40:56].mean(), picture[:6, :6].mean()
     assert corner < 0.9 * middle
+
+
+def test_a_lamp_shines_from_its_shade_and_throws_no_shadow_of_its_own_on_the_ceiling():
+    """A dish below six glowing candles, the bulb below the dish as stages have it."""
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    dish = UsdGeom.Cube.Define(stage, "/Lamp/Dish")
+    dish.AddTranslateOp().Set(Gf.Vec3d(0, 2.0, 0))
+    dish.AddScaleOp().Set(Gf.Vec3f(0.3, 0.02, 0.3))
+    light = UsdLux.SphereLight.Define(stage, "/Lamp/Bulb")
+    light.CreateIntensityAttr(10.0)
+    UsdGeom.Xformable(light).AddTranslateOp().Set(Gf.Vec3d(0, 1.9, 0))
+    ring = np.linspace(0, 2 * np.pi, 7)[:-1]
+    candles = np.stack([0.25 * np.cos(ring), np.full(6, 2.1), 0.25 * np.sin(ring)], 1)
+    corners = 0.02 * np.array([(0.0, 1.0, 0.0), (1.0, -1.0, 0.0), (-1.0, -1.0, 1.0)])
+    candles = (candles[:, None] + corners).astype(np.float32)
+    far = candles + np.float32(2.0)
+    spots = read_lights(stage, [far, candles]).bulbs[0]
+    apart = np.linalg.norm(spots[:, None] - candles.mean(1), axis=-1)
+    assert apart.min(1).max() < 1e-5
+    assert set(apart.argmin(1)) == set(range(6))
+    bare = read_lights(stage, [far]).bulbs[0]
+    assert np.linalg.norm(bare - (0, 1.9, 0), axis=1).max() < 0.051
+    ceiling = {"bulbs": read_lights(stage, [candles]).bulbs, "power": np.full((1, 3), 3.0, np.float32)}
+    scenery, _ = box_room(sky=0.0, **ceiling)
+    up = View(view_matrix(np.array([0.0, 0.5, 0.0]), np.array([0.01, 3.0, 0.0])), 0.7, False, inside=True)
+    dark = read_scenery(stage).triangles
+    added = {
+        "triangles": dark, "normals": np.zeros_like(dark) + np.float32((0, -1, 0)), "st": np.zeros((len(dark), 3, 2)),
+        "flat_colors": np.zeros((len(dark), 3)), "emissive": np.zeros((len(dark), 3)), "gloss": np.zeros(len(dark)),
+        "texture": np.full(len(dark), -1), "wall": np.full(len(dark), -1),
+    }  # fmt: skip
+    joined = {key: np.concatenate([getattr(scenery, key), more]).astype(more.dtype) for key, more in added.items()}
+    picture = trace(replace(scenery, **joined), up, 96, rays=2).mean(-1)
+    beside, middle = picture[44:52, 76:80].mean(), picture[44:52, 63:66].mean()
+    assert middle > 0.9 * beside
+
+
+def test_who_looks_into_a_mirror_sees_what_is_before_it():
+    scenery, down = box_room(
+        sky=1.0, bulbs=np.array([[(0.0, 1.5, 0.0)]], np.float32), power=np.ones((1, 3), np.float32)
+    )
+    floor, above = ((np.abs(scenery.triangles[..., 1] - level) < 0.1).all(1) for level in (0.0, 3.0))
+    down = replace(down, half=0.2)
+    colors = np.where(above[:, None], np.float32([0.7, 0.05, 0.05]), np.float32(0.6))
+    plain, mirrored = (
+        trace(
+            replace(scenery, flat_colors=colors, gloss=np.where(floor, gloss, 0).astype(np.float32)), down, 32, rays=2
+        )
+        for gloss in (0.5, 0.9)
+    )
+    assert plain[..., 0].mean() < 2 * plain[..., 1].mean()
+    assert mirrored[..., 0].mean() > 2 * mirrored[..., 1].mean()
+
+
+def test_light_is_evened_about_its_mean():
+    light = np.zeros((3, 5), np.float32)
+    light[:, :3] = np.array([0.1, 1.0, 10.0])[:, None]
+    light[0, 4] = 0.0
+    even = evened(light, np.ones(3, np.float32), np.ones(3, np.float32))[:, 0]
+    assert even[1] == pytest.approx(1.0)
+    assert 10 < even[2] / even[0] < 50  # of 100
+    sunny = light.copy()
+    sunny[1] = (0, 0, 0, 0, 10.0)  # all of it from the sun counts as bright as that from elsewhere
+    assert evened(sunny, np.ones(3, np.float32), np.ones(3, np.float32))[1, 4] == pytest.approx(even[2])
 
 
 def exposed(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> np.ndarray:
