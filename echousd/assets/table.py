@@ -8,10 +8,12 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from echomodel.files import whole_file, within_memory
+from echomodel.late import extra
 from echomodel.vocabulary import vocabulary
 from echousd.assets.colors import MOST
 from echousd.assets.record import AssetRecord
@@ -65,11 +67,8 @@ class Library:
 
 def arrow() -> Any:
     """The module pyarrow; raises ImportError that says how it is installed."""
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise ImportError("libraries of assets need pyarrow (pip install 'echousd[assets]')") from None
+    pyarrow = extra("pyarrow", "libraries of assets need pyarrow", "assets", ImportError)
+    import_module("pyarrow.parquet")
     return pyarrow
 
 

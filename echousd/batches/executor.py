@@ -16,6 +16,8 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, Protocol
 
+from echomodel.late import extra
+
 POLL = 0.25  # seconds between two looks at the workers' memory and time
 # as many workers as cores: each needs one, and USD need not tell that it was told so
 ONE_CORE = dict.fromkeys(
@@ -289,7 +291,7 @@ class RayCluster:
         memory: int | None = None,
         gpus: bool = False,
     ) -> None:
-        self._ray = _ray()
+        self._ray = extra("ray", "--ray needs Ray", "ray")
         self._ours = not self._ray.is_initialized()
         if self._ours:
             self._connect(address, workers)
@@ -402,11 +404,3 @@ def watched(call: Any, given: Any, memory: int | None, seconds: float | None = N
             threading.Timer(1.0, os._exit, (1,)).start()  # after this answer is on its way: the thread cannot be ended
             return "limit", told
     return found[0]
-
-
-def _ray() -> Any:
-    try:
-        import ray
-    except ImportError:
-        raise ValueError("--ray needs Ray (pip install 'echousd[ray]')") from None
-    return ray

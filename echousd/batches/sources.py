@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from echomodel.files import within_memory
+from echomodel.late import extra
 from echomodel.vocabulary import vocabulary
 from echousd.assets.table import LARGEST, unpacked
 from echousd.graph import GraphError, Node, RoomSpec, SceneGraph
@@ -143,11 +144,9 @@ def _lines(path: Path) -> Iterator[Found]:
 
 
 def _rows(path: Path) -> Iterator[Found]:
-    try:
-        import pyarrow.parquet as parquet
-        from pyarrow import ArrowException
-    except ImportError:
-        raise ValueError(f"{path}: reading Parquet needs pyarrow (pip install 'echousd[batch]')") from None
+    parquet = extra("pyarrow.parquet", f"{path}: reading Parquet needs pyarrow", "batch")
+    from pyarrow import ArrowException
+
     try:
         with parquet.ParquetFile(path) as file:
             size = unpacked(file.metadata)

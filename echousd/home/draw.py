@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 
 from echomodel.files import whole_file, write_json
+from echomodel.late import extra
 from echomodel.openings import Opening, direction, hinge_point, inward_normal, segment, signed_area, swing_area
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError
@@ -141,10 +142,7 @@ def draw_plans(
 
 def write_dxf(plan: Plan, path: Path, things: Sequence[Standing] = ()) -> None:
     """Write a plan as DXF in metres with what stands in it, a layer each; raises `GraphError` without ezdxf."""
-    try:
-        import ezdxf
-    except ImportError:
-        raise GraphError('DXF needs ezdxf: pip install "echousd[dxf]"') from None
+    ezdxf = extra("ezdxf", "DXF needs ezdxf", "dxf", GraphError)
     drawing = ezdxf.new(units=6)  # metres
     for name, colour in LAYERS.items():
         drawing.layers.add(name, color=colour)

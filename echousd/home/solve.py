@@ -10,6 +10,7 @@ from typing import Any
 import networkx
 import numpy as np
 
+from echomodel.late import extra
 from echousd.graph import GraphError
 from echousd.home.graph import HomeRelation
 
@@ -79,11 +80,7 @@ class Problem:
 
 def solver_module() -> Any:
     """OR-tools' CP-SAT; raises `GraphError` that says how to install it."""
-    try:
-        from ortools.sat.python import cp_model
-    except ImportError:
-        raise GraphError('plans need a constraint solver: pip install "echousd[home]"') from None
-    return cp_model
+    return extra("ortools.sat.python.cp_model", "plans need a constraint solver", "home", GraphError)
 
 
 def solved(problem: Problem) -> tuple[str, Cells]:

@@ -11,6 +11,7 @@ import numpy as np
 import trimesh
 from pxr import Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
+from echomodel.late import extra
 from echousd.shapes.geometry import Mass
 from echousd.shapes.matter import moves, read_mass
 from echousd.stage.contents import triangulated
@@ -302,11 +303,7 @@ class SettleUnavailable(ValueError):
 
 def require_engine() -> Any:
     """The module of MuJoCo; raises SettleUnavailable without the extra `sim`."""
-    try:
-        import mujoco
-    except ImportError:
-        raise SettleUnavailable("MuJoCo is not installed; pip install 'echousd[sim]'") from None
-    return mujoco
+    return extra("mujoco", "MuJoCo is not installed", "sim", SettleUnavailable)
 
 
 def simulate(world: World, seconds: float) -> tuple[np.ndarray, Sequence[Overlap]]:

@@ -1,4 +1,4 @@
-"""Functions that tables name: the module of one is imported when it is called, not with the table."""
+"""What is imported when it is called: functions that tables name, modules of optional extras."""
 
 from dataclasses import dataclass
 from importlib import import_module
@@ -15,3 +15,11 @@ class Late:
     def __call__(self, *given: Any, **by_name: Any) -> Any:
         module, name = self.place.split(":")
         return attrgetter(name)(import_module(module))(*given, **by_name)
+
+
+def extra(module: str, need: str, name: str, error: type[Exception] = ValueError) -> Any:
+    """A module of an optional extra of that name; raises an error that says the need and how to install it."""
+    try:
+        return import_module(module)
+    except ImportError:
+        raise error(f"{need}: pip install 'echousd[{name}]'") from None

@@ -15,6 +15,7 @@ from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.data.roomset import RoomSet, kept_out, with_known_words
 from echomodel.data.sgfront import SGFront
 from echomodel.data.shapeset import ShapeSet
+from echomodel.late import extra
 from echomodel.roomboxes import RoomBoxes
 from echomodel.text import CachedTextEncoder, ClipTextEncoder, RandomTextEncoder, TextEncoder, edge_text
 from echomodel.training.recipe import Recipe
@@ -78,10 +79,7 @@ class PublishedShapes:
 
     def published(self, numbers: np.ndarray, side: int) -> Tensor:
         """Grids (K, 1, side, side, side) float32 as published; raises ValueError that names a file of another form."""
-        try:
-            import h5py
-        except ImportError:
-            raise ValueError("3D-FUTURE-SDF is read with h5py: pip install 'echousd[sgfront]'") from None
+        h5py = extra("h5py", "3D-FUTURE-SDF is read with h5py", "sgfront")
         out = []
         for number in numbers:
             try:

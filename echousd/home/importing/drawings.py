@@ -16,6 +16,7 @@ from xml.etree.ElementTree import ParseError
 import numpy as np
 import shapely
 
+from echomodel.late import extra
 from echousd.graph import GraphError
 from echousd.home.importing.found import MAP, SCREEN, Found, Hole, Piece, Room, kind_of, long_sides, rooms_between, span
 
@@ -145,14 +146,12 @@ def _arc(points: np.ndarray) -> np.ndarray | None:
 
 def read_dxf(path: Path, unit: float | None) -> Found:
     """A DXF in the unit that it states, or in `unit` metres; x is east, y north. Raises `GraphError`."""
-    try:
-        import ezdxf
-        from ezdxf import path as paths
-        from ezdxf import recover
-        from ezdxf.enums import InsertUnits
-        from ezdxf.units import conversion_factor
-    except ImportError:
-        raise GraphError('DXF needs ezdxf: pip install "echousd[dxf]"') from None
+    ezdxf = extra("ezdxf", "DXF needs ezdxf", "dxf", GraphError)
+    from ezdxf import path as paths
+    from ezdxf import recover
+    from ezdxf.enums import InsertUnits
+    from ezdxf.units import conversion_factor
+
     try:
         document, _ = recover.readfile(path)
     except (ezdxf.DXFError, OSError, ValueError) as error:
@@ -198,11 +197,7 @@ DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
 
 def read_svg(content: bytes, unit: float | None) -> Found:
     """An SVG of which one unit is `unit` metres; x is east, y south. Raises `GraphError`."""
-    try:
-        import svgelements
-    except ImportError:
-        raise GraphError('SVG needs svgelements: pip install "echousd[svg]"') from None
-
+    svgelements = extra("svgelements", "SVG needs svgelements", "svg", GraphError)
     if unit is None:
         raise GraphError(
             "an SVG has no scale, allowed: --unit with the metres of one of its units, such as --unit 0.01"
@@ -267,12 +262,10 @@ def read_ifc(path: Path, unit: float | None) -> Found:
 
 def read_here(path: str, unit: float | None) -> Found:
     """As `read_ifc`, in this process."""
-    try:
-        import ifcopenshell
-        from ifcopenshell import geom
-        from ifcopenshell.util import element, shape
-    except ImportError:
-        raise GraphError('IFC needs ifcopenshell: pip install "echousd[ifc]"') from None
+    ifcopenshell = extra("ifcopenshell", "IFC needs ifcopenshell", "ifc", GraphError)
+    from ifcopenshell import geom
+    from ifcopenshell.util import element, shape
+
     try:
         file = ifcopenshell.open(path)
     except Exception as error:  # of any kind, from the C++ library

@@ -23,6 +23,7 @@ from PIL import Image
 from torch import nn
 
 from echomodel.furniture import Choices, Style, mesh_of, solids
+from echomodel.late import extra
 from echomodel.metrics.sets import frechet_distance, kernel_distance, with_subsets
 from echomodel.metrics.statistics import Figure, Pair, mean
 from echomodel.roomboxes import RoomBoxes
@@ -109,11 +110,9 @@ def picture(room: RoomBoxes, seed: int) -> np.ndarray:
 
     Raises ValueError where Embree is not installed.
     """
-    try:
-        from embreex import rtcore_scene
-        from embreex.mesh_construction import TriangleMesh
-    except ImportError as error:
-        raise ValueError(f'pictures need Embree ({error}): pip install "echousd[render]"') from None
+    rtcore_scene = extra("embreex.rtcore_scene", "pictures need Embree", "render")
+    from embreex.mesh_construction import TriangleMesh
+
     classes = [vocabulary().category(word).coarse for word in room.categories]
     meshes = [(mesh, word) for mesh, word in zip(bodies(room, seed), classes, strict=True) if word != "lamp"]
     side = SIDE * FINER

@@ -144,5 +144,5 @@ def test_what_is_no_index_is_said(tmp_path, monkeypatch):
 
 def test_pyarrow_is_asked_for_by_name(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
-    with pytest.raises(ImportError, match=r"libraries of assets need pyarrow \(pip install 'echousd\[assets\]'\)"):
+    with pytest.raises(ImportError, match=r"libraries of assets need pyarrow: pip install 'echousd\[assets\]'"):
         index([tmp_path], tmp_path / "lib.parquet")

@@ -12,7 +12,7 @@ from echousd.batches.executor import RayCluster, watched
 
 def test_without_ray_it_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(ValueError, match=r"--ray needs Ray \(pip install 'echousd\[ray\]'\)"):
+    with pytest.raises(ValueError, match=r"--ray needs Ray: pip install 'echousd\[ray\]'"):
         batch(sample={"bedroom": 1}, out=tmp_path / "run", ray="auto")
     with pytest.raises(ValueError, match="needs Ray"):
         RayCluster()

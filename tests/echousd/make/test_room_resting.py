@@ -123,5 +123,5 @@ def test_the_command_needs_the_extra_before_it_works(tmp_path, echousd_command, 
     echousd.write_graph(small_graph(), tmp_path / "graph.usda")
     done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", "--settle")
     assert done.code == 2
-    assert "MuJoCo is not installed; pip install 'echousd[sim]'" in done.err
+    assert "MuJoCo is not installed: pip install 'echousd[sim]'" in done.err
     assert not (tmp_path / "room").exists()

@@ -84,7 +84,7 @@ def test_the_command_says_what_does_not_rest(root, tmp_path, echousd_command):
 
 def test_the_missing_extra_is_named(root, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(SettleUnavailable, match=r"MuJoCo is not installed; pip install 'echousd\[sim\]'"):
+    with pytest.raises(SettleUnavailable, match=r"MuJoCo is not installed: pip install 'echousd\[sim\]'"):
         settle(root)
 
 
