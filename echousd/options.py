@@ -71,10 +71,6 @@ def _licences(text: str) -> str:
     return text
 
 
-def _upper(word: Any) -> Any:
-    return word.upper() if isinstance(word, str) else word
-
-
 File = Annotated[str, BeforeValidator(lambda value: str(value) if isinstance(value, Path) else value)]
 
 
@@ -90,7 +86,7 @@ class Look(BaseModel):
     palette: Annotated[str, AfterValidator(_palette)] = row(
         "", LOOK, "colours, as oak; else by the seed", everyday=True, words="name"
     )
-    up_axis: Annotated[Literal["Y", "Z"], BeforeValidator(_upper)] = row(
+    up_axis: Annotated[Literal["Y", "Z"], BeforeValidator(lambda word: str(word).upper())] = row(
         "Y", FILES, "axis up, in assets too", everyday=True
     )
     meters_per_unit: float = row(1.0, FILES, "unit of the files, in assets too", ge=1e-6, le=1e6)

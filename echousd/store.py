@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import IO
 
-from echomodel.files import flush, read_json, write_json
+from echomodel.files import flush, read_json, telling, write_json
 from echousd.graph.files import CRATE
 from echousd.pending import STAGING
 
@@ -64,11 +64,9 @@ class Store:
             if (root / MARK).is_file():
                 return cls.open(root)
             raise ValueError(f"{root}: holds {', '.join(others[:3])} and no store; choose another folder")
-        try:
+        with telling(root):
             root.mkdir(parents=True, exist_ok=True)
             write_json(root / MARK, {"echousd_store": VERSION})
-        except OSError as error:
-            raise ValueError(f"{root}: cannot be written ({error.strerror or error})") from None
         return cls(root)
 
     @classmethod
@@ -99,13 +97,11 @@ class Store:
         """
         key = key_of(files)
         place = self.folder(key)
-        try:
+        with telling(place):
             if _whole(place, files):
                 os.utime(place)  # it is wanted again: `collect` waits
             else:
                 self._write(place, files)
-        except OSError as error:
-            raise ValueError(f"{place}: cannot be written ({error.strerror or error})") from None
         return key
 
     def read(self, key: str) -> dict[str, bytes]:
@@ -113,10 +109,8 @@ class Store:
         place = self.folder(key)
         if not KEY.fullmatch(key) or not place.is_dir():
             raise ValueError(f"{self.root}: {key!r:.40} is not in the store")
-        try:
+        with telling(place, "cannot be read"):
             files = {path.relative_to(place).as_posix(): path.read_bytes() for path in _files(place)}
-        except OSError as error:
-            raise ValueError(f"{place}: cannot be read ({error.strerror or error})") from None
         if key_of(files) != key:
             raise ValueError(f"{place}: changed since it was stored; make its room again")
         return files

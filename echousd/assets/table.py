@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from echomodel.files import whole_file, within_memory
+from echomodel.files import telling, whole_file, within_memory
 from echomodel.late import extra
 from echomodel.vocabulary import vocabulary
 from echousd.assets.colors import MOST
@@ -93,12 +93,10 @@ def write_library(file: Path, records: Iterable[AssetRecord], about: Mapping[str
     names = schema.names
     rows = sorted(records, key=lambda record: record.id)
     columns = {name: [_plain(getattr(record, name)) for record in rows] for name in names}
-    try:
+    with telling(file):
         file.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(file) as beside:
             pa.parquet.write_table(pa.table(columns, schema=schema), beside, compression="zstd")
-    except OSError as error:
-        raise ValueError(f"{file}: cannot be written ({error.strerror or error})") from None
 
 
 class OldIndex(ValueError):

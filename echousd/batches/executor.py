@@ -55,11 +55,6 @@ class Outcome:
 class Executor(Protocol):
     """Runs tasks; local processes and Ray keep it."""
 
-    @property
-    def workers(self) -> int:
-        """How many rooms are made at once."""
-        ...
-
     def free(self) -> int:
         """How many more tasks are taken now."""
         ...
@@ -110,11 +105,6 @@ class LocalWorkers:
         self._timeout, self._memory = timeout, memory
         self._context = multiprocessing.get_context("spawn")
         self._workers = [self._start(one) for one in islice(cycle(devices or [{}]), workers)]
-
-    @property
-    def workers(self) -> int:
-        """How many rooms are made at once."""
-        return len(self._workers)
 
     def free(self) -> int:
         """How many more tasks are taken now."""
@@ -304,11 +294,6 @@ class RayCluster:
         self._begun: dict[Any, _Begun] = {}
         share = min(1.0, there / self._slots) if gpus else 0.0
         self._room = self._ray.remote(num_cpus=1, num_gpus=share, max_retries=0)(watched)
-
-    @property
-    def workers(self) -> int:
-        """How many rooms are made at once."""
-        return self._slots
 
     @property
     def megabytes(self) -> float:

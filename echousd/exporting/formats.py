@@ -58,13 +58,9 @@ def _flat(stage: Usd.Stage, asked: Export) -> Mapping[Path, bytes]:
     return {asked.out: layer_bytes(_marked(layer, stage), asked.out.suffix), **package.files(asked.out.parent)}
 
 
-def _glb(stage: Usd.Stage, asked: Export) -> Mapping[Path, bytes]:
-    return {asked.out: glb(stage, asked.reach)}
-
-
 FORMATS: Mapping[str, Format] = {
     ".usdz": Format(_usdz, frozenset({"physics", "pictures", "arkit"})),
-    ".glb": Format(_glb),
+    ".glb": Format(lambda stage, asked: {asked.out: glb(stage, asked.reach)}),
     ".usda": Format(_flat, frozenset({"physics", "pictures"}), physics=True),
     ".usdc": Format(_flat, frozenset({"physics", "pictures"}), physics=True),
 }

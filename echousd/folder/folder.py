@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from echomodel.files import digest, flush
+from echomodel.files import digest, flush, telling
 from echousd.folder.lock import LOCK, locked, run_of
 from echousd.folder.manifest import LARGEST, Digest, find_manifest
 from echousd.folder.within import check_links, inside
@@ -259,7 +259,7 @@ def recover(folder: Path) -> str:
 def finish(folder: Path) -> str | None:
     """Do what the journal of a run says, and return the run's name; None where there is nothing to finish."""
     staging = folder / STAGING
-    try:
+    with telling(folder, then="; run again to finish"):
         journal = read_journal(folder)
         if journal is not None and _whole(folder, journal):
             _finish(folder, journal)
@@ -269,8 +269,6 @@ def finish(folder: Path) -> str | None:
         if journal is None or not journal.run:
             _discard(staging)
         return journal.run if journal else None
-    except OSError as error:
-        raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); run again to finish") from None
 
 
 def backup_name(folder: Path, path: str) -> str:

@@ -6,7 +6,7 @@ import io
 import json
 import os
 import zipfile
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -147,19 +147,17 @@ def told(root: Path, run: str) -> tuple[str, ...]:
 
 def undone(folder: Path) -> list[str]:
     """Paths of the archives of edits that were taken back, the earliest edit first; what others put there is none."""
-    found = []
-    for archive in _numbered(folder):
-        try:
-            _read_told(folder / archive, _read_archive(folder, archive, only=TOLD).get(TOLD, b""))
-        except ValueError:
-            continue
-        found.append(archive)
-    return found
+    return [archive for archive, told in _numbered(folder) if isinstance(told, _Told)]
 
 
-def _numbered(folder: Path) -> list[str]:
+def _numbered(folder: Path) -> Iterator[tuple[str, _Told | ValueError]]:
+    """Paths of the archives of edits that were taken back, by number, and what each says, or what is wrong with it."""
     found = [path for path in inside(folder, UNDONE, "a file of the room").glob("*.zip") if path.stem.isdecimal()]
-    return [f"{UNDONE}/{path.name}" for path in sorted(found, key=lambda path: int(path.stem))]
+    for archive in (f"{UNDONE}/{path.name}" for path in sorted(found, key=lambda path: int(path.stem))):
+        try:
+            yield archive, _read_told(folder / archive, _read_archive(folder, archive, only=TOLD).get(TOLD, b""))
+        except ValueError as error:
+            yield archive, error
 
 
 def _free(folder: Path, where: str, number: int) -> tuple[int, str]:
@@ -174,17 +172,13 @@ def _following(folder: Path, state: str) -> str | None:
 
     Raises ValueError where none does and an archive is damaged, so that it might have been that one.
     """
-    damaged: ValueError | None = None
-    for archive in _numbered(folder):
-        try:
-            told = _read_told(folder / archive, _read_archive(folder, archive, only=TOLD).get(TOLD, b""))
-        except ValueError as error:
-            damaged = damaged or error
-            continue
-        if told.after == state:
+    found = list(_numbered(folder))
+    for archive, told in found:
+        if isinstance(told, _Told) and told.after == state:
             return archive
-    if damaged is not None:
-        raise damaged
+    for _, told in found:
+        if isinstance(told, ValueError):
+            raise told
     return None
 
 

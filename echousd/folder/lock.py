@@ -13,6 +13,8 @@ from pathlib import Path
 
 from filelock import FileLock, SoftFileLock, Timeout
 
+from echomodel.files import telling
+
 LOCK = ".echousd.lock"
 POLL = 0.05  # seconds between two tries of one who waits
 SHORT = 100  # characters of a lock file that are told
@@ -93,10 +95,8 @@ def owner_of(folder: Path) -> str:
 def _create(folder: Path) -> list[Path]:
     """Create the folder and return what was created, innermost first."""
     missing = [place for place in (folder, *folder.parents) if not place.exists()]
-    try:
+    with telling(folder, then="; nothing was changed"):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); nothing was changed") from None
     return missing
 
 

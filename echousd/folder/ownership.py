@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from pxr import Sdf, Tf, UsdUtils
 
+from echomodel.files import telling
 from echousd.draw.pictures import is_ours
 from echousd.folder.folder import backup_name, digest, digest_of
 from echousd.folder.within import inside
@@ -58,10 +59,8 @@ def backups(
 def read(folder: Path, path: str) -> bytes | None:
     """The file's bytes, None where there is none; raises ValueError for a link that leads out of the folder."""
     place = inside(folder, path, "a file of the room")
-    try:
+    with telling(place, "cannot be read", "; nothing was changed"):
         return place.read_bytes() if place.is_file() else None
-    except OSError as error:
-        raise ValueError(f"{place}: cannot be read ({error.strerror or error}); nothing was changed") from None
 
 
 def referenced(

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Usd, UsdGeom
 
+from echomodel.files import telling
 from echousd.draw.surfaces import Painted, Surfaces, read_surfaces
 from echousd.stage.contents import room_frame
 from echousd.stage.files import open_stage
@@ -219,7 +220,7 @@ def _check_free(out: Path, force: bool) -> None:
 
 def _write_folder(out: Path, files: dict[str, bytes]) -> None:
     """The folder appears whole; raises ValueError where it cannot be written."""
-    try:
+    with telling(out, then="; nothing was changed"):
         out.parent.mkdir(parents=True, exist_ok=True)
         beside = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
         try:
@@ -237,8 +238,6 @@ def _write_folder(out: Path, files: dict[str, bytes]) -> None:
             beside.replace(out)
         finally:
             shutil.rmtree(beside, ignore_errors=True)
-    except OSError as error:
-        raise ValueError(f"{out}: cannot be written ({error.strerror or error}); nothing was changed") from None
 
 
 def room_prompt(surfaces: Surfaces) -> str:

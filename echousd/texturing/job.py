@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from echomodel.files import read_bounded
+from echomodel.files import read_bounded, telling
 from echousd.folder.within import inside
 from echousd.options import told
 from echousd.texturing.atlas import Unwrapped, layout_digest
@@ -95,11 +95,8 @@ def read_job(folder: Path) -> Job:
     """The job in a folder; raises ValueError that names the file and the field."""
     path = folder / JOB
     try:
-        job = Job.model_validate_json(read_bounded(path, LARGEST))
-    except OSError as error:
-        raise ValueError(
-            f"{path}: cannot be read ({error.strerror or error}), allowed: the folder of texture export"
-        ) from None
+        with telling(path, "cannot be read", ", allowed: the folder of texture export"):
+            job = Job.model_validate_json(read_bounded(path, LARGEST))
     except ValidationError as error:
         raise ValueError(f"{path}: {told(error)}") from None
     for thing in job.objects:

@@ -14,7 +14,7 @@ import numpy as np
 import trimesh
 from trimesh.util import append_faces
 
-from echomodel.files import read_bounded
+from echomodel.files import read_bounded, telling
 from echousd.texturing.atlas import DIGITS, Unwrapped
 
 LARGEST = 256 * 2**20  # bytes of a mesh that is read
@@ -32,10 +32,8 @@ def obj_bytes(mesh: Unwrapped, name: str, *, material: bool = True) -> bytes:
 
 def read_file(path: Path) -> bytes:
     """The bytes of a mesh's file; raises ValueError for what is no regular file, or larger than `LARGEST`."""
-    try:
+    with telling(path, "cannot be read"):
         return read_bounded(path, LARGEST)
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({error.strerror or error})") from None
 
 
 def read_obj(path: Path) -> Unwrapped:

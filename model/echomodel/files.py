@@ -16,10 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
-
-if TYPE_CHECKING:
-    pass
+from typing import Any, BinaryIO
 
 HELD = 512 * 2**20  # bytes of memory that reading any file of somebody's may take
 EACH = 16  # and for each of its bytes: plain data takes more than its text
@@ -136,6 +133,15 @@ def read_bounded(path: str | os.PathLike[str], most: int) -> bytes:
 
 
 @contextmanager
+def telling(path: str | os.PathLike[str], fails: str = "cannot be written", then: str = "") -> Iterator[None]:
+    """Raises ValueError in place of an OSError of the block: the path, what fails, the system's reason, what then."""
+    try:
+        yield
+    except OSError as error:
+        raise ValueError(f"{path}: {fails} ({error.strerror or error}){then}") from None
+
+
+@contextmanager
 def within_memory(path: Path, name: str = "", *, size: int | None = None) -> Iterator[None]:
     """Keep the process from holding much more than a file of somebody's has bytes while the block reads it.
 
@@ -217,10 +223,8 @@ def read_note(path: Path, **kinds: type) -> dict:
 
     Raises ValueError, with the file's path, for anything else.
     """
-    try:
+    with telling(path, "cannot be read"):
         found = read_json(path, 2**24)
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({error.strerror or error})") from None
     wrong = [key for key, kind in kinds.items() if not isinstance(found, dict) or type(found.get(key)) is not kind]
     if wrong or not isinstance(found, dict):
         told = ", ".join(f"{key} ({kinds[key].__name__})" for key in wrong) or "an object"

@@ -183,10 +183,6 @@ class CompactModel(nn.Module):
         """Where the weights are."""
         return next(self.parameters()).device
 
-    def part_tensors(self, part: str) -> dict[str, Tensor]:
-        """State of one part, keys with the part's name in front."""
-        return {f"{part}.{key}": value for key, value in self.get_submodule(part).state_dict().items()}
-
     def part_parameters(self, part: str) -> list[nn.Parameter]:
         """Parameters of one part."""
         return list(self.get_submodule(part).parameters())
@@ -200,9 +196,9 @@ def save_weights(path: Path, model: CompactModel, parts: Sequence[str]) -> None:
     """Write parts of a model with everything needed to use them; floats as float16, some in 8 bits."""
     tensors: dict[str, Tensor] = {}
     for part in parts:
-        for key, value in model.part_tensors(part).items():
+        for key, value in model.get_submodule(part).state_dict().items():
             stored = value.half() if value.is_floating_point() else value
-            tensors[key] = stored.detach().cpu().contiguous()
+            tensors[f"{part}.{key}"] = stored.detach().cpu().contiguous()
     metadata = {
         "format": FORMAT,
         "config": to_json(model.config),

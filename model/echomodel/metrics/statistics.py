@@ -61,7 +61,7 @@ def figure(counts: Counts, seed: int, reference: Counts | None = None) -> Figure
     asked = int((counts.whole > 0).any(1).sum())
     if counts.value is None or asked < 2:
         return Figure(counts.value, rooms=asked)
-    drawn = _resampled(len(counts.whole), seed)
+    drawn = np.random.default_rng([seed, 3]).integers(len(counts.whole), size=(RESAMPLES, len(counts.whole)))
     ratio = _ratio(counts.part[drawn].sum(1), counts.whole[drawn].sum(1))
     found = spread(counts.value, ratio, asked)
     if reference is None or reference.value is None or len(reference.whole) != len(counts.whole):
@@ -91,10 +91,6 @@ def spread(value: float, drawn: Sequence[float] | np.ndarray, rooms: int) -> Fig
 def mean(values: Iterable[float], seed: int) -> Figure:
     """The mean of values and its interval."""
     return figure(Counts.of([(value, 1.0) for value in values]), seed)
-
-
-def _resampled(count: int, seed: int) -> np.ndarray:
-    return np.random.default_rng([seed, 3]).integers(count, size=(RESAMPLES, count))
 
 
 def _ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
