@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -10,10 +10,13 @@ from echomodel.boxes2d import seen
 
 CUT = 3.0  # how much more what is cut off by a picture's border disturbs
 ASPECT = 1.6  # of a picture from inside: its width over its height
-# rays through such a picture whose half width at distance 1 is 1, and what each of them counts
-SPREAD = np.linspace(-1, 1, 13)
-RAYS = np.stack([*(g.ravel() for g in np.meshgrid(SPREAD, SPREAD / ASPECT)), np.full(169, -1.0)], 1)
-WEIGHTS = np.where(np.abs(RAYS[:, :2] * (1, ASPECT)).max(1) > 0.8, CUT, 1.0)
+# rays through such a picture whose half width at distance 1 is 1 and past its border, which are in it, and what each of
+# these counts
+SPREAD = np.arange(-8, 9) / 6
+RAYS = np.stack([*(g.ravel() for g in np.meshgrid(SPREAD, SPREAD / ASPECT)), np.full(289, -1.0)], 1)
+WITHIN = np.abs(RAYS[:, :2] * (1, ASPECT)).max(1) < 1.01
+AHEAD = WITHIN & (RAYS[:, 1] == 0)
+WEIGHTS = np.where(np.abs(RAYS[WITHIN, :2] * (1, ASPECT)).max(1) > 0.8, CUT, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +47,11 @@ class Furniture:
         local = cube * self.size[:, None]
         return np.asarray(self.position[:, None] + np.einsum("nji,nkj->nki", self._turns(), local))
 
+    def with_others(self, *others: Furniture | None) -> Furniture:
+        """These boxes, then some others."""
+        every = [self, *(other for other in others if other is not None)]
+        return Furniture(*(np.concatenate([getattr(one, f.name) for one in every]) for f in fields(Furniture)))
+
     def nearness(self, eye: np.ndarray, reach: float) -> np.ndarray:
         """(n,) how near each box is to `eye` (3,): 0 at `reach` metres and beyond, 1 where the eye touches it."""
         local = eye - self.position - self.size * (0.0, 0.5, 0.0)
@@ -51,18 +59,9 @@ class Furniture:
         away = np.linalg.norm(np.maximum(np.abs(local) - self.size / 2, 0.0), axis=1)
         return np.clip(1.0 - away / reach, 0.0, 1.0)
 
-    def filled(self, view: np.ndarray, half: float, reach: float) -> float:
-        """Share of a picture from inside that boxes nearer than `reach` metres fill: the nearer the more, and what the
-        picture's border cuts off `CUT` times; `view`, `half`: as `away`.
-        """
-        near = self.nearness(view[:3, 3], reach) > 0
-        if not near.any():
-            return 0.0
-        away = Furniture(self.size[near], self.position[near], self.yaw[near]).away(view, half)
-        return float((np.clip(1.0 - away / reach, 0.0, 1.0) * WEIGHTS).mean())
-
-    def away(self, view: np.ndarray, half: float) -> np.ndarray:
-        """(169,) metres to the nearest box along `RAYS` through a picture from inside, inf where there is none.
+    def met(self, view: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
+        """(289,) int which box is the nearest along each of `RAYS` through a picture from inside and past its border,
+        and metres to it, inf where there is none.
 
         `view`: (4, 4) float camera to world. `half`: half of the picture's width at distance 1.
         """
@@ -72,7 +71,9 @@ class Furniture:
         start = np.einsum("nij,nj->ni", turn, view[:3, 3] - self.position - self.size * (0.0, 0.5, 0.0))
         way = (turn.reshape(-1, 3) @ ways.T).reshape(len(turn), 3, -1).transpose(0, 2, 1)
         enter, leave = _crossing(start[:, None], way, 0.5 * self.size[:, None])
-        return np.asarray(np.where((enter < leave) & (leave > 0), np.maximum(enter, 0.0), np.inf).min(0))
+        away = np.where((enter < leave) & (leave > 0), np.maximum(enter, 0.0), np.inf)
+        which = away.argmin(0)
+        return which, away[which, np.arange(len(RAYS))]
 
     def hidden(self, eye: np.ndarray) -> float:
         """How many objects are hidden behind others from `eye` (3,): shares of 27 points in each box, summed."""
@@ -98,6 +99,19 @@ class Furniture:
         turn = np.zeros((len(self.size), 3, 3))
         turn[:, 0, 0], turn[:, 0, 2], turn[:, 1, 1], turn[:, 2, 0], turn[:, 2, 2] = cos, -sin, 1.0, sin, cos
         return turn
+
+
+def filled(away: np.ndarray, reach: np.ndarray) -> float:
+    """Share of a picture that is nearer than `reach` metres: the nearer the more, and what its border cuts off `CUT`
+    times; `away`, `reach`: (289,) metres, as `Furniture.met` has them."""
+    return float((np.clip(1.0 - away / reach, 0.0, 1.0)[WITHIN] * WEIGHTS).mean())
+
+
+def torn(which: np.ndarray, away: np.ndarray, worth: np.ndarray) -> float:
+    """How much of the things in a picture its border cuts off, as shares of it; `which`, `away`: as `Furniture.met`,
+    `worth`: (n,) what each thing counts."""
+    inside, outside = (np.bincount(which[rows & np.isfinite(away)], minlength=len(worth)) for rows in (WITHIN, ~WITHIN))
+    return float(np.minimum(inside, 2 * outside) @ worth / WITHIN.sum())
 
 
 def _crossing(start: np.ndarray, way: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

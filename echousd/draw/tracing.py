@@ -66,8 +66,8 @@ def _drawn(world: World, height: int, rays: int, white: np.ndarray | None) -> np
     everywhere = np.flatnonzero(seen.face >= 0)
     for met in (everywhere[start : start + BLOCK] for start in range(0, len(everywhere), BLOCK)):
         color[met] = _colored(world, seen.face[met], st[met], light[met])
-    here = color[everywhere] if len(everywhere) else color  # how bright it is outside is nothing to the room
-    tone = _tone if white is None else exposure(here, white, world.scenery.lights.day)
+    own = everywhere[world.scenery.emissive[seen.face[everywhere]].sum(1) == 0]  # no lamp, and nothing outside
+    tone = _tone if white is None else exposure(color[own] if len(own) else color, white, world.scenery.lights.day)
     color = tone(color)
     mixed = color.copy()
     for pixel, more in finer:

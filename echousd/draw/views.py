@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,7 +14,7 @@ from pxr import UsdGeom
 from echomodel.openings import inward_normal
 from echomodel.triangles import cross
 from echousd.draw.scenery import Scenery
-from echousd.draw.sight import ASPECT, RAYS, Furniture
+from echousd.draw.sight import AHEAD, ASPECT, RAYS, WITHIN, Furniture, filled, torn
 from echousd.naming import free_name
 from echousd.stage.units import metres_per_unit, up_axis
 
@@ -28,18 +28,19 @@ EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
 SLOPES = (0.05, 0.12, 0.2, 0.28)  # metres that the middle of its picture is lower for a metre ahead
 PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
 WHOLE, CLEAR = 400.0, 30.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
-TRIED = 128  # views of all that are looked at closely
+LOOKED, CHOSEN, TRIED = 48, 3, 32  # eyes of which one view is looked at closely; eyes, and of each so many views
 LOW = 1.4  # metres: over what is so high one looks
 # bare walls: what all of a picture costs, from which share on, metres of rounding
 BARE, BAREST, DEEP = 60.0, 0.28, 0.02
-BEFORE, WALLED = 2.0, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
-FILLED = 170.0  # metres of depth that a picture full of what is near is worth
+BEFORE, WALLED = 2.6, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
+FILLED = 260.0  # metres of depth that a picture full of what is near is worth
+TORN, HANGS = 60.0, 4.0  # and one full of what its border cuts off; how much more what hangs on walls counts there
 BEHIND, ASKANCE = 25.0, 0.0  # metres of depth that the main piece from behind costs, and from which cosine on
 HALVED, LACKED = 60.0, 12.0  # metres of depth that a lamp costs which the border cuts, or which is beyond it
 SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width over which it is cord; metres
 UNSEEN = 3.0  # metres of depth that each piece in the picture is worth
 SHOWN, FAR = 30.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
-TOUCHED = 0.86  # nearness of what the eye must not be at: a quarter of a metre
+TOUCHED, NOWHERE = 0.86, 1e4  # nearness of what the eye must not be at, a third of a metre; what that costs
 STEPS = (0.3, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
 APART = 3.0  # metres from the middle that it keeps where it stands further from its corner
 ALONG, OFF = (0.2, 0.35, 0.5, 0.65, 0.8), 0.4  # or along a wall, as shares of its length, and metres from it
@@ -128,7 +129,8 @@ def inside_view(
     """Camera to world (4, 4) float, `shifted`, and focal length in mm of a view inside a room, its main piece whole.
 
     Of all eyes, headings and lenses those count that have the main piece whole in the picture; of these the one that
-    hides and cuts off least, has most furniture and depth in its picture and no bare wall over a third of it.
+    hides and cuts off least of what stands and hangs, has most furniture and depth in its picture and little that is
+    near, and no bare wall over a third of it.
 
     Arguments:
         floor: (k, 2) float, x and z of the corners, metres.
@@ -141,22 +143,36 @@ def inside_view(
     floor = np.asarray(floor, float)
     room = shapely.Polygon(floor)
     middle = np.asarray(room.representative_point().coords[0])
-    things = [some for some in (furniture, hung) if some is not None and len(some.size)]
-    near = [*((some, BEFORE) for some in things), (_walls(floor, height), WALLED)]
-    at_walls = [*things, *([openings] if openings is not None and len(openings.size) else [])]
+    things = furniture.with_others(hung)
+    everything = things.with_others(openings, _walls(floor, height))
     main = _main(furniture) if main is None else main
+    row = np.arange(len(everything.size))
+    reach = np.where((row < len(things.size)) & (row != main), BEFORE, WALLED)
+    worth = np.select([row < len(furniture.size), row < len(things.size)], [1.0, HANGS])
     aim = middle if main is None else furniture.position[main, [0, 2]]
     around = 0.5 * aim + 0.5 * (furniture.centre if len(furniture.size) else middle)
     corners = np.empty((0, 3)) if main is None else furniture.corners[main]
     shades = _shades(furniture, height)
     front = np.zeros(2) if main is None else np.array([np.sin(furniture.yaw[main]), np.cos(furniture.yaw[main])])
-    best, most = (_view(middle + 0.1, middle, EYES[0] * height, SLOPES[-1]), LENSES[0]), -np.inf
     wider = room.buffer(0.05)
-    shots: list[Shot] = []
+
+    def merit(shot: Shot) -> float:
+        """Metres of depth that a view is worth."""
+        eye, half = shot.view[:3, 3], APERTURE / 2 / shot.lens
+        which, away = everything.met(shot.view, half)
+        seen = (~shot.blocked & (_aside(shot.points, shot.view) <= half)).mean(-1).sum()
+        bare = bare_share(np.where(row[which] < len(row) - len(floor), np.inf, away), height, shot.view, half)
+        return (
+            float(np.minimum(away[AHEAD], FAR).mean() + (eye[[0, 2]] - middle) @ furniture.facing + UNSEEN * seen)
+            + SHOWN * float((np.isfinite(away) & (which < len(furniture.size)))[WITHIN].mean())
+            - FILLED * filled(away, reach[which]) - TORN * torn(which, away, worth)
+            - BARE * max(0.0, bare - BAREST) - shot.cost
+        )  # fmt: skip
+
+    eyes: list[list[Shot]] = []
     for spot, level in product(_spots(floor, middle), EYES):
         eye = np.array([spot[0], level * height, spot[1]])
-        if any(bool((some.nearness(eye, BEFORE) > TOUCHED).any()) for some in things):
-            continue
+        touched = NOWHERE * float(things.nearness(eye, BEFORE).max(initial=0.0) > TOUCHED)
         points, blocked = furniture.blocked(eye)
         hidden = 0.0 if main is None else _hidden(wider, points[main], blocked[main], eye)
         views = _turned(eye, np.stack([aim - spot, around - spot]))
@@ -164,43 +180,30 @@ def inside_view(
         cut = (_aside(corners, views)[..., None] > halves / MARGIN).mean(-2) if len(corners) else np.zeros(len(LENSES))
         before = float((spot - aim) @ front) / max(float(np.linalg.norm(spot - aim)), 1e-9)
         hidden = CLEAR * hidden + (BEHIND * max(0.0, ASKANCE - before) if main is not None else 0.0)
-        cost = WHOLE * cut + _shown(shades, views, halves) + hidden
-        cost = cost + np.abs(PANS)[:, None, None] + 0.1 * np.arange(len(LENSES))
-        cost = cost.transpose(0, 1, 3, 2).reshape(-1, len(SLOPES))  # of each slope the first that costs least
-        for slope, row in sorted(enumerate(cost.argmin(0)), key=lambda found: (found[1] // len(LENSES), found[0])):
-            heading, number = divmod(int(row), len(LENSES))
-            view = views.reshape(-1, len(SLOPES), 4, 4)[heading, slope]
-            shots.append(Shot(float(cost[row, slope]), view, LENSES[number], points, blocked))
-    for first, view, lens, points, blocked in sorted(shots, key=lambda shot: shot.cost)[:TRIED]:
-        eye, half = view[:3, 3], APERTURE / 2 / lens
-        merit = min(_depth(room, eye[[0, 2]], -view[[0, 2], 2]), FAR) - first
-        if len(furniture.size):
-            unseen = blocked | (_aside(points, view) > half)
-            merit += float((eye[[0, 2]] - middle) @ furniture.facing - UNSEEN * unseen.mean(1).sum())
-        if merit + SHOWN <= most:  # the rest only takes away
-            continue
-        if len(furniture.size):
-            merit += SHOWN * np.isfinite(furniture.away(view, half)).mean()
-        merit -= FILLED * sum(some.filled(view, half, reach) for some, reach in near)
-        if merit > most:
-            merit -= BARE * max(0.0, bare_share(floor, height, at_walls, view, half) - BAREST)
-        if merit > most:
-            best, most = (view, lens), merit
-    return best
+        cost = WHOLE * cut + _shown(shades, views, halves) + hidden + touched
+        cost = (cost + np.abs(PANS)[:, None, None] + 0.1 * np.arange(len(LENSES))).ravel()
+        views = np.repeat(views.reshape(-1, 4, 4), len(LENSES), axis=0)
+        eyes.append([
+            Shot(float(cost[n]), views[n], LENSES[n % len(LENSES)], points, blocked)
+            for n in np.argsort(cost, kind="stable")[:TRIED]
+        ])  # fmt: skip
+    eyes = sorted(eyes, key=lambda shots: shots[0].cost)[:LOOKED]
+    best = sorted(eyes, key=lambda shots: -merit(shots[0]))[:CHOSEN]  # of each eye by the view that costs least
+    shot = max((shot for shots in best for shot in shots), key=merit)
+    return shot.view, shot.lens
 
 
-def bare_share(floor: np.ndarray, height: float, things: Sequence[Furniture], view: np.ndarray, half: float) -> float:
-    """Share of a picture inside a room that shows walls with nothing at or before them; `things`: all boxes.
+def bare_share(wall: np.ndarray, height: float, view: np.ndarray, half: float) -> float:
+    """Share of a picture inside a room that shows walls with nothing at or before them.
 
-    `floor`: (k, 2) float, metres; `height`: of the walls, metres. `view`, `half`: as `Furniture.away`.
+    `wall`: (289,) metres to bare walls along `RAYS`, inf where there is none. `height`: of the walls, metres. `view`,
+    `half`: as `Furniture.met`.
     """
-    wall = _walls(floor, height).away(view, half)
-    before = np.min([some.away(view, half) for some in things], axis=0) if things else np.inf
     way = RAYS[:, 1] * half * view[1, 1] - view[1, 2]  # up, over the length of the ray
     way = way / np.linalg.norm(RAYS * (half, half, 1.0), axis=1)
     with np.errstate(divide="ignore"):
         level = np.where(way < 0, -view[1, 3] / way, (height - view[1, 3]) / np.maximum(way, 1e-12))
-    return float((wall < np.minimum(before, level) - DEEP).mean())
+    return float((wall < level - DEEP)[WITHIN].mean())
 
 
 def _main(furniture: Furniture) -> int | None:
@@ -233,7 +236,7 @@ def _aside(points: np.ndarray, view: np.ndarray) -> np.ndarray:
 def _shades(furniture: Furniture, height: float) -> np.ndarray:
     """(n, 8, 3) float: corners of what hangs from a ceiling at this height, without its cords, metres."""
     tall, wide = furniture.size[:, 1], furniture.size[:, [0, 2]].max(1)
-    hangs = (furniture.position[:, 1] > LOW) & (furniture.position[:, 1] + tall > height - AT_CEILING)
+    hangs = (furniture.position[:, 1] > LOW - DEEP) & (furniture.position[:, 1] + tall > height - AT_CEILING)
     size = np.insert(furniture.size[:, [0, 2]], 1, np.minimum(SHADE[0] * tall, SHADE[1] * wide), axis=1)
     return replace(furniture, size=size).corners[hangs]
 
@@ -266,12 +269,6 @@ def _spots(floor: np.ndarray, middle: np.ndarray) -> list[np.ndarray]:
     return spots
 
 
-def _view(spot: np.ndarray, aim: np.ndarray, level: float, slope: float) -> np.ndarray:
-    """(4, 4) float camera to world over `spot` at a level towards `aim`, `shifted` by a slope."""
-    eye, target = np.insert(spot, 1, level), np.insert(aim, 1, level)
-    return shifted(view_matrix(eye, target), slope)
-
-
 def _turned(eye: np.ndarray, ways: np.ndarray) -> np.ndarray:
     """(w, `PANS`, `SLOPES`, 4, 4) float camera to world of an eye that looks along ways (w, 2), turned, `shifted`."""
     cos, sin = np.cos(PANS), np.sin(PANS)
@@ -280,14 +277,6 @@ def _turned(eye: np.ndarray, ways: np.ndarray) -> np.ndarray:
     level = view_matrix(np.broadcast_to(eye, target.shape), target)
     shape = (*level.shape[:-2], len(SLOPES), 4, 4)
     return shifted(np.broadcast_to(level[..., None, :, :], shape), np.broadcast_to(SLOPES, shape[:-2]))
-
-
-def _depth(room: shapely.Polygon, spot: np.ndarray, way: np.ndarray) -> float:
-    """Metres that one sees from a spot in the mean of a wide picture, up to the walls."""
-    turn = np.arctan2(way[1], way[0]) + np.linspace(-0.7, 0.7, 15)
-    ends = spot + 50.0 * np.stack([np.cos(turn), np.sin(turn)], 1)
-    lines = shapely.linestrings([[spot, end] for end in ends])
-    return float(shapely.distance(shapely.Point(spot), shapely.intersection(lines, room.boundary)).mean())
 
 
 WIDEST = 4.0  # width of a picture over its height, and the other way round

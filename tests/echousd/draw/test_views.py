@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import shapely
 
-from echousd.draw.sight import ASPECT, Furniture
-from echousd.draw.views import APERTURE, LENSES, bare_share, inside_view, view_matrix
+from echousd.draw.sight import ASPECT, RAYS, Furniture, filled, torn
+from echousd.draw.views import APERTURE, LENSES, _walls, bare_share, inside_view, view_matrix
 
 FLOOR = np.array([(0.0, 0.0), (0.0, 4.0), (5.0, 4.0), (5.0, 0.0)])
 
@@ -15,6 +15,15 @@ FLOOR = np.array([(0.0, 0.0), (0.0, 4.0), (5.0, 4.0), (5.0, 0.0)])
 def boxes(*rows: tuple[float, ...]) -> Furniture:
     found = np.array(rows, float).reshape(-1, 7)
     return Furniture(found[:, :3], found[:, 3:6], found[:, 6])
+
+
+def fills(things: Furniture, view: np.ndarray, half: float, reach: float) -> float:
+    return filled(things.met(view, half)[1], np.full(len(RAYS), reach))
+
+
+def bare_walls(things: list[Furniture], view: np.ndarray, half: float) -> float:
+    which, away = boxes().with_others(*things, _walls(FLOOR, 2.8)).met(view, half)
+    return bare_share(np.where(which < sum(len(some.size) for some in things), np.inf, away), 2.8, view, half)
 
 
 BED = boxes((1.8, 0.6, 2.0, 2.5, 0.0, 1.2, 0.0))
@@ -38,7 +47,7 @@ def test_the_camera_turns_away_from_what_its_picture_would_cut_off() -> None:
     edge = eye - 1.3 * free[:3, 2] + 1.1 * free[:3, 0]  # at the right border of its picture
     plant = boxes((0.4, 1.3, 0.4, edge[0], 0.0, edge[2], 0.0))
     other, lens = inside_view(FLOOR, BED, 2.8, plant)
-    assert plant.filled(other, APERTURE / 2 / lens, 2.0) < 0.25 * plant.filled(free, half, 2.0)
+    assert fills(plant, other, APERTURE / 2 / lens, 2.0) < 0.25 * fills(plant, free, half, 2.0)
 
 
 def test_the_camera_looks_down_a_little_in_the_smallest_room() -> None:
@@ -78,17 +87,17 @@ def test_the_main_piece_is_whole_in_the_picture_and_the_eye_in_the_room(floor, s
 def test_a_wall_is_bare_where_nothing_is_at_it():
     view = view_matrix(np.array([2.5, 1.4, 0.5]), np.array([2.5, 1.4, 4.0]))
     half = APERTURE / 2 / LENSES[0]
-    bare = bare_share(FLOOR, 2.8, [], view, half)
+    bare = bare_walls([], view, half)
     picture = boxes((3.5, 1.6, 0.05, 2.5, 0.6, 3.97, 0.0))
     assert 0.4 < bare < 0.9
-    assert bare_share(FLOOR, 2.8, [picture], view, half) < bare - 0.1
+    assert bare_walls([picture], view, half) < bare - 0.1
 
 
 def test_the_camera_shows_no_bare_wall_where_it_need_not():
     walls = boxes(*((2.4, 1.6, 0.05, x, 0.6, 3.96, 0.0) for x in (1.3, 3.7)))  # pictures at one long wall
     bed = boxes((1.8, 0.6, 2.0, 2.5, 0.0, 2.8, 0.0))
     view, lens = inside_view(FLOOR, bed, 2.8, walls)
-    assert bare_share(FLOOR, 2.8, [bed, walls], view, APERTURE / 2 / lens) < 1 / 3
+    assert bare_walls([bed, walls], view, APERTURE / 2 / lens) < 1 / 3
 
 
 def test_only_what_is_near_and_in_the_picture_fills_it() -> None:
@@ -97,9 +106,33 @@ def test_only_what_is_near_and_in_the_picture_fills_it() -> None:
         boxes((0.3, 2.0, 0.3, x, 0.0, z, 0.0)) for x, z in ((0.8, 0.0), (-0.8, 0.0), (0.3, 0.9), (3.0, 0.0))
     )
     assert ahead.nearness(view[:3, 3], 1.0)[0] == behind.nearness(view[:3, 3], 1.0)[0] == pytest.approx(0.35)
-    assert ahead.filled(view, 1.0, 1.0) > 0.05
-    assert behind.filled(view, 1.0, 1.0) == far.filled(view, 1.0, 1.0) == 0
-    assert beside.filled(view, 0.5, 1.0) == 0  # a narrow picture does not reach so far
+    assert fills(ahead, view, 1.0, 1.0) > 0.05
+    assert fills(behind, view, 1.0, 1.0) == fills(far, view, 1.0, 1.0) == 0
+    assert fills(beside, view, 0.5, 1.0) == 0  # a narrow picture does not reach so far
+
+
+def test_what_the_border_cuts_is_torn_and_what_is_whole_or_beyond_it_is_not() -> None:
+    view = view_matrix(np.array([0.0, 1.5, 0.0]), np.array([1.0, 1.5, 0.0]))
+    share = {
+        z: torn(
+            *boxes((0.8, 1.0, 0.8, 2.0, 1.0, z, 0.0), (0.1, 0.1, 0.1, -9.0, 0.0, 0.0, 0.0)).met(view, 0.7), np.ones(2)
+        )
+        for z in (0.0, 1.3, 4.0)
+    }
+    assert share[0.0] == share[4.0] == 0.0
+    assert share[1.3] > 0.03
+    picture = boxes((0.8, 1.0, 0.8, 2.0, 1.0, 1.3, 0.0))
+    assert torn(*picture.met(view, 0.7), np.array([4.0])) == pytest.approx(4 * share[1.3])
+
+
+def test_the_camera_turns_to_have_a_picture_on_the_wall_whole() -> None:
+    """What its heading alone would cut off: the pictures hang at either end of what it sees without turning."""
+    view, lens = inside_view(FLOOR, BED, 2.8)
+    for side in (-1, 1):
+        at = view[:3, 3] - 3.0 * view[:3, 2] + side * 3.0 * APERTURE / 2 / lens * view[:3, 0]
+        picture = boxes((0.5, 0.6, 0.03, np.clip(at[0], 0.4, 4.6), 1.3, 3.97 if at[2] > 2 else 0.03, 0.0))
+        other, lens_then = inside_view(FLOOR, BED, 2.8, picture)
+        assert torn(*picture.met(other, APERTURE / 2 / lens_then), np.ones(1)) < 0.02
 
 
 def lit(at: tuple[float, float], wide: float, tall: float) -> tuple[Furniture, np.ndarray]:
