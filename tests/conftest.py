@@ -18,7 +18,7 @@ settings.register_profile("project", deadline=None, suppress_health_check=[Healt
 settings.load_profile("project")
 
 
-SLOW = frozenset(Path(__file__).with_name("slow.txt").read_text("utf-8").split())  # files that `make quick` leaves out
+SLOW = Path(__file__).with_name("slow.txt").read_text("utf-8").split()  # left out by `make quick`; the dearest first
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -28,6 +28,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     slow = collection_path.is_file() and collection_path.relative_to(Path(__file__).parent).as_posix() in SLOW
     return True if slow and config.getoption("--quick") else None
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Dear files begin first, so that no worker ends the run alone with one (with `--no-loadscope-reorder`)."""
+    place = {f"tests/{file}": number for number, file in enumerate(SLOW)}
+    items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(place)))
 
 
 @pytest.fixture(autouse=True, scope="session")

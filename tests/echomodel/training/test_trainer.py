@@ -18,6 +18,7 @@ from echomodel.floors import known, outside
 from echomodel.graph import GraphBatch
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts
+from echomodel.training import trainer
 from echomodel.training.layout_stage import LayoutStage, as_carried, measure_distance, told_triplets
 from echomodel.training.recipe import OptimizerConfig, Recipe, read_recipe
 from echomodel.training.rooms import PackedRooms, draw_batch, make_batch
@@ -113,6 +114,8 @@ def test_pseudo_edits_leave_out_added_nodes(packed: PackedRooms) -> None:
 
 def test_smoke_recipe_trains_everything(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Autoencoder, layout, shapes and both branches together; losses fall and a room with shapes can be sampled."""
+    monkeypatch.setattr("echomodel.compact.sampling.AFTER", 1)  # of forty equal steps
+    drawn = trainer.plot_log
     whole = AutoencoderStage.validate
     monkeypatch.setattr(AutoencoderStage, "validate", lambda stage, model: whole(stage, model, 4))  # held-out shapes
     few = "shapes_per_batch=3", "model.autoencoder.width=8"
@@ -127,12 +130,12 @@ def test_smoke_recipe_trains_everything(data: Path, tmp_path: Path, monkeypatch:
         names = ",".join(f'"{path}"' for path in start)
         count = {"joint": 5, "vqvae": 24}.get(stage, 40)
         steps = f"steps={count}", f"validate_every={count}"
-        trainer = open_run(smoke(stage, data, f"start=[{names}]", *few, *steps), tmp_path / stage)
-        trainer.run()
+        monkeypatch.setattr(trainer, "plot_log", drawn if stage == "layout" else lambda log, out: None)
+        open_run(smoke(stage, data, f"start=[{names}]", *few, *steps), tmp_path / stage).run()
         losses = [value for _, name, value in read_log(tmp_path / stage / "log.csv") if name == "loss"]
-        assert (tmp_path / stage / "curves.png").stat().st_size > 5000
         if stage != "joint":  # starts from trained parts
             assert np.median(losses[-4:]) < 0.97 * losses[0], stage
+    assert (tmp_path / "layout/curves.png").stat().st_size > 5000
     names = ",".join(f'"{weights[stage]}"' for stage in ("vqvae", "shape"))  # the decoder, on what the denoiser can say
     recipe = smoke("vqvae", data, f"start=[{names}]", *few, "steps=6", "validate_every=6")
     decoder = open_run(recipe, tmp_path / "decoder")
@@ -154,6 +157,7 @@ def test_smoke_recipe_trains_everything(data: Path, tmp_path: Path, monkeypatch:
 def test_resumed_run_is_bit_equal(stage: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for one in (AutoencoderStage, LayoutStage):
         monkeypatch.setattr(one, "validate", lambda stage, model: {})
+    monkeypatch.setattr(trainer, "plot_log", lambda log, out: None)
     recipe = smoke(stage, data, "steps=6", "log_every=1", "shapes_per_batch=2", "nodes=80")
     whole = open_run(recipe, tmp_path / "whole")
     whole.run()

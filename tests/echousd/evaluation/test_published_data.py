@@ -12,6 +12,7 @@ import pytest
 from echomodel.data.sgfront import SGFront, write_sgfront
 from echomodel.metrics.layouts import tasks_of
 from echomodel.rooms.generator import generate_rooms
+from echomodel.training import trainer
 from echomodel.training.recipe import read_recipe
 from echoscene.model import ReleasedModel, Schedule
 from echoscene.training import PublishedRooms, PublishedShapes, opened_data
@@ -70,6 +71,9 @@ def test_one_command_trains_and_fills_our_column(folder, tmp_path, monkeypatch):
         monkeypatch.setattr(f"echousd.evaluation.sections.{name}", ("wardrobe",))
     for name, few in {"POINTS": 128, "SUITES": 4, "PAIRS": 2, "DISTANCES": {"Chamfer": 0, "EMD": 16}}.items():
         monkeypatch.setattr(f"echousd.evaluation.sections.{name}", few)
+    monkeypatch.setattr("echousd.evaluation.suite.PANELS", 3)  # a few plots
+    monkeypatch.setattr("echousd.evaluation.systems.searched", lambda task, draft, config: draft)  # of `default`
+    monkeypatch.setattr(trainer, "plot_log", lambda log, out: None)
     whole = Schedule.ddim  # a thousand steps and a hundred are for tests/parity
     monkeypatch.setattr(Schedule, "ddim", lambda tables, count: whole(tables, 4))
     monkeypatch.setattr(ReleasedModel, "layout_tables", Schedule.linear(1e-3, 0.2, 10))
