@@ -237,7 +237,7 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
                     shelved_books(setting, row, rng)
                 break
     wanted = [str(kind) for kind in rng.permutation(ware or setting.story.shelves)]
-    for number in range(2 if setting.full else 1):
+    for number in range(2):
         if rng.random() < 0.75:
             places = [(x * side, 0.2) for x in (0.75, 0.4, 0.95, 0.1, -0.2, -0.6)]
             for kind in wanted[number * 4 : number * 4 + 4]:

@@ -17,7 +17,7 @@ STEP = 0.02  # metres from place to place
 WIDE_BED = 1.3  # metres
 LEVEL = 0.005  # metres: what is as high as that is one height
 AHEAD = (0.0, 0.04, 0.08)  # metres that a blanket lies before where the back seems to begin
-FOLDED = 0.45  # share of rooms dressed in full whose sofa has a folded blanket
+FOLDED = 0.45  # share of rooms whose sofa has a folded blanket
 RAISED = 0.04  # metres that a flat thing is raised at most so that it lies on the solids of a seat
 
 
@@ -88,9 +88,7 @@ def on_covers(setting: Setting) -> None:
 
 
 def folded(setting: Setting) -> None:
-    """A folded blanket at an end of the largest sofa of some full rooms, before cushions take both."""
-    if not setting.full:
-        return
+    """A folded blanket at an end of the largest sofa of some rooms, before cushions take both."""
     for host in sorted(setting.of("sofa"), key=lambda o: -float(o.size[0]))[:1]:
         rng = setting.rng(host.name, "folded")
         size, variant, seat = usual_size("folded_throw", rng), int(rng.integers(1 << 30)), _Seat.of(host)

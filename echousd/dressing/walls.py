@@ -264,6 +264,7 @@ SHARES = (0.5, 0.3, 0.7, 0.18, 0.82)  # of a wall's length, the middle first
 SHELF = 1.38  # metres from the floor to the board of a wall shelf
 WALL_SHELVES = ("wall_shelf", "ledge", "box_shelf")  # of a room both are alike
 ABOVE = 0.3  # metres over a shelf that stay free
+CLOCKS = 0.4  # share of rooms with a clock on a wall, of those where people sit together or work
 
 
 def shelves(setting: Setting) -> None:
@@ -307,9 +308,9 @@ def _geometry(board: Thing) -> Geometry:
 
 def clock(setting: Setting) -> None:
     """A clock on a wall where people sit together or work."""
-    if not (setting.full and setting.walls and setting.inviting("clock")):
-        return
     rng = setting.rng("wall clock")
+    if not (setting.walls and setting.inviting("clock") and (setting.full or rng.random() < CLOCKS)):
+        return
     size, variant = usual_size("wall_clock", rng), int(rng.integers(1 << 30))
     spots = [(wall, share) for wall in _roomiest(setting) for share in SHARES]
     _hang_first(setting, Thing("wall_clock", size, np.zeros(3), 0.0, "", variant), spots, 1.72, 0.05)
