@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -87,7 +88,7 @@ def _parts(prefix: str, pieces: Sequence[Piece], body: str) -> list[Part]:
 
 
 def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int, *, round: bool = False) -> list[Piece]:
-    """The solids meshed as finely as `faces` triangles allow; where boxes are too many, the smallest are left out."""
+    """The solids as fine as `faces` triangles allow; of too many boxes the smallest are left out and it warns."""
     for detail in range(FINEST, -1, -1):
         pieces = pieces_of(solids, size, detail, round=round)
         if sum(len(piece.faces) for piece in pieces) <= faces:
@@ -98,6 +99,7 @@ def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int, *, roun
         if total + len(pieces[number].faces) <= faces:
             kept.append(number)
             total += len(pieces[number].faces)
+    warnings.warn(f"{faces} faces are too few: {len(pieces) - len(kept)} small solids are left out", stacklevel=2)
     return pieces_of([pieces[number].solid for number in sorted(kept)], size, 0, round=round)
 
 

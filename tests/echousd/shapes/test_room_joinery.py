@@ -1,6 +1,7 @@
 """Geometry from solids: closed and in its box, within the budget, with colliders, weight and bodies that move."""
 
 import importlib.util
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,15 @@ def test_more_faces_are_finer_and_the_second_level_is_coarser():
     assert sum(len(part.mesh.faces) for part in made.coarse) < made.faces
     assert [part.name for part in made.coarse] == [part.name for part in made.parts]
     assert all(set(one.slots) == set(two.slots) for one, two in zip(made.coarse, made.parts, strict=True))
+
+
+def test_solids_that_the_budget_has_no_room_for_are_told_of():
+    parts = solids("armchair", *piece_of(np.zeros(WIDTH)), SIZE)
+    with pytest.warns(UserWarning, match=r"^100 faces are too few: \d+ small solids are left out$"):
+        assert sum(len(p.faces) for p in within_budget(parts, SIZE, 100)) <= 100
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        within_budget(parts, SIZE, 9000)
 
 
 @pytest.mark.parametrize("category", [row.name for row in vocabulary().categories if row.support in ("floor", "table")])
