@@ -41,8 +41,8 @@ import pytest
 
 TOP = Path(__file__).parents[1]
 GROUPS = {  # modules, and what tests them
-    "rules": ("model/echomodel/rules", ["echomodel/test_rules.py", "echomodel/test_placement_rules.py",
-                                        "echomodel/test_turned_relations.py"]),
+    "rules": ("model/echomodel/rules", ["echomodel/test_rules.py", "echomodel/test_rules_arrays.py",
+                                        "echomodel/test_placement_rules.py", "echomodel/test_turned_relations.py"]),
     "graph": ("echousd/graph", ["echousd/graph"]),
     "stage": ("echousd/stage", ["echousd/stage"]),
     "edit": ("echousd/make/edit.py", ["echousd/make/test_room_edit.py"]),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import torch
 
 from echomodel.rooms.runs import Run, Site, obstacles, runs
 from echomodel.rules import margins
@@ -32,7 +31,7 @@ def fitted(at: Setting, rigid: np.ndarray) -> tuple[Setting, np.ndarray]:
     over = {number[a]: number[b] for a, word, b in at.triplets.tolist()
             if word == above and a in number and b in number}  # fmt: skip
     fixed = at.fixed & np.array([kind.support in ("floor", "wall") for kind in kinds], bool)
-    outline = at.plan.floor[0].numpy()
+    outline = at.plan.floor[0]
     site = Site(outline, obstacles(outline, at.plan.openings[0], at.size[fixed], at.position[fixed], at.yaw[fixed]))
 
     def built(run: Run) -> tuple[np.ndarray, Setting]:
@@ -43,11 +42,10 @@ def fitted(at: Setting, rigid: np.ndarray) -> tuple[Setting, np.ndarray]:
 
     def missed(run: Run) -> float:
         _, boxes = built(run)
-        margin = margins(boxes.plan, told, rules=at.rules, center=centre, fronts=at.plan.fronts)
+        margin = margins(boxes.plan, told, rules=at.rules, center=at.centre, fronts=at.plan.fronts)
         return MISSED * float((margin < 0).sum())
 
-    centre = torch.from_numpy(at.centre)
-    told = torch.from_numpy(at.triplets[(mine | at.fixed)[at.triplets[:, [0, 2]]].all(1)])
+    told = at.triplets[(mine | at.fixed)[at.triplets[:, [0, 2]]].all(1)]
     found = runs([kinds[i] for i in number], at.size[mine], ~rigid[mine], site, over=over, draft=at.position[mine],
                  missed=missed if len(told) else None)  # fmt: skip
     best, least = (at, none), np.inf

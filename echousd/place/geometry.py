@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import torch
 
 from echomodel import boxes2d
+from echomodel.arrays import norm
 from echomodel.boxes2d import seen
 from echomodel.floors import signed_distance
 from echomodel.roomboxes import footprints
@@ -136,9 +136,9 @@ def depth_inside(floor: Floor, points: np.ndarray) -> np.ndarray:
     if floor.rectangle is not None:
         middle, half = floor.rectangle
         out = np.abs(points - middle) - half
-        return -np.where((out <= 0).all(1), out.max(1), np.linalg.norm(np.maximum(out, 0.0), axis=1))
-    inside = signed_distance(torch.from_numpy(points)[None], torch.from_numpy(floor.polygon)[None])
-    return np.asarray(inside[0].numpy())
+        deepest = np.maximum(out[:, 0], out[:, 1])
+        return -np.where(deepest <= 0, deepest, norm(np.maximum(out, 0.0)))
+    return np.asarray(signed_distance(points[None], floor.polygon[None])[0])
 
 
 def beyond(floor: Floor, size: np.ndarray, at: np.ndarray, turn: np.ndarray) -> np.ndarray:

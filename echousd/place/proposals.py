@@ -56,7 +56,7 @@ def proposals(setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np
             rows += _in_the_open(setting, i, loose)
         rows += _as_stated(setting, position, yaw, i)
         beside = twins(setting, position, yaw, i)
-        rows = [*beside, *((*row[:3], row[3] + APART_TWINS * bool(beside)) for row in rows)]
+        rows = [*beside, *((*row[:3], row[3] + APART_TWINS) for row in rows)] if beside else rows
     drawn, more = setting.position[i, [0, 2]].tolist(), loose + out_of_habit(setting, i)
     carrier = int(setting.carrier[i])
     turns = (_squared(setting, i), float(setting.yaw[i])) if carrier < 0 else (float(yaw[carrier]),)

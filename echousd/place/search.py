@@ -11,16 +11,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import torch
 from scipy.optimize import linear_sum_assignment
 
-from echomodel.boxes import Boxes
+from echomodel.arrays import Array, at_least, at_most, repeat, rows, sum_of
 from echomodel.boxes2d import axes
 from echomodel.objective import TERMS, Plan, Term, unreached
 from echomodel.objective.copies import copies_of, looks_at
 from echomodel.objective.plan import Found, found, nobody
 from echomodel.objective.table import PRICE
 from echomodel.rules import margins
+from echomodel.rules.placements import Spread
 from echousd.place.geometry import beyond, depths
 from echousd.place.proposals import ahead, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
 from echousd.place.setting import Setting
@@ -80,8 +80,9 @@ class Search:
         sizes = {row.name for row in _predicates() if row.measures == "size"} | {"scale"}  # which no pose changes
         told = words | {"placed"}
         self.terms = tuple(t for t in terms if t.name not in sizes and (t.kind != "relations" or t.name in told))
-        self.firm = torch.tensor([term.name not in yields for term in self.terms])
+        self.firm = np.array([term.name not in yields for term in self.terms])
         self.rooms: dict[bytes, Plan] = {}
+        self.ways: dict[tuple[int, ...], list[list[tuple[float, float, float, float]]]] = {}
         self.looks: list[np.ndarray] = []
         self.urgent: list[int] = []
         self.regrets: dict[int, tuple[float, float, float]] = {}
@@ -99,15 +100,10 @@ class Search:
         """(K,) float: what rooms of boxes `there` (n,) bool cost: position (K, n, 3), yaw (K, n), moved (n,) bool."""
         room, whole = self._room(there), bool(there.all())
         self.judged += len(yaw)
-        with torch.inference_mode():
-            copies = copies_of(
-                room, torch.from_numpy(position[:, there]), torch.from_numpy(yaw[:, there]),
-                torch.from_numpy(moved[there]),
-            )  # fmt: skip
-            asked = [term for term in self.terms_of(moved) if whole or term.name not in WHOLE]
-            seen, paid = priced([(term, term.find(copies)) for term in asked], copies)
-            total = torch.zeros(len(yaw), dtype=torch.float64).index_add_(0, copies.scene[seen.who], paid)
-        return total.numpy()
+        copies = copies_of(room, position[:, there], yaw[:, there], moved[there])
+        asked = [term for term in self.terms_of(moved) if whole or term.name not in WHOLE]
+        seen, paid = priced([(term, term.find(copies)) for term in asked], copies)
+        return np.asarray(sum_of(copies.scene[seen.who], paid, len(yaw)))
 
     def terms_of(self, moved: np.ndarray) -> list[Term]:
         """The terms that look at any of some boxes (n,) bool; all before any room was judged."""
@@ -124,20 +120,19 @@ class Search:
         """What a room costs in all, and the boxes that its broken terms are about, the worst first."""
         setting = self.setting
         worst: dict[int, float] = {}
-        with torch.inference_mode():
-            room = self._plan(state.position, state.yaw)
-            if self.looks:
-                room = copies_of(setting.plan, room.position[None], room.yaw[None], torch.ones_like(room.given))
-                every = [term.find(room) for term in self.terms]
-            else:
-                rows = [looks_at(room, term.find) for term in self.terms]
-                self.looks, every = [looks.numpy() for looks, _ in rows], [found for _, found in rows]
-            seen, paid = priced(list(zip(self.terms, every, strict=True)), room)
-            total = float(paid.sum())
-            firm = self.firm.repeat_interleave(torch.tensor([len(found.who) for found in every]))
-            for row in (firm & (paid > 0.5)).nonzero()[:, 0].tolist():
-                for box in {int(seen.who[row]), int(seen.other[row])} - {-1}:
-                    worst[box] = worst.get(box, 0.0) + float(paid[row])
+        room = self._plan(state.position, state.yaw)
+        if self.looks:
+            room = copies_of(setting.plan, room.position[None], room.yaw[None], np.ones_like(room.given))
+            every = [term.find(room) for term in self.terms]
+        else:
+            looked = [looks_at(room, term.find) for term in self.terms]
+            self.looks, every = [looks for looks, _ in looked], [found for _, found in looked]
+        seen, paid = priced(list(zip(self.terms, every, strict=True)), room)
+        total = float(paid.sum())
+        firm = self.firm.repeat([len(found.who) for found in every])
+        for row in rows(firm & (paid > 0.5)).tolist():
+            for box in {int(seen.who[row]), int(seen.other[row])} - {-1}:
+                worst[box] = worst.get(box, 0.0) + float(paid[row])
         lost = self._unreached(state.position, state.yaw)
         self.walked = bool(lost)
         for box in lost:
@@ -245,13 +240,18 @@ class Search:
         return [fault.object for fault in unreached(self._plan(position, yaw))]
 
     def _plan(self, position: np.ndarray, yaw: np.ndarray) -> Plan:
-        return self.setting.plan.at(torch.from_numpy(position), torch.from_numpy(yaw))
+        return self.setting.plan.at(position, yaw)
+
+    def _ways_around(self, i: int, seats: list[int]) -> list[list[tuple[float, float, float, float]]]:
+        if (i, *seats) not in self.ways:
+            self.ways[i, *seats] = seatings(self.setting, i, seats)
+        return self.ways[i, *seats]
 
     def reseated(self, state: State, there: np.ndarray, i: int) -> State:
         """The state with those who stand around box i at one of the ways in which as many sit there."""
         setting = self.setting
         seats = [k for k in self.children[i] if there[k] and not setting.turned[k]]
-        ways = seatings(setting, i, seats)
+        ways = self._ways_around(i, seats)
         if not ways:
             return state
         position, yaw = np.repeat(state.position[None], len(ways) + 1, 0), np.repeat(state.yaw[None], len(ways) + 1, 0)
@@ -322,29 +322,50 @@ class Search:
         self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray, taste: np.ndarray
     ) -> np.ndarray:
         """(k,) int: the poses that run into the least, leave the floor least and break the fewest relations."""
+        keep, half = np.arange(len(rows)), JUDGED // 2
+        if len(rows) > 2 * JUDGED:  # what is lost for where the box itself stands is not looked at with its group
+            alone = self._hits(state, there, i, group, rows, [i])
+            first = np.argsort(alone + taste, kind="stable")[:JUDGED]
+            most = np.sort(self._unlikely(state, there, i, group, rows[first]) + taste[first])[half - 1]
+            keep = np.flatnonzero((alone < HIT) | (alone + taste <= most + 1 / GRAIN))
+        cost = self._unlikely(state, there, i, group, rows[keep])
+        order = np.argsort(np.round((cost + taste[keep]) * GRAIN), kind="stable")
+        if len(order) > JUDGED:
+            free = order[half:]  # some of all the others that are free, too
+            free = free[cost[free] < HIT]
+            some = free[np.linspace(0, len(free) - 1, half).round().astype(int)] if len(free) else free
+            order = np.concatenate([order[:half], some])
+            order = order[np.sort(np.unique(order, return_index=True)[1])]
+        return keep[order]
+
+    def _unlikely(self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray) -> np.ndarray:
+        """(K,) float: what a box with its group runs into, leaves of the floor and breaks of relations at K poses."""
+        cost = self._hits(state, there, i, group, rows, group)
+        told = self.setting.told(i)
+        far = ~np.isin(np.where(told[:, 0] == i, told[:, 2], told[:, 0]), group)
+        told = told[there[told[:, ::2]].all(1) & far]
+        if len(told):
+            at = np.stack([rows[:, 0], np.full(len(rows), height_of(self.setting, state.position, i)), rows[:, 1]], 1)
+            margin = self.margins_at(state, i, at, rows[:, 2], told)
+            cost += MISSED * (np.maximum(-margin, 0.0) + (margin < 0)).sum(1)
+        return cost
+
+    def _hits(
+        self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray, which: list[int]
+    ) -> np.ndarray:
+        """(K,) float: what some boxes of a group run into and leave of the floor where one of it is at K poses."""
         setting = self.setting
-        position, yaw = self._carried(state, i, group, rows)
-        others = np.flatnonzero(there & ~np.isin(np.arange(len(there)), group))
-        cost = np.zeros(len(rows))
-        for k in group:
+        position, yaw = self._carried(state, i, which, rows)
+        apart = there.copy()
+        apart[group] = False
+        others, cost = np.flatnonzero(apart), np.zeros(len(rows))
+        for k in which:
             deep = depths(setting.size[k], position[:, k], yaw[:, k], setting.size[others], state.position[others],
                           state.yaw[others])  # fmt: skip
             deep = np.maximum(deep - setting.shared[k, others], 0.0)
             out = np.maximum(beyond(setting.floor, setting.size[k], position[:, k], yaw[:, k]), 0.0)
             cost += (HIT * (deep > 0.01) + DEEP * deep).sum(1) + HIT * (out > 0.01) + DEEP * out
-        told = setting.told(i)
-        told = told[there[told[:, [0, 2]]].all(1) & ~np.isin(np.where(told[:, 0] == i, told[:, 2], told[:, 0]), group)]
-        if len(told):
-            margin = self.margins_at(state, i, position[:, i], yaw[:, i], told)
-            cost += MISSED * (np.maximum(-margin, 0.0) + (margin < 0)).sum(1)
-        order = np.argsort(np.round((cost + taste) * GRAIN), kind="stable")
-        if len(order) <= JUDGED:
-            return order
-        free = order[JUDGED // 2 :]  # some of all the others that are free, too
-        free = free[cost[free] < HIT]
-        some = free[np.linspace(0, len(free) - 1, JUDGED // 2).round().astype(int)] if len(free) else free
-        chosen = np.concatenate([order[: JUDGED // 2], some])
-        return chosen[np.sort(np.unique(chosen, return_index=True)[1])]
+        return cost
 
     def margins_at(self, state: State, i: int, at: np.ndarray, turn: np.ndarray, told: np.ndarray) -> np.ndarray:
         """(K, e) float: margins of relations (e, 3) of box i at poses (K, 3) and (K,), the others where they are."""
@@ -353,14 +374,10 @@ class Search:
         position = np.where(own[..., None], at[:, None, None], state.position[ends]).reshape(-1, 3)
         yaw = np.where(own, turn[:, None, None], state.yaw[ends]).ravel()
         size, fronts = (np.tile(of[ends], (len(turn), *[1] * of.ndim)) for of in (setting.size, setting.fronts))
-        rows = np.stack([2 * np.arange(count), np.tile(told[:, 1], len(turn)), 2 * np.arange(count) + 1], 1)
-        boxes = (torch.from_numpy(of) for of in (size.reshape(-1, 3), position, yaw))
-        with torch.inference_mode():
-            found = margins(
-                Boxes(*boxes), torch.from_numpy(rows), rules=setting.rules, center=torch.from_numpy(setting.centre),
-                fronts=torch.from_numpy(fronts.ravel()),
-            )  # fmt: skip
-        return np.asarray(found.reshape(len(turn), -1).numpy())
+        asked = np.stack([2 * np.arange(count), np.tile(told[:, 1], len(turn)), 2 * np.arange(count) + 1], 1)
+        found = margins(Spread(size.reshape(-1, 3), position, yaw), asked, rules=setting.rules, center=setting.centre,
+                        fronts=fronts.ravel())  # fmt: skip
+        return np.asarray(found.reshape(len(turn), -1))
 
     def exchanged(self, state: State, boxes: list[int]) -> State:
         """The state after two pieces, with their groups, changed places if that is better."""
@@ -516,38 +533,36 @@ class Search:
         return Arranged(state.position, state.yaw, total, self.judged, tuple(wrong))
 
 
-def priced(rows_of: Sequence[tuple[Term, Found]], room: Plan) -> tuple[Found, torch.Tensor]:
+def priced(rows_of: Sequence[tuple[Term, Found]], room: Plan) -> tuple[Found, Array]:
     """The rows (P,) of what terms found in a room or its copies, all together, and what each costs (P,) float."""
     every = [(term, seen) for term, seen in rows_of if len(seen.who)]
     if not every:
         return nobody(room.size), room.size[:0, 0]
-    count = torch.tensor([len(seen.who) for _, seen in every])
+    xp, count = room.kit, [len(seen.who) for _, seen in every]
     row = [(term.slack, *PRICE[term.kind], term.weight, term.kind in ("relations", "physics")) for term, _ in every]
-    slack, broken, each, weight, always = torch.tensor(row, dtype=room.size.dtype).repeat_interleave(count, 0).T
-    who, other, margin = (torch.cat([getattr(seen, name) for _, seen in every]) for name in ("who", "other", "margin"))
-    rows = found(who, margin, other=other)
-    missed = (slack - rows.margin).clamp(0.0, 2.0)
-    blamed = ~room.given[rows.who] | (always > 0)
-    return rows, (broken * (rows.margin < 0) + each * weight * missed) * blamed
+    slack, broken, each, weight, always = repeat(room.numbers(row), xp.asarray(count)).T
+    who, other, margin = (xp.concat([getattr(seen, name) for _, seen in every]) for name in ("who", "other", "margin"))
+    missed = at_most(at_least(slack - margin, 0.0), 2.0)
+    blamed = ~room.given[who] | (always > 0)
+    return found(who, margin, other=other), (broken * (margin < 0) + each * weight * missed) * blamed
 
 
 def cost_of(room: Plan) -> float:
     """What a plan of one room costs by all terms."""
-    with torch.no_grad():
-        return float(priced([(term, term.find(room)) for term in TERMS], room)[1].sum())
+    return float(priced([(term, term.find(room)) for term in TERMS], room)[1].sum())
 
 
 def part_of(room: Plan, there: np.ndarray) -> Plan:
     """The plan of some boxes of a room, who attend and stand on each other as in the whole."""
-    keep = torch.from_numpy(np.flatnonzero(there))
-    number = torch.full((len(there) + 3,), -1)
-    number[keep] = torch.arange(len(keep))
+    keep = np.flatnonzero(there)
+    number = np.full(len(there) + 3, -1)
+    number[keep] = np.arange(len(keep))
 
-    def mapped(of: torch.Tensor) -> torch.Tensor:
-        return torch.where(of < 0, of, number[of.clamp_min(0)])[keep]
+    def mapped(of: np.ndarray) -> np.ndarray:
+        return np.where(of < 0, of, number[np.maximum(of, 0)])[keep]
 
-    rows = room.triplets[torch.from_numpy(there)[room.triplets[:, [0, 2]]].all(1)]
-    rows = torch.stack([number[rows[:, 0]], rows[:, 1], number[rows[:, 2]]], 1)
+    told = room.triplets[there[room.triplets[:, ::2]].all(1)]
+    told = np.stack([number[told[:, 0]], told[:, 1], number[told[:, 2]]], 1)
     stated = tuple(
         replace(one, subject=int(number[one.subject]), others=tuple(int(number[k]) for k in one.others))
         for one in room.stated
@@ -555,7 +570,7 @@ def part_of(room: Plan, there: np.ndarray) -> Plan:
     )
     out = Plan(
         tuple(room.kinds[k] for k in keep.tolist()), room.size[keep], room.position[keep], room.yaw[keep],
-        room.scene[keep], room.floor, room.openings, rows, room.given[keep], room.height, room.rules, stated,
+        room.scene[keep], room.floor, room.openings, told, room.given[keep], room.height, room.rules, stated,
     )  # fmt: skip
     vars(out).update(
         anchor=mapped(room.anchor), carrier=mapped(room.carrier), joins=mapped(room.joins),

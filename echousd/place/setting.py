@@ -8,9 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 
-from echomodel.boxes import Boxes
 from echomodel.boxes2d import seen
 from echomodel.objective import Plan, plan_of
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, carriers
@@ -28,7 +26,7 @@ WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's norm
 
 
 def _of_plan(name: str) -> cached_property[np.ndarray]:
-    return cached_property(lambda setting: np.asarray(getattr(setting.plan, name).numpy()))
+    return cached_property(lambda setting: getattr(setting.plan, name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +55,7 @@ class Setting:
 
     def at(self, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> Setting:
         """The same room with boxes of size and at position (n, 3), metres, and yaw (n,), radians."""
-        wide, there, turned = (torch.from_numpy(of) for of in (size, position, yaw))
-        return replace(self, plan=replace(self.plan, size=wide, position=there, yaw=turned))
+        return replace(self, plan=replace(self.plan, size=size, position=position, yaw=yaw))
 
     def spread(self) -> Setting:
         """The setting whose pieces keep usual distances to walls where drawn ones are too alike, at those walls."""
@@ -70,9 +67,8 @@ class Setting:
         position = self.position.copy()
         away = wall_gaps(self.wall, self.size, position, self.yaw) - behind  # which the solver would take up later
         position[leaning[:, None], [0, 2]] -= away[leaning, None] * self.wall[leaning, 1]
-        vars(self.plan)["carrier"] = torch.from_numpy(self.carrier)
-        plan = self.plan.at(torch.from_numpy(position), self.plan.yaw)
-        return replace(self, plan=plan, behind=behind)
+        vars(self.plan)["carrier"] = self.carrier
+        return replace(self, plan=self.plan.at(position, self.plan.yaw), behind=behind)
 
     # -- what the plan says, as arrays -------------------------------------------------------------------------------
 
@@ -133,7 +129,7 @@ class Setting:
     @cached_property
     def shared(self) -> np.ndarray:
         """(n, n) float: depth in metres to which two boxes may overlap; without bound for a carrier and its load."""
-        i, j, allowed = (values.numpy() for values in self.plan.couples)
+        i, j, allowed = self.plan.couples
         out = np.full((len(self.size), len(self.size)), np.inf)
         out[i, j] = out[j, i] = allowed
         return out
@@ -201,6 +197,7 @@ def setting_of(
         The others as `echousd.place.place_boxes`.
     """
     from echomodel.rules import measured
+    from echomodel.rules.placements import Spread
 
     words = tuple(vocabulary().category(word).name for word in categories)
     told = np.flatnonzero(np.isin(triplets[:, 1], sorted(measured(rules))))
@@ -214,10 +211,10 @@ def setting_of(
         turn = ~np.isnan(wall[:, 1, 0]) & ~fixed & ~turned
         yaw[turn] = np.arctan2(wall[turn, 1, 0], wall[turn, 1, 1])
     behind = kept_behind(words, size, wall_gaps(wall, size, position, yaw))
-    boxes = Boxes(*(torch.from_numpy(of) for of in (size, position, yaw)))
     plan = plan_of(
-        boxes, words, floor_polygon, openings, triplets[told], given=fixed, height=height, rules=rules, stated=stated
-    )
+        Spread(size, position, yaw), words, floor_polygon, openings, triplets[told], given=fixed, height=height,
+        rules=rules, stated=stated,
+    )  # fmt: skip
     return Setting(plan, told, rigid, turned, floor, carrier, wall, behind)
 
 

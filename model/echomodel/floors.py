@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from echomodel.arrays import Array, at_least, at_most, dot, kit
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import axes, outline
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, inward_normal, rectangle, segment
@@ -46,17 +47,17 @@ def trimmed(floor: Tensor) -> Tensor:
     return floor[:, : most or 4]
 
 
-def known(floor: Tensor) -> Tensor:
+def known(floor: Array) -> Array:
     """(S,) bool, which floors are known."""
-    return torch.isfinite(floor[:, :1]).all(2).any(1)
+    return kit(floor).isfinite(floor[:, :1]).all(2).any(1)
 
 
-def area(floor: Tensor) -> Tensor:
+def area(floor: Array) -> Array:
     """(S,) float32, square metres; 0 for corners on a line and where the floor is unknown."""
-    return signed_area(floor).abs()
+    return abs(signed_area(floor))
 
 
-def signed_area(floor: Tensor) -> Tensor:
+def signed_area(floor: Array) -> Array:
     """(S,) float32, square metres, positive where the inside lies at (-dz, dx) of a wall (dx, dz)."""
     start, end = edges(floor)
     return (start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]).sum(1) / 2
@@ -70,13 +71,14 @@ def extents(floor: Tensor) -> Tensor:
     return torch.where(there.any(1), high - low, torch.nan)
 
 
-def edges(floor: Tensor) -> tuple[Tensor, Tensor]:
+def edges(floor: Array) -> tuple[Array, Array]:
     """Start and end (S, K, 2) of the walls; padding repeats the first corner, which makes walls of no length."""
-    start = torch.nan_to_num(torch.where(torch.isfinite(floor), floor, floor[:, :1]))  # NaN would spoil gradients
-    return start, torch.roll(start, -1, 1)
+    xp = kit(floor)
+    start = xp.nan_to_num(xp.where(xp.isfinite(floor), floor, floor[:, :1]))  # NaN would spoil gradients
+    return start, xp.roll(start, -1, 1)
 
 
-def signed_distance(points: Tensor, floor: Tensor) -> Tensor:
+def signed_distance(points: Array, floor: Array) -> Array:
     """Distance to the nearest wall in metres, positive on the floor, 0 where the floor is unknown; differentiable.
 
     Arguments:
@@ -84,13 +86,14 @@ def signed_distance(points: Tensor, floor: Tensor) -> Tensor:
 
     Returns (M, Q) float32.
     """
+    xp = kit(points)
     start, end = (wall[:, None] for wall in edges(floor))
     along, off = end - start, points[:, :, None] - start
-    t = ((off * along).sum(-1) / along.square().sum(-1).clamp_min(1e-9)).clamp(0, 1)
-    # the square root of nought has no slope
-    distance = (off - t[..., None] * along).square().sum(-1).amin(-1).clamp_min(1e-12).sqrt()
-    distance = torch.where(_inside(points, start, end), distance, -distance)
-    return torch.where(known(floor)[:, None], distance, torch.zeros_like(distance))
+    t = at_most(at_least(dot(off, along) / at_least(dot(along, along), 1e-9), 0.0), 1.0)
+    away = off - t[..., None] * along
+    distance = xp.sqrt(at_least(xp.amin(dot(away, away), -1), 1e-12))  # the square root of nought has no slope
+    distance = xp.where(_inside(points, start, end), distance, -distance)
+    return xp.where(known(floor)[:, None], distance, xp.zeros_like(distance))
 
 
 def nearest_wall(points: Tensor, floor: Tensor) -> Tensor:
@@ -109,17 +112,17 @@ def nearest_wall(points: Tensor, floor: Tensor) -> Tensor:
     return torch.atan2(-wall[:, 1] * turn, wall[:, 0] * turn)
 
 
-def _inside(points: Tensor, start: Tensor, end: Tensor) -> Tensor:
+def _inside(points: Array, start: Array, end: Array) -> Array:
     """(M, Q) bool: an odd number of walls lies to the +x side."""
     x, z = points[:, :, None, 0], points[:, :, None, 1]
     crossed = (start[..., 1] > z) != (end[..., 1] > z)
-    return ((crossed & (_meeting(z, start, end, 1) > x)).sum(-1) % 2).bool()
+    return (crossed & (_meeting(z, start, end, 1) > x)).sum(-1) % 2 > 0
 
 
-def _meeting(level: Tensor, start: Tensor, end: Tensor, axis: int) -> Tensor:
+def _meeting(level: Array, start: Array, end: Array, axis: int) -> Array:
     """Where the walls' lines reach a value of `axis`, on the other axis."""
     run = end[..., axis] - start[..., axis]
-    share = (level - start[..., axis]) / torch.where(run == 0, 1.0, run)
+    share = (level - start[..., axis]) / kit(run).where(run == 0, 1.0, run)
     return start[..., 1 - axis] + share * (end[..., 1 - axis] - start[..., 1 - axis])
 
 
@@ -143,7 +146,7 @@ def wall_distances(points: Tensor, floor: Tensor) -> Tensor:
     return torch.stack(out, 1)
 
 
-def footprint(size: Tensor, position: Tensor, yaw: Tensor) -> Tensor:
+def footprint(size: Array, position: Array, yaw: Array) -> Array:
     """Corners and middles of the sides of boxes in plan, the back left one first (`SIDES`).
 
     Arguments:
@@ -151,7 +154,7 @@ def footprint(size: Tensor, position: Tensor, yaw: Tensor) -> Tensor:
 
     Returns (N, 8, 2) float32, x and z, metres. Walls that enter between two of these points are not met.
     """
-    return outline(size[:, [0, 2]] / 2, yaw, SIDES) + position[:, None, [0, 2]]
+    return outline(size[:, ::2] / 2, yaw, SIDES) + position[:, None, ::2]
 
 
 def outside(boxes: Boxes, floor: Tensor) -> Tensor:

@@ -61,7 +61,7 @@ def music():
 
     @rule("in_line_with")
     def in_line(pair):
-        return LEVEL - pair.offset[:, 0].abs()
+        return LEVEL - abs(pair.offset[:, 0])
 
     more = replace(
         words, categories=(*words.categories, harp, spinet), predicates=(*words.predicates, line),

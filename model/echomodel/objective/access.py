@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-import torch
-from torch import Tensor
-
+from echomodel.arrays import Array, at_least, cast, full, held, kit, put, whole
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, nobody, worst
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_normal, segment
 
@@ -23,16 +21,18 @@ def parallel(plan: Plan) -> Found:
     massive = plan.of("storage", "bed", "sofa", "board") & plan.standing
     who = plan.those(massive & ~plan.stands("company", "beside") & plan.moved)
     _, along, _, length = (of[plan.scene[who]] for of in plan.walls)
-    wall = torch.atan2(-along[..., 1], along[..., 0])
+    xp = plan.kit
+    wall = xp.atan2(-along[..., 1], along[..., 0])
     off = _from_quarter(plan.yaw[who, None] - wall)
-    off = torch.where(length > 0.3, off, torch.full_like(off, math.pi / 4)).amin(1)
-    off = torch.where((length > 0).any(1), off, _from_quarter(plan.yaw[who]))
-    return found(who, CROOKED - off, measure=torch.rad2deg(off))
+    off = xp.amin(xp.where(length > 0.3, off, xp.full_like(off, math.pi / 4)), 1)
+    off = xp.where((length > 0).any(1), off, _from_quarter(plan.yaw[who]))
+    return found(who, CROOKED - off, measure=xp.rad2deg(off))
 
 
-def _from_quarter(angle: Tensor) -> Tensor:
+def _from_quarter(angle: Array) -> Array:
     """How far an angle is from the nearest quarter turn, radians."""
-    return torch.atan2((4 * angle).sin(), (4 * angle).cos()).abs() / 4
+    xp, four = kit(angle), 4 * angle
+    return abs(xp.atan2(xp.sin(four), xp.cos(four))) / 4
 
 
 def at_wall(plan: Plan) -> Found:
@@ -46,39 +46,42 @@ def at_wall(plan: Plan) -> Found:
     gap = plan.back_gaps(who)
     free = plan.of("sofa")[who] & (gap >= PASSAGE)
     if bool(free.any()):
-        free = free & (_deep(plan, who) | _backed(plan, who, gap.detach()))
-    return found(who, torch.where(free, gap - PASSAGE, TOUCHING - gap), measure=gap, words=(gap < FAR).long())
+        free = free & (_deep(plan, who) | _backed(plan, who, held(gap)))
+    return found(who, plan.kit.where(free, gap - PASSAGE, TOUCHING - gap), measure=gap, words=whole(gap < FAR))
 
 
-def _deep(plan: Plan, who: Tensor) -> Tensor:
+def _deep(plan: Plan, who: Array) -> Array:
     """(P,) bool: the room is so long where boxes look that at the wall they would be far from all else."""
-    along = (plan.floor[plan.scene[who]] * plan.axes(who)[1][:, None]).sum(-1).detach()
-    there = torch.isfinite(along)
-    least = torch.where(there, along, torch.inf).amin(1)
-    return torch.where(there, along, -torch.inf).amax(1) - least >= DEEP
+    along, xp = held((plan.floor[plan.scene[who]] * plan.axes(who)[1][:, None]).sum(-1)), plan.kit
+    there = xp.isfinite(along)
+    least = xp.amin(xp.where(there, along, math.inf), 1)
+    return xp.amax(xp.where(there, along, -math.inf), 1) - least >= DEEP
 
 
-def _backed(plan: Plan, who: Tensor, gap: Tensor) -> Tensor:
+def _backed(plan: Plan, who: Array, gap: Array) -> Array:
     """(P,) bool: something of another group stands between a box and the wall behind it."""
     i, j = plan.pairs(plan.standing, plan.standing & plan.of("board", "storage", "bed", "seat", "sofa"))
     lateral, forward = plan.local(j, i)
-    back = -forward.detach() - plan.size[i, 2] / 2
-    room = torch.full((len(plan),), -1.0, dtype=plan.size.dtype).index_put((who,), gap.to(plan.size))
-    behind = (back > 0) & (back < room[i]) & (lateral.abs() < plan.size[i, 0] / 2) & ~plan.kin(i, j)
-    return torch.isin(who, i[behind])
+    back = -held(forward) - plan.size[i, 2] / 2
+    room = put(full(plan.size, len(plan), -1.0), who, cast(gap, plan.size))
+    behind = (back > 0) & (back < room[i]) & (abs(lateral) < plan.size[i, 0] / 2) & ~plan.kin(i, j)
+    backed = full(plan.given, len(plan), False)
+    backed[i[behind]] = True
+    return backed[who]
 
 
 def desk_at_wall(plan: Plan) -> Found:
     """A desk has a side near a wall, or who sits there a wall at the back."""
     desks = plan.of("board") & plan.works & plan.standing & ~plan.which(lambda kind: kind.wall or kind.task)
-    seats = torch.bincount(plan.anchor[plan.stands("at") & (plan.anchor >= 0)], minlength=len(plan))
+    xp = plan.kit
+    seats = xp.bincount(plan.anchor[plan.stands("at") & (plan.anchor >= 0)], minlength=len(plan))
     who = plan.those(desks & plan.walled & plan.moved & (seats < DINERS))
     side, front = (axis[:, None] for axis in plan.axes(who))
     side, back = side * plan.size[who, None, :1] / 2, front * plan.size[who, None, 2:] / 2
-    points = plan.position[who][:, None, [0, 2]] + torch.cat([side, -side, back, -back, back + front * BEHIND], 1)
-    *near, seated = plan.inside(points, who).unbind(1)
-    gap = torch.stack(near).amin(0)
-    return found(who, torch.maximum(NEAR_WALL - gap, -seated), measure=gap)
+    points = plan.position[who][:, None, ::2] + xp.concat([side, -side, back, -back, back + front * BEHIND], 1)
+    inside = plan.inside(points, who)
+    gap = xp.amin(inside[:, :-1], 1)
+    return found(who, xp.maximum(NEAR_WALL - gap, -inside[:, -1]), measure=gap)
 
 
 NEEDED = 0.45  # share of the vocabulary's access depth below which a front counts as blocked
@@ -98,10 +101,10 @@ def front_free(plan: Plan) -> Found:
     return before_fronts(plan, plan.works & plan.standing & ~plan.of("seat"), depth)  # an armchair is walked round
 
 
-def before_fronts(plan: Plan, opens: Tensor, depth: Tensor) -> Found:
+def before_fronts(plan: Plan, opens: Array, depth: Array) -> Found:
     """How much more than a depth (N,) is free before the fronts of boxes (N,) bool; corners of rows are shared."""
     i, j = plan.pairs(opens, plan.standing & ~plan.movable, least=True)
-    corner = plan.stands("row")[i] & plan.stands("row")[j] & ((plan.yaw[i] - plan.yaw[j]).cos().abs() < 0.1)
+    corner = plan.stands("row")[i] & plan.stands("row")[j] & (abs(plan.kit.cos(plan.yaw[i] - plan.yaw[j])) < 0.1)
     low = plan.position[:, 1] + plan.size[:, 1] < CLEAR_HEIGHT  # rugs
     keep = (plan.anchor[j] != i) & (plan.anchor[i] != j) & ~corner & ~low[j]
     i, j = i[keep], j[keep]
@@ -109,16 +112,18 @@ def before_fronts(plan: Plan, opens: Tensor, depth: Tensor) -> Found:
     least, about = plan.worst(i, margin, j)
     who = plan.those(opens)
     walls = _clear_of_walls(plan, who, depth[who])
-    margin = torch.minimum(least[who], walls)
-    return found(who, margin, other=torch.where(walls < least[who], -1, about[who]), measure=margin + depth[who])
+    margin = plan.kit.minimum(least[who], walls)
+    return found(who, margin, other=plan.kit.where(walls < least[who], -1, about[who]), measure=margin + depth[who])
 
 
-def _clear_of_walls(plan: Plan, who: Tensor, depth: Tensor) -> Tensor:
+def _clear_of_walls(plan: Plan, who: Array, depth: Array) -> Array:
     """(P,): how far the far side of the space before each front is inside the room; 9 where there are no walls."""
     side, front = plan.axes(who)
-    ahead = plan.position[who][:, [0, 2]] + front * (plan.size[who, 2] / 2 + depth)[:, None]
+    ahead = plan.position[who][:, ::2] + front * (plan.size[who, 2] / 2 + depth)[:, None]
     across = plan.size[who, 0, None] * plan.numbers([-0.25, 0.0, 0.25])
-    return plan.inside(ahead[:, None] + side[:, None] * across[..., None], who).median(1).values
+    inside, xp = plan.inside(ahead[:, None] + side[:, None] * across[..., None], who), plan.kit
+    one, other = xp.minimum(inside[:, 0], inside[:, 1]), xp.maximum(inside[:, 0], inside[:, 1])
+    return xp.maximum(one, xp.minimum(other, inside[:, 2]))  # the middle one
 
 
 def bed_side_free(plan: Plan) -> Found:
@@ -129,24 +134,24 @@ def bed_side_free(plan: Plan) -> Found:
         return nobody(plan.size)
     i, j = plan.pairs(beds, plan.standing & ~plan.stands("head") & ~plan.movable, least=True)
     lateral, aside, along = _at_side(plan, j, i)
-    out = []
+    out, xp = [], plan.kit
     for sign in (1.0, -1.0):
-        margin = torch.where(sign * lateral > 0, aside - BEDSIDE, FAR)
-        margin = torch.maximum(margin, 0.4 * plan.size[i, 2] - along)
+        margin = xp.where(sign * lateral > 0, aside - BEDSIDE, FAR)
+        margin = xp.maximum(margin, 0.4 * plan.size[i, 2] - along)
         least, _ = plan.worst(i, margin, j)
-        points = plan.position[who][:, [0, 2]] + sign * plan.axes(who)[0] * (plan.size[who, 0] / 2 + BEDSIDE)[:, None]
-        out.append(torch.minimum(least[who], plan.inside(points[:, None], who)[:, 0]))
-    margin = torch.maximum(*out)
+        points = plan.position[who][:, ::2] + sign * plan.axes(who)[0] * (plan.size[who, 0] / 2 + BEDSIDE)[:, None]
+        out.append(xp.minimum(least[who], plan.inside(points[:, None], who)[:, 0]))
+    margin = xp.maximum(*out)
     return found(who, margin, measure=margin + BEDSIDE)
 
 
-def _at_side(plan: Plan, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+def _at_side(plan: Plan, i: Array, j: Array) -> tuple[Array, Array, Array]:
     """(P,) each, metres: how far i lies to the side of bed j, from its edge, and along it from shoulders to foot."""
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)
-    length = plan.size[j, 2]
-    along = torch.minimum(forward + half_depth, length / 2) - torch.maximum(forward - half_depth, -length / 5)
-    return lateral, lateral.abs() - half_width - plan.size[j, 0] / 2, along
+    length, xp = plan.size[j, 2], plan.kit
+    along = xp.minimum(forward + half_depth, length / 2) - xp.maximum(forward - half_depth, -length / 5)
+    return lateral, abs(lateral) - half_width - plan.size[j, 0] / 2, along
 
 
 def plant_aside(plan: Plan) -> Found:
@@ -154,8 +159,9 @@ def plant_aside(plan: Plan) -> Found:
     chairs = plan.stands("at")
     i, j = plan.pairs(plan.of("decor") & plan.standing, (plan.of("light", "bed") | chairs) & plan.standing, least=True)
     _, aside, along = _at_side(plan, i, j)
-    apart = plan.apart(i, j) - torch.where(chairs[j], OF_CHAIRS, OF_LAMPS)
-    return plan.nearest(i, j, torch.where(plan.of("bed")[j], torch.maximum(aside - INTO_BED, -along), apart), 0.0)
+    xp = plan.kit
+    apart = plan.apart(i, j) - xp.where(chairs[j], OF_CHAIRS, OF_LAMPS)
+    return plan.nearest(i, j, xp.where(plan.of("bed")[j], xp.maximum(aside - INTO_BED, -along), apart), 0.0)
 
 
 def door_free(plan: Plan) -> Found:
@@ -169,60 +175,61 @@ def window_free(plan: Plan) -> Found:
 
 
 def _before_openings(plan: Plan, *, window: bool) -> Found:
-    rows: list[tuple[Tensor, Tensor, int]] = []
+    rows: list[tuple[Array, Array, int]] = []
     on_wall = plan.which(lambda kind: kind.support == "wall" and kind.role == "storage")
     asked = (plan.standing | (on_wall if window else _hangs_low(plan))) & plan.moved
     for scenes, polygon, openings in plan.rooms:
-        who = plan.those(torch.isin(plan.scene, scenes) & asked)
+        here = plan.scene == scenes[0] if len(scenes) < 2 else plan.scene >= 0  # one room, or all are copies of one
+        who = plan.those(here & asked)
         for number, opening in enumerate(openings):
             if (opening.kind == "window") == window and opening.edge < len(polygon):
                 rows.append((who, _clearance(plan, who, polygon, opening), number))
     if not rows:
         return nobody(plan.size)
-    who = torch.cat([row[0] for row in rows])
-    margin = torch.cat([row[1] for row in rows])
-    about = torch.cat([torch.full_like(row[0], row[2]) for row in rows])
+    xp = plan.kit
+    who, margin = (xp.concat([row[k] for row in rows]) for k in (0, 1))
+    about = xp.concat([full(row[0], len(row[0]), row[2]) for row in rows])
     least, which = worst(who, margin, about, len(plan), FAR)
-    met = who.unique()
+    met = xp.unique(who)
     return found(met, least[met], measure=GRAZE - least[met], words=which[met])
 
 
-def _hangs_low(plan: Plan) -> Tensor:
+def _hangs_low(plan: Plan) -> Array:
     return (
         ~plan.standing
-        & (plan.position[:, 1].detach() < CLEARANCE)
-        & (plan.size.detach().amax(1) > 0.3)
+        & (held(plan.position)[:, 1] < CLEARANCE)
+        & (plan.kit.amax(held(plan.size), 1) > 0.3)
         & (plan.of("storage", "seat", "sofa", "board", "bed"))
     )
 
 
-def _clearance(plan: Plan, who: Tensor, polygon, opening: Opening) -> Tensor:  # type: ignore[no-untyped-def]
+def _clearance(plan: Plan, who: Array, polygon, opening: Opening) -> Array:  # type: ignore[no-untyped-def]
     """(P,): how far boxes stay out of an opening's way, beyond what is tolerated, metres."""
-    near, far = (plan.numbers(point.tolist()) for point in segment(polygon, opening))
-    inward = plan.numbers(inward_normal(polygon, opening.edge).tolist())
+    near, far = map(plan.numbers, segment(polygon, opening))
+    inward = plan.numbers(inward_normal(polygon, opening.edge))
     along = (far - near) / opening.width
     swings = opening.kind == "door" and opening.swing == "in"
     depth = WINDOW_DEPTH if opening.kind == "window" else opening.width if swings else STEP
-    offset = plan.position[who][:, [0, 2]] - near
+    offset, xp = plan.position[who][:, ::2] - near, plan.kit
     side, front = plan.axes(who)
     width, length = plan.size[who, 0] / 2, plan.size[who, 2] / 2
 
-    def reach(axis: Tensor) -> Tensor:
-        return (side @ axis).abs() * width + (front @ axis).abs() * length
+    def reach(axis: Array) -> Array:
+        return abs(side @ axis) * width + abs(front @ axis) * length
 
     at, deep = offset @ along, offset @ inward
-    beside = (at - opening.width / 2).abs() - opening.width / 2 - reach(along)
-    out = torch.maximum(beside, deep - reach(inward) - depth)
+    beside = abs(at - opening.width / 2) - opening.width / 2 - reach(along)
+    out = xp.maximum(beside, deep - reach(inward) - depth)
     if opening.kind == "window":
-        headboard = HEADBOARD * plan.of("bed")[who].to(plan.size)
+        headboard = HEADBOARD * plan.of("bed")[who]
         low = opening.sill + TALL + headboard - (plan.position[who, 1] + plan.size[who, 1])
-        return torch.maximum(out + 0.15, low)
+        return xp.maximum(out + 0.15, low)
     if swings:  # of the corner of the square that the leaf does not sweep what one walks through
-        hinge, closed = (plan.numbers(point.tolist()) for point in hinge_point(polygon, opening))
-        off = plan.position[who][:, [0, 2]] - hinge
-        x = ((off @ closed).abs() - reach(closed)).clamp_min(0)
-        z = ((off @ inward).abs() - reach(inward)).clamp_min(0)
-        walked = torch.maximum(beside + max(opening.width - WALKED, 0.0) / 2, deep - reach(inward) - depth)
-        swept = (x.square() + z.square()).clamp_min(1e-12).sqrt() - opening.width
-        out = torch.minimum(walked, torch.maximum(out, swept))
+        hinge, closed = map(plan.numbers, hinge_point(polygon, opening))
+        off = plan.position[who][:, ::2] - hinge
+        x = at_least(abs(off @ closed) - reach(closed), 0.0)
+        z = at_least(abs(off @ inward) - reach(inward), 0.0)
+        walked = xp.maximum(beside + max(opening.width - WALKED, 0.0) / 2, deep - reach(inward) - depth)
+        swept = xp.sqrt(at_least(x * x + z * z, 1e-12)) - opening.width
+        out = xp.minimum(walked, xp.maximum(out, swept))
     return out + GRAZE

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import torch
-from torch import Tensor
-
+from echomodel.arrays import Array, at_least, full, held, kit, least_of, pairs_in, put, rows, sum_of
 from echomodel.boxes2d import turned
-from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, joined, worst
+from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, joined, nobody
 from echomodel.vocabulary import vocabulary
 
 LOOK = math.radians(60.0)  # chairs at a corner of their table look at it by up to 45 degrees
@@ -33,19 +31,22 @@ TURNED = math.radians(45.0)  # 94 % of real nightstands look the same way as the
 def seat_faces(plan: Plan) -> Found:
     """A seat that stands at a table or desk looks at it."""
     i, j = plan.attended("at")
-    looks = (plan.gap(i, j).detach() < NEAR_TABLE) & ~plan.solid[i]  # stools have no front
-    i, j = i[looks], j[looks]
-    lateral, forward = plan.nearest_point(i, j)
-    inside = (lateral.square() + forward.square()).detach() < 1e-6
-    centre = plan.local(j, i)
-    lateral, forward = turned(torch.stack([lateral, forward], -1), plan.yaw[j] - plan.yaw[i]).unbind(-1)
-    off = facing_angle(torch.where(inside, centre[0], lateral), torch.where(inside, centre[1], forward))
-    return found(i, LOOK - off, other=j, measure=torch.rad2deg(off))
+    if not len(i):
+        return nobody(plan.size)
+    away, xp = plan.kit.stack(plan.nearest_point(i, j), -1), plan.kit
+    square = held(away * away).sum(1)
+    looks = (square < NEAR_TABLE**2) & ~plan.solid[i]  # stools have no front
+    i, j, away, inside = i[looks], j[looks], away[looks], square[looks] < 1e-6
+    centre, edge = plan.local(j, i), turned(away, plan.yaw[j] - plan.yaw[i])
+    off = facing_angle(xp.where(inside, centre[0], edge[:, 0]), xp.where(inside, centre[1], edge[:, 1]))
+    return found(i, LOOK - off, other=j, measure=xp.rad2deg(off))
 
 
 def seat_in_reach(plan: Plan) -> Found:
     """A seat whose work is at a table or desk stands at it, a stool at its dressing table, a bench at its table."""
     i, j = plan.attended("at", "foot", to=plan.of("board"))
+    if not len(i):
+        return nobody(plan.size)
     works = plan.which(lambda kind: kind.access > 0 or kind.wall)  # at a dinner table stools go anywhere
     bound = ~plan.solid[i] | works[j]
     i, j = i[bound], j[bound]
@@ -56,107 +57,110 @@ def seat_in_reach(plan: Plan) -> Found:
 def seat_before_desk(plan: Plan) -> Found:
     """Who works at a desk or dressing table sits before it, not at its corner."""
     i, j = plan.attended("at", to=plan.which(lambda kind: kind.role == "board" and (kind.access > 0 or kind.wall)))
-    near = plan.gap(i, j).detach() < NEAR_TABLE
+    if not len(i):
+        return nobody(plan.size)
+    near = held(plan.gap(i, j)) < NEAR_TABLE
     i, j = i[near], j[near]
-    aside = plan.local(i, j)[0].abs()
+    aside = abs(plan.local(i, j)[0])
     return found(i, AT_DESK * plan.size[j, 0] - aside, other=j, measure=aside)
 
 
 def lounger_faces(plan: Plan) -> Found:
     """An armchair of a group is turned towards it, and towards the sofa before which it stands."""
     i, j = plan.attended("company")
-    near = plan.gap(i, j).detach() < COMPANY
-    sofa = plan.group[i]
+    if not len(i):
+        return nobody(plan.size)
+    near, sofa, xp = held(plan.gap(i, j)) < COMPANY, plan.group[i], plan.kit
     lateral, forward = plan.local(i, sofa)
-    before = plan.of("sofa")[sofa] & (forward > plan.size[sofa, 2] / 2) & (lateral.abs() < plan.size[sofa, 0] / 2)
-    i, j = torch.cat([i[near], i[near & before]]), torch.cat([j[near], sofa[near & before]])
+    before = plan.of("sofa")[sofa] & (forward > plan.size[sofa, 2] / 2) & (abs(lateral) < plan.size[sofa, 0] / 2)
+    i, j = xp.concat([i[near], i[near & before]]), xp.concat([j[near], sofa[near & before]])
     off = facing_angle(*plan.local(j, i))
-    return found(i, LOUNGE - off, other=j, measure=torch.rad2deg(off))
+    return found(i, LOUNGE - off, other=j, measure=xp.rad2deg(off))
 
 
 def loungers_together(plan: Plan) -> Found:
     """Armchairs without a sofa stand together, none with its back to the next one."""
     lone = plan.stands("company") & (plan.anchor < 0) & plan.standing
     i, j = plan.pairs(lone, lone)
-    first = _rank_at(i, plan.apart(i, j).detach()) == 0
-    i, j = i[first], j[first]
-    off, apart = facing_angle(*plan.local(j, i)), plan.apart(i, j)
-    margin = torch.stack([LOUNGE - off, TOGETHER - apart], -1)
-    return _first_of(i, j, margin, torch.stack([torch.rad2deg(off), apart], -1))
+    if not len(i):
+        return nobody(plan.size)
+    apart = plan.apart(i, j)
+    first = _ranked(i, held(apart))[0] == 0
+    i, j, apart = i[first], j[first], apart[first]
+    off = facing_angle(*plan.local(j, i))
+    return first_of(i, j, [LOUNGE - off, TOGETHER - apart], [plan.kit.rad2deg(off), apart])
 
 
 def table_before_sofa(plan: Plan) -> Found:
     """A coffee table lies before its sofa, within its width and a hand's reach; of several one does."""
     i, j = plan.attended("before")
-    lateral, forward = plan.local(i, j)
-    _, half_depth = plan.reach(i, j)
-    gap = forward - half_depth - plan.size[j, 2] / 2
-    cornered = vocabulary().cornered
-    ell = plan.which(lambda kind: kind.name in cornered)[j]
-    least = torch.where(ell, BEFORE_SOFA[0] - plan.size[j, 2] * 0.6, plan.numbers([BEFORE_SOFA[0]]).expand_as(gap))
-    within = WITHIN * plan.size[j, 0] - lateral.abs()
-    margin = torch.stack([gap - least, BEFORE_SOFA[1] - gap, within], -1)
-    most = margin.new_full((len(plan),), -torch.inf).scatter_reduce(0, j, margin.amin(1), "amax")
-    first = margin.amin(1).detach() >= most.detach()[j]
-    return _first_of(i[first], j[first], margin[first], torch.stack([gap, gap, lateral.abs()], -1)[first])
+    if not len(i):
+        return nobody(plan.size)
+    lateral, _, gap = _at_edges(plan, i, j)
+    xp, cornered, off = plan.kit, vocabulary().cornered, abs(lateral)
+    ell = xp.asarray([plan.kinds[sofa].name in cornered for sofa in j.tolist()])
+    least = xp.where(ell, BEFORE_SOFA[0] - plan.size[j, 2] * 0.6, BEFORE_SOFA[0])
+    out = first_of(i, j, [gap - least, BEFORE_SOFA[1] - gap, WITHIN * plan.size[j, 0] - off], [gap, gap, off])
+    return out.take(held(-out.margin) <= least_of(j, held(-out.margin), len(plan), math.inf)[j])
 
 
 def nightstand_at_head(plan: Plan) -> Found:
     """Nightstands stand beside the bed at its head; of more than two the nearest two."""
     i, j = plan.attended("head")
-    _, beside, back = _at_bed(plan, i, j)
-    rank = _rank_at(j, plan.gap(i, j).detach())
-    turn = plan.yaw[i] - plan.yaw[j]
-    off = facing_angle(turn.sin(), turn.cos())
-    margin = torch.stack([BESIDE - beside, beside + IN_BED, HEAD - back.abs(), TURNED - off], -1)
-    keep = rank < 2
-    measure = torch.stack([beside, beside, back.abs(), torch.rad2deg(off)], -1)
-    return _first_of(i[keep], j[keep], margin[keep], measure[keep])
+    if not len(i):
+        return nobody(plan.size)
+    near = _ranked(j, held(plan.gap(i, j)))[0] < 2
+    i, j = i[near], j[near]
+    _, beside, before = _at_edges(plan, i, j)
+    turn, back, xp = plan.yaw[i] - plan.yaw[j], abs(before + plan.size[j, 2]), plan.kit
+    off = facing_angle(xp.sin(turn), xp.cos(turn))
+    margins = [BESIDE - beside, beside + IN_BED, HEAD - back, TURNED - off]
+    return first_of(i, j, margins, [beside, beside, back, xp.rad2deg(off)])
 
 
 def nightstands_alike(plan: Plan) -> Found:
     """The nightstands at both sides of a bed are as far from it as each other."""
     i, j = plan.attended("head")
-    lateral, beside, back = _at_bed(plan, i, j)
-    at_head, right = (back.abs() < HEAD) & (beside < BESIDE) & (beside > -IN_BED), lateral > 0
-    pairs = (j[:, None] == j[None]) & (at_head & right)[:, None] & (at_head & ~right)[None]
-    one, other = pairs.nonzero(as_tuple=True)
-    apart = (beside[one] - beside[other]).abs()
-    swap = (beside[one] < beside[other]).detach()
-    return found(
-        torch.where(swap, i[other], i[one]), PAIR - apart, other=torch.where(swap, i[one], i[other]), measure=apart
-    )
+    if len(i) < 2:
+        return nobody(plan.size)
+    lateral, beside, before = _at_edges(plan, i, j)
+    at_head = (abs(before + plan.size[j, 2]) < HEAD) & (beside < BESIDE) & (beside > -IN_BED)
+    right, left, xp = at_head & (lateral > 0), at_head & ~(lateral > 0), plan.kit
+    one, other = pairs_in((j[:, None] == j[None]) & right[:, None] & left[None])
+    apart, swap = abs(beside[one] - beside[other]), beside[one] < beside[other]
+    one, other = xp.where(swap, i[other], i[one]), xp.where(swap, i[one], i[other])
+    return found(one, PAIR - apart, other=other, measure=apart)
 
 
-def _at_bed(plan: Plan, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """(P,) each, metres: how far i lies to the side of bed j, how far beside its edge, and before the head's level."""
+def _at_edges(plan: Plan, i: Array, j: Array) -> tuple[Array, Array, Array]:
+    """(P,) each, metres: how far i lies to the side of j, how far beside its edge, and before its front."""
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)
-    return lateral, lateral.abs() - half_width - plan.size[j, 0] / 2, forward - half_depth + plan.size[j, 2] / 2
+    return lateral, abs(lateral) - half_width - plan.size[j, 0] / 2, forward - half_depth - plan.size[j, 2] / 2
 
 
 def bench_at_foot(plan: Plan) -> Found:
     """A bench or ottoman at the foot of a bed stands close to it, within its width."""
     i, j = plan.attended("foot", to=plan.of("bed"))
-    lateral, forward = plan.local(i, j)
-    _, half_depth = plan.reach(i, j)
-    gap = forward - half_depth - plan.size[j, 2] / 2
-    margin = torch.stack([FOOT - gap, ALONG * plan.size[j, 0] - lateral.abs()], -1)
-    return _first_of(i, j, margin, torch.stack([gap, lateral.abs()], -1))
+    if not len(i):
+        return nobody(plan.size)
+    lateral, _, gap = _at_edges(plan, i, j)
+    return first_of(i, j, [FOOT - gap, ALONG * plan.size[j, 0] - abs(lateral)], [gap, abs(lateral)])
 
 
-def _rank_at(anchor: Tensor, distance: Tensor) -> Tensor:
-    """(P,) int64: how many of the same anchor are nearer."""
-    same = anchor[:, None] == anchor[None]
-    order = torch.arange(len(anchor))
-    nearer = (distance[None] < distance[:, None]) | ((distance[None] == distance[:, None]) & (order < order[:, None]))
-    return (same & nearer).sum(1)
+def _ranked(anchor: Array, distance: Array) -> tuple[Array, Array]:
+    """(P,) and (P,) int64: how many of the same anchor are nearer, and how many it has."""
+    xp, counts = kit(anchor), kit(anchor).bincount(anchor)
+    order = xp.argsort(distance, stable=True)
+    order = order[xp.argsort(anchor[order], stable=True)]
+    return put(anchor, order, xp.arange(len(anchor))) - (counts.cumsum(0) - counts)[anchor], counts[anchor]
 
 
-def _first_of(i: Tensor, j: Tensor, margin: Tensor, measure: Tensor) -> Found:
-    """Of several demands (P, Q) the one that is missed by most."""
-    least, which = margin.min(1)
-    return found(i, least, other=j, measure=measure.gather(1, which[:, None])[:, 0], words=which)
+def first_of(i: Array, j: Array, margins: list[Array], measures: list[Array]) -> Found:
+    """Of several demands, (P,) each, the one that is missed by most."""
+    xp, margin = kit(i), kit(i).stack(margins)
+    at = margin.argmin(0), xp.arange(len(i))
+    return found(i, margin[at], other=j, measure=xp.stack(measures)[at], words=at[0])
 
 
 EVEN = 0.16  # metres between a table's middle and the middle of its chairs, one chair pulled out is less
@@ -192,31 +196,31 @@ class Seats:
         count, rank: (P,) int64, how many sit there, and how many of them further to the left.
     """
 
-    i: Tensor
-    j: Tensor
-    ahead: Tensor
-    along: Tensor
-    across: Tensor
-    side: Tensor
-    count: Tensor
-    rank: Tensor
+    i: Array
+    j: Array
+    ahead: Array
+    along: Array
+    across: Array
+    side: Array
+    count: Array
+    rank: Array
 
-    def facing(self) -> tuple[Tensor, Tensor]:
+    def facing(self) -> tuple[Array, Array]:
         """Rows (Q,) of seats that have another one opposite, of as many, and rows (Q,) of those."""
         one, other = self._rows(self.side ^ 1, self.rank)
         keep = self.count[one] == self.count[other]
         return one[keep], other[keep]
 
-    def beside(self) -> tuple[Tensor, Tensor]:
+    def beside(self) -> tuple[Array, Array]:
         """Rows (Q,) of seats that have another one to their right, and rows (Q,) of those."""
         return self._rows(self.side, self.rank + 1)
 
-    def _rows(self, side: Tensor, rank: Tensor) -> tuple[Tensor, Tensor]:
+    def _rows(self, side: Array, rank: Array) -> tuple[Array, Array]:
         most = max(self.count.tolist(), default=0) + 1
-        place = torch.full(((max(self.side.tolist(), default=0) // 4 + 1) * 4 * most,), -1)
-        place[self.side * most + self.rank] = torch.arange(len(self.i))
+        place = full(self.side, (max(self.side.tolist(), default=0) // 4 + 1) * 4 * most, -1)
+        place[self.side * most + self.rank] = kit(self.side).arange(len(self.i))
         other = place[side * most + rank]
-        one = (other >= 0).nonzero()[:, 0]
+        one = rows(other >= 0)
         return one, other[one]
 
 
@@ -230,88 +234,90 @@ def seats_at(plan: Plan) -> Seats:
 
 def _seats_at(plan: Plan) -> Seats:
     i, j = plan.attended("at", "foot", to=plan.dining)
-    near = plan.apart(i, j).detach() < AROUND
+    near, xp = held(plan.apart(i, j)) < AROUND if len(i) else i > 0, plan.kit
     i, j = i[near], j[near]
     lateral, forward = plan.local(i, j)
-    half = plan.size[j][:, [0, 2]].detach() / 2
-    ahead = forward.detach().abs() - half[:, 1] > lateral.detach().abs() - half[:, 0]
-    along, across = torch.where(ahead, lateral, forward), torch.where(ahead, forward, lateral)
+    half = held(plan.size)[j] / 2
+    ahead = abs(held(forward)) - half[:, 2] > abs(held(lateral)) - half[:, 0]
+    along, across = xp.where(ahead, lateral, forward), xp.where(ahead, forward, lateral)
     side = 4 * j + 2 * ahead + (across > 0)
-    order = along.detach().argsort(stable=True)
-    order = order[side[order].argsort(stable=True)]
-    counts = torch.bincount(side)
-    ends, count = counts.cumsum(0)[side], counts[side]
-    rank = torch.empty_like(side).index_put((order,), torch.arange(len(side))) - (ends - count)
+    rank, count = _ranked(side, held(along))
     return Seats(i, j, ahead, along, across, side, count, rank)
 
 
 def chairs_even(plan: Plan) -> Found:
     """The chairs of a table stand evenly around it; a bench counts as the chairs that it stands for."""
-    seats = seats_at(plan)
-    i, j = seats.i, seats.j
-    places = (plan.size[i, 0] / PLACE).round().clamp_min(1.0).detach()
-    count = torch.zeros(len(plan), dtype=plan.size.dtype).index_add(0, j, places)
-    away = torch.stack(plan.local(i, j), -1) * places[:, None]
-    sums = torch.zeros(len(plan), 2, dtype=plan.size.dtype).index_add(0, j, away)
-    who = (count > 1).nonzero()[:, 0]
-    n = count[who]
-    shift = (sums[who] / n[:, None]).abs()
-    odd = (n % 2)[:, None] * (ODD * plan.size[who][:, [0, 2]] + 0.3) / n[:, None]
-    margin, axis = (EVEN + odd - shift).min(1)
-    return found(who, margin, measure=shift.gather(1, axis[:, None])[:, 0])
+    i, j, xp = seats_at(plan).i, seats_at(plan).j, plan.kit
+    if not len(i):
+        return nobody(plan.size)
+    places = at_least((held(plan.size)[i, 0] / PLACE).round(), 1.0)
+    count = sum_of(j, places, len(plan))
+    who = rows(count > 1)
+    n = count[who][:, None]
+    shift = abs(xp.stack([sum_of(j, off * places, len(plan))[who] for off in plan.local(i, j)], -1) / n)
+    margin = EVEN + n % 2 * (ODD * plan.size[who][:, ::2] + 0.3) / n - shift
+    at = xp.arange(len(who)), margin.argmin(1)
+    return found(who, margin[at], measure=shift[at])
 
 
 def chairs_opposite(plan: Plan) -> Found:
     """Where both sides of a table have as many chairs, each has another one opposite."""
     seats = seats_at(plan)
-    one, other = seats.facing()
-    margin = STAGGERED - (seats.along[one] - seats.along[other]).abs()
-    least, _ = worst(seats.j[one], margin, seats.i[one], len(plan), FAR)
-    who = (least < FAR).nonzero()[:, 0]
-    return found(who, least[who], measure=STAGGERED - least[who])
+    return _alike(plan, seats, *seats.facing(), seats.along, STAGGERED)
 
 
 def chairs_level(plan: Plan) -> Found:
     """The chairs of a table are pushed under it alike: neighbours, and those opposite each other."""
-    seats = seats_at(plan)
+    seats, xp = seats_at(plan), plan.kit
+    if not len(seats.i):
+        return nobody(plan.size)
     half_width, half_depth = plan.reach(seats.i, seats.j)
-    out = seats.across.abs() - torch.where(seats.ahead, half_depth, half_width)
-    one, other = (torch.cat(rows) for rows in zip(seats.facing(), seats.beside(), strict=True))
+    out = abs(seats.across) - xp.where(seats.ahead, half_depth, half_width)
+    one, other = (xp.concat(of) for of in zip(seats.facing(), seats.beside(), strict=True))
     chairs = plan.stands("at")[seats.i]
     keep = chairs[one] & chairs[other]
-    one, other = one[keep], other[keep]
-    least, _ = worst(seats.j[one], LEVEL - (out[one] - out[other]).abs(), seats.i[one], len(plan), FAR)
-    who = (least < FAR).nonzero()[:, 0]
-    return found(who, least[who], measure=LEVEL - least[who])
+    return _alike(plan, seats, one[keep], other[keep], out, LEVEL)
+
+
+def _alike(plan: Plan, seats: Seats, one: Array, other: Array, off: Array, most: float) -> Found:
+    """Tables at which some seats differ from others by less than `most` metres."""
+    if not len(one):
+        return nobody(plan.size)
+    least = least_of(seats.j[one], most - abs(off[one] - off[other]), len(plan), FAR)
+    who = rows(least < FAR)
+    return found(who, least[who], measure=most - least[who])
 
 
 def sofas_in_circle(plan: Plan) -> Found:
     """A second sofa looks into the group of the first."""
     i, j = plan.attended("with")
-    near = plan.apart(i, j).detach() < NEAR
+    if not len(i):
+        return nobody(plan.size)
+    near = held(plan.apart(i, j)) < NEAR
     i, j = i[near], j[near]
-    middle = plan.position[j][:, [0, 2]] + plan.axes(j)[1] * (plan.size[j, 2] / 2 + BEFORE)[:, None]
+    middle = plan.position[j][:, ::2] + plan.axes(j)[1] * (plan.size[j, 2] / 2 + BEFORE)[:, None]
     off = facing_angle(*plan.seen(i, middle))
-    return found(i, CIRCLE - off, other=j, measure=torch.rad2deg(off))
+    return found(i, CIRCLE - off, other=j, measure=plan.kit.rad2deg(off))
 
 
 def at_its_side(plan: Plan) -> Found:
     """Side tables and floor lamps stand beside their sofa or bed, not before it; armchairs leave room for its knees."""
-    i, j = plan.attended("beside")
-    keep = (plan.apart(i, j).detach() < SIDE) & plan.of("sofa", "bed")[j]
+    i, j = plan.attended("beside", to=plan.of("sofa", "bed"))
+    keep, xp = held(plan.apart(i, j)) < SIDE if len(i) else i > 0, plan.kit
     chairs = plan.those(plan.stands("company") & plan.of("sofa")[plan.group] & ~plan.of("sofa"))
-    i, j = torch.cat([i[keep], chairs]), torch.cat([j[keep], plan.group[chairs]])
-    armchair = plan.stands("company")[i]
+    i, j = xp.concat([i[keep], chairs]), xp.concat([j[keep], plan.group[chairs]])
+    if not len(i):
+        return nobody(plan.size)
+    armchair, width = plan.stands("company")[i], plan.size[j, 0]
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)
-    covered = plan.size[j, 0] / 2 + half_width - lateral.abs()
-    before = forward - half_depth - plan.size[j, 2] / 2
-    share = torch.where(armchair, ELBOW, COVERS).to(plan.size)
-    margin = torch.maximum(share * plan.size[j, 0] - covered, -0.05 - before)
+    covered = width / 2 + half_width - abs(lateral)
     ahead = forward - plan.size[j, 2] / 2  # of its middle, where it stands off the end as well
-    margin = torch.where(plan.of("seat")[i], margin, torch.minimum(margin, AHEAD - ahead))
-    margin = torch.where(armchair, torch.maximum(margin, before - KNEES), margin)
-    return found(i, margin, other=j, measure=before.clamp_min(0.0))
+    before = ahead - half_depth
+    margin = xp.maximum(xp.where(armchair, ELBOW * width, COVERS * width) - covered, -0.05 - before)
+    margin = xp.where(plan.of("seat")[i], margin, xp.minimum(margin, AHEAD - ahead))
+    margin = xp.where(armchair, xp.maximum(margin, before - KNEES), margin)
+    return found(i, margin, other=j, measure=at_least(before, 0.0))
 
 
 def not_alone(plan: Plan) -> Found:
@@ -322,19 +328,24 @@ def not_alone(plan: Plan) -> Found:
     loner = plan.stands("company") & (plan.anchor < 0)
     small = (plan.of("light", "decor") | plan.stands("beside") | loner) & plan.standing
     company = plan.stands("company") & plan.of("seat") & plan.standing & ~loner
-    lit = plan.of("seat", "sofa", "bed", "board")
-    i, j = plan.pairs(small, plan.standing, least=True)
-    gap, _ = plan.worst(i, torch.where(plan.of("light")[i] & ~lit[j], FAR, plan.apart(i, j)), j)
-    who = plan.those(small & plan.walled)
-    half = plan.size[who][:, [0, 2]].amax(1) / 2
-    wall = plan.inside(plan.position[who][:, None, [0, 2]], who)[:, 0] - half
-    free = torch.where(plan.of("decor"), OF_PLANTS, torch.where(plan.stands("beside"), OF_SMALL, 0.0))[who]
-    away = torch.minimum(gap[who] + free, wall)
-    away = torch.where(loner[who], wall - (EDGE - ALONE), away)
-    lonely = found(who, ALONE - away, measure=torch.where(loner[who], wall, torch.minimum(gap[who], wall)))
+    lonely, xp = nobody(plan.size), plan.kit
+    if bool(small.any()):
+        lit = plan.of("seat", "sofa", "bed", "board")
+        i, j = plan.pairs(small, plan.standing, least=True)
+        gap, _ = plan.worst(i, xp.where(plan.of("light")[i] & ~lit[j], FAR, plan.apart(i, j)), j)
+        who = plan.those(small & plan.walled)
+        gap, loner = gap[who], loner[who]
+        half = xp.maximum(plan.size[who, 0], plan.size[who, 2]) / 2
+        wall = plan.inside(plan.position[who][:, None, ::2], who)[:, 0] - half
+        free = xp.where(plan.stands("beside")[who], gap + OF_SMALL, gap)
+        free = xp.where(plan.of("decor")[who], gap + OF_PLANTS, free)
+        away = xp.where(loner, wall - (EDGE - ALONE), xp.minimum(free, wall))
+        lonely = found(who, ALONE - away, measure=xp.where(loner, wall, xp.minimum(gap, wall)))
+    if not bool(company.any()):
+        return lonely
     others = plan.of("light", "storage", "board") | plan.stands("beside", "company")
     i, j = plan.pairs(company, others & plan.standing, least=True)
     gap, _ = plan.worst(i, plan.apart(i, j), j)
     who = plan.those(company)
-    who = who[plan.apart(who, plan.anchor[who]).detach() > LEFT]
-    return joined(lonely, found(who, OWN - gap[who], measure=gap[who].clamp(0.0, FAR)))
+    who = who[held(plan.apart(who, plan.anchor[who])) > LEFT]
+    return joined(lonely, found(who, OWN - gap[who], measure=at_least(gap[who], 0.0)))

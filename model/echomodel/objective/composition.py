@@ -8,9 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import torch
-from torch import Tensor
 
+from echomodel.arrays import Array, at_least, at_most, full, held, least_of, norm, rows, sum_of, whole
 from echomodel.floors import signed_distance
 from echomodel.objective.company import AROUND, BESIDE, Seats, seats_at
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
@@ -31,24 +30,24 @@ def bare_limit(area: float, count: int) -> float:
 
 def floor_used(plan: Plan) -> Found:
     """No large part of the floor is bare while the pieces stand close elsewhere; the nearest one is told."""
-    out = nobody(plan.size)
+    out, xp = nobody(plan.size), plan.kit
     for scenes, area, points, walls in floor_points(plan):
-        there, far, gap, nearest = floor_gaps(plan, scenes, points)
-        rows = int(plan.stands("row")[there[0]].sum())  # a row of units is one piece
-        limit = bare_limit(area, there.shape[1] - max(rows - 1, 0))
-        inner = walls[far] > limit
-        if not bool(inner.any()):  # no circle of that size fits in
+        there, far, gap = floor_gaps(plan, scenes, points)
+        row = int(plan.stands("row")[there[0]].sum())  # a row of units is one piece
+        limit = bare_limit(area, there.shape[1] - max(row - 1, 0))
+        inner = rows(walls[far] > limit)
+        if not len(inner):  # no circle of that size fits in
             continue
-        nearest, radius = nearest[:, inner], torch.minimum(gap[:, inner], walls[far[inner]])
-        at = radius.detach().argmax(1, keepdim=True)
-        most = radius.gather(1, at)[:, 0]
-        out = joined(out, found(nearest.gather(1, at)[:, 0], limit - most, measure=2 * most))
+        radius = xp.minimum(gap[:, inner], walls[far[inner]])
+        at = held(radius).argmax(1)
+        most = radius[xp.arange(len(at)), at]
+        out = joined(out, found(_nearest(plan, there, points[far[inner[at]]]), limit - most, measure=2 * most))
     return out
 
 
-def floor_points(plan: Plan) -> list[tuple[Tensor, float, Tensor, Tensor]]:
+def floor_points(plan: Plan) -> list[tuple[Array, float, Array, Array]]:
     """For rooms of one floor: their numbers (s,), its area, points (P, 2) on it, and their distance to walls (P,)."""
-    kept: list[tuple[Tensor, float, Tensor, Tensor]] = vars(plan.first).setdefault("floor_points", [])
+    kept: list[tuple[Array, float, Array, Array]] = vars(plan.first).setdefault("floor_points", [])
     if not kept:
         for scenes, polygon, _ in plan.first.rooms:
             x, z = polygon.T
@@ -63,51 +62,46 @@ def floor_points(plan: Plan) -> list[tuple[Tensor, float, Tensor, Tensor]]:
     return [(scenes, area, points, walls) for (scenes, *_), (_, area, points, walls) in rooms]
 
 
-def in_rooms(plan: Plan, scenes: Tensor) -> Tensor:
-    """(s, n) int64, numbers of the pieces that stand in rooms (s,) of as many pieces."""
-    there = torch.isin(plan.scene, scenes) & plan.standing & (plan.size[:, 1].detach() > CLEAR_HEIGHT)
-    return plan.those(there).reshape(len(scenes), -1)
-
-
-def floor_gaps(plan: Plan, scenes: Tensor, points: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """How far points (P, 2) lie from the pieces of rooms (s,) of one floor.
+def floor_gaps(plan: Plan, scenes: Array, points: Array) -> tuple[Array, Array, Array]:
+    """How far points (P, 2) lie from the pieces of rooms (s,), one after the other, of one floor.
 
     Returns (s, n) int64, the pieces. (q,) int64, numbers of the points that count: in copies of one room not those near
-    to what stands alike in all. (s, q) float, metres to the nearest piece, and (s, q) int64, which that is.
+    to what stands alike in all. (s, q) float, metres to the nearest piece.
     """
-    kept: dict[int, tuple[Tensor, Tensor, Tensor, Tensor]] = vars(plan).setdefault("floor_gaps", {})
+    kept: dict[int, tuple[Array, Array, Array]] = vars(plan).setdefault("floor_gaps", {})
     asked = int(scenes[0])
     if asked not in kept:
-        kept[asked] = _floor_gaps(plan, in_rooms(plan, scenes), points)
+        here = (plan.scene >= asked) & (plan.scene <= int(scenes[-1]))
+        there = plan.those(here & plan.standing & (plan.size[:, 1] > CLEAR_HEIGHT)).reshape(len(scenes), -1)
+        kept[asked] = there, *_far_points(plan, there, points)
     return kept[asked]
 
 
-def _floor_gaps(plan: Plan, there: Tensor, points: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    count, far = len(there), torch.arange(len(points))
+def _far_points(plan: Plan, there: Array, points: Array) -> tuple[Array, Array]:
     if there.shape[1] < 2:
-        return there, far[:0], points[:0], far[:0]
-    moved = plan.moved[there[0]]
-    still, moved = (~moved).nonzero()[:, 0], moved.nonzero()[:, 0]
-    if not len(still):
-        gap, which = _nearest(plan, there, points)
-        return there, far, gap, there.gather(1, which)
-    gap, which = _nearest(plan, there[:1, still], points)
-    far = (gap[0] > NEARBY).nonzero()[:, 0]
-    gap, nearest = gap[:, far].expand(count, -1), still[which[:, far]].expand(count, -1)
-    if len(moved):
-        other, which = _nearest(plan, there[:, moved], points[far])
-        closer = other < gap
-        gap, nearest = torch.where(closer, other, gap), torch.where(closer, moved[which], nearest)
-    return there, far, gap, there.gather(1, nearest)
+        return there.reshape(-1)[:0], points[:0]
+    moved, xp = plan.moved[there[0]], plan.kit
+    still, moved = there[:1, ~moved], there[:, moved]
+    squares = xp.amin(_squares(plan, still, points), 1) if still.shape[1] else full(points, (1, len(points)), math.inf)
+    far = rows(squares[0] > NEARBY**2)
+    squares = squares[:, far]
+    if moved.shape[1]:
+        squares = xp.minimum(squares, xp.amin(_squares(plan, moved, points[far]), 1))
+    return far, xp.broadcast_to(xp.sqrt(at_least(squares, 1e-12)), (len(there), len(far)))
 
 
-def _nearest(plan: Plan, who: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
-    size = plan.size[who][:, None]
-    aside, ahead = plan.seen(who[:, None], points[:, None])
-    lateral = (aside.abs() - size[..., 0] / 2).clamp_min(0)
-    forward = (ahead.abs() - size[..., 2] / 2).clamp_min(0)
-    squares, which = (lateral.square() + forward.square()).min(-1)
-    return squares.clamp_min(1e-12).sqrt(), which
+def _nearest(plan: Plan, who: Array, points: Array) -> Array:
+    """(s,) int64, of pieces (s, n) those nearest to points (s, 2)."""
+    return who[plan.kit.arange(len(who)), _squares(plan, who, points[:, None, None])[..., 0].argmin(1)]
+
+
+def _squares(plan: Plan, who: Array, points: Array) -> Array:
+    """(s, n, P): square of the metres between pieces (s, n) and points (..., P, 2)."""
+    size, position, cos, sin = (of[who][..., None] for of in (plan.size, plan.position, *plan.turn))
+    x, z = points[..., 0] - position[:, :, 0], points[..., 1] - position[:, :, 2]
+    lateral = at_least(abs(cos * x - sin * z) - size[:, :, 0] / 2, 0.0)
+    forward = at_least(abs(sin * x + cos * z) - size[:, :, 2] / 2, 0.0)
+    return lateral * lateral + forward * forward
 
 
 def sofa_ahead(plan: Plan) -> Found:
@@ -117,7 +111,7 @@ def sofa_ahead(plan: Plan) -> Found:
     i, j = plan.pairs(sofas, others, least=True)
     other = plan.group[i] != plan.group[j]
     i, j = i[other], j[other]
-    return plan.nearest(i, j, plan.more_ahead(i, j, AHEAD, COVERED), AHEAD)
+    return plan.nearest(i, j, plan.more_ahead(i, j, AHEAD, COVERED), AHEAD) if len(i) else nobody(plan.size)
 
 
 SERVED = 1.0  # metres: floor further from all furniture serves nothing
@@ -132,7 +126,7 @@ OPENS = 0.55  # metres before a wardrobe to a bed: a leaf of 0.5 m and who stand
 FACED = 0.3  # share of a wardrobe's width from which on something is before it
 
 
-def served_limit(area: float, width: Tensor, depth: Tensor) -> float:
+def served_limit(area: float, width: Array, depth: Array) -> float:
     """Share of a floor (square metres) that may lie far from furniture of these widths and depths (n,), metres.
 
     The emptier a room, the more: 84 % of real rooms stay below exp(0.8 - 2 f), f being the area that the pieces fill
@@ -145,117 +139,125 @@ def floor_served(plan: Plan) -> Found:
     """Furniture serves the whole floor: no more of it lies far from everything than so much furniture must leave."""
     out = nobody(plan.size)
     for scenes, area, points, _ in floor_points(plan):
-        there, far, gap, nearest = floor_gaps(plan, scenes, points)
+        there, far, gap = floor_gaps(plan, scenes, points)
         if not len(far):
             continue
-        size = plan.size[there[0]].detach()
+        size = held(plan.size[there[0]])
         row = plan.stands("row")[there[0]]  # whose neighbours fill what is beside each
-        share = ((gap - SERVED + SOFT) / (2 * SOFT)).clamp(0.0, 1.0).sum(1) / len(points)
+        share = ((gap - SERVED + SOFT) / (2 * SOFT)).clip(0.0, 1.0).sum(1) / len(points)
         margin = served_limit(area, size[:, 0] - 2 * REACH * row, size[:, 2]) - share
-        farthest = nearest.gather(1, gap.detach().argmax(1, keepdim=True))[:, 0]
-        out = joined(out, found(farthest, margin, measure=100.0 * share))
+        farthest = points[far[held(gap).argmax(1)]]
+        out = joined(out, found(_nearest(plan, there, farthest), margin, measure=100.0 * share))
     return out
 
 
 def elbow_room(plan: Plan) -> Found:
     """Who sits beside others at a table has room for the elbows, and chairs stand apart."""
-    seats = seats_at(plan)
-    i, j = seats.i, seats.j
+    seats, xp = seats_at(plan), plan.kit
     one, other = seats.beside()
-    keep = plan.of("seat")[i[one]] & plan.of("seat")[i[other]]
+    keep = plan.of("seat")[seats.i[one]] & plan.of("seat")[seats.i[other]]
     one, other = one[keep], other[keep]
-    edge = torch.where(seats.ahead, plan.size[j, 0], plan.size[j, 2]) / seats.count
-    half_width, half_depth = plan.reach(i, j)
-    reach = torch.where(seats.ahead, half_width, half_depth)
+    if not len(one):
+        return nobody(plan.size)
+    j = seats.j[one]  # whose sides are those of both
+    edge = xp.where(seats.ahead[one], plan.size[j, 0], plan.size[j, 2]) / seats.count[one]
+    half_width, half_depth = plan.reach(seats.i, seats.j)
+    reach = xp.where(seats.ahead, half_width, half_depth)
     gap = seats.along[other] - seats.along[one] - reach[one] - reach[other]
-    margins = torch.stack([edge[one] - ELBOW, gap - FENCE], -1)
-    least, which = margins.min(1)
-    measure = torch.stack([edge[one], gap.clamp_min(0.0)], -1).gather(1, which[:, None])[:, 0]
-    at, row = worst(j[one], least, torch.arange(len(one)), len(plan), FAR)
-    who = (at < FAR).nonzero()[:, 0]
-    return found(who, at[who], measure=measure[row[who]], words=which[row[who]])
+    tight = gap - FENCE < edge - ELBOW
+    least, measure = xp.where(tight, gap - FENCE, edge - ELBOW), xp.where(tight, at_least(gap, 0.0), edge)
+    at, row = worst(j, least, xp.arange(len(one)), len(plan), FAR)
+    who = rows(at < FAR)
+    return found(who, at[who], measure=measure[row[who]], words=whole(tight)[row[who]])
 
 
 def chairs_at_sides(plan: Plan) -> Found:
     """Chairs share the sides of their table: none sits shoulder to shoulder with others while a side is free."""
-    seats = seats_at(plan)
+    seats, xp = seats_at(plan), plan.kit
     who, free = _free_sides(plan, seats)
-    side = 4 * who[:, None] + torch.arange(4)
-    count = torch.bincount(seats.side, minlength=4 * len(plan))[side]
+    if not len(who):
+        return nobody(plan.size)
+    count = xp.bincount(seats.side, minlength=4 * len(plan)).reshape(-1, 4)[who]
     edge = plan.size[who][:, [2, 2, 0, 0]]
-    each = torch.where(count > 1, edge / count.clamp_min(1), FAR)
-    best = torch.where(free, edge / (count + 1), 0.0).amax(1).clamp_max(EASY)
-    least = each.amin(1)
+    best = at_most(xp.amax(xp.where(free, edge / (count + 1), 0.0), 1), EASY)
+    least = xp.amin(xp.where(count > 1, edge / at_least(count, 1), FAR), 1)
     crowded = least < FAR
     return found(who[crowded], (least - best)[crowded], measure=least[crowded])
 
 
 def chairs_balanced(plan: Plan) -> Found:
     """As many sit at one side of a table as opposite, but for one where their number is odd, or no room is there."""
-    seats = seats_at(plan)
+    seats, xp = seats_at(plan), plan.kit
     who, free = _free_sides(plan, seats)
-    places = (plan.size[:, 0].detach() / ELBOW).round().clamp_min(1.0)  # a bench counts for several chairs
-    count = places.new_zeros(4 * len(plan)).index_add(0, seats.side, places[seats.i]).reshape(-1, 2, 2)[who]
-    fewer = count.argmin(-1, keepdim=True)
-    room = free.reshape(-1, 2, 2).gather(-1, fewer) | (count.gather(-1, fewer) > 0)
-    more = ((count[..., 0] - count[..., 1]).abs() * room[..., 0]).sum(-1)
+    if not len(who):
+        return nobody(plan.size)
+    places = at_least((held(plan.size)[:, 0] / ELBOW).round(), 1.0)  # a bench counts for several chairs
+    count = sum_of(seats.side, places[seats.i], 4 * len(plan)).reshape(-1, 2, 2)[who]
+    one, other, free = count[..., 0], count[..., 1], free.reshape(-1, 2, 2)
+    room = xp.where(other < one, free[..., 1], free[..., 0]) | (xp.minimum(one, other) > 0)
+    more = (abs(one - other) * room).sum(-1)
     i, j = plan.attended("at", "foot")  # who stands far off, too
-    total = places.new_zeros(len(plan)).index_add(0, j, places[i])[who]
+    total = sum_of(j, places[i], len(plan))[who]
     some = count.sum((1, 2)) > 2  # two may sit around a corner
     return found(who[some], (total % 2 + 0.5 - more)[some], measure=more[some])
 
 
 def bench_fits(plan: Plan) -> Found:
     """A seat stands within its side of a table, a bench along one that is as long as it, with no end to it."""
-    seats = seats_at(plan)
+    seats, xp = seats_at(plan), plan.kit
+    if not len(seats.i):
+        return nobody(plan.size)
     half_width, half_depth = plan.reach(seats.i, seats.j)
-    own = 2 * torch.where(seats.ahead, half_width, half_depth)
-    side = torch.where(seats.ahead, plan.size[seats.j, 0], plan.size[seats.j, 2])
-    beyond = (seats.along.abs() + (own - side) / 2) * ~plan.solid[seats.i]  # a stool stands anywhere
-    least, which = torch.stack([own - side, plan.size[seats.i, 0] - own, beyond - CORNER], -1).max(-1)
+    own = 2 * xp.where(seats.ahead, half_width, half_depth)
+    side = xp.where(seats.ahead, plan.size[seats.j, 0], plan.size[seats.j, 2])
+    beyond = (abs(seats.along) + (own - side) / 2) * ~plan.solid[seats.i]  # a stool stands anywhere
+    each = xp.stack([own - side, plan.size[seats.i, 0] - own, beyond - CORNER], -1)
+    which = held(each).argmax(-1)
+    least = each[xp.arange(len(which)), which]
     return found(seats.i, BEYOND - least, other=seats.j, measure=least + CORNER * (which == 2), words=which)
 
 
-def _free_sides(plan: Plan, seats: Seats) -> tuple[Tensor, Tensor]:
+def _free_sides(plan: Plan, seats: Seats) -> tuple[Array, Array]:
     """(P,) int64, the tables with seats, and (P, 4) bool, whether one could sit left, right, behind and before them."""
-    kept: dict[str, tuple[Tensor, Tensor]] = vars(plan)
+    kept: dict[str, tuple[Array, Array]] = vars(plan)
     if "free_sides" not in kept:
-        who = seats.j.unique()
+        who = rows(plan.kit.bincount(seats.j, minlength=len(plan)) > 0)
         kept["free_sides"] = who, _free_beside(plan, who) > SEAT
     return kept["free_sides"]
 
 
-def _free_beside(plan: Plan, who: Tensor) -> Tensor:
+def _free_beside(plan: Plan, who: Array) -> Array:
     """(P, 4): metres free left, right, behind and before of tables, to walls and to what is no seat."""
-    right, front = plan.axes(who)
-    out = torch.stack([-right, right, -front, front], 1)
+    (right, front), xp = plan.axes(who), plan.kit
+    out = xp.stack([-right, right, -front, front], 1)
     half = plan.size[who][:, [0, 0, 2, 2]] / 2
-    edge = plan.position[who][:, None, [0, 2]] + out * half[..., None]
+    edge = plan.position[who][:, None, ::2] + out * half[..., None]
     walls = plan.inside(edge + out * SEAT, who) + SEAT
-    asked = torch.zeros(len(plan), dtype=torch.bool).index_put((who,), torch.tensor(True))
-    row, k = plan.beside(who, plan.standing & ~plan.of("seat") & (plan.size[:, 1].detach() > CLEAR_HEIGHT))
+    row, k = plan.beside(who, plan.standing & ~plan.of("seat") & (plan.size[:, 1] > CLEAR_HEIGHT))
     j = who[row]
-    keep = (k != j) & asked[j]
+    keep = k != j
     row, k, j = row[keep], k[keep], j[keep]
     lateral, forward = plan.local(k, j)
     wide, deep = plan.reach(k, j)
-    meets = torch.stack([forward.abs() - deep - plan.size[j, 2] / 2, lateral.abs() - wide - plan.size[j, 0] / 2], -1)
-    beyond = torch.stack([-lateral - wide, lateral - wide, -forward - deep, forward - deep], -1) - half[row]
-    beyond = torch.where((meets.repeat_interleave(2, -1) < 0) & (beyond > -half[row]), beyond, FAR)
-    index = row[:, None].expand(-1, 4)
-    return walls.scatter_reduce(0, index, beyond.to(walls), "amin")
+    ahead, aside = abs(forward) - deep - plan.size[j, 2] / 2, abs(lateral) - wide - plan.size[j, 0] / 2
+    beyond = xp.stack([-lateral - wide, lateral - wide, -forward - deep, forward - deep], -1) - half[row]
+    meets = (xp.stack([ahead, ahead, aside, aside], -1) < 0) & (beyond > -half[row])
+    beyond = xp.where(meets, beyond, FAR).reshape(-1)
+    side = (4 * row[:, None] + xp.arange(4)).reshape(-1)
+    return xp.minimum(walls, least_of(side, beyond, 4 * len(who), math.inf).reshape(-1, 4))
 
 
 def workers_apart(plan: Plan) -> Found:
     """Two who work at desks of their own sit apart from each other."""
-    chairs, at = plan.attended("at")
-    chairs = chairs[(plan.of("board") & plan.works)[at] & plan.of("seat")[chairs]]
-    sits = torch.zeros(len(plan), dtype=torch.bool).index_put((chairs,), torch.tensor(True))
+    sits = plan.stands("at") & plan.of("seat") & (plan.anchor >= 0) & (plan.of("board") & plan.works)[plan.anchor]
+    chairs = plan.those(sits)
+    if len(chairs) < 2:
+        return nobody(plan.size)
     row, k = plan.beside(chairs, sits)
     i = chairs[row]
     keep = (i < k) & (plan.anchor[i] != plan.anchor[k])
     i, k = i[keep], k[keep]
-    apart = (plan.position[i] - plan.position[k])[:, [0, 2]].square().sum(1).clamp_min(1e-12).sqrt()
+    apart = norm((plan.position[i] - plan.position[k])[:, ::2])
     return found(i, apart - WORKPLACE, other=k, measure=apart)
 
 
@@ -263,7 +265,7 @@ def wardrobe_opens(plan: Plan) -> Found:
     """One can stand before an open wardrobe, also at the foot of a bed, and nobody sits there."""
     wardrobes = plan.of("storage") & plan.standing & plan.which(lambda kind: kind.access > 0.6)
     i, j = plan.pairs(wardrobes, (plan.of("bed") | plan.stands("company")) & plan.standing, least=True)
-    return plan.nearest(i, j, plan.more_ahead(i, j, OPENS, FACED), OPENS)
+    return plan.nearest(i, j, plan.more_ahead(i, j, OPENS, FACED), OPENS) if len(i) else nobody(plan.size)
 
 
 def each_served(plan: Plan) -> Found:
@@ -280,10 +282,11 @@ def each_served(plan: Plan) -> Found:
         if not len(one):
             continue
         i, j = plan.pairs(guests & plan.standing, hosts)
-        close = plan.apart(i, j).detach() < near
-        served = torch.zeros(len(plan), dtype=torch.int64).index_add(0, j[close], torch.ones_like(j[close]))
+        close = plan.apart(i, j) < near
+        served = plan.kit.bincount(j[close], minlength=len(plan))
         unfair = (served[one] == 0) & (served[other] > 1)
-        who = one[unfair].unique()
-        about = torch.full((len(plan),), -1, dtype=torch.int64).index_put((one[unfair],), other[unfair])
-        out = joined(out, found(who, torch.full_like(plan.yaw[who], -1.0), other=about[who]))
+        about = plan.kit.full_like(plan.scene, -1)
+        about[one[unfair]] = other[unfair]
+        who = rows(about >= 0)
+        out = joined(out, found(who, full(plan.yaw, len(who), -1.0), other=about[who]))
     return out

@@ -8,9 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
+from echomodel.arrays import Array, at_least, kit, norm, pairs_in, repeat, rows
 from echomodel.objective.plan import FAR, OF_WORDS, Found, Plan, worst
 from echomodel.openings import Opening
 from echomodel.vocabulary import Category
@@ -22,37 +21,37 @@ MANY = 80_000  # pairs of boxes in all copies from which on those that stand ali
 class Watched(Plan):
     """A plan that notes whose poses are asked for: of masks of words and pairs of them, before any pose is compared."""
 
-    asked: Tensor = field(kw_only=True)
+    asked: Array = field(kw_only=True)
 
-    def those(self, mask: Tensor) -> Tensor:
-        self.asked.logical_or_(mask)
+    def those(self, mask: Array) -> Array:
+        self.asked[mask] = True
         return super().those(mask)
 
-    def pairs(self, first: Tensor, second: Tensor, *, least: bool = False) -> tuple[Tensor, Tensor]:
+    def pairs(self, first: Array, second: Array, *, least: bool = False) -> tuple[Array, Array]:
         i, j = super().pairs(first, second)
         return self._noted(i), self._noted(j)
 
-    def rows_of(self, predicate: str) -> Tensor:
+    def rows_of(self, predicate: str) -> Array:
         rows = super().rows_of(predicate)
         for ends in self.stated_pairs[::2]:
             self._noted(ends[rows])
         return rows
 
-    def everywhere(self, number: int) -> Tensor:
+    def everywhere(self, number: int) -> Array:
         return self._noted(super().everywhere(number))
 
-    def beside(self, i: Tensor, others: Tensor) -> tuple[Tensor, Tensor]:
+    def beside(self, i: Array, others: Array) -> tuple[Array, Array]:
         row, k = super().beside(i, others)
         return row, self._noted(k)
 
-    def _noted(self, numbers: Tensor) -> Tensor:
+    def _noted(self, numbers: Array) -> Array:
         self.asked[numbers] = True
         return numbers
 
 
-def looks_at(room: Plan, find: Callable[[Plan], Found]) -> tuple[Tensor, Found]:
+def looks_at(room: Plan, find: Callable[[Plan], Found]) -> tuple[Array, Found]:
     """(N,) bool, the boxes of a room whose poses decide what a term finds, whatever they are; and what it finds."""
-    plan = Watched(**{of.name: getattr(room, of.name) for of in fields(Plan)}, asked=torch.zeros_like(room.given))
+    plan = Watched(**{of.name: getattr(room, of.name) for of in fields(Plan)}, asked=room.kit.zeros_like(room.given))
     vars(plan).update({name: getattr(room, name) for name in (*OF_WORDS, "turn")})
     seen = find(plan)
     for whom in (room.anchor, room.group, room.carrier):
@@ -60,12 +59,12 @@ def looks_at(room: Plan, find: Callable[[Plan], Found]) -> tuple[Tensor, Found]:
     return plan.asked, seen
 
 
-def _repeated(name: str) -> cached_property[Tensor]:
+def _repeated(name: str) -> cached_property[Array]:
     """A column of the room, the same in every copy."""
-    return cached_property(lambda copies: getattr(copies.template, name).repeat(copies.count))
+    return cached_property(lambda copies: copies._again(getattr(copies.template, name)))
 
 
-def _numbered(name: str) -> cached_property[Tensor]:
+def _numbered(name: str) -> cached_property[Array]:
     """Numbers of boxes of the room, in every copy its own."""
     return cached_property(lambda copies: copies._tiled(getattr(copies.template, name)))
 
@@ -80,7 +79,7 @@ class Copies(Plan):
     """
 
     template: Plan = field(kw_only=True)
-    apart_in: Tensor = field(kw_only=True)
+    apart_in: Array = field(kw_only=True)
 
     @property
     def count(self) -> int:
@@ -93,38 +92,41 @@ class Copies(Plan):
         return self.template
 
     @cached_property
-    def moved(self) -> Tensor:
+    def moved(self) -> Array:
         """(K * N,) bool, boxes that do not stand alike in all copies."""
-        return self.apart_in.repeat(self.count)
+        return self._again(self.apart_in)
 
     @cached_property
-    def _shift(self) -> Tensor:
-        return torch.arange(self.count)[:, None] * len(self.template)
+    def _shift(self) -> Array:
+        return self.kit.arange(self.count)[:, None] * len(self.template)
 
-    def _tiled(self, number: Tensor) -> Tensor:
+    def _again(self, column: Array) -> Array:
+        """(K * N, ...): a column of the room (N, ...), the same in every copy."""
+        return self.kit.tile(column, (self.count, *[1] * (column.ndim - 1)))
+
+    def _tiled(self, number: Array) -> Array:
         """(K * P,) numbers of boxes of the room (P,), negative ones as they are, in every copy."""
-        return torch.where(number[None] < 0, number[None], number[None] + self._shift).reshape(-1)
+        return self.kit.where(number[None] < 0, number[None], number[None] + self._shift).reshape(-1)
 
-    def _mask(self, values: Any) -> Tensor:
+    def _mask(self, values: Any) -> Array:
         raise NotImplementedError("masks of copies are those of their room")
 
-    def of(self, *roles: str) -> Tensor:
+    def of(self, *roles: str) -> Array:
         return self._masked(("of", *roles), lambda: self.template.of(*roles))
 
-    def stands(self, *stances: str) -> Tensor:
+    def stands(self, *stances: str) -> Array:
         return self._masked(("stands", *stances), lambda: self.template.stands(*stances))
 
-    def _masked(self, asked: tuple[str, ...], mask: Callable[[], Tensor]) -> Tensor:
+    def _masked(self, asked: tuple[str, ...], mask: Callable[[], Array]) -> Array:
         if asked not in self._masks:
-            self._masks[asked] = mask().repeat(self.count)
+            self._masks[asked] = self._again(mask())
         return self._masks[asked]
 
-    def which(self, asked: Callable[[Category], object]) -> Tensor:
-        return self.template.which(asked).repeat(self.count)
+    def which(self, asked: Callable[[Category], object]) -> Array:
+        return self._again(self.template.which(asked))
 
-    def column(self, asked: Callable[[Category], Any]) -> Tensor:
-        one = self.template.column(asked)
-        return one.repeat(self.count, *[1] * (one.ndim - 1))
+    def column(self, asked: Callable[[Category], Any]) -> Array:
+        return self._again(self.template.column(asked))
 
     @cached_property
     def stance(self) -> tuple[str, ...]:
@@ -135,81 +137,83 @@ class Copies(Plan):
     smaller, walled = _repeated("smaller"), _repeated("walled")
     joins, carrier, anchor, group = _numbered("joins"), _numbered("carrier"), _numbered("anchor"), _numbered("group")
 
-    def inside(self, points: Tensor, who: Tensor) -> Tensor:
+    def inside(self, points: Array, who: Array) -> Array:
         if self.template.rectangle is None:
             return super().inside(points, who)
         middle, half = self.template.rectangle
-        out = (points - middle).abs() - half
-        return torch.where((out <= 0).all(-1), -out.amax(-1), -out.clamp_min(0).norm(dim=-1))
+        out = abs(points - middle) - half
+        deepest = self.kit.maximum(out[..., 0], out[..., 1])
+        return self.kit.where(deepest <= 0, -deepest, -norm(at_least(out, 0.0)))
 
     @cached_property
-    def couples(self) -> tuple[Tensor, Tensor, Tensor]:
+    def couples(self) -> tuple[Array, Array, Array]:
         """As `Plan.couples`; without pairs that stand alike in all copies."""
         i, j, allowed = self.template.couples
         differ = self.apart_in[i] | self.apart_in[j]
         i, j, allowed = i[differ], j[differ], allowed[differ]
-        return self._tiled(i), self._tiled(j), allowed.repeat(self.count)
+        return self._tiled(i), self._tiled(j), self._again(allowed)
 
-    def told(self, predicate: str) -> tuple[Tensor, Tensor]:
+    def told(self, predicate: str) -> tuple[Array, Array]:
         one, other = self.template.told(predicate)
         return self._tiled(one), self._tiled(other)
 
     @cached_property
-    def stated_pairs(self) -> tuple[Tensor, Tensor, Tensor]:
+    def stated_pairs(self) -> tuple[Array, Array, Array]:
         """As `Plan.stated_pairs`; without pairs that stand alike in all copies."""
         i, predicate, j = self.template.stated_pairs
         differ = self.apart_in[i] | self.apart_in[j]
-        return self._tiled(i[differ]), predicate[differ].repeat(self.count), self._tiled(j[differ])
+        return self._tiled(i[differ]), self._again(predicate[differ]), self._tiled(j[differ])
 
-    def everywhere(self, number: int) -> Tensor:
+    def everywhere(self, number: int) -> Array:
         return number + self._shift[:, 0]
 
     @cached_property
-    def rooms(self) -> list[tuple[Tensor, np.ndarray, tuple[Opening, ...]]]:
-        return [(torch.arange(self.count), corners, openings) for _, corners, openings in self.template.rooms]
+    def rooms(self) -> list[tuple[Array, np.ndarray, tuple[Opening, ...]]]:
+        return [(self.kit.arange(self.count), corners, openings) for _, corners, openings in self.template.rooms]
 
     @cached_property
-    def walls(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        start, along, normal, length = (of.expand(self.count, *of.shape[1:]) for of in self.template.walls)
+    def walls(self) -> tuple[Array, Array, Array, Array]:
+        start, along, normal, length = (_spread(of, self.count) for of in self.template.walls)
         return start, along, normal, length
 
-    def pairs(self, first: Tensor, second: Tensor, *, least: bool = False) -> tuple[Tensor, Tensor]:
+    def pairs(self, first: Array, second: Array, *, least: bool = False) -> tuple[Array, Array]:
         """As `Plan.pairs`; `least`: what stands alike in all copies is paired in the first one alone."""
         n = len(self.template)
         together = first[:n, None] & second[None, :n]
-        together.fill_diagonal_(False)
+        here = self.kit.arange(n)
+        together[here, here] = False
         still = self._still if least else None
-        i, j = (together if still is None else together & ~still).nonzero(as_tuple=True)
+        i, j = pairs_in(together if still is None else together & ~still)
         i, j = (self._shift + i).reshape(-1), (self._shift + j).reshape(-1)
         if still is None:
             return i, j
-        one, other = (together & still).nonzero(as_tuple=True)
-        return torch.cat([one, i]), torch.cat([other, j])
+        one, other = pairs_in(together & still)
+        return self.kit.concat([one, i]), self.kit.concat([other, j])
 
-    def beside(self, i: Tensor, others: Tensor) -> tuple[Tensor, Tensor]:
+    def beside(self, i: Array, others: Array) -> tuple[Array, Array]:
         n = len(self.template)
-        which = others[:n].nonzero()[:, 0]
-        row = torch.arange(len(i)).repeat_interleave(len(which))
-        return row, (i - i % n)[row] + which.repeat(len(i))
+        which = rows(others[:n])
+        row = repeat(self.kit.arange(len(i)), len(which))
+        return row, (i - i % n)[row] + self.kit.tile(which, (len(i),))
 
     @cached_property
-    def _still(self) -> Tensor | None:
+    def _still(self) -> Array | None:
         """(N, N) bool, pairs that stand alike in all copies; None where it is no use to leave them out."""
         if self.count * len(self.template) ** 2 < MANY or bool(self.apart_in.all()):
             return None
         return ~(self.apart_in[:, None] | self.apart_in)
 
-    def worst(self, who: Tensor, margin: Tensor, other: Tensor) -> tuple[Tensor, Tensor]:
+    def worst(self, who: Array, margin: Array, other: Array) -> tuple[Array, Array]:
         least, about = super().worst(who, margin, other)
         if self._still is None:
             return least, about
-        rows = ~(self.moved[who] | self.moved[other])
-        rest, of = worst(who[rows], margin[rows], other[rows], len(self.template), FAR)
-        rest = rest.repeat(self.count)
-        return torch.minimum(least, rest), torch.where(rest < least, self._tiled(of), about)
+        alike = ~(self.moved[who] | self.moved[other])
+        rest, of = worst(who[alike], margin[alike], other[alike], len(self.template), FAR)
+        rest = self._again(rest)
+        return self.kit.minimum(least, rest), self.kit.where(rest < least, self._tiled(of), about)
 
     @cached_property
-    def _dense(self) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
+    def _dense(self) -> tuple[Array, Array, Array, Array, Array]:
         """(K * N * N,) each: lateral, forward, half width and half depth of the first in the second's frame, apart."""
         n = len(self.template)
         x, z = (self.position[:, axis].reshape(-1, n) for axis in (0, 2))
@@ -217,45 +221,50 @@ class Copies(Plan):
         dx, dz = x[:, :, None] - x[:, None], z[:, :, None] - z[:, None]
         lateral = cos[:, None] * dx - sin[:, None] * dz
         forward = sin[:, None] * dx + cos[:, None] * dz
-        along = (cos[:, :, None] * cos[:, None] + sin[:, :, None] * sin[:, None]).abs()
-        across = (sin[:, :, None] * cos[:, None] - cos[:, :, None] * sin[:, None]).abs()
+        along = abs(cos[:, :, None] * cos[:, None] + sin[:, :, None] * sin[:, None])
+        across = abs(sin[:, :, None] * cos[:, None] - cos[:, :, None] * sin[:, None])
         width, depth = self.template.size[:, None, 0] / 2, self.template.size[:, None, 2] / 2
         half_width, half_depth = along * width + across * depth, across * width + along * depth
-        gap = torch.maximum(lateral.abs() - half_width - width.T, forward.abs() - half_depth - depth.T)
-        gap = torch.maximum(gap, gap.transpose(1, 2))
+        xp = self.kit
+        gap = xp.maximum(abs(lateral) - half_width - width.T, abs(forward) - half_depth - depth.T)
+        gap = xp.maximum(gap, xp.moveaxis(gap, 1, 2))
         return tuple(of.reshape(-1) for of in (lateral, forward, half_width, half_depth, gap))  # type: ignore[return-value]
 
-    def _at(self, i: Tensor, j: Tensor) -> Tensor:
+    def _at(self, i: Array, j: Array) -> Array:
         n = len(self.template)
         return i * n + j % n
 
-    def local(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
+    def local(self, i: Array, j: Array) -> tuple[Array, Array]:
         at = self._at(i, j)
         return self._dense[0][at], self._dense[1][at]
 
-    def reach(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
+    def reach(self, i: Array, j: Array) -> tuple[Array, Array]:
         at = self._at(i, j)
         return self._dense[2][at], self._dense[3][at]
 
-    def apart(self, i: Tensor, j: Tensor) -> Tensor:
+    def apart(self, i: Array, j: Array) -> Array:
         return self._dense[4][self._at(i, j)]
 
     def __len__(self) -> int:
         return self.count * len(self.template)
 
 
-def copies_of(room: Plan, position: Tensor, yaw: Tensor, moved: Tensor) -> Copies:
+def copies_of(room: Plan, position: Array, yaw: Array, moved: Array) -> Copies:
     """Copies of a plan of one room.
 
     Arguments:
         room: N boxes. position: (K, N, 3) float, metres; yaw: (K, N) float, radians, of the copies.
         moved: (N,) bool, boxes that do not stand alike in all of them.
     """
-    count = len(yaw)
+    count, xp = len(yaw), room.kit
     return Copies(
-        room.kinds * count, room.size.repeat(count, 1), position.reshape(-1, 3), yaw.reshape(-1),
-        torch.arange(count).repeat_interleave(len(room)), room.floor.expand(count, *room.floor.shape[1:]),
-        room.openings * count, room.triplets[:0], room.given.repeat(count),
-        None if room.height is None else room.height.expand(count), room.rules, room.stated,
-        template=room, apart_in=moved,
+        room.kinds * count, xp.tile(room.size, (count, 1)), position.reshape(-1, 3), yaw.reshape(-1),
+        repeat(xp.arange(count), len(room)), _spread(room.floor, count), room.openings * count, room.triplets[:0],
+        xp.tile(room.given, (count,)), None if room.height is None else _spread(room.height, count), room.rules,
+        room.stated, template=room, apart_in=moved,
     )  # fmt: skip
+
+
+def _spread(one: Array, count: int) -> Array:
+    """(K, ...) the only row (1, ...) as so many, none of them copied."""
+    return kit(one).broadcast_to(one, (count, *one.shape[1:]))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import torch
-from torch import Tensor
+import math
 
+from echomodel.arrays import Array, at_least, cast, dot, held, rows, whole
 from echomodel.objective.company import Seats, seats_at
 from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody, worst
 
@@ -14,6 +14,7 @@ APART = {
     ("seat", "seat"): 0.06, ("seat", "storage"): 0.12, ("bed", "seat"): 0.05, ("bed", "sofa"): 0.12,
     ("bed", "bed"): 0.15,
 }  # fmt: skip
+ROLES = sorted({role for pair in APART for role in pair})
 PULL, PULL_WALL = 0.22, 0.1  # metres behind a chair at a table, before furniture and before a wall
 DESK, DESK_WALL = 0.33, 0.19  # the same at a desk, where one works
 SQUEEZED, SPARE = 0.17, 0.6  # metres behind chairs of one side, and how much more behind those opposite is to spare
@@ -32,28 +33,28 @@ EDGE = 0.06  # the same for lamps and plants, which are narrow
 
 def groups_apart(plan: Plan) -> Found:
     """Pieces of different groups leave a gap: a table does not touch a sofa, nor a chair the next bed."""
-    roles = sorted({role for pair in APART for role in pair})
-    massive = plan.of(*roles) & plan.standing
+    massive = plan.of(*ROLES) & plan.standing
     i, j = plan.pairs(massive, massive, least=True)
     keep = (plan.smaller[i] < plan.smaller[j]) & ~plan.kin(i, j)
     i, j = i[keep], j[keep]
-    table = plan.numbers([[APART.get((a, b), APART.get((b, a), 0.0)) for b in roles] for a in roles])
-    number = plan.column(lambda kind: roles.index(kind.role) if kind.role in roles else 0).long()
+    table = plan.numbers([[APART.get((a, b), APART.get((b, a), 0.0)) for b in ROLES] for a in ROLES])
+    number = whole(plan.column(lambda kind: ROLES.index(kind.role) if kind.role in ROLES else 0))
     wanted = table[number[i], number[j]]
     keep = (wanted > 0) & ~_side_by_side(plan, i, j)
     i, j, wanted = i[keep], j[keep], wanted[keep]
     least, about = plan.worst(i, plan.apart(i, j) - wanted, j)
-    who = (least < FAR).nonzero()[:, 0]
-    return found(who, least[who], other=about[who], measure=plan.apart(who, about[who]).clamp_min(0.0))
+    who = rows(least < FAR)
+    j = about[who]
+    return found(who, least[who], other=j, measure=at_least(least[who] + table[number[who], number[j]], 0.0))
 
 
-def _side_by_side(plan: Plan, i: Tensor, j: Tensor) -> Tensor:
+def _side_by_side(plan: Plan, i: Array, j: Array) -> Array:
     """(P,) bool: desks and the like in one row, looking the same way."""
-    lateral, _ = plan.local(i, j)
-    half_width, _ = plan.reach(i, j)
-    row = lateral.abs() - half_width - plan.size[j, 0] / 2 > -0.05
-    board = plan.of("board")
-    return (row & ((plan.yaw[i] - plan.yaw[j]).cos() > 0.97) & board[i] & board[j]).detach()
+    boards = plan.of("board")[i] & plan.of("board")[j]
+    if not bool(boards.any()):
+        return boards
+    aside = abs(plan.local(i, j)[0]) - plan.reach(i, j)[0] - plan.size[j, 0] / 2
+    return boards & (aside > -0.05) & (plan.kit.cos(plan.yaw[i] - plan.yaw[j]) > 0.97)
 
 
 def desks_in_line(plan: Plan) -> Found:
@@ -62,71 +63,71 @@ def desks_in_line(plan: Plan) -> Found:
     i, j = plan.pairs(desks, desks)
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)
-    next_to = _side_by_side(plan, i, j) & (lateral.abs() - half_width - plan.size[j, 0] / 2 < NEXT).detach()
-    off = (forward - half_depth + plan.size[j, 2] / 2).abs()
-    once = next_to & (i < j)
-    return found(i[once], IN_LINE - off[once], other=j[once], measure=off[once])
+    next_to = _side_by_side(plan, i, j) & (abs(lateral) - half_width - plan.size[j, 0] / 2 < NEXT) & (i < j)
+    off = abs(forward - half_depth + plan.size[j, 2] / 2)[next_to]
+    return found(i[next_to], IN_LINE - off, other=j[next_to], measure=off)
 
 
 def chair_pulls_out(plan: Plan) -> Found:
     """A chair can be moved back from its table or desk."""
     chairs = plan.stands("at") & (plan.anchor >= 0) & ~plan.solid
-    works = plan.works[plan.anchor.clamp_min(0)]
-    needed, wall = torch.where(works, DESK, PULL), torch.where(works, DESK_WALL, PULL_WALL)
+    works, xp = plan.works[at_least(plan.anchor, 0)], plan.kit
+    needed, wall = xp.where(works, DESK, PULL), xp.where(works, DESK_WALL, PULL_WALL)
     seen = _clear(plan, chairs, _massive(plan), needed, wall, behind=True)
-    return seen.take(plan.apart(seen.who, plan.anchor[seen.who]).detach() < AT)
+    return seen.take(plan.apart(seen.who, plan.anchor[seen.who]) < AT) if len(seen.who) else seen
 
 
-def _massive(plan: Plan) -> Tensor:
+def _massive(plan: Plan) -> Array:
     """(N,) bool, what chairs are moved against."""
     return plan.of("board", "bed", "storage", "sofa") & plan.standing
 
 
 def table_amid(plan: Plan) -> Found:
     """A table is not shoved to one side: chairs are not squeezed where those opposite have room to spare."""
-    seats = seats_at(plan)
-    behind, about = _room_behind(plan, seats)
-    least, which = worst(seats.side, behind, about, 4 * len(plan), FAR)
-    asked = seats.side.unique()
-    asked = asked[torch.isin(asked ^ 1, asked)]  # chairs sit opposite
-    asked = asked[plan.walled[asked // 4]]
-    margin = torch.maximum(least[asked] - SQUEEZED, SPARE - least[asked ^ 1] + least[asked])
+    seats, xp = seats_at(plan), plan.kit
+    if not len(seats.i):
+        return nobody(plan.size)
+    least, which = worst(seats.side, *_room_behind(plan, seats), 4 * len(plan), FAR)
+    taken = xp.bincount(seats.side, minlength=4 * len(plan)) > 0
+    asked = rows(taken)
+    asked = asked[taken[asked ^ 1] & plan.walled[asked // 4]]  # chairs sit opposite
+    margin = xp.maximum(least[asked] - SQUEEZED, SPARE - least[asked ^ 1] + least[asked])
     at, other = worst(asked // 4, margin, asked, len(plan), FAR)
-    who = (asked // 4).unique()
-    return found(who, at[who], other=which[other[who]], measure=least[other[who]].clamp_min(0.0))
+    who = rows(xp.bincount(asked // 4) > 0)
+    return found(who, at[who], other=which[other[who]], measure=at_least(least[other[who]], 0.0))
 
 
-def _room_behind(plan: Plan, seats: Seats) -> tuple[Tensor, Tensor]:
+def _room_behind(plan: Plan, seats: Seats) -> tuple[Array, Array]:
     """(P,) and (P,): metres from seats away from their tables to furniture or a wall, and which, -1 = a wall."""
-    i, j = seats.i, seats.j
-    axis = plan.yaw[j] + torch.where(seats.ahead, 0.0, torch.pi / 2)
-    way = torch.stack([axis.sin(), axis.cos()], -1) * seats.across.detach().sign()[:, None]
-    across = torch.stack([way[:, 1], -way[:, 0]], -1)
+    i, j, xp = seats.i, seats.j, plan.kit
+    axis = plan.yaw[j] + xp.where(seats.ahead, 0.0, math.pi / 2)
+    way = xp.stack([xp.sin(axis), xp.cos(axis)], -1) * xp.sign(held(seats.across))[:, None]
+    across = xp.stack([way[:, 1], -way[:, 0]], -1)
     cos, sin = plan.turn
 
-    def half(k: Tensor, along: Tensor) -> Tensor:
+    def half(k: Array, along: Array) -> Array:
         side = cos[k] * along[:, 0] - sin[k] * along[:, 1]
         front = sin[k] * along[:, 0] + cos[k] * along[:, 1]
-        return (side.abs() * plan.size[k, 0] + front.abs() * plan.size[k, 2]) / 2
+        return (abs(side) * plan.size[k, 0] + abs(front) * plan.size[k, 2]) / 2
 
     row, k = plan.beside(i, _massive(plan))
     keep = k != j[row]
     row, k = row[keep], k[keep]
-    away = (plan.position[k] - plan.position[i[row]])[:, [0, 2]]
+    away = (plan.position[k] - plan.position[i[row]])[:, ::2]
     own = half(i, way)
-    ahead = (away * way[row]).sum(-1)
+    ahead = dot(away, way[row])
     gap = ahead - half(k, way[row]) - own[row]
-    covered = half(k, across[row]) + half(i, across)[row] - (away * across[row]).sum(-1).abs()
+    covered = half(k, across[row]) + half(i, across)[row] - abs(dot(away, across[row]))
     met = (covered > MET * plan.size[i[row], 0]) & (ahead > 0)
-    least, about = worst(row, torch.where(met, gap, FAR), k, len(i), FAR)
+    least, about = worst(row, xp.where(met, gap, FAR), k, len(i), FAR)
     start, along, normal, length = (of[plan.scene[i]] for of in plan.walls)
-    back = plan.position[i][:, [0, 2]] + way * own[:, None]
-    towards = -(normal * way[:, None]).sum(-1)
-    reach = ((back[:, None] - start) * normal).sum(-1) / towards.clamp_min(1e-3)
-    at = ((back[:, None] + reach[..., None] * way[:, None] - start) * along).sum(-1)
+    back = plan.position[i][:, ::2] + way * own[:, None]
+    towards = -dot(normal, way[:, None])
+    reach = dot(back[:, None] - start, normal) / at_least(towards, 1e-3)
+    at = dot(back[:, None] + reach[..., None] * way[:, None] - start, along)
     hit = (length > 0) & (towards > 1e-3) & (at > -1e-3) & (at < length + 1e-3) & (reach > -0.3)
-    wall = torch.where(hit, reach, FAR).amin(1)
-    return torch.minimum(least, wall), torch.where(wall < least, -1, about)
+    wall = xp.amin(xp.where(hit, reach, FAR), 1)
+    return xp.minimum(least, wall), xp.where(wall < least, -1, about)
 
 
 def knees_free(plan: Plan) -> Found:
@@ -134,7 +135,7 @@ def knees_free(plan: Plan) -> Found:
     return _clear(plan, _loungers(plan), plan.standing & ~plan.movable, KNEES, KNEES_WALL)
 
 
-def _loungers(plan: Plan) -> Tensor:
+def _loungers(plan: Plan) -> Array:
     """(N,) bool, sofas and armchairs."""
     return (plan.of("sofa") | plan.stands("company")) & plan.standing
 
@@ -149,9 +150,11 @@ def lamp_aside(plan: Plan) -> Found:
     """Lamps and plants do not stand before shelves, cupboards and drawers, nor before who sits."""
     fronts = (plan.of("storage") & plan.standing & plan.works) | _loungers(plan)
     i, j = plan.pairs(plan.of("light", "decor") & plan.standing, fronts, least=True)
-    free = torch.where(_loungers(plan), AT_SEAT, torch.where(plan.stands("head"), AT_BED, LAMP)).to(plan.size)
-    least, about = plan.worst(i, plan.more_ahead(j, i, free[j], EDGE), j)
-    who = (least < FAR).nonzero()[:, 0]
+    if not len(i):
+        return nobody(plan.size)
+    free = plan.kit.where(_loungers(plan), AT_SEAT, plan.kit.where(plan.stands("head"), AT_BED, LAMP))
+    least, about = plan.worst(i, plan.more_ahead(j, i, cast(free, plan.size)[j], EDGE), j)
+    who = rows(least < FAR)
     return found(who, least[who], other=about[who], measure=least[who] + free[about[who]])
 
 
@@ -165,9 +168,10 @@ def seat_room(plan: Plan) -> Found:
     if not len(i):
         return found_one
     least, about = plan.worst(i, plan.apart(i, j) - TOUCHED, j)
-    who = (least < 0).nonzero()[:, 0]
-    who = who[~torch.isin(who, found_one.who[found_one.margin < 0])]
-    touched = found(who, least[who], other=about[who], measure=(least[who] + TOUCHED).clamp_min(0.0))
+    near = least < 0
+    near[found_one.who[found_one.margin < 0]] = False
+    who = rows(near)
+    touched = found(who, least[who], other=about[who], measure=at_least(least[who] + TOUCHED, 0.0))
     return joined(found_one, touched)
 
 
@@ -177,19 +181,19 @@ def loungers_apart(plan: Plan) -> Found:
     i, j = plan.pairs(lounging, lounging, least=True)
     keep = (plan.smaller[i] < plan.smaller[j]) & plan.kin(i, j)
     i, j = i[keep], j[keep]
-    return plan.nearest(i, j, plan.apart(i, j) - HAND, HAND)
+    return plan.nearest(i, j, plan.apart(i, j) - HAND, HAND) if len(i) else nobody(plan.size)
 
 
 def _clear(
-    plan: Plan, fronts: Tensor, block: Tensor, needed: float | Tensor, needed_wall: float | Tensor, *,
+    plan: Plan, fronts: Array, block: Array, needed: float | Array, needed_wall: float | Array, *,
     behind: bool = False, kin: bool = False,
 ) -> Found:  # fmt: skip
     """How much more than is needed is free before (or behind) some boxes, to other groups' pieces (or their own)."""
     who = plan.those(fronts)
     if not len(who):
         return nobody(plan.size)
-    sign = -1.0 if behind else 1.0
-    needed, needed_wall = (torch.zeros_like(plan.yaw) + value for value in (needed, needed_wall))
+    sign, xp = -1.0 if behind else 1.0, plan.kit
+    needed, needed_wall = (xp.zeros_like(plan.yaw) + value for value in (needed, needed_wall))
     i, j = plan.pairs(fronts, block, least=True)
     other = plan.kin(i, j) == kin
     i, j = i[other], j[other]
@@ -198,9 +202,9 @@ def _clear(
     least, about, needed, needed_wall = least[who], about[who], needed[who], needed_wall[who]
     if bool((needed_wall > 0).any()):
         front = plan.axes(who)[1] * sign
-        points = plan.position[who][:, [0, 2]] + front * (plan.size[who, 2] / 2 + needed_wall)[:, None]
+        points = plan.position[who][:, ::2] + front * (plan.size[who, 2] / 2 + needed_wall)[:, None]
         wall = plan.inside(points[:, None], who)[:, 0]
         by_wall = wall < least
-        least, about = torch.minimum(least, wall), torch.where(by_wall, -1, about)
-        needed = torch.where(by_wall, needed_wall, needed)
-    return found(who, least, other=about, measure=(least + needed).clamp_min(0.0))
+        least, about = xp.minimum(least, wall), xp.where(by_wall, -1, about)
+        needed = xp.where(by_wall, needed_wall, needed)
+    return found(who, least, other=about, measure=at_least(least + needed, 0.0))

@@ -10,9 +10,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import torch
-from torch import Tensor
 
+from echomodel.arrays import Array, full, held, rows
 from echomodel.objective.plan import CLEAR_HEIGHT, Plan, plan_of
 from echomodel.objective.table import PRICE, TERMS
 from echomodel.openings import Opening, inward_normal, segment
@@ -100,7 +99,7 @@ class Fault:
 
 def faults(
     boxes: BoxesLike, categories: Sequence[str], floor: np.ndarray | None = None, openings: Sequence[Opening] = (),
-    relations: np.ndarray | Tensor | None = None, *, given: np.ndarray | None = None,
+    relations: np.ndarray | None = None, *, given: np.ndarray | None = None,
 ) -> list[Fault]:  # fmt: skip
     """What a person would point at in a room, in the order of the terms; see `plan_of` for the arguments.
 
@@ -113,19 +112,18 @@ def faults(
 def faults_of(plan: Plan, kinds: Collection[str] = BY_EYE) -> list[Fault]:
     """The faults of all terms of some kinds, for any number of rooms; numbers count through them."""
     out = []
-    with torch.no_grad():
-        for term in TERMS:
-            if term.kind not in kinds:
+    for term in TERMS:
+        if term.kind not in kinds:
+            continue
+        seen = term.find(plan)
+        for row in rows(seen.margin < 0).tolist():
+            who, other = int(seen.who[row]), int(seen.other[row])
+            if bool(plan.given[who]):
                 continue
-            seen = term.find(plan)
-            for row in (seen.margin < 0).nonzero()[:, 0].tolist():
-                who, other = int(seen.who[row]), int(seen.other[row])
-                if bool(plan.given[who]):
-                    continue
-                text = term.says[int(seen.words[row]) % len(term.says)]
-                said = text.replace("{a}", "\0").replace("{b}", "\1").format(x=float(seen.measure[row]))
-                said = said.replace("\0", "{a}").replace("\1", "{b}")
-                out.append(Fault(who, other, term.name, float(seen.margin[row]), said))
+            text = term.says[int(seen.words[row]) % len(term.says)]
+            said = text.replace("{a}", "\0").replace("{b}", "\1").format(x=float(seen.measure[row]))
+            said = said.replace("\0", "{a}").replace("\1", "{b}")
+            out.append(Fault(who, other, term.name, float(seen.margin[row]), said))
     return out
 
 
@@ -136,33 +134,34 @@ def unreached(plan: Plan) -> list[Fault]:
         return []
     furniture = plan.standing & plan.of("seat", "sofa", "board", "bed", "storage")
     reached = walked.reached
-    attends = plan.anchor.numpy()  # a nightstand is reached from its bed, a chair with its table
+    attends = np.asarray(plan.anchor)  # a nightstand is reached from its bed, a chair with its table
     reached = reached | ((attends >= 0) & reached[attends])
-    lost = np.flatnonzero(furniture.numpy() & ~reached & ~plan.given.numpy())
+    lost = np.flatnonzero(np.asarray(furniture & ~plan.given) & ~reached)
     return [Fault(int(i), -1, REACHED, -1.0, "{a} cannot be walked to from the door") for i in lost]
 
 
 def walk(plan: Plan) -> Ways | None:
     """Where a robot gets to in a plan of one room, None where its floor is unknown."""
-    corners = plan.floor[0][torch.isfinite(plan.floor[0]).all(1)].numpy()
+    corners = np.asarray(plan.floor[0])
+    corners = corners[np.isfinite(corners).all(1)]
     if len(corners) < 3:
         return None
-    size, position, yaw = (value.detach().numpy() for value in (plan.size, plan.position, plan.yaw))
-    in_the_way = (plan.standing & ~plan.movable).numpy() & (size[:, 1] > CLEAR_HEIGHT)
+    size, position, yaw = (np.asarray(held(of)) for of in (plan.size, plan.position, plan.yaw))
+    in_the_way = np.asarray(plan.standing & ~plan.movable) & (size[:, 1] > CLEAR_HEIGHT)
     return ways(size, position, yaw, in_the_way, corners, plan.openings[0])
 
 
-def missed(plan: Plan, kinds: Collection[str] = BY_EYE, beyond: float = -math.inf) -> Tensor:
+def missed(plan: Plan, kinds: Collection[str] = BY_EYE, beyond: float = -math.inf) -> Array:
     """() float, what the missed margins of the terms of some kinds cost, differentiable.
 
     `beyond`: what is asked for beyond the slack of each term, in its unit; by default nothing, not even that.
     """
-    total = plan.size.new_zeros(())
+    total = full(plan.size, (), 0.0)
     for term in TERMS:
         seen = term.find(plan) if term.kind in kinds else None
         if seen is None or not len(seen.who):
             continue
-        miss = (max(term.slack + beyond, 0.0) - seen.margin).clamp(0.0, MOST)
+        miss = (max(term.slack + beyond, 0.0) - seen.margin).clip(0.0, MOST)
         if term.kind in BY_EYE:
             miss = miss * ~plan.given[seen.who]
         total = total + PRICE[term.kind][1] * term.weight * miss.sum()

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import torch
-from torch import Tensor
-
+from echomodel.arrays import Array, at_least, full, norm, rows, sum_of, whole
 from echomodel.objective.access import before_fronts
 from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody, worst
 from echomodel.openings import segment
@@ -19,50 +17,54 @@ POINTS = 9  # of each way that are looked at
 
 def row_flush(plan: Plan) -> Found:
     """Fitted units stand in a row: no gap to the next one, backs in one line, or corner to corner."""
-    units = plan.stands("row") & plan.standing
+    units, xp = plan.stands("row") & plan.standing, plan.kit
     i, j = plan.pairs(units, units)
+    if not len(i):
+        return nobody(plan.size)
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)
-    level = (forward - half_depth + plan.size[j, 2] / 2).abs()
-    gap = (lateral.abs() - half_width - plan.size[j, 0] / 2).abs()
-    along = (plan.yaw[i] - plan.yaw[j]).cos()
-    off = torch.where(along > 0.99, torch.maximum(gap, level), torch.where(along.abs() < 0.01, plan.apart(i, j), FAR))
-    least, about = worst(i, off.abs(), j, len(plan), FAR)
-    who = i.unique()
+    level = abs(forward - half_depth + plan.size[j, 2] / 2)
+    gap = abs(abs(lateral) - half_width - plan.size[j, 0] / 2)
+    along = xp.cos(plan.yaw[i] - plan.yaw[j])
+    off = xp.where(along > 0.99, xp.maximum(gap, level), xp.where(abs(along) < 0.01, plan.apart(i, j), FAR))
+    least, about = worst(i, abs(off), j, len(plan), FAR)
+    who = rows(xp.bincount(i) > 0)
     return found(who, FLUSH - least[who], other=about[who], measure=least[who])
 
 
 def hung_over(plan: Plan) -> Found:
     """Wall units hang over worktops, a hood over the middle of its hob, a mirror over its basin."""
-    hung = plan.stands("over")
-    tops = plan.stands("row") & plan.standing & (plan.size[:, 1].detach() <= TALL)
-    i, j = plan.pairs(hung & plan.which(lambda kind: kind.task == "store"), tops)
+    hung, stores, xp = plan.stands("over"), plan.which(lambda kind: kind.task == "store"), plan.kit
+    if not bool(hung.any()):
+        return nobody(plan.size)
+    i, j = plan.pairs(hung & stores, plan.stands("row") & plan.standing & (plan.size[:, 1] <= TALL))
     lateral, forward = plan.local(i, j)
     half_width, _ = plan.reach(i, j)
-    shared = torch.minimum(2 * half_width, half_width + plan.size[j, 0] / 2 - lateral.abs()).clamp_min(0.0)
-    below = forward.abs() < plan.size[j, 2] / 2
-    total = torch.zeros_like(plan.yaw).index_add(0, i, torch.where(below, shared, torch.zeros_like(shared)))
-    who = i.unique()
+    shared = at_least(xp.minimum(2 * half_width, half_width + plan.size[j, 0] / 2 - abs(lateral)), 0.0)
+    total = sum_of(i, xp.where(abs(forward) < plan.size[j, 2] / 2, shared, 0.0), len(plan))
+    who = rows(xp.bincount(i) > 0)
     out = found(who, total[who] - COVERED * plan.size[who, 0], measure=100 * total[who] / plan.size[who, 0])
     one, other = plan.attended("over")
-    single = ~plan.which(lambda kind: kind.task == "store")[one]
+    single = ~stores[one]
     one, other = one[single], other[single]
     lateral, forward = plan.local(one, other)
-    off = torch.maximum(lateral.abs() - CENTRED, forward.abs() - plan.size[other, 2] / 2)
-    return joined(out, found(one, -off, other=other, measure=off + CENTRED, words=torch.ones_like(one)))
+    off = xp.maximum(abs(lateral) - CENTRED, abs(forward) - plan.size[other, 2] / 2)
+    return joined(out, found(one, -off, other=other, measure=off + CENTRED, words=xp.ones_like(one)))
 
 
 def aisle(plan: Plan) -> Found:
     """One opens an oven with somebody behind: units keep an aisle to what stands opposite, and one walks along them."""
     works = plan.which(lambda kind: bool(kind.task)) & plan.standing
     i, j = plan.pairs(works, works)
+    if not len(i):
+        return nobody(plan.size)
     lateral, forward = plan.local(j, i)
     half_width, half_depth = plan.reach(j, i)
-    facing = ((plan.yaw[i] - plan.yaw[j]).cos() < -0.9) | ~plan.stands("row")[j]
-    met = facing & (lateral.abs() < half_width + plan.size[i, 0] / 2 - 0.1) & (forward > 0)
+    facing = (plan.kit.cos(plan.yaw[i] - plan.yaw[j]) < -0.9) | ~plan.stands("row")[j]
+    met = facing & (abs(lateral) < half_width + plan.size[i, 0] / 2 - 0.1) & (forward > 0)
     clear = forward - half_depth - plan.size[i, 2] / 2
-    least, about = worst(i, torch.where(met, clear, FAR), j, len(plan), FAR)
-    who = i.unique()
+    least, about = worst(i, plan.kit.where(met, clear, FAR), j, len(plan), FAR)
+    who = rows(plan.kit.bincount(i) > 0)
     return found(who, least[who] - AISLE, other=about[who], measure=least[who])
 
 
@@ -70,82 +72,84 @@ def work_triangle(plan: Plan) -> Found:
     """The ways between hob, sink and fridge are neither cramped nor long, and nothing stands in them."""
     tasks = {task: plan.which(lambda kind, task=task: kind.task == task) & plan.standing  # type: ignore[misc]
              for task in ("cook", "wash", "cool")}  # fmt: skip
-    cook = plan.those(tasks["cook"])
+    cook, xp = plan.those(tasks["cook"]), plan.kit
+    if not len(cook):
+        return nobody(plan.size)
     ends = [(cook, _front(plan, cook))]
     for task in ("wash", "cool"):
         i, j = plan.pairs(tasks["cook"], tasks[task])
-        away = (plan.position[i] - plan.position[j])[:, [0, 2]].norm(dim=1)
+        away = norm((plan.position[i] - plan.position[j])[:, ::2])
         near = worst(i, away, j, len(plan), FAR)[1][cook]
-        ends.append((near, _front(plan, near.clamp_min(0))))
-    there = (torch.stack([number for number, _ in ends]) >= 0).all(0)
+        ends.append((near, _front(plan, at_least(near, 0))))
+    there = (xp.stack([number for number, _ in ends]) >= 0).all(0)
     cook, points = cook[there], [point[there] for _, point in ends]
     if not len(cook):
         return nobody(plan.size)
     pairs = ((0, 1), (1, 2), (2, 0))
-    way = sum((points[a] - points[b]).norm(dim=1) for a, b in pairs)
+    way = sum(norm(points[a] - points[b]) for a, b in pairs)
     low, high = TRIANGLE
-    out = found(cook, torch.minimum(way - low, high - way), measure=way, words=(way > high).long())
+    out = found(cook, xp.minimum(way - low, high - way), measure=way, words=whole(way > high))
     share = plan.numbers([(k + 0.5) / POINTS for k in range(POINTS)])[:, None]
-    walked = torch.cat([points[a][:, None] * share + points[b][:, None] * (1 - share) for a, b in pairs], 1)
-    others = plan.standing & ~plan.movable & ~plan.stands("row") & (plan.size[:, 1].detach() > 0.3)
+    walked = xp.concat([points[a][:, None] * share + points[b][:, None] * (1 - share) for a, b in pairs], 1)
+    others = plan.standing & ~plan.movable & ~plan.stands("row") & (plan.size[:, 1] > 0.3)
     i, j = plan.pairs(tasks["cook"], others)
-    keep = torch.isin(i, cook)
+    number = full(i, len(plan), -1)
+    number[cook] = xp.arange(len(cook))
+    keep = number[i] >= 0
     i, j = i[keep], j[keep]
-    number = torch.full((len(plan),), -1).index_put((cook,), torch.arange(len(cook)))
     lateral, forward = plan.seen(j[:, None], walked[number[i]])
-    beside, ahead = lateral.abs() - plan.size[j, None, 0] / 2, forward.abs() - plan.size[j, None, 2] / 2
-    least, about = worst(i, torch.maximum(beside, ahead).amin(1), j, len(plan), FAR)
-    blocked = found(cook, least[cook], other=about[cook], measure=-least[cook], words=torch.full_like(cook, 2))
+    beside, ahead = abs(lateral) - plan.size[j, None, 0] / 2, abs(forward) - plan.size[j, None, 2] / 2
+    least, about = worst(i, xp.amin(xp.maximum(beside, ahead), 1), j, len(plan), FAR)
+    blocked = found(cook, least[cook], other=about[cook], measure=-least[cook], words=xp.full_like(cook, 2))
     return joined(out, blocked)
 
 
-def _front(plan: Plan, who: Tensor) -> Tensor:
+def _front(plan: Plan, who: Array) -> Array:
     """(P, 2): where one stands before boxes."""
-    return plan.position[who][:, [0, 2]] + plan.axes(who)[1] * (plan.size[who, 2] / 2 + WALKED)[:, None]
+    return plan.position[who][:, ::2] + plan.axes(who)[1] * (plan.size[who, 2] / 2 + WALKED)[:, None]
 
 
 def hob_safe(plan: Plan) -> Found:
     """A hob has worktop beside it to put a pan down, and lies neither in a corner nor under a window."""
     hobs = plan.which(lambda kind: kind.task == "cook") & plan.standing
-    rows = plan.stands("row") & plan.standing
-    i, j = plan.pairs(hobs, rows)
-    if not bool(hobs.any()):
+    i, j = plan.pairs(hobs, plan.stands("row") & plan.standing)
+    who, xp = plan.those(hobs), plan.kit
+    if not len(who):
         return nobody(plan.size)
     lateral, forward = plan.local(j, i)
     half_width, half_depth = plan.reach(j, i)
-    along = (plan.yaw[i] - plan.yaw[j]).cos()
-    beside = (along > 0.99) & ((lateral.abs() - half_width - plan.size[i, 0] / 2).abs() < 2 * FLUSH)
-    worktop = torch.where(beside & (plan.size[j, 1] <= TALL), plan.size[j, 0], torch.zeros_like(lateral))
-    who = plan.those(hobs)
+    along = xp.cos(plan.yaw[i] - plan.yaw[j])
+    aside = abs(lateral) - half_width - plan.size[i, 0] / 2
+    beside = (along > 0.99) & (abs(aside) < 2 * FLUSH)
+    worktop = xp.where(beside & (plan.size[j, 1] <= TALL), plan.size[j, 0], 0.0)
     landing, _ = worst(i, -worktop, j, len(plan), 0.0)
     out = found(who, -landing[who] - LANDING, measure=-landing[who])
-    across = along.abs() < 0.01
-    inner = torch.maximum(lateral.abs() - half_width - plan.size[i, 0] / 2, forward - half_depth - plan.size[i, 2] / 2)
-    least, about = worst(i, torch.where(across, inner, FAR), j, len(plan), FAR)
+    inner = xp.maximum(aside, forward - half_depth - plan.size[i, 2] / 2)
+    least, about = worst(i, xp.where(abs(along) < 0.01, inner, FAR), j, len(plan), FAR)
     start, along_wall, normal, length = (of[plan.scene[who]] for of in plan.walls)
     side = plan.axes(who)[0][:, None]
-    off = plan.position[who][:, None, [0, 2]] - start
+    off = plan.position[who][:, None, ::2] - start
     gap = (off * normal).sum(-1) - plan.size[who, None, 0] / 2
     at = (off * along_wall).sum(-1)
-    met = (length > 0) & ((normal * side).sum(-1).abs() > 0.9) & (at > 0) & (at < length) & (gap > -0.1)
-    wall = torch.where(met, gap, FAR).amin(1)
-    corner = torch.minimum(least[who], wall)
-    out = joined(out, found(who, corner - LANDING / 2, other=torch.where(wall < least[who], -1, about[who]),
-                            measure=corner, words=torch.ones_like(who)))  # fmt: skip
+    met = (length > 0) & (abs((normal * side).sum(-1)) > 0.9) & (at > 0) & (at < length) & (gap > -0.1)
+    wall = xp.amin(xp.where(met, gap, FAR), 1)
+    corner = xp.minimum(least[who], wall)
+    out = joined(out, found(who, corner - LANDING / 2, other=xp.where(wall < least[who], -1, about[who]),
+                            measure=corner, words=xp.ones_like(who)))  # fmt: skip
     return joined(out, _under_windows(plan, who))
 
 
-def _under_windows(plan: Plan, who: Tensor) -> Found:
-    margin = torch.full_like(plan.yaw[who], FAR)
+def _under_windows(plan: Plan, who: Array) -> Found:
+    margin, xp = full(plan.yaw, len(who), FAR), plan.kit
     for scenes, polygon, openings in plan.rooms:
-        here = torch.isin(plan.scene[who], scenes)
+        here = (plan.scene[who] >= scenes[0]) & (plan.scene[who] <= scenes[-1])
         for one in (opening for opening in openings if opening.kind == "window" and opening.edge < len(polygon)):
             ends = plan.numbers(segment(polygon, one).tolist())
             lateral, forward = plan.seen(who[:, None], ends)
             behind = (forward < -plan.size[who, None, 2] / 4).all(1) & (forward > -plan.size[who, None, 2]).all(1)
-            beside = torch.maximum(lateral.amin(1) - plan.size[who, 0] / 2, -lateral.amax(1) - plan.size[who, 0] / 2)
-            margin = torch.where(here & behind, torch.minimum(margin, beside), margin)
-    return found(who, margin, measure=-margin, words=torch.full_like(who, 2))
+            beside = xp.maximum(xp.amin(lateral, 1), -xp.amax(lateral, 1)) - plan.size[who, 0] / 2
+            margin = xp.where(here & behind, xp.minimum(margin, beside), margin)
+    return found(who, margin, measure=-margin, words=xp.full_like(who, 2))
 
 
 def standing_room(plan: Plan) -> Found:

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import torch
-from torch import Tensor
+import numpy as np
 
+from echomodel.arrays import Array, at_least, full, held, put, whole
 from echomodel.floors import edges, footprint, signed_area
 from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody
 from echomodel.objective.support import ON_CEILING, ON_FLOOR
@@ -23,11 +23,11 @@ def apart(plan: Plan) -> Found:
     i, j, allowed = plan.couples
     if not len(i):
         return nobody(plan.size)
-    rise = torch.maximum(
+    rise = plan.kit.maximum(
         plan.position[j, 1] - plan.position[i, 1] - plan.size[i, 1],
         plan.position[i, 1] - plan.position[j, 1] - plan.size[j, 1],
     )
-    depth = -torch.maximum(plan.apart(i, j), rise)
+    depth = -plan.kit.maximum(plan.apart(i, j), rise)
     return found(i, TOUCH + allowed - depth, other=j, measure=depth)
 
 
@@ -36,45 +36,45 @@ def on_floor(plan: Plan) -> Found:
     who = plan.those(plan.walled & plan.moved)
     if not len(who):
         return nobody(plan.size)
-    inside = plan.inside(footprint(plan.size[who], plan.position[who], plan.yaw[who]), who).amin(1)
-    clear = inside if plan.first.rectangle is not None else torch.minimum(inside, _off_corners(plan, who))
+    inside = plan.inside(footprint(plan.size[who], plan.position[who], plan.yaw[who]), who)
+    inside = plan.kit.amin(inside, 1)
+    clear = inside if plan.first.rectangle is not None else plan.kit.minimum(inside, _off_corners(plan, who))
     return found(who, clear + TOUCH, measure=-inside)
 
 
-def _off_corners(plan: Plan, who: Tensor) -> Tensor:
+def _off_corners(plan: Plan, who: Array) -> Array:
     """(P,): metres between boxes and the corners that look into their room, negative inside; `FAR` where none does."""
     start, end = edges(plan.floor)
-    along = end - start
-    before = along.roll(1, 1)
+    along, xp = end - start, plan.kit
+    before = xp.roll(along, 1, 1)
     turn = (before[..., 0] * along[..., 1] - before[..., 1] * along[..., 0]) * signed_area(plan.floor)[:, None]
     reflex = (turn < -1e-6).any(0)
     if not bool(reflex.any()):
-        return plan.size.new_full((len(who),), FAR)
+        return full(plan.size, len(who), FAR)
     looks = (turn < -1e-6)[plan.scene[who]][:, reflex]
-    local = torch.stack(plan.seen(who[:, None], start[plan.scene[who]][:, reflex]), -1)
-    outside = (local.abs() - plan.size[who][:, None, [0, 2]] / 2).amax(-1)
-    return torch.where(looks, outside, FAR).amin(1)
+    local = xp.stack(plan.seen(who[:, None], start[plan.scene[who]][:, reflex]), -1)
+    outside = xp.amax(abs(local) - plan.size[who][:, None, ::2] / 2, -1)
+    return xp.amin(xp.where(looks, outside, FAR), 1)
 
 
 def rests(plan: Plan) -> Found:
     """Furniture stands on the floor or on its carrier, with its middle over it, and what hangs hangs at the ceiling."""
-    who = plan.those(plan.moved | plan.moved[plan.carrier.clamp_min(0)])
+    xp = plan.kit
+    who = plan.those(plan.moved | plan.moved[at_least(plan.carrier, 0)])
     carrier = plan.carrier[who]
-    carried, on = carrier >= 0, carrier.clamp_min(0)
+    carried, on = carrier >= 0, at_least(carrier, 0)
     bottom, top = plan.position[who, 1], plan.position[on, 1] + plan.size[on, 1]
     ceiling = plan.ceiling[who] - plan.size[who, 1]
-    air = torch.where(carried, bottom - top, torch.where(carrier == ON_CEILING, ceiling - bottom, bottom))
-    free = ~(carried | (carrier == ON_FLOOR) | ((carrier == ON_CEILING) & torch.isfinite(ceiling)))
-    air = torch.where(free, 0.0, air)
-    margin, beside = TOUCH - air.abs(), torch.full_like(air, FAR)
+    air = xp.where(carried, bottom - top, xp.where(carrier == ON_CEILING, ceiling - bottom, bottom))
+    free = ~(carried | (carrier == ON_FLOOR) | ((carrier == ON_CEILING) & xp.isfinite(ceiling)))
+    air = xp.where(free, 0.0, air)
+    margin, beside = TOUCH - abs(air), xp.full_like(air, FAR)
     if bool(carried.any()):
         lateral, forward = plan.local(who[carried], on[carried])
-        half = plan.size[on[carried]][:, [0, 2]] / 2
-        over = torch.minimum(half[:, 0] - lateral.abs(), half[:, 1] - forward.abs())
-        beside = beside.index_put((carried,), over)
-    return found(
-        who, torch.minimum(margin, beside), other=carrier.clamp_min(-1), measure=air, words=(beside < margin).long()
-    )
+        half = plan.size[on[carried]][:, ::2] / 2
+        beside = put(beside, carried, xp.minimum(half[:, 0] - abs(lateral), half[:, 1] - abs(forward)))
+    other, words = at_least(carrier, -1), whole(beside < margin)
+    return found(who, xp.minimum(margin, beside), other=other, measure=air, words=words)
 
 
 def in_height(plan: Plan) -> Found:
@@ -82,8 +82,8 @@ def in_height(plan: Plan) -> Found:
     who = plan.those(plan.moved)
     ceiling, low = plan.ceiling[who], plan.position[who, 1]
     high = ceiling - low - plan.size[who, 1]
-    margin = TOUCH + torch.minimum(low, torch.where(torch.isfinite(ceiling), high, FAR))
-    return found(who, margin, measure=TOUCH - margin, words=(high < low).long())
+    margin = TOUCH + plan.kit.minimum(low, plan.kit.where(plan.kit.isfinite(ceiling), high, FAR))
+    return found(who, margin, measure=TOUCH - margin, words=whole(high < low))
 
 
 def told(predicate: str) -> Callable[[Plan], Found]:
@@ -110,14 +110,14 @@ def placed(plan: Plan) -> Found:
         every = {number: Spread(plan.size[at], plan.position[at], plan.yaw[at])
                  for number, at in zip((one.subject, *one.others), rows, strict=True)}  # fmt: skip
         floor = plan.floor[int(plan.scene[one.subject])]
-        corners = floor[torch.isfinite(floor).all(1)]
-        walls = Walls(corners.detach().cpu().numpy()) if len(corners) else None
+        corners = np.asarray(held(floor[plan.kit.isfinite(floor).all(1)]))
+        walls = Walls(corners) if len(corners) else None
         if walls is None and not one.others:
             continue
         margin = margin_of(one, every, walls, {one.subject: plan.kinds[one.subject].name})
-        about = rows[1] if one.others else torch.full_like(rows[0], -1)
+        about = rows[1] if one.others else full(rows[0], len(rows[0]), -1)
         number = [row.name for row in vocabulary().placements].index(one.placement)
-        out = joined(out, found(rows[0], margin, other=about, words=torch.full_like(rows[0], number)))
+        out = joined(out, found(rows[0], margin, other=about, words=full(rows[0], len(rows[0]), number)))
     return out
 
 

@@ -1,4 +1,4 @@
-"""What living rules look at: boxes with what their words say, walls, openings and who attends whom (torch)."""
+"""What living rules look at: boxes with what their words say, walls, openings and who attends whom."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
-from echomodel.floors import edges, known, padded, signed_area, signed_distance
+from echomodel.arrays import Array, at_least, cast, constant, dot, full, held, kit, least_of, norm, pairs_in, rows
+from echomodel.floors import edges, known, signed_area, signed_distance
 from echomodel.objective.support import carriers, shared_fraction
 from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
@@ -31,38 +30,39 @@ class Found:
         measure: (P,) float, the number that the sentence names. words: (P,) int64, which sentence of the rule's it is.
     """
 
-    who: Tensor
-    other: Tensor
-    margin: Tensor
-    measure: Tensor
-    words: Tensor
+    who: Array
+    other: Array
+    margin: Array
+    measure: Array
+    words: Array
 
-    def take(self, rows: Tensor) -> Found:
+    def take(self, rows: Array) -> Found:
         """Some of the rows, by number or mask."""
         return Found(self.who[rows], self.other[rows], self.margin[rows], self.measure[rows], self.words[rows])
 
 
 def found(
-    who: Tensor, margin: Tensor, *, other: Tensor | None = None, measure: Tensor | None = None,
-    words: Tensor | None = None,
+    who: Array, margin: Array, *, other: Array | None = None, measure: Array | None = None,
+    words: Array | None = None,
 ) -> Found:  # fmt: skip
     """A `Found` with what is left out filled in: nothing, the margin, the first sentence."""
-    other = torch.full_like(who, -1) if other is None else other
-    words = torch.zeros_like(who) if words is None else words
+    xp = kit(who)
+    other = xp.full_like(who, -1) if other is None else other
+    words = xp.zeros_like(who) if words is None else words
     return Found(who, other, margin, margin if measure is None else measure, words)
 
 
-def nobody(like: Tensor) -> Found:
+def nobody(like: Array) -> Found:
     """A `Found` of a rule that looks at no box of a plan, with numbers like these."""
-    none, nothing = torch.zeros(0, dtype=torch.int64), like.new_zeros(0)
+    none, nothing = kit(like).zeros(0, dtype=kit(like).int64), full(like, 0, 0.0)
     return Found(none, none, nothing, nothing, none)
 
 
-def worst(who: Tensor, margin: Tensor, other: Tensor, count: int, nothing: float) -> tuple[Tensor, Tensor]:
+def worst(who: Array, margin: Array, other: Array, count: int, nothing: float) -> tuple[Array, Array]:
     """Of the rows (P,) of each box the least margin (count,), `nothing` where it has none, and whom that is about."""
-    least = margin.new_full((count,), nothing).scatter_reduce(0, who, margin, "amin")
-    about = torch.full((count,), -1, dtype=torch.int64)
-    hit = margin.detach() <= least.detach()[who]
+    least = least_of(who, margin, count, nothing)
+    about = full(who, count, -1)
+    hit = held(margin) <= held(least)[who]
     about[who[hit]] = other[hit]
     return least, about
 
@@ -70,7 +70,7 @@ def worst(who: Tensor, margin: Tensor, other: Tensor, count: int, nothing: float
 def joined(first: Found, second: Found) -> Found:
     """The rows of both."""
     pairs = ((getattr(one, name) for one in (first, second)) for name in ("who", "other", "margin", "measure", "words"))
-    return Found(*(torch.cat(list(pair)) for pair in pairs))
+    return Found(*(kit(first.who).concat(list(pair)) for pair in pairs))
 
 
 # Predicates that say which anchor an object attends.
@@ -86,7 +86,7 @@ OF_WORDS = (
 )  # fmt: skip
 
 
-def _answered(asked: Callable[[Category], object]) -> cached_property[Tensor]:
+def _answered(asked: Callable[[Category], object]) -> cached_property[Array]:
     """(N,) bool, boxes whose row answers a question with yes, kept."""
     return cached_property(lambda plan: plan.which(asked))
 
@@ -108,19 +108,24 @@ class Plan:
     """
 
     kinds: tuple[Category, ...]
-    size: Tensor
-    position: Tensor
-    yaw: Tensor
-    scene: Tensor
-    floor: Tensor
+    size: Array
+    position: Array
+    yaw: Array
+    scene: Array
+    floor: Array
     openings: tuple[tuple[Opening, ...], ...]
-    triplets: Tensor
-    given: Tensor
-    height: Tensor | None = None
+    triplets: Array
+    given: Array
+    height: Array | None = None
     rules: str = "strict"
     stated: tuple[Stated, ...] = ()
 
-    def at(self, position: Tensor, yaw: Tensor) -> Plan:
+    @property
+    def kit(self) -> Any:
+        """The library whose arrays these are: `numpy`, or `torch` where gradients are asked for."""
+        return kit(self.size)
+
+    def at(self, position: Array, yaw: Array) -> Plan:
         """The same boxes at position (N, 3) and yaw (N,): whom each attends and what carries it stays as it is here."""
         out = replace(self, position=position, yaw=yaw)
         vars(out).update({name: getattr(self, name) for name in OF_WORDS})
@@ -129,11 +134,11 @@ class Plan:
 
     # -- words -------------------------------------------------------------------------------------------------------
 
-    def of(self, *roles: str) -> Tensor:
+    def of(self, *roles: str) -> Array:
         """(N,) bool, boxes with one of these roles."""
         return self._kept(("of", *roles), lambda: [kind.role in roles for kind in self.kinds])
 
-    def stands(self, *stances: str) -> Tensor:
+    def stands(self, *stances: str) -> Array:
         """(N,) bool, boxes that stand so to what they attend (`stance`)."""
         return self._kept(("stands", *stances), lambda: [stance in stances for stance in self.stance])
 
@@ -144,12 +149,12 @@ class Plan:
         return tuple("with" if j >= 0 else kind.stands for kind, j in zip(self.kinds, joins, strict=True))
 
     @cached_property
-    def joins(self) -> Tensor:
+    def joins(self) -> Array:
         """(N,) int64, for sofas that share a coffee table with the first sofa of their room that sofa, -1 = none.
 
         The first is the one that most tables and screens are told to stand before or opposite, of these the largest.
         """
-        out = torch.full((len(self),), -1, dtype=torch.int64)
+        out = full(self.scene, len(self), -1)
         sofas = [k for k, kind in enumerate(self.kinds) if kind.role == "sofa" and kind.wall]
         tables = [k for k, kind in enumerate(self.kinds) if kind.stands == "before"]
         scene = self.scene.tolist()
@@ -171,17 +176,17 @@ class Plan:
                 served += 1
         return served
 
-    def which(self, asked: Callable[[Category], object]) -> Tensor:
+    def which(self, asked: Callable[[Category], object]) -> Array:
         """(N,) bool, boxes whose row answers a question with yes."""
         return self._mask([bool(asked(kind)) for kind in self.kinds])
 
-    def column(self, asked: Callable[[Category], Any]) -> Tensor:
+    def column(self, asked: Callable[[Category], Any]) -> Array:
         """(N, ...) float, what the rows of the boxes answer."""
         return self.numbers([asked(kind) for kind in self.kinds])
 
-    def numbers(self, values: Sequence[Any]) -> Tensor:
-        """Numbers as a tensor like the boxes."""
-        return torch.tensor(values, dtype=self.size.dtype, device=self.size.device)
+    def numbers(self, values: Any) -> Array:
+        """Numbers as an array like the boxes."""
+        return constant(values, self.size)
 
     # (N,) bool: seats that are moved aside to open or to reach something, and those without a front, stools;
     # boxes at whose front somebody works or takes things out, and those that have one; tables that people sit around
@@ -192,34 +197,34 @@ class Plan:
     dining = _answered(lambda kind: kind.role == "board" and not (kind.access or kind.wall))
 
     @cached_property
-    def smaller(self) -> Tensor:
+    def smaller(self) -> Array:
         """(N,) int64, order of the boxes by volume, of equal ones the later first."""
-        return torch.argsort(torch.argsort(self.size.detach().prod(1).flip(0), stable=True)).flip(0)
+        xp = self.kit
+        return xp.flip(xp.argsort(xp.argsort(xp.flip(held(self.size).prod(1), (0,)), stable=True)), (0,))
 
-    def _kept(self, asked: tuple[str, ...], values: Callable[[], list[bool]]) -> Tensor:
+    def _kept(self, asked: tuple[str, ...], values: Callable[[], list[bool]]) -> Array:
         """A mask that is asked for again and again."""
         if asked not in self._masks:
             self._masks[asked] = self._mask(values())
         return self._masks[asked]
 
     @cached_property
-    def _masks(self) -> dict[tuple[str, ...], Tensor]:
+    def _masks(self) -> dict[tuple[str, ...], Array]:
         return {}
 
-    def _mask(self, values: Sequence[bool]) -> Tensor:
-        return torch.tensor(values, dtype=torch.bool, device=self.size.device)
+    def _mask(self, values: Sequence[bool]) -> Array:
+        return constant(values, self.given)
 
     @cached_property
-    def standing(self) -> Tensor:
+    def standing(self) -> Array:
         """(N,) bool, boxes that stand on the floor and are in the way of legs and doors."""
-        return self.which(lambda kind: kind.support == "floor") & (self.position[:, 1].detach() < 0.3)
+        return self.which(lambda kind: kind.support == "floor") & (held(self.position)[:, 1] < 0.3)
 
     @cached_property
-    def carrier(self) -> Tensor:
+    def carrier(self) -> Array:
         """(N,) int64, what each box stands on, as `support.carriers`."""
-        boxes = (value.detach().cpu().double().numpy() for value in (self.size, self.position, self.yaw))
-        size, position, yaw = boxes
-        scene, triplets = self.scene.numpy(), self.triplets.numpy()
+        size, position, yaw = (np.asarray(held(of), np.float64) for of in (self.size, self.position, self.yaw))
+        scene, triplets = np.asarray(self.scene), np.asarray(self.triplets)
         out = np.empty(len(self), int)
         for room in np.unique(scene):
             here = np.flatnonzero(scene == room)
@@ -229,16 +234,17 @@ class Plan:
             local = np.stack([number[told[:, 0]], told[:, 1], number[told[:, 2]]], 1) if len(told) else told
             found = carriers([self.kinds[k] for k in here], size[here], position[here], yaw[here], local)
             out[here] = np.where(found >= 0, here[found.clip(0)], found)
-        return torch.from_numpy(out)
+        return constant(out, self.scene)
 
     @cached_property
-    def rooms(self) -> list[tuple[Tensor, np.ndarray, tuple[Opening, ...]]]:
+    def rooms(self) -> list[tuple[Array, np.ndarray, tuple[Opening, ...]]]:
         """Numbers (s,) of the rooms that share a floor and its openings, its corners (k, 2), and these; known ones."""
         out = []
         for number, openings in enumerate(self.openings):
-            corners = self.floor[number][torch.isfinite(self.floor[number]).all(1)].detach().cpu().numpy()
+            corners = np.asarray(held(self.floor[number]))
+            corners = corners[np.isfinite(corners).all(1)]
             if len(corners) > 2:
-                out.append((torch.tensor([number]), corners, openings))
+                out.append((full(self.scene, 1, number), corners, openings))
         return out
 
     @property
@@ -247,37 +253,38 @@ class Plan:
         return self
 
     @property
-    def moved(self) -> Tensor:
+    def moved(self) -> Array:
         """(N,) bool, boxes that do not stand alike in all rooms."""
-        return torch.ones(len(self), dtype=torch.bool)
+        return self.kit.ones(len(self), dtype=self.kit.bool)
 
     @cached_property
-    def ceiling(self) -> Tensor:
+    def ceiling(self) -> Array:
         """(N,) float, height of the ceiling over each box, metres; NaN = unknown."""
         if self.height is None:
-            return torch.full_like(self.yaw, torch.nan)
-        return self.height.to(self.yaw)[self.scene]
+            return self.kit.full_like(self.yaw, np.nan)
+        return cast(self.height, self.yaw)[self.scene]
 
     @cached_property
-    def centres(self) -> Tensor:
+    def centres(self) -> Array:
         """(N, 3) float, middle of the bounding box of each box's floor, on the floor, metres; 0 where it is unknown."""
-        corners = torch.where(torch.isfinite(self.floor), self.floor, self.floor[:, :1])
-        middle = torch.nan_to_num((corners.amax(1) + corners.amin(1)) / 2).to(self.size)
-        return torch.stack([middle[:, 0], torch.zeros_like(middle[:, 0]), middle[:, 1]], 1)[self.scene]
+        xp = self.kit
+        corners = xp.where(xp.isfinite(self.floor), self.floor, self.floor[:, :1])
+        middle = cast(xp.nan_to_num((xp.amax(corners, 1) + xp.amin(corners, 1)) / 2), self.size)
+        return xp.stack([middle[:, 0], xp.zeros_like(middle[:, 0]), middle[:, 1]], 1)[self.scene]
 
-    def told(self, predicate: str) -> tuple[Tensor, Tensor]:
+    def told(self, predicate: str) -> tuple[Array, Array]:
         """Subjects (P,) and objects (P,) of the relations of one name that the graphs state."""
         (i, _, j), rows = self.stated_pairs, self.rows_of(predicate)
         return i[rows], j[rows]
 
     @cached_property
-    def stated_pairs(self) -> tuple[Tensor, Tensor, Tensor]:
+    def stated_pairs(self) -> tuple[Array, Array, Array]:
         """Subjects, predicates and objects (E,) of all relations that the graphs state."""
         return self.triplets[:, 0], self.triplets[:, 1], self.triplets[:, 2]
 
-    def rows_of(self, predicate: str) -> Tensor:
+    def rows_of(self, predicate: str) -> Array:
         """Which of the `stated_pairs` have a predicate."""
-        return (self.stated_pairs[1] == vocabulary().predicate_id(predicate)).nonzero()[:, 0]
+        return rows(self.stated_pairs[1] == vocabulary().predicate_id(predicate))
 
     @cached_property
     def pair_geometry(self) -> PairGeometry:
@@ -285,17 +292,17 @@ class Plan:
         i, _, j = self.stated_pairs
         return pairs(self, i, j, self.centres, oriented=rule_set(self.rules).oriented, fronts=self.fronts)
 
-    def everywhere(self, number: int) -> Tensor:
+    def everywhere(self, number: int) -> Array:
         """(1,) int64, a box of the first room; of copies of one room (K,), in each of them."""
-        return torch.tensor([number])
+        return full(self.scene, 1, number)
 
     # -- pairs -------------------------------------------------------------------------------------------------------
 
-    def those(self, mask: Tensor) -> Tensor:
+    def those(self, mask: Array) -> Array:
         """(P,) int64, numbers of the boxes of a mask (N,) bool."""
-        return mask.nonzero()[:, 0]
+        return rows(mask)
 
-    def pairs(self, first: Tensor, second: Tensor, *, least: bool = False) -> tuple[Tensor, Tensor]:
+    def pairs(self, first: Array, second: Array, *, least: bool = False) -> tuple[Array, Array]:
         """Numbers (P,), (P,) of all ordered pairs of different boxes of one room, the first of `first` (N,) bool.
 
         Arguments:
@@ -303,61 +310,60 @@ class Plan:
             least: the rows go to `worst`, which alone knows what pairs are left out of copies of one room.
         """
         together = (self.scene[:, None] == self.scene[None]) & first[:, None] & second[None]
-        together.fill_diagonal_(False)
-        i, j = together.nonzero(as_tuple=True)
-        return i, j
+        here = self.kit.arange(len(self))
+        together[here, here] = False
+        return pairs_in(together)
 
-    def beside(self, i: Tensor, others: Tensor) -> tuple[Tensor, Tensor]:
+    def beside(self, i: Array, others: Array) -> tuple[Array, Array]:
         """Rows (Q,) of boxes i (P,), and the boxes (Q,) of others (N,) bool that stand in the same room."""
-        row, k = ((self.scene[i][:, None] == self.scene[None]) & others).nonzero(as_tuple=True)
-        return row, k
+        return pairs_in((self.scene[i][:, None] == self.scene[None]) & others)
 
-    def worst(self, who: Tensor, margin: Tensor, other: Tensor) -> tuple[Tensor, Tensor]:
+    def worst(self, who: Array, margin: Array, other: Array) -> tuple[Array, Array]:
         """Of the rows (P,) of each box the least margin (N,), `FAR` where it has none, and whom that is about."""
         return worst(who, margin, other, len(self), FAR)
 
-    def local(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
+    def local(self, i: Array, j: Array) -> tuple[Array, Array]:
         """(P,) and (P,): how far i's centre lies to j's +x side and before j's centre, metres."""
         dx, dz = self.position[i, 0] - self.position[j, 0], self.position[i, 2] - self.position[j, 2]
         cos, sin = self.turn[0][j], self.turn[1][j]
         return cos * dx - sin * dz, sin * dx + cos * dz
 
     @cached_property
-    def turn(self) -> tuple[Tensor, Tensor]:
+    def turn(self) -> tuple[Array, Array]:
         """(N,) and (N,) float, cosine and sine of the headings."""
-        return self.yaw.cos(), self.yaw.sin()
+        return self.kit.cos(self.yaw), self.kit.sin(self.yaw)
 
-    def axes(self, who: Tensor) -> tuple[Tensor, Tensor]:
+    def axes(self, who: Array) -> tuple[Array, Array]:
         """(P, 2) each, x and z: unit vectors to the +x side and to the front of boxes (P,)."""
         cos, sin = self.turn[0][who], self.turn[1][who]
-        return torch.stack([cos, -sin], -1), torch.stack([sin, cos], -1)
+        return self.kit.stack([cos, -sin], -1), self.kit.stack([sin, cos], -1)
 
-    def seen(self, who: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
+    def seen(self, who: Array, points: Array) -> tuple[Array, Array]:
         """(...,) and (...,): how far points (..., 2) lie to the +x side of boxes (...,) and before them, metres."""
-        off = points - self.position[who][..., [0, 2]]
+        off = points - self.position[who][..., ::2]
         cos, sin = self.turn[0][who], self.turn[1][who]
         return cos * off[..., 0] - sin * off[..., 1], sin * off[..., 0] + cos * off[..., 1]
 
-    def reach(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
+    def reach(self, i: Array, j: Array) -> tuple[Array, Array]:
         """(P,) and (P,): half extents of i along j's width and along j's front, metres."""
         turn = self.yaw[i] - self.yaw[j]
-        cos, sin = turn.cos().abs(), turn.sin().abs()
+        cos, sin = abs(self.kit.cos(turn)), abs(self.kit.sin(turn))
         width, depth = self.size[i, 0] / 2, self.size[i, 2] / 2
         return cos * width + sin * depth, sin * width + cos * depth
 
-    def nearest_point(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
+    def nearest_point(self, i: Array, j: Array) -> tuple[Array, Array]:
         """(P,) and (P,): lateral and forward, in j's frame, from i's centre to the nearest point of j's footprint."""
         lateral, forward = self.local(i, j)
-        half = self.size[j][:, [0, 2]] / 2
-        aside = torch.minimum(torch.maximum(lateral, -half[:, 0]), half[:, 0]) - lateral
-        return aside, torch.minimum(torch.maximum(forward, -half[:, 1]), half[:, 1]) - forward
+        half, xp = self.size[j][:, ::2] / 2, self.kit
+        aside = xp.minimum(xp.maximum(lateral, -half[:, 0]), half[:, 0]) - lateral
+        return aside, xp.minimum(xp.maximum(forward, -half[:, 1]), half[:, 1]) - forward
 
-    def gap(self, i: Tensor, j: Tensor) -> Tensor:
+    def gap(self, i: Array, j: Array) -> Array:
         """(P,): distance from i's centre to j's footprint, 0 inside it, metres."""
         lateral, forward = self.nearest_point(i, j)
-        return (lateral.square() + forward.square()).clamp_min(1e-12).sqrt()
+        return self.kit.sqrt(at_least(lateral * lateral + forward * forward, 1e-12))
 
-    def ahead(self, i: Tensor, j: Tensor, sign: float = 1.0) -> tuple[Tensor, Tensor, Tensor]:
+    def ahead(self, i: Array, j: Array, sign: float = 1.0) -> tuple[Array, Array, Array]:
         """(P,) each, metres: from i's front to j, of i's width that j covers, and how far j's middle lies before i's.
 
         `sign`: -1 looks at i's back.
@@ -365,102 +371,105 @@ class Plan:
         lateral, forward = self.local(j, i)
         half_width, half_depth = self.reach(j, i)
         forward = sign * forward
-        covered = torch.minimum(self.size[i, 0], self.size[i, 0] / 2 + half_width - lateral.abs())
+        covered = self.kit.minimum(self.size[i, 0], self.size[i, 0] / 2 + half_width - abs(lateral))
         return forward - half_depth - self.size[i, 2] / 2, covered, forward
 
     def more_ahead(
-        self, i: Tensor, j: Tensor, needed: float | Tensor, share: float, *, start: float = 0.0, sign: float = 1.0
-    ) -> Tensor:
+        self, i: Array, j: Array, needed: float | Array, share: float, *, start: float = 0.0, sign: float = 1.0
+    ) -> Array:
         """(P,): how much more than `needed` metres is free before i, where j covers more than a share of its width.
 
         Arguments:
             start: share of i's depth before its middle from which on j counts. sign: -1 looks at i's back.
         """
         clear, covered, forward = self.ahead(i, j, sign)
-        beside = torch.maximum(clear - needed, share * self.size[i, 0] - covered)
-        return torch.maximum(beside, start * self.size[i, 2] - forward)
+        beside = self.kit.maximum(clear - needed, share * self.size[i, 0] - covered)
+        return self.kit.maximum(beside, start * self.size[i, 2] - forward)
 
-    def nearest(self, i: Tensor, j: Tensor, margin: Tensor, needed: float) -> Found:
+    def nearest(self, i: Array, j: Array, margin: Array, needed: float) -> Found:
         """What a rule finds at boxes i (P,) that keep more than `needed` metres to j (P,), the least of each."""
         least, about = self.worst(i, margin, j)
-        who = (least < FAR).nonzero()[:, 0]
-        return found(who, least[who], other=about[who], measure=(least[who] + needed).clamp_min(0.0))
+        who = rows(least < FAR)
+        return found(who, least[who], other=about[who], measure=at_least(least[who] + needed, 0.0))
 
     @cached_property
-    def couples(self) -> tuple[Tensor, Tensor, Tensor]:
+    def couples(self) -> tuple[Array, Array, Array]:
         """Pairs (P,), (P,) of boxes, each once, none on the other, and metres (P,) that they may overlap."""
-        every = torch.ones(len(self), dtype=torch.bool)
+        every = full(self.given, len(self), True)
         i, j = self.pairs(every, every)
         keep = (i < j) & (self.carrier[i] != j) & (self.carrier[j] != i)
         i, j = i[keep], j[keep]
         known = {pair: shared_fraction(*pair) for pair in {(self.kinds[a], self.kinds[b]) for a, b in _listed(i, j)}}
-        rows = [known[self.kinds[a], self.kinds[b]] for a, b in _listed(i, j)]
-        share, owner = self.numbers([row[0] for row in rows]), torch.tensor([row[1] for row in rows], dtype=torch.bool)
-        side = torch.where(owner, self.size[j][:, [0, 2]].amin(1), self.size[i][:, [0, 2]].amin(1)).detach()
+        shared = [known[self.kinds[a], self.kinds[b]] for a, b in _listed(i, j)]
+        share, owner = self.numbers([row[0] for row in shared]), self._mask([bool(row[1]) for row in shared])
+        short = self.kit.minimum(held(self.size)[:, 0], held(self.size)[:, 2])
+        side = self.kit.where(owner, short[j], short[i])
         # chairs are tucked under their own table alone; a nightstand in its bed is moved off its wall later
         strange = (self.anchor[i] != j) & (self.anchor[j] != i)
         head = self.stands("head")
-        return i, j, torch.where(strange | head[i] | head[j], 0.0, share * side)
+        return i, j, self.kit.where(strange | head[i] | head[j], 0.0, share * side)
 
     @cached_property
-    def anchor(self) -> Tensor:
+    def anchor(self) -> Array:
         """(N,) int64, the object that each one attends, -1 = none: as the graph states, else the nearest."""
         words = list(dict.fromkeys(self.kinds))
         number = {kind: k for k, kind in enumerate(words)}
-        mine = torch.tensor([number[kind] for kind in self.kinds], dtype=torch.int64)
+        xp = self.kit
+        mine = constant([number[kind] for kind in self.kinds], self.scene)
         table = self._mask([b.name in kind.belongs_to for kind in words for b in words])
         belongs = table.reshape(len(words), len(words))[mine[:, None], mine[None]]
         together = (self.scene[:, None] == self.scene[None]) & belongs
-        together.fill_diagonal_(False)
-        cost = torch.full(together.shape, torch.inf, dtype=self.size.dtype)
-        i, j = together.nonzero(as_tuple=True)
-        with torch.no_grad():
-            centre = (self.position[i] - self.position[j])[:, [0, 2]].norm(dim=1)
-            cost[i, j] = (self.gap(i, j) + 0.05 * centre).to(cost)
+        here = xp.arange(len(self))
+        together[here, here] = False
+        cost = full(self.size, tuple(together.shape), np.inf)
+        i, j = pairs_in(together)
+        centre = norm(held(self.position[i] - self.position[j])[:, ::2])
+        cost[i, j] = held(self.gap(i, j)) + 0.05 * centre
         joining = self.joins >= 0
-        cost[:, joining] += torch.where(self.stands("before", "opposite"), torch.inf, 0.0)[:, None].to(cost)
+        cost[:, joining] += xp.where(self.stands("before", "opposite"), self.numbers(np.inf), 0.0)[:, None]
         for predicate in NEARNESS:
             chosen = self.triplets[self.triplets[:, 1] == vocabulary().predicate_id(predicate)]
             for a, b in ((0, 2), (2, 0)):
                 cost[chosen[:, a], chosen[:, b]] -= 100.0
         if not len(self):
-            return torch.zeros(0, dtype=torch.int64)
-        best, found = cost.min(1)
-        return torch.where(joining, self.joins, torch.where(torch.isfinite(best), found, -1))
+            return full(self.scene, 0, 0)
+        best = cost.argmin(1)
+        return xp.where(joining, self.joins, xp.where(xp.isfinite(cost[here, best]), best, -1))
 
     @cached_property
-    def group(self) -> Tensor:
+    def group(self) -> Array:
         """(N,) int64, the box that each one's group is about: whom it attends, and whom that one attends in turn.
 
         The fitted units of a room are one group.
         """
-        out = torch.arange(len(self))
+        xp = self.kit
+        out = xp.arange(len(self))
         for _ in range(3):
             ahead = self.anchor[out]
-            out = torch.where(ahead >= 0, ahead, out)
+            out = xp.where(ahead >= 0, ahead, out)
         row = self.stands("row")
         if bool(row.any()):
-            for room in self.scene[row].unique():
+            for room in xp.unique(self.scene[row]):
                 here = row & (self.scene == room)
-                out[here[out]] = here.nonzero()[0, 0]
+                out[here[out]] = rows(here)[0]
         return out
 
-    def kin(self, i: Tensor, j: Tensor) -> Tensor:
+    def kin(self, i: Array, j: Array) -> Array:
         """(P,) bool: i and j are of one group and may come close; what is only near or opposite it keeps away."""
         away = self.stands("near", "opposite")
         return (self.group[i] == self.group[j]) & ~away[i] & ~away[j]
 
-    def apart(self, i: Tensor, j: Tensor) -> Tensor:
+    def apart(self, i: Array, j: Array) -> Array:
         """(P,): metres between the footprints of i and j along the axis that parts them best, negative = overlap."""
         gaps = []
         for a, b in ((i, j), (j, i)):
             lateral, forward = self.local(a, b)
             half_width, half_depth = self.reach(a, b)
-            gaps.append(lateral.abs() - half_width - self.size[b, 0] / 2)
-            gaps.append(forward.abs() - half_depth - self.size[b, 2] / 2)
-        return torch.stack(gaps, -1).amax(-1)
+            gaps.append(abs(lateral) - half_width - self.size[b, 0] / 2)
+            gaps.append(abs(forward) - half_depth - self.size[b, 2] / 2)
+        return self.kit.amax(self.kit.stack(gaps), 0)
 
-    def attended(self, *stances: str, to: Tensor | None = None) -> tuple[Tensor, Tensor]:
+    def attended(self, *stances: str, to: Array | None = None) -> tuple[Array, Array]:
         """Numbers (P,), (P,) of boxes that stand so to what they attend, one of `to` (N,) bool, and of that."""
         attends = (self.anchor >= 0) & self.stands(*stances)
         i = self.those(attends if to is None else attends & to[self.anchor])
@@ -469,59 +478,57 @@ class Plan:
     # -- walls -------------------------------------------------------------------------------------------------------
 
     @cached_property
-    def walls(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    def walls(self) -> tuple[Array, Array, Array, Array]:
         """Start (S, K, 2), direction (S, K, 2), inward normal (S, K, 2) and length (S, K) of the walls; 0 = none."""
         start, end = edges(self.floor)
-        along = end - start
-        length = along.norm(dim=-1)
-        length = torch.where(length > 1e-3, length, torch.zeros_like(length))
-        along = along / length.clamp_min(1e-3)[..., None]
-        normal = torch.stack([-along[..., 1], along[..., 0]], -1) * torch.sign(signed_area(self.floor))[:, None, None]
+        along, xp = end - start, self.kit
+        length = norm(along)
+        length = xp.where(length > 1e-3, length, xp.zeros_like(length))
+        along = along / at_least(length, 1e-3)[..., None]
+        normal = xp.stack([-along[..., 1], along[..., 0]], -1) * xp.sign(signed_area(self.floor))[:, None, None]
         length = length * known(self.floor)[:, None]
         return start, along, normal, length
 
     @cached_property
-    def walled(self) -> Tensor:
+    def walled(self) -> Array:
         """(N,) bool, boxes of rooms whose floor is known."""
         return known(self.floor)[self.scene]
 
     @cached_property
-    def rectangle(self) -> tuple[Tensor, Tensor] | None:
+    def rectangle(self) -> tuple[Array, Array] | None:
         """Middle (2,) and half extents (2,), metres, of the floor of one room if that is a rectangle along x and z."""
-        corners = self.floor[0][torch.isfinite(self.floor[0]).all(1)]
+        corners = self.floor[0][self.kit.isfinite(self.floor[0]).all(1)]
         if len(corners) != 4 or len(self.openings) > 1:
             return None
-        low, high = corners.amin(0), corners.amax(0)
+        low, high = self.kit.amin(corners, 0), self.kit.amax(corners, 0)
         square = bool(((corners == low) | (corners == high)).all()) and bool((high > low).all())
         return ((low + high) / 2, (high - low) / 2) if square else None
 
-    def inside(self, points: Tensor, who: Tensor) -> Tensor:
+    def inside(self, points: Array, who: Array) -> Array:
         """(P, Q): metres from points (P, Q, 2) at boxes (P,) to the nearest wall, negative beyond it; `FAR` without."""
-        return torch.where(self.walled[who, None], signed_distance(points, self.floor[self.scene[who]]), FAR)
+        return self.kit.where(self.walled[who, None], signed_distance(points, self.floor[self.scene[who]]), FAR)
 
-    def back_gaps(self, who: Tensor) -> Tensor:
+    def back_gaps(self, who: Array) -> Array:
         """(P,): metres between the backs of some boxes and the wall behind them; `FAR` where there is none."""
         start, along, normal, length = (of[self.scene[who]] for of in self.walls)
         side, front = (axis[:, None] for axis in self.axes(who))
-        offset = self.position[who][:, None, [0, 2]] - start
-        reach = (normal * side).sum(-1).abs() * self.size[who, None, 0] / 2
-        reach = reach + (normal * front).sum(-1).abs() * self.size[who, None, 2] / 2
-        gap = (offset * normal).sum(-1) - reach
-        at = (offset * along).sum(-1)
-        behind = (length > 0) & ((normal * front).sum(-1) > FACING) & (at > -0.1) & (at < length + 0.1) & (gap > -1.0)
-        return torch.where(behind, gap.abs(), torch.full_like(gap, FAR)).amin(1)
+        offset = self.position[who][:, None, ::2] - start
+        turned = dot(normal, front)
+        reach = abs(dot(normal, side)) * self.size[who, None, 0] / 2 + abs(turned) * self.size[who, None, 2] / 2
+        gap, at = dot(offset, normal) - reach, dot(offset, along)
+        behind = (length > 0) & (turned > FACING) & (at > -0.1) & (at < length + 0.1) & (gap > -1.0)
+        return self.kit.amin(self.kit.where(behind, abs(gap), self.kit.full_like(gap, FAR)), 1)
 
     def __len__(self) -> int:
         return len(self.kinds)
 
 
 def plan_of(
-    boxes: BoxesLike, categories: Sequence[str], floor: np.ndarray | Tensor | None = None,
-    openings: Sequence[Opening] = (), relations: np.ndarray | Tensor | None = None, *, given: np.ndarray | None = None,
+    boxes: BoxesLike, categories: Sequence[str], floor: Any = None,
+    openings: Sequence[Opening] = (), relations: Any = None, *, given: np.ndarray | None = None,
     height: float | None = None, rules: str = "strict", stated: Sequence[Stated] = (),
-    dtype: torch.dtype = torch.float64,
 ) -> Plan:  # fmt: skip
-    """The plan of one room.
+    """The plan of one room, float64; in numpy, or in torch where the boxes are tensors.
 
     Arguments:
         boxes: N boxes, metres and radians, arrays or tensors. categories: N words; those outside the vocabulary are in
@@ -531,18 +538,16 @@ def plan_of(
         given: (N,) bool, boxes that no term blames.
         height: of the ceiling, metres. rules, stated: as in `Plan`.
     """
-    corners = torch.full((1, 4, 2), torch.nan, dtype=dtype)
-    if floor is not None and len(floor):
-        corners = torch.as_tensor(np.asarray(floor), dtype=dtype)[None]
-    size = torch.as_tensor(boxes.size).to(dtype)
+    xp = kit(boxes.size)
+    corners = np.full((1, 4, 2), np.nan) if floor is None or not len(floor) else np.asarray(floor, np.float64)[None]
+    size, position, yaw = (cast(of, xp.zeros(0, dtype=xp.float64)) for of in (boxes.size, boxes.position, boxes.yaw))
     none = np.zeros(len(size), bool)
-    triplets = np.zeros((0, 3), int) if relations is None else np.asarray(relations)
-    position, yaw = (torch.as_tensor(values).to(dtype) for values in (boxes.position, boxes.yaw))
+    triplets = np.zeros((0, 3), int) if relations is None else np.asarray(relations).reshape(-1, 3)
     return Plan(
-        kinds_of(categories, triplets), size, position, yaw, torch.zeros(len(size), dtype=torch.int64), corners,
-        (tuple(openings),), torch.as_tensor(triplets, dtype=torch.int64).reshape(-1, 3),
-        torch.as_tensor(none if given is None else np.asarray(given, bool)),
-        None if height is None else torch.tensor([height], dtype=dtype), rules, tuple(stated),
+        kinds_of(categories, triplets), size, position, yaw, xp.zeros(len(size), dtype=xp.int64), xp.asarray(corners),
+        (tuple(openings),), xp.asarray(triplets, dtype=xp.int64),
+        xp.asarray(none if given is None else np.asarray(given, bool)),
+        None if height is None else xp.asarray([height], dtype=xp.float64), rules, tuple(stated),
     )  # fmt: skip
 
 
@@ -552,22 +557,24 @@ def plan_of_rooms(rooms: Sequence[RoomBoxes]) -> Plan:
     told = [np.zeros((0, 3), int) if room.relations is None else room.relations for room in rooms]
     shift = np.cumsum([0, *sizes[:-1]])
     columns = ((getattr(room, name) for room in rooms) for name in ("size", "position", "yaw"))
-    size, position, yaw = (torch.as_tensor(np.concatenate(list(of)), dtype=torch.float32) for of in columns)
-    floors = [torch.as_tensor(room.floor_polygon, dtype=torch.float32).reshape(1, -1, 2) for room in rooms]
+    size, position, yaw = (np.concatenate(list(of)).astype(np.float32) for of in columns)
+    corners = [np.asarray(room.floor_polygon, np.float32).reshape(-1, 2) for room in rooms]
+    floor = np.full((len(rooms), max(map(len, corners)), 2), np.nan, np.float32)
+    for number, own in enumerate(corners):
+        floor[number, : len(own)] = own
     return Plan(
         tuple(kind for room, t in zip(rooms, told, strict=True) for kind in kinds_of(room.categories, t)),
-        size, position, yaw, torch.arange(len(rooms)).repeat_interleave(torch.tensor(sizes)), padded(floors),
-        tuple(tuple(room.openings) for room in rooms),
-        torch.as_tensor(np.concatenate([t + np.array([k, 0, k]) for t, k in zip(told, shift, strict=True)])),
-        torch.zeros(sum(sizes), dtype=torch.bool), torch.tensor([room.height for room in rooms]),
+        size, position, yaw, np.arange(len(rooms)).repeat(sizes), floor, tuple(tuple(room.openings) for room in rooms),
+        np.concatenate([t + np.array([k, 0, k]) for t, k in zip(told, shift, strict=True)]),
+        np.zeros(sum(sizes), bool), np.array([room.height for room in rooms], np.float32),
     )  # fmt: skip
 
 
-def _listed(i: Tensor, j: Tensor) -> list[tuple[int, int]]:
+def _listed(i: Array, j: Array) -> list[tuple[int, int]]:
     return list(zip(i.tolist(), j.tolist(), strict=True))
 
 
-def kinds_of(categories: Sequence[str], triplets: np.ndarray | Tensor) -> tuple[Category, ...]:
+def kinds_of(categories: Sequence[str], triplets: np.ndarray | Array) -> tuple[Category, ...]:
     """The rows of N words; an armchair that is told to be at a desk where nobody else sits is a chair of that desk.
 
     Arguments:
@@ -592,6 +599,7 @@ def kind_of(word: str) -> Category:
         return UNKNOWN
 
 
-def facing_angle(lateral: Tensor, forward: Tensor) -> Tensor:
+def facing_angle(lateral: Array, forward: Array) -> Array:
     """Angle between a front and a direction in its frame, 0 to pi; smooth but at the front itself."""
-    return torch.atan2((lateral.square() + 1e-12).sqrt(), forward)
+    xp = kit(lateral)
+    return xp.atan2(xp.sqrt(lateral * lateral + 1e-12), forward)

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 
 import numpy as np
-import torch
 
+from echomodel.arrays import at_least, rows
 from echomodel.boxes2d import seen
-from echomodel.objective.plan import Found, Plan, found, kind_of
+from echomodel.objective.plan import Found, Plan, found, kind_of, nobody
 from echomodel.sizes import size_statistics, usual_range
 from echomodel.vocabulary import Category
 
@@ -176,15 +176,15 @@ def hung_lamps(
 
 def scale(plan: Plan) -> Found:
     """A piece has the size of its kind; boards and seats may be turned by a quarter."""
-    known = [number for number in plan.moved.nonzero()[:, 0].tolist() if plan.kinds[number].name]
-    who = torch.tensor(known, dtype=torch.int64)
-    ranges = [size_range(plan.kinds[number].name) for number in known]
-    low = plan.numbers([r[0] for r in ranges]).reshape(-1, 3)
-    high = plan.numbers([r[1] for r in ranges]).reshape(-1, 3)
-    size = plan.size[who].clamp_min(1e-3)
-    margin = torch.minimum((size / low).log(), (high / size).log())
-    least, axis = margin.min(1)
-    return found(who, least, measure=size.gather(1, axis[:, None])[:, 0], words=axis)
+    known = [number for number in rows(plan.moved).tolist() if plan.kinds[number].name]
+    if not known:
+        return nobody(plan.size)
+    who, xp = plan.kit.asarray(known), plan.kit
+    limits = plan.numbers([size_range(plan.kinds[number].name) for number in known])
+    size = at_least(plan.size[who], 1e-3)
+    margin = xp.log(xp.minimum(size / limits[:, 0], limits[:, 1] / size))
+    at = xp.arange(len(known)), margin.argmin(1)
+    return found(who, margin[at], measure=size[at], words=at[1])
 
 
 def _kinds(categories: Sequence[str], some: np.ndarray) -> Iterator[tuple[int, Category]]:

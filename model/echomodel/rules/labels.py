@@ -7,12 +7,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import torch
 
-from echomodel.boxes import Boxes
 from echomodel.roomboxes import RoomBoxes
-from echomodel.rules.geometry import pairs
-from echomodel.rules.margins import fronts, tensors
+from echomodel.rules.geometry import Spread, pairs
+from echomodel.rules.margins import fronts
 from echomodel.rules.sets import RuleSet, rule_set
 from echomodel.vocabulary import vocabulary
 
@@ -67,14 +65,14 @@ def _label(rooms: Sequence[RoomBoxes], starts: np.ndarray, rules: RuleSet, headi
     subject, object_ = _ordered_pairs(starts)
     if not len(subject):
         return np.zeros((0, 3), np.int64)
-    boxes = Boxes.cat([tensors(room, torch.float64) for room in rooms])
-    centre = torch.from_numpy(np.concatenate([_centres(room) for room in rooms]))
-    headed = fronts(word for room in rooms for word in room.categories) if headings else None
-    pair = pairs(
-        boxes, torch.from_numpy(subject), torch.from_numpy(object_), centre, oriented=rules.oriented, fronts=headed
+    size, position, yaw, centre = (
+        np.concatenate([np.asarray(of, float) for of in every])
+        for every in zip(*((room.size, room.position, room.yaw, _centres(room)) for room in rooms), strict=True)
     )
+    headed = fronts(word for room in rooms for word in room.categories) if headings else None
+    pair = pairs(Spread(size, position, yaw), subject, object_, centre, oriented=rules.oriented, fronts=headed)
     same_category, same = _likeness(rooms, subject, object_)
-    columns = {predicate: rule(pair).numpy() >= SLACK for predicate, rule in rules.labels.items()}
+    columns = {predicate: rule(pair) >= SLACK for predicate, rule in rules.labels.items()}
     for predicate in rules.same_category & columns.keys():
         columns[predicate] &= same_category
     columns.update(same)

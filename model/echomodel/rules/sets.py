@@ -10,15 +10,13 @@ import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import torch
-from torch import Tensor
-
+from echomodel.arrays import Array, at_least, dot, kit
 from echomodel.boxes2d import axes, hull, seen
 from echomodel.rules.geometry import TINY, PairGeometry
 from echomodel.vocabulary import vocabulary
 
-Margin = Callable[[PairGeometry], Tensor]
-Divisor = Callable[[Tensor, Tensor], Tensor]
+Margin = Callable[[PairGeometry], Array]
+Divisor = Callable[[Array, Array], Array]
 
 APART = 0.05  # metres between two centres for left, right, front and behind
 OVERLAP = 0.3  # largest intersection over the smaller volume for the same four
@@ -92,81 +90,81 @@ class RuleSet:
 def _beside(axis: int, sign: float, needed: float) -> Margin:
     """Subject on the given side of the object by at least `needed` metres, without running into it."""
 
-    def margin(pair: PairGeometry) -> Tensor:
-        return torch.minimum(sign * pair.offset[:, axis] - needed, OVERLAP - pair.overlap_ratio)
+    def margin(pair: PairGeometry) -> Array:
+        return pair.kit.minimum(sign * pair.offset[:, axis] - needed, OVERLAP - pair.overlap_ratio)
 
     return margin
 
 
-def _relative(
-    values: Callable[[PairGeometry], tuple[Tensor, Tensor]], sign: float, needed: float, to: Divisor
-) -> Margin:
+def _relative(values: Callable[[PairGeometry], tuple[Array, Array]], sign: float, needed: float, to: Divisor) -> Margin:
     """(s - o) over what `to` makes of both."""
 
-    def margin(pair: PairGeometry) -> Tensor:
+    def margin(pair: PairGeometry) -> Array:
         s, o = values(pair)
         return sign * (s - o) / to(s, o) - needed
 
     return margin
 
 
-def _subject(s: Tensor, o: Tensor) -> Tensor:
+def _subject(s: Array, o: Array) -> Array:
     """As published: the ratio to the subject, so that `bigger` and `smaller` are not quite inverse."""
-    return torch.where(s.abs() < TINY, torch.full_like(s, TINY), s)
+    return kit(s).where(abs(s) < TINY, TINY, s)
 
 
-def _larger(s: Tensor, o: Tensor) -> Tensor:
+def _larger(s: Array, o: Array) -> Array:
     """Bounded, and `bigger` is exactly the inverse of `smaller`."""
-    return torch.maximum(s, o).clamp_min(1e-6)
+    return at_least(kit(s).maximum(s, o), 1e-6)
 
 
-def _volumes(pair: PairGeometry) -> tuple[Tensor, Tensor]:
+def _volumes(pair: PairGeometry) -> tuple[Array, Array]:
     return pair.size_s.prod(-1), pair.size_o.prod(-1)
 
 
-def _tops(pair: PairGeometry) -> tuple[Tensor, Tensor]:
+def _tops(pair: PairGeometry) -> tuple[Array, Array]:
     return pair.top_s, pair.top_o
 
 
-def _close(pair: PairGeometry) -> Tensor:
+def _close(pair: PairGeometry) -> Array:
     return NEAR - pair.corner_distance
 
 
-def _near(pair: PairGeometry) -> Tensor:
+def _near(pair: PairGeometry) -> Array:
     """Corners are close, as published, or sides: a chair in the middle of a long table's side is near it, too."""
-    level = torch.maximum(pair.position_s[:, 1] - pair.top_o, pair.position_o[:, 1] - pair.top_s)
-    sides = torch.minimum(SIDES + pair.footprint_penetration, NEAR - level)
-    return torch.maximum(_close(pair), sides)
+    xp = pair.kit
+    level = xp.maximum(pair.position_s[:, 1] - pair.top_o, pair.position_o[:, 1] - pair.top_s)
+    sides = xp.minimum(SIDES + pair.footprint_penetration, NEAR - level)
+    return xp.maximum(_close(pair), sides)
 
 
-def _sgfront_standing_on(pair: PairGeometry) -> Tensor:
-    return TOUCH - (pair.position_s[:, 1] - pair.position_o[:, 1]).abs()
+def _sgfront_standing_on(pair: PairGeometry) -> Array:
+    return TOUCH - abs(pair.position_s[:, 1] - pair.position_o[:, 1])
 
 
-def _sgfront_symmetrical(pair: PairGeometry) -> Tensor:
+def _sgfront_symmetrical(pair: PairGeometry) -> Array:
     return NEAR - pair.mirror_distance(point=True)
 
 
-def _higher(pair: PairGeometry) -> Tensor:
+def _higher(pair: PairGeometry) -> Array:
     """SG-FRONT labels `above` by height alone: a ceiling lamp is above everything that does not reach it."""
     return pair.position_s[:, 1] - pair.top_o
 
 
-def _standing_on(pair: PairGeometry) -> Tensor:
-    return torch.minimum(TOUCH - (pair.position_s[:, 1] - pair.top_o).abs(), pair.centre_inside)
+def _standing_on(pair: PairGeometry) -> Array:
+    return pair.kit.minimum(TOUCH - abs(pair.position_s[:, 1] - pair.top_o), pair.centre_inside)
 
 
-def _above(pair: PairGeometry) -> Tensor:
-    return torch.minimum(pair.position_s[:, 1] - pair.top_o - TOUCH, pair.footprint_penetration)
+def _above(pair: PairGeometry) -> Array:
+    return pair.kit.minimum(pair.position_s[:, 1] - pair.top_o - TOUCH, pair.footprint_penetration)
 
 
-def _symmetrical(pair: PairGeometry) -> Tensor:
+def _symmetrical(pair: PairGeometry) -> Array:
     """One image of the subject is near the object and, where both have a front, looks the way that the object looks."""
     if pair.fronts is None:
         return NEAR - pair.mirror_distance(point=False)
-    near = NEAR - pair.mirror_distances[:, :2]
-    alike = torch.where(pair.fronts[:, None], pair.mirror_likeness - LOOK, near)
-    return torch.minimum(near, alike).amax(-1)
+    xp, near = pair.kit, NEAR - pair.mirror_distances[:, :2]
+    alike = xp.where(pair.fronts[:, None], pair.mirror_likeness - LOOK, near)
+    both = xp.minimum(near, alike)
+    return xp.maximum(both[:, 0], both[:, 1])
 
 
 def _rules(
@@ -245,7 +243,7 @@ def rule_set(name: str) -> RuleSet:
 
 
 def rule(predicate: str, *, sets: Sequence[str] = ("strict",), labels: bool = False) -> Callable[[Margin], Margin]:
-    """Decorator that registers a margin as what a predicate of the vocabulary means.
+    """Decorator that registers a margin, of numpy's and torch's arrays alike, as what a predicate means.
 
     Arguments:
         predicate: name of its row.
@@ -269,34 +267,32 @@ def rule(predicate: str, *, sets: Sequence[str] = ("strict",), labels: bool = Fa
 LINE = 0.1  # metres beside the line
 
 
-def _faces(yaw: Tensor, way: Tensor) -> Tensor:
+def _faces(yaw: Array, way: Array) -> Array:
     """(P,) how much better than `LOOK` a front at `yaw` (P,) points along `way` (P, 2)."""
-    return (axes(yaw)[1] * way).sum(-1) / way.square().sum(-1).clamp_min(TINY).sqrt() - LOOK
+    return dot(axes(yaw)[1], way) / kit(way).sqrt(at_least(dot(way, way), TINY)) - LOOK
 
 
 @rule("facing")
-def facing(pair: PairGeometry) -> Tensor:
+def facing(pair: PairGeometry) -> Array:
     """The subject's front looks at the object's centre, to 30 degrees, or straight ahead at any part of it."""
-    way = -pair.offset[:, [0, 2]]
-    aside, ahead = seen(way, pair.yaw_s).unbind(-1)
+    xp, local = pair.kit, seen(-pair.flat, pair.yaw_s)
     across = hull(pair.footprint_o[0], pair.yaw_o - pair.yaw_s)[:, 0]
-    return torch.maximum(_faces(pair.yaw_s, way), torch.minimum(across - aside.abs(), ahead))
+    return xp.maximum(_faces(pair.yaw_s, -pair.flat), xp.minimum(across - abs(local[:, 0]), local[:, 1]))
 
 
 @rule("opposite")
-def opposite(pair: PairGeometry) -> Tensor:
+def opposite(pair: PairGeometry) -> Array:
     """Both look at each other."""
-    way = pair.offset[:, [0, 2]]
-    return torch.minimum(_faces(pair.yaw_s, -way), _faces(pair.yaw_o, way))
+    return pair.kit.minimum(_faces(pair.yaw_s, -pair.flat), _faces(pair.yaw_o, pair.flat))
 
 
 @rule("aligned_with")
-def aligned(pair: PairGeometry) -> Tensor:
+def aligned(pair: PairGeometry) -> Array:
     """The subject's centre lies in line with the object's, beside it or before it."""
-    return LINE - pair.local.abs().amin(-1)
+    return LINE - pair.kit.minimum(abs(pair.local[:, 0]), abs(pair.local[:, 1]))
 
 
 @rule("centered_on")
-def centred(pair: PairGeometry) -> Tensor:
+def centred(pair: PairGeometry) -> Array:
     """The subject's centre lies on the line through the object's middle along its front."""
-    return LINE - pair.local[:, 0].abs()
+    return LINE - abs(pair.local[:, 0])

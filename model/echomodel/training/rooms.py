@@ -178,7 +178,7 @@ def _allowed(rooms: Sequence[RoomBoxes]) -> Tensor:
     out = []
     for first in range(0, len(rooms), TOGETHER):
         part = rooms[first : first + TOGETHER]
-        one, other, metres = plan_of_rooms(part).couples
+        one, other, metres = map(torch.from_numpy, plan_of_rooms(part).couples)
         counts = torch.tensor([len(room) for room in part])
         table = torch.full((int(counts.sum()),) * 2, torch.inf)
         table[one, other] = table[other, one] = metres

@@ -1,4 +1,4 @@
-"""Copies of a room are judged as each of them alone, whatever moves in them."""
+"""Copies of a room are judged as each of them alone, whatever moves in them, in numpy as in torch."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from plans import tensors_of
 
 from echomodel.objective import TERMS, copies, plan_of
 from echomodel.objective.copies import copies_of
@@ -24,22 +25,22 @@ ROOMS = [
 
 @pytest.fixture(scope="module", params=[(room, once) for room in range(len(ROOMS)) for once in (False, True)])
 def copied(request):
-    """A plan, seven copies of it with two boxes elsewhere, each as a plan of its own, and which boxes these are."""
+    """A plan, seven copies of it with two boxes elsewhere, each of them as a plan in torch, which boxes move."""
     number, once = request.param
     room = ROOMS[number]
     told = label_relations(room, rules="strict", drop=0.7, rng=np.random.default_rng(0))
     stated = (Stated("against_wall", 0), Stated("between", 1, (0, 2)))
     plan = plan_of(room, room.categories, room.floor_polygon, room.openings, told, height=2.7, stated=stated)
-    luck = torch.Generator().manual_seed(number)
-    position, yaw = plan.position[None].repeat(7, 1, 1), plan.yaw[None].repeat(7, 1)
-    moved = torch.zeros(len(plan), dtype=torch.bool)
+    luck = np.random.default_rng(number)
+    position, yaw = plan.position[None].repeat(7, 0), plan.yaw[None].repeat(7, 0)
+    moved = np.zeros(len(plan), bool)
     moved[[1, len(plan) // 2]] = True
-    position[:, moved] += torch.randn(7, int(moved.sum()), 3, generator=luck).double() * torch.tensor([0.6, 0.0, 0.6])
-    yaw[:, moved] += torch.randint(0, 4, (7, int(moved.sum())), generator=luck) * np.pi / 2
-    alone = [replace(plan, position=position[k], yaw=yaw[k]) for k in range(7)]
+    position[:, moved] += luck.normal(size=(7, moved.sum(), 3)) * (0.6, 0.0, 0.6)
+    yaw[:, moved] += luck.integers(0, 4, (7, moved.sum())) * np.pi / 2
+    alone = [tensors_of(replace(plan, position=position[k], yaw=yaw[k])) for k in range(7)]
     for one in alone:
         for name in ("anchor", "carrier", "joins"):
-            vars(one)[name] = getattr(plan, name)
+            vars(one)[name] = torch.from_numpy(getattr(plan, name))
     before, copies.MANY = copies.MANY, 0 if once else 10**9  # whether what stands alike is looked at once
     yield plan, copies_of(plan, position, yaw, moved), alone, moved
     copies.MANY = before

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import torch
+from plans import tensors_of
 
 from echomodel.boxes import Boxes
 from echomodel.objective import TERMS, faults, faults_of, missed, plan_of
@@ -370,25 +371,22 @@ def test_arms_reach_as_far_from_every_side_of_a_turned_box(yaw):
 def test_margins_have_finite_slopes(term):
     room = generate_rooms(1, 5, room_type="living_dining_room")[0]
     door = Opening("door", "door", 0, 0.2, 0.9, 2.0)
-    plan = plan_of(room, room.categories, room.floor_polygon, (door,))
-    free = [value.clone().requires_grad_() for value in (plan.size, plan.position, plan.yaw)]
-    for field, value in zip(("size", "position", "yaw"), free, strict=True):
-        object.__setattr__(plan, field, value)
+    plan = tensors_of(plan_of(room, room.categories, room.floor_polygon, (door,)), free=True)
     margin = term.find(plan).margin
     if margin.requires_grad:
-        slopes = torch.autograd.grad(margin.sum(), free, allow_unused=True)
+        slopes = torch.autograd.grad(margin.sum(), (plan.size, plan.position, plan.yaw), allow_unused=True)
         assert all(bool(torch.isfinite(slope).all()) for slope in slopes if slope is not None)
 
 
 def packed_plan(plans):
-    from echomodel.floors import padded
-
-    scene = torch.cat([torch.full((len(plan),), number) for number, plan in enumerate(plans)])
+    scene = np.concatenate([np.full(len(plan), number) for number, plan in enumerate(plans)])
+    most, given = max(plan.floor.shape[1] for plan in plans), np.zeros(len(scene), bool)
+    floors = [np.pad(np.asarray(plan.floor), [(0, 0), (0, most - plan.floor.shape[1]), (0, 0)], constant_values=np.nan)
+              for plan in plans]  # fmt: skip
     return type(plans[0])(
         tuple(kind for plan in plans for kind in plan.kinds),
-        *(torch.cat([getattr(plan, name) for plan in plans]) for name in ("size", "position", "yaw")),
-        scene, padded([plan.floor for plan in plans]), ((),) * len(plans),
-        torch.zeros((0, 3), dtype=torch.int64), torch.zeros(len(scene), dtype=torch.bool),
+        *(np.concatenate([np.asarray(getattr(plan, name)) for plan in plans]) for name in ("size", "position", "yaw")),
+        scene, np.concatenate(floors), ((),) * len(plans), np.zeros((0, 3), int), given,
     )  # fmt: skip
 
 

@@ -1,0 +1,108 @@
+"""One way to write what runs on numpy arrays, quick where they are small, and on torch tensors, which have gradients.
+
+Both call most functions alike (`kit(x).where(...)`, `maximum`, `stack`, `concat`, `amin`, `atan2`); here is the rest.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+Array = Any  # np.ndarray or torch.Tensor
+NUMPY: Any = (np.ndarray, np.generic, float)
+
+
+def kit(values: Array) -> Any:
+    """The library whose functions take these values: `numpy` or `torch`, which is not imported for numpy's."""
+    if isinstance(values, NUMPY):
+        return np
+    import torch
+
+    return torch
+
+
+def held(values: Array) -> Array:
+    """Values through which no gradient goes."""
+    return values if isinstance(values, NUMPY) else values.detach()
+
+
+def rows(mask: Array) -> Array:
+    """(k,) int64, where a mask (n,) is true."""
+    return mask.nonzero()[0] if isinstance(mask, NUMPY) else mask.nonzero()[:, 0]
+
+
+def pairs_in(mask: Array) -> tuple[Array, Array]:
+    """(k,) and (k,) int64, rows and columns where a mask (n, m) is true."""
+    return mask.nonzero() if isinstance(mask, NUMPY) else mask.nonzero(as_tuple=True)
+
+
+def at_least(values: Array, low: float) -> Array:
+    """The larger one of each value and a number."""
+    return np.maximum(values, low) if isinstance(values, NUMPY) else values.clamp_min(low)
+
+
+def at_most(values: Array, high: float) -> Array:
+    """The smaller one of each value and a number."""
+    return np.minimum(values, high) if isinstance(values, NUMPY) else values.clamp_max(high)
+
+
+def dot(one: Array, other: Array) -> Array:
+    """Products of vectors (..., 2): (...); of so few numbers a sum takes many times as long."""
+    return one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1]
+
+
+def norm(values: Array) -> Array:
+    """Length of vectors (..., 2): (...)."""
+    return np.sqrt(dot(values, values)) if isinstance(values, NUMPY) else values.norm(dim=-1)
+
+
+def cast(values: Array, like: Array) -> Array:
+    """Values as numbers of the same type as others."""
+    return values.astype(like.dtype) if isinstance(values, NUMPY) else values.to(like)
+
+
+def whole(values: Array) -> Array:
+    """Values as int64."""
+    return values.astype(np.int64) if isinstance(values, NUMPY) else values.long()
+
+
+def constant(values: Any, like: Array) -> Array:
+    """Numbers as an array of the same type as another, on its device."""
+    return np.asarray(values, like.dtype) if isinstance(like, NUMPY) else like.new_tensor(values)
+
+
+def full(like: Array, shape: int | tuple[int, ...], value: float) -> Array:
+    """An array of one value, of the same type as another."""
+    shape = (shape,) if isinstance(shape, int) else shape
+    return np.full(shape, value, like.dtype) if isinstance(like, NUMPY) else like.new_full(shape, value)
+
+
+def repeat(values: Array, times: int | Array) -> Array:
+    """Every row (n, ...) so many times, one after the other."""
+    return values.repeat(times, 0) if isinstance(values, NUMPY) else values.repeat_interleave(times, 0)
+
+
+def put(values: Array, at: Array, others: Array) -> Array:
+    """The values with others where a mask or numbers say; gradients go through both."""
+    if not isinstance(values, NUMPY):
+        return values.index_put((at,), others)
+    out = values.copy()
+    out[at] = others
+    return out
+
+
+def least_of(who: Array, values: Array, count: int, nothing: float) -> Array:
+    """(count,): of the values (k,) of each of `who` (k,) int64 the least, and none more than `nothing`."""
+    out = full(values, count, nothing)
+    if not isinstance(values, NUMPY):
+        return out.scatter_reduce(0, who, values, "amin")
+    np.minimum.at(out, who, values)
+    return out
+
+
+def sum_of(who: Array, values: Array, count: int) -> Array:
+    """(count,): of the values (k,) of each of `who` (k,) int64 the sum."""
+    if not isinstance(values, NUMPY):
+        return values.new_zeros(count).index_add(0, who, values)
+    return np.bincount(who, values, count)
