@@ -14,12 +14,12 @@ from echomodel.compact.shape import wholeness
 from echomodel.data.roomset import with_known_words
 from echomodel.data.shapeset import ShapeSet
 from echomodel.echo import EchoModel
-from echomodel.floors import outside
 from echomodel.graph import GraphBatch
 from echomodel.metrics.pointsets import chamfer, surface_points
 from echomodel.roomboxes import RoomBoxes, read_rooms
 from echomodel.rules import label_rooms, verdicts
 from echomodel.samplers import SAMPLERS
+from echomodel.surroundings import outside
 from echomodel.tsdf import mesh_from_tsdf
 
 RULES = "sgfront"

@@ -10,9 +10,9 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
-from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
+from echousd.graph.arrays import stated_placements, triplets_of
 
 LENGTH = 1e-4  # metres
 ANGLE = 0.01  # degrees
@@ -77,32 +77,6 @@ def graph_batch(graph: SceneGraph) -> GraphBatch:
         ],
         height=graph.room.height,
     )
-
-
-def triplets_of(graph: SceneGraph) -> np.ndarray:
-    """(e, 3) int, the relations of a graph in their order: numbers of subject, predicate and object."""
-    number, words = {name: i for i, name in enumerate(graph.names)}, vocabulary()
-    rows = [(number[r.subject], words.predicate_id(r.predicate), number[r.object]) for r in graph.relations]
-    return np.array(rows, np.int64).reshape(-1, 3)
-
-
-def stated_placements(graph: SceneGraph) -> tuple[Stated, ...]:
-    """The placements of a graph by the numbers of its nodes, in the order of `SceneGraph.placements`."""
-    number = {name: i for i, name in enumerate(graph.names)}
-    return tuple(
-        Stated(one.placement, number[one.subject], tuple(number[name] for name in one.others))
-        for one in graph.placements
-    )
-
-
-def floor_centre(graph: SceneGraph) -> torch.Tensor:
-    """(3,) float32: the middle of the floor's bounding box, where the model's frame has its origin."""
-    polygon = graph.room.floor_polygon
-    if not polygon:
-        return torch.zeros(3)
-    corners = torch.tensor(polygon, dtype=torch.float32)
-    middle = (corners.max(0).values + corners.min(0).values) / 2
-    return torch.stack([middle[0], torch.zeros(()), middle[1]])
 
 
 def seeded(seed: int, branch: str, number: int = 0) -> torch.Generator:

@@ -37,9 +37,6 @@ if TYPE_CHECKING:
 
 def verdicts_of(room: RoomContents, rules: str = "strict") -> tuple[Verdict, ...]:
     """What became of every relation and placement of objects with boxes; raises ValueError for unknown rules."""
-    import torch
-
-    from echomodel.boxes import Boxes
     from echousd.make.verdicts import relation_verdicts
 
     here = {thing.name for thing in room.objects}
@@ -49,9 +46,7 @@ def verdicts_of(room: RoomContents, rules: str = "strict") -> tuple[Verdict, ...
     ]
     spec = room.spec or RoomSpec(UNTOLD)  # what contradicts itself in it is told by others
     graph = SceneGraph.model_construct(room=spec, nodes=tuple(nodes), relations=room.relations)
-    found = _boxes(room)
-    boxes = Boxes(*(torch.from_numpy(value) for value in (found.size, found.position, found.yaw)))
-    return relation_verdicts(graph, boxes, rules=rules)
+    return relation_verdicts(graph, _boxes(room), rules=rules)
 
 
 @dataclass(frozen=True)

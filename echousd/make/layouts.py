@@ -21,6 +21,7 @@ from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
+from echousd.graph.arrays import floor_centre
 from echousd.graph.floors import with_placed_openings
 from echousd.make.verdicts import layout_outcome
 from echousd.options import RoomOptions
@@ -30,7 +31,7 @@ from echousd.place.solver import PlaceConfig, sentence
 from echousd.progress import StageTimer
 from echousd.shapes.styles import equal_sizes, unequal_pairs
 from echousd.shapes.walls import floor_polygon
-from echousd.tensors import floor_centre, graph_batch, one_thread, rounded_boxes, seeded
+from echousd.tensors import graph_batch, one_thread, rounded_boxes, seeded
 
 DRAFTS = 8  # of which the best is kept
 ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
@@ -76,7 +77,7 @@ def sample_boxes(
     model: RoomModel, graph: SceneGraph, draws: Draws, *, count: int = 1, timer: StageTimer
 ) -> list[Boxes]:
     """So many drafts at once from the layout branch, in the room's frame; what the graph fixes comes back."""
-    centre, nodes = floor_centre(graph), graph.nodes
+    centre, nodes = torch.from_numpy(floor_centre(graph)), graph.nodes
     batch = GraphBatch.pack([graph_batch(graph)] * count)
     given = torch.tensor([None not in (n.size, n.position, n.yaw) for n in nodes])
     known = Boxes.cat([Boxes(

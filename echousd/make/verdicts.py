@@ -5,17 +5,15 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-import torch
 
-from echomodel.boxes import Boxes
 from echomodel.rules import fronts, judged, margins
-from echomodel.rules.margins import tensors
+from echomodel.rules.geometry import BoxesLike, Spread
 from echomodel.rules.placements import placement_margins
 from echousd.graph import SceneGraph
+from echousd.graph.arrays import floor_centre, stated_placements, triplets_of
 from echousd.place.geometry import pair_indices
 from echousd.place.report import Collision, collisions
 from echousd.room import LayoutOutcome, RoomData, Verdict
-from echousd.tensors import floor_centre, stated_placements, triplets_of
 
 ROUNDING = 1e-4  # metres: boxes are written to a tenth of a millimetre, meshes in single precision
 STATES = {1: "kept", 0: "broken", -1: "unmeasured"}
@@ -25,12 +23,12 @@ class RoomWarning(UserWarning):
     """A room is finished but does not keep its graph, or its furniture collides."""
 
 
-def layout_outcome(graph: SceneGraph, boxes: Boxes) -> LayoutOutcome:
+def layout_outcome(graph: SceneGraph, boxes: BoxesLike) -> LayoutOutcome:
     """What became of one layout, whether it was placed or not."""
     return LayoutOutcome(relation_verdicts(graph, boxes), colliding(graph, boxes))
 
 
-def colliding(graph: SceneGraph, boxes: Boxes) -> tuple[Collision, ...]:
+def colliding(graph: SceneGraph, boxes: BoxesLike) -> tuple[Collision, ...]:
     """Pairs of boxes that run into each other deeper than they may, deepest first."""
     size, position, yaw = (np.asarray(v, float) for v in (boxes.size, boxes.position, boxes.yaw))
     names, words = graph.names, [node.category for node in graph.nodes]
@@ -46,13 +44,12 @@ def warn_of_faults(room: RoomData) -> None:
         warnings.warn(f"the room has faults: {'; '.join(faults[:3])}{more}", RoomWarning, stacklevel=3)
 
 
-def relation_verdicts(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict") -> tuple[Verdict, ...]:
+def relation_verdicts(graph: SceneGraph, boxes: BoxesLike, *, rules: str = "strict") -> tuple[Verdict, ...]:
     """One verdict per relation of the graph, in its order, then one per placement."""
     if not graph.relations:
         return _placement_verdicts(graph, boxes)
-    triplets, centre = torch.from_numpy(triplets_of(graph)), floor_centre(graph)[[0, 2]]
-    headed = fronts(node.category for node in graph.nodes)
-    found = margins(tensors(boxes, torch.float64), triplets, rules=rules, center=centre, fronts=headed)
+    triplets, headed = triplets_of(graph), fronts(node.category for node in graph.nodes)
+    found = margins(_arrays(boxes), triplets, rules=rules, center=floor_centre(graph)[::2], fronts=headed)
     state, margin = judged(found, triplets, rules).tolist(), found.tolist()
     return tuple(
         Verdict(r.subject, r.predicate, r.object, STATES[s or int(m > -ROUNDING)], None if s < 0 else m)
@@ -60,9 +57,13 @@ def relation_verdicts(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict")
     ) + _placement_verdicts(graph, boxes)
 
 
-def _placement_verdicts(graph: SceneGraph, boxes: Boxes) -> tuple[Verdict, ...]:
+def _arrays(boxes: BoxesLike) -> Spread:
+    return Spread(*(np.asarray(of, np.float64) for of in (boxes.size, boxes.position, boxes.yaw)))
+
+
+def _placement_verdicts(graph: SceneGraph, boxes: BoxesLike) -> tuple[Verdict, ...]:
     categories = [node.category for node in graph.nodes]
-    margin = placement_margins(boxes, stated_placements(graph), graph.room.corners, categories).tolist()
+    margin = placement_margins(_arrays(boxes), stated_placements(graph), graph.room.corners, categories).tolist()
     return tuple(
         Verdict(*placed.triple, STATES[-1 if m != m else int(m > -ROUNDING)], None if m != m else m)
         for placed, m in zip(graph.placements, margin, strict=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from echomodel.rules.geometry import BoxesLike
 from echousd.graph import SceneGraph
-from echousd.tensors import triplets_of
+from echousd.graph.arrays import triplets_of
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,12 @@ def living_faults(
         all_blamed: objects whose place the graph states, too.
     """
     from echomodel.objective import faults
+    from echomodel.rules.geometry import Spread
 
     names = list(graph.names)
     corners = graph.room.corners
     found = faults(
-        boxes,
+        Spread(*(np.asarray(of, np.float64) for of in (boxes.size, boxes.position, boxes.yaw))),
         [node.category for node in graph.nodes],
         floor if corners is None else np.asarray(corners, float),  # openings count the edges of the stated floor
         graph.room.openings if corners is not None else (),

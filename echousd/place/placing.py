@@ -26,13 +26,13 @@ from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
 from echomodel.rules import verdicts
 from echomodel.vocabulary import vocabulary
+from echousd.graph.arrays import stated_placements, triplets_of
 from echousd.place.distances import BED_LIT
 from echousd.place.geometry import DEFAULT_HEIGHT
 from echousd.place.report import collisions, outside
 from echousd.place.search import ANEW, Arranged, Search
 from echousd.place.setting import Setting, setting_of, stacked
 from echousd.place.solver import Conflict, PlaceConfig, conflicts, solve, unmet
-from echousd.tensors import stated_placements, triplets_of
 
 if TYPE_CHECKING:
     from echomodel.rules.placements import Stated

@@ -15,6 +15,7 @@ from pxr import Usd
 from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
+from echousd.graph.arrays import triplets_of
 from echousd.graph.titles import DressingGraph, SmallNode
 from echousd.stage import encoding as usd
 from echousd.stage import values
@@ -22,7 +23,6 @@ from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, save_layer
 from echousd.stage.read import node_names, place, read_rooms, relation_of, stated_fields, the_room
 from echousd.stage.write import graph_layer
-from echousd.tensors import triplets_of
 
 
 def relations_from_boxes(graph: SceneGraph, *, rules: str = "strict", per_object: float | None = None) -> SceneGraph:

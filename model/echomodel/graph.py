@@ -9,9 +9,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from echomodel.floors import ROW, area, centred, extents, opening_rows, padded, padded_rows, trimmed
+from echomodel.floors import area
 from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
+from echomodel.surroundings import ROW, centred, extents, opening_rows, padded, padded_rows, trimmed
 from echomodel.vocabulary import vocabulary
 
 

@@ -110,7 +110,7 @@ def plan_of_graph(graph: GraphBatch, rules: str) -> Plan:
 
 
 def openings_of(floor: np.ndarray, rows: Sequence[Sequence[float]]) -> tuple[Opening, ...]:
-    """The openings that rows stand for (`floors.opening_rows`); a leaf whose hinges they do not tell swings both ways.
+    """The openings of rows (`surroundings.opening_rows`); a leaf whose hinges they do not tell swings both ways.
 
     `floor`: (K, 2) float, corners of their floor, metres, padded with NaN.
     """

@@ -8,9 +8,10 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echomodel.floors import GRID, centred, extents, footprint, padded, plan_features, signed_distance, wall_distances
+from echomodel.floors import footprint, signed_distance
 from echomodel.rooms.floor import sample_floor
 from echomodel.rooms.statistics import room_type_statistics
+from echomodel.surroundings import GRID, centred, extents, padded, plan_features, wall_distances
 
 UNKNOWN = torch.full((1, 4, 2), torch.nan)
 

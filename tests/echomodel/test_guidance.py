@@ -7,11 +7,11 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.floors import centred, outside
 from echomodel.graph import GraphBatch
 from echomodel.guidance import LATE, guided, mended, openings_of, plan_of_graph
 from echomodel.objective import KINDS, faults_of
 from echomodel.openings import Opening
+from echomodel.surroundings import centred, outside
 from echomodel.vocabulary import vocabulary
 
 FLOOR = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])

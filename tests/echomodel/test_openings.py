@@ -13,7 +13,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echomodel.boxes import Boxes
-from echomodel.floors import ROW, clearances, opening_rows
 from echomodel.openings import (
     Opening,
     check_openings,
@@ -28,6 +27,7 @@ from echomodel.openings import (
     zone,
 )
 from echomodel.roomboxes import RoomBoxes, read_rooms, write_rooms
+from echomodel.surroundings import ROW, clearances, opening_rows
 
 ROOM = rectangle(4.0, 3.0)  # wall 0 at -z, 1 at +x, 2 at +z, 3 at -x
 

@@ -20,12 +20,13 @@ from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 from echomodel.vocabulary import vocabulary
 from echousd.checks.report import check
+from echousd.graph.arrays import floor_centre
 from echousd.graph.floors import with_plan
 from echousd.make.layouts import finished_boxes
 from echousd.make.verdicts import layout_outcome
 from echousd.progress import StageTimer
 from echousd.shapes.styles import style_groups
-from echousd.tensors import floor_centre, graph_batch
+from echousd.tensors import graph_batch
 
 SAMPLES = sorted((Path(__file__).parents[2] / "samples").glob("*.usda"))
 SEEDS = (0, 1, 2)
@@ -113,7 +114,7 @@ def test_the_network_alone_draws_most_of_what_the_graph_says():
     hits = []
     for number, graph in enumerate(graphs):
         rows = batch.scene == number
-        boxes = Boxes(found.size[rows], found.position[rows] + floor_centre(graph), found.yaw[rows])
+        boxes = Boxes(found.size[rows], found.position[rows] + torch.from_numpy(floor_centre(graph)), found.yaw[rows])
         outcome = layout_outcome(graph, finished_boxes(graph, boxes, style_groups(graph), False, StageTimer())[0])
         total += Counter(verdict.state for verdict in outcome.verdicts)
         hits += outcome.collisions

@@ -7,15 +7,16 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import torch
 
 from echomodel.boxes import Boxes
 from echousd.graph import SceneGraph
+from echousd.graph.arrays import floor_centre
 from echousd.progress import StageTimer
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.meshing import FACES
 from echousd.shapes.sources.retrieval import Retrieved
 from echousd.shapes.styles import shared_assets
-from echousd.tensors import floor_centre
 
 if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
@@ -49,7 +50,7 @@ class ShapeRequest:
     @property
     def centred(self) -> Boxes:
         """The boxes about the middle of the floor, as models know them."""
-        return Boxes(self.boxes.size, self.boxes.position - floor_centre(self.graph), self.boxes.yaw)
+        return Boxes(self.boxes.size, self.boxes.position - torch.from_numpy(floor_centre(self.graph)), self.boxes.yaw)
 
     @property
     def edited(self) -> dict[str, Any]:

@@ -8,7 +8,8 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import hull, seen
 from echomodel.compact.pairs import Pairs
-from echomodel.floors import NEAR, ROUND_ABOUT, SIDES, footprint, known, nearest_wall, signed_distance, wall_distances
+from echomodel.floors import SIDES, footprint, known, signed_distance
+from echomodel.surroundings import NEAR, ROUND_ABOUT, nearest_wall, wall_distances
 
 FARTHEST = 20.0  # metres
 RATIO = 0.2  # scale at which logarithms of volumes and heights are told

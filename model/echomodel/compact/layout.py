@@ -19,16 +19,9 @@ from echomodel.compact.draft import PAIR_FEATURES, WALL_FEATURES, measurable, pa
 from echomodel.compact.learned import WordTable
 from echomodel.compact.pairs import Alone, EchoLayer, Pairs, level_features
 from echomodel.config import CompactConfig
-from echomodel.floors import (
-    GRID,
-    OPENING_FEATURES,
-    PLAN,
-    clearances,
-    plan_features,
-    room_features,
-)
 from echomodel.graph import GraphBatch
 from echomodel.samplers import clean_from
+from echomodel.surroundings import GRID, OPENING_FEATURES, PLAN, clearances, plan_features, room_features
 
 BOX = 8
 WILDEST = 8.0  # at high noise the clean boxes of the `noise` objective may lie anywhere

@@ -15,11 +15,11 @@ from scipy.stats import entropy, ks_2samp
 
 from echomodel.boxes import Boxes
 from echomodel.compact.draft import measurable, seen_from, wall_features
-from echomodel.floors import centred
 from echomodel.metrics.pointsets import compared
 from echomodel.metrics.statistics import Figure, spread
 from echomodel.roomboxes import RoomBoxes
 from echomodel.sizes import size_score
+from echomodel.surroundings import centred
 from echomodel.vocabulary import vocabulary
 
 COMPONENTS = 12  # principal components of the reference that layout features are told in

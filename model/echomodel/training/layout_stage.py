@@ -17,13 +17,13 @@ from echomodel.compact.draft import FARTHEST, measurable, pair_features, wall_fe
 from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import layout_predictor
-from echomodel.floors import clearances, kept_free, outside
 from echomodel.objective import Plan, faults_of
 from echomodel.objective.physics import apart
 from echomodel.objective.plan import UNKNOWN
 from echomodel.randomness import normal
 from echomodel.rules import margins, verdicts
 from echomodel.samplers import add_noise, clean_from, draw_levels, sample, target
+from echomodel.surroundings import clearances, kept_free, outside
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
 from echomodel.training.start import Start

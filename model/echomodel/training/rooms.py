@@ -13,11 +13,11 @@ from echomodel.boxes import Boxes
 from echomodel.compact.pairs import Pairs, inverse_predicates, ordered_pairs, reverse_pairs
 from echomodel.config import names_of
 from echomodel.data.roomset import RoomSet
-from echomodel.floors import padded, padded_rows, trimmed
 from echomodel.graph import GraphBatch
 from echomodel.objective.plan import plan_of_rooms
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.telling import near_first
+from echomodel.surroundings import padded, padded_rows, trimmed
 from echomodel.vocabulary import vocabulary
 
 PREDICATES = names_of("predicates")  # that networks are told, by their ids from 0 on; rules may measure more

@@ -7,8 +7,8 @@ import torch
 from echomodel.boxes import Boxes
 from echomodel.compact.draft import PAIR_FEATURES, WALL_FEATURES, pair_features, wall_features
 from echomodel.compact.pairs import pairs_of
-from echomodel.floors import centred, padded
 from echomodel.graph import GraphBatch
+from echomodel.surroundings import centred, padded
 
 
 def boxes() -> Boxes:

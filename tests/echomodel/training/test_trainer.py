@@ -14,10 +14,11 @@ from echomodel.compact.model import WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.data.roomset import RoomSet
 from echomodel.echo import EchoModel
-from echomodel.floors import known, outside
+from echomodel.floors import known
 from echomodel.graph import GraphBatch
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts
+from echomodel.surroundings import outside
 from echomodel.training import trainer
 from echomodel.training.layout_stage import LayoutStage, as_carried, measure_distance, told_triplets
 from echomodel.training.recipe import OptimizerConfig, Recipe, read_recipe
