@@ -16,7 +16,7 @@ from echomodel.furniture.assembly import pieces_of
 from echomodel.furniture.decor import PANEL
 from echomodel.furniture.solids import Ball
 from echomodel.furniture.style import Style
-from echomodel.objective.sizes import EDGE, FEET, fitting_loads, in_proportion, size_range, usual_sizes
+from echomodel.objective.sizes import EDGE, FEET, fitting_loads, in_proportion, laid_tables, size_range, usual_sizes
 from echomodel.sizes import usual_range
 from echomodel.vocabulary import vocabulary
 
@@ -126,3 +126,13 @@ def test_globes_are_spheres(word):
                 extent = np.ptp(piece.vertices, axis=0)
                 assert extent.max() < 1.2 * extent.min(), (word, size, extent)
     assert globes
+
+
+@pytest.mark.parametrize(("chairs", "least"), [(2, 0.56), (4, 1.12), (6, 1.68), (8, 1.98)])
+def test_a_table_is_long_enough_for_who_sits_at_it(chairs, least):
+    words = ["dining_table", *["dining_chair"] * chairs]
+    size = np.array([[0.5, 0.75, 0.8], *[[0.42, 0.9, 0.5]] * chairs])
+    anchor = np.array([-1, *[0] * chairs])
+    found = laid_tables(words, size, anchor, np.ones(len(words), bool))
+    assert found[0, [0, 2]].max() == pytest.approx(max(least, 0.8))
+    assert np.array_equal(laid_tables(words, size, anchor, np.zeros(len(words), bool)), size)

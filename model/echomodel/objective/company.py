@@ -61,8 +61,9 @@ def seat_before_desk(plan: Plan) -> Found:
         return nobody(plan.size)
     near = held(plan.gap(i, j)) < NEAR_TABLE
     i, j = i[near], j[near]
-    aside = abs(plan.local(i, j)[0])
-    return found(i, AT_DESK * plan.size[j, 0] - aside, other=j, measure=aside)
+    aside, alone = abs(plan.local(i, j)[0]), plan.kit.bincount(j, minlength=len(plan)) == 1
+    share = plan.kit.where(alone[j], AT_DESK, 0.5)  # several sit beside each other, those at a bar from end to end
+    return found(i, share * plan.size[j, 0] - aside, other=j, measure=aside)
 
 
 def lounger_faces(plan: Plan) -> Found:

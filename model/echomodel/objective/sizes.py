@@ -9,6 +9,7 @@ import numpy as np
 
 from echomodel.arrays import at_least, rows
 from echomodel.boxes2d import seen
+from echomodel.objective.composition import ELBOW
 from echomodel.objective.plan import Found, Plan, found, kind_of, nobody
 from echomodel.sizes import size_statistics, usual_range
 from echomodel.vocabulary import Category
@@ -21,7 +22,8 @@ USUAL = 0.6  # power of the ratio of the 5th and 95th percentile to the median
 ELBOWS = 0.05  # metres between two chairs
 TUCKED = 0.15  # metres by which chairs at the ends of a table keep off those at its sides
 LEAST_DEPTH, MOST_DEPTH = 0.75, 1.05  # metres of a table at which people sit opposite each other
-PLACE, SPARE = 0.55, 0.8  # metres of a table's side for each chair there, and in all beside that, at most
+PLACE = ELBOW + 0.01  # metres of a table's side for each chair there
+SPARE = 0.8  # and in all beside that, at most
 EDGE = 0.02  # metres of a top that stay free around what stands on it
 FEET = 0.18  # metres, depth of the feet on which a screen stands
 SHRUNK = 0.85  # of its width and depth: what a piece becomes at the least where the room is too full for it
@@ -120,12 +122,12 @@ def laid_tables(categories: Sequence[str], size: np.ndarray, anchor: np.ndarray,
         if kinds[table].wall:  # they sit along its front
             out[table, 0] = max(size[table, 0], len(chairs) * (width + ELBOWS))
             continue
-        at_ends = len(chairs) > 4
+        at_ends = len(chairs) > 6  # of six, three sit at each long side where no end is free
         a_side = -(-(len(chairs) - 2 * at_ends) // 2)
         long = 0 if size[table, 0] >= size[table, 2] else 2
         ends = 2 * TUCKED * at_ends
-        least, most = a_side * (width + ELBOWS) + ends, a_side * max(PLACE, width + ELBOWS) + ends + SPARE
-        out[table, long] = np.clip(size[table, long], least, most)
+        least = a_side * max(PLACE, width + ELBOWS) + ends
+        out[table, long] = np.clip(size[table, long], least, least + SPARE)
         if not kinds[table].like:  # a child's table is as it comes
             out[table, 2 - long] = np.clip(size[table, 2 - long], LEAST_DEPTH, MOST_DEPTH)
     return out

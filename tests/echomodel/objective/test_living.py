@@ -367,6 +367,15 @@ def test_arms_reach_as_far_from_every_side_of_a_turned_box(yaw):
         assert found.reached.tolist() == [reached, False]
 
 
+def test_stools_stand_along_the_whole_of_their_bar():
+    bar = {"bar": {"kind": "console_table", "size": (1.5, 0.95, 0.4), "at": (0.0, -1.8)}}
+    for aside, beside in ((0.55, False), (0.8, True)):
+        stools = {f"stool{k}": {"kind": "bar_stool", "size": (0.4, 0.75, 0.4), "at": (k * aside, -1.35), "yaw": np.pi}
+                  for k in (-1, 0, 1)}  # fmt: skip
+        found = Room({**bar, **stools}).found()
+        assert (("stool1", "seat_before_desk") in found) == beside
+
+
 @pytest.mark.parametrize("term", TERMS, ids=[term.name for term in TERMS])
 def test_margins_have_finite_slopes(term):
     room = generate_rooms(1, 5, room_type="living_dining_room")[0]
