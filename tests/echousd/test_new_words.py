@@ -132,7 +132,7 @@ def test_placing_follows_the_rule_of_a_new_relation(music):
     position = np.array([[0.0, 0.0, -1.0], [0.6, 0.0, 1.0]])
     triplets = np.array([[0, music.predicate_id("in_line_with"), 1]])
     before = margins(Boxes(size, position, yaw), torch.from_numpy(triplets))
-    assert float(before) == pytest.approx(LEVEL - 0.6)
+    assert before.tolist() == pytest.approx([LEVEL - 0.6])
     done = place_boxes(["harp", "armchair"], size, position, yaw, triplets)
     assert done.verdict.tolist() == [1]
     assert abs(done.position[0, 0] - done.position[1, 0]) <= LEVEL
