@@ -255,7 +255,7 @@ class Plan:
     @property
     def moved(self) -> Array:
         """(N,) bool, boxes that do not stand alike in all rooms."""
-        return self.kit.ones(len(self), dtype=self.kit.bool)
+        return full(self.given, len(self), True)
 
     @cached_property
     def ceiling(self) -> Array:
@@ -309,10 +309,8 @@ class Plan:
             first, second: (N,) bool, by the words of boxes and what stands alike in copies, never by their poses.
             least: the rows go to `worst`, which alone knows what pairs are left out of copies of one room.
         """
-        together = (self.scene[:, None] == self.scene[None]) & first[:, None] & second[None]
-        here = self.kit.arange(len(self))
-        together[here, here] = False
-        return pairs_in(together)
+        other = ~self.kit.eye(len(self), dtype=self.kit.bool)
+        return pairs_in((self.scene[:, None] == self.scene[None]) & first[:, None] & second[None] & other)
 
     def beside(self, i: Array, others: Array) -> tuple[Array, Array]:
         """Rows (Q,) of boxes i (P,), and the boxes (Q,) of others (N,) bool that stand in the same room."""
@@ -395,8 +393,7 @@ class Plan:
     @cached_property
     def couples(self) -> tuple[Array, Array, Array]:
         """Pairs (P,), (P,) of boxes, each once, none on the other, and metres (P,) that they may overlap."""
-        every = full(self.given, len(self), True)
-        i, j = self.pairs(every, every)
+        i, j = self.pairs(self.moved, self.moved)
         keep = (i < j) & (self.carrier[i] != j) & (self.carrier[j] != i)
         i, j = i[keep], j[keep]
         known = {pair: shared_fraction(*pair) for pair in {(self.kinds[a], self.kinds[b]) for a, b in _listed(i, j)}}
@@ -418,11 +415,9 @@ class Plan:
         mine = constant([number[kind] for kind in self.kinds], self.scene)
         table = self._mask([b.name in kind.belongs_to for kind in words for b in words])
         belongs = table.reshape(len(words), len(words))[mine[:, None], mine[None]]
-        together = (self.scene[:, None] == self.scene[None]) & belongs
-        here = xp.arange(len(self))
-        together[here, here] = False
-        cost = full(self.size, tuple(together.shape), np.inf)
-        i, j = pairs_in(together)
+        here, other = xp.arange(len(self)), ~xp.eye(len(self), dtype=xp.bool)
+        i, j = pairs_in((self.scene[:, None] == self.scene[None]) & belongs & other)
+        cost = full(self.size, (len(self), len(self)), np.inf)
         centre = norm(held(self.position[i] - self.position[j])[:, ::2])
         cost[i, j] = held(self.gap(i, j)) + 0.05 * centre
         joining = self.joins >= 0
