@@ -245,15 +245,13 @@ class EditRequest:
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def takes_options(
-    names: Collection[str] = tuple(RoomOptions.model_fields), model: type[RoomOptions] = RoomOptions
-) -> Callable[[Function], Function]:
+def takes_options(names: Collection[str] = tuple(RoomOptions.model_fields)) -> Callable[[Function], Function]:
     """Show rows of the table in place of a function's `**given` in its signature."""
 
     def shown(function: Function) -> Function:
         own = [one for one in signature(function).parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
-        rows = [Parameter(name, Parameter.KEYWORD_ONLY, default=model.model_fields[name].default) for name in names]
-
+        table = RoomOptions.model_fields
+        rows = [Parameter(name, Parameter.KEYWORD_ONLY, default=table[name].default) for name in names]
         function.__signature__ = signature(function).replace(parameters=[*own, *rows])  # type: ignore[attr-defined]
         return function
 

@@ -41,21 +41,18 @@ class Unwrapped:
         return self.points[self.faces]
 
 
-def unwrap(
-    objects: Sequence[Sequence[Mesh]], resolution: int, padding: int = PADDING, *, together: bool = True
-) -> list[Unwrapped]:
+def unwrap(objects: Sequence[Sequence[Mesh]], resolution: int, *, together: bool = True) -> list[Unwrapped]:
     """Lay objects out, all in one picture or each in its own, charts apart from each other.
 
     Arguments:
         objects: for every object its meshes: (t, 3, 3) float corners of triangles, metres, and (t, 3) int vertices.
         resolution: texels along the picture's sides, roughly: charts may fill a part of it.
-        padding: texels between charts.
 
     Raises ValueError where xatlas is not installed, or does not survive the meshes.
     """
     boards = [_boards(meshes) for meshes in objects]
     scaled = [[(100 * board.points, board.faces) for board in pieces] for pieces in boards]  # centimetres, see `charts`
-    laid = iter(charts([list(chain(*scaled))] if together else scaled, resolution, padding))
+    laid = iter(charts([list(chain(*scaled))] if together else scaled, resolution, PADDING))
     out = []
     for pieces in boards:
         points, st, count = [], [], 0
