@@ -25,6 +25,7 @@ from echomodel.objective.sizes import (
 from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
 from echomodel.rules import verdicts
+from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
 from echousd.graph.arrays import stated_placements, triplets_of
 from echousd.place.distances import BED_LIT
@@ -210,25 +211,13 @@ def place_boxes(
     end = stacked(size_end, hung, at.carrier, None, held)
     ceiling = np.inf if height is None else np.maximum(height - size_end[:, 1], 0.0)
     end[~held, 1] = np.clip(end[:, 1], 0.0, ceiling)[~held]  # whatever is told of a lamp, it stays in the room
-    boxes = Boxes(*(torch.as_tensor(of).float() for of in (size_end, end, turn)))
-    headed = torch.from_numpy(at.fronts)
-    verdict = verdicts(boxes, torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(at.centre), fronts=headed)
+    written = Spread(*(of.astype(np.float32) for of in (size_end, end, turn)))
+    verdict = verdicts(written, triplets, rules=rules, center=at.centre, fronts=at.fronts)
     hit = collisions(at.categories, size_end, end, turn, at.pairs)
     beyond = outside(at, size_end, end, turn)
-    failures = (
-        set(np.flatnonzero(verdict.numpy() == 0).tolist()),
-        {pair for pair, _ in hit},
-        {number for number, _ in beyond},
-    )
-    return PlacedBoxes(
-        size=size_end,
-        position=end,
-        yaw=turn,
-        verdict=verdict.numpy(),
-        conflicts=conflicts(at, found, failures),
-        collisions=hit,
-        outside=beyond,
-    )
+    broken = set(np.flatnonzero(verdict == 0).tolist())
+    failures = broken, {pair for pair, _ in hit}, {number for number, _ in beyond}
+    return PlacedBoxes(size_end, end, turn, verdict, conflicts(at, found, failures), hit, beyond)
 
 
 def fullness(at: Setting) -> float:

@@ -21,6 +21,7 @@ from echomodel.objective.plan import Found, found, nobody
 from echomodel.objective.table import PRICE
 from echomodel.rules import margins
 from echomodel.rules.placements import Spread
+from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import beyond, depths
 from echousd.place.proposals import ahead, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
 from echousd.place.setting import Setting
@@ -75,10 +76,9 @@ class Search:
         yields: frozenset[str] = frozenset(),
     ) -> None:  # fmt: skip
         self.setting, self.budget, self.judged, self.walked = setting, budget, 0, False
-        said = {int(number) for number in setting.triplets[:, 1]}
-        words = {row.name for row in _predicates() if row.id in said}
-        sizes = {row.name for row in _predicates() if row.measures == "size"} | {"scale"}  # which no pose changes
-        told = words | {"placed"}
+        said, words = {int(number) for number in setting.triplets[:, 1]}, vocabulary().predicates
+        told = {row.name for row in words if row.id in said} | {"placed"}
+        sizes = {row.name for row in words if row.measures == "size"} | {"scale"}  # which no pose changes
         self.terms = tuple(t for t in terms if t.name not in sizes and (t.kind != "relations" or t.name in told))
         self.firm = np.array([term.name not in yields for term in self.terms])
         self.rooms: dict[bytes, Plan] = {}
@@ -242,16 +242,13 @@ class Search:
     def _plan(self, position: np.ndarray, yaw: np.ndarray) -> Plan:
         return self.setting.plan.at(position, yaw)
 
-    def _ways_around(self, i: int, seats: list[int]) -> list[list[tuple[float, float, float, float]]]:
-        if (i, *seats) not in self.ways:
-            self.ways[i, *seats] = seatings(self.setting, i, seats)
-        return self.ways[i, *seats]
-
     def reseated(self, state: State, there: np.ndarray, i: int) -> State:
         """The state with those who stand around box i at one of the ways in which as many sit there."""
         setting = self.setting
         seats = [k for k in self.children[i] if there[k] and not setting.turned[k]]
-        ways = self._ways_around(i, seats)
+        if (i, *seats) not in self.ways:
+            self.ways[i, *seats] = seatings(setting, i, seats)
+        ways = self.ways[i, *seats]
         if not ways:
             return state
         position, yaw = np.repeat(state.position[None], len(ways) + 1, 0), np.repeat(state.yaw[None], len(ways) + 1, 0)
@@ -577,9 +574,3 @@ def part_of(room: Plan, there: np.ndarray) -> Plan:
         stance=tuple(room.stance[k] for k in keep.tolist()),
     )  # fmt: skip
     return out
-
-
-def _predicates():  # type: ignore[no-untyped-def]
-    from echomodel.vocabulary import vocabulary
-
-    return vocabulary().predicates

@@ -12,7 +12,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from echomodel.triangles import area_normals
-from echousd.shapes.charts import charts
 from echousd.shapes.finishes.slots import metres_of
 
 NUDGE = 4e-6  # metres between points of different boards at one place
@@ -66,6 +65,8 @@ def surfaces(
     board = connected_pieces(faces, len(points))
     normals = _indexed(_corner_normals(points, faces, sharpest), 4, np.repeat(owner, 3))
     if atlas:
+        from echousd.shapes.charts import charts
+
         laid = charts([[(mesh.vertices, mesh.faces)] for mesh, _, _ in forms], *ATLAS)
         st = [(places.astype(np.float32), index.astype(np.int32).ravel()) for _, index, places in laid]
     else:
