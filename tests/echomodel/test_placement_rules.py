@@ -52,6 +52,14 @@ def test_between_is_the_space_that_two_others_span():
         assert (found >= 0) is kept, (x, z, found)
 
 
+def test_beside_one_and_far_from_the_other_is_not_between():
+    words, beds = ["nightstand", "single_bed", "single_bed"], ((1.0, 2.0, -1.0, 0.0, 0.0), (1.0, 2.0, 1.0, 0.0, 0.0))
+    assert margin("between", [(0.5, 0.4, 0.0, -0.8, 0.0), *beds], words, others=(1, 2)) > 0.1
+    across = ((1.0, 2.0, -1.0, -1.0, np.pi / 2), (1.0, 2.0, 1.0, 1.0, 0.0))  # side of one, foot of the other
+    assert margin("between", [(0.5, 0.4, -1.7, -0.3, 0.0), *across], words, others=(1, 2)) < -0.3
+    assert margin("between", [(0.5, 0.4, 0.3, -0.2, 0.0), *across], words, others=(1, 2)) > 0.1
+
+
 @pytest.mark.parametrize("away", [(3.0, 2.5), (-3.0, 2.5), (-9.0, -9.0)])
 def test_a_room_may_lie_anywhere(away):
     x, z = away

@@ -21,6 +21,7 @@ SQUEEZED, SPARE = 0.17, 0.6  # metres behind chairs of one side, and how much mo
 AT = 0.5  # metres: a chair further from its table is not pulled back from it
 KNEES, KNEES_WALL = 0.4, 0.6  # metres before a sofa or armchair, before furniture of other groups and before a wall
 ROOM = 0.25  # metres before a seat to its own group's lamps and other seats
+END = 0.8  # metres before an armchair that looks at a sofa's end, to that
 TOUCHED = 0.08  # metres between a coffee table and a second sofa or an ottoman: 95 % of real ottomans keep 0.12
 HAND = 0.05  # metres between two seats of a group: 90 % of real ones, most others overlap
 FOOT = 0.35  # metres between the foot of a bed and furniture: one passes sideways
@@ -159,20 +160,28 @@ def lamp_aside(plan: Plan) -> Found:
 
 
 def seat_room(plan: Plan) -> Found:
-    """One can sit down in a group, too: nothing but its table stands close before a sofa or armchair."""
+    """One can sit down in a group, too: nothing but its table stands close before a sofa or armchair, nor a sofa's end
+    before an armchair."""
     block = (plan.of("sofa", "light", "decor", "storage", "bed") | plan.stands("company", "beside")) & plan.standing
-    found_one = _clear(plan, _loungers(plan), block, ROOM, -FAR, kin=True)
+    close = _clear(plan, _loungers(plan), block, ROOM, -FAR, kin=True)
     tables = plan.stands("before") & plan.standing  # which a second sofa or an ottoman does not touch
     i, j = plan.pairs((plan.stands("with") | (plan.stands("foot") & plan.of("seat"))) & plan.standing, tables,
                       least=True)  # fmt: skip
-    if not len(i):
-        return found_one
-    least, about = plan.worst(i, plan.apart(i, j) - TOUCHED, j)
-    near = least < 0
-    near[found_one.who[found_one.margin < 0]] = False
-    who = rows(near)
-    touched = found(who, least[who], other=about[who], measure=at_least(least[who] + TOUCHED, 0.0))
-    return joined(found_one, touched)
+    one, sofa = plan.pairs(plan.stands("company") & plan.of("seat") & plan.standing, plan.of("sofa") & plan.standing,
+                           least=True)  # fmt: skip
+    if not len(i) + len(one):
+        return close
+    lateral, forward = plan.local(one, sofa)
+    aside = (abs(lateral) > plan.size[sofa, 0] / 2) & (forward < plan.size[sofa, 2] / 2)
+    ends = plan.kit.where(aside, plan.more_ahead(one, sofa, END, MET), FAR)
+    margin = plan.kit.concat([plan.apart(i, j) - TOUCHED, ends])
+    least, about = plan.worst(plan.kit.concat([i, one]), margin, plan.kit.concat([j, sofa]))
+    met = least < 0
+    met[close.who[close.margin < 0]] = False
+    who = rows(met)
+    end = plan.of("sofa")[about[who]]
+    measure = at_least(least[who] + plan.kit.where(end, END, TOUCHED), 0.0)
+    return joined(close, found(who, least[who], other=about[who], measure=measure, words=whole(end)))
 
 
 def loungers_apart(plan: Plan) -> Found:

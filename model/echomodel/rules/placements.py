@@ -11,8 +11,8 @@ from functools import reduce
 
 import numpy as np
 
-from echomodel.arrays import Array, constant, dot, kit
-from echomodel.boxes2d import seen
+from echomodel.arrays import Array, at_least, constant, dot, kit, norm
+from echomodel.boxes2d import along_sides, seen
 from echomodel.openings import signed_area
 from echomodel.rules.geometry import BoxesLike, Spread
 from echomodel.rules.margins import tensors
@@ -21,6 +21,7 @@ from echomodel.vocabulary import Category, vocabulary
 AT_WALL = 0.15  # metres between a wall and the side that stands against it
 AT_CORNER = 0.25  # metres between each wall of a corner and what stands in it
 WITHIN = 0.05  # metres by which a centre may leave the space between two others
+DETOUR = 0.5  # metres that the way from one to the other is longer by way of it, at most
 WAYS = np.stack([way(np.arange(48) * (np.pi / 24)) for way in (np.cos, np.sin)])  # from which that space is looked at
 
 
@@ -87,12 +88,16 @@ def in_corner(own: Spread, others: Sequence[Spread], walls: Walls, kind: Categor
 
 
 def between(own: Spread, others: Sequence[Spread], walls: Walls | None, kind: Category) -> Array:
-    """The centre lies in the space that the two others span (the hull of their footprints), and in neither of them."""
+    """The centre lies within the hull of the two others' footprints, in neither, about on the way between them."""
     xp, own_centre, way = kit(own.yaw), own.centre, constant(WAYS, own.yaw)
     reach = reduce(xp.maximum, [xp.amax(other.corners @ way, 1) for other in others])  # (K, directions)
     inside = xp.amin(reach - own_centre @ way, -1) + WITHIN
-    clear = [xp.amax(abs(seen(own_centre - other.centre, other.yaw)) - other.size[:, ::2] / 2, -1) for other in others]
-    return reduce(xp.minimum, [inside, *clear])
+    off = [abs(seen(own_centre - other.centre, other.yaw)) - other.size[:, ::2] / 2 for other in others]
+    one, two = others
+    along, both = along_sides(one.centre - two.centre, one.size[:, ::2] / 2, one.yaw, two.size[:, ::2] / 2, two.yaw)
+    direct = at_least(xp.amax(abs(along) - both, -1), 0.0)
+    detour = sum(norm(at_least(aside, 0.0)) for aside in off) - direct
+    return reduce(xp.minimum, [inside, DETOUR - detour, *(xp.amax(aside, -1) for aside in off)])
 
 
 # a placement of the vocabulary -> what it means

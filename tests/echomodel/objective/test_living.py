@@ -192,6 +192,7 @@ MORE = [
     (with_one(LIVING, "chair", kind="armchair", size=(0.8, 0.8, 0.8), at=(-1.4, 0.9), yaw=-2.6),
      ("chair", "screen_not_behind"), "chair turns its back on stand (1"),
     (LIVING.moved("armchair", at=(0.9, -0.45), yaw=-2.4), ("armchair", "seat_room"), "one cannot sit down on"),
+    (LIVING.moved("armchair", at=(2.0, -1.53)), ("armchair", "seat_room"), "armchair looks at the end of sofa, 0.50 m"),
     (with_one(LIVING, "table", kind="dining_table", size=(1.4, 0.75, 0.8), at=(0.0, 0.8)), ("stand", "view_free"),
      "table stands between stand and who watches it"),
     (Room({name: {**row, "at": (row["at"][0], min(row["at"][1] + 1.0, 1.7))} for name, row in SET.things.items()}),
