@@ -155,6 +155,6 @@ def test_what_no_plan_keeps_is_a_smallest_set(kept, more):
 
 
 def test_without_the_solver_it_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "ortools.sat.python", None)
+    monkeypatch.setitem(__import__("sys").modules, "ortools.sat.python.cp_model", None)
     with pytest.raises(GraphError, match=r"pip install 'echousd\[home\]'"):
         plan_home(HomeGraph.from_words("hall door bedroom"))
