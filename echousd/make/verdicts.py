@@ -49,7 +49,7 @@ def relation_verdicts(graph: SceneGraph, boxes: BoxesLike, *, rules: str = "stri
     if not graph.relations:
         return _placement_verdicts(graph, boxes)
     triplets, headed = triplets_of(graph), fronts(node.category for node in graph.nodes)
-    found = margins(_arrays(boxes), triplets, rules=rules, center=floor_centre(graph)[::2], fronts=headed)
+    found = margins(Spread.of(boxes), triplets, rules=rules, center=floor_centre(graph)[::2], fronts=headed)
     state, margin = judged(found, triplets, rules).tolist(), found.tolist()
     return tuple(
         Verdict(r.subject, r.predicate, r.object, STATES[s or int(m > -ROUNDING)], None if s < 0 else m)
@@ -57,13 +57,9 @@ def relation_verdicts(graph: SceneGraph, boxes: BoxesLike, *, rules: str = "stri
     ) + _placement_verdicts(graph, boxes)
 
 
-def _arrays(boxes: BoxesLike) -> Spread:
-    return Spread(*(np.asarray(of, np.float64) for of in (boxes.size, boxes.position, boxes.yaw)))
-
-
 def _placement_verdicts(graph: SceneGraph, boxes: BoxesLike) -> tuple[Verdict, ...]:
     categories = [node.category for node in graph.nodes]
-    margin = placement_margins(_arrays(boxes), stated_placements(graph), graph.room.corners, categories).tolist()
+    margin = placement_margins(Spread.of(boxes), stated_placements(graph), graph.room.corners, categories).tolist()
     return tuple(
         Verdict(*placed.triple, STATES[-1 if m != m else int(m > -ROUNDING)], None if m != m else m)
         for placed, m in zip(graph.placements, margin, strict=True)

@@ -39,12 +39,10 @@ def living_faults(
         all_blamed: objects whose place the graph states, too.
     """
     from echomodel.objective import faults
-    from echomodel.rules.geometry import Spread
 
-    names = list(graph.names)
-    corners = graph.room.corners
+    names, corners = list(graph.names), graph.room.corners
     found = faults(
-        Spread(*(np.asarray(of, np.float64) for of in (boxes.size, boxes.position, boxes.yaw))),
+        boxes,
         [node.category for node in graph.nodes],
         floor if corners is None else np.asarray(corners, float),  # openings count the edges of the stated floor
         graph.room.openings if corners is not None else (),

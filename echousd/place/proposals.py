@@ -320,9 +320,7 @@ def _in_the_open(setting: Setting, i: int, more: float) -> list[Row]:
     return [(x, z, yaw, more) for x, z in points.tolist() for yaw in turns]
 
 
-def _overhead(
-    setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np.ndarray, i: int
-) -> list[Row]:  # fmt: skip
+def _overhead(setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np.ndarray, i: int) -> list[Row]:
     """Over the middle of tables, beds and sofas' tables, and over the middle of the room."""
     above = vocabulary().predicate_id("above")
     told = [b for a, word, b in setting.triplets.tolist() if a == i and word == above]

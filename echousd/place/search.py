@@ -120,7 +120,7 @@ class Search:
         """What a room costs in all, and the boxes that its broken terms are about, the worst first."""
         setting = self.setting
         worst: dict[int, float] = {}
-        room = self._plan(state.position, state.yaw)
+        room = setting.plan.at(state.position, state.yaw)
         if self.looks:
             room = copies_of(setting.plan, room.position[None], room.yaw[None], np.ones_like(room.given))
             every = [term.find(room) for term in self.terms]
@@ -237,10 +237,7 @@ class Search:
         return best if cost[best] < cost[0] - GAIN * GRAIN else 0
 
     def _unreached(self, position: np.ndarray, yaw: np.ndarray) -> list[int]:
-        return [fault.object for fault in unreached(self._plan(position, yaw))]
-
-    def _plan(self, position: np.ndarray, yaw: np.ndarray) -> Plan:
-        return self.setting.plan.at(position, yaw)
+        return [fault.object for fault in unreached(self.setting.plan.at(position, yaw))]
 
     def reseated(self, state: State, there: np.ndarray, i: int) -> State:
         """The state with those who stand around box i at one of the ways in which as many sit there."""

@@ -249,14 +249,9 @@ def stacked(
 
 
 def lean(
-    categories: Sequence[str],
-    size: np.ndarray,
-    position: np.ndarray,
-    yaw: np.ndarray,
-    floor: Floor,
-    carrier: np.ndarray,
-    told: Collection[int] = (),
-) -> np.ndarray:
+    categories: Sequence[str], size: np.ndarray, position: np.ndarray, yaw: np.ndarray, floor: Floor,
+    carrier: np.ndarray, told: Collection[int] = (),
+) -> np.ndarray:  # fmt: skip
     """(n, 2, 2) float: point and inward normal of the wall that each piece of wall furniture leans on, NaN = none.
 
     Arguments:

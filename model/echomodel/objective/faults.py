@@ -16,7 +16,7 @@ from echomodel.objective.plan import CLEAR_HEIGHT, Plan, plan_of
 from echomodel.objective.table import PRICE, TERMS
 from echomodel.openings import Opening, inward_normal, segment
 from echomodel.roomboxes import footprints
-from echomodel.rules.geometry import BoxesLike
+from echomodel.rules.geometry import BoxesLike, Spread
 
 ROBOT, SLACK = 0.2, 0.025  # metres, its radius, and how much narrower a way it squeezes through
 STEP = 0.1  # metres beyond that between a door and where it enters
@@ -105,7 +105,7 @@ def faults(
 
     A term counts a box at most once. What the relations state decides whom a box attends.
     """
-    plan = plan_of(boxes, categories, floor, openings, relations, given=given)
+    plan = plan_of(Spread.of(boxes), categories, floor, openings, relations, given=given)
     return faults_of(plan) + unreached(plan)
 
 

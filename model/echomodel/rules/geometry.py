@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
 
+import numpy as np
+
 from echomodel.arrays import Array, at_least, at_most, constant, dot, kit, put, rows
 from echomodel.boxes2d import CORNERS, along_sides, outline, seen
 
@@ -30,6 +32,11 @@ class Spread:
     size: Array
     position: Array
     yaw: Array
+
+    @classmethod
+    def of(cls, boxes: BoxesLike) -> Spread:
+        """Boxes as arrays of numpy, float64."""
+        return cls(*(np.asarray(of, np.float64) for of in (boxes.size, boxes.position, boxes.yaw)))
 
     @cached_property
     def corners(self) -> Array:
