@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, at_most, full, held, least_of, norm, rows, sum_of, whole
+from echomodel.arrays import Array, at_least, at_most, full, held, least_of, norm, rows, sum_of
 from echomodel.floors import signed_distance
-from echomodel.objective.company import AROUND, BESIDE, Seats, seats_at
+from echomodel.objective.company import AROUND, BESIDE, Seats, first_of, seats_at
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
 from echomodel.sizes import REACH, filled_area
 
@@ -164,11 +164,9 @@ def elbow_room(plan: Plan) -> Found:
     half_width, half_depth = plan.reach(seats.i, seats.j)
     reach = xp.where(seats.ahead, half_width, half_depth)
     gap = seats.along[other] - seats.along[one] - reach[one] - reach[other]
-    tight = gap - FENCE < edge - ELBOW
-    least, measure = xp.where(tight, gap - FENCE, edge - ELBOW), xp.where(tight, at_least(gap, 0.0), edge)
-    at, row = worst(j, least, xp.arange(len(one)), len(plan), FAR)
-    who = rows(at < FAR)
-    return found(who, at[who], measure=measure[row[who]], words=whole(tight)[row[who]])
+    tight = first_of(j, xp.full_like(j, -1), [edge - ELBOW, gap - FENCE], [edge, at_least(gap, 0.0)])
+    at, row = worst(j, tight.margin, xp.arange(len(one)), len(plan), FAR)
+    return tight.take(row[at < FAR])
 
 
 def chairs_at_sides(plan: Plan) -> Found:
@@ -211,10 +209,9 @@ def bench_fits(plan: Plan) -> Found:
     own = 2 * xp.where(seats.ahead, half_width, half_depth)
     side = xp.where(seats.ahead, plan.size[seats.j, 0], plan.size[seats.j, 2])
     beyond = (abs(seats.along) + (own - side) / 2) * ~plan.solid[seats.i]  # a stool stands anywhere
-    each = xp.stack([own - side, plan.size[seats.i, 0] - own, beyond - CORNER], -1)
-    which = held(each).argmax(-1)
-    least = each[xp.arange(len(which)), which]
-    return found(seats.i, BEYOND - least, other=seats.j, measure=least + CORNER * (which == 2), words=which)
+    measures = [own - side, plan.size[seats.i, 0] - own, beyond]
+    margins = [BEYOND - measures[0], BEYOND - measures[1], BEYOND + CORNER - beyond]
+    return first_of(seats.i, seats.j, margins, measures)
 
 
 def _free_sides(plan: Plan, seats: Seats) -> tuple[Array, Array]:

@@ -179,9 +179,7 @@ class Copies(Plan):
     def pairs(self, first: Array, second: Array, *, least: bool = False) -> tuple[Array, Array]:
         """As `Plan.pairs`; `least`: what stands alike in all copies is paired in the first one alone."""
         n = len(self.template)
-        together = first[:n, None] & second[None, :n]
-        here = self.kit.arange(n)
-        together[here, here] = False
+        together = first[:n, None] & second[None, :n] & ~self.kit.eye(n, dtype=self.kit.bool)
         still = self._still if least else None
         i, j = pairs_in(together if still is None else together & ~still)
         i, j = (self._shift + i).reshape(-1), (self._shift + j).reshape(-1)

@@ -569,7 +569,7 @@ def _listed(i: Array, j: Array) -> list[tuple[int, int]]:
     return list(zip(i.tolist(), j.tolist(), strict=True))
 
 
-def kinds_of(categories: Sequence[str], triplets: np.ndarray | Array) -> tuple[Category, ...]:
+def kinds_of(categories: Sequence[str], triplets: Array) -> tuple[Category, ...]:
     """The rows of N words; an armchair that is told to be at a desk where nobody else sits is a chair of that desk.
 
     Arguments:

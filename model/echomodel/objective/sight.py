@@ -170,9 +170,11 @@ def _viewers(plan: Plan) -> Watched:
 
 def _told(plan: Plan, i: Array, j: Array, words: Sequence[str] = TOLD) -> Array:
     """(P,) bool: the graph says one of these words of i and j, or of j and i."""
-    said = {pair for word in words for pair in zip(*(end.tolist() for end in plan.told(word)), strict=True)}
-    ends = zip(i.tolist(), j.tolist(), strict=True)
-    return plan.kit.asarray([(a, b) in said or (b, a) in said for a, b in ends], dtype=plan.kit.bool)
+    count = len(plan.first)
+    said = full(plan.given, (count, count), False)
+    for one, other in map(plan.first.told, words):
+        said[one, other] = said[other, one] = True
+    return said[i % count, j % count]
 
 
 def _lying_or_sitting_back(plan: Plan, i: Array, j: Array) -> Array:

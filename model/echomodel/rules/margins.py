@@ -14,7 +14,7 @@ from echomodel.rules.sets import RuleSet, rule_set
 from echomodel.vocabulary import vocabulary
 
 
-def tensors(boxes: BoxesLike, dtype: Any = None) -> Spread:
+def floating(boxes: BoxesLike, dtype: Any = None) -> Spread:
     """Boxes as floating-point arrays of one type, of the library that theirs are of."""
     dtype = dtype or (boxes.size[:0] / 1).dtype
     every = (boxes.size, boxes.position, boxes.yaw)
@@ -49,7 +49,7 @@ def margins(
     Returns (E,) float, in metres (sides, close by, standing on, above, symmetrical to) or as a ratio (sizes, overlap);
     0 where the rules do not measure the predicate. Never NaN or infinite for finite boxes.
     """
-    own = tensors(boxes)
+    own = floating(boxes)
     triplets, centre = _beside(own.size, triplets), kit(own.size).zeros_like(own.position)
     if center is not None:
         centre[:, ::2] = _beside(own.size, center)
@@ -75,7 +75,7 @@ def fronts(categories: Iterable[str]) -> np.ndarray:
 
 def verdicts(boxes: BoxesLike, triplets: Array, *, rules: str = "strict", **about: Any) -> Array:
     """Hard verdict of every relation: (E,) int8, 1 kept, 0 broken, -1 not measured. Arguments as for `margins`."""
-    own = tensors(boxes, kit(boxes.size).float64)
+    own = floating(boxes, kit(boxes.size).float64)
     own = Spread(held(own.size), held(own.position), held(own.yaw))
     return judged(margins(own, triplets, rules=rules, **about), triplets, rules)
 

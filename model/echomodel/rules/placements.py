@@ -15,7 +15,7 @@ from echomodel.arrays import Array, at_least, constant, dot, kit, norm
 from echomodel.boxes2d import along_sides, seen
 from echomodel.openings import signed_area
 from echomodel.rules.geometry import BoxesLike, Spread
-from echomodel.rules.margins import tensors
+from echomodel.rules.margins import floating
 from echomodel.vocabulary import Category, vocabulary
 
 AT_WALL = 0.15  # metres between a wall and the side that stands against it
@@ -115,7 +115,7 @@ def placement_margins(
         categories: N canonical category words.
     """
     xp = kit(boxes.yaw)
-    own = tensors(boxes, xp.float64)
+    own = floating(boxes, xp.float64)
     named = {i for one in stated for i in (one.subject, *one.others)}
     every = {i: Spread(own.size[i : i + 1], own.position[i : i + 1], own.yaw[i : i + 1]) for i in named}
     walls = None if floor is None else Walls(floor)
