@@ -7,6 +7,10 @@ Every ```bash and ```python block runs, except
 * blocks below a comment `<!-- not run: reason -->`,
 * `make` commands (they set up the environment that these tests run in).
 
+Python and lines that call `echousd` with plain words run in this process, which has loaded what they want and draws
+small pictures; a block that begins with something else (the first one does) runs in a shell, with the command on its
+PATH.
+
 A ```text block below a comment `<!-- output -->` must be what the block above it printed; a line `...` in it stands for
 any number of lines.
 """
@@ -15,18 +19,36 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from functools import partial
+from io import StringIO
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
+
+from echousd.cli import main as commands
+from echousd.draw import rendering
 
 REPOSITORY = Path(__file__).parents[1]
 README = REPOSITORY / "README.md"
 FENCE = re.compile(r"^(?P<indent> *)```(?P<language>\w*)\s*$")
 SECONDS = 600
+
+
+@pytest.fixture(autouse=True, scope="module")
+def pictures_are_small() -> Iterator[None]:
+    """Commands that do not say how large a picture is draw small ones; a shell's draw their own size."""
+    sizes = {name: (size // 5, rays) for name, (size, rays) in rendering.QUALITIES.items()}
+    with patch.dict(rendering.QUALITIES, sizes), patch("echousd.make.save.PREVIEW", 96):
+        yield
 
 
 @dataclass(frozen=True)
@@ -60,20 +82,52 @@ def blocks(markdown: str) -> list[Block]:
     return found
 
 
-def command_of(block: Block) -> list[str] | None:
-    """What runs a block, None for those that are not to be run."""
+def steps(block: Block) -> list[Callable[[], int]]:
+    """What runs a block, one after the other, each for its exit code: nothing for a block that is not to be run."""
     if block.comment.startswith("not run:") or block.language not in ("bash", "python"):
-        return None
+        return []
     if block.language == "python":
-        return [sys.executable, "-c", block.text]
-    kept = [line for line in block.text.splitlines() if not re.match(r"\s*make\b", line)]
-    return ["bash", "-euo", "pipefail", "-c", "\n".join(kept)] if any(map(str.strip, kept)) else None
+        return [partial(python, block.text)]
+    lines = [line for line in block.text.splitlines() if line.strip() and not re.match(r"\s*make\b", line)]
+    if not lines or not lines[0].startswith("echousd "):
+        return [partial(shell, "\n".join(lines))] if lines else []
+    return [
+        partial(shell, line) if set(line.partition("#")[0]) & set("|<>;&$") else partial(command, line)
+        for line in lines
+    ]
+
+
+def command(line: str) -> int:
+    """Run a line that calls `echousd`, or one that is a remark."""
+    words = shlex.split(line, comments=True)
+    return commands.run(words[1:]) if words else 0
+
+
+def shell(text: str) -> int:
+    """Run a text in a shell that stops at the first failure; its exit code."""
+    paths = [str(Path(sys.executable).parent), os.environ["PATH"]]
+    environment = {**os.environ, "PATH": os.pathsep.join(paths), "NO_COLOR": "1", "PYTHONIOENCODING": "utf-8"}
+    done = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", text],
+        env=environment, capture_output=True, text=True, timeout=SECONDS, encoding="utf-8",
+    )  # fmt: skip
+    sys.stdout.write(done.stdout)
+    sys.stderr.write(done.stderr)
+    return done.returncode
+
+
+def python(text: str) -> int:
+    """Run a text as Python, with names of its own; its exit code."""
+    try:
+        exec(text, {})
+    except Exception:
+        traceback.print_exc()
+        return 1
+    return 0
 
 
 def run(markdown: str, folder: Path) -> int:
     """Run the blocks of `markdown` in `folder`; the number of blocks that ran. Fails at the first that fails."""
-    paths = [str(Path(sys.executable).parent), os.environ["PATH"]]
-    environment = {**os.environ, "PATH": os.pathsep.join(paths), "NO_COLOR": "1", "PYTHONIOENCODING": "utf-8"}
     count, printed = 0, ""
     for block in blocks(markdown):
         if block.comment == "output":
@@ -82,14 +136,13 @@ def run(markdown: str, folder: Path) -> int:
                 for line in block.text.splitlines()
             )
             assert re.fullmatch(pattern, printed), f"README line {block.line}: printed was\n{printed}"
-        command = command_of(block)
-        if command is None:
+        parts, out, errors = steps(block), StringIO(), StringIO()
+        if not parts:
             continue
-        done = subprocess.run(
-            command, cwd=folder, env=environment, capture_output=True, text=True, timeout=SECONDS, encoding="utf-8"
-        )
-        printed = done.stdout
-        assert done.returncode == 0, f"README line {block.line}: exit code {done.returncode}\n{printed}{done.stderr}"
+        with chdir(folder), redirect_stdout(out), redirect_stderr(errors):
+            code = next(filter(None, (part() for part in parts)), 0)
+        printed = out.getvalue()
+        assert code == 0, f"README line {block.line}: exit code {code}\n{printed}{errors.getvalue()}"
         count += 1
     return count
 
@@ -144,9 +197,13 @@ def test_a_remark_counts_for_the_next_block_alone(tmp_path):
         run(markdown, tmp_path)
 
 
-@pytest.mark.parametrize("block", ["bash\nfalse\ntrue", "bash\nfalse | true", "python\nraise ValueError"])
+WRONG = ["bash\nfalse\ntrue", "bash\nfalse | true", "python\nraise ValueError", "bash\nechousd graph no.usda | cat",
+         "bash\nechousd graph no.usda\nechousd plugin-path"]  # fmt: skip
+
+
+@pytest.mark.parametrize("block", WRONG)
 def test_a_block_that_fails_fails_the_test(tmp_path, block):
-    with pytest.raises(AssertionError, match="README line 1: exit code 1"):
+    with pytest.raises(AssertionError, match=r"README line 1: exit code [12]"):
         run(f"```{block}\n```\n", tmp_path)
 
 
