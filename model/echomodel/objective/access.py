@@ -106,7 +106,8 @@ def before_fronts(plan: Plan, opens: Array, depth: Array) -> Found:
     i, j = plan.pairs(opens, plan.standing & ~plan.movable, least=True)
     corner = plan.stands("row")[i] & plan.stands("row")[j] & (abs(plan.kit.cos(plan.yaw[i] - plan.yaw[j])) < 0.1)
     low = plan.position[:, 1] + plan.size[:, 1] < CLEAR_HEIGHT  # rugs
-    keep = (plan.anchor[j] != i) & (plan.anchor[i] != j) & ~corner & ~low[j]
+    near = plan.stands("near", "opposite")[i]  # a sideboard opens beside its table, too
+    keep = (plan.anchor[j] != i) & ((plan.anchor[i] != j) | near) & ~corner & ~low[j]
     i, j = i[keep], j[keep]
     margin = plan.more_ahead(i, j, depth[i], SHARE, start=0.5)  # what stands beside or behind is in no front's way
     least, about = plan.worst(i, margin, j)

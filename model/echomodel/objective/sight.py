@@ -149,7 +149,8 @@ def _viewers(plan: Plan) -> Watched:
     i, j = plan.pairs(stands | (plan.of("screen") & ~on_stand), plan.of("sofa", "bed") | plan.stands("company"))
     if not len(i):
         return nobody(plan.size), i > 0, full(plan.size, 0, 0.0), i
-    for better in (_told, _lying_or_sitting_back):
+    main = plan.of("sofa", "bed") & ~plan.stands("company")  # armchairs watch where there is neither
+    for better in (_told, lambda _plan, _i, j: main[j]):
         good = better(plan, i, j)
         keep = good | (xp.bincount(i[good], minlength=len(plan))[i] == 0)
         i, j = i[keep], j[keep]
@@ -175,11 +176,6 @@ def _told(plan: Plan, i: Array, j: Array, words: Sequence[str] = TOLD) -> Array:
     for one, other in map(plan.first.told, words):
         said[one, other] = said[other, one] = True
     return said[i % count, j % count]
-
-
-def _lying_or_sitting_back(plan: Plan, i: Array, j: Array) -> Array:
-    """(P,) bool: j is a sofa or bed; armchairs watch where there is neither."""
-    return plan.of("sofa", "bed")[j] & ~plan.stands("company")[j]
 
 
 def _clear(plan: Plan, i: Array, j: Array) -> tuple[Array, Array]:

@@ -214,8 +214,13 @@ MORE = [
      "plant crowds lamp"),
     (with_one(BEDROOM, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.4, -0.6)), ("plant", "plant_aside"),
      "plant crowds bed"),
-    (with_one(DINING, "lamp", kind="floor_lamp", size=(0.3, 1.6, 0.3), at=(-0.9, -1.2)), ("lamp", "not_alone"),
-     "lamp stands alone in the room"),  # beside a sideboard, and what one sits at is 0.6 m away
+    (with_one(DINING, "lamp", kind="floor_lamp", size=(0.3, 1.6, 0.3), at=(-0.9, -0.5)), ("lamp", "not_alone"),
+     "lamp stands alone in the room"),  # beside a table in the open
+    (Room({"a": {**ARMCHAIR, "at": (1.5, 0.0)}}), ("a", "not_alone"), "a stands alone in the room, 0.60 m from"),
+    (with_one(DINING, "board", kind="sideboard", size=(1.4, 0.9, 0.4), at=(0.0, -0.85)), ("board", "front_free"),
+     "the front of board has 0.20 m before table"),
+    (with_one(STUDY, "books", kind="bookshelf", size=(0.8, 2.0, 0.3), at=(1.2, -0.98), yaw=-HALF),
+     ("books", "wardrobe_opens"), "books has 0.45 m before it, then chair"),
     (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(0.9, 0.6)), ("plant", "plant_aside"),
      "plant crowds chair_1_1"),
     (STUDY.moved("desk", at=(0.0, -0.5)), ("desk", "desk_at_wall"), "desk stands in the open, 1.15 m from the walls"),
@@ -229,7 +234,14 @@ KEPT = [
     (with_one(BENCH, "table", kind="dining_table", size=(0.8, 0.75, 0.8), at=(1.9, 1.4)), ("bench", "seat_in_reach")),
     (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.1, 1.7)), ("plant", "plant_aside")),
     (with_one(BEDROOM, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(2.2, 0.4)), ("plant", "plant_aside")),
-    (with_one(DINING, "lamp", kind="floor_lamp", size=(0.3, 1.6, 0.3), at=(-0.9, -0.5)), ("lamp", "not_alone")),
+    (with_one(DINING, "lamp", kind="floor_lamp", size=(0.3, 1.6, 0.3), at=(-0.9, -1.5)), ("lamp", "not_alone")),
+    (Room({"a": {**ARMCHAIR, "at": (1.7, 0.0)}}), ("a", "not_alone")),
+    (Room({"a": ARMCHAIR, "b": {**ARMCHAIR, "at": (-1.0, 1.0)}}), ("a", "not_alone")),  # two are no only one
+    (with_one(DINING, "board", kind="sideboard", size=(1.4, 0.9, 0.4), at=(0.0, -0.95)), ("board", "front_free")),
+    (
+        with_one(STUDY, "books", kind="bookshelf", size=(0.8, 2.0, 0.3), at=(1.4, -0.98), yaw=-HALF),
+        ("books", "wardrobe_opens"),
+    ),
     (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.0, 0.7)), ("plant", "plant_aside")),
     (STUDY.moved("desk", at=(2.1, -0.5)), ("desk", "desk_at_wall")),
     (
