@@ -19,6 +19,7 @@ SKY = 4.0  # radiance of the sky in a window for a dome of intensity 1, whose li
 SUN = 9.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
 CEILING = np.array([0.80, 0.79, 0.77], np.float32)
 VIEW = 0.8  # of the sky's radiance, what is seen of it through a window: eyes adapt
+BLURRED, HAZE = 0.7, 0.4  # degrees that it is out of focus, and the share of its colour that haze takes
 DIM = 0.05  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
@@ -28,7 +29,10 @@ WHITE, PAPER = 92, 0.95  # what so many of a hundred points are darker than come
 CONTRAST, KNEE = 1.3, 0.6  # power about what is bright, and from where on highlights are rolled off
 HUE = 0.6  # share of colours that keep their hue where they are bright; film bleaches them
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
-DAY, GLOWING = 0.5, 5.0  # radiance of the sky by day; by night a shade glows so much more, as eyes see it
+DAY = 0.5  # radiance of the sky by day
+# The brightest shade over what white paper is on the average in the room, by night and by day, as eyes see it; the
+# share of its light that is seen at its rim.
+GLOWING, RIM = (4.0, 5.0), 0.3
 # Metres around a lamp where it throws no shadow of its own, and how far from a bulb its shade may be; its places that
 # light comes from, where it has no shade as far around the bulb.
 OWN, SHADED, SPOTS, BULB = 0.25, 0.5, 24, 0.05
@@ -69,7 +73,7 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
         if prim.IsA(UsdLux.DomeLight):
             domes, sky, tint = domes + 1, sky + strength, color / max(strength, 1e-9)
             picture = UsdLux.DomeLight(prim).GetTextureFileAttr().Get()
-            view = view if picture is None else image_of(str(prim.GetPath()), picture.resolvedPath)
+            view = view if picture is None else _out_of_focus(image_of(str(prim.GetPath()), picture.resolvedPath))
         elif prim.IsA(UsdLux.DistantLight):
             towards = world[:3, 2] / max(float(np.linalg.norm(world[:3, 2])), 1e-9)
             suns.append(np.stack([towards, color]))
@@ -82,6 +86,14 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
         bulbs=np.array(bulbs, np.float32).reshape(-1, SPOTS, 3), power=np.array(power, np.float32).reshape(-1, 3),
         tint=tint, view=view,
     )  # fmt: skip
+
+
+def _out_of_focus(view: np.ndarray) -> np.ndarray:
+    """What lies around (h, w, 3), uint8, as it is behind a room that is in focus: soft, and in a little haze."""
+    from PIL import Image, ImageFilter
+
+    soft = Image.fromarray(view).filter(ImageFilter.BoxBlur(BLURRED * view.shape[1] / 360))
+    return np.asarray(Image.blend(soft, Image.merge("RGB", [soft.convert("L")] * 3), HAZE))
 
 
 def _spots(bulb: np.ndarray, shades: Sequence[np.ndarray]) -> np.ndarray:

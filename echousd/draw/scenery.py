@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import colorsys
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from pxr import Usd
 
+from echomodel.triangles import area_normals
 from echousd.draw.drawables import Drawable, Paint, image_of, read_drawables
 from echousd.draw.indoors import Lights, read_lights
 from echousd.draw.sight import Furniture
@@ -18,6 +20,7 @@ LINEAR = (np.arange(256, dtype=np.float32) / 255) ** 2.2  # of a byte of sRGB
 MIXED = np.array([0.3141, 0.2718, 0.1618], np.float32)  # so that no two colours of a room add up to the same
 SHELL = ("floor", "wall", "ceiling", "door", "window")
 SMALL = 0.35  # metres: what is no larger hides nothing that a picture is of
+SMALLEST = 6  # times that an image is halved at most
 SEEN_THROUGH = 0.5  # opacity of a window's pane below which one looks out
 HUNG = ("picture", "mirror", "curtain", "blind", "wall_shelf", "wall_clock", "coats")  # goes with its wall
 
@@ -76,19 +79,52 @@ class Scenery:
         """(f,) float32, a number that differs where colour, glow or texture do."""
         return (self.flat_colors @ MIXED + 3 * self.emissive @ MIXED + self.texture).astype(np.float32)
 
-    def colors(self, face: np.ndarray, st: np.ndarray) -> np.ndarray:
-        """(n, 3) mean colour of faces (n,) at texture coordinates (n, k, 2)."""
-        out = self.flat_colors[face]
-        texture = self.texture[face]
-        for number, (image, tint) in enumerate(self.images):
-            here = np.flatnonzero(texture == number)
-            if len(here):
-                height, width = image.shape[:2]
-                places = st[here] % 1.0
-                column = (places[..., 0] * width).astype(np.int32) % width
-                row = ((1 - places[..., 1]) * height).astype(np.int32) % height
-                out[here] = (LINEAR[image.reshape(-1, 3)[row * width + column]] * tint).mean(1)
+    @cached_property
+    def texels(self) -> np.ndarray:
+        """(f,) float32, pixels of its image that a metre of each face has."""
+        sizes = np.array([(i.shape[1], i.shape[0]) for i, _ in self.images] or [(1, 1)], np.float32)
+        flat = np.diff(self.st, axis=1) * sizes[self.texture][:, None]
+        area = np.linalg.norm(area_normals(self.triangles), axis=1)
+        pixels = np.abs(flat[:, 0, 0] * flat[:, 1, 1] - flat[:, 0, 1] * flat[:, 1, 0])
+        return np.sqrt(pixels / np.maximum(area, 1e-9)).astype(np.float32)
+
+    def colors(self, face: np.ndarray, st: np.ndarray, breadth: np.ndarray) -> np.ndarray:
+        """(n, 3) colour of places `breadth` (n,) metres wide on faces (n,) at texture coordinates (n, 2).
+
+        It is that of an image reduced until its pixels are so wide: finer ones would flicker ("mip map").
+        """
+        out, texture = self.flat_colors[face], self.texture[face]
+        level = np.clip(np.log2(np.maximum(breadth * self.texels[face], 1)), 0, SMALLEST).astype(np.int8)
+        for number, (_, tint) in enumerate(self.images):
+            own = np.flatnonzero(texture == number)
+            for halved in np.unique(level[own]).tolist():
+                here = own[level[own] == halved]
+                out[here] = between(self.reduced(number, halved), st[here, 0], 1 - st[here, 1]) * tint
         return out
+
+    @cached_property
+    def reduced(self) -> Callable[[int, int], np.ndarray]:
+        """Number of an image, and how often its sides are halved -> (h, w, 3) uint8."""
+        from PIL import Image
+
+        return cache(lambda number, halved: np.asarray(Image.fromarray(self.images[number][0]).reduce(2**halved)))
+
+
+def between(image: np.ndarray, right: np.ndarray, down: np.ndarray) -> np.ndarray:
+    """(n, 3) linear RGB of an image (h, w, 3), uint8, at shares (n,) of its width and height, between its pixels; it
+    goes on beyond its borders."""
+    height, width = image.shape[:2]
+    x, y = right * width - 0.5, down * height - 0.5
+    column, row = np.floor(x), np.floor(y)
+    x, y, pixels = (x - column)[:, None], (y - row)[:, None], image.reshape(-1, 3)
+    left, right, above, below = (
+        (first + k).astype(np.int32) % n for first, n in ((column, width), (row, height)) for k in (0, 1)
+    )
+    first, second = (
+        (1 - x) * LINEAR[pixels[line * width + left]] + x * LINEAR[pixels[line * width + right]]
+        for line in (above, below)
+    )
+    return (1 - y) * first + y * second
 
 
 def class_color(category: str) -> tuple[float, float, float]:

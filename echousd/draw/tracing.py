@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from echousd.draw.bounced import Bounced
-from echousd.draw.indoors import DIM, GLOWING, OWN, SKY, SUN, VIEW, evened, exposure
-from echousd.draw.scenery import LINEAR, Scenery
+from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, VIEW, evened, exposure
+from echousd.draw.scenery import Scenery, between
 from echousd.draw.views import View
 
 FINE, QUICK = 3, 2  # squared: rays per pixel
@@ -28,32 +28,32 @@ class RenderUnavailable(ImportError, ValueError):
 def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: int = 0) -> np.ndarray:
     """The picture as (size / aspect, size, 3) float sRGB in [0, 1].
 
-    Pixels at edges send `rays`² rays, others one and look the texture up as often. Light is asked at every second pixel
-    of every second row, twice `rays` times at edges, (`rays` - 1)² times elsewhere. What asks covers the sun's disc and
-    the sky evenly, each pixel with another shift (randomised quasi-Monte Carlo), so that little noise is left.
+    Pixels at edges send `rays`² rays, others one. Light is asked at every second pixel of every second row, twice
+    `rays` times at edges, (`rays` - 1)² times elsewhere. What asks covers the sun's disc and the sky evenly, each pixel
+    with another shift (randomised quasi-Monte Carlo), so that little noise is left.
 
     `scenery`: triangles and their colours. `view`: the camera; inside a room its windows and lamps light it, else sun
     and sky from above. `size`: pixels across. `rays`: along each side of a pixel. `seed`: of the shifts; the same seed
     gives the same picture.
     """
     height = round(size / view.aspect)
-    across, down = (grid.ravel() for grid in np.meshgrid(np.arange(size), np.arange(height)))
-    noise = np.random.default_rng(seed).random(4)
-    shift = ((across[:, None] * LATTICE[0] + down[:, None] * LATTICE[1] + noise) % 1.0).astype(np.float32)
+    shift = np.random.default_rng(seed).random(4)
     sun = scenery.lights.sun
     sun = np.float32(SUN / np.pi) * (0 * SUN_LIGHT if sun is None else sun[1]) if view.inside else 0.55 * SUN_LIGHT
-    glow = float(np.interp(scenery.lights.day, (0, 1), (GLOWING, 1))) if view.inside else 1.0
-    world = World(embree(scenery.triangles), scenery, view, size, shift, Bounced.dark(*scenery.bounds), sun, glow)
+    world = World(embree(scenery.triangles), scenery, view, size, shift, Bounced.dark(*scenery.bounds), sun)
     white = None
     if view.inside:
         world, white = _lit(world)
+        brightest = float((scenery.emissive @ LUMA).max(initial=1e-6))
+        glow = np.interp(scenery.lights.day, (0, 1), GLOWING) * white / brightest
+        world = world._replace(glow=glow.astype(np.float32))
     return _drawn(world, height, rays, white) ** (1 / 2.2)
 
 
 def _drawn(world: World, height: int, rays: int, white: np.ndarray | None) -> np.ndarray:
     """(height, size, 3) linear colours of the picture, of each ray as it is shown: so edges of what glares are even."""
     size, many = world.size, rays**2
-    places = [((inner % rays + 0.5) / rays, (inner // rays + 0.5) / rays) for inner in range(many)]
+    places = [((3 * (inner + 1) % (many + 1) - 0.5) / many, (inner + 0.5) / many) for inner in range(many)]
     _, seen = _met(world, np.arange(height * size), places[0])
     near = np.flatnonzero(_at_edges(seen, (height, size)))
     finer = [_met(world, near, place, seen) for place in places[1:]]
@@ -62,10 +62,10 @@ def _drawn(world: World, height: int, rays: int, white: np.ndarray | None) -> np
         edge[pixel] = True
     light = _light_of(world, seen, edge, 2 * rays, max(1, (rays - 1) ** 2))
     light = light if white is None else evened(light, world.sun, white)
-    color, st = seen.glow.copy(), _spread(seen.st.reshape(height, size, 2), rays).reshape(-1, many, 2)
+    color = seen.glow.copy()
     everywhere = np.flatnonzero(seen.face >= 0)
     for met in (everywhere[start : start + BLOCK] for start in range(0, len(everywhere), BLOCK)):
-        color[met] = _colored(world, seen.face[met], st[met], light[met])
+        color[met] = _colored(world, seen.of(met), light[met])
     own = everywhere[world.scenery.emissive[seen.face[everywhere]].sum(1) == 0]  # no lamp, and nothing outside
     tone = _tone if white is None else exposure(color[own] if len(own) else color, white, world.scenery.lights.day)
     color = tone(color)
@@ -73,9 +73,17 @@ def _drawn(world: World, height: int, rays: int, white: np.ndarray | None) -> np
     for pixel, more in finer:
         met = np.flatnonzero(more.face >= 0)
         lent = _lent(world, more.of(met), pixel[met], seen, light)
-        more.glow[met] = _colored(world, more.face[met], more.st[met, None], lent)
+        more.glow[met] = _colored(world, more.of(met), lent)
         mixed[pixel] += (tone(more.glow) - color[pixel]) / many
-    return mixed.reshape(height, size, 3)
+    mixed = mixed.reshape(height, size, 3)
+    return np.where(edge.reshape(height, size, 1), _softened(mixed), mixed)
+
+
+def _softened(picture: np.ndarray) -> np.ndarray:
+    """A picture (h, w, 3), a quarter of each pixel from both beside it and a quarter from above and below."""
+    padded = np.pad(picture, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    rows = padded[1:-1] * 0.75 + (padded[:-2] + padded[2:]) * 0.125
+    return rows[:, 1:-1] * 0.75 + (rows[:, :-2] + rows[:, 2:]) * 0.125
 
 
 BLOCK = 32_000  # rays at a time, which bounds the memory and stays in the cache
@@ -85,12 +93,11 @@ CLOSE, EVEN = 2, 0.4  # from which ring on it matters how bright neighbours are,
 ALIKE, FLAT = 0.95, 0.02  # cosine and metres within which two points lie on one flat piece of surface
 KEPT, NOTHING = ("primID", "u", "v", "tfar"), np.float32(-9)  # of a hit; the material of what is not there
 MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
-TORN = 0.25  # of a texture: where it changes by more from pixel to pixel, it begins anew
 
 
 class World(NamedTuple):
-    """What rays run through: the tree, what is in it, the camera, pixels across, shifts by pixel; what light is thrown
-    back and what the sun gives to what faces it, by colour; how much brighter shades are than told."""
+    """What rays run through: the tree, what is in it, the camera, pixels across, shifts of the first; what light is
+    thrown back, what the sun gives to what faces it and how much brighter shades are than told, by colour."""
 
     scene: Any
     scenery: Scenery
@@ -99,7 +106,7 @@ class World(NamedTuple):
     shift: np.ndarray
     thrown: Bounced
     sun: np.ndarray
-    glow: float
+    glow: np.ndarray = np.ones(3, np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,12 +182,8 @@ def _at_edges(seen: Seen, shape: tuple[int, int]) -> np.ndarray:
         differs = _other(seen.of(one), seen.of(two))
         out[one] |= differs
         out[two] |= differs
-    wider = out.copy()
-    wider[1:] |= out[:-1]
-    wider[:-1] |= out[1:]
-    wider[:, 1:] |= out[:, :-1]
-    wider[:, :-1] |= out[:, 1:]
-    return wider.ravel()
+    wide = np.pad(out, 1)
+    return (out | wide[2:, 1:-1] | wide[:-2, 1:-1] | wide[1:-1, 2:] | wide[1:-1, :-2]).ravel()
 
 
 def _seen(world: World, origin: np.ndarray, direction: np.ndarray, hit: Mapping[str, np.ndarray]) -> Seen:
@@ -208,8 +211,10 @@ def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndar
         toward = np.broadcast_to(view.matrix[:3, 2], point.shape) if view.orthographic else view.matrix[:3, 3] - point
         gloss = world.scenery.gloss[seen.face[rows]]
         hits = Hits(point + np.float32(2e-3) * normal, normal, _unit(toward.astype(np.float32)), gloss)
+        across, down = pixel[rows, None] % world.size, pixel[rows, None] // world.size
+        shift = ((across * LATTICE[0] + down * LATTICE[1] + world.shift) % 1.0).astype(np.float32)
         for sample in range(samples):
-            out[rows] += (_light_inside if view.inside else _light)(world, hits, sample, world.shift[pixel[rows]])
+            out[rows] += (_light_inside if view.inside else _light)(world, hits, sample, shift)
     return out / samples
 
 
@@ -219,52 +224,30 @@ def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: in
     Where there is little of a surface around to smooth the light over, at an `edge` (n,), it is asked `often`.
     """
     shape = len(seen.face) // world.size, world.size
-    met, asked = seen.face.reshape(shape) >= 0, np.zeros(shape, bool)
+    met, coarse = seen.face.reshape(shape) >= 0, np.s_[::2, ::2]
     normal, point = (each.reshape(*shape, 3) for each in (seen.normal, seen.point))
-    light = np.zeros((*shape, 5), np.float32)
-    coarse = slice(None, None, 2), slice(None, None, 2)
-    asked[coarse] = met[coarse]
-    torn = edge.reshape(shape)
+    asked, torn, number = met[coarse], edge.reshape(shape)[coarse], np.arange(met.size).reshape(shape)[coarse]
+    found, light = np.zeros((*asked.shape, 5), np.float32), np.zeros((*shape, 5), np.float32)
     for here, times in ((asked & torn, often), (asked & ~torn, seldom)):
-        pixel = np.flatnonzero(here)
-        light[here] = _asked(world, seen.of(pixel), pixel, times)
+        found[here] = _asked(world, seen.of(number[here]), number[here], times)
     for layers, rings in ((slice(4), RINGS), (slice(4, 5), RINGS[:1])):
-        light[coarse][..., layers] = smooth_light(light[coarse][..., layers], normal[coarse], point[coarse], rings)
-    for axis in (1, 0):  # between two in a row, then between two rows
-        here, *sides = (_along_axis(axis, start, shape[axis]) for start in (1, 0, 2))
-        total, weight = np.zeros_like(light[here]), np.zeros((*light[here].shape[:2], 1), np.float32)
-        for side in sides:
-            end = light[side].shape[axis]
-            inside = (slice(None),) * axis + (slice(end),)
-            fits = _same(normal[here][inside], point[here][inside], normal[side], point[side]) & asked[side]
-            total[inside] += fits[..., None] * light[side]
-            weight[inside] += fits[..., None]
-        light[here] = total / np.maximum(weight, 1)
-        asked[here] = (weight[..., 0] > 0) & met[here]
-    rest = np.flatnonzero(met & ~asked)
+        found[..., layers] = smooth_light(found[..., layers], normal[coarse], point[coarse], rings)
+    weight = np.zeros((*shape, 1), np.float32)
+    for steps in product((0, 1), repeat=2):  # of up to four that were asked around it, those of its own surface
+        beside = np.ix_(*(np.arange(s, n + s).clip(0, n - 1) // 2 for n, s in zip(shape, steps, strict=True)))
+        fits = asked[beside] & _same(normal, point, normal[coarse][beside], point[coarse][beside])
+        light += fits[..., None] * found[beside]
+        weight += fits[..., None]
+    light /= np.maximum(weight, 1)
+    rest = np.flatnonzero(met & (weight[..., 0] == 0))
     light.reshape(-1, 5)[rest] = _asked(world, seen.of(rest), rest, often)
     return smooth_light(light, normal, point, RINGS[:1]).reshape(-1, 5)
-
-
-def _along_axis(axis: int, start: int, end: int) -> tuple[slice, slice]:
-    """Every second place along an axis of a picture; along the other those that have light by then."""
-    return (slice(start, end, 2), slice(None)) if axis == 0 else (slice(None, None, 2), slice(start, end, 2))
 
 
 def _same(normal: np.ndarray, point: np.ndarray, other_normal: np.ndarray, other_point: np.ndarray) -> np.ndarray:
     """Whether points lie on one flat piece of surface, (...) bool of (..., 3)."""
     turn = np.einsum("...x,...x->...", normal, other_normal)
     return (turn > ALIKE) & (np.abs(np.einsum("...x,...x->...", normal, point - other_point)) < FLAT)
-
-
-def _spread(st: np.ndarray, rays: int) -> np.ndarray:
-    """(h, w, rays², 2) texture coordinates at all rays of each pixel, of those at its first (h, w, 2)."""
-    across, down = np.zeros_like(st), np.zeros_like(st)
-    across[:, :-1], down[:-1] = np.diff(st, axis=1), np.diff(st, axis=0)
-    for step in (across, down):
-        step[np.abs(step).max(-1) > TORN] = 0
-    inner = np.arange(rays, dtype=np.float32) / rays
-    return np.stack([st + x * across + y * down for y in inner for x in inner], 2)
 
 
 def _lent(world: World, met: Seen, pixel: np.ndarray, seen: Seen, light: np.ndarray) -> np.ndarray:
@@ -281,11 +264,32 @@ def _lent(world: World, met: Seen, pixel: np.ndarray, seen: Seen, light: np.ndar
     return out
 
 
-def _colored(world: World, face: np.ndarray, st: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """(n, 3) radiance of faces whose textures are looked up at st (n, k, 2), in light (n, 5)."""
+def _colored(world: World, seen: Seen, light: np.ndarray) -> np.ndarray:
+    """(n, 3) radiance of what was seen in light (n, 5)."""
     fallen = light[:, :3] + light[:, 4:] * world.sun
-    glow = world.glow * world.scenery.emissive[face] + np.float32(0.5) * light[:, 3:4]
-    return world.scenery.colors(face, st) * fallen + glow
+    glow = np.float32(0.5) * light[:, 3:4] + world.scenery.emissive[seen.face]
+    if len(shade := np.flatnonzero(world.scenery.emissive[seen.face].any(1))):
+        glow[shade] *= world.glow * _through(world, seen.of(shade))[:, None]
+        fallen[shade] = 0  # but little of what they throw on themselves
+    return world.scenery.colors(seen.face, seen.st, _breadth(world, seen)) * fallen + glow
+
+
+def _through(world: World, seen: Seen) -> np.ndarray:
+    """(n,) in [0, 1] how much of a lamp's light comes through its shade: most at the bulb, little at its rim."""
+    back, bulbs = _unit(world.view.matrix[:3, 3].astype(np.float32) - seen.point), world.scenery.lights.bulbs.mean(1)
+    share = np.clip(_dot(back, seen.normal), 0, 1)
+    if len(bulbs):
+        away = seen.point[:, None] - bulbs
+        share *= _dot(_unit(away[np.arange(len(away)), (away**2).sum(2).argmin(1)]), seen.normal) ** 2
+    return np.asarray(RIM + (1 - RIM) * share)
+
+
+def _breadth(world: World, seen: Seen) -> np.ndarray:
+    """(n,) metres of what was seen that a pixel shows, the mean of both ways over it."""
+    back = world.view.matrix[:3, 3].astype(np.float32) - seen.point
+    away = np.sqrt(_dot(back, back))
+    slant = np.clip(_dot(back, seen.normal) / away, 0.05, 1)
+    return np.asarray(2 * world.view.half / world.size * (away / np.sqrt(slant)) ** (not world.view.orthographic))
 
 
 def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, rings: Sequence[int] = RINGS) -> np.ndarray:
@@ -337,10 +341,6 @@ SUN_SPREAD = 0.10  # radius of the sun's disc at distance 1: soft shadows
 SUN_LIGHT = np.array([1.05, 0.99, 0.90], np.float32)
 SKY_LIGHT = np.array([0.90, 0.93, 0.97], np.float32)
 BACKGROUND = np.array([0.90, 0.905, 0.915], np.float32) ** 2.2
-OUTSIDE = (  # what is seen through a window: height in it from -1 to 1, linear colours
-    np.array([-1.0, -0.55, -0.3, 0.2, 1.0]),
-    np.array([(0.33, 0.42, 0.25), (0.47, 0.55, 0.40), (0.80, 0.84, 0.84), (0.74, 0.83, 0.92), (0.47, 0.65, 0.88)]),
-)
 # Of each pixel's shifts, a step to the right and one down: neighbours have different ones, so that smoothing sees all.
 LATTICE = np.array([(0.75487767, 0.81917251, 0.54970048, 0.73389190), (0.56984029, 0.67104361, 0.85667488, 0.62870672)])
 R2 = np.array([0.7548776662, 0.5698402910], np.float32)
@@ -369,24 +369,14 @@ def outside(scenery: Scenery, origin: np.ndarray, direction: np.ndarray) -> np.n
         point = origin + reach[:, None] * direction - middle
         u, v = point @ side / (side @ side), point @ rise / (rise @ rise)
         here = (reach > 0) & (np.abs(u) <= 1) & (np.abs(v) <= 1)
-        if around is None:
-            out[here] = np.stack([np.interp(v[here], OUTSIDE[0], tone) for tone in OUTSIDE[1].T], 1)
-        else:
-            out[here] = _around(around, direction[here])
+        out[here] = SKY_LIGHT if around is None else _around(around, direction[here])
     return out
 
 
 def _around(picture: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """(n, 3) linear colour of a picture by latitude and longitude in directions (n, 3), between its pixels."""
-    height, width = picture.shape[:2]
-    down = np.clip(np.arccos(np.clip(way[:, 1], -1, 1)) / np.pi * height - 0.5, 0, height - 1)
-    right = (0.5 + np.arctan2(way[:, 0], way[:, 2]) / (2 * np.pi)) * width - 0.5
-    out = np.zeros((len(way), 3), np.float32)
-    for y, x in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        row, column = np.floor(down).astype(int) + y, np.floor(right).astype(int) + x
-        share = (1 - np.abs(down - row)) * (1 - np.abs(right - column))
-        out += share[:, None] * LINEAR[picture[np.minimum(row, height - 1), column % width]]
-    return out
+    """(n, 3) linear colour of a picture by latitude and longitude in directions (n, 3)."""
+    down = np.arccos(np.clip(way[:, 1], -1, 1)) / np.pi
+    return between(picture, 0.5 + np.arctan2(way[:, 0], way[:, 2]) / (2 * np.pi), down)
 
 
 class Hits(NamedTuple):
@@ -406,16 +396,12 @@ def _light(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarr
     """(n, 5) the sky's light on the points, the sun's reflection, and the share of the sun that shines there."""
     scene, scenery = world.scene, world.scenery
     point, normal, count = hits.point, hits.normal, len(hits.point)
-    sun = ABOVE + SUN_SPREAD * _on_sphere(_even(sample, shift[:, :2]))
-    sun = _unit(sun)
+    sun = _unit(ABOVE + SUN_SPREAD * _on_sphere(_even(sample, shift[:, :2])))
     facing = np.clip(normal @ ABOVE, 0, None)
-    lit = np.zeros(count, np.float32)
-    ask = np.flatnonzero(facing > 0)
-    lit[ask] = scene.run(_f32(point[ask]), _f32(sun[ask]), query="OCCLUDED") != 0
+    lit = _free(scene, point, sun, np.full(count, 1e3, np.float32), facing > 0)
     sky = np.zeros((count, 3), np.float32)
     for ray in range(SKY_RAYS):
-        away = normal + _on_sphere(_even(sample * SKY_RAYS + ray, shift[:, 2:]))  # cosine-weighted
-        away = _unit(away)
+        away = _unit(normal + _on_sphere(_even(sample * SKY_RAYS + ray, shift[:, 2:])))  # cosine-weighted
         other = scene.run(_f32(point), _f32(away), output=1)
         blocked = other["primID"] >= 0
         # What a sky ray meets sends back a little of its own colour: one crude bounce.

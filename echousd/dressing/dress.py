@@ -161,9 +161,7 @@ def bare_walls(setting: Setting) -> None:
         variant = int(rng.integers(1 << 30))
         low = EYE - float(size[1]) / 2
         series = shown(setting, size, len(spots), f"wall {wall.edge}")
-        row = [
-            hung_at(setting, wall, spot, kind, size, low, variant, "") for kind, spot in zip(series, spots, strict=True)
-        ]
+        row = [hung_at(setting, wall, x, kind, size, low, variant) for kind, x in zip(series, spots, strict=True)]
         setting.placed += [one for one in row if one is not None] if None not in row else []
 
 
@@ -171,7 +169,7 @@ def stretches(setting: Setting, wall: Wall) -> list[tuple[float, float]]:
     """Length and middle (metres along the wall) of its longest bare stretch at eye height, [] where it is short."""
     spots = np.arange(0.3, wall.length - 0.25, STEP)
     low = EYE - float(PROBE[1]) / 2
-    bare = [hung_at(setting, wall, float(spot), "picture", PROBE, low, 0, "") is not None for spot in spots]
+    bare = [hung_at(setting, wall, float(spot), "picture", PROBE, low, 0) is not None for spot in spots]
     runs = [[n for n, _ in run] for free, run in groupby(enumerate(bare), key=lambda one: one[1]) if free]
     ends = [(float(spots[run[0]]), float(spots[run[-1]])) for run in runs]
     long = [(last - first + float(PROBE[0]), (first + last) / 2) for first, last in ends]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import islice
 
@@ -16,7 +16,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.dressing.setting import Setting, Standing, Thing, rectangle, standing
 from echousd.dressing.tabletops import shelved_books, surfaces
 from echousd.shapes.fittings import RAIL
-from echousd.shapes.geometry import Geometry, Origin
+from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
 
 EYE = 1.52  # metres, height of a picture's middle on an empty wall
@@ -67,14 +67,12 @@ def curtains(setting: Setting) -> None:
 
     Over what stands under a window curtains may end at its sill: in half of the rooms, in the others it has a blind.
     """
-    if not setting.walls:
+    if not setting.walls or setting.use == "outdoor":
         return
     above, before, beyond = RAIL
     for wall in walls_of(setting):
         for window in (o for o in setting.openings if o.kind == "window" and o.edge == wall.edge):
             rail = window.sill + window.height + above
-            if setting.use == "outdoor":
-                continue
             if setting.use == "wet" or rail > setting.height - 0.05:
                 _blind(setting, wall, window)
                 continue
@@ -145,7 +143,7 @@ def sockets(setting: Setting) -> None:
         if wall is not None:
             ways = [side * (float(host.size[0]) / 2 + off) for off in (0.15, 0.3, 0.6, 0.8) for side in (1, -1)]
             spots = [(wall, (along + way) / wall.length) for way in ways]
-            _hang_first(setting, Thing("socket", size, np.zeros(3), 0.0, "", variant), spots, 0.3, 0.0)
+            _hang_first(setting, Thing("socket", size, np.zeros(3), 0.0, "", variant), spots, 0.3)
 
 
 def pictures(setting: Setting) -> None:
@@ -197,9 +195,7 @@ def _group(setting: Setting, wall: Wall, along: float, host: Standing, rng: np.r
     series = iter(shown(setting, size, 3 * rows, host.name))
     for row in range(rows):
         for column in (-1, 0, 1):
-            least = max(host.top + OVER, LOWEST) + row * (h + 0.08)
-            if rows == 2:
-                least = host.top + OVER + row * (h + 0.08)
+            least = max(host.top + OVER, LOWEST if rows == 1 else 0.0) + row * (h + 0.08)
             spot = along + column * (float(size[0]) + 0.08)
             one = hung_at(setting, wall, spot, next(series), size, least, variant, host.name)
             if one is None:
@@ -226,9 +222,8 @@ def _over(host: Standing, setting: Setting, rng: np.random.Generator) -> list[tu
     wide = float(host.size[0])
     out: list[tuple[str, np.ndarray]] = []
     if "mirror" in host.row.invites:
-        out.append(("round_mirror" if rng.random() < 0.5 else "mirror", usual_size("round_mirror", rng)))
-        if out[0][0] == "mirror":
-            out = [("mirror", usual_size("mirror", rng))]
+        mirror = "round_mirror" if rng.random() < 0.5 else "mirror"
+        out.append((mirror, usual_size(mirror, rng)))
     share = rng.uniform(0.5, 0.62)
     w = float(np.clip(wide * share, 0.35, 1.3))
     ratio = rng.uniform(0.6, 0.72) if w > 0.55 else rng.uniform(1.25, 1.4)
@@ -240,18 +235,23 @@ def _over(host: Standing, setting: Setting, rng: np.random.Generator) -> list[tu
 
 
 def hung_at(
-    setting: Setting, wall: Wall, along: float, kind: str, size: np.ndarray, low: float, variant: int, on: str
-) -> Thing | None:
-    """A thing whose lower side is at `low`; None where an opening, furniture or something else is in its way."""
-    if along - size[0] / 2 < 0.12 or along + size[0] / 2 > wall.length - 0.12:
+    setting: Setting, wall: Wall, along: float, kind: str, size: np.ndarray, low: float, variant: int, on: str = "",
+    *, above: float = 0.0, before: float = 0.3,
+) -> Thing | None:  # fmt: skip
+    """A thing whose lower side is at `low`; None where an opening, furniture or something else is in its way.
+
+    `above`, `before`: metres that stay free over it and before it.
+    """
+    half, high, deep = float(size[0]) / 2, low + float(size[1]) + above, float(size[2])
+    if min(along, wall.length - along) < half + 0.1 or high > setting.height - 0.05:
         return None
     for opening in (o for o in setting.openings if o.edge == wall.edge):
-        beside = SIDE if opening.kind == "window" else 0.15
-        if meets(opening, along, size[0] / 2 + beside, low, low + size[1]):
+        if meets(opening, along, half + (SIDE if opening.kind == "window" else 0.12), low, high):
             return None
-    thing = Thing(kind, size, wall.at(along, size[2] / 2 + 0.002, low), wall.yaw, on, variant)
-    before = Thing(kind, size + np.array([0.1, 0.06, 0.3]), wall.at(along, 0.18, low - 0.03), wall.yaw, on)
-    return thing if setting.clear(before, margin=0.0, floor=False, host=on) else None
+    room = np.array([2 * half + 0.1, high - low + 0.1, deep + before])
+    free = Thing(kind, room, wall.at(along, room[2] / 2 + 0.012, max(low - 0.1, 0.002)), wall.yaw, on)
+    hung = Thing(kind, size, wall.at(along, deep / 2 + 0.002, low), wall.yaw, on, variant)
+    return hung if setting.clear(free, margin=0.0, floor=False, host=on) else None
 
 
 def meets(opening: Opening, along: float, half: float, low: float, high: float) -> bool:
@@ -263,7 +263,7 @@ def meets(opening: Opening, along: float, half: float, low: float, high: float) 
 SHARES = (0.5, 0.3, 0.7, 0.18, 0.82)  # of a wall's length, the middle first
 SHELF = 1.38  # metres from the floor to the board of a wall shelf
 WALL_SHELVES = ("wall_shelf", "ledge", "box_shelf")  # of a room both are alike
-ABOVE = 0.3  # metres over a shelf that stay free
+ABOVE, STANDING = 0.3, 0.6  # metres that stay free over a shelf, and before a mirror in which one sees all of oneself
 CLOCKS = 0.4  # share of rooms with a clock on a wall, of those where people sit together or work
 
 
@@ -276,7 +276,7 @@ def shelves(setting: Setting) -> None:
     for wall in _roomiest(setting):
         size = usual_size(kind, setting.rng(f"wall {wall.edge}", "shelf"))
         one, spots = Thing(kind, size, np.zeros(3), 0.0, "", variant), [(wall, share) for share in SHARES]
-        board = _hang_first(setting, one, spots, SHELF - float(size[1]), ABOVE)
+        board = _hang_first(setting, one, spots, SHELF - float(size[1]), above=ABOVE)
         if board:
             _filled(setting, board, f"wall shelf {wall.edge}")
             done += 1
@@ -287,12 +287,12 @@ def shelves(setting: Setting) -> None:
 def _filled(setting: Setting, board: Thing, name: str) -> None:
     """Books and small things on a shelf."""
     rng = setting.rng(name, "filled")
-    carrier = standing(name, "shelf", board.size, board.position, board.yaw, _geometry(board))
-    setting.carriers[name] = carrier
+    parts = solids_of(board.kind, board.size, np.random.default_rng(board.variant))
+    made = assembled(parts, board.size, faces=1200, origin=Origin("dressing"))
+    carrier = setting.carriers[name] = standing(name, "shelf", board.size, board.position, board.yaw, made)
     for surface in sorted(surfaces(carrier), key=lambda level: -level.area.area)[:1]:
         side = float(rng.choice((-1.0, 1.0)))
-        tall = 0.25
-        size = np.array([round(float(board.size[0]) * rng.uniform(0.25, 0.4), 3), tall, 0.16])
+        size = np.array([round(float(board.size[0]) * rng.uniform(0.25, 0.4), 3), 0.25, 0.16])
         row = surface.put(setting, "book_row", [(0.97 * side, 0.3), (-0.97 * side, 0.3)], size=size, word="row")
         if row:
             shelved_books(setting, row, rng)
@@ -301,19 +301,13 @@ def _filled(setting: Setting, board: Thing, name: str) -> None:
             surface.put(setting, str(kind), places, word=str(number))
 
 
-def _geometry(board: Thing) -> Geometry:
-    rng = np.random.default_rng(board.variant)
-    return assembled(solids_of(board.kind, board.size, rng), board.size, faces=1200, origin=Origin("dressing"))
-
-
 def clock(setting: Setting) -> None:
     """A clock on a wall where people sit together or work."""
     rng = setting.rng("wall clock")
     if not (setting.walls and setting.inviting("clock") and (setting.full or rng.random() < CLOCKS)):
         return
-    size, variant = usual_size("wall_clock", rng), int(rng.integers(1 << 30))
     spots = [(wall, share) for wall in _roomiest(setting) for share in SHARES]
-    _hang_first(setting, Thing("wall_clock", size, np.zeros(3), 0.0, "", variant), spots, 1.72, 0.05)
+    _hang_first(setting, _new("wall_clock", rng), spots, 1.72)
 
 
 def coats(setting: Setting) -> None:
@@ -322,12 +316,10 @@ def coats(setting: Setting) -> None:
         return
     for wall in walls_of(setting):
         for door in (o for o in setting.openings if o.kind == "door" and o.edge == wall.edge):
-            rng = setting.rng(door.name, "coats")
-            size, variant = usual_size("coats", rng), int(rng.integers(1 << 30))
-            half = float(size[0]) / 2 + 0.12
+            one = _new("coats", setting.rng(door.name, "coats"))
+            half = float(one.size[0]) / 2 + 0.12
             spots = [(wall, along / wall.length) for along in (door.end + half, door.offset - half)]
-            one = Thing("coats", size, np.zeros(3), 0.0, "", variant)
-            if _hang_first(setting, one, spots, 1.78 - float(size[1]), 0.02):
+            if _hang_first(setting, one, spots, 1.78 - float(one.size[1])):
                 return
 
 
@@ -369,21 +361,15 @@ def _posts(host: Standing) -> bool:
 
 
 def tall_mirror(setting: Setting) -> None:
-    """A mirror for the whole person where somebody dresses: in rooms with a wardrobe or a bed."""
-    if not (setting.full and setting.walls and setting.inviting("tall_mirror")):
-        return
-    rng = setting.rng("tall mirror")
-    size, variant = usual_size("tall_mirror", rng), int(rng.integers(1 << 30))
-    spots = [(wall, share) for wall in _roomiest(setting) for share in (0.18, 0.82, *SHARES)]
-    one = Thing("tall_mirror", size, np.zeros(3), 0.0, "", variant)
-    _hang_first(setting, one, spots, 0.3, 0.02, _free_before)
+    """A mirror for the whole person where somebody dresses and can stand before it: in rooms with a wardrobe or bed."""
+    if setting.full and setting.walls and setting.inviting("tall_mirror"):
+        spots = [(wall, share) for wall in _roomiest(setting) for share in (0.18, 0.82, *SHARES)]
+        _hang_first(setting, _new("tall_mirror", setting.rng("tall mirror")), spots, 0.3, before=STANDING)
 
 
-def _free_before(setting: Setting, wall: Wall, mirror: Thing) -> bool:
-    """Whether a person can stand before a mirror."""
-    along = float((mirror.position[[0, 2]] - wall.start) @ wall.along)
-    there = Thing("mirror", np.array([0.5, 1.5, 0.5]), wall.at(along, 0.35, 0.05), wall.yaw)
-    return setting.clear(there, margin=0.0)
+def _new(kind: str, rng: np.random.Generator) -> Thing:
+    """A thing of a usual size that has no place yet."""
+    return Thing(kind, usual_size(kind, rng), np.zeros(3), 0.0, "", int(rng.integers(1 << 30)))
 
 
 def _roomiest(setting: Setting) -> Iterable[Wall]:
@@ -402,31 +388,13 @@ def _roomiest(setting: Setting) -> Iterable[Wall]:
 
 
 def _hang_first(
-    setting: Setting, one: Thing, spots: Iterable[tuple[Wall, float]], low: float, above: float,
-    wanted: Callable[[Setting, Wall, Thing], bool] = lambda setting, wall, thing: True,
+    setting: Setting, one: Thing, spots: Iterable[tuple[Wall, float]], low: float, *, above: float = 0.02,
+    before: float = 0.02,
 ) -> Thing | None:  # fmt: skip
-    """Hang a thing at the first of some shares of walls' lengths where it fits and is wanted; None where none is."""
+    """Hang a thing at the first of some shares of walls' lengths where it fits; None where none is."""
     for wall, share in spots:
-        found = _hung_up(setting, wall, share, one, low, above)
-        if found and wanted(setting, wall, found):
+        place = wall, share * wall.length, one.kind, one.size, low, one.variant
+        if found := hung_at(setting, *place, above=above, before=before):
             setting.placed.append(found)
             return found
     return None
-
-
-def _hung_up(setting: Setting, wall: Wall, share: float, thing: Thing, low: float, above: float) -> Thing | None:
-    """The thing at a share of a wall's length, its lower side at `low`; None where it does not fit."""
-    along, high = share * wall.length, low + float(thing.size[1])
-    half = float(thing.size[0]) / 2
-    if along - half < 0.1 or along + half > wall.length - 0.1 or high + above > setting.height - 0.05:
-        return None
-    for opening in (o for o in setting.openings if o.edge == wall.edge):
-        beside = SIDE if opening.kind == "window" else 0.1
-        if meets(opening, along, half + beside, low, high + above):
-            return None
-    depth = float(thing.size[2])
-    before = Thing(thing.kind, thing.size + np.array([0.08, 0.1 + above, 0.02]),
-                   wall.at(along, depth / 2 + 0.012, max(low - 0.1, 0.002)), wall.yaw)  # fmt: skip
-    if not setting.clear(before, margin=0.0, floor=False):
-        return None
-    return Thing(thing.kind, thing.size, wall.at(along, depth / 2 + 0.002, low), wall.yaw, "", thing.variant)

@@ -170,6 +170,63 @@ def test_a_lamp_shines_from_its_shade_and_throws_no_shadow_of_its_own_on_the_cei
     assert middle > 0.9 * beside
 
 
+def with_sheet(scenery, corners: np.ndarray, **values):
+    """The scenery and an upright or level rectangle (4, 3) in it, whose colours, glow or texture are told."""
+    triangles = corners.astype(np.float32)[[[0, 1, 2], [0, 2, 3]]]
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    added = {
+        "triangles": triangles, "normals": np.broadcast_to(normal / np.linalg.norm(normal), (2, 3, 3)),
+        "flat_colors": np.full((2, 3), 0.5), "emissive": np.zeros((2, 3)), "gloss": np.zeros(2),
+        "st": np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)[[[0, 1, 2], [0, 2, 3]]], "texture": np.full(2, -1),
+        "wall": np.full(2, -1), **values,
+    }  # fmt: skip
+    joined = {key: np.concatenate([getattr(scenery, key), more]) for key, more in added.items()}
+    return replace(scenery, **{key: value.astype(getattr(scenery, key).dtype) for key, value in joined.items()})
+
+
+def level_sheet(x: float, z: float, y: float = 0.05) -> np.ndarray:
+    """(4, 3) corners of a rectangle of these sides about the middle of the room, facing up."""
+    return np.array([(-x, y, z), (x, y, z), (x, y, -z), (-x, y, -z)]) / (2, 1, 2)
+
+
+LAMP = {"bulbs": np.array([[(0.0, 1.5, 0.0)]], np.float32), "power": np.ones((1, 3), np.float32)}
+
+
+def test_a_fine_pattern_is_an_even_tone_from_afar_and_seen_from_near():
+    scenery, down = box_room(sky=0.0, **LAMP)
+    board = np.where(np.indices((256, 256)).sum(0) % 2, 255, 0).astype(np.uint8)
+    chess = (np.repeat(board[..., None], 3, 2), np.ones(3, np.float32))
+    spread = {}
+    for side in (1.0, 100.0):
+        sheet = with_sheet(scenery, level_sheet(side, side), texture=np.zeros(2))
+        picture = trace(replace(sheet, images=(chess,)), down, 96, rays=2).mean(-1)
+        spread[side] = float(picture[40:56, 40:56].std())
+    assert spread[1.0] < 0.03  # seven fields a pixel
+    assert spread[100.0] > 0.15
+
+
+def test_a_bar_thinner_than_a_pixel_has_no_gaps():
+    scenery, down = box_room(sky=0.0, **LAMP)
+    bar = np.full((2, 3), 0.02)
+    across = abs(down.matrix[0, 0]) > 0.5
+    turn = np.array([[np.cos(0.1), 0, np.sin(0.1)], [0, 1, 0], [-np.sin(0.1), 0, np.cos(0.1)]])
+    corners = level_sheet(*((3.0, 0.05) if across else (0.05, 3.0)), y=0.3) @ turn  # a pixel is 0.07 m there
+    with_bar, without = (
+        trace(one, down, 48, rays=2).mean(-1) for one in (with_sheet(scenery, corners, flat_colors=bar), scenery)
+    )
+    darker = (without - with_bar)[:, 8:40].max(0)
+    assert darker.min() > 0.35 * np.median(darker)
+
+
+def test_a_shade_is_brightest_at_its_bulb():
+    scenery, down = box_room(sky=0.0, **LAMP)
+    white = replace(scenery, flat_colors=np.full_like(scenery.flat_colors, 0.8))
+    shade = with_sheet(white, level_sheet(1.6, 1.6, y=1.2), emissive=np.full((2, 3), 0.5))
+    picture = trace(shade, down, 96, rays=2).mean(-1)
+    middle, rim = picture[46:50, 46:50].mean(), picture[46:50, 6:10].mean()
+    assert 1.0 > middle > rim + 0.02
+
+
 def test_who_looks_into_a_mirror_sees_what_is_before_it():
     scenery, down = box_room(
         sky=1.0, bulbs=np.array([[(0.0, 1.5, 0.0)]], np.float32), power=np.ones((1, 3), np.float32)
