@@ -131,13 +131,13 @@ def with_ceiling(scenery: Scenery) -> Scenery:
 
 
 def evened(light: np.ndarray, sun: np.ndarray, white: np.ndarray) -> np.ndarray:
-    """Light on points (n, 5), see `tracing`, less bright where it is brighter than the mean and brighter where it is
+    """Light on points (n, 6), see `tracing`, less bright where it is brighter than the mean and brighter where it is
     less: so walls at lamps and windows keep their colour and corners are not black.
 
     `sun`: (3,) what the sun gives. `white`: (3,) the mean light in the room.
     """
-    level = (light[:, :3] + light[:, 4:] * sun) @ LUMA / max(float(white @ LUMA), 1e-6)
-    return np.asarray(light * np.maximum(level, np.float32(1e-3))[:, None] ** np.float32(-EVEN))
+    level = (light[:, :3] + light[:, 4:5] * sun) @ LUMA / max(float(white @ LUMA), 1e-6)
+    return np.asarray(light * np.maximum(level, np.float32(1e-3))[:, None] ** np.array([*[-EVEN] * 5, 0], np.float32))
 
 
 def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable[[np.ndarray], np.ndarray]:

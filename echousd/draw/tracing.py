@@ -18,7 +18,7 @@ FINE, QUICK = 3, 2  # squared: rays per pixel
 SKY_RAYS, AROUND = 3, 3  # per ray: rays towards the sky; inside a room, to what stands around
 # Places at which a room's light is found, rays of each kind from each, and how often light is thrown on.
 PLACES, OFTEN, TURNS = (600, 1200), 3, 3
-NEAR, CREVICE = 0.1, 1.5  # what of the light around comes where something touches, and from how many metres on all
+CREVICE, DEPTH = 0.6, 1.3  # metres from which on nothing makes a place darker; how dark what touches it does
 
 
 class RenderUnavailable(ImportError, ValueError):
@@ -203,9 +203,9 @@ def _seen(world: World, origin: np.ndarray, direction: np.ndarray, hit: Mapping[
 
 
 def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndarray:
-    """(n, 5) what falls on what was seen in some pixels: soft light by colour, what of it is mirrored to the eye, and
-    the share of the sun that shines there."""
-    view, out = world.view, np.zeros((len(pixel), 5), np.float32)
+    """(n, 6) what falls on what was seen in some pixels: soft light by colour, what of it is mirrored to the eye, the
+    share of the sun that shines there, and how free the place is of what stands near, see `CREVICE`."""
+    view, out = world.view, np.zeros((len(pixel), 6), np.float32)
     for rows in (slice(start, start + BLOCK) for start in range(0, len(pixel), BLOCK)):
         point, normal = seen.point[rows], seen.normal[rows]
         toward = np.broadcast_to(view.matrix[:3, 2], point.shape) if view.orthographic else view.matrix[:3, 3] - point
@@ -219,7 +219,7 @@ def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndar
 
 
 def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: int) -> np.ndarray:
-    """(n, 5) light at all pixels: asked at every second of every second row, lent to those of the same surface.
+    """(n, 6) light at all pixels: asked at every second of every second row, lent to those of the same surface.
 
     Where there is little of a surface around to smooth the light over, at an `edge` (n,), it is asked `often`.
     """
@@ -227,10 +227,10 @@ def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: in
     met, coarse = seen.face.reshape(shape) >= 0, np.s_[::2, ::2]
     normal, point = (each.reshape(*shape, 3) for each in (seen.normal, seen.point))
     asked, torn, number = met[coarse], edge.reshape(shape)[coarse], np.arange(met.size).reshape(shape)[coarse]
-    found, light = np.zeros((*asked.shape, 5), np.float32), np.zeros((*shape, 5), np.float32)
+    found, light = np.zeros((*asked.shape, 6), np.float32), np.zeros((*shape, 6), np.float32)
     for here, times in ((asked & torn, often), (asked & ~torn, seldom)):
         found[here] = _asked(world, seen.of(number[here]), number[here], times)
-    for layers, rings in ((slice(4), RINGS), (slice(4, 5), RINGS[:1])):
+    for layers, rings in ((slice(4), RINGS), (slice(4, 5), RINGS[:1]), (slice(5, 6), RINGS[:3])):
         found[..., layers] = smooth_light(found[..., layers], normal[coarse], point[coarse], rings)
     weight = np.zeros((*shape, 1), np.float32)
     for steps in product((0, 1), repeat=2):  # of up to four that were asked around it, those of its own surface
@@ -240,8 +240,8 @@ def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: in
         weight += fits[..., None]
     light /= np.maximum(weight, 1)
     rest = np.flatnonzero(met & (weight[..., 0] == 0))
-    light.reshape(-1, 5)[rest] = _asked(world, seen.of(rest), rest, often)
-    return smooth_light(light, normal, point, RINGS[:1]).reshape(-1, 5)
+    light.reshape(-1, 6)[rest] = _asked(world, seen.of(rest), rest, often)
+    return smooth_light(light, normal, point, RINGS[:1]).reshape(-1, 6)
 
 
 def _same(normal: np.ndarray, point: np.ndarray, other_normal: np.ndarray, other_point: np.ndarray) -> np.ndarray:
@@ -251,8 +251,8 @@ def _same(normal: np.ndarray, point: np.ndarray, other_normal: np.ndarray, other
 
 
 def _lent(world: World, met: Seen, pixel: np.ndarray, seen: Seen, light: np.ndarray) -> np.ndarray:
-    """(n, 5) light of what further rays in some pixels met: that of the same surface there or beside it, else asked."""
-    out, wanted = np.zeros((len(pixel), 5), np.float32), np.arange(len(pixel))
+    """(n, 6) light of what further rays in some pixels met: that of the same surface there or beside it, else asked."""
+    out, wanted = np.zeros((len(pixel), 6), np.float32), np.arange(len(pixel))
     for apart in (0, 1, -1, world.size, -world.size):
         other = np.clip(pixel[wanted] + apart, 0, len(light) - 1)
         fits = (seen.face[other] >= 0) & _same(
@@ -265,8 +265,8 @@ def _lent(world: World, met: Seen, pixel: np.ndarray, seen: Seen, light: np.ndar
 
 
 def _colored(world: World, seen: Seen, light: np.ndarray) -> np.ndarray:
-    """(n, 3) radiance of what was seen in light (n, 5)."""
-    fallen = light[:, :3] + light[:, 4:] * world.sun
+    """(n, 3) radiance of what was seen in light (n, 6)."""
+    fallen = light[:, :3] * light[:, 5:] ** DEPTH + light[:, 4:5] * world.sun
     glow = np.float32(0.5) * light[:, 3:4] + world.scenery.emissive[seen.face]
     if len(shade := np.flatnonzero(world.scenery.emissive[seen.face].any(1))):
         glow[shade] *= world.glow * _through(world, seen.of(shade))[:, None]
@@ -393,7 +393,7 @@ class Hits(NamedTuple):
 
 
 def _light(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarray:
-    """(n, 5) the sky's light on the points, the sun's reflection, and the share of the sun that shines there."""
+    """(n, 6) the sky's light on the points, the sun's reflection, and the share of the sun that shines there."""
     scene, scenery = world.scene, world.scenery
     point, normal, count = hits.point, hits.normal, len(hits.point)
     sun = _unit(ABOVE + SUN_SPREAD * _on_sphere(_even(sample, shift[:, :2])))
@@ -410,16 +410,16 @@ def _light(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarr
         open_sky = (0.72 + 0.28 * np.clip(away[:, 1:2], -1, 1)) * SKY_LIGHT
         sky += np.where(blocked[:, None], bounce * (0.45 + 0.55 * near), open_sky)
     sky /= SKY_RAYS
-    return np.column_stack([1.05 * sky, hits.shine(ABOVE) * lit, facing * lit])
+    return np.column_stack([1.05 * sky, hits.shine(ABOVE) * lit, facing * lit, np.ones(count, np.float32)])
 
 
 def _light_inside(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarray:
     """As `_light`, in a closed room: sky in the windows, sun through them, lamps, and what the room throws back."""
     light, shine, sun = _direct(world, hits, *(_even(sample, part) for part in (shift[:, :2], shift[:, 2:])))
-    light += DIM * max(world.scenery.lights.sky, 0.1)
+    light = np.pad(light + np.float32(DIM * max(world.scenery.lights.sky, 0.1)), ((0, 0), (0, 1)))
     for ray in range(AROUND):
         light += _gathered(world, hits, _even(sample * AROUND + ray, shift[:, 2:])) / AROUND
-    return np.column_stack([light, shine, sun])
+    return np.column_stack([light[:, :3], shine, sun, light[:, 3]])
 
 
 def _direct(world: World, hits: Hits, spot: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -456,13 +456,13 @@ def _direct(world: World, hits: Hits, spot: np.ndarray, turn: np.ndarray) -> tup
 
 
 def _gathered(world: World, hits: Hits, square: np.ndarray) -> np.ndarray:
-    """(n, 3) what surfaces around throw on the points, by one ray each; `square`: (n, 2) in [0, 1), where it goes."""
+    """(n, 4) what surfaces throw on points by one ray each, which goes to `square` (n, 2), and shares of `CREVICE`."""
     way = _unit(hits.normal + _on_sphere(square))  # cosine-weighted
     other = world.scene.run(_f32(hits.point), _f32(way), output=1)
-    near = NEAR + (1 - NEAR) * np.clip(other["tfar"][:, None] / CREVICE, 0, 1)
     normal = world.scenery.normals[np.maximum(other["primID"], 0), 0]
     rows = world.thrown.rows(hits.point, way, np.minimum(other["tfar"], 100), normal)
-    return np.asarray((other["primID"] >= 0)[:, None] * near * world.thrown.radiance[rows])
+    thrown = (other["primID"] >= 0)[:, None] * world.thrown.radiance[rows]
+    return np.column_stack([thrown, np.clip(other["tfar"] / CREVICE, 0, 1)])
 
 
 def _lit(world: World) -> tuple[World, np.ndarray]:
@@ -491,7 +491,7 @@ def _lit(world: World) -> tuple[World, np.ndarray]:
     for _ in range(TURNS):
         world = world._replace(thrown=world.thrown.lit(rows, albedo * (direct + light)))
         squares = rng.random((OFTEN, len(point), 2), np.float32)
-        light = np.mean([_gathered(world, hits, square) for square in squares], 0)
+        light = np.mean([_gathered(world, hits, square)[:, :3] for square in squares], 0)
     return world, (direct + light).mean(0)
 
 

@@ -205,6 +205,15 @@ def test_a_fine_pattern_is_an_even_tone_from_afar_and_seen_from_near():
     assert spread[100.0] > 0.15
 
 
+def test_a_floor_is_darker_where_something_touches_it_and_nowhere_else():
+    scenery, down = box_room(sky=0.0, **LAMP)
+    fence = with_sheet(scenery, np.array([(-0.8, 0.0, 0.6), (0.8, 0.0, 0.6), (0.8, 0.4, 0.6), (-0.8, 0.4, 0.6)]))
+    bare, fenced = (trace(one, down, 96, rays=2).mean(-1) for one in (scenery, fence))
+    share = fenced / bare
+    assert np.percentile(share, 2) < 0.92
+    assert np.median(share) > 0.97
+
+
 def test_a_bar_thinner_than_a_pixel_has_no_gaps():
     scenery, down = box_room(sky=0.0, **LAMP)
     bar = np.full((2, 3), 0.02)
@@ -245,14 +254,13 @@ def test_who_looks_into_a_mirror_sees_what_is_before_it():
 
 
 def test_light_is_evened_about_its_mean():
-    light = np.zeros((3, 5), np.float32)
+    light = np.zeros((3, 6), np.float32)
     light[:, :3] = np.array([0.1, 1.0, 10.0])[:, None]
-    light[0, 4] = 0.0
     even = evened(light, np.ones(3, np.float32), np.ones(3, np.float32))[:, 0]
     assert even[1] == pytest.approx(1.0)
     assert 10 < even[2] / even[0] < 50  # of 100
     sunny = light.copy()
-    sunny[1] = (0, 0, 0, 0, 10.0)  # all of it from the sun counts as bright as that from elsewhere
+    sunny[1] = (0, 0, 0, 0, 10.0, 0)  # all of it from the sun counts as bright as that from elsewhere
     assert evened(sunny, np.ones(3, np.float32), np.ones(3, np.float32))[1, 4] == pytest.approx(even[2])
 
 
