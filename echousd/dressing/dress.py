@@ -138,7 +138,7 @@ def geometry_of(kind: str, size: tuple[float, float, float], variant: int) -> Ge
     return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, weighed(pieces))
 
 
-STRETCH, FULLER, LONG = 1.9, 1.2, 3.2  # metres of bare wall that ask for a picture, in full rooms, and for three
+STRETCH, FULLER, LONG = 1.6, 1.2, 3.2  # metres of bare wall that ask for a picture, in full rooms, and for three
 STEP = 0.1  # metres from spot to spot along a wall
 PROBE = np.array([0.3, 0.8, 0.03])  # a picture that tells whether a spot is bare
 EMPTY = 0.8  # metres around a corner where nothing stands
@@ -152,14 +152,13 @@ def bare_walls(setting: Setting) -> None:
     found = [(length, middle, wall) for wall in walls_of(setting) for length, middle in stretches(setting, wall)]
     for length, middle, wall in sorted(found, key=lambda one: -one[0])[: None if setting.full else 2]:
         rng = setting.rng(f"wall {wall.edge}", "bare")
-        wide = float(np.clip(0.3 * length, 0.6, 1.0))
+        wide = float(np.clip(0.4 * length, 0.6, 1.3))
         size = np.round([wide, wide * rng.uniform(0.66, 0.75), 0.03], 2)
         spots = [middle]
         if length > LONG:
-            size = np.array([0.5, 0.68, 0.03])
-            spots = [middle + step * 0.66 for step in (-1, 0, 1)]
-        variant = int(rng.integers(1 << 30))
-        low = EYE - float(size[1]) / 2
+            size = np.array([0.6, 0.82, 0.03])
+            spots = [middle + step * 0.72 for step in (-1, 0, 1)]
+        low, variant = EYE - float(size[1]) / 2, int(rng.integers(1 << 30))
         series = shown(setting, size, len(spots), f"wall {wall.edge}")
         row = [hung_at(setting, wall, x, kind, size, low, variant) for kind, x in zip(series, spots, strict=True)]
         setting.placed += [one for one in row if one is not None] if None not in row else []

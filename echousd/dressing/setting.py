@@ -117,6 +117,10 @@ class Setting:
         key = "/".join((str(self.seed), "dressing", *words)).encode()
         return np.random.default_rng(int.from_bytes(hashlib.blake2b(key, digest_size=8).digest(), "big"))
 
+    def has(self, share: float, rng: np.random.Generator) -> bool:
+        """Whether this room has what a share of rooms has, and every one that is dressed in full."""
+        return self.full or bool(rng.random() < share)
+
     def of(self, *roles: str) -> list[Standing]:
         """The objects of some roles, in the order of the graph."""
         return [o for o in self.objects.values() if o.row.role in roles]

@@ -26,13 +26,12 @@ class Wish:
     beside: tuple[str, ...] = ()  # `with`
     by: str = ""
     turn: str = ""
-    full: bool = False
     share: float = 1.0
     needs: str = ""
 
     def comes(self, full: bool, rng: np.random.Generator) -> bool:
         """Whether a room that is dressed in full, or not, has it."""
-        return (full or not self.full) and bool(rng.random() < self.share)
+        return bool(rng.random() < (2 if full else 1) * self.share)
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ def story(resident: str = "") -> Story:
 
 def _wish(row: dict[str, Any]) -> Wish:
     at = (spot for one in row["at"] for spot in (TABLE["places"].get(one, [one]) if isinstance(one, str) else [one]))
-    rest = {word: row[word] for word in ("by", "turn", "full", "share", "needs") if word in row}
+    rest = {word: row[word] for word in ("by", "turn", "share", "needs") if word in row}
     return Wish(tuple(row["of"]), tuple(at), tuple(row.get("with", ())), **rest)
 
 

@@ -200,16 +200,14 @@ def _laid(setting: Setting, host: Standing, surface: Surface) -> None:
         share, edge = local / half, np.zeros(2)
         edge[side] = np.sign(local[side])
         share[side] = 0.97 * edge[side]
-        along = share[1 - side]
         turn = float(np.arctan2(-edge[0], -edge[1]))
         room = half[1 - side] - plate[0] / 2
-        spot = share.copy()
-        spot[1 - side] = np.clip(along * half[1 - side] / max(room, 1e-6), -0.98, 0.98)
-        if surface.put(setting, "plate", [(spot[0], spot[1])], size=plate, turn=turn, variant=variant, word=seat.name):
-            beside = spot.copy()
+        share[1 - side] = np.clip(local[1 - side] / max(room, 1e-6), -0.98, 0.98)
+        if surface.put(setting, "plate", [tuple(share)], size=plate, turn=turn, variant=variant, word=seat.name):
+            beside = share.copy()
             beside[1 - side] += 0.2 / max(room, 1e-6) * (1 if edge[side] * (1 if side == 1 else -1) > 0 else -1)
             beside[side] *= 0.72
-            surface.put(setting, "glass", [(beside[0], beside[1])], size=glass, variant=variant, word=seat.name)
+            surface.put(setting, "glass", [tuple(beside)], size=glass, variant=variant, word=seat.name)
 
 
 def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
@@ -221,8 +219,8 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
     wide, deep = x1 - x0, z1 - z0
     side = 1.0 if rng.random() < 0.5 else -1.0
     ware = WARE if host.row.task else LINEN if setting.use == "wet" else ()
-    if rng.random() < (0.95 if setting.full else 0.75) and not ware:
-        length = wide * rng.uniform(0.35, 0.65)
+    if rng.random() < (0.95 if setting.full else 0.85) and not ware:
+        length = wide * rng.uniform(0.4, 0.8)
         for share in (1.0, 0.6, 0.35):
             if length * share < 0.1:
                 break
@@ -238,7 +236,7 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
                 break
     wanted = [str(kind) for kind in rng.permutation(ware or setting.story.shelves)]
     for number in range(2):
-        if rng.random() < 0.75:
+        if rng.random() < 0.85:
             places = [(x * side, 0.2) for x in (0.75, 0.4, 0.95, 0.1, -0.2, -0.6)]
             for kind in wanted[number * 4 : number * 4 + 4]:
                 if surface.put(setting, kind, places, word=str(number)):

@@ -158,7 +158,7 @@ def pictures(setting: Setting) -> None:
         wall, along = behind
         rng = setting.rng(host.name, "picture")
         for kind, size in _over(host, setting, rng):
-            if setting.full and kind == "picture" and _group(setting, wall, along, host, rng):
+            if kind == "picture" and setting.has(GROUPS, rng) and _group(setting, wall, along, host, rng):
                 break
             if kind == "picture":
                 (kind,) = shown(setting, size, 1, host.name)
@@ -264,14 +264,16 @@ SHARES = (0.5, 0.3, 0.7, 0.18, 0.82)  # of a wall's length, the middle first
 SHELF = 1.38  # metres from the floor to the board of a wall shelf
 WALL_SHELVES = ("wall_shelf", "ledge", "box_shelf")  # of a room both are alike
 ABOVE, STANDING = 0.3, 0.6  # metres that stay free over a shelf, and before a mirror in which one sees all of oneself
-CLOCKS = 0.4  # share of rooms with a clock on a wall, of those where people sit together or work
+# Shares of rooms with a clock, of those where people sit together or work; with shelves, coats, a tall mirror; of the
+# pieces with a picture above them, those that have three.
+CLOCKS, WITH_SHELVES, COATS, MIRRORS, GROUPS = 0.4, 0.3, 0.25, 0.5, 0.5
 
 
 def shelves(setting: Setting) -> None:
     """Up to two shelves on walls that have room, with books and small things on them."""
-    if not (setting.full and setting.walls):
-        return
     done, rng = 0, setting.rng("shelves")
+    if not (setting.walls and setting.has(WITH_SHELVES, rng)):
+        return
     kind, variant = str(rng.choice(WALL_SHELVES)), int(rng.integers(1 << 30))
     for wall in _roomiest(setting):
         size = usual_size(kind, setting.rng(f"wall {wall.edge}", "shelf"))
@@ -304,7 +306,7 @@ def _filled(setting: Setting, board: Thing, name: str) -> None:
 def clock(setting: Setting) -> None:
     """A clock on a wall where people sit together or work."""
     rng = setting.rng("wall clock")
-    if not (setting.walls and setting.inviting("clock") and (setting.full or rng.random() < CLOCKS)):
+    if not (setting.walls and setting.inviting("clock") and setting.has(CLOCKS, rng)):
         return
     spots = [(wall, share) for wall in _roomiest(setting) for share in SHARES]
     _hang_first(setting, _new("wall_clock", rng), spots, 1.72)
@@ -312,9 +314,7 @@ def clock(setting: Setting) -> None:
 
 def coats(setting: Setting) -> None:
     """A rail with a coat and a bag beside a door."""
-    if not (setting.full and setting.walls):
-        return
-    for wall in walls_of(setting):
+    for wall in walls_of(setting) if setting.walls and setting.has(COATS, setting.rng("coats")) else ():
         for door in (o for o in setting.openings if o.kind == "door" and o.edge == wall.edge):
             one = _new("coats", setting.rng(door.name, "coats"))
             half = float(one.size[0]) / 2 + 0.12
@@ -347,11 +347,10 @@ def hung_up(setting: Setting) -> None:
             size[0] = min(size[0], w - 0.1)
             count, high, z = 1, 0.86 * h - float(size[1]), d / 2 - 0.02
         for k in range(count):
-            x = (k - (count - 1) / 2) * w / count
-            variant = int(rng.integers(1 << 30))
-            place = host.to_room(np.array([[x, high, z]]))[0]
+            place = host.to_room(np.array([[(k - (count - 1) / 2) * w / count, high, z]]))
+            one = Thing(kind, size, place[0], host.yaw, host.name, int(rng.integers(1 << 30)))
             if kind == "towel" or k == 0 or rng.random() < 0.7:
-                setting.placed.append(Thing(kind, size, place, host.yaw, host.name, variant))
+                setting.placed.append(one)
 
 
 def _posts(host: Standing) -> bool:
@@ -362,9 +361,10 @@ def _posts(host: Standing) -> bool:
 
 def tall_mirror(setting: Setting) -> None:
     """A mirror for the whole person where somebody dresses and can stand before it: in rooms with a wardrobe or bed."""
-    if setting.full and setting.walls and setting.inviting("tall_mirror"):
+    rng = setting.rng("tall mirror")
+    if setting.walls and setting.inviting("tall_mirror") and setting.has(MIRRORS, rng):
         spots = [(wall, share) for wall in _roomiest(setting) for share in (0.18, 0.82, *SHARES)]
-        _hang_first(setting, _new("tall_mirror", setting.rng("tall mirror")), spots, 0.3, before=STANDING)
+        _hang_first(setting, _new("tall_mirror", rng), spots, 0.3, before=STANDING)
 
 
 def _new(kind: str, rng: np.random.Generator) -> Thing:

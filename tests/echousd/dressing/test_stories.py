@@ -9,7 +9,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.dressing import tabletops
 from echousd.dressing.dress import dressed, setting_of
 from echousd.dressing.setting import Thing
-from echousd.dressing.stories import TABLE, guessed, story
+from echousd.dressing.stories import TABLE, Wish, guessed, story
 from echousd.graph import SceneGraph
 from echousd.graph.fields import RESIDENTS
 from echousd.options import RoomOptions
@@ -22,6 +22,15 @@ nodes:
   - {name: desk, category: desk}
   - {name: nightstand, category: nightstand}
 """
+
+
+def test_rooms_dressed_in_full_have_twice_as_often_what_others_may_have():
+    cup, rng = Wish(of=("cup",), at=(), share=0.3), np.random.default_rng(0)
+    some, full = (np.mean([cup.comes(full, rng) for _ in range(2000)]) for full in (False, True))
+    assert some == pytest.approx(0.3, abs=0.04)
+    assert full == pytest.approx(0.6, abs=0.04)
+    always = Wish(of=("cup",), at=(), share=0.5)
+    assert all(always.comes(True, rng) for _ in range(100))
 
 
 @pytest.fixture(scope="module")
