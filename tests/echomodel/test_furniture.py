@@ -80,11 +80,17 @@ def test_pieces_of_one_style_are_closer_in_size_than_pieces_of_different_styles(
     assert within < 0.8 * np.abs(pairs[:, 0] - np.roll(pairs[:, 1], 1, axis=0)).mean()
 
 
+@pytest.fixture(scope="module")
+def styles():
+    rng = np.random.default_rng(3)
+    return [style for _ in range(750) for style in (None, Style.draw(rng))]
+
+
 @pytest.mark.parametrize("category", CATEGORIES)
-def test_sizes_have_the_percentiles_of_real_rooms(category):
+def test_sizes_have_the_percentiles_of_real_rooms(category, styles):
     rng = np.random.default_rng(3)
     statistics = size_statistics(category)
-    sizes = np.array([sample_size(category, rng, Style.draw(rng) if i % 2 else None) for i in range(1500)])
+    sizes = np.array([sample_size(category, rng, style) for style in styles])
     low, median, high = np.percentile(sizes, [5, 50, 95], axis=0)
     np.testing.assert_allclose(median, statistics.median, rtol=0.10)
     np.testing.assert_allclose(low, statistics.low, rtol=0.20)

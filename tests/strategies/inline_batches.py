@@ -2,10 +2,12 @@
 
 import json
 
+from small_room import BARE
+
 from echousd.batches.executor import Outcome, attempt
 from echousd.batches.plan import room_digest
 
-QUICK = {"shapes": "boxes", "preview": False, "drafts": 1, "steps": 2}
+QUICK = {"shapes": "boxes", "preview": False, "drafts": 1, "steps": 2, **BARE}
 
 
 class Inline:

@@ -37,7 +37,7 @@ def smoke(stage: str, data: Path, *settings: str) -> Recipe:
 
 def test_told_relations_hold_in_mirrored_rooms(packed: PackedRooms) -> None:
     seen = 0
-    for seed in range(4):
+    for seed in range(2):
         batch = draw_batch(packed, 200, torch.Generator().manual_seed(seed))
         triplets = told_triplets(batch)
         for number, rules in enumerate(("sgfront", "strict")):
@@ -45,7 +45,7 @@ def test_told_relations_hold_in_mirrored_rooms(packed: PackedRooms) -> None:
             kept = verdicts(batch.boxes, mine, rules=rules)
             seen += int((kept >= 0).sum())
             assert not (kept == 0).any()
-    assert seen > 1000
+    assert seen > 500
 
 
 def test_losses_see_boxes_at_the_heights_of_what_carries_them(packed: PackedRooms) -> None:

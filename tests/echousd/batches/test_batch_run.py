@@ -174,7 +174,8 @@ def test_palettes_openings_and_dressing_vary(tmp_path):
     assert graph.room.openings
     (tmp_path / "graph.json").write_text(graph.replaced(nodes=nodes, relations=()).to_json())
     varied = {"palette": ["coast", "clay"], "openings": ["kept", "drawn"]}
-    batch(tmp_path / "graph.json", tmp_path / "run", count=4, executor=Inline(), variations=varied, **QUICK)
+    walled = {**QUICK, "walls": True}
+    batch(tmp_path / "graph.json", tmp_path / "run", count=4, executor=Inline(), variations=varied, **walled)
     found = [json.loads(p.read_text()) for p in sorted((tmp_path / "run" / "rooms").glob("*/*/*.json"))]
     assert [room["palette"] for room in found] == ["coast", "coast", "clay", "clay"]
     openings = [room["graph"]["room"]["openings"] for room in found]

@@ -11,6 +11,7 @@ import traceback
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from inline_batches import Inline
 
 from echousd.cli.main import run
 from echousd.cli.output import say_json
@@ -135,10 +136,11 @@ def test_an_index_is_whole_or_stays_as_it_was(tmp_path, room):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="this system limits no file's size")
-def test_a_batch_on_a_full_disk_goes_on_later(tmp_path):
+def test_a_batch_on_a_full_disk_goes_on_later(tmp_path, monkeypatch):
+    monkeypatch.setattr("echousd.batches.batch._executor", lambda how, rooms, device: Inline())
     graph, out = tmp_path / "graph.yaml", tmp_path / "batch"
     graph.write_text(GRAPH)
-    words = ("batch", "run", graph, "-o", out, "--shapes", "boxes", "--dress", "none", "--workers", "1")
+    words = ("batch", "run", graph, "-o", out, "--shapes", "boxes", "--dress", "none", "--no-walls")
     done = full(20_000, *words)
     assert done.returncode in (1, 2), done.stderr
     assert "cannot be written (File too large)" in done.stdout + done.stderr

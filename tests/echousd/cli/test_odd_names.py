@@ -26,7 +26,9 @@ def quick(monkeypatch):
 def make(echousd_command, folder, style="plain"):
     text = folder.parent / "graph.yaml"
     text.write_text(GRAPH.replace("STYLE", json.dumps(style)), "utf-8")
-    return echousd_command("generate", text, "-o", folder, "--shapes", "boxes", "--no-place", "--dress", "none")
+    return echousd_command(
+        "generate", text, "-o", folder, "--shapes", "boxes", "--no-place", "--dress", "none", "--no-walls"
+    )
 
 
 def materials(folder):

@@ -27,7 +27,7 @@ from echousd.layers.compose import room_files
 from echousd.options import RoomOptions
 from echousd.shapes.fittings import SKIRTING
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
-from echousd.shapes.sources.whole import solid_geometry
+from echousd.shapes.sources.whole import material_groups, solid_geometry
 from echousd.shapes.walls import walls
 from echousd.stage.graphs import read_graph
 
@@ -51,8 +51,13 @@ def root(room, tmp_path_factory):
     return room.save(tmp_path_factory.mktemp("rooms") / "living_room", preview=False)
 
 
-def test_nothing_else_changes(bare, room):
-    plain, dressed = room_files(bare), room_files(room)
+@pytest.fixture(scope="module")
+def files(room):
+    return room_files(room)
+
+
+def test_nothing_else_changes(bare, files):
+    plain, dressed = room_files(bare), files
     small = {path for path in dressed if path not in plain}
     assert small
     assert all(path == "layers/dressing.usda" or path.startswith(("assets/small_", "textures/")) for path in small)
@@ -60,8 +65,8 @@ def test_nothing_else_changes(bare, room):
     assert touched <= {"living_room.usda", "layers/materials.usda"}
 
 
-def test_same_room_same_things(room):
-    assert room_files(room) == room_files(room)
+def test_same_room_same_things(room, files):
+    assert room_files(room) == files
     assert not dress(replace(room, options=RoomOptions(walls=False, dress="none"))).layouts
 
 
@@ -334,8 +339,9 @@ def test_cushions_lie_before_the_pillows_of_wide_beds():
     pillow.apply_translation((0, 0.53, -deep / 2 + 0.3))
     board = trimesh.creation.box((wide, tall, 0.04))
     board.apply_translation((0, tall / 2, -deep / 2 + 0.02))
-    whole = solid_geometry(trimesh.util.concatenate([mattress, pillow, board]), "double_bed", Origin("boxes"))
-    geometry = {**room.geometry, "bed": replace(whole, colliders=(Collider("collider", board, "convexHull"),))}
+    cut, slots = material_groups(trimesh.util.concatenate([mattress, pillow, board]), "double_bed")
+    colliders = (Collider("collider", board, "convexHull"),)
+    geometry = {**room.geometry, "bed": Geometry((Part("mesh", cut, slots),), colliders, Origin("boxes"))}
     setting, counts = setting_of(replace(room, geometry=geometry)), set()
     bed = setting.objects["bed"]
     for setting.seed in range(12):

@@ -1,7 +1,6 @@
 import errno
 import json
 import os
-import textwrap
 from pathlib import Path
 
 import pytest
@@ -73,19 +72,14 @@ def test_killed_at_any_step_leaves_the_old_or_the_new_room(tmp_path, monkeypatch
 
 def test_killed_process_leaves_a_room(tmp_path):
     """The real thing: SIGKILL while rooms are written over and over."""
-    code = textwrap.dedent("""
-        import sys
-        from pathlib import Path
-        from echousd.folder.folder import claim, write_together
-        folder = Path(sys.argv[1])
-        print("go", flush=True)
-        for n in range(10**9):
-            files = {f"assets/{i}.usda": b"%d" % n for i in range(20)} | {"room.usda": b"%d" % n}
-            claim(folder, force=True)
-            write_together(folder, files, last=["room.usda"], remove=[])
-    """)
+
+    def act(number):
+        files = {f"assets/{i}.usda": b"%d" % number for i in range(20)} | {"room.usda": b"%d" % number}
+        claim(tmp_path, force=True)
+        write_together(tmp_path, files, last=["room.usda"], remove=[])
+
     for delay in (0.01, 0.03, 0.08):
-        killed(code, tmp_path, delay)
+        killed(act, delay)
         recover(tmp_path)
         values = set(written(tmp_path).values())
         assert len(values) <= 1, f"a mixture of runs: {values}"

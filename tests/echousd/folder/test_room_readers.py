@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 from PIL import Image
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.folder import folder as folders
@@ -33,7 +33,7 @@ def model(monkeypatch):
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes")
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes", **BARE)
     return room.save(tmp_path_factory.mktemp("made") / "bedroom", preview=False)
 
 
@@ -124,7 +124,7 @@ def test_several_rooms_of_which_one_is_half_written_are_checked(half, made, echo
 
 
 def test_a_first_room_that_is_half_written_is_one(tmp_path, echousd_command, monkeypatch):
-    room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes")
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes", **BARE)
     with killed(monkeypatch, 2):
         room.save(tmp_path / "bedroom", preview=False)
     for place in (tmp_path, tmp_path / "bedroom"):
@@ -226,7 +226,9 @@ def test_the_picture_is_of_the_state_or_is_not_there(root, echousd_command, monk
     assert picture.read_bytes() == before
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes").save(root.parent, preview=False)
+        echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes", **BARE).save(
+            root.parent, preview=False
+        )
     assert picture.read_bytes() == before  # nothing changed
     Image.new("RGB", (4, 4), "red").save(picture)  # somebody's
     mine = picture.read_bytes()

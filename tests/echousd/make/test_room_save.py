@@ -2,8 +2,8 @@ import hashlib
 import os
 import subprocess
 import sys
-import textwrap
 from dataclasses import replace
+from functools import cache
 
 import pytest
 from dying_process import killed
@@ -21,9 +21,16 @@ from echousd.pending import STAGING
 from echousd.shapes.sources import whole
 
 
-def make(seed=0, shift=0.5, graph=None, **more):
+@cache
+def make(seed=0, without=(), added=(), **more):
+    """A room that several tests save, each into a folder of its own: the small one without and with some nodes."""
+    graph = small_graph()
+    for name in without:
+        graph = graph.remove_node(name)
+    for name, category in added:
+        graph = graph.add_node(name, category)
     more = {"place": False, "shapes": "boxes", **more}
-    return echousd.generate(graph or small_graph(), seed=seed, model=StandIn(shift), **{**BARE, **more})
+    return echousd.generate(graph, seed=seed, model=StandIn(0.5), **{**BARE, **more})
 
 
 def opened(path):
@@ -47,7 +54,8 @@ def changed(before, after):
 
 def test_same_room_gives_same_bytes(monkeypatch):
     monkeypatch.setattr(whole, "within_budget", whole.within_budget.__wrapped__)  # meshed anew each time
-    rooms = [make(seed=4, shapes="sdf", faces=600) for _ in range(2)]
+    few = {"without": ("wardrobe", "pendant", "nightstand_right"), "shapes": "sdf", "faces": 600}
+    rooms = [make.__wrapped__(seed=4, **few) for _ in range(2)]
     first, second = (room_files(room) for room in rooms)
     assert first == second
 
@@ -127,8 +135,7 @@ def test_asset_of_an_object_that_is_gone_is_removed_unless_edited(tmp_path):
     make(seed=1).save(folder, preview=False)
     touched = folder / "assets/wardrobe/wardrobe.usda"
     touched.write_text(touched.read_text() + "# mine\n")
-    smaller = small_graph().remove_node("pendant").remove_node("wardrobe")
-    root = make(seed=1, graph=smaller).save(folder, preview=False)
+    root = make(seed=1, without=("pendant", "wardrobe")).save(folder, preview=False)
     assert not (folder / "assets/pendant").exists()
     assert touched.exists()
     stage = Usd.Stage.Open(str(root))
@@ -137,22 +144,10 @@ def test_asset_of_an_object_that_is_gone_is_removed_unless_edited(tmp_path):
 
 def test_killed_while_saving_leaves_a_room_that_opens(tmp_path):
     """SIGKILL at several moments of a run that saves one room after the other into the same folder."""
-    code = textwrap.dedent("""
-        import sys
-        from pathlib import Path
-        from dataclasses import replace
-        from small_room import StandIn, small_graph
-        import echousd
-        options = {"model": StandIn(0.5), "shapes": "boxes", "place": False}
-        rooms = [echousd.generate(small_graph(), seed=seed, **options) for seed in (1, 2)]
-        rooms[0].save(sys.argv[1], preview=False)
-        print("go", flush=True)
-        for n in range(10**6):
-            rooms[n % 2].save(sys.argv[1], preview=False)
-    """)
-    folder = tmp_path / "bedroom"
+    folder, rooms = tmp_path / "bedroom", [make(seed=1), make(seed=2)]
+    rooms[0].save(folder, preview=False)
     for delay in (0.03, 0.21):
-        killed(code, folder, delay)
+        killed(lambda number: rooms[number % 2].save(folder, preview=False), delay)
         stage = opened(folder / "bedroom.usda")
         assert stage.GetCompositionErrors() == []
         assert stage.GetPrimAtPath("/Room/Objects/bed/geo/bed_mesh").IsA(UsdGeom.Mesh)
@@ -168,7 +163,7 @@ def test_room_opens_after_every_step_of_a_regeneration(tmp_path, monkeypatch, mo
 
     folder = tmp_path / "bedroom"
     root = make(seed=1).save(folder, preview=False)
-    other = make(seed=2, graph=small_graph().remove_node("pendant").add_node("second_bed", "double_bed"))
+    other = make(seed=2, without=("pendant",), added=(("second_bed", "double_bed"),))
     files = len(room_files(other))  # each is written to the staging folder before
     with stopped_disk(monkeypatch, files + moment, KeyboardInterrupt):
         other.save(folder, preview=False)

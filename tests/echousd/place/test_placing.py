@@ -163,7 +163,7 @@ def test_noisy_rooms_get_their_relations_back() -> None:
     rng = np.random.default_rng(5)
     kept = measured = hit = 0
     ids = {p.name: p.id for p in vocabulary().predicates}
-    for _ in range(6):
+    for _ in range(3):
         n = 8
         categories = ["armchair", "shelf", "cabinet", "dresser", "nightstand", "lounge_chair", "cabinet", "lazy_sofa"]
         spots = rng.permutation([(x, z) for x in (-2.1, -0.7, 0.7, 2.1) for z in (-2.0, 0.0, 2.0)])[:n]
@@ -184,7 +184,7 @@ def test_noisy_rooms_get_their_relations_back() -> None:
         kept, measured = kept + int((done.verdict == 1).sum()), measured + int((done.verdict >= 0).sum())
         hit += len(done.collisions)
         assert not done.outside
-    assert measured > 500
+    assert measured > 250
     assert kept / measured >= 0.995
     assert hit == 0
 

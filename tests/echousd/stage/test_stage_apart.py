@@ -19,6 +19,7 @@ from echousd.assets.index import index
 from echousd.batches.batch import batch
 from echousd.batches.plan import room_digest
 from echousd.batches.verify import verify
+from echousd.draw import rendering
 from echousd.stage import apart
 from echousd.stage.apart import check_apart, fatal
 from echousd.stage.encoding import StageError
@@ -124,6 +125,7 @@ def stand_in(monkeypatch):
     monkeypatch.setattr("echousd.make.layouts.load_model", lambda *_, **__: StandIn())
     monkeypatch.setattr("echomodel.echo.EchoModel.load", classmethod(lambda cls, path=None, **options: StandIn()))
     monkeypatch.setattr("echousd.make.save.PREVIEW", 16)
+    monkeypatch.setitem(rendering.QUALITIES, "fast", (16, 1))
 
 
 @pytest.mark.parametrize("words", COMMANDS, ids=lambda words: " ".join(words[:2]).replace(" {root}", ""))

@@ -21,6 +21,7 @@ from echousd.stage.read import read_rooms
 from echousd.stage.write import graph_layer
 
 FEW = settings(max_examples=25, deadline=None)
+FEWER = settings(max_examples=12, deadline=None)  # through files
 
 BEDROOM = SceneGraph(
     RoomSpec("bedroom", floor_polygon=((0, 0), (4, 0), (4, 3.1), (0, 3)), height=2.6),
@@ -38,7 +39,7 @@ BEDROOM = SceneGraph(
 
 
 @given(graph=scene_graphs(), extension=st.sampled_from(["usda", "usdc"]))
-@FEW
+@FEWER
 def test_files(graph, extension, tmp_path_factory):
     path = tmp_path_factory.mktemp("stage") / f"room.{extension}"
     save_layer(graph_layer(graph), path)
@@ -59,7 +60,7 @@ def bare_process():
 
 
 @given(first=scene_graphs(), second=scene_graphs(), extension=st.sampled_from(["usda", "usdc"]))
-@FEW
+@FEWER
 def test_without_the_plugin(first, second, extension, bare_process, tmp_path_factory):
     folder = tmp_path_factory.mktemp("bare")
     given, made = folder / f"given.{extension}", folder / f"made.{extension}"

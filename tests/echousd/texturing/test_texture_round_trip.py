@@ -26,8 +26,11 @@ from echousd.texturing.obj import glb_bytes
 
 @pytest.fixture(scope="module")
 def room(tmp_path_factory):
-    """A room of parts with walls, a window and small things."""
-    data = echousd.generate("samples/study.usda", seed=3, drafts=1, options=RoomOptions(walls=True, dress="some"))
+    """A room of three pieces of parts with walls, a window and small things."""
+    graph = echousd.read_graph("samples/study.usda")
+    for name in ("books", "armchair", "floor_lamp", "ceiling_lamp"):
+        graph = graph.remove_node(name)
+    data = echousd.generate(graph, seed=3, drafts=1, options=RoomOptions(walls=True, dress="some"))
     return data.save(tmp_path_factory.mktemp("rooms") / "study", preview=False)
 
 
@@ -35,6 +38,13 @@ def room(tmp_path_factory):
 def small(tmp_path_factory):
     data = small_room(shapes="boxes", place=False)
     return data.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
+
+
+@pytest.fixture(scope="module")
+def generic(room, tmp_path_factory):
+    """The room's job for any tool, its small things as one object, and the folder it is in."""
+    folder = tmp_path_factory.mktemp("generic") / "job"
+    return export_job(room, folder, "generic", dressing="grouped", resolution=512), folder
 
 
 def copied(root, tmp_path):
@@ -46,10 +56,14 @@ def small_pictures(monkeypatch):
     monkeypatch.setattr(scenetex, "RESOLUTION", 1024)
 
 
-@pytest.mark.parametrize(("tool", "dressing"), [("scenetex", "none"), ("generic", "grouped")])
-def test_every_point_gets_its_colour_back(room, tool, dressing, tmp_path, small_pictures):
+@pytest.mark.parametrize("tool", ["scenetex", "generic"])
+def test_every_point_gets_its_colour_back(room, generic, tool, tmp_path, small_pictures):
     root = copied(room, tmp_path)
-    job = export_job(root, tmp_path / "job", tool, dressing=dressing, resolution=None if tool == "scenetex" else 512)
+    if tool == "generic":
+        job, made = generic
+        shutil.copytree(made, tmp_path / "job")
+    else:
+        job = export_job(root, tmp_path / "job", tool)
     assert not job.left_out
     assert {thing.kind for thing in job.objects} == {"stuff", "things"}
     paint(tmp_path / "job")
@@ -64,10 +78,10 @@ def test_every_point_gets_its_colour_back(room, tool, dressing, tmp_path, small_
     assert not report.warnings
 
 
-def test_charts_are_unique_and_inside(room, tmp_path):
-    job = export_job(room, tmp_path / "job", "generic", resolution=512)
+def test_charts_are_unique_and_inside(generic):
+    job, folder = generic
     for thing in job.objects:
-        corners = job_mesh(tmp_path / "job", thing).corners
+        corners = job_mesh(folder, thing).corners
         assert corners.min() >= 0
         assert corners.max() <= 1
         _, bary, place = texel_faces(corners, 512)
