@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
-LENSES = (24.0, 28.0, 35.0)  # mm, of a camera inside: 74 to 54 degrees across
+LENSES = (24.0, 28.0, 35.0, 20.0)  # mm, of a camera inside: 74 to 54 degrees across, 84 where nothing else helps
 EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
 SLOPES = (0.05, 0.12, 0.2, 0.28)  # metres that the middle of its picture is lower for a metre ahead
 PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
@@ -34,7 +34,7 @@ LOW = 1.4  # metres: over what is so high one looks
 BARE, BAREST, DEEP = 60.0, 0.28, 0.02
 BEFORE, WALLED = 2.6, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
 FILLED = 260.0  # metres of depth that a picture full of what is near is worth
-TORN, HANGS = 60.0, 4.0  # and one full of what its border cuts off; how much more what hangs on walls counts there
+TORN, HANGS = 140.0, 4.0  # and one full of what its border cuts off; how much more what hangs on walls counts there
 BEHIND, ASKANCE = 25.0, 0.0  # metres of depth that the main piece from behind costs, and from which cosine on
 HALVED, LACKED = 60.0, 12.0  # metres of depth that a lamp costs which the border cuts, or which is beyond it
 SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width over which it is cord; metres
@@ -181,7 +181,7 @@ def inside_view(
         before = float((spot - aim) @ front) / max(float(np.linalg.norm(spot - aim)), 1e-9)
         hidden = CLEAR * hidden + (BEHIND * max(0.0, ASKANCE - before) if main is not None else 0.0)
         cost = WHOLE * cut + _shown(shades, views, halves) + hidden + touched
-        cost = (cost + np.abs(PANS)[:, None, None] + 0.1 * np.arange(len(LENSES))).ravel()
+        cost = (cost + np.abs(PANS)[:, None, None] + 0.1 * np.arange(len(LENSES)) ** 3).ravel()
         views = np.repeat(views.reshape(-1, 4, 4), len(LENSES), axis=0)
         eyes.append([
             Shot(float(cost[n]), views[n], LENSES[n % len(LENSES)], points, blocked)
