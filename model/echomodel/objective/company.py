@@ -230,12 +230,12 @@ def seats_at(plan: Plan) -> Seats:
     """Seats at the tables that people sit around."""
     kept: dict[str, Seats] = vars(plan)
     if "seats_at" not in kept:
-        kept["seats_at"] = _seats_at(plan)
+        kept["seats_at"] = _seats_at(plan, plan.dining)
     return kept["seats_at"]
 
 
-def _seats_at(plan: Plan) -> Seats:
-    i, j = plan.attended("at", "foot", to=plan.dining)
+def _seats_at(plan: Plan, boards: Array) -> Seats:
+    i, j = plan.attended("at", "foot", to=boards)
     near, xp = held(plan.apart(i, j)) < AROUND if len(i) else i > 0, plan.kit
     i, j = i[near], j[near]
     lateral, forward = plan.local(i, j)
@@ -269,8 +269,8 @@ def chairs_opposite(plan: Plan) -> Found:
 
 
 def chairs_level(plan: Plan) -> Found:
-    """The chairs of a table are pushed under it alike: neighbours, and those opposite each other."""
-    seats, xp = seats_at(plan), plan.kit
+    """The chairs of a table or bar are pushed under it alike: neighbours, and those opposite each other."""
+    seats, xp = _seats_at(plan, plan.of("board")), plan.kit
     if not len(seats.i):
         return nobody(plan.size)
     half_width, half_depth = plan.reach(seats.i, seats.j)

@@ -97,10 +97,17 @@ PENDANTS = Room({**SET.things, **{f"pendant_{x}": {
 } for x in (-1, 1)}})  # fmt: skip
 
 
+BAR = Room({
+    "bar": {"kind": "console_table", "size": (1.8, 1.0, 0.5), "at": (0.0, -1.73)},
+    **{f"stool_{x}": {"kind": "bar_stool", "size": (0.4, 0.8, 0.4), "at": (0.6 * x, -1.4), "yaw": np.pi}
+       for x in (-1, 0, 1)},
+})  # fmt: skip
+
+
 @pytest.mark.parametrize(
     "room",
-    [BEDROOM, LIVING, DINING, STUDY, SET, SOFAS, BENCH, SMALL, PENDANTS],
-    ids=["bedroom", "living", "dining", "study", "set", "sofas", "bench", "small", "pendants"],
+    [BEDROOM, LIVING, DINING, STUDY, SET, SOFAS, BENCH, SMALL, PENDANTS, BAR],
+    ids=["bedroom", "living", "dining", "study", "set", "sofas", "bench", "small", "pendants", "bar"],
 )
 def test_a_tidy_room_has_no_fault(room):
     assert room.found() == {}
@@ -221,6 +228,7 @@ MORE = [
      "the front of board has 0.20 m before table"),
     (with_one(STUDY, "books", kind="bookshelf", size=(0.8, 2.0, 0.3), at=(1.2, -0.98), yaw=-HALF),
      ("books", "wardrobe_opens"), "books has 0.45 m before it, then chair"),
+    (BAR.moved("stool_1", at=(0.6, -1.25)), ("bar", "chairs_level"), "pushed under it by 0.15 m more than another"),
     (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(0.9, 0.6)), ("plant", "plant_aside"),
      "plant crowds chair_1_1"),
     (STUDY.moved("desk", at=(0.0, -0.5)), ("desk", "desk_at_wall"), "desk stands in the open, 1.15 m from the walls"),
