@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -35,6 +35,7 @@ from echousd.tensors import graph_batch, one_thread, rounded_boxes, seeded
 
 DRAFTS = 8  # of which the best is kept
 ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
+POSES = 12_000  # that are judged for one room, over all its drafts; the search that is begun then comes to its end
 CROWD = 160  # objects of all drafts together, unless somebody says how many drafts
 MAX_OBJECTS = 200  # of one room: up to here time grows no faster than their number, 400 take six times that of 200
 TALL, GLARE = 2.0, 0.03  # metres a screen counts as high before a window, and square metres of it that are too much
@@ -108,7 +109,8 @@ def best_boxes(
 ) -> tuple[Boxes, tuple[str, ...]]:  # fmt: skip
     """The best of several drafts after place: kept relations first, then collisions, then the living rules.
 
-    Further drafts are drawn, a few at once, only where those before leave something to be wished for.
+    Further drafts are drawn, a few at once, only where those before leave something to be wished for. Each is searched
+    in passing; what is left then is searched for in earnest, the best first, until the room's `POSES` are judged.
 
     Arguments:
         draws: of the first draft. drafts: how many at most. sized: boxes whose sizes the graph states for all layouts.
@@ -117,32 +119,38 @@ def best_boxes(
     """
     best: tuple[Boxes, tuple[str, ...]] | None = None
     worth: tuple[float, ...] = ()
-    ways = [(graph, DEFAULTS)]
+    ways, judged = [(graph, DEFAULTS)], 0
+    left: list[tuple[tuple[float, ...], int, Boxes]] = []  # what a draft leaves to be wished for, its number, and it
     if proposed and graph.room.openings:  # which make way for the furniture
         bare = graph.replaced(room=graph.room.replaced(openings=()))
         ways = [(graph, PlaceConfig(yields=OF_OPENINGS)), (bare, DEFAULTS)]
-    for start, count in draft_rounds(drafts):
-        if best is not None and not any(worth):
-            break
-        for draft in sample_boxes(
-            model, graph, replace(draws, number=draws.number + start, guided=not place), count=count, timer=timer
-        ):
-            if sized is not None:
-                draft = Boxes(sized.size, draft.position, draft.yaw)
-            tried = []
-            for room, config in ways:
-                found = finished_boxes(room, draft, styles, place, timer, config)
-                if drafts == 1 or not place:
-                    return found
-                with timer.stage("place"), one_thread():
-                    tried.append(_wishes(graph, found, draws.seed if proposed else None))
-                if best is None or tried[-1] < worth:
-                    best, worth = found, tried[-1]
-                if not any(worth):
-                    break
-            ways = ways[: 1 + (tried[-1] < tried[0])]  # if the second is no better, it is not tried again
+
+    def drawn() -> Iterator[tuple[Boxes, int]]:
+        for start, count in draft_rounds(drafts):
+            by = replace(draws, number=draws.number + start, guided=not place)
+            for draft in sample_boxes(model, graph, by, count=count, timer=timer) if judged < POSES / 2 else ():
+                draft = draft if sized is None else Boxes(sized.size, draft.position, draft.yaw)
+                yield draft, 0 if drafts > 1 else DEFAULTS.anew
+        for _, _, draft in sorted(left):
+            yield draft, DEFAULTS.anew
+
+    for draft, anew in drawn():
+        tried = []
+        for room, config in ways:
+            boxes, told, poses = finished_boxes(room, draft, styles, place, timer, replace(config, anew=anew))
+            if drafts == 1 or not place:
+                return boxes, told
+            judged += poses
+            with timer.stage("place"), one_thread():
+                tried.append(_wishes(graph, (boxes, told), draws.seed if proposed else None))
+            if best is None or tried[-1] < worth:
+                best, worth = (boxes, told), tried[-1]
             if not any(worth):
                 break
+        left.append((min(tried), len(left), draft))
+        ways = ways[: 1 + (tried[-1] < tried[0])]  # if the second is no better, it is not tried again
+        if not any(worth) or judged > POSES:
+            break
     assert best is not None
     return best
 
@@ -187,11 +195,11 @@ def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int |
 def finished_boxes(
     graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], place: bool, timer: StageTimer,
     config: PlaceConfig = DEFAULTS,
-) -> tuple[Boxes, tuple[str, ...]]:  # fmt: skip
-    """Sampled boxes after equal sizes within style groups and, if wanted, placing; and demands in conflict."""
+) -> tuple[Boxes, tuple[str, ...], int]:  # fmt: skip
+    """Sampled boxes, of equal sizes within style groups and, if wanted, placed; demands in conflict; poses judged."""
     boxes = _alike(graph, _mounted(graph, boxes), styles)
     if not place:
-        return rounded_boxes(graph, boxes), ()
+        return rounded_boxes(graph, boxes), (), 0
     from echousd.place.living import living_faults
 
     @cache
@@ -201,16 +209,18 @@ def finished_boxes(
     graph = _with_homeless_unlocked(graph)
     with timer.stage("place"), one_thread():
         found = placed(graph, boxes, config=config)
+        judged = found.judged
         same = _alike(graph, found.boxes, styles)
         if not torch.equal(same.size, found.boxes.size):
             # chairs of one set that had to shrink: all of them, if it fits; else at other places
             fixed = with_sizes(graph, same)
             second = placed(fixed, same, config=replace(config, arrange=False))
             if wrong(second) > wrong(found):
-                second = min(second, placed(fixed, same, config=config), key=wrong)
+                third = placed(fixed, same, config=config)
+                judged, second = judged + third.judged, min(second, third, key=wrong)
             if wrong(second)[:2] <= wrong(found)[:2]:
                 found = second
-    return rounded_boxes(graph, found.boxes), tuple(sentence(conflict, graph) for conflict in found.conflicts)
+    return rounded_boxes(graph, found.boxes), tuple(sentence(one, graph) for one in found.conflicts), judged
 
 
 def _with_homeless_unlocked(graph: SceneGraph) -> SceneGraph:

@@ -31,7 +31,7 @@ from echousd.graph.arrays import stated_placements, triplets_of
 from echousd.place.distances import BED_LIT
 from echousd.place.geometry import DEFAULT_HEIGHT
 from echousd.place.report import collisions, outside
-from echousd.place.search import ANEW, Arranged, Search
+from echousd.place.search import Arranged, Search
 from echousd.place.setting import Setting, setting_of, stacked
 from echousd.place.solver import Conflict, PlaceConfig, conflicts, solve, unmet
 
@@ -57,6 +57,7 @@ class PlacedBoxes:
         verdict: (e,) int8, 1 kept, 0 broken, -1 not measured.
         conflicts: groups of demands that contradict each other.
         collisions: (pair, depth in metres) of boxes that still collide; outside: (object, depth in metres).
+        judged: poses, each of a whole room, that the search looked at.
     """
 
     size: np.ndarray
@@ -66,6 +67,7 @@ class PlacedBoxes:
     conflicts: tuple[Conflict, ...]
     collisions: tuple[tuple[tuple[int, int], float], ...]
     outside: tuple[tuple[int, float], ...]
+    judged: int
 
     @property
     def boxes(self) -> Boxes:
@@ -152,10 +154,10 @@ def place_boxes(
     fixed, rigid, turned = (none if mask is None else np.asarray(mask, bool) for mask in (fixed, rigid, turned))
     config = config or PlaceConfig()
     terms = tuple(term for term in TERMS if term.name not in config.without)
+    tried: list[Arranged] = []
 
     sizes = [predicate.id for predicate in vocabulary().predicates if predicate.measures == "size"]
     told = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
-
     held: np.ndarray = fixed
 
     def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, kept: np.ndarray) -> Setting:
@@ -185,18 +187,16 @@ def place_boxes(
 
         at = suited(at, at.size)
 
-        def searched(of: Setting, anew: int = ANEW) -> Arranged:
-            return Search(of.spread(), terms, yields=config.yields).run(anew)
+        def searched(of: Setting) -> Arranged:
+            tried.append(Search(of.spread(), terms, yields=config.yields).run(config.anew))
+            return tried[-1]
 
+        chosen = searched(at)
         less = suited(at, smaller_sizes(at.categories, at.size, free)) if fullness(at) > FULL else at
-        shrinks = not np.array_equal(less.size, at.size)
-        chosen = searched(at, 0 if shrinks else ANEW)
-        if chosen.wrong and chosen.cost > BAD and shrinks:
+        if chosen.wrong and chosen.cost > BAD and not np.array_equal(less.size, at.size):
             other = searched(less)
             if other.cost < chosen.cost - WORTH:
                 at, chosen = less, other
-            elif other.wrong and other.cost > BAD:
-                chosen = searched(at)
         hung = hung_lamps(at.categories, at.size, chosen.position, chosen.yaw, free)
         at = posed(hung, chosen.position, chosen.yaw, kept)
     found = solve(at, config)
@@ -217,7 +217,8 @@ def place_boxes(
     beyond = outside(at, size_end, end, turn)
     broken = set(np.flatnonzero(verdict == 0).tolist())
     failures = broken, {pair for pair, _ in hit}, {number for number, _ in beyond}
-    return PlacedBoxes(size_end, end, turn, verdict, conflicts(at, found, failures), hit, beyond)
+    against, judged = conflicts(at, found, failures), sum(one.judged for one in tried)
+    return PlacedBoxes(size_end, end, turn, verdict, against, hit, beyond, judged)
 
 
 def fullness(at: Setting) -> float:

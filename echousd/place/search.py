@@ -25,10 +25,10 @@ from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import beyond, depths
 from echousd.place.proposals import ahead, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
 from echousd.place.setting import Setting
+from echousd.place.solver import PlaceConfig
 
 JUDGED = 48  # poses that are judged at once
 SWEEPS = 3  # times that what misses something is looked at after the first time
-ANEW = 3  # times that pieces are taken out and put in again
 BUDGET = 4500  # poses that are judged in all; each is a whole room
 GAIN = 1e-3  # by which a move must be better
 WORTH = 0.5  # that a sweep must gain for another one
@@ -40,7 +40,6 @@ FIRST = {"bed": 0.0, "sofa": 1.0, "board": 3.0, "storage": 4.0, "seat": 6.0, "sc
 HIT, DEEP, MISSED = 1.0, 4.0, 3.0  # before anything is judged: for running into something, per metre, and relations
 WALKS = 6  # states of those judged at once that are walked through, where something cannot be walked to
 ASKEW = np.radians(20.0)  # what is turned less against the walls is meant to be parallel to them
-ALIKE, REGRET = 0.8, 2.0  # metres within which a pose is the one that is regretted, and for that
 ASIDE = 0.1  # metres from its axis of a group within which nobody stands to one side
 LIT = 0.35  # metres between the middles of a lamp and of what it hangs over
 
@@ -85,7 +84,6 @@ class Search:
         self.ways: dict[tuple[int, ...], list[list[tuple[float, float, float, float]]]] = {}
         self.looks: list[np.ndarray] = []
         self.urgent: list[int] = []
-        self.regrets: dict[int, tuple[float, float, float]] = {}
         n = len(setting.size)
         self.children: list[list[int]] = [[] for _ in range(n)]
         self.screens: list[list[int]] = [[] for _ in range(n)]
@@ -166,7 +164,7 @@ class Search:
         near = aside(setting, state.position, state.yaw, i)
         taste = np.concatenate([self._taste(i, rows), state.taste[i] + 0.3 * near[:, 3]])
         rows = np.concatenate([rows, near])
-        keep = self._promising(state, there, i, group, rows, taste + self._regret(i, rows))
+        keep = self._promising(state, there, i, group, rows, taste)
         rows, taste = rows[keep], taste[keep]
         states = [(state.position[None], state.yaw[None]), self._carried(state, i, group, rows)]
         tastes = [state.taste[i : i + 1], taste]
@@ -187,8 +185,7 @@ class Search:
         position, yaw = (np.concatenate(part) for part in zip(*states, strict=True))
         every = np.concatenate(tastes)
         changed[[*group, *(m for k in screens for m in self.group(k, there, state))]] = True
-        poses = np.concatenate([position[:, i, ::2], yaw[:, i, None]], 1)
-        best = self._best(there, position, yaw, changed, every + self._regret(i, poses))
+        best = self._best(there, position, yaw, changed, every)
         if best == 0:
             return state
         own = state.taste.copy()
@@ -272,13 +269,6 @@ class Search:
         share = ATTENDING if setting.anchor[i] >= 0 or setting.hanging[i] else 1.0
         taste: np.ndarray = share * (PULL * off + TURN * turned) + 0.3 * rows[:, 3]
         return taste
-
-    def _regret(self, i: int, rows: np.ndarray) -> np.ndarray:
-        """(K,) float: how much others are liked better than poses like the one that a box is to leave."""
-        if i not in self.regrets:
-            return np.zeros(len(rows))
-        x, z, yaw = self.regrets[i]
-        return REGRET * ((np.hypot(rows[:, 0] - x, rows[:, 1] - z) < ALIKE) & (np.cos(rows[:, 2] - yaw) > 0.9))
 
     def _carried(
         self, state: State, i: int, group: list[int], rows: np.ndarray, screens: Sequence[int] = ()
@@ -498,10 +488,9 @@ class Search:
                 break
         return state, total, wrong
 
-    def run(self, anew: int = ANEW) -> Arranged:
+    def run(self, anew: int = PlaceConfig.anew) -> Arranged:
         """The best state that the budget finds, pieces taken out and put in again so many times."""
-        setting = self.setting
-        n = len(setting.size)
+        setting, n = self.setting, len(self.setting.size)
         habits = [0.02 + 0.3 * out_of_habit(setting, i) for i in range(n)]
         state = State(setting.position.copy(), setting.yaw.copy(), np.array(habits))
         state = self.squared(state)
@@ -515,11 +504,9 @@ class Search:
             if not wrong or self.judged >= self.budget:
                 break
             out = list(range(n)) if number else self.involved(wrong)
-            if number:  # the worst first, and elsewhere; next time another one
-                self.urgent = wrong[number - 1 :] + wrong[: number - 1]
-                self.regrets = {i: (*state.position[i, [0, 2]], float(state.yaw[i])) for i in self.urgent[:1]}
+            self.urgent = wrong if number else []  # the worst first
             built = self.rebuilt(state, out)
-            self.urgent, self.regrets = [], {}
+            self.urgent = []
             after = self.swept(built, out)
             cost, still = self.faults(after)
             if cost < total - GAIN:

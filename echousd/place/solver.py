@@ -44,6 +44,7 @@ class PlaceConfig:
         limit: largest change of the logarithm of a size.
         slack: metres or ratio by which relations are to hold.
         arrange: first choose for every piece among the places that a person would try; False = only by millimetres.
+        anew: times that a search that still misses something takes pieces out and puts them in again.
         rounds: most linearisations in one attempt; patience: how many of them without progress end it.
         budget: most linearisations in all attempts together: what a room may cost, the same on every machine.
         yields: names of terms that the search sees, but for which it does not begin anew: doors that may be moved.
@@ -56,6 +57,7 @@ class PlaceConfig:
     slack: float = 0.004
     rounds: int = 16
     arrange: bool = True
+    anew: int = 2
     patience: int = 6
     budget: int = 26
     yields: frozenset[str] = frozenset()

@@ -334,29 +334,51 @@ def test_options_that_are_stated_are_not_those_of_the_other_stage(tmp_path):
         echousd.RoomOptions(room_path="World")
 
 
-FIRM, LATE = (1, set()), (1, {"door_free", "window_free"})  # windows, and terms that yield
+FIRM, LATE, NONE = (1, set()), (1, {"door_free", "window_free"}), (0, set())  # windows, and terms that yield
 
 
-@pytest.mark.parametrize(
-    ("proposed", "faults", "tried"),
-    [
-        (True, [0], [LATE]),
-        (True, [3, 2, 2, 2], [LATE, (0, set()), LATE, (0, set())]),
-        (True, [2, 3, 2], [LATE, (0, set()), LATE]),  # to leave windows out did not help: not once more
-        (False, [3, 2], [FIRM, FIRM]),  # openings that somebody stated do not make way
-    ],
-)
-def test_openings_that_nobody_stated_make_way_for_furniture(monkeypatch, proposed, faults, tried):
+def searches(monkeypatch, faults, *, poses=100, **options):
+    """Windows, yielding terms and times anew of each search, where they leave so many faults."""
     graph = small_graph()
     window = Opening("window", "window", 1, 1.0, 0.9, 1.2, 0.9)
     graph = graph.replaced(room=graph.room.replaced(size=(4.0, 3.4), floor_polygon=None, openings=(window,)))
     asked = []
 
     def finished(graph, boxes, styles, place, timer, config):
-        asked.append((len(graph.room.openings), config.yields))
-        return boxes, ()
+        asked.append((len(graph.room.openings), config.yields, config.anew))
+        return boxes, (), poses
 
     monkeypatch.setattr(layouts, "finished_boxes", finished)
     monkeypatch.setattr(layouts, "_wishes", lambda *_: (faults[len(asked) - 1],))
-    layouts.best_boxes(StandIn(), graph, {}, layouts.Draws(seed=1), drafts=2, proposed=proposed, timer=StageTimer())
-    assert asked == tried
+    layouts.best_boxes(StandIn(), graph, {}, layouts.Draws(seed=1), timer=StageTimer(), **options)
+    return asked
+
+
+@pytest.mark.parametrize(
+    ("proposed", "faults", "tried"),
+    [
+        (True, [0], [LATE]),
+        (True, [3, 2, 2, 2, 2, 0], [LATE, NONE, LATE, NONE, LATE, LATE]),
+        (True, [2, 3, 2, 1, 1], [LATE, NONE, LATE, LATE, LATE]),  # to leave windows out did not help: not once more
+        (False, [3, 2, 1, 1], [FIRM, FIRM, FIRM, FIRM]),  # openings that somebody stated do not make way
+    ],
+)
+def test_openings_that_nobody_stated_make_way_for_furniture(monkeypatch, proposed, faults, tried):
+    asked = searches(monkeypatch, faults, drafts=2, proposed=proposed)
+    assert [search[:2] for search in asked] == tried
+
+
+@pytest.mark.parametrize(
+    ("poses", "faults", "anew"),
+    [
+        (100, [0], [0]),
+        (100, [3, 2, 0], [0, 0, 0]),
+        (100, [3, 2, 3, 1, 0], [0, 0, 0, 2, 2]),  # all drafts in passing, then the best in earnest
+        (100, [3, 2, 3, 3, 3, 3], [0, 0, 0, 2, 2, 2]),
+        (6500, [3, 2, 1], [0, 2]),  # of 12000 one half goes to drafts in passing
+        (2500, [3, 2, 1, 1, 1], [0, 0, 0, 2, 2]),
+    ],
+)
+def test_a_room_has_so_many_poses_for_all_its_searches(monkeypatch, poses, faults, anew):
+    asked = searches(monkeypatch, faults, poses=poses, drafts=3)
+    assert [search[2] for search in asked] == anew

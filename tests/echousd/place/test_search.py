@@ -144,8 +144,9 @@ def test_who_attends_a_bed_changes_sides_with_it():
     mirrored = search._mirrored(state, 0, [0, 1, 2, 3])
     assert mirrored.position[:, 2] == pytest.approx([0.1, 1.3, -1.1, 1.3])
     assert mirrored.position[:, 0] == pytest.approx(state.position[:, 0])
-    search.regrets = {0: (1.4, 0.1, -np.pi / 2)}  # it shall stand elsewhere: at the other wall, left stays left
-    after = search.moved(state, np.ones(4, bool), 0)
+    drawn = np.array(at) * (-1, 1, 1)  # at the other wall, which is liked better: left stays left
+    search, _ = searched(*BED, drawn, [np.pi / 2] * 4, told)
+    after = search.moved(State(state.position, state.yaw, np.array([2.0, 0, 0, 0])), np.ones(4, bool), 0)
     assert np.cos(after.yaw[0] + np.pi / 2) < 0.5
     assert after.position[1, 2] < after.position[0, 2] < after.position[2, 2]
     assert after.position[3, [0, 2]] == pytest.approx(after.position[1, [0, 2]], abs=0.01)
@@ -157,16 +158,6 @@ def test_one_alone_has_no_sides():
     )
     assert search._mirrored(state, 0, [0]) is None
     assert search._mirrored(state, 0, [0, 1]) is None  # as good as in the middle
-
-
-def test_what_is_regretted_is_left_even_where_nothing_is_wrong():
-    search, state = searched(["wardrobe"], [(1.2, 2.0, 0.6)], [(0.0, 0, -1.7)], [0.0])
-    every = np.ones(1, bool)
-    assert search.moved(state, every, 0) is state
-    search.regrets = {0: (0.0, -1.7, 0.0)}
-    after = search.moved(state, every, 0)
-    assert np.hypot(*(after.position[0] - state.position[0])[[0, 2]]) >= 0.8 or np.cos(after.yaw[0]) < 0.9
-    assert after.taste[0] < 2.0  # what it regrets is no habit
 
 
 def test_what_stands_on_a_nightstand_comes_with_it_to_its_bed():
