@@ -53,7 +53,7 @@ def budget() -> dict[str, float]:
     noisy = torch.randn(nodes, 8)
     room = dense_graph(8)
     boxes = Boxes(torch.ones(8, 3), torch.zeros(8, 3), torch.zeros(8))
-    echo = EchoModel(model, packed=False)  # the counter does not see packed products
+    echo = EchoModel(model)
 
     def whole_room() -> None:
         generator = torch.Generator().manual_seed(0)

@@ -2,7 +2,7 @@
 
     python benchmarks/inference_modes.py [--subjects layout,shape,decode,released] [--repeats 5] [--threads 2]
 
-Modes: `packed` (linear maps with weights laid out for oneDNN, what the compact shape branch uses on a CPU), `compile`
+Modes: `packed` (linear maps with weights laid out for oneDNN, what the published layout uses on a CPU), `compile`
 (torch.compile), `bf16` (autocast), `last` (channels_last_3d), and for the released shape U-Net its own fast path.
 Each line holds the time, the ratio to eager float32 (above one is faster) and the largest absolute difference of the
 outputs beside the largest output. CUDA graphs need a GPU and are not run here.
@@ -30,9 +30,9 @@ from echomodel.compact.model import load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
-from echomodel.packed import pack_linear_maps
 from echoscene.config import shape_unet
 from echoscene.denoisers import ShapeUNet
+from echoscene.packed import pack_linear_maps
 
 Run = Callable[[], Tensor]
 LAST = torch.channels_last_3d
@@ -183,7 +183,7 @@ def main() -> None:
     report_machine(options.threads)
     subjects = options.subjects.split(",")
     paths = sorted(Path(str(resources.files("echomodel") / "weights")).glob("*.safetensors"))
-    model = EchoModel(*load_weights(paths), packed=False)
+    model = EchoModel(*load_weights(paths))
     if "layout" in subjects:
         report("compact layout step, 1 room of 12", layout_modes(model, 1), options.repeats * 5)
         report("compact layout step, 16 rooms of 12", layout_modes(model, 16), options.repeats)

@@ -42,7 +42,7 @@ def main(count: int) -> None:
         words = [node.category for graph in some for node in graph.nodes]
         sizes = np.asarray(boxes.size, float)
         sizes = usual_sizes(words, sizes, lenient=np.zeros_like(sizes, bool))
-        for word, size, description in zip(words, sizes, told.numpy(), strict=True):
+        for word, size, description in zip(words, sizes, np.asarray(told), strict=True):
             pieces = pieces_of(solids(word, *piece_of(np.asarray(description, float)), size), size, 1)
             found[word].append(weighed(pieces).mass)
     outside = 0

@@ -74,7 +74,7 @@ def main() -> None:
         spent.append(time.process_time() - began)
     print(f"eight objects, processor seconds: {np.median(spent):.2f} in the median, {max(spent):.2f} at most")
     sizes = np.stack([sample_size(word, rng) for word in words[:8]])
-    plain = EchoModel(model.model, packed=False)  # the counter does not see packed products
+    plain = EchoModel(model.model)
     with torch.no_grad(), FlopCounterMode(display=False) as counter:
         sampled(plain, words[:8], sizes, 1)
     print(f"GFLOP an object: {counter.get_total_flops() / 8e9:.3f}")

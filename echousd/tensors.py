@@ -1,15 +1,16 @@
-"""A graph as the model takes it: tensors, randomness for every branch; numbers rounded so that bytes are equal."""
+"""A graph as the model takes it: arrays, randomness for every branch; numbers rounded so that bytes are equal."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
-import torch
 
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
+from echomodel.randomness import Noise
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import stated_placements, triplets_of
@@ -22,7 +23,11 @@ TOLD = 1e-4  # of a number that describes a piece of furniture
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Run torch on one thread inside the block, whatever the machine or the environment offers."""
+    """Run torch, if it is loaded, on one thread inside the block, whatever the machine or the environment offers."""
+    torch = sys.modules.get("torch")
+    if torch is None:
+        yield
+        return
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -44,7 +49,7 @@ def rounded_boxes(graph: SceneGraph, boxes: Boxes) -> Boxes:
         size[i] = size[i] if node.size is None else node.size
         position[i] = position[i] if node.position is None else node.position
         turn[i] = turn[i] if node.yaw is None else node.yaw
-    return Boxes(*(torch.as_tensor(v, dtype=torch.float32) for v in (size, position, turn)))
+    return Boxes(*(values.astype(np.float32) for values in (size, position, turn)))
 
 
 def rounded_grids(grids: np.ndarray) -> np.ndarray:
@@ -62,12 +67,12 @@ def _round(values: np.ndarray, step: float) -> np.ndarray:
 
 
 def graph_batch(graph: SceneGraph) -> GraphBatch:
-    """The graph as tensors; relations and placements in their order."""
+    """The graph as arrays of numpy; relations and placements in their order."""
     words = vocabulary()
     kinds = [row.name for row in words.placements]
     return GraphBatch.single(
         [words.category_id(node.category) for node in graph.nodes],
-        triplets_of(graph).tolist(),
+        triplets_of(graph),
         room_type=words.room_type_id(graph.room.type),
         floor=graph.room.floor_polygon or graph.room.size,
         names=[node.name for node in graph.nodes],
@@ -76,10 +81,11 @@ def graph_batch(graph: SceneGraph) -> GraphBatch:
             (one.subject, kinds.index(one.placement), *(one.others or (-1, -1))) for one in stated_placements(graph)
         ],
         height=graph.room.height,
+        device=None,
     )
 
 
-def seeded(seed: int, branch: str, number: int = 0) -> torch.Generator:
+def seeded(seed: int, branch: str, number: int = 0) -> Noise:
     """Independent randomness for each branch and layout, so that one more layout changes no other."""
     state = np.random.SeedSequence([seed, *branch.encode(), number]).generate_state(1, np.uint64)[0]
-    return torch.Generator().manual_seed(int(state >> np.uint64(1)))
+    return Noise(int(state >> np.uint64(1)))

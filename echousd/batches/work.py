@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import torch
-
 from echousd.batches.options import BatchOptions
 from echousd.batches.plan import room_digest
 from echousd.batches.sources import sampled_graph
@@ -144,6 +142,8 @@ def devices(device: str) -> list[dict[str, str]]:
     """
     if device == CPU:
         return []
+    import torch
+
     if device == "cuda" and torch.cuda.is_available():
         count = torch.cuda.device_count()
         named = [word.strip() for word in os.environ.get(VISIBLE, "").split(",") if word.strip()]

@@ -9,7 +9,6 @@ from itertools import groupby
 
 import numpy as np
 import shapely
-import torch
 from pxr import Sdf
 
 from echomodel.dressing import KINDS, usual_size
@@ -275,4 +274,4 @@ def _relation(setting: Setting, named: Mapping[str, Thing], name: str, thing: Th
 def _holds(predicate: str, thing: Thing, host: Standing) -> bool:
     size, position = np.stack([thing.size, host.size]), np.stack([thing.position, host.position])
     both = Furniture(size, position, np.array([thing.yaw, host.yaw]))
-    return bool(verdicts(both, torch.tensor([[0, vocabulary().predicate_id(predicate), 1]]))[0] == 1)
+    return bool(verdicts(both, np.array([[0, vocabulary().predicate_id(predicate), 1]]))[0] == 1)

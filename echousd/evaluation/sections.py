@@ -14,6 +14,7 @@ import trimesh
 
 from echomodel.boxes import Boxes
 from echomodel.data.shapeset import ShapeSet
+from echomodel.echo import EchoModel
 from echomodel.furniture import Choices, Style, mesh_of, solids
 from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
@@ -252,7 +253,7 @@ def shapes(run: Run) -> list[Table]:
     seed, count = run.settings.seed, max(4, min(12, run.settings.count // 2))
     rng = np.random.default_rng([seed, 20])
     sizes = {word: np.stack([usual_size(word, rng) for _ in range(count)]) for word in PUBLISHED}
-    models: dict[str, RoomModel] = {"network": load_model(None), "shuffled": shuffled_model()}
+    models: dict[str, RoomModel] = {"network": EchoModel.load(), "shuffled": shuffled_model()}
     models |= {s.name: load_model(s.weights) for s in run.systems if s.weights and not s.finish}
     models = {name: model for name, model in models.items() if model.branches & {"shape", "furniture"}}
     made: dict[str, Mapping[str, Sequence[trimesh.Trimesh]]] = {}

@@ -15,14 +15,14 @@ from scipy.optimize import linear_sum_assignment
 from torch import nn
 
 from echomodel.boxes import Boxes
-from echomodel.compact.pairs import EchoLayer
+from echomodel.compact.modules import EchoLayer
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.metrics.furniture import usual_size
 from echomodel.metrics.layouts import HALVES, Task, layout_scores
 from echomodel.protocols import GraphEdit, RoomModel
-from echomodel.randomness import SceneGenerators
+from echomodel.randomness import Randomness, SceneGenerators
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_room, generate_rooms
 from echomodel.rooms.statistics import room_type_statistics
@@ -122,7 +122,7 @@ def networks(load: Callable[[], RoomModel], guidance: float | None = 0.0, steps:
         for start in range(0, len(tasks), TOGETHER):
             part = tasks[start : start + TOGETHER]
             graph, rows = GraphBatch.pack([task.graph for task in part]), [len(task.room) for task in part]
-            each: SceneGenerators | torch.Generator = seeded(seed, "layout", start)
+            each: Randomness = seeded(seed, "layout", start)
             if isinstance(model, EchoModel):
                 each = SceneGenerators([seeded(seed, "layout", start + k) for k in range(len(part))], rows)
             with one_thread():

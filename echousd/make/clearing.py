@@ -313,8 +313,8 @@ def _onto_top(
 
 
 def _at(boxes: Boxes, moves: np.ndarray) -> Boxes:
-    position = boxes.position.clone()
-    position[:, [0, 2]] += position.new_tensor(moves)
+    position = np.array(boxes.position, np.float32)
+    position[:, ::2] += moves.astype(np.float32)
     return Boxes(boxes.size, position, boxes.yaw)
 
 

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import torch
+import numpy as np
 
 from echomodel.boxes import Boxes
 from echomodel.progress import StageListener
@@ -188,7 +188,7 @@ def graph_edit(before: SceneGraph, after: SceneGraph) -> GraphEdit:
     An object of another category counts as new.
     """
     old = {node.name: node.category for node in before.nodes}
-    added = torch.tensor([old.get(node.name) != node.category for node in after.nodes], dtype=torch.bool)
+    added = np.array([old.get(node.name) != node.category for node in after.nodes], bool)
     stay = {node.name for node, new in zip(after.nodes, added.tolist(), strict=True) if not new}
     relations = tuple(r for r in before.relations if r.subject in stay and r.object in stay)
     return GraphEdit(graph_batch(after.replaced(relations=relations)).triplets, added)
@@ -213,9 +213,7 @@ def _pinned(
 
 def _boxes_of(graph: SceneGraph) -> Boxes:
     return Boxes(
-        torch.tensor([node.size for node in graph.nodes]),
-        torch.tensor([node.position for node in graph.nodes]),
-        torch.tensor([node.yaw for node in graph.nodes]),
+        *(np.array([getattr(node, name) for node in graph.nodes], np.float32) for name in ("size", "position", "yaw"))
     )
 
 

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import shapely
-import torch
 
 from echomodel.boxes import Boxes
 from echomodel.echo import EchoModel
@@ -78,15 +77,15 @@ def sample_boxes(
     model: RoomModel, graph: SceneGraph, draws: Draws, *, count: int = 1, timer: StageTimer
 ) -> list[Boxes]:
     """So many drafts at once from the layout branch, in the room's frame; what the graph fixes comes back."""
-    centre, nodes = torch.from_numpy(floor_centre(graph)), graph.nodes
+    centre, nodes = floor_centre(graph), graph.nodes
     batch = GraphBatch.pack([graph_batch(graph)] * count)
-    given = torch.tensor([None not in (n.size, n.position, n.yaw) for n in nodes])
+    given = np.array([None not in (n.size, n.position, n.yaw) for n in nodes] * count)
     known = Boxes.cat([Boxes(
-        torch.tensor([n.size or (1.0, 1.0, 1.0) for n in nodes], dtype=torch.float32),
-        torch.tensor([n.position or (0.0, 0.0, 0.0) for n in nodes], dtype=torch.float32) - centre,
-        torch.tensor([n.yaw or 0.0 for n in nodes], dtype=torch.float32),
+        np.array([n.size or (1.0, 1.0, 1.0) for n in nodes], np.float32),
+        np.array([n.position or (0.0, 0.0, 0.0) for n in nodes], np.float32) - centre,
+        np.array([n.yaw or 0.0 for n in nodes], np.float32),
     )] * count)  # fmt: skip
-    extra: dict[str, Any] = {"known": known, "known_mask": given.repeat(count)} if bool(given.any()) else {}
+    extra: dict[str, Any] = {"known": known, "known_mask": given} if given.any() else {}
     if draws.steps is not None:
         extra["steps"] = draws.steps
     if not draws.guided and isinstance(model, EchoModel):
@@ -95,11 +94,11 @@ def sample_boxes(
         extra["edit"] = repeated(draws.change, len(nodes), count)
     generator = seeded(draws.seed, "layout", draws.number)
     with timer.stage("layout") as tell, one_thread():
-        drawn = not bool(given.all())  # else nothing is left to draw
-        found = model.sample_layout(batch, generator=generator, progress=tell, **extra).to("cpu") if drawn else known
+        drawn = not given.all()  # else nothing is left to draw
+        found = model.sample_layout(batch, generator=generator, progress=tell, **extra).to(None) if drawn else known
     return [
         rounded_boxes(graph, Boxes(found.size[rows], found.position[rows] + centre, found.yaw[rows]))
-        for rows in torch.arange(count * len(nodes)).chunk(count)
+        for rows in np.arange(count * len(nodes)).reshape(count, -1)
     ]
 
 
@@ -157,8 +156,8 @@ def best_boxes(
 
 def repeated(change: GraphEdit, nodes: int, count: int) -> GraphEdit:
     """The edit of one graph of `nodes` objects for `count` copies of it behind one another."""
-    shift = torch.arange(count)[:, None, None] * torch.tensor([nodes, 0, nodes])
-    return GraphEdit((change.before[None] + shift).reshape(-1, 3), change.added.repeat(count))
+    shift = np.arange(count)[:, None, None] * [nodes, 0, nodes]
+    return GraphEdit((change.before + shift).reshape(-1, 3), np.tile(change.added, count))
 
 
 def most_drafts(model: RoomModel, objects: int) -> int:
@@ -197,7 +196,7 @@ def finished_boxes(
     config: PlaceConfig = DEFAULTS,
 ) -> tuple[Boxes, tuple[str, ...], int]:  # fmt: skip
     """Sampled boxes, of equal sizes within style groups and, if wanted, placed; demands in conflict; poses judged."""
-    boxes = _alike(graph, _mounted(graph, boxes), styles)
+    boxes = _alike(graph, _mounted(graph, boxes.to(None)), styles)
     if not place:
         return rounded_boxes(graph, boxes), (), 0
     from echousd.place.living import living_faults
@@ -211,7 +210,7 @@ def finished_boxes(
         found = placed(graph, boxes, config=config)
         judged = found.judged
         same = _alike(graph, found.boxes, styles)
-        if not torch.equal(same.size, found.boxes.size):
+        if not np.array_equal(same.size, found.boxes.size):
             # chairs of one set that had to shrink: all of them, if it fits; else at other places
             fixed = with_sizes(graph, same)
             second = placed(fixed, same, config=replace(config, arrange=False))
@@ -290,12 +289,11 @@ def plan_boxes(layouts: Sequence[Boxes]) -> tuple[np.ndarray, np.ndarray, np.nda
 
 def _mounted(graph: SceneGraph, boxes: Boxes) -> Boxes:
     """The boxes with what is fixed to a wall at the height where such things hang, unless its place is stated."""
-    height = boxes.position[:, 1].clone()
+    position = boxes.position.copy()
     for number, node in enumerate(graph.nodes):
         row = vocabulary().category(node.category)
         if row.mounted and node.position is None:
-            height[number] = row.mounted
-    position = torch.stack([boxes.position[:, 0], height, boxes.position[:, 2]], 1)
+            position[number, 1] = row.mounted
     return Boxes(boxes.size, position, boxes.yaw)
 
 
@@ -304,4 +302,4 @@ def _alike(graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str]) -> Boxes:
     cut = [vocabulary().category(word).stands in ("row", "over") for word in categories]  # to the length there is
     free = np.array([node.size is None and not node.locked for node in graph.nodes]) & ~np.array(cut, bool)
     size = equal_sizes(names, categories, styles, np.asarray(boxes.size, float), free, unequal_pairs(graph))
-    return Boxes(torch.as_tensor(size, dtype=torch.float32), boxes.position, boxes.yaw)
+    return Boxes(size.astype(np.float32), boxes.position, boxes.yaw)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 import trimesh
 from pxr import Sdf, Tf, Usd, UsdGeom
 
@@ -91,13 +90,13 @@ def read_room(root: str | Path) -> SavedRoom:
                 carried[asset] = {path: f.read_bytes() for path, f in files.items() if path == must or f.exists()}
         assets[node.name], geometry[node.name] = asset, found
     bounds = np.array([geometry[name].mesh.bounds for name in graph.names])
-    sizes = torch.tensor(bounds[:, 1] - bounds[:, 0], dtype=torch.float32)
+    sizes = np.asarray(bounds[:, 1] - bounds[:, 0], np.float32)
     boxes = _boxes(stage, objects, graph, sizes)
     layouts = _layouts(stage, objects, graph, sizes) or (boxes,)
     return SavedRoom(graph, boxes, layouts, geometry, assets, carried, manifest)
 
 
-def _boxes(stage: Usd.Stage, objects: str, graph: SceneGraph, size: torch.Tensor) -> Boxes:
+def _boxes(stage: Usd.Stage, objects: str, graph: SceneGraph, size: np.ndarray) -> Boxes:
     """Boxes of the objects below a path as the stage places them now."""
     position, yaw, cache, room = [], [], UsdGeom.XformCache(), stage.GetPrimAtPath(objects).GetParent()
     turn, ahead = (Z_TO_Y, (0, -1, 0)) if stands_z_up(room) else (np.eye(3), (0, 0, 1))
@@ -109,10 +108,10 @@ def _boxes(stage: Usd.Stage, objects: str, graph: SceneGraph, size: torch.Tensor
         front, place = (np.array(v) @ turn.T for v in (pose.TransformDir(ahead), pose.ExtractTranslation()))
         position.append(place * metres_per_unit(stage))
         yaw.append(np.arctan2(front[0], front[2]))
-    return Boxes(size, *(torch.tensor(np.array(v), dtype=torch.float32) for v in (position, yaw)))
+    return Boxes(size, *(np.array(v, np.float32) for v in (position, yaw)))
 
 
-def _layouts(stage: Usd.Stage, objects: str, graph: SceneGraph, size: torch.Tensor) -> tuple[Boxes, ...]:
+def _layouts(stage: Usd.Stage, objects: str, graph: SceneGraph, size: np.ndarray) -> tuple[Boxes, ...]:
     """Boxes under every variant of `layout`; the stage is left as it was."""
     variants = stage.GetPrimAtPath(objects).GetParent().GetVariantSet("layout")
     names = [name for name in variants.GetVariantNames() if name.startswith("layout_")]

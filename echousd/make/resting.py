@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import torch
 
 from echomodel.boxes import Boxes
 from echousd.make.finished import Room
@@ -66,5 +65,5 @@ def _rested(room: Room, boxes: Boxes, report: SettleReport) -> tuple[Boxes, list
         position[row] = place[:3, 3]
         yaw[row] = np.arctan2(place[0, 2], place[2, 2])
         names.append(motion.name)
-    made = Boxes(boxes.size, *(torch.as_tensor(v, dtype=torch.float32) for v in (position, yaw)))
+    made = Boxes(boxes.size, *(v.astype(np.float32) for v in (position, yaw)))
     return rounded_boxes(room.graph, made), names

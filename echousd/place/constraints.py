@@ -1,20 +1,17 @@
 """The constraints of a room, linearised at its present boxes: relations, collisions, floor, walls and support.
 
-What the graph states has the margins of `echomodel.rules`, whose slopes are torch's: every row looks at copies of its
-own boxes, so that one way back from the sum of all margins gives the gradients of each. Headings stay, and so do the
-slopes of what stands apart, against a wall or on something.
+What the graph states has the margins of `echomodel.rules`, whose slopes are differences: all numbers of all rows are
+moved at once. Headings stay, and so do the slopes of what stands apart, against a wall or on something.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
-import torch
 from scipy import sparse
-from torch import Tensor
 
 from echomodel.boxes2d import CORNERS, hull
 from echomodel.floors import signed_distance
@@ -22,7 +19,7 @@ from echomodel.objective.support import ON_CEILING, ON_FLOOR, allowed_overlap
 from echomodel.rules import rule_set
 from echomodel.rules.geometry import PairGeometry
 from echomodel.rules.margins import pair_margins
-from echomodel.rules.placements import Spread, margin_of
+from echomodel.rules.placements import Spread, Stated, margin_of
 from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import COLUMNS, PLAN, SIDES, axes, parting
 from echousd.place.setting import Setting
@@ -34,6 +31,7 @@ HANDLES = 0.05  # metres at the front of a box that handles and doors take, on w
 ROUNDED = 0.02  # metres at its back, where a top with rounded corners may end before its box
 NEIGHBOURS = 2.0  # metres by which neighbours at one wall rather part along it than one in front of the other
 LONGEST_STEP = 0.6  # of any number in one round, metres or ratio
+NEARBY = 1e-6  # metres to either side at which slopes are measured
 
 Matrix: TypeAlias = Any  # (r, m) float, an array of numpy or a sparse one
 
@@ -130,29 +128,33 @@ class Constraints:
         """Relations, and placements, for which furniture moves, but none grows or shrinks."""
         setting, triplets, found = self.setting, self.setting.triplets, []
         rules, ends = rule_set(setting.rules), triplets[:, [0, 2]]
-        with torch.inference_mode(False):  # whatever calls this up from slopes
-            if len(triplets):
-                one, other = (self._copies(state, end, setting.centre.tolist()) for end in ends.T)
-                fronts = torch.from_numpy(setting.fronts[ends].all(1))
-                (size_s, at_s, yaw_s), (size_o, at_o, yaw_o) = one, other
-                pair = PairGeometry(size_s, size_o, at_s, at_o, yaw_s, yaw_o, rules.oriented, fronts)
-                margin = pair_margins(pair, torch.from_numpy(triplets[:, 1]), rules)
-                found.append(Rows(RELATION, ends, *_with_slopes(margin - self.slack, [one, other])))
-            for stated in setting.stated:
-                if stated.others or setting.surroundings is not None:
-                    who = [stated.subject, *stated.others]
-                    own = [self._copies(state, np.array([box])) for box in who]
-                    every = {box: Spread(size.detach(), *at) for box, (size, *at) in zip(who, own, strict=True)}
-                    margin = margin_of(stated, every, setting.surroundings, setting.categories)
-                    found.append(Rows(PLACEMENT, np.array([who]), *_with_slopes(margin - self.slack, own)))
-        return found
+        middle = np.array([setting.centre[0], 0.0, setting.centre[1]])
 
-    def _copies(
-        self, state: np.ndarray, who: np.ndarray, middle: Sequence[float] = (0.0, 0.0)
-    ) -> tuple[Tensor, Tensor, Tensor]:
-        """Size and position (r, 3) about `middle` and heading (r,) of boxes (r,), each row's its own."""
-        position = torch.from_numpy(state[who, :3] - (middle[0], 0.0, middle[1])).requires_grad_()
-        return torch.from_numpy(state[who, 3:]).requires_grad_(), position, torch.from_numpy(self.yaw[who])
+        def relations(boxes: np.ndarray) -> np.ndarray:
+            times = len(boxes) // len(ends)
+            (one, other), (yaw, turn) = boxes.swapaxes(0, 1), np.tile(self.yaw[ends], (times, 1)).T
+            fronts = np.tile(setting.fronts[ends].all(1), times)
+            pair = PairGeometry(
+                one[:, 3:], other[:, 3:], one[:, :3] - middle, other[:, :3] - middle, yaw, turn, rules.oriented, fronts
+            )
+            return pair_margins(pair, np.tile(triplets[:, 1], times), rules)
+
+        if len(triplets):
+            margin, by = _with_slopes(relations, state[ends])
+            found.append(Rows(RELATION, ends, margin - self.slack, by))
+        for stated in setting.stated:
+            who = [stated.subject, *stated.others]
+
+            def placement(boxes: np.ndarray, stated: Stated = stated, who: list[int] = who) -> np.ndarray:
+                poses = {box: Spread(boxes[:, at, 3:], boxes[:, at, :3], self.yaw[box].repeat(len(boxes)))
+                         for at, box in enumerate(who)}  # fmt: skip
+                return margin_of(stated, poses, setting.surroundings, setting.categories)
+
+            if stated.others or setting.surroundings is not None:
+                margin, by = _with_slopes(placement, state[[who]])
+                by[..., 3:] = 0.0
+                found.append(Rows(PLACEMENT, np.array([who]), margin - self.slack, by))
+        return found
 
     def _apart(self, state: np.ndarray, handicap: np.ndarray) -> tuple[Rows, np.ndarray]:
         """Pairs, each parted along the axis and to the side that are best."""
@@ -172,13 +174,14 @@ class Constraints:
             return []
         place, side, axis = state[who][:, PLAN], state[who][:, SIDES], self.axis[who]
         arm = np.array(CORNERS)[:, :, None] / 2 * axis[:, None]  # of each corner, for a metre of each side
-        with torch.inference_mode(False):
-            point = torch.from_numpy(place[:, None] + np.einsum("ncsd,ns->ncd", arm, side)).requires_grad_()
-            inside = signed_distance(point, torch.from_numpy(floor.polygon).expand(len(who), -1, -1))
-            (way,) = (slope.numpy() for slope in torch.autograd.grad(inside.sum(), point))
+        point = place[:, None] + np.einsum("ncsd,ns->ncd", arm, side)
+        inside, slopes = _with_slopes(
+            lambda points: signed_distance(points.swapaxes(0, 1), floor.polygon[None])[0], point.reshape(-1, 1, 2)
+        )
+        way = slopes.reshape(-1, 4, 2)
         by = np.zeros((*way.shape[:2], COLUMNS))
         by[..., PLAN], by[..., SIDES] = way, np.einsum("ncd,ncsd->ncs", way, arm)
-        found = [_of_one(FLOOR, who.repeat(4), inside.detach().numpy().ravel(), by.reshape(-1, COLUMNS))]
+        found = [_of_one(FLOOR, who.repeat(4), inside, by.reshape(-1, COLUMNS))]
         if len(floor.reflex):
             local = np.einsum("nsd,nrd->nrs", axis, floor.reflex - place[:, None])
             off = np.abs(local) - side[:, None] / 2
@@ -186,9 +189,8 @@ class Constraints:
             by[..., PLAN] = -np.sign(local)[..., None] * axis[:, None]
             by[..., 0, 3], by[..., 1, 5] = -0.5, -0.5
             best = off.argmax(2)[..., None]
-            by = np.take_along_axis(by, best[..., None], 2).reshape(-1, COLUMNS)
-            off = np.take_along_axis(off, best, 2).ravel()
-            found.append(_of_one(FLOOR, who.repeat(len(floor.reflex)), off, by))
+            by, off = np.take_along_axis(by, best[..., None], 2), np.take_along_axis(off, best, 2)
+            found.append(_of_one(FLOOR, who.repeat(len(floor.reflex)), off.ravel(), by.reshape(-1, COLUMNS)))
         return found
 
     def _walls(self, state: np.ndarray) -> Rows:
@@ -233,11 +235,13 @@ def _of_one(kind: int, who: np.ndarray, value: np.ndarray, by: np.ndarray) -> Ro
     return Rows(kind, who[:, None], value, by[:, None])
 
 
-def _with_slopes(margin: Tensor, own: Sequence[tuple[Tensor, Tensor, Tensor]]) -> tuple[np.ndarray, np.ndarray]:
-    """Margins (r,) and their slopes (r, k, 6) by the copies of the k boxes that each is about."""
-    leaves = [of for size, position, _ in own for of in (position, size)]
-    slopes = torch.autograd.grad(margin.sum(), leaves, allow_unused=True, materialize_grads=True)
-    return margin.detach().numpy(), torch.cat(slopes, 1).reshape(len(margin), -1, COLUMNS).numpy()
+def _with_slopes(margin: Callable[[np.ndarray], np.ndarray], at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Margins (r,) and their slopes (r, k, c) at numbers (r, k, c), of what gives the margins of many times r rows."""
+    rows, numbers = len(at), int(np.prod(at.shape[1:]))
+    off = NEARBY * np.concatenate([np.zeros((1, numbers)), np.eye(numbers), -np.eye(numbers)])
+    found = margin((at + off.reshape(-1, 1, *at.shape[1:])).reshape(-1, *at.shape[1:])).reshape(2 * numbers + 1, rows)
+    ahead, behind = found[1:].reshape(2, numbers, rows)
+    return found[0], ((ahead - behind) / (2 * NEARBY)).T.reshape(at.shape)
 
 
 def _linearised(every: Sequence[Rows], state: np.ndarray, axis: np.ndarray) -> Linearised:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 
 from echomodel.boxes import Boxes
 from echomodel.late import Late
@@ -71,8 +70,8 @@ class PlacedBoxes:
 
     @property
     def boxes(self) -> Boxes:
-        """The same boxes as tensors, float32."""
-        return Boxes(*(torch.from_numpy(of).float() for of in (self.size, self.position, self.yaw)))
+        """The same boxes, float32."""
+        return Boxes(*(of.astype(np.float32) for of in (self.size, self.position, self.yaw)))
 
 
 def place(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: PlaceConfig | None = None) -> PlacedBoxes:

@@ -5,12 +5,17 @@ Both call most functions alike (`kit(x).where(...)`, `maximum`, `stack`, `concat
 
 from __future__ import annotations
 
-from typing import Any
+import sys
+from collections.abc import Callable
+from contextlib import nullcontext
+from functools import wraps
+from typing import Any, TypeVar
 
 import numpy as np
 
 Array = Any  # np.ndarray or torch.Tensor
 NUMPY: Any = (np.ndarray, np.generic, float)
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def kit(values: Array) -> Any:
@@ -25,6 +30,37 @@ def kit(values: Array) -> Any:
 def held(values: Array) -> Array:
     """Values through which no gradient goes."""
     return values if isinstance(values, NUMPY) else values.detach()
+
+
+def on_device(values: Array, device: Any) -> Array:
+    """Values as a tensor on a device, or with None as an array of numpy."""
+    if device is not None:
+        import torch
+
+        return torch.as_tensor(values, device=device)
+    return values if isinstance(values, NUMPY) else values.detach().cpu().numpy()
+
+
+def device_of(values: Array) -> Any:
+    """Where a tensor is; None for an array of numpy."""
+    return None if isinstance(values, NUMPY) else values.device
+
+
+def beside(values: Any, other: Array) -> Array:
+    """Values of either library in that of another array, on its device."""
+    return np.asarray(values) if isinstance(other, NUMPY) else on_device(values, other.device)
+
+
+def without_slopes(function: Function) -> Function:
+    """The function, run without keeping what gradients would need; torch is not loaded for it."""
+
+    @wraps(function)
+    def run(*given: Any, **named: Any) -> Any:
+        torch = sys.modules.get("torch")
+        with torch.no_grad() if torch else nullcontext():
+            return function(*given, **named)
+
+    return run  # type: ignore[return-value]
 
 
 def rows(mask: Array) -> Array:
@@ -47,6 +83,16 @@ def at_most(values: Array, high: float) -> Array:
     return np.minimum(values, high) if isinstance(values, NUMPY) else values.clamp_max(high)
 
 
+def clipped(values: Array, low: float, high: float) -> Array:
+    """Values no less than one number and no more than another."""
+    return kit(values).clip(values, low, high)
+
+
+def picked(values: Array, at: Array) -> Array:
+    """Of each row (n, k, ...) the entry that `at` (n,) int64 says: (n, ...)."""
+    return values[beside(np.arange(len(at)), at), at]
+
+
 def dot(one: Array, other: Array) -> Array:
     """Products of vectors (..., 2): (...); of so few numbers a sum takes many times as long."""
     return one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1]
@@ -58,8 +104,8 @@ def norm(values: Array) -> Array:
 
 
 def cast(values: Array, like: Array) -> Array:
-    """Values as numbers of the same type as others."""
-    return values.astype(like.dtype) if isinstance(values, NUMPY) else values.to(like)
+    """Values as numbers of the same type as others, where those are."""
+    return values.astype(like.dtype) if isinstance(like, NUMPY) else kit(like).as_tensor(values).to(like)
 
 
 def whole(values: Array) -> Array:
@@ -106,3 +152,36 @@ def sum_of(who: Array, values: Array, count: int) -> Array:
     if not isinstance(values, NUMPY):
         return values.new_zeros(count).index_add(0, who, values)
     return np.bincount(who, values, count)
+
+
+def sums_of(who: Array, values: Array, count: int) -> Array:
+    """(count, c): sums of the rows (k, c) of each of `who` (k,) int64."""
+    if not isinstance(values, NUMPY):
+        return values.new_zeros(count, *values.shape[1:]).index_add(0, who, values)
+    if (np.diff(who) < 0).any():
+        order = np.argsort(who, kind="stable")
+        who, values = who[order], values[order]
+    out, starts = full(values, (count, *values.shape[1:]), 0.0), np.flatnonzero(np.diff(who, prepend=-1))
+    if len(starts):
+        out[who[starts]] = np.add.reduceat(values, starts)
+    return out
+
+
+def silu(values: Array) -> Array:
+    """Each value times its logistic function."""
+    if not isinstance(values, NUMPY):
+        return kit(values).nn.functional.silu(values)
+    return values * (0.5 + 0.5 * np.tanh(0.5 * values))
+
+
+def parted(values: Array, count: int) -> Any:
+    """So many equal parts of the columns of values (n, c)."""
+    return np.split(values, count, 1) if isinstance(values, NUMPY) else values.chunk(count, 1)
+
+
+def softmax(values: Array) -> Array:
+    """Shares (..., k) that numbers (..., k) stand for as logarithms."""
+    if not isinstance(values, NUMPY):
+        return values.softmax(-1)
+    odds = np.exp(values - values.max(-1, keepdims=True))
+    return odds / odds.sum(-1, keepdims=True)

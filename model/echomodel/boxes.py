@@ -1,4 +1,4 @@
-"""Oriented boxes as tensors, and the normalised 8-vector that the layout denoiser sees (EchoScene, section 3.3)."""
+"""Oriented boxes as arrays of numpy or torch, and the normalised 8-vector that the layout denoiser sees (3.3)."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import torch
-from torch import Tensor
+import numpy as np
 
+from echomodel.arrays import Array, at_least, beside, cast, clipped, kit, on_device
 from echomodel.roomboxes import RoomBoxes
 
 FEWEST = 50  # boxes that the statistics of a class need
@@ -30,9 +30,9 @@ class Boxes:
     Raises ValueError where the shapes do not belong together.
     """
 
-    size: Tensor
-    position: Tensor
-    yaw: Tensor
+    size: Array
+    position: Array
+    yaw: Array
 
     def __post_init__(self) -> None:
         shapes = tuple(self.size.shape), tuple(self.position.shape), tuple(self.yaw.shape)
@@ -46,64 +46,63 @@ class Boxes:
     def __len__(self) -> int:
         return len(self.yaw)
 
-    def __getitem__(self, index: slice | Tensor) -> Boxes:
+    def __getitem__(self, index: slice | Array) -> Boxes:
         return Boxes(self.size[index], self.position[index], self.yaw[index])
 
     @classmethod
     def cat(cls, boxes: Sequence[Boxes]) -> Boxes:
         """Boxes behind one another."""
-        size, position = torch.cat([b.size for b in boxes]), torch.cat([b.position for b in boxes])
-        return cls(size, position, torch.cat([b.yaw for b in boxes]))
+        parts = ([getattr(each, name) for each in boxes] for name in ("size", "position", "yaw"))
+        return cls(*(kit(part[0]).concat(part) for part in parts))
 
     @classmethod
     def from_room(cls, room: RoomBoxes) -> Boxes:
-        """The boxes of a room, moved so that the centre of its floor's bounding box is the origin."""
-        position = torch.as_tensor(room.position, dtype=torch.float32).reshape(-1, 3).clone()
+        """The boxes of a room as tensors, moved so that the centre of its floor's bounding box is the origin."""
+        position = np.asarray(room.position, np.float32).reshape(-1, 3).copy()
         if len(room.floor_polygon):
-            centre = (room.floor_polygon.max(0) + room.floor_polygon.min(0)) / 2
-            position[:, 0] -= float(centre[0])
-            position[:, 2] -= float(centre[1])
-        size = torch.as_tensor(room.size, dtype=torch.float32).reshape(-1, 3)
-        return cls(size, position, torch.as_tensor(room.yaw, dtype=torch.float32).reshape(-1))
+            position[:, ::2] -= ((room.floor_polygon.max(0) + room.floor_polygon.min(0)) / 2).astype(np.float32)
+        size, yaw = np.asarray(room.size, np.float32).reshape(-1, 3), np.asarray(room.yaw, np.float32).reshape(-1)
+        return cls(size, position, yaw).to("cpu")
 
-    def to(self, device: torch.device | str) -> Boxes:
-        """The same boxes on another device."""
-        return Boxes(self.size.to(device), self.position.to(device), self.yaw.to(device))
+    def to(self, device: Any) -> Boxes:
+        """The same boxes as tensors on a device, or with None as arrays of numpy."""
+        return Boxes(*(on_device(values, device) for values in (self.size, self.position, self.yaw)))
 
-    def replaced(self, mask: Tensor, by: Boxes) -> Boxes:
+    def replaced(self, mask: Array, by: Boxes) -> Boxes:
         """The same boxes, but those of `by` where `mask` (N,) bool is true."""
-        wide = mask[:, None]
-        size, position = torch.where(wide, by.size, self.size), torch.where(wide, by.position, self.position)
-        return Boxes(size, position, torch.where(mask, by.yaw, self.yaw))
+        wide, xp = mask[:, None], kit(self.yaw)
+        size, position = xp.where(wide, by.size, self.size), xp.where(wide, by.position, self.position)
+        return Boxes(size, position, xp.where(mask, by.yaw, self.yaw))
 
     def check(self) -> None:
         """Raises ValueError for a box that is not finite or has an extent that is not positive; names the first."""
-        flat = torch.cat([self.size, self.position, self.yaw[:, None]], dim=1)
+        size, position, yaw = (on_device(values, None) for values in (self.size, self.position, self.yaw))
         for text, wrong in (
-            ("is not finite", ~torch.isfinite(flat).all(1)),
-            ("has an extent that is not positive", (self.size <= 0).any(1)),
+            ("is not finite", ~np.isfinite(np.concatenate([size, position, yaw[:, None]], 1)).all(1)),
+            ("has an extent that is not positive", (size <= 0).any(1)),
         ):
-            if bool(wrong.any()):
-                at = int(wrong.nonzero()[0])
-                size, position = self.size[at].tolist(), self.position[at].tolist()
-                raise ValueError(f"box {at} {text}: size {size}, position {position}, yaw {float(self.yaw[at])}")
+            if wrong.any():
+                at = int(wrong.argmax())
+                where = f"position {position[at].tolist()}, yaw {float(yaw[at])}"
+                raise ValueError(f"box {at} {text}: size {size[at].tolist()}, {where}")
 
-    def encode(self, scale: BoxScale) -> Tensor:
+    def encode(self, scale: BoxScale) -> Array:
         """(N, 8) float32 [sx, sy, sz, px, py, pz, sin, cos], size and position in the units of `scale`."""
-        size = self.size.clamp_min(1e-3).log() if scale.log_size else self.size
-        off = torch.cat([size, self.position], dim=1) - scale.middle.to(size)
-        scaled = off / torch.where(off < 0, scale.below.to(size), scale.above.to(size))
-        return torch.cat([scaled, torch.sin(self.yaw)[:, None], torch.cos(self.yaw)[:, None]], dim=1)
+        xp = kit(self.yaw)
+        size = xp.log(at_least(self.size, 1e-3)) if scale.log_size else self.size
+        off = xp.concat([size, self.position], 1) - cast(scale.middle, size)
+        scaled = off / xp.where(off < 0, cast(scale.below, size), cast(scale.above, size))
+        return xp.concat([scaled, xp.sin(self.yaw)[:, None], xp.cos(self.yaw)[:, None]], 1)
 
     @classmethod
-    def decode(cls, vectors: Tensor, scale: BoxScale) -> Boxes:
+    def decode(cls, vectors: Array, scale: BoxScale) -> Boxes:
         """The inverse of `encode`, differentiable: (N, 8) of any length of (sin, cos), yaw = atan2(sin, cos)."""
-        scaled = vectors[:, :6]
-        step = torch.where(scaled < 0, scale.below.to(vectors), scale.above.to(vectors))
-        plain = scale.middle.to(vectors) + scaled * step
+        xp, scaled = kit(vectors), vectors[:, :6]
+        step = xp.where(scaled < 0, cast(scale.below, vectors), cast(scale.above, vectors))
+        plain = cast(scale.middle, vectors) + scaled * step
         # a guess of the clean box from pure noise lies anywhere: its exponential must stay finite, gradients too
-        size = plain[:, :3].clamp(-LARGEST, LARGEST).exp() if scale.log_size else plain[:, :3]
-        return cls(size, plain[:, 3:], torch.atan2(vectors[:, 6], vectors[:, 7]))
+        size = xp.exp(clipped(plain[:, :3], -LARGEST, LARGEST)) if scale.log_size else plain[:, :3]
+        return cls(size, plain[:, 3:], xp.atan2(vectors[:, 6], vectors[:, 7]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +114,9 @@ class BoxScale:
         log_size: sizes are in log metres.
     """
 
-    middle: Tensor
-    below: Tensor
-    above: Tensor
+    middle: Array
+    below: Array
+    above: Array
     log_size: bool
 
 
@@ -156,44 +155,47 @@ class BoxStatistics:
                 raise ValueError(f"box statistics: class {number} is {row}, expected nine numbers of log sizes")
 
     @classmethod
-    def from_boxes(cls, boxes: Boxes, category: Tensor, categories: int) -> BoxStatistics:
+    def from_boxes(cls, boxes: Boxes, category: Array, categories: int) -> BoxStatistics:
         """Spreads of log size per class and of position; x and z share theirs (rooms turn).
 
         Arguments:
             boxes: N boxes. category: (N,) int64, their classes. categories: number of classes; one with fewer than
                 `FEWEST` boxes gets the spread of all.
         """
-        size, position = boxes.size.double().clamp_min(1e-3).log(), boxes.position.double()
-        mean, std = size.mean(0), size.std(0)
-        centre = torch.stack([torch.zeros(()), position[:, 1].mean().float(), torch.zeros(())]).double()
-        plane = position[:, [0, 2]].square().mean().sqrt()
-        spread = torch.stack([plane, position[:, 1].std(), plane])
+        boxes, category = boxes.to(None), np.asarray(category)
+        size, position = np.log(np.maximum(boxes.size.astype(float), 1e-3)), boxes.position.astype(float)
+        mean, std = size.mean(0), size.std(0, ddof=1)
+        centre = np.array([0.0, position[:, 1].mean(), 0.0])
+        plane = np.sqrt(np.square(position[:, ::2]).mean())
+        spread = np.array([plane, position[:, 1].std(ddof=1), plane])
         numbers = [(mean - std), (mean + std), (centre - spread), (centre + spread)]
         low, high, start, stop = (tuple(round(float(v), 5) for v in values) for values in numbers)
-        rows, shares = [], size.new_tensor([0.05, 0.5, 0.95])
+        rows = []
         for number in range(categories):
             own = size[category == number]
-            few, middle, many = (own if len(own) >= FEWEST else size).quantile(shares, dim=0)
-            steps = (torch.cat([middle - few, many - middle]) / Z95).clamp_min(NARROWEST)
-            rows.append(tuple(round(float(v), 4) for v in torch.cat([middle, steps])))
+            few, middle, many = np.quantile(own if len(own) >= FEWEST else size, [0.05, 0.5, 0.95], axis=0)
+            steps = np.maximum(np.concatenate([middle - few, many - middle]) / Z95, NARROWEST)
+            rows.append(tuple(round(float(v), 4) for v in (*middle, *steps)))
         return cls(low, high, start, stop, log_size=True, classes=tuple(rows))
 
-    def scale(self, category: Tensor | None = None) -> BoxScale:
+    def scale(self, category: Array | None = None) -> BoxScale:
         """What the numbers of boxes stand for: of N boxes of `category` (N,) int64, or of all alike.
 
         Raises ValueError where sizes are normalised within classes and there is no `category`.
         """
-        device = "cpu" if category is None else category.device
-        low = torch.tensor([*self.size_low, *self.position_low])[None].to(device)
-        high = torch.tensor([*self.size_high, *self.position_high])[None].to(device)
+        where = np.zeros(1) if category is None else category
+        low, high = (np.array([[*size, *place]], np.float32) for size, place in (
+            (self.size_low, self.position_low), (self.size_high, self.position_high)
+        ))  # fmt: skip
         middle, half = (low + high) / 2, (high - low) / 2
         if not self.classes:
-            return BoxScale(middle, half, half, self.log_size)
+            return BoxScale(beside(middle, where), beside(half, where), beside(half, where), self.log_size)
         if category is None:
             raise ValueError("box statistics normalise sizes within classes: the classes of the boxes are needed")
-        sizes = torch.tensor(self.classes).to(category.device)[category].split(3, dim=1)
-        places = (values[:, 3:].expand(len(category), 3) for values in (middle, half, half))
-        centre, below, above = (torch.cat(pair, 1) for pair in zip(sizes, places, strict=True))
+        of_class = np.array(self.classes, np.float32).reshape(-1, 3, 3)
+        rows = (np.concatenate([of_class[:, number], np.repeat(values[:, 3:], len(of_class), 0)], 1)
+                for number, values in enumerate((middle, half, half)))  # fmt: skip
+        centre, below, above = (beside(values, where)[where] for values in rows)
         return BoxScale(centre, below, above, self.log_size)
 
     def to_json(self) -> dict:

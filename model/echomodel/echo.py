@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import cached_property
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import torch
-from torch import Tensor
+import numpy as np
 
+from echomodel.arrays import Array, beside, on_device, without_slopes
 from echomodel.boxes import Boxes
 from echomodel.compact.learned import unlearned
-from echomodel.compact.model import CompactModel, WeightsError, branches, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.sampling import (
     CompactSampling,
+    Model,
     known_values,
     sample_boxes,
     sample_descriptions,
     with_whole_styles,
 )
+from echomodel.compact.weights import WeightsError, branches
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
 from echomodel.late import Late
@@ -29,36 +30,32 @@ from echomodel.protocols import GraphEdit, touched_nodes
 from echomodel.vocabulary import vocabulary
 
 CHECKPOINT = "checkpoint.safetensors"  # beside the weights in the folder of a training
-LATER = ("autoencoder", "shape")  # shipped parts that few rooms need: three quarters of the bytes
-sample_shapes, packed_shape = Late("echomodel.compact.shape:sample_shapes"), Late("echomodel.packed:packed")
+load_weights, load_plain = Late("echomodel.compact.model:load_weights"), Late("echomodel.compact.plain:load_plain")
+sample_shapes = Late("echomodel.compact.shape:sample_shapes")
 
 
 class EchoModel:
-    """Samples rooms with a `CompactModel`; equal arguments and generator state give equal results on one device.
+    """Samples rooms with a compact model; equal arguments and generator state give equal results on one device.
 
     Arguments:
-        model: the model, in evaluation mode.
+        model: the model, of torch in evaluation mode or of numpy; graphs and what is known may be of either, what
+            is sampled is of its own.
         hash: short hash of the weights it came from.
-        packed: on a CPU, lay the shape denoiser's linear maps out for oneDNN, equal but for rounding and 1.5 times as
-            fast (`benchmarks/inference_modes.py`); do not train the model on then.
     """
 
     preset = "compact"  # how this model's preset is called
 
-    def __init__(self, model: CompactModel, hash: str = "", *, packed: bool = True) -> None:
-        self.model, self.hash = model.eval(), hash
-        if packed and "shape" in model.parts and self.device.type == "cpu":
-            if "shape" in model.later:
-                model.later["shape"] = partial(packed_shape, model.later["shape"])
-            else:
-                packed_shape(lambda: model.shape)
+    def __init__(self, model: Model, hash: str = "") -> None:
+        self.model: Any = model if model.device is None else model.eval()
+        self.hash = hash
 
     @classmethod
-    def load(cls, path: str | Path | None = None, *, device: torch.device | str = "cpu") -> EchoModel:
+    def load(cls, path: str | Path | None = None, *, device: Any = "cpu") -> EchoModel:
         """Load the weights that ship with the package, a weights file, a folder of such, or that of a training.
 
         Arguments:
-            path: file or folder, None = the shipped weights. device: where to.
+            path: file or folder, None = the shipped weights.
+            device: where to; None = as arrays of numpy, which the shipped weights alone can be.
 
         Raises WeightsError where there are none, or they are damaged or do not belong together.
         """
@@ -68,7 +65,14 @@ class EchoModel:
             files = sorted(file for file in source.glob("*.safetensors") if file.name != CHECKPOINT)
         if path is not None and not files:
             raise WeightsError(f"{source}: holds no weights files (.safetensors)")
-        return cls(*load_weights(files, device, LATER if path is None else ()))
+        if device is None:
+            return cls(*load_plain(files))
+        return cls(*load_weights(files, device))
+
+    @cached_property
+    def whole(self) -> EchoModel:
+        """The same weights as modules of torch, which shapes need."""
+        return EchoModel.load() if self.device is None else self
 
     @property
     def branches(self) -> frozenset[str]:
@@ -86,11 +90,11 @@ class EchoModel:
         return self.model.config
 
     @property
-    def device(self) -> torch.device:
-        """Where the weights are."""
+    def device(self) -> Any:
+        """Where the weights are; None = they are arrays of numpy."""
         return self.model.device
 
-    @torch.no_grad()
+    @without_slopes
     def sample_layout(self, graph: GraphBatch, **how: Any) -> Boxes:
         """Boxes for all objects of S scenes (EchoScene 3.3), in the room frame of `Boxes`; sizes are positive.
 
@@ -102,14 +106,14 @@ class EchoModel:
         graph = self._checked(graph)
         return sample_boxes(self.model, self.graph_latent, graph, self._how(graph, how))
 
-    @torch.no_grad()
-    def graph_latent(self, graph: GraphBatch, edit: GraphEdit | None = None) -> Tensor:
+    @without_slopes
+    def graph_latent(self, graph: GraphBatch, edit: GraphEdit | None = None) -> Array:
         """Latent nodes (N, latent width) that both branches read; `edit` routes them through the manipulator's edit."""
         pairs = pairs_of(graph, self.config.predicates)
         if edit is None:
             return self.model.latent(graph.category, pairs)
-        old = pairs_of(graph.with_triplets(edit.before.to(self.device)), self.config.predicates)
-        added = edit.added.to(self.device)
+        old = pairs_of(graph.with_triplets(on_device(edit.before, self.device)), self.config.predicates)
+        added = on_device(edit.added, self.device)
         return self.model.latent(
             graph.category, pairs, before=old.without(~added, old.told), added=added, touched=touched_nodes(graph, edit)
         )
@@ -118,21 +122,20 @@ class EchoModel:
         """One sentence for every word of the graph that the weights do not know, and what becomes of it."""
         return unlearned(graph, self.config)
 
-    @torch.no_grad()
-    def sample_shapes(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Tensor:
+    @without_slopes
+    def sample_shapes(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Array:
         """Shapes for all objects of S scenes (EchoScene 3.4); objects of one class and style become equal.
 
         Arguments as for `sample_layout`; the shapes will fill the sizes of the boxes.
 
         Returns (N, 64, 64, 64) float32 truncated signed distances on the box-normalised grid, negative inside.
         """
-        graph, boxes = self._checked(graph), self._of(graph, boxes)
-        found: Tensor = sample_shapes(self.model, self.graph_latent, graph, boxes, equal_furniture(graph),
-                                      self._how(graph, how))  # fmt: skip
-        return found
+        own, graph, boxes = self.whole, self.whole._checked(graph), self.whole._of(graph, boxes)
+        found = sample_shapes(own.model, own.graph_latent, graph, boxes, equal_furniture(graph), own._how(graph, how))
+        return on_device(found, self.device)
 
-    @torch.no_grad()
-    def sample_furniture(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Tensor:
+    @without_slopes
+    def sample_furniture(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Array:
         """Descriptions of all pieces of furniture of S scenes (`echomodel.furniture.style`).
 
         Arguments as for `sample_layout`; only the sizes of the boxes matter.
@@ -166,32 +169,31 @@ class EchoModel:
         return boxes
 
 
-def equal_furniture(graph: GraphBatch) -> Tensor:
+def equal_furniture(graph: GraphBatch) -> Array:
     """(N,) int64: for every node the first node of its class that relations of style or material join it to."""
-    triplets = graph.triplets
-    joins = torch.isin(triplets[:, 1], triplets.new_tensor(vocabulary().uniting("shape")))
-    joins &= graph.category[triplets[:, 0]] == graph.category[triplets[:, 2]]
-    return _first_joined(graph.num_nodes, triplets[joins][:, [0, 2]])
+    own = graph.to(None)
+    joins = np.isin(own.triplets[:, 1], vocabulary().uniting("shape"))
+    joins &= own.category[own.triplets[:, 0]] == own.category[own.triplets[:, 2]]
+    return beside(_first_joined(own.num_nodes, own.triplets[joins][:, [0, 2]]), graph.category)
 
 
-def joined(graph: GraphBatch, styles: Tensor | None = None) -> Tensor:
+def joined(graph: GraphBatch, styles: Array | None = None) -> Array:
     """(N,) int64: for every node the first node of its style, by relations of style and by `styles` (N,), -1 = none."""
-    triplets = graph.triplets
-    ends = triplets[torch.isin(triplets[:, 1], triplets.new_tensor(vocabulary().uniting("style")))][:, [0, 2]]
+    own = graph.to(None)
+    ends = own.triplets[np.isin(own.triplets[:, 1], vocabulary().uniting("style"))][:, [0, 2]]
     if styles is not None:
-        styles = styles.to(triplets.device)
-        same = (styles[:, None] == styles) & (graph.scene[:, None] == graph.scene) & (styles >= 0)
-        ends = torch.cat([ends, same.nonzero()])
-    return _first_joined(graph.num_nodes, ends)
+        styles = on_device(styles, None)
+        same = (styles[:, None] == styles) & (own.scene[:, None] == own.scene) & (styles >= 0)
+        ends = np.concatenate([ends, np.argwhere(same)])
+    return beside(_first_joined(own.num_nodes, ends), graph.category)
 
 
-def _first_joined(nodes: int, ends: Tensor) -> Tensor:
+def _first_joined(nodes: int, ends: np.ndarray) -> np.ndarray:
     """(N,) int64: for every node the first that a chain of the pairs `ends` (E, 2) joins it to."""
-    first = torch.arange(nodes, device=ends.device)
-    while len(ends):
-        lowest = first[ends].amin(1)
-        lower = first.scatter_reduce(0, ends.flatten(), lowest.repeat_interleave(2), "amin")
-        if torch.equal(lower, first):
-            break
+    first = np.arange(nodes)
+    while True:
+        lower = first.copy()
+        np.minimum.at(lower, ends.ravel(), first[ends].min(1).repeat(2))
+        if np.array_equal(lower, first):
+            return first
         first = lower
-    return first

@@ -1,18 +1,18 @@
-"""Scene graphs as tensors: many rooms packed as one disjoint graph."""
+"""Scene graphs as arrays of numpy or torch: many rooms packed as one disjoint graph."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
+from echomodel.arrays import Array, constant, full, kit, on_device
 from echomodel.floors import area
 from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
-from echomodel.surroundings import ROW, centred, extents, opening_rows, padded, padded_rows, trimmed
+from echomodel.surroundings import ROW, centred, extents, opening_rows, padded, trimmed
 from echomodel.vocabulary import vocabulary
 
 
@@ -36,74 +36,75 @@ class GraphBatch:
     Raises ValueError where a tensor has the wrong shape, dtype or device.
     """
 
-    category: Tensor
-    triplets: Tensor
-    scene: Tensor
-    room_type: Tensor
-    floor: Tensor
+    category: Array
+    triplets: Array
+    scene: Array
+    room_type: Array
+    floor: Array
     names: tuple[str, ...] | None = None
-    openings: Tensor = None  # type: ignore[assignment]
-    placements: Tensor = None  # type: ignore[assignment]
-    height: Tensor = None  # type: ignore[assignment]
+    openings: Array = None
+    placements: Array = None
+    height: Array = None
 
     def __post_init__(self) -> None:
         nodes, scenes = len(self.category), len(self.room_type)
         if self.openings is None:
-            object.__setattr__(self, "openings", self.floor.new_zeros(scenes, 0, ROW))
+            object.__setattr__(self, "openings", full(self.floor, (scenes, 0, ROW), 0.0))
         if self.placements is None:
-            object.__setattr__(self, "placements", self.triplets.new_zeros(0, 4))
+            object.__setattr__(self, "placements", full(self.triplets, (0, 4), 0))
         if self.height is None:
-            object.__setattr__(self, "height", self.floor.new_full((scenes,), torch.nan))
-        expected: dict[str, tuple[tuple[int, ...], torch.dtype]] = {
-            "category": ((nodes,), torch.int64),
-            "triplets": ((len(self.triplets), 3), torch.int64),
-            "placements": ((len(self.placements), 4), torch.int64),
-            "scene": ((nodes,), torch.int64),
-            "room_type": ((scenes,), torch.int64),
-            "floor": ((scenes, max(1, self.floor.shape[1] if self.floor.ndim == 3 else 4), 2), torch.float32),
-            "height": ((scenes,), torch.float32),
-            "openings": ((scenes, self.openings.shape[1] if self.openings.ndim == 3 else 0, ROW), torch.float32),
+            object.__setattr__(self, "height", full(self.floor, scenes, np.nan))
+        expected: dict[str, tuple[tuple[int, ...], str]] = {
+            "category": ((nodes,), "int64"),
+            "triplets": ((len(self.triplets), 3), "int64"),
+            "placements": ((len(self.placements), 4), "int64"),
+            "scene": ((nodes,), "int64"),
+            "room_type": ((scenes,), "int64"),
+            "floor": ((scenes, max(1, self.floor.shape[1] if self.floor.ndim == 3 else 4), 2), "float32"),
+            "height": ((scenes,), "float32"),
+            "openings": ((scenes, self.openings.shape[1] if self.openings.ndim == 3 else 0, ROW), "float32"),
         }
         for name, (shape, dtype) in expected.items():
-            tensor = getattr(self, name)
-            if tuple(tensor.shape) != shape or tensor.dtype != dtype:
-                found = f"{tuple(tensor.shape)} {tensor.dtype}"
+            array = getattr(self, name)
+            if tuple(array.shape) != shape or str(array.dtype).removeprefix("torch.") != dtype:
+                found = f"{tuple(array.shape)} {array.dtype}"
                 raise ValueError(f"GraphBatch.{name} is {found}, expected {shape} {dtype}")
-            if tensor.device != self.category.device:
-                raise ValueError(f"GraphBatch.{name} is on {tensor.device}, category on {self.category.device}")
+            if array.device != self.category.device:
+                raise ValueError(f"GraphBatch.{name} is on {array.device}, category on {self.category.device}")
         if self.names is not None and len(self.names) != nodes:
             raise ValueError(f"GraphBatch.names has {len(self.names)} names for {nodes} nodes")
 
     @classmethod
     def single(
-        cls, category: Sequence[int] | Tensor, triplets: Sequence[Sequence[int]] | Tensor = (), *, room_type: int = 0,
+        cls, category: Sequence[int] | Array, triplets: Sequence[Sequence[int]] | Array = (), *, room_type: int = 0,
         floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | None = None,
         names: Sequence[str] | None = None, openings: Sequence[Opening] = (),
-        placements: Sequence[Sequence[int]] | Tensor = (), height: float | None = None,
+        placements: Sequence[Sequence[int]] | Array = (), height: float | None = None, device: Any = "cpu",
     ) -> GraphBatch:  # fmt: skip
         """One scene graph from plain lists; arguments as in the class.
 
         `floor` is None where unknown, two extents (x, z) of a rectangle, or corners in any frame. `openings` lie in the
         edges of its corners, those of `echomodel.openings.rectangle` for extents; where it is unknown they are too.
+        `device`: as of `to`.
         """
-        nodes = torch.as_tensor(category, dtype=torch.int64).reshape(-1)
+        nodes, corners = np.asarray(category, np.int64).reshape(-1), centred(floor)
         return cls(
-            category=nodes, triplets=torch.as_tensor(triplets, dtype=torch.int64).reshape(-1, 3),
-            scene=torch.zeros_like(nodes), room_type=torch.tensor([room_type]), floor=(corners := centred(floor))[None],
+            category=nodes, triplets=np.asarray(triplets, np.int64).reshape(-1, 3),
+            scene=np.zeros_like(nodes), room_type=np.array([room_type]), floor=corners[None],
             names=None if names is None else tuple(names),
-            openings=opening_rows(() if floor is None else openings, corners.numpy())[None],
-            placements=torch.as_tensor(placements, dtype=torch.int64).reshape(-1, 4),
-            height=torch.tensor([torch.nan if height is None else height]),
-        )  # fmt: skip
+            openings=opening_rows(() if floor is None else openings, corners)[None],
+            placements=np.asarray(placements, np.int64).reshape(-1, 4),
+            height=np.array([np.nan if height is None else height], np.float32),
+        ).to(device)  # fmt: skip
 
     @classmethod
-    def from_room(cls, room: RoomBoxes, *, triplets: Sequence[Sequence[int]] | Tensor | None = None) -> GraphBatch:
+    def from_room(cls, room: RoomBoxes, *, triplets: Sequence[Sequence[int]] | Array | None = None) -> GraphBatch:
         """The graph of a labelled room (`triplets` overrides its relations); raises `UnknownWord`."""
         words = vocabulary()
         relations = room.relations if triplets is None else triplets
         return cls.single(
             [words.category_id(word) for word in room.categories],
-            torch.as_tensor([] if relations is None else relations, dtype=torch.int64).reshape(-1, 3),
+            [] if relations is None else relations,
             room_type=words.room_type_id(room.room_type),
             floor=room.floor_polygon if len(room.floor_polygon) else None,
             openings=room.openings, height=room.height,
@@ -117,19 +118,19 @@ class GraphBatch:
             raise ValueError("GraphBatch.pack needs at least one graph, got none")
         triplets, placements, scenes, nodes, count = [], [], [], 0, 0
         for graph in graphs:
-            triplets.append(graph.triplets + graph.triplets.new_tensor([nodes, 0, nodes]))
+            triplets.append(graph.triplets + constant([nodes, 0, nodes], graph.triplets))
             placements.append(_shifted(graph.placements, nodes))
             scenes.append(graph.scene + count)
             nodes += graph.num_nodes
             count += graph.num_scenes
-        names = [graph.names for graph in graphs]
+        names, xp = [graph.names for graph in graphs], kit(graphs[0].floor)
         return cls(
-            category=torch.cat([graph.category for graph in graphs]), triplets=torch.cat(triplets),
-            scene=torch.cat(scenes), room_type=torch.cat([graph.room_type for graph in graphs]),
+            category=xp.concat([graph.category for graph in graphs]), triplets=xp.concat(triplets),
+            scene=xp.concat(scenes), room_type=xp.concat([graph.room_type for graph in graphs]),
             floor=padded([graph.floor for graph in graphs]),
             names=None if any(n is None for n in names) else tuple(name for n in names for name in n or ()),
-            openings=padded_rows([graph.openings for graph in graphs]), placements=torch.cat(placements),
-            height=torch.cat([graph.height for graph in graphs]),
+            openings=padded([graph.openings for graph in graphs]), placements=xp.concat(placements),
+            height=xp.concat([graph.height for graph in graphs]),
         )  # fmt: skip
 
     def unpack(self) -> list[GraphBatch]:
@@ -138,10 +139,10 @@ class GraphBatch:
         out, start = [], 0
         for number, count in enumerate(self.node_counts.tolist()):
             nodes, room = slice(start, start + count), slice(number, number + 1)
-            triplets = self.triplets[owner == number] - self.triplets.new_tensor([start, 0, start])
+            triplets = self.triplets[owner == number] - constant([start, 0, start], self.triplets)
             names = None if self.names is None else self.names[nodes]
             graph = GraphBatch(
-                self.category[nodes], triplets, torch.zeros_like(self.scene[nodes]), self.room_type[room],
+                self.category[nodes], triplets, self.scene[nodes] * 0, self.room_type[room],
                 trimmed(self.floor[room]), names, _there(self.openings[room]),
                 _shifted(self.placements[placed == number], -start), self.height[room],
             )  # fmt: skip
@@ -160,16 +161,16 @@ class GraphBatch:
         return len(self.room_type)
 
     @property
-    def node_counts(self) -> Tensor:
+    def node_counts(self) -> Array:
         """(S,) int64, nodes of each scene."""
-        return torch.bincount(self.scene, minlength=self.num_scenes)
+        return kit(self.scene).bincount(self.scene, minlength=self.num_scenes)
 
-    def to(self, device: torch.device | str) -> GraphBatch:
-        """The same batch on another device."""
-        moved = {f.name: getattr(self, f.name).to(device) for f in fields(self) if f.name != "names"}
+    def to(self, device: Any) -> GraphBatch:
+        """The same batch as tensors on a device, or with None as arrays of numpy."""
+        moved = {f.name: on_device(getattr(self, f.name), device) for f in fields(self) if f.name != "names"}
         return replace(self, **moved)
 
-    def with_triplets(self, triplets: Tensor) -> GraphBatch:
+    def with_triplets(self, triplets: Array) -> GraphBatch:
         """The same nodes with other relations; `triplets` (E, 3) int64."""
         return replace(self, triplets=triplets)
 
@@ -180,55 +181,54 @@ class GraphBatch:
         of an object to itself or across scenes, scenes out of order, or a floor that is none; the message names the
         entry at fault.
         """
-        words = vocabulary()
+        own, words = self.to(None), vocabulary()
         categories, predicates, room_types = len(words.categories), len(words.predicates), len(words.room_types)
-        if not self.num_nodes:
+        if not own.num_nodes:
             raise ValueError("graph has no nodes, at least one is needed")
-        within("category of node", self.category, categories)
-        within("room type of scene", self.room_type, room_types)
-        within("scene of node", self.scene, self.num_scenes)
-        if bool((self.scene[1:] < self.scene[:-1]).any()):
+        within("category of node", own.category, categories)
+        within("room type of scene", own.room_type, room_types)
+        within("scene of node", own.scene, own.num_scenes)
+        if (own.scene[1:] < own.scene[:-1]).any():
             raise ValueError("GraphBatch.scene decreases: the nodes of a scene must stand together, in scene order")
-        within("predicate of triplet", self.triplets[:, 1], predicates)
-        within("subject of triplet", self.triplets[:, 0], self.num_nodes)
-        within("object of triplet", self.triplets[:, 2], self.num_nodes)
-        within("subject of placement", self.placements[:, 0], self.num_nodes)
-        within("word of placement", self.placements[:, 1], len(words.placements))
-        within("other object of placement", self.placements[:, 2:].clamp_min(0), self.num_nodes)
-        subject, target = self.triplets[:, 0], self.triplets[:, 2]
+        within("predicate of triplet", own.triplets[:, 1], predicates)
+        within("subject of triplet", own.triplets[:, 0], own.num_nodes)
+        within("object of triplet", own.triplets[:, 2], own.num_nodes)
+        within("subject of placement", own.placements[:, 0], own.num_nodes)
+        within("word of placement", own.placements[:, 1], len(words.placements))
+        within("other object of placement", own.placements[:, 2:].max(1, initial=0), own.num_nodes)
+        subject, target = own.triplets[:, 0], own.triplets[:, 2]
         for text, wrong in (
             ("relates a node to itself", subject == target),
-            ("crosses scenes", self.scene[subject] != self.scene[target]),
+            ("crosses scenes", own.scene[subject] != own.scene[target]),
         ):
-            if bool(wrong.any()):
-                at = int(wrong.nonzero()[0])
-                raise ValueError(f"triplet {at} {self.triplets[at].tolist()} {text}")
-        for at, corners in enumerate(self.floor):
-            there = torch.isfinite(corners).all(1)
-            used = corners[: int(there.sum())]
-            if not bool(torch.isnan(corners[len(used) :]).all()) or len(used) in (1, 2):
+            if wrong.any():
+                at = int(wrong.argmax())
+                raise ValueError(f"triplet {at} {own.triplets[at].tolist()} {text}")
+        for at, corners in enumerate(own.floor):
+            used = corners[: int(np.isfinite(corners).all(1).sum())]
+            if not np.isnan(corners[len(used) :]).all() or len(used) in (1, 2):
                 raise ValueError(f"floor of scene {at} has corners {corners.tolist()} m, expected 3 or more, then NaN")
-            if len(used) and float(area(used[None])) < 1e-6:
+            if len(used) and float(area(used[None])[0]) < 1e-6:
                 raise ValueError(f"floor of scene {at} spans {extents(used[None])[0].tolist()} m and encloses no area")
-            middle = (used.amax(0) + used.amin(0)) / 2 if len(used) else used.new_zeros(2)
-            if float(middle.abs().max()) > 1e-3:
+            middle = (used.max(0) + used.min(0)) / 2 if len(used) else np.zeros(2)
+            if float(abs(middle).max()) > 1e-3:
                 raise ValueError(f"floor of scene {at} has its middle at {middle.tolist()} m, expected [0.0, 0.0]")
 
 
-def _shifted(placements: Tensor, nodes: int) -> Tensor:
+def _shifted(placements: Array, nodes: int) -> Array:
     """Placements whose nodes are counted from elsewhere."""
-    moved = placements + placements.new_tensor([nodes, 0, nodes, nodes])
-    return torch.where(placements < 0, placements, moved)
+    moved = placements + constant([nodes, 0, nodes, nodes], placements)
+    return kit(moved).where(placements < 0, placements, moved)
 
 
-def _there(rows: Tensor) -> Tensor:
+def _there(rows: Array) -> Array:
     """The rows (1, O, ROW) of one scene without padding."""
-    return rows[:, : int(torch.isfinite(rows[0, :, 0]).sum())]
+    return rows[:, : int(kit(rows).isfinite(rows[0, :, 0]).sum())]
 
 
-def within(what: str, values: Tensor, size: int) -> None:
+def within(what: str, values: Array, size: int) -> None:
     """Raises ValueError naming the first of `values` (n,) that lies outside 0..size-1."""
     wrong = (values < 0) | (values >= size)
-    if bool(wrong.any()):
-        at = int(wrong.nonzero()[0])
+    if wrong.any():
+        at = int(wrong.nonzero()[0][0])
         raise ValueError(f"{what} {at} is {int(values[at])}, allowed: 0..{size - 1}")

@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import torch
-from torch import Tensor
 
+from echomodel.arrays import Array, at_least, cast, device_of, full, kit, on_device
 from echomodel.boxes import Boxes, BoxScale
 from echomodel.graph import GraphBatch
 from echomodel.objective import KINDS, Plan, missed
@@ -37,73 +36,73 @@ def guided(predict: Predict, plan: Plan, scale: BoxScale, *, strength: float, ro
         scale: what the numbers of the boxes stand for. strength, rounds: as in `mended`.
     """
 
-    def pulled(x: Tensor, level: Tensor) -> Tensor:
+    def pulled(x: Array, level: Array) -> Array:
         clean = predict(x, level)
         if not rounds or bool((level > LATE).any()):
             return clean
         drawn = Boxes.decode(clean, scale)
         there = mended(plan, drawn, strength=strength, rounds=rounds, given=level == 0).encode(scale)
-        return torch.where((level > 0)[:, None], torch.cat([clean[:, :3], there[:, 3:]], 1), clean)
+        xp = kit(x)
+        return xp.where((level > 0)[:, None], xp.concat([clean[:, :3], there[:, 3:]], 1), clean)
 
     return pulled
 
 
-def mended(plan: Plan, boxes: Boxes, *, strength: float, rounds: int, given: Tensor | None = None) -> Boxes:
+def mended(plan: Plan, boxes: Boxes, *, strength: float, rounds: int, given: Array | None = None) -> Boxes:
     """Boxes after so many steps of Adam (Kingma & Ba 2015) on their places and headings, down what all terms miss.
 
     Arguments:
-        plan: of N boxes of S rooms, wherever they stand. boxes: N, where they are drawn.
+        plan: of N boxes of S rooms, wherever they stand; of torch if there are rounds.
+        boxes: N, where they are drawn.
         strength: of the first step, metres and radians; the steps become shorter and shorter.
         rounds: how many; without one only heights are set.
         given: (N,) bool, boxes that stay; None = none.
     """
-    device, drawn = boxes.yaw.device, boxes.to("cpu")
-    boxes = Boxes(drawn.size.double(), drawn.position.double(), drawn.yaw.double())  # rounding would choose the side
-    stays = torch.zeros(len(boxes), dtype=torch.bool) if given is None else given.cpu()
-    start = replace(
-        plan, size=boxes.size, position=boxes.position, yaw=boxes.yaw, given=stays, floor=plan.floor.double()
-    )
-    height = torch.where(stays, boxes.position[:, 1], heights(start))
-    start = start.at(torch.stack([boxes.position[:, 0], height, boxes.position[:, 2]], 1), boxes.yaw)
-    place = torch.cat([boxes.position[:, [0, 2]], boxes.yaw[:, None]], 1)
-    mean, square = torch.zeros_like(place), torch.zeros_like(place)
+    xp, device, drawn = kit(plan.yaw), device_of(boxes.yaw), boxes.to(device_of(plan.yaw))
+    like = xp.zeros(0, dtype=xp.float64)  # rounding would choose the side
+    size, position, yaw = (cast(of, like) for of in (drawn.size, drawn.position, drawn.yaw))
+    stays = xp.zeros(len(boxes), dtype=xp.bool) if given is None else on_device(given, device_of(plan.yaw))
+    start = replace(plan, size=size, position=position, yaw=yaw, given=stays, floor=cast(plan.floor, like))
+    height = xp.where(stays, position[:, 1], heights(start))
+    start = start.at(xp.stack([position[:, 0], height, position[:, 2]], 1), yaw)
+    place = xp.concat([position[:, ::2], yaw[:, None]], 1)
+    mean, square = xp.zeros_like(place), xp.zeros_like(place)
     for number in range(rounds):
-        with torch.enable_grad():
+        with xp.enable_grad():
             free = place.detach().requires_grad_()
-            pull = missed(start.at(torch.stack([free[:, 0], height, free[:, 1]], 1), free[:, 2]), KINDS, BEYOND)
-            (slope,) = torch.autograd.grad(pull, free, allow_unused=True, materialize_grads=True)
+            pull = missed(start.at(xp.stack([free[:, 0], height, free[:, 1]], 1), free[:, 2]), KINDS, BEYOND)
+            (slope,) = xp.autograd.grad(pull, free, allow_unused=True, materialize_grads=True)
         mean = MOMENTS[0] * mean + (1 - MOMENTS[0]) * slope
         square = MOMENTS[1] * square + (1 - MOMENTS[1]) * slope.square()
         step = mean / (1 - MOMENTS[0] ** (number + 1)) / ((square / (1 - MOMENTS[1] ** (number + 1))).sqrt() + 1e-8)
         rate = strength * (1 - (1 - LEAST) * number / rounds)
-        place = torch.where(stays[:, None], place, place - rate * step)
-    moved = torch.stack([place[:, 0], height, place[:, 1]], 1)
-    return Boxes(drawn.size, moved.to(drawn.size), place[:, 2].to(drawn.size)).to(device)
+        place = xp.where(stays[:, None], place, place - rate * step)
+    moved = xp.stack([place[:, 0], height, place[:, 1]], 1)
+    return Boxes(drawn.size, cast(moved, drawn.size), cast(place[:, 2], drawn.size)).to(device)
 
 
-def heights(plan: Plan) -> Tensor:
+def heights(plan: Plan) -> Array:
     """(N,) metres: the bottoms of boxes on the floor, on what carries them or at the ceiling, else where they are."""
-    out, carrier, high = plan.position[:, 1], plan.carrier, plan.size[:, 1]
-    out = torch.where(carrier == ON_FLOOR, 0.0, out)
-    out = torch.where((carrier == ON_CEILING) & torch.isfinite(plan.ceiling), plan.ceiling - high, out)
+    xp, out, carrier, high = kit(plan.yaw), plan.position[:, 1], plan.carrier, plan.size[:, 1]
+    out = xp.where(carrier == ON_FLOOR, 0.0, out)
+    out = xp.where((carrier == ON_CEILING) & xp.isfinite(plan.ceiling), plan.ceiling - high, out)
     for _ in range(len(out)):
-        on = torch.where(carrier >= 0, (out + high)[carrier.clamp_min(0)], out)
-        if torch.equal(on, out):
+        on = xp.where(carrier >= 0, (out + high)[at_least(carrier, 0)], out)
+        if (on == out).all():
             break
         out = on
     return out
 
 
 def plan_of_graph(graph: GraphBatch, rules: str) -> Plan:
-    """The rooms of a graph as the objective sees them, their boxes nowhere yet; on the CPU."""
-    graph, words = graph.to("cpu"), vocabulary()
-    nowhere = torch.zeros(graph.num_nodes, 3)
-    rooms = zip(graph.floor.double().numpy(), graph.openings.tolist(), strict=True)
+    """The rooms of a graph, on the CPU, as the objective sees them, their boxes nowhere yet."""
+    words, nowhere = vocabulary(), full(graph.floor, (graph.num_nodes, 3), 0.0)
+    rooms = zip(np.asarray(graph.floor, float), graph.openings.tolist(), strict=True)
     kinds = [words.placements[kind].name for kind in graph.placements[:, 1].tolist()]
     return Plan(
         tuple(words.categories[number] for number in graph.category.tolist()), nowhere, nowhere, nowhere[:, 0],
         graph.scene, graph.floor, tuple(openings_of(floor, rows) for floor, rows in rooms), graph.triplets,
-        torch.zeros(graph.num_nodes, dtype=torch.bool), graph.height, rules,
+        graph.scene < 0, graph.height, rules,
         stated=tuple(Stated(kind, who, tuple(other for other in others if other >= 0))
                      for kind, (who, _, *others) in zip(kinds, graph.placements.tolist(), strict=True)),
     )  # fmt: skip

@@ -11,10 +11,11 @@ from pathlib import Path
 
 from safetensors import SafetensorError, safe_open
 
+from echomodel.compact.weights import FORMAT as COMPACT
 from echomodel.late import Late
 from echomodel.protocols import RoomModel
 
-COMPACT, RUN = "echousd-compact-1", "weights.safetensors"  # a format, and what a training calls its weights
+RUN = "weights.safetensors"  # what a training calls its weights
 # format of a weights file -> what gives the model of a path, on a `device`
 LOADERS = {
     COMPACT: Late("echomodel.echo:EchoModel.load"), "echousd-released-1": Late("echoscene.echo:ReleasedEcho.load"),
@@ -26,16 +27,16 @@ def load_model(weights: str | Path | None = None, *, device: str = "cpu") -> Roo
 
     A file that did not change since is not read again.
 
-    `device`: where to load it, as torch calls it (`cpu`, `cuda`, `mps`).
+    `device`: where to load it, as torch calls it (`cpu`, `cuda`, `mps`); on `cpu` what ships is loaded without torch.
 
     Raises ValueError where there is none.
     """
     path = None if weights is None else Path(weights).absolute()
-    return _loaded(path, _stamp(path), device)
+    return _loaded(path, _stamp(path), None if path is None and device == "cpu" else device)
 
 
 @lru_cache(maxsize=2)
-def _loaded(path: Path | None, stamp: tuple[tuple[str, int, int], ...], device: str) -> RoomModel:
+def _loaded(path: Path | None, stamp: tuple[tuple[str, int, int], ...], device: str | None) -> RoomModel:
     if path is not None and _format(path / RUN) in LOADERS.keys() - {COMPACT}:
         path = path / RUN  # a training of published networks; a folder of compact weights is read as a whole
     found: RoomModel = LOADERS.get(_format(path), LOADERS[COMPACT])(path, device=device)
@@ -47,7 +48,7 @@ def _format(path: Path | None) -> str:
     if path is None or not path.is_file():
         return ""
     try:
-        with safe_open(path, framework="pt") as file:
+        with safe_open(path, framework="np") as file:
             return (file.metadata() or {}).get("format", "")
     except (OSError, SafetensorError):
         return ""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeGuard
 
-from torch import Tensor
+import numpy as np
 
+from echomodel.arrays import Array, beside
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
 from echomodel.progress import StepListener
@@ -22,8 +23,8 @@ class GraphEdit:
         added: (N,) bool, nodes that were not there before; triplets of `before` do not touch them.
     """
 
-    before: Tensor
-    added: Tensor
+    before: Array
+    added: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,19 +43,18 @@ class Sampling:
     generator: Randomness
     steps: int | None = None
     known: Any = None
-    known_mask: Tensor | None = None
+    known_mask: Array | None = None
     edit: GraphEdit | None = None
     progress: StepListener | None = None
 
 
-def touched_nodes(graph: GraphBatch, edit: GraphEdit) -> Tensor:
+def touched_nodes(graph: GraphBatch, edit: GraphEdit) -> Array:
     """(N,) bool: nodes that were added, and both ends of every triplet that came or went."""
-    touched = edit.added.to(graph.category.device).clone()
+    touched = np.array(edit.added.tolist(), bool)
     now, before = ({tuple(row) for row in triplets.tolist()} for triplets in (graph.triplets, edit.before))
     for subject, _, target in now ^ before:
-        touched[subject] = True
-        touched[target] = True
-    return touched
+        touched[[subject, target]] = True
+    return beside(touched, graph.category)
 
 
 class RoomModel(Protocol):
@@ -87,7 +87,7 @@ class RoomModel(Protocol):
         """
         ...
 
-    def sample_shapes(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Tensor:
+    def sample_shapes(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Array:
         """(N, R, R, R) float32 signed distances on the box-normalised grid, negative inside (EchoScene 3.4).
 
         Arguments as for `sample_layout`. Raises ValueError for a model without a shape branch.
@@ -103,7 +103,7 @@ class FurnitureModel(RoomModel, Protocol):
         """Numbers in a description."""
         ...
 
-    def sample_furniture(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Tensor:
+    def sample_furniture(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Array:
         """Descriptions (N, D) float32 of N pieces of furniture; arguments as for `sample_layout`."""
         ...
 

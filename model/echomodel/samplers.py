@@ -10,15 +10,15 @@ import math
 from collections.abc import Callable
 from itertools import pairwise
 
-import torch
-from torch import Tensor
+import numpy as np
 
+from echomodel.arrays import Array, at_least, cast, device_of, full, kit
 from echomodel.config import Objective, Sampler
 from echomodel.progress import StepListener
 from echomodel.randomness import Randomness, normal
 
 
-def alpha_sigma(level: Tensor, objective: Objective) -> tuple[Tensor, Tensor]:
+def alpha_sigma(level: Array, objective: Objective) -> tuple[Array, Array]:
     """Signal and noise strength at `level` (any shape) in [0, 1].
 
     Rectified flow interpolates linearly, (1 - level, level). Noise and velocity prediction use the variance-preserving
@@ -26,29 +26,29 @@ def alpha_sigma(level: Tensor, objective: Objective) -> tuple[Tensor, Tensor]:
     """
     if objective == "flow":
         return 1 - level, level
-    log_alpha = -0.25 * level.square() * (20.0 - 0.1) - 0.5 * level * 0.1
-    return torch.exp(log_alpha), torch.sqrt(-torch.expm1(2 * log_alpha))
+    xp, log_alpha = kit(level), -0.25 * level * level * (20.0 - 0.1) - 0.5 * level * 0.1
+    return xp.exp(log_alpha), xp.sqrt(-xp.expm1(2 * log_alpha))
 
 
-def sampling_levels(steps: int) -> Tensor:
+def sampling_levels(steps: int) -> np.ndarray:
     """Evenly spaced levels from 1 to 0: (steps + 1,) float64; raises ValueError for fewer than one step."""
     if steps < 1:
         raise ValueError(f"steps is {steps}, at least 1 is needed")
-    return torch.linspace(1, 0, steps + 1, dtype=torch.float64)
+    return np.linspace(1, 0, steps + 1)
 
 
-def expand(level: Tensor, like: Tensor) -> Tensor:
+def expand(level: Array, like: Array) -> Array:
     """(N,) -> (N, 1, ...) with as many dimensions as `like`."""
     return level.reshape(-1, *[1] * (like.ndim - 1))
 
 
-def add_noise(clean: Tensor, noise: Tensor, level: Tensor, objective: Objective) -> Tensor:
+def add_noise(clean: Array, noise: Array, level: Array, objective: Objective) -> Array:
     """Noisy samples at a level per node: clean, noise (N, ...), level (N,) -> (N, ...)."""
     alpha, sigma = alpha_sigma(expand(level, clean), objective)
     return alpha * clean + sigma * noise
 
 
-def target(clean: Tensor, noise: Tensor, level: Tensor, objective: Objective) -> Tensor:
+def target(clean: Array, noise: Array, level: Array, objective: Objective) -> Array:
     """The training target: the noise (DDPM), alpha noise - sigma clean (v), or noise - clean (rectified flow)."""
     if objective == "noise":
         return noise
@@ -58,7 +58,7 @@ def target(clean: Tensor, noise: Tensor, level: Tensor, objective: Objective) ->
     return alpha * noise - sigma * clean
 
 
-def clean_from(output: Tensor, noisy: Tensor, level: Tensor, objective: Objective) -> Tensor:
+def clean_from(output: Array, noisy: Array, level: Array, objective: Objective) -> Array:
     """The clean sample that a prediction of the target stands for."""
     if objective == "flow":
         return noisy - expand(level, noisy) * output
@@ -68,9 +68,9 @@ def clean_from(output: Tensor, noisy: Tensor, level: Tensor, objective: Objectiv
     return (noisy - sigma * output) / alpha
 
 
-def output_from(clean: Tensor, noisy: Tensor, level: Tensor, objective: Objective, floor: float = 0.05) -> Tensor:
+def output_from(clean: Array, noisy: Array, level: Array, objective: Objective, floor: float = 0.05) -> Array:
     """The prediction that a clean sample stands for; levels below `floor` are treated as `floor` (1 / sigma grows)."""
-    level = level.clamp_min(floor)
+    level = at_least(level, floor)
     if objective == "flow":
         return (noisy - clean) / expand(level, noisy)
     alpha, sigma = alpha_sigma(expand(level, noisy), objective)
@@ -78,21 +78,14 @@ def output_from(clean: Tensor, noisy: Tensor, level: Tensor, objective: Objectiv
     return noise if objective == "noise" else alpha * noise - sigma * clean
 
 
-def draw_levels(count: int, generator: torch.Generator, device: torch.device | str = "cpu") -> Tensor:
-    """Training levels, one per scene, stratified over (0, 1] so that every batch sees the whole range: (count,)."""
-    offset = torch.rand(1, generator=generator)
-    level = (torch.arange(count) + offset) / count
-    return level[torch.randperm(count, generator=generator)].clamp(1e-3, 1.0).to(device)
-
-
-Predict = Callable[[Tensor, Tensor], Tensor]
-Step = Callable[[Tensor, Tensor, float, float], Tensor]
+Predict = Callable[[Array, Array], Array]
+Step = Callable[[Array, Array, float, float], Array]
 
 
 def ddim(objective: Objective, generator: Randomness | None = None) -> Step:
     """Deterministic DDIM (Song et al. 2021, Eq. 12 with eta 0); with rectified flow this is the Euler method."""
 
-    def step(x: Tensor, clean: Tensor, start: float, end: float) -> Tensor:
+    def step(x: Array, clean: Array, start: float, end: float) -> Array:
         (a, s), (b, r) = _strengths(start, objective), _strengths(end, objective)
         return b * clean + r * (x - a * clean) / s
 
@@ -102,14 +95,14 @@ def ddim(objective: Objective, generator: Randomness | None = None) -> Step:
 def ancestral(objective: Objective, generator: Randomness | None = None) -> Step:
     """DDPM ancestral sampling from the posterior q(x_s | x_t, x0) (Ho et al. 2020, Eq. 7)."""
 
-    def step(x: Tensor, clean: Tensor, start: float, end: float) -> Tensor:
+    def step(x: Array, clean: Array, start: float, end: float) -> Array:
         (a, s), (b, r) = _strengths(start, objective), _strengths(end, objective)
         ratio = a / b
         between = s * s - ratio * ratio * r * r
         mean = (ratio * r * r * x + b * between * clean) / (s * s)
         if end == 0:
             return mean
-        noise = normal(x.shape, generator, x.device, x.dtype)
+        noise = cast(normal(x.shape, generator, device_of(x)), x)
         return mean + math.sqrt(max(between, 0.0)) * r / s * noise
 
     return step
@@ -119,9 +112,9 @@ SAMPLERS: dict[Sampler, Callable[[Objective, Randomness | None], Step]] = {"ddim
 
 
 def sample(
-    sampler: Sampler, predict: Predict, x: Tensor, steps: int, objective: Objective, *, known: Tensor | None = None,
-    known_mask: Tensor | None = None, generator: Randomness | None = None, progress: StepListener | None = None,
-) -> Tensor:  # fmt: skip
+    sampler: Sampler, predict: Predict, x: Array, steps: int, objective: Objective, *, known: Array | None = None,
+    known_mask: Array | None = None, generator: Randomness | None = None, progress: StepListener | None = None,
+) -> Array:  # fmt: skip
     """Run a sampler by name.
 
     Arguments:
@@ -135,20 +128,20 @@ def sample(
     if sampler not in SAMPLERS:
         raise ValueError(f"sampler is {sampler!r}, allowed: {', '.join(SAMPLERS)}")
     step, times = SAMPLERS[sampler](objective, generator), sampling_levels(steps).tolist()
-    free = torch.ones(len(x), dtype=x.dtype, device=x.device)
+    free = full(x, len(x), 1.0)
     fixed = None
     if known_mask is not None and known is not None:
-        free = (~known_mask).to(x.dtype)
+        free = cast(~known_mask, x)
         fixed = expand(known_mask, x)
-        x = torch.where(fixed, known.to(x.dtype), x)
+        x = kit(x).where(fixed, cast(known, x), x)
     for number, (start, end) in enumerate(pairwise(times)):
         moved = step(x, predict(x, free * start), start, end)
-        x = moved if fixed is None else torch.where(fixed, x, moved)
+        x = moved if fixed is None else kit(x).where(fixed, x, moved)
         if progress is not None:
             progress(number + 1, len(times) - 1)
     return x
 
 
 def _strengths(level: float, objective: Objective) -> tuple[float, float]:
-    alpha, sigma = alpha_sigma(torch.tensor(level, dtype=torch.float64), objective)
+    alpha, sigma = alpha_sigma(level, objective)
     return float(alpha), float(sigma)

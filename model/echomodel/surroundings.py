@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import torch
-from torch import Tensor
 
+from echomodel.arrays import Array, at_least, at_most, cast, constant, dot, full, held, kit, norm, picked
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import axes
 from echomodel.floors import edges, footprint, known, meeting, signed_area, signed_distance
@@ -21,7 +20,7 @@ OPENING_FEATURES = 10 + 12
 PLAN = 11
 
 
-def centred(floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | None) -> Tensor:
+def centred(floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | None) -> np.ndarray:
     """(k, 2) float32, corners of a floor about the centre of their bounding box; four times NaN where it is unknown.
 
     `floor`: None, two extents (x, z) of a rectangle, or k >= 3 corners (x, z) in any frame, metres.
@@ -29,36 +28,37 @@ def centred(floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | No
     Raises ValueError for neither of these.
     """
     if floor is None:
-        return torch.full((4, 2), torch.nan)
-    given = torch.as_tensor(np.asarray(floor, np.float64))
+        return np.full((4, 2), np.nan, np.float32)
+    given = np.asarray(floor, np.float64)
     if given.shape == (2,):
-        return torch.from_numpy(rectangle(*given.tolist())).float()
+        return rectangle(*given.tolist()).astype(np.float32)
     if given.ndim != 2 or given.shape[1] != 2 or len(given) < 3:
-        raise ValueError(f"floor has shape {tuple(given.shape)}, expected (2,) extents or (k, 2) corners, k >= 3")
-    return (given - (given.amax(0) + given.amin(0)) / 2).float()
+        raise ValueError(f"floor has shape {given.shape}, expected (2,) extents or (k, 2) corners, k >= 3")
+    return (given - (given.max(0) + given.min(0)) / 2).astype(np.float32)
 
 
-def padded(floors: Sequence[Tensor]) -> Tensor:
-    """Floors (s, k, 2) of different numbers of corners behind one another, padded with NaN: (S, K, 2)."""
-    most = max(floor.shape[1] for floor in floors)
-    return torch.cat([torch.nn.functional.pad(f, (0, 0, 0, most - f.shape[1]), value=torch.nan) for f in floors])
+def padded(rows: Sequence[Array]) -> Array:
+    """Corners or openings (s, k, c), of different numbers, behind one another, padded with NaN: (S, K, c)."""
+    most, xp = max(part.shape[1] for part in rows), kit(rows[0])
+    short = [full(part, (len(part), most - part.shape[1], part.shape[2]), np.nan) for part in rows]
+    return xp.concat([xp.concat([part, rest], 1) for part, rest in zip(rows, short, strict=True)])
 
 
-def trimmed(floor: Tensor) -> Tensor:
+def trimmed(floor: Array) -> Array:
     """The same floors without needless padding; where all are unknown four corners remain."""
-    most = int(torch.isfinite(floor[..., 0]).sum(1).amax()) if len(floor) else 0
+    most = int(kit(floor).isfinite(floor[..., 0]).sum(1).max()) if len(floor) else 0
     return floor[:, : most or 4]
 
 
-def extents(floor: Tensor) -> Tensor:
+def extents(floor: Array) -> Array:
     """(S, K, 2) corners -> (S, 2), x and z extent of the bounding box in metres, NaN where the floor is unknown."""
-    there = torch.isfinite(floor)
-    high = torch.where(there, floor, -torch.inf).amax(1)
-    low = torch.where(there, floor, torch.inf).amin(1)
-    return torch.where(there.any(1), high - low, torch.nan)
+    xp, there = kit(floor), kit(floor).isfinite(floor)
+    high = xp.amax(xp.where(there, floor, -np.inf), 1)
+    low = xp.amin(xp.where(there, floor, np.inf), 1)
+    return xp.where(there.any(1), high - low, np.nan)
 
 
-def nearest_wall(points: Tensor, floor: Tensor) -> Tensor:
+def nearest_wall(points: Array, floor: Array) -> Array:
     """(M,) heading in radians of what stands at each point with its back to the wall nearest to it, 0 where unknown.
 
     Arguments:
@@ -66,15 +66,15 @@ def nearest_wall(points: Tensor, floor: Tensor) -> Tensor:
     """
     start, end = edges(floor)
     along, off = end - start, points[:, None] - start
-    length = along.square().sum(-1)
-    t = ((off * along).sum(-1) / length.clamp_min(1e-9)).clamp(0, 1)
-    distance = (off - t[..., None] * along).square().sum(-1) + (length < 1e-9) * FAR**2
-    wall = along.gather(1, distance.argmin(1)[:, None, None].expand(-1, 1, 2))[:, 0]
-    turn = torch.where(signed_area(floor) > 0, 1.0, -1.0)  # which side of the wall is inside
-    return torch.atan2(-wall[:, 1] * turn, wall[:, 0] * turn)
+    length = dot(along, along)
+    t = at_most(at_least(dot(off, along) / at_least(length, 1e-9), 0.0), 1.0)
+    away = off - t[..., None] * along
+    wall = picked(along, (dot(away, away) + (length < 1e-9) * FAR**2).argmin(1))
+    turn = 1.0 - 2 * cast(signed_area(floor) <= 0, floor)  # which side of the wall is inside
+    return kit(floor).atan2(-wall[:, 1] * turn, wall[:, 0] * turn)
 
 
-def wall_distances(points: Tensor, floor: Tensor) -> Tensor:
+def wall_distances(points: Array, floor: Array) -> Array:
     """How far it is to the next wall along +x, -x, +z and -z in metres, 0 where there is none.
 
     Arguments:
@@ -82,42 +82,42 @@ def wall_distances(points: Tensor, floor: Tensor) -> Tensor:
 
     Returns (M, 4) float32, 0 where the floor is unknown.
     """
-    start, end = edges(floor)
+    xp, (start, end) = kit(floor), edges(floor)
     out = []
     for axis in (1, 0):  # walls that cross the line through the point along the other axis
         level, own = points[:, None, axis], points[:, None, 1 - axis]
         crossed = (start[..., axis] > level) != (end[..., axis] > level)
         ahead = meeting(level, start, end, axis) - own
         for side in (1, -1):
-            nearest = torch.where(crossed & (side * ahead > 0), side * ahead, FAR).amin(1)
-            out.append(torch.where(nearest < FAR, nearest, 0.0))
-    return torch.stack(out, 1)
+            nearest = xp.amin(xp.where(crossed & (side * ahead > 0), side * ahead, FAR), 1)
+            out.append(xp.where(nearest < FAR, nearest, 0.0))
+    return xp.stack(out, 1)
 
 
-def outside(boxes: Boxes, floor: Tensor) -> Tensor:
+def outside(boxes: Boxes, floor: Array) -> Array:
     """How far the corners and the middles of the sides lie beyond the walls: (N, 8) metres, 0 where unknown.
 
     Arguments:
         boxes: N boxes; none is asked to shrink. floor: (N, K, 2) float32, corners of the floor under each.
     """
-    return (-signed_distance(footprint(boxes.size.detach(), boxes.position, boxes.yaw), floor)).clamp_min(0)
+    return at_least(-signed_distance(footprint(held(boxes.size), boxes.position, boxes.yaw), floor), 0.0)
 
 
-def plan_features(floor: Tensor) -> Tensor:
+def plan_features(floor: Array) -> Array:
     """What a floor looks like: (S, K, 2) -> (S, 6 + GRID^2), zeros where it is unknown.
 
     Extents in metres, their logarithms, whether they are known, and signed distances on a grid over the bounding box.
     """
-    extent = extents(floor)
-    there = known(floor)[:, None].to(floor.dtype)
-    extent = torch.where(there > 0, extent, torch.ones_like(extent))
-    steps = (torch.arange(GRID, device=floor.device, dtype=floor.dtype) + 0.5) / GRID - 0.5
-    places = torch.cartesian_prod(steps, steps)[None] * extent[:, None]
-    distance = torch.tanh(signed_distance(places, floor))
-    return torch.cat([extent / 5 * there, extent.log() * there, there.expand(-1, 2), distance], dim=1)
+    xp, extent = kit(floor), extents(floor)
+    there = cast(known(floor), floor)[:, None]
+    extent = xp.where(there > 0, extent, xp.ones_like(extent))
+    steps = [(number + 0.5) / GRID - 0.5 for number in range(GRID)]
+    places = constant([(x, z) for x in steps for z in steps], floor)[None] * extent[:, None]
+    distance = xp.tanh(signed_distance(places, floor))
+    return xp.concat([extent / 5 * there, xp.log(extent) * there, there, there, distance], 1)
 
 
-def opening_rows(openings: Sequence[Opening], polygon: np.ndarray) -> Tensor:
+def opening_rows(openings: Sequence[Opening], polygon: np.ndarray) -> np.ndarray:
     """(o, ROW) float32, metres, in the room frame of `Boxes`, whose origin is the middle of the floor's bounding box.
 
     Arguments:
@@ -132,25 +132,19 @@ def opening_rows(openings: Sequence[Opening], polygon: np.ndarray) -> Tensor:
         near, far = segment(corners, opening) - middle
         top = opening.sill + opening.height
         rows.append([*near, *far, *inward_normal(corners, opening.edge), depth, opening.sill, top, float(window)])
-    return torch.tensor(rows, dtype=torch.float32).reshape(-1, ROW)
+    return np.array(rows, np.float32).reshape(-1, ROW)
 
 
-def padded_rows(rows: Sequence[Tensor]) -> Tensor:
-    """Rows (s, o, ROW) of different numbers of openings behind one another, padded with NaN: (S, O, ROW)."""
-    most = max((part.shape[1] for part in rows), default=0)
-    return torch.cat([torch.nn.functional.pad(r, (0, 0, 0, most - r.shape[1]), value=torch.nan) for r in rows])
-
-
-def room_features(rows: Tensor) -> tuple[Tensor, Tensor]:
+def room_features(rows: Array) -> tuple[Array, Array]:
     """Every opening as numbers (S, O, PLAN), zeros for padding, and which are there, (S, O) float32."""
-    there = torch.isfinite(rows[..., 0])
-    rows = torch.where(there[..., None], rows, torch.zeros_like(rows))
-    width = (rows[..., 2:4] - rows[..., :2]).norm(dim=-1, keepdim=True)
-    told = torch.cat([rows[..., :4] / 2, rows[..., 4:6], width, rows[..., 6:]], dim=-1)
-    return told, there.to(rows.dtype)
+    xp, there = kit(rows), kit(rows).isfinite(rows[..., 0])
+    rows = xp.where(there[..., None], rows, xp.zeros_like(rows))
+    width = norm(rows[..., 2:4] - rows[..., :2])[..., None]
+    told = xp.concat([rows[..., :4] / 2, rows[..., 4:6], width, rows[..., 6:]], -1)
+    return told, cast(there, rows)
 
 
-def clearances(boxes: Boxes, rows: Tensor) -> Tensor:
+def clearances(boxes: Boxes, rows: Array) -> Array:
     """How far each box keeps from the door or passage, and the window, that it comes nearest to, at several scales.
 
     Arguments:
@@ -159,21 +153,21 @@ def clearances(boxes: Boxes, rows: Tensor) -> Tensor:
     Returns (N, OPENING_FEATURES) float32; zeros where there is no opening of the kind.
     """
     if not rows.shape[1]:
-        return boxes.size.new_zeros(len(boxes), OPENING_FEATURES)
+        return full(boxes.size, (len(boxes), OPENING_FEATURES), 0.0)
     there, window, beside, before, under = _gaps(boxes, rows)
-    out = []
+    xp, out = kit(rows), []
     for mask, gaps in ((there & ~window, (beside, before)), (there & window, (beside, before, under))):
-        clear = torch.stack(gaps[:2]).amax(0)
-        nearest = torch.where(mask, clear, torch.full_like(clear, AWAY * 10)).argmin(1, keepdim=True)
-        some = mask.any(1, keepdim=True).to(clear.dtype)
-        chosen = torch.cat([gap.gather(1, nearest) for gap in (*gaps[:2], clear)], 1)
-        told = [torch.tanh(chosen / scale) for scale in (AWAY, ROUND_ABOUT, NEAR)]
-        told += [torch.tanh(gap.gather(1, nearest) / s) for gap in gaps[2:] for s in (ROUND_ABOUT, NEAR)]
-        out.append(torch.cat([torch.cat(told, 1) * some, some], 1))
-    return torch.cat(out, 1)
+        clear = xp.maximum(*gaps[:2])
+        nearest = xp.where(mask, clear, xp.full_like(clear, AWAY * 10)).argmin(1)
+        some = cast(mask.any(1), clear)[:, None]
+        chosen = xp.stack([picked(gap, nearest) for gap in (*gaps[:2], clear)], 1)
+        told = [xp.tanh(chosen / scale) for scale in (AWAY, ROUND_ABOUT, NEAR)]
+        told += [xp.tanh(picked(gap, nearest)[:, None] / s) for gap in gaps[2:] for s in (ROUND_ABOUT, NEAR)]
+        out.append(xp.concat([xp.concat(told, 1) * some, some], 1))
+    return xp.concat(out, 1)
 
 
-def kept_free(boxes: Boxes, rows: Tensor) -> Tensor:
+def kept_free(boxes: Boxes, rows: Array) -> Array:
     """How far each box keeps out of the way of the openings of its room: the least of all, metres, differentiable.
 
     Arguments:
@@ -183,28 +177,27 @@ def kept_free(boxes: Boxes, rows: Tensor) -> Tensor:
     where there is no opening.
     """
     if not rows.shape[1]:
-        return boxes.size.new_full((len(boxes),), AWAY)
-    there, window, beside, before, under = _gaps(boxes, rows)
-    clear = torch.maximum(beside, before)
-    clear = torch.where(window, torch.maximum(clear, under), clear)
-    return torch.where(there, clear, torch.full_like(clear, AWAY)).amin(1).clamp_max(AWAY)
+        return full(boxes.size, len(boxes), AWAY)
+    xp, (there, window, beside, before, under) = kit(rows), _gaps(boxes, rows)
+    clear = xp.maximum(beside, before)
+    clear = xp.where(window, xp.maximum(clear, under), clear)
+    return at_most(xp.amin(xp.where(there, clear, xp.full_like(clear, AWAY)), 1), AWAY)
 
 
-def _gaps(boxes: Boxes, rows: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
+def _gaps(boxes: Boxes, rows: Array) -> tuple[Array, Array, Array, Array, Array]:
     """(N, O) each: which openings there are and which are windows; how far each box stands beside, before and below."""
-    there = torch.isfinite(rows[..., 0])
-    rows = torch.where(there[..., None], rows, torch.zeros_like(rows))
+    xp, there = kit(rows), kit(rows).isfinite(rows[..., 0])
+    rows = xp.where(there[..., None], rows, xp.zeros_like(rows))
     near, far, inward = rows[..., 0:2], rows[..., 2:4], rows[..., 4:6]
-    length = (far - near).square().sum(-1).clamp_min(1e-9).sqrt()
+    length = xp.sqrt(at_least(dot(far - near, far - near), 1e-9))
     along = (far - near) / length[..., None]
-    off = boxes.position[:, None, [0, 2]] - (near + far) / 2
-    half = boxes.size[:, None, [0, 2]] / 2
+    off = boxes.position[:, None, ::2] - (near + far) / 2
+    half = boxes.size[:, None, ::2] / 2
 
-    def reach(direction: Tensor) -> Tensor:
-        parts = [(direction * axis[:, None]).sum(-1).abs() for axis in axes(boxes.yaw)]
-        return (torch.stack(parts, -1) * half).sum(-1)
+    def reach(direction: Array) -> Array:
+        return sum(abs(dot(direction, axis[:, None])) * half[..., side] for side, axis in enumerate(axes(boxes.yaw)))
 
-    beside = (off * along).sum(-1).abs() - reach(along) - length / 2
-    before = (off * inward).sum(-1) - reach(inward) - rows[..., 6]
+    beside = abs(dot(off, along)) - reach(along) - length / 2
+    before = dot(off, inward) - reach(inward) - rows[..., 6]
     under = rows[..., 7] - (boxes.position[:, 1] + boxes.size[:, 1])[:, None]
     return there, rows[..., 9] > 0.5, beside, before, under

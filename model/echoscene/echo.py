@@ -13,9 +13,11 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from echomodel.arrays import on_device
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit, Sampling, touched_nodes
+from echomodel.randomness import SceneGenerators
 from echomodel.text import TextEncoder, edge_text, encoder_named, node_text
 from echomodel.vocabulary import vocabulary
 from echoscene.encoder import SceneGraphTensors
@@ -85,7 +87,7 @@ class ReleasedEcho:
         text features.
         """
         by = Sampling(**how)
-        assert isinstance(by.generator, torch.Generator)  # scenes of their own seeds are for compact weights
+        assert not isinstance(by.generator, SceneGenerators)  # scenes of their own seeds are for compact weights
         whole, change, objects = self._told(graph, by.edit)
         boxes = self.model.sample_layout(
             whole, generator=by.generator, steps=by.steps, change=change, progress=by.progress
@@ -93,7 +95,7 @@ class ReleasedEcho:
         boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
         if by.known is None or by.known_mask is None:
             return boxes
-        return boxes.replaced(by.known_mask.to(self.model.device), by.known.to(self.model.device))
+        return boxes.replaced(on_device(by.known_mask, self.model.device), by.known.to(self.model.device))
 
     @torch.no_grad()
     def sample_shapes(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Tensor:
@@ -107,7 +109,7 @@ class ReleasedEcho:
         Raises ValueError for no shape branch, a category without a class, or no text features.
         """
         by = Sampling(**how)
-        assert isinstance(by.generator, torch.Generator)  # scenes of their own seeds are for compact weights
+        assert not isinstance(by.generator, SceneGenerators)  # scenes of their own seeds are for compact weights
         whole, change, objects = self._told(graph, by.edit)
         latents = self.model.sample_shapes(
             whole, generator=by.generator, steps=by.steps or 100, change=change, progress=by.progress
@@ -147,7 +149,8 @@ class ReleasedEcho:
         scenes, objects = self._scenes(graph)
         change = None
         if edit is not None:
-            change = self._change(graph, scenes, replace(edit, before=edit.before.cpu(), added=edit.added.cpu()))
+            told = replace(edit, before=on_device(edit.before, "cpu"), added=on_device(edit.added, "cpu"))
+            change = self._change(graph, scenes, told)
         return pack_scenes(scenes)[0], change, objects.to(self.model.device)
 
     def _scenes(self, graph: GraphBatch) -> tuple[list[SceneGraphTensors], Tensor]:

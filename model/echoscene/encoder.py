@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from echomodel.graph import within
-from echomodel.randomness import normal
+from echomodel.randomness import Randomness, normal
 from echoscene.config import EncoderConfig
 
 
@@ -176,7 +176,7 @@ class GraphEncoder(nn.Module):
 
     def manipulate(
         self, latent: Tensor, graph: SceneGraphTensors, *, added: Sequence[int] = (), touched: Sequence[int] = (),
-        noise: Tensor | None = None, generator: torch.Generator | None = None,
+        noise: Tensor | None = None, generator: Randomness | None = None,
     ) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
         """Latents of an edited graph from those of the graph before (generation: no edit).
 

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.progress import StepListener
-from echomodel.randomness import normal
+from echomodel.randomness import Randomness, normal
 from echoscene.config import ReleasedConfig
 from echoscene.denoisers import LayoutNet, ShapeNet
 from echoscene.encoder import GraphEncoder, SceneGraphTensors
@@ -163,7 +163,7 @@ class ReleasedModel(GraphEncoder):
         return next(self.parameters()).device
 
     def conditions(
-        self, graph: SceneGraphTensors, change: GraphChange | None = None, generator: torch.Generator | None = None
+        self, graph: SceneGraphTensors, change: GraphChange | None = None, generator: Randomness | None = None
     ) -> Conditions:
         """What the denoisers are conditioned on.
 
@@ -192,7 +192,7 @@ class ReleasedModel(GraphEncoder):
 
     @torch.no_grad()
     def sample_layout(
-        self, graph: SceneGraphTensors, *, generator: torch.Generator, steps: int | None = None,
+        self, graph: SceneGraphTensors, *, generator: Randomness, steps: int | None = None,
         change: GraphChange | None = None, progress: StepListener | None = None,
     ) -> Boxes:  # fmt: skip
         """Boxes of all nodes by ancestral steps (EchoScene, section 3.3); sizes can come out negative.
@@ -230,7 +230,7 @@ class ReleasedModel(GraphEncoder):
 
     @torch.no_grad()
     def sample_shapes(
-        self, graph: SceneGraphTensors, *, generator: torch.Generator, steps: int = 100, shared_noise: bool = True,
+        self, graph: SceneGraphTensors, *, generator: Randomness, steps: int = 100, shared_noise: bool = True,
         change: GraphChange | None = None, progress: StepListener | None = None,
     ) -> Tensor:  # fmt: skip
         """Shape latents of all nodes by deterministic DDIM (EchoScene, section 3.4); decode them with `vqvae.decode`.

@@ -16,8 +16,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from echomodel.packed import pack_linear_maps
 from echoscene.config import UNetConfig
+from echoscene.packed import pack_linear_maps
 
 GROUPS = 32
 Net = TypeVar("Net", bound=nn.Module)

@@ -56,7 +56,7 @@ def test_a_footprint_starts_at_the_back_left_and_turns_with_the_box() -> None:
 
 
 def test_floors_of_different_numbers_of_corners_stand_together() -> None:
-    floor = padded([centred((4, 3))[None], torch.zeros(1, 6, 2), UNKNOWN])
+    floor = padded([torch.from_numpy(centred((4, 3)))[None], torch.zeros(1, 6, 2), UNKNOWN])
     assert floor.shape == (3, 6, 2)
     assert extents(floor)[0].tolist() == [4, 3]
     assert extents(floor)[2].isnan().all()
@@ -64,7 +64,7 @@ def test_floors_of_different_numbers_of_corners_stand_together() -> None:
 
 def test_a_plan_tells_notches_apart_and_nothing_of_unknown_floors() -> None:
     notched = torch.tensor([[[-2.0, -1.5], [0, -1.5], [0, 0], [2, 0], [2, 1.5], [-2, 1.5]]])
-    plans = plan_features(padded([centred((4, 3))[None], notched, UNKNOWN]))
+    plans = plan_features(padded([torch.from_numpy(centred((4, 3)))[None], notched, UNKNOWN]))
     assert plans.shape == (3, 6 + GRID**2)
     assert torch.equal(plans[0, :6], plans[1, :6])
     assert (plans[0, 6:] > 0).all()

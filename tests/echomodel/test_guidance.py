@@ -117,4 +117,4 @@ def test_what_lies_beyond_the_walls_is_measured():
     missed = outside(boxes, torch.stack([torch.tensor(notched), torch.full((6, 2), torch.nan)]))
     assert missed[0].max() == 0.75  # the first stands in the notch, its back farthest
     assert missed[1].max() == 0  # nothing is known of the second one's floor
-    assert outside(boxes[:1], centred((9.0, 9.0))[None]).max() == 0
+    assert outside(boxes[:1], torch.from_numpy(centred((9.0, 9.0)))[None]).max() == 0

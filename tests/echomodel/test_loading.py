@@ -1,11 +1,13 @@
 import pickle
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
 from echomodel import loading
 from echomodel.compact.model import load_weights
+from echomodel.compact.plain import Net, Table
 from echomodel.echo import EchoModel
 from echomodel.loading import load_model
 
@@ -33,31 +35,36 @@ def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
     assert read == [(path, "cpu"), (path, "cpu"), (path, "cuda")]
 
 
-def test_formats_are_those_that_are_written():
-    from echomodel.compact.model import FORMAT
-    from echoscene.weights import FORMAT as PUBLISHED
-
-    assert set(loading.LOADERS) == {FORMAT, PUBLISHED}
-    assert loading.COMPACT == FORMAT
-
-
-def test_weights_that_few_rooms_need_are_read_when_they_are_asked_for():
-    model = EchoModel.load().model
-    assert {"latent", "layout", "furniture", "shape", "autoencoder"} == set(model.parts)
-    assert set(model.later) == {"shape", "autoencoder"}
-    assert not any(name.startswith(("shape.", "autoencoder.")) for name in model.state_dict())
-    whole, _ = load_weights(sorted((Path(loading.__file__).parent / "weights").glob("*.safetensors")))
-    again = pickle.loads(pickle.dumps(EchoModel.load())).model
+def test_what_ships_is_loaded_as_arrays_and_whole_where_shapes_need_it():
+    model = loading.load_model()
+    assert isinstance(model, EchoModel)
+    assert model.device is None
+    assert not hasattr(model.model, "shape")
+    assert model.branches == {"layout", "furniture", "shape"}
+    files = sorted((Path(loading.__file__).parent / "weights").glob("*.safetensors"))
+    whole, name = load_weights(files)
+    assert model.hash == name
     for part in ("shape", "autoencoder"):
-        own, read = model.get_submodule(part).state_dict(), again.get_submodule(part).state_dict()
-        for key, value in whole.get_submodule(part).state_dict().items():
-            assert torch.equal(own[key], value)
-            assert torch.equal(read[key], value)
-    assert model.later == {}
-    with pytest.raises(AttributeError, match="colour"):
-        _ = model.colour
+        own = model.whole.model.get_submodule(part).state_dict()
+        assert all(torch.equal(own[key], value) for key, value in whole.get_submodule(part).state_dict().items())
+    again = pickle.loads(pickle.dumps(loading.load_model()))
+    for part in ("latent", "layout", "furniture"):
+        numbers = {key: getattr(whole, part).state_dict()[key].numpy() for key in getattr(whole, part).state_dict()}
+        assert flat(getattr(again.model, part)).keys() == numbers.keys()
+        assert all(np.array_equal(value, numbers[key]) for key, value in flat(getattr(again.model, part)).items())
+
+
+def flat(net: object, before: str = "") -> dict[str, np.ndarray]:
+    """All numbers of a network of numpy by their names."""
+    out: dict[str, np.ndarray] = {}
+    for name, part in vars(net).items():
+        if isinstance(part, np.ndarray) and name != "turned":
+            out[f"{before}{'weight' if name == 'rows' else name}"] = part
+        elif isinstance(part, Net | Table):
+            out |= flat(part, f"{before}{name}.")
+    return out
 
 
 def test_a_default_model_brings_no_published_network_and_no_compiler(loaded_by):
     loaded = loaded_by("from echomodel.loading import load_model; load_model(None)")
-    assert not {"echoscene", "torch._dynamo", "sympy"} & loaded
+    assert not {"echoscene", "torch", "sympy"} & loaded

@@ -171,7 +171,7 @@ def test_openings_of_rooms_come_back(tmp_path) -> None:
 
 
 def test_clearances_know_doors_and_windows():
-    rows = opening_rows((door(offset=2.0), window()), ROOM)
+    rows = torch.from_numpy(opening_rows((door(offset=2.0), window()), ROOM))
     assert rows.shape == (2, ROW)
     middle, inward = (rows[0, :2] + rows[0, 2:4]) / 2, rows[0, 4:6]
     places = torch.stack([middle + inward * away for away in (0.3, 2.5)])

@@ -1,9 +1,10 @@
 """Scenes that are packed draw the noise that they would draw alone."""
 
+import numpy as np
 import pytest
 import torch
 
-from echomodel.randomness import SceneGenerators, normal
+from echomodel.randomness import Noise, SceneGenerators, normal
 
 
 def generator(seed):
@@ -30,3 +31,19 @@ def test_scenes_of_one_generator_draw_as_they_would_alone():
 
     drawn = normal((18, 3), source(), "cpu").reshape(2, 9, 3)
     assert torch.equal(drawn[:, :5].reshape(10, 3), torch.randn((10, 3), generator=generator(1)))
+
+
+@pytest.mark.parametrize("seed", [0, 7, 2**32 + 5, 2**63 - 1])
+def test_noise_is_that_of_torch_without_torch(seed):
+    own, other = Noise(seed), generator(seed)
+    for shape in [(16,), (6, 8), (5, 3, 7), (17,), (3, 86), (31,)]:
+        drawn = normal(shape, own, None)
+        assert drawn.dtype == np.float32
+        assert np.abs(drawn - torch.randn(shape, generator=other).numpy()).max() < 1e-5
+
+
+def test_few_numbers_are_drawn_from_a_block_and_scenes_draw_noise_as_they_would_alone():
+    assert np.array_equal(Noise(3).draw(5), Noise(3).draw(16)[:5])
+    packed = normal((5, 3), SceneGenerators([Noise(1), Noise(2)], [2, 3]), None)
+    assert np.array_equal(packed, np.concatenate([normal((2, 3), Noise(1), None), normal((3, 3), Noise(2), None)]))
+    assert torch.equal(normal((4, 4), Noise(1), "cpu"), torch.from_numpy(normal((4, 4), Noise(1), None)))

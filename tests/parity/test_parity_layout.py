@@ -13,7 +13,9 @@ from echoscene.unet import packed
 
 
 def _net(numbers: Numbers) -> LayoutNet:
-    return numbers.net(LayoutNet, layout_config(numbers))
+    net = LayoutNet(layout_config(numbers))
+    numbers.fill(net)
+    return net
 
 
 def _tables(raw: dict) -> Schedule:

@@ -13,7 +13,9 @@ from echoscene.vqvae import VQVAE
 
 
 def _net(numbers: Numbers) -> ShapeNet:
-    return numbers.net(ShapeNet, shape_config(numbers))
+    net = ShapeNet(shape_config(numbers))
+    numbers.fill(net)
+    return net
 
 
 def _objects(numbers: Numbers) -> torch.Tensor:
@@ -80,7 +82,8 @@ def test_step_at_full_size() -> None:
 @pytest.mark.parametrize("name", ["vqvae", "full_vqvae"])
 def test_autoencoder(name: str) -> None:
     numbers = Numbers(name)
-    net = numbers.net(VQVAE, vq_config(numbers))
+    net = VQVAE(vq_config(numbers))
+    numbers.fill(net)
     z = net.encode(numbers["sdf"])
     close(z, numbers["z"], 1e-4)
     quantised, index = net.quantise(numbers["z"])

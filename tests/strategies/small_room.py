@@ -11,6 +11,7 @@ import numpy as np
 import torch
 
 from echomodel.boxes import Boxes
+from echomodel.randomness import Noise, normal
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 
@@ -52,6 +53,11 @@ def small_graph(**room: object) -> SceneGraph:
     )
 
 
+def drawn(generator: Noise | torch.Generator) -> float:
+    """A number of a source that tells seeds apart."""
+    return float(normal((16,), generator, None)[0])
+
+
 class StandIn:
     """Knows the two calls of the echo model; `shift` metres along x come from the generator it is given.
 
@@ -79,7 +85,7 @@ class StandIn:
             size.append(extent)
             position.append((x, y, z))
             yaw.append(turn)
-        moved = torch.tensor(position) + torch.rand(1, generator=generator) * torch.tensor([self.shift, 0.0, 0.0])
+        moved = torch.tensor(position) + drawn(generator) * torch.tensor([self.shift, 0.0, 0.0])
         if progress is not None:
             progress(1, 1)
         return Boxes(torch.tensor(size), moved, torch.tensor(yaw, dtype=torch.float32))

@@ -8,8 +8,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 
+from echomodel.arrays import on_device
 from echomodel.furniture import solids
 from echomodel.furniture.style import WIDTH, piece_of
 from echomodel.late import Late
@@ -66,18 +66,18 @@ def descriptions(request: ShapeRequest) -> np.ndarray:
     needs_furniture(model)
     assert furnishes(model)
     words = sorted(set(request.styles.values()))
-    styles = torch.tensor([words.index(request.styles[name]) for name in graph.names])
+    styles = np.array([words.index(request.styles[name]) for name in graph.names])
     extra = request.edited
     kept = {name: form.description for name, form in request.kept.items() if len(form.description) == WIDTH}
     if kept:
-        extra["known"] = torch.tensor([kept.get(name, (0.0,) * WIDTH) for name in graph.names])
-        extra["known_mask"] = torch.tensor([name in kept for name in graph.names])
+        extra["known"] = np.array([kept.get(name, (0.0,) * WIDTH) for name in graph.names], np.float32)
+        extra["known_mask"] = np.array([name in kept for name in graph.names])
     with request.timer.stage("shapes") as tell, one_thread():
         found = model.sample_furniture(
             graph_batch(graph), request.centred, generator=seeded(request.seed, "parts"), steps=request.steps,
             styles=styles, progress=tell, **extra,
         )  # fmt: skip
-    return rounded_descriptions(np.asarray(found.cpu()))
+    return rounded_descriptions(on_device(found, None))
 
 
 @dataclass(frozen=True)

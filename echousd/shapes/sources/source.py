@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 
 from echomodel.boxes import Boxes
 from echousd.graph import SceneGraph
@@ -50,7 +49,7 @@ class ShapeRequest:
     @property
     def centred(self) -> Boxes:
         """The boxes about the middle of the floor, as models know them."""
-        return Boxes(self.boxes.size, self.boxes.position - torch.from_numpy(floor_centre(self.graph)), self.boxes.yaw)
+        return Boxes(self.boxes.size, self.boxes.position - floor_centre(self.graph), self.boxes.yaw)
 
     @property
     def edited(self) -> dict[str, Any]:

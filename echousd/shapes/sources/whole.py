@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import trimesh
 
+from echomodel.arrays import on_device
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
 from echomodel.late import Late
@@ -121,7 +122,7 @@ def _grids(request: ShapeRequest, batch: GraphBatch, stream: str, extra: dict[st
             batch, request.centred, generator=seeded(request.seed, stream), steps=request.steps, progress=tell,
             **(extra or {}),
         )  # fmt: skip
-        return rounded_grids(grids.numpy(force=True))
+        return rounded_grids(on_device(grids, None))
 
 
 def chosen_models(request: ShapeRequest, source: str) -> Shapes:

@@ -11,17 +11,14 @@ import math
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 
-import torch
-from torch import Tensor, nn
-
+from echomodel.arrays import NUMPY, Array, cast, clipped, constant, held, kit, parted
 from echomodel.boxes import Boxes, BoxScale
-from echomodel.compact.draft import PAIR_FEATURES, WALL_FEATURES, measurable, pair_features, wall_features
-from echomodel.compact.learned import WordTable
-from echomodel.compact.pairs import Alone, EchoLayer, Pairs, level_features
-from echomodel.config import CompactConfig
+from echomodel.compact.draft import measurable, pair_features, wall_features
+from echomodel.compact.pairs import Layers, Pairs
+from echomodel.config import LayoutConfig
 from echomodel.graph import GraphBatch
 from echomodel.samplers import clean_from
-from echomodel.surroundings import GRID, OPENING_FEATURES, PLAN, clearances, plan_features, room_features
+from echomodel.surroundings import clearances, plan_features, room_features
 
 BOX = 8
 WILDEST = 8.0  # at high noise the clean boxes of the `noise` objective may lie anywhere
@@ -32,61 +29,23 @@ class LayoutContext:
     """What stays the same over all steps: `nodes` (N, width), pairs, `floor` (N, K, 2) and `openings` (N, O, ROW) in
     metres, and `scale`."""
 
-    nodes: Tensor
+    nodes: Array
     pairs: Pairs
-    floor: Tensor
-    openings: Tensor
+    floor: Array
+    openings: Array
     scale: BoxScale
 
 
-class LayoutDenoiser(nn.Module):
+class Layout(Layers):
     """Predicts the objective's target for noisy boxes; each node has its own noise level, 0 = known.
-
-    `config`: its `layout` and what it shares with the other parts.
-
-    Raises ValueError for a negative number of drafts, or fewer layers than drafts and the last prediction need.
 
     Shapes:
         boxes (N, 8), level (N,) in [0, 1], `LayoutContext` -> (N, 8)
     """
 
-    def __init__(self, config: CompactConfig) -> None:
-        super().__init__()
-        layout, width = config.layout, config.layout.width
-        self.frequencies, self.objective, self.layers = layout.frequencies, layout.objective, layout.layers
-        each, rest = divmod(layout.layers, max(layout.drafts, 0) + 1)
-        if layout.drafts < 0 or not each:
-            raise ValueError(f"layout.layers {layout.layers} are too few for layout.drafts {layout.drafts}")
-        self.category = WordTable("categories", config.categories, width)
-        self.room_type = WordTable("room_types", config.room_types, width)
-        self.rules = nn.Embedding(len(config.rules), width)
-        self.floor = nn.Sequential(nn.Linear(6 + GRID**2, width), nn.SiLU(), nn.Linear(width, width))
-        self.opening = nn.Sequential(nn.Linear(PLAN, width), nn.SiLU(), nn.Linear(width, width))
-        self.tidy = nn.Embedding(2, width)  # the weights that ship knew shaken rooms; the second row is for others
-        self.latent = nn.Linear(config.latent.width, width)
-        self.box = nn.Linear(BOX * (1 + 2 * layout.frequencies), width)
-        self.known = nn.Parameter(torch.randn(width) * 0.02)
-        self.level = nn.Sequential(nn.Linear(64, 128), nn.SiLU())
-        self.modulation = nn.Linear(128, 2 * width * layout.layers)
-        measured = BOX * (1 + 2 * layout.frequencies) + WALL_FEATURES + OPENING_FEATURES
-        self.rounds = nn.ModuleList(
-            nn.ModuleList(
-                EchoLayer(width, 2 * len(config.predicates) + PAIR_FEATURES * (n > 0)) if layout.echo else Alone(width)
-                for _ in range(layers)
-            )
-            for n, layers in enumerate([each + rest] + [each] * layout.drafts)
-        )
-        self.measured = nn.ModuleList(nn.Linear(measured, width) for _ in range(layout.drafts))
-        self.norms = nn.ModuleList(nn.LayerNorm(width) for _ in self.rounds)
-        self.heads = nn.ModuleList(nn.Linear(width, BOX) for _ in self.rounds)
-        for table in (self.category, self.room_type, self.rules):
-            nn.init.normal_(table.weight, std=0.3)
-        nn.init.zeros_(self.tidy.weight)
-        for layer in (self.modulation, self.opening[-1], *self.heads):  # type: ignore[assignment]
-            nn.init.zeros_(layer.weight)
-            nn.init.zeros_(layer.bias)
+    settings: LayoutConfig
 
-    def context(self, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor, scale: BoxScale) -> LayoutContext:
+    def context(self, graph: GraphBatch, pairs: Pairs, latent: Array, rules: Array, scale: BoxScale) -> LayoutContext:
         """Everything that does not depend on the step.
 
         Arguments:
@@ -103,45 +62,49 @@ class LayoutDenoiser(nn.Module):
         nodes = self.category(graph.category) + self.latent(latent) + room[graph.scene]
         return LayoutContext(nodes, pairs, graph.floor[graph.scene], graph.openings[graph.scene], scale)
 
-    def forward(self, boxes: Tensor, level: Tensor, context: LayoutContext) -> Tensor:
+    def forward(self, boxes: Array, level: Array, context: LayoutContext) -> Array:
+        """The prediction."""
         return self.drafts(boxes, level, context)[-1]
 
-    def drafts(self, boxes: Tensor, level: Tensor, context: LayoutContext) -> list[Tensor]:
+    def drafts(self, boxes: Array, level: Array, context: LayoutContext) -> list[Array]:
         """The drafts of the prediction, (N, 8) each, and the prediction, the last of them."""
-        known = (level == 0).to(boxes.dtype)[:, None]
+        known, settings = cast(level == 0, boxes)[:, None], self.settings
         with exactly(boxes):
-            x = context.nodes + self.box(box_features(boxes, self.frequencies)) + known * self.known
-        modulations = iter(self.modulation(self.level(level_features(level))).chunk(self.layers, dim=1))
-        pairs, out = context.pairs, [torch.zeros_like(boxes)]
+            x = context.nodes + self.box(box_features(boxes, settings.frequencies)) + known * self.known
+        modulations, pairs = iter(parted(self.modulated(level), settings.layers)), context.pairs
+        out = [kit(boxes).zeros_like(boxes)]
         for number, layers in enumerate(self.rounds):
             if number:
-                draft = clean_from(out[-1].detach(), boxes, level, self.objective).clamp(-WILDEST, WILDEST)
+                draft = clipped(clean_from(held(out[-1]), boxes, level, settings.objective), -WILDEST, WILDEST)
                 with exactly(boxes):
                     features, pairs = self._measure(draft, context)
                     x = x + self.measured[number - 1](features)
-            for layer in layers:  # type: ignore[attr-defined]
+            for layer in layers:
                 x = layer(x, pairs, next(modulations))
             with exactly(boxes):
                 out.append(out[-1] + self.heads[number](self.norms[number](x)))
         return out[1:]
 
-    def _measure(self, clean: Tensor, context: LayoutContext) -> tuple[Tensor, Pairs]:
+    def _measure(self, clean: Array, context: LayoutContext) -> tuple[Array, Pairs]:
         """What the nodes (N, F) and the pairs are told about a draft of the boxes."""
         boxes = measurable(Boxes.decode(clean, context.scale))
         walls, openings = wall_features(boxes, context.floor), clearances(boxes, context.openings)
-        features = torch.cat([box_features(clean, self.frequencies), walls, openings], dim=1)
-        told = torch.cat([context.pairs.told, pair_features(boxes, context.pairs)], dim=1)
+        concat = kit(clean).concat
+        features = concat([box_features(clean, self.settings.frequencies), walls, openings], 1)
+        told = concat([context.pairs.told, pair_features(boxes, context.pairs)], 1)
         return features, replace(context.pairs, told=told)
 
 
-def exactly(x: Tensor) -> AbstractContextManager[None]:
+def exactly(x: Array) -> AbstractContextManager[None]:
     """Numbers that stand for centimetres are not rounded where the rest is computed in bfloat16."""
-    device = x.device.type
+    if isinstance(x, NUMPY):
+        return nullcontext()
+    torch, device = kit(x), x.device.type
     return torch.autocast(device, enabled=False) if torch.amp.is_autocast_available(device) else nullcontext()
 
 
-def box_features(boxes: Tensor, frequencies: int) -> Tensor:
+def box_features(boxes: Array, frequencies: int) -> Array:
     """The box and the sines and cosines of its numbers at doubling frequencies: (N, 8) -> (N, 8 (1 + 2 F))."""
-    scales = math.pi / 4 * 2.0 ** torch.arange(frequencies, device=boxes.device, dtype=boxes.dtype)
-    angles = (boxes[:, :, None] * scales).flatten(1)
-    return torch.cat([boxes, torch.sin(angles), torch.cos(angles)], dim=1)
+    xp, scales = kit(boxes), constant([math.pi / 4 * 2.0**octave for octave in range(frequencies)], boxes)
+    angles = (boxes[:, :, None] * scales).reshape(len(boxes), -1)
+    return xp.concat([boxes, xp.sin(angles), xp.cos(angles)], 1)

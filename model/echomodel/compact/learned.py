@@ -4,36 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-import torch
-from torch import Tensor, nn
+import numpy as np
 
+from echomodel.arrays import Array, beside
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
 from echomodel.vocabulary import Vocabulary, vocabulary
 
 Names = tuple[str, ...]
-_PLACES: dict[tuple[str, Names], tuple[Vocabulary, Tensor]] = {}
+_PLACES: dict[tuple[str, Names], tuple[Vocabulary, np.ndarray]] = {}
 
 
-class WordTable(nn.Embedding):
-    """Vectors of words, one row for each that the weights name.
-
-    Arguments:
-        kind: `categories` or `room_types`. names: of the rows. width: of the vectors.
-
-    Shapes:
-        (...) int64, positions in today's vocabulary -> (..., width)
-    """
-
-    def __init__(self, kind: str, names: Names, width: int) -> None:
-        super().__init__(len(names), width)
-        self.kind, self.names = kind, names
-
-    def forward(self, input: Tensor) -> Tensor:
-        return super().forward(places(self.kind, self.names, input))
-
-
-def places(kind: str, names: Names, words: Tensor) -> Tensor:
+def places(kind: str, names: Names, words: Array) -> Array:
     """Row of each of some words among those that weights name; an unknown word has that of what its row is `like`.
 
     Arguments:
@@ -42,22 +24,23 @@ def places(kind: str, names: Names, words: Tensor) -> Tensor:
 
     Raises ValueError for a word that the weights do not know, like nothing that they know.
     """
-    found = table_of(kind, names).to(words.device)[words]
-    if bool((table_of(kind, names) < 0).any()) and bool((found < 0).any()):
+    table = table_of(kind, names)
+    found = beside(table, words)[words]
+    if (table < 0).any() and bool((found < 0).any()):
         row = getattr(vocabulary(), kind)[int(words[found < 0][0])]
         like = _like(row)
         raise ValueError(f"these weights know neither {row.name!r} nor {like!r}, which its row names as the nearest")
     return found
 
 
-def table_of(kind: str, names: Names) -> Tensor:
+def table_of(kind: str, names: Names) -> np.ndarray:
     """(W,) int64: for every word of the vocabulary the row of weights that name `names`, -1 where there is none."""
     words = vocabulary()
     spoken, table = _PLACES.get((kind, names), (None, None))
     if spoken is not words or table is None:
         row_of = {words.name_of(kind, name): row for row, name in enumerate(names)}
         nearest = [_nearest(kind, row.name, row_of) for row in getattr(words, kind)]
-        table = torch.tensor([-1 if name is None else row_of[name] for name in nearest])
+        table = np.array([-1 if name is None else row_of[name] for name in nearest])
         _PLACES[kind, names] = words, table
     return table
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-import torch
-from torch import Tensor
+import numpy as np
 
+from echomodel.arrays import Array, beside, clipped, full, kit, on_device, pairs_in, rows, sums_of, without_slopes
 from echomodel.boxes import Boxes
-from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import Pairs, pairs_of
 from echomodel.config import BranchConfig, Sampler
 from echomodel.graph import GraphBatch
@@ -20,39 +19,44 @@ from echomodel.randomness import normal
 from echomodel.samplers import Predict, clean_from, sample
 from echomodel.vocabulary import vocabulary
 
+if TYPE_CHECKING:
+    from echomodel.compact.model import CompactModel
+    from echomodel.compact.plain import PlainModel
 
-def layout_predictor(model: CompactModel, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor) -> Predict:
+Model: TypeAlias = "CompactModel | PlainModel"
+
+
+def layout_predictor(model: Model, graph: GraphBatch, pairs: Pairs, latent: Array, rules: Array) -> Predict:
     """Clean boxes (N, 8) in noisy ones; arguments as for `LayoutDenoiser.context`."""
     context = model.layout.context(graph, pairs, latent, rules, model.scale(graph.category))
 
-    def predict(x: Tensor, level: Tensor) -> Tensor:
+    def predict(x: Array, level: Array) -> Array:
         return clean_from(model.layout(x, level, context), x, level, model.config.layout.objective)
 
     return predict
 
 
-def agreeing(predict: Predict, groups: Tensor) -> Predict:
+def agreeing(predict: Predict, groups: Array) -> Predict:
     """Clean codes on which each group agrees, their mean, so that equal furniture stays equal from the first step on.
 
     Arguments:
         predict: the denoiser's clean sample (N, K).
         groups: (N,) int64, number of each node's group in [0, N). Known nodes (level 0) speak for their whole group.
     """
-    alone = bool((groups == torch.arange(len(groups), device=groups.device)).all())
+    alone = np.array_equal(on_device(groups, None), np.arange(len(groups)))
 
-    def agreed(x: Tensor, level: Tensor) -> Tensor:
+    def agreed(x: Array, level: Array) -> Array:
         clean = predict(x, level)
-        weight = torch.where(level == 0, 1.0, 1e-6).to(clean)[:, None]
+        weight = kit(level).where(level == 0, full(clean, len(clean), 1.0), 1e-6)[:, None]
         return group_means(clean * weight, groups) / group_means(weight, groups)
 
     return predict if alone else agreed
 
 
-def group_means(values: Tensor, groups: Tensor) -> Tensor:
+def group_means(values: Array, groups: Array) -> Array:
     """Each value (N, ...) replaced by the mean of its group; groups (N,) int64 in [0, N)."""
-    total = torch.zeros_like(values).index_add(0, groups, values)
-    count = torch.zeros_like(values).index_add(0, groups, torch.ones_like(values))
-    return (total / count.clamp_min(1))[groups]
+    count = sums_of(groups, full(values, len(values), 1.0), len(values))[groups]
+    return sums_of(groups, values, len(values))[groups] / count.reshape(-1, *[1] * (values.ndim - 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,55 +77,57 @@ class CompactSampling(Sampling):
     sampler: Sampler | None = None
     rules: str = "strict"
     relation_guidance: float | None = None
-    noise: Tensor | None = None
+    noise: Array | None = None
     candidates: int | None = None
-    styles: Tensor | None = None
+    styles: Array | None = None
 
-    def denoised(self, predict: Predict, noise: Tensor, settings: BranchConfig) -> Tensor:
+    def denoised(self, predict: Predict, noise: Array, settings: BranchConfig) -> Array:
         """What becomes of `noise` (N, ...), by the branch's sampler and steps where none are asked for."""
         return sample(
             self.sampler or settings.sampler, predict, noise, self.steps or settings.steps, settings.objective,
             known=self.known, known_mask=self.known_mask, generator=self.generator, progress=self.progress,
         )  # fmt: skip
 
-    def start(self, nodes: int, width: int, device: torch.device) -> Tensor:
+    def start(self, nodes: int, width: int, device: Any) -> Array:
         """The noise (nodes, width) that is given, checked, or the generator's."""
         if self.noise is None:
             return normal((nodes, width), self.generator, device)
         if tuple(self.noise.shape) != (nodes, width):
             raise ValueError(f"noise is {tuple(self.noise.shape)}, expected {(nodes, width)}")
-        bad = ~torch.isfinite(self.noise).all(1)
+        bad = ~kit(self.noise).isfinite(self.noise).all(1)
         if bool(bad.any()):
-            raise ValueError(f"noise of node {int(bad.nonzero()[0])} is not finite")
-        return self.noise.to(device)
+            raise ValueError(f"noise of node {int(rows(bad)[0])} is not finite")
+        return on_device(self.noise, device)
 
 
-def known_values(graph: GraphBatch, known: Any, mask: Tensor | None, device: torch.device) -> tuple[Any, Tensor | None]:
+def known_values(graph: GraphBatch, known: Any, mask: Array | None, device: Any) -> tuple[Any, Array | None]:
     """Known values and their mask on `device`, with unknown rows replaced by something harmless."""
     if (known is None) != (mask is None):
         raise ValueError("known and known_mask belong together, one of them is missing")
     if known is None or mask is None:
         return None, None
     nodes = graph.num_nodes
-    if len(known) != nodes or tuple(mask.shape) != (nodes,) or mask.dtype != torch.bool:
+    if len(known) != nodes or tuple(mask.shape) != (nodes,) or str(mask.dtype).removeprefix("torch.") != "bool":
         found = f"{len(known)} values and a {tuple(mask.shape)} {mask.dtype} mask"
         raise ValueError(f"known: {found} for a graph of {nodes} nodes, expected one of each per node (bool)")
-    known, mask = known.to(device), mask.to(device)
+    mask = on_device(mask, device)
     if isinstance(known, Boxes):
-        plain = Boxes(torch.ones_like(known.size), torch.zeros_like(known.position), torch.zeros_like(known.yaw))
-        filled = plain.replaced(mask, known)
+        known = known.to(device)
+        zeros, ones = kit(mask).zeros_like, kit(mask).ones_like
+        filled = Boxes(ones(known.size), zeros(known.position), zeros(known.yaw)).replaced(mask, known)
         filled.check()
         return filled, mask
-    bad = ~torch.isfinite(known.flatten(1)).all(1) & mask
+    known = on_device(known, device)
+    bad = ~kit(known).isfinite(known.reshape(nodes, -1)).all(1) & mask
     if bool(bad.any()):
-        raise ValueError(f"known shape of node {int(bad.nonzero()[0])} holds values that are not finite")
-    return torch.where(mask.reshape(-1, *[1] * (known.ndim - 1)), known, torch.ones_like(known)), mask
+        raise ValueError(f"known shape of node {int(rows(bad)[0])} holds values that are not finite")
+    return kit(known).where(mask.reshape(-1, *[1] * (known.ndim - 1)), known, kit(known).ones_like(known)), mask
 
 
-Latent = Callable[[GraphBatch, GraphEdit | None], Tensor]
+Latent = Callable[[GraphBatch, GraphEdit | None], Array]
 
 
-def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: CompactSampling) -> Boxes:
+def sample_boxes(model: Model, latent: Latent, graph: GraphBatch, how: CompactSampling) -> Boxes:
     """Boxes (N) of S scenes, drawn from noise; each stands or hangs at the height that what carries it gives.
 
     Arguments:
@@ -135,39 +141,40 @@ def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: Co
     given = None if how.known is None else how.known.encode(scale)
     if how.rules not in model.config.rules:
         raise ValueError(f"rules is {how.rules!r}, allowed: {', '.join(model.config.rules)}")
-    rules = torch.full_like(graph.room_type, model.config.rules.index(how.rules))
+    rules = kit(graph.room_type).full_like(graph.room_type, model.config.rules.index(how.rules))
     pairs = pairs_of(graph, model.config.predicates)
     predict = layout_predictor(model, graph, pairs, latent(graph, how.edit), rules)
     strength = config.guidance if how.relation_guidance is None else how.relation_guidance
-    plan = plan_of_graph(graph, how.rules)
+    plan = plan_of_graph(graph.to("cpu" if strength else None), how.rules)  # slopes are torch's
     if strength:
         predict = guided(predict, plan, scale, strength=strength, rounds=config.guidance_rounds)
-    noise = how.start(graph.num_nodes, 8, graph.category.device)
+    noise = how.start(graph.num_nodes, 8, model.device)
     vectors = replace(how, known=given).denoised(predict, noise, config)
     boxes = Boxes.decode(vectors, scale)
-    boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
+    boxes = Boxes(clipped(boxes.size, 0.01, 20.0), boxes.position, boxes.yaw)
     boxes = mended(plan, boxes, strength=strength, rounds=AFTER if strength else 0, given=how.known_mask)
     if how.known is None or how.known_mask is None:
         return boxes
     return boxes.replaced(how.known_mask, how.known)
 
 
-def with_whole_styles(graph: GraphBatch, groups: Tensor) -> GraphBatch:
+def with_whole_styles(graph: GraphBatch, groups: Array) -> GraphBatch:
     """The graph with every two nodes of one group told to be of one style: who is like my like is like me.
 
     `groups`: (N,) int64, number of each node's style group in [0, N).
     """
     alike = (groups[:, None] == groups) & (graph.scene[:, None] == graph.scene)
-    subject, target = (alike & ~torch.eye(len(groups), dtype=torch.bool, device=groups.device)).nonzero(as_tuple=True)
-    told = torch.stack([subject, torch.full_like(subject, vocabulary().predicate_id("same_style_as")), target], dim=1)
-    return graph.with_triplets(torch.cat([graph.triplets, told]).unique(dim=0))
+    subject, target = pairs_in(alike & beside(~np.eye(len(groups), dtype=bool), groups))
+    same = kit(subject).full_like(subject, vocabulary().predicate_id("same_style_as"))
+    told = kit(subject).stack([subject, same, target], 1)
+    return graph.with_triplets(kit(told).concat([graph.triplets, told]))
 
 
-@torch.no_grad()
+@without_slopes
 def sample_descriptions(
-    model: CompactModel, graph: GraphBatch, size: Tensor, latent: Tensor, equal: Tensor, noise: Tensor,
+    model: Model, graph: GraphBatch, size: Array, latent: Array, equal: Array, noise: Array,
     how: CompactSampling,
-) -> Tensor:  # fmt: skip
+) -> Array:  # fmt: skip
     """Descriptions (N, D) of all pieces of S scenes.
 
     Arguments:
@@ -178,7 +185,7 @@ def sample_descriptions(
     """
     context = model.furniture.context(graph, size, pairs_of(graph, model.config.predicates), latent)
 
-    def predict(x: Tensor, level: Tensor) -> Tensor:
+    def predict(x: Array, level: Array) -> Array:
         return model.furniture(x, level, context)
 
     return how.denoised(agreeing(predict, equal), noise, model.config.furniture)

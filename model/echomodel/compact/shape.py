@@ -15,9 +15,9 @@ from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import seen
-from echomodel.compact.learned import WordTable
 from echomodel.compact.model import CompactModel
-from echomodel.compact.pairs import EchoLayer, Pairs, level_features, pairs_of
+from echomodel.compact.modules import EchoLayer, WordTable
+from echomodel.compact.pairs import Pairs, level_features, pairs_of
 from echomodel.compact.sampling import CompactSampling, Latent, agreeing, group_means
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch

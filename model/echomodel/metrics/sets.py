@@ -40,7 +40,7 @@ def object_features(room: RoomBoxes) -> np.ndarray:
         yaw=np.radians(np.round(np.degrees(room.yaw)) % 360),
     )  # fmt: skip
     boxes = measurable(Boxes.from_room(room))
-    floor = centred(room.floor_polygon if len(room.floor_polygon) else None)[None].expand(len(room), -1, -1)
+    floor = torch.from_numpy(centred(room.floor_polygon if len(room.floor_polygon) else None)).expand(len(room), -1, -1)
     sizes = [size_score(word, room.size[k : k + 1])[0] for k, word in enumerate(room.categories)]
     lift = torch.tanh(5 * boxes.position[:, 1:2])
     apart = torch.cdist(boxes.position[:, [0, 2]], boxes.position[:, [0, 2]]).fill_diagonal_(torch.inf)

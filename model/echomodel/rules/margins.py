@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.arrays import Array, constant, full, held, kit, put, rows
+from echomodel.arrays import Array, beside, constant, full, held, kit, put, rows
 from echomodel.rules.geometry import BoxesLike, PairGeometry, Spread, pairs
 from echomodel.rules.sets import RuleSet, rule_set
 from echomodel.vocabulary import vocabulary
@@ -50,11 +50,11 @@ def margins(
     0 where the rules do not measure the predicate. Never NaN or infinite for finite boxes.
     """
     own = floating(boxes)
-    triplets, centre = _beside(own.size, triplets), kit(own.size).zeros_like(own.position)
+    triplets, centre = beside(triplets, own.size), kit(own.size).zeros_like(own.position)
     if center is not None:
-        centre[:, ::2] = _beside(own.size, center)
+        centre[:, ::2] = beside(center, own.size)
     out = full(own.size, len(triplets), 0.0)
-    headed = None if fronts is None else _beside(own.size, fronts)
+    headed = None if fronts is None else beside(fronts, own.size)
     placed = replace(own, size=held(own.size)) if rigid else own
     words, told, chosen = vocabulary().predicates, triplets[:, 1], rule_set(rules)
     there = {words[number].name: words[number] for number in sorted(set(told.tolist())) if 0 <= number < len(words)}
@@ -82,7 +82,7 @@ def verdicts(boxes: BoxesLike, triplets: Array, *, rules: str = "strict", **abou
 
 def judged(margin: Array, triplets: Array, rules: str) -> Array:
     """The `verdicts` (E,) int8 on relations (E, 3) int64 with these margins (E,) float."""
-    xp, chosen, predicate = kit(margin), rule_set(rules), _beside(margin, triplets)[:, 1]
+    xp, chosen, predicate = kit(margin), rule_set(rules), beside(triplets, margin)[:, 1]
     kept = xp.where(_among(predicate, chosen.open), margin > 0, margin >= 0)
     return xp.where(_among(predicate, frozenset(chosen.margins)), kept, xp.full_like(kept, -1, dtype=xp.int8))
 
@@ -102,8 +102,3 @@ def pair_margins(pair: PairGeometry, predicate: Array, rules: RuleSet) -> Array:
 
 def _among(predicate: Array, ids: frozenset[int]) -> Array:
     return (predicate[:, None] == constant(sorted(ids), predicate)).any(1)
-
-
-def _beside(these: Array, values: Array) -> Array:
-    """Values of either library in that of these, on their device."""
-    return np.asarray(values) if isinstance(these, np.ndarray) else kit(these).as_tensor(values, device=these.device)

@@ -22,10 +22,10 @@ from echomodel.objective.physics import apart
 from echomodel.objective.plan import UNKNOWN
 from echomodel.randomness import normal
 from echomodel.rules import margins, verdicts
-from echomodel.samplers import add_noise, clean_from, draw_levels, sample, target
+from echomodel.samplers import add_noise, clean_from, sample, target
 from echomodel.surroundings import clearances, kept_free, outside
 from echomodel.training.recipe import Recipe
-from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
+from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, draw_levels, make_batch
 from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
 

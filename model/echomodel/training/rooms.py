@@ -17,7 +17,7 @@ from echomodel.graph import GraphBatch
 from echomodel.objective.plan import plan_of_rooms
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.telling import near_first
-from echomodel.surroundings import padded, padded_rows, trimmed
+from echomodel.surroundings import padded, trimmed
 from echomodel.vocabulary import vocabulary
 
 PREDICATES = names_of("predicates")  # that networks are told, by their ids from 0 on; rules may measure more
@@ -65,7 +65,7 @@ class PackedRooms:
             category=torch.cat([g.category for g in graphs]), size=boxes.size, position=boxes.position, yaw=boxes.yaw,
             style=torch.tensor([s for room in rooms for s in (room.styles or (-1,) * len(room))]),
             count=torch.tensor([len(room) for room in rooms]), room_type=torch.cat([g.room_type for g in graphs]),
-            floor=padded([g.floor for g in graphs]), openings=padded_rows([g.openings for g in graphs]),
+            floor=padded([g.floor for g in graphs]), openings=padded([g.openings for g in graphs]),
             rules=torch.full((len(rooms),), rules), bits=torch.cat([_bits(g) for g in graphs]),
             allowed=_allowed(rooms),
         )  # fmt: skip
@@ -80,7 +80,7 @@ class PackedRooms:
             for number, name in enumerate(rules)
             for some in np.split(numbers, range(500, len(numbers), 500))
         ]
-        join = {"floor": padded, "openings": padded_rows}
+        join = {"floor": padded, "openings": padded}
         joined = {f.name: [getattr(part, f.name) for part in parts] for f in fields(cls)}
         return cls(**{name: join.get(name, torch.cat)(of) for name, of in joined.items()})
 
@@ -241,7 +241,7 @@ def _thinned(
 def _told(predicates: Tensor, receiver: Tensor, sender: Tensor, counts: Tensor) -> Tensor:
     """Fill in inverses: (P, 16) float -> (P, 32) as in `pairs_of`."""
     back = reverse_pairs(receiver, sender, counts)
-    inverse = inverse_predicates(PREDICATES)
+    inverse = torch.from_numpy(inverse_predicates(PREDICATES))
     has = inverse >= 0
     flipped = torch.zeros_like(predicates)
     flipped[:, inverse[has]] = predicates[:, has]
@@ -275,3 +275,10 @@ def _pseudo_edit(
     pseudo[changed] = wrong
     told = _told(pseudo, pairs.receiver, pairs.sender, counts)
     return pairs.without(~added, told), added, touched
+
+
+def draw_levels(count: int, generator: torch.Generator, device: torch.device | str = "cpu") -> Tensor:
+    """Training levels, one per scene, stratified over (0, 1] so that every batch sees the whole range: (count,)."""
+    offset = torch.rand(1, generator=generator)
+    level = (torch.arange(count) + offset) / count
+    return level[torch.randperm(count, generator=generator)].clamp(1e-3, 1.0).to(device)

@@ -22,9 +22,9 @@ from echomodel.data.shapeset import ShapeSet
 from echomodel.graph import GraphBatch
 from echomodel.metrics.pointsets import surface_scores
 from echomodel.randomness import normal
-from echomodel.samplers import add_noise, draw_levels, output_from, target
+from echomodel.samplers import add_noise, output_from, target
 from echomodel.training.layout_stage import LayoutStage, draw_known, edited_latent
-from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch
+from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, draw_levels
 from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
 

@@ -10,9 +10,11 @@ from typing import Any, ClassVar, Protocol
 import torch
 
 from echomodel.boxes import BoxStatistics
-from echomodel.compact.learned import WordTable, places
-from echomodel.compact.model import WORDS, CompactModel, load_weights, read_header, read_weights, words_of
+from echomodel.compact.learned import places
+from echomodel.compact.model import CompactModel, load_weights, read_weights
+from echomodel.compact.modules import WordTable
 from echomodel.compact.shape import ShapeDenoiser
+from echomodel.compact.weights import WORDS, read_header, words_of
 from echomodel.config import CompactConfig
 from echomodel.data.roomset import RoomSet
 from echomodel.data.shapeset import ShapeSet

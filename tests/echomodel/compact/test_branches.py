@@ -10,8 +10,9 @@ import torch
 from torch import nn
 
 from echomodel.boxes import BoxStatistics
-from echomodel.compact.model import PARTS, CompactModel, Part, WeightsError, branches, load_weights, save_weights
+from echomodel.compact.model import CompactModel, load_weights, save_weights
 from echomodel.compact.pairs import pairs_of
+from echomodel.compact.weights import PARTS, Part, branches
 from echomodel.config import CompactConfig, LatentConfig
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
@@ -63,15 +64,11 @@ class ColourStage:
         return {"held/colours": 0.0}
 
 
-def outdated(settings):
-    return None if "width" in settings else "whose colours had no width; train it again"
-
-
 @pytest.fixture
 def colours(monkeypatch):
-    monkeypatch.setitem(PARTS, "colours", Part(Colours, ("latent",), branch=True, outdated=outdated))
+    monkeypatch.setitem(PARTS, "colours", Part(Colours, ("latent",), branch=True))
     monkeypatch.setitem(STAGES, "colours", ColourStage)
-    monkeypatch.setattr("echomodel.compact.model.CompactConfig", WithColours)
+    monkeypatch.setattr("echomodel.compact.weights.CompactConfig", WithColours)
 
 
 def test_a_third_branch_is_built_trained_saved_and_loaded(colours, tmp_path):
@@ -87,13 +84,6 @@ def test_a_third_branch_is_built_trained_saved_and_loaded(colours, tmp_path):
     assert model.parts == ("latent", "colours")
     assert EchoModel(model).branches == {"colours"}
     assert torch.isfinite(model.colours(model.latent(GRAPH.category, pairs_of(GRAPH)))).all()
-
-
-def test_settings_that_a_branch_no_longer_reads_are_refused(colours, monkeypatch, tmp_path):
-    save_weights(tmp_path / "old.safetensors", CompactModel(CONFIG, STATISTICS, ("colours",)), ("colours",))
-    monkeypatch.setitem(PARTS, "colours", Part(Colours, outdated=lambda settings: "whose colours were grey"))
-    with pytest.raises(WeightsError, match=r"old.safetensors: is of an earlier version, whose colours were grey"):
-        load_weights([tmp_path / "old.safetensors"])
 
 
 def test_every_part_has_settings_and_every_stage_a_name():

@@ -10,7 +10,8 @@ from torch import Tensor
 
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.model import CompactModel
-from echomodel.compact.pairs import EchoLayer, Pairs, inverse_predicates, pair_messages, pairs_of
+from echomodel.compact.modules import EchoLayer
+from echomodel.compact.pairs import Pairs, inverse_predicates, pair_messages, pairs_of
 from echomodel.config import CompactConfig, from_dict, names_of
 from echomodel.graph import GraphBatch
 

@@ -18,7 +18,8 @@ def boxes() -> Boxes:
 
 
 def test_gaps_to_the_walls() -> None:
-    features = wall_features(boxes(), padded([centred((4, 3))[None], torch.full((1, 4, 2), torch.nan)]))
+    known = torch.from_numpy(centred((4, 3)))[None]
+    features = wall_features(boxes(), padded([known, torch.full((1, 4, 2), torch.nan)]))
     assert features.shape == (2, WALL_FEATURES)
     gaps = torch.atanh(features[0, :12]) * 3
     torch.testing.assert_close(gaps[:4], torch.tensor([1.0, 1.0, 2.0, 0.0]), atol=1e-4, rtol=0)  # +x, -x, +z, -z
@@ -46,7 +47,7 @@ def test_pairs_are_measured_from_the_receiver() -> None:
 def test_gradients_are_finite_where_the_floor_is_unknown() -> None:
     own = boxes()
     position = own.position.clone().requires_grad_()
-    floor = padded([centred((4, 3))[None], torch.full((1, 4, 2), torch.nan)])
+    floor = padded([torch.from_numpy(centred((4, 3)))[None], torch.full((1, 4, 2), torch.nan)])
     wall_features(Boxes(own.size, position, own.yaw), floor).square().sum().backward()
     assert position.grad is not None
     assert torch.isfinite(position.grad).all()

@@ -11,8 +11,10 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 from echomodel.boxes import BoxStatistics
-from echomodel.compact.learned import WordTable, places
-from echomodel.compact.model import CompactModel, WeightsError, load_weights, save_weights
+from echomodel.compact.learned import places
+from echomodel.compact.model import CompactModel, load_weights, save_weights
+from echomodel.compact.modules import WordTable
+from echomodel.compact.weights import WeightsError
 from echomodel.config import CompactConfig, from_dict
 from echomodel.data.roomset import RoomSet, build_rooms
 from echomodel.echo import EchoModel

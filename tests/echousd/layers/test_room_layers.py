@@ -59,7 +59,7 @@ def test_assets_of_ours_name_nobody_and_those_of_others_their_author(stage, root
 
 
 def test_the_volume_of_a_room_holds_floor_and_furniture(room):
-    points, position, size = room_points(room), room.boxes.position.numpy(), room.boxes.size.numpy()
+    points, position, size = room_points(room), room.boxes.position, room.boxes.size
     tops = position[:, 1] + size[:, 1]
     heights = {round(float(y), 4) for y in points[:, 1]}
     assert {round(float(y), 4) for y in (*position[:, 1], *tops, 0.0)} <= heights

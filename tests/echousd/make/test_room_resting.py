@@ -30,9 +30,9 @@ class High(StandIn):
 
 def lifted(up_axis="Y", **by):
     room = echousd.generate(small_graph(), model=StandIn(), options=PLAIN, up_axis=up_axis)
-    position = room.boxes.position.clone()
+    position = room.boxes.position.copy()
     for name, way in by.items():
-        position[room.names.index(name)] += position.new_tensor(way)
+        position[room.names.index(name)] += way
     boxes = Boxes(room.boxes.size, position, room.boxes.yaw)
     return replace(room, boxes=boxes, layouts=(boxes,))
 
@@ -47,7 +47,7 @@ def test_what_stands_too_high_is_put_where_it_rests(up_axis):
     assert found.boxes.position[row, 1] == pytest.approx(0.0, abs=1e-3)
     np.testing.assert_allclose(
         found.boxes.position[row],
-        room.boxes.position[row] - room.boxes.position.new_tensor([0, 0.02, 0]),
+        room.boxes.position[row] - np.array([0, 0.02, 0]),
         atol=3e-3,
     )
     np.testing.assert_allclose(found.boxes.yaw, room.boxes.yaw, atol=0.02)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -55,13 +54,6 @@ def pack_linear_maps(net: nn.Module) -> None:
         for name, layer in list(module.named_children()):
             if type(layer) is nn.Linear:
                 setattr(module, name, PackedLayer(layer))
-
-
-def packed(read: Callable[[], nn.Module]) -> nn.Module:
-    """What `read` gives, with packed layers."""
-    net = read()
-    pack_linear_maps(net)
-    return net
 
 
 @cache

@@ -1,0 +1,104 @@
+"""Weights files: which parts of the compact model there are, and what a file says of its own beside the numbers.
+
+Each part is registered once, under the name of its settings in `CompactConfig`. A branch is a part that gives something
+of a room: boxes, shapes, furniture. A further branch is a module with its network and its sampling, its settings in
+`CompactConfig`, its row here, and a training stage in `echomodel.training`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from safetensors import SafetensorError, safe_open
+
+from echomodel.boxes import BoxStatistics
+from echomodel.config import CompactConfig, FurnitureConfig, from_dict
+from echomodel.late import Late
+
+
+@dataclass(frozen=True)
+class Part:
+    """What weights files and the model know of a part.
+
+    Arguments:
+        module: builds it from the whole configuration.
+        needs: other parts without which it gives nothing.
+        branch: whether it gives something of a room.
+    """
+
+    module: Callable[[CompactConfig], Any]
+    needs: tuple[str, ...] = ()
+    branch: bool = False
+
+
+MODULES = "echomodel.compact.modules"
+PARTS: dict[str, Part] = {
+    "latent": Part(Late(f"{MODULES}:LatentGraph")),
+    "layout": Part(Late(f"{MODULES}:LayoutDenoiser"), ("latent",), branch=True),
+    "autoencoder": Part(Late("echomodel.compact.shape:Autoencoder")),
+    "shape": Part(Late("echomodel.compact.shape:ShapeDenoiser"), ("latent", "autoencoder"), branch=True),
+    "furniture": Part(Late(f"{MODULES}:FurnitureDenoiser"), ("latent",), branch=True),
+}
+
+
+def branches(parts: Iterable[str]) -> frozenset[str]:
+    """Names of the branches among `parts` that have what they need beside them."""
+    there = set(parts)
+    return frozenset(name for name in there if PARTS[name].branch and there.issuperset(PARTS[name].needs))
+
+
+WORDS = ("categories", "predicates", "room_types")
+_SHARED = (*WORDS, "rules")
+FORMAT = "echousd-compact-1"
+
+
+class WeightsError(ValueError):
+    """A weights file that is not one, or whose tensors do not fit the configuration."""
+
+
+def read_header(path: Path) -> dict[str, str]:
+    """Metadata of a safetensors file; raises WeightsError where it cannot be read."""
+    try:
+        with safe_open(path, "np") as handle:
+            return handle.metadata() or {}
+    except (OSError, SafetensorError) as error:
+        raise WeightsError(f"{path}: not a readable safetensors file ({error})") from None
+
+
+def joined_config(metadata: Mapping[Path, dict[str, str]]) -> CompactConfig:
+    """Each part's settings from the file that holds the part; what all parts share must be equal."""
+    joined, first = None, None
+    for path, header in metadata.items():
+        own = from_dict(CompactConfig, {**json.loads(header["config"]), **words_of(path, header)})
+        joined, first = joined or own, first or path
+        for shared in _SHARED:
+            if vars(own)[shared] != vars(joined)[shared]:
+                raise WeightsError(f"{path}: {shared} differs from that of {first}, they are not one model")
+        parts, known = json.loads(header["parts"]), FurnitureConfig()
+        if "furniture" in parts and (own.furniture.kinds, own.furniture.numbers) != (known.kinds, known.numbers):
+            raise WeightsError(f"{path}: its furniture was described in other words; train it again")
+        joined = replace(joined, **{part: vars(own)[part] for part in parts})
+    assert joined is not None
+    return joined
+
+
+def own_statistics(metadata: Mapping[Path, Mapping[str, str]]) -> BoxStatistics:
+    """The box statistics of the file with the layout branch, which alone knows boxes, else of the first file."""
+    headers = list(metadata.values())
+    own = next((header for header in headers if "layout" in json.loads(header["parts"])), headers[0])
+    return BoxStatistics.from_json(json.loads(own["statistics"]))
+
+
+def words_of(path: Path, header: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
+    """The words that a weights file names, of every kind in `WORDS`; files of before counted them in their
+    configuration and named them beside. Raises WeightsError for a name that is there twice."""
+    raw, beside = json.loads(header["config"]), json.loads(header.get("vocabulary", "{}"))
+    named = {kind: tuple(beside[kind] if isinstance(raw[kind], int) else raw[kind]) for kind in WORDS}
+    for kind, names in named.items():
+        if twice := [name for number, name in enumerate(names) if name in names[:number]]:
+            raise WeightsError(f"{path}: names {twice[0]!r} twice among its {kind}")
+    return named
