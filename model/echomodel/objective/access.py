@@ -8,7 +8,7 @@ from echomodel.arrays import Array, at_least, cast, full, held, kit, put, whole
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, nobody, worst
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_normal, segment
 
-CROOKED = math.radians(5.0)  # 98 to 100 % of such furniture in real rooms is turned less
+CROOKED = math.radians(1.0)  # 98 % of such furniture in real rooms is turned less
 TOUCHING = 0.3  # metres: 93 % of real beds, nightstands and tv stands have a smaller gap behind
 NEAR_WALL, BEHIND = 0.4, 1.5  # metres between a wall and the nearest side of a desk, or its front with who sits there
 DINERS = 3  # chairs that make a dining table of a desk

@@ -231,6 +231,7 @@ MORE = [
     (BAR.moved("stool_1", at=(0.6, -1.25)), ("bar", "chairs_level"), "pushed under it by 0.15 m more than another"),
     (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(0.9, 0.6)), ("plant", "plant_aside"),
      "plant crowds chair_1_1"),
+    (SET.moved("table", yaw=0.03), ("table", "parallel"), "table is turned by 2 degrees against the walls"),
     (STUDY.moved("desk", at=(0.0, -0.5)), ("desk", "desk_at_wall"), "desk stands in the open, 1.15 m from the walls"),
     (Room({"a": ARMCHAIR, "b": {**ARMCHAIR, "at": (1.0, -1.0), "yaw": -HALF}}), ("a", "loungers_together"),
      "a turns its back on b (153 degrees)"),
@@ -252,6 +253,7 @@ KEPT = [
     ),
     (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.0, 0.7)), ("plant", "plant_aside")),
     (STUDY.moved("desk", at=(2.1, -0.5)), ("desk", "desk_at_wall")),
+    (SET.moved("table", yaw=0.015), ("table", "parallel")),
     (
         Room({**STUDY.moved("desk", at=(0.0, -0.5)).things, "a": STUDY.things["chair"], "b": STUDY.things["chair"]}),
         ("desk", "desk_at_wall"),
