@@ -1,9 +1,12 @@
 """Kitchens, bathrooms and what else a home has: closed, true to size, and what makes each what it is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
+from echomodel.furniture.fronts import front
 from echomodel.vocabulary import vocabulary
 
 HOME = (
@@ -74,3 +77,11 @@ def test_what_hangs_says_how_high():
     for name, low in hung.items():
         assert vocabulary().category(name).support == "wall"
         assert low + vocabulary().category(name).sizes[2][1] < 2.61  # below the ceiling
+
+
+def test_the_doors_of_a_wardrobe_have_a_grip_where_lower_fronts_have_none():
+    style = replace(Style.draw(np.random.default_rng(0)), handles="none", fronts="flat")
+    made = {h: front((0.0, 0.0), (0.5, h), 0.3, 1, 1, "door", style, 0.5) for h in (0.7, 2.0)}
+    grips = {h: [part for part in parts if part.role == "handle"] for h, parts in made.items()}
+    assert len(grips[0.7]) == 0
+    assert len(grips[2.0]) == 1

@@ -39,7 +39,7 @@ def _grid() -> tuple[np.ndarray, np.ndarray]:
     return axis[None, :], axis[:, None]
 
 
-def wood(seed: int = 1, rings: int = 14, contrast: float = 1.0) -> Relief:
+def wood(seed: int = 1, rings: int = 9, contrast: float = 0.75) -> Relief:
     """Sawn wood, its fibres along u: bands of early and late wood, streaks, pores."""
     _, v = _grid()
     bands = np.sin(2 * np.pi * (rings * v + 0.55 * noise(seed, 1.2, 3.0, 3.0)))
@@ -50,7 +50,7 @@ def wood(seed: int = 1, rings: int = 14, contrast: float = 1.0) -> Relief:
 
 def veneer() -> Relief:
     """Fine even wood."""
-    return wood(11, 24, 0.55)
+    return wood(11, 24, 0.25)
 
 
 def planks(rows: int = 8) -> Relief:

@@ -16,7 +16,7 @@ Point = tuple[float, float]
 PANEL, SHEET = 0.018, 0.01  # metres: thickness of a front, and of the boards of a drawer
 OPEN = math.radians(100)  # of a hinged door
 PULL = 0.75  # share of its depth that a drawer comes out
-ENOUGH = 0.12  # metres of depth that a drawer needs
+ENOUGH, TALL = 0.12, 1.5  # metres of depth that a drawer needs; of height, from which on a door is a wardrobe's
 SHELVES, HANGING = 0.38, 1.35  # metres between shelves behind doors; doors from this height on hide a rail
 
 
@@ -143,11 +143,11 @@ def _pane(x0: float, x1: float, y0: float, y1: float, z: float, role: str) -> li
 def _handle(
     x0: float, x1: float, y0: float, y1: float, z: float, kind: str, *, hinge_left: bool, style: Style
 ) -> list[Solid]:
-    if style.handles == "none":
-        return []
     w, h, door = x1 - x0, y1 - y0, kind == "door"
+    if style.handles == "none" and h < TALL:  # the doors of a wardrobe have a grip along their edge
+        return []
     x = (x1 - min(0.12 * w, 0.05) if hinge_left else x0 + min(0.12 * w, 0.05)) if door else (x0 + x1) / 2
-    y = (y0 + y1) / 2 if h < 1.5 else y0 + min(1.0, 0.5 * h)
+    y = (y0 + y1) / 2 if h < TALL else y0 + min(1.0, 0.5 * h)
     deep = 0.004  # metres that a handle reaches into its front
     if style.fronts == "framed":  # the frame stands out, the panel does not
         z, deep = z + 0.012, 0.016
@@ -160,7 +160,7 @@ def _handle(
             parts.append(tube(np.array([x + dx, y, z]) + stem, 0.006, "metal", "handle"))
             parts.append(ball((x + dx, y, z + r + 0.004), (r, r, r * 0.8), "metal", "handle"))
         return parts
-    if style.handles == "edge":
+    if style.handles in ("edge", "none"):
         low, high = (x0 + 0.1 * w, y1 - 0.02), (x1 - 0.1 * w, y1 - 0.004)
         if door:
             low, high = (x - 0.008, y0 + 0.1 * h), (x + 0.008, y1 - 0.1 * h)
