@@ -33,6 +33,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 import pytest
+from inline_batches import Inline
 
 from echousd.cli import main as commands
 from echousd.draw import rendering
@@ -48,6 +49,16 @@ def pictures_are_small() -> Iterator[None]:
     """Commands that do not say how large a picture is draw small ones; a shell's draw their own size."""
     sizes = {name: (size // 5, rays) for name, (size, rays) in rendering.QUALITIES.items()}
     with patch.dict(rendering.QUALITIES, sizes), patch("echousd.make.save.PREVIEW", 96):
+        yield
+
+
+@pytest.fixture(autouse=True, scope="module")
+def rooms_are_made_here() -> Iterator[None]:
+    """Rooms of homes and batches are made in this process, and not by workers that import everything first."""
+    with (
+        patch("echousd.home.assemble.LocalWorkers", lambda *_, **__: Inline()),
+        patch("echousd.batches.batch._executor", lambda how, rooms, device: Inline()),
+    ):
         yield
 
 

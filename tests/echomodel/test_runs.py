@@ -105,7 +105,7 @@ def test_plans_go_where_the_draft_is_and_by_what_they_miss():
 
 @pytest.mark.parametrize("room_type", ["kitchen", "bathroom", "hallway", "utility_room", "balcony", "childrens_room"])
 def test_the_generator_has_rooms_of_a_home(room_type):
-    rooms = generate_rooms(6, 4, room_type=room_type)
+    rooms = generate_rooms(4, 4, room_type=room_type)
     row = vocabulary().room_type(room_type)
     for room in rooms:
         assert room.room_type == room_type

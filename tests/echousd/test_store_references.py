@@ -256,7 +256,7 @@ def two(*more):
 @pytest.mark.parametrize("crate", [False, True])
 def test_all_states_of_a_room_open_after_gc(tmp_path, crate, echousd_command):
     store = tmp_path / "store"
-    options = echousd.RoomOptions(crate=crate)
+    options = echousd.RoomOptions(crate=crate, walls=False, dress="none")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         made = echousd.generate(two(), model=None, shapes="boxes", drafts=1, steps=2, place=False, options=options)
@@ -283,7 +283,7 @@ def test_all_states_of_a_room_open_after_gc(tmp_path, crate, echousd_command):
 def test_what_an_interrupted_run_has_not_moved_yet_holds(tmp_path, monkeypatch, echousd_command):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        made = echousd.generate(two(), shapes="boxes", drafts=1, steps=2, place=False)
+        made = echousd.generate(two(), shapes="boxes", drafts=1, steps=2, place=False, walls=False, dress="none")
         root = made.save(tmp_path / "room", preview=False, store=tmp_path / "store")
         bigger = edit(root, two(Node("chair", "chair")), shapes="boxes", drafts=1, steps=2, place=False)
         with monkeypatch.context() as patch:

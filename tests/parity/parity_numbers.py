@@ -10,9 +10,11 @@ import json
 import os
 import re
 import zlib
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -77,6 +79,12 @@ class Numbers:
         prefix = "gradnorm/"
         return {name[len(prefix) :]: float(self[name]) for name in self.names if name.startswith(prefix)}
 
+    def net(self, kind: Callable[[Any], nn.Module], config: Any) -> Any:
+        """A network of this config with the seeded weights: torch's own are not drawn before."""
+        kept = {name: lambda tensor, *_, **__: tensor for name in ("kaiming_uniform_", "uniform_", "normal_")}
+        with patch.multiple(nn.init, **kept):
+            return self.fill(kind(config))
+
     def fill(self, module: nn.Module) -> nn.Module:
         """Give a module the seeded weights, and check its names and shapes against the file's."""
         state = nn.Module.state_dict(module)
@@ -93,7 +101,9 @@ def value(key: str, shape: tuple[int, ...], seed: int, gain: float) -> np.ndarra
     unit variance, other weights variance gain^2 / fan-in.
     """
     stream = np.random.RandomState((zlib.crc32(key.encode()) + seed) % 2**32)
-    centred = 2.0 * stream.random_sample(shape) - 1.0
+    centred = stream.random_sample(shape)
+    centred *= 2.0  # in place: some networks have hundreds of millions of numbers
+    centred -= 1.0
     role = key.rpartition(".")[2]
     embeds = key.endswith("embedding.weight") or "embeddings_" in key or "pred_embeddings" in key
     if role == "running_mean":
@@ -107,7 +117,10 @@ def value(key: str, shape: tuple[int, ...], seed: int, gain: float) -> np.ndarra
     elif embeds:
         drawn = 3**0.5 * centred
     else:
-        drawn = 3**0.5 * centred * gain / np.sqrt(np.prod(shape[1:]))
+        drawn = centred
+        drawn *= 3**0.5
+        drawn *= gain
+        drawn /= np.sqrt(np.prod(shape[1:]))
     return drawn.astype(np.float32)
 
 

@@ -13,9 +13,7 @@ from echoscene.unet import packed
 
 
 def _net(numbers: Numbers) -> LayoutNet:
-    net = LayoutNet(layout_config(numbers))
-    numbers.fill(net)
-    return net
+    return numbers.net(LayoutNet, layout_config(numbers))
 
 
 def _tables(raw: dict) -> Schedule:

@@ -13,9 +13,7 @@ from echoscene.vqvae import VQVAE
 
 
 def _net(numbers: Numbers) -> ShapeNet:
-    net = ShapeNet(shape_config(numbers))
-    numbers.fill(net)
-    return net
+    return numbers.net(ShapeNet, shape_config(numbers))
 
 
 def _objects(numbers: Numbers) -> torch.Tensor:
@@ -82,8 +80,7 @@ def test_step_at_full_size() -> None:
 @pytest.mark.parametrize("name", ["vqvae", "full_vqvae"])
 def test_autoencoder(name: str) -> None:
     numbers = Numbers(name)
-    net = VQVAE(vq_config(numbers))
-    numbers.fill(net)
+    net = numbers.net(VQVAE, vq_config(numbers))
     z = net.encode(numbers["sdf"])
     close(z, numbers["z"], 1e-4)
     quantised, index = net.quantise(numbers["z"])

@@ -21,7 +21,7 @@ def flat():
     return plan_home(HomeGraph.from_words(FLAT, area=75))
 
 
-@settings(max_examples=12)
+@settings(max_examples=8)
 @given(homes())
 def test_a_plan_keeps_the_graph_or_the_conflict_is_named(home):
     try:

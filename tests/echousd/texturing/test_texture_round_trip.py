@@ -23,6 +23,8 @@ from echousd.texturing.atlas import Unwrapped, texel_faces
 from echousd.texturing.job import job_mesh
 from echousd.texturing.obj import glb_bytes
 
+SIDE = 768  # pixels of a picture for all
+
 
 @pytest.fixture(scope="module")
 def room(tmp_path_factory):
@@ -53,7 +55,7 @@ def copied(root, tmp_path):
 
 @pytest.fixture
 def small_pictures(monkeypatch):
-    monkeypatch.setattr(scenetex, "RESOLUTION", 1024)
+    monkeypatch.setattr(scenetex, "RESOLUTION", SIDE)
 
 
 @pytest.mark.parametrize("tool", ["scenetex", "generic"])
@@ -126,8 +128,8 @@ def test_scenetex_may_lay_out_anew(small, tmp_path, small_pictures):
         (run / "meshes" / thing.kind / f"{number}_{thing.name}.obj").write_bytes(
             scenetex.obj_bytes(turned, thing.name, material=False)
         )
-        whole = painted((turned.corners * 1023 + 0.5) / 1024, in_room(mesh, thing), 1024, whole)
-    filled(np.full((1024, 1024, 3), 0.1)).save(run / "texture_100.png")
+        whole = painted((turned.corners * (SIDE - 1) + 0.5) / SIDE, in_room(mesh, thing), SIDE, whole)
+    filled(np.full((SIDE, SIDE, 3), 0.1)).save(run / "texture_100.png")
     filled(whole).save(run / "texture_29900.png")
     import_job(root, tmp_path / "job", preview=False)
     assert np.quantile(errors_in_texels(root, job), 0.99) < 0.75
