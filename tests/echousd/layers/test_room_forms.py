@@ -16,9 +16,12 @@ from echousd.make.reading import read_room
 from echousd.options import RoomOptions
 
 
-def made(folder, **options):
+def made(folder, without=(), **options):
+    graph = small_graph()
+    for name in without:
+        graph = graph.remove_node(name)
     options = RoomOptions(walls=True, dress="some", **options)
-    room = echousd.generate(small_graph(), seed=3, model=StandIn(), place=False, shapes="boxes", options=options)
+    room = echousd.generate(graph, seed=3, model=StandIn(), place=False, shapes="boxes", options=options)
     return room.save(folder / "bedroom", preview=False)
 
 
@@ -81,7 +84,8 @@ def test_shared_assets_are_instances_that_look_and_collide_alike(tmp_path):
 
 def test_every_asset_has_a_picture(tmp_path):
     pytest.importorskip("embreex")
-    root = made(tmp_path / "room", thumbnails=True)
+    root = made(tmp_path / "room", ("lamp", "wardrobe", "pendant", "nightstand_right"), thumbnails=True)
+    assert len(list((root.parent / "assets").glob("small_*"))) > 5
     for asset in (root.parent / "assets").iterdir():
         content = (asset / f".thumbs/256x256/{asset.name}.usda.png").read_bytes()
         with Image.open(io.BytesIO(content)) as picture:

@@ -42,7 +42,7 @@ def missed():
     rooms = [
         room
         for word in ("bedroom", "living_dining_room", "living_room", "dining_room", "study", "kitchen", "bathroom")
-        for room in generate_rooms(8, 2, room_type=word)
+        for room in generate_rooms(2 if word == "kitchen" else 8, 2, room_type=word)  # kitchens take a second each
     ]
     for number, room in enumerate(rooms):
         luck = np.random.default_rng(number)
