@@ -103,19 +103,16 @@ def norm(values: Array) -> Array:
     return np.sqrt(dot(values, values)) if isinstance(values, NUMPY) else values.norm(dim=-1)
 
 
-def cast(values: Array, like: Array) -> Array:
-    """Values as numbers of the same type as others, where those are."""
-    return values.astype(like.dtype) if isinstance(like, NUMPY) else kit(like).as_tensor(values).to(like)
+def cast(values: Any, like: Array) -> Array:
+    """Values of either library, or plain numbers, as an array of the library and type of another, where that is."""
+    if isinstance(like, NUMPY):
+        return np.asarray(values, like.dtype)
+    return values.to(like) if isinstance(values, kit(like).Tensor) else like.new_tensor(values)
 
 
 def whole(values: Array) -> Array:
     """Values as int64."""
     return values.astype(np.int64) if isinstance(values, NUMPY) else values.long()
-
-
-def constant(values: Any, like: Array) -> Array:
-    """Numbers as an array of the same type as another, on its device."""
-    return np.asarray(values, like.dtype) if isinstance(like, NUMPY) else like.new_tensor(values)
 
 
 def full(like: Array, shape: int | tuple[int, ...], value: float) -> Array:
@@ -148,16 +145,11 @@ def least_of(who: Array, values: Array, count: int, nothing: float) -> Array:
 
 
 def sum_of(who: Array, values: Array, count: int) -> Array:
-    """(count,): of the values (k,) of each of `who` (k,) int64 the sum."""
-    if not isinstance(values, NUMPY):
-        return values.new_zeros(count).index_add(0, who, values)
-    return np.bincount(who, values, count)
-
-
-def sums_of(who: Array, values: Array, count: int) -> Array:
-    """(count, c): sums of the rows (k, c) of each of `who` (k,) int64."""
+    """(count, ...): the sum of the values (k, ...) of each of `who` (k,) int64."""
     if not isinstance(values, NUMPY):
         return values.new_zeros(count, *values.shape[1:]).index_add(0, who, values)
+    if values.ndim == 1:
+        return np.bincount(who, values, count)
     if (np.diff(who) < 0).any():
         order = np.argsort(who, kind="stable")
         who, values = who[order], values[order]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.arrays import Array, constant, full, kit, on_device
+from echomodel.arrays import Array, cast, full, kit, on_device
 from echomodel.floors import area
 from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
@@ -118,7 +118,7 @@ class GraphBatch:
             raise ValueError("GraphBatch.pack needs at least one graph, got none")
         triplets, placements, scenes, nodes, count = [], [], [], 0, 0
         for graph in graphs:
-            triplets.append(graph.triplets + constant([nodes, 0, nodes], graph.triplets))
+            triplets.append(graph.triplets + cast([nodes, 0, nodes], graph.triplets))
             placements.append(_shifted(graph.placements, nodes))
             scenes.append(graph.scene + count)
             nodes += graph.num_nodes
@@ -139,7 +139,7 @@ class GraphBatch:
         out, start = [], 0
         for number, count in enumerate(self.node_counts.tolist()):
             nodes, room = slice(start, start + count), slice(number, number + 1)
-            triplets = self.triplets[owner == number] - constant([start, 0, start], self.triplets)
+            triplets = self.triplets[owner == number] - cast([start, 0, start], self.triplets)
             names = None if self.names is None else self.names[nodes]
             graph = GraphBatch(
                 self.category[nodes], triplets, self.scene[nodes] * 0, self.room_type[room],
@@ -217,7 +217,7 @@ class GraphBatch:
 
 def _shifted(placements: Array, nodes: int) -> Array:
     """Placements whose nodes are counted from elsewhere."""
-    moved = placements + constant([nodes, 0, nodes, nodes], placements)
+    moved = placements + cast([nodes, 0, nodes, nodes], placements)
     return kit(moved).where(placements < 0, placements, moved)
 
 

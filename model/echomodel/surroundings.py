@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, at_most, cast, constant, dot, full, held, kit, norm, picked
+from echomodel.arrays import Array, at_least, at_most, cast, dot, full, held, kit, norm, picked
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import axes
 from echomodel.floors import edges, footprint, known, meeting, signed_area, signed_distance
@@ -112,7 +112,7 @@ def plan_features(floor: Array) -> Array:
     there = cast(known(floor), floor)[:, None]
     extent = xp.where(there > 0, extent, xp.ones_like(extent))
     steps = [(number + 0.5) / GRID - 0.5 for number in range(GRID)]
-    places = constant([(x, z) for x in steps for z in steps], floor)[None] * extent[:, None]
+    places = cast([(x, z) for x in steps for z in steps], floor)[None] * extent[:, None]
     distance = xp.tanh(signed_distance(places, floor))
     return xp.concat([extent / 5 * there, xp.log(extent) * there, there, there, distance], 1)
 

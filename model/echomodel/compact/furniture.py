@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
-from echomodel.arrays import Array, at_least, cast, clipped, kit, parted, softmax, sums_of
+from echomodel.arrays import Array, at_least, cast, clipped, kit, parted, softmax, sum_of
 from echomodel.compact.pairs import Layers, Pairs
 from echomodel.config import FurnitureConfig
 from echomodel.graph import GraphBatch
@@ -67,9 +67,9 @@ class Furniture(Layers):
         xp = kit(x)
         clear = xp.log1p(2 * (1 - level) / (level + 0.05))  # 0 for pure noise, 3.7 for a known piece
         weight = cast(1 / (1 + xp.exp(-self.trust(pairs.told))), x) * clear[pairs.sender, None]
-        total = sums_of(pairs.receiver, weight, len(x))
+        total = sum_of(pairs.receiver, weight, len(x))
         out = []
         for voice in range(weight.shape[1]):
-            spoken = sums_of(pairs.receiver, weight[:, voice, None] * x[pairs.sender], len(x))
+            spoken = sum_of(pairs.receiver, weight[:, voice, None] * x[pairs.sender], len(x))
             out += [spoken / (total[:, voice, None] + 0.05), xp.tanh(total[:, voice, None])]
         return xp.concat(out, 1)

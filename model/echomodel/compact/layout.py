@@ -11,7 +11,7 @@ import math
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 
-from echomodel.arrays import NUMPY, Array, cast, clipped, constant, held, kit, parted
+from echomodel.arrays import NUMPY, Array, cast, clipped, held, kit, parted
 from echomodel.boxes import Boxes, BoxScale
 from echomodel.compact.draft import measurable, pair_features, wall_features
 from echomodel.compact.pairs import Layers, Pairs
@@ -105,6 +105,6 @@ def exactly(x: Array) -> AbstractContextManager[None]:
 
 def box_features(boxes: Array, frequencies: int) -> Array:
     """The box and the sines and cosines of its numbers at doubling frequencies: (N, 8) -> (N, 8 (1 + 2 F))."""
-    xp, scales = kit(boxes), constant([math.pi / 4 * 2.0**octave for octave in range(frequencies)], boxes)
+    xp, scales = kit(boxes), cast([math.pi / 4 * 2.0**octave for octave in range(frequencies)], boxes)
     angles = (boxes[:, :, None] * scales).reshape(len(boxes), -1)
     return xp.concat([boxes, xp.sin(angles), xp.cos(angles)], 1)

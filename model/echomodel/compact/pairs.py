@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from echomodel.arrays import Array, beside, cast, full, kit, on_device, parted, repeat, rows, silu, sums_of
+from echomodel.arrays import Array, beside, cast, full, kit, on_device, parted, repeat, rows, silu, sum_of
 from echomodel.compact.learned import table_of
 from echomodel.config import names_of
 from echomodel.graph import GraphBatch
@@ -143,7 +143,7 @@ class Echo(Layers):
 
 def pair_messages(a: Array, b: Array, e: Array, receiver: Array, sender: Array) -> Array:
     """Summed messages sum_j silu(a_i + b_j + e_ij): a, b (N, C), e (P, C), receiver, sender (P,) -> (N, C)."""
-    return sums_of(receiver, silu(a[receiver] + b[sender] + e), len(a))
+    return sum_of(receiver, silu(a[receiver] + b[sender] + e), len(a))
 
 
 def level_features(level: Array) -> Array:

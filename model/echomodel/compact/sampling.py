@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from echomodel.arrays import Array, beside, clipped, full, kit, on_device, pairs_in, rows, sums_of, without_slopes
+from echomodel.arrays import Array, beside, clipped, full, kit, on_device, pairs_in, rows, sum_of, without_slopes
 from echomodel.boxes import Boxes
 from echomodel.compact.pairs import Pairs, pairs_of
 from echomodel.config import BranchConfig, Sampler
@@ -55,8 +55,8 @@ def agreeing(predict: Predict, groups: Array) -> Predict:
 
 def group_means(values: Array, groups: Array) -> Array:
     """Each value (N, ...) replaced by the mean of its group; groups (N,) int64 in [0, N)."""
-    count = sums_of(groups, full(values, len(values), 1.0), len(values))[groups]
-    return sums_of(groups, values, len(values))[groups] / count.reshape(-1, *[1] * (values.ndim - 1))
+    count = sum_of(groups, full(values, len(values), 1.0), len(values))[groups]
+    return sum_of(groups, values, len(values))[groups] / count.reshape(-1, *[1] * (values.ndim - 1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, cast, constant, dot, full, held, kit, least_of, norm, pairs_in, rows
+from echomodel.arrays import Array, at_least, cast, dot, full, held, kit, least_of, norm, pairs_in, rows
 from echomodel.floors import edges, known, signed_area, signed_distance
 from echomodel.objective.support import carriers, shared_fraction
 from echomodel.openings import Opening
@@ -186,7 +186,7 @@ class Plan:
 
     def numbers(self, values: Any) -> Array:
         """Numbers as an array like the boxes."""
-        return constant(values, self.size)
+        return cast(values, self.size)
 
     # (N,) bool: seats that are moved aside to open or to reach something, and those without a front, stools;
     # boxes at whose front somebody works or takes things out, and those that have one; tables that people sit around
@@ -213,7 +213,7 @@ class Plan:
         return {}
 
     def _mask(self, values: Sequence[bool]) -> Array:
-        return constant(values, self.given)
+        return cast(values, self.given)
 
     @cached_property
     def standing(self) -> Array:
@@ -234,7 +234,7 @@ class Plan:
             local = np.stack([number[told[:, 0]], told[:, 1], number[told[:, 2]]], 1) if len(told) else told
             found = carriers([self.kinds[k] for k in here], size[here], position[here], yaw[here], local)
             out[here] = np.where(found >= 0, here[found.clip(0)], found)
-        return constant(out, self.scene)
+        return cast(out, self.scene)
 
     @cached_property
     def rooms(self) -> list[tuple[Array, np.ndarray, tuple[Opening, ...]]]:
@@ -412,7 +412,7 @@ class Plan:
         words = list(dict.fromkeys(self.kinds))
         number = {kind: k for k, kind in enumerate(words)}
         xp = self.kit
-        mine = constant([number[kind] for kind in self.kinds], self.scene)
+        mine = cast([number[kind] for kind in self.kinds], self.scene)
         table = self._mask([b.name in kind.belongs_to for kind in words for b in words])
         belongs = table.reshape(len(words), len(words))[mine[:, None], mine[None]]
         here, other = xp.arange(len(self)), ~xp.eye(len(self), dtype=xp.bool)

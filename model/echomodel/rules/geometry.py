@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, at_most, constant, dot, kit, put, rows
+from echomodel.arrays import Array, at_least, at_most, cast, dot, kit, put, rows
 from echomodel.boxes2d import CORNERS, along_sides, outline, seen
 
 TINY = 1e-12
@@ -170,7 +170,7 @@ class PairGeometry:
     @cached_property
     def mirror_distances(self) -> Array:
         """(P, 3) distances of the object to the subject's mirror images about x axis, z axis and centre, metres."""
-        signs = constant([[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]], self.position_s)
+        signs = cast([[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]], self.position_s)
         off = self.position_s[:, None, ::2] * signs - self.position_o[:, None, ::2]
         return self.kit.sqrt(at_least(dot(off, off), TINY))
 
@@ -218,7 +218,7 @@ def rectangle_overlap(corners: Array, half: Array, yaw: Array) -> Array:
     half = abs(half) + 7.3e-6
     a = seen(corners, yaw[:, None])
     winding = kit(a).sign(_cross(a[:, 1] - a[:, 0], a[:, 2] - a[:, 1]))
-    b = half[:, None] * constant(CORNERS, half)
+    b = half[:, None] * cast(CORNERS, half)
     total = winding * _clipped_cross(a, b) + _clipped_cross(b, a, winding)
     return at_least(total / 2, 0.0)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.arrays import Array, beside, constant, full, held, kit, put, rows
+from echomodel.arrays import Array, beside, cast, full, held, kit, put, rows
 from echomodel.rules.geometry import BoxesLike, PairGeometry, Spread, pairs
 from echomodel.rules.sets import RuleSet, rule_set
 from echomodel.vocabulary import vocabulary
@@ -101,4 +101,4 @@ def pair_margins(pair: PairGeometry, predicate: Array, rules: RuleSet) -> Array:
 
 
 def _among(predicate: Array, ids: frozenset[int]) -> Array:
-    return (predicate[:, None] == constant(sorted(ids), predicate)).any(1)
+    return (predicate[:, None] == cast(sorted(ids), predicate)).any(1)

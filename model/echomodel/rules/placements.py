@@ -11,7 +11,7 @@ from functools import reduce
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, constant, dot, kit, norm
+from echomodel.arrays import Array, at_least, cast, dot, kit, norm
 from echomodel.boxes2d import along_sides, seen
 from echomodel.openings import signed_area
 from echomodel.rules.geometry import BoxesLike, Spread
@@ -57,12 +57,12 @@ class Walls:
 
     def away(self, points: Array) -> Array:
         """(..., E) distance of points (..., 2) from the line of every wall, inwards positive."""
-        return dot(points[..., None, :] - constant(self.start, points), constant(self.normal, points))
+        return dot(points[..., None, :] - cast(self.start, points), cast(self.normal, points))
 
     def beside(self, points: Array) -> Array:
         """(..., E) how far points (..., 2) lie from the nearer end of every wall, along it; negative: past it."""
-        at = dot(points[..., None, :] - constant(self.start, points), constant(self.along, points))
-        return kit(points).minimum(at, constant(self.length, points) - at)
+        at = dot(points[..., None, :] - cast(self.start, points), cast(self.along, points))
+        return kit(points).minimum(at, cast(self.length, points) - at)
 
 
 Measure = Callable[[Spread, Sequence[Spread], Walls, Category], Array]
@@ -89,7 +89,7 @@ def in_corner(own: Spread, others: Sequence[Spread], walls: Walls, kind: Categor
 
 def between(own: Spread, others: Sequence[Spread], walls: Walls | None, kind: Category) -> Array:
     """The centre lies within the hull of the two others' footprints, in neither, about on the way between them."""
-    xp, own_centre, way = kit(own.yaw), own.centre, constant(WAYS, own.yaw)
+    xp, own_centre, way = kit(own.yaw), own.centre, cast(WAYS, own.yaw)
     reach = reduce(xp.maximum, [xp.amax(other.corners @ way, 1) for other in others])  # (K, directions)
     inside = xp.amin(reach - own_centre @ way, -1) + WITHIN
     off = [abs(seen(own_centre - other.centre, other.yaw)) - other.size[:, ::2] / 2 for other in others]

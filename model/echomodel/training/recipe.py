@@ -72,7 +72,7 @@ class Recipe:
         warm: weights files, of an earlier version too, whose tensors are taken over as far as they reach: what has
             grown keeps what it had in its first rows and columns and begins with zeros in the others.
         frozen: parts that the stage would train but that stay as they are.
-        nodes: node budget of a batch of rooms, per process. shapes_per_batch: objects per shape batch, per process.
+        nodes: node budget of a batch of rooms. shapes_per_batch: objects per shape batch.
         scenes, text: `paper` alone: scenes per batch, and where text features come from: `clip` (downloaded once), a
             weights file of CLIP's, or `random` (vectors that only tell texts apart).
         relation_weight: weight of the hinge on the relations' margins of the predicted boxes.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import torch
@@ -39,9 +38,7 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
     """
     if recipe.threads:
         torch.set_num_threads(recipe.threads)
-    device = own_device()
-    if int(os.environ.get("WORLD_SIZE", 1)) > 1 and not torch.distributed.is_initialized():
-        torch.distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     torch.manual_seed(recipe.seed)
     if recipe.stage in ELSEWHERE:
         made: Trainer = ELSEWHERE[recipe.stage](recipe, folder, device, resume=resume, report=report)
@@ -49,12 +46,3 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
     kind = STAGES[recipe.stage]
     start = started(kind, recipe, device, resume=resume)
     return Trainer(recipe, start.model, kind.open(start), folder, resume=resume, report=report)
-
-
-def own_device() -> torch.device:
-    """Where this process trains: its own GPU where there are any (one per process of a node), else the CPU."""
-    if not torch.cuda.is_available():
-        return torch.device("cpu")
-    device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", 0)) % torch.cuda.device_count())
-    torch.cuda.set_device(device)
-    return device

@@ -141,7 +141,7 @@ class ShapeStage:
     Arguments:
         rooms: packed rooms, whose styles and categories name the shapes.
         shapes: the shape set in latent space.
-        batch: objects per batch, per process.
+        batch: objects per batch.
     """
 
     trained = saved = ("shape",)
@@ -311,7 +311,7 @@ class AutoencoderStage:
 
     Arguments:
         shapes: shape set; its held-out part is for validation.
-        batch: grids per batch, per process.
+        batch: grids per batch.
         components: a shape branch whose principal components the decoder learns to read: a batch then is `batch` whole
             latents projected on them, which is all that a denoiser working in them can say, and half as many latents
             as they are. The decoder puts back what the projection blurs (thin legs, edges).

@@ -6,7 +6,6 @@ import copy
 import csv
 import json
 import math
-import os
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -46,17 +45,6 @@ class TrainingStage(Protocol):
     def validate(self, model: Any) -> dict[str, float]: ...
 
 
-class _Loss(nn.Module):
-    """The loss as a module's forward pass, which is what DistributedDataParallel wraps."""
-
-    def __init__(self, model: Trainable, stage: TrainingStage) -> None:
-        super().__init__()
-        self.model, self._stage = model, stage
-
-    def forward(self, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
-        return self._stage.loss(self.model, generator)
-
-
 class Trainer:
     """Trains the stage's parts of a model and keeps checkpoint, log, curves and averaged weights in a folder.
 
@@ -78,7 +66,6 @@ class Trainer:
     ) -> None:  # fmt: skip
         self.recipe, self.model, self.stage, self.folder = recipe, model, stage, folder
         self.report = report or (lambda step, values: None)
-        self.rank, self.world = int(os.environ.get("RANK", 0)), int(os.environ.get("WORLD_SIZE", 1))
         for name in model.parts:
             for parameter in model.part_parameters(name):
                 parameter.requires_grad_(name in stage.trained)
@@ -100,20 +87,14 @@ class Trainer:
     def run(self, until: int | None = None, seconds: float | None = None) -> int:
         """Train to the recipe's last step, or to step `until`, or for so many seconds; returns the step reached."""
         recipe, last = self.recipe, self.recipe.steps if until is None else min(until, self.recipe.steps)
-        loss_module: nn.Module = _Loss(self.model, self.stage)
-        if self.world > 1:
-            loss_module = nn.parallel.DistributedDataParallel(loss_module, find_unused_parameters=True)
         self.folder.mkdir(parents=True, exist_ok=True)
-        log = RunLog(self.folder, self.step) if self.rank == 0 else None
+        log = RunLog(self.folder, self.step)
         started = marked = time.monotonic()
         sums: dict[str, float] = {}
         self.model.train()
         while self.step < last and (seconds is None or time.monotonic() - started < seconds):
-            values = self._train_step(loss_module)
-            for name, value in values.items():
+            for name, value in self._train_step().items():
                 sums[name] = sums.get(name, 0.0) + value
-            if self.rank or log is None:
-                continue
             if self.step % recipe.log_every == 0:
                 means = {name: value / recipe.log_every for name, value in sums.items()}
                 means["steps_per_second"] = recipe.log_every / (time.monotonic() - marked)
@@ -127,18 +108,17 @@ class Trainer:
                 plot_log(log.path, self.folder / "curves.png")
             if self.step % recipe.save_every == 0 or self.step == last:
                 self.save()
-        if log is not None:
-            self.save()
+        self.save()
         return self.step
 
-    def _train_step(self, loss_module: nn.Module) -> dict[str, float]:
+    def _train_step(self) -> dict[str, float]:
         settings = self.recipe.optimizer
         for group in self.optimizer.param_groups:
             group["lr"] = settings.rate_at(self.step, self.recipe.steps)
-        generator = step_generator(self.recipe.seed, self.step, self.rank)
+        generator = step_generator(self.recipe.seed, self.step)
         half = self.recipe.precision == "bfloat16"
         with torch.autocast(self.device.type, torch.bfloat16) if half else nullcontext():
-            loss, parts = loss_module(generator)
+            loss, parts = self.stage.loss(self.model, generator)
         loss.backward()
         norm = nn.utils.clip_grad_norm_(list(self.trained.values()), settings.clip)
         if not torch.isfinite(norm):
@@ -220,10 +200,10 @@ def changed_fields(was: dict[str, Any], now: dict[str, Any], above: str = "") ->
     return found
 
 
-def step_generator(seed: int, step: int, rank: int = 0) -> torch.Generator:
-    """The source of all randomness of one step on one process."""
-    # a splitmix64 round spreads neighbouring (seed, step, rank) over the generator's states
-    mixed = (seed * 0x9E3779B97F4A7C15 + step * 0xBF58476D1CE4E5B9 + rank * 0x94D049BB133111EB + 1) % 2**63
+def step_generator(seed: int, step: int) -> torch.Generator:
+    """The source of all randomness of one step."""
+    # a splitmix64 round spreads neighbouring (seed, step) over the generator's states
+    mixed = (seed * 0x9E3779B97F4A7C15 + step * 0xBF58476D1CE4E5B9 + 1) % 2**63
     return torch.Generator().manual_seed(mixed)
 
 
