@@ -10,7 +10,6 @@ from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_ty
 from echomodel.vocabulary import vocabulary
 
 Objective = Literal["noise", "velocity", "flow"]
-Prediction = Literal["output", "sample"]
 Sampler = Literal["ddim", "ancestral"]
 DEPTHS = frozenset({"layers", "echo_layers", "blocks", "drafts", "voices"})  # each of them costs tensors
 RANGES = {  # of what costs no tensors, but time
@@ -103,8 +102,6 @@ class ShapeConfig(BranchConfig):
         tokens: tokens that share the components, the strongest first.
         echo_width: channels of a node in the shape echo.
         echo_layers: triplet-GCN layers of the shape echo.
-        echo_time: give the echo the noise level (Table 4: off = no time embedding).
-        conditioning: how the echo reaches the tokens, `cross` attention or `concat` (Table 4).
         temperature: scale of the starting noise; below one, fewer stray pieces and less variety.
         candidates: draws per object, of which the most whole is kept.
     """
@@ -116,12 +113,10 @@ class ShapeConfig(BranchConfig):
     tokens: int = 4
     echo_width: int = 128
     echo_layers: int = 2
-    echo_time: bool = True
-    conditioning: Literal["cross", "concat"] = "cross"
-    prediction: Prediction = "sample"
     temperature: float = 1.0
     candidates: int = 8
     steps: int = 10
+    GONE: ClassVar = ("echo_time", "conditioning", "prediction")  # files of before name them; all had the one way
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import OptimizerConfig, Recipe
 from echomodel.training.rooms import PackedRooms
-from echomodel.training.shape_stage import AutoencoderStage, EncodedShapes, JointStage, ShapeStage
+from echomodel.training.shape_stage import AutoencoderStage, EncodedShapes, ShapeStage
 from echomodel.training.trainer import Trainer, step_generator
 
 GPU = pytest.param(torch.device("cuda"), marks=pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU"))
@@ -131,12 +131,11 @@ def stage_of(name: str, packed: PackedRooms, model: CompactModel):
     latents = torch.randn(3 * len(CONFIG.categories), 6, 16, 16, 16, generator=torch.Generator().manual_seed(0)).half()
     sizes = torch.ones(len(latents), 3)
     shapes = EncodedShapes(latents, sizes, len(CONFIG.categories), torch.tensor([0, 1]), torch.tensor([2]))
-    shape = ShapeStage(packed, shapes, 24)
-    return shape if name == "shape" else JointStage(layout, shape)
+    return ShapeStage(packed, shapes, 24)
 
 
 @pytest.mark.parametrize("device", DEVICES)
-@pytest.mark.parametrize("name", ["layout", "shape", "joint", "parts", "vqvae", "vqvae of components"])
+@pytest.mark.parametrize("name", ["layout", "shape", "parts", "vqvae", "vqvae of components"])
 def test_a_step_of_training_is_the_same_on_another_device(name, device, packed, model, tmp_path):
     first = {key: value.clone() for key, value in model.state_dict().items()}
     found = []

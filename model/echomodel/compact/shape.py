@@ -22,7 +22,7 @@ from echomodel.compact.sampling import CompactSampling, Latent, agreeing, group_
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
 from echomodel.progress import part_of
-from echomodel.samplers import Predict, clean_from
+from echomodel.samplers import Predict
 from echomodel.tsdf import FILLED
 from echomodel.vocabulary import vocabulary
 
@@ -140,7 +140,7 @@ class ShapeContext:
 
 
 class ShapeDenoiser(nn.Module):
-    """Predicts the objective's target, or the clean codes, of every object; each has its own level, 0 = known.
+    """Predicts the clean codes of every object; each has its own level, 0 = known.
 
     A code holds the K principal components of a latent grid over the whole training set. Furniture on the
     box-normalised grid lies close to so few directions that noise in all others would only have to be learnt away.
@@ -170,13 +170,10 @@ class ShapeDenoiser(nn.Module):
         echo = shape.echo_width
         self.echo_node = nn.Linear(width, echo)
         self.echo_code = nn.Linear(shape.components, echo)
-        self.echo_level = nn.Linear(64, echo) if shape.echo_time else None
+        self.echo_level = nn.Linear(64, echo)
         self.echo_layers = nn.ModuleList(EchoLayer(echo, 2 * len(config.predicates)) for _ in range(shape.echo_layers))
         self.echo_out = nn.Sequential(nn.LayerNorm(echo), nn.Linear(echo, width))
-        self.concat = nn.Linear(2 * width, width) if shape.conditioning == "concat" else None
-        self.blocks = nn.ModuleList(
-            _Block(width, shape.heads, cross=shape.conditioning == "cross") for _ in range(shape.layers)
-        )
+        self.blocks = nn.ModuleList(_Block(width, shape.heads) for _ in range(shape.layers))
         self.norm = nn.LayerNorm(width, elementwise_affine=False)
         self.scale_shift = nn.Linear(width, 2 * width)
         self.head = nn.Parameter(torch.zeros(shape.tokens, width, values))
@@ -240,8 +237,6 @@ class ShapeDenoiser(nn.Module):
         condition = nn.functional.silu(context.nodes + self.level(sinusoids))
         heard = self._echo(x, sinusoids, context) if self.settings.echo else torch.zeros_like(context.nodes)
         h = torch.einsum("ntv,tvw->ntw", x.reshape(len(x), self.settings.tokens, -1), self.token) + self.place
-        if self.concat is not None:
-            h = self.concat(torch.cat([h, heard[:, None].expand_as(h)], dim=2))
         told = torch.stack([heard, context.nodes, condition], dim=1)
         for block in self.blocks:
             h = block(h, condition, told)
@@ -250,9 +245,7 @@ class ShapeDenoiser(nn.Module):
 
     def _echo(self, x: Tensor, sinusoids: Tensor, context: ShapeContext) -> Tensor:
         """What each object hears of the others' current shapes: (N, width)."""
-        nodes = context.echo_nodes + self.echo_code(x)
-        if self.echo_level is not None:
-            nodes = nodes + self.echo_level(sinusoids)
+        nodes = context.echo_nodes + self.echo_code(x) + self.echo_level(sinusoids)
         for layer in self.echo_layers:
             nodes = layer(nodes, context.pairs)
         return self.echo_out(nodes)
@@ -261,16 +254,16 @@ class ShapeDenoiser(nn.Module):
 class _Block(nn.Module):
     """Self-attention, cross-attention to the told tokens, perceptron; all gated by the condition (Peebles 2023)."""
 
-    def __init__(self, width: int, heads: int, *, cross: bool) -> None:
+    def __init__(self, width: int, heads: int) -> None:
         super().__init__()
         self.heads = heads
         self.norm = nn.LayerNorm(width, elementwise_affine=False)
         self.modulation = nn.Linear(width, 6 * width)
         self.qkv = nn.Linear(width, 3 * width)
         self.attended = nn.Linear(width, width)
-        self.cross_q = nn.Linear(width, width) if cross else None
-        self.cross_kv = nn.Linear(width, 2 * width) if cross else None
-        self.cross_out = nn.Linear(width, width) if cross else None
+        self.cross_q = nn.Linear(width, width)
+        self.cross_kv = nn.Linear(width, 2 * width)
+        self.cross_out = nn.Linear(width, width)
         self.mlp = nn.Sequential(nn.Linear(width, 4 * width), nn.GELU(approximate="tanh"), nn.Linear(4 * width, width))
         nn.init.zeros_(self.modulation.weight)
         nn.init.zeros_(self.modulation.bias)
@@ -281,10 +274,9 @@ class _Block(nn.Module):
         q, k, v = (self._split(part) for part in self.qkv(normed).chunk(3, dim=2))
         attended = nn.functional.scaled_dot_product_attention(q, k, v)
         h = h + (1 + gate_a) * self.attended(self._merge(attended))
-        if self.cross_q is not None and self.cross_kv is not None and self.cross_out is not None:
-            k, v = (self._split(part) for part in self.cross_kv(told).chunk(2, dim=2))
-            crossed = nn.functional.scaled_dot_product_attention(self._split(self.cross_q(self.norm(h))), k, v)
-            h = h + self.cross_out(self._merge(crossed))
+        k, v = (self._split(part) for part in self.cross_kv(told).chunk(2, dim=2))
+        crossed = nn.functional.scaled_dot_product_attention(self._split(self.cross_q(self.norm(h))), k, v)
+        h = h + self.cross_out(self._merge(crossed))
         return h + (1 + gate_m) * self.mlp(self.norm(h) * (1 + scale_m) + shift_m)
 
     def _split(self, x: Tensor) -> Tensor:
@@ -299,13 +291,7 @@ class _Block(nn.Module):
 def shape_predictor(model: CompactModel, graph: GraphBatch, size: Tensor, pairs: Pairs, latent: Tensor) -> Predict:
     """Clean codes (N, K) in noisy ones; arguments as for `ShapeDenoiser.context`."""
     context = model.shape.context(graph, size, pairs, latent)
-    settings = model.config.shape
-
-    def predict(x: Tensor, level: Tensor) -> Tensor:
-        output = model.shape(x, level, context)
-        return output if settings.prediction == "sample" else clean_from(output, x, level, settings.objective)
-
-    return predict
+    return lambda x, level: model.shape(x, level, context)
 
 
 TOP = 58  # voxel from which on a column counts as reaching the top of the box

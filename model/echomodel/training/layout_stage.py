@@ -221,8 +221,9 @@ class LayoutStage:
         return cls(rooms, held, start.recipe)
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
-        """Loss of one random batch."""
-        return self.scored(model, self._drawn(generator).to(model.device), generator)
+        """Loss of one random batch, whose graph passes encoder and manipulator, and its parts."""
+        batch = self._drawn(generator).to(model.device)
+        return layout_loss(model, batch, edited_latent(model, batch), generator, self.recipe)
 
     def _drawn(self, generator: torch.Generator) -> LayoutBatch:
         """A batch drawn here, or by `workers` processes ahead of the step: then a resumed run draws other batches."""
@@ -233,12 +234,6 @@ class LayoutStage:
             source = _Batches(self.rooms, nodes, generator.initial_seed())
             self._ahead = iter(DataLoader(source, batch_size=None, num_workers=workers, prefetch_factor=4))
         return next(self._ahead)
-
-    def scored(
-        self, model: CompactModel, batch: LayoutBatch, generator: torch.Generator
-    ) -> tuple[Tensor, dict[str, Tensor]]:
-        """Loss of one batch, whose graph passes encoder and manipulator, and its parts."""
-        return layout_loss(model, batch, edited_latent(model, batch), generator, self.recipe)
 
     @torch.no_grad()
     def validate(self, model: CompactModel, rooms: int = 96) -> dict[str, float]:

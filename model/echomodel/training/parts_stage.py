@@ -33,7 +33,7 @@ def parts_loss(
         batch: scenes; `shape` numbers equal pieces. clean: (N, D) float32 descriptions. size: (N, 3) float32, metres.
     """
     settings = model.config.furniture
-    known, level, _, noisy = noised(batch, clean, settings.objective, generator)
+    known, level, noisy = noised(batch, clean, settings.objective, generator)
     with torch.no_grad():
         latent = model.latent(batch.graph.category, batch.pairs)
     context = model.furniture.context(batch.graph, size, batch.pairs, latent)

@@ -10,7 +10,7 @@ from typing import Literal
 
 from echomodel.config import CompactConfig, from_dict, with_settings
 
-Stage = Literal["vqvae", "layout", "shape", "parts", "joint", "paper_vqvae", "paper"]
+Stage = Literal["vqvae", "layout", "shape", "parts", "paper_vqvae", "paper"]
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,8 @@ class Recipe:
     """One training run.
 
     Arguments:
-        stage: `vqvae` (autoencoder), `layout`, `shape`, `parts` (descriptions of furniture) or `joint`
-            (layouts and shapes on one latent graph); `paper_vqvae` and `paper` are the autoencoder
-            and the joint stage of the `paper` preset.
+        stage: `vqvae` (autoencoder), `layout`, `shape` or `parts` (descriptions of furniture); `paper_vqvae` and
+            `paper` are the autoencoder and the joint stage of the `paper` preset.
         steps: optimiser steps.
         seed: seed of the initial weights and of every batch.
         data: folder that `echousd data build` made, or a packed set of rooms; its held-out part is for validation.

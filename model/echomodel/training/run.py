@@ -10,7 +10,7 @@ from echomodel.late import Late
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import Recipe
-from echomodel.training.shape_stage import AutoencoderStage, JointStage, ShapeStage
+from echomodel.training.shape_stage import AutoencoderStage, ShapeStage
 from echomodel.training.start import CompactStage, started
 from echomodel.training.trainer import Report, Trainer
 
@@ -18,7 +18,6 @@ STAGES: dict[str, type[CompactStage]] = {
     "layout": LayoutStage,
     "vqvae": AutoencoderStage,
     "shape": ShapeStage,
-    "joint": JointStage,
     "parts": PartsStage,
 }  # the stages of the compact model, as recipes name them
 # those of other models -> the module whose `opened` makes their trainer

@@ -22,8 +22,8 @@ from echomodel.data.shapeset import ShapeSet
 from echomodel.graph import GraphBatch
 from echomodel.metrics.pointsets import surface_scores
 from echomodel.randomness import normal
-from echomodel.samplers import add_noise, output_from, target
-from echomodel.training.layout_stage import LayoutStage, draw_known, edited_latent
+from echomodel.samplers import add_noise, output_from
+from echomodel.training.layout_stage import draw_known
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, draw_levels
 from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
@@ -38,51 +38,42 @@ class ShapeBatch:
 
     Arguments:
         graph, pairs: N nodes. shape: (N,) int64, number of the shape in the set.
-        room: the room that the scenes are, None for suites of furniture without a room.
     """
 
     graph: GraphBatch
     pairs: Pairs
     shape: Tensor
-    room: LayoutBatch | None = None
 
     def to(self, device: torch.device | str) -> ShapeBatch:
         """The same batch on another device."""
-        room = None if self.room is None else self.room.to(device)
-        return ShapeBatch(self.graph.to(device), self.pairs.to(device), self.shape.to(device), room)
+        return ShapeBatch(self.graph.to(device), self.pairs.to(device), self.shape.to(device))
 
 
 def shape_loss(
-    model: CompactModel, batch: ShapeBatch, clean: Tensor, size: Tensor, generator: torch.Generator,
-    graph_latent: Tensor | None = None,
-) -> tuple[Tensor, dict[str, Tensor]]:  # fmt: skip
+    model: CompactModel, batch: ShapeBatch, clean: Tensor, size: Tensor, generator: torch.Generator
+) -> tuple[Tensor, dict[str, Tensor]]:
     """Denoising loss of the unknown objects' codes.
 
     Arguments:
         clean: (N, K) float32 codes.
         size: (N, 3) float32, metres.
-        graph_latent: (N, latent width) shared with the layout branch, None = encode the graph here.
     """
-    settings, objective = model.config.shape, model.config.shape.objective
-    known, level, noise, noisy = noised(batch, clean, objective, generator)
-    latent = model.latent(batch.graph.category, batch.pairs) if graph_latent is None else graph_latent
+    objective = model.config.shape.objective
+    known, level, noisy = noised(batch, clean, objective, generator)
+    latent = model.latent(batch.graph.category, batch.pairs)
     context = model.shape.context(batch.graph, size, batch.pairs, latent)
-    output = model.shape(noisy, level, context).float()
-    if settings.prediction == "sample":
-        output = output_from(output, noisy, level, objective, LOWEST)
-        wanted = output_from(clean, noisy, level, objective, LOWEST)
-    else:
-        wanted = target(clean, noise, level, objective)
+    said, wanted = (output_from(of, noisy, level, objective, LOWEST)
+                    for of in (model.shape(noisy, level, context).float(), clean))  # fmt: skip
     free = (~known).float()
-    error = (output - wanted).square().flatten(1).mean(1)
+    error = (said - wanted).square().flatten(1).mean(1)
     loss = (error * free).sum() / free.sum().clamp_min(1)
     return loss, {"shape": loss}
 
 
 def noised(
     batch: ShapeBatch, clean: Tensor, objective: Objective, generator: torch.Generator
-) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Which objects are known (N,) bool, the level of each (N,), noise and noisy codes (N, K) of the clean ones."""
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Which objects are known (N,) bool, the level of each (N,), noisy codes (N, K) of the clean ones."""
     scene, scenes = batch.graph.scene, batch.graph.num_scenes
     known = draw_known(scene, scenes, generator)
     level = shifted(draw_levels(scenes, generator, clean.device))[scene] * ~known
@@ -90,7 +81,7 @@ def noised(
     # equal furniture starts from equal noise when sampled, so most of the scenes train that way
     shared = (torch.rand(scenes, generator=generator) < 0.75).to(clean.device)[scene, None]
     noise = torch.where(shared, noise[first_of_group(batch)], noise)
-    return known, level, noise, torch.where(known[:, None], clean, add_noise(clean, noise, level, objective))
+    return known, level, torch.where(known[:, None], clean, add_noise(clean, noise, level, objective))
 
 
 def shifted(level: Tensor) -> Tensor:
@@ -155,11 +146,7 @@ class ShapeStage:
     @classmethod
     def open(cls, start: Start) -> ShapeStage:
         """The stage of a recipe, its shapes encoded; a new denoiser is fitted to them."""
-        return cls.on(start.rooms(held=False), start)
-
-    @classmethod
-    def on(cls, rooms: PackedRooms, start: Start) -> ShapeStage:
-        """As `open`, on rooms that are read already."""
+        rooms = start.rooms(held=False)
         stage = cls(rooms, encoded_set(start.model.autoencoder, start.shapes()), start.recipe.shapes_per_batch)
         if "shape" not in start.given and not start.resume:
             stage.initialise(start.model, start.generator)
@@ -208,7 +195,7 @@ class ShapeStage:
 def room_shapes(room: LayoutBatch, shapes: EncodedShapes) -> ShapeBatch:
     """The shapes of a batch of rooms; their styles are mapped onto those that are trained on."""
     style = shapes.styles[room.style % len(shapes.styles)]
-    return ShapeBatch(room.graph, room.pairs, style * shapes.categories + room.graph.category, room)
+    return ShapeBatch(room.graph, room.pairs, style * shapes.categories + room.graph.category)
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,43 +245,6 @@ def draw_grids(shapes: ShapeSet, numbers: np.ndarray, count: int, generator: tor
     grids = read(shapes, numbers[torch.randint(len(numbers), (count,), generator=generator).numpy()])
     flip = torch.rand(count, generator=generator) < 0.5
     return torch.where(flip[:, None, None, None], grids.flip(1), grids)
-
-
-class JointStage:
-    """What the trainer needs to know about joint training.
-
-    A batch of scenes feeds the layout branch and a smaller one, within the node budget of shapes, the shape branch
-    (Supplement, batch size definition); both pass the same encoder and manipulator.
-
-    `layout`, `shape`: the two stages, with their data and budgets.
-    """
-
-    trained = saved = ("latent", "layout", "shape")
-    parts: ClassVar[tuple[str, ...]] = ("latent", "layout", "autoencoder", "shape")
-    needs: ClassVar[tuple[str, ...]] = ("autoencoder",)
-
-    def __init__(self, layout: LayoutStage, shape: ShapeStage) -> None:
-        self.layout, self.shape = layout, shape
-
-    @classmethod
-    def open(cls, start: Start) -> JointStage:
-        """Both stages of a recipe, on the same rooms."""
-        layout = LayoutStage.open(start)
-        return cls(layout, ShapeStage.on(layout.rooms, start))
-
-    def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
-        """Sum of both branches' losses on one random batch."""
-        batch = draw_batch(self.layout.rooms, self.layout.recipe.nodes, generator).to(model.device)
-        layout, parts = self.layout.scored(model, batch, generator)
-        few = draw_batch(self.layout.rooms, self.shape.batch, generator)
-        objects = room_shapes(few, self.shape.shapes).to(model.device)
-        latent = edited_latent(model, few.to(model.device))
-        shape, more = shape_loss(model, objects, *self.shape.truth(model, objects), generator, latent)
-        return layout + shape, {**parts, **more}
-
-    def validate(self, model: CompactModel) -> dict[str, float]:
-        """Both branches' validation."""
-        return {**self.layout.validate(model), **self.shape.validate(model)}
 
 
 NOISE = 0.1  # standard deviation added to the latent, so that the decoder forgives a denoiser's small errors

@@ -114,28 +114,26 @@ def test_pseudo_edits_leave_out_added_nodes(packed: PackedRooms) -> None:
 
 
 def test_smoke_recipe_trains_everything(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Autoencoder, layout, shapes and both branches together; losses fall and a room with shapes can be sampled."""
+    """Autoencoder, layout and shapes; losses fall and a room with shapes can be sampled."""
     monkeypatch.setattr("echomodel.compact.sampling.AFTER", 1)  # of forty equal steps
     drawn = trainer.plot_log
     whole = AutoencoderStage.validate
     monkeypatch.setattr(AutoencoderStage, "validate", lambda stage, model: whole(stage, model, 4))  # held-out shapes
     few = "shapes_per_batch=3", "model.autoencoder.width=8"
-    weights = {name: str(tmp_path / name / "weights.safetensors") for name in ("vqvae", "layout", "shape", "joint")}
+    weights = {name: str(tmp_path / name / "weights.safetensors") for name in ("vqvae", "layout", "shape")}
     starts = {
         "vqvae": [],
         "layout": [],
         "shape": [weights["layout"], weights["vqvae"]],
-        "joint": [weights["layout"], weights["vqvae"], weights["shape"]],
     }
     for stage, start in starts.items():
         names = ",".join(f'"{path}"' for path in start)
-        count = {"joint": 5, "vqvae": 24}.get(stage, 40)
+        count = {"vqvae": 24}.get(stage, 40)
         steps = f"steps={count}", f"validate_every={count}"
         monkeypatch.setattr(trainer, "plot_log", drawn if stage == "layout" else lambda log, out: None)
         open_run(smoke(stage, data, f"start=[{names}]", *few, *steps), tmp_path / stage).run()
         losses = [value for _, name, value in read_log(tmp_path / stage / "log.csv") if name == "loss"]
-        if stage != "joint":  # starts from trained parts
-            assert np.median(losses[-4:]) < 0.97 * losses[0], stage
+        assert np.median(losses[-4:]) < 0.97 * losses[0], stage
     assert (tmp_path / "layout/curves.png").stat().st_size > 5000
     names = ",".join(f'"{weights[stage]}"' for stage in ("vqvae", "shape"))  # the decoder, on what the denoiser can say
     recipe = smoke("vqvae", data, f"start=[{names}]", *few, "steps=6", "validate_every=6")
@@ -146,7 +144,7 @@ def test_smoke_recipe_trains_everything(data: Path, tmp_path: Path, monkeypatch:
     assert 0 < logged["held/fscore_projected"] <= 1
     assert logged["loss"] == pytest.approx(logged["reconstruction"] + logged["projected"], rel=1e-3)
     assert torch.equal(decoder.model.autoencoder.basis, basis)
-    model = EchoModel(*load_weights([Path(weights["vqvae"]), Path(weights["joint"])]))
+    model = EchoModel(*load_weights([Path(weights[stage]) for stage in weights]))
     graph = GraphBatch.single([14, 23], [[1, 5, 0]], floor=(4.0, 3.0))
     boxes = model.sample_layout(graph, generator=torch.Generator().manual_seed(0), steps=3)
     grids = model.sample_shapes(graph, boxes, generator=torch.Generator().manual_seed(0), steps=2)
@@ -217,7 +215,7 @@ def test_recipes_name_what_is_wrong(tmp_path: Path) -> None:
     (tmp_path / "b.toml").write_text('stage = "layout"\nsteps = 5\n[optimizer]\nspeed = 3\n')
     with pytest.raises(ValueError, match=r"unknown field 'optimizer.speed', allowed: rate"):
         read_recipe(tmp_path / "b.toml")
-    with pytest.raises(ValueError, match="stage is 'layouts', allowed: vqvae, layout, shape, parts, joint"):
+    with pytest.raises(ValueError, match="stage is 'layouts', allowed: vqvae, layout, shape, parts, paper_vqvae"):
         read_recipe(RECIPES / "layout.toml", ["stage=layouts"])
     with pytest.raises(ValueError, match="setting 'steps' has no '='"):
         read_recipe(RECIPES / "layout.toml", ["steps"])
