@@ -22,9 +22,9 @@ from echomodel.loading import load_model
 from echomodel.objective.sizes import usual_sizes
 from echomodel.rooms.generator import generate_rooms
 from echomodel.vocabulary import vocabulary
+from echousd.graph.arrays import graph_batch
 from echousd.shapes.matter import weighed
 from echousd.stage.boxes import graph_of
-from echousd.tensors import graph_batch
 
 AT_ONCE = 50  # rooms in one batch
 

@@ -28,7 +28,7 @@ LAYERS = (
     ("exporting",),
     ("draw",),
     ("stage",),
-    ("store", "tensors"),
+    ("store",),
     ("graph",),
     ("naming", "pages", "pending", "plugin", "progress", "srgb", "textures"),
 )

@@ -27,9 +27,9 @@ from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_room, generate_rooms
 from echomodel.rooms.statistics import room_type_statistics
 from echomodel.vocabulary import vocabulary
+from echousd.graph.arrays import one_thread, seeded
 from echousd.place.placing import place_boxes
 from echousd.place.solver import PlaceConfig
-from echousd.tensors import one_thread, seeded
 
 TOGETHER = 64  # scenes in one pass of a network
 POOL, POOL_SEED = 400, 910_000  # generated rooms from which `retrieval` takes

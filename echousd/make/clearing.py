@@ -16,7 +16,7 @@ from echomodel.objective.support import carriers
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Placed, Relation, SceneGraph
-from echousd.graph.arrays import triplets_of
+from echousd.graph.arrays import rounded_boxes, triplets_of
 from echousd.make.verdicts import relation_verdicts
 from echousd.place.geometry import DEFAULT_HEIGHT
 from echousd.place.living import living_faults
@@ -27,7 +27,6 @@ from echousd.shapes.nofit import FLUSH, Solids, depth, forbidden_moves
 from echousd.shapes.surface import connected_pieces
 from echousd.shapes.walls import ShellPart
 from echousd.shapes.walls import walls as walls_of
-from echousd.tensors import rounded_boxes
 
 REACH = 0.5  # metres that a piece is moved at most in all
 NEAR = 0.01  # metres within which solids are looked at first: most things at most touch

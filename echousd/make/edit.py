@@ -16,6 +16,7 @@ from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.vocabulary import vocabulary
 from echousd.assets.reference import Vector
 from echousd.graph import Node, SceneGraph
+from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.floors import with_plan_of
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
@@ -39,7 +40,6 @@ from echousd.shapes.sources.retrieval import (
 )
 from echousd.shapes.sources.source import ShapeRequest
 from echousd.shapes.styles import asset_names, style_groups, told_styles
-from echousd.tensors import graph_batch, one_thread
 
 
 @takes_options(OF_NEW)

@@ -20,7 +20,7 @@ from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
-from echousd.graph.arrays import floor_centre
+from echousd.graph.arrays import floor_centre, graph_batch, one_thread, rounded_boxes, seeded
 from echousd.graph.floors import with_placed_openings
 from echousd.make.verdicts import layout_outcome
 from echousd.options import RoomOptions
@@ -30,7 +30,6 @@ from echousd.place.solver import PlaceConfig, sentence
 from echousd.progress import StageTimer
 from echousd.shapes.styles import equal_sizes, unequal_pairs
 from echousd.shapes.walls import floor_polygon
-from echousd.tensors import graph_batch, one_thread, rounded_boxes, seeded
 
 DRAFTS = 8  # of which the best is kept
 ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two

@@ -12,6 +12,7 @@ from echomodel.progress import StageListener
 from echomodel.protocols import RoomModel
 from echomodel.roomboxes import footprints
 from echousd.graph import SceneGraph, load_graph
+from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.consistency import faults_of
 from echousd.graph.files import STAGE_FORMS
 from echousd.graph.floors import check_doors, check_space, with_plan, with_wider_floor, without_openings
@@ -48,7 +49,6 @@ from echousd.shapes.styles import asset_names, style_groups
 from echousd.stage.files import open_stage
 from echousd.stage.graphs import read_graph
 from echousd.stage.units import conventions
-from echousd.tensors import graph_batch, one_thread
 
 
 @takes_options()

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.boxes import Boxes
+from echousd.graph.arrays import rounded_boxes
 from echousd.make.finished import Room
 from echousd.make.verdicts import relation_verdicts
 from echousd.settle.settle import SettleReport, settle_layouts
 from echousd.stage.paths import OBJECTS, ROOM
-from echousd.tensors import rounded_boxes
 
 UPRIGHT = 1.0  # degrees: what leans further at rest is no pose that a layout can hold
 

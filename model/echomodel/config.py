@@ -59,19 +59,17 @@ class LayoutConfig(BranchConfig):
 
     Arguments:
         drafts: how often the prediction so far is measured and told to the next layers.
-        measures: which set of measures that is: 2, with openings, headings and both ends of a pair.
         frequencies: octaves of the Fourier features of the noisy box.
         guidance: default of the first step of the guidance, metres and radians, 0 = off (see `echomodel.guidance`).
         guidance_rounds: its steps per call of the denoiser in the last part of the sampling.
     """
 
     drafts: int = 3
-    measures: int = 2
     frequencies: int = 4
     objective: Objective = "velocity"
     guidance: float = 0.1
     guidance_rounds: int = 4
-    GONE: ClassVar = ("start", "sides")  # files of before name them: beginning on an arrangement, hearing each wall
+    GONE: ClassVar = ("start", "sides", "measures")  # files of before name them
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ def machine():
 
 def output(sample):
     """What a sample gives: width, height, depth, x, y, z in 0.1 mm and turn in 0.01 degrees of every object, which is
-    what stages hand on (`echousd/tensors.py`), and of the layers that are text the numbers and a digest of
+    what stages hand on (`echousd/graph/arrays.py`), and of the layers that are text the numbers and a digest of
     what stands between them."""
     room = echousd.generate(sample, seed=SEED, shapes="boxes", walls=False, dress="none")
     size, position, yaw = (np.asarray(value, float) for value in (room.boxes.size, room.boxes.position, room.boxes.yaw))

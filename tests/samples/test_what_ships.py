@@ -20,13 +20,12 @@ from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 from echomodel.vocabulary import vocabulary
 from echousd.checks.report import check
-from echousd.graph.arrays import floor_centre
+from echousd.graph.arrays import floor_centre, graph_batch
 from echousd.graph.floors import with_plan
 from echousd.make.layouts import finished_boxes
 from echousd.make.verdicts import layout_outcome
 from echousd.progress import StageTimer
 from echousd.shapes.styles import style_groups
-from echousd.tensors import graph_batch
 
 SAMPLES = sorted((Path(__file__).parents[2] / "samples").glob("*.usda"))
 SEEDS = (0, 1, 2)

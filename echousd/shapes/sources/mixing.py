@@ -16,12 +16,12 @@ from echomodel.late import Late
 from echomodel.protocols import RoomModel, furnishes
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
+from echousd.graph.arrays import graph_batch, one_thread, rounded_descriptions, seeded
 from echousd.shapes.geometry import Geometry, Origin
 from echousd.shapes.joinery import assembled
 from echousd.shapes.sources.retrieval import source_of
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
 from echousd.shapes.styles import told_styles
-from echousd.tensors import graph_batch, one_thread, rounded_descriptions, seeded
 
 if TYPE_CHECKING:
     pass

@@ -18,6 +18,7 @@ from echomodel.late import Late
 from echomodel.protocols import RoomModel
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
+from echousd.graph.arrays import graph_batch, one_thread, rounded_grids, seeded
 from echousd.progress import StageTimer
 from echousd.shapes.colliders import colliders_of
 from echousd.shapes.geometry import Geometry, Origin, Part
@@ -25,7 +26,6 @@ from echousd.shapes.meshing import LEAST_FACES, box_mesh, mesh_from_shape
 from echousd.shapes.sources.retrieval import source_of
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
 from echousd.shapes.styles import EQUAL, style_groups
-from echousd.tensors import graph_batch, one_thread, rounded_grids, seeded
 
 if TYPE_CHECKING:
     from echousd.assets.choose import AssetWishes

@@ -14,7 +14,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.compact.shape import _decoded
 from echomodel.echo import EchoModel
-from echousd.tensors import one_thread, rounded_boxes, rounded_descriptions, rounded_grids
+from echousd.graph.arrays import one_thread, rounded_boxes, rounded_descriptions, rounded_grids
 
 CODE = textwrap.dedent("""
     import hashlib, os, sys
