@@ -65,9 +65,9 @@ def rounded_boxes(graph: SceneGraph, boxes: Boxes) -> Boxes:
     What the graph fixes stays exactly as given.
     """
     degrees = np.rad2deg(np.asarray(boxes.yaw, float))
-    turn = np.deg2rad(_round(degrees - 360 * np.round(degrees / 360.01), ANGLE))  # half a turn keeps its sign
-    size = np.maximum(_round(np.asarray(boxes.size, float), LENGTH), LENGTH)
-    position = _round(np.asarray(boxes.position, float), LENGTH)
+    turn = np.deg2rad(rounded(degrees - 360 * np.round(degrees / 360.01), ANGLE))  # half a turn keeps its sign
+    size = np.maximum(rounded(boxes.size, LENGTH), LENGTH)
+    position = rounded(boxes.position, LENGTH)
     for i, node in enumerate(graph.nodes):
         size[i] = size[i] if node.size is None else node.size
         position[i] = position[i] if node.position is None else node.position
@@ -75,18 +75,9 @@ def rounded_boxes(graph: SceneGraph, boxes: Boxes) -> Boxes:
     return Boxes(*(values.astype(np.float32) for values in (size, position, turn)))
 
 
-def rounded_grids(grids: np.ndarray) -> np.ndarray:
-    """(n, d, d, d) float32 signed distances in steps of `DISTANCE`."""
-    return _round(np.asarray(grids, float), DISTANCE).astype(np.float32)
-
-
-def rounded_descriptions(told: np.ndarray) -> np.ndarray:
-    """(n, d) float32 descriptions of furniture in steps of `TOLD`."""
-    return _round(np.asarray(told, float), TOLD).astype(np.float32)
-
-
-def _round(values: np.ndarray, step: float) -> np.ndarray:
-    return np.round(values / step) * step + 0.0
+def rounded(values: np.ndarray, step: float) -> np.ndarray:
+    """(...) float numbers in steps, none of them a negative nought."""
+    return np.round(np.asarray(values, float) / step) * step + 0.0
 
 
 def graph_batch(graph: SceneGraph) -> GraphBatch:

@@ -110,11 +110,6 @@ def cast(values: Any, like: Array) -> Array:
     return values.to(like) if isinstance(values, kit(like).Tensor) else like.new_tensor(values)
 
 
-def whole(values: Array) -> Array:
-    """Values as int64."""
-    return values.astype(np.int64) if isinstance(values, NUMPY) else values.long()
-
-
 def full(like: Array, shape: int | tuple[int, ...], value: float) -> Array:
     """An array of one value, of the same type as another."""
     shape = (shape,) if isinstance(shape, int) else shape

@@ -80,11 +80,6 @@ class EchoModel:
         return branches(self.model.parts)
 
     @property
-    def description_width(self) -> int:
-        """Numbers in a description of a piece of furniture."""
-        return sum(self.config.furniture.kinds) + self.config.furniture.numbers
-
-    @property
     def config(self) -> CompactConfig:
         """Sizes, objectives and default steps."""
         return self.model.config
@@ -144,11 +139,12 @@ class EchoModel:
         """
         graph, boxes = self._checked(graph), self._of(graph, boxes)
         by, equal = self._how(graph, how), equal_furniture(graph)
-        start = by.start(graph.num_nodes, self.description_width, self.device)
+        own = self.config.furniture
+        start = by.start(graph.num_nodes, sum(own.kinds) + own.numbers, self.device)
         graph = with_whole_styles(graph, joined(graph, by.styles))
         return sample_descriptions(
             self.model, graph, boxes.size, self.graph_latent(graph, by.edit), equal,
-            self.config.furniture.temperature * start[equal] if by.noise is None else start, by,
+            own.temperature * start[equal] if by.noise is None else start, by,
         )  # fmt: skip
 
     def _how(self, graph: GraphBatch, told: dict[str, Any]) -> CompactSampling:

@@ -98,11 +98,6 @@ class RoomModel(Protocol):
 class FurnitureModel(RoomModel, Protocol):
     """A model of rooms that also describes furniture."""
 
-    @property
-    def description_width(self) -> int:
-        """Numbers in a description."""
-        ...
-
     def sample_furniture(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Array:
         """Descriptions (N, D) float32 of N pieces of furniture; arguments as for `sample_layout`."""
         ...

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,29 +15,21 @@ from echomodel.late import Late
 from echomodel.protocols import RoomModel, furnishes
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
-from echousd.graph.arrays import graph_batch, one_thread, rounded_descriptions, seeded
+from echousd.graph.arrays import TOLD, graph_batch, one_thread, rounded, seeded
 from echousd.shapes.geometry import Geometry, Origin
 from echousd.shapes.joinery import assembled
 from echousd.shapes.sources.retrieval import source_of
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
 from echousd.shapes.styles import told_styles
 
-if TYPE_CHECKING:
-    pass
-
 WHOLE = "echousd.shapes.sources.whole"
 shape_nearness = Late(f"{WHOLE}:shape_nearness")
 
 
 def needs_furniture(model: RoomModel | None) -> None:
-    """Raises ValueError for a model without a furniture branch, or one that describes furniture in other words."""
+    """Raises ValueError for a model without a furniture branch."""
     if not furnishes(model):
         raise ValueError("these weights have no furniture branch; use --shapes sdf, --shapes boxes or other weights")
-    if model.description_width != WIDTH:
-        raise ValueError(
-            f"these weights describe furniture by {model.description_width} numbers, this version by {WIDTH}; "
-            "train them again or use --shapes sdf"
-        )
 
 
 def furniture_of_parts(request: ShapeRequest) -> Shapes:
@@ -77,7 +68,7 @@ def descriptions(request: ShapeRequest) -> np.ndarray:
             graph_batch(graph), request.centred, generator=seeded(request.seed, "parts"), steps=request.steps,
             styles=styles, progress=tell, **extra,
         )  # fmt: skip
-    return rounded_descriptions(on_device(found, None))
+    return rounded(on_device(found, None), TOLD).astype(np.float32)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from echomodel.late import Late
 from echomodel.protocols import RoomModel
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
-from echousd.graph.arrays import graph_batch, one_thread, rounded_grids, seeded
+from echousd.graph.arrays import DISTANCE, graph_batch, one_thread, rounded, seeded
 from echousd.progress import StageTimer
 from echousd.shapes.colliders import colliders_of
 from echousd.shapes.geometry import Geometry, Origin, Part
@@ -122,7 +122,7 @@ def _grids(request: ShapeRequest, batch: GraphBatch, stream: str, extra: dict[st
             batch, request.centred, generator=seeded(request.seed, stream), steps=request.steps, progress=tell,
             **(extra or {}),
         )  # fmt: skip
-        return rounded_grids(on_device(grids, None))
+        return rounded(on_device(grids, None), DISTANCE).astype(np.float32)
 
 
 def chosen_models(request: ShapeRequest, source: str) -> Shapes:

@@ -111,7 +111,7 @@ def _hung(
     w, h, d = size
     cloth = material or _drape(rng)
     folds = max(2, round(w / fold))
-    x = np.linspace(-w / 2, w / 2, 8 * folds + 1)
+    x = np.linspace(-w / 2, w / 2, 7 * folds + 1)
     phase, wander = rng.uniform(0, 2 * np.pi), drift * rng.uniform(-1, 1, 3)
     rows = []
     for share in np.linspace(0, 1, 5):

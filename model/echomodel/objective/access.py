@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from echomodel.arrays import Array, at_least, cast, full, held, kit, put, whole
+from echomodel.arrays import Array, at_least, cast, full, held, kit, put
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, nobody, worst
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_normal, segment
 
@@ -47,7 +47,7 @@ def at_wall(plan: Plan) -> Found:
     free = plan.of("sofa")[who] & (gap >= PASSAGE)
     if bool(free.any()):
         free = free & (_deep(plan, who) | _backed(plan, who, held(gap)))
-    return found(who, plan.kit.where(free, gap - PASSAGE, TOUCHING - gap), measure=gap, words=whole(gap < FAR))
+    return found(who, plan.kit.where(free, gap - PASSAGE, TOUCHING - gap), measure=gap, words=1 * (gap < FAR))
 
 
 def _deep(plan: Plan, who: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from echomodel.arrays import Array, at_least, cast, dot, held, rows, whole
+from echomodel.arrays import Array, at_least, cast, dot, held, rows
 from echomodel.objective.company import Seats, seats_at
 from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody, worst
 
@@ -39,7 +39,7 @@ def groups_apart(plan: Plan) -> Found:
     keep = (plan.smaller[i] < plan.smaller[j]) & ~plan.kin(i, j)
     i, j = i[keep], j[keep]
     table = plan.numbers([[APART.get((a, b), APART.get((b, a), 0.0)) for b in ROLES] for a in ROLES])
-    number = whole(plan.column(lambda kind: ROLES.index(kind.role) if kind.role in ROLES else 0))
+    number = cast(plan.column(lambda kind: ROLES.index(kind.role) if kind.role in ROLES else 0), plan.scene)
     wanted = table[number[i], number[j]]
     keep = (wanted > 0) & ~_side_by_side(plan, i, j)
     i, j, wanted = i[keep], j[keep], wanted[keep]
@@ -181,7 +181,7 @@ def seat_room(plan: Plan) -> Found:
     who = rows(met)
     end = plan.of("sofa")[about[who]]
     measure = at_least(least[who] + plan.kit.where(end, END, TOUCHED), 0.0)
-    return joined(close, found(who, least[who], other=about[who], measure=measure, words=whole(end)))
+    return joined(close, found(who, least[who], other=about[who], measure=measure, words=1 * end))
 
 
 def loungers_apart(plan: Plan) -> Found:

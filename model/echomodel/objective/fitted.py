@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from echomodel.arrays import Array, at_least, full, norm, rows, sum_of, whole
+from echomodel.arrays import Array, at_least, full, norm, rows, sum_of
 from echomodel.objective.access import before_fronts
 from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody, worst
 from echomodel.openings import segment
@@ -88,7 +88,7 @@ def work_triangle(plan: Plan) -> Found:
     pairs = ((0, 1), (1, 2), (2, 0))
     way = sum(norm(points[a] - points[b]) for a, b in pairs)
     low, high = TRIANGLE
-    out = found(cook, xp.minimum(way - low, high - way), measure=way, words=whole(way > high))
+    out = found(cook, xp.minimum(way - low, high - way), measure=way, words=1 * (way > high))
     share = plan.numbers([(k + 0.5) / POINTS for k in range(POINTS)])[:, None]
     walked = xp.concat([points[a][:, None] * share + points[b][:, None] * (1 - share) for a, b in pairs], 1)
     others = plan.standing & ~plan.movable & ~plan.stands("row") & (plan.size[:, 1] > 0.3)

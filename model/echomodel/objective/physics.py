@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, full, held, put, whole
+from echomodel.arrays import Array, at_least, full, held, put
 from echomodel.floors import edges, footprint, signed_area
 from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody
 from echomodel.objective.support import ON_CEILING, ON_FLOOR
@@ -73,7 +73,7 @@ def rests(plan: Plan) -> Found:
         lateral, forward = plan.local(who[carried], on[carried])
         half = plan.size[on[carried]][:, ::2] / 2
         beside = put(beside, carried, xp.minimum(half[:, 0] - abs(lateral), half[:, 1] - abs(forward)))
-    other, words = at_least(carrier, -1), whole(beside < margin)
+    other, words = at_least(carrier, -1), 1 * (beside < margin)
     return found(who, xp.minimum(margin, beside), other=other, measure=air, words=words)
 
 
@@ -83,7 +83,7 @@ def in_height(plan: Plan) -> Found:
     ceiling, low = plan.ceiling[who], plan.position[who, 1]
     high = ceiling - low - plan.size[who, 1]
     margin = TOUCH + plan.kit.minimum(low, plan.kit.where(plan.kit.isfinite(ceiling), high, FAR))
-    return found(who, margin, measure=TOUCH - margin, words=whole(high < low))
+    return found(who, margin, measure=TOUCH - margin, words=1 * (high < low))
 
 
 def told(predicate: str) -> Callable[[Plan], Found]:

@@ -14,7 +14,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.compact.shape import _decoded
 from echomodel.echo import EchoModel
-from echousd.graph.arrays import one_thread, rounded_boxes, rounded_descriptions, rounded_grids
+from echousd.graph.arrays import DISTANCE, TOLD, one_thread, rounded, rounded_boxes
 
 CODE = textwrap.dedent("""
     import hashlib, os, sys
@@ -142,10 +142,9 @@ def test_codes_are_rounded_before_they_are_decoded(monkeypatch):
 
 def test_grids_are_rounded_and_threads_come_back():
     grid = np.full((1, 2, 2, 2), 0.01234567, np.float32)
-    assert (rounded_grids(grid) == rounded_grids(grid + 1e-6)).all()
-    assert rounded_grids(grid).dtype == np.float32
+    assert (rounded(grid, DISTANCE) == rounded(grid + 1e-6, DISTANCE)).all()
     told = np.full((2, 3), 0.123456, np.float32)
-    assert (rounded_descriptions(told) == rounded_descriptions(told + 2e-6)).all()
+    assert (rounded(told, TOLD) == rounded(told + 2e-6, TOLD)).all()
     before = torch.get_num_threads()
     with one_thread():
         assert torch.get_num_threads() == 1
