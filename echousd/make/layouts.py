@@ -117,7 +117,7 @@ def best_boxes(
     """
     best: tuple[Boxes, tuple[str, ...]] | None = None
     worth: tuple[float, ...] = ()
-    ways, judged = [(graph, DEFAULTS)], 0
+    ways, judged, budget = [(graph, DEFAULTS)], 0, POSES * max(1.0, drafts / DRAFTS)
     left: list[tuple[tuple[float, ...], int, Boxes]] = []  # what a draft leaves to be wished for, its number, and it
     if proposed and graph.room.openings:  # which make way for the furniture
         bare = graph.replaced(room=graph.room.replaced(openings=()))
@@ -126,9 +126,10 @@ def best_boxes(
     def drawn() -> Iterator[tuple[Boxes, int]]:
         for start, count in draft_rounds(drafts):
             by = replace(draws, number=draws.number + start, guided=not place)
-            for draft in sample_boxes(model, graph, by, count=count, timer=timer) if judged < POSES / 2 else ():
-                draft = draft if sized is None else Boxes(sized.size, draft.position, draft.yaw)
-                yield draft, 0 if drafts > 1 else DEFAULTS.anew
+            for draft in sample_boxes(model, graph, by, count=count, timer=timer) if judged < budget / 2 else ():
+                if judged < budget / 2:
+                    draft = draft if sized is None else Boxes(sized.size, draft.position, draft.yaw)
+                    yield draft, 0 if drafts > 1 else DEFAULTS.anew
         for _, _, draft in sorted(left):
             yield draft, DEFAULTS.anew
 
@@ -145,9 +146,9 @@ def best_boxes(
                 best, worth = (boxes, told), tried[-1]
             if not any(worth):
                 break
-        left.append((min(tried), len(left), draft))
+        left += [] if anew else [(min(tried), len(left), draft)]
         ways = ways[: 1 + (tried[-1] < tried[0])]  # if the second is no better, it is not tried again
-        if not any(worth) or judged > POSES:
+        if not any(worth) or (anew and judged > budget):
             break
     assert best is not None
     return best

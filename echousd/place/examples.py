@@ -153,7 +153,7 @@ def _drafts(plan: ExamplesPlan, rooms: list[RoomBoxes], told: list[np.ndarray], 
     out: list[list[Boxes]] = [[] for _ in rooms]
     for draft in range(plan.drafts):
         generator = torch.Generator().manual_seed(plan.seed * 1_000_003 + number * 101 + draft)
-        boxes = model.sample_layout(graph, generator=generator, relation_guidance=0.0)
+        boxes = model.sample_layout(graph, generator=generator, relation_guidance=0.0).to("cpu")
         columns = (values.split(counts) for values in (boxes.size, boxes.position, boxes.yaw))
         for mine, size, position, yaw in zip(out, *columns, strict=True):
             mine.append(Boxes(size, position, yaw))

@@ -32,13 +32,13 @@ def held(values: Array) -> Array:
     return values if isinstance(values, NUMPY) else values.detach()
 
 
-def on_device(values: Array, device: Any) -> Array:
-    """Values as a tensor on a device, or with None as an array of numpy."""
-    if device is not None:
-        import torch
+def on_device(values: Any, device: Any) -> Array:
+    """Values of either library as a tensor of its own on a device, or with None as an array of numpy."""
+    if device is None:
+        return values.detach().cpu().numpy() if hasattr(values, "detach") else np.asarray(values)
+    import torch
 
-        return torch.as_tensor(values, device=device)
-    return values if isinstance(values, NUMPY) else values.detach().cpu().numpy()
+    return values.to(device) if isinstance(values, torch.Tensor) else torch.tensor(values, device=device)
 
 
 def device_of(values: Array) -> Any:
@@ -48,7 +48,7 @@ def device_of(values: Array) -> Any:
 
 def beside(values: Any, other: Array) -> Array:
     """Values of either library in that of another array, on its device."""
-    return np.asarray(values) if isinstance(other, NUMPY) else on_device(values, other.device)
+    return on_device(values, device_of(other))
 
 
 def without_slopes(function: Function) -> Function:
@@ -144,7 +144,7 @@ def sum_of(who: Array, values: Array, count: int) -> Array:
     if not isinstance(values, NUMPY):
         return values.new_zeros(count, *values.shape[1:]).index_add(0, who, values)
     if values.ndim == 1:
-        return np.bincount(who, values, count)
+        return np.bincount(who, values, count).astype(values.dtype)
     if (np.diff(who) < 0).any():
         order = np.argsort(who, kind="stable")
         who, values = who[order], values[order]

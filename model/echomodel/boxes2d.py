@@ -5,9 +5,7 @@ Yaws are in radians; a yaw of shape (...) belongs to points or half extents (...
 
 from __future__ import annotations
 
-import numpy as np
-
-from echomodel.arrays import Array, kit
+from echomodel.arrays import Array, cast, kit
 
 CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))  # of a footprint, those of the back first
 
@@ -35,8 +33,7 @@ def seen(points: Array, yaw: Array) -> Array:
 
 def outline(half: Array, yaw: Array, places: Array = CORNERS) -> Array:
     """(..., k, 2) points on rectangles about the origin, their corners, by half extents (..., 2)."""
-    signs = np.asarray(places) if kit(half) is np else half.new_tensor(places)
-    return turned(half[..., None, :] * signs, yaw[..., None])
+    return turned(half[..., None, :] * cast(places, half), yaw[..., None])
 
 
 def hull(half: Array, yaw: Array) -> Array:

@@ -14,7 +14,7 @@ Sampler = Literal["ddim", "ancestral"]
 DEPTHS = frozenset({"layers", "echo_layers", "blocks", "drafts", "voices"})  # each of them costs tensors
 RANGES = {  # of what costs no tensors, but time
     "steps": (1, 1000), "candidates": (1, 64), "guidance_rounds": (0, 64), "guidance": (0, 100),
-    "temperature": (0, 10), "heads": (1, 64), "frequencies": (0, 16), "levels": (0, 0), "patch": (1, 64),
+    "temperature": (0, 10), "heads": (1, 64), "frequencies": (0, 16), "patch": (1, 64),
 }  # fmt: skip
 C = TypeVar("C")
 
@@ -69,7 +69,7 @@ class LayoutConfig(BranchConfig):
     objective: Objective = "velocity"
     guidance: float = 0.1
     guidance_rounds: int = 4
-    GONE: ClassVar = ("start", "sides", "measures")  # files of before name them
+    GONE: ClassVar = {"start": None, "sides": None, "measures": 2}  # files of before name them; None = whatever it is
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class AutoencoderConfig:
     channels: int = 6
     width: int = 64
     blocks: int = 2
-    GONE: ClassVar = ("levels",)  # files of before name it: 0, latents that are not rounded
+    GONE: ClassVar = {"levels": 0}  # latents that are not rounded
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class ShapeConfig(BranchConfig):
     temperature: float = 1.0
     candidates: int = 8
     steps: int = 10
-    GONE: ClassVar = ("echo_time", "conditioning", "prediction")  # files of before name them; all had the one way
+    GONE: ClassVar = {"echo_time": True, "conditioning": "cross", "prediction": "sample"}
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ def from_json(kind: type[C], text: str) -> C:
 
 
 def from_dict(kind: type[C], raw: dict[str, Any], where: str = "") -> C:
-    """A configuration from nested plain values; fields left out keep their defaults, those that are `GONE` say nothing.
+    """A configuration from nested plain values; fields left out keep their defaults, `GONE` ones have the one value.
 
     Raises ValueError where a field is not known or its value has the wrong type.
     """
@@ -199,7 +199,7 @@ def from_dict(kind: type[C], raw: dict[str, Any], where: str = "") -> C:
     values: dict[str, Any] = {}
     for name, value in raw.items():
         path = f"{where}.{name}" if where else name
-        if name in getattr(kind, "GONE", ()):
+        if getattr(kind, "GONE", {}).get(name, names) in (None, value):
             continue
         if name not in names:
             raise ValueError(f"unknown field {path!r}, allowed: {', '.join(names)}")

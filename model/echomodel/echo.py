@@ -55,7 +55,7 @@ class EchoModel:
 
         Arguments:
             path: file or folder, None = the shipped weights.
-            device: where to; None = as arrays of numpy, which the shipped weights alone can be.
+            device: where to; None = the shipped weights as arrays of numpy.
 
         Raises WeightsError where there are none, or they are damaged or do not belong together.
         """
@@ -65,7 +65,7 @@ class EchoModel:
             files = sorted(file for file in source.glob("*.safetensors") if file.name != CHECKPOINT)
         if path is not None and not files:
             raise WeightsError(f"{source}: holds no weights files (.safetensors)")
-        if device is None:
+        if device is None and path is None:
             return cls(*load_plain(files))
         return cls(*load_weights(files, device))
 

@@ -90,7 +90,7 @@ class GraphBatch:
         nodes, corners = np.asarray(category, np.int64).reshape(-1), centred(floor)
         return cls(
             category=nodes, triplets=np.asarray(triplets, np.int64).reshape(-1, 3),
-            scene=np.zeros_like(nodes), room_type=np.array([room_type]), floor=corners[None],
+            scene=np.zeros_like(nodes), room_type=np.array([room_type], np.int64), floor=corners[None],
             names=None if names is None else tuple(names),
             openings=opening_rows(() if floor is None else openings, corners)[None],
             placements=np.asarray(placements, np.int64).reshape(-1, 4),

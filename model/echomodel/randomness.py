@@ -1,6 +1,7 @@
 """Normal noise from one source, or of many scenes packed together, each from a source of its own.
 
-Noise is drawn without torch, and yet as torch's generator of the same seed draws it on a CPU, but for rounding.
+Noise is drawn without torch, and yet, of sixteen numbers and more, as torch's generator of the same seed draws it on
+a CPU, but for rounding.
 """
 
 from __future__ import annotations

@@ -93,5 +93,8 @@ def test_settings_that_are_gone_are_passed_over(layout, tmp_path):
     save_file(tensors, tmp_path / "before.safetensors", metadata={**metadata, "config": json.dumps(config)})
     assert EchoModel.load(tmp_path / "before.safetensors").config.layout == EchoModel.load().config.layout
     assert from_dict(Recipe, {"stage": "layout", "steps": 1, "model": {"layout": {"start": 0.05}}}).model.layout
+    with pytest.raises(ValueError, match=r"unknown field 'shape\.conditioning'"):  # none that was another way
+        from_dict(CompactConfig, {"shape": {"conditioning": "concat"}})
+    assert from_dict(CompactConfig, {"shape": {"conditioning": "cross"}}) == CompactConfig()
     with pytest.raises(ValueError, match=r"unknown field 'layout\.begin'"):
         from_dict(CompactConfig, {"layout": {"begin": 0.05}})

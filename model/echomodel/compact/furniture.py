@@ -54,7 +54,7 @@ class Furniture(Layers):
         h = context.nodes + self.own(x)
         if self.settings.echo:
             h = h + self.heard(self._voices(x, level, context.pairs))
-        for layer, own in zip(self.layers, parted(self.modulated(level), len(self.layers)), strict=True):
+        for layer, own in zip(self.layers, parted(self.modulated(level), self.settings.layers), strict=True):
             h = layer(h, context.pairs, own)
         return self.head(self.norm(h))
 

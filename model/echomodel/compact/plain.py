@@ -64,9 +64,6 @@ class Net:
     def __iter__(self) -> Iterator[Net]:
         return (self[number] for number in self.numbered)
 
-    def __len__(self) -> int:
-        return len(self.numbered)
-
     def mapped(self, x: np.ndarray) -> np.ndarray:
         """A linear map, a norm, rows of a table, or maps one after the other."""
         if self.numbered:

@@ -2,7 +2,7 @@
 
 Each part is registered once, under the name of its settings in `CompactConfig`. A branch is a part that gives something
 of a room: boxes, shapes, furniture. A further branch is a module with its network and its sampling, its settings in
-`CompactConfig`, its row here, and a training stage in `echomodel.training`.
+`CompactConfig`, its row here (and in `plain.NETS`), and a training stage in `echomodel.training`.
 """
 
 from __future__ import annotations

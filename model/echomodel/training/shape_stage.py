@@ -1,7 +1,6 @@
 """The shape stage, denoising codes of a scene's objects joined by echoes (EchoScene 3.4), and those beside it.
 
-The autoencoder (recipes call it `vqvae`, after the paper) learns crops of signed distances there and back; the joint
-stage trains layouts and shapes on one latent graph.
+The autoencoder (recipes call it `vqvae`, after the paper) learns crops of signed distances there and back.
 """
 
 from __future__ import annotations

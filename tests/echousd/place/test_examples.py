@@ -48,6 +48,14 @@ def test_rooms_of_the_generator_that_miss_nothing_are_kept_unsearched(tmp_path):
         search_examples(tmp_path, ExamplesPlan(5), shards=1)
 
 
+def test_drafts_are_the_networks():
+    rooms = generate_rooms(2, 5)
+    none = [np.zeros((0, 3), int)] * 2
+    found = examples._drafts(ExamplesPlan(5, drafts=2), rooms, none, 0)
+    assert [[len(boxes) for boxes in each] for each in found] == [[len(room)] * 2 for room in rooms]
+    assert examples._searched(rooms[0], none[0], found[0][1]) is not None
+
+
 def test_a_room_that_misses_something_is_left_out():
     room = generate_rooms(1, 5)[0]
     start = Boxes.from_room(room)
