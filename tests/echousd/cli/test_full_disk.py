@@ -35,6 +35,7 @@ def full(most, *words):
             sys.stdout, sys.stderr = (os.fdopen(number, "w", encoding="utf-8", closefd=False) for number in (1, 2))
             import resource
 
+            signal.alarm(180)  # whatever it waits for, it ends
             os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
