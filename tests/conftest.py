@@ -16,8 +16,6 @@ from hypothesis import HealthCheck, settings
 # Busy machines draw examples slowly, which says nothing about the code.
 settings.register_profile("project", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("project")
-# A fork of a process whose stages were read by several threads may wait for ever for one of them.
-os.environ.setdefault("PXR_WORK_THREAD_LIMIT", "1")
 
 
 SLOW = Path(__file__).with_name("slow.txt").read_text("utf-8").split()  # left out by `make quick`; the dearest first
