@@ -19,7 +19,7 @@ def descriptors(model: object, grids: np.ndarray) -> np.ndarray:
     if not isinstance(model, EchoModel) or "autoencoder" not in model.model.parts:
         raise ValueError("these weights have no encoder of shapes; use --shapes library or other weights")
     with torch.no_grad():
-        latent = model.whole.model.autoencoder.encode(torch.as_tensor(np.asarray(grids, np.float32)))
+        latent = model.in_torch.model.autoencoder.encode(torch.as_tensor(np.asarray(grids, np.float32)))
         coarse = torch.nn.functional.adaptive_avg_pool3d(latent, CELLS).flatten(1)
     coarse = coarse - coarse.mean(1, keepdim=True)
     return np.asarray(torch.nn.functional.normalize(coarse, dim=1), np.float32)

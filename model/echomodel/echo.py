@@ -70,7 +70,7 @@ class EchoModel:
         return cls(*load_weights(files, device))
 
     @cached_property
-    def whole(self) -> EchoModel:
+    def in_torch(self) -> EchoModel:
         """The same weights as modules of torch, which shapes need."""
         return EchoModel.load() if self.device is None else self
 
@@ -125,7 +125,8 @@ class EchoModel:
 
         Returns (N, 64, 64, 64) float32 truncated signed distances on the box-normalised grid, negative inside.
         """
-        own, graph, boxes = self.whole, self.whole._checked(graph), self.whole._of(graph, boxes)
+        own = self.in_torch
+        graph, boxes = own._checked(graph), own._of(graph, boxes)
         found = sample_shapes(own.model, own.graph_latent, graph, boxes, equal_furniture(graph), own._how(graph, how))
         return on_device(found, self.device)
 

@@ -45,7 +45,7 @@ def test_what_ships_is_loaded_as_arrays_and_whole_where_shapes_need_it():
     whole, name = load_weights(files)
     assert model.hash == name
     for part in ("shape", "autoencoder"):
-        own = model.whole.model.get_submodule(part).state_dict()
+        own = model.in_torch.model.get_submodule(part).state_dict()
         assert all(torch.equal(own[key], value) for key, value in whole.get_submodule(part).state_dict().items())
     again = pickle.loads(pickle.dumps(loading.load_model()))
     for part in ("latent", "layout", "furniture"):
@@ -58,7 +58,7 @@ def flat(net: object, before: str = "") -> dict[str, np.ndarray]:
     """All numbers of a network of numpy by their names."""
     out: dict[str, np.ndarray] = {}
     for name, part in vars(net).items():
-        if isinstance(part, np.ndarray) and name != "turned":
+        if isinstance(part, np.ndarray) and name != "transposed":
             out[f"{before}{'weight' if name == 'rows' else name}"] = part
         elif isinstance(part, Net | Table):
             out |= flat(part, f"{before}{name}.")

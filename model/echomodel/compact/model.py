@@ -18,8 +18,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 from torch.overrides import TorchFunctionMode
 
-from echomodel.boxes import BoxScale, BoxStatistics
-from echomodel.compact.learned import places
+from echomodel.boxes import BoxStatistics
 from echomodel.compact.modules import FurnitureDenoiser, LatentGraph, LayoutDenoiser
 from echomodel.compact.weights import (
     FORMAT,
@@ -60,10 +59,6 @@ class CompactModel(nn.Module):
     autoencoder: Autoencoder
     shape: ShapeDenoiser
     furniture: FurnitureDenoiser
-
-    def scale(self, category: Tensor) -> BoxScale:
-        """What the normalised numbers of boxes of `category` (N,) int64 stand for."""
-        return self.statistics.scale(places("categories", self.config.categories, category))
 
     @property
     def device(self) -> torch.device:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from echomodel.arrays import Array, beside, clipped, full, kit, on_device, pairs_in, rows, sum_of, without_slopes
-from echomodel.boxes import Boxes
+from echomodel.boxes import Boxes, BoxScale
+from echomodel.compact.learned import places
 from echomodel.compact.pairs import Pairs, pairs_of
 from echomodel.config import BranchConfig, Sampler
 from echomodel.graph import GraphBatch
@@ -26,9 +27,14 @@ if TYPE_CHECKING:
 Model: TypeAlias = "CompactModel | PlainModel"
 
 
+def box_scale(model: Model, category: Array) -> BoxScale:
+    """What the normalised numbers of boxes of `category` (N,) int64 stand for."""
+    return model.statistics.scale(places("categories", model.config.categories, category))
+
+
 def layout_predictor(model: Model, graph: GraphBatch, pairs: Pairs, latent: Array, rules: Array) -> Predict:
     """Clean boxes (N, 8) in noisy ones; arguments as for `LayoutDenoiser.context`."""
-    context = model.layout.context(graph, pairs, latent, rules, model.scale(graph.category))
+    context = model.layout.context(graph, pairs, latent, rules, box_scale(model, graph.category))
 
     def predict(x: Array, level: Array) -> Array:
         return clean_from(model.layout(x, level, context), x, level, model.config.layout.objective)
@@ -137,7 +143,7 @@ def sample_boxes(model: Model, latent: Latent, graph: GraphBatch, how: CompactSa
     Raises ValueError for rules that the model does not know.
     """
     config = model.config.layout
-    scale = model.scale(graph.category)
+    scale = box_scale(model, graph.category)
     given = None if how.known is None else how.known.encode(scale)
     if how.rules not in model.config.rules:
         raise ValueError(f"rules is {how.rules!r}, allowed: {', '.join(model.config.rules)}")

@@ -16,7 +16,7 @@ from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.draft import FARTHEST, measurable, pair_features, wall_features
 from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
-from echomodel.compact.sampling import layout_predictor
+from echomodel.compact.sampling import box_scale, layout_predictor
 from echomodel.objective import Plan, faults_of
 from echomodel.objective.physics import apart
 from echomodel.objective.plan import UNKNOWN
@@ -130,7 +130,7 @@ def layout_loss(
     Returns the loss, and the parts that the log names.
     """
     objective = model.config.layout.objective
-    scale = model.scale(batch.graph.category)
+    scale = box_scale(model, batch.graph.category)
     clean = batch.boxes.encode(scale)
     known = draw_known(batch.graph.scene, batch.graph.num_scenes, generator)
     level = draw_levels(batch.graph.num_scenes, generator, clean.device)[batch.graph.scene] * ~known
@@ -288,4 +288,4 @@ def sample_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Gener
     predict = layout_predictor(model, batch.graph, batch.pairs, latent, batch.rules)
     noise = normal((batch.graph.num_nodes, 8), generator, model.device)
     vectors = sample(layout.sampler, predict, noise, layout.steps, layout.objective, generator=generator)
-    return Boxes.decode(vectors, model.scale(batch.graph.category))
+    return Boxes.decode(vectors, box_scale(model, batch.graph.category))
