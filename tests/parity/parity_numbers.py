@@ -25,6 +25,7 @@ from torch import Tensor, nn
 LISTINGS = Path(__file__).parent / "fixtures"
 FOLDER = Path(os.environ.get("ECHOUSD_PARITY_DIR") or LISTINGS)
 DEFAULT_GAIN = 0.7
+AT_ONCE = 1 << 16  # numbers drawn at a time: they stay in the cache, and some networks have hundreds of millions
 
 
 class Numbers:
@@ -101,27 +102,29 @@ def value(key: str, shape: tuple[int, ...], seed: int, gain: float) -> np.ndarra
     unit variance, other weights variance gain^2 / fan-in.
     """
     stream = np.random.RandomState((zlib.crc32(key.encode()) + seed) % 2**32)
-    centred = stream.random_sample(shape)
-    centred *= 2.0  # in place: some networks have hundreds of millions of numbers
-    centred -= 1.0
     role = key.rpartition(".")[2]
     embeds = key.endswith("embedding.weight") or "embeddings_" in key or "pred_embeddings" in key
-    if role == "running_mean":
-        drawn = 0.2 * centred
-    elif role == "running_var":
-        drawn = 0.5 + (centred + 1.0) / 2.0
-    elif role == "bias":
-        drawn = 0.1 * centred
-    elif len(shape) == 1:
-        drawn = 1.0 + 0.2 * centred
-    elif embeds:
-        drawn = 3**0.5 * centred
-    else:
-        drawn = centred
-        drawn *= 3**0.5
-        drawn *= gain
-        drawn /= np.sqrt(np.prod(shape[1:]))
-    return drawn.astype(np.float32)
+    out = np.empty(int(np.prod(shape)), np.float32)
+    for part in np.split(out, range(AT_ONCE, len(out), AT_ONCE)):
+        centred = stream.random_sample(len(part))
+        centred *= 2.0
+        centred -= 1.0
+        if role == "running_mean":
+            part[:] = 0.2 * centred
+        elif role == "running_var":
+            part[:] = 0.5 + (centred + 1.0) / 2.0
+        elif role == "bias":
+            part[:] = 0.1 * centred
+        elif len(shape) == 1:
+            part[:] = 1.0 + 0.2 * centred
+        elif embeds:
+            part[:] = 3**0.5 * centred
+        else:
+            centred *= 3**0.5
+            centred *= gain
+            centred /= np.sqrt(np.prod(shape[1:]))
+            part[:] = centred
+    return out.reshape(shape)
 
 
 def fill(module: nn.Module, seed: int, gain: float = DEFAULT_GAIN) -> None:
