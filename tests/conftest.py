@@ -11,6 +11,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 import pytest
+from forked_reader import readers_are_forked
 from hypothesis import HealthCheck, settings
 
 # Busy machines draw examples slowly, which says nothing about the code.
@@ -41,6 +42,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def disks_are_not_waited_for() -> Iterator[None]:
     """Files reach the disk when the system likes: a machine that loses its power is no part of a test."""
     with patch.object(os, "fsync", lambda file: None):
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def readers_begin_soon() -> Iterator[None]:
+    """Files of others are read by forks of one process; a test of how it begins wants `apart.subprocess` itself."""
+    with readers_are_forked():
         yield
 
 

@@ -49,7 +49,8 @@ def test_openusd_ends_at_it_and_not_at_what_is_flatter(deadly):
         assert subprocess.run(words, capture_output=True, check=False).returncode in (0, 1)
 
 
-def test_the_file_that_ends_the_reader_is_named(deadly, tmp_path):
+def test_the_file_that_ends_the_reader_is_named(deadly, tmp_path, monkeypatch):
+    monkeypatch.setattr(apart, "subprocess", subprocess)  # no fork of `forked_reader`
     (tmp_path / "good.usda").write_text('#usda 1.0\ndef "a" {}\n')
     (tmp_path / "broken.usda").write_text("#usda 1.0\ndef {")
     (tmp_path / "root.usda").write_text('#usda 1.0\n(subLayers = [@./good.usda@, @./deep.usda@])\ndef "a" {}\n')
