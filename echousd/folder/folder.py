@@ -11,6 +11,7 @@ import os
 import shutil
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -75,8 +76,8 @@ def digest_of(path: Path) -> str:
 
 def write_journal(staging: Path, journal: Journal) -> None:
     """Put the journal beside its staged files: these are on the disk before, and it is there as a whole."""
-    for entry in journal.move:
-        flush(staging / entry.staged)
+    with ThreadPoolExecutor() as pool:  # one after another a room's hundred files wait a third of a second
+        list(pool.map(flush, (staging / entry.staged for entry in journal.move)))
     (staging / "journal.new").write_text(journal.model_dump_json(), "utf-8")
     flush(staging / "journal.new")
     (staging / "journal.new").replace(staging / JOURNAL)
