@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import trimesh
 
 from echousd.graph import SceneGraph
 from echousd.options import RoomOptions
 from echousd.shapes.styles import style_groups
 
 if TYPE_CHECKING:
+    import trimesh
+
     from echomodel.boxes import Boxes
     from echousd.place.report import Collision
     from echousd.shapes.geometry import Geometry
@@ -183,6 +184,8 @@ class RoomData:
 
     def scene(self) -> trimesh.Scene:
         """All objects in their places, in the room frame."""
+        import trimesh
+
         scene = trimesh.Scene()
         for number, name in enumerate(self.names):
             asset, pose = self.assets[name], self.pose(number)

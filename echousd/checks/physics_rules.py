@@ -11,12 +11,11 @@ from echomodel.vocabulary import vocabulary
 from echousd.checks.findings import Finding, rule
 from echousd.checks.reading import Reading, below
 from echousd.graph.nodes import OBSTACLE
-from echousd.shapes.matter import moves
 from echousd.stage.contents import triangulated, words_of
 from echousd.stage.encoding import CATEGORY, FREE
 from echousd.stage.read import value
 from echousd.stage.units import up_axis, upwards
-from echousd.stage.values import UNREADABLE, array, lineage, readable, targets
+from echousd.stage.values import UNREADABLE, array, lineage, moves, readable, targets
 
 HEAVY = 3000.0  # kg in each m³ of a body's box: stone
 APART = 0.05  # metres between the anchors of a hinge, and from a centre of mass to the geometry

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import trimesh
-from scipy.spatial import cKDTree
-from trimesh.graph import connected_component_labels
-from trimesh.triangles import closest_point
 
 from echomodel.dressing import SMALL
-from echomodel.openings import segment
+from echomodel.openings import SKIRTING, segment
 from echomodel.roomboxes import footprints
+from echomodel.triangles import area_normals, connected_pieces, distances
 from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import (
     DEFAULT_HEIGHT,
@@ -26,7 +23,6 @@ from echousd.place.geometry import (
     separation,
 )
 from echousd.place.report import TOUCH, Collision
-from echousd.shapes.fittings import SKIRTING
 from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding, read_contents, surroundings
 from echousd.stage.labels import known_category
 from echousd.stage.read import RoomPrims
@@ -328,14 +324,12 @@ def _reach(surface: Shape, solid: Shape) -> float:
     skin = np.concatenate((solid.points, _scatter(solid.points, solid.faces, 4000)))
     deepest = 0.0
     # A sample of the skin is further away than the skin itself: deepest first, until no point can be deeper.
-    at_most = cKDTree(skin).query(within)[0]
+    at_most = np.sqrt([((skin - point) ** 2).sum(1).min() for point in within])
     for number in np.argsort(-at_most):
         if at_most[number] <= max(deepest, DEEP):
             break
         close = triangles[np.linalg.norm(middle - within[number], axis=1) <= around + at_most[number] + 1e-9]
-        near = closest_point(close, np.broadcast_to(within[number], (len(close), 3)))
-        far = np.linalg.norm(near - within[number], axis=1)  # NaN where a triangle has no area
-        deepest = max(deepest, float(np.fmin.reduce(far, initial=at_most[number])))
+        deepest = max(deepest, min(at_most[number], distances(within[number], close).min(initial=np.inf)))
     return deepest
 
 
@@ -352,10 +346,15 @@ def surface_points(surface: Shape, solid: Shape) -> np.ndarray:
 
 
 def _scatter(points: np.ndarray, faces: np.ndarray, count: int) -> np.ndarray:
-    mesh = trimesh.Trimesh(points, faces, process=False)
-    if not mesh.area_faces.sum() > 0:
+    """(count, 3) points of the triangles, as many everywhere; none of what has no area."""
+    triangles, rng = points[faces], np.random.default_rng(0)
+    area = np.cumsum(np.linalg.norm(area_normals(triangles), axis=1))
+    if not area[-1] > 0:
         return np.zeros((0, 3))
-    return np.asarray(trimesh.sample.sample_surface(mesh, count, seed=0)[0])
+    there = triangles[np.searchsorted(area, rng.random(count) * area[-1])]
+    share = rng.random((count, 2))
+    share = np.where(share.sum(1, keepdims=True) > 1, 1 - share, share)
+    return np.asarray(there[:, 0] + np.einsum("ne,nex->nx", share, there[:, 1:] - there[:, :1]))
 
 
 def _local(points: np.ndarray, solid: Shape) -> np.ndarray:
@@ -382,7 +381,7 @@ def inside_solid(points: np.ndarray, solid: Shape) -> np.ndarray:
     faces = solid.faces
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     count = len(solid.points)
-    piece = connected_component_labels(edges, count)[faces[:, 0]]
+    piece = connected_pieces(faces, count)
     _, where = np.unique(edges.min(1) * count + edges.max(1), return_inverse=True)
     balance = np.bincount(where, np.where(edges[:, 0] < edges[:, 1], 1, -1))
     open_pieces = np.unique(np.tile(piece, 3)[balance[where] != 0])

@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from echomodel.boxes import Boxes
 from echomodel.objective.support import carriers
 from echomodel.roomboxes import footprints
+from echomodel.triangles import connected_pieces
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Placed, Relation, SceneGraph
 from echousd.graph.arrays import rounded_boxes, triplets_of
@@ -24,7 +25,6 @@ from echousd.place.report import Collision
 from echousd.room import LayoutOutcome
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.nofit import FLUSH, Solids, depth, forbidden_moves
-from echousd.shapes.surface import connected_pieces
 from echousd.shapes.walls import ShellPart
 from echousd.shapes.walls import walls as walls_of
 

@@ -13,13 +13,13 @@ from pxr import Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from echomodel.late import extra
 from echousd.shapes.geometry import Mass
-from echousd.shapes.matter import moves, read_mass
+from echousd.shapes.matter import read_mass
 from echousd.stage.contents import triangulated
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.layouts import each_layout
 from echousd.stage.units import metres_per_unit, upwards
-from echousd.stage.values import array, lineage, matrix
+from echousd.stage.values import array, lineage, matrix, moves
 
 GRAVITY = 9.81  # m/s², where the stage tells none
 FRICTION = 0.5  # where no physics material is bound

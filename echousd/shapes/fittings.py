@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 import trimesh
 
-from echomodel.openings import Opening
+from echomodel.openings import SKIRTING, Opening
 from echomodel.vocabulary import vocabulary
 
 WALL = 0.15  # metres, thickness of walls
@@ -21,7 +21,6 @@ LINING = 0.03
 LEAF = 0.04  # thickness of a door's leaf
 GAP = 0.004
 FRAME, BAR, PANE = 0.055, 0.022, 0.42  # width of a window's frame and of its glazing bars, and about what lies between
-SKIRTING = 0.012  # thickness
 PLATE, REACH = 0.085, 0.12  # side of a switch's plate, and how far beside a door's trim it is
 RAIL = (0.12, 0.09, 0.25)  # curtain rail: above the window, before the wall, beyond its sides
 

@@ -6,12 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 
 from echomodel.furniture.solids import Joint
 from echousd.shapes.surface import CREASE
+
+if TYPE_CHECKING:
+    import trimesh
 
 CONVERTED = "model.usdc"
 
@@ -107,6 +110,8 @@ class Geometry:
         """All parts as one mesh."""
         if len(self.parts) == 1:
             return self.parts[0].mesh
+        import trimesh
+
         whole = trimesh.util.concatenate([part.mesh for part in self.parts])
         assert isinstance(whole, trimesh.Trimesh)
         return whole

@@ -6,12 +6,11 @@ import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-import trimesh
 from pxr import Gf, Usd, UsdPhysics
-from scipy.spatial import ConvexHull, QhullError
 from shapely.affinity import scale
 
 from echomodel.dressing.prints import PRINTS
@@ -21,6 +20,9 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.geometry import Collider, Geometry, Mass
 from echousd.stage.pen import Pen
+
+if TYPE_CHECKING:
+    import trimesh
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,8 @@ def density(category: str) -> float:
 
 def hull_volume(points: np.ndarray) -> float:
     """Volume of the convex hull of points (n, 3), m³; 0 of points in one plane."""
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         return float(ConvexHull(points).volume)  # trimesh's hull is a mesh and takes five times as long
     except QhullError:
@@ -161,13 +165,6 @@ def read_mass(prim: Usd.Prim) -> Mass | None:
     kilograms, centre, inertia, turn = (attribute.Get() for attribute in told)
     axes = np.array(Gf.Matrix3d(Gf.Rotation(Gf.Quatd(turn))), float).T  # USD's matrices act on rows
     return Mass(float(kilograms), np.array(centre, float), np.array(inertia, float), axes)
-
-
-def moves(prim: Usd.Prim) -> bool:
-    """Whether a prim is a rigid body that engines move."""
-    body = UsdPhysics.RigidBodyAPI(prim)
-    enabled = prim.HasAPI(UsdPhysics.RigidBodyAPI) and body.GetRigidBodyEnabledAttr().Get() is not False
-    return enabled and not body.GetKinematicEnabledAttr().Get()
 
 
 def _quaternion(axes: np.ndarray) -> Gf.Quatf:

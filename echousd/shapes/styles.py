@@ -6,9 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from echomodel.triangles import connected_pieces
 from echomodel.vocabulary import RoomStyle, vocabulary
 from echousd.naming import free_name
 
@@ -66,8 +65,8 @@ def told_styles(graph: SceneGraph) -> dict[str, RoomStyle | None]:
 
 def _joined(alike: Sequence[tuple[int, int]], count: int) -> list[int]:
     """Number of the group of each of `count` objects, given pairs that are alike."""
-    links = coo_array((np.ones(len(alike)), np.array(alike, int).reshape(-1, 2).T), shape=(count, count))
-    return connected_components(links, directed=False)[1].tolist() if count else []
+    links = np.array([*((number, number) for number in range(count)), *alike], int).reshape(-1, 2)
+    return connected_pieces(links, count)[:count].tolist()
 
 
 def _rows(graph: SceneGraph, group_of: Sequence[int]) -> list[tuple[int, int]]:

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from echomodel.triangles import area_normals
+from echomodel.triangles import area_normals, connected_pieces
 from echousd.shapes.finishes.slots import metres_of
+
+if TYPE_CHECKING:
+    import trimesh
 
 NUDGE = 4e-6  # metres between points of different boards at one place
 CREASE = np.radians(42.0)  # neighbours that fold more sharply than this keep a hard edge
-MANY_FACES = 1000
 ATLAS = 1024, 2  # texels along a side and between charts, of pieces that are unwrapped without overlaps
 
 
@@ -198,21 +198,6 @@ def unshared(points: np.ndarray, faces: np.ndarray, owner: np.ndarray, piece: np
             out[vertex] -= NUDGE * times[again] * outwards / max(float(np.linalg.norm(outwards)), 1e-20)
         times[again] += 1
     return out.astype(np.float32)
-
-
-def connected_pieces(faces: np.ndarray, points: int) -> np.ndarray:
-    """(f,) int, the connected piece that each face belongs to, in the order of their first points."""
-    if len(faces) > MANY_FACES:
-        pairs = np.concatenate([faces[:, :2], faces[:, 1:]])
-        links = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(points, points))
-        least = connected_components(links, directed=False)[1]
-    else:  # boards: building the matrix would take ten times as long
-        least, before = np.arange(points), None
-        while before is None or not np.array_equal(least, before):
-            before, least = least, least.copy()  # the first point that each is known to be connected with
-            np.minimum.at(least, faces.ravel(), np.repeat(before[faces].min(1), 3))
-            least = least[least]
-    return np.unique(least[faces[:, 0]], return_inverse=True)[1]
 
 
 def facing_axis(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

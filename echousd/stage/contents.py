@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 from pxr import Kind, Sdf, Usd, UsdGeom
-from trimesh.util import append_faces
 
 from echomodel.boxes2d import seen, turned
+from echomodel.triangles import joined
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import LABELS
 from echousd.stage.forms import Polygons, forms, polygons
@@ -225,4 +225,4 @@ def surface_of(
             world = placed @ form.world
             points.append(vertices @ world[:3, :3].T + world[:3, 3])
             faces.append(triangles)
-    return append_faces(points, faces)
+    return joined(points, faces)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
-from pxr import Gf, Sdf, Tf, Usd, UsdGeom
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
 from echousd.graph import MAX_TEXT
 from echousd.stage.encoding import StageError
@@ -182,6 +182,13 @@ def check_types(layer: Sdf.Layer, where: str) -> None:
         for found in (spec.default, *(layer.QueryTimeSample(spec.path, time) for time in samples)):
             if misfit(spec.typeName, found):
                 raise StageError(f"{where}: <{spec.path}> is {shown(found)}, allowed: {spec.typeName}")
+
+
+def moves(prim: Usd.Prim) -> bool:
+    """Whether a prim is a rigid body that engines move."""
+    body = UsdPhysics.RigidBodyAPI(prim)
+    enabled = prim.HasAPI(UsdPhysics.RigidBodyAPI) and body.GetRigidBodyEnabledAttr().Get() is not False
+    return enabled and not body.GetKinematicEnabledAttr().Get()
 
 
 def lineage(prim: Usd.Prim) -> Iterator[Usd.Prim]:

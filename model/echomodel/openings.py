@@ -21,6 +21,7 @@ USUAL = {  # metres, where nobody says otherwise
 }
 WINDOW_DEPTH = 0.35  # metres before a window where nothing tall stands
 STEP = 0.6  # metres before a door that a person needs to stand
+SKIRTING = 0.012  # metres, thickness of the boards along the foot of a wall
 HIGHEST = 100.0  # metres of an opening's height and sill: more than any room has
 LONGEST = 10_000.0  # metres of its offset and width: longer than any wall
 PROPOSED = 12.0  # metres along a wall of a floor that nobody stated: so far a proposed floor grows for its openings

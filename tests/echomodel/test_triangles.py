@@ -1,7 +1,12 @@
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from trimesh.triangles import closest_point
 
-from echomodel.triangles import area_normals, cross
+from echomodel.triangles import area_normals, connected_pieces, cross, distances, joined
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
@@ -16,3 +21,34 @@ def test_a_vector_product_is_numpy_s_bit_for_bit(shape, kind):
 def test_a_normal_is_twice_as_long_as_its_triangle_s_area():
     triangle = np.array([[[0, 0, 0], [2, 0, 0], [0, 3, 0]]], float)
     np.testing.assert_array_equal(area_normals(triangle), [[0, 0, 6]])
+
+
+def test_distances_are_those_of_trimesh_and_of_the_edge_where_there_is_no_area():
+    rng = np.random.default_rng(0)
+    triangles, points = rng.normal(size=(40, 3, 3)), 2 * rng.normal(size=(200, 3))
+    for point in points:
+        near = closest_point(triangles, np.broadcast_to(point, (40, 3)))
+        np.testing.assert_allclose(distances(point, triangles), np.linalg.norm(near - point, axis=1), atol=1e-12)
+    flat = np.array([np.zeros((3, 3)), [[0, 0, 0], [1, 0, 0], [2, 0, 0]]])
+    np.testing.assert_allclose(distances(np.array([0.5, 1.0, 0.0]), flat), [np.sqrt(1.25), 1.0])
+
+
+@given(st.integers(1, 60), st.integers(0, 2**31))
+def test_connected_pieces_are_those_of_scipy_in_the_order_of_their_points(points, seed):
+    rng = np.random.default_rng(seed)
+    faces = rng.integers(points, size=(rng.integers(1, 50), 3))
+    links = np.concatenate([faces[:, :2], faces[:, 1:]]).T
+    found = connected_components(coo_array((np.ones(links.shape[1]), links), shape=(points, points)))[1]
+    first = np.unique(found[faces[:, 0]], return_inverse=True)[1]
+    np.testing.assert_array_equal(connected_pieces(faces, points), first)
+
+
+def test_a_long_strip_in_any_order_is_one_piece():
+    strip = np.arange(5000)[:, None] + np.arange(3)
+    assert not connected_pieces(np.random.default_rng(0).permutation(5002)[strip], 5002).any()
+
+
+def test_meshes_joined_keep_their_corners():
+    one, two = (np.arange(9.0).reshape(3, 3), np.array([[0, 1, 2]])), (-np.ones((4, 3)), np.array([[1, 2, 3]]))
+    points, faces = joined(*zip(one, two, strict=True))
+    np.testing.assert_array_equal(points[faces], [one[0], two[0][1:]])

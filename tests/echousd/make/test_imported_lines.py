@@ -20,6 +20,12 @@ unused = ("echousd.checks", "echousd.texturing", "echousd.batches", "echousd.exp
           "echomodel.rooms.generator", "echoscene", "torch", "sklearn", "scipy.stats")
 print(sum(lines.values()), [name for name in unused if name in sys.modules])
 """
+CHECK = """
+import sys
+from echousd.cli.main import run
+assert run(["check", sys.argv[1]]) == 0
+print([name for name in ("torch", "trimesh", "scipy", "networkx", "echousd.place.search") if name in sys.modules])
+"""
 
 
 def test_a_bedroom_loads_what_it_uses(tmp_path):
@@ -28,3 +34,6 @@ def test_a_bedroom_loads_what_it_uses(tmp_path):
     lines, unused = found.split(maxsplit=1)
     assert unused.strip() == "[]"
     assert 15_000 < int(lines) < MOST
+    command[2] = CHECK
+    found = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    assert found.splitlines()[-1] == "[]"
