@@ -11,7 +11,7 @@ import numpy as np
 from echomodel.dressing import SMALL
 from echomodel.openings import SKIRTING, segment
 from echomodel.roomboxes import footprints
-from echomodel.triangles import area_normals, connected_pieces, distances
+from echomodel.triangles import area_normals, connected_pieces, distances, spread
 from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import (
     DEFAULT_HEIGHT,
@@ -347,14 +347,8 @@ def surface_points(surface: Shape, solid: Shape) -> np.ndarray:
 
 def _scatter(points: np.ndarray, faces: np.ndarray, count: int) -> np.ndarray:
     """(count, 3) points of the triangles, as many everywhere; none of what has no area."""
-    triangles, rng = points[faces], np.random.default_rng(0)
-    area = np.cumsum(np.linalg.norm(area_normals(triangles), axis=1))
-    if not area[-1] > 0:
-        return np.zeros((0, 3))
-    there = triangles[np.searchsorted(area, rng.random(count) * area[-1])]
-    share = rng.random((count, 2))
-    share = np.where(share.sum(1, keepdims=True) > 1, 1 - share, share)
-    return np.asarray(there[:, 0] + np.einsum("ne,nex->nx", share, there[:, 1:] - there[:, :1]))
+    triangles = points[faces]
+    return spread(triangles, count)[0] if area_normals(triangles).any() else np.zeros((0, 3))
 
 
 def _local(points: np.ndarray, solid: Shape) -> np.ndarray:

@@ -6,7 +6,6 @@ import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -20,9 +19,6 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.geometry import Collider, Geometry, Mass
 from echousd.stage.pen import Pen
-
-if TYPE_CHECKING:
-    import trimesh
 
 
 @dataclass(frozen=True)
@@ -48,7 +44,7 @@ def weighed(pieces: Iterable[Piece]) -> Mass:
     total, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
     for piece in pieces:
         matter = PARTS.get((piece.solid.role, piece.solid.material)) or MATTER[piece.solid.material]
-        volume, area = _moments(piece)
+        volume, area = _moments(piece.vertices, piece.faces)
         inside, skin = max(volume[0], 1e-7), max(area[0], 1e-7)
         walls = min(inside, skin * matter.wall)
         massive = walls >= inside
@@ -71,10 +67,10 @@ def weighed(pieces: Iterable[Piece]) -> Mass:
 Moments = tuple[float, np.ndarray, np.ndarray]
 
 
-def _moments(piece: Piece) -> tuple[Moments, Moments]:
+def _moments(vertices: np.ndarray, faces: np.ndarray) -> tuple[Moments, Moments]:
     """Of the volume and of the surface of a closed mesh: measure, first (3,) and second moment (3, 3) about 0."""
-    origin = piece.vertices[0]
-    corners = (piece.vertices - origin)[piece.faces]
+    origin = vertices[0]
+    corners = (vertices - origin)[faces]
     one, two, three = corners.transpose(1, 0, 2)
     whole = corners.sum(1)
     pairs = np.einsum("tki,tkj->tij", corners, corners) + whole[:, :, None] * whole[:, None, :]
@@ -130,19 +126,11 @@ def hull_volume(points: np.ndarray) -> float:
 def _spread(colliders: Iterable[Collider]) -> tuple[np.ndarray, np.ndarray]:
     """Centre of mass (3,), and the tensor of inertia (3, 3) about it of one kilogram in the colliders' hulls."""
     hulls = [collider.mesh.convex_hull for collider in colliders]
-    volume = np.array([max(float(hull.volume), 1e-9) for hull in hulls])
-    centres = np.array([hull.center_mass for hull in hulls])
-    middle = volume @ centres / volume.sum()
-    tensor = np.zeros((3, 3))
-    for hull, own, centre in zip(hulls, volume, centres, strict=True):
-        away = centre - middle
-        tensor += _inertia(hull) + own * (away @ away * np.eye(3) - np.outer(away, away))
-    return middle, tensor / volume.sum()
-
-
-def _inertia(hull: trimesh.Trimesh) -> np.ndarray:
-    tensor = np.asarray(hull.moment_inertia)
-    return (tensor + tensor.T) / 2
+    moments = [_moments(hull.vertices, hull.faces)[0] for hull in hulls]
+    volume, first, second = (sum(part) for part in zip(*moments, strict=True))
+    middle = first / volume
+    spread = second / volume - np.outer(middle, middle)
+    return middle, np.trace(spread) * np.eye(3) - spread
 
 
 def write_mass(pen: Pen, path: str, mass: Mass) -> None:

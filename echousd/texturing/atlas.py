@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
-from trimesh.graph import connected_component_labels
 
+from echomodel.triangles import connected_pieces
 from echousd.shapes.charts import charts
 
 Mesh = tuple[np.ndarray, np.ndarray]
@@ -82,8 +82,7 @@ def _boards(meshes: Sequence[Mesh]) -> list[_Board]:
         flat = vertices.reshape(-1)
         _, first, index = np.unique(flat, return_index=True, return_inverse=True)
         faces = index.reshape(-1, 3)
-        pairs = np.concatenate([faces[:, :2], faces[:, 1:]])
-        label = connected_component_labels(pairs, len(first))[faces[:, 0]]
+        label = connected_pieces(faces, len(first))
         for board in np.unique(label):
             own = np.flatnonzero(label == board)
             used, local = np.unique(faces[own].ravel(), return_inverse=True)

@@ -32,6 +32,19 @@ def distances(point: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return np.where(over, np.abs((corner[:, 0] * normal).sum(1)) / np.maximum(length, 1e-30), out)
 
 
+def spread(triangles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """(count, 3) points of triangles (f, 3, 3) that have any area, and the triangle that each is on, (count,) int.
+
+    They lie evenly along the summed area, and on a low-discrepancy sequence inside: random ones leave holes.
+    """
+    area, step = np.cumsum(np.linalg.norm(area_normals(triangles), axis=1)), np.arange(count)
+    face = np.searchsorted(area / area[-1], (step + 0.5) / count).clip(0, len(area) - 1)
+    share = np.stack([step * 0.7548776662466927, step * 0.5698402909980532], 1) % 1
+    share = np.where(share.sum(1, keepdims=True) > 1, 1 - share, share)
+    corner, sides = triangles[face, :1], triangles[face, 1:]
+    return corner[:, 0] + np.einsum("ne,nex->nx", share, sides - corner), face
+
+
 def joined(points: Sequence[np.ndarray], faces: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) and faces (m, 3) of several meshes as those of one."""
     first = np.cumsum([0, *map(len, points)])

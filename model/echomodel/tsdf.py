@@ -16,7 +16,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from echomodel.furniture.solids import Solid, Tube
-from echomodel.triangles import area_normals
+from echomodel.triangles import area_normals, spread
 
 if TYPE_CHECKING:
     import trimesh
@@ -136,15 +136,7 @@ def _distance_to_triangles(triangles: np.ndarray) -> np.ndarray:
     keep = area > 1e-9
     triangles, area = triangles[keep], area[keep]
     points = min(max(SURFACE_POINTS, int(POINTS_PER_VOXEL * area.sum())), MOST_POINTS)
-    # Evenly along the summed area and on a low-discrepancy sequence inside: random points leave holes to leak through.
-    step = np.arange(points)
-    face = np.searchsorted(np.cumsum(area) / area.sum(), (step + 0.5) / points).clip(0, len(area) - 1)
-    u, v = (step * 0.7548776662466927) % 1, (step * 0.5698402909980532) % 1
-    flip = u + v > 1
-    u[flip], v[flip] = 1 - u[flip], 1 - v[flip]
-    a, b, c = triangles[face].transpose(1, 0, 2)
-    samples = a + u[:, None] * (b - a) + v[:, None] * (c - a)
-
+    samples, face = spread(triangles, points)
     reach = TRUNCATION + 1.0
     occupied = np.zeros((RESOLUTION,) * 3, bool)
     occupied[tuple(np.clip(np.rint(samples), 0, RESOLUTION - 1).astype(int).T)] = True

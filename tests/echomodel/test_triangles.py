@@ -6,7 +6,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from trimesh.triangles import closest_point
 
-from echomodel.triangles import area_normals, connected_pieces, cross, distances, joined
+from echomodel.triangles import area_normals, connected_pieces, cross, distances, joined, spread
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
@@ -52,3 +52,14 @@ def test_meshes_joined_keep_their_corners():
     one, two = (np.arange(9.0).reshape(3, 3), np.array([[0, 1, 2]])), (-np.ones((4, 3)), np.array([[1, 2, 3]]))
     points, faces = joined(*zip(one, two, strict=True))
     np.testing.assert_array_equal(points[faces], [one[0], two[0][1:]])
+
+
+def test_points_are_spread_evenly_over_the_area():
+    triangles = np.array([[[0, 0, 0], [3, 0, 0], [0, 1, 0]], [[0, 0, 5], [1, 0, 5], [0, 1, 5]], np.zeros((3, 3))])
+    points, face = spread(triangles, 4000)
+    np.testing.assert_array_equal(np.bincount(face, minlength=3), [3000, 1000, 0])
+    np.testing.assert_array_equal(points[:, 2], 5.0 * face)
+    x, y = points[face == 0, :2].T
+    assert min(x.min(), y.min()) >= 0
+    assert (x / 3 + y).max() <= 1 + 1e-12
+    np.testing.assert_allclose(points[face == 0].mean(0), [1, 1 / 3, 0], atol=0.01)

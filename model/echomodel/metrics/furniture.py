@@ -7,8 +7,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import torch
 import trimesh
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from torch import Tensor
 
 from echomodel.boxes import Boxes
@@ -18,7 +16,7 @@ from echomodel.furniture.style import GROUPS, HOT, STYLE
 from echomodel.graph import GraphBatch
 from echomodel.objective.sizes import size_range
 from echomodel.protocols import FurnitureModel
-from echomodel.triangles import area_normals
+from echomodel.triangles import connected_pieces, spread
 from echomodel.vocabulary import vocabulary
 
 TOUCH = 0.006  # metres between solids that still count as joined
@@ -45,24 +43,14 @@ def group_of(solids: Sequence[Solid]) -> tuple[Array, int]:
     for i, j in zip(*np.nonzero(np.triu(near, 1)), strict=True):
         if _touches(surfaces[i], solids[j]) or _touches(surfaces[j], solids[i]):
             joined.append((i, j))
-    ends = np.array(joined, int).reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(solids), len(solids)))
-    _, group = connected_components(graph, directed=False)
+    group = connected_pieces(np.array([*((n, n) for n in range(len(solids))), *joined]), len(solids))[: len(solids)]
     return group, int(np.bincount(group).argmax())
 
 
 def _surface_of(solid: Solid) -> Array:
     """Vertices of a solid and points spread evenly over its faces, metres."""
     vertices, faces = solid.mesh(2)
-    corners = vertices[faces]
-    area = np.linalg.norm(area_normals(corners), axis=1)
-    if area.sum() <= 0:
-        return vertices
-    share = (np.arange(POINTS) + 0.5) / POINTS
-    face = corners[np.searchsorted(np.cumsum(area) / area.sum(), share).clip(max=len(faces) - 1)]
-    u, v = np.sqrt((np.arange(POINTS) * 0.7548776662) % 1)[:, None], ((np.arange(POINTS) * 0.5698402910) % 1)[:, None]
-    inside = (1 - u) * face[:, 0] + u * (1 - v) * face[:, 1] + u * v * face[:, 2]
-    return np.concatenate([vertices, inside])
+    return np.concatenate([vertices, spread(vertices[faces], POINTS)[0]])
 
 
 def _touches(points: Array, solid: Solid) -> bool:
