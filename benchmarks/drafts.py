@@ -1,8 +1,11 @@
 """What the layout network draws, judged room by room: weights beside one another and beside the same ones shuffled.
 
     python benchmarks/drafts.py [WEIGHTS ...] [--ways alone guided searched] [--rooms ROOMS.json] [--count 40]
+    python benchmarks/drafts.py ships muted shuffled random generator --ways searched --poses 250 1000 4500
 
-`ships`, `shuffled` and `muted` (the echo off) are words for WEIGHTS. The rooms are of the room generator from a seed
+`ships`, `shuffled` and `muted` (the echo off) are words for WEIGHTS, and so are two who are no network: `random` places
+and the room `generator`. `--poses`: what a search may judge, each a whole room; a search ends with the move that passes
+it, so what it did judge is told. The rooms are of the room generator from a seed
 that no training used, or every so many of a rooms file, one near relation an object told, one draft each; faults are
 those of all terms. Below each way stand the means of the differences to the first weights, room by room, with 95 %
 intervals by bootstrap.
@@ -12,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -22,29 +26,39 @@ from echomodel.loading import load_model
 from echomodel.metrics.layouts import Task, kept_relations, tasks_of
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
 from echomodel.rooms.generator import generate_rooms
-from echousd.evaluation.systems import muted_model, networks, searched, shuffled_model
-from echousd.place.solver import PlaceConfig
+from echousd.evaluation.systems import BASES, muted_model, networks, shuffled_model
+from echousd.graph.arrays import one_thread
+from echousd.place import search
+from echousd.place.placing import place_boxes
 
 SEED = 770_000  # of the generated rooms, as in `placing.py`
+OTHERS = {"random": BASES["random"][0], "generator": BASES["generator"][0]}
 WORDS = {"ships": partial(load_model, None), "shuffled": shuffled_model, "muted": muted_model}
 ROWS = ("told kept", "faults an object", "rooms without")
 DRAWS = 4000  # of the bootstrap
 
 
-def judged(weights: str, way: str, tasks: list[Task]) -> tuple[np.ndarray, Counter[str]]:
-    """Part and whole of `ROWS` in each room (R, 3, 2), and how often each term was missed."""
-    draw = networks(WORDS.get(weights, partial(load_model, weights)), None if way == "guided" else 0.0)
-    rooms = draw(tasks, 0)
-    if way == "searched":
-        rooms = [searched(task, room, PlaceConfig()) for task, room in zip(tasks, rooms, strict=True)]
+def judged(weights: str, way: str, tasks: list[Task]) -> tuple[np.ndarray, Counter[str], int]:
+    """Part and whole of `ROWS` in each room (R, 3, 2), how often each term was missed, and poses judged in all."""
+    draw = OTHERS.get(weights) or networks(
+        WORDS.get(weights, partial(load_model, weights)), None if way == "guided" else 0.0
+    )
+    rooms, poses = draw(tasks, 0), 0
     scores, missed = [], Counter[str]()
     for task, room in zip(tasks, rooms, strict=True):
+        if way == "searched":
+            with one_thread():
+                done = place_boxes(
+                    room.categories, room.size, room.position, room.yaw, task.told, floor_polygon=room.floor_polygon,
+                    height=room.height, openings=room.openings, rules=task.rules,
+                )  # fmt: skip
+            room, poses = replace(room, size=done.size, position=done.position, yaw=done.yaw), poses + done.judged
         plan = plan_of(room, room.categories, room.floor_polygon, room.openings, task.told, height=room.height)
         found = [fault.rule for fault in [*faults_of(plan, KINDS), *unreached(plan)]]
         kept, told = map(np.sum, kept_relations(task, room)["all"])
         scores.append([(kept, told), (len(found), len(room)), (not found, 1)])
         missed.update(found)
-    return np.array(scores, float), missed
+    return np.array(scores, float), missed, poses
 
 
 def interval(mine: np.ndarray, first: np.ndarray) -> np.ndarray:
@@ -63,20 +77,25 @@ def main() -> None:
     parser.add_argument("--ways", nargs="+", default=["alone"], choices=["alone", "guided", "searched"])
     parser.add_argument("--rooms", type=Path)
     parser.add_argument("--count", type=int, default=40)
+    parser.add_argument("--poses", nargs="+", type=int, default=[search.BUDGET])
     options = parser.parse_args()
     rooms = generate_rooms(options.count, SEED) if options.rooms is None else load_rooms(options.rooms)
     rooms = [room for room in with_known_words(rooms) if len(room) > 1]
     rooms = [rooms[number * len(rooms) // options.count] for number in range(min(options.count, len(rooms)))]
     tasks = tasks_of(rooms, 0, told=1.0)
     print(f"{len(tasks)} rooms, {sum(len(task.room) for task in tasks)} objects")
-    for way in options.ways:
+    for way, poses in [(w, p) for w in options.ways for p in (options.poses if w == "searched" else [0])]:
         first: np.ndarray | None = None
         for weights in options.weights:
-            found, missed = judged(weights, way, tasks)
+            if way == "searched":
+                search.Search.__init__.__defaults__ = (search.TERMS, poses, *search.Search.__init__.__defaults__[2:])
+            found, missed, looked = judged(weights, way, tasks)
             total = found.sum(0)
             told, faults, clean = total[:, 0] / total[:, 1]
             most = ", ".join(f"{name} {n}" for name, n in missed.most_common(6))
-            print(f"{way:8s} {weights}: told kept {told:.3f}, {faults:.3f} faults an object, {clean:.2f} without")
+            after = f" after {looked / len(tasks):.0f} poses a room" if looked else ""
+            said = f"told kept {told:.3f}, {faults:.3f} faults an object, {clean:.2f} without{after}"
+            print(f"{way:8s} {weights}: {said}")
             print(f"         {most}", flush=True)
             if first is not None:
                 low, high = interval(found, first)
