@@ -33,7 +33,7 @@ OUTSIDE = 0.03  # metres beyond the floor's edge
 FLOATING = 0.03  # metres of air below, or depth below the floor
 HANGING = 0.06  # metres between a ceiling thing and the ceiling
 LEANING = 0.15  # metres between a wall thing and its wall
-DRAPED = 0.06  # metres of air below the edge of cloth that hangs over what it lies on
+DRAPED = 0.06  # metres of air below cloth that lies over folds
 BESIDE = 0.6  # metres that a curtain or a blind may hang beside its window
 SCREENS = ("tv", "television")
 ACROSS = np.cos(np.radians(60))  # of the angle between a screen and what it stands on
@@ -186,7 +186,7 @@ def _small_faults(
             if beside > BESIDE:
                 yield "off its window", beside
         return
-    air = _air_below(shape, carriers)
+    air = _air_below(shape, carriers, draped=kind.lies)
     if air > (DRAPED if kind.lies else FLOATING):
         yield "floating", air
 
@@ -219,11 +219,14 @@ def _footprint(thing: Shape) -> np.ndarray:
     return footprints(thing.size[None], thing.position[None], np.array([thing.yaw]))[0]
 
 
-def _air_below(thing: Shape, others: Sequence[Shape]) -> float:
-    """Height of the bottom over the floor or over the nearest surface below the middle or a corner of the object."""
-    bottom = float(thing.position[1])
-    air = abs(bottom)
+def _air_below(thing: Shape, others: Sequence[Shape], *, draped: bool = False) -> float:
+    """Height of the bottom over the floor or over the nearest surface below the middle or a corner of the object.
+
+    `draped`: it hangs lower than it lies, and counts from where it lies there.
+    """
     feet = np.concatenate((thing.position[None, [0, 2]], 0.5 * (_footprint(thing) + thing.position[[0, 2]])))
+    bottom = _surface_gap(feet, 0.0, thing) if draped and len(thing.points) else float(thing.position[1])
+    air = abs(bottom)
     for other in others:
         if other is thing:
             continue

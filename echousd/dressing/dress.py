@@ -81,10 +81,10 @@ def dress(room: RoomData) -> Dressing:
         if room.options.dress == "none":  # rails hang where curtains would
             continue
         for found in setting.placed:
-            key = (found.kind, *np.round(found.size, 4).tolist(), found.variant)
+            key = (found.kind, *np.round(found.size, 4).tolist(), found.variant, found.lie)
             if key not in known:
                 known[key] = free_name(f"small_{found.kind}", taken | set(geometry))
-                geometry[known[key]] = geometry_of(found.kind, tuple(found.size.tolist()), found.variant)
+                geometry[known[key]] = geometry_of(found.kind, tuple(found.size.tolist()), *key[-2:])
             word = KINDS[found.kind].name
             name = free_name(word, taken | set(named))
             while kinds.setdefault(name, key) != key:  # a name has one asset in all layouts
@@ -129,9 +129,9 @@ def setting_of(room: RoomData, layout: int = 0) -> Setting:
 
 
 @lru_cache(maxsize=100)  # a room that is edited keeps most of its things
-def geometry_of(kind: str, size: tuple[float, float, float], variant: int) -> Geometry:
+def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: tuple[float, ...] = ()) -> Geometry:
     """The geometry of a thing, with one hull to bump into that stands."""
-    solids = solids_of(kind, np.array(size), np.random.default_rng(variant))
+    solids = solids_of(kind, np.array(size), np.random.default_rng(variant), **({"lie": lie} if lie else {}))
     pieces = within_budget(solids, np.array(size), KINDS[kind].faces)
     part = part_of("mesh", pieces)
     return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, weighed(pieces))

@@ -33,6 +33,7 @@ class Thing:
     on: str = ""  # the object that it belongs to, "" for floor and walls
     variant: int = 0  # seed of its program; things of one kind, size and variant share an asset
     count: int = 1  # how many things a person would count
+    lie: tuple[float, ...] = ()  # of cloth: how far below its top what it lies on is, in a grid, metres
 
     @cached_property
     def footprint(self) -> shapely.Polygon:

@@ -7,6 +7,7 @@ import shapely
 
 from echomodel.dressing import usual_size
 from echomodel.dressing.prints import names_of
+from echomodel.dressing.textiles import LIES
 from echomodel.triangles import area_normals
 from echousd.dressing.setting import Setting, Standing, Thing
 from echousd.shapes.nofit import forbidden_moves
@@ -18,6 +19,8 @@ WIDE_BED = 1.3  # metres
 LEVEL = 0.005  # metres: what is as high as that is one height
 AHEAD = (0.0, 0.04, 0.08)  # metres that a blanket lies before where the back seems to begin
 FOLDED = 0.45  # share of rooms whose sofa has a folded blanket
+SOFT, BEYOND = 0.04, 12  # metres between folds of a bed; places further from pillows that a cushion may be
+BOARD = 0.12  # metres over a bed's middle from which on what stands there is a board
 RAISED = 0.04  # metres that a flat thing is raised at most so that it lies on the solids of a seat
 
 
@@ -138,15 +141,16 @@ def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -
 
 
 def _lying(host: Standing, seat: _Seat, spot: np.ndarray, turn: float, size: np.ndarray) -> np.ndarray | None:
-    """A place near a spot (3,) that is clear of the host, at the height of what is below; None where there is none."""
+    """A place near a spot (3,) that is clear of the host and on what is below; None where there is none."""
     for _ in range(3):
-        clear = _clear_of(host, spot, turn, size)
-        down = None if clear is None else seat.below(clear, size)
-        if clear is None or down is None:
+        down = seat.below(spot, size)
+        upon = None if down is None else _upon(host, np.array([spot[0], down, spot[2]]), size)
+        clear = None if upon is None else _clear_of(host, upon + np.array([0.0, 0.002, 0.0]), turn, size)
+        if upon is None or clear is None:
             return None
-        if abs(down - clear[1]) < LEVEL:
+        if np.abs(clear - upon).max() < LEVEL:
             return clear
-        spot = np.array([clear[0], down, clear[2]])
+        spot = clear
     return None
 
 
@@ -183,10 +187,11 @@ class _Seat:
         head = self.z < 0.1 * self.z[0]  # the half of the head and a little more
         raised = np.flatnonzero(head & (self.height[rows].max(0) > self.level + 0.08))
         first = int(raised[-1]) + 1 if len(raised) else len(self.z)
-        under = self.height[rows, first : first + deep]
-        if under.shape[1] < deep or np.ptp(under) > 0.05:
-            return None
-        return np.array([x, float(under.max()), self.z[first] + (deep - 1) * STEP / 2])
+        for at in range(first, min(first + BEYOND, len(self.z) - deep)):
+            under = self.height[rows, at : at + deep]
+            if np.ptp(under) < SOFT:
+                return np.array([x, float(under.max()), self.z[at] + (deep - 1) * STEP / 2])
+        return None
 
     def below(self, spot: np.ndarray, size: np.ndarray) -> float | None:
         """Height of the level surface below most of what lies at a spot (3,); None where it is not level."""
@@ -195,7 +200,7 @@ class _Seat:
         if not under.size or not np.isfinite(under).any():
             return None
         top = float(under.max())
-        return top if (under > top - 4 * LEVEL).mean() > 0.6 else None
+        return top if (under > top - SOFT).mean() > 0.6 else None
 
     def resting(self, end: float, size: np.ndarray) -> np.ndarray | None:
         """(3,) a place on the seat against the back, towards one end (-1 to 1); None where there is none."""
@@ -246,24 +251,28 @@ def _heights(corners: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
 def throws(setting: Setting) -> None:
     """A blanket across the foot of every bed that lets it lie flat and hang down."""
     for host in setting.of("bed"):
-        rng = setting.rng(host.name, "throw")
-        mesh = host.geometry.mesh
-        corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)]
+        rng, seat = setting.rng(host.name, "throw"), _Seat.of(host)
         deep = float(np.clip(0.3 * host.size[2], 0.4, 0.75))
-        depths = (float(host.size[2]) / 2 - back - deep / 2 for back in (0.12, 0.2, 0.3))
-        wanted = (thing for z in depths if (thing := _across(host, corners, z, deep, rng)) is not None)
+        depths = (float(host.size[2]) / 2 - back - deep / 2 for back in (0.1, 0.2, 0.3)) if seat else ()
+        wanted = (thing for z in depths if seat and (thing := _across(host, seat, z, deep, rng)) is not None)
         setting.put_first(wanted, host=host.name, margin=0.0)
 
 
-def _across(host: Standing, corners: np.ndarray, z: float, deep: float, rng: np.random.Generator) -> Thing | None:
-    """A throw across a bed, its middle at `z`; None where nothing of a bed's height lies there."""
-    here = corners[(corners[..., 2].min(1) < z + deep / 2) & (corners[..., 2].max(1) > z - deep / 2)]
-    lying = here[..., 2].min(1) > z - 3 * deep  # boards along the whole bed end where the bed ends
-    top = float(here[lying][..., 1].max()) if lying.any() else 0.0
-    if not 0.25 < top < 0.85:
+def _across(host: Standing, seat: _Seat, z: float, deep: float, rng: np.random.Generator) -> Thing | None:
+    """A throw across a bed, its middle at `z`, that lies on all of it; None where nothing of a bed's height is there or
+    a board stands in its way.
+    """
+    under = seat.height[:, np.abs(seat.z - z) < deep / 2]
+    middle, top = float(np.median(under[np.abs(seat.x) < 0.3 * host.size[0]])), float(under.max())
+    if not 0.25 < middle <= top < min(0.85, middle + BOARD):
         return None
-    side = here[here[..., 1].max(1) > top - 0.2]
-    half = float(np.abs(side[..., 0]).max())
+    half = float(np.abs(seat.x[(under > top - 0.2).any(1)]).max()) + STEP / 2
     size = np.round([2 * half + 0.05, 0.012 + rng.uniform(0.16, 0.22), deep], 3)
+    rows, columns = np.linspace(0, under.shape[1], LIES[0] + 1), np.linspace(-half, half, LIES[1] + 1)
+    cells = [
+        [under[np.abs(seat.x - x - half / LIES[1]) < 0.05, int(k) : int(k) + 3].max() for x in columns[:-1]]
+        for k in rows[:-1]
+    ]
+    lie = tuple(np.round(np.clip(top - np.array(cells), 0.0, BOARD), 3).ravel().tolist())
     spot = host.to_room(np.array([[0.0, top + 0.014 - size[1], z]]))[0]
-    return Thing("throw", size, spot, host.yaw, host.name, int(rng.integers(1 << 30)))
+    return Thing("throw", size, spot, host.yaw, host.name, int(rng.integers(1 << 30)), lie=lie)

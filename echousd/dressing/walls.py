@@ -26,7 +26,7 @@ SIDE = 0.32  # metres that curtains take beside a window
 RADIATORS = ("panel_radiator", "panel_radiator", "flat_radiator", "column_radiator")  # without a style
 BELOW, BEHIND = 0.14, 0.03  # metres of air between a window's sill and a radiator, and behind it
 PLUGGED = ("bed", "desk", "tv_stand")  # words of what has a socket beside it
-CURTAINS = ("curtain", "eyelet_curtain", "pleated_curtain", "sheer_curtain")  # of a room all are alike
+CURTAINS = ("curtain", "tied_curtain", "eyelet_curtain", "pleated_curtain", "sheer_curtain")  # of a room all are alike
 BLINDS = ("blind", "roman_blind", "cafe_curtain")  # as well; where it is wet, the first
 BEFORE = 0.35  # metres from a window: what stands so near is under it
 

@@ -47,11 +47,20 @@ def test_a_cord_runs_along_the_seam_of_its_cushion():
 def test_a_cover_has_folds_and_two_covers_differ():
     def tops(seed):
         points = cover(-HALF, HALF, "blanket", 0.04, 0.03, np.random.default_rng(seed)).mesh()[0]
-        inner = (abs(points[:, 0]) < 0.3) & (abs(points[:, 2]) < 0.2) & (points[:, 1] > 0)
-        return points[inner, 1]
+        return points[(abs(points[:, [0, 2]]) < HALF[[0, 2]] - 0.045).all(1) & (points[:, 1] > 0), 1]
 
     assert 0.008 < np.ptp(tops(1)) < 0.031
-    assert not np.allclose(tops(1), tops(2))
+    assert not np.allclose(np.sort(tops(1))[-40:], np.sort(tops(2))[-40:])
+
+
+@pytest.mark.parametrize("falls", [False, True])
+def test_a_cover_hangs_over_its_sides_and_at_its_foot_where_it_falls(falls):
+    points = cover(-HALF, HALF, "blanket", 0.04, 0.03, np.random.default_rng(1), falls=falls).mesh()[0]
+    foot = points[(points[:, 2] > HALF[2] - 0.04) & (abs(points[:, 0]) < HALF[0] - 0.05)]
+    assert (foot[:, 1].min() < -0.5 * HALF[1]) == falls
+    assert foot[:, 1].max() > HALF[1] - 0.035  # a round edge
+    hem = points[(abs(points[:, 2]) < 0.15) & (points[:, 0] > HALF[0] - 0.04) & (points[:, 1] < 0)]
+    assert np.ptp(hem[hem[:, 1] < -0.06, 0]) > 0.01  # waves
 
 
 def test_sofas_have_eight_bodies_and_each_family_builds_several():

@@ -83,6 +83,6 @@ def usual_size(kind: str, rng: np.random.Generator) -> np.ndarray:
     return np.round(low + (high - low) * rng.random(), 4)
 
 
-def thing(kind: str, size: np.ndarray, rng: np.random.Generator) -> list[Solid]:
+def thing(kind: str, size: np.ndarray, rng: np.random.Generator, **form: tuple[float, ...]) -> list[Solid]:
     """The solids of one small thing, about as large as `size` (3,), metres; +Y up, +Z its front, its bottom at 0."""
-    return KINDS[kind].program(np.asarray(size, float), rng)
+    return KINDS[kind].program(np.asarray(size, float), rng, **form)

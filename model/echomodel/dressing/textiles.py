@@ -2,48 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from echomodel.dressing.prints import any_of
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.cloth import folds, pillow, seam
-from echomodel.furniture.solids import FINEST, Array, Solid, ball, rotation, tube, turned
+from echomodel.furniture.cloth import Sheet, folds, pillow, seam
+from echomodel.furniture.solids import Solid, ball, rotation, tube, turned
 
-FOLD = 0.14  # metres of curtain from one fold to the next
+LIES = (11, 16)  # cells in which a throw knows what it lies on
+FOLD = 0.125  # metres of curtain from one fold to the next
+# where in a fold its cloth has points, radians from where it is foremost: it bends alike at each
+BENDS = np.array([0.5, np.pi / 2, np.pi - 0.5, np.pi, np.pi + 0.5, 1.5 * np.pi, 2 * np.pi - 0.5, 2 * np.pi])
 DRAPES = {"curtain": 0.3, "linen": 0.15, "drape": 0.3, "velvet": 0.25}  # what curtains are of, how often
-
-
-@dataclass(frozen=True, eq=False)
-class Sheet(Solid):
-    """Cloth: `front` and `back` (n, m, 3) float are its two sides, point for point, metres."""
-
-    front: Array = field(default_factory=lambda: np.zeros((2, 2, 3)))
-    back: Array = field(default_factory=lambda: np.zeros((2, 2, 3)))
-
-    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        n, m = self.front.shape[:2]
-        index = np.arange(n * m).reshape(n, m)
-        vertices = np.concatenate([self.front.reshape(-1, 3), self.back.reshape(-1, 3)])
-        border = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
-        after = np.roll(border, -1)
-        far = n * m
-        faces = np.concatenate(
-            [
-                _quads(index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]),
-                _quads(index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]) + far,
-                _quads(after, border, border + far, after + far),
-            ]
-        )
-        corners = vertices[faces]
-        volume = np.einsum("nx,nx->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()
-        return vertices, faces if volume > 0 else np.ascontiguousarray(faces[:, ::-1])
-
-
-def _quads(a: Array, b: Array, c: Array, d: Array) -> Array:
-    a, b, c, d = (v.ravel() for v in (a, b, c, d))
-    return np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
 
 
 def rug(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
@@ -60,22 +32,30 @@ def round_rug(size: Size, rng: np.random.Generator, shown: str = "") -> list[Sol
 
 def curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     """One curtain in loose folds below rings, which spread towards its foot."""
-    return [*_hung(size, rng, FOLD, top=0.65, drift=0.4, head=0.03), *_rings(size, FOLD)]
+    return [*_hung(size, rng, FOLD, top=0.65, drift=0.8, head=0.03), *_rings(size, FOLD)]
+
+
+def tied_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """One curtain that a band of its cloth holds together below its middle."""
+    w, h, d = size
+    cloth = _drape(rng)
+    band = turned((0, 0.37 * h, 0), (0.29 * w, 0.4 * d), 0.04, rounding=0.012, power=3.0, material=cloth)
+    return [*_hung(size, rng, FOLD, top=0.5, drift=0.3, material=cloth, tied=0.5), band]
 
 
 def eyelet_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     """One curtain in even waves from its rod to its foot, as eyelets make them."""
-    return [*_hung(size, rng, 1.3 * FOLD, top=1.0, drift=0.0), *_rings(size, 0.65 * FOLD, below=0.02)]
+    return [*_hung(size, rng, FOLD, top=1.0, drift=0.15), *_rings(size, FOLD, below=0.02)]
 
 
 def pleated_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     """One curtain whose head is pinched into narrow pleats and whose foot is wide."""
-    return _hung(size, rng, 0.75 * FOLD, top=0.3, drift=0.25, narrow=0.16)
+    return _hung(size, rng, 0.9 * FOLD, top=0.3, drift=0.5, narrow=0.16)
 
 
 def sheer_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     """One thin curtain in many small folds, through which light comes."""
-    return _hung(size, rng, 0.6 * FOLD, top=0.5, drift=0.5, material="sheer")
+    return _hung(size, rng, 0.85 * FOLD, top=0.5, drift=0.8, material="sheer")
 
 
 def cafe_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -83,8 +63,8 @@ def cafe_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     w, h, d = size
     rod = tube([(-w / 2, h - 0.012, 0), (w / 2, h - 0.012, 0)], 0.006, "metal")
     within = np.array([0.97 * w, h - 0.02, d])
-    cloth = _hung(within, rng, 0.75 * FOLD, top=0.7, drift=0.3, narrow=0.0, material="sheer")
-    return [*cloth, *_rings(np.array([w, h, d]), FOLD), rod]
+    cloth = _hung(within, rng, FOLD, top=0.7, drift=0.3, narrow=0.0, material="sheer")
+    return [*cloth, *_rings(np.array([w, h, d]), 1.5 * FOLD), rod]
 
 
 def _drape(rng: np.random.Generator) -> str:
@@ -102,23 +82,30 @@ def _rings(size: Size, apart: float, below: float = 0.0) -> list[Solid]:
 
 def _hung(
     size: Size, rng: np.random.Generator, fold: float, *, top: float, drift: float, narrow: float = 0.04,
-    material: str = "", head: float = 0.0,
+    material: str = "", head: float = 0.0, tied: float = 0.0,
 ) -> list[Solid]:  # fmt: skip
-    """Cloth in folds of `fold` metres, at its head `top` times as deep and by `narrow` of its width less wide.
+    """Cloth in round folds of about `fold` metres, no two alike, at its head `top` times as deep and by `narrow` of its
+    width less wide; they wander by `drift` of a fold from head to foot.
 
     `head`: metres from the top of `size` to that of the cloth, which is one of `DRAPES` where no `material` is told.
+    `tied`: share of its width that is drawn in below its middle.
     """
     w, h, d = size
     cloth = material or _drape(rng)
-    folds = max(2, round(w / fold))
-    x = np.linspace(-w / 2, w / 2, 7 * folds + 1)
-    phase, wander = rng.uniform(0, 2 * np.pi), drift * rng.uniform(-1, 1, 3)
+    count = max(2, round(w / fold))
+    phase, wander = rng.uniform(0, 2 * np.pi, 4), drift * rng.uniform(-1, 1, 3)
+    turn = (np.arange(count)[:, None] * 2 * np.pi + BENDS).ravel()
+    along = turn / (2 * np.pi * count) - 0.5
+    uneven = 0.8 + 0.2 * np.sin(0.43 * turn + phase[1])
     rows = []
-    for share in np.linspace(0, 1, 5):
-        depth = (d - 0.012) / 2 * (1.0 - (1.0 - top) * share)
-        bend = wander[0] * np.sin(2.1 * x / w + wander[1]) * (1 - share)
-        z = depth * np.sin(2 * np.pi * folds * (x + w / 2) / w + phase + bend)
-        rows.append(np.stack([x * (1.0 - narrow * share), np.full_like(x, share * (h - head)), z], 1))
+    for share in np.linspace(0, 1, 7 if count < 5 or tied else 5):
+        slack = 1 - share
+        waist = tied * np.exp(-(((share - 0.38) / 0.16) ** 2))
+        wide = (1 - narrow * share) * (1 - waist) * w
+        aside = slack * (np.sin(6 * along + phase[2]) + wander[1] * slack * np.sin(11 * along + phase[3]))
+        x = wide * (along + 0.3 * wander[0] / count * aside)
+        z = (d - 0.012) / 2 * (1 - (1 - top) * share) * (1 - 0.3 * waist) * uneven * np.cos(turn)
+        rows.append(np.stack([x, np.full_like(x, share * (h - head)), z], 1))
     front, thick = np.stack(rows), np.array([0, 0, 0.004])
     return [Sheet(front=front + thick, back=front - thick, material=cloth)]
 
@@ -172,28 +159,31 @@ def lumbar_cushion(size: Size, rng: np.random.Generator, shown: str = "") -> lis
     return cushion(size, rng, shown)
 
 
-def throw(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A blanket over the foot of a bed: it lies across and hangs down at both sides by its height."""
+def throw(size: Size, rng: np.random.Generator, lie: tuple[float, ...] = ()) -> list[Solid]:
+    """A blanket over the foot of a bed: it lies across and hangs down at both sides by its height.
+
+    `lie`: how far below its top the bed is, metres, in `LIES` cells from the head and from the left.
+    """
     w, h, d = size
     thick, round_off = 0.012, 0.05
     flat = w / 2 - round_off
     turn = np.linspace(0, np.pi / 2, 4)
     corner = np.stack([flat + round_off * np.sin(turn), h - round_off * (1 - np.cos(turn))], 1)
     hang = np.stack([np.full(3, w / 2), np.linspace(h - round_off, 0, 4)[1:]], 1)
-    flats = [[share * flat, h] for share in (0.12, 0.25, 0.37, 0.5, 0.62, 0.75, 0.87)]
-    side = np.concatenate([flats, corner, hang])
+    side = np.concatenate([[[share * flat, h] for share in np.linspace(0, 1, 9)[1:-1]], corner, hang])
     profile = np.concatenate([side[::-1] * (-1, 1), [[0.0, h]], side])
     inner = np.stack([profile[:, 0] * (1 - 2 * thick / w), profile[:, 1] - thick * (profile[:, 1] > h - round_off)], 1)
-    z = np.linspace(-d / 2, d / 2, 11)
-    ripple = 0.012 * np.sin(np.linspace(0, 9, len(z)) + rng.uniform(0, 6))
-    phase = rng.uniform(0, 6, 3)
+    z, phase = np.linspace(-d / 2, d / 2, LIES[0]), rng.uniform(0, 6, 3)
+    cells, at = np.reshape(lie or np.zeros(LIES), LIES), (np.arange(LIES[1]) + 0.5) / LIES[1] * 2 - 1
+    lower = np.array([np.interp(profile[:, 0] / (w / 2), at, row) for row in cells])
+    lower[1:-1] = (lower[:-2] + 2 * lower[1:-1] + lower[2:]) / 4
 
     def spread(line: np.ndarray) -> np.ndarray:
-        rows = [np.stack([line[:, 0], line[:, 1], np.full(len(line), at)], 1) for at in z]
-        out = np.stack(rows)
+        x, deep = np.meshgrid(line[:, 0], z)
         hanging = np.clip((h - line[:, 1]) / max(h, 1e-6), 0, 1)
-        out[..., 0] += np.sign(line[:, 0]) * hanging * ripple[:, None]
-        out[..., 1] -= 0.01 * folds(out[..., 0], 2.5 * out[..., 2], phase) * (hanging < 0.1)
-        return out
+        ripple = 0.025 * np.sin(2 * np.pi * deep / d * 2.5 + phase[0] + np.sign(x)) * hanging
+        skew = (0.03 * np.sin(2.2 * x + phase[1]) + 0.05 * (phase[2] / 3 - 1) * x) * (1 - hanging / 2)
+        y = line[:, 1] - lower * (1 - hanging) - 0.006 * folds(x, 2.5 * deep, phase) * (hanging < 0.1)
+        return np.stack([x + np.sign(x) * ripple, y, deep + skew], -1)
 
     return [Sheet(front=spread(profile), back=spread(inner), material="accent_cloth")]

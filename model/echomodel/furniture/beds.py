@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -58,24 +58,25 @@ def _headboard(style: Style, w: float, h: float, z: float) -> list[Solid]:
     return [arch, box((-w / 2, 0.02, z + SET_BACK), (w / 2, h * 0.62, z + t - SET_BACK), stuff)]
 
 
-def bedding(w: float, z0: float, z1: float, low: float, choices: Choices, style: Style, pillows: int) -> list[Solid]:
-    """Mattress, pillows and a cover from z0 (head) to z1."""
+def bedding(
+    w: float, z0: float, z1: float, low: float, choices: Choices, style: Style, pillows: int, *, falls: bool
+) -> list[Solid]:
+    """Mattress, pillows and a cover from z0 (head) to z1, where it hangs over the frame or is tucked in."""
     thick = 0.2
     parts: list[Solid] = [box((-w / 2, low, z0), (w / 2, low + thick, z1), "linen", 0.05, "mattress")]
     each, rng = w / pillows, choices.stream("pattern")
-    for i in range(pillows):
-        half = (min(each * 0.44, 0.38), 0.115, 0.24)
-        place, lean = (
-            (-w / 2 + each * (i + 0.5), low + thick + 0.11, z0 + 0.23),
-            rotation(x=-0.5, y=rng.uniform(-0.06, 0.06)),
-        )
-        parts.append(pillow(place, half, "linen", "pillow", lean))
+    rows = [(0.13, 0.27, -0.5), (0.24, 0.1, -1.25)] if choices.chance("count", 0.5) else [(0.13, 0.23, -0.45)]
+    for (high, off, lean), i in product(rows, range(pillows)):
+        place = (-w / 2 + each * (i + 0.5), low + thick + high, z0 + off)
+        turn = rotation(x=lean, y=rng.uniform(-0.08, 0.08))
+        half = (min(each * 0.46, 0.38), 0.13, 0.25)
+        parts.append(replace(pillow(place, half, "linen", "pillow", turn), power=2.7))
     if choices.chance("cover", 0.85):
-        start = z0 + (z1 - z0) * choices.between("spread", 0.28, 0.48)
-        over, top = 0.03 + 0.05 * style.softness, low + thick + 0.08
-        x, y = w / 2 + over, low + thick * 0.25
-        parts.append(cover((-x, y, start), (x, top, z1 + 0.035), "blanket", 0.05, 0.045, rng))
-        fold = 0.14 + 0.1 * style.softness  # the sheet turned back over it
+        start = z0 + (z1 - z0) * choices.between("spread", 0.28, 0.42)
+        x, y, top = w * 0.53 + 0.02 + 0.03 * style.softness, low - 0.09, low + thick + 0.09
+        end = z1 + (0.08 + 0.02 * style.softness if falls else 0.03)
+        parts.append(cover((-x, y, start), (x, top, end), "blanket", 0.085, 0.04, rng, falls=falls))
+        fold = 0.16 + 0.1 * style.softness  # the sheet turned back over it
         x, y = x + 0.004, low + thick * 0.4
         parts.append(cover((-x, y, start - 0.01), (x, top + 0.006, start + fold), "linen", 0.04, 0.02, rng))
     return parts
@@ -109,7 +110,7 @@ def bed(size: Size, style: Style, choices: Choices, pillows: int) -> list[Solid]
     parts.append(box((-inner, deck - 0.09, z0 + head), (inner, deck - 0.06, end - t / 2), role="rail"))
     parts.append(core((-frame / 2, foot, near), (frame / 2, deck, z1), stuff))
     parts += of_role("headboard", _headboard(style, w, h, z0))
-    parts += bedding(frame * 0.95, z0 + head, end - 0.04, deck - 0.06, choices, style, pillows)
+    parts += bedding(frame * 0.95, z0 + head, end - 0.04, deck - 0.06, choices, style, pillows, falls=not board)
     if board:
         tall = deck + min(0.3, 0.35 * (h - deck))
         parts.append(box((-frame / 2, 0, z1 - 0.055), (frame / 2, tall, z1), "wood", 0.01, "footboard"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -68,39 +68,75 @@ def folds(x: Array, z: Array, phase: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Cover(Block):
-    """Cloth over a mattress: a block whose top lies in folds and whose sides hang down in waves to a hem.
+    """Filled cloth over a mattress: its top lies in folds; sides, and the foot (+z) where it `falls`, bend down over
+    `radius` and hang in waves to an uneven hem; at its head it ends in a roll that is not straight.
 
     `depth`: metres from the highest folds to the lowest; `phase` as of `folds`.
     """
 
     depth: float = 0.03
     phase: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    falls: bool = False
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         w, h, d = self.half
-        r, steps = min(self.radius, h, w / 2, d / 2), (6, 8, 14, 18)[detail]
-        arc = np.linspace(0, np.pi / 2, 4)
-        over = np.linspace(w - r, r - w, steps + 1)[1:-1]
-        x = np.concatenate([[w, w], w - r + r * np.cos(arc), over, r - w - r * np.sin(arc), [-w, -w]])
-        y = np.concatenate([[-h, -h / 2], h - r + r * np.sin(arc), np.full(len(over), h), h - r + r * np.cos(arc)])
-        y = np.concatenate([y, [-h / 2, -h]])
-        hangs = np.clip((h - y) / (2 * h), 0, 1)
-        rings = []
-        for z in np.linspace(-d, d, max(4, round(steps * d / w) + 1)):
-            rim = r - np.sqrt(max(0.0, r**2 - max(0.0, abs(z) - d + r) ** 2))  # rounded at head and foot, too
-            down = self.depth * folds(x, np.full_like(x, z), np.array(self.phase)) * (1 - hangs) ** 0.5
-            wave = self.depth * hangs * (0.5 + 0.5 * np.sin(19 * z + self.phase[0] + np.sign(x) * self.phase[1]))
-            hem = 0.5 * self.depth * (hangs > 0.9) * (1 + np.sin(13 * z + self.phase[2] + np.sign(x)))
-            rings.append(np.stack([x - np.sign(x) * wave, y - down - rim * (hangs < 0.5) + hem, np.full_like(x, z)], 1))
-        vertices, faces = loft(rings)
-        return vertices, _outward(vertices, faces)
+        r, steps, phase = min(self.radius, h, w / 2, d / 2), (5, 7, 11, 15)[detail], np.array(self.phase)
+        bend = r * np.pi / 2  # metres of cloth around an edge
+        roll, hang = np.linspace(0, bend, 4), bend + np.array([0.3, 0.65, 1.0]) * max(2 * h - r, 1e-3)
+        side, over = np.concatenate([roll, hang]), np.linspace(r - w, w - r, steps + 1)[1:-1]
+        across = np.concatenate([r - w - side[::-1], over, w - r + side])
+        flat = np.linspace(r - d, d - r, max(3, round(steps * d / w)) + 1)[1:-1]
+        along = np.concatenate([r - d - roll[::-1], flat, d - r + (side if self.falls else roll)])
+        s, t = np.meshgrid(across, along)
+        q = np.stack([np.maximum(np.abs(s) - w + r, 0), np.maximum(np.abs(t) - d + r, 0)])
+        far, length = q.max(0), np.maximum(np.linalg.norm(q, axis=0), 1e-9)
+        out = q / length * np.sign([s, t])  # which way is down from here, in plan
+        turn, hung = np.minimum(far / max(r, 1e-9), np.pi / 2), np.clip((far - bend) / (hang[-1] - bend), 0, 1)
+        x, z = np.clip(s, r - w, w - r), np.clip(t, r - d, d - r)
+        line = z * out[0] ** 2 + x * out[1] ** 2 + 0.1 * out[0] * out[1]  # metres around the hem
+        wave = 0.5 + 0.5 * np.sin(17 * line + phase[0] + 1.3 * np.sin(5 * line + phase[1]) + out[0])
+        reach = r * np.sin(turn) - 0.8 * self.depth * wave * hung
+        lie = self.depth * folds(x, z, phase) * np.cos(turn)
+        y = h - r * (1 - np.cos(turn)) - hung * (2 * h - r) - lie
+        y += hung * self.depth * (0.4 + 0.3 * np.sin(9 * line + phase[2]) + 0.3 * np.sin(23 * line + phase[1]))
+        slack = self.depth * (0.5 + 0.5 * np.sin(6 * x + phase[1])) * np.clip(1 - (t + d) / 0.25, 0, 1)
+        top = np.stack([x + out[0] * reach, y, z + out[1] * reach + slack], -1)
+        faces, border = _grid(*s.shape)
+        vertices = np.concatenate([top.reshape(-1, 3), [[0.0, -h, 0.0]]])  # its border is joined to a point below
+        fan = np.stack([np.roll(border, -1), border, np.full(len(border), s.size)], 1)
+        return vertices, _outward(vertices, np.concatenate([faces, fan]))
 
 
-def cover(low: Vector, high: Vector, material: str, radius: float, depth: float, rng: np.random.Generator) -> Solid:
+@dataclass(frozen=True, eq=False)
+class Sheet(Solid):
+    """Cloth: `front` and `back` (n, m, 3) float are its two sides, point for point, metres."""
+
+    front: Array = field(default_factory=lambda: np.zeros((2, 2, 3)))
+    back: Array = field(default_factory=lambda: np.zeros((2, 2, 3)))
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        faces, border = _grid(*self.front.shape[:2])
+        far, after = self.front.size // 3, np.roll(border, -1)
+        strip = np.stack([after, border, border + far, after, border + far, after + far], 1).reshape(-1, 3)
+        vertices = np.concatenate([self.front.reshape(-1, 3), self.back.reshape(-1, 3)])
+        return vertices, _outward(vertices, np.concatenate([faces, faces[:, ::-1] + far, strip]))
+
+
+def _grid(n: int, m: int) -> tuple[Array, Array]:
+    """Triangles (f, 3) of a grid of n times m points, and the numbers of those at its border as it runs around them."""
+    at = np.arange(n * m).reshape(n, m)
+    a, b, c, d = (corner.ravel() for corner in (at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]))
+    border = np.concatenate([at[0, :-1], at[:-1, -1], at[-1, :0:-1], at[:0:-1, 0]])
+    return np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]), border
+
+
+def cover(
+    low: Vector, high: Vector, material: str, radius: float, depth: float, rng: np.random.Generator, **form: bool
+) -> Solid:
     """The cover between two corners (3,), its edges rounded by `radius`, its folds `depth` deep, metres."""
     a, b = np.asarray(low, float), np.asarray(high, float)
     first, second, third = rng.uniform(0, 2 * np.pi, 3).tolist()
-    made = Cover(centre=(a + b) / 2, half=(b - a) / 2, radius=radius, depth=depth, phase=(first, second, third))
+    made = Cover(centre=(a + b) / 2, half=(b - a) / 2, radius=radius, depth=depth, phase=(first, second, third), **form)
     return replace(made, material=material, role="cover")
 
 

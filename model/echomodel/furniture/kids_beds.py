@@ -8,6 +8,7 @@ from echomodel.furniture.beds import bed
 from echomodel.furniture.carpentry import Size, both, box, four, of_role, post
 from echomodel.furniture.cloth import cover, pillow
 from echomodel.furniture.fronts import front
+from echomodel.furniture.household import cot
 from echomodel.furniture.solids import Block, Solid, rotation
 from echomodel.furniture.style import Choices, Style
 
@@ -16,7 +17,7 @@ def kids_bed(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A cot when small, a bunk when tall, otherwise a small bed with rails, drawers or a gabled headboard."""
     w, h, d = size
     if w < 0.85 or d < 1.4:
-        return _cot(size, style)
+        return cot(size, style, choices)
     if h > 1.55:
         return _bunk(size, style, choices)
     if h > 1.2 and choices.chance("kind", 0.45):
@@ -83,24 +84,6 @@ def _loft(size: Size) -> list[Solid]:
     chest: list[Solid] = [box((x0, y, z0), (x1, y + 0.02, z1)) for y in (0.03, deck * 0.36, deck * 0.7)]
     chest += [box((x - 0.01, 0, z0), (x + 0.01, deck, z1)) for x in (x0, x1)]
     return parts + of_role("ladder", ladder) + of_role("shelf", chest)
-
-
-def _cot(size: Size, style: Style) -> list[Solid]:
-    """Bars on four sides round a small mattress."""
-    w, h, d = size
-    t, y0 = 0.025, min(0.2, h * 0.3)
-    x, z, half, r = w / 2 - t, d / 2 - t, t * 0.7, 0.011
-    posts, parts = four(post(x, z, t, 0, h)), []
-    for y in (y0, h - 0.05):
-        parts += both(box((x - half, y, -d / 2), (x + half, y + 0.045, d / 2)))
-        parts += both(box((-w / 2, y, z - half), (w / 2, y + 0.045, z + half)), axis=2)
-    for at in np.linspace(-d / 2, d / 2, int(np.clip(d / 0.13, 5, 24)))[1:-1]:
-        parts += both(post(x, at, r, y0, h - 0.03))
-    for at in np.linspace(-w / 2, w / 2, int(np.clip(w / 0.13, 4, 16)))[1:-1]:
-        parts += both(post(at, z, r, y0, h - 0.03), axis=2)
-    low, high = (-w / 2 + 0.04, y0, -d / 2 + 0.04), (w / 2 - 0.04, y0 + 0.12, d / 2 - 0.04)
-    mattress = box(low, high, "linen", 0.03, "mattress")
-    return [*of_role("leg", posts), *of_role("guard", parts), mattress]
 
 
 def _bunk(size: Size, style: Style, choices: Choices) -> list[Solid]:
