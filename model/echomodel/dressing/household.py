@@ -48,14 +48,13 @@ def mirror(size: Size, rng: np.random.Generator) -> list[Solid]:
     return [*_frame(w, h, d, bar), glass]
 
 
-def round_mirror(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A round mirror in a narrow frame."""
+def round_mirror(size: Size, rng: np.random.Generator, power: float = 2.0) -> list[Solid]:
+    """A round mirror in a narrow frame, the more of a rectangle with round corners the larger `power`."""
     w, h, d = size
-    face = rotation(x=np.pi / 2)
-    back = np.array([0.0, h / 2, -d / 2])
-    rim = turned(back, (w / 2, h / 2), d * 0.8, turn=face, material="frame")
-    inner = (w / 2 - 0.018, h / 2 - 0.018)
-    return [rim, turned(back, inner, d, turn=face, material="mirror")]
+    form = {"turn": rotation(x=np.pi / 2), "power": power}
+    back, inner = np.array([0.0, h / 2, -d / 2]), (w / 2 - 0.018, h / 2 - 0.018)
+    rim = turned(back, (w / 2, h / 2), d * 0.8, material="frame", **form)
+    return [rim, turned(back, inner, d, material="mirror", **form)]
 
 
 def clock(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -88,11 +87,4 @@ def wall_clock(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 def tall_mirror(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A mirror for the whole person."""
-    if rng.random() < 0.5:
-        return household.mirror(size, rng)
-    w, h, d = size
-    face, back = rotation(x=np.pi / 2), np.array([0.0, h / 2, -d / 2])
-    rim = turned(back, (w / 2, h / 2), d * 0.8, power=4.0, turn=face, material="frame")
-    inner = (w / 2 - 0.016, h / 2 - 0.016)
-    glass = turned(back, inner, d, power=4.0, turn=face, material="mirror")
-    return [rim, glass]
+    return household.mirror(size, rng) if rng.random() < 0.5 else round_mirror(size, rng, 4.0)

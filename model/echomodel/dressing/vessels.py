@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, box
@@ -110,19 +108,6 @@ def candles(size: Size, rng: np.random.Generator) -> list[Solid]:
         parts.append(Lathe(centre=np.array([x, 0.0, 0.0]), profile=disc, material="wax"))
         parts.append(tube([[x, tall - 0.003, 0], [x + 0.002, tall + 0.012, 0]], 0.0012, "soil"))
     return parts
-
-
-def cup(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A mug with a handle, coffee in it."""
-    w, h, d = size
-    radius = d / 2
-    centre = -(w - d) / 2
-    body = vessel(_outline([0.86, 0.95, 1.0, 1.0], np.array([d, h, d])), 0.004, "ceramic")
-    turn = np.linspace(-np.pi / 2, np.pi / 2, 7)
-    loop = np.stack([radius * 0.95 + (w - d) * np.cos(turn), h * (0.52 + 0.3 * np.sin(turn)), 0 * turn], 1)
-    coffee = Lathe(profile=np.array([[radius * 0.92, h * 0.5], [radius * 0.92, h * 0.78]]), material="soil")
-    parts = [body, tube(loop, 0.0045, "ceramic"), coffee]
-    return [replace(part, centre=part.centre + np.array([centre, 0, 0])) for part in parts]
 
 
 def floor_plant(size: Size, rng: np.random.Generator) -> list[Solid]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, both, box, chair_legs, cushion, leaning, of_role, slim_arms
 from echomodel.furniture.cloth import Tufted
-from echomodel.furniture.solids import Block, Lathe, Solid, ball, bent, rotation, tube, turned
+from echomodel.furniture.solids import Block, Lathe, Solid, ball, bent, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
 
 BODIES: list[dict[str, Any]] = list(
@@ -139,12 +139,7 @@ def _piping(pad: Solid) -> list[Solid]:
     r = min(pad.radius, *pad.half)
     sunk = r * (1 - 2**-0.5)
     a, b = pad.half[0] - sunk, pad.half[2] - sunk
-    c = min(r * 0.8 + 0.01, a, b)
-    turn = np.linspace(0, np.pi / 2, 4)
-    corners = [(a - c, b - c, 0.0), (-a + c, b - c, 0.5), (-a + c, -b + c, 1.0), (a - c, -b + c, 1.5)]
-    plan = np.array(
-        [(x + c * np.cos(t + s * np.pi), z + c * np.sin(t + s * np.pi)) for x, z, s in corners for t in turn]
-    )
+    plan = superellipse(2 + 1.5 * min(a, b) / (r + 0.01), 24) * (a, b)
     plan = np.concatenate([plan, plan[:1]])
     cords: list[Solid] = []
     for y in (pad.half[1] - sunk, -pad.half[1] + sunk):
