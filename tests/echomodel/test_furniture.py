@@ -8,7 +8,7 @@ import trimesh
 
 from echomodel.furniture import MATERIALS, Choices, Style, furniture, mesh_of, sample_size, solids
 from echomodel.furniture.carpentry import back_rest
-from echomodel.furniture.solids import Ball, Block, Lathe, Shell, Tube, Turned, rotation
+from echomodel.furniture.solids import Ball, Block, Bow, Lathe, Pad, Shell, Tube, Turned, rotation
 from echomodel.metrics.furniture import loose_solids
 from echomodel.sizes import size_score, size_statistics
 from echomodel.tsdf import mesh_from_tsdf, tsdf_from_mesh, tsdf_of
@@ -172,6 +172,16 @@ def test_only_a_high_cabinet_for_children_has_a_gable():
             parts = solids("children_cabinet", look, Choices.draw(np.random.default_rng(style)), size)
             found.add(any(part.role == "roof" for part in parts))
         assert found == {gabled, False}
+
+
+def test_a_cushion_is_fuller_in_its_middle_and_a_bent_board_hollow():
+    flat, puffed = (Pad(half=np.array([0.3, 0.1, 0.3]), radius=0.06, crown=crown).mesh()[0] for crown in (0.0, 0.02))
+    assert puffed[:, 1].max() == pytest.approx(0.1, abs=0.004)
+    assert np.linalg.norm(puffed, axis=1).max() < np.linalg.norm(flat, axis=1).max() - 0.02
+    board = Bow(half=np.array([0.3, 0.2, 0.012]), bow=0.05).mesh()[0]
+    ends = abs(board[:, 0]) > 0.29
+    assert board[ends, 2].min() > -0.02
+    assert board[abs(board[:, 0]) < 0.05, 2].max() < -0.03
 
 
 def test_trestles_and_bows_hold_together():

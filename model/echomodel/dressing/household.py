@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from echomodel.dressing import household
@@ -51,7 +53,7 @@ def mirror(size: Size, rng: np.random.Generator) -> list[Solid]:
 def round_mirror(size: Size, rng: np.random.Generator, power: float = 2.0) -> list[Solid]:
     """A round mirror in a narrow frame, the more of a rectangle with round corners the larger `power`."""
     w, h, d = size
-    form = {"turn": rotation(x=np.pi / 2), "power": power}
+    form: dict[str, Any] = {"turn": rotation(x=np.pi / 2), "power": power}
     back, inner = np.array([0.0, h / 2, -d / 2]), (w / 2 - 0.018, h / 2 - 0.018)
     rim = turned(back, (w / 2, h / 2), d * 0.8, material="frame", **form)
     return [rim, turned(back, inner, d, material="mirror", **form)]

@@ -79,58 +79,9 @@ def _potted(size: Size, kind: str, tall: float, share: float, rng: np.random.Gen
     return [pot, soil, *grown(kind, 0.88 * tall, size, radius, rng)]
 
 
-def bowl(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A wide bowl, often with fruit in it."""
-    w, h, d = size
-    rim = h if rng.random() < 0.35 else h * 0.78
-    parts: list[Solid] = [vessel(_outline([0.42, 0.62, 0.84, 0.95, 1.0], np.array([w, rim, d])), 0.006, "ceramic")]
-    if rim < h:
-        radius = min(w, d) * 0.15
-        for number in range(5):
-            away = 0.0 if number == 4 else 0.19 * min(w, d)
-            yaw = 2 * np.pi * number / 4 + rng.uniform(0, 0.4)
-            level = h - radius if number == 4 else rim - radius * 0.6
-            centre = np.array([np.sin(yaw) * away, level, np.cos(yaw) * away])
-            parts.append(ball(centre, np.full(3, radius) * (1, 0.93, 1), "fruit"))
-    return parts
-
-
-def candles(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """Two or three candles of different heights, side by side."""
-    w, h, d = size
-    count = 3 if w > 0.16 else 2
-    radius = min(w / count, d) / 2 * 0.92
-    parts: list[Solid] = []
-    for number, share in enumerate(rng.permutation([1.0, 0.72, 0.5])[:count]):
-        x = (number - (count - 1) / 2) * w / count
-        tall = h * share - 0.012
-        disc = np.array([[radius, 0.0], [radius, tall - 0.004], [radius - 0.003, tall]])
-        parts.append(Lathe(centre=np.array([x, 0.0, 0.0]), profile=disc, material="wax"))
-        parts.append(tube([[x, tall - 0.003, 0], [x + 0.002, tall + 0.012, 0]], 0.0012, "soil"))
-    return parts
-
-
 def floor_plant(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A tall plant in a pot."""
     return _potted(size, str(rng.choice(species("floor"))), float(np.clip(0.24 * size[1], 0.2, 0.34)), 0.3, rng)
-
-
-def floor_vase(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A floor vase with dry branches."""
-    w, h, d = size
-    radius, tall = min(w, d) / 2 * 0.72, 0.5 * h
-    outline = np.array([[0.6, 0.0], [0.9, 0.25], [1.0, 0.5], [0.75, 0.8], [0.45, 0.93], [0.5, 1.0]]) * (radius, tall)
-    parts: list[Solid] = [vessel(outline, 0.008, "ceramic", 0.05)]
-    for number in range(6):
-        yaw = 2 * np.pi * (number + rng.uniform(-0.3, 0.3)) / 6
-        out = np.array([np.sin(yaw), 0.0, np.cos(yaw)]) * min(w, d) / 2
-        knee = out * 0.3 + (0, h * 0.7, 0)
-        tip = out * rng.uniform(0.55, 0.95) + (0, h * rng.uniform(0.85, 0.99), 0)
-        parts.append(tube(np.stack([[0, 0.1 * tall, 0], knee, tip]), 0.003, "stem"))
-        for at in (0.6, 0.8, 1.0):
-            place = knee + (tip - knee) * at
-            parts.append(ball(place, (0.012, 0.02, 0.012), "petal"))
-    return parts
 
 
 def cable(size: Size, rng: np.random.Generator) -> list[Solid]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.furniture.solids import IDENTITY, Block, Solid, Turned, ball, rotation, tube, turned, upright
+from echomodel.furniture.solids import IDENTITY, Block, Bow, Pad, Solid, Turned, ball, rotation, tube, turned, upright
 from echomodel.furniture.style import Style
 
 Size = np.ndarray  # (3,) width x, height y, depth z, metres
@@ -59,14 +59,12 @@ def of_role(role: str, parts: Sequence[Solid], **changes: Any) -> list[Solid]:
 
 def cushion(
     low: tuple, high: tuple, style: Style, material: str = "fabric", turn: np.ndarray = IDENTITY, role: str = "seat"
-) -> Solid:
+) -> Pad:
     """An upholstered body between two corners: its edges rounded as far as the style is soft, bulging at most."""
     a, b = np.asarray(low, float), np.asarray(high, float)
-    centre, half = (a + b) / 2, np.maximum((b - a) / 2, 1e-3)
-    if style.softness > 0.85 and half.min() / half.max() > 0.12:
-        return ball(centre, half * 1.02, material, role, power=5.0, turn=turn)
-    radius = float(half.min() * (0.25 + 0.7 * style.softness))
-    return Block(centre=centre, half=half, radius=radius, turn=turn, material=material, role=role)
+    half = np.maximum((b - a) / 2, 1e-3)
+    radius, crown = (float(half.min() * (low + more * style.softness)) for low, more in ((0.25, 0.55), (0.05, 0.2)))
+    return Pad((a + b) / 2, turn, material, role, half=half, radius=radius, crown=crown)
 
 
 def corner_power(style: Style) -> float:
@@ -212,9 +210,13 @@ def seat_of(style: Style, w: float, d: float, y: float, thick: float, z: float =
     return replace(board, centre=np.array([0, y - thick, z]), role="seat")
 
 
-def leaning(low: tuple, high: tuple, rake: float, pivot_y: float, pivot_z: float, **kwargs) -> Block:
-    """A block that leans back by `rake` about the horizontal line through (pivot_y, pivot_z)."""
-    block = box(low, high, kwargs.get("material", "wood"), kwargs.get("radius", 0.0), "back")
+def leaning(
+    low: tuple, high: tuple, rake: float, pivot_y: float, pivot_z: float, *, bow: float = 0.0, **look: Any
+) -> Block:
+    """A block that leans back by `rake` about the horizontal line through (pivot_y, pivot_z), bent by `bow` metres."""
+    block = box(low, high, role="back", **look)
+    if bow:
+        block = Bow(block.centre, IDENTITY, block.material, "back", half=block.half, radius=block.radius, bow=bow)
     turn = rotation(x=-rake)
     pivot = np.array([0, pivot_y, pivot_z])
     return replace(block, centre=turn @ (block.centre - pivot) + pivot, turn=turn)
@@ -234,17 +236,17 @@ def _back(style: Style, kind: str, w: float, y0: float, y1: float, z: float, thi
     def lean(x0: float, x1: float, s0: float, s1: float, t: float, **kwargs) -> Block:
         return leaning((x0, y0 + s0 * length, z - t / 2), (x1, y0 + s1 * length, z + t / 2), rake, y0, z, **kwargs)
 
-    post = max(0.024, 0.03 * style.bulk)
+    post, bow = max(0.024, 0.03 * style.bulk), a * (0.12 + 0.14 * style.corner)
     if kind == "cushion":
         t = max(thick, 0.07 + 0.06 * style.softness)
-        return [lean(-a, a, -0.05, 1, t, radius=t * 0.45 * (0.4 + 0.6 * style.softness), material="fabric")]
+        return [lean(-a, a, -0.05, 1, t, radius=0.05, material="fabric", bow=bow)]
     if kind == "panel":
         if style.softness > 0.5:
-            soft = lean(-a, a, 0.12, 1, 0.05, radius=0.022, material="fabric")
+            soft = lean(-a, a, 0.12, 1, 0.05, radius=0.05, material="fabric", bow=bow)
             return [soft, *both(lean(a * 0.8 - post / 2, a * 0.8 + post / 2, -0.1, 0.4, post))]
         behind = max(0.0, post * 0.4 - 0.01)  # stiles thicker than the board stand out behind it, not before it
         stile = lean(a - post - post / 2, a - post + post / 2, -0.1, 0.5, post * 0.8)
-        board = lean(-a, a, 0.0 if style.contrast < 0.5 else 0.3, 1, 0.025, radius=0.01)
+        board = lean(-a, a, 0.0 if style.contrast < 0.5 else 0.3, 1, 0.025, radius=0.04, bow=bow)
         return [board, *both(replace(stile, centre=stile.centre - [0, 0, behind]))]
     if kind == "oval":
         t = 0.05
@@ -253,22 +255,25 @@ def _back(style: Style, kind: str, w: float, y0: float, y1: float, z: float, thi
         turn = rotation(x=-rake)
         centre = turn @ np.array([0, middle - y0, 0]) + [0, y0, z]
         return [*stems, ball(centre, (a * 0.95, length * 0.4, t / 2), "fabric", power=2.6, turn=turn)]
-    posts = both(lean(a - post / 2 - post / 2, a - post / 2 + post / 2, -0.08, 1, post))
+    posts = both(lean(a - post / 2 - post / 2, a - post / 2 + post / 2, -0.08, 1, post, radius=0.006))
     rail = 0.1 + 0.12 * style.contrast
     if kind == "frame":
-        posts += [lean(-a, a, 1 - rail, 1, post * 0.8), lean(-a, a, 0.2, 0.2 + rail * 0.6, post * 0.8)]
-        inner, pad = a - post * 0.6, post * 1.3  # padded on both faces of the frame
-        return [*posts, lean(-inner, inner, 0.2 + rail * 0.3, 1 - rail * 0.5, pad, material="fabric", radius=0.012)]
+        posts += [lean(-a, a, s, t, post * 0.8, bow=bow) for s, t in ((1 - rail, 1), (0.2, 0.2 + rail * 0.6))]
+        inner, s, t = a - post * 0.6, 0.2 + rail * 0.3, 1 - rail * 0.5
+        return [*posts, lean(-inner, inner, s, t, post * 1.3, material="fabric", radius=0.012, bow=bow)]  # padded
     if kind == "rails":
         count = int(2 + 2.99 * style.tufting)
         for i in range(count):
             s0 = 0.2 + (0.98 - 0.2) * i / count
-            posts.append(lean(-a, a, s0 + 0.04, s0 + 0.78 / count * 0.72, post * 0.7))
+            posts.append(lean(-a, a, s0 + 0.04, s0 + 0.78 / count * 0.72, post * 0.7, bow=bow))
         return posts
-    posts.append(lean(-a, a, 1 - rail, 1, post * 0.9))
+    posts.append(lean(-a, a, 1 - rail, 1, post * 0.9, bow=bow))
     count = int(3 + 4.99 * style.tufting)
     for x in np.linspace(-a * 0.78, a * 0.78, count):
-        posts.append(lean(x - post * 0.3, x + post * 0.3, 0, 1 - rail / 2, post * 0.6))
+        further = np.arctan(bow * (1 - (x / a) ** 2) / length)  # from the seat to the rail, which is bent
+        t, tall = post * 0.3, (1 - rail / 2) * length
+        low, high = (x - t, y0 - 0.03, z - t), (x + t, y0 + tall, z + t)
+        posts.append(leaning(low, high, rake + further, y0, z, radius=0.004))
     return posts
 
 

@@ -94,8 +94,8 @@ def dining_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     thick = 0.035 + 0.05 * style.softness
     rake = style.rake * 0.8
     leg_thick = 0.038 * style.bulk
-    sw, sd = w * 0.94, d * 0.86
-    parts: list[Solid] = [seat_of(style, sw, sd, seat, thick, d * 0.05)]
+    sw, sd = w * 0.94, d * 0.9
+    parts: list[Solid] = [seat_of(style, sw, sd, seat, thick, d * 0.04)]
     parts += chair_legs(style, w * 0.86, d * 0.76, seat - thick * 0.5, leg_thick)
     if style.back == "shell":
         arms = seat + (h - seat) * (0.35 + 0.3 * style.arm_height)
@@ -221,10 +221,11 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         parts.append(ball(centre, (sw * 0.47, tall / 2, 0.04), "fabric", "back", power=power, turn=turn))
     elif style.tufting > 0.6:
         for a, b in pairwise(np.linspace(y0, h, 5)):
-            parts.append(lean(sw * 0.44, a + 0.01, b, -0.02, 0.02, material="fabric", radius=0.018))
+            parts.append(lean(sw * 0.44, a + 0.01, b, -0.02, 0.02, material="fabric", radius=0.018, bow=0.04))
         parts.append(lean(0.03, y0, h * 0.98, -0.04, -0.015, material="metal"))
     else:
-        parts.append(lean(sw * 0.46, y0, y0 + (h - y0) / np.cos(rake), -0.03, 0.03, material="fabric", radius=0.028))
+        tall = (h - y0) / np.cos(rake)
+        parts.append(lean(sw * 0.46, y0, y0 + tall, -0.03, 0.03, material="fabric", radius=0.06, bow=0.05))
     rise = y0 + 0.15 - seat  # the bracket ends in the middle of the back, which leans away from it
     rest = [0, y0 + 0.15, -d * 0.4 - rise * np.tan(rake) - 0.012]
     parts.append(tube([[0, seat - 0.05, -d * 0.1], [0, seat - 0.05, -d * 0.43], rest], 0.016, "metal", "stem"))

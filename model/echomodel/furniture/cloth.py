@@ -131,13 +131,14 @@ def _grid(n: int, m: int) -> tuple[Array, Array]:
 
 
 def cover(
-    low: Vector, high: Vector, material: str, radius: float, depth: float, rng: np.random.Generator, **form: bool
-) -> Solid:
+    low: Vector, high: Vector, material: str, radius: float, depth: float, rng: np.random.Generator, *,
+    falls: bool = False,
+) -> Solid:  # fmt: skip
     """The cover between two corners (3,), its edges rounded by `radius`, its folds `depth` deep, metres."""
     a, b = np.asarray(low, float), np.asarray(high, float)
     first, second, third = rng.uniform(0, 2 * np.pi, 3).tolist()
-    made = Cover(centre=(a + b) / 2, half=(b - a) / 2, radius=radius, depth=depth, phase=(first, second, third), **form)
-    return replace(made, material=material, role="cover")
+    made = Cover((a + b) / 2, IDENTITY, material, "cover", half=(b - a) / 2, radius=radius, depth=depth, falls=falls)
+    return replace(made, phase=(first, second, third))
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +158,7 @@ class Tufted(Block):
             lines = (2 * i, 2 * i) if self.channels else (i + j, i - j)
             first, second = (np.abs(np.cos(np.pi * line * step / self.apart)) for line in lines)
             edge = np.minimum(1.0, 6 * np.minimum(1 - abs(x) / w, 1 - np.abs(y) / h) + 0.1) ** 0.5
-            front = d * (2 * edge * (0.45 + 0.55 * (first * second) ** 0.5) - 1)
+            front = d * (2 * edge * (0.4 + 0.6 * first * second * (2 - first * second)) - 1)
             rings.append(np.stack([np.full(up + 3, x), [*y, h, -h], [*front, -d, -d]], 1))
         vertices, faces = loft(rings)
         return vertices, _outward(vertices, faces)

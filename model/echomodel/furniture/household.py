@@ -126,8 +126,8 @@ def cot(size: Size, style: Style, choices: Choices) -> list[Solid]:
             parts.append(tube([[at, low + 0.02, s * z], [at, h - 0.03, s * z]], 0.008, role="bar"))
     slab = box((-x, floor - 0.03, -z), (x, floor, z), role="slats")
     mattress = box((-x + 0.03, floor - 0.002, -z + 0.03), (x - 0.03, floor + 0.1, z - 0.03), "linen", 0.02, "mattress")
-    low, high = (-x + 0.025, floor + 0.03, -0.2 * d), (x - 0.025, floor + 0.125, z - 0.028)
-    return [*parts, slab, mattress, cover(low, high, "blanket", 0.02, 0.015, choices.stream("pattern"))]
+    one, other = (-x + 0.025, floor + 0.03, -0.2 * d), (x - 0.025, floor + 0.125, z - 0.028)
+    return [*parts, slab, mattress, cover(one, other, "blanket", 0.02, 0.015, choices.stream("pattern"))]
 
 
 def toy_box(size: Size, style: Style, choices: Choices) -> list[Solid]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, both, box, chair_legs, cushion, leaning, of_role, slim_arms
 from echomodel.furniture.cloth import Tufted
-from echomodel.furniture.solids import Block, Lathe, Solid, ball, bent, rotation, superellipse, tube, turned
+from echomodel.furniture.solids import Block, Lathe, Pad, Solid, ball, bent, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
 
 BODIES: list[dict[str, Any]] = list(
@@ -127,14 +127,12 @@ def _cushions(
     edges = np.linspace(x0, x1, count + 1)
     gap = 0.004
     pads = [cushion((a + gap, y0, z0), (b - gap, y1, z1), style) for a, b in pairwise(edges)]
-    if style.piping > 0.55:
-        pads += [part for pad in pads for part in _piping(pad)]
-    return pads
+    return [*pads, *(cord for pad in pads for cord in _piping(pad) if style.piping > 0.55)]
 
 
-def _piping(pad: Solid) -> list[Solid]:
+def _piping(pad: Pad) -> list[Solid]:
     """Cords along the seams of a cushion, above and below its side."""
-    if not isinstance(pad, Block) or min(pad.half) < 0.03:
+    if min(pad.half) < 0.03:
         return []
     r = min(pad.radius, *pad.half)
     sunk = r * (1 - 2**-0.5)
@@ -143,7 +141,7 @@ def _piping(pad: Solid) -> list[Solid]:
     plan = np.concatenate([plan, plan[:1]])
     cords: list[Solid] = []
     for y in (pad.half[1] - sunk, -pad.half[1] + sunk):
-        points = np.insert(plan, 1, y, axis=1) @ pad.turn.T + pad.centre
+        points = pad.puffed(np.insert(plan, 1, y, axis=1)) @ pad.turn.T + pad.centre
         cords.append(tube(points, 0.005, pad.material, "seam"))
     return cords
 
@@ -153,7 +151,7 @@ def _backs(x0: float, x1: float, y0: float, y1: float, z0: float, count: int, st
     edges = np.linspace(x0, x1, count + 1)
     thick = 0.12 + 0.08 * style.softness
     turn = rotation(x=-0.12 - 0.3 * style.rake)
-    parts = []
+    parts: list[Solid] = []
     for a, b in pairwise(edges):
         low = (a + 0.004, y0, z0 - thick * 0.2)
         parts.append(cushion(low, (b - 0.004, y1, z0 + thick * 0.8), style, turn=turn, role="back"))

@@ -140,24 +140,63 @@ class Block(Solid):
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         r = min(self.radius, *(self.half * 0.999))
-        steps = min(detail, 1 if r < 0.008 else 3)
+        return self._rounded(r, min(detail, 1 if r < 0.008 else 3), 1)
+
+    def _rounded(self, r: float, steps: int, flat: int) -> tuple[Array, Array]:
+        """Its surface with, on every axis, `steps` cells for the rounding at either end and `flat` ones between."""
         if r <= 0 or not steps:
-            vertices, faces = cube_surface(1)
+            vertices, faces = cube_surface(flat)
             return vertices * self.half, faces
-        # On every axis `steps` cells carry the rounding at either end, one cell the flat between them.
-        cells = 2 * steps + 1
+        cells = 2 * steps + flat
         vertices, faces = cube_surface(cells)
-        node = np.rint((vertices + 1) / 2 * cells)
-        core = np.where(node <= steps, -1.0, 1.0)
-        corner = np.where(node <= steps, node - steps, node - steps - 1) / steps
+        node = np.rint((vertices + 1) / 2 * cells) - steps
+        corner = (np.minimum(node, 0) + np.maximum(node - flat, 0)) / steps
         corner = np.sign(corner) * np.tan(np.abs(corner) * np.pi / 4)
-        corner = np.where(np.abs(corner) < 1e-12, 0.0, corner)
         length = np.linalg.norm(corner, axis=1, keepdims=True)
+        core = np.clip(node, 0, flat) * 2 / flat - 1
         return core * (self.half - r) + r * corner / np.maximum(length, 1e-12), faces
 
     def inradius(self, scale: Array) -> float:
         local = self.turn * np.asarray(scale)[:, None]
         return float(min(self.half / np.linalg.norm(local, axis=0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Pad(Block):
+    """A filled cushion: every side stands out in its middle by `crown` metres over its edges."""
+
+    crown: float = 0.02
+
+    def puffed(self, points: Array) -> Array:
+        """Points (n, 3) of the block, as far drawn in as its filling lets them be."""
+        share = np.clip(1 - (points / self.half) ** 2, 0, 1)
+        flat = share[:, [1, 2, 0]] * share[:, [2, 0, 1]]  # 1 in the middle of the sides of each axis
+        return np.asarray(points * (1 - np.minimum(self.crown / self.half, 0.2) * (1 - flat)))
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        steps, flat = ((0, 1), (1, 1), (1, 3), (2, 3))[detail]
+        vertices, faces = self._rounded(min(self.radius, *(self.half * 0.999)), steps, flat)
+        return self.puffed(vertices), faces
+
+
+@dataclass(frozen=True, eq=False)
+class Bow(Block):
+    """A board with round edges whose middle stands back (-z) by `bow` metres behind its ends at left and right."""
+
+    bow: float = 0.03
+
+    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
+        return super().local_distance(x, y, z + self.bow * (1 - np.minimum((x / self.half[0]) ** 2, 1)), metric)
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        w, h, t = self.half
+        outline = superellipse(7.0, (4, 8, 12, 16)[detail]) * (t, h)
+        end = 1 - min(0.04, 0.2 * w) / w
+        across = np.concatenate([[-1.0], np.linspace(-end, end, (2, 3, 5, 7)[detail]), [1.0]])
+        tall = np.where(np.abs(across) > end, 1 - min(0.3, self.radius / h), 1.0)
+        rings = [np.stack([0 * outline[:, 0] + w * u, outline[:, 1] * high, outline[:, 0] - self.bow * (1 - u * u)], 1)
+                 for u, high in zip(across, tall, strict=True)]  # fmt: skip
+        return loft(rings)
 
 
 @dataclass(frozen=True, eq=False)
