@@ -57,7 +57,7 @@ def test_what_a_term_misses_is_mended_and_none_shrinks(things, more, wrong):
             for key, rows in more.items()}  # fmt: skip
     plan, boxes = room(*things, **more)
     assert wrong in faults(plan, boxes)
-    after = mended(plan, boxes, strength=0.1, rounds=60)
+    after = mended(plan, boxes, strength=0.1, rounds=40)
     assert wrong not in faults(plan, after)
     torch.testing.assert_close(after.size, boxes.size)
 

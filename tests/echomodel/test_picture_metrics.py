@@ -82,8 +82,8 @@ def test_their_distances_have_closed_forms():
     assert picture_figures(a, b, ("FID-CLIP",), 0)["FID-CLIP"] == found["FID"]
     ones, zeros = np.ones((9, 4)), np.zeros((9, 4))
     assert picture_figures(ones, zeros, ("FID", "KID x 1000"), 0)["KID x 1000"].value == pytest.approx(7000)
-    wide = rng.normal(0, 1, (12, 300))  # fewer pictures than numbers: by the matrix product of Heusel et al.
-    other = wide @ rng.normal(0, 0.1, (300, 300))
+    wide = rng.normal(0, 1, (12, 60))  # fewer pictures than numbers: by the matrix product of Heusel et al.
+    other = wide @ rng.normal(0, 0.1, (60, 60))
     product = np.linalg.eigvals(np.cov(wide, rowvar=False) @ np.cov(other, rowvar=False))
     root = np.sqrt(product.real.clip(0)).sum()
     apart = ((wide.mean(0) - other.mean(0)) ** 2).sum() + wide.var(0, ddof=1).sum() + other.var(0, ddof=1).sum()
@@ -91,7 +91,7 @@ def test_their_distances_have_closed_forms():
 
 
 def test_a_small_network_tells_what_differs_and_nothing_else(monkeypatch):
-    monkeypatch.setattr("echomodel.metrics.pictures.STEPS", 30)
+    monkeypatch.setattr("echomodel.metrics.pictures.STEPS", 20)
     shown = np.stack([picture(room, 0) for room in generate_rooms(12, 4)])
     assert told_by_pictures(shown, 255 - shown, 0).value > 0.95
     same = told_by_pictures(shown, shown, 0)

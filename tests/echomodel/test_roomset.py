@@ -9,8 +9,10 @@ import pytest
 from echomodel.data import roomset
 from echomodel.data.build import build_data
 from echomodel.data.roomset import RoomSet, build_rooms, pack_rooms
+from echomodel.furniture.solids import Ball
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
+from echomodel.tsdf import tsdf_of
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +109,9 @@ def test_bad_folders_are_told(folder, tmp_path):
         build_data(tmp_path, "huge", 1)
 
 
-def test_the_smoke_recipe_makes_rooms_that_refer_to_its_shapes(tmp_path):
+def test_the_smoke_recipe_makes_rooms_that_refer_to_its_shapes(tmp_path, monkeypatch):
+    ball = tsdf_of([Ball(half=np.array([0.3, 0.2, 0.3]))])
+    monkeypatch.setattr("echomodel.data.shapeset.tsdf_of", lambda parts: ball)
     told = []
     rooms, shapes = build_data(tmp_path, "smoke", 7, lambda part, done, total: told.append((part, done, total)))
     assert (len(rooms), len(shapes)) == (64, 146)

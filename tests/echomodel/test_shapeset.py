@@ -2,6 +2,8 @@
 
 import pickle
 import shutil
+from collections.abc import Iterator
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -12,6 +14,21 @@ from echomodel.tsdf import tsdf_of
 from echomodel.vocabulary import vocabulary
 
 COUNT = len(vocabulary().categories)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def solids_are_measured_once() -> Iterator[None]:
+    """The grid of the same solids is worked out once: sets differ where their pieces do."""
+    known: dict[bytes, np.ndarray] = {}
+
+    def measured(parts):
+        key = pickle.dumps(parts)
+        if key not in known:
+            known[key] = tsdf_of(parts)
+        return known[key]
+
+    with patch.object(shapeset, "tsdf_of", measured):
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+from few_cameras import FEW
 from small_room import StandIn
 
 from echomodel.files import digest
@@ -40,8 +41,7 @@ def fine_things_are_coarse() -> Iterator[None]:
 @pytest.fixture(autouse=True, scope="module")
 def cameras_are_found_soon(request: pytest.FixtureRequest) -> Iterator[None]:
     """The cameras of a room are looked for at a dozen places; at two hundred where the test asks for what they see."""
-    few = {"STEPS": (0.5, 1.6), "ALONG": (0.5,), "EYES": (0.55,), "LOOKED": 12, "CHOSEN": 1}
-    with nullcontext() if request.path.parent.name == "draw" else patch.multiple("echousd.draw.views", **few):
+    with nullcontext() if request.path.parent.name == "draw" else patch.multiple("echousd.draw.views", **FEW):
         yield
 
 

@@ -231,7 +231,7 @@ def test_indices(tmp_path, echousd_command, monkeypatch):
         os.utime(file, ns=(number, number))  # another one than before
         done = echousd_command(
             "generate", tmp_path / "g.json", "-o", tmp_path / f"out_{number}", "--shapes", "library", "--assets", file,
-            "--no-place", "--dress", "none",
+            "--no-place", "--dress", "none", "--no-walls", "--no-preview",
         )  # fmt: skip
         fine(done, tmp_path)
         shutil.rmtree(tmp_path / f"out_{number}", ignore_errors=True)

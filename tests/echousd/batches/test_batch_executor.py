@@ -1,40 +1,14 @@
 """Workers that die, stall, eat memory or raise cost their task and nothing else."""
 
 import os
-import signal
 import subprocess
 import sys
 import time
 
 import pytest
+from bad_tasks import broken, dies, eats, square, stalls, wrong
 
 from echousd.batches.executor import LocalWorkers, Task, attempt
-
-
-def square(number):
-    return number * number
-
-
-def wrong(_):
-    raise ValueError("no such room")
-
-
-def broken(_):
-    raise KeyError("x")
-
-
-def dies(_):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def stalls(_):
-    time.sleep(60)
-
-
-def eats(_):
-    held = b"x" * (400 * 2**20)
-    time.sleep(60)
-    return len(held)
 
 
 def all_outcomes(pool, tasks):
@@ -49,7 +23,7 @@ def all_outcomes(pool, tasks):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is measured in /proc")
 def test_a_bad_task_costs_only_itself():
-    pool = LocalWorkers(2, timeout=8.0, memory=300)
+    pool = LocalWorkers(2, timeout=4.0, memory=300)
     calls = [("raises", wrong), ("breaks", broken), ("dies", dies), ("stalls", stalls), ("eats", eats)]
     tasks = [Task(f"square {k}", square, k) for k in range(6)]
     for place, (key, call) in enumerate(calls):
@@ -60,7 +34,7 @@ def test_a_bad_task_costs_only_itself():
         assert (found["raises"].fate, found["raises"].error) == ("error", "no such room")
         assert "unexpected KeyError" in found["breaks"].error
         assert (found["dies"].fate, found["dies"].error) == ("died", "the worker was killed (signal 9)")
-        assert (found["stalls"].fate, found["stalls"].error) == ("limit", "took longer than 8 s")
+        assert (found["stalls"].fate, found["stalls"].error) == ("limit", "took longer than 4 s")
         assert found["eats"].fate == "limit"
         assert found["eats"].error.endswith("MiB of memory, allowed: 300 MiB")
         assert pool.free() == 2

@@ -125,6 +125,7 @@ def test_what_does_not_rest_fails_the_verdict_of_a_batch_that_settles(source, tm
     source.write_text(small_graph().replaced(nodes=nodes, relations=relations).to_json())
     monkeypatch.setattr(batches, "_executor", lambda how, rooms, device: Inline())
     quick = ("--shapes", "boxes", "--drafts", 1, "--steps", 2, "--no-preview", "--no-place", "--workers", 1)
+    quick += ("--no-walls", "--dress", "none")
     for settles in (False, True):
         words = (*quick, *(["--settle"] if settles else []))
         done = echousd_command("batch", source, "-o", tmp_path / str(settles), *words)

@@ -1,6 +1,7 @@
 """`check` on several rooms, folders and patterns."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -10,11 +11,18 @@ import echousd
 from echomodel.boxes import Boxes
 
 
+@cache
+def room():
+    graph = small_graph()
+    for name in ("nightstand_left", "nightstand_right", "lamp"):
+        graph = graph.remove_node(name)
+    return echousd.generate(graph, seed=5, model=StandIn(), shapes="boxes", **BARE)
+
+
 @pytest.fixture
 def rooms(tmp_path):
     for name in ("a", "b"):
-        room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes", **BARE)
-        room.save(tmp_path / name, preview=False)
+        room().save(tmp_path / name, preview=False)
     return tmp_path
 
 

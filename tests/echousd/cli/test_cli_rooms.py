@@ -107,7 +107,7 @@ def test_older_crate_version_for_older_hosts(graph, tmp_path):
 
     code = (
         "import sys; from small_room import *; import echousd;"
-        "room = echousd.generate(small_graph(), model=StandIn(), shapes='boxes', place=False);"
+        "room = echousd.generate(small_graph(), model=StandIn(), shapes='boxes', place=False, **BARE);"
         "room.save(sys.argv[1], preview=False)"
     )
     paths = os.pathsep.join(path for path in sys.path if path)

@@ -123,7 +123,7 @@ def test_rooms(tmp_path, quiet, run, store):
 
 def test_import_of_a_look(tmp_path, monkeypatch):
     graph = small_graph()
-    for name in ("nightstand_left", "nightstand_right", "lamp", "pendant", "wardrobe"):
+    for name in ("nightstand_left", "nightstand_right", "bed", "pendant", "wardrobe"):
         graph = graph.remove_node(name)
     made = echousd.generate(graph, model=StandIn(), shapes="boxes", place=False, **BARE)
     root = made.save(tmp_path / "made/bedroom", preview=False)

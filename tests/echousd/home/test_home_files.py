@@ -1,6 +1,7 @@
 """Homes on disk: rooms in their places, doors once, one palette; a room is made anew and the others stay."""
 
 import json
+import shutil
 
 import ezdxf
 import numpy as np
@@ -23,13 +24,24 @@ relations: [living door bedroom]
 """
 
 
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """The folder that the first test makes a home in."""
+    return tmp_path_factory.mktemp("home")
+
+
 @pytest.fixture
-def made(tmp_path, monkeypatch, echousd_command):
+def made(kept, tmp_path, monkeypatch, echousd_command):
+    """A copy of the home, and what its making told."""
     inline(monkeypatch)
-    (tmp_path / "flat.yaml").write_text(FLAT)
-    done = echousd_command("generate", tmp_path / "flat.yaml", "-o", tmp_path / "out", *QUICK, "--json")
-    assert done.code == 0, done.err
-    return tmp_path / "out", json.loads(done.out)
+    if not (kept / "told").exists():
+        (kept / "flat.yaml").write_text(FLAT)
+        done = echousd_command("generate", kept / "flat.yaml", "-o", kept / "out", *QUICK, "--json")
+        assert done.code == 0, done.err
+        (kept / "told").write_text(done.out)
+    shutil.copy(kept / "flat.yaml", tmp_path)
+    shutil.copytree(kept / "out", tmp_path / "out")
+    return tmp_path / "out", json.loads((kept / "told").read_text().replace(str(kept), str(tmp_path)))
 
 
 def digests(folder):

@@ -41,7 +41,7 @@ def test_in_six_square_metres_what_has_no_place_is_left_out_and_said(tmp_path):
     (tmp_path / "flat.yaml").write_text(graph.to_yaml(), encoding="utf-8")
     with pytest.raises(ValueError, match=r"^flat\.yaml: the floor of 3\.00 x 2\.00 m .* is too small"):
         echousd.generate(tmp_path / "flat.yaml", shapes="boxes", seed=2, **BARE)
-    room = echousd.generate(graph, shapes="boxes", seed=2, fit="drop", drafts=2, **BARE)
+    room = echousd.generate(graph, shapes="boxes", seed=2, fit="drop", drafts=1, **BARE)
     gone = set(words) - set(room.graph.names)
     assert gone
     assert {note.split(":")[1].split(",")[0].strip() for note in room.notes if note.startswith("left out")} == gone

@@ -57,8 +57,8 @@ def test_exit_code_of_a_room_with_faults(tmp_path, echousd_command, monkeypatch)
 
     monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: StandIn()))
     echousd.write_graph(together(), tmp_path / "graph.usda")
-    quick = ("--shapes", "boxes", "--drafts", 1)
-    done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", *quick)
+    quick, bare = ("--shapes", "boxes", "--drafts", 1), ("--no-walls", "--dress", "none")
+    done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", *quick, *bare)
     assert done.code == 1
     assert "collide  bed and wardrobe by 1.10 m" in done.out
     assert "warning" not in done.err

@@ -54,6 +54,7 @@ def test_room_from_a_converted_checkpoint(weights, tmp_path, echousd_command):
     echousd.write_graph(small_graph(), tmp_path / "graph.usda")
     folder = tmp_path / "out" / "bedroom"
     words = ("--weights", weights, "--seed", 3, "--steps", 2, "--faces", 400)
+    words += ("--drafts", 1, "--no-walls", "--dress", "none")
     done = echousd_command("generate", tmp_path / "graph.usda", "-o", folder, *words)
     assert done.code == 0, done.err
     manifest = json.loads((folder / "bedroom.json").read_text())

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom
-from small_room import BARE, StandIn, small_graph
+from small_room import BARE, StandIn, saved_room, small_graph
 
 import echousd
 from echousd.graph import GraphError
@@ -26,8 +26,7 @@ def model(monkeypatch):
 
 @pytest.fixture
 def root(tmp_path):
-    room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes", **BARE)
-    return room.save(tmp_path / "bedroom", preview=False)
+    return saved_room(tmp_path / "bedroom", seed=5, shapes="boxes")
 
 
 def box(root, name):

@@ -38,8 +38,7 @@ def at(start: Setting, size: np.ndarray, position: np.ndarray) -> Linearised:
     return found.at(size, position, found.handicap)
 
 
-@pytest.mark.parametrize("rules", ["strict", "sgfront"])
-@pytest.mark.parametrize("square", [False, True])
+@pytest.mark.parametrize(("rules", "square"), [("strict", False), ("sgfront", True)])
 def test_slopes_are_those_of_the_values(monkeypatch, rules, square):
     monkeypatch.setattr("echousd.place.constraints.LONGEST_STEP", 99.0)  # no row is left out
     start = posed(rules, square, 1)

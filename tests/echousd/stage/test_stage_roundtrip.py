@@ -20,8 +20,8 @@ from echousd.stage.graphs import read_graph, write_graph
 from echousd.stage.read import read_rooms
 from echousd.stage.write import graph_layer
 
-FEW = settings(max_examples=25, deadline=None)
-FEWER = settings(max_examples=12, deadline=None)  # through files
+FEW = settings(max_examples=15, deadline=None)
+FEWER = settings(max_examples=8, deadline=None)  # through files
 
 BEDROOM = SceneGraph(
     RoomSpec("bedroom", floor_polygon=((0, 0), (4, 0), (4, 3.1), (0, 3)), height=2.6),
