@@ -151,7 +151,7 @@ class RoomData:
     @property
     def meshes(self) -> dict[str, trimesh.Trimesh]:
         """Object name -> all its parts as one mesh in the object's frame, metres, filling its box."""
-        return {name: geometry.mesh for name, geometry in self.geometry.items()}
+        return {name: geometry.mesh.trimesh for name, geometry in self.geometry.items()}
 
     @cached_property
     def styles(self) -> dict[str, str]:
@@ -190,6 +190,6 @@ class RoomData:
         for number, name in enumerate(self.names):
             asset, pose = self.assets[name], self.pose(number)
             if asset not in scene.geometry:
-                scene.geometry[asset] = self.geometry[name].mesh
+                scene.geometry[asset] = self.geometry[name].mesh.trimesh
             scene.graph.update(frame_to=name, matrix=pose, geometry=asset)
         return scene

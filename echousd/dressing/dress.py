@@ -27,8 +27,8 @@ from echousd.graph import Relation
 from echousd.graph.titles import DressingGraph, SmallNode
 from echousd.naming import free_name
 from echousd.room import RoomData
-from echousd.shapes.colliders import standing_hull
 from echousd.shapes.geometry import Geometry, Origin
+from echousd.shapes.hulls import standing_hull
 from echousd.shapes.joinery import part_of, within_budget
 from echousd.shapes.matter import weighed
 from echousd.stage import encoding as usd

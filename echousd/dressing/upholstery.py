@@ -112,8 +112,9 @@ def _upon(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | No
     points = np.stack(np.meshgrid(x, z), -1).reshape(-1, 2)
     top = float(spot[1])
     for collider in host.geometry.colliders:
-        normal = np.asarray(collider.mesh.face_normals)
-        beyond = (normal * collider.mesh.triangles_center).sum(1) - points @ normal[:, [0, 2]].T  # metres, of y = 0
+        normal = area_normals(collider.mesh.triangles)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        beyond = (normal * collider.mesh.triangles[:, 0]).sum(1) - points @ normal[:, [0, 2]].T  # metres, of y = 0
         up, down = normal[:, 1] > 1e-6, normal[:, 1] < -1e-6
         high = (beyond[:, up] / normal[up, 1]).min(1)
         low = (beyond[:, down] / normal[down, 1]).max(1)

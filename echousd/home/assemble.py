@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 from pxr import Sdf
 
 import echousd
 from echomodel.openings import numbered
+from echomodel.triangles import box
 from echousd.batches.batch import MEMORY, cores, weights_hash
 from echousd.batches.executor import Executor, LocalWorkers, Task
 from echousd.batches.options import BatchOptions
@@ -237,8 +237,8 @@ def _thresholds(layer: Sdf.Layer, plan: Plan) -> None:
         taken.append(name)
         pen.define(f"{above}/{name}", "Xform", kind="component")
         pen.label(f"{above}/{name}", category="floor")
-        box = trimesh.creation.box(bounds=[(low_x, -THICKNESS, low_z), (high_x, 0.0, high_z)])
+        slab = box((low_x, -THICKNESS, low_z), (high_x, 0.0, high_z))
         mesh = f"{above}/{name}/{name}_mesh"
-        write_mesh(pen, mesh, surface(box, {"threshold": np.arange(len(box.faces))}))
+        write_mesh(pen, mesh, surface(slab, {"threshold": np.arange(len(slab.faces))}))
         pen.over(mesh, apis=["PhysicsCollisionAPI"])
         pen.bind(mesh, f"{above}/Looks/threshold")

@@ -15,6 +15,7 @@ import numpy as np
 from pxr import Gf, Kind, Sdf
 
 from echomodel.late import Late
+from echomodel.triangles import area_normals
 from echousd.layers.materials import write_looks, write_palettes
 from echousd.layers.physics import write_asset_physics
 from echousd.options import Look
@@ -188,8 +189,9 @@ def most_used(geometry: Geometry) -> list[str]:
     """Material slots of all parts, the one with most surface first."""
     area: dict[str, float] = {}
     for part in geometry.parts:
+        size = np.linalg.norm(area_normals(part.mesh.triangles), axis=1)
         for slot, faces in part.slots.items():
-            area[slot] = area.get(slot, 0.0) + float(part.mesh.area_faces[faces].sum())
+            area[slot] = area.get(slot, 0.0) + float(size[faces].sum())
     return sorted(area, key=lambda slot: (-area[slot], slot))
 
 
@@ -235,8 +237,7 @@ def placed_files(
     """
     original = geometry.original
     assert original is not None
-    extent = np.asarray(geometry.mesh.bounds)
-    component = component_layer(name, category, extent, geometry, data)
+    component = component_layer(name, category, geometry.mesh.bounds, geometry, data)
     _place(component, name, original, _reference(name, original, folder))
     ours = {component_file(name): component}
     if not original.colliders:

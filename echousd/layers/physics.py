@@ -8,8 +8,9 @@ from echomodel.dressing import SMALL
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.geometry import Geometry
+from echousd.shapes.hulls import hull_volume
 from echousd.shapes.joints import STATIC
-from echousd.shapes.matter import hull_volume, mass_of, write_mass
+from echousd.shapes.matter import mass_of, write_mass
 from echousd.stage.layouts import ARTICULATED, ARTICULATION
 from echousd.stage.paths import MTL, SHELL, piece_path
 from echousd.stage.pen import Pen

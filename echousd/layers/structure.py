@@ -8,16 +8,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import trimesh
 from pxr import Kind, Sdf
 
 from echomodel.furniture.solids import Joint
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal
+from echomodel.triangles import Mesh
 from echomodel.vocabulary import Category, vocabulary
 from echousd.layers import assets
 from echousd.room import RoomData
 from echousd.shapes.fittings import PLAIN, Millwork, millwork_of
 from echousd.shapes.geometry import Mass
+from echousd.shapes.matter import hull_moments
 from echousd.shapes.surface import CREASE, Surface, surfaces
 from echousd.shapes.walls import Piece, ShellPart, ceiling, floor, wall_name, walls
 from echousd.stage import encoding
@@ -197,13 +198,12 @@ def _prims(part: ShellPart, above: str, kind: str, forms: Iterator[Surface]) -> 
         yield from prims
 
 
-def _forms(part: ShellPart) -> Iterator[tuple[trimesh.Trimesh, Mapping[str, np.ndarray], float]]:
+def _forms(part: ShellPart) -> Iterator[tuple[Mesh, Mapping[str, np.ndarray], float]]:
     """What the surfaces of a part and of those inside it are made from, in their own frames."""
     for piece in part.pieces:
         mesh = piece.mesh
         if part.joint:
-            mesh = mesh.copy()
-            mesh.apply_translation(-np.array(part.joint.anchor))
+            mesh = Mesh(mesh.vertices - part.joint.anchor, mesh.faces)
         yield mesh, {piece.look: np.arange(len(mesh.faces))}, CREASE
     for inner in part.inner:
         yield from _forms(inner)
@@ -211,6 +211,6 @@ def _forms(part: ShellPart) -> Iterator[tuple[trimesh.Trimesh, Mapping[str, np.n
 
 def _mass(pieces: Sequence[Piece], at: np.ndarray) -> Mass:
     """Of a leaf, as light as a hollow door."""
-    hull = trimesh.Trimesh(np.concatenate([piece.mesh.vertices for piece in pieces])).convex_hull
-    moments, axes = np.linalg.eigh(LEAF * np.asarray(hull.moment_inertia))
-    return Mass(round(LEAF * float(hull.volume), 2), hull.center_mass - at, moments, axes)
+    volume, middle, tensor = hull_moments([np.concatenate([piece.mesh.vertices for piece in pieces])])
+    moments, axes = np.linalg.eigh(LEAF * volume * tensor)
+    return Mass(round(LEAF * volume, 2), middle - at, moments, axes)

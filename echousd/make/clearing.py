@@ -7,14 +7,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
-import trimesh
 from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
 from echomodel.boxes import Boxes
 from echomodel.objective.support import carriers
 from echomodel.roomboxes import footprints
-from echomodel.triangles import connected_pieces
+from echomodel.triangles import Mesh, connected_pieces
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Placed, Relation, SceneGraph
 from echousd.graph.arrays import rounded_boxes, triplets_of
@@ -216,9 +215,9 @@ def _level(solids: Solids) -> BaseGeometry:
     return shapely.union_all([shapely.convex_hull(shapely.multipoints(points)) for points in near if len(points) > 2])
 
 
-def _boards(mesh: trimesh.Trimesh) -> Solids:
+def _boards(mesh: Mesh) -> Solids:
     """Points of the connected pieces of a mesh."""
-    faces, points = np.asarray(mesh.faces), np.asarray(mesh.vertices)
+    faces, points = mesh.faces, mesh.vertices
     board = connected_pieces(faces, len(points))
     return [points[np.unique(faces[board == number])] for number in range(int(board.max()) + 1)]
 

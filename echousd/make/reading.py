@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 from pxr import Sdf, Tf, Usd, UsdGeom
 
 from echomodel.boxes import Boxes
+from echomodel.triangles import Mesh
 from echousd.folder.folder import recover
 from echousd.folder.manifest import find_manifest
 from echousd.folder.stored import asset_from, shelf_of
@@ -160,9 +160,9 @@ def _pieces(root: Usd.Prim, asset: str) -> Iterator[tuple[Usd.Prim, str, str]]:
                     yield child, own, name
 
 
-def _mesh(mesh: UsdGeom.Mesh) -> trimesh.Trimesh:
+def _mesh(mesh: UsdGeom.Mesh) -> Mesh:
     points = np.asarray(mesh.GetPointsAttr().Get(), float)
-    return trimesh.Trimesh(points, np.asarray(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3), process=False)
+    return Mesh(points, np.asarray(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3))
 
 
 def _slots(mesh: UsdGeom.Mesh, faces: int) -> dict[str, np.ndarray]:
@@ -187,7 +187,7 @@ def read_original(root: Usd.Prim, asset: str | None, category: str, manifest: Ma
     points, faces = surface_of(root, cache, np.linalg.inv(matrix(cache.GetLocalToWorldTransform(root), root)))
     if not len(faces):
         return None
-    mesh = trimesh.Trimesh(points, faces, process=False)
+    mesh = Mesh(points, faces)
     told = manifest["meshes"][asset]
     words = (told.get("shapes", ""), told.get("licence", LICENCE), told.get("credit", ""))
     origin = Origin(*words, asset=told.get("asset", ""), sha256=told.get("sha256", ""))
@@ -241,7 +241,5 @@ def in_our_frame(geometry: Geometry, metres: float, *, z_up: bool) -> Geometry:
     return replace(geometry, parts=parts, colliders=colliders, mass=mass, original=original)
 
 
-def _brought(mesh: trimesh.Trimesh, to_ours: np.ndarray) -> trimesh.Trimesh:
-    out = mesh.copy()
-    out.vertices = np.asarray(mesh.vertices) @ to_ours.T
-    return out
+def _brought(mesh: Mesh, to_ours: np.ndarray) -> Mesh:
+    return Mesh(mesh.vertices @ to_ours.T, mesh.faces)

@@ -9,10 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import manifold3d
 import numpy as np
-import trimesh
+import shapely
 
 from echomodel.openings import SKIRTING, Opening
+from echomodel.triangles import Mesh, box, joined
 from echomodel.vocabulary import vocabulary
 
 WALL = 0.15  # metres, thickness of walls
@@ -54,15 +56,12 @@ def millwork_of(seed: int, style: str | None = None, *, private: bool = False) -
     return Millwork(window, door, float(skirting), float(cornice))
 
 
-def board(u: tuple[float, float], v: tuple[float, float], w: tuple[float, float]) -> trimesh.Trimesh:
+def board(u: tuple[float, float], v: tuple[float, float], w: tuple[float, float]) -> Mesh:
     """A box between two values of each coordinate."""
-    low, high = np.array([u[0], v[0], w[0]]), np.array([u[1], v[1], w[1]])
-    box = trimesh.creation.box(high - low)
-    box.apply_translation((low + high) / 2)
-    return box
+    return box(*zip(u, v, w, strict=True))
 
 
-def door_frame(opening: Opening, wall: float = WALL, *, both: bool = True) -> trimesh.Trimesh:
+def door_frame(opening: Opening, wall: float = WALL, *, both: bool = True) -> Mesh:
     """Lining of the hole in a wall of this thickness, and the trim around it, on both sides or on the inner one."""
     far = wall + PROUD if both else wall
     start, end, top = opening.offset, opening.end, opening.height
@@ -78,7 +77,7 @@ def door_frame(opening: Opening, wall: float = WALL, *, both: bool = True) -> tr
     return joined(boards)
 
 
-def door_leaf(opening: Opening, wall: float = WALL, kind: str = "panelled") -> trimesh.Trimesh:
+def door_leaf(opening: Opening, wall: float = WALL, kind: str = "panelled") -> Mesh:
     """The closed leaf, flush with the side that it opens to; `kind` of `DOORS`."""
     start, end, low, top, w = _leaf(opening, wall)
     if kind == "glazed":
@@ -101,7 +100,7 @@ def door_leaf(opening: Opening, wall: float = WALL, kind: str = "panelled") -> t
     return joined(boards)
 
 
-def door_glass(opening: Opening, wall: float = WALL) -> trimesh.Trimesh:
+def door_glass(opening: Opening, wall: float = WALL) -> Mesh:
     """The pane of a glazed leaf."""
     start, end, low, top, (near, far) = _leaf(opening, wall)
     return board(*_lights(start, end, low, top), ((near + far) / 2 - 0.003, (near + far) / 2 + 0.003))
@@ -119,7 +118,7 @@ def _lights(start: float, end: float, low: float, top: float) -> tuple[tuple[flo
     return (start + 0.11, end - 0.11), (low + 0.38 * (top - low), top - 0.12)
 
 
-def light_switch(opening: Opening, left_first: bool, length: float) -> trimesh.Trimesh | None:
+def light_switch(opening: Opening, left_first: bool, length: float) -> Mesh | None:
     """A switch beside a door, where its handle is; None where the wall ends there."""
     beside = CASING + REACH
     at = opening.end + beside if _hinge_first(opening, left_first) else opening.offset - beside
@@ -130,7 +129,7 @@ def light_switch(opening: Opening, left_first: bool, length: float) -> trimesh.T
     return joined([board((at - r, at + r), (1.05 - r, 1.05 + r), w) for r, w in plates])
 
 
-def door_handle(opening: Opening, left_first: bool, wall: float = WALL) -> trimesh.Trimesh:
+def door_handle(opening: Opening, left_first: bool, wall: float = WALL) -> Mesh:
     """A lever on both sides of the leaf, away from the hinges.
 
     `left_first`: whether someone inside who looks at the wall has its first corner on the left. `wall`: its thickness,
@@ -166,7 +165,7 @@ def _hinge_first(opening: Opening, left_first: bool) -> bool:
     return (opening.hinge == "left") == left_first
 
 
-def window_frame(opening: Opening, kind: str = "plain") -> trimesh.Trimesh:
+def window_frame(opening: Opening, kind: str = "plain") -> Mesh:
     """The frame in the middle of the wall, with the bars of its `kind` of `WINDOWS`."""
     w = (0.05, 0.11)
     start, end, low, top = opening.offset, opening.end, opening.sill, opening.sill + opening.height
@@ -191,27 +190,26 @@ def window_frame(opening: Opening, kind: str = "plain") -> trimesh.Trimesh:
     return joined(boards)
 
 
-def window_glass(opening: Opening) -> trimesh.Trimesh:
+def window_glass(opening: Opening) -> Mesh:
     """One pane behind the frame."""
     u = (opening.offset + FRAME / 2, opening.end - FRAME / 2)
     return board(u, (opening.sill + FRAME / 2, opening.sill + opening.height - FRAME / 2), (0.078, 0.084))
 
 
-def window_sill(opening: Opening) -> trimesh.Trimesh:
+def window_sill(opening: Opening) -> Mesh:
     """The board below a window, a little into the room."""
     return board((opening.offset - 0.05, opening.end + 0.05), (opening.sill - 0.03, opening.sill), (-0.04, 0.0))
 
 
-def curtain_rail(opening: Opening, length: float, height: float) -> trimesh.Trimesh | None:
+def curtain_rail(opening: Opening, length: float, height: float) -> Mesh | None:
     """A rail above a window with two holders, None where the ceiling is too near."""
     above, before, beyond = RAIL
     level = opening.sill + opening.height + above
     if level > height - 0.05:
         return None
     start, end = max(opening.offset - beyond, 0.02), min(opening.end + beyond, length - 0.02)
-    rod = trimesh.creation.cylinder(0.012, end - start, sections=12)
-    rod.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (0, 1, 0)))
-    rod.apply_translation(((start + end) / 2, level, -before))
+    rod = extruded(shapely.Point(-before, level).buffer(0.012, quad_segs=3), end - start)
+    rod = Mesh(rod.vertices[:, [2, 1, 0]] + (start, 0, 0), rod.faces[:, ::-1])
     holders = [
         board((at - 0.008, at + 0.008), (level - 0.008, level + 0.008), (-before, 0.0))
         for at in (start + 0.06, end - 0.06)
@@ -219,7 +217,7 @@ def curtain_rail(opening: Opening, length: float, height: float) -> trimesh.Trim
     return joined([rod, *holders])
 
 
-def skirting(openings: Sequence[Opening], length: float, tall: float = 0.08) -> trimesh.Trimesh | None:
+def skirting(openings: Sequence[Opening], length: float, tall: float = 0.08) -> Mesh | None:
     """Boards of this height along the foot of a wall, but for its doors and passages; None where nothing is left."""
     holes = sorted((o.offset, o.end, CASING if o.kind == "door" else 0.0) for o in openings if o.sill <= tall)
     boards, at = [], 0.0
@@ -230,8 +228,14 @@ def skirting(openings: Sequence[Opening], length: float, tall: float = 0.08) -> 
     return joined(boards) if boards else None
 
 
-def joined(boards: list[trimesh.Trimesh]) -> trimesh.Trimesh:
-    """Several meshes as one."""
-    mesh = trimesh.util.concatenate(boards)
-    assert isinstance(mesh, trimesh.Trimesh)
-    return mesh
+def extruded(flat: shapely.Polygon, height: float) -> Mesh:
+    """A closed prism above a polygon in x and y, up to z = `height`, metres."""
+    whole = shapely.geometry.polygon.orient(flat)
+    rings = [np.array(ring.coords)[:-1] for ring in (whole.exterior, *whole.interiors)]
+    below, faces = np.concatenate(rings), manifold3d.triangulate(rings).astype(int)
+    count, start = len(below), np.cumsum([0, *map(len, rings)])
+    this = np.arange(count)
+    after = np.concatenate([np.roll(np.arange(a, b), -1) for a, b in pairwise(start)])
+    sides = [np.stack([this, after, after + count], 1), np.stack([this, after + count, this + count], 1)]
+    points = [np.column_stack([below, np.full(count, at)]) for at in (0.0, height)]
+    return Mesh(np.concatenate(points), np.concatenate([faces[:, ::-1], faces + count, *sides]))

@@ -6,15 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from echomodel.furniture.solids import Joint
+from echomodel.triangles import Mesh, joined
 from echousd.shapes.surface import CREASE
-
-if TYPE_CHECKING:
-    import trimesh
 
 CONVERTED = "model.usdc"
 
@@ -54,7 +51,7 @@ class Part:
     """One mesh of a piece of furniture."""
 
     name: str  # unique in its geometry; the prim is called `<asset>_<name>`
-    mesh: trimesh.Trimesh  # in the object's frame, metres
+    mesh: Mesh  # in the object's frame, metres
     # material slot (a group of `echousd.shapes.looks`) -> (m,) int face numbers; together every face once
     slots: Mapping[str, np.ndarray]
     crease: float = CREASE  # neighbours that fold more sharply than this keep a hard edge, radians
@@ -76,7 +73,7 @@ class Collider:
     """What a piece of furniture collides with."""
 
     name: str  # unique in its geometry; the prim is called `<asset>_<name>`
-    mesh: trimesh.Trimesh  # in the object's frame, metres
+    mesh: Mesh  # in the object's frame, metres
     approximation: str  # UsdPhysics's word for how the mesh is meant, `convexHull` or `convexDecomposition`
     body: str = ""  # as for `Part`
 
@@ -106,15 +103,9 @@ class Geometry:
             raise ValueError(f"geometry has the pieces {names}, need parts and colliders, each with a name of its own")
 
     @cached_property
-    def mesh(self) -> trimesh.Trimesh:
+    def mesh(self) -> Mesh:
         """All parts as one mesh."""
-        if len(self.parts) == 1:
-            return self.parts[0].mesh
-        import trimesh
-
-        whole = trimesh.util.concatenate([part.mesh for part in self.parts])
-        assert isinstance(whole, trimesh.Trimesh)
-        return whole
+        return joined([part.mesh for part in self.parts])
 
     @property
     def theirs_collides(self) -> bool:
@@ -128,13 +119,5 @@ class Geometry:
 
     @property
     def watertight(self) -> bool:
-        """Whether every part is closed as it is, or once vertices at one place are one, as trimesh says."""
-        return all(_closed(part.mesh) for part in self.parts)
-
-
-def _closed(mesh: trimesh.Trimesh) -> bool:
-    if mesh.is_watertight:
-        return True
-    merged = mesh.copy()
-    merged.merge_vertices(merge_tex=True, merge_norm=True)
-    return bool(merged.is_watertight)
+        """Whether every part is closed as it is, or once vertices at one place are one."""
+        return all(part.mesh.closed for part in self.parts)

@@ -6,14 +6,13 @@ import warnings
 from collections.abc import Sequence
 
 import numpy as np
-import trimesh
 from scipy.spatial import ConvexHull, QhullError
-from trimesh.util import append_faces
 
 from echomodel.furniture.assembly import Piece, pieces_of
 from echomodel.furniture.solids import FINEST, Solid
-from echomodel.triangles import area_normals
+from echomodel.triangles import Mesh, joined
 from echousd.shapes.geometry import FRAME, Collider, Geometry, Mass, Origin, Part
+from echousd.shapes.hulls import convex_hull
 from echousd.shapes.matter import ballasted, weighed
 
 SLOTS = {"accent": "front"}  # material of a solid -> material slot, where they differ
@@ -105,7 +104,7 @@ def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int, *, roun
 
 def part_of(name: str, pieces: Sequence[Piece], body: str = "") -> Part:
     """Some meshed solids as one part with a slot per material."""
-    mesh = trimesh.Trimesh(*append_faces([p.vertices for p in pieces], [p.faces for p in pieces]), process=False)
+    mesh = joined([Mesh(piece.vertices, piece.faces) for piece in pieces])
     words = [SLOTS.get(piece.solid.material, piece.solid.material) for piece in pieces]
     slot = np.repeat(words, [len(piece.faces) for piece in pieces])
     return Part(name, mesh, {word: np.flatnonzero(slot == word) for word in sorted(set(words))}, CREASE, body)
@@ -131,7 +130,7 @@ def covering(plain: np.ndarray, shown: np.ndarray) -> np.ndarray:
     return corners
 
 
-def convex_pieces(points: Sequence[np.ndarray], box: float) -> list[trimesh.Trimesh]:
+def convex_pieces(points: Sequence[np.ndarray], box: float) -> list[Mesh]:
     """Convex hulls (each a closed mesh) around solids; a small one joins the one that it wastes the least room with.
 
     Where all of them would waste more than a small one is, and hulls are few enough, it stays alone: on a wedge from a
@@ -155,26 +154,9 @@ def convex_pieces(points: Sequence[np.ndarray], box: float) -> list[trimesh.Trim
         groups[one] = np.concatenate([groups[one], groups.pop(other)])
         low[one], high[one] = groups[one].min(0), groups[one].max(0)
         low, high = np.delete(low, other, axis=0), np.delete(high, other, axis=0)
-    return [_hull(group) for group in groups]
+    return [convex_hull(group) for group in groups]
 
 
 def _volume(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Volumes of boxes, none thinner than a millimetre."""
     return np.prod(np.maximum(high - low, 1e-3), axis=-1)
-
-
-def _hull(points: np.ndarray) -> trimesh.Trimesh:
-    """The convex hull with exact corners, facing outwards; of points in one plane their box, a tenth of a mm thick."""
-    try:
-        hull = ConvexHull(points, qhull_options="QbB Pp Qt")
-    except QhullError:
-        extent = np.maximum(np.ptp(points, axis=0), 1e-4)
-        flat = trimesh.creation.box(extent)
-        flat.apply_translation((points.max(0) + points.min(0)) / 2)
-        return flat
-    corner = points[hull.simplices]
-    normal = area_normals(corner)
-    inwards = (normal * hull.equations[:, :3]).sum(1) < 0
-    faces = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
-    used, index = np.unique(faces, return_inverse=True)
-    return trimesh.Trimesh(points[used], index.reshape(-1, 3), process=False)

@@ -14,11 +14,14 @@ from shapely.affinity import scale
 
 from echomodel.dressing.prints import PRINTS
 from echomodel.furniture.assembly import Piece
+from echomodel.late import Late
 from echomodel.triangles import cross
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
-from echousd.shapes.geometry import Collider, Geometry, Mass
+from echousd.shapes.geometry import Geometry, Mass
 from echousd.stage.pen import Pen
+
+convex_hull = Late("echousd.shapes.hulls:convex_hull")  # with scipy, which who reads masses does without
 
 
 @dataclass(frozen=True)
@@ -102,10 +105,10 @@ def mass_of(geometry: Geometry, category: str) -> Mass:
     size = np.ptp(geometry.mesh.bounds, axis=0)
     low, high = (0.2, np.inf) if category == OBSTACLE else vocabulary().category(category).kg
     kilograms = round(float(np.clip(np.prod(size) * density(category), low, high)), 2)
-    middle, tensor = _spread(geometry.colliders)
+    solids = [collider.mesh.vertices for collider in geometry.colliders]
+    _, middle, tensor = hull_moments(solids)
     moments, axes = np.linalg.eigh(kilograms * tensor)
-    mass = Mass(kilograms, middle, np.maximum(moments, LEAST_INERTIA), axes)
-    return ballasted(mass, [collider.mesh.vertices for collider in geometry.colliders])
+    return ballasted(Mass(kilograms, middle, np.maximum(moments, LEAST_INERTIA), axes), solids)
 
 
 def density(category: str) -> float:
@@ -113,24 +116,17 @@ def density(category: str) -> float:
     return SOLID if category == OBSTACLE else vocabulary().category(category).density
 
 
-def hull_volume(points: np.ndarray) -> float:
-    """Volume of the convex hull of points (n, 3), m³; 0 of points in one plane."""
-    from scipy.spatial import ConvexHull, QhullError
+def hull_moments(solids: Iterable[np.ndarray]) -> tuple[float, np.ndarray, np.ndarray]:
+    """Volume and centre of mass (3,) of the hulls of solids, and one kilogram's tensor of inertia (3, 3) about it.
 
-    try:
-        return float(ConvexHull(points).volume)  # trimesh's hull is a mesh and takes five times as long
-    except QhullError:
-        return 0.0
-
-
-def _spread(colliders: Iterable[Collider]) -> tuple[np.ndarray, np.ndarray]:
-    """Centre of mass (3,), and the tensor of inertia (3, 3) about it of one kilogram in the colliders' hulls."""
-    hulls = [collider.mesh.convex_hull for collider in colliders]
+    `solids`: corners (n, 3) of each, metres.
+    """
+    hulls = [convex_hull(solid) for solid in solids]
     moments = [_moments(hull.vertices, hull.faces)[0] for hull in hulls]
     volume, first, second = (sum(part) for part in zip(*moments, strict=True))
     middle = first / volume
-    spread = second / volume - np.outer(middle, middle)
-    return middle, np.trace(spread) * np.eye(3) - spread
+    square = second / volume - np.outer(middle, middle)
+    return volume, middle, np.trace(square) * np.eye(3) - square
 
 
 def write_mass(pen: Pen, path: str, mass: Mass) -> None:

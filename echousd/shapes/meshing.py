@@ -11,11 +11,12 @@ from scipy import ndimage
 from trimesh import smoothing
 
 from echomodel.late import Late
+from echousd.shapes.sources.source import FACES
 
 mesh_from_tsdf = Late("echomodel.tsdf:mesh_from_tsdf")
 SMALLEST = 0.004  # solids below this share of the largest one are noise
 ROUNDS, SHRINK, SWELL = 6, 0.5, 0.53  # Taubin (1995): lambda, -mu; low frequencies such as thin legs stay
-FACES, LEAST_FACES = 5000, 100
+LEAST_FACES = 100
 FINEST, COARSENINGS = 1 / 1200, 11  # first tolerance in diagonals of the mesh; it grows to a twentieth
 
 

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echomodel.triangles import area_normals, connected_pieces
+from echomodel.triangles import Mesh, area_normals, connected_pieces
 from echousd.shapes.finishes.slots import metres_of
-
-if TYPE_CHECKING:
-    import trimesh
 
 NUDGE = 4e-6  # metres between points of different boards at one place
 CREASE = np.radians(42.0)  # neighbours that fold more sharply than this keep a hard edge
@@ -39,9 +35,7 @@ class Surface:
         return np.stack([self.points.min(0), self.points.max(0)]).astype(np.float32)
 
 
-def surface(
-    mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray], *, atlas: bool = False, crease: float = CREASE
-) -> Surface:
+def surface(mesh: Mesh, groups: Mapping[str, np.ndarray], *, atlas: bool = False, crease: float = CREASE) -> Surface:
     """A mesh with normals and texture coordinates.
 
     `mesh`: triangles in metres. `groups`: material group -> face numbers. `atlas`: unwrap without overlaps into the
@@ -51,9 +45,7 @@ def surface(
     return surfaces([(mesh, groups, crease)], atlas=atlas)[0]
 
 
-def surfaces(
-    forms: Sequence[tuple[trimesh.Trimesh, Mapping[str, np.ndarray], float]], *, atlas: bool = False
-) -> list[Surface]:
+def surfaces(forms: Sequence[tuple[Mesh, Mapping[str, np.ndarray], float]], *, atlas: bool = False) -> list[Surface]:
     """Meshes, groups and creases as for `surface`, all at once: of boards each alone takes several times as long."""
     meshes = [(np.asarray(mesh.vertices), np.asarray(mesh.faces)) for mesh, _, _ in forms]
     first = np.cumsum([0, *(len(points) for points, _ in meshes)])
@@ -87,7 +79,7 @@ def surfaces(
     ]
 
 
-def creased_normals(mesh: trimesh.Trimesh, crease: float = CREASE) -> tuple[np.ndarray, np.ndarray]:
+def creased_normals(mesh: Mesh, crease: float = CREASE) -> tuple[np.ndarray, np.ndarray]:
     """Corner normals, smooth within `crease` radians: ((k, 3) float32 values, (3 f) int32 indices)."""
     faces = np.asarray(mesh.faces)
     total = _corner_normals(np.asarray(mesh.vertices), faces, np.full(len(faces), np.cos(crease)))
@@ -207,10 +199,9 @@ def facing_axis(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return axis, np.where(normal[np.arange(len(normal)), axis] < 0, -1.0, 1.0)
 
 
-def box_projection(mesh: trimesh.Trimesh) -> np.ndarray:
+def box_projection(mesh: Mesh) -> np.ndarray:
     """(f, 3, 2) float: texture coordinates in metres along the axis that each face looks at most."""
-    triangles = np.asarray(mesh.vertices)[np.asarray(mesh.faces)]
-    return _projected(triangles, *facing_axis(triangles))
+    return _projected(mesh.triangles, *facing_axis(mesh.triangles))
 
 
 def _projected(triangles: np.ndarray, axis: np.ndarray, way: np.ndarray) -> np.ndarray:

@@ -8,10 +8,10 @@ from functools import lru_cache
 
 import numpy as np
 import shapely
-import trimesh
 
 from echomodel.furniture.solids import Joint
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal, signed_area
+from echomodel.triangles import Mesh, joined
 from echousd.shapes import fittings
 from echousd.shapes.fittings import PLAIN, WALL, Millwork
 from echousd.stage.paths import piece_name
@@ -26,7 +26,7 @@ class Piece:
 
     name: str
     look: str
-    mesh: trimesh.Trimesh
+    mesh: Mesh
     solid: bool = True
 
 
@@ -109,11 +109,10 @@ def floor(polygon: np.ndarray) -> ShellPart:
     return ShellPart("Floor", "floor", (Piece(piece_name("Floor", "mesh"), "floor", _slab(polygon, -THICKNESS)),))
 
 
-def _slab(polygon: np.ndarray, bottom: float) -> trimesh.Trimesh:
+def _slab(polygon: np.ndarray, bottom: float) -> Mesh:
     flat = shapely.Polygon(np.stack([polygon[:, 0], -polygon[:, 1]], 1))  # x right, -z up: seen from above
-    slab = trimesh.creation.extrude_polygon(flat, THICKNESS)
-    slab.vertices = np.stack([slab.vertices[:, 0], slab.vertices[:, 2] + bottom, -slab.vertices[:, 1]], 1)
-    return slab
+    slab = fittings.extruded(flat, THICKNESS)
+    return Mesh(slab.vertices[:, [0, 2, 1]] * (1, 1, -1) + (0, bottom, 0), slab.faces)
 
 
 def outline(polygon: np.ndarray, thickness: Sequence[float] | np.ndarray = ()) -> np.ndarray:
@@ -140,9 +139,7 @@ def wall_frame(polygon: np.ndarray, edge: int) -> np.ndarray:
     return frame
 
 
-def _wall(
-    polygon: np.ndarray, edge: int, height: float, openings: Sequence[Opening], thickness: np.ndarray
-) -> trimesh.Trimesh:
+def _wall(polygon: np.ndarray, edge: int, height: float, openings: Sequence[Opening], thickness: np.ndarray) -> Mesh:
     """The wall with its holes, in its own frame."""
     length = float(edge_lengths(polygon)[edge])
     face = shapely.box(0.0, -THICKNESS, length, height)
@@ -150,30 +147,28 @@ def _wall(
         low = opening.sill if opening.sill > 0 else 0.0
         face = face.difference(shapely.box(opening.offset, low, opening.end, min(low + opening.height, height)))
     pieces = [p for p in getattr(face, "geoms", [face]) if p.area > 1e-6]
-    mesh = fittings.joined([trimesh.creation.extrude_polygon(p, thickness[edge]) for p in pieces])
+    mesh = joined([fittings.extruded(p, thickness[edge]) for p in pieces])
     outer = outline(polygon, thickness)
     along = direction(polygon, edge)
     first = float((outer[edge] - polygon[edge]) @ along)
     last = float((outer[(edge + 1) % len(polygon)] - polygon[edge]) @ along)
-    vertices = np.array(mesh.vertices)
+    vertices = mesh.vertices
     far = vertices[:, 2] > thickness[edge] / 2
     vertices[far & (vertices[:, 0] < 1e-6), 0] = first
     vertices[far & (vertices[:, 0] > length - 1e-6), 0] = last
-    mesh.vertices = vertices
     return mesh
 
 
-def _cornice(polygon: np.ndarray, edge: int, height: float, tall: float) -> trimesh.Trimesh:
+def _cornice(polygon: np.ndarray, edge: int, height: float, tall: float) -> Mesh:
     """A moulding of two steps in the corner of a wall and the ceiling, mitred with those of the walls beside it."""
     inner, steps = outline(polygon, [-0.6 * tall] * len(polygon)), []
     for share, low in ((1.0, 0.5 * tall), (0.5, tall)):
         last = (edge + 1) % len(polygon)
         near = [polygon[k] + share * (inner[k] - polygon[k]) for k in (last, edge)]
         flat = shapely.Polygon(np.array([polygon[edge], polygon[last], *near]) * (1, -1))
-        step = trimesh.creation.extrude_polygon(flat, low - 0.5 * tall * (share < 1))
-        step.vertices = step.vertices[:, [0, 2, 1]] * (1, 1, -1) + (0, height - low, 0)
-        steps.append(step)
-    return fittings.joined(steps)
+        step = fittings.extruded(flat, low - 0.5 * tall * (share < 1))
+        steps.append(Mesh(step.vertices[:, [0, 2, 1]] * (1, 1, -1) + (0, height - low, 0), step.faces))
+    return joined(steps)
 
 
 def _filled(
@@ -186,7 +181,7 @@ def _filled(
     """
     name = f"{wall}_{opening.name}"
 
-    def made(what: str, look: str, mesh: trimesh.Trimesh | None, solid: bool = True) -> tuple[Piece, ...]:
+    def made(what: str, look: str, mesh: Mesh | None, solid: bool = True) -> tuple[Piece, ...]:
         return () if mesh is None else (Piece(piece_name(name, what), look, _placed(mesh, frame), solid),)
 
     if opening.kind == "window":
@@ -217,13 +212,10 @@ def _hinge(opening: Opening, frame: np.ndarray, left_first: bool, deep: float) -
     return Joint("hinge", "revolute", (0.0, float(np.sign(up[1])), 0.0), tuple(anchor.round(6).tolist()), np.pi / 2)
 
 
-def _placed(mesh: trimesh.Trimesh, frame: np.ndarray) -> trimesh.Trimesh:
+def _placed(mesh: Mesh, frame: np.ndarray) -> Mesh:
     """The mesh in the room's frame; a frame of the other hand turns the faces back."""
-    out = mesh.copy()
-    out.vertices = mesh.vertices @ frame[:3, :3].T + frame[:3, 3]
-    if np.linalg.det(frame[:3, :3]) < 0:
-        out.faces = np.ascontiguousarray(out.faces[:, ::-1])
-    return out
+    inside_out = np.linalg.det(frame[:3, :3]) < 0
+    return Mesh(mesh.vertices @ frame[:3, :3].T + frame[:3, 3], mesh.faces[:, ::-1] if inside_out else mesh.faces)
 
 
 MARGIN = 0.35  # metres of floor around the furniture where nobody said how large the floor is

@@ -10,7 +10,7 @@ import numpy as np
 from pxr import Kind, Sdf, Usd, UsdGeom
 
 from echomodel.boxes2d import seen, turned
-from echomodel.triangles import joined
+from echomodel.triangles import Mesh, joined
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import LABELS
 from echousd.stage.forms import Polygons, forms, polygons
@@ -218,11 +218,11 @@ def surface_of(
         placed: (4, 4) float, column vectors, from the stage's world to where the points are wanted.
         read: what gives the points and triangles of a prim in its own frame.
     """
-    points, faces = [NOTHING[0]], [NOTHING[1]]
+    pieces = [Mesh(*NOTHING)]
     for form in forms(top, cache, others):
         vertices, triangles = read(form.prim)
         if len(triangles):
             world = placed @ form.world
-            points.append(vertices @ world[:3, :3].T + world[:3, 3])
-            faces.append(triangles)
-    return joined(points, faces)
+            pieces.append(Mesh(vertices @ world[:3, :3].T + world[:3, 3], triangles))
+    whole = joined(pieces)
+    return whole.vertices, whole.faces

@@ -6,7 +6,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from trimesh.triangles import closest_point
 
-from echomodel.triangles import area_normals, connected_pieces, cross, distances, joined, spread
+from echomodel.triangles import Mesh, area_normals, box, connected_pieces, cross, distances, joined, spread
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
@@ -49,9 +49,16 @@ def test_a_long_strip_in_any_order_is_one_piece():
 
 
 def test_meshes_joined_keep_their_corners():
-    one, two = (np.arange(9.0).reshape(3, 3), np.array([[0, 1, 2]])), (-np.ones((4, 3)), np.array([[1, 2, 3]]))
-    points, faces = joined(*zip(one, two, strict=True))
-    np.testing.assert_array_equal(points[faces], [one[0], two[0][1:]])
+    one, two = Mesh(np.arange(9.0).reshape(3, 3), np.array([[0, 1, 2]])), Mesh(-np.eye(4, 3), np.array([[1, 2, 3]]))
+    np.testing.assert_array_equal(joined([one, two]).triangles, [one.vertices, two.vertices[1:]])
+
+
+def test_a_box_is_closed_and_ends_at_its_corners():
+    made = box((1, 2, 3), (2, 4, 7))
+    np.testing.assert_array_equal(made.bounds, [(1, 2, 3), (2, 4, 7)])
+    assert made.trimesh.volume == pytest.approx(8.0)
+    assert made.closed
+    assert not Mesh(made.vertices, made.faces[1:]).closed
 
 
 def test_points_are_spread_evenly_over_the_area():

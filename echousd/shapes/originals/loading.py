@@ -18,6 +18,7 @@ from pxr import Sdf, Tf, UsdUtils
 from trimesh.graph import connected_component_labels
 
 from echomodel.files import within_memory
+from echomodel.triangles import Mesh
 from echousd.assets.catalogues import Entry
 from echousd.assets.describe import described, digest_of
 from echousd.assets.measure import Measured, measure
@@ -78,7 +79,7 @@ def geometry_of(
     found = measure(model)
     pose = record.pose(size)
     points = found.points @ pose[:3, :3].T + pose[:3, 3]
-    mesh = trimesh.Trimesh(points, found.faces, process=False)
+    mesh = Mesh(points, found.faces)
     original = _original(model, found, pose, collect)
     origin = Origin(source, record.licence, record.author, asset=record.id, sha256=record.sha256)
     return Geometry((Part("mesh", mesh, {}),), (hull_of(mesh, category),), origin, original=original)
@@ -247,10 +248,11 @@ def _layer(parts: list[_Part], images: Images) -> Sdf.Layer:
 
 def _write_mesh(pen: Pen, path: str, part: _Part) -> None:
     points, faces = part.points.astype(np.float32), part.faces.astype(np.int32)
-    whole = trimesh.Trimesh(part.points, part.faces, process=False)
+    whole = Mesh(part.points, part.faces)
     flat = None if part.uv is not None else box_projection(whole)
-    whole.merge_vertices()  # along the seams of texture coordinates, so that shading has none
-    normals, index = creased_normals(whole)
+    merged = whole.trimesh
+    merged.merge_vertices()  # along the seams of texture coordinates, so that shading has none
+    normals, index = creased_normals(Mesh.of(merged))
     values = part.uv if flat is None else flat.reshape(-1, 2)
     mesh = pen.define(path, "Mesh", {
         "uniform token subdivisionScheme": "none", "uniform bool doubleSided": True, "point3f[] points": points,

@@ -16,6 +16,7 @@ from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
 from echomodel.late import Late
 from echomodel.protocols import RoomModel
+from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import DISTANCE, graph_batch, one_thread, rounded, seeded
@@ -48,7 +49,7 @@ def plain_boxes(request: ShapeRequest) -> Shapes:
 def solid_geometry(mesh: trimesh.Trimesh, category: str, origin: Origin) -> Geometry:
     """The geometry of one mesh (object frame, metres) whose category says which materials it has where."""
     cut, slots = material_groups(mesh, category)
-    return Geometry((Part("mesh", cut, slots),), colliders_of(mesh, category), origin)
+    return Geometry((Part("mesh", Mesh.of(cut), slots),), colliders_of(Mesh.of(mesh), category), origin)
 
 
 def needs_shapes(model: RoomModel | None) -> None:

@@ -14,6 +14,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.dressing import KINDS, SMALL
 from echomodel.openings import Opening
+from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.checks import check
 from echousd.dressing import upholstery
@@ -340,8 +341,8 @@ def test_cushions_lie_before_the_pillows_of_wide_beds():
     board = trimesh.creation.box((wide, tall, 0.04))
     board.apply_translation((0, tall / 2, -deep / 2 + 0.02))
     cut, slots = material_groups(trimesh.util.concatenate([mattress, pillow, board]), "double_bed")
-    colliders = (Collider("collider", board, "convexHull"),)
-    geometry = {**room.geometry, "bed": Geometry((Part("mesh", cut, slots),), colliders, Origin("boxes"))}
+    colliders = (Collider("collider", Mesh.of(board), "convexHull"),)
+    geometry = {**room.geometry, "bed": Geometry((Part("mesh", Mesh.of(cut), slots),), colliders, Origin("boxes"))}
     setting, counts = setting_of(replace(room, geometry=geometry)), set()
     bed = setting.objects["bed"]
     for setting.seed in range(12):
@@ -361,8 +362,8 @@ def test_cushions_lie_before_the_pillows_of_wide_beds():
 def test_what_stands_at_a_height_reaches_there_with_its_foot():
     foot = trimesh.creation.cone(radius=0.1, height=0.4)  # wide where it stands
     foot.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0)))
-    part = Part("mesh", foot, {"metal": np.arange(len(foot.faces))})
-    geometry = Geometry((part,), (Collider("collider", foot, "convexHull"),), Origin("test"))
+    part = Part("mesh", Mesh.of(foot), {"metal": np.arange(len(foot.faces))})
+    geometry = Geometry((part,), (Collider("collider", part.mesh, "convexHull"),), Origin("test"))
     lamp = standing("lamp", "table_lamp", np.array([0.2, 0.4, 0.2]), np.array([0.0, 0.5, 0.0]), 0.0, geometry)
     assert meets(lamp, 0.5, 0.6, shapely.Point(0.096, 0).buffer(1e-3))
     assert not meets(lamp, 0.5, 0.6, shapely.Point(0.11, 0).buffer(1e-3))

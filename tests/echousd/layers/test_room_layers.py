@@ -116,7 +116,7 @@ def test_kinds_payloads_and_hints(stage):
 
 def test_style_group_shares_one_asset(stage, room):
     assert room.assets["nightstand_right"] == room.assets["nightstand_left"] == "nightstand"
-    assert room.meshes["nightstand_right"] is room.meshes["nightstand_left"]
+    assert room.geometry["nightstand_right"] is room.geometry["nightstand_left"]
     assert stage.GetPrimAtPath("/Room/Objects/nightstand_right/geo/nightstand_mesh")
 
 

@@ -7,12 +7,14 @@ from pxr import Usd, UsdGeom
 
 from echomodel.dressing import KINDS
 from echomodel.dressing import thing as solids_of
+from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.layers.physics import CONTACT, WOODEN, write_asset_physics
-from echousd.shapes.colliders import collider, colliders_of, standing_hull
+from echousd.shapes.colliders import collider, colliders_of
 from echousd.shapes.geometry import Collider, Geometry, Mass, Origin, Part
+from echousd.shapes.hulls import hull_volume, standing_hull
 from echousd.shapes.joinery import part_of, within_budget
-from echousd.shapes.matter import ballasted, hull_volume, mass_of, read_mass
+from echousd.shapes.matter import ballasted, mass_of, read_mass
 from echousd.shapes.meshing import box_mesh
 from echousd.shapes.sources.whole import solid_geometry
 from echousd.stage.pen import Pen
@@ -38,7 +40,7 @@ def test_written_masses_are_read_back(seed):
     rng = np.random.default_rng(seed)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]  # half of these are reflections
     told = Mass(7.25, rng.normal(size=3), np.sort(rng.random(3)) + 1.0, turn)
-    mesh = box_mesh(SIZE)
+    mesh = Mesh.of(box_mesh(SIZE))
     part = Part("mesh", mesh, {"wood": np.arange(len(mesh.faces))})
     geometry = Geometry((part,), (Collider("collider", mesh, "convexHull"),), Origin("boxes"), mass=told)
     stage = Usd.Stage.CreateInMemory()
@@ -59,7 +61,7 @@ def test_a_prim_without_a_whole_mass_has_none():
 def test_colliders_stand_on_planes_that_end_where_the_mesh_does(category):
     mesh = trimesh.creation.icosphere(4, 0.5)
     mesh.vertices *= (1.0, 2.0, 0.7)
-    light = collider(mesh, category).mesh
+    light = collider(Mesh.of(mesh), category).mesh
     np.testing.assert_allclose(light.bounds, mesh.bounds, atol=1e-6)
     for height in light.bounds[:, 1]:
         assert (np.abs(light.vertices[:, 1] - height) < 1e-9).sum() >= 3
@@ -84,8 +86,8 @@ def test_a_convex_piece_as_thin_as_a_table_top_keeps_its_thickness(monkeypatch):
     top.apply_translation((0, 0.745, 0))
     legs.apply_translation((0, 0.37, 0))
     monkeypatch.setattr("echousd.shapes.colliders.find_spec", lambda name: name)
-    monkeypatch.setattr("echousd.shapes.colliders.convex_pieces", lambda mesh: [top, legs])
-    plate, post = colliders_of(trimesh.util.concatenate([top, legs]), "dining_table")
+    monkeypatch.setattr("echousd.shapes.colliders.convex_pieces", lambda mesh: [Mesh.of(top), Mesh.of(legs)])
+    plate, post = colliders_of(Mesh.of(trimesh.util.concatenate([top, legs])), "dining_table")
     np.testing.assert_allclose(plate.mesh.bounds[:, 1], (0.74, 0.75), atol=1e-4)
     np.testing.assert_allclose(post.mesh.bounds[0, 1], 0.0, atol=1e-4)
 
@@ -117,17 +119,19 @@ def test_what_is_hollow_collides_by_convex_pieces():
     top = trimesh.creation.box((0.9, 0.05, 0.7))
     top.apply_translation((0, 0.71, 0))
     table = trimesh.boolean.union([top, *legs], engine="manifold")
-    found = colliders_of(table, "dining_table")
+    found = colliders_of(Mesh.of(table), "dining_table")
     assert len(found) >= 5
     assert {piece.approximation for piece in found} == {"convexHull"}
     assert len({piece.name for piece in found}) == len(found)
-    assert all(piece.mesh.is_convex and piece.mesh.is_watertight for piece in found)
+    assert all(piece.mesh.trimesh.is_convex and piece.mesh.trimesh.is_watertight for piece in found)
     corners = np.concatenate([piece.mesh.vertices for piece in found])
     np.testing.assert_allclose([corners.min(0), corners.max(0)], table.bounds, atol=1e-6)
-    assert sum(piece.mesh.volume for piece in found) == pytest.approx(table.volume, rel=0.3)  # its hull: ten times
-    again = colliders_of(table, "dining_table")
+    assert sum(piece.mesh.trimesh.volume for piece in found) == pytest.approx(
+        table.volume, rel=0.3
+    )  # its hull: ten times
+    again = colliders_of(Mesh.of(table), "dining_table")
     assert all((a.mesh.vertices == b.mesh.vertices).all() for a, b in zip(found, again, strict=True))
-    assert [piece.name for piece in colliders_of(top, "dining_table")] == ["collider"]
+    assert [piece.name for piece in colliders_of(Mesh.of(top), "dining_table")] == ["collider"]
 
 
 @pytest.mark.parametrize("material", [*CONTACT, "wood"])

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import shapely
 import torch
-import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from echomodel.boxes import Boxes
+from echomodel.triangles import box
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.openings import Opening
 from echousd.graph.text import stating
@@ -22,9 +22,8 @@ FLOOR = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
 
 
 def board(size, at):
-    mesh = trimesh.creation.box(size)
-    mesh.apply_translation(np.add(at, (0, size[1] / 2, 0)))
-    return mesh
+    half = np.multiply(size, (0.5, 0, 0.5))
+    return box(at - half, at + half + (0, size[1], 0))
 
 
 def piece(*boards):

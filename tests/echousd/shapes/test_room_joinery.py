@@ -31,9 +31,11 @@ def piece(category: str, size: np.ndarray = SIZE, seed: int = 0, faces: int = 50
 def test_a_piece_is_closed_fills_its_box_and_keeps_the_budget(category):
     for faces in (5000, 800, 100):
         made = piece(category, faces=faces)
-        assert all(part.mesh.is_watertight for part in made.parts)  # each solid: boards that touch share no vertices
+        assert all(
+            part.mesh.trimesh.is_watertight for part in made.parts
+        )  # each solid: boards that touch share no vertices
         assert 0 < made.faces <= faces
-        np.testing.assert_allclose(made.mesh.extents, SIZE, atol=1e-6)
+        np.testing.assert_allclose(made.mesh.trimesh.extents, SIZE, atol=1e-6)
         assert sorted(np.concatenate(list(made.parts[0].slots.values()))) == list(range(len(made.parts[0].mesh.faces)))
 
 
@@ -72,8 +74,8 @@ def test_colliders_are_convex_and_hold_the_geometry():
         made = piece(category)
         for collider in made.colliders:
             assert collider.approximation == "convexHull"
-            hull = collider.mesh.convex_hull
-            assert abs(hull.volume - collider.mesh.volume) <= 1e-6 + 1e-3 * hull.volume
+            hull = collider.mesh.trimesh.convex_hull
+            assert abs(hull.volume - collider.mesh.trimesh.volume) <= 1e-6 + 1e-3 * hull.volume
         low = np.min([c.mesh.bounds[0] for c in made.colliders], axis=0)
         high = np.max([c.mesh.bounds[1] for c in made.colliders], axis=0)
         np.testing.assert_allclose(high - low, SIZE, atol=0.03)
@@ -103,7 +105,7 @@ def test_a_body_of_many_solids_has_no_more_hulls_than_it_may_and_free_shelves(se
     assert len(joined) <= COLLIDERS
     # what books and boards take; where they were joined across a compartment, things stood inside
     alone = sum(trimesh.convex.convex_hull(points).volume for points in apart)
-    assert sum(hull.volume for hull in joined) < 1.1 * alone
+    assert sum(hull.trimesh.volume for hull in joined) < 1.1 * alone
 
 
 def test_drawers_are_bodies_of_a_dresser():
@@ -121,7 +123,7 @@ def test_drawers_are_bodies_of_a_dresser():
 def test_what_needs_more_boxes_than_the_budget_leaves_the_smallest_out():
     made = piece("bookshelf", np.array([2.0, 2.2, 0.35]), faces=100)
     assert made.faces <= 100
-    np.testing.assert_allclose(made.mesh.extents, [2.0, 2.2, 0.35], atol=1e-6)
+    np.testing.assert_allclose(made.mesh.trimesh.extents, [2.0, 2.2, 0.35], atol=1e-6)
 
 
 SIZES = [(0.01, 0.01, 0.01), (40.0, 2.2, 0.6), (5.0, 0.01, 5.0), (0.3, 10.0, 0.3), (1.0, 1.0, 0.001)]
@@ -133,7 +135,7 @@ def test_boxes_of_any_size_are_filled(category, size):
     made = piece(category, np.array(size))
     assert 0 < made.faces <= 5000
     assert made.watertight
-    np.testing.assert_allclose(made.mesh.extents, size, atol=1e-6)
+    np.testing.assert_allclose(made.mesh.trimesh.extents, size, atol=1e-6)
     assert all(np.isfinite(collider.mesh.vertices).all() for collider in made.colliders)
 
 
@@ -213,6 +215,6 @@ def test_nothing_collides_above_the_free_half_of_a_dressing_table():
         made = piece("dressing_table", size, seed)
         met = []
         for meshes in ([made.mesh], [collider.mesh for collider in made.colliders]):
-            points = [mesh.ray.intersects_location(places, np.full((6, 3), [0, -1.0, 0]))[0] for mesh in meshes]
+            points = [mesh.trimesh.ray.intersects_location(places, np.full((6, 3), [0, -1.0, 0]))[0] for mesh in meshes]
             met.append(max(found[:, 1].max() for found in points if len(found)))
         assert met[1] - met[0] < 0.002, seed

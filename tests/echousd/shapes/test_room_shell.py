@@ -26,7 +26,7 @@ PASSAGE = Opening("way", "passage", 2, 2.0, 1.0, 2.1)
 
 
 def pieces(parts) -> dict:
-    return {piece.name: piece.mesh for part in parts for piece in part.pieces} | (
+    return {piece.name: piece.mesh.trimesh for part in parts for piece in part.pieces} | (
         pieces([one for part in parts for one in part.inner]) if parts else {}
     )
 
@@ -98,7 +98,7 @@ def test_rooms_of_other_seeds_have_other_millwork_and_private_ones_no_glass_in_t
 
 
 def test_ceiling_lies_on_the_walls() -> None:
-    slab = ceiling(NOTCHED, 2.6).pieces[0].mesh
+    slab = ceiling(NOTCHED, 2.6).pieces[0].mesh.trimesh
     assert slab.bounds[0, 1] == pytest.approx(2.6)
     assert slab.volume == pytest.approx(shapely.Polygon(NOTCHED).area * 0.1)
 
@@ -134,7 +134,7 @@ def test_a_leaf_opens_about_its_hinge_to_the_side_that_it_should(swing, hinge, t
     door = Opening("door", "door", 2, 0.4, 0.9, 2.0, hinge=hinge, swing=swing)
     wall = walls(plan, 2.6, (door,))[2]
     (leaf,) = wall.inner[0].inner
-    mesh = next(piece.mesh for piece in leaf.pieces if piece.name.endswith("leaf")).copy()
+    mesh = next(piece.mesh for piece in leaf.pieces if piece.name.endswith("leaf")).trimesh
     jamb, closed = hinge_point(plan, door)
     assert np.linalg.norm(np.array(leaf.joint.anchor)[[0, 2]] - jamb) < 0.04 + (WALL if swing == "out" else 0)
     axis = np.array(leaf.joint.axis)

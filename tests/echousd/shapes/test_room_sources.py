@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import trimesh
 from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
 from small_room import BARE, StandIn, small_graph
 
 import echousd
+from echomodel.triangles import box
 from echousd import options
 from echousd.make.edit import edit
 from echousd.make.reading import read_room
@@ -36,9 +36,9 @@ class Slabs:
 
     @staticmethod
     def made(size) -> Geometry:
-        top, foot = (trimesh.creation.box(size * (1, 0.5, 1)), trimesh.creation.box(size * (0.3, 0.5, 0.3)))
-        top.apply_translation((0, 0.75 * size[1], 0))
-        foot.apply_translation((0, 0.25 * size[1], 0))
+        half = size / 2
+        top = box((-half[0], half[1], -half[2]), (half[0], size[1], half[2]))
+        foot = box((-0.3 * half[0], 0, -0.3 * half[2]), (0.3 * half[0], half[1], 0.3 * half[2]))
         parts = (
             Part("top", top, {"fabric": np.arange(6), "wood": np.arange(6, 12)}),
             Part("foot", foot, {"metal": np.arange(12)}),
