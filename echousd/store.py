@@ -358,11 +358,8 @@ def _files(place: Path) -> list[Path]:
 
 
 def _digest(path: Path) -> str:
-    total = hashlib.blake2b(digest_size=16)
     with path.open("rb") as file:
-        while block := file.read(BLOCK):
-            total.update(block)
-    return total.hexdigest()
+        return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
 
 
 def _delete(place: Path) -> None:

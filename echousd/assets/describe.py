@@ -24,7 +24,6 @@ from echousd.assets.reference import relative
 from echousd.textures import encoded
 
 PLACEMENT = {"floor": "floor", "table": "surface", "wall": "wall", "ceiling": "ceiling"}
-BLOCK = 2**20
 SIDE = 96  # pixels of a thumbnail
 
 
@@ -132,11 +131,8 @@ def _faced(record: AssetRecord, entry: Entry, found: Measured) -> AssetRecord:
 
 def digest_of(file: ModelFile) -> str:
     """sha256 of a model's file (of its member in an archive)."""
-    sha = hashlib.sha256()
     with file.opened() as content:
-        while block := content.read(BLOCK):
-            sha.update(block)
-    return sha.hexdigest()
+        return hashlib.file_digest(content, "sha256").hexdigest()
 
 
 def stamp(path: Path) -> str:

@@ -83,8 +83,7 @@ def index(
     before: Mapping[str, AssetRecord] = {}
     if file.exists():
         with suppress(OldIndex):
-            old_index = read_library(file)
-            before = old_index.records if old_index.complete else {}
+            before = read_library(file).records
     done: dict[str, AssetRecord] = {}
     fresh: list[Entry] = []
     for entry in entries:

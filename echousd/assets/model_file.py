@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
-from typing import Any, BinaryIO
+from typing import Any
 
 from PIL import Image
 from trimesh.resolvers import Resolver
@@ -46,7 +46,7 @@ class ModelFile:
         return f"{self.path}!{self.member}" if self.member else str(self.path)
 
     @contextmanager
-    def opened(self) -> Iterator[BinaryIO]:
+    def opened(self) -> Iterator[io.BufferedIOBase]:
         """The model's bytes; raises ValueError for a file that is missing, no regular file, empty or too large."""
         with unpacking(self):
             if not self.path.is_file():

@@ -20,7 +20,6 @@ from echousd.assets.record import AssetRecord
 from echousd.assets.reference import check_reach
 
 VERSION = 2
-OLDER = {1: ("colors",)}  # version of an index that can still be used -> columns that it has not
 KEY = b"echousd.assets"
 LARGEST = 4 * 2**30  # bytes of an index when it is unpacked
 KINDS = {"str": "string", "float": "float64", "int": "int64", "bool": "bool_", "bytes": "binary"}
@@ -32,12 +31,10 @@ class Library:
 
     Arguments:
         file: the Parquet file, which paths of records are relative to. records: by id, in the index's order.
-        complete: whether its rows say all that those of today do, so that none is read again for that.
     """
 
     file: Path
     records: Mapping[str, AssetRecord]
-    complete: bool = True
 
     @cached_property
     def by_category(self) -> dict[str, tuple[AssetRecord, ...]]:
@@ -132,12 +129,11 @@ def _read(file: Path, changed: int) -> Library:
 def _library(file: Path, table: Any) -> Library:
     about = json.loads((table.schema.metadata or {}).get(KEY, b"null"))
     version = about.get("version") if isinstance(about, dict) else None
-    absent = () if version == VERSION else OLDER.get(version) if isinstance(version, int) else None
-    if absent is None:
+    if version != VERSION:
         told = f"version {'none' if version is None else version} of an index of assets, allowed: {VERSION}"
         kind = OldIndex if isinstance(version, int) else ValueError
         raise kind(f"{file}: {told}; index the folder again")
-    wanted = [column for column in _schema() if column.name not in absent]
+    wanted = list(_schema())
     wrong = [f.name for f in wanted if f.name not in table.schema.names or table.schema.field(f.name).type != f.type]
     if wrong:
         raise OldIndex(f"{file}: columns {', '.join(wrong)} are missing or of another type; index the folder again")
@@ -152,7 +148,7 @@ def _library(file: Path, table: Any) -> Library:
         if fault:
             raise ValueError(f"{file}: row {len(records) + 1}: {fault}; index the folder again")
         records[record.id] = record
-    return Library(file, records, complete=not absent)
+    return Library(file, records)
 
 
 def _fault(record: AssetRecord) -> str:

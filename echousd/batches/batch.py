@@ -101,8 +101,6 @@ def batch(
 
 def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
     """`batch` for a checked request."""
-    if out.exists() and not out.is_dir():
-        raise ValueError(f"{out}: is a file, the output must be a folder")
     check_writable(out)
     if "://" in str(out) or re.match(r"[A-Za-z][A-Za-z0-9+.-]+:/", out.as_posix()):  # `Path` makes one slash of two
         raise ValueError(f"{out}: allowed: a folder on a disk; its rooms are whole and may be copied as they appear")

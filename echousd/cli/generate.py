@@ -49,7 +49,9 @@ def generate(
     check_output(output, flat=flat, force=force)
     if flat and store:
         raise ValueError(f"--store is {store}, which a file of --flat does not use; leave one of them out")
-    home = None if room or flat else home_of(graph)
+    from echousd.home.files import load_home
+
+    home = load_home(graph) if graph.is_file() and not (room or flat) else None
     if home is not None:
         generate_home(graph, home, output, options, outside or (), force=force, json=json)
         return
@@ -69,15 +71,6 @@ def generate(
     spent |= {"other": total - sum(spent.values()), "total": total}
     more = {"timings": {stage: round(seconds, 3) for stage, seconds in spent.items()}}
     report([written], json=json, more=more)
-
-
-def home_of(graph: Path) -> HomeGraph | None:
-    """The home in a file, None where it holds one room or is none; text is not worth loading USD for."""
-    if not graph.is_file():
-        return None
-    from echousd.home.files import load_home
-
-    return load_home(graph)
 
 
 def generate_home(

@@ -105,7 +105,7 @@ def export(
     from echousd.graph.files import STAGE_FORMS
     from echousd.home.draw import PICTURES, draw_plans, write_dxf, write_procthor
     from echousd.home.files import load_home
-    from echousd.home.given import plan_of, plan_there
+    from echousd.home.given import plan_there
     from echousd.home.plan import plans
     from echousd.home.stages import furniture, write_home
 
@@ -117,11 +117,9 @@ def export(
     home = load_home(source)
     if home is None:
         raise GraphError(f"{source}: no home, allowed: a file with rooms and how they lie to each other")
-    if several > 1:
-        found = [one] if (one := plan_there(source, home)) else plans(home, several, seed)
-    else:
-        found = [plan_of(source, home, seed=seed)]
-    things = furniture(found[0], source) if plan_there(source, home) else []
+    there = plan_there(source, home)
+    found = [there] if there else plans(home, several, seed)
+    things = furniture(there, source) if there else []
     if form in PICTURES:
         draw_plans(found, output, things=things)
     elif form == ".dxf":

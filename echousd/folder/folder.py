@@ -129,10 +129,6 @@ def claim(folder: Path, *, force: bool, root: str = "") -> dict[str, Any]:
     Raises ValueError for a file in the way, or a folder that holds other things than a room of ours.
     """
     check_path(folder)
-    if folder.exists() and not folder.is_dir():
-        raise ValueError(f"{folder}: is a file, the output must be a folder")
-    if not folder.exists():
-        return {}
     recover(folder)
     manifest = find_manifest(folder, root)
     if manifest is not None:
@@ -151,7 +147,8 @@ def check_writable(folder: Path) -> None:
     while not nearest.exists():
         nearest = nearest.parent
     if not nearest.is_dir():
-        raise ValueError(f"{folder}: {nearest} is a file, not a folder")
+        here = "is a file, the output must be a folder"
+        raise ValueError(f"{folder}: {here}" if nearest == folder else f"{folder}: {nearest} is a file, not a folder")
     if not os.access(nearest, os.W_OK | os.X_OK):
         raise ValueError(f"{folder}: {nearest} is not writable (permission denied)")
 
@@ -353,8 +350,6 @@ def check_output(output: Path, *, flat: bool, force: bool) -> None:
         return
     if output.suffix in STAGE_FORMS:
         raise ValueError(f"{output}: the output is a folder; --flat writes one file")
-    if output.exists() and not output.is_dir():
-        raise ValueError(f"{output}: is a file, the output must be a folder")
     check_writable(output)
 
 

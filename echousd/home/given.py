@@ -22,12 +22,6 @@ APART = 0.05  # square metres that floors of different rooms may share by roundi
 Placed = Mapping[str, tuple[SceneGraph, np.ndarray]]  # graph of every room, and its pose in the home
 
 
-def plan_of(path: Path, home: HomeGraph, *, seed: int = 0) -> Plan:
-    """The plan of the home in a file: that which is there, else a new one; raises `GraphError`."""
-    stated = plan_there(path, home)
-    return stated or plan_home(home, seed=seed)
-
-
 def next_plan(home: HomeGraph, *, seed: int = 0, before: Path | None = None) -> Plan:
     """The plan of a home of which one may be there already; raises `GraphError`.
 

@@ -108,14 +108,16 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     built = structure.shell_prims(room, dressing.bare)
     harmony = room.options.palette or looks.palette_of_room(room.provenance.seed, room.graph.room.style)
     slots = _slots(small)
-    table, bindings = room_looks(room, made, built, slots, harmony)
-    files |= materials.texture_files(table, harmony)
+    named, bindings = room_slots(room, made, built, slots)
+    shown = looks.alternatives(harmony, room.graph.room.style)
+    tables = {word: {name: looks.look(word, *of) for name, of in named.items()} for word in shown}
+    files |= materials.texture_files(tables[harmony], harmony)
     files |= lights.image_files(room)
     layers = {
         "geometry": geometry_layer(room),
         "shell": structure.shell_layer(built, layer_data(room, f"{room.name}_shell"), room.graph.room.openings),
         "graph": graph_layer(room), "layout": layout_layer(room), "physics": physics_layer(room, built),
-        "materials": materials_layer(room, made, built, small, bindings, harmony),
+        "materials": materials_layer(room, bindings, tables, harmony),
     }  # fmt: skip
     if room.options.dress != "none":
         layers["dressing"] = dressing_layer(room, dressing, small)
@@ -198,15 +200,14 @@ def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.L
     return pen.layer
 
 
-def room_looks(
-    room: RoomData, made: Mapping[str, Asset], built: Sequence[structure.ShellPrim], small: Collection[str],
-    harmony: str,
-) -> tuple[dict[str, looks.Look], dict[str, str]]:  # fmt: skip
-    """Material name -> look in a harmony, and prim path -> material name; the dressing binds its own.
+def room_slots(
+    room: RoomData, made: Mapping[str, Asset], built: Sequence[structure.ShellPrim], small: Collection[str]
+) -> tuple[dict[str, tuple[str, int]], dict[str, str]]:
+    """Material name -> slot and voice of its look, and prim path -> material name; the dressing binds its own.
 
-    `made`: the furniture. `built`: the shell. `small`: material slots of the dressing. `harmony`: of the whole room.
+    `made`: the furniture. `built`: the shell. `small`: material slots of the dressing.
     """
-    table: dict[str, looks.Look] = {}
+    table: dict[str, tuple[str, int]] = {}
     bindings: dict[str, str] = {}
     voices, slugs, alike = {ROOM_STYLE: 0}, _slugs(room), instanced(room)
     for node in room.graph.nodes:
@@ -217,30 +218,29 @@ def room_looks(
         above = class_path(asset) if node.name in alike else f"{OBJECTS}/{node.name}"
         for path, slot in assets.slot_paths(above, made[asset].slots).items():
             name = f"{slug}_{slot}"
-            table[name] = looks.look(harmony, slot, voice)
+            table[name] = slot, voice
             bindings[path] = name
-    table |= {f"{ROOM_STYLE}_{slot}": looks.look(harmony, slot) for slot in small}
+    table |= {f"{ROOM_STYLE}_{slot}": (slot, 0) for slot in small}
     covered = {f"{SHELL}/{name}": slot for name, slot in structure.covered_walls(room).items()}
     shell = {mesh.look: mesh.look for part in built for mesh in part.meshes} | {slot: slot for slot in covered.values()}
     shell |= {"floor": structure.floor_slot(room), "glass": "pane"}
-    table |= {name: looks.look(harmony, slot) for name, slot in shell.items()}
+    table |= {name: (slot, 0) for name, slot in shell.items()}
     for part in built:
         own = {"wall": covered.get(part.path, "wall")}
         bindings |= {mesh.path: own.get(mesh.look, mesh.look) for mesh in part.meshes}
     used = {*bindings.values(), *(f"{ROOM_STYLE}_{slot}" for slot in small)}
-    return {name: look for name, look in table.items() if name in used}, bindings
+    return {name: of for name, of in table.items() if name in used}, bindings
 
 
 def materials_layer(
-    room: RoomData, made: Mapping[str, Asset], built: Sequence[structure.ShellPrim], small: Mapping[str, Asset],
-    bindings: Mapping[str, str], harmony: str,
-) -> Sdf.Layer:  # fmt: skip
-    """`layers/materials.usda`: materials, bindings, and the variant set `palette`; arguments as for `room_looks`."""
+    room: RoomData, bindings: Mapping[str, str], tables: Mapping[str, Mapping[str, looks.Look]], harmony: str
+) -> Sdf.Layer:
+    """`layers/materials.usda`: materials, bindings (prim path -> material), and the variant set `palette`.
+
+    `tables`: harmony -> material name -> its look. `harmony`: of the whole room.
+    """
     pen = _pen(room, "materials")
     pen.over("/Room")
-    slots = _slots(small)
-    shown = looks.alternatives(harmony, room.graph.room.style)
-    tables = {name: room_looks(room, made, built, slots, name)[0] for name in shown}
     materials.write_looks(pen, tables[harmony], bindings, also=tables[harmony], harmony=harmony, tinted=True)
     for asset in sorted({room.assets[name] for name in instanced(room)}):
         assets.as_class(pen.layer, asset)

@@ -15,7 +15,7 @@ from echomodel.boxes import Boxes
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
-from echomodel.openings import free_area
+from echomodel.openings import free_area, signed_area
 from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
@@ -29,10 +29,10 @@ from echousd.place.placing import place as placed
 from echousd.place.solver import PlaceConfig, sentence
 from echousd.progress import StageTimer
 from echousd.shapes.styles import equal_sizes, unequal_pairs
-from echousd.shapes.walls import floor_polygon
 
 DRAFTS = 8  # of which the best is kept
 ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
+MARGIN = 0.35  # metres of floor around the furniture where nobody said how large the floor is
 POSES = 12_000  # that are judged for one room, over all its drafts; the search that is begun then comes to its end
 CROWD = 160  # objects of all drafts together, unless somebody says how many drafts
 MAX_OBJECTS = 200  # of one room: up to here time grows no faster than their number, 400 take six times that of 200
@@ -273,9 +273,20 @@ def with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:
 
 
 def room_floor(graph: SceneGraph, layouts: Sequence[Boxes]) -> np.ndarray:
-    """(k, 2) float: corners of the floor, from the graph or around the furniture of all layouts."""
-    plan = [footprints(*(np.asarray(v, float) for v in (b.size, b.position, b.yaw))).reshape(-1, 2) for b in layouts]
-    return floor_polygon(graph.room.floor_polygon, graph.room.size, np.concatenate(plan))
+    """(k, 2) float: corners of the floor, counter-clockwise seen from above (x to the right, z towards the viewer).
+
+    They are those of the graph's polygon, of its size around the origin, or of what stands there in any layout.
+    """
+    room = graph.room
+    if room.floor_polygon is not None:
+        corners = np.asarray(shapely.Polygon(room.floor_polygon).exterior.coords)[:-1]
+    else:
+        plan = footprints(*plan_boxes(layouts)).reshape(-1, 2)
+        low, high = plan.min(0) - MARGIN, plan.max(0) + MARGIN
+        if room.size is not None:
+            low, high = -np.asarray(room.size) / 2, np.asarray(room.size) / 2
+        corners = np.array([(low[0], low[1]), (low[0], high[1]), (high[0], high[1]), (high[0], low[1])])
+    return corners if signed_area(corners) < 0 else corners[::-1].copy()
 
 
 def plan_boxes(layouts: Sequence[Boxes]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

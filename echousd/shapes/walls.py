@@ -16,6 +16,7 @@ from echousd.shapes import fittings
 from echousd.shapes.fittings import PLAIN, WALL, Millwork
 from echousd.stage.paths import piece_name
 
+THICKNESS = 0.1  # metres, of floor and ceiling
 COVED = 2.5  # metres, height of rooms from which on there may be a cornice
 PARAPET = 1.05  # metres, height of a wall outdoors that nothing opens
 
@@ -133,9 +134,7 @@ def wall_frame(polygon: np.ndarray, edge: int) -> np.ndarray:
     """(4, 4) float: a wall's own frame (u along, v up, w outwards) to the room's."""
     frame = np.eye(4)
     along, outward = direction(polygon, edge), -inward_normal(polygon, edge)
-    frame[[0, 2], 0], frame[1, 1], frame[[0, 2], 2] = along, 1.0, outward
-    frame[1, 1], frame[1, 0], frame[1, 2] = 1.0, 0.0, 0.0
-    frame[[0, 2], 3] = polygon[edge]
+    frame[[0, 2], 0], frame[[0, 2], 2], frame[[0, 2], 3] = along, outward, polygon[edge]
     return frame
 
 
@@ -216,34 +215,3 @@ def _placed(mesh: Mesh, frame: np.ndarray) -> Mesh:
     """The mesh in the room's frame; a frame of the other hand turns the faces back."""
     inside_out = np.linalg.det(frame[:3, :3]) < 0
     return Mesh(mesh.vertices @ frame[:3, :3].T + frame[:3, 3], mesh.faces[:, ::-1] if inside_out else mesh.faces)
-
-
-MARGIN = 0.35  # metres of floor around the furniture where nobody said how large the floor is
-THICKNESS = 0.1
-
-
-def floor_polygon(
-    polygon: Sequence[Sequence[float]] | None, size: Sequence[float] | None, boxes: np.ndarray
-) -> np.ndarray:
-    """Corners of the floor, counter-clockwise seen from above (x to the right, z towards the viewer).
-
-    `polygon`: (k, 2) float x and z of the corners, or None. `size`: x and z extents of a rectangle around the origin,
-    or None; used where there is no polygon. `boxes`: (n, 2) float x and z of the furniture's corners, from which the
-    floor comes where nothing else says. Raises ValueError for a polygon that crosses itself or has no area.
-    """
-    if polygon is not None and len(polygon):
-        shape = shapely.Polygon(np.asarray(polygon, float))
-        if not shape.is_valid or shape.area < 1e-4:
-            reason = f"{shapely.is_valid_reason(shape)}, area {shape.area:.4f} m²"
-            raise ValueError(f"floor polygon: {reason}; need a polygon that does not cross itself")
-        corners = np.asarray(shape.exterior.coords)[:-1]
-    else:
-        if size is not None:
-            half = np.asarray(size, float) / 2
-            lower, upper = -half, half
-        elif len(boxes):
-            lower, upper = boxes.min(0) - MARGIN, boxes.max(0) + MARGIN
-        else:
-            lower, upper = np.full(2, -1.5), np.full(2, 1.5)
-        corners = np.array([[lower[0], lower[1]], [lower[0], upper[1]], [upper[0], upper[1]], [upper[0], lower[1]]])
-    return corners if signed_area(corners) < 0 else corners[::-1].copy()

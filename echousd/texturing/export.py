@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -131,10 +131,9 @@ def _made(
     if tool in SCRIPTS:
         files["run.sh"] = script_for(tool)
     files[f"{RESULTS}/README.txt"] = _expected(tool).encode()
-    cameras = [asdict(camera) for camera in around]
     job = Job.model_validate({
         "tool": tool, "room": name, "palette": surfaces.palette, "prompt": words, "resolution": texture,
-        "one_picture": together, "dressing": dressing, "cameras": cameras, "objects": entries, "left_out": left,
+        "one_picture": together, "dressing": dressing, "cameras": around, "objects": entries, "left_out": left,
     })  # fmt: skip
     return job, files
 

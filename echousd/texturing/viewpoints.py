@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -14,6 +13,7 @@ from echousd.draw.surfaces import Painted, Surfaces
 from echousd.draw.tracing import RenderUnavailable, embree
 from echousd.draw.views import view_matrix
 from echousd.texturing.atlas import Unwrapped, texel_faces
+from echousd.texturing.job import JobCamera
 
 HEIGHT = 1.4  # metres, of the point that cameras look through
 SPHERE = 0.5  # metres from it
@@ -21,15 +21,6 @@ ELEVATIONS, AZIMUTHS = (-30.0, 30.0), (-180.0, 180.0)  # degrees
 FIELDS = (45.0, 75.0)  # of view, degrees
 SEEN_FROM = 48  # cameras that texels are counted with
 SAMPLES = 1500  # points of an object
-
-
-@dataclass(frozen=True)
-class Camera:
-    """A camera: (4, 4) camera to world as rows (it looks along its -Z, +Y up, metres), field of view in degrees."""
-
-    name: str
-    matrix: tuple[tuple[float, float, float, float], ...]
-    fov: float
 
 
 def free_point(surfaces: Surfaces) -> tuple[np.ndarray, float]:
@@ -62,21 +53,22 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
 
 def sphere_cameras(
     at: np.ndarray, distance: float, azimuths: int, elevations: Sequence[float], fov: float
-) -> list[Camera]:
+) -> list[JobCamera]:
     """Cameras on a sphere around `at` that look through it, elevation by elevation; azimuth 0 stands at +Z."""
-    found: list[Camera] = []
+    found: list[JobCamera] = []
     for up in elevations:
         for step in range(azimuths):
             around = AZIMUTHS[0] + (AZIMUTHS[1] - AZIMUTHS[0]) * step / azimuths
             e, a = np.radians(up), np.radians(around)
             eye = at + distance * np.array([np.cos(e) * np.sin(a), np.sin(e), np.cos(e) * np.cos(a)])
             rows = tuple(tuple(round(float(v), 6) + 0.0 for v in row) for row in view_matrix(eye, at))
-            found.append(Camera(f"view_{len(found):03d}", rows, fov))  # type: ignore[arg-type]
+            camera = {"name": f"view_{len(found):03d}", "matrix": rows, "fov": fov}
+            found.append(JobCamera.model_validate(camera))
     return found
 
 
 def visible_shares(
-    objects: Sequence[Painted], laid: Sequence[Unwrapped], cameras: Sequence[Camera]
+    objects: Sequence[Painted], laid: Sequence[Unwrapped], cameras: Sequence[JobCamera]
 ) -> list[float] | None:
     """For every object the share of its texels that a camera sees past all others; None where Embree is missing."""
     try:

@@ -108,8 +108,7 @@ class Predicate:
         measures: what its rule asks of boxes, `place` or `size`; None where it is not measured.
         step: signs (x, z) of the way from the object to the subject, (0, 0) where it names no direction.
         mirror_x, mirror_z: what it becomes where the room is mirrored along an axis, None = itself.
-        emphasis, loss_weight: weight of its margin in guidance and in the training loss; what is rare and must hit a
-            small spot needs more than one.
+        loss_weight: of its margin in the training loss; what is rare and must hit a small spot needs more than one.
         rests: the subject stands on the object: placing puts it onto the object's top.
         follows: the subject goes along where the object is moved.
         unites: what the two objects have in common, of `style` and `shape`.
@@ -130,7 +129,6 @@ class Predicate:
     step: tuple[int, int] = (0, 0)
     mirror_x: str | None = None
     mirror_z: str | None = None
-    emphasis: float = 1.0
     loss_weight: float = 1.0
     rests: bool = False
     follows: bool = False

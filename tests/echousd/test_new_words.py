@@ -52,7 +52,7 @@ def music():
     )  # fmt: skip
     line = Predicate(
         name="in_line_with", id=len(words.predicates), kind="closeness", inverse="in_line_with", symmetric=True,
-        measures="place", emphasis=4.0, aliases=("level_with",),
+        measures="place", aliases=("level_with",),
     )  # fmt: skip
     room = RoomType(
         "music_room", contents=(("harp", 1), ("stool", 1), ("bookshelf", 1)), like="living_room", signs=("harp",),

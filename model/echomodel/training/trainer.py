@@ -242,13 +242,7 @@ def read_log(path: Path) -> list[tuple[int, str, float]]:
 
 def plot_log(log: Path, out: Path) -> None:
     """Draw every curve of a log file, grouped by the word before the slash, into one picture."""
-    try:
-        import matplotlib
-    except ImportError:
-        return  # the CSV file has everything
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
+    from matplotlib.figure import Figure
 
     groups: dict[str, dict[str, list[tuple[int, float]]]] = {}
     for step, name, value in read_log(log):
@@ -258,7 +252,8 @@ def plot_log(log: Path, out: Path) -> None:
         return
     columns = min(3, len(groups))
     rows = math.ceil(len(groups) / columns)
-    figure, axes = plt.subplots(rows, columns, squeeze=False, figsize=(5 * columns, 3.5 * rows))
+    figure = Figure(figsize=(5 * columns, 3.5 * rows))
+    axes = figure.subplots(rows, columns, squeeze=False)
     for axis, (group, curves) in zip(axes.flat, sorted(groups.items()), strict=False):
         for label, points in curves.items():
             axis.plot(*zip(*points, strict=True), label=label, linewidth=1)
@@ -267,4 +262,3 @@ def plot_log(log: Path, out: Path) -> None:
     figure.tight_layout()
     with whole_file(out, Path(out).suffix) as beside:
         figure.savefig(beside, dpi=110)
-    plt.close(figure)

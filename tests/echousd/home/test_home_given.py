@@ -10,8 +10,8 @@ import echousd
 from echomodel.openings import Opening
 from echousd.graph import Node, SceneGraph
 from echousd.home.files import load_home
-from echousd.home.given import plan_of, plan_there
-from echousd.home.plan import INNER, OUTER, ways
+from echousd.home.given import plan_there
+from echousd.home.plan import INNER, OUTER, plan_home, ways
 from echousd.stage.graphs import write_graph
 
 
@@ -53,7 +53,7 @@ def three(tmp_path, doors):
         spec = spec.replaced(openings=doors.get(name, ()))
         rooms[name] = SceneGraph(spec, (Node("bed", "single_bed"),))
     stage_of(tmp_path / "row.usda", rooms)
-    return plan_of(tmp_path / "row.usda", load_home(tmp_path / "row.usda"))
+    return plan_there(tmp_path / "row.usda", load_home(tmp_path / "row.usda"))
 
 
 def test_floors_that_meet_stay_where_they_are(tmp_path):
@@ -90,7 +90,7 @@ def test_rooms_are_made_where_they_stand(file, tmp_path, echousd_command):
 def test_rooms_in_one_place_get_a_plan(tmp_path):
     stage_of(tmp_path / "house.usda", {"West": small_graph(), "East": small_graph()})
     assert plan_there(tmp_path / "house.usda") is None
-    plan = plan_of(tmp_path / "house.usda", load_home(tmp_path / "house.usda"))
+    plan = plan_home(load_home(tmp_path / "house.usda"))
     assert [pair for pair, _ in ways(plan)] in ([("West", "East")], [("East", "West")])
 
 
@@ -100,7 +100,7 @@ def test_a_floor_of_a_text_is_a_plan(tmp_path):
         "  hall: {type: hallway, floor_polygon: [[0, 0], [2, 0], [2, 4], [0, 4]]}\n"
         "  bedroom: {floor_polygon: [[2, 0], [6, 0], [6, 4], [2, 4]]}\n"
     )
-    plan = plan_of(tmp_path / "row.yaml", load_home(tmp_path / "row.yaml"))
+    plan = plan_there(tmp_path / "row.yaml", load_home(tmp_path / "row.yaml"))
     assert plan.floors["bedroom"][:, 0].min() == 2 + INNER / 2
 
 
