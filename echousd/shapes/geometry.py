@@ -14,6 +14,7 @@ from echomodel.triangles import Mesh, joined
 from echousd.shapes.surface import CREASE
 
 CONVERTED = "model.usdc"
+FACES = 5000  # budget of each mesh
 
 
 @dataclass(frozen=True, eq=False)

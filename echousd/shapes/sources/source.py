@@ -12,14 +12,12 @@ from echomodel.boxes import Boxes
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import floor_centre
 from echousd.progress import StageTimer
-from echousd.shapes.geometry import Geometry
+from echousd.shapes.geometry import FACES, Geometry
 from echousd.shapes.sources.retrieval import Retrieved
 from echousd.shapes.styles import shared_assets
 
 if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
-
-FACES = 5000  # budget of each mesh
 
 
 @dataclass(frozen=True, eq=False)
