@@ -168,9 +168,9 @@ class RoomData:
 
     @property
     def height(self) -> float:
-        """Height of the room in metres: the graph's, else 2.8, and never below the highest object."""
+        """Height of the room in metres: the graph's, and never below the highest object."""
         top = float((np.asarray(self.boxes.position)[:, 1] + np.asarray(self.boxes.size)[:, 1]).max(initial=0.0))
-        return max(float(self.graph.room.height or 2.8), top)
+        return max(self.graph.room.tall, top)
 
     def pose(self, number: int, layout: int = 0) -> np.ndarray:
         """(4, 4) float: object frame -> room frame of one object in one layout."""

@@ -13,8 +13,8 @@ from echomodel.openings import SKIRTING, segment
 from echomodel.roomboxes import footprints
 from echomodel.triangles import area_normals, connected_pieces, distances, spread
 from echomodel.vocabulary import vocabulary
+from echousd.graph.nodes import HEIGHT
 from echousd.place.geometry import (
-    DEFAULT_HEIGHT,
     Floor,
     axes,
     depth_inside,
@@ -111,7 +111,7 @@ def _furniture(whole: Whole) -> Iterator[Misplacement]:
     """Objects that are outside the floor, float, sink into it, or have no geometry where others have."""
     room, floor = whole.room, whole.floor
     yield from (Misplacement(name, "empty") for name in room.missing)
-    told = DEFAULT_HEIGHT if room.spec is None or room.spec.height is None else room.spec.height
+    told = HEIGHT if room.spec is None else room.spec.tall
     height = max([told, *(float(thing.position[1] + thing.size[1]) for thing in room.objects)])
     for thing in room.objects:
         beyond = -np.inf if floor is None else _beyond(thing, floor)

@@ -31,6 +31,7 @@ from echousd.assets.naming import category_of
 from echousd.evaluation.systems import System, drawn, finished
 from echousd.folder.found import rooms_at
 from echousd.graph.files import STAGE_FORMS
+from echousd.graph.nodes import HEIGHT
 from echousd.stage.boxes import room_of
 from echousd.stage.files import open_stage
 from echousd.stage.foreign import boxed_graph
@@ -234,7 +235,6 @@ def figures(
 
 
 ASSETS = ("_data", "assets")  # folders beside SceneEval's states, or above, in which its models lie
-HEIGHT = 2.8  # metres, of walls that nobody tells
 BUFFER = 0.1  # metres that Holodeck adds to what an object covers
 Object = tuple[str, np.ndarray, np.ndarray, float]  # word, size, position, yaw
 

@@ -21,7 +21,6 @@ from echousd.stage.turning import TURN
 from echousd.stage.units import metres_per_unit, up_axis
 
 UP = {"up": [0, 1, 0], "front": [0, 0, -1]}  # Habitat's own, and of every glb
-HEIGHT = 2.8  # metres, of a room that states none
 FOLDERS = {"stages": "stages", "objects": "objects", "scene_instances": "scenes"}
 
 
@@ -109,7 +108,7 @@ def _region(stage: Usd.Stage, prims: RoomPrims) -> dict[str, Any]:
         "label": graph.room.type,
         "poly_loop": [[round(v, 4) for v in point] for point in points],
         "floor_height": floor,
-        "extrusion_height": graph.room.height or HEIGHT,
+        "extrusion_height": graph.room.tall,
     }
 
 
@@ -159,7 +158,7 @@ def scene_state(graph: SceneGraph) -> dict[str, Any]:
             for o in graph.room.openings if o.edge == edge
         ]  # fmt: skip
         elements.append(
-            {"id": f"wall_{edge}", "roomId": kind, "type": "Wall", "height": graph.room.height or HEIGHT, "depth": 0.1,
+            {"id": f"wall_{edge}", "roomId": kind, "type": "Wall", "height": graph.room.tall, "depth": 0.1,
              "points": [start, floor[(edge + 1) % len(floor)]], "holes": holes}
         )  # fmt: skip
     objects = []

@@ -9,9 +9,9 @@ from echomodel.roomboxes import footprints
 from echomodel.sizes import footprint
 from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError
+from echousd.graph.nodes import HEIGHT
 from echousd.graph.scene import SceneGraph
 
-HEIGHT = 2.8  # metres, of rooms that state none
 LARGEST = 10_000.0  # m² of the box around a floor; what is rasterized on it takes 0.1 MB for each
 CROWDED = 0.62  # share of the floor, from which on a person is told
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -96,7 +96,7 @@ def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGr
     fitted = any(words.category(node.category).stands == "row" for node in graph.nodes)
     use = "wet" if fitted else words.room_type(graph.room.type).use
     placed = place_openings(
-        corners, graph.room.height or HEIGHT, _generator(seed, "openings"), boxes=boxes, stated=graph.room.openings,
+        corners, graph.room.tall, _generator(seed, "openings"), boxes=boxes, stated=graph.room.openings,
         use=use if use in WINDOWS else "",
     )  # fmt: skip
     return graph.replaced(room=graph.room.replaced(openings=placed))

@@ -168,7 +168,6 @@ def write_dxf(plan: Plan, path: Path, things: Sequence[Standing] = ()) -> None:
         drawing.saveas(beside)
 
 
-HEIGHT = 2.7  # metres of a room that says nothing of it
 KINDS = {"kitchen": "Kitchen", "bathroom": "Bathroom", "bedroom": "Bedroom", "childrens_room": "Bedroom"}
 LOOK = {"name": "PureWhite"}
 ASSETS = {"door": "Doorway_1", "passage": "Doorframe_1", "window": "Window_Slider_48x36"}
@@ -187,7 +186,7 @@ def write_procthor(plan: Plan, path: Path) -> None:
         about = {"roomType": KINDS.get(spec.type, "LivingRoom"), "floorPolygon": corners, "floorMaterial": LOOK}
         rooms.append({"id": f"room|{number[name]}", **about, "ceilings": [], "children": []})
         for edge, ends in enumerate(zip(corners, [*corners[1:], corners[0]], strict=True)):
-            polygon = [*ends, *({**corner, "y": spec.height or HEIGHT} for corner in ends)]
+            polygon = [*ends, *({**corner, "y": spec.tall} for corner in ends)]
             mine = {"id": f"wall|{number[name]}|{edge}", "roomId": f"room|{number[name]}"}
             walls.append({**mine, "material": LOOK, "polygon": polygon})
     found: dict[str, Any] = {"rooms": rooms, "walls": walls, "doors": [], "windows": [], "objects": []}

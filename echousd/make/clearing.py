@@ -18,7 +18,6 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph import Placed, Relation, SceneGraph
 from echousd.graph.arrays import rounded_boxes, triplets_of
 from echousd.make.verdicts import relation_verdicts
-from echousd.place.geometry import DEFAULT_HEIGHT
 from echousd.place.living import living_faults
 from echousd.place.report import Collision
 from echousd.room import LayoutOutcome
@@ -185,7 +184,7 @@ def scene_of(
         for i, node in enumerate(nodes)
     ]
     plan = floor if graph.room.corners is None else graph.room.corners
-    height = graph.room.height or DEFAULT_HEIGHT
+    height = graph.room.tall
     built = walls_of(plan, height, graph.room.openings, thickness=graph.room.walls) if walls else []
     shell = list(shell_solids(built))
     everything = [*solids, *(pieces for _, pieces in shell)]

@@ -17,7 +17,6 @@ from echomodel.floors import signed_distance
 from echomodel.roomboxes import footprints
 
 COLUMNS = 6  # numbers of a box: its position x, y, z and its sides
-DEFAULT_HEIGHT = 2.8  # metres, of a room that states none
 PLAN, SIDES = slice(0, 3, 2), slice(3, 6, 2)  # columns of x and z and of width and depth
 
 

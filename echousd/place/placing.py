@@ -28,7 +28,6 @@ from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
 from echousd.graph.arrays import stated_placements, triplets_of
 from echousd.place.distances import BED_LIT
-from echousd.place.geometry import DEFAULT_HEIGHT
 from echousd.place.report import collisions, outside
 from echousd.place.search import Arranged, Search
 from echousd.place.setting import Setting, setting_of, stacked
@@ -97,7 +96,7 @@ def place(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: Pla
         np.asarray(boxes.yaw, float),
         triplets_of(graph),
         floor_polygon=graph.room.corners,
-        height=graph.room.height or DEFAULT_HEIGHT,
+        height=graph.room.tall,
         openings=graph.room.openings,
         stated=stated_placements(graph),
         fixed=np.array([node.locked or node.position is not None for node in nodes]),

@@ -498,7 +498,9 @@ def test_a_house_of_procthor_goes_out_and_comes_back(tmp_path, echousd_command):
     form, found = read_plan(tmp_path / "flat.json")
     back = imported(found).plan
     assert form == "procthor"
-    assert json.loads((tmp_path / "flat.json").read_text())["metadata"]["schema"] == "1.0.0"
+    house = json.loads((tmp_path / "flat.json").read_text())
+    assert house["metadata"]["schema"] == "1.0.0"
+    assert {corner["y"] for wall in house["walls"] for corner in wall["polygon"]} == {0, 2.8}  # as `generate` has them
     names = dict(zip(back.floors, plan.floors, strict=True))
     for name, cell in back.cells.items():  # their walls have no thickness, and outer ones stand outside
         assert shapely.Polygon(cell).buffer(1e-3).covers(shapely.Polygon(plan.floors[names[name]]))
