@@ -15,7 +15,7 @@ from echomodel.boxes import Boxes
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
-from echomodel.openings import free_area, signed_area
+from echomodel.openings import signed_area
 from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
@@ -24,7 +24,7 @@ from echousd.graph.arrays import floor_centre, graph_batch, one_thread, rounded_
 from echousd.graph.floors import with_placed_openings
 from echousd.make.verdicts import layout_outcome
 from echousd.options import RoomOptions
-from echousd.place.placing import PlacedBoxes
+from echousd.place.placing import Arranged, PlacedBoxes
 from echousd.place.placing import place as placed
 from echousd.place.solver import PlaceConfig, sentence
 from echousd.progress import StageTimer
@@ -36,7 +36,7 @@ MARGIN = 0.35  # metres of floor around the furniture where nobody said how larg
 POSES = 12_000  # that are judged for one room, over all its drafts; the search that is begun then comes to its end
 CROWD = 160  # objects of all drafts together, unless somebody says how many drafts
 MAX_OBJECTS = 200  # of one room: up to here time grows no faster than their number, 400 take six times that of 200
-TALL, GLARE = 2.0, 0.03  # metres a screen counts as high before a window, and square metres of it that are too much
+TALL = 2.0  # metres by which a screen counts as higher where openings are placed: it wants no window behind it
 DEFAULTS = PlaceConfig()
 OF_OPENINGS = frozenset({"door_free", "window_free"})  # terms
 DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
@@ -118,36 +118,33 @@ def best_boxes(
     best: tuple[Boxes, tuple[str, ...]] | None = None
     worth: tuple[float, ...] = ()
     ways, judged, budget = [(graph, DEFAULTS)], 0, POSES * max(1.0, drafts / DRAFTS)
-    left: list[tuple[tuple[float, ...], int, Boxes]] = []  # what a draft leaves to be wished for, its number, and it
-    if proposed and graph.room.openings:  # which make way for the furniture
+    # what a draft leaves to be wished for, its number, it, and the searches that were begun from it
+    left: list[tuple[tuple[float, ...], int, Boxes, dict[bytes, Arranged]]] = []
+    if proposed and graph.room.openings:  # which make way for the furniture of every other draft
         bare = graph.replaced(room=graph.room.replaced(openings=()))
         ways = [(graph, PlaceConfig(yields=OF_OPENINGS)), (bare, DEFAULTS)]
 
-    def drawn() -> Iterator[tuple[Boxes, int]]:
+    def drawn() -> Iterator[tuple[int, Boxes, dict[bytes, Arranged], int]]:
         for start, count in draft_rounds(drafts):
             by = replace(draws, number=draws.number + start, guided=not place)
             for draft in sample_boxes(model, graph, by, count=count, timer=timer) if judged < budget / 2 else ():
                 if judged < budget / 2:
                     draft = draft if sized is None else Boxes(sized.size, draft.position, draft.yaw)
-                    yield draft, 0 if drafts > 1 else DEFAULTS.anew
-        for _, _, draft in sorted(left):
-            yield draft, DEFAULTS.anew
+                    yield len(left), draft, {}, 0 if drafts > 1 else DEFAULTS.anew
+        for _, number, draft, begun in sorted(left, key=lambda one: one[:2]):
+            yield number, draft, begun, DEFAULTS.anew
 
-    for draft, anew in drawn():
-        tried = []
-        for room, config in ways:
-            boxes, told, poses = finished_boxes(room, draft, styles, place, timer, replace(config, anew=anew))
-            if drafts == 1 or not place:
-                return boxes, told
-            judged += poses
-            with timer.stage("place"), one_thread():
-                tried.append(_wishes(graph, (boxes, told), draws.seed if proposed else None))
-            if best is None or tried[-1] < worth:
-                best, worth = (boxes, told), tried[-1]
-            if not any(worth):
-                break
-        left += [] if anew else [(min(tried), len(left), draft)]
-        ways = ways[: 1 + (tried[-1] < tried[0])]  # if the second is no better, it is not tried again
+    for number, draft, begun, anew in drawn():
+        room, config = ways[number % len(ways)]
+        found, poses = finished_boxes(room, draft, styles, place, timer, replace(config, anew=anew), begun)
+        if drafts == 1 or not place:
+            return found
+        judged += poses
+        with timer.stage("place"), one_thread():
+            wishes = _wishes(graph, found, draws.seed if proposed else None)
+        if best is None or wishes < worth:
+            best, worth = found, wishes
+        left += [] if anew else [(wishes, number, draft, begun)]
         if not any(worth) or (anew and judged > budget):
             break
     assert best is not None
@@ -180,34 +177,35 @@ def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int |
 
     `seed`: where nobody stated the openings, that by which they make way; None = they stay.
     """
-    from echousd.place.living import living_faults
+    from echousd.place.living import living_faults, severity
 
     boxes, conflicts = found
     faults = living_faults(graph, boxes)
     if seed is not None and any(fault.rule in OF_OPENINGS for fault in faults):
         graph = with_free_openings(graph, [boxes], seed)
         faults = living_faults(graph, boxes)
-    late = [seed is not None and fault.rule in OF_OPENINGS for fault in faults]
-    return len(layout_outcome(graph, boxes).faults), len(conflicts), len(late) - sum(late), sum(late)
+    late = [fault for fault in faults if seed is not None and fault.rule in OF_OPENINGS]
+    now = [fault for fault in faults if fault not in late]
+    return len(layout_outcome(graph, boxes).faults), len(conflicts), severity(now), severity(late)
 
 
 def finished_boxes(
     graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], place: bool, timer: StageTimer,
-    config: PlaceConfig = DEFAULTS,
-) -> tuple[Boxes, tuple[str, ...], int]:  # fmt: skip
-    """Sampled boxes, of equal sizes within style groups and, if wanted, placed; demands in conflict; poses judged."""
+    config: PlaceConfig = DEFAULTS, begun: dict[bytes, Arranged] | None = None,
+) -> tuple[tuple[Boxes, tuple[str, ...]], int]:  # fmt: skip
+    """Sampled boxes, of equal sizes within style groups, placed if wanted, and demands in conflict; poses judged."""
     boxes = _alike(graph, _mounted(graph, boxes.to(None)), styles)
     if not place:
-        return rounded_boxes(graph, boxes), (), 0
-    from echousd.place.living import living_faults
+        return (rounded_boxes(graph, boxes), ()), 0
+    from echousd.place.living import living_faults, severity
 
     @cache
-    def wrong(one: PlacedBoxes) -> tuple[int, ...]:
-        return int((one.verdict == 0).sum()), len(one.collisions), len(living_faults(graph, one.boxes))
+    def wrong(one: PlacedBoxes) -> tuple[float, ...]:
+        return int((one.verdict == 0).sum()), len(one.collisions), severity(living_faults(graph, one.boxes))
 
     graph = _with_homeless_unlocked(graph)
     with timer.stage("place"), one_thread():
-        found = placed(graph, boxes, config=config)
+        found = placed(graph, boxes, config=config, begun=begun)
         judged = found.judged
         same = _alike(graph, found.boxes, styles)
         if not np.array_equal(same.size, found.boxes.size):
@@ -215,11 +213,11 @@ def finished_boxes(
             fixed = with_sizes(graph, same)
             second = placed(fixed, same, config=replace(config, arrange=False))
             if wrong(second) > wrong(found):
-                third = placed(fixed, same, config=config)
+                third = placed(fixed, same, config=config, begun=begun)
                 judged, second = judged + third.judged, min(second, third, key=wrong)
             if wrong(second)[:2] <= wrong(found)[:2]:
                 found = second
-    return rounded_boxes(graph, found.boxes), tuple(sentence(one, graph) for one in found.conflicts), judged
+    return (rounded_boxes(graph, found.boxes), tuple(sentence(one, graph) for one in found.conflicts)), judged
 
 
 def _with_homeless_unlocked(graph: SceneGraph) -> SceneGraph:
@@ -232,12 +230,12 @@ def _with_homeless_unlocked(graph: SceneGraph) -> SceneGraph:
 def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int) -> SceneGraph:
     """The graph with openings that nobody stated moved to where nothing stands, if furniture is in their way.
 
-    A screen is in the way of a window, too: who watches it would look into the light.
+    A screen wants no window behind it.
     """
     from echousd.place.living import living_faults
 
     def faults(graph: SceneGraph) -> int:
-        return sum(len(living_faults(graph, boxes)) + backlit(graph, boxes) for boxes in layouts)
+        return sum(len(living_faults(graph, boxes)) for boxes in layouts)
 
     size, position, yaw = plan_boxes(layouts)
     size[np.tile(screens(graph), len(layouts)), 1] += TALL
@@ -253,17 +251,6 @@ def screens(graph: SceneGraph) -> np.ndarray:
     """(n,) bool, televisions and what they stand on."""
     kinds = [vocabulary().category(node.category) for node in graph.nodes]
     return np.array([kind.role == "screen" or kind.stands == "opposite" for kind in kinds], bool)
-
-
-def backlit(graph: SceneGraph, boxes: Boxes) -> int:
-    """How many windows have a screen before them."""
-    corners, here = graph.room.corners, screens(graph)
-    if corners is None or not here.any():
-        return 0
-    plan = footprints(*(np.asarray(v, float)[here] for v in (boxes.size, boxes.position, boxes.yaw)))
-    there = shapely.union_all(shapely.polygons(plan))
-    windows = [opening for opening in graph.room.openings if opening.kind == "window"]
-    return sum(shapely.Polygon(free_area(corners, one)).intersection(there).area > GLARE for one in windows)
 
 
 def with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:

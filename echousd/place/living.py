@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,6 +54,13 @@ def living_faults(
         LivingFault(names[f.object], f.rule, names[f.other] if f.other >= 0 else None, f.margin, f.sentence(names))
         for f in found
     )
+
+
+def severity(faults: Sequence[LivingFault]) -> float:
+    """How bad some faults are: one for each, and as much as it misses, at most `MOST` of its unit."""
+    from echomodel.objective.faults import MOST
+
+    return sum(1.0 + min(-fault.margin, MOST) for fault in faults)
 
 
 def unusual_sizes(graph: SceneGraph) -> tuple[str, ...]:

@@ -73,7 +73,10 @@ class PlacedBoxes:
         return Boxes(*(of.astype(np.float32) for of in (self.size, self.position, self.yaw)))
 
 
-def place(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: PlaceConfig | None = None) -> PlacedBoxes:
+def place(
+    graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: PlaceConfig | None = None,
+    begun: dict[bytes, Arranged] | None = None,
+) -> PlacedBoxes:  # fmt: skip
     """Place the sampled boxes of a graph: see `place_boxes`.
 
     Nodes that are locked or have a position stay where they are, nodes with a size keep it, nodes with a yaw keep it.
@@ -104,6 +107,7 @@ def place(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: Pla
         turned=np.array([node.locked or node.yaw is not None for node in nodes]),
         rules=rules,
         config=config,
+        begun=begun,
     )
 
 
@@ -123,6 +127,7 @@ def place_boxes(
     stated: tuple[Stated, ...] = (),
     rules: str = "strict",
     config: PlaceConfig | None = None,
+    begun: dict[bytes, Arranged] | None = None,
 ) -> PlacedBoxes:
     """Move and size boxes as little as possible until relations, collisions, floor, walls and support are right.
 
@@ -136,6 +141,7 @@ def place_boxes(
         openings: doors and windows in the edges of the floor polygon.
         stated: where single objects must stand in the room.
         rules: `strict` or `sgfront`.
+        begun: what earlier searches of the same boxes found, by their sizes, which goes on from there; filled.
 
     Raises:
         ValueError: a box that is not finite, a floor without area, or unknown rules.
@@ -153,6 +159,7 @@ def place_boxes(
     config = config or PlaceConfig()
     terms = tuple(term for term in TERMS if term.name not in config.without)
     tried: list[Arranged] = []
+    known = {} if begun is None else begun
 
     sizes = [predicate.id for predicate in vocabulary().predicates if predicate.measures == "size"]
     told = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
@@ -186,7 +193,9 @@ def place_boxes(
         at = suited(at, at.size)
 
         def searched(of: Setting) -> Arranged:
-            tried.append(Search(of.spread(), terms, yields=config.yields).run(config.anew))
+            key = of.size.tobytes()
+            tried.append(Search(of.spread(), terms, yields=config.yields).run(config.anew, known.get(key)))
+            known[key] = tried[-1]
             return tried[-1]
 
         chosen = searched(at)
@@ -195,8 +204,8 @@ def place_boxes(
             other = searched(less)
             if other.cost < chosen.cost - WORTH:
                 at, chosen = less, other
-        hung = hung_lamps(at.categories, at.size, chosen.position, chosen.yaw, free)
-        at = posed(hung, chosen.position, chosen.yaw, kept)
+        hung = hung_lamps(at.categories, at.size, chosen.state.position, chosen.state.yaw, free)
+        at = posed(hung, chosen.state.position, chosen.state.yaw, kept)
     found = solve(at, config)
     if at is not drawn and unmet(found.at):  # what the graph states comes before all habits
         plain = solve(drawn, config)

@@ -156,9 +156,9 @@ def seatings(setting: Setting, i: int, seats: Sequence[int]) -> list[list[tuple[
     found = sorted(slots_at(setting, largest, i), key=lambda slot: slot[3])
     size = setting.size[largest]
     out: list[list[tuple[float, float, float, float]]] = []
-    for start in range(len(found)):  # those that go with each slot, without running into each other
+    for start in found:  # those that go with each slot, its likes first, without running into each other
         chosen: list[tuple[float, float, float, float]] = []
-        for slot in (found[start], *found):
+        for slot in (start, *(one for one in found if one[3] == start[3]), *found):
             if len(chosen) < len(seats) and all(_clear(slot, other, size) for other in chosen):
                 chosen.append(slot)
         if len(chosen) == len(seats) and not any({*chosen} == {*other} for other in out):

@@ -1,7 +1,7 @@
 """Search: pieces and groups are moved to the poses that the objective finds cheapest, all candidates judged at once.
 
 First every piece, anchors before those who attend them; then what the terms that are still missed are about: single
-pieces, groups, exchanges of places; then such pieces are taken out and put in anew, the worst first. The same for equal
+pieces and groups; then such pieces are taken out and put in anew, the worst first. The same for equal
 settings on any machine: costs are compared to a ten-thousandth, of equal ones the first counts.
 """
 
@@ -39,8 +39,9 @@ WHOLE = ("floor_used", "floor_served", "each_served")  # terms that ask for all 
 FIRST = {"bed": 0.0, "sofa": 1.0, "board": 3.0, "storage": 4.0, "seat": 6.0, "screen": 7.0, "decor": 8.5, "light": 8.0}
 HIT, DEEP, MISSED = 1.0, 4.0, 3.0  # before anything is judged: for running into something, per metre, and relations
 WALKS = 6  # states of those judged at once that are walked through, where something cannot be walked to
-ASKEW = np.radians(20.0)  # what is turned less against the walls is meant to be parallel to them
 ASIDE = 0.1  # metres from its axis of a group within which nobody stands to one side
+ASTRAY = 1.0  # metres from its slots beyond which a box is no longer at what it attends
+LIKED = 0.05  # of what slots are liked less, where chairs are seated together
 LIT = 0.35  # metres between the middles of a lamp and of what it hangs over
 
 
@@ -55,13 +56,12 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Arranged:
-    """What was found: position (n, 3) float, metres, yaw (n,) float, radians; what it costs; poses judged.
+    """What was found: where the boxes stand; what it costs; poses judged.
 
     `wrong`: boxes that broken terms are about, the worst first.
     """
 
-    position: np.ndarray
-    yaw: np.ndarray
+    state: State
     cost: float
     judged: int
     wrong: tuple[int, ...]
@@ -81,6 +81,7 @@ class Search:
         self.terms = tuple(t for t in terms if t.name not in sizes and (t.kind != "relations" or t.name in told))
         self.firm = np.array([term.name not in yields for term in self.terms])
         self.rooms: dict[bytes, Plan] = {}
+        self.slots: dict[tuple[int, int], np.ndarray] = {}
         self.ways: dict[tuple[int, ...], list[list[tuple[float, float, float, float]]]] = {}
         self.looks: list[np.ndarray] = []
         self.urgent: list[int] = []
@@ -141,11 +142,11 @@ class Search:
     # -- moves -------------------------------------------------------------------------------------------------------
 
     def group(self, i: int, there: np.ndarray, state: State) -> list[int]:
-        """A box, whoever attends or stands on it, and the lamps that hang over it."""
+        """A box, whoever attends or stands on it and is not astray, and the lamps that hang over it."""
         out, at = [i], 0
         while at < len(out):
             for k in self.children[out[at]]:
-                if there[k] and k not in out:
+                if there[k] and k not in out and not self._astray(state, k, out[at]):
                     out.append(k)
             at += 1
         for k in np.flatnonzero(self.setting.hanging & there).tolist():
@@ -154,13 +155,33 @@ class Search:
                 out.append(k)
         return out
 
+    def _astray(self, state: State, k: int, i: int) -> bool:
+        """Whether a box stands too far from where it belongs at another one to go with it."""
+        if (k, i) not in self.slots:
+            self.slots[k, i] = np.array(slots_at(self.setting, k, i)).reshape(-1, 4)
+        side, front = axes(state.yaw[i])
+        away = (state.position[k] - state.position[i])[::2]
+        off = self.slots[k, i][:, :2] - (away @ side, away @ front)
+        return bool(len(off)) and float(np.hypot(*off.T).min()) > ASTRAY
+
+    def _joining(self, state: State, there: np.ndarray, i: int) -> np.ndarray:
+        """(K, 4) float: poses at which those who attend a box, and are astray, stand right where they are."""
+        rows = [
+            out_of(state.position[k], float(state.yaw[k]) - turn, (-lateral, -forward, 0.0, more))
+            for k in self.children[i]
+            if there[k] and self._astray(state, k, i)
+            for lateral, forward, turn, more in self.slots[k, i].tolist()
+        ]
+        return np.array(rows).reshape(-1, 4)
+
     def moved(self, state: State, there: np.ndarray, i: int) -> State:
         """The state with box i, and its group with it, at the best of its poses."""
         setting = self.setting
         if setting.fixed[i]:
             return state
         group = self.group(i, there, state)
-        rows = proposals(setting, state.position, state.yaw, there, i)
+        drawn = proposals(setting, state.position, state.yaw, there, i)
+        rows = np.concatenate([drawn, self._joining(state, there, i)])
         near = aside(setting, state.position, state.yaw, i)
         taste = np.concatenate([self._taste(i, rows), state.taste[i] + 0.3 * near[:, 3]])
         rows = np.concatenate([rows, near])
@@ -255,7 +276,8 @@ class Search:
             yaw[number, chosen] = rows[other, 2]
         changed = np.zeros(len(state.yaw), bool)
         changed[seats] = True
-        taste = np.array([state.taste[seats].sum(), *(0.001 * number for number in range(len(ways)))])
+        likes = [LIKED * sum(slot[3] for slot in slots) + 0.001 * number for number, slots in enumerate(ways)]
+        taste = np.array([state.taste[seats].sum(), *likes])
         best = self._best(there, position, yaw, changed, taste)
         own = state.taste.copy()
         own[seats] = 0.0
@@ -363,33 +385,6 @@ class Search:
                         fronts=fronts.ravel())  # fmt: skip
         return np.asarray(found.reshape(len(turn), -1))
 
-    def exchanged(self, state: State, boxes: list[int]) -> State:
-        """The state after two pieces, with their groups, changed places if that is better."""
-        setting, every = self.setting, np.ones(len(state.yaw), bool)
-        free = [i for i in range(len(every)) if setting.standing(i) and not setting.fixed[i]]
-        pairs = [
-            (i, k)
-            for n, i in enumerate(b for b in boxes if b in free)
-            for k in free
-            if k not in boxes[: n + 1] and setting.kinds[k].role == setting.kinds[i].role
-        ]
-        states = [state]
-        for i, k in pairs[: JUDGED - 1]:
-            position, yaw = state.position.copy(), state.yaw.copy()
-            for one, other in ((i, k), (k, i)):
-                row = np.array([[*state.position[other, [0, 2]], state.yaw[other]]])
-                group = self.group(one, every, state)
-                if other in group:
-                    break
-                at, turn = self._carried(state, one, group, row)
-                position[group], yaw[group] = at[0, group], turn[0, group]
-            states.append(State(position, yaw, state.taste))
-        if len(states) < 2:
-            return state
-        cost = self.costs(every, np.stack([s.position for s in states]), np.stack([s.yaw for s in states]), every)
-        best = int(np.round(cost * GRAIN).argmin())
-        return states[best] if cost[best] < cost[0] - GAIN else state
-
     # -- the whole ---------------------------------------------------------------------------------------------------
 
     def order(self, boxes: list[int]) -> list[int]:
@@ -451,21 +446,6 @@ class Search:
             there[k] = True
         return state
 
-    def squared(self, state: State) -> State:
-        """The state with all that stands nearly parallel to the walls parallel to them."""
-        setting, every = self.setting, np.ones(len(state.yaw), bool)
-        for i in self.order([k for k in range(len(every)) if setting.standing(k)]):
-            off = np.remainder(state.yaw[i] - setting.grain + np.pi / 4, np.pi / 2) - np.pi / 4
-            if abs(off) < ASKEW and not (setting.fixed[i] or setting.turned[i]):
-                row = np.array([[*state.position[i, [0, 2]], state.yaw[i] - off]])
-                position, yaw = self._carried(state, i, self.group(i, every, state), row)
-                state = State(position[0], yaw[0], state.taste)
-        yaw = state.yaw.copy()
-        for k in self.order(list(np.flatnonzero(setting.carrier >= 0))):
-            if setting.kinds[k].front and not (setting.fixed[k] or setting.turned[k]):
-                yaw[k] = yaw[setting.carrier[k]]
-        return State(state.position, yaw, state.taste)
-
     def involved(self, boxes: list[int]) -> list[int]:
         """Boxes, whom they attend, and who attends these."""
         out = list(boxes)
@@ -480,7 +460,7 @@ class Search:
         for _ in range(SWEEPS):
             if not wrong or self.judged >= self.budget:
                 break
-            after = self.exchanged(self.swept(state, self.involved(wrong)), wrong)
+            after = self.swept(state, self.involved(wrong))
             before, (cost, still) = total, self.faults(after)
             if cost < before - GAIN:
                 state, total, wrong = after, cost, still
@@ -488,18 +468,13 @@ class Search:
                 break
         return state, total, wrong
 
-    def run(self, anew: int = PlaceConfig.anew) -> Arranged:
-        """The best state that the budget finds, pieces taken out and put in again so many times."""
-        setting, n = self.setting, len(self.setting.size)
-        habits = [0.02 + 0.3 * out_of_habit(setting, i) for i in range(n)]
-        state = State(setting.position.copy(), setting.yaw.copy(), np.array(habits))
-        state = self.squared(state)
-        _, wrong = self.faults(state)
-        at = np.array([stance == "at" for stance in setting.stances], bool)
-        mates = np.array([((setting.anchor == a) & at).sum() for a in setting.anchor])
-        seated = at & (setting.anchor >= 0) & (mates > 1) & ~np.isin(np.arange(n), wrong)  # together with their table
-        state = self.swept(state, [i for i in range(n) if not seated[i]])
-        state, total, wrong = self.mended(state, *self.faults(state))
+    def run(self, anew: int = PlaceConfig.anew, begun: Arranged | None = None) -> Arranged:
+        """The best state that the budget finds, pieces taken out and put in again so many times.
+
+        `begun`: what the same search found before, from where it goes on.
+        """
+        n = len(self.setting.size)
+        state, total, wrong = self._first() if begun is None else (begun.state, *self.faults(begun.state))
         for number in range(anew):
             if not wrong or self.judged >= self.budget:
                 break
@@ -511,7 +486,19 @@ class Search:
             cost, still = self.faults(after)
             if cost < total - GAIN:
                 state, total, wrong = self.mended(after, cost, still)
-        return Arranged(state.position, state.yaw, total, self.judged, tuple(wrong))
+        return Arranged(state, total, self.judged, tuple(wrong))
+
+    def _first(self) -> tuple[State, float, list[int]]:
+        """Where all were moved once from where they were drawn and what is missed was mended, as `mended`."""
+        setting, n = self.setting, len(self.setting.size)
+        habits = [0.02 + 0.3 * out_of_habit(setting, i) for i in range(n)]
+        state = State(setting.position.copy(), setting.yaw.copy(), np.array(habits))
+        _, wrong = self.faults(state)
+        at = np.array([stance == "at" for stance in setting.stances], bool)
+        mates = np.array([((setting.anchor == a) & at).sum() for a in setting.anchor])
+        seated = at & (setting.anchor >= 0) & (mates > 1) & ~np.isin(np.arange(n), wrong)  # together with their table
+        state = self.swept(state, [i for i in range(n) if not seated[i]])
+        return self.mended(state, *self.faults(state))
 
 
 def priced(rows_of: Sequence[tuple[Term, Found]], room: Plan) -> tuple[Found, Array]:

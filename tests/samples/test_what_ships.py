@@ -114,7 +114,8 @@ def test_the_network_alone_draws_most_of_what_the_graph_says():
     for number, graph in enumerate(graphs):
         rows = batch.scene == number
         boxes = Boxes(found.size[rows], found.position[rows] + torch.from_numpy(floor_centre(graph)), found.yaw[rows])
-        outcome = layout_outcome(graph, finished_boxes(graph, boxes, style_groups(graph), False, StageTimer())[0])
+        (drawn, _), _ = finished_boxes(graph, boxes, style_groups(graph), False, StageTimer())
+        outcome = layout_outcome(graph, drawn)
         total += Counter(verdict.state for verdict in outcome.verdicts)
         hits += outcome.collisions
     assert total["kept"] / (total["kept"] + total["broken"]) >= DRAWN, total

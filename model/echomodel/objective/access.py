@@ -6,6 +6,7 @@ import math
 
 from echomodel.arrays import Array, at_least, cast, full, held, kit, put
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, nobody, worst
+from echomodel.objective.sight import screens
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_normal, segment
 
 CROOKED = math.radians(1.0)  # 98 % of such furniture in real rooms is turned less
@@ -171,14 +172,14 @@ def door_free(plan: Plan) -> Found:
 
 
 def window_free(plan: Plan) -> Found:
-    """Windows are not covered by tall furniture."""
+    """Windows are not covered by tall furniture, nor are screens watched against their light."""
     return _before_openings(plan, window=True)
 
 
 def _before_openings(plan: Plan, *, window: bool) -> Found:
     rows: list[tuple[Array, Array, int]] = []
     on_wall = plan.which(lambda kind: kind.support == "wall" and kind.role == "storage")
-    asked = (plan.standing | (on_wall if window else _hangs_low(plan))) & plan.moved
+    asked = (plan.standing | (on_wall | screens(plan) if window else _hangs_low(plan))) & plan.moved
     for scenes, polygon, openings in plan.rooms:
         here = plan.scene == scenes[0] if len(scenes) < 2 else plan.scene >= 0  # one room, or all are copies of one
         who = plan.those(here & asked)
@@ -224,7 +225,7 @@ def _clearance(plan: Plan, who: Array, polygon, opening: Opening) -> Array:  # t
     if opening.kind == "window":
         headboard = HEADBOARD * plan.of("bed")[who]
         low = opening.sill + TALL + headboard - (plan.position[who, 1] + plan.size[who, 1])
-        return xp.maximum(out + 0.15, low)
+        return xp.maximum(out + 0.15, xp.where(screens(plan)[who], -FAR, low))
     if swings:  # of the corner of the square that the leaf does not sweep what one walks through
         hinge, closed = map(plan.numbers, hinge_point(polygon, opening))
         off = plan.position[who][:, ::2] - hinge

@@ -137,6 +137,12 @@ def _watched(plan: Plan) -> Watched:
     return kept["watched"]
 
 
+def screens(plan: Plan) -> Array:
+    """(N,) bool, what televisions stand on, and those that stand or hang elsewhere."""
+    stands = plan.stands("opposite")
+    return stands | (plan.of("screen") & ~(stands[plan.anchor] & (plan.anchor >= 0)))
+
+
 def _viewers(plan: Plan) -> Watched:
     """Each screen with the viewer that sees it best, of those that the graph names where it names any.
 
@@ -144,9 +150,8 @@ def _viewers(plan: Plan) -> Watched:
     bool, whether the screen lies in its viewer's view. clear: (P,) float, metres that the line of sight keeps from what
     is high. about: (P,) int64, what is nearest to it, -1 = nothing.
     """
-    stands, xp = plan.stands("opposite"), plan.kit
-    on_stand = stands[plan.anchor] & (plan.anchor >= 0)
-    i, j = plan.pairs(stands | (plan.of("screen") & ~on_stand), plan.of("sofa", "bed") | plan.stands("company"))
+    xp = plan.kit
+    i, j = plan.pairs(screens(plan), plan.of("sofa", "bed") | plan.stands("company"))
     if not len(i):
         return nobody(plan.size), i > 0, full(plan.size, 0, 0.0), i
     main = plan.of("sofa", "bed") & ~plan.stands("company")  # armchairs watch where there is neither

@@ -63,6 +63,14 @@ def test_one_stands_before_an_open_wardrobe(gap, aside, margin):
     assert found == {1: pytest.approx(expected)}
 
 
+@pytest.mark.parametrize(("gap", "margin"), [(0.4, -0.15), (0.7, 0.15)])
+def test_no_table_stands_before_storage(gap, margin):
+    table = ("dining_table", (1.6, 0.75, 0.9), (0.0, 0.2 + gap + 0.45), 0.0)
+    found, seen_of, _ = seen(composition.wardrobe_opens, [("bookshelf", (1.2, 2.0, 0.4), (0.0, 0.0), 0.0), table])
+    assert found == {0: pytest.approx(margin)}
+    assert seen_of.other.tolist() == [1]
+
+
 def test_a_bed_behind_a_wardrobe_is_not_before_it():
     bed = ("double_bed", (1.8, 0.5, 2.0), (0.0, 0.0), 0.0)
     assert seen(composition.wardrobe_opens, [bed, ("wardrobe", (1.6, 2.2, 0.6), (0.0, 1.5), 0.0)])[0][1] > 0

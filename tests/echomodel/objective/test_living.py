@@ -323,6 +323,18 @@ def test_doors_swing_free_and_windows_are_not_covered():
     assert ("wardrobe", "window_free") not in low.found(openings=(window,))
 
 
+@pytest.mark.parametrize(("at", "dazzled"), [(0.0, True), (-1.6, False)])
+def test_nobody_watches_a_screen_against_a_window(at, dazzled):
+    window = Opening("window", "window", 2, 1.8, 1.4, 1.3, sill=0.9)  # in the middle of the wall
+    room = Room({
+        "sofa": {"kind": "sofa", "size": (1.8, 0.85, 0.9), "at": (at, -1.5)},
+        "stand": {"kind": "tv_stand", "size": (1.2, 0.5, 0.4), "at": (at, 1.8), "yaw": np.pi},
+        "tv": {"kind": "tv", "size": (1.0, 0.6, 0.1), "at": (at, 1.8), "yaw": np.pi, "up": 0.5},
+    })  # fmt: skip
+    found = {who: text for (who, rule), text in room.found(openings=(window,)).items() if rule == "window_free"}
+    assert found == ({"stand": "stand stands before a window"} if dazzled else {})
+
+
 @pytest.mark.parametrize(("hinge", "at"), [("left", {0.82: True, 0.74: False}), ("right", {1.68: True, 1.76: False})])
 def test_one_walks_in_straight_ahead_beside_the_leaf(hinge, at):
     door = Opening("door", "door", 3, 0.3, 0.9, 2.0, hinge=hinge)  # from z = 0.8 to 1.7, 0.6 m of it in its middle

@@ -73,7 +73,7 @@ def test_plants_have_no_pose_that_leaves_the_floor(size: tuple[float, float, flo
 @pytest.mark.parametrize(("rigid", "times"), [(True, 1), (False, 2)])  # quickly, then smaller, which is better
 def test_a_full_room_is_not_arranged_again_where_nothing_may_shrink(monkeypatch, rigid: bool, times: int) -> None:
     run, calls = Search.run, []
-    monkeypatch.setattr(Search, "run", lambda search, anew: calls.append(search) or run(search, anew))
+    monkeypatch.setattr(Search, "run", lambda search, *asked: calls.append(search) or run(search, *asked))
     size = np.array([(2.0, 1.0, 2.2), (1.8, 2.2, 0.6), (1.8, 2.2, 0.6), (1.8, 2.2, 0.6)])
     small = FLOOR * (0.46, 0.6)
     place_boxes(

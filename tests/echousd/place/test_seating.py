@@ -34,6 +34,18 @@ def test_four_chairs_sit_opposite_each_other(seed):
     assert np.abs(left - right).max() < 0.12
 
 
+def test_eight_chairs_that_are_too_many_for_two_sides_take_all_four():
+    rng = np.random.default_rng(0)
+    size = np.array([(2.0, 0.75, 0.9), *[(0.45, 0.9, 0.5)] * 8])
+    position = np.array([(0.0, 0.0, 0.0), *((x, 0.0, z) for x, z in rng.uniform(-1.5, 1.5, (8, 2)))])
+    done = place_boxes(
+        ["dining_table", *["dining_chair"] * 8], size, position, np.zeros(9), np.zeros((0, 3), int),
+        floor_polygon=FLOOR, height=2.6, rigid=np.ones(9, bool),
+    )  # fmt: skip
+    quarters = np.round(np.mod(done.yaw[1:] - done.yaw[0], 2 * np.pi) / (np.pi / 2)).astype(int) % 4
+    assert sorted(np.bincount(quarters, minlength=4).tolist()) == [1, 1, 3, 3]
+
+
 def test_a_bench_has_a_side_of_its_own():
     seats, _ = laid(["bench", "dining_chair", "dining_chair"], told=[(1, CLOSE, 0), (2, CLOSE, 0), (3, CLOSE, 0)])
     assert abs(seats[0, 0]) < 0.12
