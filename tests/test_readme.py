@@ -33,6 +33,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 import pytest
+from few_cameras import FEW
 from inline_batches import Inline
 
 from echousd.cli import main as commands
@@ -49,6 +50,17 @@ def pictures_are_small() -> Iterator[None]:
     """Commands that do not say how large a picture is draw small ones; a shell's draw their own size."""
     sizes = {name: (size // 5, rays) for name, (size, rays) in rendering.QUALITIES.items()}
     with patch.dict(rendering.QUALITIES, sizes), patch("echousd.make.save.PREVIEW", 96):
+        yield
+
+
+@pytest.fixture(autouse=True, scope="module")
+def rooms_are_made_of_few_drafts() -> Iterator[None]:
+    """One draft a room, and its cameras are looked for at a dozen places."""
+    with (
+        patch("echousd.make.pipeline.most_drafts", lambda model, objects: 1),
+        patch("echousd.make.edit.most_drafts", lambda model, objects: 1),
+        patch.multiple("echousd.draw.views", **FEW),
+    ):
         yield
 
 

@@ -48,7 +48,7 @@ CONFIG = from_dict(
 @pytest.fixture(scope="module")
 def rooms():
     made = []
-    for room in generate_rooms(3, 1):
+    for room in generate_rooms(2, 1):
         relations = label_relations(room, rules="strict", drop=0.5, rng=np.random.default_rng(1))
         made.append(replace(room, relations=relations))
     return made

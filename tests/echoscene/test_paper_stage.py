@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 from published_shapes import fit_to_box
+from smoke_data import smoke_data
 
-from echomodel.data.build import build_data
 from echomodel.data.roomset import RoomSet
 from echomodel.data.shapeset import ShapeSet
 from echomodel.text import RandomTextEncoder, TextEncoder
@@ -29,11 +29,9 @@ SMALL = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("data")
-    build_data(folder, "smoke", seed=3)
-    return folder
+    return smoke_data(tmp_path_factory)
 
 
 @pytest.fixture(autouse=True)

@@ -3,6 +3,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from few_cameras import FEW
 from pxr import Usd, UsdGeom
 from small_room import StandIn
 
@@ -26,6 +27,8 @@ class Anything(StandIn):
 @pytest.fixture(autouse=True)
 def small_pictures(monkeypatch):
     monkeypatch.setattr("echousd.make.save.PREVIEW", 96)
+    for name, value in FEW.items():
+        monkeypatch.setattr(f"echousd.draw.views.{name}", value)
 
 
 @pytest.fixture

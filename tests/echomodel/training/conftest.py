@@ -5,17 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from smoke_data import smoke_data
 
-from echomodel.data.build import build_data
 from echomodel.data.roomset import RoomSet
 from echomodel.training.rooms import PackedRooms
 
 
 @pytest.fixture(scope="session")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("data")
-    build_data(folder, "smoke", seed=3)
-    return folder
+    return smoke_data(tmp_path_factory)
 
 
 @pytest.fixture(scope="session")

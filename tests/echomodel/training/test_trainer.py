@@ -38,14 +38,14 @@ def smoke(stage: str, data: Path, *settings: str) -> Recipe:
 def test_told_relations_hold_in_mirrored_rooms(packed: PackedRooms) -> None:
     seen = 0
     for seed in range(2):
-        batch = draw_batch(packed, 200, torch.Generator().manual_seed(seed))
+        batch = draw_batch(packed, 100, torch.Generator().manual_seed(seed))
         triplets = told_triplets(batch)
         for number, rules in enumerate(("sgfront", "strict")):
             mine = triplets[batch.rules[batch.graph.scene[triplets[:, 0]]] == number]
             kept = verdicts(batch.boxes, mine, rules=rules)
             seen += int((kept >= 0).sum())
             assert not (kept == 0).any()
-    assert seen > 500
+    assert seen > 250
 
 
 def test_losses_see_boxes_at_the_heights_of_what_carries_them(packed: PackedRooms) -> None:
@@ -251,7 +251,10 @@ def test_boxes_of_a_room_set_survive_packing(data: Path, packed: PackedRooms) ->
     torch.testing.assert_close(packed.position[: len(boxes)], boxes.position)
 
 
-def test_a_checkpoint_of_another_recipe_is_refused_and_the_fields_are_named(data: Path, tmp_path: Path) -> None:
+def test_a_checkpoint_of_another_recipe_is_refused_and_the_fields_are_named(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(LayoutStage, "validate", lambda stage, model: {})
     recipe = smoke("layout", data, "steps=1", "validate_every=9")
     open_run(recipe, tmp_path).run()
     open_run(replace(recipe, steps=2, nodes=300, threads=1), tmp_path, resume=True)  # these may change

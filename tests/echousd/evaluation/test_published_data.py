@@ -71,7 +71,7 @@ def test_one_command_trains_and_fills_our_column(folder, tmp_path, monkeypatch):
         monkeypatch.setattr(f"echousd.evaluation.sections.{name}", ("wardrobe",))
     for name, few in {"POINTS": 128, "SUITES": 4, "PAIRS": 2, "DISTANCES": {"Chamfer": 0, "EMD": 16}}.items():
         monkeypatch.setattr(f"echousd.evaluation.sections.{name}", few)
-    monkeypatch.setattr("echousd.evaluation.suite.PANELS", 3)  # a few plots
+    monkeypatch.setattr("echousd.evaluation.suite.PANELS", 1)  # a plot
     monkeypatch.setattr("echousd.evaluation.systems.searched", lambda task, draft, config: draft)  # of `default`
     monkeypatch.setattr(trainer, "plot_log", lambda log, out: None)
     whole = Schedule.ddim  # a thousand steps and a hundred are for tests/parity

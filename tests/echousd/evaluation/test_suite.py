@@ -29,7 +29,7 @@ def quick(monkeypatch):
     for finer, few in {"POINTS": 128, "SUITES": 4, "PAIRS": 2, "DISTANCES": {"Chamfer": 0, "EMD": 16}}.items():
         monkeypatch.setattr(f"echousd.evaluation.sections.{finer}", few)
     monkeypatch.setattr(suite, "HONEST", ("real",))
-    monkeypatch.setattr(suite, "PANELS", 3)  # a few plots
+    monkeypatch.setattr(suite, "PANELS", 1)  # a plot
     monkeypatch.setattr("echousd.evaluation.sections.PUBLISHED", ("wardrobe", "nightstand"))
     monkeypatch.setattr("echousd.evaluation.sections.CONSISTENT", ("wardrobe",))
     monkeypatch.setattr("echousd.evaluation.sections.SWEPT", (2, 4))

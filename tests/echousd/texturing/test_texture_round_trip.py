@@ -46,7 +46,7 @@ def small(tmp_path_factory):
 def generic(room, tmp_path_factory):
     """The room's job for any tool, its small things as one object, and the folder it is in."""
     folder = tmp_path_factory.mktemp("generic") / "job"
-    return export_job(room, folder, "generic", dressing="grouped", resolution=512), folder
+    return export_job(room, folder, "generic", dressing="grouped", resolution=256), folder
 
 
 def copied(root, tmp_path):
@@ -86,7 +86,7 @@ def test_charts_are_unique_and_inside(generic):
         corners = job_mesh(folder, thing).corners
         assert corners.min() >= 0
         assert corners.max() <= 1
-        _, bary, place = texel_faces(corners, 512)
+        _, bary, place = texel_faces(corners, 256)
         inner = place[(bary > 1e-6).all(1)]
         assert len(np.unique(inner, axis=0)) == len(inner), thing.name
 
