@@ -17,9 +17,7 @@ from echomodel.vocabulary import UnknownWord, vocabulary
 CATEGORIES = [category.name for category in vocabulary().categories]
 
 SOLIDS = {
-    "block": Block(half=np.array([0.3, 0.1, 0.5])),
     "rounded": Block(half=np.array([0.3, 0.1, 0.5]), radius=0.05, turn=rotation(0.3, 0.5, 0.2)),
-    "cone": Turned(low=(0.3, 0.2), high=(0.1, 0.1), height=0.5),
     "disc": Turned(low=(0.3, 0.3), high=(0.3, 0.3), height=0.2, rounding=0.04),
     "leg": Turned(low=(0.03, 0.03), high=(0.05, 0.05), height=0.7, power=np.inf, turn=rotation(0.2, 0.3)),
     "top": Turned(low=(0.8, 0.4), high=(0.8, 0.4), height=0.1, power=6.0),
