@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
-LENSES = (24.0, 28.0, 35.0, 20.0)  # mm, of a camera inside: 74 to 54 degrees across, 84 where nothing else helps
+LENSES = (24.0, 28.0, 35.0, 21.0)  # mm, of a camera inside: 74 to 54 degrees across, 81 where nothing else helps
 EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
 SLOPES = (0.05, 0.12, 0.2, 0.28)  # metres that the middle of its picture is lower for a metre ahead
 PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
-WHOLE, CLEAR = 400.0, 30.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
+WHOLE, CLEAR = 1000.0, 30.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
 LOOKED, CHOSEN, TRIED = 48, 3, 32  # eyes of which one view is looked at closely; eyes, and of each so many views
 LOW = 1.4  # metres: over what is so high one looks
 # bare walls: what all of a picture costs, from which share on, metres of rounding

@@ -137,7 +137,7 @@ def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: 
     return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, weighed(pieces))
 
 
-STRETCH, FULLER, LONG = 1.6, 1.2, 3.2  # metres of bare wall that ask for a picture, in full rooms, and for three
+STRETCH, FULLER, LONG = 1.4, 1.2, 3.0  # metres of bare wall that ask for a picture, in full rooms, and for three
 STEP = 0.1  # metres from spot to spot along a wall
 PROBE = np.array([0.3, 0.8, 0.03])  # a picture that tells whether a spot is bare
 EMPTY = 0.8  # metres around a corner where nothing stands
@@ -145,11 +145,11 @@ FLOORS = (12.0, 22.0, 34.0)  # m² of floor from which on one, two, three corner
 
 
 def bare_walls(setting: Setting) -> None:
-    """A picture as wide as suits the stretch on the two longest bare ones, three equal ones where it is very long."""
+    """A picture as wide as suits the stretch on the three longest bare ones, three equal ones where it is very long."""
     if not setting.walls or setting.use:
         return
     found = [(length, middle, wall) for wall in walls_of(setting) for length, middle in stretches(setting, wall)]
-    for length, middle, wall in sorted(found, key=lambda one: -one[0])[: None if setting.full else 2]:
+    for length, middle, wall in sorted(found, key=lambda one: -one[0])[: None if setting.full else 3]:
         rng = setting.rng(f"wall {wall.edge}", "bare")
         wide = float(np.clip(0.4 * length, 0.6, 1.3))
         size = np.round([wide, wide * rng.uniform(0.66, 0.75), 0.03], 2)

@@ -123,7 +123,7 @@ def clusters(setting: Setting) -> None:
     for number, wish in enumerate(setting.story.floor):
         for host in setting.near(wish.by):
             rng = setting.rng(host.name, "floor", str(number))
-            if not wish.comes(setting.full, rng):
+            if not setting.has(wish.share, rng):
                 continue
             near = host.footprint.buffer(NEAR).union(rugs)
             first = setting.put_first((t for t in _by(host, wish, rng) if near.intersects(t.footprint)), margin=0.03)

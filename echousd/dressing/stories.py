@@ -9,8 +9,6 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-import numpy as np
-
 from echomodel.vocabulary import Category
 from echousd.graph.fields import RESIDENTS
 
@@ -28,10 +26,6 @@ class Wish:
     turn: str = ""
     share: float = 1.0
     needs: str = ""
-
-    def comes(self, full: bool, rng: np.random.Generator) -> bool:
-        """Whether a room that is dressed in full, or not, has it."""
-        return bool(rng.random() < (2 if full else 1) * self.share)
 
 
 @dataclass(frozen=True)

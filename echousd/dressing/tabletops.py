@@ -162,7 +162,7 @@ def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
     for number, wish in enumerate(setting.story.tops[name]):
         order = [str(k) for k in rng.permutation(wish.of)]
         turn = float(rng.uniform(-0.12, 0.12))
-        if not wish.comes(setting.full, rng) or (wish.needs and wish.needs not in taken):
+        if not setting.has(wish.share, rng) or (wish.needs and wish.needs not in taken):
             continue
         for kind in [k for k in order if k not in taken] or order:
             straight = kind in STRAIGHT or surface.area.area < 0.1

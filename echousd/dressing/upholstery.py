@@ -76,7 +76,7 @@ def on_covers(setting: Setting) -> None:
         seat = _Seat.of(host)
         for number, wish in enumerate(setting.story.beds):
             rng = setting.rng(host.name, "cover", str(number))
-            if seat is None or not wish.comes(setting.full, rng):
+            if seat is None or not setting.has(wish.share, rng):
                 continue
             kind, variant, turn = str(rng.choice(wish.of)), int(rng.integers(1 << 30)), float(rng.uniform(-0.5, 0.5))
             size = usual_size(kind, rng)

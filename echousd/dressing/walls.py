@@ -221,7 +221,7 @@ def _over(host: Standing, setting: Setting, rng: np.random.Generator) -> list[tu
     """What would look good over an object, best first."""
     wide = float(host.size[0])
     out: list[tuple[str, np.ndarray]] = []
-    if "mirror" in host.row.invites:
+    if "mirror" in host.row.invites and not any("mirror" in part.slots for part in host.geometry.parts):
         mirror = "round_mirror" if rng.random() < 0.5 else "mirror"
         out.append((mirror, usual_size(mirror, rng)))
     share = rng.uniform(0.5, 0.62)
@@ -266,7 +266,7 @@ WALL_SHELVES = ("wall_shelf", "ledge", "box_shelf")  # of a room both are alike
 ABOVE, STANDING = 0.3, 0.6  # metres that stay free over a shelf, and before a mirror in which one sees all of oneself
 # Shares of rooms with a clock, of those where people sit together or work; with shelves, coats, a tall mirror; of the
 # pieces with a picture above them, those that have three.
-CLOCKS, WITH_SHELVES, COATS, MIRRORS, GROUPS = 0.4, 0.3, 0.25, 0.5, 0.5
+CLOCKS, WITH_SHELVES, COATS, MIRRORS, GROUPS = 0.4, 0.4, 0.3, 0.6, 0.5
 
 
 def shelves(setting: Setting) -> None:

@@ -2,17 +2,21 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 import echousd
 from echomodel.dressing import KINDS
 from echomodel.vocabulary import vocabulary
 from echousd.dressing import tabletops
 from echousd.dressing.dress import dressed, setting_of
-from echousd.dressing.setting import Thing
-from echousd.dressing.stories import TABLE, Wish, guessed, story
+from echousd.dressing.setting import Setting, Thing, standing
+from echousd.dressing.stories import TABLE, guessed, story
+from echousd.dressing.walls import _over
 from echousd.graph import SceneGraph
 from echousd.graph.fields import RESIDENTS
 from echousd.options import RoomOptions
+from echousd.shapes.colliders import standing_hull
+from echousd.shapes.geometry import Geometry, Origin, Part
 from echousd.stage.graphs import read_graph
 
 STUDY = """
@@ -24,13 +28,23 @@ nodes:
 """
 
 
-def test_rooms_dressed_in_full_have_twice_as_often_what_others_may_have():
-    cup, rng = Wish(of=("cup",), at=(), share=0.3), np.random.default_rng(0)
-    some, full = (np.mean([cup.comes(full, rng) for _ in range(2000)]) for full in (False, True))
-    assert some == pytest.approx(0.3, abs=0.04)
-    assert full == pytest.approx(0.6, abs=0.04)
-    always = Wish(of=("cup",), at=(), share=0.5)
-    assert all(always.comes(True, rng) for _ in range(100))
+def test_rooms_dressed_in_full_have_all_that_a_share_of_others_has():
+    floor = np.array([[-2.0, -2.0], [-2.0, 2.0], [2.0, 2.0], [2.0, -2.0]])
+    some, full = (Setting({}, floor, (), 2.6, True, dressed, 0) for dressed in (False, True))
+    rng = np.random.default_rng(0)
+    assert np.mean([some.has(0.3, rng) for _ in range(2000)]) == pytest.approx(0.3, abs=0.04)
+    assert all(full.has(0.01, rng) for _ in range(100))
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_no_mirror_hangs_over_a_table_that_has_one(mirrored):
+    size, slot = np.array([1.1, 0.8, 0.45]), "mirror" if mirrored else "wood"
+    part = Part("mesh", trimesh.creation.box(size), {slot: np.arange(12)})
+    made = Geometry((part,), (standing_hull(part.mesh),), Origin("parts"))
+    host = standing("table", "dressing_table", size, np.zeros(3), 0.0, made)
+    setting = Setting({"table": host}, np.zeros((4, 2)), (), 2.6, True, True, 0)
+    kinds = [kind for kind, _ in _over(host, setting, np.random.default_rng(0))]
+    assert any("mirror" in kind for kind in kinds) != mirrored
 
 
 @pytest.fixture(scope="module")
