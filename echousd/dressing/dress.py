@@ -141,7 +141,7 @@ STRETCH, FULLER, LONG = 1.4, 1.2, 3.0  # metres of bare wall that ask for a pict
 STEP = 0.1  # metres from spot to spot along a wall
 PROBE = np.array([0.3, 0.8, 0.03])  # a picture that tells whether a spot is bare
 EMPTY = 0.8  # metres around a corner where nothing stands
-FLOORS = (12.0, 22.0, 34.0)  # m² of floor from which on one, two, three corners get something
+FLOORS = (10.0, 17.0, 28.0)  # m² of floor from which on one, two, three corners get something
 
 
 def bare_walls(setting: Setting) -> None:

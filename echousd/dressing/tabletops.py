@@ -125,6 +125,7 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
     return np.array([*lines, *areas], object)
 
 
+LAID = 0.4  # share of rooms whose dining table is set
 VOLUMES = 7  # kinds of single books that a row is of
 BETWEEN = 0.002  # metres from book to book
 EYE = 1.7  # metres: what is put higher cannot be seen
@@ -142,7 +143,7 @@ def tabletops(setting: Setting) -> None:
         if not levels:
             continue
         name = host.row.top
-        if name == "dining_table" and setting.full:
+        if name == "dining_table" and setting.has(LAID, setting.rng(host.name, "set")):
             _laid(setting, host, levels[0])
         footprint = float(host.size[0] * host.size[2])
         tops = [s for s in levels if s.area.area > 0.3 * footprint and s.host.position[1] + s.y < EYE]
@@ -220,7 +221,7 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
     side = 1.0 if rng.random() < 0.5 else -1.0
     ware = WARE if host.row.task else LINEN if setting.use == "wet" else ()
     if rng.random() < (0.95 if setting.full else 0.85) and not ware:
-        length = wide * rng.uniform(0.4, 0.8)
+        length = wide * rng.uniform(0.5, 0.85)
         for share in (1.0, 0.6, 0.35):
             if length * share < 0.1:
                 break

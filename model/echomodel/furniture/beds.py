@@ -112,7 +112,7 @@ def bed(size: Size, style: Style, choices: Choices, pillows: int) -> list[Solid]
     parts += of_role("headboard", _headboard(style, w, h, z0))
     parts += bedding(frame * 0.95, z0 + head, end - 0.04, deck - 0.06, choices, style, pillows, falls=not board)
     if board:
-        tall = deck + min(0.3, 0.35 * (h - deck))
+        tall = deck + min(0.17, 0.35 * (h - deck))
         parts.append(box((-frame / 2, 0, z1 - 0.055), (frame / 2, tall, z1), "wood", 0.01, "footboard"))
     return parts
 

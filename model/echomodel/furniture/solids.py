@@ -191,9 +191,10 @@ class Bow(Block):
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         w, h, t = self.half
         outline = superellipse(7.0, (4, 8, 12, 16)[detail]) * (t, h)
-        end = 1 - min(0.04, 0.2 * w) / w
-        across = np.concatenate([[-1.0], np.linspace(-end, end, (2, 3, 5, 7)[detail]), [1.0]])
-        tall = np.where(np.abs(across) > end, 1 - min(0.3, self.radius / h), 1.0)
+        r, turn = max(min(self.radius, w / 2, h / 2), 0.002), np.linspace(0, np.pi / 2, (2, 3, 3, 4)[detail])
+        end, cut = 1 - r * (1 - np.sin(turn)) / w, 1 - r * (1 - np.cos(turn)) / h
+        across = np.concatenate([-end[::-1], np.linspace(-end[0], end[0], (3, 4, 5, 7)[detail])[1:-1], end])
+        tall = np.interp(np.abs(across), end, cut)
         rings = [np.stack([0 * outline[:, 0] + w * u, outline[:, 1] * high, outline[:, 0] - self.bow * (1 - u * u)], 1)
                  for u, high in zip(across, tall, strict=True)]  # fmt: skip
         return loft(rings)
