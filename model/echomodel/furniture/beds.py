@@ -113,7 +113,11 @@ def bed(size: Size, style: Style, choices: Choices, pillows: int) -> list[Solid]
     parts += bedding(frame * 0.95, z0 + head, end - 0.04, deck - 0.06, choices, style, pillows, falls=not board)
     if board:
         tall = deck + min(0.17, 0.35 * (h - deck))
-        parts.append(box((-frame / 2, 0, z1 - 0.055), (frame / 2, tall, z1), "wood", 0.01, "footboard"))
+        x, back = frame / 2, z1 - 0.055
+        ends = both(box((x - 0.07, 0, back), (x, tall, z1), "wood", 0.01))
+        bar = box((-x, tall - 0.07, back), (x, tall, z1), "wood", 0.01)
+        panel = box((0.03 - x, foot, back + 0.01), (x - 0.03, tall - 0.05, z1 - 0.012))
+        parts += of_role("footboard", [*ends, bar, panel])
     return parts
 
 
