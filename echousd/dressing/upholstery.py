@@ -21,8 +21,8 @@ WIDE_BED = 1.3  # metres
 LEVEL = 0.005  # metres: what is as high as that is one height
 AHEAD = (0.0, 0.04, 0.08)  # metres that a blanket lies before where the back seems to begin
 FOLDED = 0.45  # share of rooms whose sofa has a folded blanket
-SOFT, BEYOND = 0.04, 12  # metres between folds of a bed; places further from pillows that a cushion may be
-BOARD = 0.12  # metres over a bed's middle from which on what stands there is a board
+# Metres between folds of a bed, and over its middle from where on it is a board; places behind pillows for cushions.
+SOFT, BOARD, BEYOND = 0.04, 0.12, 12
 RAISED = 0.04  # metres that a flat thing is raised at most so that it lies on the solids of a seat
 
 
@@ -263,9 +263,7 @@ def throws(setting: Setting) -> None:
 
 
 def _across(host: Standing, seat: _Seat, z: float, deep: float, rng: np.random.Generator) -> Thing | None:
-    """A throw across a bed, its middle at `z`, that lies on all of it; None where nothing of a bed's height is there or
-    a board stands in its way.
-    """
+    """A throw across a bed, its middle at `z`, that lies on all of it; None where nothing flat of its height is."""
     under = seat.height[:, np.abs(seat.z - z) < deep / 2]
     middle, top = float(np.median(under[np.abs(seat.x) < 0.3 * host.size[0]])), float(under.max())
     if not 0.25 < middle <= top < min(0.85, middle + BOARD):

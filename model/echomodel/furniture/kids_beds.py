@@ -41,13 +41,12 @@ def _made_up(x0: float, x1: float, y: float, d: float, inset: float) -> list[Sol
     thick, rng = 0.14, np.random.default_rng(int(1000 * y))
     middle, wide = (x0 + x1) / 2, x1 - x0
     rear, near = -d / 2 + inset, d / 2 - inset
+    low, high = (x0 + 0.045, y + 0.05, -d * 0.12), (x1 - 0.045, y + thick + 0.04, near + 0.01)
     place, half = (middle, y + thick + 0.045, rear + 0.22), (min(0.32, 0.36 * wide), 0.075, 0.18)
     return [
         box((x0 + 0.05, y, rear), (x1 - 0.05, y + thick, near), "linen", 0.04, "mattress"),
         pillow(place, half, "linen", "pillow"),
-        cover(
-            (x0 + 0.045, y + 0.05, -d * 0.12), (x1 - 0.045, y + thick + 0.04, near + 0.01), "blanket", 0.04, 0.025, rng
-        ),
+        cover(low, high, "blanket", 0.04, 0.025, rng),
     ]
 
 
