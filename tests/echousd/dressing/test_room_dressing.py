@@ -293,7 +293,7 @@ def test_long_bare_walls_get_pictures_and_large_floors_plants():
     things = placed(room)
     alone = [thing for thing in things if KINDS[thing.kind].name == "picture" and not thing.on]
     yaws = {round(thing.yaw, 3) for thing in alone}
-    assert 1 <= len(yaws) <= 2  # the two barest walls
+    assert 1 <= len(yaws) <= 3  # the three barest walls
     for yaw in yaws:
         row = [thing for thing in alone if round(thing.yaw, 3) == yaw]
         assert len(row) in (1, 3)
