@@ -269,10 +269,10 @@ def _across(host: Standing, seat: _Seat, z: float, deep: float, rng: np.random.G
     if not 0.25 < middle <= top < min(0.85, middle + BOARD):
         return None
     half = float(np.abs(seat.x[(under > top - 0.2).any(1)]).max()) + STEP / 2
-    size = np.round([2 * half + 0.05, 0.012 + rng.uniform(0.16, 0.22), deep], 3)
+    size = np.round([2 * half + 0.08, 0.012 + rng.uniform(0.16, 0.22), deep], 3)
     rows, columns = np.linspace(0, under.shape[1], LIES[0] + 1), np.linspace(-half, half, LIES[1] + 1)
     cells = [
-        [under[np.abs(seat.x - x - half / LIES[1]) < 0.05, int(k) : int(k) + 3].max() for x in columns[:-1]]
+        [under[np.abs(seat.x - x - half / LIES[1]) < 0.08, max(int(k) - 2, 0) : int(k) + 5].max() for x in columns[:-1]]
         for k in rows[:-1]
     ]
     lie = tuple(np.round(np.clip(top - np.array(cells), 0.0, BOARD), 3).ravel().tolist())

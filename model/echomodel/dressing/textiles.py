@@ -181,7 +181,7 @@ def throw(size: Size, rng: np.random.Generator, lie: tuple[float, ...] = ()) -> 
     def spread(line: np.ndarray) -> np.ndarray:
         x, deep = np.meshgrid(line[:, 0], z)
         hanging = np.clip((h - line[:, 1]) / max(h, 1e-6), 0, 1)
-        ripple = 0.025 * np.sin(2 * np.pi * deep / d * 2.5 + phase[0] + np.sign(x)) * hanging
+        ripple = 0.012 * (1 + np.sin(2 * np.pi * deep / d * 2.5 + phase[0] + np.sign(x))) * hanging  # away from the bed
         skew = (0.03 * np.sin(2.2 * x + phase[1]) + 0.05 * (phase[2] / 3 - 1) * x) * (1 - hanging / 2)
         y = line[:, 1] - lower * (1 - hanging) - 0.006 * folds(x, 2.5 * deep, phase) * (hanging < 0.1)
         return np.stack([x + np.sign(x) * ripple, y, deep + skew], -1)
