@@ -251,7 +251,7 @@ SABOTAGES: tuple[Sabotage, ...] = (
     Sabotage("cushion through a wall", move(f"{D}/cushion", z=-1.0), "outside", "cushion"),
     Sabotage("cushion five times as large", scale(f"{D}/cushion", 5, 5, 5), "too large", "cushion"),
     Sabotage("cushion as a thimble", scale(f"{D}/cushion", 0.05, 0.05, 0.05), "too small", "cushion"),
-    Sabotage("cushion in a cushion", lambda stage: together(stage, f"{D}/cushion", f"{D}/cushion_2"), "collision", "cushion_2"),
+    Sabotage("cushion in a basket", lambda stage: together(stage, f"{D}/cushion", f"{D}/basket"), "collision", "cushion"),
     Sabotage("photo hidden", hidden(f"{D}/photo"), "empty", "photo"),
     Sabotage("photo upside down", op(f"{D}/photo", "rotateX", 180.0, T.Float), "echo:Upright", f"{D}/photo"),
     # Furniture.
