@@ -23,6 +23,7 @@ AHEAD = (0.0, 0.04, 0.08)  # metres that a blanket lies before where the back se
 FOLDED = 0.45  # share of rooms whose sofa has a folded blanket
 # Metres between folds of a bed, and over its middle from where on it is a board; places behind pillows for cushions.
 SOFT, BOARD, BEYOND = 0.04, 0.12, 12
+PRESS = 0.035  # metres that what is soft presses into a seat at most
 RAISED = 0.04  # metres that a flat thing is raised at most so that it lies on the solids of a seat
 
 
@@ -41,6 +42,7 @@ def cushions(setting: Setting) -> None:
             turn = -0.12 * end * float(rng.uniform(0.3, 1.6))
             spot = None if spot is None else _clear_of(host, spot, turn, size)
             if spot is not None:
+                spot = seat.pressed(spot, size)
                 thing = Thing(kind, size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
                 setting.put_first([thing], host=host.name, margin=0.0, floor=False)
 
@@ -103,7 +105,7 @@ def folded(setting: Setting) -> None:
         seen = (spot for end in (side, -side, 0.7 * side) if (spot := seat.resting(end, size)) is not None)
         fronts = (spot + np.array([0.0, 0.0, ahead]) for spot in seen for ahead in AHEAD)
         spots = (spot for place in fronts if (spot := _upon(host, place, size)) is not None)
-        places = (host.to_room(spot[None] + np.array([0.0, 0.002, 0.0]))[0] for spot in spots)
+        places = (host.to_room(seat.pressed(spot, size)[None] + np.array([0.0, 0.002, 0.0]))[0] for spot in spots)
         wanted = (Thing("folded_throw", size, place, host.yaw, host.name, variant) for place in places)
         setting.put_first(wanted, host=host.name, margin=0.0, floor=False)
 
@@ -205,6 +207,13 @@ class _Seat:
             return None
         top = float(under.max())
         return top if (under > top - SOFT).mean() > 0.6 else None
+
+    def pressed(self, spot: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """The spot (3,) let down into a seat that is fuller in its middle, onto half of it, by `PRESS` at most."""
+        rows, columns = np.abs(self.x - spot[0]) < size[0] / 2, np.abs(self.z - spot[2]) < size[2] / 2
+        under = self.height[np.ix_(rows, columns)]
+        down = float(np.clip(spot[1] - np.median(under), 0, PRESS)) if under.size else 0.0
+        return spot - np.array([0.0, down, 0.0])
 
     def resting(self, end: float, size: np.ndarray) -> np.ndarray | None:
         """(3,) a place on the seat against the back, towards one end (-1 to 1); None where there is none."""

@@ -330,6 +330,16 @@ def test_armchairs_around_a_table_share_a_rug():
     assert rugs[0].size[0] > 1.6  # under the chairs' feet, too
 
 
+def test_cushions_press_into_seats_that_are_fuller_in_their_middle():
+    line = np.arange(-0.5, 0.5, STEP) + STEP / 2
+    height = np.full((len(line), len(line)), 0.4)
+    height[20:30, 20:30] = 0.45
+    seat, size = _Seat(line, line, height, 0.4), np.array([0.5, 0.2, 0.5])
+    assert seat.pressed(np.array([0.0, 0.452, 0.0]), size) == pytest.approx([0, 0.452 - upholstery.PRESS, 0])
+    assert seat.pressed(np.array([0.0, 0.41, 0.0]), size) == pytest.approx([0, 0.4, 0])
+    assert seat.pressed(np.array([0.0, 0.39, 0.0]), size) == pytest.approx([0, 0.39, 0])
+
+
 def test_cushions_lie_before_the_pillows_of_wide_beds():
     room = large_room()
     number = room.names.index("bed")
