@@ -87,8 +87,7 @@ class Surface:
 
 def surfaces(host: Standing) -> list[Surface]:
     """The levels of an object, highest first."""
-    mesh = host.geometry.mesh
-    corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)]
+    corners = host.geometry.mesh.triangles
     normal = area_normals(corners)
     double = np.linalg.norm(normal, axis=1)
     up = np.flatnonzero((normal[:, 1] > 0.97 * double) & (double > 1e-9))

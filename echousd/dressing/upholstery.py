@@ -117,7 +117,7 @@ def _upon(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | No
     top = float(spot[1])
     for collider in host.geometry.colliders:
         normal = area_normals(collider.mesh.triangles)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
         beyond = (normal * collider.mesh.triangles[:, 0]).sum(1) - points @ normal[:, [0, 2]].T  # metres, of y = 0
         up, down = normal[:, 1] > 1e-6, normal[:, 1] < -1e-6
         high = (beyond[:, up] / normal[up, 1]).min(1)
@@ -169,8 +169,7 @@ class _Seat:
     @lru_cache(maxsize=4)  # three rules ask about one bed
     def of(cls, host: Standing) -> _Seat | None:
         """The seat of an object, None where nothing of it looks like one."""
-        mesh = host.geometry.mesh
-        corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)]
+        corners = host.geometry.mesh.triangles
         normal = area_normals(corners)
         double = np.linalg.norm(normal, axis=1)
         y = corners[..., 1].mean(1)
@@ -230,7 +229,7 @@ class _Seat:
         cost = fits[:, 1] * 1.5 + np.abs(fits[:, 0] - wish)
         i, k = fits[int(np.argmin(cost))]
         under = self.height[i : i + wide, k : k + deep]
-        top = float(under[np.abs(under - self.level) < 0.07].max()) + 0.002  # of a seat that is fuller in its middle
+        top = float(under[free[i : i + wide, k : k + deep]].max()) + 0.002  # of a seat that is fuller in its middle
         return np.array([self.x[i] + (wide - 1) * STEP / 2, top, self.z[k] + (deep - 1) * STEP / 2])
 
 

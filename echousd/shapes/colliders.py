@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import fast_simplification
 import numpy as np
 
-from echomodel.triangles import Mesh, box
+from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.shapes.geometry import Collider
-from echousd.shapes.hulls import convex_hull, flush, hull_volume, rounded_hull, snapped, standing_hull
+from echousd.shapes.hulls import box_around, convex_hull, flush, hull_volume, rounded_hull, snapped, standing_hull
 
 if TYPE_CHECKING:
     import trimesh
@@ -99,6 +99,4 @@ def hull_of(mesh: Mesh, category: str) -> Collider:
     try:
         return collider(mesh, category)
     except Exception:  # qhull and the simplifier fail on flat and broken meshes in their own ways
-        low, high = mesh.bounds
-        thick = np.maximum(1e-3 - (high - low), 0) / 2
-        return Collider("collider", box(low - thick, high + thick), "convexHull")
+        return Collider("collider", box_around(mesh.bounds, 1e-3), "convexHull")

@@ -20,14 +20,19 @@ def convex_hull(points: np.ndarray) -> Mesh:
     try:
         hull = ConvexHull(points, qhull_options="QbB Pp Qt")
     except QhullError:
-        low, high = points.min(0), points.max(0)
-        thick = np.maximum(THIN - (high - low), 0) / 2
-        return box(low - thick, high + thick)
+        return box_around(points, THIN)
     normal = area_normals(points[hull.simplices])
     inwards = (normal * hull.equations[:, :3]).sum(1) < 0
     faces = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
     used, index = np.unique(faces, return_inverse=True)
     return Mesh(points[used], index.reshape(-1, 3))
+
+
+def box_around(points: np.ndarray, least: float) -> Mesh:
+    """The box of points (n, 3), metres, no extent below `least`."""
+    low, high = points.min(0), points.max(0)
+    thick = np.maximum(least - (high - low), 0) / 2
+    return box(low - thick, high + thick)
 
 
 def hull_volume(points: np.ndarray) -> float:
