@@ -99,9 +99,9 @@ def table_before_sofa(plan: Plan) -> Found:
     if not len(i):
         return nobody(plan.size)
     lateral, _, gap = _at_edges(plan, i, j)
-    xp, cornered, off = plan.kit, vocabulary().cornered, abs(lateral)
-    ell = xp.asarray([plan.kinds[sofa].name in cornered for sofa in j.tolist()])
-    least = xp.where(ell, BEFORE_SOFA[0] - plan.size[j, 2] * 0.6, BEFORE_SOFA[0])
+    cornered, off = vocabulary().cornered, abs(lateral)
+    ell = plan.which(lambda kind: kind.name in cornered)[j]
+    least = plan.kit.where(ell, BEFORE_SOFA[0] - plan.size[j, 2] * 0.6, BEFORE_SOFA[0])
     out = first_of(i, j, [gap - least, BEFORE_SOFA[1] - gap, WITHIN * plan.size[j, 0] - off], [gap, gap, off])
     return out.take(held(-out.margin) <= least_of(j, held(-out.margin), len(plan), math.inf)[j])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -82,7 +83,7 @@ UNKNOWN = Category("", "", "", support="floor", role="", look="", density=0.0, a
 # What of a plan stays as it is while its boxes move.
 OF_WORDS = (
     "anchor", "carrier", "group", "joins", "stance", "standing", "movable", "solid", "works", "dining", "fronts",
-    "smaller", "walls", "walled", "rectangle", "_masks",
+    "smaller", "walls", "walled", "rectangle", "_masks", "_words",
 )  # fmt: skip
 
 
@@ -136,11 +137,11 @@ class Plan:
 
     def of(self, *roles: str) -> Array:
         """(N,) bool, boxes with one of these roles."""
-        return self._kept(("of", *roles), lambda: [kind.role in roles for kind in self.kinds])
+        return self._kept(("of", *roles), lambda: self.which(lambda kind: kind.role in roles))
 
     def stands(self, *stances: str) -> Array:
         """(N,) bool, boxes that stand so to what they attend (`stance`)."""
-        return self._kept(("stands", *stances), lambda: [stance in stances for stance in self.stance])
+        return self._kept(("stands", *stances), lambda: self._mask([one in stances for one in self.stance]))
 
     @cached_property
     def stance(self) -> tuple[str, ...]:
@@ -157,32 +158,29 @@ class Plan:
         out = full(self.scene, len(self), -1)
         sofas = [k for k, kind in enumerate(self.kinds) if kind.role == "sofa" and kind.wall]
         tables = [k for k, kind in enumerate(self.kinds) if kind.stands == "before"]
-        scene = self.scene.tolist()
+        scene, near = self.scene.tolist(), vocabulary().predicate_id("close_by")
+        # how many tables and screens are told to stand before or opposite each, not only near it
+        ends = ((a, b) for a, predicate, b in self.triplets.tolist() if predicate != near)
+        served = Counter(sofa for pair in ends for sofa, other in (pair, pair[::-1])
+                         if self.kinds[other].stands in ("before", "opposite"))  # fmt: skip
         for room in {scene[k] for k in sofas}:
             here = [k for k in sofas if scene[k] == room]
             if len(here) < 2 or sum(scene[k] == room for k in tables) >= len(here):
                 continue  # every sofa has a table of its own
-            first = max(here, key=lambda k: (self._served(k), round(float(self.size[k, 0]), 2), -k))
+            first = max(here, key=lambda k: (served[k], round(float(self.size[k, 0]), 2), -k))
             for k in here:
                 out[k] = first if k != first else -1
         return out
 
-    def _served(self, sofa: int) -> int:
-        """How many tables and screens are told to stand before or opposite a sofa, not only near it."""
-        near, served = vocabulary().predicate_id("close_by"), 0
-        for a, predicate, b in self.triplets.tolist():
-            other = b if a == sofa else a
-            if sofa in (a, b) and predicate != near and self.kinds[other].stands in ("before", "opposite"):
-                served += 1
-        return served
-
     def which(self, asked: Callable[[Category], object]) -> Array:
         """(N,) bool, boxes whose row answers a question with yes."""
-        return self._mask([bool(asked(kind)) for kind in self.kinds])
+        words, mine = self._words
+        return self._mask([bool(asked(kind)) for kind in words])[mine]
 
     def column(self, asked: Callable[[Category], Any]) -> Array:
         """(N, ...) float, what the rows of the boxes answer."""
-        return self.numbers([asked(kind) for kind in self.kinds])
+        words, mine = self._words
+        return self.numbers([asked(kind) for kind in words])[mine]
 
     def numbers(self, values: Any) -> Array:
         """Numbers as an array like the boxes."""
@@ -197,15 +195,22 @@ class Plan:
     dining = _answered(lambda kind: kind.role == "board" and not (kind.access or kind.wall))
 
     @cached_property
+    def _words(self) -> tuple[list[Category], Array]:
+        """The different rows of the vocabulary, and which of them (N,) int64 each box has."""
+        words = list(dict.fromkeys(self.kinds))
+        number = {kind: k for k, kind in enumerate(words)}
+        return words, cast([number[kind] for kind in self.kinds], self.scene)
+
+    @cached_property
     def smaller(self) -> Array:
         """(N,) int64, order of the boxes by volume, of equal ones the later first."""
         xp = self.kit
         return xp.flip(xp.argsort(xp.argsort(xp.flip(held(self.size).prod(1), (0,)), stable=True)), (0,))
 
-    def _kept(self, asked: tuple[str, ...], values: Callable[[], list[bool]]) -> Array:
+    def _kept(self, asked: tuple[str, ...], mask: Callable[[], Array]) -> Array:
         """A mask that is asked for again and again."""
         if asked not in self._masks:
-            self._masks[asked] = self._mask(values())
+            self._masks[asked] = mask()
         return self._masks[asked]
 
     @cached_property
@@ -396,11 +401,11 @@ class Plan:
         i, j = self.pairs(self.moved, self.moved)
         keep = (i < j) & (self.carrier[i] != j) & (self.carrier[j] != i)
         i, j = i[keep], j[keep]
-        known = {pair: shared_fraction(*pair) for pair in {(self.kinds[a], self.kinds[b]) for a, b in _listed(i, j)}}
-        shared = [known[self.kinds[a], self.kinds[b]] for a, b in _listed(i, j)]
-        share, owner = self.numbers([row[0] for row in shared]), self._mask([bool(row[1]) for row in shared])
+        words, mine = self._words
+        shared = self.numbers([shared_fraction(one, other) for one in words for other in words]).reshape(-1, 2)
+        share, owner = shared[mine[i] * len(words) + mine[j]].T
         short = self.kit.minimum(held(self.size)[:, 0], held(self.size)[:, 2])
-        side = self.kit.where(owner, short[j], short[i])
+        side = self.kit.where(owner > 0, short[j], short[i])
         # chairs are tucked under their own table alone; a nightstand in its bed is moved off its wall later
         strange = (self.anchor[i] != j) & (self.anchor[j] != i)
         head = self.stands("head")
@@ -409,11 +414,8 @@ class Plan:
     @cached_property
     def anchor(self) -> Array:
         """(N,) int64, the object that each one attends, -1 = none: as the graph states, else the nearest."""
-        words = list(dict.fromkeys(self.kinds))
-        number = {kind: k for k, kind in enumerate(words)}
-        xp = self.kit
-        mine = cast([number[kind] for kind in self.kinds], self.scene)
-        table = self._mask([b.name in kind.belongs_to for kind in words for b in words])
+        words, mine = self._words
+        xp, table = self.kit, self._mask([b.name in kind.belongs_to for kind in words for b in words])
         belongs = table.reshape(len(words), len(words))[mine[:, None], mine[None]]
         here, other = xp.arange(len(self)), ~xp.eye(len(self), dtype=xp.bool)
         i, j = pairs_in((self.scene[:, None] == self.scene[None]) & belongs & other)
@@ -563,10 +565,6 @@ def plan_of_rooms(rooms: Sequence[RoomBoxes]) -> Plan:
         np.concatenate([t + np.array([k, 0, k]) for t, k in zip(told, shift, strict=True)]),
         np.zeros(sum(sizes), bool), np.array([room.height for room in rooms], np.float32),
     )  # fmt: skip
-
-
-def _listed(i: Array, j: Array) -> list[tuple[int, int]]:
-    return list(zip(i.tolist(), j.tolist(), strict=True))
 
 
 def kinds_of(categories: Sequence[str], triplets: Array) -> tuple[Category, ...]:

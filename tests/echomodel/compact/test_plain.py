@@ -81,9 +81,7 @@ def test_furniture_is_alike(models):
 def test_shapes_are_those_of_torch(models):
     alone = GraphBatch.single([vocabulary().category_id("chair")])
     box = Boxes(torch.full((1, 3), 0.5), torch.zeros(1, 3), torch.zeros(1))
-    whole, plain = (
-        model.sample_shapes(alone, box, generator=Noise(1), steps=1, candidates=1) for model in models
-    )
+    whole, plain = (model.sample_shapes(alone, box, generator=Noise(1), steps=1, candidates=1) for model in models)
     assert np.array_equal(whole.numpy(), plain)
 
 
