@@ -11,10 +11,10 @@ from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
 from echomodel.boxes import Boxes
-from echomodel.objective.support import carriers
+from echomodel.objective.plan import plan_of
 from echomodel.roomboxes import footprints
+from echomodel.rules.geometry import Spread
 from echomodel.triangles import Mesh, connected_pieces
-from echomodel.vocabulary import vocabulary
 from echousd.graph import Placed, Relation, SceneGraph
 from echousd.graph.arrays import rounded_boxes, triplets_of
 from echousd.make.verdicts import relation_verdicts
@@ -29,6 +29,7 @@ from echousd.shapes.walls import walls as walls_of
 REACH = 0.5  # metres that a piece is moved at most in all
 NEAR = 0.01  # metres within which solids are looked at first: most things at most touch
 EDGE = 0.002  # metres beyond the floor, or beyond what it stands on, that a piece may be
+ALIKE = 0.7  # cosine between the headings of seats at one side of a table
 ASIDE = 2.0  # a seat moves back from its table more easily than aside
 
 
@@ -37,8 +38,9 @@ class Scene:
     """Everything that can be in the way; numbers from n on are parts of the shell, which stays."""
 
     solids: Sequence[Solids]  # corners of the convex pieces of every thing in the room, metres
-    fixed: np.ndarray  # (n,) bool, what must not move
+    fixed: np.ndarray  # (s,) bool, what must not move
     carrier: np.ndarray  # (n,) int, as `Problem.carrier`
+    anchor: np.ndarray  # (n,) int, whom each thing attends, -1 = nobody
     heading: np.ndarray  # (n,) float, yaw in radians
     seat: np.ndarray  # (n,) bool
     bulk: np.ndarray  # (n,) float, square root of the footprint, metres
@@ -94,16 +96,19 @@ class Scene:
                 return deep
         return depth(self.forbidden(pair), way)
 
-    def carried(self, mover: int) -> list[int]:
-        """A thing and all that stands on it, and on that."""
-        out = [mover]
+    def carried(self, *movers: int) -> list[int]:
+        """Things and all that stands on them, and on that."""
+        out = [*movers]
         for one in out:
             out += [int(i) for i in np.flatnonzero(self.carrier == one) if i not in out and not self.fixed[i]]
         return out
 
-    def stays(self, one: int) -> bool:
-        """Whether a thing cannot be moved: what is fixed, and the shell."""
-        return one >= len(self.fixed) or bool(self.fixed[one])
+    def guests(self, mover: int, other: int) -> list[int]:
+        """Free things that attend a thing, but for seats that look as another one does."""
+        around = self.anchor == mover
+        if other < len(around):
+            around &= ~self.seat | (np.cos(self.heading - self.heading[other]) < ALIKE)
+        return [k for k in np.flatnonzero(around).tolist() if not self.fixed[k]]
 
     def space(self, group: Sequence[int], moves: np.ndarray, gap: float, *, pushing: bool = False) -> BaseGeometry:
         """Further moves (x, z) of a group at which it is clear of everything by `gap` metres and stays on the floor.
@@ -114,11 +119,13 @@ class Scene:
         taken = []
         for one in group:
             for other in self.near(one, moves, 2 * REACH):
-                if other not in group and (self.stays(other) or not pushing):
+                if other not in group and (self.fixed[other] or not pushing):
                     way = moves[one] - moves[other] if other < len(moves) else moves[one]
                     taken.append(translate(self.forbidden((one, other)), *-way))
+            below, carrier = self.floor, int(self.carrier[one])
+            if one == group[0] and carrier >= 0:
+                below = translate(self.outline[carrier], *moves[carrier]).buffer(EDGE, join_style="mitre")
             for corner in self._corners(one, moves):
-                below = self.floor if one != group[0] or self.carrier[one] < 0 else self._top(one, moves)
                 if below.covers(shapely.Point(corner)):
                     space = space.intersection(translate(below, *-corner))
         return space.difference(shapely.union_all(taken).buffer(gap, quad_segs=2))
@@ -129,9 +136,8 @@ class Scene:
         trial[out] += way
         for one in group:
             for other in self.near(one, trial, 0.0):
-                if other in out or self.stays(other):
-                    continue
-                if depth(self.forbidden((one, other)), trial[one] - trial[other]) > 0.0:
+                free = other not in out and not self.fixed[other]
+                if free and depth(self.forbidden((one, other)), trial[one] - trial[other]) > 0.0:
                     out += [each for each in self.carried(other) if each not in out]
         return out
 
@@ -144,10 +150,6 @@ class Scene:
 
     def _corners(self, one: int, moves: np.ndarray) -> np.ndarray:
         return np.asarray(shapely.get_coordinates(self.outline[one])[:4] + moves[one])
-
-    def _top(self, one: int, moves: np.ndarray) -> BaseGeometry:
-        carrier = int(self.carrier[one])
-        return translate(self.outline[carrier], *moves[carrier]).buffer(EDGE, join_style="mitre")
 
     def hangs_over(self, one: int, moves: np.ndarray) -> bool:
         """Whether the middle of a thing is above no level part of what it should stand on."""
@@ -163,9 +165,7 @@ class Scene:
         level = translate(self.level[int(self.carrier[one])], *moves[int(self.carrier[one])]).buffer(EDGE)
         corners, space = self._corners(one, moves), self.space(group, moves, gap)
         for points in (corners, corners.mean(0, keepdims=True)):
-            found = space
-            for corner in points:
-                found = found.intersection(translate(level, *-corner))
+            found = space.intersection(shapely.intersection_all([translate(level, *-corner) for corner in points]))
             if not found.is_empty:
                 break
         return found
@@ -175,10 +175,9 @@ def scene_of(
     graph: SceneGraph, boxes: Boxes, geometry: Mapping[str, Geometry], floor: np.ndarray, *, walls: bool
 ) -> Scene:
     """The scene of a layout; arguments as `cleared`."""
-    nodes, words = graph.nodes, vocabulary()
-    size, position, yaw = (np.asarray(v, float) for v in (boxes.size, boxes.position, boxes.yaw))
-    kinds = [words.category(node.category) for node in nodes]
-    triplets = triplets_of(graph)
+    nodes = graph.nodes
+    room = plan_of(Spread.of(boxes), [node.category for node in nodes], relations=triplets_of(graph))
+    size, position, yaw = room.size, room.position, room.yaw
     solids = [
         [_placed(collider.mesh.vertices, position[i], yaw[i]) for collider in geometry[node.name].colliders]
         for i, node in enumerate(nodes)
@@ -189,9 +188,9 @@ def scene_of(
     shell = list(shell_solids(built))
     everything = [*solids, *(pieces for _, pieces in shell)]
     return Scene(
-        everything, np.array([node.locked or node.position is not None for node in nodes]),
-        carriers(kinds, size, position, yaw, triplets), yaw, np.array([kind.role == "seat" for kind in kinds]),
-        np.sqrt(size[:, 0] * size[:, 2]), [shapely.Polygon(corner) for corner in footprints(size, position, yaw)],
+        everything, np.array([node.locked or node.position is not None for node in nodes] + [True] * len(shell)),
+        room.carrier, room.anchor, yaw, room.of("seat"), np.sqrt(size[:, 0] * size[:, 2]),
+        [shapely.Polygon(corner) for corner in footprints(size, position, yaw)],
         [_level(pieces) for pieces in solids], shapely.Polygon(floor).buffer(EDGE, join_style="mitre"),
         np.array([(np.concatenate(pieces).min(0), np.concatenate(pieces).max(0)) for pieces in everything]),
         [*graph.names, *(wall for wall, _ in shell)],
@@ -200,11 +199,8 @@ def scene_of(
 
 def shell_solids(parts: Sequence[ShellPart]) -> Iterator[tuple[str, Solids]]:
     """Walls' names and convex pieces of what stands before them: sills, casings, leaves; walls are the floor's edge."""
-    for part in parts:
-        for filled in part.inner:
-            for piece in filled.pieces:
-                if piece.solid:
-                    yield part.name, _boards(piece.mesh)
+    pieces = ((part.name, piece) for part in parts for filled in part.inner for piece in filled.pieces)
+    return ((name, _boards(piece.mesh)) for name, piece in pieces if piece.solid)
 
 
 def _level(solids: Solids) -> BaseGeometry:
@@ -285,14 +281,10 @@ def cleared(
             stuck.add(pair)
         else:
             moves = found
-    names = graph.names
     left = tuple(Collision(scene.names[i], scene.names[k], deep) for (i, k), deep in scene.overlaps(moves, DEEP))
     far = np.linalg.norm(moves, axis=1)
-    if not far.any():
-        return Cleared(boxes, left, {})
-    return Cleared(
-        rounded_boxes(graph, _at(boxes, moves)), left, {names[i]: float(far[i]) for i in np.flatnonzero(far)}
-    )
+    moved = {graph.names[i]: float(far[i]) for i in np.flatnonzero(far)}
+    return Cleared(rounded_boxes(graph, _at(boxes, moves)) if moved else boxes, left, moved)
 
 
 def _onto_top(
@@ -325,12 +317,31 @@ def _moved_apart(
 
     `holds`: numbers of the relations that must hold afterwards as well.
     """
-    trials: list[tuple[int, float, np.ndarray]] = []  # relations that hold, what it costs, and the moves
-    for mover in pair:
-        if mover >= len(graph.nodes) or scene.fixed[mover]:
-            continue
-        other = pair[0] if mover == pair[1] else pair[1]
-        groups = [scene.carried(mover)]
+    found, fewest, before = None, np.inf, len(living_faults(graph, _at(boxes, moves), floor))
+    for together in (False, True):  # a table with its chairs, where each alone would make a fault
+        trials = list(_trials(scene, graph, boxes, moves, pair, holds, together))
+        most = max((kept for kept, _, _ in trials), default=0)
+        for _, _, trial in sorted((one for one in trials if one[0] == most), key=lambda one: one[1]):
+            faults = len(living_faults(graph, _at(boxes, trial), floor))
+            if faults < fewest:
+                found, fewest = trial, faults
+            if fewest <= before:
+                return found
+    return found
+
+
+def _trials(
+    scene: Scene, graph: SceneGraph, boxes: Boxes, moves: np.ndarray, pair: tuple[int, int], holds: frozenset[int],
+    together: bool,
+) -> Iterator[tuple[int, float, np.ndarray]]:  # fmt: skip
+    """Relations that hold, what it costs, and the moves with one of a pair moved out of everything.
+
+    `together`: those who attend it go with it, but for those at the side of the other one.
+    """
+    for mover, other in (pair, pair[::-1]):
+        guests = scene.guests(mover, other) if together else []
+        asked = not scene.fixed[mover] and (guests or not together)
+        groups = [scene.carried(mover, *guests)] if asked else []
         for group in groups:
             if other in group:
                 continue
@@ -344,18 +355,9 @@ def _moved_apart(
                 kept = _unbroken(graph, _at(boxes, trial))
                 broken = holds - kept
                 if not broken:
-                    trials.append((len(kept), scene.price(mover, way) * (1 + len(group) - len(groups[0])), trial))
+                    yield len(kept), scene.price(mover, way) * (1 + len(group) - len(groups[0])), trial
                 elif (more := _with_partners(scene, graph, group, broken)) not in groups and len(groups) <= GROUPS:
                     groups.append(more)
-    most = max((kept for kept, _, _ in trials), default=0)
-    found, fewest = None, np.inf
-    for _, _, trial in sorted((one for one in trials if one[0] == most), key=lambda one: one[1]):
-        faults = len(living_faults(graph, _at(boxes, trial), floor))
-        if faults < fewest:
-            found, fewest = trial, faults
-        if not faults:
-            break
-    return found
 
 
 def _unbroken(graph: SceneGraph, boxes: Boxes) -> set[int]:
@@ -380,12 +382,9 @@ def _with_partners(scene: Scene, graph: SceneGraph, group: list[int], broken: se
 
 def _ways(space: shapely.geometry.base.BaseGeometry, heading: float) -> list[np.ndarray]:
     """Moves into a space: the nearest, and the nearest straight to each side of a heading."""
-    if space.is_empty:
-        return []
+    rays = [
+        shapely.LineString([(0.0, 0.0), (REACH * np.sin(angle), REACH * np.cos(angle))]).intersection(space)
+        for angle in heading + np.arange(DIRECTIONS) * 2 * np.pi / DIRECTIONS
+    ]
     start = shapely.Point(0.0, 0.0)
-    ends = [shapely.get_coordinates(shapely.shortest_line(start, space))[1]]
-    for angle in heading + np.arange(DIRECTIONS) * 2 * np.pi / DIRECTIONS:
-        ray = shapely.LineString([(0.0, 0.0), (REACH * np.sin(angle), REACH * np.cos(angle))]).intersection(space)
-        if not ray.is_empty:
-            ends.append(shapely.get_coordinates(shapely.shortest_line(start, ray))[1])
-    return ends
+    return [shapely.get_coordinates(shapely.shortest_line(start, one))[1] for one in (space, *rays) if not one.is_empty]

@@ -17,9 +17,9 @@ NEAR_TABLE = 1.5  # metres: a seat further from its table is judged for its dist
 COMPANY = 2.5  # metres: an armchair further away stands for itself
 TOGETHER = 1.5  # metres between armchairs without a sofa: all real ones are nearer
 REACH = 0.25  # metres between a seat's front and its table: 95 % of real chairs are nearer
-BEFORE_SOFA = (0.12, 1.0)  # metres between a sofa and its coffee table: less than 0.3 is tight, a hand is too little
+BEFORE_SOFA = (0.12, 0.85)  # metres between a sofa and its coffee table: 90 % of real straight ones lie within
 AT_DESK = 0.33  # share of a desk's width that a seat's middle may lie beside its own: 19 of 20 real ones
-WITHIN = 0.35  # share of a sofa's width that the table's middle may lie beside its own: 80 % of real ones lie 0.2
+WITHIN = (0.2, 0.25)  # share of a sofa's width, and of a cornered one's, that the table's middle may lie beside its own
 BESIDE = 0.4  # metres between a bed and its nightstand: 95 % of real ones are nearer
 PAIR = 0.15  # metres by which the gaps of the two nightstands of a bed may differ: 98 % of real ones differ less
 IN_BED = 0.4  # metres by which a nightstand may reach into the box of a bed whose board is wider than it is
@@ -99,10 +99,10 @@ def table_before_sofa(plan: Plan) -> Found:
     if not len(i):
         return nobody(plan.size)
     lateral, _, gap = _at_edges(plan, i, j)
-    cornered, off = vocabulary().cornered, abs(lateral)
-    ell = plan.which(lambda kind: kind.name in cornered)[j]
-    least = plan.kit.where(ell, BEFORE_SOFA[0] - plan.size[j, 2] * 0.6, BEFORE_SOFA[0])
-    out = first_of(i, j, [gap - least, BEFORE_SOFA[1] - gap, WITHIN * plan.size[j, 0] - off], [gap, gap, off])
+    ell, xp, off = plan.which(lambda kind: kind.name in vocabulary().cornered)[j], plan.kit, abs(lateral)
+    least = xp.where(ell, BEFORE_SOFA[0] - plan.size[j, 2] * 0.6, BEFORE_SOFA[0])
+    within = xp.where(ell, WITHIN[1], WITHIN[0]) * plan.size[j, 0]
+    out = first_of(i, j, [gap - least, BEFORE_SOFA[1] - gap, within - off], [gap, gap, off])
     return out.take(held(-out.margin) <= least_of(j, held(-out.margin), len(plan), math.inf)[j])
 
 

@@ -261,8 +261,9 @@ def workers_apart(plan: Plan) -> Found:
 def wardrobe_opens(plan: Plan) -> Found:
     """One can stand before an open wardrobe, also at the foot of a bed; no seat or table stands before any storage."""
     stores = plan.of("storage") & plan.works & plan.standing & ~plan.stands("near")
-    block = plan.of("bed") | plan.stands("company", "at") | (plan.of("board") & ~plan.stands("before", "beside"))
-    i, j = plan.pairs(stores, block & plan.standing, least=True)
+    tables = plan.of("board") & ~plan.stands("before", "beside")
+    block = (plan.of("bed") | plan.stands("company", "at", "head") | tables) & plan.standing
+    i, j = plan.pairs(stores, block, least=True)
     met = plan.which(lambda kind: kind.access > 0.6)[i] | ~plan.of("bed")[j]
     i, j = i[met], j[met]
     return plan.nearest(i, j, plan.more_ahead(i, j, OPENS, FACED), OPENS) if len(i) else nobody(plan.size)

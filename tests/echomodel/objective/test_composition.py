@@ -219,3 +219,11 @@ def test_nobody_sits_before_a_wardrobe():
     assert seen(composition.wardrobe_opens, [wardrobe, beanbag])[0] == {0: pytest.approx(0.5 - 0.55)}
     aside = ("lazy_sofa", (0.8, 0.75, 0.8), (1.6, -0.5), 0.0)
     assert seen(composition.wardrobe_opens, [wardrobe, aside])[0][0] > 0
+
+
+@pytest.mark.parametrize(("gap", "margin"), [(0.3, -0.25), (0.6, 0.05)])
+def test_no_nightstand_stands_before_a_wardrobe(gap, margin):
+    wardrobe = ("wardrobe", (0.6, 2.2, 0.6), (0.0, -1.7), 0.0)
+    bed = ("double_bed", (1.6, 0.5, 2.0), (1.6, 0.2), 0.0)
+    stand = ("nightstand", (0.5, 0.5, 0.4), (0.1, -1.4 + gap + 0.2), 0.0)
+    assert seen(composition.wardrobe_opens, [wardrobe, bed, stand])[0] == {0: pytest.approx(margin)}

@@ -199,6 +199,9 @@ MORE = [
     (with_one(LIVING, "chair", kind="armchair", size=(0.8, 0.8, 0.8), at=(-1.4, 0.9), yaw=-2.6),
      ("chair", "screen_not_behind"), "chair turns its back on stand (1"),
     (LIVING.moved("armchair", at=(0.9, -0.45), yaw=-2.4), ("armchair", "seat_room"), "one cannot sit down on"),
+    (LIVING.moved("armchair", at=(1.0, -0.3)), ("armchair", "seat_room"), "armchair: 0.05 m before it stands coffee"),
+    (LIVING.moved("coffee", at=(-0.5, -0.4)), ("coffee", "table_before_sofa"), "0.50 m beside the middle of sofa"),
+    (LIVING.moved("coffee", at=(0.0, 0.1)), ("coffee", "table_before_sofa"), "coffee lies 0.88 m before sofa"),
     (LIVING.moved("armchair", at=(2.0, -1.53)), ("armchair", "seat_room"), "armchair looks at the end of sofa, 0.50 m"),
     (with_one(LIVING, "table", kind="dining_table", size=(1.4, 0.75, 0.8), at=(0.0, 0.8)), ("stand", "view_free"),
      "table stands between stand and who watches it"),
@@ -239,6 +242,9 @@ MORE = [
      "a stands 1.60 m from b"),
 ]  # fmt: skip
 KEPT = [
+    (LIVING.moved("armchair", at=(1.1, -0.3)), ("armchair", "seat_room")),
+    (LIVING.moved("coffee", at=(-0.4, -0.4)), ("coffee", "table_before_sofa")),
+    (LIVING.moved("coffee", at=(0.0, 0.0)), ("coffee", "table_before_sofa")),
     (with_one(SET, "bench", kind="bench", size=(1.2, 0.45, 0.4), at=(0.0, 0.8)), ("bench", "seat_in_reach")),
     (with_one(BENCH, "table", kind="dining_table", size=(0.8, 0.75, 0.8), at=(1.9, 1.4)), ("bench", "seat_in_reach")),
     (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.1, 1.7)), ("plant", "plant_aside")),

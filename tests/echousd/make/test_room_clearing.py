@@ -15,6 +15,7 @@ from echousd.graph.openings import Opening
 from echousd.graph.text import stating
 from echousd.make.clearing import cleared
 from echousd.make.verdicts import relation_verdicts
+from echousd.place.living import living_faults
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
 from echousd.shapes.nofit import depth, forbidden, forbidden_moves
 
@@ -68,6 +69,24 @@ def test_a_chair_is_tucked_as_far_as_it_fits_its_back_a_millimetre_before_the_ta
         assert (x, y) == pytest.approx((0.2, 0.0), abs=1e-4)
     else:
         assert not found.moved
+
+
+def test_a_table_goes_with_its_other_chairs_where_one_would_be_pushed_to_the_wall():
+    things = (
+        ("table", "dining_table", table_piece(), (0, 0, 1.4), 0.0, False),
+        ("back", "dining_chair", chair_piece(), (0, 0, 1.6), np.pi, False),
+        ("front", "dining_chair", chair_piece(), (0, 0, 1.105), 0.0, False),
+    )
+    graph, boxes, geometry = room(*things)
+    found = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    assert found.collisions == ()
+    assert set(found.moved) == {"table", "front"}
+    assert found.moved["table"] == pytest.approx(found.moved["front"])
+    assert not living_faults(graph, found.boxes, FLOOR)
+    alone = (*things[0][:-1], True)
+    graph, boxes, geometry = room(alone, *things[1:])
+    pushed = living_faults(graph, cleared(graph, boxes, geometry, FLOOR, walls=False).boxes, FLOOR)
+    assert ("back", "chair_pulls_out") in {(fault.object, fault.rule) for fault in pushed}
 
 
 def test_what_is_locked_stays_and_what_cannot_go_is_named():
