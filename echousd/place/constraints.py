@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
-from scipy import sparse
 
 from echomodel.boxes2d import CORNERS, hull
 from echomodel.floors import signed_distance
+from echomodel.late import Late
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, allowed_overlap
 from echomodel.rules import rule_set
 from echomodel.rules.geometry import PairGeometry
@@ -24,6 +24,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import COLUMNS, PLAN, SIDES, axes, parting
 from echousd.place.setting import Setting
 
+csr_array = Late("scipy.sparse:csr_array")
 KINDS = RELATION, PLACEMENT, COLLISION, FLOOR, OVERHANG, WALL, SUPPORT, CEILING = range(8)  # from `WALL` on equalities
 MANY = 60  # boxes beyond which gradients are sparse
 PART = 0.002  # metres that pairs are parted farther than they may overlap
@@ -260,5 +261,5 @@ def _linearised(every: Sequence[Rows], state: np.ndarray, axis: np.ndarray) -> L
     value, kind, number = (np.concatenate(part) for part in zip(*kept, strict=True))
     gradient = gradient[:first].reshape(first, state.size)
     if len(state) > MANY:
-        gradient = sparse.csr_array(gradient)
+        gradient = csr_array(gradient)
     return Linearised(value, gradient, kind, number, axis)

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from echomodel.arrays import Array, at_least, at_most, repeat, rows, sum_of
 from echomodel.boxes2d import axes
+from echomodel.late import Late
 from echomodel.objective import TERMS, Plan, Term, unreached
 from echomodel.objective.copies import copies_of, looks_at
 from echomodel.objective.plan import Found, found, nobody
@@ -27,6 +27,7 @@ from echousd.place.proposals import ahead, aside, height_of, out_of, out_of_habi
 from echousd.place.setting import Setting
 from echousd.place.solver import PlaceConfig
 
+linear_sum_assignment = Late("scipy.optimize:linear_sum_assignment")  # which rooms without seats at tables do without
 JUDGED = 48  # poses that are judged at once
 SWEEPS = 3  # times that what misses something is looked at after the first time
 BUDGET = 4500  # poses that are judged in all; each is a whole room

@@ -11,10 +11,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse.linalg import splu
 
+from echomodel.late import Late
 from echousd.place.constraints import (
     CEILING,
     COLLISION,
@@ -32,6 +30,8 @@ from echousd.place.setting import Setting
 
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
+
+diags_array, splu = Late("scipy.sparse:diags_array"), Late("scipy.sparse.linalg:splu")
 
 
 @dataclass(frozen=True)
@@ -222,9 +222,9 @@ def _least(
     rows: Matrix, stiffness: np.ndarray, diagonal: np.ndarray, value: np.ndarray, pull: np.ndarray
 ) -> np.ndarray:
     """The d (m,) with (rows' S rows + D) d = -rows' S value - pull."""
-    if sparse.issparse(rows):
-        stiff = sparse.diags_array(stiffness) @ rows
-        hessian = (rows.T @ stiff + sparse.diags_array(diagonal)).tocsc()
+    if not isinstance(rows, np.ndarray):
+        stiff = diags_array(stiffness) @ rows
+        hessian = (rows.T @ stiff + diags_array(diagonal)).tocsc()
         factors = splu(hessian, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         found: np.ndarray = factors.solve(-(stiff.T @ value) - pull)
         return found
@@ -233,7 +233,8 @@ def _least(
     hessian[np.diag_indices_from(hessian)] += diagonal
     wanted = -scaled.T @ value - pull
     try:
-        solved: np.ndarray = cho_solve(cho_factor(hessian, check_finite=False), wanted)
+        np.linalg.cholesky(hessian)
+        solved: np.ndarray = np.linalg.solve(hessian, wanted)
     except np.linalg.LinAlgError:  # indefinite by rounding: stiff rows span more digits than a float has
         solved = np.linalg.lstsq(hessian, wanted, rcond=None)[0]
     return solved

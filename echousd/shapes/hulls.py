@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fast_simplification
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+from manifold3d import Manifold
 
 from echomodel.triangles import Mesh, area_normals, box
 from echousd.shapes.geometry import Collider
@@ -13,19 +13,22 @@ FACES = 120  # of the hull of what stands
 DIGITS = 4  # of metres, corners of a hull
 FLAT = 0.012  # metres: what is as near to the top or the bottom belongs to it
 THIN = 1e-4  # metres, least extent of the box of points in one plane
+FINE = 1e-6  # metres: a corner that is nearer than that to a line or plane between others is none
+PLANE = 1e-9  # share of the cube of their extent that the hull of points in one plane may have by rounding
+
+
+def hull_of(points: np.ndarray) -> Mesh | None:
+    """The convex hull of points (n, 3) with exact corners, facing outwards; None of points in one plane."""
+    hull = Manifold.hull_points(points).simplify(FINE)
+    if hull.volume() < PLANE * np.ptp(points, axis=0).max() ** 3:
+        return None
+    mesh = hull.to_mesh64()
+    return Mesh(mesh.vert_properties, mesh.tri_verts.astype(int))
 
 
 def convex_hull(points: np.ndarray) -> Mesh:
-    """The convex hull with exact corners, facing outwards; of points in one plane their box, a tenth of a mm thick."""
-    try:
-        hull = ConvexHull(points, qhull_options="QbB Pp Qt")
-    except QhullError:
-        return box_around(points, THIN)
-    normal = area_normals(points[hull.simplices])
-    inwards = (normal * hull.equations[:, :3]).sum(1) < 0
-    faces = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
-    used, index = np.unique(faces, return_inverse=True)
-    return Mesh(points[used], index.reshape(-1, 3))
+    """As `hull_of`; of points in one plane their box, a tenth of a mm thick."""
+    return hull_of(points) or box_around(points, THIN)
 
 
 def box_around(points: np.ndarray, least: float) -> Mesh:
@@ -37,10 +40,8 @@ def box_around(points: np.ndarray, least: float) -> Mesh:
 
 def hull_volume(points: np.ndarray) -> float:
     """Volume of the convex hull of points (n, 3), m³; 0 of points in one plane."""
-    try:
-        return float(ConvexHull(points).volume)
-    except QhullError:
-        return 0.0
+    hull = hull_of(points)
+    return 0.0 if hull is None else float(np.einsum("fx,fx->", hull.triangles[:, 0], area_normals(hull.triangles)) / 6)
 
 
 def rounded_hull(points: np.ndarray) -> Mesh:

@@ -6,13 +6,12 @@ import warnings
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from echomodel.furniture.assembly import Piece, pieces_of
 from echomodel.furniture.solids import FINEST, Solid
-from echomodel.triangles import Mesh, joined
+from echomodel.triangles import Mesh, area_normals, joined
 from echousd.shapes.geometry import FRAME, Collider, Geometry, Mass, Origin, Part
-from echousd.shapes.hulls import convex_hull
+from echousd.shapes.hulls import convex_hull, hull_of
 from echousd.shapes.matter import ballasted, weighed
 
 SLOTS = {"accent": "front"}  # material of a solid -> material slot, where they differ
@@ -115,12 +114,10 @@ def covering(plain: np.ndarray, shown: np.ndarray) -> np.ndarray:
     by more than `SLACK`: a round top of twelve corners lacks a centimetre of what is seen.
     """
     corners = plain
-    while not np.array_equal(plain, shown):
-        try:
-            planes = ConvexHull(corners).equations
-        except QhullError:  # flat
-            break
-        beyond = shown @ planes[:, :3].T + planes[:, 3]
+    while not np.array_equal(plain, shown) and (hull := hull_of(corners)):
+        normal = area_normals(hull.triangles)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        beyond = shown @ normal.T - (hull.triangles[:, 0] * normal).sum(1)
         far = beyond.max(0)
         if far.max() <= SLACK:
             break

@@ -21,7 +21,7 @@ from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.geometry import Geometry, Mass
 from echousd.stage.pen import Pen
 
-convex_hull = Late("echousd.shapes.hulls:convex_hull")  # with scipy, which who reads masses does without
+convex_hull = Late("echousd.shapes.hulls:convex_hull")  # with manifold3d, which who reads masses does without
 
 
 @dataclass(frozen=True)

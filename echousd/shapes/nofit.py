@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-from scipy.spatial import ConvexHull, QhullError
 from shapely.geometry.base import BaseGeometry
+
+from echousd.shapes.hulls import hull_of
 
 FLUSH = 0.002  # metres: what reaches less far into another from above or below stands on it
 Solids = Sequence[np.ndarray]
@@ -23,13 +24,10 @@ def forbidden(moving: np.ndarray, fixed: np.ndarray) -> BaseGeometry | None:
     low = max(moving[:, 1].min(), fixed[:, 1].min())
     if min(moving[:, 1].max(), fixed[:, 1].max()) - low <= FLUSH:
         return None
-    apart = (fixed[:, None] - moving[None]).reshape(-1, 3)
-    try:
-        hull = ConvexHull(apart)
-    except QhullError:  # two parallel sheets
+    hull = hull_of((fixed[:, None] - moving[None]).reshape(-1, 3))
+    if hull is None:  # two parallel sheets
         return None
-    edges = hull.simplices[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    start, end = hull.points[edges[:, 0]], hull.points[edges[:, 1]]
+    start, end = hull.triangles.reshape(-1, 3), np.roll(hull.triangles, -1, axis=1).reshape(-1, 3)
     start, end = start[start[:, 1] * end[:, 1] <= 0], end[start[:, 1] * end[:, 1] <= 0]
     rise = end[:, 1] - start[:, 1]
     share = np.where(np.abs(rise) > 1e-12, -start[:, 1] / np.where(np.abs(rise) > 1e-12, rise, 1.0), 0.0)

@@ -8,8 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from echomodel.late import Late
+
+cKDTree = Late("scipy.spatial:cKDTree")
 SIZE = 512  # pixels on each side
 
 
