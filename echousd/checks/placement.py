@@ -297,7 +297,7 @@ def _hits(
     for (i, j), depth in zip(pairs[overlap > TOUCH].tolist(), overlap[overlap > TOUCH], strict=True):
         one, other = things[i][1], things[j][1]
         if len(one.faces) and len(other.faces):
-            reach = max(mesh_depth(one, other), depth if _one_place(one, other) else 0.0)
+            reach = max(mesh_depth(one, other, deep), depth if _one_place(one, other) else 0.0)
         else:
             reach = depth if second is None else 0.0
         if reach > deep:
@@ -311,12 +311,12 @@ def _one_place(one: Shape, other: Shape) -> bool:
     return bool(near and np.abs(one.size - other.size).max() < NEAR)
 
 
-def mesh_depth(first: Shape, second: Shape) -> float:
-    """How deep one surface reaches into the other solid in metres, 0 where they do not meet."""
-    return max(_reach(first, second), _reach(second, first))
+def mesh_depth(first: Shape, second: Shape, deep: float = DEEP) -> float:
+    """How deep one surface reaches into the other solid in metres, no more than `deep` where that is not deeper."""
+    return max(_reach(first, second, deep), _reach(second, first, deep))
 
 
-def _reach(surface: Shape, solid: Shape) -> float:
+def _reach(surface: Shape, solid: Shape, deep: float) -> float:
     points = surface_points(surface, solid)
     within = points[inside_solid(points, solid)] if len(points) else points
     if not len(within):
@@ -329,7 +329,7 @@ def _reach(surface: Shape, solid: Shape) -> float:
     # A sample of the skin is further away than the skin itself: deepest first, until no point can be deeper.
     at_most = np.sqrt([((skin - point) ** 2).sum(1).min() for point in within])
     for number in np.argsort(-at_most):
-        if at_most[number] <= max(deepest, DEEP):
+        if at_most[number] <= max(deepest, deep):
             break
         close = triangles[np.linalg.norm(middle - within[number], axis=1) <= around + at_most[number] + 1e-9]
         deepest = max(deepest, min(at_most[number], distances(within[number], close).min(initial=np.inf)))
@@ -394,7 +394,7 @@ def inside_solid(points: np.ndarray, solid: Shape) -> np.ndarray:
     return np.asarray(turns > 0.5)
 
 
-def winding_number(points: np.ndarray, triangles: np.ndarray, block: int = 400_000) -> np.ndarray:
+def winding_number(points: np.ndarray, triangles: np.ndarray, block: int = 20_000) -> np.ndarray:
     """(s,) float: generalised winding number of a triangle soup around points, 1 inside, 0 outside (Jacobson 2013).
 
     Arguments:
@@ -403,11 +403,16 @@ def winding_number(points: np.ndarray, triangles: np.ndarray, block: int = 400_0
     """
     out = np.zeros(len(points))
     step = max(1, block // max(len(triangles), 1))
-    corners = triangles.astype(np.float32)
-    for start in range(0, len(points), step):
-        a, b, c = np.moveaxis(corners[None] - points[start : start + step, None, None].astype(np.float32), 2, 0)
-        la, lb, lc = (np.sqrt((v * v).sum(-1)) for v in (a, b, c))
-        triple = (a * np.cross(b, c)).sum(-1)
-        below = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
-        out[start : start + step] = np.arctan2(triple, below).sum(-1) / (2 * np.pi)
+    corners, places = (np.moveaxis(values.astype(np.float32), 0, -1).copy() for values in (triangles, points))
+    for start in range(0, len(points), step):  # each number of all pairs lies in one plane
+        some = slice(start, start + step)
+        a, b, c = corners[:, :, None] - places[:, some, None]
+        la, lb, lc = (np.sqrt(_dot(v, v)) for v in (a, b, c))
+        triple = _dot(a, (b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]))
+        below = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
+        out[some] = np.arctan2(triple, below).sum(-1) / (2 * np.pi)
     return out
+
+
+def _dot(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
