@@ -11,7 +11,7 @@ import numpy as np
 from echomodel.dressing import SMALL
 from echomodel.openings import SKIRTING, segment
 from echomodel.roomboxes import footprints
-from echomodel.triangles import area_normals, connected_pieces, distances, spread
+from echomodel.triangles import along, area_normals, connected_pieces, distances, spread
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import HEIGHT
 from echousd.place.geometry import (
@@ -407,12 +407,8 @@ def winding_number(points: np.ndarray, triangles: np.ndarray, block: int = 20_00
     for start in range(0, len(points), step):  # each number of all pairs lies in one plane
         some = slice(start, start + step)
         a, b, c = corners[:, :, None] - places[:, some, None]
-        la, lb, lc = (np.sqrt(_dot(v, v)) for v in (a, b, c))
-        triple = _dot(a, (b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]))
-        below = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
+        la, lb, lc = (np.sqrt(along(v, v)) for v in (a, b, c))
+        triple = along(a, (b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]))
+        below = la * lb * lc + along(a, b) * lc + along(b, c) * la + along(c, a) * lb
         out[some] = np.arctan2(triple, below).sum(-1) / (2 * np.pi)
     return out
-
-
-def _dot(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]

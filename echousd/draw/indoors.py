@@ -147,7 +147,7 @@ def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable
     `color`: (n, 3) linear radiance of the picture. `light`: (3,) that of the room, to whose colour the eye adapts in
     part. `day`: 1 by day, 0 by night, see `Lights.day`.
     """
-    adapted, bright = (np.interp(day, (0, 1), ends) for ends in (ADAPTED, BRIGHT))
+    adapted, bright = (float(np.interp(day, (0, 1), ends)) for ends in (ADAPTED, BRIGHT))  # floats keep float32
     white = (np.maximum(light, 1e-6) / max(float(light.mean()), 1e-6)) ** adapted
     seen, most = np.maximum(np.percentile(color / white @ LUMA, (SHARE, WHITE)), 1e-4)
     scale = (min(bright / seen, bright / BRIGHT[1] * PAPER / most, BRIGHTEST) / white).astype(np.float32)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from echomodel.triangles import along
 from echousd.draw.bounced import Bounced
 from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, VIEW, evened, exposure
 from echousd.draw.scenery import Scenery, between
@@ -152,7 +153,10 @@ def _met(
     for rows in (pixel[start : start + BLOCK] for start in range(0, max(len(pixel), 1), BLOCK)):
         origin, direction = _rays(world, rows % world.size + place[0], rows // world.size + place[1])
         hit = world.scene.run(_f32(origin), _f32(direction), output=1)
-        part = _seen(world, origin, direction, {key: hit[key] for key in KEPT})
+        if first is not None:
+            new = np.flatnonzero(hit["primID"] != first.face[rows])
+            origin, direction, rows, hit = origin[new], direction[new], rows[new], {key: hit[key][new] for key in KEPT}
+        part = _seen(world, origin, direction, hit)
         mirror = np.flatnonzero((part.face >= 0) & (world.scenery.gloss[part.face] > MIRROR))
         if len(mirror):  # who looks into a mirror sees what is before it
             way = direction[mirror] - 2 * _dot(direction[mirror], part.normal[mirror])[:, None] * part.normal[mirror]
@@ -315,12 +319,12 @@ def _smoothed(rows: slice, width: int, apart: int, padded: Sequence[np.ndarray])
         return (a[:, rows.start + down : rows.stop + down, across : across + width] for a in padded)
 
     light, normal, point = shifted(apart, apart)
-    here, total = _along(normal, point), np.zeros(light.shape, np.float32)
+    here, total = along(normal, point), np.zeros(light.shape, np.float32)
     weight, bright = np.zeros_like(here), light.mean(0) if apart > CLOSE else None
     for down, across in product((0, apart, 2 * apart), repeat=2):
         other_light, other_normal, other_point = shifted(down, across)
-        turn = np.clip(_along(normal, other_normal), 0, 1)
-        step = np.abs(_along(normal, other_point) - here)
+        turn = np.clip(along(normal, other_normal), 0, 1)
+        step = np.abs(along(normal, other_point) - here)
         for _ in range(4):  # to the 16th power
             turn *= turn
         share = turn * (step < 0.02)
@@ -329,11 +333,6 @@ def _smoothed(rows: slice, width: int, apart: int, padded: Sequence[np.ndarray])
         total += share * other_light
         weight += share
     return np.where(weight > 1e-6, total / np.maximum(weight, 1e-6), light)
-
-
-def _along(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """(h, w) scalar products of vectors whose components are planes, (3, h, w) each."""
-    return np.asarray(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
 
 
 ABOVE = np.array([0.38, 0.84, 0.32], np.float32) / np.float32(0.9759)

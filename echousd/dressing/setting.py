@@ -111,6 +111,7 @@ class Setting:
 
     def __post_init__(self) -> None:
         self.room = shapely.Polygon(self.floor)
+        self.wider = self.room.buffer(0.005)
         self.ways = [(shapely.Polygon(free_area(self.floor, o)), o) for o in self.openings if o.kind != "window"]
 
     def rng(self, *words: str) -> np.random.Generator:
@@ -146,7 +147,7 @@ class Setting:
     def clear(self, thing: Thing, *, host: str = "", margin: float = APART, floor: bool = True) -> bool:
         """Whether a thing stands in the room, in nobody's way, and meets neither an object but its host nor a thing."""
         plan = thing.footprint
-        if floor and not self.room.buffer(0.005).contains(plan):
+        if floor and not self.wider.contains(plan):
             return False
         low, high = float(thing.position[1]), float(thing.position[1] + thing.size[1])
         around = plan.buffer(margin)

@@ -216,11 +216,10 @@ def layer_bytes(layer: Sdf.Layer, suffix: str) -> bytes:
     """The layer as it would lie on disk; the same content gives the same bytes. `suffix`: `.usda` or `.usdc`."""
     if suffix == ".usda":
         return layer.ExportToString().encode("utf-8")
-    with tempfile.TemporaryDirectory(prefix="echousd-") as folder:
-        path = Path(folder) / f"layer{suffix}"
-        if not layer.Export(str(path)):
-            raise OSError(f"cannot write a layer to {folder}")
-        return path.read_bytes()
+    with tempfile.NamedTemporaryFile(prefix="echousd-", suffix=suffix) as file:
+        if not layer.Export(file.name):
+            raise OSError(f"cannot write a layer to {file.name}")
+        return Path(file.name).read_bytes()
 
 
 def write_all(files: Mapping[Path, bytes], *, left: str = "nothing was changed") -> None:

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
+import numpy as np
 from pxr import Sdf
 
 NOTHING: Mapping[str, Any] = {}
@@ -94,8 +95,8 @@ def say(spec: Sdf.PrimSpec, values: Mapping[str, Any], apis: Iterable[str] = (),
         attribute = spec.properties.get(name) or Sdf.AttributeSpec(spec, name, kind, variability, custom)
         if connects:
             attribute.connectionPathList.explicitItems = [Sdf.Path(value)]
-        elif value is not None:
-            attribute.default = value
+        elif value is not None:  # USD takes four times as long to find out how an array of numpy fits
+            attribute.default = kind.type.pythonClass.FromNumpy(value) if isinstance(value, np.ndarray) else value
     if apis:
         apply_apis(spec, *apis)
     for name, value in about.items():

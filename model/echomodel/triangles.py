@@ -80,6 +80,11 @@ def cross(one: np.ndarray, two: np.ndarray) -> np.ndarray:
     return out
 
 
+def along(one: Sequence[np.ndarray] | np.ndarray, other: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+    """(...): the scalar products of vectors whose components are planes, (3, ...) each."""
+    return np.asarray(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
+
+
 def area_normals(triangles: np.ndarray) -> np.ndarray:
     """(f, 3): normals of the triangles (f, 3, 3), twice as long as their areas."""
     return cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
