@@ -137,11 +137,11 @@ def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: 
     return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, weighed(pieces))
 
 
-STRETCH, FULLER, LONG = 1.4, 1.2, 3.0  # metres of bare wall that ask for a picture, in full rooms, and for three
+STRETCH, FULLER, LONG = 1.2, 1.0, 3.0  # metres of bare wall that ask for a picture, in full rooms, and for three
 STEP = 0.1  # metres from spot to spot along a wall
 PROBE = np.array([0.3, 0.8, 0.03])  # a picture that tells whether a spot is bare
-EMPTY = 0.8  # metres around a corner where nothing stands
-FLOORS = (10.0, 17.0, 28.0)  # m² of floor from which on one, two, three corners get something
+EMPTY = 0.65  # metres around a corner where nothing stands
+FLOORS = (5.0, 13.0, 24.0)  # m² of floor from which on one, two, three corners get something
 
 
 def bare_walls(setting: Setting) -> None:

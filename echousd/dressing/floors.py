@@ -14,7 +14,7 @@ from echousd.dressing.stories import Wish
 PILE = 0.008  # metres; furniture stands on the floor below, through the rug
 FROM_WALL = 0.12
 SHOES = 0.25  # share of rooms with a door that somebody leaves shoes at
-LARGEST = (4.0, 3.0)
+LARGEST, ALONE = (4.0, 3.0), (2.6, 1.7)  # metres: of rugs, and of one that nothing stands on
 RUNNER = 2.1  # times as long as wide
 OVALS, ROUNDS = 0.1, 0.25  # shares of rugs, of those that are about square
 AROUND = 1.2  # metres from a table: a seat that belongs to it
@@ -24,75 +24,81 @@ SHRUNK = sorted(((x, z) for x in SHARES for z in SHARES), key=lambda share: -sha
 
 def rugs(setting: Setting) -> None:
     """One rug below every sofa group, bed and dining table that has room for it; else below the table that armchairs
-    stand around, below an armchair or a desk."""
-    done: list[shapely.Polygon] = []
+    stand around, below an armchair or before the only desk; between the furniture where none of these has one."""
     hosts = setting.inviting("rug")
     seats = [o for o in hosts if o.row.role == "seat"]
     desks = [o for o in hosts if o.row.role == "board" and o.row.access]
-    near = {o.name: sum(o.footprint.distance(s.footprint) < AROUND for s in seats) for o in setting.stands("before")}
-    shared = [o for o in setting.stands("before") if near[o.name] > 1]
-    groups = [o for o in hosts if o not in seats and o not in desks] or shared or seats or desks
+    shared = [o for o in setting.stands("before") if sum(o.footprint.distance(s.footprint) < AROUND for s in seats) > 1]
+    groups = [o for o in hosts if o not in seats and o not in desks] or shared or seats or desks[: len(desks) == 1]
     for host in sorted(groups, key=lambda o: -float(o.size[0] * o.size[2])):
-        group, centre, size = _under(setting, host)
+        centre, size = _under(setting, host)
         if np.prod(size) < 1.2:
             continue
+        group = setting.of("seat", "light", "decor", "sofa" if host.row.role == "sofa" else "seat")
+        free = _free(setting, [host, *group, *setting.stands("head", "before", "beside")])
+        spot = host.on_floor(*centre)
         for share in SHRUNK:
             extents = np.round(np.minimum(np.array(size) * share, LARGEST), 2)
-            spot = host.on_floor(*centre)
-            plan = rectangle(spot[[0, 2]], extents, host.yaw)
-            if _lies(setting, plan, group) and not any(plan.intersects(other) for other in done):
-                done.append(plan.buffer(0.1))
+            if free.contains(rectangle(spot[[0, 2]], extents, host.yaw)):
                 setting.placed.append(_rug(setting, host, spot, extents))
                 break
+    if not (setting.placed or setting.use):
+        _between(setting)
 
 
-def _rug(setting: Setting, host: Standing, spot: np.ndarray, extents: np.ndarray) -> Thing:
+def _between(setting: Setting) -> None:
+    """A rug along the room near its middle, below seats at most."""
+    free, low, high = _free(setting, setting.of("seat")), setting.floor.min(0), setting.floor.max(0)
+    middles = np.stack(np.meshgrid(*np.linspace(low, high, 16).T), -1).reshape(-1, 2)
+    middles = middles[np.argsort(np.linalg.norm(middles - (low + high) / 2, axis=1))]
+    whole = np.minimum(high - low - 2 * FROM_WALL, ALONE if high[0] - low[0] > high[1] - low[1] else ALONE[::-1])
+    for extents in (np.round(whole * share, 2) for share in SHRUNK):
+        lies = shapely.contains(free, shapely.box(*(middles - extents / 2).T, *(middles + extents / 2).T))
+        if lies.any():
+            x, z = middles[lies.argmax()]
+            setting.placed.append(_rug(setting, None, np.array([x, 0.0, z]), extents))
+            return
+
+
+def _rug(setting: Setting, host: Standing | None, spot: np.ndarray, extents: np.ndarray) -> Thing:
     """A rug of a design new to the room, along its longer side; below a seat and on some squares round."""
-    rng, (short, long) = setting.rng(host.name, "rug"), np.sort(extents)
+    of, own, seat = (host.name, host.yaw, host.row.role == "seat") if host else ("", 0.0, False)
+    rng, (short, long) = setting.rng(of, "rug"), np.sort(extents)
     form = "runner" if long > RUNNER * short else "oval" if rng.random() < OVALS else "rug"
-    if long < 1.3 * short and (host.row.role == "seat" or rng.random() < ROUNDS):
+    if long < 1.3 * short and (seat or rng.random() < ROUNDS):
         form, long = "round", short
     names = names_of("rug", form, rng.choice((setting.resident, "")))
     new = [name for name in names if all(thing.kind != name for thing in setting.placed)]
-    yaw = host.yaw if extents[0] >= extents[1] else host.yaw + np.pi / 2
-    return Thing(str(rng.choice(new or names)), np.array([long, PILE, short]), spot, yaw, host.name)
+    yaw = own if extents[0] >= extents[1] else own + np.pi / 2
+    return Thing(str(rng.choice(new or names)), np.array([long, PILE, short]), spot, yaw, of)
 
 
-def _under(setting: Setting, host: Standing) -> tuple[set[str], tuple[float, float], tuple[float, float]]:
-    """Who stands on the rug of a group, the rug's middle in the host's frame and its wished extents."""
+def _under(setting: Setting, host: Standing) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The middle of the rug of a group in the host's frame and its wished extents."""
     w, _, d = (float(v) for v in host.size)
     if host.row.role == "bed":
-        wide, long = w + 1.3, min(d * 0.75 + 0.5, 2.4)
-        near = {o.name for o in (*setting.of("seat"), *setting.stands("head"))}
-        return {host.name, *near}, (0.0, d / 2 + 0.45 - long / 2), (wide, long)
+        long = min(d * 0.75 + 0.5, 2.4)
+        return (0.0, d / 2 + 0.45 - long / 2), (w + 1.3, long)
     if host.row.role == "seat":
-        wide, long = w + 0.9, d + 0.8
-        near = {o.name for o in (*setting.of("seat", "light", "decor"), *setting.stands("before", "beside"))}
-        return {host.name, *near}, (0.0, 0.25), (wide, long)
+        return (0.0, 0.25), (w + 0.9, d + 0.8)
     if host.row.role == "sofa":
-        front = d / 2
         tables = [o for o in setting.stands("before") if host.footprint.distance(o.footprint) < AROUND]
         reach = 1.7
         for table in tables[:1]:
-            _, ahead = host.in_plan(table.position)
-            reach = float(np.clip(ahead - front, 0.4, 1.3)) + float(table.size[2]) / 2 + 0.45
-        around = {o.name for o in (*setting.of("seat", "sofa", "light", "decor"), *setting.stands("before", "beside"))}
-        long = reach + 0.3
-        return {host.name, *around}, (0.0, front - 0.3 + long / 2), (w + 0.5, long)
-    seats = {o.name for o in setting.of("seat")}
-    return {host.name, *seats}, (0.0, 0.0), (w + 1.2, d + 1.2)
+            ahead = host.in_plan(table.position)[1] - d / 2
+            reach = float(np.clip(ahead, 0.4, 1.3)) + float(table.size[2]) / 2 + 0.45
+        return (0.0, d / 2 + reach / 2 - 0.15), (w + 0.5, reach + 0.3)
+    if host.row.access:  # a desk, which may stand at a wall
+        return (0.0, d / 2 + 0.3), (w + 0.9, 1.5)
+    return (0.0, 0.0), (w + 1.2, d + 1.2)
 
 
-def _lies(setting: Setting, plan: shapely.Polygon, group: set[str]) -> bool:
-    """Inside the room, away from doors, and below nobody but its group."""
-    if not setting.room.buffer(-FROM_WALL).contains(plan):
-        return False
-    if any(way.intersects(plan) for way, _ in setting.ways):
-        return False
-    return not any(
-        other.footprint.intersects(plan)
-        for other in setting.objects.values()
-        if other.name not in group and other.position[1] < 0.05
+def _free(setting: Setting, group: list[Standing]) -> shapely.Geometry:
+    """Where a rug may lie: inside the room, away from doors and other rugs, and below nobody but its group."""
+    others = (o.footprint for o in setting.objects.values() if o not in group and o.position[1] < 0.05)
+    rugs = (thing.footprint.buffer(0.1) for thing in setting.placed)
+    return setting.room.buffer(-FROM_WALL).difference(
+        shapely.union_all([*others, *rugs, *(w for w, _ in setting.ways)])
     )
 
 
@@ -119,7 +125,7 @@ def by_doors(setting: Setting) -> None:
 
 def clusters(setting: Setting) -> None:
     """What lies on the floor beside furniture, as its story has it; nothing alone on bare floor."""
-    rugs = shapely.union_all([t.footprint for t in setting.placed if KINDS[t.kind].name == "rug"])
+    rugs = _rugs(setting)
     for number, wish in enumerate(setting.story.floor):
         for host in setting.near(wish.by):
             rng = setting.rng(host.name, "floor", str(number))
@@ -158,9 +164,10 @@ def cables(setting: Setting) -> None:
     """The cable of every lamp that stands on the floor, to the nearest wall, where it lies free."""
     if not (setting.full and setting.walls):
         return
+    rugs = _rugs(setting)
     for host in (lamp for lamp in setting.of("light") if lamp.row.support == "floor"):
         rng = setting.rng(host.name, "cable")
-        ways = (thing for thing in _ways_to_walls(setting, host, rng) if not _on_rug(setting, thing))
+        ways = (thing for thing in _ways_to_walls(setting, host, rng) if not rugs.intersects(thing.footprint))
         setting.put_first(ways, host=host.name, margin=0.004)
 
 
@@ -181,6 +188,6 @@ def _ways_to_walls(setting: Setting, host: Standing, rng: np.random.Generator) -
     return sorted(out, key=lambda thing: float(thing.size[2]))
 
 
-def _on_rug(setting: Setting, thing: Thing) -> bool:
-    rugs = [t.footprint for t in setting.placed if KINDS[t.kind].name == "rug"]
-    return shapely.union_all(rugs).intersects(thing.footprint) if rugs else False
+def _rugs(setting: Setting) -> shapely.Geometry:
+    """What rugs cover."""
+    return shapely.union_all([thing.footprint for thing in setting.placed if KINDS[thing.kind].name == "rug"])

@@ -20,6 +20,7 @@ from echousd.shapes.geometry import Geometry
 
 SKIN = 1e-4  # metres that count as nothing
 APART = 0.008  # metres of air between a small thing and everything else
+BESIDE = 0.04  # and between two that stand beside each other, each with its margin
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +184,7 @@ class Setting:
 
 def around(first: Thing, size: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """(12, 2) ways (x, z) from the middle of a thing to that of another of some extents (3,) that stands beside it."""
-    reach = (max(first.size[[0, 2]]) + max(size[[0, 2]])) / 2 + 0.015
+    reach = (max(first.size[[0, 2]]) + max(size[[0, 2]])) / 2 + BESIDE
     angle = rng.uniform(0, 2 * np.pi) + np.linspace(0, 2 * np.pi, 12, endpoint=False)
     return reach * np.stack([np.cos(angle), np.sin(angle)], 1)
 

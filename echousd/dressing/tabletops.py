@@ -31,19 +31,19 @@ class Surface:
     above: shapely.STRtree  # what stands on it or passes through it, in plan
 
     @property
-    def bounds(self) -> tuple[float, float, float, float]:
-        """Least x and z, greatest x and z of the level, object frame."""
-        least_x, least_z, most_x, most_z = self.area.bounds
-        return least_x, least_z, most_x, most_z
+    def span(self) -> tuple[np.ndarray, np.ndarray]:
+        """(2,) x and z of the middle of the level, and its half extents, object frame."""
+        bounds = np.array(self.area.bounds).reshape(2, 2)
+        return bounds.mean(0), np.ptp(bounds, axis=0) / 2
 
     @property
     def closed(self) -> bool:
         """Whether doors or drawer fronts stand before it."""
-        x0, z0, x1, z1 = self.bounds
+        (x, z), (wide, deep) = self.span
         front = float(self.host.size[2]) / 2 + 0.02
-        if front - z1 < 1e-3:
+        if front - z - deep < 1e-3:
             return False
-        lines = [shapely.LineString([(x, (z0 + z1) / 2), (x, front)]) for x in np.linspace(x0, x1, 9)[1:-1]]
+        lines = [shapely.LineString([(at, z), (at, front)]) for at in x + wide * np.linspace(-1, 1, 9)[1:-1]]
         return sum(len(self.above.query(line, predicate="intersects")) > 0 for line in lines) > len(lines) / 2
 
     def put(
@@ -61,11 +61,10 @@ class Surface:
         size = usual_size(kind, rng) if size is None else size
         if size[1] > self.air or not self.area.area > 0:
             return None
-        x0, z0, x1, z1 = self.bounds
-        half = np.array([x1 - x0, z1 - z0]) / 2
+        middle, half = self.span
         turned = np.abs(np.array([np.cos(turn), np.sin(turn)]) @ [[size[0], size[2]], [size[2], size[0]]])
         room = np.maximum(half - turned / 2 - EDGE, 0.0)
-        places = [np.array([(x0 + x1) / 2, (z0 + z1) / 2]) + np.array(share) * room for share in at]
+        places = [middle + np.array(share) * room for share in at]
         if beside is not None:
             places += [self.host.in_plan(beside.position) + way for way in around(beside, size, rng)]
         for place in places:
@@ -125,6 +124,7 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
 
 
 LAID = 0.4  # share of rooms whose dining table is set
+COVER = {"plate": (0.0, 0.17), "napkin": (-0.225, 0.15), "glass": (0.2, 0.28)}  # metres to the right, and from the edge
 VOLUMES = 7  # kinds of single books that a row is of
 BETWEEN = 0.002  # metres from book to book
 EYE = 1.7  # metres: what is put higher cannot be seen
@@ -186,28 +186,24 @@ def _television(setting: Setting, host: Standing, surface: Surface) -> None:
 
 
 def _laid(setting: Setting, host: Standing, surface: Surface) -> None:
-    """A plate and a glass before every seat at a table."""
+    """A plate before every seat at a table, a napkin with a knife and a fork at its left, a glass behind it."""
     rng = setting.rng(host.name, "laid")
-    plate, glass, variant = usual_size("plate", rng), usual_size("glass", rng), int(rng.integers(1 << 30))
-    x0, z0, x1, z1 = surface.bounds
-    middle, half = np.array([x0 + x1, z0 + z1]) / 2, np.array([x1 - x0, z1 - z0]) / 2
+    sizes, variant = [usual_size(kind, rng) for kind in COVER], int(rng.integers(1 << 30))
+    middle, half = surface.span
     for seat in setting.of("seat"):
         local = host.in_plan(seat.position) - middle
         beyond = np.abs(local) - half
         if np.max(beyond) > 0.6 or np.min(beyond) > 0:
             continue
-        side = int(np.argmax(beyond))
-        share, edge = local / half, np.zeros(2)
-        edge[side] = np.sign(local[side])
-        share[side] = 0.97 * edge[side]
-        turn = float(np.arctan2(-edge[0], -edge[1]))
-        room = half[1 - side] - plate[0] / 2
-        share[1 - side] = np.clip(local[1 - side] / max(room, 1e-6), -0.98, 0.98)
-        if surface.put(setting, "plate", [tuple(share)], size=plate, turn=turn, variant=variant, word=seat.name):
-            beside = share.copy()
-            beside[1 - side] += 0.2 / max(room, 1e-6) * (1 if edge[side] * (1 if side == 1 else -1) > 0 else -1)
-            beside[side] *= 0.72
-            surface.put(setting, "glass", [tuple(beside)], size=glass, variant=variant, word=seat.name)
+        side, out = int(np.argmax(beyond)), np.zeros(2)
+        out[side] = np.sign(local[side])
+        right = np.array([out[1], -out[0]])  # of who sits there
+        edge = np.where(out == 0.0, np.clip(local, 0.29 - half, half - 0.29), out * half)
+        turn = float(np.arctan2(-out[0], -out[1]))
+        for (kind, (aside, ahead)), size in zip(COVER.items(), sizes, strict=True):
+            room = half - np.roll(size[[0, 2]], 1 - side) / 2 - EDGE
+            share = (edge + aside * right - ahead * out) / np.maximum(room, 1e-6)
+            surface.put(setting, kind, [tuple(share)], size=size, turn=turn, variant=variant, word=seat.name)
 
 
 def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
@@ -215,8 +211,7 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
     if not 0.1 < host.position[1] + surface.y < EYE or surface.area.area < 0.03 or surface.closed:
         return
     rng = setting.rng(host.name, "shelf", f"{surface.y:.2f}")
-    x0, z0, x1, z1 = surface.bounds
-    wide, deep = x1 - x0, z1 - z0
+    wide, deep = 2 * surface.span[1]
     side = 1.0 if rng.random() < 0.5 else -1.0
     ware = WARE if host.row.task else LINEN if setting.use == "wet" else ()
     if rng.random() < (0.95 if setting.full else 0.85) and not ware:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, product
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from echousd.shapes.joinery import assembled
 
 EYE = 1.52  # metres, height of a picture's middle on an empty wall
 OVER, LOWEST = 0.22, 1.15  # metres between furniture and what hangs over it, which hangs no lower
+ASIDE = (0.0, 0.4, -0.4)  # to which side of its middle: shares of the width that what hangs there leaves
 NEAR = 0.45  # metres: furniture whose back is so near to a wall stands at it
 SIDE = 0.32  # metres that curtains take beside a window
 RADIATORS = ("panel_radiator", "panel_radiator", "flat_radiator", "column_radiator")  # without a style
@@ -157,14 +158,15 @@ def pictures(setting: Setting) -> None:
             continue
         wall, along = behind
         rng = setting.rng(host.name, "picture")
-        for kind, size in _over(host, setting, rng):
+        for (kind, size), aside in product(_over(host, setting, rng), ASIDE):
             if kind == "picture" and setting.has(GROUPS, rng) and _group(setting, wall, along, host, rng):
                 break
             if kind == "picture":
                 (kind,) = shown(setting, size, 1, host.name)
             least, variant = host.top + OVER, int(rng.integers(1 << 30))
             low = min(max(least, LOWEST), setting.height - 0.2 - size[1])
-            thing = hung_at(setting, wall, along, kind, size, low, variant, host.name)
+            spot = along + aside * max(0.0, float(host.size[0] - size[0]))
+            thing = hung_at(setting, wall, spot, kind, size, low, variant, host.name)
             if thing and low > least - 0.1:
                 setting.placed.append(thing)
                 break
@@ -236,7 +238,7 @@ def _over(host: Standing, setting: Setting, rng: np.random.Generator) -> list[tu
 
 def hung_at(
     setting: Setting, wall: Wall, along: float, kind: str, size: np.ndarray, low: float, variant: int, on: str = "",
-    *, above: float = 0.0, before: float = 0.3,
+    *, above: float = 0.0, before: float = 0.2,
 ) -> Thing | None:  # fmt: skip
     """A thing whose lower side is at `low`; None where an opening, furniture or something else is in its way.
 
@@ -298,9 +300,9 @@ def _filled(setting: Setting, board: Thing, name: str) -> None:
         row = surface.put(setting, "book_row", [(0.97 * side, 0.3), (-0.97 * side, 0.3)], size=size, word="row")
         if row:
             shelved_books(setting, row, rng)
-        for number, kind in enumerate(rng.permutation(setting.story.shelves)[:3]):
-            places = [(x * side, 0.0) for x in (-0.9, -0.45, 0.0, 0.35)]
-            surface.put(setting, str(kind), places, word=str(number))
+        kinds, places = rng.permutation(setting.story.shelves), [(x * side, 0.0) for x in (-0.9, -0.45, 0.0, 0.35)]
+        put = (surface.put(setting, str(kind), places, word=str(number)) for number, kind in enumerate(kinds))
+        list(islice(filter(None, put), 3))
 
 
 def clock(setting: Setting) -> None:
@@ -323,7 +325,7 @@ def coats(setting: Setting) -> None:
                 return
 
 
-HUNG_OVER = {"coat_rack": "coats", "towel_radiator": "towel"}  # a row's `top` -> what hangs from it
+HUNG_OVER = {"coat_rack": "hung_coats", "towel_radiator": "towel"}  # a row's `top` -> what hangs from it
 
 
 def hung_up(setting: Setting) -> None:
@@ -335,7 +337,7 @@ def hung_up(setting: Setting) -> None:
         rng = setting.rng(host.name, kind)
         size = usual_size(kind, rng)
         w, h, d = (float(side) for side in host.size)
-        if kind == "coats":
+        if kind == "hung_coats":
             corners = host.geometry.mesh.vertices
             pegs = (corners[:, 1] > 0.6 * h) & (corners[:, 2] > 0.05 - d / 2) & (abs(corners[:, 0]) < w / 2 - 0.06)
             hooks = min([1.7, 0.9 * h, *corners[pegs, 1] - 0.005])

@@ -12,6 +12,7 @@ from echomodel.openings import Opening
 from echousd.dressing import floors, tabletops, upholstery, walls
 from echousd.dressing.dress import RULES, bare_walls
 from echousd.dressing.setting import Setting, standing
+from echousd.dressing.stories import story
 from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
 
@@ -20,18 +21,23 @@ WINDOW = Opening("window", "window", 0, 1.2, 1.4, 1.2, 0.9)
 SIZES = {
     "base_unit": (1.2, 0.9, 0.6), "wall_unit": (1.2, 0.7, 0.35), "coat_rack": (1.3, 1.9, 0.4),
     "towel_radiator": (0.5, 1.2, 0.09), "toy_box": (0.8, 0.45, 0.45), "shoe_cabinet": (0.8, 1.1, 0.25),
-    "multi_seat_sofa": (2.1, 0.82, 0.92),
+    "multi_seat_sofa": (2.1, 0.82, 0.92), "sideboard": (1.5, 0.85, 0.42), "desk": (1.1, 0.74, 0.55),
+    "dining_table": (1.6, 0.76, 0.95), "bench": (1.2, 0.45, 0.4),
 }  # fmt: skip
+
+
+def stood(word, seed, at, yaw=0.0, name=None):
+    rng, size = np.random.default_rng(seed), np.array(SIZES[word])
+    parts = solids(word, Style.draw(rng), Choices.draw(rng), size)
+    made = assembled(parts, size, faces=3000, origin=Origin("parts"))
+    return standing(name or word, word, size, np.array(at), yaw, made)
 
 
 def setting(word="", *, seed=1, use="", openings=()):
     objects = {}
     if word:
-        rng, size = np.random.default_rng(seed), np.array(SIZES[word])
-        parts = solids(word, Style.draw(rng), Choices.draw(rng), size)
-        made = assembled(parts, size, faces=3000, origin=Origin("parts"))
         low = {"wall_unit": 1.4, "towel_radiator": 0.35}.get(word, 0.0)
-        objects[word] = standing(word, word, size, np.array([0.0, low, -1.49 + size[2] / 2]), 0.0, made)
+        objects[word] = stood(word, seed, [0.0, low, -1.49 + SIZES[word][2] / 2])
     return Setting(objects, FLOOR, tuple(openings), 2.6, True, False, seed, use)
 
 
@@ -46,7 +52,7 @@ def test_no_books_lie_where_nobody_reads(word):
     assert {"base_unit": {"bowl", "bottles", "plates"}, "toy_box": {"bear"}}.get(word, set()) <= kinds
 
 
-@pytest.mark.parametrize(("word", "kind", "least"), [("coat_rack", "coats", 1), ("towel_radiator", "towel", 1)])
+@pytest.mark.parametrize(("word", "kind", "least"), [("coat_rack", "hung_coats", 1), ("towel_radiator", "towel", 1)])
 def test_coats_hang_on_racks_and_towels_on_rungs(word, kind, least):
     for seed in range(6):
         room = setting(word, seed=seed)
@@ -56,7 +62,7 @@ def test_coats_hang_on_racks_and_towels_on_rungs(word, kind, least):
         for thing in room.placed:
             assert thing.kind == kind
             assert thing.position[1] > 0.3
-            if kind == "coats":  # below the hooks, and none reaches into a bench
+            if kind == "hung_coats":  # below the hooks, and none reaches into a bench
                 corners = host.geometry.mesh.vertices + host.position
                 half = thing.size / 2
                 inside = (abs(corners[:, [0, 2]] - thing.position[[0, 2]]) < half[[0, 2]] - 1e-3).all(1)
@@ -72,7 +78,7 @@ def test_curtains_keep_clear_of_the_coats_on_a_rack():
         for rule in (rule for rule in RULES if rule in (walls.curtains, walls.hung_up)):
             rule(room)
         curtains = [thing for thing in room.placed if KINDS[thing.kind].name == "curtain"]
-        coats = [thing for thing in room.placed if thing.kind == "coats"]
+        coats = [thing for thing in room.placed if thing.kind == "hung_coats"]
         assert coats
         met += bool(curtains)
         for one, other in itertools.product(curtains, coats):
@@ -205,3 +211,63 @@ def test_a_folded_blanket_lies_near_an_end_of_its_sofa():
         found += [abs(thing.position[0]) for thing in room.placed if thing.kind == "folded_throw"]
     assert len(found) >= 4
     assert min(found) > 0.3
+
+
+def test_what_belongs_together_stands_together_on_shallow_tops():
+    beside = 0
+    for seed in range(12):
+        room = setting("sideboard", seed=seed)
+        tabletops.tabletops(room)
+        beside += sum(thing.kind in ("candles", "bowl") for thing in room.placed if thing.position[1] > 0.8)
+    assert beside >= 12  # at flowers or a vase, within the 42 cm of the top
+
+
+def test_offices_write_on_small_desks():
+    kinds = []
+    for seed in range(12):
+        room = setting("desk", seed=seed)
+        room.story = story("office")
+        tabletops.tabletops(room)
+        kinds.append({thing.kind for thing in room.placed if thing.on == "desk"})
+    assert sum({"monitor", "keyboard"} <= one for one in kinds) >= 10
+    assert sum(bool({"papers", "notebook"} & one) for one in kinds) >= 10
+
+
+def test_a_set_table_has_a_napkin_at_the_left_and_a_glass_at_the_right_of_each_plate():
+    table = stood("dining_table", 3, np.zeros(3))
+    room = setting()
+    seats = [(0.0, 0.7, np.pi), (0.0, -0.7, 0.0)]
+    sat = [stood("bench", 1, [x, 0.0, z], yaw, f"seat_{n}") for n, (x, z, yaw) in enumerate(seats)]
+    room.objects = {one.name: one for one in (table, *sat)}
+    tabletops._laid(room, table, tabletops.surfaces(table)[0])
+    plates = [thing for thing in room.placed if thing.kind == "plate"]
+    assert len(plates) == len(seats)
+    for plate in plates:
+        sides = {}
+        for thing in room.placed:
+            way = thing.position - plate.position
+            ahead = np.array([np.sin(plate.yaw), np.cos(plate.yaw)])  # what a plate turns to who sits there
+            if np.linalg.norm(way) < 0.3:
+                sides[thing.kind] = float(way[[0, 2]] @ (-ahead[1], ahead[0]))
+        assert sides["napkin"] < -0.2 < 0.15 < sides["glass"]
+
+
+def test_a_hall_has_a_rug_between_what_stands_there():
+    doors = [Opening("door", "door", 1, 0.2, 0.9, 2.0)]
+    room, wet = (setting("shoe_cabinet", openings=doors, use=use) for use in ("", "wet"))
+    floors.rugs(wet)
+    floors.rugs(room)
+    (rug,) = room.placed
+    assert not wet.placed
+    assert KINDS[rug.kind].name == "rug"
+    assert room.room.buffer(-0.1).contains(rug.footprint)
+    taken = [way for way, _ in room.ways] + [one.footprint for one in room.objects.values()]
+    assert not any(rug.footprint.intersects(one) for one in taken)
+
+
+def test_the_only_desk_has_a_rug_before_it_though_it_stands_at_a_wall():
+    room = setting("desk")
+    floors.rugs(room)
+    (rug,) = room.placed
+    assert rug.on == "desk"
+    assert rug.position[2] > room.objects["desk"].position[2]
