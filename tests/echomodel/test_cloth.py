@@ -1,12 +1,14 @@
 """Pillows, covers and tufted panels: closed at every detail, within their boxes, and no plain blocks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
 from echomodel.furniture import Choices, Style, solids
 from echomodel.furniture.cloth import Tufted, cover, pillow, seam
-from echomodel.furniture.sofas import BODIES
+from echomodel.furniture.sofas import BODIES, upholstered_arms
 from echomodel.furniture.style import FAMILIES
 
 HALF = np.array([0.4, 0.1, 0.25])
@@ -71,4 +73,31 @@ def test_sofas_have_eight_bodies_and_each_family_builds_several():
     for _ in range(40):
         parts = solids("multi_seat_sofa", Style.draw(rng), Choices.draw(rng), size)
         made.add(tuple(sorted((type(part).__name__, part.role) for part in parts)))
+    assert len(made) >= 12
+
+
+def test_tufted_panels_fold_along_both_diagonals():
+    vertices, faces = MADE["tufted"].mesh(3)
+    middles = vertices[faces].mean(1)
+    front = np.round(middles[middles[:, 2] > 0], 6)
+    assert {tuple(row) for row in front} == {tuple(row) for row in front * (-1, 1, 1) + 0.0}
+
+
+@pytest.mark.parametrize(("arms", "softness"), [("box", 0.7), ("box", 0.2), ("slim", 0.5), ("rolled", 0.5)])
+def test_arms_are_no_plain_boxes_and_stay_within_the_seat(arms, softness):
+    style = replace(Style.draw(np.random.default_rng(3)), arms=arms, softness=softness, piping=0.0)
+    parts = upholstered_arms(2.0, 0.1, 0.6, 0.9, 0.16, style)
+    points = np.concatenate([part.mesh()[0] for part in parts])
+    assert np.abs(points[:, 0]).max() < 1.02
+    low, high = (np.abs(points[there, 0]) for there in (points[:, 1] < 0.3, points[:, 1] > 0.45))
+    assert high.max() > low.max() + 0.01
+    assert arms == "rolled" or softness > 0.4 or high.min() > low.min() + 0.01  # firm ones flare
+
+
+def test_armchairs_are_made_like_sofas():
+    rng, size, made = np.random.default_rng(1), np.array([0.85, 0.85, 0.85]), set()
+    for _ in range(40):
+        parts = solids("armchair", Style.draw(rng), Choices.draw(rng), size)
+        made.add(tuple(sorted((type(part).__name__, part.role) for part in parts)))
+    assert any(("Tufted", "back") in one for one in made)
     assert len(made) >= 12

@@ -20,6 +20,7 @@ BODIES: list[dict[str, Any]] = list(
     tomllib.loads(resources.files(__package__).joinpath("bodies.toml").read_text("utf-8")).values()
 )
 padded = partial(turned, material="fabric")
+FLARED = 0.4  # softness up to which arms have no pad and flare
 
 
 def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -52,27 +53,25 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         back = leaning(one, other, style.rake, seat, z, material="fabric", radius=0.05)
         frame_under = box((-w * 0.47, seat - 0.17, -d * 0.43), (w * 0.47, seat - 0.13, d * 0.45), "wood", 0.006, "rail")
         return [*legs, frame_under, pad, back, *(slim_arms(w, d, seat, h, style, arm) if frame else [])]
-    arm = w * (0.13 + 0.06 * style.softness)
-    y_arm = seat + (h - seat) * (0.2 + 0.5 * style.arm_height)
-    one, other = (-w / 2 + 0.02, foot, -d / 2 + 0.02), (w / 2 - 0.02, seat - 0.12, d / 2 - 0.02)
-    parts.append(box(one, other, "fabric", 0.02, "base"))
-    parts += upholstered_arms(w, foot, y_arm, d, arm, style)
-    one, other = (-w / 2 + arm * 0.5, foot + 0.05, -d / 2), (w / 2 - arm * 0.5, h, -d / 2 + 0.16)
-    soft = 0.03 + 0.04 * style.softness
-    back = leaning(one, other, style.rake * 0.6, seat, -d / 2 + 0.08, material="fabric", radius=soft)
-    pad = cushion((-w / 2 + arm, seat - 0.15, -d / 2 + 0.14), (w / 2 - arm, seat, d / 2), style)
-    return [*parts, back, pad]
+    return _couch(size, style, choices, 1)
 
 
 def upholstered_arms(w: float, foot: float, y: float, d: float, arm: float, style: Style) -> list[Solid]:
-    """Box arms, or arms with a roll along the top, at both ends of a seat `w` wide."""
+    """Arms at both ends of a seat `w` wide: rolled along the top, with a pad on them, or firm ones that flare."""
     x0, x1 = w / 2 - arm, w / 2
+    firm = replace(style, softness=min(style.softness, 0.8))
+    if style.arms == "slim" or (style.arms != "rolled" and style.softness < FLARED):
+        tall, out = y - foot, 0.2 * arm
+        lean = (x0 - out, foot, -d / 2 + 0.01), (x1 - out, y, d / 2 - 0.01)
+        return of_role("arm", both(cushion(*lean, firm, turn=rotation(z=-2 * out / tall))))
     if style.arms != "rolled":
-        firm = replace(style, softness=min(style.softness, 0.8))
-        return of_role("arm", both(cushion((x0, foot, -d / 2 + 0.01), (x1, y, d / 2 - 0.01), firm)))
+        thick = 0.06 + 0.07 * style.softness
+        pad = cushion((x0 - 0.01, y - thick, -d / 2 + 0.02), (x1, y, d / 2 - 0.005), firm)
+        side = box((x0, foot, -d / 2 + 0.03), (x1 - 0.016, y - 0.6 * thick, d / 2 - 0.03), "fabric", 0.03)
+        return of_role("arm", both(side, pad, *(_piping(pad) if style.piping > 0.55 else ())))
     r = arm * 0.6
     x = (x0 + x1) / 2 - (r - arm / 2) * 0.5
-    side = box((x0 + arm * 0.14, foot, -d / 2 + 0.03), (x1 - arm * 0.14, y - r, d / 2 - 0.02), "fabric", 0.015)
+    side = box((x0 + arm * 0.14, foot, -d / 2 + 0.03), (x1 - arm * 0.14, y - r, d / 2 - 0.02), "fabric", 0.03)
     roll = padded((x, y - r, -d / 2 + 0.03), r, d - 0.05, rounding=0.02, turn=rotation(x=np.pi / 2))
     return of_role("arm", both(side, roll))
 
@@ -121,13 +120,13 @@ def _legs(style: Style, w: float, d: float, foot: float) -> list[Solid]:
 
 
 def _cushions(
-    x0: float, x1: float, y0: float, y1: float, z0: float, z1: float, count: int, style: Style
+    x0: float, x1: float, y0: float, y1: float, z0: float, z1: float, count: int, style: Style, **form: Any
 ) -> list[Solid]:
     """A row of cushions from x0 to x1."""
-    edges = np.linspace(x0, x1, count + 1)
     gap = 0.004
-    pads = [cushion((a + gap, y0, z0), (b - gap, y1, z1), style) for a, b in pairwise(edges)]
-    return [*pads, *(cord for pad in pads for cord in _piping(pad) if style.piping > 0.55)]
+    edges = pairwise(np.linspace(x0, x1, count + 1))
+    pads = [cushion((a + gap, y0, z0), (b - gap, y1, z1), style, **form) for a, b in edges]
+    return [*pads, *(cord for pad in pads if pad.role == "seat" for cord in _piping(pad) if style.piping > 0.55)]
 
 
 def _piping(pad: Pad) -> list[Solid]:
@@ -146,18 +145,6 @@ def _piping(pad: Pad) -> list[Solid]:
     return cords
 
 
-def _backs(x0: float, x1: float, y0: float, y1: float, z0: float, count: int, style: Style) -> list[Solid]:
-    """A row of leaning back cushions in front of the frame at z0."""
-    edges = np.linspace(x0, x1, count + 1)
-    thick = 0.12 + 0.08 * style.softness
-    turn = rotation(x=-0.12 - 0.3 * style.rake)
-    parts: list[Solid] = []
-    for a, b in pairwise(edges):
-        low = (a + 0.004, y0, z0 - thick * 0.2)
-        parts.append(cushion(low, (b - 0.004, y1, z0 + thick * 0.8), style, turn=turn, role="back"))
-    return parts
-
-
 def _couch(
     size: Size, style: Style, choices: Choices, seats: int, *, chaise: int = 0, chaise_depth: float = 0.0
 ) -> list[Solid]:
@@ -170,24 +157,21 @@ def _couch(
     style = replace(style, **body["style"])
     foot = _foot(style)
     seat = float(np.clip(0.43, 0.4 * h, 0.62 * h))
-    armless = style.arms == "none"
-    arm = 0.0 if armless else float(np.clip(w * 0.075 * (0.7 + 0.7 * style.softness), 0.07, 0.26))
+    arm = float(np.clip((0.07 + 0.042 * w) * (0.7 + 0.7 * style.softness), 0.07, 0.26))
+    arm = {"none": 0.0, "slim": 0.06}.get(style.arms, arm)
     y_arm = seat + (h - seat) * body.get("level", 0.2 + 0.55 * style.arm_height)
     frame = 0.1 + 0.06 * style.softness
     pad = 0.12 + 0.06 * style.softness
     z0, z1 = -d / 2, d / 2
     parts: list[Solid] = _legs(style, w, d, foot)
     inset, under = (0.012, 0.006) if body.get("skirt") else (arm * 0.5, foot)
-    low, high = (-w / 2 + inset, under, z0 + 0.02), (w / 2 - inset, seat - pad, z1 - 0.015)
-    parts.append(box(low, high, "fabric", 0.015, "base"))
+    low, high = (-w / 2 + inset, under, z0 + 0.02), (w / 2 - inset, seat - pad, z1 - 0.03)
+    parts.append(box(low, high, "fabric", 0.015 if body.get("skirt") else 0.045, "base"))
     tall = h - (0.06 if seats > 1 and style.contrast < 0.6 else 0.0)
     low, high = (-w / 2 + arm * 0.4, foot + 0.02, z0), (w / 2 - arm * 0.4, tall, z0 + frame)
     soft = 0.02 + 0.05 * style.softness
     parts.append(leaning(low, high, 0.5 * style.rake, seat, z0 + frame / 2, material="fabric", radius=soft))
-    if style.arms == "slim":
-        arm = 0.05
-        parts += both(box((w / 2 - arm, foot, z0 + 0.02), (w / 2, y_arm, z1 - 0.02), "fabric", 0.015, "arm"))
-    elif not armless:
+    if arm:
         parts += upholstered_arms(w, foot, y_arm, d, arm, style)
     inner = w / 2 - arm
     front_z = z1 + 0.01
@@ -201,8 +185,10 @@ def _couch(
         form = {"channels": back == "channels", "apart": (tall - seat) / 1.5}
         parts.append(Tufted(np.array(middle), turn, "fabric", "back", half=np.array(half), **form))
     else:
-        parts += _backs(-inner, inner, seat - 0.02, h if back == "pads" else 0.94 * h, z0 + frame, seats, style)
-    if back == "roll" and not chaise:
+        thick, turn = 0.12 + 0.08 * style.softness, rotation(x=-0.12 - 0.3 * style.rake)
+        far, near, high = z0 + frame - 0.2 * thick, z0 + frame + 0.8 * thick, h if back == "pads" else 0.94 * h
+        parts += _cushions(-inner, inner, seat - 0.02, high, far, near, seats, style, turn=turn, role="back")
+    if back == "roll" and seats > 1 and not chaise:
         place, turn = (inner - 0.085, seat + 0.08, z0 + 0.7 * frame), rotation(x=np.pi / 2)
         parts += both(padded(place, 0.08, min(0.52, 0.6 * d), rounding=0.02, turn=turn, role="cushion"))
     if chaise:
