@@ -1,4 +1,4 @@
-"""Cushions on sofas, armchairs and beds, throws over the foot of beds."""
+"""Cushions on sofas, armchairs and beds, throws over the foot of beds and the arms of sofas."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ PILLOW = 3.2  # exponent of the outline of a cushion
 STEP = 0.02  # metres from place to place
 WIDE_BED = 1.3  # metres
 LEVEL = 0.005  # metres: what is as high as that is one height
-AHEAD = (0.0, 0.04, 0.08)  # metres that a blanket lies before where the back seems to begin
-FOLDED = 0.45  # share of rooms whose sofa has a folded blanket
+DRAPED = 0.6  # share of sofas with a blanket over an arm
 # Metres between folds of a bed, and over its middle from where on it is a board; places behind pillows for cushions.
 SOFT, BOARD, BEYOND = 0.04, 0.12, 12
+RIDGE = 0.1  # metres that an arm is higher than the seat at least so that a throw hangs over it
 PRESS = 0.035  # metres that what is soft presses into a seat at most
 RAISED = 0.04  # metres that a flat thing is raised at most so that it lies on the solids of a seat
 
@@ -92,22 +92,6 @@ def on_covers(setting: Setting) -> None:
                     thing = Thing(kind, size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
                     if setting.put_first([thing], host=host.name, floor=False):
                         break
-
-
-def folded(setting: Setting) -> None:
-    """A folded blanket at an end of the largest sofa of some rooms, before cushions take both."""
-    for host in sorted(setting.of("sofa"), key=lambda o: -float(o.size[0]))[:1]:
-        rng = setting.rng(host.name, "folded")
-        size, variant, seat = usual_size("folded_throw", rng), int(rng.integers(1 << 30)), _Seat.of(host)
-        if seat is None or rng.random() > FOLDED:
-            continue
-        side = float(rng.choice((-0.95, 0.95)))
-        seen = (spot for end in (side, -side, 0.7 * side) if (spot := seat.resting(end, size)) is not None)
-        fronts = (spot + np.array([0.0, 0.0, ahead]) for spot in seen for ahead in AHEAD)
-        spots = (spot for place in fronts if (spot := _upon(host, place, size)) is not None)
-        places = (host.to_room(seat.pressed(spot, size)[None] + np.array([0.0, 0.002, 0.0]))[0] for spot in spots)
-        wanted = (Thing("folded_throw", size, place, host.yaw, host.name, variant) for place in places)
-        setting.put_first(wanted, host=host.name, margin=0.0, floor=False)
 
 
 def _upon(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | None:
@@ -261,28 +245,52 @@ def _heights(corners: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def throws(setting: Setting) -> None:
-    """A blanket across the foot of every bed that lets it lie flat and hang down."""
-    for host in setting.of("bed"):
+    """A blanket across the foot of every bed that lets it lie flat and hang down; over an arm of most sofas."""
+    for host in setting.of("bed", "sofa"):
         rng, seat = setting.rng(host.name, "throw"), _Seat.of(host)
-        deep = float(np.clip(0.3 * host.size[2], 0.4, 0.75))
-        depths = (float(host.size[2]) / 2 - back - deep / 2 for back in (0.1, 0.2, 0.3)) if seat else ()
-        wanted = (thing for z in depths if seat and (thing := _across(host, seat, z, deep, rng)) is not None)
-        setting.put_first(wanted, host=host.name, margin=0.0)
+        if seat is None or (host.row.role == "sofa" and not setting.has(DRAPED, rng)):
+            continue
+        if host.row.role == "sofa":
+            over = (_over_arm(host, seat, side, rng) for side in rng.permutation((-1.0, 1.0)))
+        else:
+            deep, everywhere = float(np.clip(0.3 * host.size[2], 0.4, 0.75)), np.full(len(seat.x), True)
+            depths = (float(host.size[2]) / 2 - back - deep / 2 for back in (0.1, 0.2, 0.3))
+            over = (_across(host, seat, everywhere, z, deep, 0.22, rng) for z in depths)
+        setting.put_first(filter(None, over), host=host.name, margin=0.0)
 
 
-def _across(host: Standing, seat: _Seat, z: float, deep: float, rng: np.random.Generator) -> Thing | None:
-    """A throw across a bed, its middle at `z`, that lies on all of it; None where nothing flat of its height is."""
-    under = seat.height[:, np.abs(seat.z - z) < deep / 2]
-    middle, top = float(np.median(under[np.abs(seat.x) < 0.3 * host.size[0]])), float(under.max())
+def _over_arm(host: Standing, seat: _Seat, side: float, rng: np.random.Generator) -> Thing | None:
+    """A throw over the arm of a sofa at a side, below 0 the left one; None where there is none to hang it over."""
+    z, deep = 0.16 * float(host.size[2]), float(rng.uniform(0.34, 0.46))
+    level = seat.height[:, np.abs(seat.z - z) < deep / 2].min(1)
+    arm = (level > seat.level + RIDGE) & (np.sign(side) * seat.x > 0.3 * host.size[0])
+    if not 0.08 < arm.sum() * STEP < 0.34:
+        return None
+    return _across(host, seat, arm, z, deep, float(np.median(level[arm])) - seat.level - 0.04, rng)
+
+
+def _across(
+    host: Standing, seat: _Seat, where: np.ndarray, z: float, deep: float, most: float, rng: np.random.Generator
+) -> Thing | None:
+    """A throw across a bed or an arm, its middle at `z`, that lies on all of it; None where nothing flat of its height
+    is.
+
+    `where`: (len(seat.x),) bool, what it lies on. `most`: metres that it hangs down at most.
+    """
+    under, x = seat.height[where][:, np.abs(seat.z - z) < deep / 2], seat.x[where]
+    centre = float(x[0] + x[-1]) / 2
+    x = x - centre
+    middle, top = float(np.median(under[np.abs(x) < 0.6 * x[-1] + STEP])), float(under.max())
     if not 0.25 < middle <= top < min(0.85, middle + BOARD):
         return None
-    half = float(np.abs(seat.x[(under > top - 0.2).any(1)]).max()) + STEP / 2
-    size = np.round([2 * half + 0.08, 0.012 + rng.uniform(0.16, 0.22), deep], 3)
+    half = float(np.abs(x[(under > top - 0.2).any(1)]).max()) + STEP / 2
+    size = np.round([2 * half + 0.08, 0.012 + min(most, rng.uniform(0.16, 0.22)), deep], 3)
     rows, columns = np.linspace(0, under.shape[1], LIES[0] + 1), np.linspace(-half, half, LIES[1] + 1)
+    near = min(0.08, 0.3 * half)
     cells = [
-        [under[np.abs(seat.x - x - half / LIES[1]) < 0.08, max(int(k) - 2, 0) : int(k) + 5].max() for x in columns[:-1]]
+        [under[np.abs(x - at - half / LIES[1]) < near, max(int(k) - 2, 0) : int(k) + 5].max() for at in columns[:-1]]
         for k in rows[:-1]
     ]
     lie = tuple(np.round(np.clip(top - np.array(cells), 0.0, BOARD), 3).ravel().tolist())
-    spot = host.to_room(np.array([[0.0, top + 0.014 - size[1], z]]))[0]
+    spot = host.to_room(np.array([[centre, top + 0.014 - size[1], z]]))[0]
     return Thing("throw", size, spot, host.yaw, host.name, int(rng.integers(1 << 30)), lie=lie)

@@ -344,7 +344,8 @@ def hung_up(setting: Setting) -> None:
             seat = corners[corners[:, 1] < h / 2, 1].max()  # of a bench or a board for shoes
             size[1] = min(size[1], hooks - seat - 0.02)
             count, high = max(1, int((w - 0.04) / size[0])), hooks - float(size[1])
-            z = 0.0 if d > 2 * size[2] and _posts(host) else -d / 2 + 0.03 + float(size[2]) / 2
+            panel = ((corners[:, 1] > 0.6 * h) & (corners[:, 2] < -0.4 * d)).any()  # else a rail on posts, open behind
+            z = -d / 2 + 0.03 + float(size[2]) / 2 if panel else 0.0
         else:
             size[0] = min(size[0], w - 0.1)
             count, high, z = 1, 0.86 * h - float(size[1]), d / 2 - 0.02
@@ -353,12 +354,6 @@ def hung_up(setting: Setting) -> None:
             one = Thing(kind, size, place[0], host.yaw, host.name, int(rng.integers(1 << 30)))
             if kind == "towel" or k == 0 or rng.random() < 0.7:
                 setting.placed.append(one)
-
-
-def _posts(host: Standing) -> bool:
-    """Whether a coat rack is a rail on posts, open behind."""
-    box = host.geometry.mesh.vertices
-    return not bool(((box[:, 1] > 0.6 * host.size[1]) & (box[:, 2] < -0.4 * host.size[2])).any())
 
 
 def tall_mirror(setting: Setting) -> None:

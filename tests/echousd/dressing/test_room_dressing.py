@@ -407,7 +407,7 @@ def test_curtains_hang_over_the_pane_where_something_stands_beside_it(beside):
     assert all(thing.position[1] < 0.1 for thing in hung)
 
 
-def test_a_folded_blanket_lies_on_the_solids_of_its_seat():
+def test_what_is_flat_lies_on_the_solids_of_its_seat():
     """Not on what is seen of it: a back's solid reaches further forward than its cloth, a seat's may be higher."""
     seat, back = trimesh.creation.box((1.6, 0.4, 0.9)), trimesh.creation.box((1.6, 0.8, 0.2))
     seat.apply_translation((0, 0.2, 0))
