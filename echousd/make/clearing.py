@@ -230,15 +230,6 @@ DIRECTIONS = 8
 GROUPS = 3  # sets of things that are tried for one move
 
 
-@dataclass(frozen=True, eq=False)
-class Cleared:
-    """What became of a layout."""
-
-    boxes: Boxes  # N boxes, those that were moved in other places
-    collisions: tuple[Collision, ...]  # what still reaches into one another, or into what a wall holds, deepest first
-    moved: Mapping[str, float]  # name -> metres, of what was moved
-
-
 def cleared_layouts(
     graphs: Sequence[SceneGraph], layouts: Sequence[Boxes], geometry: Mapping[str, Geometry], floor: np.ndarray, *,
     walls: bool,
@@ -246,16 +237,17 @@ def cleared_layouts(
     """Every layout `cleared`, and what became of it; one graph a layout, which says what must stay."""
     found = [cleared(graph, boxes, geometry, floor, walls=walls) for graph, boxes in zip(graphs, layouts, strict=True)]
     outcomes = [
-        LayoutOutcome(relation_verdicts(graph, each.boxes), each.collisions)
-        for graph, each in zip(graphs, found, strict=True)
+        LayoutOutcome(relation_verdicts(graph, boxes), left) for graph, (boxes, left) in zip(graphs, found, strict=True)
     ]
-    return [each.boxes for each in found], tuple(outcomes)
+    return [boxes for boxes, _ in found], tuple(outcomes)
 
 
 def cleared(
     graph: SceneGraph, boxes: Boxes, geometry: Mapping[str, Geometry], floor: np.ndarray, *, walls: bool
-) -> Cleared:
+) -> tuple[Boxes, tuple[Collision, ...]]:
     """Move what is free as little as possible until nothing starts inside anything else.
+
+    Returns the boxes, and what still reaches into one another, or into what a wall holds, deepest first.
 
     What is locked or has a position stays, and no relation that holds is broken: where only that would help, the two
     stay where they are and are among the collisions. Living rules are kept before distances.
@@ -282,9 +274,7 @@ def cleared(
         else:
             moves = found
     left = tuple(Collision(scene.names[i], scene.names[k], deep) for (i, k), deep in scene.overlaps(moves, DEEP))
-    far = np.linalg.norm(moves, axis=1)
-    moved = {graph.names[i]: float(far[i]) for i in np.flatnonzero(far)}
-    return Cleared(rounded_boxes(graph, _at(boxes, moves)) if moved else boxes, left, moved)
+    return rounded_boxes(graph, _at(boxes, moves)) if moves.any() else boxes, left
 
 
 def _onto_top(
