@@ -21,6 +21,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
 
@@ -192,11 +193,11 @@ def together(request: BatchRequest, folder: Path, workers: int) -> tuple[float, 
     ended = 0
     while ended < workers:
         ended += len(pool.outcomes(1.0))
-    begun = sum(_cpu_of(process) for process in pool.processes)
+    begun = sum(_cpu_of(process.pid) for process in active_children())
     wall = time.perf_counter()
     Run(plan, plan.packs(), frozenset(), folder, journal, RunOptions()).execute(pool)
     wall = time.perf_counter() - wall
-    used = sum(_cpu_of(process) for process in pool.processes) - begun
+    used = sum(_cpu_of(process.pid) for process in active_children()) - begun
     pool.close()
     return wall / len(plan.entries), used / len(plan.entries)
 

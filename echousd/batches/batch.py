@@ -86,7 +86,7 @@ def batch(
         variations: option -> values, whose combinations a graph's rooms take in turn.
         options: of the rooms, those of `echousd.batches.options.BatchOptions`;
             of the run, fields of `echousd.batches.batch.RunOptions`: workers, shard=(i, n), resume, max_failures,
-            timeout, until, memory, ray, outside, executor, progress.
+            timeout, until, memory, ray, outside, progress.
 
     Raises ValueError for what is not allowed, a folder in use or with another plan, and says the difference.
     """
@@ -105,7 +105,7 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
     if "://" in str(out) or re.match(r"[A-Za-z][A-Za-z0-9+.-]+:/", out.as_posix()):  # `Path` makes one slash of two
         raise ValueError(f"{out}: allowed: a folder on a disk; its rooms are whole and may be copied as they appear")
     device = request.options.device
-    if not how.ray and how.executor is None:
+    if not how.ray:
         work.devices(device)
     plan = _with_libraries(make_plan(request, weights_hash(request.options.weights), how.outside), how.outside)
     place = shard_folder(out, how.shard)
@@ -113,7 +113,7 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
         _agree_on(plan, out, resume=how.resume or how.shard[1] > 1)
         valid = _valid(plan, out, how.shard)
         journal = Journal(place)
-        pool = how.executor or _executor(how, len(plan.entries), device)
+        pool = _executor(how, len(plan.entries), device)
         seen = out.resolve() if how.ray else out  # workers elsewhere stand in another folder
         run = Run(plan, plan.part(how.shard), valid, seen, journal, how)
         try:
@@ -261,7 +261,6 @@ class RunOptions:
         memory: MiB a worker; a room that needs more fails.
         ray: `auto` or the address of a Ray cluster, whose nodes see the folder under one path; "" = local processes.
         outside: folders besides those of the graphs and of the index in which models may lie.
-        executor: runs the tasks in place of either.
         progress: called after every room.
 
     Raises ValueError for a shard that is none of its parts.
@@ -276,7 +275,6 @@ class RunOptions:
     memory: int | None = MEMORY
     ray: str = ""
     outside: tuple[str, ...] = ()
-    executor: Executor | None = None
     progress: Callable[[BatchProgress], None] | None = None
 
     def __post_init__(self) -> None:

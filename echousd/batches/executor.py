@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import cycle, islice
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from echomodel.late import extra
 
@@ -50,31 +50,6 @@ class Outcome:
     fate: str
     value: Any = None
     error: str = ""
-
-
-class Executor(Protocol):
-    """Runs tasks; local processes and Ray keep it."""
-
-    def free(self) -> int:
-        """How many more tasks are taken now."""
-        ...
-
-    @property
-    def megabytes(self) -> float:
-        """Memory of the workers together, 0 where nobody knows."""
-        ...
-
-    def submit(self, task: Task) -> None:
-        """Begin a task."""
-        ...
-
-    def outcomes(self, seconds: float) -> list[Outcome]:
-        """What has ended since, after waiting for at most so long."""
-        ...
-
-    def close(self) -> None:
-        """End all workers at once; what they were at is lost."""
-        ...
 
 
 @dataclass
@@ -114,11 +89,6 @@ class LocalWorkers:
     def megabytes(self) -> float:
         """Memory of the workers together."""
         return sum(resident(worker.process.pid) for worker in self._workers)
-
-    @property
-    def processes(self) -> list[int]:
-        """Process ids of the workers."""
-        return [worker.process.pid for worker in self._workers]
 
     def submit(self, task: Task) -> None:
         """Give a task to an idle worker."""
@@ -252,12 +222,6 @@ STARTING = 120.0  # seconds that Ray may take to start a worker, who counts its 
 DYING = 0.2  # seconds between two looks of a worker at its own memory
 
 
-@dataclass
-class _Begun:
-    task: Task
-    since: float
-
-
 class RayCluster:
     """Runs tasks on a Ray cluster; every node must see the run's folder under the same path and have echousd installed.
 
@@ -291,7 +255,7 @@ class RayCluster:
         if gpus and not there:
             self._leave()
             raise ValueError("device: the Ray cluster has no GPUs, allowed: cpu")
-        self._begun: dict[Any, _Begun] = {}
+        self._begun: dict[Any, tuple[Task, float]] = {}  # and when it began
         share = min(1.0, there / self._slots) if gpus else 0.0
         self._room = self._ray.remote(num_cpus=1, num_gpus=share, max_retries=0)(watched)
 
@@ -307,7 +271,7 @@ class RayCluster:
     def submit(self, task: Task) -> None:
         """Begin a task."""
         reference = self._room.remote(task.call, task.given, self._memory, self._timeout)
-        self._begun[reference] = _Begun(task, time.monotonic())
+        self._begun[reference] = task, time.monotonic()
 
     def outcomes(self, seconds: float) -> list[Outcome]:
         """What has ended since, after waiting for at most so long; tasks beyond the time limit are cancelled."""
@@ -321,8 +285,8 @@ class RayCluster:
             ready, _ = self._ray.wait(waiting, num_returns=1, timeout=min(POLL, max(until - time.monotonic(), 0.0)))
             more, _ = self._ray.wait(waiting, num_returns=len(waiting), timeout=0) if ready else ([], None)
             for reference in more:
-                begun = self._begun.pop(reference)
-                found.append(self._ended(reference, begun))
+                task, _ = self._begun.pop(reference)
+                found.append(self._ended(reference, task))
             found += self._overdue()
         return found
 
@@ -349,26 +313,26 @@ class RayCluster:
                 raise ValueError(f"--ray is {address!r}, where no cluster answers ({error})") from None
             self._ray.init(num_cpus=workers, include_dashboard=False, **quiet)
 
-    def _ended(self, reference: Any, begun: _Begun) -> Outcome:
+    def _ended(self, reference: Any, task: Task) -> Outcome:
         errors = self._ray.exceptions
         try:
             fate, value = self._ray.get(reference)
         except errors.OutOfMemoryError:
-            return Outcome(begun.task, "limit", error="the node had no memory left")
+            return Outcome(task, "limit", error="the node had no memory left")
         except errors.TaskCancelledError:
-            return Outcome(begun.task, "died", error="the task was cancelled")
+            return Outcome(task, "died", error="the task was cancelled")
         except errors.RayError as error:
-            return Outcome(begun.task, "died", error=f"the worker was lost ({type(error).__name__})")
-        return Outcome(begun.task, fate, value) if fate == "done" else Outcome(begun.task, fate, error=value)
+            return Outcome(task, "died", error=f"the worker was lost ({type(error).__name__})")
+        return Outcome(task, fate, value) if fate == "done" else Outcome(task, fate, error=value)
 
     def _overdue(self) -> list[Outcome]:
         found = []
-        for reference, begun in list(self._begun.items()):
-            if self._timeout is None or time.monotonic() - begun.since <= self._timeout + STARTING:
+        for reference, (task, since) in list(self._begun.items()):
+            if self._timeout is None or time.monotonic() - since <= self._timeout + STARTING:
                 continue
             del self._begun[reference]
             self._ray.cancel(reference, force=True)
-            found.append(Outcome(begun.task, "limit", error=f"took longer than {self._timeout:g} s"))
+            found.append(Outcome(task, "limit", error=f"took longer than {self._timeout:g} s"))
         return found
 
 
@@ -389,3 +353,6 @@ def watched(call: Any, given: Any, memory: int | None, seconds: float | None = N
             threading.Timer(1.0, os._exit, (1,)).start()  # after this answer is on its way: the thread cannot be ended
             return "limit", told
     return found[0]
+
+
+Executor = LocalWorkers | RayCluster

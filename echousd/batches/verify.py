@@ -8,7 +8,6 @@ import math
 import tarfile
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -172,21 +171,13 @@ def write_index(folder: Path, rows: Iterable[dict[str, Any]]) -> Path:
     return folder / INDEX
 
 
-@dataclass(frozen=True)
-class Wrong:
-    """A room that is not as it should be: its id, and what is wrong with it."""
-
-    room: str
-    problem: str
-
-
 def status(folder: Path) -> dict[str, Any]:
     """The run's summary as the journals tell it now; raises ValueError for a folder without a run."""
     return summary(manifest_rows(load_plan(folder), folder))
 
 
-def verify(folder: Path, *, check: bool = False) -> Iterator[Wrong]:
-    """Rooms that are missing, failed, changed or, with `check`, do not pass `echousd check`.
+def verify(folder: Path, *, check: bool = False) -> Iterator[tuple[str, str]]:
+    """Ids of rooms that are missing, failed, changed or, with `check`, do not pass `echousd check`, and which of it.
 
     Raises ValueError for a folder without a run.
     """
@@ -195,11 +186,11 @@ def verify(folder: Path, *, check: bool = False) -> Iterator[Wrong]:
         row, place = rows.get(entry.id), entry.folder(folder)
         settle = plan.options[entry.options].settle  # its verdict said so, too
         if row is None:
-            yield Wrong(entry.id, "missing" if not place.is_dir() else "in the folder, not in the journal")
+            yield entry.id, "missing" if not place.is_dir() else "in the folder, not in the journal"
         elif row["state"] != "done":
-            yield Wrong(entry.id, f"failed: {row['error']}")
+            yield entry.id, f"failed: {row['error']}"
         elif fault := _fault(place, row, stored, check=check, settle=settle):
-            yield Wrong(entry.id, fault)
+            yield entry.id, fault
 
 
 def _fault(place: Path, row: dict[str, Any], stored: Collection[str], *, check: bool, settle: bool) -> str:

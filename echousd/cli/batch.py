@@ -118,10 +118,10 @@ def verify(
     from echousd.batches.verify import verify as found_wrong
 
     wrong = []
-    for fault in found_wrong(folder, check=check):
-        wrong.append({"room": fault.room, "problem": fault.problem})
+    for room, problem in found_wrong(folder, check=check):
+        wrong.append({"room": room, "problem": problem})
         if not json:
-            say(f"{fault.room}: {one_line(fault.problem)}")
+            say(f"{room}: {one_line(problem)}")
     if json:
         say_json({"ok": not wrong, "wrong": wrong}, indent=2)
     if wrong:

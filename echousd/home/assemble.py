@@ -17,7 +17,7 @@ import echousd
 from echomodel.openings import numbered
 from echomodel.triangles import box
 from echousd.batches.batch import MEMORY, cores, weights_hash
-from echousd.batches.executor import Executor, LocalWorkers, Task
+from echousd.batches.executor import LocalWorkers, Task
 from echousd.batches.options import BatchOptions
 from echousd.batches.work import Job, room
 from echousd.folder.manifest import find_manifest
@@ -164,7 +164,7 @@ def _run(jobs: Sequence[Job], workers: int | None) -> Iterator[tuple[str, Mappin
     waiting = sorted(jobs, key=lambda job: -len(job.text))  # the fullest first
     if not waiting:
         return
-    pool: Executor = LocalWorkers(min(workers or cores(), len(waiting)), memory=MEMORY)
+    pool = LocalWorkers(min(workers or cores(), len(waiting)), memory=MEMORY)
     try:
         running = 0
         while waiting or running:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from inline_batches import Inline
+from inline_batches import Inline, batch
 from pxr import Usd, UsdPhysics
 from small_room import BARE
 
@@ -20,7 +20,6 @@ from echomodel.rooms.generator import drawn_shares, generate_rooms
 from echomodel.rows import Habit
 from echomodel.rules import margins, rule, rule_set
 from echomodel.vocabulary import Category, Predicate, RoomType, speaking, vocabulary
-from echousd.batches.batch import batch
 from echousd.checks import check
 from echousd.cli.main import command
 from echousd.dressing.dress import placed

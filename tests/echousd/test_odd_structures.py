@@ -16,14 +16,13 @@ from pathlib import Path
 
 import pytest
 import yaml
-from inline_batches import QUICK, Inline
+from inline_batches import QUICK, Inline, batch
 from small_models import chest, write_obj
 from small_room import StandIn, small_graph
 
 from echousd.assets.index import index
 from echousd.assets.model_file import ModelFile
 from echousd.assets.table import read_library, write_library
-from echousd.batches.batch import batch
 from echousd.batches.verify import finish
 from echousd.shapes.originals.loading import converted
 

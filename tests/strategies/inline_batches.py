@@ -1,9 +1,11 @@
 """Batches in the test's own process, of rooms that are made fast."""
 
 import json
+from unittest.mock import patch
 
 from small_room import BARE
 
+from echousd.batches import batch as batches
 from echousd.batches.executor import Outcome, attempt
 from echousd.batches.plan import room_digest
 
@@ -37,6 +39,17 @@ class Inline:
 
     def close(self):
         pass
+
+
+def batch(*given, executor=None, **options):
+    """`echousd.batch`, by an executor of one's own on whatever devices are asked for."""
+    if executor is None:
+        return batches.batch(*given, **options)
+    with (
+        patch.object(batches, "_executor", lambda how, rooms, device: executor),
+        patch("echousd.batches.work.devices", lambda name: []),
+    ):
+        return batches.batch(*given, **options)
 
 
 def digests(folder):

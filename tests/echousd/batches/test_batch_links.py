@@ -9,10 +9,9 @@ import tarfile
 from pathlib import Path
 
 import pytest
-from inline_batches import QUICK, Inline
+from inline_batches import QUICK, Inline, batch
 
 from echomodel.files import HOST
-from echousd.batches.batch import batch
 from echousd.batches.plan import room_digest
 from echousd.batches.verify import finish, verify
 from echousd.store import KEY
@@ -102,7 +101,7 @@ def test_a_room_with_a_link_is_another_room(run):
     graph = room / "layers/graph.usda"
     graph.rename(run.parent / "graph.usda")
     graph.symlink_to(run.parent / "graph.usda")  # the same bytes, elsewhere
-    assert [wrong.problem for wrong in verify(run)] == ["changed since it was made"]
+    assert [problem for _, problem in verify(run)] == ["changed since it was made"]
 
 
 @pytest.mark.parametrize("url", ["s3://bucket/night", "file:///etc"])

@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import pytest
 import torch
-from inline_batches import QUICK, Inline
+from inline_batches import QUICK, Inline, batch
 from small_models import small_library
 from small_room import small_graph
 
 from echomodel import text as texts
 from echousd.assets.index import index
-from echousd.batches.batch import batch
 from echousd.batches.options import BatchOptions, parse_options, read_toml, request_of
 from echousd.batches.plan import read_journals
 from echousd.batches.verify import finish, verify
@@ -136,8 +135,8 @@ def test_what_does_not_rest_fails_the_verdict_of_a_batch_that_settles(source, tm
         assert bool(told) == settles, row["check_errors"]
     summary = finish(tmp_path / "True")
     assert (summary["restless"], summary["passed_check"]) == (row["restless"], 0)
-    (wrong,) = verify(tmp_path / "True", check=True)
-    assert wrong.problem.endswith(f"{row['restless']} restless")
+    ((_, problem),) = verify(tmp_path / "True", check=True)
+    assert problem.endswith(f"{row['restless']} restless")
 
 
 @pytest.mark.parametrize("words", [("batch",), ("batch", "run")])

@@ -6,13 +6,13 @@ import tarfile
 from pathlib import Path
 
 import pytest
-from inline_batches import QUICK, Inline, digests, small
+from inline_batches import QUICK, Inline, batch, digests, small
 from pxr import Usd
 
 from echousd.batches import batch as front
 from echousd.batches import batch as running
 from echousd.batches import work
-from echousd.batches.batch import batch, generate_many
+from echousd.batches.batch import generate_many
 from echousd.batches.plan import load_plan, read_journals, room_digest, shard_folder
 from echousd.batches.sources import find_graphs, sampled_graph
 from echousd.batches.verify import finish, manifest_rows, status, verify, write_sheet, write_webdataset
@@ -39,7 +39,7 @@ def test_a_poisonous_graph_is_recorded_and_the_others_are_made(calm):
     failed = [row for row in read_journals(folder).values() if row["state"] == "failed"]
     assert len(failed) == 1
     assert f"{source}:2" in failed[0]["error"]
-    assert next((wrong.room[-6:], wrong.problem[:7]) for wrong in verify(folder)) == ("000001", "failed:")
+    assert next((room[-6:], problem[:7]) for room, problem in verify(folder)) == ("000001", "failed:")
 
 
 def test_manifest_sheet_and_index_hold_every_room(calm):
@@ -143,7 +143,7 @@ def test_a_damaged_room_is_made_again_and_set_aside(calm, tmp_path):
     out = tmp_path / "run"
     shutil.copytree(folder, out)
     (out / "rooms" / "0000" / "graphs_000000" / "layers" / "graph.usda").write_text("#usda 1.0\n")
-    assert "graphs_000000: changed since it was made" in [f"{w.room}: {w.problem}" for w in verify(out)]
+    assert "graphs_000000: changed since it was made" in [f"{room}: {problem}" for room, problem in verify(out)]
     batch(source, out, executor=Inline(), workers=1, resume=True, **QUICK)
     assert digests(out) == digests(folder)
     assert len(list((out / ".batch" / "set_aside").iterdir())) == 1
@@ -209,7 +209,7 @@ def test_a_damaged_asset_of_the_store_is_told_and_made_again(calm, tmp_path, ech
     file = place / "double_bed_geo.usdc"
     file.chmod(0o644)
     file.write_bytes(b"no crate")
-    told = [f"{wrong.room}: {wrong.problem}" for wrong in verify(out)]
+    told = [f"{room}: {problem}" for room, problem in verify(out)]
     assert "graphs_000000: 1 of its assets are missing in the store or changed" in told
     for words, count in ((("batch", "verify", out), "wrong"), (("store", "verify", out / "store"), "changed")):
         done = echousd_command(*words, "--json")
@@ -217,7 +217,7 @@ def test_a_damaged_asset_of_the_store_is_told_and_made_again(calm, tmp_path, ech
         assert json.loads(done.out)["ok"] is False
         assert json.loads(done.out)[count]
     batch(source, out, executor=Inline(), workers=1, resume=True, **QUICK)
-    assert [wrong.problem[:7] for wrong in verify(out)] == ["failed:"]
+    assert [problem[:7] for _, problem in verify(out)] == ["failed:"]
     assert digests(out) == digests(folder)
     shutil.rmtree(place)
     assert len(list(verify(out))) == 2
@@ -229,7 +229,7 @@ def test_rooms_that_travel_alone_have_all_in_their_folders(calm, tmp_path):
     assert not (tmp_path / "run" / "store").exists()
     rooms = sorted((tmp_path / "run" / "rooms").glob("*/*"))
     assert all((room / "assets").is_dir() for room in rooms)
-    assert [wrong.problem[:7] for wrong in verify(tmp_path / "run")] == ["failed:"]
+    assert [problem[:7] for _, problem in verify(tmp_path / "run")] == ["failed:"]
     assert not list((folder / "rooms").glob("*/*/assets"))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 from dying_process import dying
-from inline_batches import QUICK, Inline
+from inline_batches import QUICK, Inline, batch
 from painter import paint
 from plain_rooms import plain_files, plain_room
 from small_room import BARE, StandIn, small_graph
@@ -19,7 +19,6 @@ import echousd
 from echomodel.files import sweep
 from echousd.assets.index import index
 from echousd.assets.table import read_library
-from echousd.batches.batch import batch
 from echousd.batches.verify import finish
 from echousd.folder import history
 from echousd.folder.folder import DONE

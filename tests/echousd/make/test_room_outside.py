@@ -7,14 +7,13 @@ import shutil
 from dataclasses import replace
 
 import pytest
-from inline_batches import QUICK, Inline
+from inline_batches import QUICK, Inline, batch
 from small_models import chest, picture, write_obj
 from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.assets.index import index
 from echousd.assets.table import read_library, write_library
-from echousd.batches.batch import batch
 from echousd.batches.plan import read_journals
 from echousd.make.edit import edit
 from echousd.make.reading import read_room

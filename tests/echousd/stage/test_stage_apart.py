@@ -10,13 +10,12 @@ import sys
 
 import pytest
 import trimesh
-from inline_batches import QUICK, Inline
+from inline_batches import QUICK, Inline, batch
 from pxr import Sdf
 from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.assets.index import index
-from echousd.batches.batch import batch
 from echousd.batches.plan import room_digest
 from echousd.batches.verify import verify
 from echousd.draw import rendering
@@ -201,5 +200,5 @@ def test_a_run_that_was_sent_is_verified(deadly, tmp_path):
     journal = tmp_path / "run/.batch/shard_0_of_1/journal.jsonl"
     row = json.loads(journal.read_text().splitlines()[-1])
     journal.write_text(json.dumps({**row, "sha256": room_digest(room)}) + "\n")
-    (wrong,) = verify(tmp_path / "run", check=True)
-    assert "reading it ends the program" in wrong.problem
+    ((_, problem),) = verify(tmp_path / "run", check=True)
+    assert "reading it ends the program" in problem
