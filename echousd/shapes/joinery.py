@@ -113,17 +113,17 @@ def covering(plain: np.ndarray, shown: np.ndarray) -> np.ndarray:
     """Corners of a coarse solid (n, 3), and those of its finer mesh (m, 3) without which that reaches out of their hull
     by more than `SLACK`: a round top of twelve corners lacks a centimetre of what is seen.
     """
-    corners = plain
+    corners, taken = plain, np.zeros(0, int)
     while not np.array_equal(plain, shown) and (hull := hull_of(corners)):
         normal = area_normals(hull.triangles)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         beyond = shown @ normal.T - (hull.triangles[:, 0] * normal).sum(1)
         far = beyond.max(0)
-        if far.max() <= SLACK:
-            break
         # the one farthest beyond each face, of faces that lack most: one at a time takes a hull for each
-        wanted = beyond[:, far > max(SLACK, MOST * far.max())].argmax(0)
-        corners = np.concatenate([corners, shown[np.unique(wanted)]])
+        wanted = np.setdiff1d(beyond[:, far > max(SLACK, MOST * far.max())].argmax(0), taken)
+        if not len(wanted):  # where nothing is lacked, or only by a face too narrow for a normal of its own
+            break
+        corners, taken = np.concatenate([corners, shown[wanted]]), np.concatenate([taken, wanted])
     return corners
 
 

@@ -13,9 +13,11 @@ from shapely.geometry import MultiPoint, Point
 from echomodel.data.shapeset import piece as styled
 from echomodel.furniture import solids
 from echomodel.furniture.style import WIDTH, piece_of
+from echomodel.triangles import box
 from echomodel.vocabulary import vocabulary
+from echousd.shapes import joinery
 from echousd.shapes.geometry import FRAME, Origin
-from echousd.shapes.joinery import COLLIDERS, SLACK, assembled, convex_pieces, within_budget
+from echousd.shapes.joinery import COLLIDERS, SLACK, assembled, convex_pieces, covering, within_budget
 
 SIZE = np.array([0.9, 1.0, 0.45])
 STANDING = {"lazy_sofa": 6, "shelf": 6}  # styles: bags on a point and shelves that lean on nothing are among them
@@ -218,3 +220,12 @@ def test_nothing_collides_above_the_free_half_of_a_dressing_table():
             points = [mesh.trimesh.ray.intersects_location(places, np.full((6, 3), [0, -1.0, 0]))[0] for mesh in meshes]
             met.append(max(found[:, 1].max() for found in points if len(found)))
         assert met[1] - met[0] < 0.002, seed
+
+
+def test_a_corner_that_the_hull_does_not_take_is_asked_for_once(monkeypatch):
+    plain = box((-0.5, 0.0, -0.5), (0.5, 1.0, 0.5)).vertices
+    shown = np.concatenate([plain, [(0.0, 1.1, 0.0)]])
+    assert covering(plain, shown).tolist() == shown.tolist()
+    hull = joinery.hull_of(plain)
+    monkeypatch.setattr(joinery, "hull_of", lambda points: hull)  # as of slivers, whose normals point anywhere
+    assert covering(plain, shown).tolist() == shown.tolist()
