@@ -92,7 +92,7 @@ def decoded(content: bytes, path: str) -> np.ndarray:
 def encoded(picture: Image, form: str = "PNG", **how: Any) -> bytes:
     """A picture as a file of a form; `how`: as Pillow's writer of that form takes it."""
     out = io.BytesIO()
-    picture.save(out, form, **how)
+    picture.save(out, form, **{"compress_level": 4} | how)  # PNG's 6 takes three times as long, for 4 % fewer bytes
     return out.getvalue()
 
 

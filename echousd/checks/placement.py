@@ -265,6 +265,7 @@ IN_WALL = SKIRTING + 0.003  # metres: furniture stands at the wall behind its sk
 PRESSED = 0.04  # metres: cushions and blankets press into what they lie on
 NEAR = 0.05  # metres between two boxes that are one
 SAMPLES = 600  # points per surface and pair
+PAIRS = 20_000  # of points and triangles that are compared in one go, which stay in the cache
 
 
 def find_collisions(whole: Whole) -> tuple[Collision, ...]:
@@ -322,17 +323,21 @@ def _reach(surface: Shape, solid: Shape, deep: float) -> float:
     if not len(within):
         return 0.0
     triangles = solid.points[solid.faces]
-    middle = triangles.mean(1)
-    around = np.linalg.norm(triangles - middle[:, None], axis=2).max(1)
-    skin = np.concatenate((solid.points, _scatter(solid.points, solid.faces, 4000)))
+    low, high = triangles.min(1).T[:, None], triangles.max(1).T[:, None]
+    skin = np.concatenate((solid.points, _scatter(solid.points, solid.faces, 4000))).T
     deepest = 0.0
     # A sample of the skin is further away than the skin itself: deepest first, until no point can be deeper.
-    at_most = np.sqrt([((skin - point) ** 2).sum(1).min() for point in within])
-    for number in np.argsort(-at_most):
-        if at_most[number] <= max(deepest, deep):
+    ways = (skin - point[:, None] for point in within)
+    at_most = np.sqrt([along(way, way).min() for way in ways])
+    order, step = np.argsort(-at_most), max(1, PAIRS // len(triangles))
+    for some in (order[start : start + step] for start in range(0, len(order), step)):
+        if at_most[some[0]] <= max(deepest, deep):
             break
-        close = triangles[np.linalg.norm(middle - within[number], axis=1) <= around + at_most[number] + 1e-9]
-        deepest = max(deepest, min(at_most[number], distances(within[number], close).min(initial=np.inf)))
+        point, away = within[some].T[..., None], at_most[some]
+        way = np.maximum(np.maximum(low - point, point - high), 0.0)  # to the boxes around the triangles
+        number, face = np.nonzero(along(way, way) <= (away[:, None] + 1e-9) ** 2)
+        np.minimum.at(away, number, distances(within[some[number], None], triangles[face]))
+        deepest = max(deepest, float(away.max()))
     return deepest
 
 
@@ -394,7 +399,7 @@ def inside_solid(points: np.ndarray, solid: Shape) -> np.ndarray:
     return np.asarray(turns > 0.5)
 
 
-def winding_number(points: np.ndarray, triangles: np.ndarray, block: int = 20_000) -> np.ndarray:
+def winding_number(points: np.ndarray, triangles: np.ndarray, block: int = PAIRS) -> np.ndarray:
     """(s,) float: generalised winding number of a triangle soup around points, 1 inside, 0 outside (Jacobson 2013).
 
     Arguments:

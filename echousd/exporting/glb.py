@@ -309,7 +309,9 @@ def _rows(corners: np.ndarray) -> np.ndarray:
 
 
 def _is_grey(pixels: np.ndarray) -> bool:
-    return bool(np.ptp(pixels.astype(np.int16), axis=-1).max(initial=0) <= 3)  # JPEG rounds
+    red, green, blue = np.moveaxis(pixels, -1, 0)
+    most, least = np.maximum(np.maximum(red, green), blue), np.minimum(np.minimum(red, green), blue)
+    return bool((most - least).max(initial=0) <= 3)  # JPEG rounds
 
 
 def _camera(found: Gf.Camera, metres: float) -> dict[str, Any] | None:

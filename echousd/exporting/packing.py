@@ -61,7 +61,7 @@ class Reach:
     def check_layers(self, stage: Usd.Stage) -> None:
         """Raises StageError for a layer of the stage out of reach."""
         for layer in stage.GetUsedLayers():
-            if not layer.anonymous and layer.realPath:
+            if not layer.anonymous and layer.realPath and not self.holds(layer.realPath):
                 self.check(layer.realPath, f"a layer of <{_first_prim(stage, layer)}>")
 
 

@@ -91,7 +91,7 @@ def area_normals(triangles: np.ndarray) -> np.ndarray:
 
 
 def distances(point: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(f,) from a point (3,) to the triangles (f, 3, 3)."""
+    """(f,) from a point (3,), or of each its own (f, 1, 3), to the triangles (f, 3, 3)."""
     corner, side = triangles - point, np.roll(triangles, -1, axis=1) - triangles
     share = -(corner * side).sum(2) / np.maximum((side**2).sum(2), 1e-30)
     out = np.linalg.norm(corner + np.clip(share, 0, 1)[..., None] * side, axis=2).min(1)  # to their edges
