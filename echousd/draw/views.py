@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
-LENSES = (24.0, 28.0, 35.0, 21.0)  # mm, of a camera inside: 74 to 54 degrees across, 81 where nothing else helps
+LENSES = (24.0, 28.0, 35.0, 18.0)  # mm, of a camera inside: 74 to 54 degrees across, 90 where nothing else helps
 EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
 SLOPES = (0.05, 0.12, 0.2, 0.28)  # metres that the middle of its picture is lower for a metre ahead
 PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
@@ -181,7 +181,7 @@ def inside_view(
         before = float((spot - aim) @ front) / max(float(np.linalg.norm(spot - aim)), 1e-9)
         hidden = CLEAR * hidden + (BEHIND * max(0.0, ASKANCE - before) if main is not None else 0.0)
         cost = WHOLE * cut + _shown(shades, views, halves) + hidden + touched
-        cost = (cost + np.abs(PANS)[:, None, None] + 0.1 * np.arange(len(LENSES)) ** 3).ravel()
+        cost = (cost + np.abs(PANS)[:, None, None] + 0.1 * np.arange(len(LENSES)) ** 4).ravel()
         views = views.reshape(-1, 4, 4)
         eyes.append([
             Shot(float(cost[n]), views[n // len(LENSES)], LENSES[n % len(LENSES)], points, blocked)

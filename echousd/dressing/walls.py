@@ -272,9 +272,9 @@ CLOCKS, WITH_SHELVES, COATS, MIRRORS, GROUPS = 0.4, 0.4, 0.3, 0.6, 0.5
 
 
 def shelves(setting: Setting) -> None:
-    """Up to two shelves on walls that have room, with books and small things on them."""
+    """Up to two shelves on walls that have room, with books and small things on them, where it is dry."""
     done, rng = 0, setting.rng("shelves")
-    if not (setting.walls and setting.has(WITH_SHELVES, rng)):
+    if setting.use or not (setting.walls and setting.has(WITH_SHELVES, rng)):
         return
     kind, variant = str(rng.choice(WALL_SHELVES)), int(rng.integers(1 << 30))
     for wall in _roomiest(setting):

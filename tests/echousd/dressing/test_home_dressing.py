@@ -146,6 +146,10 @@ def test_shelves_on_walls_carry_books_and_something_beside(kind, seed, monkeypat
     room.full = True
     walls.shelves(room)
     board = next(thing for thing in room.placed if thing.kind == kind)
+    wet = setting(seed=seed, use="wet")
+    wet.full = True
+    walls.shelves(wet)
+    assert wet.placed == []
     borne = [thing for thing in room.placed if thing.on]
     assert sum(thing.kind == "book" for thing in borne) >= 3
     assert {thing.kind for thing in borne} - {"book"}
