@@ -399,15 +399,11 @@ def inside_solid(points: np.ndarray, solid: Shape) -> np.ndarray:
     return np.asarray(turns > 0.5)
 
 
-def winding_number(points: np.ndarray, triangles: np.ndarray, block: int = PAIRS) -> np.ndarray:
-    """(s,) float: generalised winding number of a triangle soup around points, 1 inside, 0 outside (Jacobson 2013).
-
-    Arguments:
-        points: (s, 3) float; triangles: (f, 3, 3) float.
-        block: largest number of point-triangle pairs held at once.
-    """
+def winding_number(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(s,) float: generalised winding number of a soup of triangles (f, 3, 3) around points (s, 3), 1 inside, 0
+    outside (Jacobson 2013)."""
     out = np.zeros(len(points))
-    step = max(1, block // max(len(triangles), 1))
+    step = max(1, PAIRS // max(len(triangles), 1))
     corners, places = (np.moveaxis(values.astype(np.float32), 0, -1).copy() for values in (triangles, points))
     for start in range(0, len(points), step):  # each number of all pairs lies in one plane
         some = slice(start, start + step)

@@ -309,9 +309,8 @@ def _rows(corners: np.ndarray) -> np.ndarray:
 
 
 def _is_grey(pixels: np.ndarray) -> bool:
-    red, green, blue = np.moveaxis(pixels, -1, 0)
-    most, least = np.maximum(np.maximum(red, green), blue), np.minimum(np.minimum(red, green), blue)
-    return bool((most - least).max(initial=0) <= 3)  # JPEG rounds
+    wide = pixels.astype(np.int16)
+    return all(np.abs(wide[..., k] - wide[..., k - 1]).max(initial=0) <= 3 for k in range(3))  # JPEG rounds
 
 
 def _camera(found: Gf.Camera, metres: float) -> dict[str, Any] | None:

@@ -142,7 +142,8 @@ def write_pictures(root: Path, stage: Usd.Stage | None = None) -> list[Path]:
     `stage`: of the root layer, where it is open.
     """
     stage = stage or open_stage(root)
-    return [drawn for drawn in (write_preview(root, stage), write_sheet(root, stage)) if drawn]
+    preview = write_preview(root, stage)  # None without the extra `render`, which a sheet needs as well
+    return [drawn for drawn in (preview, preview and write_sheet(root, stage)) if drawn]
 
 
 def write_preview(root: Path, stage: Usd.Stage | None = None) -> Path | None:
@@ -176,8 +177,7 @@ def write_sheet(root: Path, stage: Usd.Stage) -> Path | None:
     """
     from PIL import Image, ImageDraw
 
-    from echousd.draw.rendering import render_stage
-    from echousd.draw.tracing import QUICK, RenderUnavailable
+    from echousd.draw.rendering import QUICK, render_stage
 
     out = root.with_name(f"{root.stem}_layouts.png")
     names = layout_names(stage)
@@ -189,11 +189,8 @@ def write_sheet(root: Path, stage: Usd.Stage) -> Path | None:
     wide = min(len(names), 4)
     sheet = Image.new("RGB", (wide * SHEET, -(-len(names) // wide) * SHEET), "white")
     for number, name in enumerate(names):
-        try:
-            with showing_layout(stage, name):
-                picture = render_stage(stage, size=SHEET, rays=QUICK)
-        except RenderUnavailable:
-            return None
+        with showing_layout(stage, name):
+            picture = render_stage(stage, size=SHEET, rays=QUICK)
         ImageDraw.Draw(picture).text((8, 6), name, fill="black")
         sheet.paste(picture, (number % wide * SHEET, number // wide * SHEET))
     write_all({out: png(sheet)}, left="the room itself is complete")

@@ -26,7 +26,8 @@ HIGHEST = 100.0  # metres of an opening's height and sill: more than any room ha
 LONGEST = 10_000.0  # metres of its offset and width: longer than any wall
 PROPOSED = 12.0  # metres along a wall of a floor that nobody stated: so far a proposed floor grows for its openings
 TOUCH = 1e-6  # metres: neighbouring openings may share a jamb
-ARC = 9  # points on the arc of a swing
+# (2, 9, 1): along the wall and into the room, points on the arc of a swing
+ARC = np.stack([way(np.linspace(0.0, np.pi / 2, 9)) for way in (np.cos, np.sin)])[..., None]
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,7 @@ def direction(polygon: Any, edge: int) -> np.ndarray:
     """(2,) float, unit vector (x, z) along an edge."""
     corners = np.asarray(polygon, float)
     along = corners[(edge + 1) % len(corners)] - corners[edge]
-    return along / max(float(np.linalg.norm(along)), 1e-12)
+    return along / max(math.sqrt(along @ along), 1e-12)
 
 
 def inward_normal(polygon: Any, edge: int) -> np.ndarray:
@@ -211,8 +212,7 @@ def swing_area(polygon: Any, opening: Opening) -> np.ndarray:
         return np.zeros((0, 2))
     hinge, closed = hinge_point(polygon, opening)
     inside = inward_normal(polygon, opening.edge)
-    angle = np.linspace(0.0, np.pi / 2, ARC)[:, None]
-    return np.concatenate([hinge[None], hinge + opening.width * (np.cos(angle) * closed + np.sin(angle) * inside)])
+    return np.concatenate([hinge[None], hinge + opening.width * (ARC[0] * closed + ARC[1] * inside)])
 
 
 def free_area(polygon: Any, opening: Opening) -> np.ndarray:

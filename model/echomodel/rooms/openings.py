@@ -70,6 +70,7 @@ def _best(
     sill, tall, wide = WINDOWS[use] if kind == "window" else (0.0, USUAL[kind]["height"], USUAL[kind]["width"])
     tall = min(tall, height - sill - 0.05)
     doors = [opening for opening in made if opening.kind == "door"]
+    turned = signed_area(polygon) > 0
     places: list[Opening] = []
     tastes: list[float] = []
     for edge, length in enumerate(lengths):
@@ -88,8 +89,7 @@ def _best(
         offsets = np.unique(np.round([*offsets, length - width - margin, (length - width) / 2], 3))
         for offset, swing in product(offsets, SWINGS if kind == "door" else ("in",)):
             near, far = float(offset), float(length - width - offset)
-            hinge = "left" if (near <= far) == (signed_area(polygon) > 0) else "right"
-            hinge = hinge if kind == "door" else "left"
+            hinge = "left" if kind != "door" or (near <= far) == turned else "right"
             one = Opening(name, kind, edge, near, width, tall, sill, hinge, swing)
             if any(overlap(one, other) > -PIER for other in shared):
                 continue

@@ -223,7 +223,7 @@ def test_winding_number_agrees_with_ray_casting() -> None:
     inside = (plain > 0.2) & (plain < 0.5) & (np.abs(points[:, 2]) < 0.2)
     clear = np.abs(np.abs(points[:, 2]) - 0.2) > 0.02
     clear &= (np.abs(plain - 0.2) > 0.02) & (np.abs(plain - 0.5) > 0.02)
-    number = winding_number(points, mesh.triangles, block=1000)
+    number = winding_number(points, mesh.triangles)
     np.testing.assert_allclose(number[clear], inside[clear], atol=1e-3)
 
 
