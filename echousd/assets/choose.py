@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -135,14 +135,6 @@ class Asked:
     told: str = ""
 
 
-@dataclass
-class Choice:
-    """What was chosen: object name -> model; `missing` are the objects that the library has nothing for."""
-
-    chosen: dict[str, AssetRecord] = field(default_factory=dict)
-    missing: list[str] = field(default_factory=list)
-
-
 def choose(
     wishes: AssetWishes,
     asked: Sequence[Asked],
@@ -151,41 +143,41 @@ def choose(
     kept: Mapping[str, AssetRecord] | None = None,
     nearness: Mapping[str, Mapping[str, float]] | None = None,
     palette: np.ndarray | None = None,
-) -> Choice:
-    """A model for each object; equal arguments give equal choices.
+) -> tuple[dict[str, AssetRecord], list[str]]:
+    """Object name -> its model, and the objects that the library has nothing for; equal arguments give equal choices.
 
     Arguments:
         asked: objects in the order in which they choose; those of one `shares` get one model.
         kept: object name -> model that is chosen already. nearness: object name -> id of a model -> cost of its shape
             against the one that was generated (`--shapes guided`). palette: (p, 3) linear colours of the room.
     """
-    out = Choice(dict(kept or {}))
+    chosen, missing = dict(kept or {}), []
     groups: dict[str, AssetRecord] = {}
     styles: dict[str, list[AssetRecord]] = {}
     for one in asked:
-        if one.name in out.chosen:
-            groups.setdefault(one.shares or one.name, out.chosen[one.name])
-            styles.setdefault(one.style, []).append(out.chosen[one.name])
-    used = {record.id for record in out.chosen.values()}
+        if one.name in chosen:
+            groups.setdefault(one.shares or one.name, chosen[one.name])
+            styles.setdefault(one.style, []).append(chosen[one.name])
+    used = {record.id for record in chosen.values()}
     tones = oklab(np.asarray(palette, float).reshape(-1, 3)) if palette is not None else np.zeros((0, 3))
     if len(tones):
         tones = np.concatenate([tones, np.reshape(told_colors(wishes.text), (-1, 3))])
     for one in asked:
-        if one.name in out.chosen:
+        if one.name in chosen:
             continue
         found = groups.get(one.shares) if one.shares else None
         if found is None:
             near = (nearness or {}).get(one.name)
             found = _best(wishes, one, used, styles.get(one.style, ()), f"{seed} {one.shares or one.name}", near, tones)
         if found is None:
-            out.missing.append(one.name)
+            missing.append(one.name)
             continue
-        out.chosen[one.name] = found
+        chosen[one.name] = found
         if one.shares:
             groups[one.shares] = found
         styles.setdefault(one.style, []).append(found)
         used.add(found.id)
-    return out
+    return chosen, missing
 
 
 def fits(record: AssetRecord, size: Sequence[float] | np.ndarray, stretch: float) -> bool:

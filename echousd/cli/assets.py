@@ -101,11 +101,11 @@ def pack(
     from echousd.folder.found import room_at
     from echousd.layers.simready import pack as write
 
-    done = write(room_at(room), output, names=asset or (), author=author, force=force)
-    lines = [f"left out {sentence}" for sentence in done.left]
-    lines += [f"package  {path}" for path in done.layers]
-    lines += [f"note     {sentence}" for sentence in done.hangs]
-    say_done(json, list(done.layers), lines, {"left_out": list(done.left), "hangs": list(done.hangs)})
+    layers, left, hangs = write(room_at(room), output, names=asset or (), author=author, force=force)
+    lines = [f"left out {sentence}" for sentence in left]
+    lines += [f"package  {path}" for path in layers]
+    lines += [f"note     {sentence}" for sentence in hangs]
+    say_done(json, layers, lines, {"left_out": left, "hangs": hangs})
 
 
 store_app = typer.Typer(no_args_is_help=True)

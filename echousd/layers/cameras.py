@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from pxr import Gf
@@ -43,23 +42,25 @@ def opening_boxes(room: RoomData) -> Furniture:
 
 
 def write_cameras(
-    pen: Pen, volume: Volume, points: np.ndarray, furniture: Furniture, walled: np.ndarray | None = None,
+    pen: Pen, points: np.ndarray, furniture: Furniture, walled: np.ndarray | None = None,
     hung: Furniture | None = None, openings: Furniture | None = None, main: int | None = None,
 ) -> None:  # fmt: skip
     """Author `/Room/Cameras/top` (from afar, -Z up in the picture) and `/Room/Cameras/perspective`.
 
     Arguments:
         pen: writes the cameras.
-        volume: of the room. points, furniture: see `perspective_views`.
+        points: what is seen, see `room_points`. furniture: as of `perspective_views`.
         walled: corners of the floor of a room with walls; its perspective camera stands inside.
         hung: what hangs or stands at the walls and must not fill that camera's picture. openings: doors and windows.
         main: row of the furniture that this camera has whole in its picture.
     """
     pen.define("/Room/Cameras", "Scope")
     # from afar rather than orthographic, whose width Blender takes for ten times what it is
-    width = float((volume.upper - volume.lower)[[0, 2]].max()) * MARGIN
-    height = float(volume.upper[1]) + FAR * width
-    above = (float(volume.centre[0]), height, float(volume.centre[2]))
+    lower, upper = points.min(0), points.max(0)
+    centre = (lower + upper) / 2
+    width = float((upper - lower)[[0, 2]].max()) * MARGIN
+    height = float(upper[1]) + FAR * width
+    above = (float(centre[0]), height, float(centre[2]))
     top = {
         "float focalLength": FAR * APERTURE * TENTHS, "float horizontalAperture": APERTURE * TENTHS,
         "float verticalAperture": APERTURE * TENTHS, "float focusDistance": height,
@@ -68,33 +69,20 @@ def write_cameras(
     }  # fmt: skip
     pen.define("/Room/Cameras/top", "Camera", top)
     if walled is not None:
-        matrix, lens = inside_view(walled, furniture, float(volume.upper[1]), hung, openings, main)
+        matrix, lens = inside_view(walled, furniture, float(upper[1]), hung, openings, main)
     else:
         matrix, lens = perspective_views(points, furniture)[0], FOCAL_LENGTH
     slope = float(matrix[:3, 1] @ matrix[:3, 2])  # 0 of a camera that has no shift
-    sharp = volume.centre if main is None else furniture.corners[main].mean(0)
+    sharp = centre if main is None else furniture.corners[main].mean(0)
     camera = {
         **ops(transform=("matrix4d", Gf.Matrix4d(np.ascontiguousarray(shifted(matrix, -slope).T)))),
         "float focalLength": lens * TENTHS, "float verticalApertureOffset": -slope * lens * TENTHS,
         "float horizontalAperture": APERTURE * TENTHS,
         "float verticalAperture": APERTURE * TENTHS / (1.0 if walled is None else ASPECT),
         "float focusDistance": float(np.linalg.norm(matrix[:3, 3] - sharp)),
-        "float2 clippingRange": (0.05, 4 * float(np.linalg.norm(matrix[:3, 3] - volume.centre)) + 10.0),
+        "float2 clippingRange": (0.05, 4 * float(np.linalg.norm(matrix[:3, 3] - centre)) + 10.0),
     }  # fmt: skip
     pen.define("/Room/Cameras/perspective", "Camera", camera)
-
-
-@dataclass(frozen=True)
-class Volume:
-    """What the cameras must see, in the frame of `/Room`: (3,) float lower and upper corners, metres."""
-
-    lower: np.ndarray
-    upper: np.ndarray
-
-    @property
-    def centre(self) -> np.ndarray:
-        """Middle of the volume."""
-        return (self.lower + self.upper) / 2
 
 
 def room_points(room: RoomData) -> np.ndarray:
@@ -111,9 +99,3 @@ def room_points(room: RoomData) -> np.ndarray:
     if room.options.ceiling:
         points.append(np.insert(room.floor, 1, room.height + walls.THICKNESS, axis=1))
     return np.concatenate(points)
-
-
-def room_volume(room: RoomData) -> Volume:
-    """Box around the floor and all furniture, metres."""
-    points = room_points(room)
-    return Volume(points.min(0), points.max(0))

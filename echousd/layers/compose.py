@@ -18,7 +18,7 @@ from echousd.draw.sight import Furniture
 from echousd.dressing.dress import Dressing, dress, write_nodes
 from echousd.dressing.setting import Thing
 from echousd.layers import assets, cameras, lights, materials, physics, structure
-from echousd.layers.cameras import room_points, room_volume
+from echousd.layers.cameras import room_points
 from echousd.naming import free_name
 from echousd.room import RoomData
 from echousd.shapes import joints, looks
@@ -259,14 +259,15 @@ def root_layer(room: RoomData, hung: Furniture | None = None) -> Sdf.Layer:
         "A room made by EchoUSD. Put your own opinions into a stronger layer; layers/ is rewritten. "
         "Readers that compose no sublayers (three.js, tinyusdz) need `echousd export` of it."
     )
-    seen = room_volume(room)
-    values = {"float3[] extentsHint": np.array([seen.lower, seen.upper], np.float32)}
+    seen = room_points(room)
+    bounds = np.array([seen.min(0), seen.max(0)])
+    values = {"float3[] extentsHint": bounds.astype(np.float32)}
     pen.define("/Room", "Xform", values, ["GeomModelAPI"], kind="assembly", assetInfo={"name": room.name})
     furniture = Furniture(*(np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw)))
-    lights.write_lights(pen, room, seen)
+    lights.write_lights(pen, room, bounds)
     walled = room.floor if room.options.walls else None
     main = cameras.main_piece([node.category for node in room.graph.nodes], furniture)
-    cameras.write_cameras(pen, seen, room_points(room), furniture, walled, hung, cameras.opening_boxes(room), main)
+    cameras.write_cameras(pen, seen, furniture, walled, hung, cameras.opening_boxes(room), main)
     names = [name for name in LAYERS if name != "dressing" or room.options.dress != "none"]
     layer.subLayerPaths = [f"./{layer_file(name, crate=room.options.crate)}" for name in names]
     return layer

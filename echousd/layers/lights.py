@@ -16,7 +16,6 @@ from pxr import Gf, UsdLux
 from echomodel.openings import inward_normal, segment
 from echomodel.vocabulary import vocabulary
 from echousd.draw.views import view_matrix
-from echousd.layers.cameras import Volume
 from echousd.layers.structure import drawn
 from echousd.room import RoomData
 from echousd.shapes.finishes import baking
@@ -52,13 +51,13 @@ LIT, FILL, BRIGHT = {"evening": 85.0, "night": 75.0}, 20.0, 160.0
 Intensities = dict[str, tuple[int, float]]  # light -> its column of `TIMES`, intensity at full
 
 
-def write_lights(pen: Pen, room: RoomData, volume: Volume) -> None:
+def write_lights(pen: Pen, room: RoomData, bounds: np.ndarray) -> None:
     """Author `/Room/Lights` and the variant set `light`, with `day` chosen.
 
     Radiances are for a camera whose imaging ratio is 1 (UsdGeomCamera's default): a white surface under sky and panel
     comes to about 1, so nothing is blown out. Lamps are in the same scale, `NITS` to 1, from their lumens.
 
-    `room`: whose lamps and windows these are. `volume`: of the room, metres.
+    `room`: whose lamps and windows these are. `bounds`: (2, 3) float, of the room, metres.
     """
     pen.define(LIGHTS, "Scope")
     sky: dict[str, Any] = {}
@@ -67,7 +66,7 @@ def write_lights(pen: Pen, room: RoomData, volume: Volume) -> None:
     pen.define(f"{LIGHTS}/sky", "DomeLight", sky)
     kind = "open" if not room.options.walls else "ceiling" if room.options.ceiling else "walls"
     above, share = SHARES[kind]
-    flux = _panel(pen, volume, room.height)
+    flux = _panel(pen, bounds, room.height)
     full: Intensities = {"sky": (0, 0.5 * above)}
     if room.options.walls:
         full |= _sun(pen, room)
@@ -97,15 +96,15 @@ def _own(room: RoomData, what: str, among: Sequence[Any]) -> Any:
     return among[0 if room.graph.room.walls else drawn(room, what, len(among))]
 
 
-def _panel(pen: Pen, volume: Volume, height: float) -> float:
+def _panel(pen: Pen, bounds: np.ndarray, height: float) -> float:
     """A panel below the ceiling; returns its lumens at radiance 1, of radiance L and area A it lights the floor with
     about L A / h²."""
-    width, depth = (max(float(s), 0.5) for s in 0.3 * (volume.upper - volume.lower)[[0, 2]])
-    place = (float(volume.centre[0]), height - 0.02, float(volume.centre[2]))
+    width, depth = (max(float(s), 0.5) for s in 0.3 * np.ptp(bounds, axis=0)[[0, 2]])
+    x, _, z = (bounds.sum(0) / 2).tolist()
     values = {
         "float inputs:width": width, "float inputs:height": depth,
         "color3f inputs:color": UsdLux.BlackbodyTemperatureAsRgb(DAYLIGHT),
-        **ops(translate=("double3", place), rotateX=("float", -90.0)),
+        **ops(translate=("double3", (x, height - 0.02, z)), rotateX=("float", -90.0)),
     }  # fmt: skip
     pen.define(f"{LIGHTS}/ceiling", "RectLight", values)
     return np.pi * NITS * width * depth

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,21 +26,16 @@ INSIDE = "usd"  # the folder between a package's name and its layer
 DATE = "1980-01-01"  # the earliest there is, as in our archives: the same asset gives the same bytes
 
 
-@dataclass(frozen=True)
-class Packed:
-    """What was written: the layers that people open, and a sentence for each asset that was left out or hangs."""
-
-    layers: tuple[Path, ...]
-    left: tuple[str, ...]
-    hangs: tuple[str, ...]
-
-
-def pack(root: Path, out: Path, *, names: Sequence[str] = (), author: str = "EchoUSD", force: bool = False) -> Packed:
+def pack(
+    root: Path, out: Path, *, names: Sequence[str] = (), author: str = "EchoUSD", force: bool = False
+) -> tuple[list[Path], list[str], list[str]]:
     """Write the furniture of a room as `<out>/<name>/usd/<name>.usda` with `payload/` and `.thumbs/256x256/` beside it.
 
     `root`: root layer of a room of ours. `out`: folder of the packages. `names`: of assets; empty = all furniture.
     `author`: who is told as the author. `force`: replace packages that are there. Raises ValueError where there is no
     room of ours, no such asset, a package in the way, or nothing draws pictures.
+
+    Returns the layers that people open, and a sentence for each asset that was left out, and for each that hangs.
     """
     check_written([root])
     manifest = find_manifest(root.parent, root.stem)
@@ -70,7 +64,7 @@ def pack(root: Path, out: Path, *, names: Sequence[str] = (), author: str = "Ech
     others = [name for name in assets if name not in ours]
     left = [f"{name}: a model of somebody else's, which is packed where it comes from" for name in others]
     write_all(files)
-    return Packed(tuple(layers), tuple(left), tuple(hangs))
+    return layers, left, hangs
 
 
 def package(name: str, files: Mapping[str, bytes], *, author: str, source: str) -> dict[str, bytes]:

@@ -109,10 +109,10 @@ def foreign_pieces(
     stage: Usd.Stage, room_type: str | None = None, *, names: bool = False
 ) -> tuple[SceneGraph, dict[str, str]]:
     """The graph as `foreign_graph` reads it, and the prim path of every node; columns without a label are obstacles."""
-    found = _read(stage, names=names, columns=True)
-    floor = next((box for _, box in found.floors), None)
-    graph = _graph(stage, [node for _, node in found.nodes], floor, room_type, found.words)
-    return graph, {node.name: str(path) for path, node in found.nodes}
+    found, floors, words = _read(stage, names=names, columns=True)
+    floor = next((box for _, box in floors), None)
+    graph = _graph(stage, [node for _, node in found], floor, room_type, words)
+    return graph, {node.name: str(path) for path, node in found}
 
 
 def foreign_rooms(stage: Usd.Stage | str | os.PathLike[str], *, names: bool = False) -> dict[str, SceneGraph]:
@@ -124,17 +124,17 @@ def foreign_rooms(stage: Usd.Stage | str | os.PathLike[str], *, names: bool = Fa
         names: as for `foreign_graph`.
     """
     stage = opened(stage)
-    found = _read(stage, names=names)
+    found, floors, words = _read(stage, names=names)
     members: dict[str, list[Node]] = {}
-    for path, node in found.nodes:
+    for path, node in found:
         members.setdefault(_room_above(stage.GetPrimAtPath(path)), []).append(node)
-    inside = {key: box for key, box in ((_room_above(stage.GetPrimAtPath(p)), box) for p, box in found.floors) if key}
+    inside = {key: box for key, box in ((_room_above(stage.GetPrimAtPath(p)), box) for p, box in floors) if key}
     if len({key for key in members if key}) < 2:
-        if len(found.floors) < 2:
-            floor = next((box for _, box in found.floors), None)
-            return {"": _graph(stage, [node for _, node in found.nodes], floor, None, found.words)}
-        members, inside = {}, {str(path): box for path, box in found.floors}
-        for _, node in found.nodes:
+        if len(floors) < 2:
+            floor = next((box for _, box in floors), None)
+            return {"": _graph(stage, [node for _, node in found], floor, None, words)}
+        members, inside = {}, {str(path): box for path, box in floors}
+        for _, node in found:
             members.setdefault(next((key for key, box in inside.items() if _over(node, box)), ""), []).append(node)
     homeless = [node.name for node in members.pop("", ())]
     if homeless:
@@ -144,18 +144,14 @@ def foreign_rooms(stage: Usd.Stage | str | os.PathLike[str], *, names: bool = Fa
     }
 
 
-@dataclass(frozen=True)
-class _Found:
+def _read(
+    stage: Usd.Stage, *, names: bool, columns: bool = False
+) -> tuple[list[tuple[Sdf.Path, Node]], list[tuple[Sdf.Path, Box]], list[str]]:
     """What a stage holds: prim path and node, prim path and box of every floor, and all words."""
-
-    nodes: list[tuple[Sdf.Path, Node]]
-    floors: list[tuple[Sdf.Path, Box]]
-    words: list[str]
-
-
-def _read(stage: Usd.Stage, *, names: bool, columns: bool = False) -> _Found:
     boxed = _boxes(stage)
-    found = _Found([], [], [])
+    nodes: list[tuple[Sdf.Path, Node]] = []
+    floors: list[tuple[Sdf.Path, Box]] = []
+    said: list[str] = []
     taken: set[str] = set()
     skipped: Counter[str] = Counter()
     obstacles: Counter[str] = Counter()
@@ -165,13 +161,13 @@ def _read(stage: Usd.Stage, *, names: bool, columns: bool = False) -> _Found:
             prims.PruneChildren()
             continue
         words = list(labels(prim))
-        found.words.extend((*words, prim.GetName()))
+        said.extend((*words, prim.GetName()))
         category, told = next(filter(None, map(known_category, words)), None), {}
         if category is None and names and not words:
             category = category_of_name(prim)
         if category is None:
             if is_floor(prim, words, names=names) and (ground := boxed(prim)) is not None:
-                found.floors.append((prim.GetPath(), ground))
+                floors.append((prim.GetPath(), ground))
             if columns and not words and _is_column(prim, boxed(prim)):
                 words = [spaced(prim.GetName()) or OBSTACLE]
             if not words or any(is_structure(word) for word in words):
@@ -194,14 +190,14 @@ def _read(stage: Usd.Stage, *, names: bool, columns: bool = False) -> _Found:
             name, category, size=box.size, position=box.position, yaw=box.yaw, locked=bool(told), attributes=told,
             shapes="boxes" if told else None,
         )  # fmt: skip
-        found.nodes.append((prim.GetPath(), node))
+        nodes.append((prim.GetPath(), node))
     _tell(stage, skipped, obstacles)
-    if not found.nodes:
+    if not nodes:
         raise StageError(
             f"{source(stage)}: no scene graph (no EchoSceneGraph prim) and no prims with semantics labels and bounds "
             "to make one of" + ("" if names else "; --names takes the names of prims for labels")
         )
-    return found
+    return nodes, floors, said
 
 
 def _tell(stage: Usd.Stage, skipped: Counter[str], obstacles: Counter[str]) -> None:

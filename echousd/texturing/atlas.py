@@ -51,32 +51,26 @@ def unwrap(objects: Sequence[Sequence[Mesh]], resolution: int, *, together: bool
     Raises ValueError where xatlas is not installed, or does not survive the meshes.
     """
     boards = [_boards(meshes) for meshes in objects]
-    scaled = [[(100 * board.points, board.faces) for board in pieces] for pieces in boards]  # centimetres, see `charts`
+    scaled = [[(100 * points, faces) for points, faces, _ in pieces] for pieces in boards]  # centimetres, see `charts`
     laid = iter(charts([list(chain(*scaled))] if together else scaled, resolution, PADDING))
     out = []
     for pieces in boards:
         points, st, count = [], [], 0
-        faces = np.zeros((sum(len(board.faces) for board in pieces), 3), int)
-        for board, (origin, index, places) in zip(pieces, laid, strict=False):
-            points.append(board.points[origin])
+        faces = np.zeros((sum(len(own) for _, own, _ in pieces), 3), int)
+        for (corners, _, triangles), (origin, index, places) in zip(pieces, laid, strict=False):
+            points.append(corners[origin])
             st.append(np.clip(np.round(places, DIGITS), 0.0, 1.0))
-            faces[board.triangles] = index + count
+            faces[triangles] = index + count
             count += len(origin)
         out.append(Unwrapped(np.concatenate(points), np.concatenate(st), faces))
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class _Board:
-    """A connected part of an object: (v, 3) points, (f, 3) faces, and (f,) which triangles of the object they are."""
+def _boards(meshes: Sequence[Mesh]) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """The connected parts of an object: (v, 3) points, (f, 3) faces, and (f,) which triangles of the object they are.
 
-    points: np.ndarray
-    faces: np.ndarray
-    triangles: np.ndarray
-
-
-def _boards(meshes: Sequence[Mesh]) -> list[_Board]:
-    """The connected parts of an object; xatlas would join what touches, and lay one over the other."""
+    xatlas would join what touches, and lay one over the other.
+    """
     out, before = [], 0
     for corners, vertices in meshes:
         flat = vertices.reshape(-1)
@@ -87,7 +81,7 @@ def _boards(meshes: Sequence[Mesh]) -> list[_Board]:
             own = np.flatnonzero(label == board)
             used, local = np.unique(faces[own].ravel(), return_inverse=True)
             points = corners.reshape(-1, 3)[first[used]]
-            out.append(_Board(points, local.reshape(-1, 3), own + before))
+            out.append((points, local.reshape(-1, 3), own + before))
         before += len(vertices)
     return out
 

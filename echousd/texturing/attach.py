@@ -95,12 +95,12 @@ def import_job(
         with reading(stage):
             surfaces = read_surfaces(stage, dressing=task.dressing)
             _compare(task, surfaces, skip, folder)
-            results = read_results(folder, task)
+            objects, pictures = read_results(folder, task)
             for word in skip:
-                results.objects.pop(word, None)
-            if not results.objects:
+                objects.pop(word, None)
+            if not objects:
                 raise ValueError(f"{folder}: every object with a result is left out (--skip); nothing to import")
-            files = look_files(stage, surfaces, results, name, task.tool, task.dressing)
+            files = look_files(stage, surfaces, (objects, pictures), name, task.tool, task.dressing)
         taken = [path for path in files if not force and ownership.read(top, path) not in (None, files[path])]
         if taken:
             raise ValueError(f"{top / taken[0]}: exists; choose another --name or use --force")
@@ -114,8 +114,8 @@ def import_job(
         if preview and find_manifest(top, room.stem):
             write_preview(room)
     names = [thing.name for thing in task.objects]
-    painted = tuple(word for word in names if word in results.objects)
-    unpainted = tuple(word for word in names if word not in results.objects and word not in skip)
+    painted = tuple(word for word in names if word in objects)
+    unpainted = tuple(word for word in names if word not in objects and word not in skip)
     return ImportedLook(name, top / layer, painted, unpainted, tuple(skip))
 
 
@@ -207,14 +207,15 @@ def look_files(
         stage: the room, whose units the layers take. surfaces: what it holds. results: what was painted.
         name: of the look. tool: who painted it. dressing: see `read_surfaces`.
     """
-    painted = [thing for thing in surfaces.objects if thing.name in results.objects]
+    objects, pictures = results
+    painted = [thing for thing in surfaces.objects if thing.name in objects]
     pens = Pen(Sdf.Layer.CreateAnonymous(".usda")), Pen(Sdf.Layer.CreateAnonymous(".usda"))
     for pen, chosen in zip(pens, (name, None), strict=True):
         set_units(pen.layer, stage)
         pen.layer.defaultPrim = surfaces.room.split("/")[1]
         inside = pen.variants(surfaces.room, VARIANTS, (MADE, name), chosen)[name]
         for thing in painted:
-            result = results.objects[thing.name]
+            result = objects[thing.name]
             if chosen:
                 _bind(inside, surfaces.room, thing, result, name)
             else:
@@ -234,7 +235,7 @@ def look_files(
         },
     }
     top.subLayerPaths = [f"./{name}/st.usdc"]
-    files = {f"{FOLDER}/{name}/{picture}": content for picture, content in sorted(results.pictures.items())}
+    files = {f"{FOLDER}/{name}/{picture}": content for picture, content in sorted(pictures.items())}
     files[f"{FOLDER}/{name}/st.usdc"] = layer_bytes(laid, ".usdc")
     files[f"{FOLDER}/{name}.usda"] = layer_bytes(top, ".usda")
     return files

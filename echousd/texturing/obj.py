@@ -5,8 +5,6 @@ from __future__ import annotations
 import io
 import json
 import struct
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -67,19 +65,6 @@ KNOWN = {"KHR_texture_transform"}  # extensions that a file may require and that
 SLOTS = {"baseColorTexture": "color", "metallicRoughnessTexture": "metal_rough", "normalTexture": "normal"}
 
 
-@dataclass(frozen=True, eq=False)
-class PaintedMesh:
-    """What a tool gave back: triangles with texture coordinates, and images by what they are.
-
-    Arguments:
-        mesh: the triangles of all primitives.
-        images: `color`, `metal_rough` (roughness in green, metal in blue) and `normal` -> the encoded image.
-    """
-
-    mesh: Unwrapped
-    images: Mapping[str, bytes] = field(default_factory=dict)
-
-
 def glb_bytes(mesh: Unwrapped, name: str, color: Any = None) -> bytes:
     """A mesh as glb with a plain material, or with `color`, a PIL image, as its base colour."""
     material = trimesh.visual.material.PBRMaterial(
@@ -92,8 +77,8 @@ def glb_bytes(mesh: Unwrapped, name: str, color: Any = None) -> bytes:
     return bytes(scene.export(file_type="glb"))
 
 
-def read_glb(path: Path) -> PaintedMesh:
-    """The triangles and images of a glb.
+def read_glb(path: Path) -> tuple[Unwrapped, dict[str, bytes]]:
+    """The triangles of a glb, and `color`, `metal_rough` (roughness in green, metal in blue) and `normal` -> image.
 
     Several primitives are one mesh if they have one material; node transforms are applied. Raises ValueError that names
     the file for a damaged one, several materials, images that cannot be read, compression, and links to other files.
@@ -101,7 +86,7 @@ def read_glb(path: Path) -> PaintedMesh:
     content = read_file(path)
     tree = _checked(path, content)
     mesh = _unwrapped(path, content, "glb", merge_primitives=False)
-    return PaintedMesh(mesh, _images(path, tree, content))
+    return mesh, _images(path, tree, content)
 
 
 def _images(path: Path, tree: dict[str, Any], content: bytes) -> dict[str, bytes]:

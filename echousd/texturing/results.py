@@ -30,28 +30,24 @@ class Result:
 
     Arguments:
         st: (t, 3, 2) float, where the job's triangles lie in the pictures.
-        images: `color`, perhaps `metal_rough` and `normal` -> name of a picture in `Results.pictures`.
+        images: `color`, perhaps `metal_rough` and `normal` -> name of a picture.
     """
 
     st: np.ndarray
     images: Mapping[str, str]
 
 
-@dataclass(frozen=True, eq=False)
-class Results:
-    """What came back: object name -> result, and name of a picture (with its ending) -> encoded image."""
-
-    objects: dict[str, Result]
-    pictures: Mapping[str, bytes]
+Results = tuple[dict[str, Result], dict[str, bytes]]
 
 
 def read_results(folder: Path, job: Job) -> Results:
-    """The results in a job's folder; objects without one are left out.
+    """What came back in a job's folder: object name -> result, and name of a picture (with its ending) -> image.
 
+    Objects without a result are left out.
     Raises ValueError that names the file or the object for results that cannot be used, and where there are none.
     """
     found = _one_picture(folder, job) if job.one_picture else _many_pictures(folder, job)
-    if not found.objects:
+    if not found[0]:
         place = (
             f"{RESULTS}/scene.png or {OUTPUTS}/*/vsd/*/texture_<step>.png"
             if job.one_picture
@@ -65,7 +61,7 @@ def _one_picture(folder: Path, job: Job) -> Results:
     """SceneTex: a picture of everything."""
     picture = _beside(folder, f"{RESULTS}/{SCENE}", IMAGES) or _last_step(folder)
     if picture is None:
-        return Results({}, {})
+        return {}, {}
     name, content = image_of(texture_bytes(str(picture)) or b"", str(picture), SCENE)
     objects = {}
     for number, thing in enumerate(job.objects):
@@ -78,7 +74,7 @@ def _one_picture(folder: Path, job: Job) -> Results:
             st = _aligned(given, back, thing)
         # Its pictures' first and last texels lie on the borders 0 and 1, and not half a texel inside.
         objects[thing.name] = Result((st * (job.resolution - 1) + 0.5) / job.resolution, {"color": name})
-    return Results(objects, {name: content})
+    return objects, {name: content}
 
 
 def _aligned(given: Unwrapped, back: Unwrapped, thing: JobObject) -> np.ndarray:
@@ -96,11 +92,10 @@ def _many_pictures(folder: Path, job: Job) -> Results:
             folder, f"{RESULTS}/glbs/{thing.name}", (".glb",)
         )
         if mesh is not None:
-            painted = read_glb(mesh)
-            if "color" not in painted.images:
+            back, raw = read_glb(mesh)
+            if "color" not in raw:
                 raise ValueError(f"object {thing.name!r}: {mesh} has no base colour image")
-            st, raw = _aligned(job_mesh(folder, thing), painted.mesh, thing), dict(painted.images)
-            source = str(mesh)
+            st, source = _aligned(job_mesh(folder, thing), back, thing), str(mesh)
         else:
             picture = _beside(folder, f"{RESULTS}/{thing.name}", IMAGES)
             if picture is None:
@@ -119,7 +114,7 @@ def _many_pictures(folder: Path, job: Job) -> Results:
             images[slot], encoded = image_of(content, f"{source} ({slot})", stem)
             pictures[images[slot]] = encoded
         objects[thing.name] = Result(st, images)
-    return Results(objects, pictures)
+    return objects, pictures
 
 
 def image_of(content: bytes, where: str, stem: str) -> tuple[str, bytes]:

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -42,34 +42,28 @@ class Block:
     points: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
-class Drawing:
-    """Lines, symbols and (text, (2) where) labels of a drawing."""
-
-    strokes: Sequence[Stroke]
-    blocks: Sequence[Block] = ()
-    labels: Sequence[tuple[str, np.ndarray]] = ()
-    ignored: Counter[str] = field(default_factory=Counter)
-
-
 def meaning(*words: str) -> str:
     """What a layer's or block's names say that it is: window, door, passage, piece, wall, room or nothing."""
     return kind_of("drawings", " ".join(words).lower().replace("_", " ").replace("-", " ")) or ""
 
 
-def found_in(drawing: Drawing, axes: np.ndarray, frame: str) -> Found:
-    """What a drawing shows; raises `GraphError` where it has neither outlines of rooms nor walls that enclose any."""
+def found_in(
+    strokes: Sequence[Stroke], blocks: Sequence[Block], labels: Sequence[tuple[str, np.ndarray]], axes: np.ndarray,
+    frame: str, ignored: Counter[str],
+) -> Found:  # fmt: skip
+    """What a drawing shows by its lines, symbols and labels (text and (2,) where).
+
+    Raises `GraphError` where it has neither outlines of rooms nor walls that enclose any.
+    """
     kinds: dict[str, list[Stroke]] = {}
-    ignored = Counter(drawing.ignored)
-    for stroke in drawing.strokes:
+    for stroke in strokes:
         kind = meaning(stroke.layer)
         kinds.setdefault(kind, []).append(stroke)
         if not kind:
             ignored[f"lines on layer {stroke.layer or '0'!r}"] += 1
-    labels = [(text, axes @ where) for text, where in drawing.labels]
-    rooms = list(_rooms(kinds, labels, axes))
+    rooms = list(_rooms(kinds, [(text, axes @ where) for text, where in labels], axes))
     if not rooms:
-        layers = Counter(stroke.layer or "0" for stroke in drawing.strokes)
+        layers = Counter(stroke.layer or "0" for stroke in strokes)
         told = ", ".join(f"{name} ({count})" for name, count in layers.most_common(6)) or "none"
         raise GraphError(
             f"no rooms; layers: {told}; allowed: closed lines on a layer such as 'room', or lines that "
@@ -78,16 +72,16 @@ def found_in(drawing: Drawing, axes: np.ndarray, frame: str) -> Found:
     holes = [
         Hole(f"{kind}_{number + 1}", kind, ends, tips=tips)
         for kind in ("door", "passage", "window")
-        for number, (ends, tips) in enumerate(_holes(kinds.get(kind, ()), drawing.blocks, kind, axes))
+        for number, (ends, tips) in enumerate(_holes(kinds.get(kind, ()), blocks, kind, axes))
     ]
     pieces = []
-    symbols = [b for b in drawing.blocks if meaning(b.layer, b.name) in ("piece", "") and len(b.points)]
+    symbols = [b for b in blocks if meaning(b.layer, b.name) in ("piece", "") and len(b.points)]
     for block in [*symbols, *(Block(s.layer, s.name, s.points) for s in kinds.get("piece", ()) if s.closed)]:
         middle, along, width, deep = long_sides(block.points @ axes.T)
         if min(width, deep) > 0.05:
             at, size = np.array([middle[0], 0.0, middle[1]]), np.array([width, np.nan, deep])
             pieces.append(Piece(block.name, (block.name,), at, np.array([-along[1], along[0]]), size, sides=4))
-    lines = [stroke.points @ axes.T for stroke in drawing.strokes]
+    lines = [stroke.points @ axes.T for stroke in strokes]
     return Found(frame, rooms, holes, pieces, lines=lines, ignored=ignored)
 
 
@@ -187,7 +181,7 @@ def read_dxf(path: Path, unit: float | None) -> Found:
         if len(strokes) > MOST:
             raise GraphError(f"more than {MOST} lines, allowed: that many")
     told = f"{scale:g} m a unit ({'as told' if unit is not None else 'as the file says'}), x is east, y north"
-    return found_in(Drawing(strokes, blocks, labels, ignored), MAP, told)
+    return found_in(strokes, blocks, labels, MAP, told, ignored)
 
 
 DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
@@ -237,7 +231,8 @@ def read_svg(content: bytes, unit: float | None) -> Found:
     walk(shown, "")
     if len(strokes) > MOST:
         raise GraphError(f"more than {MOST} lines, allowed: that many")
-    return found_in(Drawing(strokes, (), labels), SCREEN, f"{unit:g} m a unit (as told), up of the picture is north")
+    told = f"{unit:g} m a unit (as told), up of the picture is north"
+    return found_in(strokes, (), labels, SCREEN, told, Counter())
 
 
 INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}label"

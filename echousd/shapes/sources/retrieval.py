@@ -156,20 +156,20 @@ def retrieved(
     size = np.asarray(boxes.size, float)
     with (timer or StageTimer()).stage("assets"):
         tones = np.array([linear(color) for color in HARMONIES[palette or palette_of_room(seed, graph.room.style)]])
-        found = choose(
+        chosen, missing = choose(
             asked, _asked(graph, wanted, size, styles), seed, kept=given.chosen, nearness=nearness, palette=tones
         )
         files, sizes = dict(given.files), dict(given.sizes)
         for i in wanted:
             node = graph.nodes[i]
-            record = found.chosen.get(node.name)
+            record = chosen.get(node.name)
             if record is None or node.name in given.chosen:
                 continue
             assert asked.library is not None
             files[node.name] = library_file(asked.library, record)
             if not fits(record, size[i], asked.stretch) and node.size is None:
                 sizes[node.name] = record.dims
-    return Retrieved(found.chosen, files, sizes, tuple(found.missing), asked.collect)
+    return Retrieved(chosen, files, sizes, tuple(missing), asked.collect)
 
 
 def _asked(graph: SceneGraph, rows: list[int], size: np.ndarray, styles: Mapping[str, str]) -> list[Asked]:

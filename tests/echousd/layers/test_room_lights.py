@@ -14,7 +14,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.graph import RoomSpec
-from echousd.layers.cameras import room_volume
+from echousd.layers.cameras import room_points
 from echousd.layers.lights import ASIDE, ELEVATION, image_files, write_lights
 from echousd.options import RoomOptions
 from echousd.stage.pen import Pen
@@ -169,7 +169,8 @@ def lights_of(graph) -> Usd.Stage:
     options = RoomOptions(walls=True, ceiling=False, dress="none")
     room = echousd.generate(graph, model=StandIn(), place=False, shapes="boxes", options=options)
     stage = Usd.Stage.CreateInMemory()
-    write_lights(Pen(stage.GetRootLayer()), room, room_volume(room))
+    points = room_points(room)
+    write_lights(Pen(stage.GetRootLayer()), room, np.array([points.min(0), points.max(0)]))
     return stage
 
 

@@ -16,11 +16,11 @@ def room(tmp_path_factory):
 
 
 def test_packages_hold_everything_that_simready_asks_for(room, tmp_path):
-    done = pack(room, tmp_path, author="A Person")
-    assert {path.stem for path in done.layers} == {"bed", "nightstand", "lamp", "pendant", "wardrobe"}
-    assert [sentence.partition(":")[0] for sentence in done.hangs] == ["pendant"]
-    assert done.left == ()
-    for path in done.layers:
+    layers, left, hangs = pack(room, tmp_path, author="A Person")
+    assert {path.stem for path in layers} == {"bed", "nightstand", "lamp", "pendant", "wardrobe"}
+    assert [sentence.partition(":")[0] for sentence in hangs] == ["pendant"]
+    assert left == []
+    for path in layers:
         assert path == tmp_path / path.stem / "usd" / f"{path.stem}.usda"
         assert {file.name for file in path.parent.iterdir()} == {".thumbs", f"{path.stem}.usda", "payload"}
         assert (path.parent / f".thumbs/256x256/{path.name}.png").read_bytes()[:4] == b"\x89PNG"

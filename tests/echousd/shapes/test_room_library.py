@@ -270,17 +270,15 @@ def test_objects_of_a_set_share_a_model_and_others_do_not_repeat(tmp_path):
     library = read_library(index([tmp_path / "models"], tmp_path / "lib.parquet").file)
     wishes = AssetWishes(library)
     alone = [Asked(f"chair_{i}", "armchair", "room", (0.8, 0.9, 0.8)) for i in range(3)]
-    assert len({record.id for record in choose(wishes, alone, 1).chosen.values()}) == 3
+    assert len({record.id for record in choose(wishes, alone, 1)[0].values()}) == 3
     together = [Asked(f"chair_{i}", "armchair", "oak", (0.8, 0.9, 0.8), "chair_0") for i in range(3)]
-    assert len({record.id for record in choose(wishes, together, 1).chosen.values()}) == 1
-    found = {choose(wishes, alone[:1], seed).chosen["chair_0"].id for seed in range(12)}
+    assert len({record.id for record in choose(wishes, together, 1)[0].values()}) == 1
+    found = {choose(wishes, alone[:1], seed)[0]["chair_0"].id for seed in range(12)}
     assert len(found) > 1  # the seed decides among equally good ones
     near = {"chair_0": {"armchair_b.obj": 0.0, "armchair_a.obj": 2.0, "armchair_c.obj": 2.0}}
-    assert all(
-        choose(wishes, alone[:1], seed, nearness=near).chosen["chair_0"].id == "armchair_b.obj" for seed in range(5)
-    )
-    assert choose(wishes, [Asked("bed", "double_bed", "room", (1.8, 1, 2))], 0).missing == ["bed"]
-    assert choose(wishes, [Asked("seat", "lounge_chair", "room", (0.8, 0.9, 0.8))], 0).chosen  # kin of an armchair
+    assert all(choose(wishes, alone[:1], seed, nearness=near)[0]["chair_0"].id == "armchair_b.obj" for seed in range(5))
+    assert choose(wishes, [Asked("bed", "double_bed", "room", (1.8, 1, 2))], 0)[1] == ["bed"]
+    assert choose(wishes, [Asked("seat", "lounge_chair", "room", (0.8, 0.9, 0.8))], 0)[0]  # kin of an armchair
 
 
 def test_a_lamp_for_tables_does_not_hang_and_nobody_dines_at_a_coffee_table(tmp_path):
@@ -294,9 +292,9 @@ def test_a_lamp_for_tables_does_not_hang_and_nobody_dines_at_a_coffee_table(tmp_
         Asked("board", "dining_table", "room", (1.8, 0.5, 1.2)),
         Asked("seat", "chair", "room", (0.42, 0.6, 0.45)),
     ]
-    choice = choose(wishes, asked, 0)
-    assert choice.missing == ["pendant", "board"]  # the project's own programs make them
-    assert choice.chosen["seat"].id == "chair.obj"  # though the box is nearer to the folded one
+    chosen, missing = choose(wishes, asked, 0)
+    assert missing == ["pendant", "board"]  # the project's own programs make them
+    assert chosen["seat"].id == "chair.obj"  # though the box is nearer to the folded one
 
 
 def test_words_say_what_models_shall_be_like(tmp_path):
@@ -311,5 +309,5 @@ def test_words_say_what_models_shall_be_like(tmp_path):
     asked = [Asked("chair", "armchair", "room", (0.8, 0.9, 0.8))]
     for word in ("oak", "steel"):
         wishes = AssetWishes(library, text=f"mid-century {word}", encoder=encoder)
-        found = {choose(wishes, asked, seed).chosen["chair"].id for seed in range(6)}
+        found = {choose(wishes, asked, seed)[0]["chair"].id for seed in range(6)}
         assert found == {f"armchair_{word}.obj"}
