@@ -344,8 +344,10 @@ def hung_up(setting: Setting) -> None:
             seat = corners[corners[:, 1] < h / 2, 1].max()  # of a bench or a board for shoes
             size[1] = min(size[1], hooks - seat - 0.02)
             count, high = max(1, int((w - 0.04) / size[0])), hooks - float(size[1])
-            panel = ((corners[:, 1] > 0.6 * h) & (corners[:, 2] < -0.4 * d)).any()  # else a rail on posts, open behind
-            z = -d / 2 + 0.03 + float(size[2]) / 2 if panel else 0.0
+            if ((corners[:, 1] > 0.6 * h) & (corners[:, 2] < -0.4 * d)).any():  # a panel, else a rail on posts
+                z = -d / 2 + 0.03 + float(size[2]) / 2
+            else:
+                size[2], z = max(size[2], d - 0.16), 0.0
         else:
             size[0] = min(size[0], w - 0.1)
             count, high, z = 1, 0.86 * h - float(size[1]), d / 2 - 0.02

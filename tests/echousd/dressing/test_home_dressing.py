@@ -71,6 +71,17 @@ def test_coats_hang_on_racks_and_towels_on_rungs(word, kind, least):
             assert abs(thing.position[0]) + thing.size[0] / 2 < host.size[0] / 2 + 0.01
 
 
+def test_coats_hang_near_the_wall_on_deep_racks_too(monkeypatch):
+    monkeypatch.setitem(SIZES, "coat_rack", (1.1, 1.8, 0.5))
+    deep = set()
+    for seed in range(12):
+        room = setting("coat_rack", seed=seed)
+        walls.hung_up(room)
+        assert max(thing.position[2] - thing.size[2] / 2 for thing in room.placed) + 1.5 < 0.1
+        deep |= {thing.size[2] > 0.2 for thing in room.placed}
+    assert deep == {False, True}  # before a panel, on a rail
+
+
 def test_curtains_keep_clear_of_the_coats_on_a_rack():
     met = 0
     for seed, offset in itertools.product(range(6), np.linspace(0.3, 2.6, 12)):
