@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from echomodel.boxes import Boxes
 from echomodel.objective.plan import plan_of
+from echomodel.objective.support import ON_CEILING
 from echomodel.roomboxes import footprints
 from echomodel.rules.geometry import Spread
 from echomodel.triangles import Mesh, connected_pieces
@@ -104,11 +105,13 @@ class Scene:
         return out
 
     def guests(self, mover: int, other: int) -> list[int]:
-        """Free things that attend a thing, but for seats that look as another one does."""
+        """Free things that attend a thing or hang over it, but for seats that look as another one does."""
         around = self.anchor == mover
         if other < len(around):
             around &= ~self.seat | (np.cos(self.heading - self.heading[other]) < ALIKE)
-        return [k for k in np.flatnonzero(around).tolist() if not self.fixed[k]]
+        lamps = self.carrier == ON_CEILING
+        lamps[lamps] = shapely.contains(self.outline[mover], shapely.centroid(np.array(self.outline)[lamps]))
+        return [k for k in np.flatnonzero(around | lamps).tolist() if not self.fixed[k]]
 
     def space(self, group: Sequence[int], moves: np.ndarray, gap: float, *, pushing: bool = False) -> BaseGeometry:
         """Further moves (x, z) of a group at which it is clear of everything by `gap` metres and stays on the floor.
@@ -138,7 +141,7 @@ class Scene:
             for other in self.near(one, trial, 0.0):
                 free = other not in out and not self.fixed[other]
                 if free and depth(self.forbidden((one, other)), trial[one] - trial[other]) > 0.0:
-                    out += [each for each in self.carried(other) if each not in out]
+                    out = self.carried(*out, other)
         return out
 
     def price(self, mover: int, way: np.ndarray) -> float:
@@ -212,9 +215,8 @@ def _level(solids: Solids) -> BaseGeometry:
 
 def _boards(mesh: Mesh) -> Solids:
     """Points of the connected pieces of a mesh."""
-    faces, points = mesh.faces, mesh.vertices
-    board = connected_pieces(faces, len(points))
-    return [points[np.unique(faces[board == number])] for number in range(int(board.max()) + 1)]
+    board = connected_pieces(mesh.faces, len(mesh.vertices))
+    return [mesh.vertices[np.unique(mesh.faces[board == number])] for number in range(int(board.max()) + 1)]
 
 
 def _placed(points: np.ndarray, position: np.ndarray, yaw: float) -> np.ndarray:
@@ -264,13 +266,12 @@ def cleared(
             moves = _onto_top(scene, graph, boxes, moves, one, holds)
     stuck: set[tuple[int, int]] = set()
     for _ in range(ROUNDS * max(len(graph.nodes), 1)):
-        hits = [(pair, deep) for pair, deep in scene.overlaps(moves, DEEP) if pair not in stuck]
+        hits = [pair for pair, _ in scene.overlaps(moves, DEEP) if pair not in stuck]
         if not hits:
             break
-        pair = hits[0][0]
-        found = _moved_apart(scene, graph, boxes, floor, moves, pair, holds)
+        found = _moved_apart(scene, graph, boxes, floor, moves, hits[0], holds)
         if found is None:
-            stuck.add(pair)
+            stuck.add(hits[0])
         else:
             moves = found
     left = tuple(Collision(scene.names[i], scene.names[k], deep) for (i, k), deep in scene.overlaps(moves, DEEP))
@@ -329,9 +330,10 @@ def _trials(
     `together`: those who attend it go with it, but for those at the side of the other one.
     """
     for mover, other in (pair, pair[::-1]):
+        if scene.fixed[mover]:
+            continue
         guests = scene.guests(mover, other) if together else []
-        asked = not scene.fixed[mover] and (guests or not together)
-        groups = [scene.carried(mover, *guests)] if asked else []
+        groups = [scene.carried(mover, *guests)] if guests or not together else []
         for group in groups:
             if other in group:
                 continue
@@ -366,7 +368,7 @@ def _with_partners(scene: Scene, graph: SceneGraph, group: list[int], broken: se
         for name in (one.subject, one.object) if isinstance(one, Relation) else (one.subject, *one.others):
             number = graph.names.index(name)
             if number not in out and not scene.fixed[number]:
-                out += [one for one in scene.carried(number) if one not in out]
+                out = scene.carried(*out, number)
     return out
 
 

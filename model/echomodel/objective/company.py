@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from echomodel.arrays import Array, at_least, full, held, kit, least_of, pairs_in, put, rows, sum_of
+from echomodel.arrays import Array, at_least, full, held, kit, least_of, norm, pairs_in, put, rows, sum_of
 from echomodel.boxes2d import turned
 from echomodel.floors import footprint
 from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, joined, nobody
@@ -34,12 +34,13 @@ def seat_faces(plan: Plan) -> Found:
     i, j = plan.attended("at")
     if not len(i):
         return nobody(plan.size)
-    away, xp = plan.kit.stack(plan.nearest_point(i, j), -1), plan.kit
-    square = held(away * away).sum(1)
-    looks = (square < NEAR_TABLE**2) & ~plan.solid[i]  # stools have no front
-    i, j, away, inside = i[looks], j[looks], away[looks], square[looks] < 1e-6
-    centre, edge = plan.local(j, i), turned(away, plan.yaw[j] - plan.yaw[i])
-    off = facing_angle(xp.where(inside, centre[0], edge[:, 0]), xp.where(inside, centre[1], edge[:, 1]))
+    off, xp = plan.kit.stack(plan.local(i, j), -1), plan.kit
+    out = abs(off) - plan.size[j, ::2] / 2
+    most = xp.amax(held(out), 1)[:, None]  # who is pushed under it came from the side where this is
+    away = xp.where(most > 1e-3, -xp.sign(held(off)) * at_least(out, 0.0), -off * (held(out) >= most))
+    looks = (norm(at_least(held(out), 0.0)) < NEAR_TABLE) & ~plan.solid[i]  # stools have no front
+    i, j, away = i[looks], j[looks], away[looks]
+    off = facing_angle(*turned(away, plan.yaw[j] - plan.yaw[i]).T)
     return found(i, LOOK - off, other=j, measure=xp.rad2deg(off))
 
 

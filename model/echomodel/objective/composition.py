@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from echomodel.arrays import Array, at_least, at_most, full, held, least_of, norm, rows, sum_of
-from echomodel.floors import signed_distance
+from echomodel.floors import signed_area, signed_distance
 from echomodel.objective.company import AROUND, BESIDE, Seats, first_of, seats_at
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
 from echomodel.sizes import REACH, filled_area
@@ -31,50 +31,49 @@ def bare_limit(area: float, count: int) -> float:
 def floor_used(plan: Plan) -> Found:
     """No large part of the floor is bare while the pieces stand close elsewhere; the nearest one is told."""
     out, xp = nobody(plan.size), plan.kit
-    for scenes, area, points, walls in floor_points(plan):
-        there, far, gap = floor_gaps(plan, scenes, points)
+    for area, _, there, points, walls, gap in floor_gaps(plan):
         row = int(plan.stands("row")[there[0]].sum())  # a row of units is one piece
         limit = bare_limit(area, there.shape[1] - max(row - 1, 0))
-        inner = rows(walls[far] > limit)
+        inner = rows(walls > limit)
         if not len(inner):  # no circle of that size fits in
             continue
-        radius = xp.minimum(gap[:, inner], walls[far[inner]])
+        radius = xp.minimum(gap[:, inner], walls[inner])
         at = held(radius).argmax(1)
         most = radius[xp.arange(len(at)), at]
-        out = joined(out, found(_nearest(plan, there, points[far[inner[at]]]), limit - most, measure=2 * most))
+        out = joined(out, found(_nearest(plan, there, points[inner[at]]), limit - most, measure=2 * most))
     return out
 
 
 def floor_points(plan: Plan) -> list[tuple[Array, float, Array, Array]]:
     """For rooms of one floor: their numbers (s,), its area, points (P, 2) on it, and their distance to walls (P,)."""
-    kept: list[tuple[Array, float, Array, Array]] = vars(plan.first).setdefault("floor_points", [])
+    kept: list[tuple[float, Array, Array]] = vars(plan.first).setdefault("floor_points", [])
     if not kept:
-        for scenes, polygon, _ in plan.first.rooms:
-            x, z = polygon.T
-            area = float(abs(x @ np.roll(z, -1) - z @ np.roll(x, -1)) / 2)
+        for _, polygon, _ in plan.first.rooms:
+            area = abs(float(signed_area(polygon[None])[0]))
             low, high = polygon.min(0), polygon.max(0)
             cell = max(CELL, math.sqrt(float(np.prod(high - low)) / POINTS))
             xs, zs = (np.arange(a + cell / 2, b, cell) for a, b in zip(low, high, strict=True))
             points = plan.numbers(np.stack(np.meshgrid(xs, zs), -1).reshape(-1, 2).tolist())
             walls = signed_distance(points[None], plan.numbers(polygon.tolist())[None])[0]
-            kept.append((scenes, area, points[walls > 0], walls[walls > 0]))
-    rooms = zip(plan.rooms, kept, strict=True)
-    return [(scenes, area, points, walls) for (scenes, *_), (_, area, points, walls) in rooms]
+            kept.append((area, points[walls > 0], walls[walls > 0]))
+    return [(scenes, *of) for (scenes, _, _), of in zip(plan.rooms, kept, strict=True)]
 
 
-def floor_gaps(plan: Plan, scenes: Array, points: Array) -> tuple[Array, Array, Array]:
-    """How far points (P, 2) lie from the pieces of rooms (s,), one after the other, of one floor.
+def floor_gaps(plan: Plan) -> list[tuple[float, int, Array, Array, Array, Array]]:
+    """How far the floor lies from the pieces, for rooms (s,), one after the other, of one floor.
 
-    Returns (s, n) int64, the pieces. (q,) int64, numbers of the points that count: in copies of one room not those near
-    to what stands alike in all. (s, q) float, metres to the nearest piece.
+    Returns its area, how many points it has, (s, n) int64, the pieces, (q, 2) the points that count: in copies of one
+    room not those near to what stands alike in all, (q,) metres to the walls, and (s, q) to the nearest piece.
     """
-    kept: dict[int, tuple[Array, Array, Array]] = vars(plan).setdefault("floor_gaps", {})
-    asked = int(scenes[0])
-    if asked not in kept:
-        here = (plan.scene >= asked) & (plan.scene <= int(scenes[-1]))
-        there = plan.those(here & plan.standing & (plan.size[:, 1] > CLEAR_HEIGHT)).reshape(len(scenes), -1)
-        kept[asked] = there, *_far_points(plan, there, points)
-    return kept[asked]
+    kept: dict[str, list[tuple[float, int, Array, Array, Array, Array]]] = vars(plan)
+    if "floor_gaps" not in kept:
+        kept["floor_gaps"] = []
+        for scenes, area, points, walls in floor_points(plan):
+            here = (plan.scene >= int(scenes[0])) & (plan.scene <= int(scenes[-1]))
+            there = plan.those(here & plan.standing & (plan.size[:, 1] > CLEAR_HEIGHT)).reshape(len(scenes), -1)
+            far, gap = _far_points(plan, there, points)
+            kept["floor_gaps"].append((area, len(points), there, points[far], walls[far], gap))
+    return kept["floor_gaps"]
 
 
 def _far_points(plan: Plan, there: Array, points: Array) -> tuple[Array, Array]:
@@ -121,6 +120,7 @@ FENCE = 0.03  # metres between two chairs of one side: 95 % of real ones
 EASY = 0.6  # metres of edge a seat that are enough for anybody: DIN 68880
 SEAT = 0.7  # metres that a side needs before it to seat somebody
 BEYOND, CORNER = 0.1, 0.1  # metres that a seat may reach beyond its side of a table, and more beyond one end of it
+ALONE = 0.3  # share of a side of a table that who sits there alone may be beside its middle: 90 % of real ones
 WORKPLACE = 1.0  # metres between the middles of two who work
 OPENS = 0.55  # metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it
 FACED = 0.3  # share of a wardrobe's width from which on something is before it
@@ -138,16 +138,14 @@ def served_limit(area: float, width: Array, depth: Array) -> float:
 def floor_served(plan: Plan) -> Found:
     """Furniture serves the whole floor: no more of it lies far from everything than so much furniture must leave."""
     out = nobody(plan.size)
-    for scenes, area, points, _ in floor_points(plan):
-        there, far, gap = floor_gaps(plan, scenes, points)
-        if not len(far):
+    for area, count, there, points, _, gap in floor_gaps(plan):
+        if not len(points):
             continue
         size = held(plan.size[there[0]])
         row = plan.stands("row")[there[0]]  # whose neighbours fill what is beside each
-        share = ((gap - SERVED + SOFT) / (2 * SOFT)).clip(0.0, 1.0).sum(1) / len(points)
+        share = ((gap - SERVED + SOFT) / (2 * SOFT)).clip(0.0, 1.0).sum(1) / count
         margin = served_limit(area, size[:, 0] - 2 * REACH * row, size[:, 2]) - share
-        farthest = points[far[held(gap).argmax(1)]]
-        out = joined(out, found(_nearest(plan, there, farthest), margin, measure=100.0 * share))
+        out = joined(out, found(_nearest(plan, there, points[held(gap).argmax(1)]), margin, measure=100.0 * share))
     return out
 
 
@@ -201,16 +199,17 @@ def chairs_balanced(plan: Plan) -> Found:
 
 
 def bench_fits(plan: Plan) -> Found:
-    """A seat stands within its side of a table, a bench along one that is as long as it, with no end to it."""
+    """A seat stands within its side of a table, before its middle if alone; a bench along one that is as long as it."""
     seats, xp = seats_at(plan), plan.kit
     if not len(seats.i):
         return nobody(plan.size)
     half_width, half_depth = plan.reach(seats.i, seats.j)
     own = 2 * xp.where(seats.ahead, half_width, half_depth)
     side = xp.where(seats.ahead, plan.size[seats.j, 0], plan.size[seats.j, 2])
-    beyond = (abs(seats.along) + (own - side) / 2) * ~plan.solid[seats.i]  # a stool stands anywhere
-    measures = [own - side, plan.size[seats.i, 0] - own, beyond]
-    margins = [BEYOND - measures[0], BEYOND - measures[1], BEYOND + CORNER - beyond]
+    aside = abs(seats.along) * ~plan.solid[seats.i]  # a stool stands anywhere
+    most = xp.where(seats.count == 1, ALONE * side, (side - own) / 2 + BEYOND + CORNER)
+    measures = [own - side, plan.size[seats.i, 0] - own, aside]
+    margins = [BEYOND - measures[0], BEYOND - measures[1], most - aside]
     return first_of(seats.i, seats.j, margins, measures)
 
 
@@ -247,11 +246,7 @@ def _free_beside(plan: Plan, who: Array) -> Array:
 def workers_apart(plan: Plan) -> Found:
     """Two who work at desks of their own sit apart from each other."""
     sits = plan.stands("at") & plan.of("seat") & (plan.anchor >= 0) & (plan.of("board") & plan.works)[plan.anchor]
-    chairs = plan.those(sits)
-    if len(chairs) < 2:
-        return nobody(plan.size)
-    row, k = plan.beside(chairs, sits)
-    i = chairs[row]
+    i, k = plan.pairs(sits, sits)
     keep = (i < k) & (plan.anchor[i] != plan.anchor[k])
     i, k = i[keep], k[keep]
     apart = norm((plan.position[i] - plan.position[k])[:, ::2])

@@ -165,10 +165,9 @@ def seat_room(plan: Plan) -> Found:
     block = (plan.of("sofa", "light", "decor", "storage", "bed") | plan.stands("company", "beside")) & plan.standing
     close = _clear(plan, _loungers(plan), block, ROOM, -FAR, kin=True)
     tables = plan.stands("before") & plan.standing  # which a second sofa, an armchair or an ottoman does not touch
-    others = plan.stands("with") | (plan.stands("company", "foot") & plan.of("seat"))
-    i, j = plan.pairs(others & plan.standing, tables, least=True)
-    one, sofa = plan.pairs(plan.stands("company") & plan.of("seat") & plan.standing, plan.of("sofa") & plan.standing,
-                           least=True)  # fmt: skip
+    chairs, ottomans = (plan.stands(word) & plan.of("seat") & plan.standing for word in ("company", "foot"))
+    i, j = plan.pairs((plan.stands("with") & plan.standing) | chairs | ottomans, tables, least=True)
+    one, sofa = plan.pairs(chairs, plan.of("sofa") & plan.standing, least=True)
     if not len(i) + len(one):
         return close
     lateral, forward = plan.local(one, sofa)

@@ -100,9 +100,12 @@ def screen_in_view(plan: Plan) -> Found:
 
 
 def screen_on_axis(plan: Plan) -> Found:
-    """A screen stands on the axis of the seat that looks at it; one that is out of its view is told of for that."""
+    """A screen and its stand are on the axis of the seat that looks at it; one out of its view is told of for that."""
     seen, ahead, _, _ = _watched(plan)
-    screen, viewer = seen.who[ahead], seen.other[ahead]
+    screen, viewer, xp = seen.who[ahead], seen.other[ahead], plan.kit
+    carried = plan.those(plan.of("screen") & (plan.carrier >= 0))
+    at, k = pairs_in(plan.carrier[carried][None] == screen[:, None])
+    screen, viewer = xp.concat([screen, carried[k]]), xp.concat([viewer, viewer[at]])
     aside = abs(plan.local(screen, viewer)[0])
     return found(screen, ON_AXIS - aside, other=viewer, measure=aside)
 

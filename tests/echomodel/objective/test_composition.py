@@ -198,11 +198,18 @@ def test_no_bench_lies_across_the_end_of_its_table(length, margin):
 
 @pytest.mark.parametrize(("along", "margin"), [(0.6, 0.04), (0.68, -0.04)])  # 0.16 and 0.24 m beyond the corner
 def test_nobody_sits_at_the_corner_of_a_table(along, margin):
-    found = seen(composition.bench_fits, seated(((along, 0.65), np.pi)))
-    assert found[0] == {1: pytest.approx(margin)}
-    assert found[1].measure.tolist() == [pytest.approx(along + 0.21 - 0.65)]
+    found = seen(composition.bench_fits, seated(((along, 0.65), np.pi), ((-0.4, 0.65), np.pi)))
+    assert found[0][1] == pytest.approx(margin)
+    assert found[1].measure.tolist()[0] == pytest.approx(along)
     stool = ("stool", (0.4, 0.45, 0.4), (0.8, 0.6), 0.0)
     assert seen(composition.bench_fits, [*seated(), stool])[0][1] > 0  # which has no front
+
+
+@pytest.mark.parametrize(("aside", "margin"), [(0.2, 0.07), (0.36, -0.09)])
+def test_who_sits_alone_at_the_end_of_a_table_sits_before_its_middle(aside, margin):
+    found, rows, _ = seen(composition.bench_fits, seated(((0.85, aside), -HALF), ((-0.85, 0.0), HALF)))
+    assert found[1] == pytest.approx(margin)
+    assert rows.measure.tolist()[0] == pytest.approx(aside)
 
 
 @pytest.mark.parametrize(("back", "margin"), [(0.05, 0.1), (0.35, -0.2)])

@@ -126,8 +126,19 @@ FAULTS = [
     (LIVING.moved("stand", yaw=0.0), ("stand", "screen_in_view"), "stand is turned by 180 degrees away from sofa"),
     (LIVING.moved("stand", at=(1.6, 1.78)), ("stand", "screen_in_view"), "26 degrees off where sofa looks"),
     (LIVING.moved("stand", at=(0.8, 1.78)), ("stand", "screen_on_axis"), "stand stands 0.80 m beside the axis of sofa"),
+    (
+        Room(
+            {
+                **LIVING.things,
+                "tv": {"kind": "tv", "size": (1.0, 0.6, 0.1), "at": (-0.65, 1.78), "up": 0.5, "yaw": np.pi},
+            }
+        ),
+        ("tv", "screen_on_axis"),
+        "tv stands 0.65 m beside the axis of sofa",
+    ),
     (LIVING.moved("armchair", yaw=HALF), ("armchair", "lounger_faces"), "armchair turns its back on sofa"),
     (DINING.moved("chair", yaw=0.0), ("chair", "seat_faces"), "chair looks 180 degrees past table"),
+    (DINING.moved("chair", at=(0.5, 0.4), yaw=-HALF), ("chair", "seat_faces"), "chair looks 90 degrees past table"),
     (DINING.moved("chair", at=(0.3, 1.6)), ("chair", "seat_in_reach"), "chair stands 0.90 m from table"),
     (
         STUDY.moved("chair", at=(0.9, -1.1)),
@@ -242,8 +253,13 @@ MORE = [
      "a stands 1.60 m from b"),
 ]  # fmt: skip
 KEPT = [
+    (DINING.moved("chair", at=(0.5, 0.4)), ("chair", "seat_faces")),
     (LIVING.moved("armchair", at=(1.1, -0.3)), ("armchair", "seat_room")),
     (LIVING.moved("coffee", at=(-0.4, -0.4)), ("coffee", "table_before_sofa")),
+    (
+        with_one(LIVING, "tv", kind="tv", size=(1.0, 0.6, 0.1), at=(-0.4, 1.78), up=0.5, yaw=np.pi),
+        ("tv", "screen_on_axis"),
+    ),
     (LIVING.moved("coffee", at=(0.0, 0.0)), ("coffee", "table_before_sofa")),
     (with_one(SET, "bench", kind="bench", size=(1.2, 0.45, 0.4), at=(0.0, 0.8)), ("bench", "seat_in_reach")),
     (with_one(BENCH, "table", kind="dining_table", size=(0.8, 0.75, 0.8), at=(1.9, 1.4)), ("bench", "seat_in_reach")),

@@ -76,13 +76,14 @@ def test_a_table_goes_with_its_other_chairs_where_one_would_be_pushed_to_the_wal
         ("table", "dining_table", table_piece(), (0, 0, 1.4), 0.0, False),
         ("back", "dining_chair", chair_piece(), (0, 0, 1.6), np.pi, False),
         ("front", "dining_chair", chair_piece(), (0, 0, 1.105), 0.0, False),
+        ("lamp", "pendant_lamp", piece(board((0.3, 0.4, 0.3), (0, 0, 0))), (0, 1.8, 1.4), 0.0, False),
     )
     graph, boxes, geometry = room(*things)
     found, left = cleared(graph, boxes, geometry, FLOOR, walls=False)
     assert left == ()
     way = np.asarray(found.position) - np.asarray(boxes.position)
-    assert [bool(step.any()) for step in way] == [True, False, True]
-    assert way[0] == pytest.approx(way[2], abs=1e-6)
+    assert [bool(step.any()) for step in way] == [True, False, True, True]
+    assert way[[2, 3]] == pytest.approx(way[[0, 0]], abs=1e-6)
     assert not living_faults(graph, found, FLOOR)
     alone = (*things[0][:-1], True)
     graph, boxes, geometry = room(alone, *things[1:])
