@@ -347,7 +347,7 @@ def surface_points(surface: Shape, solid: Shape) -> np.ndarray:
     if not len(near):
         return np.zeros((0, 3))
     points = np.concatenate((surface.points[near].reshape(-1, 3), _scatter(surface.points, near, 4 * SAMPLES)))
-    points = points[_within(points, solid)]
+    points = points[(np.abs(_local(points, solid)) <= solid.size / 2).all(-1)]
     if len(points) <= SAMPLES:
         return points
     return points[np.random.default_rng(0).choice(len(points), SAMPLES, replace=False)]
@@ -364,10 +364,6 @@ def _local(points: np.ndarray, solid: Shape) -> np.ndarray:
     offset = points - solid.position
     plan = offset[..., [0, 2]] @ u.T
     return np.stack((plan[..., 0], offset[..., 1] - solid.size[1] / 2, plan[..., 1]), -1)
-
-
-def _within(points: np.ndarray, solid: Shape) -> np.ndarray:
-    return (np.abs(_local(points, solid)) <= solid.size / 2).all(-1)
 
 
 def _touches(triangles: np.ndarray, solid: Shape) -> np.ndarray:

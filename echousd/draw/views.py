@@ -182,9 +182,8 @@ def inside_view(
         hidden = CLEAR * hidden + (BEHIND * max(0.0, ASKANCE - before) if main is not None else 0.0)
         cost = WHOLE * cut + _shown(shades, views, halves) + hidden + touched
         cost = (cost + np.abs(PANS)[:, None, None] + 0.1 * np.arange(len(LENSES)) ** 4).ravel()
-        views = views.reshape(-1, 4, 4)
         eyes.append([
-            Shot(float(cost[n]), views[n // len(LENSES)], LENSES[n % len(LENSES)], points, blocked)
+            Shot(float(cost[n]), views.reshape(-1, 4, 4)[n // len(LENSES)], LENSES[n % len(LENSES)], points, blocked)
             for n in np.argsort(cost, kind="stable")[:TRIED]
         ])  # fmt: skip
     eyes = sorted(eyes, key=lambda shots: shots[0].cost)[:LOOKED]
