@@ -23,7 +23,7 @@ def hull_of(points: np.ndarray) -> Mesh | None:
     if hull.volume() < PLANE * np.ptp(points, axis=0).max() ** 3:
         return None
     mesh = hull.to_mesh64()
-    return Mesh(mesh.vert_properties, mesh.tri_verts.astype(int))
+    return Mesh(np.array(mesh.vert_properties), mesh.tri_verts.astype(int))  # views would be leaks in the end
 
 
 def convex_hull(points: np.ndarray) -> Mesh:

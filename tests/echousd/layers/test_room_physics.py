@@ -12,7 +12,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.layers.physics import CONTACT, WOODEN, write_asset_physics
 from echousd.shapes.colliders import collider, colliders_of
 from echousd.shapes.geometry import Collider, Geometry, Mass, Origin, Part
-from echousd.shapes.hulls import hull_volume, standing_hull
+from echousd.shapes.hulls import convex_hull, hull_volume, standing_hull
 from echousd.shapes.joinery import part_of, within_budget
 from echousd.shapes.matter import ballasted, mass_of, read_mass
 from echousd.shapes.meshing import box_mesh
@@ -145,3 +145,10 @@ def test_volume_of_a_hull():
     points = np.random.default_rng(3).normal(size=(40, 3))
     assert hull_volume(points) == pytest.approx(trimesh.convex.convex_hull(points).volume)
     assert hull_volume(points * [1, 0, 1]) == 0.0
+
+
+def test_a_hull_that_is_kept_keeps_nothing_of_manifold3d():
+    """It tells of leaks at the end of a program where anything still views its meshes."""
+    hull = convex_hull(np.random.default_rng(3).normal(size=(40, 3)))
+    assert hull.vertices.base is None
+    assert hull.faces.base is None
