@@ -20,7 +20,7 @@ PLANE = 1e-9  # share of the cube of their extent that the hull of points in one
 def hull_of(points: np.ndarray) -> Mesh | None:
     """The convex hull of points (n, 3) with exact corners, facing outwards; None of points in one plane."""
     hull = Manifold.hull_points(points).simplify(FINE)
-    if hull.volume() < PLANE * np.ptp(points, axis=0).max() ** 3:
+    if hull.volume() <= PLANE * np.ptp(points, axis=0).max() ** 3:
         return None
     mesh = hull.to_mesh64()
     return Mesh(np.array(mesh.vert_properties), mesh.tri_verts.astype(int))  # views would be leaks in the end

@@ -145,6 +145,7 @@ def test_volume_of_a_hull():
     points = np.random.default_rng(3).normal(size=(40, 3))
     assert hull_volume(points) == pytest.approx(trimesh.convex.convex_hull(points).volume)
     assert hull_volume(points * [1, 0, 1]) == 0.0
+    assert np.ptp(convex_hull(points[[0, 0, 0, 0]]).vertices, axis=0) == pytest.approx(1e-4)
 
 
 def test_a_hull_that_is_kept_keeps_nothing_of_manifold3d():
