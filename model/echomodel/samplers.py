@@ -1,7 +1,7 @@
 """What a denoiser is trained to predict, and samplers: from noise to a sample, any subset of nodes fixed at level 0.
 
-A sampler makes the steps of one run: `step(x, clean, start, end)` takes x (N, ...) from level `start` to level `end`,
-given the clean sample that the denoiser sees in it, which `predict(x, level)` returns for a noise level per node (N,).
+A sampler makes one step: it takes x (N, ...) from the strengths of one level to those of another, given the clean
+sample that the denoiser sees in it, which `predict(x, level)` returns for a noise level per node (N,).
 """
 
 from __future__ import annotations
@@ -28,13 +28,6 @@ def alpha_sigma(level: Array, objective: Objective) -> tuple[Array, Array]:
         return 1 - level, level
     xp, log_alpha = kit(level), -0.25 * level * level * (20.0 - 0.1) - 0.5 * level * 0.1
     return xp.exp(log_alpha), xp.sqrt(-xp.expm1(2 * log_alpha))
-
-
-def sampling_levels(steps: int) -> np.ndarray:
-    """Evenly spaced levels from 1 to 0: (steps + 1,) float64; raises ValueError for fewer than one step."""
-    if steps < 1:
-        raise ValueError(f"steps is {steps}, at least 1 is needed")
-    return np.linspace(1, 0, steps + 1)
 
 
 def expand(level: Array, like: Array) -> Array:
@@ -79,36 +72,29 @@ def output_from(clean: Array, noisy: Array, level: Array, objective: Objective, 
 
 
 Predict = Callable[[Array, Array], Array]
-Step = Callable[[Array, Array, float, float], Array]
+Strengths = tuple[float, float]  # of signal and noise at a level
+Step = Callable[..., Array]
 
 
-def ddim(objective: Objective, generator: Randomness | None = None) -> Step:
+def ddim(x: Array, clean: Array, start: Strengths, end: Strengths, generator: Randomness | None) -> Array:
     """Deterministic DDIM (Song et al. 2021, Eq. 12 with eta 0); with rectified flow this is the Euler method."""
-
-    def step(x: Array, clean: Array, start: float, end: float) -> Array:
-        (a, s), (b, r) = _strengths(start, objective), _strengths(end, objective)
-        return b * clean + r * (x - a * clean) / s
-
-    return step
+    (a, s), (b, r) = start, end
+    return b * clean + r * (x - a * clean) / s
 
 
-def ancestral(objective: Objective, generator: Randomness | None = None) -> Step:
+def ancestral(x: Array, clean: Array, start: Strengths, end: Strengths, generator: Randomness | None) -> Array:
     """DDPM ancestral sampling from the posterior q(x_s | x_t, x0) (Ho et al. 2020, Eq. 7)."""
-
-    def step(x: Array, clean: Array, start: float, end: float) -> Array:
-        (a, s), (b, r) = _strengths(start, objective), _strengths(end, objective)
-        ratio = a / b
-        between = s * s - ratio * ratio * r * r
-        mean = (ratio * r * r * x + b * between * clean) / (s * s)
-        if end == 0:
-            return mean
-        noise = cast(normal(x.shape, generator, device_of(x)), x)
-        return mean + math.sqrt(max(between, 0.0)) * r / s * noise
-
-    return step
+    (a, s), (b, r) = start, end
+    ratio = a / b
+    between = s * s - ratio * ratio * r * r
+    mean = (ratio * r * r * x + b * between * clean) / (s * s)
+    if r == 0:
+        return mean
+    noise = cast(normal(x.shape, generator, device_of(x)), x)
+    return mean + math.sqrt(max(between, 0.0)) * r / s * noise
 
 
-SAMPLERS: dict[Sampler, Callable[[Objective, Randomness | None], Step]] = {"ddim": ddim, "ancestral": ancestral}
+SAMPLERS: dict[Sampler, Step] = {"ddim": ddim, "ancestral": ancestral}
 
 
 def sample(
@@ -127,21 +113,23 @@ def sample(
     """
     if sampler not in SAMPLERS:
         raise ValueError(f"sampler is {sampler!r}, allowed: {', '.join(SAMPLERS)}")
-    step, times = SAMPLERS[sampler](objective, generator), sampling_levels(steps).tolist()
+    if steps < 1:
+        raise ValueError(f"steps is {steps}, at least 1 is needed")
     free = full(x, len(x), 1.0)
     fixed = None
     if known_mask is not None and known is not None:
         free = cast(~known_mask, x)
         fixed = expand(known_mask, x)
         x = kit(x).where(fixed, cast(known, x), x)
-    for number, (start, end) in enumerate(pairwise(times)):
-        moved = step(x, predict(x, free * start), start, end)
+    for number, (start, end) in enumerate(pairwise(np.linspace(1, 0, steps + 1).tolist())):
+        clean, before, after = predict(x, free * start), _strengths(start, objective), _strengths(end, objective)
+        moved = SAMPLERS[sampler](x, clean, before, after, generator)
         x = moved if fixed is None else kit(x).where(fixed, x, moved)
         if progress is not None:
-            progress(number + 1, len(times) - 1)
+            progress(number + 1, steps)
     return x
 
 
-def _strengths(level: float, objective: Objective) -> tuple[float, float]:
+def _strengths(level: float, objective: Objective) -> Strengths:
     alpha, sigma = alpha_sigma(level, objective)
     return float(alpha), float(sigma)

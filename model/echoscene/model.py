@@ -96,13 +96,7 @@ class GraphChange:
     touched: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Conditions:
-    """What the denoisers see of a graph: (N, .) float32 per node for each branch, (E, .) per edge or None."""
-
-    layout: Tensor
-    shape: Tensor | None
-    edge_attr: Tensor | None
+Conditions = tuple[Tensor, Tensor | None, Tensor | None]  # see `ReleasedModel.conditions`
 
 
 class ReleasedModel(GraphEncoder):
@@ -165,7 +159,7 @@ class ReleasedModel(GraphEncoder):
     def conditions(
         self, graph: SceneGraphTensors, change: GraphChange | None = None, generator: Randomness | None = None
     ) -> Conditions:
-        """What the denoisers are conditioned on.
+        """What the denoisers of layouts and of shapes see: (N, .) float32 per node each, and (E, .) per edge or None.
 
         `released`: the object embedding alone. The published code also runs encoder and manipulator and then
         overwrites their result, so an edit there is a fresh sample of the edited graph; `change` has no effect.
@@ -188,7 +182,7 @@ class ReleasedModel(GraphEncoder):
             added, touched = (change.added, change.touched) if change else ((), ())
             latent, _, _ = self.manipulate(latent, graph, added=added, touched=touched, generator=generator)
             nodes = torch.cat([nodes, latent], dim=1)
-        return Conditions(nodes, self.rel_s_mlp(nodes) if self.config.shape is not None else None, edge_attr)
+        return nodes, self.rel_s_mlp(nodes) if self.config.shape is not None else None, edge_attr
 
     @torch.no_grad()
     def sample_layout(
@@ -210,14 +204,14 @@ class ReleasedModel(GraphEncoder):
         if statistics is None:
             raise ValueError("box statistics are missing: convert the checkpoint with --bounds FILE")
         graph, change, device = graph.to(self.device), self._here(change), self.device
-        conditions = self.eval().conditions(graph, change, generator)
+        nodes, _, edge_attr = self.eval().conditions(graph, change, generator)
         tables, chosen = self.layout_tables.spaced(steps or len(self.layout_tables.betas))
         chosen = chosen.to(device)
 
         fast = packed(net) if device.type == "cpu" else net
 
         def denoise(x: Tensor, t: Tensor) -> Tensor:
-            return fast(x, conditions.layout, graph.triples, chosen[t], conditions.edge_attr)
+            return fast(x, nodes, graph.triples, chosen[t], edge_attr)
 
         shape = (len(graph.classes), net.config.channels)
         start = normal(shape, generator, device)
@@ -246,7 +240,7 @@ class ReleasedModel(GraphEncoder):
         if self.config.shape is None:
             raise ValueError("this model has no shape branch")
         graph, change = graph.to(self.device), self._here(change)
-        conditions = self.eval().conditions(graph, change, generator)
+        _, nodes, edge_attr = self.eval().conditions(graph, change, generator)
         count, grid = len(graph.classes), self.config.shape.grid
         drawn = normal(
             (1 if shared_noise else count, self.config.shape.channels, grid, grid, grid), generator, self.device
@@ -254,7 +248,7 @@ class ReleasedModel(GraphEncoder):
         start = drawn.expand(count, -1, -1, -1, -1).contiguous()
 
         def denoise(x: Tensor, t: Tensor) -> Tensor:
-            return self.shape_df(x, conditions.shape, graph.triples, t, conditions.edge_attr)
+            return self.shape_df(x, nodes, graph.triples, t, edge_attr)
 
         return last(ddim(denoise, start, self.shape_tables.ddim(steps)), progress, steps)
 
@@ -277,22 +271,20 @@ class ReleasedModel(GraphEncoder):
         graph, change, scene, boxes = graph.to(device), self._here(change), scene.to(device), boxes.to(device)
         for node in (~torch.isfinite(boxes)).any(1).nonzero()[:1, 0].tolist():
             raise ValueError(f"box of node {node} is not finite")
-        conditions = self.conditions(graph, change, generator)
+        nodes, shapes, edges = self.conditions(graph, change, generator)
         count = len(self.layout_tables.betas)
         t = torch.randint(count, (int(scene.max()) + 1,), generator=generator).to(device)[scene]
         noise = normal(boxes.shape, generator, device)
-        losses = layout_loss(
-            self.layout_net, boxes, conditions.layout, graph.triples, t, noise, self.layout_tables, conditions.edge_attr
-        )
+        losses = layout_loss(self.layout_net, boxes, nodes, graph.triples, t, noise, self.layout_tables, edges)
         losses["layout"] = losses["loss"]
-        if latents is not None and conditions.shape is not None:
+        if latents is not None and shapes is not None:
             kept, triples = node_budget(graph.triples, scene, budget)
             inside = (graph.triples[:, 0] < kept) & (graph.triples[:, 2] < kept)
-            edge_attr = None if conditions.edge_attr is None else conditions.edge_attr[inside]
+            edge_attr = None if edges is None else edges[inside]
             t = torch.randint(count, (kept,), generator=generator).to(device)
             clean = latents[:kept].to(device)
             noise = normal(clean.shape, generator, device)
-            given, tables = conditions.shape[:kept], self.shape_tables
+            given, tables = shapes[:kept], self.shape_tables
             losses["shape"] = shape_loss(self.shape_df, clean, given, triples, t, noise, tables, edge_attr)
             losses["loss"] = losses["layout"] + losses["shape"]
         return losses

@@ -175,10 +175,9 @@ class VQVAE(nn.Module):
         return torch.cat(near)
 
     def quantise(self, z: Tensor) -> tuple[Tensor, Tensor]:
-        """(N, 3, d, h, w) -> the nearest codes in place, gradients passed straight through, and their indices."""
-        index = self.indices(z)
-        codes = self.quantize.embedding(index).reshape(*z.shape[:1], *z.shape[2:], -1).movedim(-1, 1)
-        return z + (codes - z).detach(), index
+        """(N, 3, d, h, w) -> the nearest codes in place, gradients passed straight through, and the codes alone."""
+        codes = self.quantize.embedding(self.indices(z)).reshape(*z.shape[:1], *z.shape[2:], -1).movedim(-1, 1)
+        return z + (codes - z).detach(), codes
 
     def decode(self, z: Tensor) -> Tensor:
         """(N, 3, d, h, w) float32 latents, quantised first -> (N, 1, R, R, R) float32 distances."""
@@ -191,7 +190,6 @@ class VQVAE(nn.Module):
     def loss(self, sdf: Tensor) -> Tensor:
         """Training loss: mean L1 + codebook + commitment, both with weight 1 (van den Oord et al. 2017, equation 3)."""
         z = self.encode(sdf)
-        index = self.indices(z)
-        codes = self.quantize.embedding(index).reshape(*z.shape[:1], *z.shape[2:], -1).movedim(-1, 1)
-        decoded = self.decoder(self.post_quant_conv(z + (codes - z).detach()))
+        straight, codes = self.quantise(z)
+        decoded = self.decoder(self.post_quant_conv(straight))
         return (decoded - sdf).abs().mean() + F.mse_loss(codes, z.detach()) + F.mse_loss(codes.detach(), z)

@@ -91,10 +91,10 @@ def test_a_batch_is_what_single_runs_are() -> None:
     generator = torch.Generator().manual_seed(1)
     x, t = torch.randn(len(both.classes), 8, generator=generator), torch.full((len(both.classes),), 400)
     with torch.inference_mode():
-        together = model.layout_net(x, model.conditions(both).layout, both.triples, t)
+        together = model.layout_net(x, model.conditions(both)[0], both.triples, t)
         count = len(BED.classes)
-        first = model.layout_net(x[:count], model.conditions(BED).layout, BED.triples, t[:count])
-        second = model.layout_net(x[count:], model.conditions(DESK).layout, DESK.triples, t[count:])
+        first = model.layout_net(x[:count], model.conditions(BED)[0], BED.triples, t[:count])
+        second = model.layout_net(x[count:], model.conditions(DESK)[0], DESK.triples, t[count:])
     assert torch.allclose(together, torch.cat([first, second]), atol=2e-5)
 
 
@@ -118,11 +118,11 @@ def test_the_published_wiring_ignores_the_encoder_and_the_papers_does_not() -> N
     for config, matters in ((CONFIG, False), (_paper(), True)):
         model = _model(config)
         with torch.inference_mode():
-            plain = model.conditions(BED).layout
-            edited = model.conditions(BED, change, torch.Generator().manual_seed(0)).layout
+            plain = model.conditions(BED)[0]
+            edited = model.conditions(BED, change, torch.Generator().manual_seed(0))[0]
             for parameter in model.gconv_net_ec.parameters():
                 parameter.mul_(1.5)
-            perturbed = model.conditions(BED).layout
+            perturbed = model.conditions(BED)[0]
         assert (not torch.allclose(plain, edited)) == matters
         assert (not torch.allclose(plain, perturbed)) == matters
 
@@ -198,9 +198,9 @@ def test_isolated_nodes_and_missing_edges_work() -> None:
 def test_two_hundred_nodes_work() -> None:
     graph = _graph([1] * 198, [[i, 1, i + 1] for i in range(197)])
     model = _model()
-    conditions = model.conditions(graph)
+    nodes = model.conditions(graph)[0]
     with torch.inference_mode():
-        noise = model.layout_net(torch.randn(200, 8), conditions.layout, graph.triples, torch.full((200,), 10))
+        noise = model.layout_net(torch.randn(200, 8), nodes, graph.triples, torch.full((200,), 10))
     assert torch.isfinite(noise).all()
 
 

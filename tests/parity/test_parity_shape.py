@@ -83,7 +83,7 @@ def test_autoencoder(name: str) -> None:
     net = numbers.net(VQVAE, vq_config(numbers))
     z = net.encode(numbers["sdf"])
     close(z, numbers["z"], 1e-4)
-    quantised, index = net.quantise(numbers["z"])
+    quantised, index = net.quantise(numbers["z"])[0], net.indices(numbers["z"])
     flat = numbers["z"].movedim(1, -1).reshape(-1, z.shape[1]).double()
     codes = net.quantize.embedding.weight.double()
     chosen, wanted = ((flat - codes[i]).square().sum(1) for i in (index, numbers["indices"]))

@@ -6,7 +6,6 @@ table it can say of itself: legs, edges, fronts, how soft, how slender.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
 from echomodel.arrays import Array, at_least, cast, clipped, kit, parted, softmax, sum_of
@@ -14,13 +13,7 @@ from echomodel.compact.pairs import Layers, Pairs
 from echomodel.config import FurnitureConfig
 from echomodel.graph import GraphBatch
 
-
-@dataclass(frozen=True, eq=False)
-class FurnitureContext:
-    """What stays the same over all steps: `nodes` (N, width) and pairs."""
-
-    nodes: Array
-    pairs: Pairs
+FurnitureContext = tuple[Array, Pairs]  # what stays the same over all steps: nodes (N, width) and pairs
 
 
 class Furniture(Layers):
@@ -37,7 +30,7 @@ class Furniture(Layers):
     def context(self, graph: GraphBatch, size: Array, pairs: Pairs, latent: Array) -> FurnitureContext:
         """Everything that does not depend on the step; arguments as for `ShapeDenoiser.context`."""
         nodes = self.category(graph.category) + self.size(kit(size).log(at_least(size, 0.01))) + self.latent(latent)
-        return FurnitureContext(nodes + self.room_type(graph.room_type)[graph.scene], pairs)
+        return nodes + self.room_type(graph.room_type)[graph.scene], pairs
 
     def forward(self, x: Array, level: Array, context: FurnitureContext) -> Array:
         """The clean descriptions."""
@@ -51,11 +44,12 @@ class Furniture(Layers):
 
     def scores(self, x: Array, level: Array, context: FurnitureContext) -> Array:
         """Logarithms of the words' odds, and the numbers as they are: (N, D)."""
-        h = context.nodes + self.own(x)
+        nodes, pairs = context
+        h = nodes + self.own(x)
         if self.settings.echo:
-            h = h + self.heard(self._voices(x, level, context.pairs))
+            h = h + self.heard(self._voices(x, level, pairs))
         for layer, own in zip(self.layers, parted(self.modulated(level), self.settings.layers), strict=True):
-            h = layer(h, context.pairs, own)
+            h = layer(h, pairs, own)
         return self.head(self.norm(h))
 
     def _voices(self, x: Array, level: Array, pairs: Pairs) -> Array:

@@ -70,25 +70,20 @@ class CompactModel(nn.Module):
         return list(self.get_submodule(part).parameters())
 
     def write(self, path: Path, parts: Sequence[str]) -> None:
-        """Write parts to a weights file, see `save_weights`."""
-        save_weights(path, self, parts)
-
-
-def save_weights(path: Path, model: CompactModel, parts: Sequence[str]) -> None:
-    """Write parts of a model with everything needed to use them; floats as float16, some in 8 bits."""
-    tensors: dict[str, Tensor] = {}
-    for part in parts:
-        for key, value in model.get_submodule(part).state_dict().items():
-            stored = value.half() if value.is_floating_point() else value
-            tensors[f"{part}.{key}"] = stored.detach().cpu().contiguous()
-    metadata = {
-        "format": FORMAT,
-        "config": to_json(model.config),
-        "statistics": json.dumps(model.statistics.to_json()),
-        "parts": json.dumps(list(parts)),
-    }
-    with whole_file(path) as beside:
-        save_file(rounded(tensors), beside, metadata=metadata)
+        """Write parts of the model with everything needed to use them; floats as float16, some in 8 bits."""
+        tensors: dict[str, Tensor] = {}
+        for part in parts:
+            for key, value in self.get_submodule(part).state_dict().items():
+                stored = value.half() if value.is_floating_point() else value
+                tensors[f"{part}.{key}"] = stored.detach().cpu().contiguous()
+        metadata = {
+            "format": FORMAT,
+            "config": to_json(self.config),
+            "statistics": json.dumps(self.statistics.to_json()),
+            "parts": json.dumps(list(parts)),
+        }
+        with whole_file(path) as beside:
+            save_file(rounded(tensors), beside, metadata=metadata)
 
 
 class _Undrawn(TorchFunctionMode):

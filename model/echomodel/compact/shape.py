@@ -6,7 +6,7 @@ per object on principal components.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -130,13 +130,7 @@ def from_patches(patches: Tensor, patch: int) -> Tensor:
     return cut.reshape(n, x * patch, y * patch, z * patch)
 
 
-@dataclass(frozen=True, eq=False)
-class ShapeContext:
-    """What stays the same over all steps: `nodes` (N, width), `echo_nodes` (N, echo width), pairs."""
-
-    nodes: Tensor
-    echo_nodes: Tensor
-    pairs: Pairs
+ShapeContext = tuple[Tensor, Tensor, Pairs]  # over all steps: nodes (N, width), echo nodes (N, echo width), pairs
 
 
 class ShapeDenoiser(nn.Module):
@@ -230,14 +224,14 @@ class ShapeDenoiser(nn.Module):
             latent: (N, latent width), output of the graph manipulator.
         """
         nodes = self.category(graph.category) + self.size(size.clamp_min(0.01).log()) + self.latent(latent)
-        return ShapeContext(nodes, self.echo_node(nodes), pairs)
+        return nodes, self.echo_node(nodes), pairs
 
     def forward(self, x: Tensor, level: Tensor, context: ShapeContext) -> Tensor:
-        sinusoids = level_features(level)
-        condition = nn.functional.silu(context.nodes + self.level(sinusoids))
-        heard = self._echo(x, sinusoids, context) if self.settings.echo else torch.zeros_like(context.nodes)
+        sinusoids, nodes = level_features(level), context[0]
+        condition = nn.functional.silu(nodes + self.level(sinusoids))
+        heard = self._echo(x, sinusoids, context) if self.settings.echo else torch.zeros_like(nodes)
         h = torch.einsum("ntv,tvw->ntw", x.reshape(len(x), self.settings.tokens, -1), self.token) + self.place
-        told = torch.stack([heard, context.nodes, condition], dim=1)
+        told = torch.stack([heard, nodes, condition], dim=1)
         for block in self.blocks:
             h = block(h, condition, told)
         scale, shift = self.scale_shift(condition)[:, None].chunk(2, dim=2)
@@ -245,9 +239,10 @@ class ShapeDenoiser(nn.Module):
 
     def _echo(self, x: Tensor, sinusoids: Tensor, context: ShapeContext) -> Tensor:
         """What each object hears of the others' current shapes: (N, width)."""
-        nodes = context.echo_nodes + self.echo_code(x) + self.echo_level(sinusoids)
+        _, nodes, pairs = context
+        nodes = nodes + self.echo_code(x) + self.echo_level(sinusoids)
         for layer in self.echo_layers:
-            nodes = layer(nodes, context.pairs)
+            nodes = layer(nodes, pairs)
         return self.echo_out(nodes)
 
 

@@ -10,7 +10,7 @@ import torch
 from torch import nn
 
 from echomodel.boxes import BoxStatistics
-from echomodel.compact.model import CompactModel, load_weights, save_weights
+from echomodel.compact.model import CompactModel, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.weights import PARTS, Part, branches
 from echomodel.config import CompactConfig, LatentConfig
@@ -74,7 +74,7 @@ def colours(monkeypatch):
 def test_a_third_branch_is_built_trained_saved_and_loaded(colours, tmp_path):
     torch.manual_seed(0)
     latent = CompactModel(CONFIG, STATISTICS, ("latent",))
-    save_weights(tmp_path / "latent.safetensors", latent, ("latent",))
+    latent.write(tmp_path / "latent.safetensors", ("latent",))
     settings = {"steps": 2, "save_every": 1, "validate_every": 1, "log_every": 1, "model": CONFIG}
     with pytest.raises(ValueError, match="stage 'colours' needs weights with latent"):
         open_run(Recipe(stage="colours", **settings), tmp_path / "run")

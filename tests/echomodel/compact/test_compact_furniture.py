@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.compact.model import CompactModel, WeightsError, load_weights, save_weights
+from echomodel.compact.model import CompactModel, WeightsError, load_weights
 from echomodel.config import CompactConfig, FurnitureConfig
 from echomodel.echo import EchoModel
 from echomodel.furniture.style import GROUPS, HOT, STYLE, WIDTH
@@ -85,7 +85,7 @@ def test_equal_furniture_is_equal():
 
 def test_weights_travel_with_the_latent_graph_and_say_what_is_missing(tmp_path):
     model = small()
-    save_weights(tmp_path / "all.safetensors", model.model, ("latent", "furniture"))
+    model.model.write(tmp_path / "all.safetensors", ("latent", "furniture"))
     loaded = EchoModel(*load_weights([tmp_path / "all.safetensors"]))
     assert loaded.branches == {"furniture"}
     with pytest.raises(ValueError, match="2 boxes for a graph of 3 nodes"):

@@ -12,7 +12,7 @@ from safetensors.torch import save_file
 
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.learned import places
-from echomodel.compact.model import CompactModel, load_weights, save_weights
+from echomodel.compact.model import CompactModel, load_weights
 from echomodel.compact.modules import WordTable
 from echomodel.compact.weights import WeightsError
 from echomodel.config import CompactConfig, from_dict
@@ -103,7 +103,7 @@ def small(tmp_path):
     torch.manual_seed(0)
     boxes = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3)
     model = CompactModel(from_dict(CompactConfig, SIZES), boxes, ("latent", "furniture"))
-    save_weights(tmp_path / "small.safetensors", model, model.parts)
+    model.write(tmp_path / "small.safetensors", model.parts)
     return tmp_path / "small.safetensors"
 
 
