@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,9 +20,6 @@ from echousd.assets.licences import allowed
 from echousd.assets.record import AssetRecord
 from echousd.assets.reference import STRETCH
 from echousd.assets.table import Library
-
-if TYPE_CHECKING:
-    from echomodel.text import TextEncoder
 
 EQUALLY_GOOD = 0.12  # difference of costs among which the seed decides
 OTHER_WORD, OTHER_FAMILY = 0.35, 0.8  # cost of a model of a related category
@@ -40,9 +36,8 @@ class AssetWishes:
         library: where models come from, None = only pieces of one's own.
         stretch: see `STRETCH`; models with joints or colliders of their own are never stretched.
         licences: which are allowed (`echousd.assets.licences.allowed`), empty = all.
-        text: words that the models shall be like, "" = none.
+        text: words that the models shall be like by CLIP (extra `text`), "" = none.
         collect: take models along with all that they need, instead of referring to where they lie.
-        encoder: of texts, None = CLIP (extra `text`), whose weights must be there.
         outside: folders besides those of the index and of the graph's file in which models may lie.
 
     Raises ValueError for a stretch that is not allowed and for an index of models that lie elsewhere.
@@ -53,7 +48,6 @@ class AssetWishes:
     licences: tuple[str, ...] = ()
     text: str = ""
     collect: bool = False
-    encoder: TextEncoder | None = None
     outside: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
@@ -85,7 +79,7 @@ class AssetWishes:
         from echomodel.text import ClipTextEncoder
 
         said = [" ".join((r.name, r.category.replace("_", " "), *r.tags, *r.materials)) for r in records]
-        vectors = (self.encoder or ClipTextEncoder())([self.text, *said])
+        vectors = ClipTextEncoder()([self.text, *said])
         vectors = torch.nn.functional.normalize(torch.as_tensor(vectors), dim=1)
         away = TEXT * (1.0 - vectors[1:] @ vectors[0])
         return dict(zip((record.id for record in records), away.tolist(), strict=True))

@@ -13,7 +13,7 @@ from typing import Any
 
 from pxr import Gf, Sdf, Usd, UsdGeom
 
-from echomodel.files import read_bounded, read_json, whole_file
+from echomodel.files import read_bounded, read_json, whole_file, write_json
 from echousd.batches.plan import COLUMNS, Plan, fault_of, load_plan, read_journals, whole_keys
 from echousd.folder.manifest import LARGEST
 from echousd.folder.within import inside
@@ -108,8 +108,7 @@ def write_manifest(plan: Plan, folder: Path) -> dict[str, Any]:
         file.writelines(json.dumps(row) + "\n" for row in manifest_rows(plan, folder))
     _write_table(plan, folder)
     found = summary(manifest_rows(plan, folder))
-    with whole_file(folder / SUMMARY) as beside:
-        beside.write_text(json.dumps(found, indent=1) + "\n", "utf-8")
+    write_json(folder / SUMMARY, found)
     return found
 
 

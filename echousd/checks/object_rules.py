@@ -97,9 +97,7 @@ def floors(reading: Reading) -> Iterator[Finding]:
         if word in SHELL:
             yield Finding(prim.GetPath(), f"the {word} is deactivated", warning=word != "floor")
     for room in reading.rooms:
-        stated = any(
-            room.graph.GetAttribute(name).HasAuthoredValue() for name in FLOOR if room.graph.HasAttribute(name)
-        )
+        stated = _states(room.graph, FLOOR)
         if stated and any("wall" in words_of(prim) for prim in components(room)) and not _has_floor(room, reading):
             yield Finding(room.room.GetPath(), "the room has walls, but no floor")
         if room.nodes and not stated and not any("floor" in words_of(prim) for prim in below(room.room)):

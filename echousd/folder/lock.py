@@ -108,12 +108,11 @@ def _take(folder: Path) -> FileLock | None:
     if path.exists() and not path.is_file():
         raise ValueError(f"{path}: is no plain file; remove it")
     lock = FileLock(path, timeout=0, thread_local=False)
-    try:
-        lock.acquire()
-    except (Timeout, FileNotFoundError):  # or the folder was removed in between
-        return None
-    except OSError as error:
-        raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); nothing was changed") from None
+    with telling(folder, then="; nothing was changed"):
+        try:
+            lock.acquire()
+        except (Timeout, FileNotFoundError):  # or the folder was removed in between
+            return None
     if not isinstance(lock, SoftFileLock):  # which, on disks without locks, writes its own owner
         told = f"process {os.getpid()} on {socket.gethostname()[:40]} (since {time.strftime('%H:%M:%S')})"
         with contextlib.suppress(OSError):  # of a full disk, which what comes next meets, too

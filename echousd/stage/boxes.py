@@ -20,7 +20,7 @@ from echousd.graph.titles import DressingGraph, SmallNode
 from echousd.stage import encoding as usd
 from echousd.stage import values
 from echousd.stage.encoding import StageError
-from echousd.stage.files import opened, save_layer
+from echousd.stage.files import WRITABLE, opened, save_layer
 from echousd.stage.read import node_names, place, read_rooms, relation_of, stated_fields, the_room
 from echousd.stage.write import graph_layer
 
@@ -109,7 +109,6 @@ def read_small(prim: Usd.Prim) -> SmallNode:
 
 
 STYLE = "style_"
-USD_FILES = (".usda", ".usdc", ".usd")
 
 
 def graph_of(room: RoomBoxes, rules: str | None = "strict") -> SceneGraph:
@@ -183,7 +182,7 @@ def read_stages(paths: Iterable[Path]) -> list[RoomBoxes]:
     """The rooms of stages, or of all stages of folders; raises StageError for an object without a box."""
     files: list[Path] = []
     for path in paths:
-        files += sorted(p for p in path.iterdir() if p.suffix in USD_FILES) if path.is_dir() else [path]
+        files += sorted(p for p in path.iterdir() if p.suffix in WRITABLE) if path.is_dir() else [path]
     found = []
     for path in files:
         for prim, graph in read_rooms(str(path)).items():

@@ -26,7 +26,7 @@ from echousd.stage.shading import Image, preview_surface
 from echousd.stage.units import set_units
 from echousd.stage.values import reading
 from echousd.texturing.job import Job, read_job
-from echousd.texturing.results import Result, Results, read_results
+from echousd.texturing.results import Results, read_results
 
 NAME = re.compile(r"^[A-Za-z_][A-Za-z0-9_]{0,63}$")
 ROOTS = (".usda", ".usd", ".usdc")
@@ -215,11 +215,11 @@ def look_files(
         pen.layer.defaultPrim = surfaces.room.split("/")[1]
         inside = pen.variants(surfaces.room, VARIANTS, (MADE, name), chosen)[name]
         for thing in painted:
-            result = objects[thing.name]
+            st, images = objects[thing.name]
             if chosen:
-                _bind(inside, surfaces.room, thing, result, name)
+                _bind(inside, surfaces.room, thing, images, name)
             else:
-                _lay_out(inside, thing, result, name)
+                _lay_out(inside, thing, st, name)
     for path in dict.fromkeys(path for thing in painted for piece in thing.pieces for path in piece.instances):
         pens[0].over(path, instanceable=False)  # each gets a picture of its own
     top, laid = (pen.layer for pen in pens)
@@ -241,10 +241,10 @@ def look_files(
     return files
 
 
-def _bind(pen: Pen, room: str, thing: Painted, result: Result, name: str) -> None:
+def _bind(pen: Pen, room: str, thing: Painted, images: Mapping[str, str], name: str) -> None:
     """One material for the object, over whatever its meshes and subsets are bound to."""
     material, chosen = f"{room}/Looks/{name}_{thing.name}", f"collection:{name}"
-    _material(pen, material, result.images, name)
+    _material(pen, material, images, name)
     kept = [path for piece in thing.pieces for path in piece.kept]
     values = {
         f"uniform token {chosen}:expansionRule": "expandPrims",
@@ -268,11 +268,11 @@ def _material(pen: Pen, path: str, images: Mapping[str, str], name: str) -> None
     preview_surface(pen, path, plain, shown, primvar(name), "clamp")
 
 
-def _lay_out(pen: Pen, thing: Painted, result: Result, name: str) -> None:
+def _lay_out(pen: Pen, thing: Painted, laid: np.ndarray, name: str) -> None:
     """The primvar of the look on every mesh of an object."""
     start = 0
     for piece in thing.pieces:
-        own = result.st[start : start + len(piece.corners)]
+        own = laid[start : start + len(piece.corners)]
         start += len(piece.corners)
         corner = np.zeros((piece.size, 2), np.float32)
         corner[piece.corners.reshape(-1)] = own.reshape(-1, 2)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,19 +23,9 @@ STEP = re.compile(r"^texture_(\d{1,9})\.png$")
 SCENE = "scene"
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
-    """What came back for one object.
-
-    Arguments:
-        st: (t, 3, 2) float, where the job's triangles lie in the pictures.
-        images: `color`, perhaps `metal_rough` and `normal` -> name of a picture.
-    """
-
-    st: np.ndarray
-    images: Mapping[str, str]
-
-
+# of an object: (t, 3, 2) float, where the job's triangles lie in the pictures, and `color`, perhaps `metal_rough` and
+# `normal` -> name of a picture
+Result = tuple[np.ndarray, Mapping[str, str]]
 Results = tuple[dict[str, Result], dict[str, bytes]]
 
 
@@ -63,7 +52,7 @@ def _one_picture(folder: Path, job: Job) -> Results:
     if picture is None:
         return {}, {}
     name, content = image_of(texture_bytes(str(picture)) or b"", str(picture), SCENE)
-    objects = {}
+    objects: dict[str, Result] = {}
     for number, thing in enumerate(job.objects):
         given = job_mesh(folder, thing)
         own = picture.parent / "meshes" / thing.kind / f"{number}_{thing.name}.obj"
@@ -73,7 +62,7 @@ def _one_picture(folder: Path, job: Job) -> Results:
             back = read_obj(own)
             st = _aligned(given, back, thing)
         # Its pictures' first and last texels lie on the borders 0 and 1, and not half a texel inside.
-        objects[thing.name] = Result((st * (job.resolution - 1) + 0.5) / job.resolution, {"color": name})
+        objects[thing.name] = (st * (job.resolution - 1) + 0.5) / job.resolution, {"color": name}
     return objects, {name: content}
 
 
@@ -113,7 +102,7 @@ def _many_pictures(folder: Path, job: Job) -> Results:
             stem = thing.name if slot == "color" else f"{thing.name}_{slot}"
             images[slot], encoded = image_of(content, f"{source} ({slot})", stem)
             pictures[images[slot]] = encoded
-        objects[thing.name] = Result(st, images)
+        objects[thing.name] = st, images
     return objects, pictures
 
 

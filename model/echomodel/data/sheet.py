@@ -100,8 +100,8 @@ def plot_rooms(
                 axes.plot(*np.vstack([swing, swing[:1]]).T, color=shade, linewidth=0.6)
         corners = footprints(room.size, room.position, room.yaw)
         for i in np.argsort(room.position[:, 1] if len(room) else []):
-            coarse = _coarse(room.categories[i])
-            colour = palette(words.index(coarse) % 20) if coarse else "grey"
+            row = vocabulary().known_category(room.categories[i])
+            colour = "grey" if row is None else palette(words.index(row.coarse) % 20)
             high = room.position[i, 1] > HANGING
             axes.fill(
                 *corners[i].T, facecolor=colour, alpha=0.3 if high else 0.7, edgecolor="black", linewidth=0.5,
@@ -117,8 +117,3 @@ def plot_rooms(
     figure.subplots_adjust(0.005, 0.005, 0.995, 0.98, 0.03, 0.08)
     with whole_file(path, Path(path).suffix) as beside:
         figure.savefig(beside, dpi=80)
-
-
-def _coarse(word: str) -> str | None:
-    row = vocabulary().known_category(word)
-    return None if row is None else row.coarse

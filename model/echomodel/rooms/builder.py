@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from echomodel.furniture.style import sample_size
 from echomodel.objective.access import INTO_BED, OF_CHAIRS, OF_LAMPS
 from echomodel.rooms.floor import Floor, Wall
-from echomodel.rooms.statistics import QUARTILE, back_gaps
+from echomodel.rooms.statistics import QUARTILE, back_gaps, room_requests
 from echomodel.sizes import size_statistics
 from echomodel.vocabulary import vocabulary
 
@@ -64,16 +63,12 @@ class Builder:
         floor: the empty room.
         rng: source of every draw.
         styles: number of style groups of the shape set that the rooms refer to.
-        size_shift: category -> shift of the sizes to try, as in `sample_size`.
     """
 
-    def __init__(
-        self, floor: Floor, rng: np.random.Generator, styles: int, size_shift: Mapping[str, Sequence[float]]
-    ) -> None:
+    def __init__(self, floor: Floor, rng: np.random.Generator, styles: int) -> None:
         self.floor = floor
         self.rng = rng
         self.styles = styles
-        self.size_shift = size_shift
         self.room_style = int(rng.integers(styles))
         self.items: list[Item] = []
         self.zones: list[tuple[Item, Item]] = []  # what stays free, and whose it is
@@ -98,7 +93,7 @@ class Builder:
         return options[-1]
 
     def size(self, category: str) -> Size:
-        shift = self.size_shift.get(category, (0.0, 0.0, 0.0))
+        shift = room_requests()["size"].get(category, (0.0, 0.0, 0.0))
         x, y, z = sample_size(category, self.rng, shift=shift).tolist()
         return x, y, z
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,7 @@ from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.builder import Builder
 from echomodel.rooms.floor import sample_floor
 from echomodel.rooms.recipes import furnish, wanted
-from echomodel.rooms.statistics import RoomTypeStatistics, room_requests, room_type_statistics
+from echomodel.rooms.statistics import RoomTypeStatistics, room_type_statistics
 from echomodel.vocabulary import vocabulary
 
 REDRAWS = 4  # rooms in which what they are for finds no place are drawn anew so often
@@ -33,8 +32,7 @@ def drawn_shares() -> dict[str, float]:
 
 def generate_room(
     rng: np.random.Generator, room_type: str | None = None, *, styles: int = STYLES, name: str = "room",
-    statistics: RoomTypeStatistics | None = None, size_shift: Mapping[str, Sequence[float]] | None = None,
-    hall: bool = False,
+    statistics: RoomTypeStatistics | None = None, hall: bool = False,
 ) -> RoomBoxes:  # fmt: skip
     """Draw one room.
 
@@ -44,7 +42,6 @@ def generate_room(
         styles: number of style groups; objects refer to shape `s<style>_<category>`.
         name: the room's id.
         statistics: what such rooms hold, default that of the real ones.
-        size_shift: which sizes to try (see `room_requests`), default those that give real rooms' sizes.
         hall: draw a large room of two or three zones.
 
     Returns the room with its floor's bounding box centred at the origin, metres and radians.
@@ -54,10 +51,9 @@ def generate_room(
         shares = drawn_shares()
         room_type = list(shares)[int(np.searchsorted(np.cumsum(list(shares.values())), rng.random() * 0.999999))]
     statistics = statistics or room_type_statistics(room_type)
-    size_shift = room_requests()["size"] if size_shift is None else size_shift
     for attempt in itertools.count():
         ground, zones = hall_of(statistics, rng) if hall else (statistics, [])
-        builder = Builder(sample_floor(ground, rng), rng, styles, size_shift)
+        builder = Builder(sample_floor(ground, rng), rng, styles)
         kinds = [room_type_statistics(zone) for zone in zones] or [statistics]
         area = builder.floor.area / len(kinds)
         builder.wanted = together([wanted(kind, area, rng) for kind in kinds])

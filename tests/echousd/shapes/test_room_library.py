@@ -297,17 +297,19 @@ def test_a_lamp_for_tables_does_not_hang_and_nobody_dines_at_a_coffee_table(tmp_
     assert chosen["seat"].id == "chair.obj"  # though the box is nearer to the folded one
 
 
-def test_words_say_what_models_shall_be_like(tmp_path):
+def test_words_say_what_models_shall_be_like(tmp_path, monkeypatch):
     import torch
 
     def encoder(texts):
         return torch.tensor([[float("oak" in text), float("steel" in text), 0.1] for text in texts])
+
+    monkeypatch.setattr("echomodel.text.ClipTextEncoder", lambda: encoder)
 
     for name in ("armchair_oak", "armchair_steel"):
         write_obj(tmp_path / "models", name, seat(0.8, 0.9, 0.8))
     library = read_library(index([tmp_path / "models"], tmp_path / "lib.parquet").file)
     asked = [Asked("chair", "armchair", "room", (0.8, 0.9, 0.8))]
     for word in ("oak", "steel"):
-        wishes = AssetWishes(library, text=f"mid-century {word}", encoder=encoder)
+        wishes = AssetWishes(library, text=f"mid-century {word}")
         found = {choose(wishes, asked, seed)[0]["chair"].id for seed in range(6)}
         assert found == {f"armchair_{word}.obj"}
