@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -74,14 +74,13 @@ class _Tree:
 
     Arguments:
         stage, reach: what is written, and where its images may lie.
-        worlds: of every node, (4, 4) float.
     """
 
     stage: Usd.Stage
     reach: Reach
-    worlds: list[np.ndarray] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        self.worlds: list[np.ndarray] = []  # of every node, (4, 4) float
         self.tables: dict[str, list[dict[str, Any]]] = {}
         self.lights: list[dict[str, Any]] = []
         self.extensions: set[str] = set()

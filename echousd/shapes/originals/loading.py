@@ -197,14 +197,7 @@ def converted(model: ModelFile) -> Mapping[str, bytes]:
     return {CONVERTED: layer_bytes(layer, ".usdc"), **images.files}
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """One mesh of a scene in the scene's frame: points (v, 3), faces (f, 3), texture coordinates (v, 2), material."""
-
-    points: np.ndarray
-    faces: np.ndarray
-    uv: np.ndarray | None
-    material: Any
+_Part = tuple[Mesh, np.ndarray | None, Any]  # in the scene's frame, with texture coordinates (v, 2) and a material
 
 
 def _parts(scene: trimesh.Scene) -> Iterator[_Part]:
@@ -220,7 +213,7 @@ def _parts(scene: trimesh.Scene) -> Iterator[_Part]:
         uv = None if told is None or len(told) != len(points) else np.asarray(told)
         if uv is not None:  # beyond a million repeats no digits are left for a place in the image: an exporter's slip
             uv = np.where(np.abs(uv) < 1e6, uv, 0.0) if np.isfinite(uv).all() else None
-        yield _Part(points, faces, uv, getattr(mesh.visual, "material", None))
+        yield Mesh(points, faces), uv, getattr(mesh.visual, "material", None)
 
 
 def _layer(parts: list[_Part], images: Images) -> Sdf.Layer:
@@ -229,9 +222,9 @@ def _layer(parts: list[_Part], images: Images) -> Sdf.Layer:
     pen.define(f"{ROOT}/Looks", "Scope")
     looks: dict[int, str] = {}
     taken: set[str] = set()
-    for number, part in enumerate(parts):
-        mesh, material = f"{ROOT}/mesh_{number}", part.material
-        _write_mesh(pen, mesh, part)
+    for number, (whole, uv, material) in enumerate(parts):
+        mesh = f"{ROOT}/mesh_{number}"
+        _write_mesh(pen, mesh, whole, uv)
         if material is None:
             continue
         if id(material) not in looks:
@@ -246,14 +239,13 @@ def _layer(parts: list[_Part], images: Images) -> Sdf.Layer:
     return pen.layer
 
 
-def _write_mesh(pen: Pen, path: str, part: _Part) -> None:
-    points, faces = part.points.astype(np.float32), part.faces.astype(np.int32)
-    whole = Mesh(part.points, part.faces)
-    flat = None if part.uv is not None else box_projection(whole)
+def _write_mesh(pen: Pen, path: str, whole: Mesh, uv: np.ndarray | None) -> None:
+    points, faces = whole.vertices.astype(np.float32), whole.faces.astype(np.int32)
+    flat = None if uv is not None else box_projection(whole)
     merged = whole.trimesh
     merged.merge_vertices()  # along the seams of texture coordinates, so that shading has none
     normals, index = creased_normals(Mesh.of(merged))
-    values = part.uv if flat is None else flat.reshape(-1, 2)
+    values = uv if flat is None else flat.reshape(-1, 2)
     mesh = pen.define(path, "Mesh", {
         "uniform token subdivisionScheme": "none", "uniform bool doubleSided": True, "point3f[] points": points,
         "int[] faceVertexCounts": np.full(len(faces), 3, np.int32),
