@@ -19,7 +19,7 @@ PILLOW = 3.2  # exponent of the outline of a cushion
 STEP = 0.02  # metres from place to place
 WIDE_BED = 1.3  # metres
 LEVEL = 0.005  # metres: what is as high as that is one height
-DRAPED = 0.6  # share of sofas with a blanket over an arm
+DRAPED = 0.9  # share of sofas with a blanket over an arm
 # Metres between folds of a bed, and over its middle from where on it is a board; places behind pillows for cushions.
 SOFT, BOARD, BEYOND = 0.04, 0.12, 12
 RIDGE = 0.1  # metres that an arm is higher than the seat at least so that a throw hangs over it
