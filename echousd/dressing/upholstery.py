@@ -281,7 +281,7 @@ def _across(
     centre = float(x[0] + x[-1]) / 2
     x = x - centre
     middle, top = float(np.median(under[np.abs(x) < 0.6 * x[-1] + STEP])), float(under.max())
-    if not 0.25 < middle <= top < min(0.85, middle + BOARD):
+    if not 0.25 < middle <= top < min(0.95, middle + BOARD):
         return None
     half = float(np.abs(x[(under > top - 0.2).any(1)]).max()) + STEP / 2
     size = np.round([2 * half + 0.08, 0.012 + min(most, rng.uniform(0.16, 0.22)), deep], 3)

@@ -21,7 +21,7 @@ WINDOW = Opening("window", "window", 0, 1.2, 1.4, 1.2, 0.9)
 SIZES = {
     "base_unit": (1.2, 0.9, 0.6), "wall_unit": (1.2, 0.7, 0.35), "coat_rack": (1.3, 1.9, 0.4),
     "towel_radiator": (0.5, 1.2, 0.09), "toy_box": (0.8, 0.45, 0.45), "shoe_cabinet": (0.8, 1.1, 0.25),
-    "multi_seat_sofa": (2.1, 0.82, 0.92), "sideboard": (1.5, 0.85, 0.42), "desk": (1.1, 0.74, 0.55),
+    "multi_seat_sofa": (2.1, 0.9, 0.92), "sideboard": (1.5, 0.85, 0.42), "desk": (1.1, 0.74, 0.55),
     "dining_table": (1.6, 0.76, 0.95), "bench": (1.2, 0.45, 0.4),
 }  # fmt: skip
 
@@ -231,7 +231,7 @@ def test_a_throw_hangs_over_an_arm_and_not_into_the_seat():
             x, z = host.in_plan(throw.position)
             under = seat.height[np.ix_(np.abs(seat.x - x) < throw.size[0] / 2, np.abs(seat.z - z) < throw.size[2] / 2)]
             assert throw.position[1] + throw.size[1] == pytest.approx(under.max(), abs=0.02)
-    assert found >= 6
+    assert found >= 10  # of twelve, the high arms of a chesterfield too
 
 
 def test_what_belongs_together_stands_together_on_shallow_tops():
