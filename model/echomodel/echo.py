@@ -117,7 +117,6 @@ class EchoModel:
         """One sentence for every word of the graph that the weights do not know, and what becomes of it."""
         return unlearned(graph, self.config)
 
-    @without_slopes
     def sample_shapes(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Array:
         """Shapes for all objects of S scenes (EchoScene 3.4); objects of one class and style become equal.
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import subprocess
+import sys
 
 import pytest
 import torch
@@ -219,3 +221,19 @@ def test_models_pickle(model: EchoModel) -> None:
     grids = [one.sample_shapes(bedroom(), boxes(), generator=seeded()) for one in (model, again)]
     assert torch.equal(*grids)
     assert set(again.model.shape.state_dict()) == set(CompactModel(model.config, STATISTICS).shape.state_dict())
+
+
+def test_shapes_need_no_torch_before_them() -> None:
+    """Whoever samples shapes with the weights of numpy loads torch on the way, which must keep no slopes then."""
+    script = (
+        "import sys, numpy as np\nfrom echomodel.boxes import Boxes\nfrom echomodel.echo import EchoModel\n"
+        "from echomodel.graph import GraphBatch\nfrom echomodel.randomness import Noise\n"
+        "graph = GraphBatch.single([0, 1], device=None)\n"
+        "size, place = np.ones((2, 3), np.float32), np.zeros((2, 3), np.float32)\n"
+        "model = EchoModel.load(device=None)\nassert 'torch' not in sys.modules\n"
+        "boxes = Boxes(size, place, place[:, 0])\n"
+        "made = model.sample_shapes(graph, boxes, generator=Noise(3), steps=1, candidates=2)\n"
+        "print(type(made).__name__, made.shape)\n"
+    )
+    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert told.stdout == "ndarray (2, 64, 64, 64)\n", told.stderr[-500:]

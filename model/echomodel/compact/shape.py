@@ -354,6 +354,7 @@ def repeated(values: Tensor | None, count: int) -> Tensor | None:
     return None if values is None else torch.cat([values] * count)
 
 
+@torch.no_grad()
 def sample_shapes(
     model: CompactModel, latent: Latent, graph: GraphBatch, boxes: Boxes, equal: Tensor, how: CompactSampling
 ) -> Tensor:  # fmt: skip
