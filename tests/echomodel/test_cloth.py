@@ -101,3 +101,13 @@ def test_armchairs_are_made_like_sofas():
         made.add(tuple(sorted((type(part).__name__, part.role) for part in parts)))
     assert any(("Tufted", "back") in one for one in made)
     assert len(made) >= 12
+
+
+@pytest.mark.parametrize("channels", [False, True])
+def test_padded_panels_have_no_face_without_area(channels):
+    for apart in np.linspace(0.06, 0.5, 60):
+        panel = Tufted(half=np.array([0.2, 0.226, 0.06]), apart=apart, channels=channels)
+        for detail in range(4):
+            vertices, faces = panel.local_mesh(detail)
+            one, other = (vertices[faces[:, k]] - vertices[faces[:, 0]] for k in (1, 2))
+            assert np.linalg.norm(np.cross(one, other), axis=1).min() > 1e-7, (apart, detail)

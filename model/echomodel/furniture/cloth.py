@@ -154,14 +154,15 @@ class Tufted(Block):
         across, up = (max(4, round(2 * side / step)) for side in (w, h))
         j, rings = np.arange(up + 1), []
         y = np.linspace(-h, h, up + 1)
+        back = (h, h / 2, -h / 2, -h)  # the middle of an end in line with none of its sides
         for i, x in enumerate(np.linspace(-w, w, across + 1)):
             lines = (2 * i, 2 * i) if self.channels else (i + j, i - j)
             first, second = (np.abs(np.cos(np.pi * line * step / self.apart)) for line in lines)
             edge = np.minimum(1.0, 6 * np.minimum(1 - abs(x) / w, 1 - np.abs(y) / h) + 0.1) ** 0.5
             front = d * (2 * edge * (0.5 + 0.5 * first * second * (2 - first * second)) - 1)
-            rings.append(np.stack([np.full(up + 3, x), [*y, h, -h], [*front, -d, -d]], 1))
+            rings.append(np.stack([np.full(up + 5, x), [*y, *back], [*front, *[-d] * 4]], 1))
         vertices, faces = loft(rings)
-        first, second = faces[: 2 * across * (up + 3)].reshape(2, -1, 3)  # of each quad, which folds where it is deeper
+        first, second = faces[: 2 * across * (up + 5)].reshape(2, -1, 3)  # of each quad, which folds where it is deeper
         (a, b, c), d, z = first.T.copy(), second[:, 2].copy(), vertices[:, 2]
         other = z[b] + z[d] < z[a] + z[c] - 1e-6
         first[other], second[other] = np.stack([a, b, d], 1)[other], np.stack([b, c, d], 1)[other]
