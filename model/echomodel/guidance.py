@@ -1,7 +1,7 @@
 """Guidance: boxes are moved down the slope of what the terms of the objective miss, while and after they are drawn.
 
 This is reconstruction guidance (Chung et al. 2023, posterior sampling) with the objective as the measurement. None is
-asked to grow or shrink, and each stands at once at the height of what carries it.
+asked to grow or shrink, each stands at the height of what carries it, and what is almost square to a wall ends so.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from echomodel.arrays import Array, at_least, cast, device_of, full, kit, on_dev
 from echomodel.boxes import Boxes, BoxScale
 from echomodel.graph import GraphBatch
 from echomodel.objective import KINDS, Plan, missed
+from echomodel.objective.access import askew
 from echomodel.objective.support import ON_CEILING, ON_FLOOR
 from echomodel.openings import HINGES, STEP, Opening, inward_normal
 from echomodel.rules.placements import Stated
@@ -25,6 +26,7 @@ LATE = 0.3  # level of noise below which boxes are where they will be, but for w
 AFTER = 40  # steps after the last of the sampler
 MOMENTS = (0.8, 0.95)  # of Adam
 LEAST = 0.02  # share of the first step that the last one has
+ALMOST = np.radians(3.0)  # off a quarter turn to a wall: nobody turns furniture by so little
 BEYOND = 0.01  # metres or ratio that is asked for beyond a term's slack
 
 
@@ -52,20 +54,15 @@ def mended(plan: Plan, boxes: Boxes, *, strength: float, rounds: int, given: Arr
     """Boxes after so many steps of Adam (Kingma & Ba 2015) on their places and headings, down what all terms miss.
 
     Arguments:
-        plan: of N boxes of S rooms, wherever they stand; of torch if there are rounds.
+        plan: of N boxes of S rooms, of torch, wherever they stand.
         boxes: N, where they are drawn.
         strength: of the first step, metres and radians; the steps become shorter and shorter.
-        rounds: how many; without one only heights are set.
+        rounds: how many.
         given: (N,) bool, boxes that stay; None = none.
     """
-    xp, device, drawn = kit(plan.yaw), device_of(boxes.yaw), boxes.to(device_of(plan.yaw))
-    like = xp.zeros(0, dtype=xp.float64)  # rounding would choose the side
-    size, position, yaw = (cast(of, like) for of in (drawn.size, drawn.position, drawn.yaw))
-    stays = xp.zeros(len(boxes), dtype=xp.bool) if given is None else on_device(given, device_of(plan.yaw))
-    start = replace(plan, size=size, position=position, yaw=yaw, given=stays, floor=cast(plan.floor, like))
-    height = xp.where(stays, position[:, 1], heights(start))
-    start = start.at(xp.stack([position[:, 0], height, position[:, 2]], 1), yaw)
-    place = xp.concat([position[:, ::2], yaw[:, None]], 1)
+    start = _standing(plan, boxes, given)
+    xp, height = kit(start.yaw), start.position[:, 1]
+    place = xp.concat([start.position[:, ::2], start.yaw[:, None]], 1)
     mean, square = xp.zeros_like(place), xp.zeros_like(place)
     for number in range(rounds):
         with xp.enable_grad():
@@ -76,9 +73,37 @@ def mended(plan: Plan, boxes: Boxes, *, strength: float, rounds: int, given: Arr
         square = MOMENTS[1] * square + (1 - MOMENTS[1]) * slope.square()
         step = mean / (1 - MOMENTS[0] ** (number + 1)) / ((square / (1 - MOMENTS[1] ** (number + 1))).sqrt() + 1e-8)
         rate = strength * (1 - (1 - LEAST) * number / rounds)
-        place = xp.where(stays[:, None], place, place - rate * step)
-    moved = xp.stack([place[:, 0], height, place[:, 1]], 1)
-    return Boxes(drawn.size, cast(moved, drawn.size), cast(place[:, 2], drawn.size)).to(device)
+        place = xp.where(start.given[:, None], place, place - rate * step)
+    return _placed(boxes, xp.stack([place[:, 0], height, place[:, 1]], 1), place[:, 2])
+
+
+def settled(plan: Plan, boxes: Boxes, given: Array | None = None) -> Boxes:
+    """Boxes at the heights that their carriers give them and, where they almost are, square to a wall.
+
+    Only the last step does so: down a slope that begins where terms have their kinks a hair's breadth decides.
+
+    Arguments: as for `mended`, the plan in either library.
+    """
+    start = _standing(plan, boxes, given)
+    off = askew(start, start.kit.arange(len(start)))
+    return _placed(boxes, start.position, start.yaw - start.kit.where((abs(off) < ALMOST) & ~start.given, off, 0.0))
+
+
+def _standing(plan: Plan, boxes: Boxes, given: Array | None) -> Plan:
+    """The plan with boxes where they are drawn, at the heights of what carries them, but for those that stay."""
+    xp, device = kit(plan.yaw), device_of(plan.yaw)
+    drawn, like = boxes.to(device), xp.zeros(0, dtype=xp.float64)  # rounding would choose the side
+    size, position, yaw = (cast(of, like) for of in (drawn.size, drawn.position, drawn.yaw))
+    stays = xp.zeros(len(boxes), dtype=xp.bool) if given is None else on_device(given, device)
+    start = replace(plan, size=size, position=position, yaw=yaw, given=stays, floor=cast(plan.floor, like))
+    height = xp.where(stays, position[:, 1], heights(start))
+    return start.at(xp.stack([position[:, 0], height, position[:, 2]], 1), yaw)
+
+
+def _placed(boxes: Boxes, position: Array, yaw: Array) -> Boxes:
+    """Boxes (N) in other places, in the library, type and place of theirs."""
+    drawn = boxes.to(device_of(yaw))
+    return Boxes(drawn.size, cast(position, drawn.size), cast(yaw, drawn.size)).to(device_of(boxes.yaw))
 
 
 def heights(plan: Plan) -> Array:

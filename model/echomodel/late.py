@@ -12,9 +12,14 @@ class Late:
 
     place: str
 
-    def __call__(self, *given: Any, **by_name: Any) -> Any:
+    @property
+    def itself(self) -> Any:
+        """What stands there."""
         module, name = self.place.split(":")
-        return attrgetter(name)(import_module(module))(*given, **by_name)
+        return attrgetter(name)(import_module(module))
+
+    def __call__(self, *given: Any, **by_name: Any) -> Any:
+        return self.itself(*given, **by_name)
 
 
 def extra(module: str, need: str, name: str, error: type[Exception] = ValueError) -> Any:

@@ -125,7 +125,8 @@ def stage_of(name: str, packed: PackedRooms, model: CompactModel):
         return PartsStage(packed, 24)
     if name.startswith("vqvae"):
         return AutoencoderStage(Grids(), 2, *([model.shape] if name == "vqvae of components" else []))
-    layout = LayoutStage(packed, packed, Recipe("layout", 1, nodes=40, measure_weight=0.3, physics_weight=1.0))
+    weights = {"measure_weight": 0.3, "physics_weight": 1.0, "drawn_weight": 1.0}
+    layout = LayoutStage(packed, packed, Recipe("layout", 1, nodes=40, **weights))
     if name == "layout":
         return layout
     latents = torch.randn(3 * len(CONFIG.categories), 6, 16, 16, 16, generator=torch.Generator().manual_seed(0)).half()

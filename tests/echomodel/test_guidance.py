@@ -8,7 +8,7 @@ import torch
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.graph import GraphBatch
-from echomodel.guidance import LATE, guided, mended, openings_of, plan_of_graph
+from echomodel.guidance import LATE, guided, mended, openings_of, plan_of_graph, settled
 from echomodel.objective import KINDS, faults_of
 from echomodel.openings import Opening
 from echomodel.surroundings import centred, outside
@@ -68,6 +68,19 @@ def test_known_boxes_stay():
     assert torch.equal(after.position[0], boxes.position[0])
     assert after.yaw[0] == boxes.yaw[0]
     assert "apart" not in faults(plan, after)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 20.0])
+def test_what_is_almost_square_to_a_wall_ends_so(tilt):
+    turn = np.radians(tilt)
+    floor = FLOOR @ np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    yaws = (tilt + 2.0, tilt - 92.5, tilt + 184.0, tilt + 1.0)  # the third is turned too far, the last is known
+    plan, boxes = room(*(("plant", (0.8 * k - 1.2, 0.3, 0.0), yaw) for k, yaw in enumerate(yaws)), floor=floor)
+    after = settled(plan, boxes, torch.tensor([False, False, False, True]))
+    assert np.degrees(after.yaw.numpy()) == pytest.approx([tilt, tilt - 90, tilt + 184, tilt + 1], abs=1e-3)
+    assert after.position[:, 1].tolist() == pytest.approx([0.0, 0.0, 0.0, 0.3])
+    assert torch.equal(after.position[:, ::2], boxes.position[:, ::2])
+    assert torch.equal(after.size, boxes.size)
 
 
 def test_a_chair_stays_under_its_desk():

@@ -14,7 +14,7 @@ from echomodel.compact.learned import places
 from echomodel.compact.pairs import Pairs, pairs_of
 from echomodel.config import BranchConfig, Sampler
 from echomodel.graph import GraphBatch
-from echomodel.guidance import AFTER, guided, mended, plan_of_graph
+from echomodel.guidance import AFTER, guided, mended, plan_of_graph, settled
 from echomodel.protocols import GraphEdit, Sampling
 from echomodel.randomness import normal
 from echomodel.samplers import Predict, clean_from, sample
@@ -158,7 +158,9 @@ def sample_boxes(model: Model, latent: Latent, graph: GraphBatch, how: CompactSa
     vectors = replace(how, known=given).denoised(predict, noise, config)
     boxes = Boxes.decode(vectors, scale)
     boxes = Boxes(clipped(boxes.size, 0.01, 20.0), boxes.position, boxes.yaw)
-    boxes = mended(plan, boxes, strength=strength, rounds=AFTER if strength else 0, given=how.known_mask)
+    if strength:
+        boxes = mended(plan, boxes, strength=strength, rounds=AFTER, given=how.known_mask)
+    boxes = settled(plan, boxes, how.known_mask)
     if how.known is None or how.known_mask is None:
         return boxes
     return boxes.replaced(how.known_mask, how.known)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from echomodel.arrays import Array, at_least, cast, full, held, kit, put
+from echomodel.arrays import Array, at_least, cast, full, held, kit, picked, put
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, nobody, worst
 from echomodel.objective.sight import screens
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_normal, segment
@@ -21,19 +21,23 @@ def parallel(plan: Plan) -> Found:
     """Storage, beds, sofas, tables and desks stand parallel to a wall; side tables go with their seat."""
     massive = plan.of("storage", "bed", "sofa", "board") & plan.standing
     who = plan.those(massive & ~plan.stands("company", "beside") & plan.moved)
+    off = abs(askew(plan, who))
+    return found(who, CROOKED - off, measure=plan.kit.rad2deg(off))
+
+
+def askew(plan: Plan, who: Array) -> Array:
+    """(P,) radians by which boxes are turned from the nearest quarter turn to a wall, or to x and z without walls."""
     _, along, _, length = (of[plan.scene[who]] for of in plan.walls)
-    xp = plan.kit
-    wall = xp.atan2(-along[..., 1], along[..., 0])
-    off = _from_quarter(plan.yaw[who, None] - wall)
-    off = xp.amin(xp.where(length > 0.3, off, xp.full_like(off, math.pi / 4)), 1)
-    off = xp.where((length > 0).any(1), off, _from_quarter(plan.yaw[who]))
-    return found(who, CROOKED - off, measure=xp.rad2deg(off))
+    xp, yaw = plan.kit, plan.yaw[who]
+    off = _from_quarter(yaw[:, None] - xp.atan2(-along[..., 1], along[..., 0]))
+    off = picked(off, xp.where(length > 0.3, abs(held(off)), math.pi / 4).argmin(1))
+    return xp.where((length > 0.3).any(1), off, _from_quarter(yaw))
 
 
 def _from_quarter(angle: Array) -> Array:
     """How far an angle is from the nearest quarter turn, radians."""
     xp, four = kit(angle), 4 * angle
-    return abs(xp.atan2(xp.sin(four), xp.cos(four))) / 4
+    return xp.atan2(xp.sin(four), xp.cos(four)) / 4
 
 
 def at_wall(plan: Plan) -> Found:

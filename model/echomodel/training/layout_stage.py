@@ -1,7 +1,4 @@
-"""The layout stage: denoising boxes (EchoScene 3.3), with losses on the boxes it predicts.
-
-They are a hinge on the relations told, what true boxes measure, collisions and walls.
-"""
+"""The layout stage: rooms in batches, the losses of true rooms and of draws, and what held-out rooms say."""
 
 from __future__ import annotations
 
@@ -13,185 +10,19 @@ from torch import Tensor
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.compact.draft import FARTHEST, measurable, pair_features, wall_features
 from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import box_scale, layout_predictor
-from echomodel.objective import Plan, faults_of
-from echomodel.objective.physics import apart
-from echomodel.objective.plan import UNKNOWN
+from echomodel.objective import faults_of
 from echomodel.randomness import normal
-from echomodel.rules import margins, verdicts
-from echomodel.samplers import add_noise, clean_from, sample, target
-from echomodel.surroundings import clearances, kept_free, outside
+from echomodel.rules import verdicts
+from echomodel.samplers import sample
+from echomodel.training.draws import drawn_loss
+from echomodel.training.layout_losses import edited_latent, layout_loss, plan_of_batch, told_triplets
 from echomodel.training.recipe import Recipe
-from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, draw_levels, make_batch
+from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
 from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
-
-TOLD_SLACK = 0.02  # the hinge asks for this much more than the rule does (metres or ratio)
-
-
-def relation_hinge(batch: LayoutBatch, decoded: Boxes, level: Tensor, known: Tensor, rules: tuple[str, ...]) -> Tensor:
-    """Mean over told relations of how far the predicted boxes miss them, weighted by (1 - level)^2."""
-    # ratios to a height near or below zero would explode or change their sign
-    lifted = torch.cat([decoded.position[:, :1], decoded.position[:, 1:2].clamp_min(0), decoded.position[:, 2:]], dim=1)
-    boxes = Boxes(decoded.size.clamp(0.05, 8.0), lifted, decoded.yaw)
-    triplets = told_triplets(batch)
-    ids = [entry.id for entry in vocabulary().predicates if entry.measures]
-    triplets = triplets[torch.isin(triplets[:, 1], triplets.new_tensor(ids))]
-    total, weights = level.new_zeros(()), level.new_zeros(())
-    emphasis = level.new_tensor([entry.loss_weight for entry in vocabulary().predicates])
-    own = batch.rules[batch.graph.scene[triplets[:, 0]]]
-    for number, name in enumerate(rules):
-        chosen = triplets[own == number]
-        if not len(chosen):
-            continue
-        ends = chosen[:, [0, 2]]
-        weight = (1 - level[ends].amax(1)).square() * ~known[ends].all(1)
-        margin = margins(boxes, chosen, rules=name, rigid=True)
-        weight = weight * emphasis[chosen[:, 1]]
-        total = total + (torch.log1p((TOLD_SLACK - margin).clamp_min(0)) * weight).sum()
-        weights = weights + weight.sum()
-    return total / weights.clamp_min(1)
-
-
-def told_triplets(batch: LayoutBatch) -> Tensor:
-    """(E, 3) int64, [subject, predicate id, object], the relations that the graphs tell."""
-    pair, predicate = batch.predicates.nonzero(as_tuple=True)
-    return torch.stack([batch.pairs.receiver[pair], predicate, batch.pairs.sender[pair]], dim=1)
-
-
-TOUCHING = 0.01  # metres that a box may reach into a wall
-FIRM = 10.0  # a miss counts as log(1 + FIRM * metres)
-
-
-def physics_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor) -> Tensor:
-    """Mean over the free boxes of how far they run into others, through walls and into the way of doors and windows,
-    weighted by (1 - level)^2.
-
-    Arguments:
-        boxes: N predicted boxes; places and headings alone are pulled at. level: (N,). known: (N,) bool.
-    """
-    graph, pairs = batch.graph, batch.pairs
-    free = measurable(Boxes(boxes.size.detach(), boxes.position, boxes.yaw))
-    told = torch.zeros(0, 3, dtype=torch.int64, device=level.device)
-    words, openings = (UNKNOWN,) * len(boxes), ((),) * graph.num_scenes
-    plan = Plan(words, free.size, free.position, free.yaw, graph.scene, graph.floor, openings, told, known)
-    once = ((pairs.receiver < pairs.sender) & torch.isfinite(batch.allowed)).nonzero()[:, 0]
-    i, j = pairs.receiver[once], pairs.sender[once]
-    vars(plan)["couples"] = i, j, batch.allowed[once]  # whom each may touch is not the network's to choose
-    sure = (1 - level).square()
-    weight = torch.minimum(sure[i], sure[j]) * ~(known[i] & known[j])
-    over = (outside(free, graph.floor[graph.scene]).square().sum(1) + 1e-12).sqrt()
-    stands = torch.tensor([row.support == "floor" for row in vocabulary().categories], device=level.device)
-    clear = kept_free(free, graph.openings[graph.scene]).clamp_min(-FARTHEST)
-    walls = deep(TOUCHING - over) + deep(clear) * stands[graph.category]
-    total = (deep(apart(plan).margin) * weight).sum() + (walls * sure * ~known).sum()
-    return total / (sure * ~known).sum().clamp_min(1)
-
-
-def plan_of_batch(batch: LayoutBatch, boxes: Boxes, known: Tensor) -> Plan:
-    """What the living rules look at, for all rooms of a batch at once; sizes are not pulled at."""
-    graph, kinds = batch.graph, vocabulary().categories
-    free = measurable(Boxes(boxes.size.detach(), boxes.position, boxes.yaw))
-    return Plan(
-        tuple(kinds[number] for number in graph.category.tolist()),
-        free.size, free.position, free.yaw, graph.scene, graph.floor, ((),) * graph.num_scenes,
-        told_triplets(batch), known,
-    )  # fmt: skip
-
-
-def deep(margin: Tensor) -> Tensor:
-    """By how much margins are missed, as the loss counts it: logarithmic, so that none pulls without bounds."""
-    return torch.log1p(FIRM * (-margin).clamp_min(0))
-
-
-DRAFT = 0.3  # weight of each draft's own denoising loss
-OPENINGS = 0.5  # weight of the clearances of doors and windows beside the gaps to the walls
-
-
-def edited_latent(model: CompactModel, batch: LayoutBatch) -> Tensor:
-    """The latent graph by the inverse strategy: pseudo graph into the encoder, true graph out of the manipulator."""
-    edit = {"before": batch.before, "added": batch.added, "touched": batch.touched}
-    return model.latent(batch.graph.category, batch.pairs, **edit)
-
-
-def layout_loss(
-    model: CompactModel, batch: LayoutBatch, latent: Tensor, generator: torch.Generator, recipe: Recipe
-) -> tuple[Tensor, dict[str, Tensor]]:
-    """Denoising loss of the unknown nodes, of the drafts too, plus the weighted relation hinge and measure distance.
-
-    Arguments:
-        model: with latent graph and layout denoiser. batch: true rooms. latent: (N, latent width), the edited graph's.
-        generator: source of levels, noise and of what is known.
-        recipe: its weights; 0 leaves the hinge, the distance, or collisions and walls out.
-
-    Returns the loss, and the parts that the log names.
-    """
-    objective = model.config.layout.objective
-    scale = box_scale(model, batch.graph.category)
-    clean = batch.boxes.encode(scale)
-    known = draw_known(batch.graph.scene, batch.graph.num_scenes, generator)
-    level = draw_levels(batch.graph.num_scenes, generator, clean.device)[batch.graph.scene] * ~known
-    noise = normal(clean.shape, generator, clean.device)
-    noisy = torch.where(known[:, None], clean, add_noise(clean, noise, level, objective))
-    context = model.layout.context(batch.graph, batch.pairs, latent, batch.rules, scale)
-    outputs = model.layout.drafts(noisy, level, context)
-    free, wanted = (~known).float(), target(clean, noise, level, objective)
-    errors = [((guess - wanted).square().mean(1) * free).sum() / free.sum().clamp_min(1) for guess in outputs]
-    output, parts = outputs[-1], {"denoising": errors[-1]}
-    if len(errors) > 1:
-        parts["draft"] = errors[0]
-    loss = errors[-1] + DRAFT * sum(errors[:-1], noise.new_zeros(()))
-    drawn = Boxes.decode(clean_from(output, noisy, level, objective), scale).replaced(known, batch.boxes)
-    predicted = as_carried(batch, drawn)
-    if recipe.relation_weight:
-        parts["relations"] = relation_hinge(batch, predicted, level, known, model.config.rules)
-        loss = loss + recipe.relation_weight * parts["relations"]
-    if recipe.measure_weight:
-        parts["measures"] = measure_distance(batch, predicted, context.floor, level, free)
-        loss = loss + recipe.measure_weight * parts["measures"]
-    if recipe.physics_weight:
-        parts["physics"] = physics_loss(batch, predicted, level, known)
-        loss = loss + recipe.physics_weight * parts["physics"]
-    return loss, parts
-
-
-def as_carried(batch: LayoutBatch, boxes: Boxes) -> Boxes:
-    """Boxes (N) at the heights that floor, ceiling or what carries them gives, as they get them once they are drawn
-    (`guidance.heights`): no loss lifts one over what it runs into. What hangs on a wall keeps its own."""
-    hangs = torch.tensor([row.support == "wall" for row in vocabulary().categories], device=boxes.yaw.device)
-    height = torch.where(hangs[batch.graph.category], boxes.position[:, 1], batch.boxes.position[:, 1])
-    return Boxes(boxes.size, torch.stack([boxes.position[:, 0], height, boxes.position[:, 2]], 1), boxes.yaw)
-
-
-def measure_distance(batch: LayoutBatch, boxes: Boxes, floor: Tensor, level: Tensor, free: Tensor) -> Tensor:
-    """Mean difference of what predicted and true boxes measure (`compact.draft`), weighted by (1 - level)^2.
-
-    It asks for a back at the wall and a chair at the table to the centimetre, where the square of a normalised position
-    would be content with a hand's breadth. It pulls at places and headings alone: sizes would shrink to their median.
-
-    Arguments:
-        boxes: N predicted boxes. floor: (N, K, 2). level: (N,). free: (N,) float, 0 for known boxes.
-    """
-    pairs = batch.pairs
-    weight = (1 - level).square()
-    own = weight * free
-    boxes, truth = measurable(Boxes(boxes.size.detach(), boxes.position, boxes.yaw)), measurable(batch.boxes)
-    walls = (wall_features(boxes, floor) - wall_features(truth, floor)).abs().mean(1)
-    openings = batch.graph.openings[batch.graph.scene]
-    walls = walls + OPENINGS * (clearances(boxes, openings) - clearances(truth, openings)).abs().mean(1)
-    both = torch.minimum(weight[pairs.receiver], weight[pairs.sender]) * free[pairs.receiver]
-    between = (pair_features(boxes, pairs) - pair_features(truth, pairs)).abs().mean(1)
-    return (walls * own).sum() / own.sum().clamp_min(1) + (between * both).sum() / both.sum().clamp_min(1)
-
-
-def draw_known(scene: Tensor, scenes: int, generator: torch.Generator) -> Tensor:
-    """(N,) bool: in half of the scenes nothing is known, in the others a random share of the nodes."""
-    some = torch.rand(scenes, generator=generator) < 0.5
-    share = (torch.rand(scenes, generator=generator) * some).to(scene.device)
-    return torch.rand(len(scene), generator=generator).to(scene.device) < share[scene]
 
 
 class LayoutStage:
@@ -221,9 +52,13 @@ class LayoutStage:
         return cls(rooms, held, start.recipe)
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
-        """Loss of one random batch, whose graph passes encoder and manipulator, and its parts."""
-        batch = self._drawn(generator).to(model.device)
-        return layout_loss(model, batch, edited_latent(model, batch), generator, self.recipe)
+        """Loss of one random batch, whose graph passes encoder and manipulator, and of draws, and their parts."""
+        batch, recipe = self._drawn(generator).to(model.device), self.recipe
+        loss, parts = layout_loss(model, batch, edited_latent(model, batch), generator, recipe)
+        if recipe.drawn_weight:
+            drawn, of_draws = drawn_loss(model, batch, generator)
+            loss, parts = loss + recipe.drawn_weight * drawn, parts | of_draws
+        return loss, parts
 
     def _drawn(self, generator: torch.Generator) -> LayoutBatch:
         """A batch drawn here, or by `workers` processes ahead of the step: then a resumed run draws other batches."""

@@ -53,7 +53,7 @@ BOUNDS: tuple[tuple[str, float, float], ...] = (
     ("seed", 0, 2**63 - 1),
     ("threads", 0, 1024),
     ("workers", 0, 1024),
-    *((f"{name}_weight", 0, 10**6) for name in ("relation", "measure", "physics")),
+    *((f"{name}_weight", 0, 10**6) for name in ("relation", "measure", "physics", "drawn")),
 )
 
 
@@ -77,6 +77,7 @@ class Recipe:
         relation_weight: weight of the hinge on the relations' margins of the predicted boxes.
         measure_weight: weight of the difference in what predicted and true boxes measure (gaps to walls, ...).
         physics_weight: weight of collisions of the predicted boxes, and of what is through a wall or in a door's way.
+        drawn_weight: weight of what is wrong with rooms that the network draws itself (`training.draws`).
         validate_every, save_every: steps.
         precision: `float32` or `bfloat16` (autocast).
         threads: CPU threads, 0 = as many as torch likes. workers: processes that draw batches of rooms ahead of a GPU,
@@ -99,6 +100,7 @@ class Recipe:
     relation_weight: float = 0.5
     measure_weight: float = 0.0
     physics_weight: float = 0.0
+    drawn_weight: float = 0.0
     validate_every: int = 2000
     save_every: int = 1000
     log_every: int = 50

@@ -7,19 +7,17 @@ from pathlib import Path
 import torch
 
 from echomodel.late import Late
-from echomodel.training.layout_stage import LayoutStage
-from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import Recipe
-from echomodel.training.shape_stage import AutoencoderStage, ShapeStage
 from echomodel.training.start import CompactStage, started
 from echomodel.training.trainer import Report, Trainer
 
-STAGES: dict[str, type[CompactStage]] = {
-    "layout": LayoutStage,
-    "vqvae": AutoencoderStage,
-    "shape": ShapeStage,
-    "parts": PartsStage,
-}  # the stages of the compact model, as recipes name them
+# the stages of the compact model, as recipes name them: a layout needs none of the libraries of shapes
+STAGES = {
+    "layout": Late("echomodel.training.layout_stage:LayoutStage"),
+    "vqvae": Late("echomodel.training.shape_stage:AutoencoderStage"),
+    "shape": Late("echomodel.training.shape_stage:ShapeStage"),
+    "parts": Late("echomodel.training.parts_stage:PartsStage"),
+}
 # those of other models -> the module whose `opened` makes their trainer
 ELSEWHERE = dict.fromkeys(("paper", "paper_vqvae"), Late("echoscene.training:opened"))
 
@@ -42,6 +40,6 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
     if recipe.stage in ELSEWHERE:
         made: Trainer = ELSEWHERE[recipe.stage](recipe, folder, device, resume=resume, report=report)
         return made
-    kind = STAGES[recipe.stage]
+    kind: type[CompactStage] = STAGES[recipe.stage].itself
     start = started(kind, recipe, device, resume=resume)
     return Trainer(recipe, start.model, kind.open(start), folder, resume=resume, report=report)

@@ -22,7 +22,7 @@ from echomodel.graph import GraphBatch
 from echomodel.metrics.pointsets import surface_scores
 from echomodel.randomness import normal
 from echomodel.samplers import add_noise, output_from
-from echomodel.training.layout_stage import draw_known
+from echomodel.training.layout_losses import draw_known
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, draw_levels
 from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary

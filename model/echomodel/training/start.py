@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import torch
 
@@ -17,11 +17,13 @@ from echomodel.compact.shape import ShapeDenoiser
 from echomodel.compact.weights import WORDS, read_header, words_of
 from echomodel.config import CompactConfig
 from echomodel.data.roomset import RoomSet
-from echomodel.data.shapeset import ShapeSet
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import PackedRooms
 from echomodel.training.trainer import TrainingStage
 from echomodel.vocabulary import vocabulary
+
+if TYPE_CHECKING:
+    from echomodel.data.shapeset import ShapeSet
 
 _NO_BOXES = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3)
 
@@ -55,6 +57,8 @@ class Start:
 
     def shapes(self) -> ShapeSet:
         """The recipe's shapes."""
+        from echomodel.data.shapeset import ShapeSet
+
         return ShapeSet(data_folder(self.recipe, "shapes"))
 
 

@@ -24,7 +24,7 @@ from echomodel.training.recipe import Recipe
 # Fields of a recipe that may change on the way: length, rates and weights, files, and what the machine offers.
 MAY_CHANGE = {
     "steps", "data", "start", "warm", "optimizer", "relation_weight", "measure_weight",
-    "physics_weight", "validate_every", "save_every", "log_every", "threads", "workers",
+    "physics_weight", "drawn_weight", "validate_every", "save_every", "log_every", "threads", "workers",
     "precision", "nodes", "scenes", "shapes_per_batch",
 }  # fmt: skip
 Report = Callable[[int, dict[str, float]], None]
@@ -90,17 +90,18 @@ class Trainer:
         self.folder.mkdir(parents=True, exist_ok=True)
         log = RunLog(self.folder, self.step)
         started = marked = time.monotonic()
-        sums: dict[str, float] = {}
+        sums, logged = dict[str, float](), self.step
         self.model.train()
         while self.step < last and (seconds is None or time.monotonic() - started < seconds):
             for name, value in self._train_step().items():
                 sums[name] = sums.get(name, 0.0) + value
             if self.step % recipe.log_every == 0:
-                means = {name: value / recipe.log_every for name, value in sums.items()}
-                means["steps_per_second"] = recipe.log_every / (time.monotonic() - marked)
+                count = self.step - logged
+                means = {name: value / count for name, value in sums.items()}
+                means["steps_per_second"] = count / (time.monotonic() - marked)
                 log.write(self.step, means)
                 self.report(self.step, means)
-                marked, sums = time.monotonic(), {}
+                marked, sums, logged = time.monotonic(), {}, self.step
             if self.step % recipe.validate_every == 0 or self.step == last:
                 scores = self.stage.validate(self.average)
                 log.write(self.step, scores)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, make_dataclass
+from types import SimpleNamespace
 from typing import ClassVar, get_args
 
 import pytest
@@ -67,7 +68,7 @@ class ColourStage:
 @pytest.fixture
 def colours(monkeypatch):
     monkeypatch.setitem(PARTS, "colours", Part(Colours, ("latent",), branch=True))
-    monkeypatch.setitem(STAGES, "colours", ColourStage)
+    monkeypatch.setitem(STAGES, "colours", SimpleNamespace(itself=ColourStage))
     monkeypatch.setattr("echomodel.compact.weights.CompactConfig", WithColours)
 
 
@@ -89,7 +90,7 @@ def test_a_third_branch_is_built_trained_saved_and_loaded(colours, tmp_path):
 def test_every_part_has_settings_and_every_stage_a_name():
     assert PARTS.keys() <= vars(CompactConfig()).keys()
     assert {*STAGES, "paper", "paper_vqvae"} == set(get_args(Stage))
-    for stage in STAGES.values():
+    for stage in (late.itself for late in STAGES.values()):
         assert {*stage.parts} <= PARTS.keys()
         assert {*stage.needs} <= {*stage.parts}
     assert branches(("latent", "layout", "shape")) == {"layout"}  # a shape branch without its autoencoder

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,7 +22,8 @@ from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts
 from echomodel.surroundings import outside
 from echomodel.training import trainer
-from echomodel.training.layout_stage import LayoutStage, as_carried, measure_distance, told_triplets
+from echomodel.training.layout_losses import as_carried, measure_distance, told_triplets
+from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.recipe import OptimizerConfig, Recipe, read_recipe
 from echomodel.training.rooms import PackedRooms, draw_batch, make_batch
 from echomodel.training.run import open_run
@@ -276,3 +279,33 @@ def test_a_checkpoint_of_another_recipe_is_refused_and_the_fields_are_named(
         (tmp_path / "log.csv").write_bytes(content)
         with pytest.raises(ValueError, match=r"log.csv: not the log of a training"):
             read_log(tmp_path / "log.csv")
+
+
+def test_a_log_holds_means_of_the_steps_since_a_run_went_on(data: Path, tmp_path: Path) -> None:
+    recipe = smoke("layout", data, "steps=6", "log_every=6", "validate_every=100", "save_every=100")
+    once, twice = (open_run(recipe, tmp_path / name) for name in ("once", "twice"))
+    once.run()
+    twice.run(until=5)
+    twice.run()
+    loss = [next(value for _, name, value in read_log(tmp_path / of / "log.csv") if name == "loss")
+            for of in ("once", "twice")]  # fmt: skip
+    assert loss[1] > 0.5 * loss[0]  # of one step, and not a sixth of it
+
+
+LAYOUTS_ALONE = """
+import sys
+from importlib.abc import MetaPathFinder
+
+class Bare(MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {"zstandard", "trimesh", "manifold3d", "pxr", "pydantic", "shapely", "skimage"}:
+            raise ModuleNotFoundError(name)
+
+sys.meta_path.insert(0, Bare())
+import echomodel.training.run
+assert echomodel.training.run.STAGES["layout"].itself.__name__ == "LayoutStage"
+"""
+
+
+def test_layouts_are_trained_without_the_libraries_of_shapes() -> None:
+    subprocess.run([sys.executable, "-c", LAYOUTS_ALONE], check=True)
