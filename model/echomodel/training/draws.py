@@ -81,6 +81,7 @@ def drawn_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Genera
     steps = int(torch.randint(STEPS[0], STEPS[1] + 1, (), generator=generator))
 
     def late(x: Tensor, level: Tensor) -> Tensor:
+        x = torch.cat([x[:, :3].detach(), x[:, 3:]], 1)  # or furniture would shrink between two steps
         with torch.set_grad_enabled(float(level[0]) * steps < KEPT + 0.5):
             return steadied(predict(x, level))
 

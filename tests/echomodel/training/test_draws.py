@@ -98,6 +98,13 @@ def test_the_gradient_goes_through_the_last_steps_alone(batch, model, monkeypatc
     assert calls == [False, False, False, True, True]
 
 
+def test_no_furniture_learns_to_be_smaller(batch, model):
+    drawn_loss(model, batch, torch.Generator().manual_seed(1))[0].backward()
+    for head in model.layout.heads:
+        assert (head.weight.grad[:3] == 0).all()  # the sizes of a box
+        assert (head.weight.grad[3:] != 0).any()
+
+
 def test_no_box_drowns_the_others():
     x = torch.ones(4, 8, requires_grad=True)
     scale = torch.tensor([1e9, 1.0, float("nan"), -2.0])
