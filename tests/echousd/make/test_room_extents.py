@@ -24,12 +24,14 @@ def graph_of(room):
     return SceneGraph(nodes=nodes, relations=(), room=spec)
 
 
-def test_a_hall_of_twenty_and_more_is_furnished_without_a_collision():
+def test_halls_of_twenty_and_more_are_furnished_without_a_collision():
     halls = [hall for hall in generate_rooms(40, 11, halls=1.0) if 20 <= len(hall) <= 28]
-    graph = graph_of(min(halls, key=len))
-    room = echousd.generate(graph, shapes="boxes", seed=1, drafts=2, **BARE)
-    assert room.faults == ()
-    assert len(living_faults(room.graph, room.boxes)) <= 0.08 * len(graph.nodes)
+    found = objects = 0
+    for hall in sorted(halls, key=len)[:2]:  # one room alone is luck: 0 to 3 faults by the seed
+        room = echousd.generate(graph_of(hall), shapes="boxes", seed=1, drafts=2, **BARE)
+        assert room.faults == ()
+        found, objects = found + len(living_faults(room.graph, room.boxes)), objects + len(hall)
+    assert found <= 0.08 * objects
 
 
 def test_in_six_square_metres_what_has_no_place_is_left_out_and_said(tmp_path):
