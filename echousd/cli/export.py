@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,7 +20,7 @@ def export(
         Path,
         typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc; a folder with --for.", show_default=False),
     ],
-    for_: Annotated[
+    reader: Annotated[
         str | None,
         typer.Option(
             "--for", help="sceneeval: its sceneState, a glb for every object; habitat: a data set of the room or home."
@@ -44,7 +43,7 @@ def export(
     pictures: Annotated[
         bool, typer.Option("--pictures/--no-pictures", help="Images, or plain colours alone (MuJoCo reads no JPEG).")
     ] = True,
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that is in the way.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that are in the way.")] = False,
     json: Written = False,
 ) -> None:
     """Write a room as one file: usdz for the web or ARKit, glb, or flat USD.
@@ -53,23 +52,12 @@ def export(
     Those that ignore purposes draw its colliders: --no-physics.
     """
     from echousd.exporting.formats import export as write
-    from echousd.exporting.habitat import export_habitat, export_sceneeval
     from echousd.folder.found import room_at
 
-    room = room_at(room)
-    if for_ is not None:
-        others: dict[str, Callable[[Path, Path], list[Path]]] = {
-            "sceneeval": export_sceneeval,
-            "habitat": export_habitat,
-        }
-        if for_ not in others:
-            raise ValueError(f"--for is {for_!r}, allowed: {', '.join(others)}")
-        written = others[for_](room, output)
-        say_done(json, written, [str(written[0])])
-        return
     path = write(
-        room, output, arkit=arkit, force=force, search=search or (), layout=layout, physics=physics, pictures=pictures
-    )
+        room_at(room), output, reader=reader, arkit=arkit, force=force, search=search or (), layout=layout,
+        physics=physics, pictures=pictures,
+    )  # fmt: skip
     say_done(json, [path], [str(path)])
 
 

@@ -13,16 +13,18 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdShade, UsdUtil
 
 from echousd.draw.drawables import rgb
 from echousd.exporting.glb import glb
+from echousd.exporting.habitat import habitat_files, sceneeval_files
 from echousd.exporting.packing import Package, Reach, images_beside, take_assets, without_clock
 from echousd.stage.files import layer_bytes, open_stage, prim_specs, source, write_all
 from echousd.stage.layouts import selected_layout, showing_layout
 from echousd.stage.units import set_units
 from echousd.stage.values import check_types, given, reading, targets
+from echousd.textures import file_of
 
 
 @dataclass(frozen=True)
 class Export:
-    """What one file is to hold: see `export`, whose arguments these are."""
+    """What is to be written: see `export`, whose arguments these are."""
 
     out: Path
     reach: Reach
@@ -33,10 +35,10 @@ class Export:
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of file.
+    """A kind of file, or of a folder that others read.
 
     Arguments:
-        write: a stage and what is asked for -> path and content of every file, the first of them `Export.out`.
+        write: a stage and what is asked for -> path and content of every file, first the one that is opened.
         options: of `export`, those that it knows.
         physics: whether it holds physics unless it is told.
     """
@@ -63,13 +65,18 @@ FORMATS: Mapping[str, Format] = {
     ".glb": Format(lambda stage, asked: {asked.out: glb(stage, asked.reach)}),
     ".usda": Format(_flat, frozenset({"physics", "pictures"}), physics=True),
     ".usdc": Format(_flat, frozenset({"physics", "pictures"}), physics=True),
+    "habitat": Format(lambda stage, asked: habitat_files(stage, asked.out, asked.reach)),
+    "sceneeval": Format(lambda stage, asked: sceneeval_files(stage, asked.out)),
 }
+ENDINGS = tuple(word for word in FORMATS if word.startswith("."))
+READERS = tuple(word for word in FORMATS if word not in ENDINGS)
 
 
 def export(
     room: str | Path,
     out: str | Path,
     *,
+    reader: str | None = None,
     arkit: bool = False,
     force: bool = False,
     search: Sequence[str | Path] = (),
@@ -77,33 +84,37 @@ def export(
     physics: bool | None = None,
     pictures: bool = True,
 ) -> Path:
-    """Write a room (any stage) as one file.
+    """Write a room (any stage) as one file, or as the folder that one `reader` expects, and return what to open.
 
     Arguments:
         room: root layer of the room.
-        out: `.usdz` (one flat usda inside, which web viewers read), `.glb`, or a flat `.usda` or `.usdc`.
+        out: `.usdz` (one flat usda inside, which web viewers read), `.glb`, or a flat `.usda` or `.usdc`; or a folder.
+        reader: `sceneeval` (its sceneState, a glb for every object) or `habitat` (a data set of the room or home).
         arkit: usdz as Apple's viewers want it: one usdc inside, Y up, without lights and scene graph.
-        force: replace a file that is in the way.
+        force: replace files that are in the way.
         physics: keep bodies, colliders, joints and the scene, or none of it; None = in flat USD alone.
         layout: number of the layout that the file holds; None = the one that the room shows. The file says which.
         pictures: take images along; without them materials have plain colours, for importers that read none (MuJoCo
             4.0 refuses JPEG).
         search: folders besides the room's own whose layers and images may be taken along.
 
-    Raises ValueError for other endings, options that a kind of file does not know, a file in the way, a stage that does
-    not open, one that names files outside its folder and `search`, or a path that is not writable.
+    Raises ValueError for other endings and readers, options that a kind of file does not know, a file in the way or one
+    that the room is read from, a stage that does not open, one that names files outside its folder and `search`, or a
+    path that is not writable.
     """
     out = Path(out)
-    if out.suffix not in FORMATS:
-        raise ValueError(f"{out}: cannot export to {out.suffix or 'no ending'!r}, allowed: {', '.join(FORMATS)}")
-    kind = FORMATS[out.suffix]
+    if reader is not None and reader not in READERS:
+        raise ValueError(f"--for is {reader!r}, allowed: {', '.join(READERS)}")
+    if reader is None and out.suffix not in ENDINGS:
+        raise ValueError(f"{out}: cannot export to {out.suffix or 'no ending'!r}, allowed: {', '.join(ENDINGS)}")
+    kind = FORMATS[reader or out.suffix]
     asked = {"--arkit": arkit, "--physics": physics, "--no-pictures": not pictures}
     for word, wanted in asked.items():
         option = word.removeprefix("--").removeprefix("no-")
         if wanted and option not in kind.options:
             allowed = ", ".join(ending for ending, other in FORMATS.items() if option in other.options)
-            raise ValueError(f"{out}: {word} says nothing to a {out.suffix}, allowed: {allowed}")
-    if out.exists() and not force:
+            raise ValueError(f"{out}: {word} says nothing to a {reader or out.suffix}, allowed: {allowed}")
+    if out.exists() and not force and not reader:
         raise ValueError(f"{out}: exists; choose another file or use --force")
     stage = open_stage(room)
     reach = Reach.of(stage, search)
@@ -111,8 +122,14 @@ def export(
     physics = kind.physics if physics is None else physics
     with showing_layout(stage, layout), reading(stage):
         files = kind.write(stage, Export(out, reach, physics, pictures, arkit))
+    read = {file_of(layer.realPath).resolve() for layer in stage.GetUsedLayers() if layer.realPath}
+    for path in files:
+        if path.resolve() in read:
+            raise ValueError(f"{path}: the room is read from it; choose another place")
+        if reader and path.exists() and not force:
+            raise ValueError(f"{path}: exists; choose another folder or use --force")
     write_all(files)
-    return out
+    return next(iter(files))
 
 
 def _marked(layer: Sdf.Layer, stage: Usd.Stage) -> Sdf.Layer:

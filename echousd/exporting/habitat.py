@@ -14,7 +14,7 @@ from echousd.exporting.glb import glb, object_glb
 from echousd.exporting.packing import Reach
 from echousd.graph import SceneGraph
 from echousd.naming import free_name
-from echousd.stage.files import open_stage, source, write_all
+from echousd.stage.files import source
 from echousd.stage.foreign import boxed_graph
 from echousd.stage.read import RoomPrims, find_rooms, node_names, room_graph, the_room
 from echousd.stage.turning import TURN
@@ -24,20 +24,19 @@ UP = {"up": [0, 1, 0], "front": [0, 0, -1]}  # Habitat's own, and of every glb
 FOLDERS = {"stages": "stages", "objects": "objects", "scene_instances": "scenes"}
 
 
-def export_habitat(room: str | Path, out: Path) -> list[Path]:
-    """Write `NAME.scene_dataset_config.json` and beside it stages, objects, the scene, and regions of its rooms.
+def habitat_files(stage: Usd.Stage, out: Path, reach: Reach) -> dict[Path, bytes]:
+    """`NAME.scene_dataset_config.json` and beside it stages, objects, the scene, and regions of its rooms.
 
     What dresses a room is part of the stage; furniture is objects, those that stand free to be moved.
 
     Raises ValueError for a stage without rooms, and as `export`.
     """
-    path = Path(room)
-    stage = open_stage(path)
     rooms = find_rooms(stage)
     if not rooms:
         raise ValueError(f"{source(stage)}: no scene graph, Habitat needs one: a room or a home of EchoUSD")
-    name, top = path.stem, f"{path.stem}.scene_dataset_config.json"
-    files: dict[str, bytes | dict[str, Any]] = {}
+    name = reach.room.stem
+    top = f"{name}.scene_dataset_config.json"
+    files: dict[str, bytes | dict[str, Any]] = {top: b""}
     objects: list[dict[str, Any]] = []
     names: dict[str, str] = {}
     cache = UsdGeom.XformCache()
@@ -61,7 +60,7 @@ def export_habitat(room: str | Path, out: Path) -> list[Path]:
             )
         for prim_path in names:
             stage.GetPrimAtPath(prim_path).SetActive(False)
-        files[f"stages/{name}.glb"] = glb(stage, Reach.of(stage, ()))
+        files[f"stages/{name}.glb"] = glb(stage, reach)
     files[f"stages/{name}.stage_config.json"] = {"render_asset": f"{name}.glb", **UP}
     files[f"scenes/{name}.scene_instance.json"] = {
         "stage_instance": {"template_name": f"stages/{name}"},
@@ -73,12 +72,10 @@ def export_habitat(room: str | Path, out: Path) -> list[Path]:
         **{kind: {"paths": {".json": [folder]}} for kind, folder in FOLDERS.items()},
         "semantic_scene_descriptor_instances": {"paths": {".json": [f"{name}.semantic_config.json"]}},
     }
-    written = {
+    return {
         out / where: content if isinstance(content, bytes) else (json.dumps(content, indent=1) + "\n").encode()
         for where, content in files.items()
     }
-    write_all(written)
-    return sorted(written, key=lambda file: file.name != top)
 
 
 def _objects(rooms: list[RoomPrims]) -> Iterator[tuple[RoomPrims, Usd.Prim, str]]:
@@ -116,26 +113,22 @@ Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # 
 ASSETS, PREFIX = Path("_data/layoutvlm-objathor"), "layoutvlm-objaverse"
 
 
-def export_sceneeval(room: str | Path, out: Path, *, method: str = "EchoUSD", scene: int = 0) -> list[Path]:
-    """Write `input/METHOD/scene_N.json` and the models below `_data`, as SceneEval's own folder has them.
+def sceneeval_files(stage: Usd.Stage, out: Path) -> dict[Path, bytes]:
+    """`input/EchoUSD/scene_0.json` and the models below `_data`, as SceneEval's own folder has them.
 
     Raises ValueError for a room without a floor or with an object that has no place, and as `export`.
     """
-    stage = open_stage(room)
     prims = the_room(stage, None)
     graph = boxed_graph(prims)
-    state = scene_state(graph)  # raises before anything is written
-    files: dict[Path, bytes] = {
-        out / "input" / method / f"scene_{scene}.json": (json.dumps(state, indent=1) + "\n").encode()
-    }
+    state = (json.dumps(scene_state(graph), indent=1) + "\n").encode()
+    files = {out / "input" / "EchoUSD" / "scene_0.json": state}
     for path, name in node_names(prims).items():
         node, number = graph.node(name), model_name(name)
         told = {"category": node.category.replace("_", " "), "description": f"a {node.category.replace('_', ' ')}"}
         folder = out / ASSETS / number
         files[folder / f"{number}.glb"] = object_glb(stage, prims.room.GetPath(), path)
         files[folder / "data.json"] = json.dumps({"annotations": {**told, "materials": []}}).encode()
-    write_all(files)
-    return list(files)
+    return files
 
 
 def model_name(name: str) -> str:

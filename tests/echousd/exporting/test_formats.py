@@ -215,3 +215,26 @@ def test_refusals(root, tmp_path):
     with pytest.raises(ValueError, match=r"nowhere\.usda"):
         export(tmp_path / "nowhere.usda", tmp_path / "other.glb")
     assert not (tmp_path / "other.glb").exists()
+
+
+@pytest.mark.parametrize("layer", ["bedroom.usda", "layers/graph.usda"])
+def test_a_room_is_never_written_over_what_it_is_read_from(root, layer):
+    before = (root.parent / layer).read_bytes()
+    with pytest.raises(ValueError, match=f"{layer}: the room is read from it"):
+        export(root, root.parent / layer, force=True)
+    assert (root.parent / layer).read_bytes() == before
+
+
+def test_folders_for_readers_replace_nothing_unless_forced_and_know_their_options(root, tmp_path):
+    opened = export(root, tmp_path, reader="sceneeval")
+    assert opened == tmp_path / "input/EchoUSD/scene_0.json"
+    opened.write_text("mine")
+    with pytest.raises(ValueError, match=r"scene_0\.json: exists; choose another folder or use --force"):
+        export(root, tmp_path, reader="sceneeval")
+    assert opened.read_text() == "mine"
+    export(root, tmp_path, reader="sceneeval", force=True)
+    assert opened.read_text() != "mine"
+    with pytest.raises(ValueError, match=r"--arkit says nothing to a habitat, allowed: \.usdz"):
+        export(root, tmp_path / "other", reader="habitat", arkit=True)
+    with pytest.raises(ValueError, match="no layout 4"):
+        export(root, tmp_path / "other", reader="habitat", layout=4)

@@ -9,7 +9,7 @@ from pxr import Usd, UsdGeom
 
 import echousd
 from echousd.cli.main import run
-from echousd.exporting.habitat import export_habitat
+from echousd.exporting.formats import export
 from echousd.graph import SceneGraph
 
 GRAPH = """
@@ -68,6 +68,6 @@ def test_a_room_stands_as_in_usd(tmp_path, axis, metres):
 def test_a_stage_without_a_graph_is_named(tmp_path):
     Usd.Stage.CreateNew(str(tmp_path / "bare.usda")).Save()
     with pytest.raises(ValueError, match=r"bare\.usda: no scene graph, Habitat needs one"):
-        export_habitat(tmp_path / "bare.usda", tmp_path / "out")
+        export(tmp_path / "bare.usda", tmp_path / "out", reader="habitat")
     assert not (tmp_path / "out").exists()
     assert run(["export", str(tmp_path / "bare.usda"), "--for", "unreal", "-o", str(tmp_path / "out")]) == 2
