@@ -65,7 +65,7 @@ benchmarks: $(STAMP)
 # make eval: the shipped weights beside chance and plain baselines, report.md, .json and .html in out/eval.
 SET ?= generated
 eval: $(STAMP)
-	$(BIN)/echousd eval suite --against $(SET) --count 24 --workers 2 -o out/eval/report
+	$(BIN)/echousd eval suite --against $(SET) --count 24 --workers 2 --force -o out/eval/report
 
 # make paper SGFRONT=DIR: trains the paper preset on SG-FRONT with 3D-FUTURE-SDF in it, and fills our column of the tables.
 PAPER ?= out/paper
@@ -73,7 +73,7 @@ TRAIN = $(BIN)/echousd train model/recipes/paper.toml --set data=$(SGFRONT) $(SE
 paper: $(STAMP)
 	$(TRAIN) --set stage=paper_vqvae -o $(PAPER)/vqvae
 	$(TRAIN) --set 'start=["$(PAPER)/vqvae/weights.safetensors"]' -o $(PAPER)/run
-	$(BIN)/echousd eval suite $(PAPER)/run default --against $(SGFRONT) --count 370 $(ASKED) -o $(PAPER)/report
+	$(BIN)/echousd eval suite $(PAPER)/run default --against $(SGFRONT) --count 370 $(ASKED) --force -o $(PAPER)/report
 
 # make benchmark: what everything takes, as one table of ratios to the machine's matrix products and memory.
 benchmark: $(STAMP)

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from echousd.cli.options import Written
-from echousd.cli.output import say, say_done
+from echousd.cli.options import Replace, Written
+from echousd.cli.output import check_free, say, say_done
 
 eval_app = typer.Typer(help="Scores of whoever lays out rooms, and studies with people.", no_args_is_help=True)
 app = typer.Typer()
@@ -43,6 +43,7 @@ def suite(
     inception: Annotated[Path | None, typer.Option(help="Weights of FID and KID: inception-2015-12-05.pt.")] = None,
     clip: Annotated[Path | None, typer.Option(help="Weights of FID-CLIP: OpenAI's ViT-B-32 (extra text).")] = None,
     workers: Annotated[int, typer.Option(help="Processes that place rooms.", min=1)] = 2,
+    force: Replace = False,
     json: Written = False,
 ) -> None:
     """Ask systems the same rooms, score them beside chance and plain baselines, and write a report.
@@ -51,8 +52,10 @@ def suite(
     """
     from echousd.cli.terminal import progress_bar
     from echousd.evaluation.runs import SYSTEMS, SuiteSettings
-    from echousd.evaluation.suite import evaluate, write_report
+    from echousd.evaluation.suite import evaluate, report_files, write_report
 
+    for path in report_files(out):
+        check_free(path, force=force)
     chosen = tuple(word.strip() for word in only.split(",") if word.strip())
     asked = tuple(systems) if systems else SYSTEMS
     files = {"shapes": shapes, "inception": inception, "clip": clip}
@@ -74,6 +77,7 @@ def study(
     against: Against = "generated",
     count: Count = 12,
     seed: Seed = 0,
+    force: Replace = False,
     json: Written = False,
 ) -> None:
     """Write a page that shows people pairs of rooms and records which they prefer, offline.
@@ -83,6 +87,7 @@ def study(
     from echousd.cli.terminal import progress_bar
     from echousd.evaluation.suite import write_study
 
+    check_free(out, force=force)
     with progress_bar() as told_to:
         path = write_study(systems, against, count, seed, out, told_to)
     say_done(json, [path], [str(path)])

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from echousd.cli.options import AsJson, Layout, Room, Written
-from echousd.cli.output import check_picture, say_done
+from echousd.cli.options import AsJson, Layout, Replace, Room, Written
+from echousd.cli.output import check_free, check_picture, say_done
 
 app = typer.Typer()
 
@@ -141,7 +141,6 @@ BOUNDS = typer.Option(
     None, "--bounds", metavar="TXT", help="centered_bounds_*_trainval.txt of the data set: box statistics to store."
 )
 CLASSES = typer.Option(None, "--classes", metavar="TXT", help="Class names in the order of their ids, one a line.")
-FORCE = typer.Option(False, "--force", help="Replace OUT.safetensors if it exists.")
 
 
 @app.command("convert")
@@ -150,7 +149,7 @@ def convert(
     output: Path = OUTPUT,
     bounds: Path | None = BOUNDS,
     classes: Path | None = CLASSES,
-    force: bool = FORCE,
+    force: Replace = False,
     json: AsJson = False,
 ) -> None:
     """Convert a published EchoScene, EchoLayout or VQ-VAE checkpoint.
@@ -162,8 +161,7 @@ def convert(
     """
     if output.suffix != ".safetensors":
         raise ValueError(f"{output}: the output's name must end by .safetensors")
-    if output.exists() and not force:
-        raise ValueError(f"{output}: exists already (--force replaces it)")
+    check_free(output, force=force)
     from echoscene import checkpoint
     from echoscene.checkpoint import read_bounds
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from echousd.cli.options import AsJson
-from echousd.cli.output import check_picture, say, say_done, say_json
+from echousd.cli.options import AsJson, Replace
+from echousd.cli.output import check_free, check_picture, say, say_done, say_json
 
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
@@ -101,7 +101,7 @@ def new(
         list[str] | None,
         typer.Option(metavar="WALL ...", help="A window: wall, metres from its first corner, width, sill=, height=."),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite OUT.")] = False,
+    force: Replace = False,
     json: AsJson = False,
 ) -> None:
     """Author a scene graph, as a stage or as text, from a file or from a room type."""
@@ -113,8 +113,7 @@ def new(
         raise GraphError("say where the graph comes from: either --from GRAPH, --room TYPE or --rooms ROOMS")
     if room is None and count:
         raise GraphError("--count goes with --room; edit the objects of a file in the file")
-    if out.exists() and not force:
-        raise GraphError(f"{out} exists, allowed: a new path, or --force to overwrite it")
+    check_free(out, force=force)
     home = None if room else home_given(source, rooms, area, size, relate or ())
     if home is not None:
         if height or door or window:

@@ -78,6 +78,12 @@ def plain_json(found: Any) -> Any:
     return [plain_json(value) for value in found] if isinstance(found, list | tuple) else found
 
 
+def check_free(path: Path, *, force: bool) -> None:
+    """Refuse to replace a file, or to fill a folder that holds something, unless `force`; raises ValueError."""
+    if path.exists() and not force and not (path.is_dir() and not any(path.iterdir())):
+        raise ValueError(f"{path}: exists; choose another place or use --force")
+
+
 def check_picture(path: Path, *, force: bool) -> None:
     """Refuse to replace a file that is no picture of ours; raises ValueError.
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from echousd.cli.options import Force, Written, group_of
-from echousd.cli.output import say_done
+from echousd.cli.output import check_free, say_done
 
 EXAMPLES = """Examples:
 
@@ -81,8 +81,7 @@ def _writable(path: Path, endings: tuple[str, ...], force: bool) -> None:
 
     if path.suffix.lower() not in endings:
         raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {', '.join(endings)}")
-    if path.exists() and not force:
-        raise GraphError(f"{path} exists, allowed: a new path, or --force to overwrite it")
+    check_free(path, force=force)
 
 
 @plan_app.command("export", epilog=EXAMPLES)

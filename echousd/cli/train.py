@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from echousd.cli.options import Replace
+from echousd.cli.output import check_free
+
 if TYPE_CHECKING:
     import trimesh
 
@@ -80,6 +83,7 @@ def rooms_command(
     count: Annotated[int, typer.Option(help="Number of rooms.")] = 100,
     seed: Seed = 0,
     room: Annotated[str | None, typer.Option(help="Room type; default a mixture.")] = None,
+    force: Replace = False,
 ) -> None:
     """Generate rooms into a rooms file.
 
@@ -89,6 +93,7 @@ def rooms_command(
     from echomodel.rooms.generator import generate_rooms
     from echomodel.vocabulary import vocabulary
 
+    check_free(out, force=force)
     kind = None if room is None else vocabulary().room_type(room).name
     write_rooms(out, generate_rooms(count, seed, room_type=kind))
 
@@ -129,6 +134,7 @@ def plot(
     columns: Annotated[int, typer.Option(help="Rooms in a row.", min=1, max=1000)] = 10,
     room: Annotated[str | None, typer.Option(help="Only rooms of this type.")] = None,
     labels: Annotated[bool, typer.Option(help="Write the categories.")] = True,
+    force: Replace = False,
 ) -> None:
     """Draw rooms from above: rectangles coloured per class, a red line to each front.
 
@@ -137,6 +143,7 @@ def plot(
     from echomodel.data.roomset import load_rooms, rooms_of_type
     from echomodel.data.sheet import plot_rooms
 
+    check_free(out, force=force)
     found = load_rooms(rooms)
     if room is not None:
         found = rooms_of_type(found, room, rooms)
@@ -190,6 +197,7 @@ def to_usd(
     limit: Annotated[int | None, typer.Option(help="Only the first rooms.")] = None,
     rules: Annotated[str, typer.Option(help="Label rooms without relations: strict, sgfront or none.")] = "strict",
     known: Annotated[bool, typer.Option(help="Leave out objects that the vocabulary does not hold.")] = True,
+    force: Replace = False,
 ) -> None:
     """Write rooms of any source as USD stages with their scene graphs.
 
@@ -198,6 +206,7 @@ def to_usd(
     from echomodel.data.roomset import load_rooms, with_known_words
     from echousd.stage.boxes import write_stages
 
+    check_free(out, force=force)
     found = load_rooms(rooms, limit)
     if known:
         kept = with_known_words(found)
@@ -215,6 +224,7 @@ def import_rooms(
     out: Annotated[Path, typer.Option("-o", "--output", help="A set to train on (.npz), or a rooms file (.json).")],
     room: Annotated[str, typer.Option(help="Of SG-FRONT: bedroom, livingroom, diningroom, library or all.")] = "all",
     split: Annotated[str, typer.Option(help="Of SG-FRONT: trainval or test.")] = "trainval",
+    force: Replace = False,
 ) -> None:
     """Bring rooms of any source into one file: for `echousd train --set data=FILE.npz`, or for eval.
 
@@ -231,6 +241,7 @@ def import_rooms(
 
     if out.suffix not in (".npz", ".json"):
         raise ValueError(f"{out}: allowed are a set to train on (.npz) and a rooms file (.json)")
+    check_free(out, force=force)
     found: list[RoomBoxes] = []
     for source in sources:
         if (source / "classes_all.txt").exists():
@@ -257,6 +268,7 @@ def to_sgfront(
     split: Annotated[str, typer.Option(help="trainval or test.")] = "trainval",
     drop: Annotated[float, typer.Option(help="Share of the relations that is left out.")] = 0.5,
     seed: Annotated[int, typer.Option(help="Seed of the dropping.")] = 0,
+    force: Replace = False,
 ) -> None:
     """Write rooms in the files of SG-FRONT, labelled by its rules.
 
@@ -265,4 +277,5 @@ def to_sgfront(
     from echomodel.data.roomset import load_rooms, with_known_words
     from echomodel.data.sgfront import write_sgfront
 
+    check_free(out, force=force)
     write_sgfront(out, with_known_words(load_rooms(rooms)), split=split, drop=drop, seed=seed)

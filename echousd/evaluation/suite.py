@@ -163,23 +163,28 @@ SHOWN = 6  # rooms of each system in the contact sheet
 PANELS, ACROSS = 16, 6  # columns beyond which a table has no plot; panels in a line
 
 
+def report_files(out: Path) -> list[Path]:
+    """The files of a report, with each of `FORMS`, of which `out` may be one, and the seconds."""
+    out = out.with_suffix("") if out.suffix in FORMS else out
+    return [out.with_name(out.name + form) for form in (*FORMS, ".seconds.json")]
+
+
 def write_report(found: Mapping[str, Any], run: Run, out: Path, command: str) -> list[Path]:
-    """Write `out` with each of `FORMS`, and beside them the seconds, which differ from run to run.
+    """Write `report_files`: with each of `FORMS`, and beside them the seconds, which differ from run to run.
 
     Arguments:
-        found: as `evaluate` gives it. command: that made it. out: any ending of `FORMS` is left away.
+        found: as `evaluate` gives it. command: that made it.
     """
-    out = out.with_suffix("") if out.suffix in FORMS else out
     out.parent.mkdir(parents=True, exist_ok=True)
     content = {**found, "about": {**found["about"], "command": command}}
     page = {**content, **_arranged(found["tables"]), "pictures": pictures(run)}
-    md, plain, html, seconds = (out.with_name(out.name + form) for form in (*FORMS, ".seconds.json"))
+    md, plain, html, seconds = written = report_files(out)
     write_text(md, rendered("report.md.j2", page, escaped=False))
     told = content | {"tables": [asdict(table) for table in found["tables"]]}
     write_text(plain, json.dumps(told, indent=1, default=float) + "\n")
     write_text(html, rendered("report.html.j2", page))
     write_json(seconds, {"CPU seconds a room": {name: round(value, 3) for name, value in run.seconds.items()}})
-    return [md, plain, html, seconds]
+    return written
 
 
 def _arranged(tables: Sequence[Table]) -> dict[str, Any]:

@@ -26,7 +26,7 @@ def test_converts(source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert "vqvae.safetensors: vqvae," in " ".join(capsys.readouterr().out.split())
     assert load_released(target).vqvae.config.codes == 16
     assert run(["convert", str(source), "-o", str(target)]) == 2
-    assert "exists already (--force replaces it)" in " ".join(capsys.readouterr().err.split())
+    assert "exists; choose another place or use --force" in " ".join(capsys.readouterr().err.split())
     assert run(["convert", str(source), "-o", str(target), "--force"]) == 0
 
 

@@ -126,3 +126,31 @@ def test_errors_are_one_line(arguments, text, capsys, tmp_path, monkeypatch):
     assert text in error
     assert error.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "data rooms --count 1 -o {tmp}/mine",
+        "data import {rooms} -o {tmp}/mine.json",
+        "data import {rooms} -o {tmp}/mine.npz",
+        "data plot {rooms} -o {tmp}/mine.png",
+        "data to-usd {rooms} -o {tmp}",
+        "data to-sgfront {rooms} -o {tmp}",
+        "eval suite random --against {rooms} -o {tmp}/mine",
+        "eval study random real --against {rooms} -o {tmp}/mine",
+    ],
+)
+def test_no_command_replaces_a_file_unless_it_is_told(rooms_file, tmp_path, capsys, command):
+    mine = [tmp_path / name for name in ("mine", "mine.json", "mine.npz", "mine.png", "mine.html")]
+    for path in mine:
+        path.write_text("mine")
+    assert run(command.format(tmp=tmp_path, rooms=rooms_file).split()) == 2
+    assert "exists; choose another place or use --force" in " ".join(capsys.readouterr().err.split())
+    assert {path.read_text() for path in tmp_path.iterdir()} == {"mine"}
+
+
+def test_force_replaces(rooms_file, tmp_path):
+    (tmp_path / "mine.json").write_text("mine")
+    assert run(["data", "import", str(rooms_file), "-o", str(tmp_path / "mine.json"), "--force"]) == 0
+    assert len(read_rooms(tmp_path / "mine.json")) == 8

@@ -61,7 +61,7 @@ def test_new_does_not_overwrite_unless_told(echousd_command, tmp_path):
     out.write_text("mine")
     outcome = echousd_command("new", out, "--room", "study")
     assert outcome.code == 2
-    assert outcome.err == f"error: {out} exists, allowed: a new path, or --force to overwrite it\n"
+    assert outcome.err == f"error: {out}: exists; choose another place or use --force\n"
     assert out.read_text() == "mine"
     assert echousd_command("new", out, "--room", "study", "--force").code == 0
     assert load_graph(out).room.type == "study"
