@@ -236,8 +236,9 @@ def import_rooms(
     from echomodel.data.sgfront import SGFront
     from echomodel.roomboxes import write_rooms
     from echousd.cli.terminal import Terminal
+    from echousd.folder.found import stages_at
     from echousd.graph.files import STAGE_FORMS
-    from echousd.stage.boxes import read_stages
+    from echousd.stage.boxes import read_stage
 
     if out.suffix not in (".npz", ".json"):
         raise ValueError(f"{out}: allowed are a set to train on (.npz) and a rooms file (.json)")
@@ -246,8 +247,10 @@ def import_rooms(
     for source in sources:
         if (source / "classes_all.txt").exists():
             found += SGFront(source, room, split).rooms()
-        elif source.suffix in STAGE_FORMS or (source.is_dir() and not any(source.rglob("rooms*.json"))):
-            found += read_stages([source])
+        elif source.suffix in STAGE_FORMS:
+            found += read_stage(source)
+        elif source.is_dir() and not any(source.rglob("rooms*.json")):
+            found += [one for stage in stages_at(source) for one in read_stage(stage)]
         else:
             found += load_rooms(source)
     if not found:

@@ -8,7 +8,7 @@ import time
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from importlib import resources
@@ -29,13 +29,10 @@ from echomodel.rooms.generator import generate_rooms
 from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.assets.naming import category_of
 from echousd.evaluation.systems import System, drawn, finished
-from echousd.folder.found import rooms_at
+from echousd.folder.found import stages_at
 from echousd.graph.files import STAGE_FORMS
 from echousd.graph.nodes import HEIGHT
-from echousd.stage.boxes import room_of
-from echousd.stage.files import open_stage
-from echousd.stage.foreign import boxed_graph
-from echousd.stage.read import find_rooms
+from echousd.stage.boxes import read_stage
 
 HELD_OUT = 770_000  # seed of generated rooms that no training used
 UNTRAINED = ("random", "generator", "shuffled")
@@ -249,29 +246,16 @@ def foreign_rooms(path: Path) -> list[RoomBoxes]:
         found = [room for file in files for room in _from_json(file)]
         if found:
             return found
-        stages = [(file, file.stem) for file in sorted(path.iterdir()) if file.suffix in STAGE_FORMS]
-        with suppress(ValueError):
-            stages = [(file, file.parent.name) for file in rooms_at(path)]
+        stages = stages_at(path)
         if not stages:
             raise ValueError(f"{path}: no room in this folder, allowed: rooms of ours, USD, rooms or scene JSON")
-        return [room for file, name in stages for room in _from_usd(file, name)]
+        return [room for file in stages for room in read_stage(file)]
     if path.suffix in STAGE_FORMS:
-        return _from_usd(path, path.parent.name)
+        return read_stage(path)
     rooms = load_rooms(path) if path.suffix == ".npz" else _from_json(path)
     if not rooms:
         raise ValueError(f"{path}: no rooms, a state of SceneEval, Holodeck's or SceneSmith's JSON")
     return rooms
-
-
-def _from_usd(file: Path, name: str) -> list[RoomBoxes]:
-    out = []
-    stage = open_stage(file)
-    for graph in map(boxed_graph, find_rooms(stage)):
-        if graph.nodes:
-            corners = graph.room.corners
-            room = replace(room_of(graph, name), openings=graph.room.openings)
-            out.append(room if corners is None else replace(room, floor_polygon=np.asarray(corners, float)))
-    return out
 
 
 def _from_json(file: Path) -> list[RoomBoxes]:

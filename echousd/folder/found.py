@@ -31,6 +31,11 @@ def rooms_at(place: Path) -> list[Path]:
     return [place]
 
 
+def stages_at(folder: Path) -> list[Path]:
+    """The root layers of the rooms of ours below a folder; where there are none, the stages that lie in it."""
+    return _rooms_below(folder) or sorted(path for path in folder.iterdir() if path.suffix in STAGE_FORMS)
+
+
 def room_at(place: Path) -> Path:
     """The one root layer at a path: a file itself, of a folder its room; raises ValueError where several are."""
     if not place.is_dir():

@@ -20,8 +20,9 @@ from echousd.graph.titles import DressingGraph, SmallNode
 from echousd.stage import encoding as usd
 from echousd.stage import values
 from echousd.stage.encoding import StageError
-from echousd.stage.files import WRITABLE, opened, save_layer
-from echousd.stage.read import node_names, place, read_rooms, relation_of, stated_fields, the_room
+from echousd.stage.files import open_stage, opened, save_layer
+from echousd.stage.foreign import boxed_graph
+from echousd.stage.read import find_rooms, node_names, place, relation_of, stated_fields, the_room
 from echousd.stage.write import graph_layer
 
 
@@ -62,11 +63,13 @@ def room_boxes(graph: SceneGraph) -> RoomBoxes:
     styles = {style: number for number, style in enumerate(dict.fromkeys(n.style for n in graph.nodes if n.style))}
     reach = np.hypot(size[:, 0], size[:, 2])[:, None] / 2
     low, high = (position[:, ::2] - reach).min(0), (position[:, ::2] + reach).max(0)
-    corners = graph.room.floor_polygon or ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]))
+    corners = graph.room.corners
+    if corners is None:
+        corners = np.array(((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])))
     return RoomBoxes(
         id="stage",
         room_type=graph.room.type,
-        floor_polygon=np.array(corners),
+        floor_polygon=np.asarray(corners, float),
         height=graph.room.height or float((position[:, 1] + size[:, 1]).max()),
         categories=tuple(node.category for node in graph.nodes),
         size=size,
@@ -74,6 +77,7 @@ def room_boxes(graph: SceneGraph) -> RoomBoxes:
         yaw=np.array([node.yaw for node in graph.nodes], float),
         models=("",) * len(graph.nodes),
         styles=tuple(styles.get(node.style, -1) if node.style else -1 for node in graph.nodes),
+        openings=graph.room.openings,
     )
 
 
@@ -178,14 +182,14 @@ def write_stages(rooms: Iterable[RoomBoxes], folder: Path, rules: str | None = "
             save_layer(graph_layer(graph_of(room, rules)), folder / f"{room.id}.usda")
 
 
-def read_stages(paths: Iterable[Path]) -> list[RoomBoxes]:
-    """The rooms of stages, or of all stages of folders; raises StageError for an object without a box."""
-    files: list[Path] = []
-    for path in paths:
-        files += sorted(p for p in path.iterdir() if p.suffix in WRITABLE) if path.is_dir() else [path]
-    found = []
-    for path in files:
-        for prim, graph in read_rooms(str(path)).items():
-            name = path.stem if prim in ("/Room", "") else f"{path.stem}{prim.replace('/', '_')}"
-            found.append(room_of(graph, name))
+def read_stage(path: Path) -> list[RoomBoxes]:
+    """The rooms of a stage that hold something, as stated, else as they stand there; each is called after the file.
+
+    Raises StageError for a file that is no stage, and an object without bounds.
+    """
+    found, stage = [], open_stage(path)
+    for prims in find_rooms(stage):
+        graph, prim = boxed_graph(prims), str(prims.room.GetPath())
+        name = path.stem if prim in ("/Room", "") else f"{path.stem}{prim.replace('/', '_')}"
+        found += [room_of(graph, name)] if graph.nodes else []
     return found

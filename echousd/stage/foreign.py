@@ -271,7 +271,8 @@ def boxed_graph(prims: RoomPrims) -> SceneGraph:
         if None in (node.size, node.position, node.yaw):
             box = object_box(prims.room.GetStage().GetPrimAtPath(paths[node.name]))
             if box is None:
-                raise StageError(f"{paths[node.name]}: has no bounds, allowed: a box or geometry for every object")
+                where = f"{source(prims.room.GetStage())}: {paths[node.name]}"
+                raise StageError(f"{where}: has no bounds, allowed: a box or geometry for every object")
             node = node.replaced(size=box.size, position=box.position, yaw=box.yaw)
         nodes.append(node)
     return graph.replaced(nodes=tuple(nodes))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -107,7 +107,7 @@ def read_rooms(path: str | os.PathLike[str]) -> list[RoomBoxes]:
     path = Path(path)
     try:
         raw = json.loads(path.read_text("utf-8"))
-        entries: Sequence[dict] = raw["rooms"]
+        entries = list(raw["rooms"])
     except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError) as error:
         form = '{"convention": ..., "rooms": [...]}'
         raise ValueError(f"{path}: not a rooms file, expected {form} ({error})") from None

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_room import small_room
 
 from echomodel.data.roomset import RoomSet
 from echomodel.roomboxes import RoomBoxes, read_rooms, write_rooms
@@ -154,3 +155,28 @@ def test_force_replaces(rooms_file, tmp_path):
     (tmp_path / "mine.json").write_text("mine")
     assert run(["data", "import", str(rooms_file), "-o", str(tmp_path / "mine.json"), "--force"]) == 0
     assert len(read_rooms(tmp_path / "mine.json")) == 8
+
+
+def test_rooms_that_were_made_are_imported_as_they_stand(tmp_path, capsys):
+    room = small_room(shapes="boxes", place=False)
+    for name in ("one", "two"):
+        room.save(tmp_path / "made" / name, preview=False)
+    assert run(["data", "import", str(tmp_path / "made"), "-o", str(tmp_path / "rooms.json")]) == 0
+    found = read_rooms(tmp_path / "rooms.json")
+    assert [one.id for one in found] == ["one", "two"]
+    assert found[0].categories == tuple(node.category for node in room.graph.nodes)
+    assert np.allclose(found[0].position, room.boxes.position, atol=1e-3)
+    assert np.allclose(found[0].floor_polygon, room.graph.room.corners, atol=1e-3)
+    assert len(found[0].openings) == len(room.graph.room.openings)
+    (tmp_path / "bare.yaml").write_text("room: bedroom\nobjects: {bed: double_bed}")
+    assert run(["new", str(tmp_path / "bare.usda"), "--from", str(tmp_path / "bare.yaml")]) == 0
+    assert run(["data", "import", str(tmp_path / "bare.usda"), "-o", str(tmp_path / "x.npz")]) == 2
+    assert "bare.usda: /Room/Objects/bed: has no bounds" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("held", ['{"rooms": 3}', '{"rooms": null}', "[]", '{"rooms": {"a": 1}}'])
+def test_a_file_that_holds_no_rooms_is_named(tmp_path, capsys, held):
+    (tmp_path / "odd.json").write_text(held)
+    assert run(["data", "import", str(tmp_path / "odd.json"), "-o", str(tmp_path / "x.npz")]) == 2
+    assert "odd.json: " in capsys.readouterr().err
+    assert not (tmp_path / "x.npz").exists()
