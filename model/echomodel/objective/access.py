@@ -95,7 +95,7 @@ BEDSIDE = 0.3  # metres beside a bed
 INTO_BED, OF_LAMPS, OF_CHAIRS = 0.4, 0.6, 0.1  # metres between a plant and a bed's side, a floor lamp, a chair
 GRAZE = 0.01  # metres that furniture may reach into a door's way, as layouts are rounded
 WALKED = 0.6  # metres, the width of a way on which one walks in, straight ahead through an open door
-TALL = 0.3  # metres over a window's sill: what is higher takes its light
+TALL, STORED = 0.3, 0.1  # metres over a window's sill: what is higher, and storage that is, takes its light
 HEADBOARD = 0.3  # metres: of a bed only the head is so high
 CLEARANCE = 1.9  # metres: what hangs higher is in nobody's way
 
@@ -201,12 +201,8 @@ def _before_openings(plan: Plan, *, window: bool) -> Found:
 
 
 def _hangs_low(plan: Plan) -> Array:
-    return (
-        ~plan.standing
-        & (held(plan.position)[:, 1] < CLEARANCE)
-        & (plan.kit.amax(held(plan.size), 1) > 0.3)
-        & (plan.of("storage", "seat", "sofa", "board", "bed"))
-    )
+    low = (held(plan.position)[:, 1] < CLEARANCE) & (plan.kit.amax(held(plan.size), 1) > 0.3)
+    return ~plan.standing & low & plan.of("storage", "seat", "sofa", "board", "bed")
 
 
 def _clearance(plan: Plan, who: Array, polygon, opening: Opening) -> Array:  # type: ignore[no-untyped-def]
@@ -227,8 +223,8 @@ def _clearance(plan: Plan, who: Array, polygon, opening: Opening) -> Array:  # t
     beside = abs(at - opening.width / 2) - opening.width / 2 - reach(along)
     out = xp.maximum(beside, deep - reach(inward) - depth)
     if opening.kind == "window":
-        headboard = HEADBOARD * plan.of("bed")[who]
-        low = opening.sill + TALL + headboard - (plan.position[who, 1] + plan.size[who, 1])
+        over = xp.where(plan.of("storage"), STORED, TALL + HEADBOARD * plan.of("bed"))[who]
+        low = opening.sill + over - (plan.position[who, 1] + plan.size[who, 1])
         return xp.maximum(out + 0.15, xp.where(screens(plan)[who], -FAR, low))
     if swings:  # of the corner of the square that the leaf does not sweep what one walks through
         hinge, closed = map(plan.numbers, hinge_point(polygon, opening))

@@ -184,6 +184,7 @@ ALONE = 0.45  # metres from everything: nothing small stands so in a room
 # Metres less from furniture: 98 % of real plants are at a wall, the others touch something; of side tables within 0.3.
 # Of 47 real floor lamps 46 are within 0.4 of a wall, the other one is at a sofa.
 OF_PLANTS, OF_SMALL = 0.35, 0.15
+LIT = 1.1  # metres between a floor lamp and the next seat, bed or table: 95 % of real ones
 EDGE = 0.5  # metres between a wall and an only armchair that belongs to no group
 
 
@@ -326,7 +327,8 @@ def at_its_side(plan: Plan) -> Found:
 def not_alone(plan: Plan) -> Found:
     """Plants and small tables stand at a wall or at something, lamps at a wall or sofa, an only armchair at a wall.
 
-    An armchair that stands apart from its group has something of its own: a lamp, a table, shelves, another one.
+    A lamp lights a seat, bed or table. An armchair that stands apart from its group has something of its own: a lamp,
+    a table, shelves, another one.
     """
     loner = plan.stands("company") & (plan.anchor < 0)
     loner = loner & (plan.kit.bincount(plan.scene[loner], minlength=len(plan))[plan.scene] == 1)
@@ -335,14 +337,18 @@ def not_alone(plan: Plan) -> Found:
     lonely, xp = nobody(plan.size), plan.kit
     if bool(small.any()):
         i, j = plan.pairs(small, plan.standing, least=True)
-        gap, _ = plan.worst(i, xp.where(plan.of("light")[i] & ~plan.of("sofa")[j], FAR, plan.apart(i, j)), j)
+        lamp, apart = plan.of("light")[i], plan.apart(i, j)
+        gap, _ = plan.worst(i, xp.where(lamp & ~plan.of("sofa")[j], FAR, apart), j)
+        used = plan.of("sofa", "seat", "bed", "board")[j]
+        lit, _ = plan.worst(i, xp.where(lamp & used, apart, FAR), j)
         who = plan.those(small & plan.walled)
-        gap, loner = gap[who], loner[who]
+        gap, loner, lit = gap[who], loner[who], lit[who]
         wall = xp.amin(plan.inside(footprint(plan.size[who], plan.position[who], plan.yaw[who]), who), 1)
         free = xp.where((plan.stands("beside") & ~plan.of("light"))[who], gap + OF_SMALL, gap)
         free = xp.where(plan.of("decor")[who], gap + OF_PLANTS, free)
         away = xp.where(loner, wall - (EDGE - ALONE), xp.minimum(free, wall))
-        lonely = found(who, ALONE - away, measure=xp.where(loner, wall, xp.minimum(gap, wall)))
+        near, lit = xp.where(loner, wall, xp.minimum(gap, wall)), xp.where(lit < FAR, lit, 0.0)
+        lonely = first_of(who, xp.full_like(who, -1), [ALONE - away, LIT - lit], [near, lit])
     if not bool(company.any()):
         return lonely
     others = plan.of("light", "storage", "board") | plan.stands("beside", "company")

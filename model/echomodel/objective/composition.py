@@ -9,10 +9,10 @@ import math
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, at_most, full, held, least_of, norm, rows, sum_of
-from echomodel.floors import signed_area, signed_distance
+from echomodel.arrays import Array, at_least, at_most, cast, full, held, least_of, norm, rows, sum_of
+from echomodel.floors import footprint, signed_area, signed_distance
 from echomodel.objective.company import AROUND, BESIDE, Seats, first_of, seats_at
-from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
+from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody
 from echomodel.sizes import REACH, filled_area
 
 # Radius of an empty circle, of the side of a square of each piece's share of the floor; more a square metre; at most.
@@ -20,6 +20,7 @@ BARE = (0.6, 0.01, 1.05)
 AHEAD = 1.0  # metres before a sofa to other groups: 97 % of real ones have them
 COVERED = 0.25  # share of its width from which on something is before it
 CELL, POINTS = 0.25, 1000  # metres between two points of the floor that are looked at; in a hall so many, farther apart
+FEW = 5  # pieces: fewer fill no room
 NEARBY = 0.5  # metres: a point nearer to a piece is neither bare nor far from everything
 
 
@@ -113,17 +114,37 @@ def sofa_ahead(plan: Plan) -> Found:
     return plan.nearest(i, j, plan.more_ahead(i, j, AHEAD, COVERED), AHEAD) if len(i) else nobody(plan.size)
 
 
+BARE_END = 0.4  # share of a room's length from a wall to the nearest piece: 88 % of real rooms
+
+
+def ends_used(plan: Plan) -> Found:
+    """No end of a room is bare: its pieces stand about its middle; the nearest one is told."""
+    out, xp = nobody(plan.size), plan.kit
+    for (_, polygon, _), (_, _, there, *_) in zip(plan.rooms, floor_gaps(plan), strict=True):
+        if there.shape[1] - max(int(plan.stands("row")[there[0]].sum()) - 1, 0) < FEW:  # a row of units is one
+            continue
+        low, high = (plan.numbers(of(polygon, axis=0).tolist()) for of in (np.min, np.max))
+        who, row = there.reshape(-1), xp.arange(len(there))
+        corners = footprint(plan.size[who], plan.position[who], plan.yaw[who]).reshape(len(there), -1, 2)
+        ends = xp.concat([(corners - low) / (high - low), (high - corners) / (high - low)], -1)
+        side = held(xp.amin(ends, 1)).argmax(1)
+        nearest = held(ends)[row, :, side].argmin(1)
+        share, piece = ends[row, nearest, side], nearest * there.shape[1] // ends.shape[1]  # of several points each
+        out = joined(out, found(there[row, piece], BARE_END - share, measure=100.0 * share))
+    return out
+
+
 SERVED = 1.0  # metres: floor further from all furniture serves nothing
 SOFT = 0.2  # metres on both sides of it over which a point of the floor counts in part
 ELBOW = 0.55  # metres of a table's edge a seat: 96 % of real sides with two seats or more (0.6 m in DIN 68880)
-FENCE = 0.03  # metres between two chairs of one side: 95 % of real ones
 EASY = 0.6  # metres of edge a seat that are enough for anybody: DIN 68880
 SEAT = 0.7  # metres that a side needs before it to seat somebody
 BEYOND, CORNER = 0.1, 0.1  # metres that a seat may reach beyond its side of a table, and more beyond one end of it
-ALONE = 0.3  # share of a side of a table that who sits there alone may be beside its middle: 90 % of real ones
+# Who sits alone at a side of a table: share of it that the middle may be beside its own, metres from which on its ends.
+ALONE, OFF = 0.3, 0.05
 WORKPLACE = 1.0  # metres between the middles of two who work
 OPENS = 0.55  # metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it
-FACED = 0.3  # share of a wardrobe's width from which on something is before it
+FACED, SCREENED = 0.3, 0.05  # share of a wardrobe's width, and of a screen's, from which on something is before it
 
 
 def served_limit(area: float, width: Array, depth: Array) -> float:
@@ -150,25 +171,7 @@ def floor_served(plan: Plan) -> Found:
 
 
 def elbow_room(plan: Plan) -> Found:
-    """Who sits beside others at a table has room for the elbows, and chairs stand apart."""
-    seats, xp = seats_at(plan), plan.kit
-    one, other = seats.beside()
-    keep = plan.of("seat")[seats.i[one]] & plan.of("seat")[seats.i[other]]
-    one, other = one[keep], other[keep]
-    if not len(one):
-        return nobody(plan.size)
-    j = seats.j[one]  # whose sides are those of both
-    edge = xp.where(seats.ahead[one], plan.size[j, 0], plan.size[j, 2]) / seats.count[one]
-    half_width, half_depth = plan.reach(seats.i, seats.j)
-    reach = xp.where(seats.ahead, half_width, half_depth)
-    gap = seats.along[other] - seats.along[one] - reach[one] - reach[other]
-    tight = first_of(j, xp.full_like(j, -1), [edge - ELBOW, gap - FENCE], [edge, at_least(gap, 0.0)])
-    at, row = worst(j, tight.margin, xp.arange(len(one)), len(plan), FAR)
-    return tight.take(row[at < FAR])
-
-
-def chairs_at_sides(plan: Plan) -> Found:
-    """Chairs share the sides of their table: none sits shoulder to shoulder with others while a side is free."""
+    """Chairs share the sides of their table: who sits beside others has room for the elbows, or no side is free."""
     seats, xp = seats_at(plan), plan.kit
     who, free = _free_sides(plan, seats)
     if not len(who):
@@ -177,8 +180,9 @@ def chairs_at_sides(plan: Plan) -> Found:
     edge = plan.size[who][:, [2, 2, 0, 0]]
     best = at_most(xp.amax(xp.where(free, edge / (count + 1), 0.0), 1), EASY)
     least = xp.amin(xp.where(count > 1, edge / at_least(count, 1), FAR), 1)
-    crowded = least < FAR
-    return found(who[crowded], (least - best)[crowded], measure=least[crowded])
+    beside = least < FAR
+    who, best, least = who[beside], best[beside], least[beside]
+    return first_of(who, xp.full_like(who, -1), [least - ELBOW, least - best], [least, least])
 
 
 def chairs_balanced(plan: Plan) -> Found:
@@ -207,7 +211,8 @@ def bench_fits(plan: Plan) -> Found:
     own = 2 * xp.where(seats.ahead, half_width, half_depth)
     side = xp.where(seats.ahead, plan.size[seats.j, 0], plan.size[seats.j, 2])
     aside = abs(seats.along) * ~plan.solid[seats.i]  # a stool stands anywhere
-    most = xp.where(seats.count == 1, ALONE * side, (side - own) / 2 + BEYOND + CORNER)
+    spare = (side - own) / 2
+    most = xp.where(seats.count == 1, xp.minimum(ALONE * side, at_least(spare, 0.0) + OFF), spare + BEYOND + CORNER)
     measures = [own - side, plan.size[seats.i, 0] - own, aside]
     margins = [BEYOND - measures[0], BEYOND - measures[1], most - aside]
     return first_of(seats.i, seats.j, margins, measures)
@@ -261,7 +266,8 @@ def wardrobe_opens(plan: Plan) -> Found:
     i, j = plan.pairs(stores, block, least=True)
     met = plan.which(lambda kind: kind.access > 0.6)[i] | ~plan.of("bed")[j]
     i, j = i[met], j[met]
-    return plan.nearest(i, j, plan.more_ahead(i, j, OPENS, FACED), OPENS) if len(i) else nobody(plan.size)
+    share = cast(plan.kit.where(plan.stands("opposite"), SCREENED, FACED)[i], plan.size)
+    return plan.nearest(i, j, plan.more_ahead(i, j, OPENS, share), OPENS) if len(i) else nobody(plan.size)
 
 
 def each_served(plan: Plan) -> Found:

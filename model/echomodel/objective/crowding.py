@@ -183,10 +183,10 @@ def seat_room(plan: Plan) -> Found:
     return joined(close, found(who, least[who], other=about[who], measure=measure, words=1 * end))
 
 
-def loungers_apart(plan: Plan) -> Found:
-    """Sofas and armchairs of one group do not touch."""
-    lounging = _loungers(plan)
-    i, j = plan.pairs(lounging, lounging, least=True)
+def seats_apart(plan: Plan) -> Found:
+    """Sofas, armchairs, chairs and benches of one group do not touch."""
+    seats = _loungers(plan) | (plan.of("seat") & plan.stands("at", "foot") & plan.standing)
+    i, j = plan.pairs(seats, seats, least=True)
     keep = (plan.smaller[i] < plan.smaller[j]) & plan.kin(i, j)
     i, j = i[keep], j[keep]
     return plan.nearest(i, j, plan.apart(i, j) - HAND, HAND) if len(i) else nobody(plan.size)

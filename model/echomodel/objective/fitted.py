@@ -92,15 +92,11 @@ def work_triangle(plan: Plan) -> Found:
     share = plan.numbers([(k + 0.5) / POINTS for k in range(POINTS)])[:, None]
     walked = xp.concat([points[a][:, None] * share + points[b][:, None] * (1 - share) for a, b in pairs], 1)
     others = plan.standing & ~plan.movable & ~plan.stands("row") & (plan.size[:, 1] > 0.3)
-    i, j = plan.pairs(tasks["cook"], others)
-    number = full(i, len(plan), -1)
-    number[cook] = xp.arange(len(cook))
-    keep = number[i] >= 0
-    i, j = i[keep], j[keep]
-    lateral, forward = plan.seen(j[:, None], walked[number[i]])
+    row, j = plan.beside(cook, others)
+    lateral, forward = plan.seen(j[:, None], walked[row])
     beside, ahead = abs(lateral) - plan.size[j, None, 0] / 2, abs(forward) - plan.size[j, None, 2] / 2
-    least, about = worst(i, xp.amin(xp.maximum(beside, ahead), 1), j, len(plan), FAR)
-    blocked = found(cook, least[cook], other=about[cook], measure=-least[cook], words=xp.full_like(cook, 2))
+    least, about = worst(row, xp.amin(xp.maximum(beside, ahead), 1), j, len(cook), FAR)
+    blocked = found(cook, least, other=about, measure=-least, words=xp.full_like(cook, 2))
     return joined(out, blocked)
 
 
@@ -126,13 +122,8 @@ def hob_safe(plan: Plan) -> Found:
     out = found(who, -landing[who] - LANDING, measure=-landing[who])
     inner = xp.maximum(aside, forward - half_depth - plan.size[i, 2] / 2)
     least, about = worst(i, xp.where(abs(along) < 0.01, inner, FAR), j, len(plan), FAR)
-    start, along_wall, normal, length = (of[plan.scene[who]] for of in plan.walls)
-    side = plan.axes(who)[0][:, None]
-    off = plan.position[who][:, None, ::2] - start
-    gap = (off * normal).sum(-1) - plan.size[who, None, 0] / 2
-    at = (off * along_wall).sum(-1)
-    met = (length > 0) & (abs((normal * side).sum(-1)) > 0.9) & (at > 0) & (at < length) & (gap > -0.1)
-    wall = xp.amin(xp.where(met, gap, FAR), 1)
+    side = plan.axes(who)[0][:, None] * plan.size[who, None, :1] / 2
+    wall = xp.amin(plan.inside(plan.position[who][:, None, ::2] + xp.concat([side, -side], 1), who), 1)
     corner = xp.minimum(least[who], wall)
     out = joined(out, found(who, corner - LANDING / 2, other=xp.where(wall < least[who], -1, about[who]),
                             measure=corner, words=xp.ones_like(who)))  # fmt: skip

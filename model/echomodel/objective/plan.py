@@ -378,7 +378,7 @@ class Plan:
         return forward - half_depth - self.size[i, 2] / 2, covered, forward
 
     def more_ahead(
-        self, i: Array, j: Array, needed: float | Array, share: float, *, start: float = 0.0, sign: float = 1.0
+        self, i: Array, j: Array, needed: float | Array, share: float | Array, *, start: float = 0.0, sign: float = 1.0
     ) -> Array:
         """(P,): how much more than `needed` metres is free before i, where j covers more than a share of its width.
 

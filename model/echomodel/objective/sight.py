@@ -5,51 +5,51 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from echomodel.arrays import Array, at_least, cast, full, held, least_of, pairs_in, rows, sum_of
+from echomodel.arrays import Array, at_least, cast, full, held, least_of, norm, pairs_in, rows, sum_of
 from echomodel.objective.company import first_of
 from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, nobody, worst
 
 OVER = 0.25  # metres by which a pendant's middle may lie beyond the edge of what it hangs over
 MIDDLE = 0.22  # share of the room's extent: so near to the middle a lamp lights the room
-CLEAR = 0.9  # metres: so far from every table a lamp lights free floor
-CENTRED = 0.3  # metres that a pendant, or the middle of several, may hang off the middle of its table
+CENTRED = 0.3  # metres that a pendant, or the middle of several, may hang off the middle of its table or bed
+PILLOW = 0.3  # metres behind the middle of a bed from which on lamps light a bedside
 IN_ROW, SPACED = 0.15, 0.25  # metres that one of several may hang beside their line, and that they keep apart
 TOUCH = 0.04  # metres of air below a lamp on its table
 
 
 def pendant_over(plan: Plan) -> Found:
-    """A pendant hangs over a table, bed or seat, over the middle of the room, or well away from all tables."""
+    """A pendant hangs over a table, bed or seat, or over the middle of the room."""
     lamps = plan.which(lambda kind: kind.look == "pendant_lamp")
-    if not bool(lamps.any()):
+    who, xp = plan.those(lamps & plan.walled), plan.kit
+    if not len(who):
         return nobody(plan.size)
     i, j = plan.pairs(lamps, (plan.of("board", "bed", "sofa") | plan.stands("head")) & plan.standing)
-    tables = plan.which(lambda kind: kind.role == "board" and not (kind.belongs_to or kind.access))[j]
-    who, gap, xp = plan.those(lamps), plan.gap(i, j), plan.kit
-    best = OVER - least_of(i, gap, len(plan), OVER + 9.0)[who]
-    near = least_of(i[tables], gap[tables], len(plan), 9.0)[who]
     corners = plan.walls[0][plan.scene[who]]
     low, high = xp.amin(corners, 1), xp.amax(corners, 1)
-    away = abs(plan.position[who][:, ::2] - (low + high) / 2) / at_least(high - low, 1e-3)
-    central = xp.where(plan.walled[who], MIDDLE - xp.amax(away, 1), -1.0)
-    margin = xp.maximum(xp.maximum(best, central), near - CLEAR)
-    return found(who, margin, measure=near)
+    away = abs(plan.position[who][:, ::2] - (low + high) / 2)
+    central = MIDDLE - xp.amax(away / at_least(high - low, 1e-3), 1)
+    best = OVER - least_of(i, plan.gap(i, j), len(plan), OVER + FAR)[who]
+    return found(who, xp.maximum(best, central), measure=norm(away))
 
 
 def _hung(plan: Plan) -> tuple[Array, Array]:
-    """Pairs (P,), (P,) of pendants and tables of their room at which nobody works."""
+    """Pairs (P,), (P,) of pendants and of the beds, and tables at which nobody works, of their room."""
     lamps = plan.which(lambda kind: kind.look == "pendant_lamp")
-    return plan.pairs(lamps, plan.which(lambda kind: kind.role == "board" and not kind.access) & plan.standing)
+    lit = plan.which(lambda kind: kind.role == "bed" or (kind.role == "board" and not kind.access))
+    return plan.pairs(lamps, lit & plan.standing)
 
 
 def pendant_centred(plan: Plan) -> Found:
-    """What hangs over a table, or shall, hangs over its middle; several pendants do so together."""
+    """What hangs over a table, or shall, hangs over its middle, over a bed on its axis; several pendants together."""
     i, j = _hung(plan)
     if not len(i):
         return nobody(plan.size)
     over = cast((plan.gap(i, j) < 1e-3) | _told(plan, i, j, ("above",)), plan.size)
     away, count = plan.position[i] - plan.position[j], at_least(sum_of(j, over, len(plan)), 1.0)
-    x, z = (sum_of(j, away[:, axis] * over, len(plan)) / count for axis in (0, 2))
-    off = plan.kit.sqrt(x * x + z * z + 1e-12)[j] * over  # of what hangs elsewhere, nothing
+    x, z = ((sum_of(j, away[:, axis] * over, len(plan)) / count)[j] for axis in (0, 2))
+    cos, sin = plan.turn[0][j], plan.turn[1][j]
+    aside = abs(cos * x - sin * z) * (sin * x + cos * z > -PILLOW)
+    off = plan.kit.where(plan.of("bed")[j], aside, plan.kit.sqrt(x * x + z * z + 1e-12)) * over  # elsewhere, nothing
     return found(i, CENTRED - off, other=j, measure=off)
 
 
@@ -58,7 +58,7 @@ def pendants_in_row(plan: Plan) -> Found:
     i, j = _hung(plan)
     if len(i) < 2:
         return nobody(plan.size)
-    over, xp = held(plan.gap(i, j)) < 1e-3, plan.kit
+    over, xp = (held(plan.gap(i, j)) < 1e-3) & plan.of("board")[j], plan.kit
     i, j = i[over], j[over]
     one, other = pairs_in((j[:, None] == j[None]) & (i[:, None] < i[None]))
     lateral, forward = plan.local(i, j)

@@ -32,19 +32,24 @@ def row_of(count, width, pitch):
 
 
 def test_every_seat_has_room_for_the_elbows():
-    assert seen(composition.elbow_room, row_of(2, 0.45, 0.6))[0][0] == pytest.approx(0.12)  # 0.15 m between the chairs
+    assert seen(composition.elbow_room, row_of(2, 0.45, 0.6))[0][0] == pytest.approx(0.8 - 0.6)
     margin, found, _ = seen(composition.elbow_room, row_of(3, 0.45, 0.53))
-    assert margin == {0: pytest.approx(1.6 / 3 - 0.55)}
+    assert margin == {0: pytest.approx(1.6 / 3 - 0.6)}
     assert found.measure.tolist() == [pytest.approx(1.6 / 3)]
-    assert found.words.tolist() == [0]
 
 
-def test_chairs_stand_no_fence():
-    margin, found, _ = seen(composition.elbow_room, row_of(2, 0.6, 0.62))
-    assert margin == {0: pytest.approx(0.02 - 0.03)}
-    assert found.words.tolist() == [1]
-    turned = [(word, size, (at[1], -at[0]), yaw + HALF) for word, size, at, yaw in row_of(2, 0.6, 0.62)]
-    assert seen(composition.elbow_room, turned)[0] == {0: pytest.approx(0.02 - 0.03)}
+@pytest.mark.parametrize(("pitch", "margin"), [(0.62, -0.03), (0.7, 0.05)])
+def test_chairs_stand_no_fence(pitch, margin):
+    row = row_of(2, 0.6, pitch)
+    assert list(seen(crowding.seats_apart, row)[0].values()) == [pytest.approx(margin)]
+    turned = [(word, size, (at[1], -at[0]), yaw + HALF) for word, size, at, yaw in row]
+    assert list(seen(crowding.seats_apart, turned)[0].values()) == [pytest.approx(margin)]
+
+
+@pytest.mark.parametrize(("aside", "margin"), [(0.18, -0.04), (0.0, 0.14)])
+def test_chairs_do_not_touch_across_the_corner_of_their_table(aside, margin):
+    chairs = seated(((0.4, 0.65), np.pi), ((0.85, aside), -HALF))
+    assert list(seen(crowding.seats_apart, chairs)[0].values()) == [pytest.approx(margin)]
 
 
 def test_seats_at_desks_and_single_chairs_need_no_elbow_room():
@@ -105,6 +110,34 @@ def test_a_small_room_has_no_circle_so_bare_as_a_hall_may():
     assert composition.bare_limit(100.0, 25) == pytest.approx(1.05 * 2)
 
 
+@pytest.mark.parametrize(("middle", "margin"), [(-2.0, -0.225), (0.0, 0.025)])
+def test_no_end_of_a_hall_is_bare(middle, margin):
+    group = [("sofa", (2.0, 0.85, 0.95), (middle, -1.6), 0.0), ("coffee_table", (1.2, 0.4, 0.6), (middle, -0.5), 0.0)]
+    stand = ("tv_stand", (1.6, 0.5, 0.4), (middle, 2.0), np.pi)
+    plants = [("plant", (0.5, 1.2, 0.5), (middle - 1.75, z), 0.0) for z in (0.0, 1.0)]
+    found, rows, boxes = seen(composition.ends_used, [*group, stand, *plants], (8.0, 5.0))
+    assert found == {0: pytest.approx(margin)}  # from the sofa's end to the wall at the right
+    assert rows.measure.tolist() == [pytest.approx(100 * (0.4 - margin))]
+    rows.margin.sum().backward()
+    assert float(boxes.position.grad[0, 0]) == pytest.approx(1 / 8)
+    assert seen(composition.ends_used, group, (8.0, 5.0))[0] == {}  # so few fill no hall
+
+
+@pytest.mark.parametrize(("aside", "margin"), [(0.05, 0.05), (0.2, -0.1)])
+def test_a_bench_alone_at_its_side_lies_before_the_middle(aside, margin):
+    bench = ("bench", (1.2, 0.45, 0.4), (aside, 0.75), np.pi)
+    assert seen(composition.bench_fits, [*seated(), bench])[0] == {1: pytest.approx(margin)}
+
+
+@pytest.mark.parametrize(("gap", "margin"), [(0.3, -0.12), (0.6, 0.05)])
+def test_no_armchair_stands_before_the_end_of_a_screen(gap, margin):
+    stand = ("tv_stand", (1.6, 0.5, 0.4), (0.0, -1.8), 0.0)
+    armchair = ("armchair", (0.8, 0.8, 0.8), (1.0, -1.6 + gap + 0.4), -HALF)  # before an eighth of it
+    assert seen(composition.wardrobe_opens, [stand, armchair])[0] == {0: pytest.approx(margin)}
+    shelf = ("bookshelf", (1.6, 0.9, 0.4), (0.0, -1.8), 0.0)
+    assert seen(composition.wardrobe_opens, [shelf, armchair])[0][0] > 0
+
+
 def test_no_desk_goes_without_a_chair_while_another_has_two():
     desks = [("desk", (1.2, 0.75, 0.6), (-1.5, 0.0), 0.0), ("desk", (1.2, 0.75, 0.6), (1.5, 0.0), 0.0)]
     chairs = [("office_chair", (0.5, 0.9, 0.5), at, np.pi) for at in ((-1.8, 0.6), (-1.2, 0.6))]
@@ -136,34 +169,22 @@ CROWDED = [((side * 0.85, z), -side * HALF) for side in (-1, 1) for z in (-0.22,
 
 
 def test_chairs_do_not_crowd_a_short_side_while_the_long_ones_are_free():
-    margin, found, _ = seen(composition.chairs_at_sides, seated(*CROWDED))
+    margin, found, _ = seen(composition.elbow_room, seated(*CROWDED))
     assert margin == {0: pytest.approx(0.45 - 0.6)}
     assert found.measure.tolist() == [pytest.approx(0.45)]
     around = [((0.33 * x, 0.65 * z), np.pi * (z > 0)) for x in (-1, 1) for z in (-1, 1)]
-    assert seen(composition.chairs_at_sides, seated(*around))[0] == {0: pytest.approx(0.65 - 0.6)}
+    assert seen(composition.elbow_room, seated(*around))[0] == {0: pytest.approx(0.65 - 0.6)}
     turned = [(word, size, (at[1], -at[0]), yaw + HALF) for word, size, at, yaw in seated(*CROWDED)]
-    assert seen(composition.chairs_at_sides, turned, (4.0, 5.0))[0] == {0: pytest.approx(0.45 - 0.6)}
+    assert seen(composition.elbow_room, turned, (4.0, 5.0))[0] == {0: pytest.approx(0.45 - 0.6)}
 
 
 def test_a_side_at_a_wall_or_at_furniture_is_not_free():
     shelves = [("bookshelf", (1.6, 2.0, 0.3), (0.0, z), 0.0) for z in (-1.0, 1.0)]
-    assert seen(composition.chairs_at_sides, seated(*CROWDED) + shelves)[0][0] >= 0
-    one = seen(composition.chairs_at_sides, seated(*CROWDED) + shelves[:1])[0]
-    assert one == {0: pytest.approx(0.45 - 0.6)}
-    assert seen(composition.chairs_at_sides, seated(*CROWDED), (5.0, 2.0))[0][0] >= 0
-
-
-def test_as_many_sit_at_one_side_of_a_table_as_opposite():
-    front, back = ([((0.33 * x, 0.65 * z), np.pi * (z > 0)) for x in (-1, 1)] for z in (1, -1))
-    end = ((0.85, 0.0), -HALF)
-    assert seen(composition.chairs_balanced, seated(*front, *back))[0] == {0: 0.5}
-    assert seen(composition.chairs_balanced, seated(*front, *back, end))[0] == {0: 0.5}
-    margin, found, _ = seen(composition.chairs_balanced, seated(*front, back[0], end))
-    assert (margin, found.measure.tolist()) == ({0: -1.5}, [2.0])
-    assert seen(composition.chairs_balanced, seated(*front, end))[0] == {0: -1.5}
-    shelf = ("bookshelf", (1.6, 2.0, 0.3), (0.0, -1.0), 0.0)  # nobody could sit there
-    assert seen(composition.chairs_balanced, [*seated(*front, end), shelf])[0] == {0: 0.5}
-    assert seen(composition.chairs_balanced, seated(front[0], end))[0] == {}  # two around a corner
+    both, narrow = (seated(*CROWDED) + shelves, (5.0, 4.0)), (seated(*CROWDED), (5.0, 2.0))
+    for room, words in ((both, 0), (narrow, 0), ((seated(*CROWDED) + shelves[:1], (5.0, 4.0)), 1)):
+        margin, found, _ = seen(composition.elbow_room, *room)
+        assert margin == {0: pytest.approx(0.45 - (0.6 if words else 0.55))}
+        assert found.words.tolist() == [words]
 
 
 @pytest.mark.parametrize(("apart", "margin"), [(2.4, 0.2), (2.0, -0.2)])

@@ -77,7 +77,7 @@ SET = Room({
     "table": {"kind": "dining_table", "size": (1.6, 0.75, 0.9), "at": (0.0, 0.0)},
     **{f"chair_{x}_{z}": {"kind": "dining_chair", "size": (0.5, 0.9, 0.5), "at": (0.4 * x, 0.6 * z),
                           "yaw": np.pi * (z > 0)} for x in (-1, 1) for z in (-1, 1)},
-    "lamp": {"kind": "floor_lamp", "size": (0.4, 1.6, 0.4), "at": (2.2, 1.7)},
+    "lamp": {"kind": "floor_lamp", "size": (0.4, 1.6, 0.4), "at": (1.9, 1.7)},
 })  # fmt: skip
 BENCH = Room({**BEDROOM.things, "bench": {
     "kind": "bench", "size": (1.2, 0.45, 0.4), "at": (0.2, 0.4),
@@ -145,8 +145,13 @@ FAULTS = [
         ("chair", "seat_before_desk"),
         "chair stands 0.90 m beside the middle of desk",
     ),
-    (DINING.moved("pendant", at=(1.2, 0.0)), ("pendant", "pendant_over"), "pendant hangs 0.50 m beside a table"),
+    (DINING.moved("pendant", at=(1.2, 0.0)), ("pendant", "pendant_over"), "hangs over nothing, 1.20 m off the middle"),
     (DINING.moved("pendant", at=(0.4, 0.2)), ("pendant", "pendant_centred"), "pendant hangs 0.45 m off the middle of"),
+    (
+        BEDROOM.moved("pendant", at=(0.4, -0.5)),
+        ("pendant", "pendant_centred"),
+        "pendant hangs 0.40 m off the middle of",
+    ),
     (PENDANTS.moved("pendant_1", at=(0.35, 0.25)), ("pendant_-1", "pendants_in_row"), "hangs 0.25 m out of the row"),
     (PENDANTS.moved("pendant_1", at=(-0.2, 0.0)), ("pendant_-1", "pendants_in_row"), "only 0.15 m from pendant_1"),
     (BEDROOM.moved("left", yaw=HALF), ("left", "nightstand_at_head"), "left is turned by 90 degrees against bed"),
@@ -160,6 +165,11 @@ FAULTS = [
     (SET.moved("chair_1_1", at=(0.62, 0.7)), ("table", "chairs_opposite"), "sides of table are staggered by 0.2"),
     (SET.moved("lamp", at=(-1.8, 0.1)), ("lamp", "not_alone"), "lamp stands alone in the room"),
     (
+        BEDROOM.moved("lamp", kind="floor_lamp", at=(2.2, 1.7), up=0.0, size=(0.4, 1.6, 0.4)),
+        ("lamp", "not_alone"),
+        "lamp lights nothing, 1.38 m from the next seat",
+    ),
+    (
         SET.moved("chair_1_1", at=(0.4, 0.8)),
         ("table", "chairs_level"),
         "one chair of table is pushed under it by 0.20 m",
@@ -172,7 +182,7 @@ FAULTS = [
         ("armchair", "lounger_faces"),
         "armchair turns its back on sofa",
     ),
-    (SOFAS.moved("armchair", at=(1.5, -0.7)), ("armchair", "loungers_apart"), "armchair leaves only 0.00 m to sofa"),
+    (SOFAS.moved("armchair", at=(1.5, -0.7)), ("armchair", "seats_apart"), "armchair leaves only 0.00 m to sofa"),
     (BENCH.moved("bench", at=(0.2, 0.8)), ("bench", "bench_at_foot"), "bench stands 0.48 m from the foot of bed"),
     (BENCH.moved("bench", at=(0.9, 0.4)), ("bench", "bench_at_foot"), "bench lies 0.90 m beside the middle of bed"),
     (LIVING.moved("armchair", at=(1.9, -0.3), yaw=HALF), ("armchair", "knees_free"), "m before it, then a wall"),
@@ -263,7 +273,7 @@ KEPT = [
     (LIVING.moved("coffee", at=(0.0, 0.0)), ("coffee", "table_before_sofa")),
     (with_one(SET, "bench", kind="bench", size=(1.2, 0.45, 0.4), at=(0.0, 0.8)), ("bench", "seat_in_reach")),
     (with_one(BENCH, "table", kind="dining_table", size=(0.8, 0.75, 0.8), at=(1.9, 1.4)), ("bench", "seat_in_reach")),
-    (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.1, 1.7)), ("plant", "plant_aside")),
+    (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(0.8, 1.7)), ("plant", "plant_aside")),
     (with_one(BEDROOM, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(2.2, 0.4)), ("plant", "plant_aside")),
     (with_one(DINING, "lamp", kind="floor_lamp", size=(0.3, 1.6, 0.3), at=(-0.9, -1.5)), ("lamp", "not_alone")),
     (Room({"a": {**ARMCHAIR, "at": (1.7, 0.0)}}), ("a", "not_alone")),
@@ -341,8 +351,9 @@ def test_doors_swing_free_and_windows_are_not_covered():
     assert "wardrobe reaches 0.88 m into the way of a door" in found["wardrobe", "door_free"]
     assert found.keys() - {("wardrobe", "door_free")} == set()
     assert set(BEDROOM.found(openings=(window,))) == {("wardrobe", "window_free")}
-    low = BEDROOM.moved("wardrobe", size=(1.8, 0.9, 0.6))
-    assert ("wardrobe", "window_free") not in low.found(openings=(window,))
+    for height, seen in ((0.95, False), (1.05, True)):  # storage a hand over the sill
+        low = BEDROOM.moved("wardrobe", size=(1.8, height, 0.6))
+        assert (("wardrobe", "window_free") in low.found(openings=(window,))) == seen
 
 
 @pytest.mark.parametrize(("at", "dazzled"), [(0.0, True), (-1.6, False)])
@@ -485,7 +496,7 @@ def test_several_rooms_at_once_are_judged_as_one_by_one():
 def test_the_room_generator_rarely_breaks_them():
     rooms = generate_rooms(60, 3)
     found = [f for room in rooms for f in faults(room, room.categories, room.floor_polygon)]
-    assert len(found) < 0.17 * sum(len(room) for room in rooms)
+    assert len(found) < 0.21 * sum(len(room) for room in rooms)
 
 
 def test_the_sofa_that_screen_and_table_are_told_of_is_the_first_whatever_its_size():
