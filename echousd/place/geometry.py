@@ -59,13 +59,18 @@ def separation(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, pairs: n
 def depths(
     size: np.ndarray, at: np.ndarray, turn: np.ndarray, others: np.ndarray, position: np.ndarray, yaw: np.ndarray
 ) -> np.ndarray:
-    """(K, m) float: how deep a box runs into m others, negative = the gap, metres.
+    """(K, m) float: how deep a box runs into m others, 0 where it does not, metres.
 
     Arguments:
         size: (3,) float of the box; at: (K, 3) and turn: (K,) float, its poses.
         others, position: (m, 3) float, sizes and places of the others; yaw: (m,) float.
     """
-    return -_gaps(size, at[:, None], turn[:, None], others, position, yaw)
+    reach = (np.hypot(size[0], size[2]) + np.hypot(others[:, 0], others[:, 2])) / 2
+    x, z = (position[:, axis] - at[:, None, axis] for axis in (0, 2))
+    k, j = np.nonzero(x * x + z * z < reach * reach)  # of the few that are near the depth is asked for
+    out = np.zeros(x.shape)
+    out[k, j] = np.maximum(-_gaps(size, at[k], turn[k], others[j], position[j], yaw[j]), 0.0)
+    return out
 
 
 def _gaps(

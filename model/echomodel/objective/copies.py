@@ -14,8 +14,6 @@ from echomodel.objective.plan import FAR, OF_WORDS, Found, Plan, worst
 from echomodel.openings import Opening
 from echomodel.vocabulary import Category
 
-MANY = 80_000  # pairs of boxes in all copies from which on those that stand alike are looked at once
-
 
 @dataclass(frozen=True, eq=False)
 class Watched(Plan):
@@ -112,15 +110,10 @@ class Copies(Plan):
         raise NotImplementedError("masks of copies are those of their room")
 
     def of(self, *roles: str) -> Array:
-        return self._masked(("of", *roles), lambda: self.template.of(*roles))
+        return self._kept(("of", *roles), lambda: self._again(self.template.of(*roles)))
 
     def stands(self, *stances: str) -> Array:
-        return self._masked(("stands", *stances), lambda: self.template.stands(*stances))
-
-    def _masked(self, asked: tuple[str, ...], mask: Callable[[], Array]) -> Array:
-        if asked not in self._masks:
-            self._masks[asked] = self._again(mask())
-        return self._masks[asked]
+        return self._kept(("stands", *stances), lambda: self._again(self.template.stands(*stances)))
 
     def which(self, asked: Callable[[Category], object]) -> Array:
         return self._again(self.template.which(asked))
@@ -149,7 +142,7 @@ class Copies(Plan):
     def couples(self) -> tuple[Array, Array, Array]:
         """As `Plan.couples`; without pairs that stand alike in all copies."""
         i, j, allowed = self.template.couples
-        differ = self.apart_in[i] | self.apart_in[j]
+        differ = self._differ[i, j]
         i, j, allowed = i[differ], j[differ], allowed[differ]
         return self._tiled(i), self._tiled(j), self._again(allowed)
 
@@ -161,7 +154,7 @@ class Copies(Plan):
     def stated_pairs(self) -> tuple[Array, Array, Array]:
         """As `Plan.stated_pairs`; without pairs that stand alike in all copies."""
         i, predicate, j = self.template.stated_pairs
-        differ = self.apart_in[i] | self.apart_in[j]
+        differ = self._differ[i, j]
         return self._tiled(i[differ]), self._again(predicate[differ]), self._tiled(j[differ])
 
     def everywhere(self, number: int) -> Array:
@@ -180,12 +173,9 @@ class Copies(Plan):
         """As `Plan.pairs`; `least`: what stands alike in all copies is paired in the first one alone."""
         n = len(self.template)
         together = first[:n, None] & second[None, :n] & ~self.kit.eye(n, dtype=self.kit.bool)
-        still = self._still if least else None
-        i, j = pairs_in(together if still is None else together & ~still)
-        i, j = (self._shift + i).reshape(-1), (self._shift + j).reshape(-1)
-        if still is None:
-            return i, j
-        one, other = pairs_in(together & still)
+        i, j = pairs_in(together & self._differ if least else together)
+        one, other = pairs_in(together & ~self._differ if least else together[:0])
+        i, j = ((self._shift + of).reshape(-1) for of in (i, j))
         return self.kit.concat([one, i]), self.kit.concat([other, j])
 
     def beside(self, i: Array, others: Array) -> tuple[Array, Array]:
@@ -195,53 +185,59 @@ class Copies(Plan):
         return row, (i - i % n)[row] + self.kit.tile(which, (len(i),))
 
     @cached_property
-    def _still(self) -> Array | None:
-        """(N, N) bool, pairs that stand alike in all copies; None where it is no use to leave them out."""
-        if self.count * len(self.template) ** 2 < MANY or bool(self.apart_in.all()):
-            return None
-        return ~(self.apart_in[:, None] | self.apart_in)
+    def _differ(self) -> Array:
+        """(N, N) bool, pairs that do not stand alike in all copies."""
+        return self.apart_in[:, None] | self.apart_in
 
     def worst(self, who: Array, margin: Array, other: Array) -> tuple[Array, Array]:
         least, about = super().worst(who, margin, other)
-        if self._still is None:
-            return least, about
         alike = ~(self.moved[who] | self.moved[other])
         rest, of = worst(who[alike], margin[alike], other[alike], len(self.template), FAR)
         rest = self._again(rest)
         return self.kit.minimum(least, rest), self.kit.where(rest < least, self._tiled(of), about)
 
     @cached_property
-    def _dense(self) -> tuple[Array, Array, Array, Array, Array]:
-        """(K * N * N,) each: lateral, forward, half width and half depth of the first in the second's frame, apart."""
-        n = len(self.template)
-        x, z = (self.position[:, axis].reshape(-1, n) for axis in (0, 2))
-        cos, sin = (turn.reshape(-1, n) for turn in self.turn)
-        dx, dz = x[:, :, None] - x[:, None], z[:, :, None] - z[:, None]
-        lateral = cos[:, None] * dx - sin[:, None] * dz
-        forward = sin[:, None] * dx + cos[:, None] * dz
-        along = abs(cos[:, :, None] * cos[:, None] + sin[:, :, None] * sin[:, None])
-        across = abs(sin[:, :, None] * cos[:, None] - cos[:, :, None] * sin[:, None])
-        width, depth = self.template.size[:, None, 0] / 2, self.template.size[:, None, 2] / 2
+    def _listed(self) -> tuple[Array, Array, Array, Array]:
+        """Numbers (P,), (P,) of the pairs whose geometry is kept, those that stand alike in all copies once; and for
+        each pair of the room (N * N,) where it is kept in the first copy, and how much further in the next one."""
+        differ, xp = self._differ, self.kit
+        i, j = pairs_in(~differ)
+        one, other = pairs_in(differ)
+        first, step = xp.zeros_like(differ, dtype=xp.int64), xp.where(differ, len(one), 0)
+        first[i, j], first[one, other] = xp.arange(len(i)), len(i) + xp.arange(len(one))
+        one, other = (self._shift + one).reshape(-1), (self._shift + other).reshape(-1)
+        return xp.concat([i, one]), xp.concat([j, other]), first.reshape(-1), step.reshape(-1)
+
+    @cached_property
+    def _geometry(self) -> tuple[Array, Array, Array, Array, Array]:
+        """(P,) each: lateral, forward, half width and half depth of the first in the second's frame, apart."""
+        i, j, xp = *self._listed[:2], self.kit
+        x, z = (self.position[i, axis] - self.position[j, axis] for axis in (0, 2))
+        (cos, other_cos), (sin, other_sin) = ((turn[j], turn[i]) for turn in self.turn)
+        along, across = abs(other_cos * cos + other_sin * sin), abs(other_sin * cos - other_cos * sin)
+        lateral, forward = cos * x - sin * z, sin * x + cos * z
+        width, depth = self.size[i, 0] / 2, self.size[i, 2] / 2
         half_width, half_depth = along * width + across * depth, across * width + along * depth
-        xp = self.kit
-        gap = xp.maximum(abs(lateral) - half_width - width.T, abs(forward) - half_depth - depth.T)
-        gap = xp.maximum(gap, xp.moveaxis(gap, 1, 2))
-        return tuple(of.reshape(-1) for of in (lateral, forward, half_width, half_depth, gap))  # type: ignore[return-value]
+        gap = xp.maximum(
+            abs(lateral) - half_width - self.size[j, 0] / 2, abs(forward) - half_depth - self.size[j, 2] / 2
+        )
+        return lateral, forward, half_width, half_depth, xp.maximum(gap, gap[self._at(j, i)])
 
     def _at(self, i: Array, j: Array) -> Array:
-        n = len(self.template)
-        return i * n + j % n
+        n, (_, _, first, step) = len(self.template), self._listed
+        pair = i % n * n + j % n
+        return first[pair] + i // n * step[pair]
 
     def local(self, i: Array, j: Array) -> tuple[Array, Array]:
         at = self._at(i, j)
-        return self._dense[0][at], self._dense[1][at]
+        return self._geometry[0][at], self._geometry[1][at]
 
     def reach(self, i: Array, j: Array) -> tuple[Array, Array]:
         at = self._at(i, j)
-        return self._dense[2][at], self._dense[3][at]
+        return self._geometry[2][at], self._geometry[3][at]
 
     def apart(self, i: Array, j: Array) -> Array:
-        return self._dense[4][self._at(i, j)]
+        return self._geometry[4][self._at(i, j)]
 
     def __len__(self) -> int:
         return self.count * len(self.template)
