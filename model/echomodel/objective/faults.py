@@ -38,38 +38,6 @@ class Ways:
     share: float
 
 
-def ways(
-    size: np.ndarray, position: np.ndarray, yaw: np.ndarray, obstacle: np.ndarray, polygon: np.ndarray,
-    openings: Sequence[Opening] = (),
-) -> Ways:  # fmt: skip
-    """Walk from the doors and passages, or in the largest free part of the room where there are none.
-
-    Arguments:
-        size, position: (n, 3) float, metres; yaw: (n,) float, radians.
-        obstacle: (n,) bool, what stands in the way.
-        polygon: (k, 2) float, corners of the floor, metres.
-    """
-    import shapely
-
-    boxes = shapely.polygons(footprints(size, position, yaw))
-    taken = shapely.union_all(shapely.buffer(boxes[obstacle], ROBOT - SLACK, quad_segs=4))
-    free = shapely.difference(shapely.buffer(shapely.Polygon(polygon), SLACK - ROBOT, join_style="mitre"), taken)
-    parts = shapely.get_parts(free)
-    parts = parts[shapely.area(parts) > LEAST]
-    if not len(parts):
-        return Ways(np.zeros(len(size), bool), 1.0)
-    area, entered = shapely.area(parts), np.zeros(len(parts), bool)
-    for opening in openings:
-        if opening.kind != "window" and opening.edge < len(polygon):
-            inside = segment(polygon, opening).mean(0) + inward_normal(polygon, opening.edge) * (ROBOT + STEP)
-            met = shapely.area(shapely.intersection(parts, shapely.Point(inside).buffer(BEFORE)))
-            entered[met.argmax()] |= met.max() > 0
-    if not entered.any():
-        entered[area.argmax()] = True
-    walked = shapely.multipolygons(parts[entered])
-    return Ways(shapely.dwithin(walked, boxes, ROBOT + ARM), float(area[entered].sum() / area.sum()))
-
-
 REACHED = "reached"
 MOST = 2.0  # of a missed unit counts
 BY_EYE = ("living", "composition")  # kinds of terms; relations and collisions have verdicts of their own
@@ -141,14 +109,33 @@ def unreached(plan: Plan) -> list[Fault]:
 
 
 def walk(plan: Plan) -> Ways | None:
-    """Where a robot gets to in a plan of one room, None where its floor is unknown."""
-    corners = np.asarray(plan.floor[0])
-    corners = corners[np.isfinite(corners).all(1)]
-    if len(corners) < 3:
+    """Where a robot gets to in a plan of one room from its doors and passages, or in its largest free part where there
+    are none; None where its floor is unknown."""
+    import shapely
+
+    polygon = np.asarray(plan.floor[0])
+    polygon = polygon[np.isfinite(polygon).all(1)]
+    if len(polygon) < 3:
         return None
     size, position, yaw = (np.asarray(held(of)) for of in (plan.size, plan.position, plan.yaw))
-    in_the_way = np.asarray(plan.standing & ~plan.movable) & (size[:, 1] > CLEAR_HEIGHT)
-    return ways(size, position, yaw, in_the_way, corners, plan.openings[0])
+    obstacle = np.asarray(plan.standing & ~plan.movable) & (size[:, 1] > CLEAR_HEIGHT)
+    boxes = shapely.polygons(footprints(size, position, yaw))
+    taken = shapely.union_all(shapely.buffer(boxes[obstacle], ROBOT - SLACK, quad_segs=4))
+    free = shapely.difference(shapely.buffer(shapely.Polygon(polygon), SLACK - ROBOT, join_style="mitre"), taken)
+    parts = shapely.get_parts(free)
+    parts = parts[shapely.area(parts) > LEAST]
+    if not len(parts):
+        return Ways(np.zeros(len(size), bool), 1.0)
+    area, entered = shapely.area(parts), np.zeros(len(parts), bool)
+    for opening in plan.openings[0]:
+        if opening.kind != "window" and opening.edge < len(polygon):
+            inside = segment(polygon, opening).mean(0) + inward_normal(polygon, opening.edge) * (ROBOT + STEP)
+            met = shapely.area(shapely.intersection(parts, shapely.Point(inside).buffer(BEFORE)))
+            entered[met.argmax()] |= met.max() > 0
+    if not entered.any():
+        entered[area.argmax()] = True
+    walked = shapely.multipolygons(parts[entered])
+    return Ways(shapely.dwithin(walked, boxes, ROBOT + ARM), float(area[entered].sum() / area.sum()))
 
 
 def missed(plan: Plan, kinds: Collection[str] = BY_EYE, beyond: float = -math.inf) -> Array:
