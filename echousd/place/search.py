@@ -84,6 +84,7 @@ class Search:
         self.rooms: dict[bytes, Plan] = {}
         self.slots: dict[tuple[int, int], np.ndarray] = {}
         self.ways: dict[tuple[int, ...], list[list[tuple[float, float, float, float]]]] = {}
+        self.lost: dict[bytes, list[int]] = {}
         self.looks: list[np.ndarray] = []
         self.urgent: list[int] = []
         n = len(setting.size)
@@ -249,14 +250,21 @@ class Search:
         """Number of the cheapest of K states, the first one where none is better by enough."""
         cost = np.round((self.costs(there, position, yaw, moved) + taste) * GRAIN)
         if self.walked and there.all():  # a walk takes as long as many poses
-            for k in {0, *np.argsort(cost, kind="stable")[:WALKS].tolist()}:
+            first = np.argsort(cost, kind="stable")[:WALKS].tolist()
+            least = np.inf
+            for k in dict.fromkeys([0, *first]):
+                if cost[k] <= least:  # else it is dearer even if all is reached
+                    cost[k] += GRAIN * PRICE["living"][0] * len(self._unreached(position[k], yaw[k]))
+                    least = min(least, cost[k])
                 cost[k] -= GRAIN * 10.0
-                cost[k] += GRAIN * PRICE["living"][0] * len(self._unreached(position[k], yaw[k]))
         best = int(cost.argmin())
         return best if cost[best] < cost[0] - GAIN * GRAIN else 0
 
     def _unreached(self, position: np.ndarray, yaw: np.ndarray) -> list[int]:
-        return [fault.object for fault in unreached(self.setting.plan.at(position, yaw))]
+        key = position.tobytes() + yaw.tobytes()
+        if key not in self.lost:
+            self.lost[key] = [fault.object for fault in unreached(self.setting.plan.at(position, yaw))]
+        return self.lost[key]
 
     def reseated(self, state: State, there: np.ndarray, i: int) -> State:
         """The state with those who stand around box i at one of the ways in which as many sit there."""
