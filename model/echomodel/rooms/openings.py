@@ -15,7 +15,6 @@ from echomodel.openings import (
     free_area,
     inward_normal,
     numbered,
-    overlap,
     signed_area,
 )
 from echomodel.roomboxes import footprints
@@ -71,7 +70,7 @@ def _best(
     tall = min(tall, height - sill - 0.05)
     doors = [opening for opening in made if opening.kind == "door"]
     turned = signed_area(polygon) > 0
-    places: list[Opening] = []
+    places: list[tuple[int, float, float, str, str]] = []  # edge, offset, width, hinge and swing
     tastes: list[float] = []
     for edge, length in enumerate(lengths):
         margin = CORNER if kind == "door" else PIER
@@ -90,35 +89,39 @@ def _best(
         for offset, swing in product(offsets, SWINGS if kind == "door" else ("in",)):
             near, far = float(offset), float(length - width - offset)
             hinge = "left" if kind != "door" or (near <= far) == turned else "right"
-            one = Opening(name, kind, edge, near, width, tall, sill, hinge, swing)
-            if any(overlap(one, other) > -PIER for other in shared):
+            if any(min(near + width, other.end) - max(near, other.offset) > -PIER for other in shared):
                 continue
-            places.append(one)
+            places.append((edge, near, width, hinge, swing))
             cost = 0.25 * min(near, far) if kind == "door" else 0.3 * abs(near - far) / length
             tastes.append(taste + cost + OUTWARDS * (swing == "out"))
-    if not places:
-        return None
-    free = np.array([shapely.Polygon(free_area(polygon, one)) for one in places])
-    cost = np.array(tastes)
-    # into the next wall of a niche
-    cost += 3.0 * shapely.area(shapely.difference(free, shapely.Polygon(polygon).buffer(1e-6)))
-    for block, top in _blocks(boxes):
-        if kind != "window" or top > sill:
+    room = shapely.Polygon(polygon).buffer(1e-6)
+    blocks = shapely.STRtree(_blocks(boxes, sill if kind == "window" else -np.inf))
+    others = [shapely.Polygon(free_area(polygon, other)) for other in made]
+    chosen: Opening | None = None
+    best, least = len(places), np.inf
+    for number in np.argsort(tastes, kind="stable").tolist():
+        if tastes[number] > least:  # what stands in the way of the others only makes them dearer
+            break
+        edge, offset, width, hinge, swing = places[number]
+        one = Opening(name, kind, edge, offset, width, tall, sill, hinge, swing)
+        free = shapely.Polygon(free_area(polygon, one))
+        cost = tastes[number] + 3.0 * shapely.area(shapely.difference(free, room))  # into the next wall of a niche
+        for block in blocks.geometries[np.sort(blocks.query(free, "intersects"))]:
             cost += 12.0 * shapely.area(shapely.intersection(free, block))
-    for other in made:
-        cost += 2.0 * shapely.area(shapely.intersection(free, shapely.Polygon(free_area(polygon, other))))
-    return places[int(cost.argmin())]
+        for other in others:
+            cost += 2.0 * shapely.area(shapely.intersection(free, other))
+        if (cost, number) < (least, best):
+            chosen, best, least = one, number, cost
+    return chosen
 
 
-def _blocks(boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None) -> list:
-    """(footprint, top) of every box that begins below a door's height."""
+def _blocks(boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None, above: float) -> np.ndarray:
+    """The footprints of the boxes that begin below a door's height and end above another one, metres."""
     import shapely
 
     if boxes is None:
-        return []
-    out = []
-    for size, position, plan in zip(*boxes[:2], footprints(*map(np.asarray, boxes)), strict=True):
-        if position[1] >= USUAL["door"]["height"] - 0.05:
-            continue
-        out.append((shapely.Polygon(plan), float(position[1] + size[1])))
-    return out
+        return np.array([])
+    size, position, yaw = map(np.asarray, boxes)
+    low = position[:, 1] < USUAL["door"]["height"] - 0.05
+    there = low & (position[:, 1] + size[:, 1] > above)
+    return np.asarray(shapely.polygons(footprints(size, position, yaw)[there]))
