@@ -11,7 +11,7 @@ from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_
 
 CROOKED = math.radians(1.0)  # 98 % of such furniture in real rooms is turned less
 TOUCHING = 0.3  # metres: 93 % of real beds, nightstands and tv stands have a smaller gap behind
-NEAR_WALL, BEHIND = 0.4, 1.5  # metres between a wall and the nearest side of a desk, or its front with who sits there
+NEAR_WALL = 0.4  # metres between a wall and the nearest side of a desk
 DINERS = 3  # chairs that make a dining table of a desk
 PASSAGE = 0.75  # metres: a sofa so far from the wall may stand in the room on purpose, one walks behind it
 DEEP = 6.0  # metres of the room along its axis from which on it does; or something of another group stands behind it
@@ -44,10 +44,9 @@ def at_wall(plan: Plan) -> Found:
     """What belongs at a wall has its back to one, but for nightstands at their bed and sofas that join another."""
     wall = plan.which(lambda kind: kind.wall)
     beside = (plan.stands("head") & (plan.anchor >= 0)) | plan.stands("with")
-    there = (plan.walls[3] > 0).any(1)[plan.scene]
     hung = plan.which(lambda kind: kind.support == "wall" and kind.role == "storage")
     belongs = (wall & plan.standing & ~beside) | hung
-    who = plan.those(belongs & there & (plan.moved | plan.of("sofa")))
+    who = plan.those(belongs & plan.walled & (plan.moved | plan.of("sofa")))
     gap = plan.back_gaps(who)
     free = plan.of("sofa")[who] & (gap >= PASSAGE)
     if bool(free.any()):
@@ -70,23 +69,20 @@ def _backed(plan: Plan, who: Array, gap: Array) -> Array:
     back = -held(forward) - plan.size[i, 2] / 2
     room = put(full(plan.size, len(plan), -1.0), who, cast(gap, plan.size))
     behind = (back > 0) & (back < room[i]) & (abs(lateral) < plan.size[i, 0] / 2) & ~plan.kin(i, j)
-    backed = full(plan.given, len(plan), False)
-    backed[i[behind]] = True
-    return backed[who]
+    return plan.kit.isin(who, i[behind])
 
 
 def desk_at_wall(plan: Plan) -> Found:
-    """A desk has a side near a wall, or who sits there a wall at the back."""
+    """A desk has a side near a wall."""
     desks = plan.of("board") & plan.works & plan.standing & ~plan.which(lambda kind: kind.wall or kind.task)
     xp = plan.kit
     seats = xp.bincount(plan.anchor[plan.stands("at") & (plan.anchor >= 0)], minlength=len(plan))
     who = plan.those(desks & plan.walled & plan.moved & (seats < DINERS))
     side, front = (axis[:, None] for axis in plan.axes(who))
     side, back = side * plan.size[who, None, :1] / 2, front * plan.size[who, None, 2:] / 2
-    points = plan.position[who][:, None, ::2] + xp.concat([side, -side, back, -back, back + front * BEHIND], 1)
-    inside = plan.inside(points, who)
-    gap = xp.amin(inside[:, :-1], 1)
-    return found(who, xp.maximum(NEAR_WALL - gap, -inside[:, -1]), measure=gap)
+    points = plan.position[who][:, None, ::2] + xp.concat([side, -side, back, -back], 1)
+    gap = xp.amin(plan.inside(points, who), 1)
+    return found(who, NEAR_WALL - gap, measure=gap)
 
 
 NEEDED = 0.45  # share of the vocabulary's access depth below which a front counts as blocked

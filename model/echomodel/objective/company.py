@@ -293,15 +293,18 @@ def _alike(plan: Plan, seats: Seats, one: Array, other: Array, off: Array, most:
 
 
 def sofas_in_circle(plan: Plan) -> Found:
-    """A second sofa looks into the group of the first."""
+    """A second sofa looks into the group of the first, and at it where it stands before it."""
     i, j = plan.attended("with")
     if not len(i):
         return nobody(plan.size)
     near = held(plan.apart(i, j)) < NEAR
     i, j = i[near], j[near]
-    middle = plan.position[j][:, ::2] + plan.axes(j)[1] * (plan.size[j, 2] / 2 + BEFORE)[:, None]
+    middle, xp = plan.position[j][:, ::2] + plan.axes(j)[1] * (plan.size[j, 2] / 2 + BEFORE)[:, None], plan.kit
     off = facing_angle(*plan.seen(i, middle))
-    return found(i, CIRCLE - off, other=j, measure=plan.kit.rad2deg(off))
+    lateral, forward = plan.local(i, j)
+    before = (forward > plan.size[j, 2] / 2) & (abs(lateral) < plan.size[j, 0] / 2)
+    off = xp.where(before, xp.maximum(off, facing_angle(*plan.local(j, i))), off)
+    return found(i, CIRCLE - off, other=j, measure=xp.rad2deg(off))
 
 
 def at_its_side(plan: Plan) -> Found:

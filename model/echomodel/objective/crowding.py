@@ -80,7 +80,7 @@ def chair_pulls_out(plan: Plan) -> Found:
 
 def _massive(plan: Plan) -> Array:
     """(N,) bool, what chairs are moved against."""
-    return plan.of("board", "bed", "storage", "sofa") & plan.standing
+    return (plan.of("board", "bed", "storage", "sofa") | plan.stands("company")) & plan.standing
 
 
 def table_amid(plan: Plan) -> Found:

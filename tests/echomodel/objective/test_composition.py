@@ -105,9 +105,9 @@ def test_an_emptier_room_may_leave_more_of_its_floor():
 
 
 def test_a_small_room_has_no_circle_so_bare_as_a_hall_may():
-    assert composition.bare_limit(16.0, 4) == pytest.approx(0.76 * 2)
-    assert composition.bare_limit(36.0, 9) == pytest.approx(0.96 * 2)
-    assert composition.bare_limit(100.0, 25) == pytest.approx(1.05 * 2)
+    assert composition.bare_limit(16.0, 4) == pytest.approx(0.684 * 2)
+    assert composition.bare_limit(36.0, 9) == pytest.approx(0.864 * 2)
+    assert composition.bare_limit(100.0, 25) == pytest.approx(0.95 * 2)
 
 
 @pytest.mark.parametrize(("middle", "margin"), [(-2.0, -0.225), (0.0, 0.025)])
