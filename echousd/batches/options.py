@@ -83,9 +83,10 @@ def read_toml(path: Path) -> dict[str, Any]:
         raw = tomllib.loads(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise ValueError(f"{path}: cannot be read as TOML ({error})") from None
-    sources = raw.get("sources", [])
-    if isinstance(sources, list) and all(isinstance(source, str) for source in sources):
-        raw["sources"] = [str(path.parent / source) for source in sources]
+    for name, kind, allowed in (("sources", list, "a list of files, folders, globs"), ("sample", dict, "room types")):
+        if not isinstance(raw.get(name, kind()), kind):
+            raise ValueError(f"{path}: {name} is {raw[name]!r:.80}, allowed: {allowed}")
+    raw["sources"] = [str(path.parent / one) if isinstance(one, str) else one for one in raw.get("sources", [])]
     options = raw.get("options")
     if isinstance(options, dict):
         for name in ("assets", "like"):

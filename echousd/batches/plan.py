@@ -83,6 +83,12 @@ class Plan:
     entries: tuple[Entry, ...]
     graphs: dict[str, str]
 
+    @property
+    def request(self) -> BatchRequest:
+        """What the run was asked."""
+        asked = self.head["request"]
+        return BatchRequest(**{**asked, "options": BatchOptions(**asked["options"])})
+
     @cached_property
     def digest(self) -> str:
         """Hash of all of it."""

@@ -36,7 +36,7 @@ def run(
     seed: Annotated[int | None, typer.Option(help="Seed of each graph's first room; default 0.", min=0)] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; default: one a core.", min=1)] = None,
     shard: Annotated[str, typer.Option(help="Part i of n, for job arrays, such as 0/8.", hidden=True)] = "0/1",
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in the folder.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the folder's run, as it was asked.")] = False,
     max_failures: Annotated[
         int | None, typer.Option(help="Stop after more failed rooms than this.", hidden=True, min=0)
     ] = None,
@@ -57,6 +57,7 @@ def run(
     """Make many rooms, each whole or not at all; end it, go on with --resume, on as many machines as there are."""
     from echousd.batches.batch import RunOptions, run_batch
     from echousd.batches.options import parse_options, parse_sample, read_toml, request_of
+    from echousd.batches.plan import load_plan
     from echousd.batches.verify import finish
 
     words = list(sources or [])
@@ -70,7 +71,8 @@ def run(
     if "assets" in given:
         given["assets"] = str(Path(given["assets"]).absolute())
     raw["options"] = {**raw.get("options", {}), **parse_options(more or []), **given}
-    request = request_of(raw, files[0] if files else "batch")
+    again = resume and raw == {"sources": [], "sample": {}, "options": {}}
+    request = load_plan(output).request if again else request_of(raw, files[0] if files else "batch")
     with _shown(json) as tell:
         how = RunOptions(
             workers=workers, shard=_shard(shard), resume=resume, max_failures=max_failures, timeout=timeout,

@@ -39,7 +39,7 @@ def edit(
 
     Every option may be given several times.
     """
-    from echousd.folder.found import is_home, refuse_house, room_at
+    from echousd.folder.found import check_ours, is_home, refuse_house, room_at
     from echousd.make.reading import read_room
     from echousd.make.wishes import wished
     from echousd.options import EditRequest
@@ -52,6 +52,7 @@ def edit(
             return
         refuse_house(room)
         room = room_at(room)
+        check_ours(room)
     if undo or redo or recover:
         if wishes != EditRequest() or dry_run or output is not None or undo + redo + recover > 1:
             does = "--undo takes the last edit back" if undo else "--redo makes it again"
@@ -95,10 +96,11 @@ def update(
 
     What the layer moves is the artist's wish: it stays where it was put, locked, and the others make way.
     """
-    from echousd.folder.found import layer_over
+    from echousd.folder.found import check_ours, layer_over
     from echousd.make.wishes import artists_wishes
 
     layer = layer_over(layer)
+    check_ours(layer)
 
     def wanted() -> tuple[Path, SceneGraph]:
         own, graph, moved = artists_wishes(layer)

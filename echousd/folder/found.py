@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 from pathlib import Path
+from typing import Any
 
 from echousd.folder.manifest import find_manifest
 from echousd.graph.files import STAGE_FORMS
@@ -49,6 +50,21 @@ def room_at(place: Path) -> Path:
         shown = ", ".join(map(str, named[:8])) + ", ..." * (len(named) > 8)
         raise ValueError(f"{place}: a folder of {len(rooms)} rooms, name one file: {shown}")
     return rooms[0]
+
+
+def manifest_of(root: Path) -> dict[str, Any]:
+    """The manifest of the room whose root layer, or whose layer over it, is `root`; raises ValueError for no room."""
+    manifest = find_manifest(root.parent, root.stem) if root.exists() else None
+    if manifest is None:
+        what = "not a room made by `echousd generate` (no manifest beside it)" if root.exists() else "no such file"
+        raise ValueError(f"{root}: {what}")
+    return manifest
+
+
+def check_ours(root: Path) -> None:
+    """Raises ValueError as `manifest_of` does, unless a run in the folder was interrupted, which is finished first."""
+    if not half_written(root.parent):
+        manifest_of(root)
 
 
 def is_home(place: Path) -> bool:

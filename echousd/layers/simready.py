@@ -12,7 +12,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdUtils
 
 import echousd
 from echousd.draw.pictures import picture
-from echousd.folder.manifest import find_manifest
+from echousd.folder.found import manifest_of
 from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.pending import check_written
@@ -38,9 +38,7 @@ def pack(
     Returns the layers that people open, and a sentence for each asset that was left out, and for each that hangs.
     """
     check_written([root])
-    manifest = find_manifest(root.parent, root.stem)
-    if manifest is None:
-        raise ValueError(f"{root}: not a room made by `echousd generate` (no manifest beside it)")
+    manifest = manifest_of(root)
     known = sorted(set(manifest["assets"].values()))
     unknown = [name for name in names if name not in known]
     if unknown:

@@ -14,7 +14,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom
 from echomodel.boxes import Boxes
 from echomodel.triangles import Mesh
 from echousd.folder.folder import recover
-from echousd.folder.manifest import find_manifest
+from echousd.folder.found import manifest_of
 from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.graph import SceneGraph
@@ -51,10 +51,7 @@ def read_room(root: str | Path) -> SavedRoom:
     """
     root = Path(root)
     recover(root.parent)
-    stage = open_stage(root)
-    manifest = find_manifest(root.parent, root.stem)
-    if manifest is None:
-        raise ValueError(f"{root}: not a room made by `echousd generate` (no manifest beside it)")
+    stage, manifest = open_stage(root), manifest_of(root)
     shelf = shelf_of(manifest, root.parent)
     graph = read_graph(stage)
     geometry: dict[str, Geometry] = {}

@@ -98,6 +98,9 @@ class EchoModel:
 
         Raises ValueError for a graph, box or argument that the model cannot work with; the message names it.
         """
+        if "layout" not in self.branches:
+            held = ", ".join(sorted(self.model.parts))
+            raise ValueError(f"these weights hold {held}, rooms need latent and layout; name others")
         graph = self._checked(graph)
         return sample_boxes(self.model, self.graph_latent, graph, self._how(graph, how))
 

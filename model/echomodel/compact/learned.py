@@ -28,8 +28,8 @@ def places(kind: str, names: Names, words: Array) -> Array:
     found = beside(table, words)[words]
     if (table < 0).any() and bool((found < 0).any()):
         row = getattr(vocabulary(), kind)[int(words[found < 0][0])]
-        like = _like(row)
-        raise ValueError(f"these weights know neither {row.name!r} nor {like!r}, which its row names as the nearest")
+        like = "" if _like(row) in ("", row.name) else f", nor {_like(row)!r}, which its row names as the nearest"
+        raise ValueError(f"these weights do not know {row.name!r}{like}")
     return found
 
 

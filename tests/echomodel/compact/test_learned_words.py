@@ -3,6 +3,7 @@
 import json
 import random
 from dataclasses import replace
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -79,11 +80,11 @@ def test_likeness_is_followed_and_its_end_is_named():
     with speaking(replace(WORDS, categories=(spinet, harp, *WORDS.categories))):
         found = places("categories", ("sofa", "bookshelf"), torch.tensor([0, 1]))
         assert found.tolist() == [1, 1]
-        with pytest.raises(ValueError, match="these weights know neither 'spinet' nor 'harp', which its row names as"):
+        with pytest.raises(ValueError, match="these weights do not know 'spinet', nor 'harp', which its row names as"):
             places("categories", ("sofa",), torch.tensor([0]))
         harp = replace(harp, like="spinet")
     circle = replace(WORDS, categories=(spinet, harp, *WORDS.categories))
-    with speaking(circle), pytest.raises(ValueError, match="neither 'spinet' nor 'harp'"):
+    with speaking(circle), pytest.raises(ValueError, match="do not know 'spinet', nor 'harp'"):
         WordTable("categories", ("sofa", "bookshelf"), 4)(torch.tensor([0]))
 
 
@@ -165,3 +166,9 @@ def test_a_room_set_names_its_words(tmp_path):
         graph = GraphBatch.from_room(after.room(0))
         assert [vocabulary().categories[k].name for k in graph.category.tolist()] == list(before[0].categories)
         assert vocabulary().room_types[int(graph.room_type[0])].name == before[0].room_type
+
+
+def test_weights_without_a_layout_say_what_they_hold():
+    weights = EchoModel.load(resources.files("echomodel") / "weights" / "parts.safetensors")
+    with pytest.raises(ValueError, match="these weights hold furniture, rooms need latent and layout"):
+        weights.sample_layout(GraphBatch.single([0]))

@@ -86,3 +86,30 @@ def test_ctrl_c_ends_a_run_within_seconds(tmp_path):
     assert time.monotonic() - began < 5
     assert run.returncode == 130
     assert said.splitlines()[-1] == "error: interrupted"
+
+
+def test_a_run_goes_on_as_it_was_asked(echousd_command, tmp_path):
+    asked = ("--sample", "bedroom:2", "--shapes", "boxes", "--dress", "none", "--no-preview", "--workers", "1")
+    assert echousd_command("batch", *asked, "--seed", "5", "-o", tmp_path / "run").code == 0
+    rooms = sorted((tmp_path / "run/rooms/0000").iterdir())
+    (rooms[1] / f"{rooms[1].name}.usda").unlink()
+    outcome = echousd_command("batch", "-o", tmp_path / "run", "--resume", "--workers", "1")
+    assert (outcome.code, "2 of 2" in outcome.out) == (0, True), outcome.err
+    assert echousd_command("batch", "verify", tmp_path / "run").code == 0
+    outcome = echousd_command("batch", "-o", tmp_path / "none", "--resume")
+    assert (outcome.code, "no run of echousd batch" in outcome.err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("sources = 5", "batch.toml: sources is 5, allowed: a list of files, folders, globs"),
+        ("sources = [5]", "batch.toml: sources.0 is 5, allowed"),
+        ("sample = 5", "batch.toml: sample is 5, allowed: room types"),
+    ],
+)
+def test_a_batch_toml_of_other_types_is_told(echousd_command, tmp_path, text, said):
+    (tmp_path / "batch.toml").write_text(text)
+    outcome = echousd_command("batch", tmp_path / "batch.toml", "-o", tmp_path / "run")
+    assert outcome.code == 2
+    assert said in outcome.err

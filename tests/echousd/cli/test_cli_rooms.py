@@ -118,3 +118,13 @@ def test_older_crate_version_for_older_hosts(graph, tmp_path):
     for crate in crates:
         assert tuple(crate.read_bytes()[8:11]) == (0, 8, 0)
         assert Usd.Stage.Open(str(crate))
+
+
+@pytest.mark.parametrize("words", [("edit", "--add", "plant:plant"), ("edit", "--undo"), ("update",)])
+def test_what_is_no_room_is_named_not_the_folder_that_it_lies_in(tmp_path, echousd_command, words):
+    (tmp_path / "graph.usda").write_text("#usda 1.0")
+    outcome = echousd_command(words[0], tmp_path / "graph.usda", *words[1:])
+    assert (outcome.code, "graph.usda: not a room made by `echousd generate`" in outcome.err) == (2, True), outcome.err
+    outcome = echousd_command(words[0], tmp_path / "none.usda", *words[1:])
+    assert (outcome.code, "none.usda: no such file" in outcome.err) == (2, True), outcome.err
+    assert [path.name for path in tmp_path.iterdir()] == ["graph.usda"]
