@@ -2,7 +2,7 @@
 
 from echousd.checks.placement import Misplacement
 from echousd.checks.report import CheckReport, check
-from echousd.checks.validity import RULES, Fault, register
+from echousd.checks.validity import RULES, Fault
 from echousd.place.report import Collision
 
-__all__ = ["RULES", "CheckReport", "Collision", "Fault", "Misplacement", "check", "register"]
+__all__ = ["RULES", "CheckReport", "Collision", "Fault", "Misplacement", "check"]

@@ -25,10 +25,9 @@ class Finding:
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule of our own: registered with UsdValidation as `name`; `doc` says what it demands."""
+    """A rule of our own, called `name`, and what finds its faults."""
 
     name: str
-    doc: str
     find: Callable[[Reading], Iterator[Finding]]
 
 
@@ -36,7 +35,7 @@ RULES: list[Rule] = []  # filled by the modules of rules as they are imported
 
 
 def rule(name: str, over: str = "", of: type | None = None) -> Callable[[Function], Callable[[Reading], Any]]:
-    """Make a rule of a generator of findings, whose docstring says what it demands.
+    """Make a rule of a generator of findings.
 
     Arguments:
         over: what of a `Reading` the generator is called for one by one, "" = for the reading alone. What it yields as
@@ -54,7 +53,7 @@ def rule(name: str, over: str = "", of: type | None = None) -> Callable[[Functio
                     except UNREADABLE:
                         continue
 
-        RULES.append(Rule(name, (function.__doc__ or "").partition("\n")[0], find if over else function))
+        RULES.append(Rule(name, find if over else function))
         return RULES[-1].find
 
     return made

@@ -247,10 +247,5 @@ def _numbers(attribute: Usd.Attribute) -> np.ndarray:
     return np.zeros(0) if np.isnan(found).any() else found
 
 
-for _name, _doc in (
-    ("echo:PhysicsValues", "Masses, frictions, gravity, drives are ones that can be."),
-    ("echo:MaterialValues", "Colours, roughness and opacity are ones that can be seen."),
-    ("echo:LightValues", "Lights have an intensity, a colour and a size."),
-    ("echo:CameraValues", "Cameras have a lens, a film and something before them."),
-):
-    RULES.append(Rule(_name, _doc, partial(out_of_range, rule=_name)))
+for _name in ("echo:PhysicsValues", "echo:MaterialValues", "echo:LightValues", "echo:CameraValues"):
+    RULES.append(Rule(_name, partial(out_of_range, rule=_name)))

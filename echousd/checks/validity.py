@@ -1,9 +1,8 @@
-"""USD validity: UsdValidation's validators and our own rules, registered as UsdValidation validators, in one run."""
+"""USD validity: UsdValidation's validators and our own rules in one run."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +19,6 @@ FAMILIES = ("object", "look", "mesh", "physics", "file")
 for family in FAMILIES:
     importlib.import_module(f"echousd.checks.{family}_rules")  # its rules enter the table
 JOINED = tuple(rule for rule in RULES if rule.name in ("echo:Joints", "echo:PhysicsValues"))
-KEYWORD = "EchoUSD"
 ALONE = "echo:Validators"
 UNKNOWN_NODE, MATERIALX = ".MissingShaderIdInRegistry", "shaderId 'ND_"
 
@@ -36,37 +34,6 @@ class Fault:
     def to_json(self) -> dict:
         """The entry of the report."""
         return {"rule": self.rule, "prim": self.prim, "message": self.message}
-
-
-def register() -> None:
-    """Register our rules as UsdValidation stage validators (once per process)."""
-    from pxr import UsdValidation
-
-    registry = UsdValidation.ValidationRegistry()
-    for rule in RULES:
-        if not registry.HasValidator(rule.name):
-            metadata = UsdValidation.ValidatorMetadata(
-                name=rule.name, doc=rule.doc, keywords=[KEYWORD], schemaTypes=[], isTimeDependent=False
-            )
-            registry.RegisterStageValidator(metadata, _validator(rule))
-
-
-def _validator(rule: Rule) -> Callable[[Usd.Stage, Any], list]:
-    def validate(stage: Usd.Stage, _time: Any) -> list:
-        from pxr import UsdValidation
-
-        kinds = UsdValidation.ValidationErrorType
-        return [
-            UsdValidation.ValidationError(
-                rule.name.partition(":")[2],
-                kinds.Warn if found.warning else kinds.Error,
-                [UsdValidation.ValidationErrorSite(stage, found.path)],
-                found.message,
-            )
-            for found in safely(rule, Reading(stage))
-        ]
-
-    return validate
 
 
 def safely(rule: Rule, reading: Reading) -> list[Finding]:
@@ -103,12 +70,11 @@ def _faults_of_usd(stage: Usd.Stage) -> tuple[set[Fault], set[Fault]]:
         from pxr import UsdValidation
 
         known = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
-        theirs = [each for each in known if KEYWORD not in each.GetMetadata().GetKeywords()]
     except (ImportError, AttributeError, TypeError):
         version = ".".join(map(str, Usd.GetVersion()))
         alone = f"OpenUSD {version} has no UsdValidation for Python: only our own rules ran"
         return set(), {Fault(ALONE, "/", alone)}
-    context = UsdValidation.ValidationContext(theirs)
+    context = UsdValidation.ValidationContext(known)
     silence = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what the report says as well
     try:
         told = context.Validate(stage)

@@ -92,14 +92,14 @@ def generate_home(
     """
     from echousd.cli.terminal import progress_bar
     from echousd.folder.found import is_home
-    from echousd.home.assemble import earlier, stale, write_rooms
+    from echousd.home.assemble import digests_of, earlier, jobs_of, stale, write_rooms
     from echousd.home.given import next_plan, plan_there
 
     stated = None if is_home(graph) else plan_there(graph, home)
     before = graph if is_home(graph) else earlier(output, options.seed)
     plan = stated or next_plan(home, seed=options.seed, before=before)
     if dry_run:
-        again = stale(plan, output, options)
+        again = stale(digests_of(jobs_of(plan, output, options)), output)
         say_done(json, [], [f"new      {name}" for name in again], {"new": again})
         return
     with progress_bar() as listen:

@@ -7,6 +7,7 @@ import json
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -89,10 +90,13 @@ def jobs_of(plan: Plan, output: Path, options: RoomOptions, outside: Sequence[st
     return jobs
 
 
-def digest_of(job: Job) -> str:
-    """Of all that decides a room's bytes."""
-    told = [job.text, job.seed, job.options.model_dump(), weights_hash(job.options.weights), echousd.__version__]
-    return hashlib.sha256(json.dumps(told, default=str, sort_keys=True).encode()).hexdigest()[:16]
+def digests_of(jobs: Mapping[str, Job]) -> dict[str, str]:
+    """Of all that decides each room's bytes."""
+    found, weights = {}, cache(weights_hash)
+    for name, job in jobs.items():
+        told = [job.text, job.seed, job.options.model_dump(), weights(job.options.weights), echousd.__version__]
+        found[name] = hashlib.sha256(json.dumps(told, default=str, sort_keys=True).encode()).hexdigest()[:16]
+    return found
 
 
 def write_rooms(
@@ -115,8 +119,8 @@ def write_rooms(
     root = output / ROOT_FILE
     check_root(root, force=force)
     jobs = jobs_of(plan, output, options, outside)
-    digests = {name: digest_of(job) for name, job in jobs.items()}
-    wanted = [jobs[name] for name in stale(plan, output, options, outside)]
+    digests = digests_of(jobs)
+    wanted = [jobs[name] for name in stale(digests, output)]
     edited = [job.id for job in wanted if (find_manifest(Path(job.folder)) or {}).get("history")]
     if edited and not force:
         raise ValueError(
@@ -137,13 +141,12 @@ def write_rooms(
     return Made(root, done, failed)
 
 
-def stale(plan: Plan, output: Path, options: RoomOptions, outside: Sequence[str] = ()) -> list[str]:
-    """The rooms of a plan that a folder does not hold as they would be made."""
+def stale(digests: Mapping[str, str], output: Path) -> list[str]:
+    """The rooms that a folder does not hold as they would be made, by their `digests_of`."""
     layer = _layer(output / ROOT_FILE)
     before = dict(layer.customLayerData.get("rooms", {})) if layer else {}
-    jobs = jobs_of(plan, output, options, outside)
-    there = [name for name, job in jobs.items() if find_manifest(Path(job.folder)) is not None]
-    return [name for name, job in jobs.items() if name not in there or before.get(name) != digest_of(job)]
+    there = [name for name in digests if find_manifest(output / FOLDER / name) is not None]
+    return [name for name, digest in digests.items() if name not in there or before.get(name) != digest]
 
 
 def remembered(root: Path) -> tuple[HomeGraph, RoomOptions]:

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from pxr import Gf, Usd, UsdGeom, UsdValidation
+from pxr import Gf, Usd, UsdGeom
 
-from echousd.checks import RULES, Collision, check, register
+from echousd.checks import Collision, check
 from echousd.checks.placement import DEEP, Whole, find_collisions, mesh_depth, winding_number
 from echousd.checks.report import find_living
 from echousd.cli.main import run
@@ -96,21 +96,6 @@ def test_what_is_not_loaded_is_called_so() -> None:
     report = check(stage)
     assert [(fault.rule, fault.prim) for fault in report.errors] == [("echo:PayloadsLoaded", "/Room")]
     assert "not loaded" in report.errors[0].message
-
-
-def test_our_rules_are_validators_of_usd() -> None:
-    register()
-    register()
-    registry = UsdValidation.ValidationRegistry()
-    names = [metadata.name for metadata in registry.GetValidatorMetadataForKeyword("EchoUSD")]
-    assert sorted(names) == sorted(rule.name for rule in RULES)
-    validator = registry.GetOrLoadValidatorByName("echo:EdgeTargets")
-    stage = Usd.Stage.Open(str(BAD / "dangling_edge.usda"))
-    errors = UsdValidation.ValidationContext([validator]).Validate(stage)
-    assert [str(error.GetSites()[0].GetPrim().GetPath()) for error in errors] == [
-        "/Room/SceneGraph/wardrobe__taller_than__bed"
-    ]
-    assert "points to </Room/Objects/sofa>, where no prim is" in errors[0].GetMessage()
 
 
 def test_messages_name_what_was_found_and_what_is_allowed() -> None:
