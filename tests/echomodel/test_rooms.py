@@ -181,7 +181,7 @@ def test_halls_hold_several_zones_and_stay_tidy():
     for unknown in ("screen_on_axis", "window_free"):  # to the recipes: screens before windows
         scores.pop(unknown)
     assert sum(number for rule, number in scores.items() if rule not in spacious) < 0.035 * objects  # .032
-    assert scores.total() < 0.14 * objects  # a full hall's zones stand closer than the rules have them
+    assert scores.total() < 0.155 * objects  # a full hall's zones stand closer than the rules have them
     assert halls[3].to_json() == generate_rooms(1, 4, start=3, halls=1.0)[0].to_json()
 
 

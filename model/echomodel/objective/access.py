@@ -11,7 +11,7 @@ from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_
 
 CROOKED = math.radians(1.0)  # 98 % of such furniture in real rooms is turned less
 TOUCHING = 0.3  # metres: 93 % of real beds, nightstands and tv stands have a smaller gap behind
-NEAR_WALL = 0.4  # metres between a wall and the nearest side of a desk
+NEAR_WALL = 0.2  # metres between a wall and the nearest side of a desk
 DINERS = 3  # chairs that make a dining table of a desk
 PASSAGE = 0.75  # metres: a sofa so far from the wall may stand in the room on purpose, one walks behind it
 DEEP = 6.0  # metres of the room along its axis from which on it does; or something of another group stands behind it

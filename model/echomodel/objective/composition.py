@@ -16,11 +16,11 @@ from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, join
 from echomodel.sizes import REACH, filled_area
 
 # Radius of an empty circle, of the side of a square of each piece's share of the floor; more a square metre; at most.
-BARE = (0.54, 0.009, 0.95)
+BARE = (0.48, 0.008, 0.84)
 AHEAD = 1.0  # metres before a sofa to other groups: 97 % of real ones have them
 COVERED = 0.25  # share of its width from which on something is before it
 CELL, POINTS = 0.25, 1000  # metres between two points of the floor that are looked at; in a hall so many, farther apart
-FEW = 5  # pieces: fewer fill no room
+FEW, LARGE = 5, 0.4  # pieces: fewer fill no room; square metres of those that fill an end of it
 NEARBY = 0.5  # metres: a point nearer to a piece is neither bare nor far from everything
 
 
@@ -114,15 +114,17 @@ def sofa_ahead(plan: Plan) -> Found:
     return plan.nearest(i, j, plan.more_ahead(i, j, AHEAD, COVERED), AHEAD) if len(i) else nobody(plan.size)
 
 
-BARE_END = 0.4  # share of a room's length from a wall to the nearest piece: 88 % of real rooms
+BARE_END = 0.45  # share of a room's length from a wall to the nearest large piece: 87 % of real rooms
 
 
 def ends_used(plan: Plan) -> Found:
-    """No end of a room is bare: its pieces stand about its middle; the nearest one is told."""
+    """No end of a room is bare: its large pieces stand about its middle; the nearest one is told."""
     out, xp = nobody(plan.size), plan.kit
     for (_, polygon, _), (_, _, there, *_) in zip(plan.rooms, floor_gaps(plan), strict=True):
-        if there.shape[1] - max(int(plan.stands("row")[there[0]].sum()) - 1, 0) < FEW:  # a row of units is one
-            continue
+        large = plan.size[there[0], 0] * plan.size[there[0], 2] > LARGE
+        if there.shape[1] - max(int(plan.stands("row")[there[0]].sum()) - 1, 0) < FEW or not bool(large.any()):
+            continue  # a row of units is one piece
+        there = there[:, large]
         low, high = (plan.numbers(of(polygon, axis=0).tolist()) for of in (np.min, np.max))
         who, row = there.reshape(-1), xp.arange(len(there))
         corners = footprint(plan.size[who], plan.position[who], plan.yaw[who]).reshape(len(there), -1, 2)
