@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from echousd.cli.output import one_line, safe, say, say_json
+from echousd.cli.output import counted, one_line, safe, say, say_json
 
 if TYPE_CHECKING:
     from echousd.checks import CheckReport
@@ -98,7 +98,7 @@ def _one(
 
 def _seen(report: CheckReport) -> str:
     """What is wrong in a room, in a few words."""
-    seen = [f"{len(report.errors)} USD errors"] * bool(report.errors)
+    seen = [counted(len(report.errors), "USD error")] * bool(report.errors)
     for each in report.layouts:
         counts = {"broken": each.broken, "colliding": each.collisions, "misplaced": each.placement}
         seen += [f"{each.name} {len(what)} {word}".strip() for word, what in counts.items() if what]
@@ -132,10 +132,10 @@ def _of_room(report: CheckReport, strict: bool) -> tuple[list[Row], list[Fault]]
         which, where = (f"{layout.name} ", f"{layout.name}: ") if layout.name else ("", "")
         unmeasured = sum(found.state == "unmeasured" for found in layout.relations)
         kept = f"{layout.kept} of {len(layout.relations) - unmeasured} kept"
-        living = f"{len(layout.living)} things that a person would point at"
+        living = f"{counted(len(layout.living), 'thing')} that a person would point at"
         rows += [
             (_mark(not layout.broken), f"{which}relations", kept + f", {unmeasured} not measured" * bool(unmeasured)),
-            (_mark(not layout.collisions), f"{which}collisions", f"{len(layout.collisions)} pairs"),
+            (_mark(not layout.collisions), f"{which}collisions", counted(len(layout.collisions), "pair")),
             (_mark(not layout.placement), f"{which}placement", f"{len(layout.placement)} misplaced"),
             (doubt[0] if layout.living else "ok", f"{which}living", living),
         ]
@@ -146,7 +146,8 @@ def _of_room(report: CheckReport, strict: bool) -> tuple[list[Row], list[Fault]]
             said.append(("placement", f"{wrong.object} is {wrong.problem}{far}"))
         faults += [(kind, where + text, "red") for kind, text in said]
         faults += [("living", f"{where}{seen.says} ({seen.rule})", doubt[1]) for seen in layout.living]
-    rows.append((_mark(not report.errors), "USD", f"{len(report.errors)} errors, {len(report.warnings)} warnings"))
+    usd = f"{counted(len(report.errors), 'error')}, {counted(len(report.warnings), 'warning')}"
+    rows.append((_mark(not report.errors), "USD", usd))
     for kind, colour, found in (("error", "red", report.errors), ("warning", "yellow", report.warnings)):
         faults += [(kind, f"{fault.rule} <{fault.prim}>: {fault.message}", colour) for fault in found]
     for rest in report.settled or ():

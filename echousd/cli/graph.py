@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from echousd.cli.options import AsJson, Replace
-from echousd.cli.output import check_free, check_picture, say, say_done, say_json
+from echousd.cli.output import check_free, check_picture, counted, say, say_done, say_json
 
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
@@ -266,11 +266,8 @@ def _rooms(source: Path, *, names: bool) -> dict[str, SceneGraph]:
 
 
 def _summary(made: SceneGraph) -> str:
-    objects, relations = len(made.nodes), len(made.relations)
-    return (
-        f"{made.room.type.replace('_', ' ')}, {objects} object{'s' * (objects != 1)}, "
-        f"{relations} relation{'s' * (relations != 1)}"
-    )
+    objects, relations = counted(len(made.nodes), "object"), counted(len(made.relations), "relation")
+    return f"{made.room.type.replace('_', ' ')}, {objects}, {relations}"
 
 
 PICTURES = (".png", ".svg", ".pdf")

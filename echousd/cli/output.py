@@ -64,6 +64,11 @@ def say_error(text: str) -> None:
     typer.echo(safe(text), err=True)
 
 
+def counted(number: int, word: str) -> str:
+    """`1 object`, `2 objects`."""
+    return f"{number} {word}{'s' * (number != 1)}"
+
+
 def say_json(found: Any, *, indent: int | None = None) -> None:
     """Print plain data as JSON; a number that is none becomes null."""
     typer.echo(json.dumps(plain_json(found), indent=indent, allow_nan=False))
@@ -225,7 +230,7 @@ def tell_room(written: Written) -> None:
     for number, found in enumerate(room.outcomes):
         counts, several = found.counts(), len(room.outcomes) > 1
         kept = f"{counts['kept']} of {counts['kept'] + counts['broken']} measured relations kept"
-        say(f"layout_{number} {kept}" if several else f"graph    {len(room.names)} objects, {kept}")
+        say(f"layout_{number} {kept}" if several else f"graph    {counted(len(room.names), 'object')}, {kept}")
         for verdict in found.broken:
             say(f"broken   {verdict.said} (margin {verdict.margin:+.2f})")
         for hit in found.collisions:

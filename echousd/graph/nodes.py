@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from inspect import Parameter, Signature, signature
 from typing import TYPE_CHECKING, Any
@@ -48,14 +49,15 @@ class PlainModel(BaseModel, metaclass=_Plain):
     def _explained(cls, fields: dict[str, Any], error: ValidationError) -> ValueError:
         first = error.errors(include_url=False)[0]
         cause = first["ctx"]["error"] if first["type"] == "value_error" else None
-        message = first["msg"] if cause is None else str(cause)
+        found = f"found {first['input']!r:.100}, allowed: "
+        message = re.sub("^Input should be ", found, first["msg"]) if cause is None else str(cause)
         where = ".".join(str(part) for part in first["loc"])
         if first["type"] == "extra_forbidden":
             message = f"unknown field, allowed: {', '.join(cls.model_fields)}"
         about = (*first["loc"], *getattr(cause, "about", ()))
-        found = GraphError(f"{cls._title(fields)}{where + ': ' if where else ''}{message}", about)
-        found.others = getattr(cause, "others", ())
-        return found
+        fault = GraphError(f"{cls._title(fields)}{where + ': ' if where else ''}{message}", about)
+        fault.others = getattr(cause, "others", ())
+        return fault
 
     @classmethod
     def _title(cls, fields: dict[str, Any]) -> str:

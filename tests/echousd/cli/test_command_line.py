@@ -14,6 +14,7 @@ import typer
 
 import echousd
 from echousd.cli import main
+from echousd.cli.output import counted
 
 
 def started(*words: str, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
@@ -198,3 +199,7 @@ def test_no_colour_where_none_is_wanted(words):
     """NO_COLOR counts on a terminal, too (https://no-color.org)."""
     plain = started(*words, environment={"FORCE_COLOR": "1", "TERM": "xterm-256color", "NO_COLOR": "1"})
     assert not re.search(r"\x1b\[[0-9;]*3[0-7]m", plain.stdout + plain.stderr)
+
+
+def test_one_is_no_plural():
+    assert [counted(n, "object") for n in (0, 1, 2)] == ["0 objects", "1 object", "2 objects"]

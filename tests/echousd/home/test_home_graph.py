@@ -85,7 +85,7 @@ def test_another_way_replaces_the_one_before():
         ("rooms: [hall]\n", "rooms: allowed: a mapping of names"),
         ("rooms: {hall: hallway}\nhome: {entrance: attic}\n", ":2: entrance 'attic' is no room, allowed: hall"),
         ("rooms: {hall: hallway}\nhome: {outline: [[0, 0], [1, 1], [1, 0], [0, 1]]}\n", "does not cross itself"),
-        ("rooms: {hall: {area: -3}}\n", "area: Input should be greater than 0.5"),
+        ("rooms: {hall: {area: -3}}\n", "area: found -3, allowed: greater than 0.5"),
         ("rooms: {}\n", "0 rooms, allowed: 1 to 40"),
         ("rooms: {hall: {objects: [bad]}}\n", "room 'hall': "),
     ],
