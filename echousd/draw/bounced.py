@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 CELL = 0.5  # metres
-THROWN = 0.6  # of what surfaces of their colours would: so rooms have the contrast that photographs have
+THROWN = 0.7  # of what surfaces of their colours would: so rooms have the contrast that photographs have
 
 
 @dataclass(frozen=True, eq=False)

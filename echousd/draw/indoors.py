@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 SKY = 4.0  # radiance of the sky in a window for a dome of intensity 1, whose light else comes from above as well
 SUN = 9.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
 CEILING = np.array([0.80, 0.79, 0.77], np.float32)
-VIEW = 0.8  # of the sky's radiance, what is seen of it through a window: eyes adapt
-BLURRED, HAZE = 0.7, 0.4  # degrees that it is out of focus, and the share of its colour that haze takes
-DIM = 0.05  # radiance at every place of a room without lamps and windows, so that one sees it
+VIEW = 0.5  # of the sky's radiance, what is seen of it through a window: eyes adapt
+BLURRED, HAZE = 0.45, 0.25  # degrees that it is out of focus, and the share of its colour that haze takes
+DIM = 0.02  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
-ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.3, 0.75), (0.35, 0.62), 70, 15.0
-EVEN = 0.3  # power of the light's brightness that eyes and those who photograph rooms take from it
+ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.3, 0.85), (0.34, 0.61), 70, 15.0
+EVEN = 0.18  # power of the light's brightness that eyes and those who photograph rooms take from it
 WHITE, PAPER = 92, 0.95  # what so many of a hundred points are darker than comes to no more than that
-CONTRAST, KNEE = 1.3, 0.6  # power about what is bright, and from where on highlights are rolled off
+CONTRAST, KNEE = 1.4, 0.6  # power about what is bright, and from where on highlights are rolled off
 HUE = 0.6  # share of colours that keep their hue where they are bright; film bleaches them
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 DAY = 0.5  # radiance of the sky by day
 # The brightest shade over what white paper is on the average in the room, by night and by day, as eyes see it; the
 # share of its light that is seen at its rim.
-GLOWING, RIM = (4.0, 5.0), 0.3
+GLOWING, RIM = (3.2, 3.5), 0.25
 # Metres around a lamp where it throws no shadow of its own, and how far from a bulb its shade may be; its places that
 # light comes from, where it has no shade as far around the bulb.
 OWN, SHADED, SPOTS, BULB = 0.25, 0.5, 24, 0.05
@@ -130,14 +130,14 @@ def with_ceiling(scenery: Scenery) -> Scenery:
     return replace(scenery, **joined)
 
 
-def evened(light: np.ndarray, sun: np.ndarray, white: np.ndarray) -> np.ndarray:
-    """Light on points (n, 6), see `tracing`, less bright where it is brighter than the mean and brighter where it is
-    less: so walls at lamps and windows keep their colour and corners are not black.
+def evened(light: np.ndarray, white: np.ndarray) -> np.ndarray:
+    """(n, 1) what light (n, 3) is multiplied by: less than 1 where it is brighter than the mean, more where it is less,
+    so that walls at lamps and windows keep their colour and corners are not black.
 
-    `sun`: (3,) what the sun gives. `white`: (3,) the mean light in the room.
+    `white`: (3,) the mean light in the room.
     """
-    level = (light[:, :3] + light[:, 4:5] * sun) @ LUMA / max(float(white @ LUMA), 1e-6)
-    return np.asarray(light * np.maximum(level, np.float32(1e-3))[:, None] ** np.array([*[-EVEN] * 5, 0], np.float32))
+    level = light @ LUMA / max(float(white @ LUMA), 1e-6)
+    return np.asarray(np.maximum(level, np.float32(1e-3))[:, None] ** np.float32(-EVEN))
 
 
 def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable[[np.ndarray], np.ndarray]:
@@ -164,6 +164,10 @@ def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable
 
 def _filmic(level: np.ndarray, middle: float) -> np.ndarray:
     """Contrast about a middle tone, and a shoulder from `KNEE` on."""
-    level = middle * (np.maximum(level, 0) / middle) ** CONTRAST
-    over = np.maximum(level - KNEE, 0)
-    return np.where(level > KNEE, KNEE + (1 - KNEE) * over / (over + 1 - KNEE), level)
+    return rolled(middle * (np.maximum(level, 0) / middle) ** CONTRAST, KNEE)
+
+
+def rolled(level: np.ndarray, knee: float = 0.72) -> np.ndarray:
+    """Bright values rolled off towards 1 from a knee on instead of clipped."""
+    over = np.maximum(level - knee, 0)
+    return np.where(level > knee, knee + (1 - knee) * over / (over + 1 - knee), level)

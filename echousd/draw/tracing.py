@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -11,15 +10,19 @@ import numpy as np
 
 from echomodel.triangles import along
 from echousd.draw.bounced import Bounced
-from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, VIEW, evened, exposure
+from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, VIEW, evened, exposure, rolled
 from echousd.draw.scenery import Scenery, between
 from echousd.draw.views import View
 
 FINE, QUICK = 3, 2  # squared: rays per pixel
-SKY_RAYS, AROUND = 3, 3  # per ray: rays towards the sky; inside a room, to what stands around
+AROUND = 3  # per ray: rays to what stands around
 # Places at which a room's light is found, rays of each kind from each, and how often light is thrown on.
 PLACES, OFTEN, TURNS = (600, 1200), 3, 3
-CREVICE, DEPTH = 0.6, 1.3  # metres from which on nothing makes a place darker; how dark what touches it does
+# Metres from which on nothing makes a place darker, how dark what touches it does, and how much less if it is white.
+CREVICE, DEPTH, PALE = 0.45, 1.9, 0.55
+# Gloss from which on surfaces mirror, and are metal, of which so much is not mirrored; how far from where a mirror
+# would a rough one mirrors.
+GLOSSY, METAL, MATT, BLUR = 0.2, 0.5, 0.4, 0.15
 
 
 class RenderUnavailable(ImportError, ValueError):
@@ -42,16 +45,10 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
     sun = scenery.lights.sun
     sun = np.float32(SUN / np.pi) * (0 * SUN_LIGHT if sun is None else sun[1]) if view.inside else 0.55 * SUN_LIGHT
     world = World(embree(scenery.triangles), scenery, view, size, shift, Bounced.dark(*scenery.bounds), sun)
-    white = None
-    if view.inside:
-        world, white = _lit(world)
-        brightest = float((scenery.emissive @ LUMA).max(initial=1e-6))
-        glow = np.interp(scenery.lights.day, (0, 1), GLOWING) * white / brightest
-        world = world._replace(glow=glow.astype(np.float32))
-    return _drawn(world, height, rays, white) ** (1 / 2.2)
+    return _drawn(_lit(world), height, rays) ** (1 / 2.2)
 
 
-def _drawn(world: World, height: int, rays: int, white: np.ndarray | None) -> np.ndarray:
+def _drawn(world: World, height: int, rays: int) -> np.ndarray:
     """(height, size, 3) linear colours of the picture, of each ray as it is shown: so edges of what glares are even."""
     size, many = world.size, rays**2
     places = [((3 * (inner + 1) % (many + 1) - 0.5) / many, (inner + 0.5) / many) for inner in range(many)]
@@ -62,13 +59,13 @@ def _drawn(world: World, height: int, rays: int, white: np.ndarray | None) -> np
     for pixel, _ in finer:
         edge[pixel] = True
     light = _light_of(world, seen, edge, 2 * rays, max(1, (rays - 1) ** 2))
-    light = light if white is None else evened(light, world.sun, white)
     color = seen.glow.copy()
     everywhere = np.flatnonzero(seen.face >= 0)
     for met in (everywhere[start : start + BLOCK] for start in range(0, len(everywhere), BLOCK)):
         color[met] = _colored(world, seen.of(met), light[met])
     own = everywhere[world.scenery.emissive[seen.face[everywhere]].sum(1) == 0]  # no lamp, and nothing outside
-    tone = _tone if white is None else exposure(color[own] if len(own) else color, white, world.scenery.lights.day)
+    tone = exposure(color[own] if len(own) else color, world.white, world.scenery.lights.day)
+    tone = tone if world.view.inside else rolled
     color = tone(color)
     mixed = color.copy()
     for pixel, more in finer:
@@ -90,15 +87,18 @@ def _softened(picture: np.ndarray) -> np.ndarray:
 BLOCK = 32_000  # rays at a time, which bounds the memory and stays in the cache
 BAND = 32  # rows of a picture at a time, for the same reasons
 RINGS = (1, 2, 4, 8)  # places between neighbours, pass by pass
+# Pixels to the right and down, near ones first.
+BESIDE = np.array(sorted(product(range(-2, 3), repeat=2), key=lambda at: at[0] ** 2 + at[1] ** 2)[:13])
 CLOSE, EVEN = 2, 0.4  # from which ring on it matters how bright neighbours are, and the share that they may differ by
-ALIKE, FLAT = 0.95, 0.02  # cosine and metres within which two points lie on one flat piece of surface
+ALIKE, FLAT = 0.97, 0.02  # cosine and metres within which two points lie on one flat piece of surface
 KEPT, NOTHING = ("primID", "u", "v", "tfar"), np.float32(-9)  # of a hit; the material of what is not there
 MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
 
 
 class World(NamedTuple):
     """What rays run through: the tree, what is in it, the camera, pixels across, shifts of the first; what light is
-    thrown back, what the sun gives to what faces it and how much brighter shades are than told, by colour."""
+    thrown back, what the sun gives to what faces it, how much brighter shades are than told, and the mean
+    light, by colour."""
 
     scene: Any
     scenery: Scenery
@@ -108,10 +108,10 @@ class World(NamedTuple):
     thrown: Bounced
     sun: np.ndarray
     glow: np.ndarray = np.ones(3, np.float32)
+    white: np.ndarray = np.ones(3, np.float32)
 
 
-@dataclass(frozen=True, eq=False)
-class Seen:
+class Seen(NamedTuple):
     """What n rays met: faces (n,), -1 for none; points and normals (n, 3), st (n, 2); colour (n, 3) where none is."""
 
     face: np.ndarray
@@ -123,12 +123,7 @@ class Seen:
 
     def of(self, rows: Any) -> Seen:
         """Those of some rays."""
-        return Seen(*(getattr(self, field.name)[rows] for field in fields(self)))
-
-    def shaped(self, shape: tuple[int, int]) -> Seen:
-        """Those of a picture's pixels by row and column."""
-        values = (getattr(self, field.name) for field in fields(self))
-        return Seen(*(value.reshape(*shape, *value.shape[1:]) for value in values))
+        return Seen(*(value[rows] for value in self))
 
 
 def _rays(world: World, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -149,7 +144,8 @@ def _met(
 
     Where `first` tells what was seen in each pixel already: only what is another surface or material.
     """
-    parts, pixels = [], []
+    parts: list[Seen] = []
+    pixels = []
     for rows in (pixel[start : start + BLOCK] for start in range(0, max(len(pixel), 1), BLOCK)):
         origin, direction = _rays(world, rows % world.size + place[0], rows // world.size + place[1])
         hit = world.scene.run(_f32(origin), _f32(direction), output=1)
@@ -162,15 +158,14 @@ def _met(
             way = direction[mirror] - 2 * _dot(direction[mirror], part.normal[mirror])[:, None] * part.normal[mirror]
             origin = part.point[mirror] + np.float32(2e-3) * part.normal[mirror]
             before = _seen(world, origin, way, world.scene.run(_f32(origin), _f32(way), output=1))
-            for field in fields(Seen):
-                getattr(part, field.name)[mirror] = getattr(before, field.name)
+            for own, other in zip(part, before, strict=True):
+                own[mirror] = other
         if first is not None:
-            other = _other(part, first.of(rows))
-            part, rows = part.of(other), rows[other]
+            differs = _other(part, first.of(rows))
+            part, rows = part.of(differs), rows[differs]
         parts.append(part)
         pixels.append(rows)
-    joined = (np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Seen))
-    return np.concatenate(pixels), Seen(*joined)
+    return np.concatenate(pixels), Seen(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _other(one: Seen, two: Seen) -> np.ndarray:
@@ -180,7 +175,7 @@ def _other(one: Seen, two: Seen) -> np.ndarray:
 
 def _at_edges(seen: Seen, shape: tuple[int, int]) -> np.ndarray:
     """(n,) bool of a picture's pixels: whether another surface is seen beside them, or beside their neighbours."""
-    seen, out = seen.shaped(shape), np.zeros(shape, bool)
+    seen, out = Seen(*(value.reshape(*shape, *value.shape[1:]) for value in seen)), np.zeros(shape, bool)
     across = (slice(None), slice(None, -1)), (slice(None), slice(1, None))
     for one, two in (across, (slice(None, -1), slice(1, None))):
         differs = _other(seen.of(one), seen.of(two))
@@ -207,8 +202,8 @@ def _seen(world: World, origin: np.ndarray, direction: np.ndarray, hit: Mapping[
 
 
 def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndarray:
-    """(n, 6) what falls on what was seen in some pixels: soft light by colour, what of it is mirrored to the eye, the
-    share of the sun that shines there, and how free the place is of what stands near, see `CREVICE`."""
+    """(n, 6) what falls on what was seen in some pixels: soft light by colour, what is mirrored to the eye, how
+    free the place is of what stands near, see `CREVICE`, and the share of the sun that shines there."""
     view, out = world.view, np.zeros((len(pixel), 6), np.float32)
     for rows in (slice(start, start + BLOCK) for start in range(0, len(pixel), BLOCK)):
         point, normal = seen.point[rows], seen.normal[rows]
@@ -218,7 +213,7 @@ def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndar
         across, down = pixel[rows, None] % world.size, pixel[rows, None] // world.size
         shift = ((across * LATTICE[0] + down * LATTICE[1] + world.shift) % 1.0).astype(np.float32)
         for sample in range(samples):
-            out[rows] += (_light_inside if view.inside else _light)(world, hits, sample, shift)
+            out[rows] += _light(world, hits, sample, shift)
     return out / samples
 
 
@@ -234,7 +229,7 @@ def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: in
     found, light = np.zeros((*asked.shape, 6), np.float32), np.zeros((*shape, 6), np.float32)
     for here, times in ((asked & torn, often), (asked & ~torn, seldom)):
         found[here] = _asked(world, seen.of(number[here]), number[here], times)
-    for layers, rings in ((slice(4), RINGS), (slice(4, 5), RINGS[:1]), (slice(5, 6), RINGS[:3])):
+    for layers, rings in ((slice(3), RINGS), (slice(3, 5), RINGS[:3]), (slice(5, 6), RINGS[:1])):
         found[..., layers] = smooth_light(found[..., layers], normal[coarse], point[coarse], rings)
     weight = np.zeros((*shape, 1), np.float32)
     for steps in product((0, 1), repeat=2):  # of up to four that were asked around it, those of its own surface
@@ -244,8 +239,20 @@ def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: in
         weight += fits[..., None]
     light /= np.maximum(weight, 1)
     rest = np.flatnonzero(met & (weight[..., 0] == 0))
-    light.reshape(-1, 6)[rest] = _asked(world, seen.of(rest), rest, often)
+    found = _shared(seen.of(rest), rest, _asked(world, seen.of(rest), rest, often // 2), world.size)
+    light.reshape(-1, 6)[rest] = found
     return smooth_light(light, normal, point, RINGS[:1]).reshape(-1, 6)
+
+
+def _shared(seen: Seen, pixel: np.ndarray, light: np.ndarray, size: int) -> np.ndarray:
+    """(n, 6) mean of the light on what is seen in some pixels, ascending, over those `BESIDE` that show the same."""
+    total, count = np.zeros_like(light), np.zeros((len(pixel), 1), np.float32)
+    for apart in BESIDE @ (1, size):
+        other = np.searchsorted(pixel, pixel + apart).clip(0, len(pixel) - 1)
+        fits = (pixel[other] == pixel + apart) & _same(seen.normal, seen.point, seen.normal[other], seen.point[other])
+        total += fits[:, None] * light[other]
+        count += fits[:, None]
+    return total / np.maximum(count, 1)
 
 
 def _same(normal: np.ndarray, point: np.ndarray, other_normal: np.ndarray, other_point: np.ndarray) -> np.ndarray:
@@ -257,25 +264,33 @@ def _same(normal: np.ndarray, point: np.ndarray, other_normal: np.ndarray, other
 def _lent(world: World, met: Seen, pixel: np.ndarray, seen: Seen, light: np.ndarray) -> np.ndarray:
     """(n, 6) light of what further rays in some pixels met: that of the same surface there or beside it, else asked."""
     out, wanted = np.zeros((len(pixel), 6), np.float32), np.arange(len(pixel))
-    for apart in (0, 1, -1, world.size, -world.size):
+    for apart in BESIDE @ (1, world.size):
         other = np.clip(pixel[wanted] + apart, 0, len(light) - 1)
         fits = (seen.face[other] >= 0) & _same(
             met.normal[wanted], met.point[wanted], seen.normal[other], seen.point[other]
         )
         out[wanted[fits]] = light[other[fits]]
         wanted = wanted[~fits]
-    out[wanted] = _asked(world, met.of(wanted), pixel[wanted], 1)
+    rest, pixel = met.of(wanted), pixel[wanted]
+    out[wanted] = _shared(rest, pixel, _asked(world, rest, pixel, 1), world.size)
     return out
 
 
 def _colored(world: World, seen: Seen, light: np.ndarray) -> np.ndarray:
     """(n, 3) radiance of what was seen in light (n, 6)."""
-    fallen = light[:, :3] * light[:, 5:] ** DEPTH + light[:, 4:5] * world.sun
-    glow = np.float32(0.5) * light[:, 3:4] + world.scenery.emissive[seen.face]
-    if len(shade := np.flatnonzero(world.scenery.emissive[seen.face].any(1))):
+    scenery = world.scenery
+    color = scenery.colors(seen.face, seen.st, _breadth(world, seen))
+    sun = light[:, 5:] * world.sun
+    fallen = (light[:, :3] * light[:, 4:5] ** np.float32(DEPTH) + sun) * evened(light[:, :3] + sun, world.white)
+    emissive = scenery.emissive[seen.face]
+    glow = light[:, 3:4] + emissive
+    if len(metal := np.flatnonzero(scenery.gloss[seen.face] > METAL)):
+        glow[metal] *= color[metal]
+        fallen[metal] *= MATT
+    if len(shade := np.flatnonzero(emissive.any(1))):
         glow[shade] *= world.glow * _through(world, seen.of(shade))[:, None]
         fallen[shade] = 0  # but little of what they throw on themselves
-    return world.scenery.colors(seen.face, seen.st, _breadth(world, seen)) * fallen + glow
+    return color * fallen + glow
 
 
 def _through(world: World, seen: Seen) -> np.ndarray:
@@ -325,7 +340,7 @@ def _smoothed(rows: slice, width: int, apart: int, padded: Sequence[np.ndarray])
         other_light, other_normal, other_point = shifted(down, across)
         turn = np.clip(along(normal, other_normal), 0, 1)
         step = np.abs(along(normal, other_point) - here)
-        for _ in range(4):  # to the 16th power
+        for _ in range(5):  # to the 32nd power
             turn *= turn
         share = turn * (step < 0.02)
         if bright is not None:
@@ -386,72 +401,63 @@ class Hits(NamedTuple):
     toward: np.ndarray
     gloss: np.ndarray
 
-    def shine(self, light: np.ndarray) -> np.ndarray:
-        """(n,) how strongly light from its directions (3,) or (n, 3) is mirrored towards the eye."""
-        return self.gloss * np.clip(_dot(self.normal, _unit(self.toward + light)), 0, None) ** (4 + 90 * self.gloss)
-
 
 def _light(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarray:
-    """(n, 6) the sky's light on the points, the sun's reflection, and the share of the sun that shines there."""
-    scene, scenery = world.scene, world.scenery
-    point, normal, count = hits.point, hits.normal, len(hits.point)
-    sun = _unit(ABOVE + SUN_SPREAD * _on_sphere(_even(sample, shift[:, :2])))
-    facing = np.clip(normal @ ABOVE, 0, None)
-    lit = _free(scene, point, sun, np.full(count, 1e3, np.float32), facing > 0)
-    sky = np.zeros((count, 3), np.float32)
-    for ray in range(SKY_RAYS):
-        away = _unit(normal + _on_sphere(_even(sample * SKY_RAYS + ray, shift[:, 2:])))  # cosine-weighted
-        other = scene.run(_f32(point), _f32(away), output=1)
-        blocked = other["primID"] >= 0
-        # What a sky ray meets sends back a little of its own colour: one crude bounce.
-        bounce = 0.9 * scenery.flat_colors[np.clip(other["primID"], 0, None)]
-        near = np.clip(other["tfar"] / 1.5, 0, 1)[:, None]
-        open_sky = (0.72 + 0.28 * np.clip(away[:, 1:2], -1, 1)) * SKY_LIGHT
-        sky += np.where(blocked[:, None], bounce * (0.45 + 0.55 * near), open_sky)
-    sky /= SKY_RAYS
-    return np.column_stack([1.05 * sky, hits.shine(ABOVE) * lit, facing * lit, np.ones(count, np.float32)])
-
-
-def _light_inside(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarray:
-    """As `_light`, in a closed room: sky in the windows, sun through them, lamps, and what the room throws back."""
-    light, shine, sun = _direct(world, hits, *(_even(sample, part) for part in (shift[:, :2], shift[:, 2:])))
+    """(n, 6) what falls on points by one sample of the sun, a window and a lamp, and what is around, see `_asked`."""
+    light, sun = _direct(world, hits, *(_even(sample, part) for part in (shift[:, :2], shift[:, 2:])))
     light = np.pad(light + np.float32(DIM * max(world.scenery.lights.sky, 0.1)), ((0, 0), (0, 1)))
     for ray in range(AROUND):
         light += _gathered(world, hits, _even(sample * AROUND + ray, shift[:, 2:])) / AROUND
-    return np.column_stack([light[:, :3], shine, sun, light[:, 3]])
+    return np.column_stack([light[:, :3], _mirrored(world, hits, _even(sample, shift[:, :2])), light[:, 3], sun])
+
+
+def _mirrored(world: World, hits: Hits, square: np.ndarray) -> np.ndarray:
+    """(n,) how bright the windows, lamps and walls are that glossy points mirror to the eye, by `square` (n, 2)."""
+    out, some = np.zeros(len(hits.point), np.float32), np.flatnonzero(hits.gloss > GLOSSY)
+    point, normal, toward, gloss = (each[some] for each in hits)
+    facing, rough = np.clip(_dot(toward, normal), 0, 1), np.clip(1 - 2 * gloss, 0, 1)
+    way = _unit(2 * facing[:, None] * normal - toward + (BLUR * rough**2)[:, None] * _on_sphere(square[some]))
+    hit, scenery = world.scene.run(_f32(point), _f32(way), output=1), world.scenery
+    face = np.maximum(hit["primID"], 0)
+    rows = world.thrown.rows(point, way, np.minimum(hit["tfar"], 100), scenery.normals[face, 0])
+    within = (world.thrown.radiance[rows] + scenery.emissive[face] * world.glow) @ LUMA
+    sky = np.float32(VIEW * scenery.lights.sky) * np.clip(0.65 + 1.4 * way[:, 1], 0.3, 1)
+    share = np.where(gloss > METAL, 1, 0.04 + (0.96 - rough) * (1 - facing) ** 5)  # Schlick's, of Fresnel's law
+    out[some] = share * np.where(hit["primID"] < 0, sky, within)
+    return out
 
 
 def _direct(world: World, hits: Hits, spot: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, ...]:
-    """(n, 3) what comes from windows and lamps, (n,) what of it is mirrored to the eye, (n,) the sun's share.
+    """(n, 3) what comes from windows and lamps, (n,) the sun's share.
 
     `spot`, `turn`: (n, 2) in [0, 1), which place in which window and lamp is asked.
     """
     scene, scenery = world.scene, world.scenery
     lights, point, normal, count = scenery.lights, hits.point, hits.normal, len(hits.point)
-    light, shine, sun = np.zeros((count, 3), np.float32), np.zeros(count, np.float32), np.zeros(count, np.float32)
-    if len(scenery.panes):  # one place in one window for each ray
+    light, sun = np.zeros((count, 3), np.float32), np.zeros(count, np.float32)
+    inside = world.view.inside
+    if inside and len(scenery.panes):  # one place in one window for each ray
         pane = scenery.panes[np.minimum((turn[:, 0] * len(scenery.panes)).astype(int), len(scenery.panes) - 1)]
         place = pane[:, 0] + (2 * spot[:, :1] - 1) * pane[:, 1] + (2 * spot[:, 1:] - 1) * pane[:, 2]
         way, away = _way(point, place)
         area = np.cross(pane[:, 1], pane[:, 2])  # a quarter of it
         seen = np.clip(_dot(way, normal), 0, None) * 4 * np.abs(_dot(way, area)) / np.maximum(away, 0.2) ** 2
-        seen *= 0.3 + 0.7 * np.clip(0.5 + 2 * way[:, 1], 0, 1)  # sky above, ground below
+        seen *= np.clip(0.65 + 1.4 * way[:, 1], 0.3, 1)  # sky above, ground below
         share = _free(scene, point, way, away, seen > 1e-4) * seen
         light += share[:, None] * (len(scenery.panes) * SKY * lights.sky / np.pi) * SKY_LIGHT * lights.tint
-        grazing = 0.2 + 0.8 * (1 - np.clip(_dot(hits.toward, normal), 0, 1)) ** 3
-        shine = hits.shine(way) * grazing * (share > 0) * np.float32(0.4 * SKY * lights.sky)
-    if lights.sun is not None and len(scenery.panes):
-        towards = _unit(lights.sun[0] + 0.008 * _on_sphere(spot))
+    if not inside or (lights.sun is not None and len(scenery.panes)):
+        towards, soft = (ABOVE, SUN_SPREAD) if lights.sun is None or not inside else (lights.sun[0], np.float32(0.008))
+        towards = _unit(towards + soft * _on_sphere(spot))
         facing = np.clip(_dot(normal, towards), 0, None)
         sun = _free(scene, point, towards, np.full(count, 1e3, np.float32), facing > 0) * facing
-    if len(lights.bulbs):  # one lamp for each ray
+    if inside and len(lights.bulbs):  # one lamp for each ray
         which = np.minimum((turn[:, 1] * len(lights.bulbs)).astype(int), len(lights.bulbs) - 1)
         way, away = _way(point, lights.bulbs[which, (spot[:, 0] * lights.bulbs.shape[1]).astype(int)])
         facing = np.clip(_dot(normal, way), 0, None) * len(lights.bulbs) / (away**2 + OWN**2)
         own = np.maximum(OWN, np.ptp(lights.bulbs, axis=1).max(-1))[which]  # what is so near is its shade
         lit = _free(scene, point, way, away - own, facing > 0) * facing
         light += lit[:, None] * lights.power[which] / np.float32(np.pi)
-    return light, shine, sun
+    return light, sun
 
 
 def _gathered(world: World, hits: Hits, square: np.ndarray) -> np.ndarray:
@@ -460,38 +466,46 @@ def _gathered(world: World, hits: Hits, square: np.ndarray) -> np.ndarray:
     other = world.scene.run(_f32(hits.point), _f32(way), output=1)
     normal = world.scenery.normals[np.maximum(other["primID"], 0), 0]
     rows = world.thrown.rows(hits.point, way, np.minimum(other["tfar"], 100), normal)
-    thrown = (other["primID"] >= 0)[:, None] * world.thrown.radiance[rows]
-    return np.column_stack([thrown, np.clip(other["tfar"] / CREVICE, 0, 1)])
+    thrown, missed = world.thrown.radiance[rows], np.flatnonzero(other["primID"] < 0)
+    thrown[missed] = 0 if world.view.inside else (0.92 + 0.35 * way[missed, 1:2]) * SKY_LIGHT
+    free, pale = np.clip(other["tfar"] / CREVICE, 0, 1), PALE * world.scenery.flat_colors[other["primID"]] @ LUMA
+    return np.column_stack([thrown, free + (1 - free) * pale])
 
 
-def _lit(world: World) -> tuple[World, np.ndarray]:
-    """A closed room that knows how bright its surfaces are, and (3,) the mean light on them.
+def _lit(world: World) -> World:
+    """A room that knows how bright its surfaces and shades are, and the mean light on them.
 
     Light is found at places that an eye in it and those places see, and thrown on `TURNS` times.
     """
     rng, normals = np.random.default_rng(0), world.scenery.normals[:, 0]
     point, normal = world.view.matrix[None, :3, 3].astype(np.float32), np.zeros((1, 3), np.float32)
     met: list[tuple[np.ndarray, ...]] = []
-    for count in PLACES:  # from the eye all around, then from what it sees
-        origin = np.resize(point, (count, 3))
-        way = _unit(np.resize(normal, (count, 3)) + _on_sphere(rng.random((count, 2), np.float32)))
+    for count in PLACES:  # from the eye all around or, where it is outside, ahead, then from what it sees
+        origin, square = np.resize(point, (count, 3)), rng.random((count, 2), np.float32)
+        way = _unit(np.resize(normal, (count, 3)) + _on_sphere(square))
+        if not (met or world.view.inside):
+            origin, way = _rays(world, *(square * (world.size, world.size / world.view.aspect)).T)
         hit = world.scene.run(_f32(origin), _f32(way), output=1)
         there = np.flatnonzero(hit["primID"] >= 0)
         origin, way, face, far = origin[there], way[there], hit["primID"][there], hit["tfar"][there]
         normal = -np.sign(_dot(normals[face], way))[:, None] * normals[face]
         point = origin + far[:, None] * way + np.float32(2e-3) * normal
         met.append((point, normal, world.thrown.rows(origin, way, far, normal), world.scenery.flat_colors[face]))
+        if not len(there):
+            return world  # with nothing in the picture
     point, normal, rows, albedo = (np.concatenate(values) for values in zip(*met, strict=True))
     hits = Hits(point, normal, normal, np.zeros(len(point), np.float32))
     direct, light = np.zeros_like(point), np.zeros_like(point)
     for _ in range(OFTEN):
-        some, _, sun = _direct(world, hits, *rng.random((2, len(point), 2), np.float32))
+        some, sun = _direct(world, hits, *rng.random((2, len(point), 2), np.float32))
         direct += (some + sun[:, None] * world.sun) / OFTEN
     for _ in range(TURNS):
         world = world._replace(thrown=world.thrown.lit(rows, albedo * (direct + light)))
         squares = rng.random((OFTEN, len(point), 2), np.float32)
         light = np.mean([_gathered(world, hits, square)[:, :3] for square in squares], 0)
-    return world, (direct + light).mean(0)
+    white, emissive = (direct + light).mean(0), world.scenery.emissive
+    glow = np.interp(world.scenery.lights.day, (0, 1), GLOWING) * white / float((emissive @ LUMA).max(initial=1e-6))
+    return world._replace(glow=glow.astype(np.float32), white=white)
 
 
 def _way(point: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -529,13 +543,6 @@ def _on_sphere(square: np.ndarray) -> np.ndarray:
     height = 2 * square[:, 0] - 1
     radius, angle = np.sqrt(np.clip(1 - height**2, 0, 1)), 2 * np.pi * square[:, 1]
     return np.stack([radius * np.cos(angle), height, radius * np.sin(angle)], 1)
-
-
-def _tone(color: np.ndarray) -> np.ndarray:
-    """Roll bright values off towards 1 instead of clipping them."""
-    knee = 0.72
-    over = np.clip(color - knee, 0, None)
-    return np.where(color > knee, knee + (1 - knee) * over / (over + (1 - knee)), color)
 
 
 def _f32(values: np.ndarray) -> np.ndarray:

@@ -253,15 +253,41 @@ def test_who_looks_into_a_mirror_sees_what_is_before_it():
     assert mirrored[..., 0].mean() > 2 * mirrored[..., 1].mean()
 
 
+def test_a_glossy_floor_mirrors_the_window_and_more_so_aslant():
+    pane = np.array([[(1.99, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.8, 0.0)]], np.float32)
+    scenery, _ = box_room(sky=1.0, sun=None)
+    wall = (scenery.triangles[..., 0] > 1.9).all(1)  # that the pane is in
+    names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "st", "texture", "wall")
+    scenery = replace(scenery, panes=pane, **{name: getattr(scenery, name)[~wall] for name in names})
+    floor = (np.abs(scenery.triangles[..., 1]) < 0.1).all(1)
+    view = View(view_matrix(np.array([-1.8, 0.6, 0.0]), np.array([0.5, 0.0, 0.0])), 0.9, False, inside=True)
+    dull, glossy = (
+        trace(replace(scenery, gloss=np.where(floor, gloss, 0).astype(np.float32)), view, 48, rays=2).mean(-1)
+        for gloss in (0.0, 0.3)
+    )
+    gain = glossy / dull
+    mirrored, beside, near = gain[24:28, 22:26].mean(), gain[28:32, :4].mean(), gain[44:, 22:26].mean()
+    assert mirrored > beside + 0.04
+    assert mirrored > near + 0.04  # there one looks down on it
+
+
+def test_what_is_white_darkens_less_where_it_touches():
+    scenery, down = box_room(sky=0.0, **LAMP)
+    corners = np.array([(-0.8, 0.0, 0.6), (0.8, 0.0, 0.6), (0.8, 0.4, 0.6), (-0.8, 0.4, 0.6)])
+    bare = trace(scenery, down, 96, rays=2).mean(-1)
+    black, white = (
+        trace(with_sheet(scenery, corners, flat_colors=np.full((2, 3), tone)), down, 96, rays=2).mean(-1) / bare
+        for tone in (0.02, 0.9)
+    )
+    near = (black < np.percentile(black, 6)) & (black > 0.6)  # the floor at it, not what it hides
+    assert white[near].mean() > black[near].mean() + 0.068
+
+
 def test_light_is_evened_about_its_mean():
-    light = np.zeros((3, 6), np.float32)
-    light[:, :3] = np.array([0.1, 1.0, 10.0])[:, None]
-    even = evened(light, np.ones(3, np.float32), np.ones(3, np.float32))[:, 0]
+    light = np.array([0.1, 1.0, 10.0], np.float32)[:, None] * np.ones(3, np.float32)
+    even = (light * evened(light, np.ones(3, np.float32)))[:, 0]
     assert even[1] == pytest.approx(1.0)
-    assert 10 < even[2] / even[0] < 50  # of 100
-    sunny = light.copy()
-    sunny[1] = (0, 0, 0, 0, 10.0, 0)  # all of it from the sun counts as bright as that from elsewhere
-    assert evened(sunny, np.ones(3, np.float32), np.ones(3, np.float32))[1, 4] == pytest.approx(even[2])
+    assert 10 < even[2] / even[0] < 70  # of 100
 
 
 def exposed(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> np.ndarray:
