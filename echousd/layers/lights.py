@@ -40,7 +40,7 @@ SUN, OVERHEAD = 1.4, 0.55
 ELEVATION, ASIDE, WARM = (26.0, 46.0), (0.2, 0.8), (5200.0, 6000.0)
 # What is left of sky, sun and lamps; the sky's colour.
 TIMES: Mapping[str, tuple[float, float, float]] = {
-    "day": (1.0, 1.0, 0.3),
+    "day": (1.0, 1.0, 0.2),
     "evening": (0.16, 0.0, 1.0),
     "night": (0.02, 0.0, 1.0),
 }

@@ -159,7 +159,7 @@ class Tufted(Block):
             lines = (2 * i, 2 * i) if self.channels else (i + j, i - j)
             first, second = (np.abs(np.cos(np.pi * line * step / self.apart)) for line in lines)
             edge = np.minimum(1.0, 6 * np.minimum(1 - abs(x) / w, 1 - np.abs(y) / h) + 0.1) ** 0.5
-            front = d * (2 * edge * (0.5 + 0.5 * first * second * (2 - first * second)) - 1)
+            front = d * (2 * edge * (0.66 + 0.34 * first * second * (2 - first * second)) - 1)
             rings.append(np.stack([np.full(up + 5, x), [*y, *back], [*front, *[-d] * 4]], 1))
         vertices, faces = loft(rings)
         first, second = faces[: 2 * across * (up + 5)].reshape(2, -1, 3)  # of each quad, which folds where it is deeper
