@@ -114,15 +114,11 @@ def _flags(*, edits: bool, asks: bool, batch: bool) -> list[Parameter]:
     rows: dict[str, Any] = dict(table.model_fields)
     chosen = OF_NEW if edits else [name for name in rows if not (batch and name == "seed")]
     ordered = sorted(chosen, key=lambda name: GROUPS.index(rows[name].json_schema_extra["group"]))
-    wishes = [
-        Parameter(one.name, Parameter.KEYWORD_ONLY, default=None, annotation=_several(one.metadata["help"]))
-        for one in (fields(EditRequest) if asks else ())
-    ]
+    wishes = []
+    for one in fields(EditRequest) if asks else ():
+        told: Any = Annotated[list[str] | None, typer.Option(help=one.metadata["help"], show_default=False)]
+        wishes.append(Parameter(one.name, Parameter.KEYWORD_ONLY, default=None, annotation=told))
     return [*wishes, *(_flag(name, rows[name]) for name in ordered)]
-
-
-def _several(help: str) -> Any:
-    return Annotated[list[str] | None, typer.Option(help=help, show_default=False)]
 
 
 def _flag(name: str, row: Any) -> Parameter:

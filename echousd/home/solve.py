@@ -78,14 +78,9 @@ class Problem:
         return extents / np.maximum((extents / step).round(), 1)
 
 
-def solver_module() -> Any:
-    """OR-tools' CP-SAT; raises `GraphError` that says how to install it."""
-    return extra("ortools.sat.python.cp_model", "plans need a constraint solver", "home", GraphError)
-
-
 def solved(problem: Problem) -> tuple[str, Cells]:
     """`solved`, `impossible` (proven) or `unknown` (not within its effort), and the cells."""
-    cp = solver_module()
+    cp = extra("ortools.sat.python.cp_model", "plans need a constraint solver", "home", GraphError)
     model, parts = _model(cp, problem)
     solver = cp.CpSolver()
     solver.parameters.num_workers = 1

@@ -62,13 +62,10 @@ def text(room: str, origins: dict[str, Origin]) -> str:
     lines = [f"# Models in {room}", "", told, ""]
     lines += ["| asset | model | licence | author |", "|---|---|---|---|"]
     for name, origin in sorted(origins.items(), key=lambda entry: (entry[1].licence, entry[1].credit, entry[0])):
-        cells = (name, origin.asset, origin.licence, origin.credit or "unknown")
-        lines.append("| " + " | ".join(_cell(cell) for cell in cells) + " |")
+        row = (name, origin.asset, origin.licence, origin.credit or "unknown")
+        cells = (" ".join(words.split()).replace("|", "\\|")[:200] for words in row)
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
-
-
-def _cell(words: str) -> str:
-    return " ".join(words.split()).replace("|", "\\|")[:200]
 
 
 OTHERS = "room_others"  # what the names of a room's second materials begin with

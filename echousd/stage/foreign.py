@@ -172,7 +172,8 @@ def _read(
                 words = [spaced(prim.GetName()) or OBSTACLE]
             if not words or any(is_structure(word) for word in words):
                 continue
-            if not _holds_furniture(prim) and _is_large(boxed(prim)):
+            size = () if _holds_furniture(prim) or (box := boxed(prim)) is None else sorted(box.size)
+            if size and size[0] > 0 and size[1] >= LARGE:
                 category, told = TAKEN_FOR, {OBSTACLE: words[0]}
                 obstacles[repr(words[0])] += 1
             else:
@@ -214,10 +215,6 @@ def _graph(
         return SceneGraph(RoomSpec(kind, floor_polygon=_corners(floor)), tuple(nodes))
     except GraphError as error:
         raise StageError(f"{source(stage)}: {error}") from None
-
-
-def _is_large(box: Box | None) -> bool:
-    return box is not None and min(box.size) > 0 and sorted(box.size)[1] >= LARGE
 
 
 def _is_column(prim: Usd.Prim, box: Box | None) -> bool:

@@ -49,10 +49,6 @@ def _first(data: Any, key: str) -> Any:
     return entries[0] if isinstance(entries, list) and entries and isinstance(entries[0], dict) else {}
 
 
-def _scan(data: Any) -> Any:
-    return _first(data, "rooms") or data
-
-
 FORMATS = (
     Format("dxf", ".dxf", read_dxf, metric=False),
     Format("ifc", ".ifc", read_ifc, metric=False),
@@ -60,7 +56,9 @@ FORMATS = (
     Format("sweethome", ".sh3d", lambda path, unit: read_sweethome(read_bounded(path, MOST), path.name)),
     Format("scenesmith", ".json", read_scenesmith, lambda data: "placed_rooms" in data),
     Format("procthor", ".json", read_procthor, lambda data: "floorPolygon" in _first(data, "rooms")),
-    Format("roomplan", ".json", read_roomplan, lambda data: "transform" in _first(_scan(data), "walls")),
+    Format(
+        "roomplan", ".json", read_roomplan, lambda data: "transform" in _first(_first(data, "rooms") or data, "walls")
+    ),
     Format("sage", ".json", read_sage, lambda data: {"room_type", "walls"} <= _first(data, "rooms").keys()),
     Format("infinigen", ".json", read_infinigen, lambda data: bool({"shape", "operation"} & {*_first(data, "rooms")})),
 )

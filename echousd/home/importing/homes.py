@@ -73,8 +73,9 @@ def imported(found: Found, storey: str | None = None, *, lenient: bool = False) 
         named[free_name(_identifier(one.name), named)] = one
     kinds = {name: room_kind(one.words) for name, one in named.items()}
     ignored["rooms of unknown kind, taken for a living room"] += sum(kind is None for kind in kinds.values())
+    corners = {name: tuple(map(tuple, floors[one].tolist())) for name, one in named.items()}
     bare = {
-        name: starting_graph(RoomSpec(kinds[name] or UNKNOWN, floor_polygon=_tuples(floors[one]), height=one.height))
+        name: starting_graph(RoomSpec(kinds[name] or UNKNOWN, floor_polygon=corners[name], height=one.height))
         for name, one in named.items()
     }
     home = HomeGraph([HomeRoom(name, graph) for name, graph in bare.items()])
@@ -147,10 +148,6 @@ def _outline(room: Room) -> np.ndarray:
     )  # the ring's first corner stays, though straight
     cross = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
     return found[cross > 1e-3 * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)].round(4)
-
-
-def _tuples(corners: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    return tuple(map(tuple, corners.tolist()))
 
 
 # -- doors and windows -------------------------------------------------------------------------------------------------
