@@ -16,7 +16,7 @@ from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, join
 from echomodel.sizes import REACH, filled_area
 
 # Radius of an empty circle, of the side of a square of each piece's share of the floor; more a square metre; at most.
-BARE = (0.48, 0.008, 0.84)
+BARE = (0.48, 0.0116, 1.0)
 AHEAD = 1.0  # metres before a sofa to other groups: 97 % of real ones have them
 COVERED = 0.25  # share of its width from which on something is before it
 CELL, POINTS = 0.25, 1000  # metres between two points of the floor that are looked at; in a hall so many, farther apart

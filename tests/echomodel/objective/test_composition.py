@@ -105,9 +105,9 @@ def test_an_emptier_room_may_leave_more_of_its_floor():
 
 
 def test_a_small_room_has_no_circle_so_bare_as_a_hall_may():
-    assert composition.bare_limit(16.0, 4) == pytest.approx(0.608 * 2)
-    assert composition.bare_limit(36.0, 9) == pytest.approx(0.768 * 2)
-    assert composition.bare_limit(100.0, 25) == pytest.approx(0.84 * 2)
+    assert composition.bare_limit(16.0, 4) == pytest.approx(0.6656 * 2)
+    assert composition.bare_limit(36.0, 9) == pytest.approx(0.8976 * 2)
+    assert composition.bare_limit(100.0, 25) == pytest.approx(1.0 * 2)
 
 
 @pytest.mark.parametrize(("middle", "margin"), [(-2.0, -0.175), (-0.2, 0.05)])
