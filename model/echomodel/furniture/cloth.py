@@ -152,14 +152,14 @@ class Tufted(Block):
         w, h, d = self.half
         step = self.apart / (3, 4, 4, 4)[detail]  # so that creases run through corners
         across, up = (max(4, round(2 * side / step)) for side in (w, h))
-        j, rings = np.arange(up + 1), []
-        y = np.linspace(-h, h, up + 1)
+        j, rings, y = np.arange(up + 1), [], np.linspace(-h, h, up + 1)
+        deep = 0.34 * min(1.0, self.apart / 0.25)  # deeper ones would fold sharply
         back = (h, h / 2, -h / 2, -h)  # the middle of an end in line with none of its sides
         for i, x in enumerate(np.linspace(-w, w, across + 1)):
             lines = (2 * i, 2 * i) if self.channels else (i + j, i - j)
             first, second = (np.abs(np.cos(np.pi * line * step / self.apart)) for line in lines)
             edge = np.minimum(1.0, 6 * np.minimum(1 - abs(x) / w, 1 - np.abs(y) / h) + 0.1) ** 0.5
-            front = d * (2 * edge * (0.66 + 0.34 * first * second * (2 - first * second)) - 1)
+            front = d * (2 * edge * (1 - deep * (1 - first * second) ** 2) - 1)
             rings.append(np.stack([np.full(up + 5, x), [*y, *back], [*front, *[-d] * 4]], 1))
         vertices, faces = loft(rings)
         first, second = faces[: 2 * across * (up + 5)].reshape(2, -1, 3)  # of each quad, which folds where it is deeper
