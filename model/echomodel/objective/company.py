@@ -327,8 +327,18 @@ def at_its_side(plan: Plan) -> Found:
     return found(i, margin, other=j, measure=at_least(before, 0.0))
 
 
+def told_of(plan: Plan, i: Array, j: Array, *words: str) -> Array:
+    """(P,) bool: the graph says one of these words of i and j, or of j and i."""
+    count = len(plan.first)
+    said = full(plan.given, (count, count), False)
+    for one, other in map(plan.first.told, words):
+        said[one, other] = said[other, one] = True
+    return said[i % count, j % count]
+
+
 def not_alone(plan: Plan) -> Found:
-    """Plants and small tables stand at a wall or at something, lamps at a wall or sofa, an only armchair at a wall.
+    """Plants and small tables stand at a wall or at something, lamps at a wall, a sofa or the table that the graph says
+    they are close by, an only armchair at a wall.
 
     A lamp lights a seat, bed or table. An armchair that stands apart from its group has something of its own: a lamp,
     a table, shelves, another one.
@@ -341,7 +351,8 @@ def not_alone(plan: Plan) -> Found:
     if bool(small.any()):
         i, j = plan.pairs(small, plan.standing, least=True)
         lamp, apart = plan.of("light")[i], plan.apart(i, j)
-        gap, _ = plan.worst(i, xp.where(lamp & ~plan.of("sofa")[j], FAR, apart), j)
+        beside = plan.of("sofa")[j] | (plan.of("board")[j] & told_of(plan, i, j, "close_by"))
+        gap, _ = plan.worst(i, xp.where(lamp & ~beside, FAR, apart), j)
         used = plan.of("sofa", "seat", "bed", "board")[j]
         lit, _ = plan.worst(i, xp.where(lamp & used, apart, FAR), j)
         who = plan.those(small & plan.walled)

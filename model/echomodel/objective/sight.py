@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from echomodel.arrays import Array, at_least, cast, full, held, least_of, norm, pairs_in, rows, sum_of
-from echomodel.objective.company import first_of
+from echomodel.objective.company import first_of, told_of
 from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, nobody, worst
 
 OVER = 0.25  # metres by which a pendant's middle may lie beyond the edge of what it hangs over
@@ -44,7 +43,7 @@ def pendant_centred(plan: Plan) -> Found:
     i, j = _hung(plan)
     if not len(i):
         return nobody(plan.size)
-    over = cast((plan.gap(i, j) < 1e-3) | _told(plan, i, j, ("above",)), plan.size)
+    over = cast((plan.gap(i, j) < 1e-3) | told_of(plan, i, j, "above"), plan.size)
     away, count = plan.position[i] - plan.position[j], at_least(sum_of(j, over, len(plan)), 1.0)
     x, z = ((sum_of(j, away[:, axis] * over, len(plan)) / count)[j] for axis in (0, 2))
     cos, sin = plan.turn[0][j], plan.turn[1][j]
@@ -158,7 +157,7 @@ def _viewers(plan: Plan) -> Watched:
     if not len(i):
         return nobody(plan.size), i > 0, full(plan.size, 0, 0.0), i
     main = plan.of("sofa", "bed") & ~plan.stands("company")  # armchairs watch where there is neither
-    for better in (_told, lambda _plan, _i, j: main[j]):
+    for better in (lambda plan, i, j: told_of(plan, i, j, *TOLD), lambda _plan, _i, j: main[j]):
         good = better(plan, i, j)
         keep = good | (xp.bincount(i[good], minlength=len(plan))[i] == 0)
         i, j = i[keep], j[keep]
@@ -175,15 +174,6 @@ def _viewers(plan: Plan) -> Watched:
     best = rows(worse == least_of(i, worse, len(plan), math.inf)[i])
     best = best[least_of(i[best], best, len(plan), len(i))[i[best]] == best]
     return view.take(best), held(margins[0])[best] >= 0, clear[best], about[best]
-
-
-def _told(plan: Plan, i: Array, j: Array, words: Sequence[str] = TOLD) -> Array:
-    """(P,) bool: the graph says one of these words of i and j, or of j and i."""
-    count = len(plan.first)
-    said = full(plan.given, (count, count), False)
-    for one, other in map(plan.first.told, words):
-        said[one, other] = said[other, one] = True
-    return said[i % count, j % count]
 
 
 def _clear(plan: Plan, i: Array, j: Array) -> tuple[Array, Array]:

@@ -527,6 +527,15 @@ def test_a_pendant_that_is_told_to_hang_above_a_table_hangs_over_its_middle_even
     assert ("pendant", "pendant_centred") not in DINING.found(relations=above)
 
 
+def test_a_lamp_that_is_told_to_be_close_by_its_table_stands_beside_it_in_the_open():
+    lamp = {"kind": "floor_lamp", "size": (0.3, 1.6, 0.3), "at": (-0.9, -0.5)}
+    room = with_one(DINING, "lamp", **lamp)
+    assert ("lamp", "not_alone") in room.found()
+    names = list(room.things)
+    told = told_near((names.index("lamp"), names.index("table")))
+    assert ("lamp", "not_alone") not in room.found(relations=told)
+
+
 def told_near(*pairs):
     near = vocabulary().predicate_id("close_by")
     return np.array([(a, near, b) for a, b in pairs])
