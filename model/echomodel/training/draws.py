@@ -26,8 +26,8 @@ LONGEST = 200.0  # slope of one box at a step: one that turns at a hair's breadt
 ASKED = 0.02  # metres, radians or a share beyond a term's margin
 PHYSICS = 2.0  # weight of what runs into something
 RELATIONS = 10.0  # weight of a metre by which something told is missed, as steep as a term is
-# Sizes are learnt as they are, openings are looked at with walls, what is bare takes a grid of points a room.
-OTHERWISE = ("scale", "door_free", "window_free", "floor_used", "floor_served", "hung_over")
+# Sizes are learnt as they are, openings are looked at with walls, what is bare is looked at room by room.
+OTHERWISE = ("scale", "door_free", "window_free", "floor_used", "floor_served", "ends_used", "hung_over")
 
 
 def drawn_loss(model: CompactModel, batch: LayoutBatch, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
