@@ -1,6 +1,6 @@
 """Train a recipe on a machine that has torch, numpy, scipy and safetensors alone; nothing is installed.
 
-    python model/recipes/train.py model/recipes/layout_gpu.toml --total 28 --minutes 9 -o runs/gpu
+    python model/recipes/train.py model/recipes/layout_draws.toml --total 28 --minutes 9 -o runs/gpu
 
 The same command again goes on. The first call measures the rate of the steps and sets the recipe's last step so that
 all calls together take `--total` minutes.

@@ -21,11 +21,11 @@ from echomodel.training.layout_losses import deep, physics_loss, plan_of_batch, 
 from echomodel.training.rooms import LayoutBatch
 from echomodel.vocabulary import vocabulary
 
-STEPS, KEPT = (6, 12), 2  # of a draw at least and at most, and its last steps, which the gradient goes through
+STEPS, KEPT = (5, 10), 2  # of a draw at least and at most, and its last steps, which the gradient goes through
 LONGEST = 200.0  # slope of one box at a step: one that turns at a hair's breadth would drown all others
 ASKED = 0.02  # metres, radians or a share beyond a term's margin
-PHYSICS = 2.0  # weight of what runs into something
-RELATIONS = 10.0  # weight of a metre by which something told is missed, as steep as a term is
+PHYSICS = 3.0  # weight of what runs into something
+RELATIONS = 30.0  # weight of a metre by which something told is missed, as steep as a term is
 # Sizes are learnt as they are, openings are looked at with walls, what is bare is looked at room by room.
 OTHERWISE = ("scale", "door_free", "window_free", "floor_used", "floor_served", "ends_used", "hung_over")
 
@@ -46,7 +46,7 @@ def drawn_loss(model: CompactModel, batch: LayoutBatch, generator: torch.Generat
         plan = plan.at(torch.stack([plan.position[:, 0], heights(plan), plan.position[:, 2]], 1), plan.yaw)
         terms = missed_terms(plan)
         boxes, level = Boxes(plan.size, plan.position, plan.yaw), torch.zeros_like(plan.yaw)
-        physics = physics_loss(batch, boxes, level, free)
+        physics = physics_loss(batch, boxes, level, free, asked=ASKED)
         relations = relation_hinge(batch, boxes, level, free, model.config.rules)
     parts = {"drawn_terms": terms, "drawn_physics": physics, "drawn_relations": relations}
     return terms + PHYSICS * physics + RELATIONS * relations, parts

@@ -60,12 +60,13 @@ TOUCHING = 0.01  # metres that a box may reach into a wall
 FIRM = 10.0  # a miss counts as log(1 + FIRM * metres)
 
 
-def physics_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor) -> Tensor:
+def physics_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor, *, asked: float = 0.0) -> Tensor:
     """Mean over the free boxes of how far they run into others, through walls and into the way of doors and windows,
     weighted by (1 - level)^2.
 
     Arguments:
         boxes: N predicted boxes; places and headings alone are pulled at. level: (N,). known: (N,) bool.
+        asked: metres by which boxes keep clear of one another and of openings, beyond what is allowed.
     """
     graph, pairs = batch.graph, batch.pairs
     free = measurable(Boxes(boxes.size.detach(), boxes.position, boxes.yaw))
@@ -79,9 +80,9 @@ def physics_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor)
     weight = torch.minimum(sure[i], sure[j]) * ~(known[i] & known[j])
     over = (outside(free, graph.floor[graph.scene]).square().sum(1) + 1e-12).sqrt()
     stands = torch.tensor([row.support == "floor" for row in vocabulary().categories], device=level.device)
-    clear = kept_free(free, graph.openings[graph.scene]).clamp_min(-FARTHEST)
+    clear = kept_free(free, graph.openings[graph.scene]).clamp_min(-FARTHEST) - asked
     walls = deep(TOUCHING - over) + deep(clear) * stands[graph.category]
-    total = (deep(apart(plan).margin) * weight).sum() + (walls * sure * ~known).sum()
+    total = (deep(apart(plan).margin - asked) * weight).sum() + (walls * sure * ~known).sum()
     return total / (sure * ~known).sum().clamp_min(1)
 
 

@@ -42,14 +42,14 @@ def test_a_step_down_the_slope_lowers_what_is_missed(batch, model):
     with torch.no_grad():
         model.layout.heads[-1].weight.mul_(0.6)  # so that much is wrong
     optimizer, losses = torch.optim.Adam(model.layout.parameters(), 3e-4), []
-    for _ in range(4):
+    for _ in range(6):
         loss, parts = drawn_loss(model, batch, torch.Generator().manual_seed(1))
         assert set(parts) == {"drawn_terms", "drawn_physics", "drawn_relations"}
         losses.append(float(loss.detach()))
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
-    assert losses[-1] < 0.75 * losses[0]
+    assert losses[-1] < 0.8 * losses[0]
 
 
 def test_every_part_of_what_is_wrong_counts(batch, model, monkeypatch):
@@ -63,7 +63,9 @@ def test_every_part_of_what_is_wrong_counts(batch, model, monkeypatch):
     assert total == pytest.approx(wanted, rel=1e-5)
     assert min(parts.values()) > 0
     monkeypatch.setattr(draws, "ASKED", 0.1)
-    assert loss()[1]["drawn_terms"] > parts["drawn_terms"]
+    farther = loss()[1]
+    assert farther["drawn_terms"] > parts["drawn_terms"]
+    assert farther["drawn_physics"] > parts["drawn_physics"]
 
 
 def test_terms_see_a_bed_that_is_turned_and_moved_but_no_size(batch):
