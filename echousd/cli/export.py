@@ -43,7 +43,7 @@ def export(
     pictures: Annotated[
         bool, typer.Option("--pictures/--no-pictures", help="Images, or plain colours alone (MuJoCo reads no JPEG).")
     ] = True,
-    force: Annotated[bool, typer.Option("--force", help="Replace files that are in the way.")] = False,
+    force: Replace = False,
     json: Written = False,
 ) -> None:
     """Write a room as one file: usdz for the web or ARKit, glb, or flat USD.

@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from echomodel.objective.crowding import HAND
 from echomodel.objective.sizes import TUCKED
 from echomodel.vocabulary import Category, vocabulary
 
@@ -68,7 +69,7 @@ def _around(own: Size, length: float, depth: float, count: int, tuck: float) -> 
     wanted = max(1, min(fits, math.ceil(count / 2)))
     free = length - 2 * TUCKED * (count > 2 * wanted)  # what sits at the ends keeps off the corners
     for per_side in sorted({wanted, max(wanted - 1, 1), fits}):
-        spacing = max(min(free / per_side, 0.85), float(own[0]) + 0.06)
+        spacing = max(min(free / per_side, 0.85), float(own[0]) + HAND + 0.01)
         more = 0.0 if per_side == wanted else 0.25 if count % 2 else 0.9
         for k in range(per_side):
             lateral = (k - (per_side - 1) / 2) * spacing

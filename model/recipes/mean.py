@@ -8,11 +8,15 @@ What the first file says of itself stays (Wortsman et al. 2022, model soups).
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import torch
-from safetensors import safe_open
 from safetensors.torch import save_file
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from echomodel.compact.model import read_weights
 
 
 def main() -> None:
@@ -21,14 +25,10 @@ def main() -> None:
     parser.add_argument("files", nargs="+", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
-    tensors, said = [], []
-    for path in options.files:
-        with safe_open(path, "pt") as handle:
-            tensors.append({key: handle.get_tensor(key) for key in handle.keys()})  # noqa: SIM118
-            said.append(handle.metadata())
-    first = tensors[0]
-    mean = {key: torch.stack([each[key].float() for each in tensors]).mean(0).to(first[key].dtype) for key in first}
-    save_file(mean, options.output, said[0])
+    files = [read_weights(path) for path in options.files]
+    alike = {key: torch.stack([tensors[key] for _, tensors in files]) for key in files[0][1]}
+    mean = {key: values.float().mean(0).to(values.dtype) for key, values in alike.items()}
+    save_file(mean, options.output, files[0][0])
 
 
 if __name__ == "__main__":
