@@ -18,6 +18,7 @@ LEVEL = 0.006  # metres: what differs less in height is one level
 LEAST = 0.012  # m² of a level
 EDGE = 0.01  # metres that things keep from the edge
 AIR = 0.6  # metres of air above a top that nothing covers
+ROW = 0.8  # metres of books side by side at most, so that all are drawn
 
 
 @dataclass(eq=False)
@@ -215,13 +216,11 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
     side = 1.0 if rng.random() < 0.5 else -1.0
     ware = WARE if host.row.task else LINEN if setting.use == "wet" else ()
     if rng.random() < (0.95 if setting.full else 0.85) and not ware:
-        length = wide * rng.uniform(0.5, 0.85)
+        length = min(wide * rng.uniform(0.5, 0.85), ROW)
         for share in (1.0, 0.6, 0.35):
-            if length * share < 0.1:
-                break
             tall = min(surface.air - 0.015, rng.uniform(0.2, 0.27))
             size = np.round([length * share, tall, min(deep - 0.03, rng.uniform(0.15, 0.2))], 3)
-            if tall < 0.14 or size[2] < 0.1:
+            if size[0] < 0.1 or tall < 0.14 or size[2] < 0.1:
                 break
             at = [(x, 0.9) for x in (-0.99 * side, 0.99 * side, -0.5 * side, 0.5 * side, 0.0)]
             row = surface.put(setting, "book_row", at, size=size, count=books_in(float(size[0])), word="row")

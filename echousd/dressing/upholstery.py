@@ -184,19 +184,20 @@ class _Seat:
 
     def below(self, spot: np.ndarray, size: np.ndarray) -> float | None:
         """Height of the level surface below most of what lies at a spot (3,); None where it is not level."""
+        under = self._under(spot, size)
+        top = float(under.max(initial=-np.inf))
+        return top if np.isfinite(top) and (under > top - SOFT).mean() > 0.6 else None
+
+    def _under(self, spot: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """(n, m) heights below what lies at a spot (3,), without its edges, which touch an arm's or a back's foot."""
         rows, columns = np.abs(self.x - spot[0]) < 0.4 * size[0], np.abs(self.z - spot[2]) < 0.4 * size[2]
-        under = self.height[np.ix_(rows, columns)]
-        if not under.size or not np.isfinite(under).any():
-            return None
-        top = float(under.max())
-        return top if (under > top - SOFT).mean() > 0.6 else None
+        return self.height[np.ix_(rows, columns)]
 
     def pressed(self, spot: np.ndarray, size: np.ndarray) -> np.ndarray:
         """The spot (3,) let down into a seat that is fuller in its middle, onto half of it, by `PRESS` at most."""
-        rows, columns = np.abs(self.x - spot[0]) < size[0] / 2, np.abs(self.z - spot[2]) < size[2] / 2
-        under = self.height[np.ix_(rows, columns)]
-        down = float(np.clip(spot[1] - np.median(under), 0, PRESS)) if under.size else 0.0
-        return spot - np.array([0.0, down, 0.0])
+        under = self._under(spot, size)
+        down = max(float(np.median(under)), float(under.max()) - PRESS) if under.size else spot[1]
+        return np.array([spot[0], min(spot[1], down), spot[2]])
 
     def resting(self, end: float, size: np.ndarray) -> np.ndarray | None:
         """(3,) a place on the seat against the back, towards one end (-1 to 1); None where there is none."""
@@ -209,12 +210,12 @@ class _Seat:
         fits = np.argwhere(count >= 0.93 * wide * deep)
         if not len(fits):
             return None
-        wish = end * (len(self.x) - wide) / 2 + (len(self.x) - wide) / 2
-        cost = fits[:, 1] * 1.5 + np.abs(fits[:, 0] - wish)
-        i, k = fits[int(np.argmin(cost))]
-        under = self.height[i : i + wide, k : k + deep]
-        top = float(under[free[i : i + wide, k : k + deep]].max()) + 0.002  # of a seat that is fuller in its middle
-        return np.array([self.x[i] + (wide - 1) * STEP / 2, top, self.z[k] + (deep - 1) * STEP / 2])
+        wish = (1 + end) * (len(self.x) - wide) / 2
+        i, k = fits[int(np.argmin(fits[:, 1] * 1.5 + np.abs(fits[:, 0] - wish)))]
+        spot = np.array([self.x[i] + (wide - 1) * STEP / 2, 0.0, self.z[k] + (deep - 1) * STEP / 2])
+        under = self._under(spot, size)
+        spot[1] = float(under[np.abs(under - self.level) < 0.07].max()) + 0.002  # it may be fuller in its middle
+        return spot
 
 
 def _heights(corners: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:

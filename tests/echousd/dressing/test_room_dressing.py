@@ -13,11 +13,13 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echomodel.boxes import Boxes
 from echomodel.dressing import KINDS, SMALL
+from echomodel.dressing import thing as solids_of
+from echomodel.furniture.assembly import pieces_of
 from echomodel.openings import Opening
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.checks import check
-from echousd.dressing import upholstery
+from echousd.dressing import tabletops, upholstery
 from echousd.dressing.dress import RULES, dress, placed, setting_of
 from echousd.dressing.setting import Setting, Thing, meets, standing
 from echousd.dressing.tabletops import surfaces
@@ -335,9 +337,21 @@ def test_cushions_press_into_seats_that_are_fuller_in_their_middle():
     height = np.full((len(line), len(line)), 0.4)
     height[20:30, 20:30] = 0.45
     seat, size = _Seat(line, line, height, 0.4), np.array([0.5, 0.2, 0.5])
-    assert seat.pressed(np.array([0.0, 0.452, 0.0]), size) == pytest.approx([0, 0.452 - upholstery.PRESS, 0])
-    assert seat.pressed(np.array([0.0, 0.41, 0.0]), size) == pytest.approx([0, 0.4, 0])
+    assert seat.pressed(np.array([0.0, 0.452, 0.0]), size) == pytest.approx([0, 0.45 - upholstery.PRESS, 0])
+    height[20:30, 20:30] = 0.42
+    assert seat.pressed(np.array([0.0, 0.422, 0.0]), size) == pytest.approx([0, 0.4, 0])
     assert seat.pressed(np.array([0.0, 0.39, 0.0]), size) == pytest.approx([0, 0.39, 0])
+
+
+def test_cushions_lie_on_their_seat_not_on_the_foot_of_its_back():
+    """Where seat and back meet, heights pass through all between them; the cushion's edge touches the back there."""
+    line = np.arange(-0.5, 0.5, STEP) + STEP / 2
+    height, size = np.full((len(line), len(line)), 0.42), np.array([0.5, 0.48, 0.18])
+    height[:, :5], height[:, 5] = 0.8, 0.485
+    seat = _Seat(line, line, height, 0.42)
+    spot = seat.resting(0.0, size)
+    assert spot[2] < -0.25  # against the back
+    assert seat.pressed(spot, size)[1] == pytest.approx(0.42, abs=0.005)
 
 
 def test_cushions_lie_before_the_pillows_of_wide_beds():
@@ -417,6 +431,19 @@ def test_what_is_flat_lies_on_the_solids_of_its_seat():
     np.testing.assert_allclose(upholstery._upon(host, np.array([0.3, 0.385, 0.1]), size), (0.3, 0.4, 0.1), atol=1e-9)
     assert upholstery._upon(host, np.array([0.3, 0.4, -0.12]), size) is None  # its back edge is in the back
     assert upholstery._upon(host, np.array([0.3, 0.35, 0.1]), size) is None  # as high as no seat is above what one sees
+
+
+def test_rows_of_books_on_long_shelves_are_drawn_whole():
+    rows = []
+    surface = SimpleNamespace(y=0.5, air=0.4, span=np.array([(0.0, 0.0), (1.2, 0.15)]), closed=False)
+    surface.area, surface.put = shapely.box(-1.2, -0.15, 1.2, 0.15), lambda *_, size=None, **__: rows.append(size)
+    host = SimpleNamespace(name="shelf", position=np.zeros(3), row=SimpleNamespace(task=""))
+    for seed in range(20):
+        tabletops._shelf(Setting({}, SQUARE, (), 2.7, True, False, seed), host, surface)
+    size = max((size for size in rows if size is not None), key=lambda size: size[0])
+    for seed in range(20):
+        books = pieces_of(solids_of("book_row", size, np.random.default_rng(seed)), size, detail=0)
+        assert sum(len(piece.faces) for piece in books) <= KINDS["book_row"].faces
 
 
 def test_cushions_of_a_sofa_are_a_pair_or_go_together():
