@@ -26,6 +26,10 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
     files = [read_weights(path) for path in options.files]
+    form = {key: values.shape for key, values in files[0][1].items()}
+    for path, (_, tensors) in zip(options.files, files, strict=True):
+        if {key: values.shape for key, values in tensors.items()} != form:
+            parser.error(f"{path}: holds other parts than {options.files[0]}, or of other sizes; nothing was written")
     alike = {key: torch.stack([tensors[key] for _, tensors in files]) for key in files[0][1]}
     mean = {key: values.float().mean(0).to(values.dtype) for key, values in alike.items()}
     save_file(mean, options.output, files[0][0])
