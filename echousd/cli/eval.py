@@ -8,8 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
+from echomodel.files import check_free
 from echousd.cli.options import Replace, Written
-from echousd.cli.output import check_free, say, say_done
+from echousd.cli.output import say, say_done
 
 eval_app = typer.Typer(help="Scores of whoever lays out rooms, and studies with people.", no_args_is_help=True)
 app = typer.Typer()

@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
+from echomodel.files import check_free
 from echousd.cli.options import AsJson, Layout, Replace, Room, Written
-from echousd.cli.output import check_free, check_picture, say_done
+from echousd.cli.output import check_picture, say_done
 
 app = typer.Typer()
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from echomodel.files import check_free
 from echousd.cli.options import AsJson, Replace
-from echousd.cli.output import check_free, check_picture, counted, say, say_done, say_json
+from echousd.cli.output import check_picture, counted, say, say_done, say_json
 
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
@@ -129,7 +130,7 @@ def new(
     given = {name: value for name, value in {"size": size, "height": height}.items() if value is not None}
     if source is not None:
         made = load_graph(source)
-        made = made.replaced(room=made.room.replaced(**given))
+        made = made.with_room(**given)
         later = relate or ()
     else:
         assert room is not None

@@ -83,12 +83,6 @@ def plain_json(found: Any) -> Any:
     return [plain_json(value) for value in found] if isinstance(found, list | tuple) else found
 
 
-def check_free(path: Path, *, force: bool) -> None:
-    """Refuse to replace a file, or to fill a folder that holds something, unless `force`; raises ValueError."""
-    if path.exists() and not force and not (path.is_dir() and not any(path.iterdir())):
-        raise ValueError(f"{path}: exists; choose another place or use --force")
-
-
 def check_picture(path: Path, *, force: bool) -> None:
     """Refuse to replace a file that is no picture of ours; raises ValueError.
 
@@ -103,7 +97,7 @@ def check_picture(path: Path, *, force: bool) -> None:
     except OSError:
         ours = False
     if not ours:
-        raise ValueError(f"{path}: exists and is no picture of echousd; choose another file or use --force")
+        raise ValueError(f"{path}: exists and is no picture of echousd; choose another place or use --force")
 
 
 LARGEST = 2**63 - 1  # what a layer, a manifest and a tensor can hold

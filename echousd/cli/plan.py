@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
+from echomodel.files import check_free
 from echousd.cli.options import Force, Written, group_of
-from echousd.cli.output import check_free, say_done
+from echousd.cli.output import say_done
 
 EXAMPLES = """Examples:
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from echomodel.files import check_free
 from echousd.cli.options import Replace
-from echousd.cli.output import check_free
 
 if TYPE_CHECKING:
     import trimesh

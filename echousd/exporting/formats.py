@@ -11,6 +11,7 @@ from pathlib import Path
 
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdShade, UsdUtils
 
+from echomodel.files import check_free
 from echousd.draw.drawables import rgb
 from echousd.exporting.glb import glb
 from echousd.exporting.habitat import habitat_files, sceneeval_files
@@ -114,8 +115,8 @@ def export(
         if wanted and option not in kind.options:
             allowed = ", ".join(ending for ending, other in FORMATS.items() if option in other.options)
             raise ValueError(f"{out}: {word} says nothing to a {reader or out.suffix}, allowed: {allowed}")
-    if out.exists() and not force and not reader:
-        raise ValueError(f"{out}: exists; choose another file or use --force")
+    if not reader:
+        check_free(out, force=force)
     stage = open_stage(room)
     reach = Reach.of(stage, search)
     reach.check_layers(stage)
@@ -126,8 +127,7 @@ def export(
     for path in files:
         if path.resolve() in read:
             raise ValueError(f"{path}: the room is read from it; choose another place")
-        if reader and path.exists() and not force:
-            raise ValueError(f"{path}: exists; choose another folder or use --force")
+        check_free(path, force=force or not reader)
     write_all(files)
     return next(iter(files))
 

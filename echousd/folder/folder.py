@@ -18,7 +18,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from echomodel.files import digest, flush, telling
+from echomodel.files import check_free, digest, flush, telling
 from echousd.folder.lock import LOCK, locked, run_of
 from echousd.folder.manifest import LARGEST, Digest, find_manifest
 from echousd.folder.within import check_links, inside
@@ -345,8 +345,7 @@ def check_output(output: Path, *, flat: bool, force: bool) -> None:
     if flat:
         if output.suffix not in (".usda", ".usdc"):
             raise ValueError(f"{output}: with --flat the output is a file that ends in .usda or .usdc")
-        if output.exists() and not force:
-            raise ValueError(f"{output}: exists; choose another file or use --force")
+        check_free(output, force=force)
         return
     if output.suffix in STAGE_FORMS:
         raise ValueError(f"{output}: the output is a folder; --flat writes one file")

@@ -194,7 +194,7 @@ def check_root(root: Path, *, force: bool = False) -> None:
     if force or not root.exists():
         return
     if not (root.is_file() and f"int {MARK}".encode() in root.read_bytes()):
-        raise ValueError(f"{root}: exists and is no home of echousd; choose another folder or use --force")
+        raise ValueError(f"{root}: exists and is no home of echousd; choose another place or use --force")
 
 
 def home_files(

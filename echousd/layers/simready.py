@@ -11,6 +11,7 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdUtils
 
 import echousd
+from echomodel.files import check_free
 from echousd.draw.pictures import picture
 from echousd.folder.found import manifest_of
 from echousd.folder.stored import asset_from, shelf_of
@@ -47,9 +48,8 @@ def pack(
     assets = {name: _files(root, manifest, name) for name in names or known}
     # Not those that hold a model as somebody else made it.
     ours = [n for n, own in assets.items() if payload_file(n) in own and not any("/original/" in path for path in own)]
-    there = [place for name in ours if (place := out / name / INSIDE).exists()]
-    if there and not force:
-        raise ValueError(f"{there[0]}: exists; choose another folder or use --force")
+    for name in ours:
+        check_free(out / name / INSIDE, force=force)
     files: dict[Path, bytes] = {}
     layers, hangs = [], []
     for name in ours:

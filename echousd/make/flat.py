@@ -9,6 +9,7 @@ from pathlib import Path
 
 from pxr import Sdf, Usd
 
+from echomodel.files import check_free
 from echousd.exporting.formats import flat_layer
 from echousd.exporting.packing import Package, Reach, images_beside
 from echousd.layers.lights import LIGHTS
@@ -31,8 +32,7 @@ def save_flat(room: RoomData, path: Path, *, force: bool = False) -> Path:
     """
     if path.suffix not in (".usda", ".usdc"):
         raise ValueError(f"{path}: a flat room ends in .usda or .usdc, found {path.suffix or 'no ending'!r}")
-    if path.exists() and not force:
-        raise ValueError(f"{path}: exists; choose another file or use --force")
+    check_free(path, force=force)
     at = room.options.room_path
     room = replace(room, options=room.options.replaced(room_path=ROOM))
     with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:

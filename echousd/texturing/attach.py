@@ -12,6 +12,7 @@ import numpy as np
 from pxr import Sdf, Usd, Vt
 
 import echousd
+from echomodel.files import check_free
 from echousd.draw.surfaces import Painted, Surfaces, read_surfaces
 from echousd.folder import folder as folders
 from echousd.folder import ownership
@@ -89,8 +90,7 @@ def import_job(
     with folders.held(top, wait=wait, run=run) as finished:
         layer = f"{paintings.FOLDER}/{name}.usda"
         force = force or finished == run
-        if (top / layer).exists() and not force:
-            raise ValueError(f"{top / layer}: exists; choose another --name or use --force")
+        check_free(top / layer, force=force, other="--name")
         stage = open_stage(room)
         with reading(stage):
             surfaces = read_surfaces(stage, dressing=task.dressing)
@@ -101,9 +101,8 @@ def import_job(
             if not objects:
                 raise ValueError(f"{folder}: every object with a result is left out (--skip); nothing to import")
             files = look_files(stage, surfaces, (objects, pictures), name, task.tool, task.dressing)
-        taken = [path for path in files if not force and ownership.read(top, path) not in (None, files[path])]
-        if taken:
-            raise ValueError(f"{top / taken[0]}: exists; choose another --name or use --force")
+        for path in (path for path in files if ownership.read(top, path) != files[path]):
+            check_free(top / path, force=force, other="--name")
         shared = {path for thing in surfaces.objects for piece in thing.pieces for path in piece.instances}
         files |= _attached(room, layer, shared)
         order = [f"{paintings.FOLDER}/{name}/st.usdc", layer, UNFIT, room.name, f"{room.stem}.json"]

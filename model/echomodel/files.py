@@ -95,6 +95,15 @@ def write_json(path: Path, content: object) -> None:
     write_text(path, json.dumps(content, indent=1) + "\n")
 
 
+def check_free(path: Path, *, force: bool, other: str = "place") -> None:
+    """Refuse to replace a file, or to fill a folder that holds something, unless `force`; raises ValueError.
+
+    `other`: what else may be chosen.
+    """
+    if path.exists() and not force and not (path.is_dir() and not any(path.iterdir())):
+        raise ValueError(f"{path}: exists; choose another {other} or use --force")
+
+
 def digest(content: bytes) -> str:
     """Short content hash, as manifests and journals record it."""
     return hashlib.blake2b(content, digest_size=16).hexdigest()

@@ -81,7 +81,7 @@ def test_pictures_replace_only_pictures_of_ours(echousd_command, tmp_path):
     picture.write_bytes(b"a photo of somebody's")
     done = echousd_command("graph", graph, "-o", picture)
     assert done.code == 2
-    assert "exists and is no picture of echousd; choose another file or use --force" in done.err
+    assert "exists and is no picture of echousd; choose another place or use --force" in done.err
     assert picture.read_bytes() == b"a photo of somebody's"
     assert echousd_command("graph", graph, "-o", picture, "--force").code == 0
     assert echousd_command("graph", graph, "-o", picture).code == 0  # its own

@@ -58,7 +58,7 @@ def test_flat_samples_z_up_and_boxes(graph, tmp_path, echousd_command):
     ("words", "text"),
     [
         (("-o", "{tmp}/graph.usda"), "the output is a folder; --flat writes one file"),
-        (("-o", "{tmp}/graph.usda", "--flat"), "exists; choose another file or use --force"),
+        (("-o", "{tmp}/graph.usda", "--flat"), "exists; choose another place or use --force"),
         (("-o", "{tmp}/room.obj", "--flat"), "with --flat the output is a file that ends in .usda or .usdc"),
         (("-o", "{tmp}"), "holds graph.usda and no room of EchoUSD; choose another folder or use --force"),
         (("-o", "{tmp}/room", "--up-axis", "x"), "up_axis is 'X', allowed: Y or Z"),

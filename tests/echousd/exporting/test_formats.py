@@ -205,7 +205,7 @@ def test_refusals(root, tmp_path):
     with pytest.raises(ValueError, match=r"--no-pictures says nothing to a .glb, allowed: .usdz, .usda, .usdc$"):
         export(root, tmp_path / "room.glb", pictures=False)
     (tmp_path / "room.glb").write_text("mine")
-    with pytest.raises(ValueError, match="exists; choose another file or use --force"):
+    with pytest.raises(ValueError, match="exists; choose another place or use --force"):
         export(root, tmp_path / "room.glb")
     assert export(root, tmp_path / "room.glb", force=True).read_bytes()[:4] == b"glTF"
     empty = tmp_path / "empty.usda"
@@ -229,7 +229,7 @@ def test_folders_for_readers_replace_nothing_unless_forced_and_know_their_option
     opened = export(root, tmp_path, reader="sceneeval")
     assert opened == tmp_path / "input/EchoUSD/scene_0.json"
     opened.write_text("mine")
-    with pytest.raises(ValueError, match=r"scene_0\.json: exists; choose another folder or use --force"):
+    with pytest.raises(ValueError, match=r"scene_0\.json: exists; choose another place or use --force"):
         export(root, tmp_path, reader="sceneeval")
     assert opened.read_text() == "mine"
     export(root, tmp_path, reader="sceneeval", force=True)

@@ -136,7 +136,7 @@ def test_an_output_that_cannot_be_is_refused_before_the_work(tmp_path):
     (tmp_path / "word").write_text("mine")
     (tmp_path / "folder").mkdir()
     refused = [
-        ("there.usda", True, False, "exists; choose another file or use --force$"),
+        ("there.usda", True, False, "exists; choose another place or use --force$"),
         ("room.usdz", True, True, r"with --flat the output is a file that ends in .usda or .usdc$"),
         ("room.usdc", False, True, "the output is a folder; --flat writes one file$"),
         ("word", False, True, "is a file, the output must be a folder$"),

@@ -110,7 +110,7 @@ def test_somebody_elses_file_stays(tmp_path, echousd_command):
     (tmp_path / "out" / "home.usda").write_text("#usda 1.0\n")
     done = echousd_command("generate", tmp_path / "flat.yaml", "-o", tmp_path / "out", *QUICK)
     assert done.code == 2
-    assert "home.usda: exists and is no home of echousd; choose another folder or use --force" in done.err
+    assert "home.usda: exists and is no home of echousd; choose another place or use --force" in done.err
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["home.usda"]
 
 

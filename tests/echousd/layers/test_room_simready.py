@@ -43,7 +43,7 @@ def test_wrong_names_and_packages_in_the_way_are_told(room, tmp_path, echousd_co
     assert echousd_command("assets", "pack", room.parent, "-o", tmp_path, "--asset", "bed").code == 0
     done = echousd_command("assets", "pack", room.parent, "-o", tmp_path, "--asset", "bed")
     assert done.code == 2
-    assert "bed/usd: exists; choose another folder or use --force" in done.err
+    assert "bed/usd: exists; choose another place or use --force" in done.err
     drawn = []
     monkeypatch.setattr("echousd.layers.simready.picture", lambda path: drawn.append(path) or b"")
     with pytest.raises(ValueError, match="bed/usd: exists"):

@@ -300,7 +300,7 @@ def test_flat_room_is_one_file_that_stands_alone(tmp_path, ending):
     text = stage.GetRootLayer().ExportToString()
     assert str(tmp_path) not in text
     assert "/tmp/" not in text
-    with pytest.raises(ValueError, match="exists; choose another file or use --force"):
+    with pytest.raises(ValueError, match="exists; choose another place or use --force"):
         save_flat(room, path)
     with pytest.raises(ValueError, match=r"a flat room ends in .usda or .usdc, found '.obj'"):
         save_flat(room, tmp_path / "room.obj")
