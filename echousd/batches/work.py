@@ -77,7 +77,7 @@ def generated(job: Job) -> Room:
 
 def _checked(job: Job) -> Any:
     """The graph, if a room can be made of it; raises ValueError."""
-    from echousd.graph.floors import check_doors, check_space, without_openings
+    from echousd.graph.floors import check_doors, check_space
     from echousd.make.layouts import check_objects
 
     if job.draw is not None and not job.text:
@@ -85,7 +85,7 @@ def _checked(job: Job) -> Any:
     else:
         graph = SceneGraph.from_json(job.text)
     if job.options.openings == "drawn":
-        graph = without_openings(graph)
+        graph = graph.with_room(openings=())
     check_objects(graph)
     check_doors(graph)
     if job.options.fit == "keep":

@@ -50,8 +50,8 @@ def with_floor(graph: SceneGraph, seed: int) -> SceneGraph:
     if not graph.room.openings:
         cut = floor_outline(graph.room.type, extents, longest_side(*furniture), _generator(seed, "outline"))
     if cut is None:
-        return graph.replaced(room=graph.room.replaced(size=extents))
-    return graph.replaced(room=graph.room.replaced(floor_polygon=tuple(map(tuple, cut.tolist()))))
+        return graph.with_room(size=extents)
+    return graph.with_room(floor_polygon=tuple(map(tuple, cut.tolist())))
 
 
 def with_wider_floor(graph: SceneGraph, corners: np.ndarray) -> SceneGraph:
@@ -99,7 +99,7 @@ def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGr
         corners, graph.room.tall, _generator(seed, "openings"), boxes=boxes, stated=graph.room.openings,
         use=use if use in WINDOWS else "",
     )  # fmt: skip
-    return graph.replaced(room=graph.room.replaced(openings=placed))
+    return graph.with_room(openings=placed)
 
 
 def _fixed(graph: SceneGraph) -> Arrays:
@@ -134,12 +134,6 @@ def check_extents(extents: tuple[float, float] | None) -> None:
             f"the floor of {extents[0]:.6g} x {extents[1]:.6g} m is too large, allowed: {LARGEST:.0f} m² around it",
             ("room",),
         )
-
-
-def without_openings(graph: SceneGraph) -> SceneGraph:
-    """The graph whose doors and windows nobody stated."""
-    found: SceneGraph = graph.replaced(room=graph.room.replaced(openings=()))
-    return found
 
 
 def check_space(graph: SceneGraph) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from inspect import Parameter, Signature, signature
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -66,7 +66,7 @@ class PlainModel(BaseModel, metaclass=_Plain):
     def __dir__(self) -> list[str]:
         return sorted({*dir(type(self)), *type(self).model_fields})
 
-    def replaced(self, **fields: Any) -> Any:
+    def replaced(self, **fields: Any) -> Self:
         """A copy with other values in `fields`, validated."""
         return type(self)(**{**{name: getattr(self, name) for name in type(self).model_fields}, **fields})
 

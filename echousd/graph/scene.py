@@ -106,6 +106,10 @@ class SceneGraph(PlainModel):
         """With a node that stays as it is (or, `locked=False`, no longer has to)."""
         return self.update_node(name, locked=locked)
 
+    def with_room(self, **fields: Any) -> SceneGraph:
+        """With other values in `fields` of the room."""
+        return self.replaced(room=self.room.replaced(**fields))
+
     def relate(self, subject: str, predicate: str, object: str, confidence: float = 1.0) -> SceneGraph:
         """With one more relation in words that files take, `relate("tv", "under", "shelf")`; raises `GraphError`."""
         ends = self._ends(subject, predicate, object)

@@ -67,7 +67,10 @@ class Plan:
     @cached_property
     def floors(self) -> dict[str, np.ndarray]:
         """(k, 2) float of every room, corners (x, z) of its floor, metres, in the home's frame."""
-        return {name: floor_of(cell, self.walls[name]) for name, cell in self.cells.items()}
+        return {
+            name: offset(np.asarray(cell, float), [-thick for thick in self.walls[name]]).round(4)
+            for name, cell in self.cells.items()
+        }
 
     @cached_property
     def sides(self) -> dict[str, Floor]:
@@ -97,9 +100,7 @@ class Plan:
         """The graph of a room with the floor, walls and openings that it has in the plan, in its own frame."""
         graph, pose = self.home.room(name).graph, self.pose(name)[[0, 2]]
         corners = tuple(map(tuple, ((self.floors[name] - pose[:, 3]) @ pose[:, [0, 2]]).round(4).tolist()))
-        fields = {"floor_polygon": corners, "size": None, "walls": self.walls[name], "openings": self.openings[name]}
-        planned: SceneGraph = graph.replaced(room=graph.room.replaced(**fields))
-        return planned
+        return graph.with_room(floor_polygon=corners, size=None, walls=self.walls[name], openings=self.openings[name])
 
     def broken(self) -> tuple[str, ...]:
         """Relations of the graph that the plan does not keep, measured on its floors and openings."""
@@ -157,11 +158,6 @@ def overlapping(floors: Mapping[Key, np.ndarray], most: float) -> Iterator[tuple
         shared = shapes[one].intersection(shapes[other]).area
         if shared > most:
             yield one, other, shared
-
-
-def floor_of(cell: np.ndarray, walls: Sequence[float]) -> np.ndarray:
-    """(k, 2) float, the floor of a cell: its edges moved inwards by what its walls take of it, metres."""
-    return offset(np.asarray(cell, float), [-thick for thick in walls]).round(4)
 
 
 def plan_home(home: HomeGraph, *, seed: int = 0, before: Plan | None = None) -> Plan:

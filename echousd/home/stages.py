@@ -113,8 +113,7 @@ def asked(graph: SceneGraph) -> SceneGraph:
     """The graph of a room without what a plan says of it."""
     if not graph.room.walls:
         return graph
-    found: SceneGraph = graph.replaced(room=graph.room.replaced(floor_polygon=None, size=None, walls=(), openings=()))
-    return found
+    return graph.with_room(floor_polygon=None, size=None, walls=(), openings=())
 
 
 def read_poses(path: Path) -> dict[str, tuple[SceneGraph, np.ndarray]]:

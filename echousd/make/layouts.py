@@ -49,11 +49,6 @@ def check_objects(graph: SceneGraph, file: str = "") -> None:
         raise ValueError(f"{file or 'the graph'}: {len(graph.nodes)} objects, allowed in one room: {MAX_OBJECTS}")
 
 
-def usual_drafts(objects: int) -> int:
-    """Layouts that are drawn where nobody says how many: fewer for very many objects, which take long enough."""
-    return max(1, min(DRAFTS, CROWD // max(objects, 1)))
-
-
 def model_of(asked: RoomOptions, model: RoomModel | None) -> RoomModel:
     """A model that is given, else that of the option `weights`; raises ValueError for a path, as `load_model` does."""
     if isinstance(model, str | os.PathLike):
@@ -122,7 +117,7 @@ def best_boxes(
     # what a draft leaves to be wished for, its number, it, and the searches that were begun from it
     left: list[tuple[tuple[float, ...], int, Boxes, dict[bytes, Arranged]]] = []
     if proposed and graph.room.openings:  # which make way for the furniture of every other draft
-        bare = graph.replaced(room=graph.room.replaced(openings=()))
+        bare = graph.with_room(openings=())
         ways = [(graph, PlaceConfig(yields=OF_OPENINGS)), (bare, DEFAULTS)]
 
     def drawn() -> Iterator[tuple[int, Boxes, dict[bytes, Arranged], int]]:
@@ -159,8 +154,11 @@ def repeated(change: GraphEdit, nodes: int, count: int) -> GraphEdit:
 
 
 def most_drafts(model: RoomModel, objects: int) -> int:
-    """How many drafts a model draws at most where nobody says it: the published ones take a thousand steps for one."""
-    return usual_drafts(objects) if model.preset == "compact" else 1
+    """How many drafts a model draws at most where nobody says it: fewer of very many objects, which take long enough.
+
+    The published models take a thousand steps for one.
+    """
+    return max(1, min(DRAFTS, CROWD // max(objects, 1))) if model.preset == "compact" else 1
 
 
 def draft_rounds(drafts: int) -> list[tuple[int, int]]:
@@ -240,7 +238,7 @@ def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int) -
 
     size, position, yaw = plan_boxes(layouts)
     size[np.tile(screens(graph), len(layouts)), 1] += TALL
-    bare = graph.replaced(room=graph.room.replaced(openings=()))
+    bare = graph.with_room(openings=())
     before = faults(graph)
     if graph.room.openings and (not before or before <= faults(bare)):
         return graph

@@ -15,7 +15,7 @@ from echousd.graph import SceneGraph, load_graph
 from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.consistency import faults_of
 from echousd.graph.files import STAGE_FORMS
-from echousd.graph.floors import check_doors, check_space, with_plan, with_wider_floor, without_openings
+from echousd.graph.floors import check_doors, check_space, with_plan, with_wider_floor
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
 from echousd.make.layouts import (
@@ -106,9 +106,8 @@ def generate(
         graph, held = with_earlier_locks(graph, earlier)
         graph, homeless = with_locked_places(graph, earlier)
     if asked.resident:
-        spoken: SceneGraph = graph.replaced(room=graph.room.replaced(resident=asked.resident))
-        graph = spoken
-    graph = anchored(without_openings(graph) if asked.openings == "drawn" else graph, beside)
+        graph = graph.with_room(resident=asked.resident)
+    graph = anchored(graph.with_room(openings=()) if asked.openings == "drawn" else graph, beside)
     if file:  # a graph that was read may come from anybody; one in memory is the caller's own
         check_files(graph, beside, outside, file)
     graph = with_own_boxes(with_own_pieces(graph, meshes or {}), boxes)

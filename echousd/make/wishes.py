@@ -64,7 +64,7 @@ def wished(saved: SavedRoom, wishes: EditRequest) -> SceneGraph:
     for text in wishes.restyle:
         name, style = _parts(text)
         if name == "room" and name not in graph.names:
-            graph = graph.replaced(room=graph.room.replaced(style=style or None))
+            graph = graph.with_room(style=style or None)
         else:
             graph = graph.update_node(_name(graph, name), style=style or None)
     return graph

@@ -212,5 +212,4 @@ def replace_size(node: Node, sizes: Mapping[str, Vector]) -> Node:
     """The node with the size that is known for it, unless it states its own."""
     if node.size is not None or node.name not in sizes:
         return node
-    sized: Node = node.replaced(size=sizes[node.name])
-    return sized
+    return node.replaced(size=sizes[node.name])
