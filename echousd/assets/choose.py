@@ -13,7 +13,7 @@ import numpy as np
 
 from echomodel.sizes import size_statistics
 from echomodel.vocabulary import Category, vocabulary
-from echousd.assets.colors import MOST, apart, main_colors, oklab, told_colors
+from echousd.assets.colors import MOST, apart, oklab, told_colors
 from echousd.assets.colors import costs as color_costs
 from echousd.assets.colors import table as color_table
 from echousd.assets.licences import allowed
@@ -192,7 +192,7 @@ def _best(
 ) -> AssetRecord | None:
     ranked: list[tuple[float, str, AssetRecord]] = []
     told = np.reshape(told_colors(one.told), (-1, 3))
-    worn = main_colors([other.colors for other in company])
+    worn = np.array([other.colors[1:4] for other in company if other.colors]).reshape(-1, 3)  # their main ones
     loud = True  # until there is one whose colours are not
     for category, cost in _shelves_for(one.category, wishes):
         if category != one.category and one.category in wishes.shelves and not loud:

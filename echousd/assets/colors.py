@@ -175,11 +175,6 @@ def _away(lab: np.ndarray, tones: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(apart, axis=-1).min(-1))
 
 
-def main_colors(rows: Sequence[tuple[float, ...]]) -> np.ndarray:
-    """(k, 3) OKLab of the main colours of models (`AssetRecord.colors`) that have any."""
-    return np.array([row[1:4] for row in rows if row]).reshape(-1, 3)
-
-
 def apart(one: tuple[float, ...], company: np.ndarray) -> float:
     """Cost of the main colour of a model among those of others (k, 3), the mean distance; 0 where one is unknown."""
     if not one or not len(company):

@@ -197,6 +197,7 @@ def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) ->
     prims = [root, *Usd.PrimRange(root, Usd.TraverseInstanceProxies())]
     layer = stage.GetRootLayer()
     data = dict(layer.customLayerData)
+    measures = any(used.pseudoRoot.HasInfo("metersPerUnit") for used in stage.GetUsedLayers())
     words = {str(key).lower(): str(value) for key, value in data.items() if isinstance(value, str)}
     joints = sum(prim.IsA(UsdPhysics.Joint) for prim in prims[1:])
     variants = tuple(
@@ -204,7 +205,7 @@ def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) ->
     )
     return Measured(
         *append_faces(points, faces),
-        metres=metres_per_unit(stage) if _says_unit(stage) else None,
+        metres=metres_per_unit(stage) if measures else None,
         z_up=up_axis(stage) == UsdGeom.Tokens.z,
         prim=str(root.GetPath()),
         above=np.array(cache.GetParentToWorldTransform(root)).T,
@@ -273,7 +274,3 @@ def missing_files(path: Path) -> list[str]:
     """Files that a stage depends on and that are not there, as their names end."""
     _, _, unresolved = UsdUtils.ComputeAllDependencies(Sdf.AssetPath(str(path)))
     return sorted({PurePosixPath(str(name).replace("\\", "/")).name for name in unresolved})
-
-
-def _says_unit(stage: Usd.Stage) -> bool:
-    return any(layer.pseudoRoot.HasInfo("metersPerUnit") for layer in stage.GetUsedLayers())

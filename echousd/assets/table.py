@@ -89,7 +89,8 @@ def write_library(file: Path, records: Iterable[AssetRecord], about: Mapping[str
     schema = _schema().with_metadata({KEY: json.dumps({"version": VERSION, **(about or {})}).encode()})
     names = schema.names
     rows = sorted(records, key=lambda record: record.id)
-    columns = {name: [_plain(getattr(record, name)) for record in rows] for name in names}
+    values = {name: [getattr(record, name) for record in rows] for name in names}
+    columns = {name: [list(v) if isinstance(v, tuple) else v for v in values[name]] for name in names}
     with telling(file):
         file.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(file) as beside:
@@ -179,7 +180,3 @@ def unpacked(metadata: Any) -> int:
     """Bytes of all columns of a Parquet file as they are held in memory, as its own tables say."""
     groups = (metadata.row_group(number) for number in range(metadata.num_row_groups))
     return sum(max(group.total_byte_size, 8 * group.num_rows * group.num_columns) for group in groups)
-
-
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value

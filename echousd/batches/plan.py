@@ -127,7 +127,9 @@ def make_plan(request: BatchRequest, weights: str, outside: Sequence[str] = ()) 
         chosen = sets.setdefault(request.chosen(copy), len(sets))
         seed = request.seed + copy
         origin, error = (text.encode("utf-8", "replace").decode() for text in (origin, error))  # of odd file names
-        entries.append(Entry(number, f"{_word(name)}_{number:06d}", origin, digest, seed, chosen, draw, error))
+        entries.append(
+            Entry(number, f"{as_identifier(name)[:60]}_{number:06d}", origin, digest, seed, chosen, draw, error)
+        )
 
     for found in find_graphs(request.sources, outside):
         digest = hashlib.sha256(found.text.encode()).hexdigest()[:16] if found.text else ""
@@ -223,11 +225,6 @@ def _entry(raw: Any, number: int, sets: int) -> Entry:
     if entry.options >= sets:
         raise ValueError(f"line {number + 2}: options is {entry.options}, allowed: 0 to {sets - 1}")
     return entry
-
-
-def _word(name: str) -> str:
-    """A file's name as the beginning of an identifier of bounded length."""
-    return as_identifier(name)[:60]
 
 
 ROOTS = (".usda", ".usdc", ".usd")

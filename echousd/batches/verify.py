@@ -170,11 +170,6 @@ def write_index(folder: Path, rows: Iterable[dict[str, Any]]) -> Path:
     return folder / INDEX
 
 
-def status(folder: Path) -> dict[str, Any]:
-    """The run's summary as the journals tell it now; raises ValueError for a folder without a run."""
-    return summary(manifest_rows(load_plan(folder), folder))
-
-
 def verify(folder: Path, *, check: bool = False) -> Iterator[tuple[str, str]]:
     """Ids of rooms that are missing, failed, changed or, with `check`, do not pass `echousd check`, and which of it.
 

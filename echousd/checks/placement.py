@@ -14,14 +14,7 @@ from echomodel.roomboxes import footprints
 from echomodel.triangles import along, area_normals, connected_pieces, distances, spread
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import HEIGHT
-from echousd.place.geometry import (
-    Floor,
-    axes,
-    depth_inside,
-    floor_from_polygon,
-    pair_indices,
-    separation,
-)
+from echousd.place.geometry import Floor, axes, depth_inside, floor_from_polygon, pair_indices, separation
 from echousd.place.report import TOUCH, Collision
 from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding, read_contents, surroundings
 from echousd.stage.labels import known_category

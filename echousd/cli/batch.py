@@ -99,9 +99,10 @@ def status(
     json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
 ) -> None:
     """How far a run is, of all its shards."""
-    from echousd.batches.verify import status as found_status
+    from echousd.batches.plan import load_plan
+    from echousd.batches.verify import manifest_rows, summary
 
-    found = found_status(folder)
+    found = summary(manifest_rows(load_plan(folder), folder))
     if json:
         say_json(found, indent=1)
         return

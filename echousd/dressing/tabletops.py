@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from echomodel.dressing import KINDS, usual_size
-from echomodel.dressing.books import BOUND, books_in, bound
+from echomodel.dressing.books import BOUND, bound
 from echomodel.triangles import area_normals
 from echousd.dressing.setting import APART, Setting, Standing, Thing, around, rectangle
 
@@ -223,7 +223,7 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
             if size[0] < 0.1 or tall < 0.14 or size[2] < 0.1:
                 break
             at = [(x, 0.9) for x in (-0.99 * side, 0.99 * side, -0.5 * side, 0.5 * side, 0.0)]
-            row = surface.put(setting, "book_row", at, size=size, count=books_in(float(size[0])), word="row")
+            row = surface.put(setting, "book_row", at, size=size, count=max(1, int(size[0] / 0.03)), word="row")
             if row:
                 if setting.full:
                     shelved_books(setting, row, rng)

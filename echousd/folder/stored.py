@@ -62,7 +62,9 @@ class Shelf:
             if unit:
                 units.setdefault(unit, {})[path] = content
         for unit, inside in units.items():
-            names = {_name_in(unit, path): path for path in inside}
+            names = {
+                PurePosixPath(path).name if path == unit else path.removeprefix(f"{unit}/"): path for path in inside
+            }
             key = self.keys[unit] = self.store.put({name: inside[path] for name, path in names.items()})
             for name, path in names.items():
                 self._paths[path] = f"{self.at}/{key[:2]}/{key}/{name}"
@@ -101,7 +103,3 @@ def asset_from(shelf: Shelf, asset: str) -> dict[str, bytes]:
     """Files of a stored asset as they would lie in the room's folder; raises ValueError where they are damaged."""
     unit = f"assets/{asset}"
     return {f"{unit}/{name}": content for name, content in shelf.store.read(shelf.keys[unit]).items()}
-
-
-def _name_in(unit: str, path: str) -> str:
-    return PurePosixPath(path).name if path == unit else path.removeprefix(f"{unit}/")

@@ -19,15 +19,8 @@ MAX_NODES = 5000  # of a graph
 MAX_CORNERS = 500  # of a floor: the work on walls and furniture grows with their square
 MAX_NAME = 100  # characters: names become file names of assets
 SHAPES = ("parts", "sdf", "boxes", "library", "guided", "independent", "own")  # of the geometry of one object
-RESIDENTS = (
-    "child",
-    "teen",
-    "couple",
-    "senior",
-    "student",
-    "office",
-    "guest",
-)  # what `echousd.dressing` has stories of
+# what `echousd.dressing` has stories of
+RESIDENTS = ("child", "teen", "couple", "senior", "student", "office", "guest")
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 Point: TypeAlias = tuple[float, float]

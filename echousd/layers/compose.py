@@ -104,7 +104,7 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
         files |= thumbnails(files, [*made, *small])
     built = structure.shell_prims(room, dressing.bare)
     harmony = room.options.palette or looks.palette_of_room(room.provenance.seed, room.graph.room.style)
-    slots = _slots(small)
+    slots = sorted({slot for asset in small.values() for slots in asset.slots.values() for slot in slots})
     named, bindings = room_slots(room, made, built, slots)
     shown = looks.alternatives(harmony, room.graph.room.style)
     tables = {word: {name: looks.look(word, *of) for name, of in named.items()} for word in shown}
@@ -334,11 +334,6 @@ def _slugs(room: RoomData) -> dict[str, str]:
             word = word if word[:1].isalpha() else f"style_{word}"
             out[style] = free_name(word, {ROOM_STYLE, OTHERS, *out.values()} - {style})
     return out
-
-
-def _slots(made: Mapping[str, Asset]) -> list[str]:
-    """Material slots of assets, each once, in an order that no hash seed changes."""
-    return sorted({slot for asset in made.values() for slots in asset.slots.values() for slot in slots})
 
 
 def _pen(room: RoomData, layer: str) -> Pen:

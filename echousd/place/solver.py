@@ -130,7 +130,8 @@ def _descend(
     for number in range(config.rounds + 1):
         now_size, now_position = np.exp(state[:, 3:]), state[:, :3].copy()
         at = constraints.at(now_size, now_position, handicap)
-        hard, soft = violation(at), afar(at)
+        hard = violation(at)
+        soft = float(np.abs(at.value[np.isin(at.kind, (WALL, CEILING))]).sum())  # missing to them, metres
         score = hard + SOFT * soft
         if best is None or score < best.score - 1e-9:
             best, last = Solution(now_size, now_position, at, score, number), number
@@ -161,11 +162,6 @@ def violation(at: Linearised) -> float:
 def unmet(at: Linearised) -> int:
     """How many of them are missed by more than `UNMET`."""
     return int((at.value[~at.equal] < -UNMET).sum())
-
-
-def afar(at: Linearised) -> float:
-    """Sum of what is missing to the walls and the ceiling, metres."""
-    return float(np.abs(at.value[np.isin(at.kind, (WALL, CEILING))]).sum())
 
 
 def newton(

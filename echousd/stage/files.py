@@ -18,9 +18,8 @@ from echousd.stage.apart import check_harmless
 from echousd.stage.encoding import StageError
 
 WRITABLE = (".usd", ".usda", ".usdc")
-MATERIALS = re.compile(
-    r"Could not open asset @([^@]*\.mtlx)@", re.IGNORECASE
-)  # a MaterialX document, not there or no plugin
+# a MaterialX document, not there or no plugin
+MATERIALS = re.compile(r"Could not open asset @([^@]*\.mtlx)@", re.IGNORECASE)
 READABLE = (*WRITABLE, ".usdz")
 
 

@@ -14,7 +14,7 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade
 
 from echomodel.boxes2d import seen
 from echomodel.roomboxes import footprints
-from echomodel.vocabulary import UnknownWord, vocabulary
+from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError, Node, RoomSpec, SceneGraph
 from echousd.graph.nodes import OBSTACLE
 from echousd.naming import free_name
@@ -27,7 +27,6 @@ from echousd.stage.labels import (
     is_structure,
     known_category,
     labels,
-    room_word,
     spaced,
 )
 from echousd.stage.read import RoomPrims, node_names, room_graph
@@ -235,8 +234,10 @@ def _holds_furniture(prim: Usd.Prim) -> bool:
 
 def _room_above(prim: Usd.Prim) -> str:
     """Path of the innermost prim above one that is labelled or called as a room, "" = there is none."""
-    rooms = (each for each in lineage(prim.GetParent()) if any(map(room_word, (*labels(each), each.GetName()))))
-    return next((str(each.GetPath()) for each in rooms), "")
+    for each in lineage(prim.GetParent()):
+        if any(vocabulary().known_room_type(spaced(word)) for word in (*labels(each), each.GetName())):
+            return str(each.GetPath())
+    return ""
 
 
 def _over(node: Node, floor: Box) -> bool:
@@ -302,11 +303,8 @@ def _corners(floor: Box | None) -> tuple[tuple[float, float], ...] | None:
 
 
 def _room_type(words: list[str], categories: list[str]) -> str:
-    for word in words:
-        try:
-            return vocabulary().room_type(word.rstrip("0123456789_")).name
-        except UnknownWord:
-            continue
+    for known in filter(None, (vocabulary().known_room_type(word.rstrip("0123456789_")) for word in words)):
+        return known.name
     has = {*categories, *(vocabulary().category(name).coarse for name in categories)}
     told = [kind for kind in vocabulary().room_types if kind.signs and has.issuperset(kind.signs)]
     return max(told, key=lambda kind: kind.certainty).name if told else UNTOLD

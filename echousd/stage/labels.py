@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from pxr import Usd
 
-from echomodel.vocabulary import UnknownWord, normalised, vocabulary
+from echomodel.vocabulary import normalised, vocabulary
 from echousd.stage.values import texts
 
 LABELS_SCHEMA = "SemanticsLabelsAPI:"
@@ -70,17 +70,4 @@ def known_category(word: str) -> str | None:
 
 def is_structure(word: str) -> bool:
     """Whether a label means a part of a building or a room."""
-    if normalised(word) in STRUCTURE:
-        return True
-    try:
-        return bool(vocabulary().room_type(word))
-    except UnknownWord:
-        return False
-
-
-def room_word(word: str) -> str | None:
-    """The room type that a label or name tells, None where it tells none."""
-    try:
-        return vocabulary().room_type(spaced(word)).name
-    except UnknownWord:
-        return None
+    return normalised(word) in STRUCTURE or vocabulary().known_room_type(word) is not None

@@ -110,6 +110,11 @@ class Vocabulary:
         """The room type called `word` (name or alias); raises `UnknownWord`."""
         return self.room_types[self._find("room type", word)]
 
+    def known_room_type(self, word: str) -> RoomType | None:
+        """As `room_type`, but None for a word that the vocabulary does not hold."""
+        found = self._known("room type", word)
+        return None if found is None else self.room_types[found]
+
     def placement(self, word: str) -> Placement:
         """The placement called `word` (name or alias); raises `UnknownWord`."""
         return self.placements[self._find("placement", word)]

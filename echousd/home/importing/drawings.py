@@ -203,9 +203,8 @@ def read_svg(content: bytes, unit: float | None) -> Found:
     except (ParseError, ValueError) as error:
         raise GraphError(f"cannot be read as SVG ({error})") from None
     box = getattr(shown, "viewbox", None)
-    unit = unit * (
-        box.width / shown.width if box and box.width and shown.width else 1.0
-    )  # the size on paper is no scale
+    # the size on paper is no scale
+    unit = unit * (box.width / shown.width if box and box.width and shown.width else 1.0)
     strokes: list[Stroke] = []
     labels = []
 

@@ -12,7 +12,7 @@ import shapely
 
 from echomodel.openings import USUAL, Opening, direction, inward_normal, numbered, overlap, segment, signed_area
 from echomodel.sizes import size_statistics
-from echomodel.vocabulary import UnknownWord, normalised, vocabulary
+from echomodel.vocabulary import normalised, vocabulary
 from echousd.assets.naming import category_of, known_word, plain
 from echousd.graph import GraphError, Node, RoomSpec, SceneGraph, starting_graph
 from echousd.graph.nodes import OBSTACLE
@@ -111,13 +111,11 @@ def room_kind(words: Sequence[str]) -> str | None:
         parts = [part for part in normalised(text).rstrip("0123456789_").split("_") if part and not part.isdecimal()]
         for length in range(len(parts), 0, -1):
             for start in range(len(parts) - length, -1, -1):
-                try:
-                    return vocabulary().room_type("_".join(parts[start : start + length])).name
-                except UnknownWord:
-                    continue
-        kind = kind_of("rooms", plain(text))
-        if kind is not None:
-            return kind
+                kind = vocabulary().known_room_type("_".join(parts[start : start + length]))
+                if kind is not None:
+                    return kind.name
+        if told := kind_of("rooms", plain(text)):
+            return told
     return None
 
 
@@ -142,10 +140,7 @@ def _outline(room: Room) -> np.ndarray:
         raise GraphError(f"room {room.name!r}: {shape.area:.0f} m² of floor, allowed: at most 5000 (see --unit)")
     ring = shapely.orient_polygons(shape, exterior_cw=False)
     found: np.ndarray = np.array(ring.exterior.coords)[:-1]
-    before, after = (
-        found - np.roll(found, 1, 0),
-        np.roll(found, -1, 0) - found,
-    )  # the ring's first corner stays, though straight
+    before, after = found - np.roll(found, 1, 0), np.roll(found, -1, 0) - found  # of the first corner, straight or not
     cross = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
     return found[cross > 1e-3 * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)].round(4)
 
@@ -258,15 +253,11 @@ def _furnished(plan: Plan, pieces: Sequence[Piece]) -> tuple[dict[str, list[Node
         floor = plan.floors[room]
         if piece.sides > 1 and _before(floor, at[[0, 2]], front) < _before(floor, at[[0, 2]], -front):
             front = -front
-        where = (
-            round(float(at[0] - origin[0]), 4),
-            round(max(float(at[1]), 0.0), 4),
-            round(float(at[2] - origin[1]), 4),
-        )
+        away = at[0] - origin[0], max(at[1], 0.0), at[2] - origin[1]
         name = free_name(_identifier(piece.name), {node.name for node in found[room]})
         found[room].append(
             Node(
-                name, category, size=tuple(size.round(4).tolist()), position=where,
+                name, category, size=tuple(size.round(4).tolist()), position=tuple(round(float(v), 4) for v in away),
                 yaw=round(float(np.arctan2(front[0], front[1])), 6), locked=True, attributes=told,
                 shapes="boxes" if told else None,
             )

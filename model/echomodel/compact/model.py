@@ -20,14 +20,7 @@ from torch.overrides import TorchFunctionMode
 
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.modules import FurnitureDenoiser, LatentGraph, LayoutDenoiser
-from echomodel.compact.weights import (
-    FORMAT,
-    PARTS,
-    WeightsError,
-    joined_config,
-    own_statistics,
-    read_header,
-)
+from echomodel.compact.weights import FORMAT, PARTS, WeightsError, joined_config, own_statistics, read_header
 from echomodel.config import CompactConfig, check_numbers, to_json
 from echomodel.files import whole_file
 

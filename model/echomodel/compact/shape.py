@@ -344,11 +344,6 @@ def bearing(grids: Tensor, boxes: Boxes, triplets: Tensor) -> Tensor:
     return out
 
 
-def merit(grids: Tensor, boxes: Boxes, triplets: Tensor) -> Tensor:
-    """What draws are chosen by: (N,), whole shapes that bear what stands on them first."""
-    return wholeness(grids) * (0.1 + 0.9 * bearing(grids, boxes, triplets))
-
-
 def repeated(values: Tensor | None, count: int) -> Tensor | None:
     """(N, ...) behind itself `count` times."""
     return None if values is None else torch.cat([values] * count)
@@ -385,7 +380,9 @@ def sample_shapes(
         codes = here.denoised(agreeing(predict, equal.repeat(count) + first), torch.cat(starts), settings)
         for draw in codes.chunk(count):
             drawn = _decoded(model, draw)
-            whole = group_means(merit(drawn, boxes, graph.triplets), equal) if tries > 1 else best
+            if tries > 1:  # whole shapes that bear what stands on them first
+                merit = wholeness(drawn) * (0.1 + 0.9 * bearing(drawn, boxes, graph.triplets))
+            whole = group_means(merit, equal) if tries > 1 else best
             if not len(grids):
                 grids, best = drawn, whole
                 continue

@@ -54,11 +54,6 @@ def book(size: Size, rng: np.random.Generator) -> list[Solid]:
     return whole + [box((-x * w, 0, d / 2 - 2 * back), (x * w, h, d / 2 - (1 - out) * back), cover) for x, out in steps]
 
 
-def books_in(width: float) -> int:
-    """How many books about a row of this width holds."""
-    return max(1, int(width / 0.03))
-
-
 def _upright(
     at: float, thick: float, tall: float, deep: float, d: float, cover: str, board: float = COVER, over: float = 0.003
 ) -> list[Solid]:

@@ -9,16 +9,10 @@ from typing import Any
 
 import numpy as np
 
+# of sheets
 ASPECTS = {
-    "tall": 0.74,
-    "wide": 1.45,
-    "rug": 1.5,
-    "round": 1.0,
-    "oval": 1.5,
-    "runner": 3.0,
-    "square": 1.0,
-    "lumbar": 1.7,
-}  # of sheets
+    "tall": 0.74, "wide": 1.45, "rug": 1.5, "round": 1.0, "oval": 1.5, "runner": 3.0, "square": 1.0, "lumbar": 1.7,
+}  # fmt: skip
 TABLE = Path(__file__).with_name("prints.toml")
 PRINTS: Mapping[str, Mapping[str, Any]] = tomllib.loads(TABLE.read_text("utf-8"))
 

@@ -82,7 +82,7 @@ def _stems(
         alone = row["along"] == 1
         tall = reach[1] * (0.3 + 0.62 * share if alone else rng.uniform(0.72, 0.95))
         away = (0.5 - 0.2 * share if alone else 0.45 * rng.uniform(0.6, 1)) * (count > 1)
-        if _upright(row):
+        if row["lift"][0] > 45:  # leaves go on where their stems end, as paddles do
             tall, length = reach[1] * rng.uniform(0.35, 0.55), min(length * 1.3, 0.5 * reach[1])
         foot = base + 0.35 * pot * ahead - (0, 0.02, 0)
         end = base + ahead * away * reach + (0, tall, 0)
@@ -96,11 +96,6 @@ def _stems(
             side = 0.0 if alone else (GOLDEN * k if count < 4 else (-1) ** k * 1.15 * (at < 1))
             parts.append(_leaf(row, place, yaw + side, _lift(row, share if alone else at, rng), length))
     return parts
-
-
-def _upright(row: dict[str, Any]) -> bool:
-    """Whether leaves go on where their stems end, as paddles do."""
-    return bool(row["lift"][0] > 45)
 
 
 def _crowns(

@@ -7,16 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from echomodel.openings import (
-    SWINGS,
-    USUAL,
-    Opening,
-    edge_lengths,
-    free_area,
-    inward_normal,
-    numbered,
-    signed_area,
-)
+from echomodel.openings import SWINGS, USUAL, Opening, edge_lengths, free_area, inward_normal, numbered, signed_area
 from echomodel.roomboxes import footprints
 
 GRID = 0.1  # metres between the places that are tried for an opening
