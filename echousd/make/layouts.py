@@ -15,6 +15,7 @@ from echomodel.boxes import Boxes
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
+from echomodel.objective.physics import TOUCH
 from echomodel.openings import signed_area
 from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.roomboxes import footprints
@@ -216,7 +217,25 @@ def finished_boxes(
                 judged, second = judged + third.judged, min(second, third, key=wrong)
             if wrong(second)[:2] <= wrong(found)[:2]:
                 found = second
-    return (rounded_boxes(graph, found.boxes), tuple(sentence(one, graph) for one in found.conflicts)), judged
+    boxes = rounded_boxes(graph, _on_cords(graph, found.boxes, styles))
+    return (boxes, tuple(sentence(one, graph) for one in found.conflicts)), judged
+
+
+def _on_cords(graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str]) -> Boxes:
+    """The boxes with lamps that had to come down from the ceiling, to be near something, on cords as much longer."""
+    lamps = np.array([vocabulary().category(node.category).support == "ceiling" for node in graph.nodes], bool)
+    free = [None is node.size is node.position and not node.locked for node in graph.nodes]
+    size, position, tall = boxes.size.copy(), boxes.position.copy(), graph.room.tall
+    low = lamps & free & (position[:, 1] + size[:, 1] < tall - TOUCH)
+    if not low.any():
+        return boxes
+    size[low, 1] = tall - position[low, 1]
+    lamps &= free
+    size[lamps] = _alike(graph, Boxes(size, position, boxes.yaw), styles).size[lamps]
+    position[lamps, 1] = tall - size[lamps, 1]
+    longer = Boxes(size, position, boxes.yaw)
+    worse = len(layout_outcome(graph, longer).faults) > len(layout_outcome(graph, boxes).faults)
+    return boxes if worse else longer
 
 
 def _with_homeless_unlocked(graph: SceneGraph) -> SceneGraph:

@@ -334,6 +334,24 @@ def test_options_that_are_stated_are_not_those_of_the_other_stage(tmp_path):
         echousd.RoomOptions(room_path="World")
 
 
+def test_lamps_that_are_told_to_be_near_something_low_hang_on_longer_cords():
+    nodes = (Node("table", "dining_table"), Node("stool", "stool"), Node("lamp", "pendant_lamp"))
+    spec = RoomSpec("dining_room", size=(4, 4), height=3.0)
+    graph = SceneGraph(spec, nodes, (Relation("lamp", "close_by", "stool"),))
+    size = np.array([(1.4, 0.75, 0.9), (0.4, 0.5, 0.4), (0.4, 0.6, 0.4)], np.float32)
+    drawn = Boxes(size, np.array([(0, 0, 0), (0, 0, 1), (0, 2.4, 0)], np.float32), np.zeros(3, np.float32))
+
+    def lamp(graph):
+        (boxes, _), _ = layouts.finished_boxes(graph, drawn, style_groups(graph), True, StageTimer())
+        return boxes.position[2, 1], boxes.size[2, 1]
+
+    low, long = lamp(graph)
+    assert low < 2.0
+    assert low + long == pytest.approx(3.0, abs=1e-3)
+    stated = graph.update_node("lamp", size=(0.4, 0.6, 0.4))
+    assert lamp(stated)[1] == pytest.approx(0.6)
+
+
 FIRM, LATE, NONE = (1, set()), (1, {"door_free", "window_free"}), (0, set())  # windows, and terms that yield
 
 
