@@ -1,14 +1,15 @@
 """What the layout network draws, judged room by room: weights beside one another and beside the same ones shuffled.
 
-    python benchmarks/drafts.py [WEIGHTS ...] [--ways alone guided searched] [--rooms ROOMS.json] [--count 40]
+    python benchmarks/drafts.py [WEIGHTS ...] [--ways alone guided searched default] [--rooms ROOMS.json] [--count 40]
     python benchmarks/drafts.py ships muted shuffled random generator --ways searched --poses 250 1000 4500
+    python benchmarks/drafts.py ships shuffled generator --ways default
 
 `ships`, `shuffled` and `muted` (the echo off) are words for WEIGHTS, and so are two who are no network: `random` places
-and the room `generator`. `--poses`: what a search may judge, each a whole room; a search ends with the move that passes
-it, so what it did judge is told. The rooms are of the room generator from a seed
-that no training used, or every so many of a rooms file, one near relation an object told, one draft each; faults are
-those of all terms. Below each way stand the means of the differences to the first weights, room by room, with 95 %
-intervals by bootstrap.
+and the room `generator`. `--poses`: what a search may judge, each a whole room; it ends with the move that passes it,
+so what it did judge is told. `default` is what `generate` does with a graph without places: of up to eight drafts the
+best; the other ways have one. The rooms are of the room generator from a seed that no training used, or every so many
+of a rooms file, one near relation an object told; faults are those of all terms. Below each way stand the means of the
+differences to the first weights, room by room, with 95 % intervals by bootstrap.
 """
 
 from __future__ import annotations
@@ -18,18 +19,26 @@ from collections import Counter
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from echomodel.boxes import Boxes
 from echomodel.data.roomset import load_rooms, with_known_words
+from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.metrics.layouts import Task, kept_relations, tasks_of
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
+from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_rooms
-from echousd.evaluation.systems import BASES, muted_model, networks, shuffled_model
+from echousd.evaluation.systems import BASES, Layouts, muted_model, networks, shuffled_model
 from echousd.graph.arrays import one_thread
+from echousd.make import layouts
 from echousd.place import search
 from echousd.place.placing import place_boxes
+from echousd.progress import StageTimer
+from echousd.shapes.styles import style_groups
+from echousd.stage.boxes import graph_of
 
 SEED = 770_000  # of the generated rooms, as in `placing.py`
 OTHERS = {"random": BASES["random"][0], "generator": BASES["generator"][0]}
@@ -40,10 +49,11 @@ DRAWS = 4000  # of the bootstrap
 
 def judged(weights: str, way: str, tasks: list[Task]) -> tuple[np.ndarray, Counter[str], int]:
     """Part and whole of `ROWS` in each room (R, 3, 2), how often each term was missed, and poses judged in all."""
-    draw = OTHERS.get(weights) or networks(
-        WORDS.get(weights, partial(load_model, weights)), None if way == "guided" else 0.0
-    )
-    rooms, poses = draw(tasks, 0), 0
+    if way == "default":
+        rooms, poses = judged_by_default(weights, tasks)
+    else:
+        network = WORDS.get(weights, partial(load_model, weights))
+        rooms, poses = (OTHERS.get(weights) or networks(network, None if way == "guided" else 0.0))(tasks, 0), 0
     scores, missed = [], Counter[str]()
     for task, room in zip(tasks, rooms, strict=True):
         if way == "searched":
@@ -61,6 +71,50 @@ def judged(weights: str, way: str, tasks: list[Task]) -> tuple[np.ndarray, Count
     return np.array(scores, float), missed, poses
 
 
+def judged_by_default(weights: str, tasks: list[Task]) -> tuple[list[RoomBoxes], int]:
+    """What `generate` makes of the tasks' graphs, whose boxes nobody states, and poses judged in all."""
+    network = None if weights in OTHERS else WORDS.get(weights, partial(load_model, weights))()
+    rooms, poses, usual = [], [0], layouts.finished_boxes
+
+    def counted(*args: Any) -> Any:
+        found = usual(*args)
+        poses[0] += found[1]
+        return found
+
+    layouts.finished_boxes = counted
+    for number, task in enumerate(tasks):
+        room = task.room
+        graph = graph_of(replace(room, relations=task.told))
+        nodes = tuple(node.replaced(size=None, position=None, yaw=None) for node in graph.nodes)
+        graph = graph.replaced(nodes=nodes, room=graph.room.replaced(openings=room.openings))
+        boxes, _ = layouts.best_boxes(
+            network or Another(OTHERS[weights], task), graph, style_groups(graph), layouts.Draws(number),
+            drafts=layouts.usual_drafts(len(room)), timer=StageTimer(),
+        )  # fmt: skip
+        size, position, yaw = (np.asarray(of, float) for of in (boxes.size, boxes.position, boxes.yaw))
+        rooms.append(replace(room, size=size, position=position, yaw=yaw))
+    layouts.finished_boxes = usual
+    return rooms, poses[0]
+
+
+class Another:
+    """Who draws layouts of one room without being a network, in the place of one."""
+
+    def __init__(self, draw: Layouts, task: Task) -> None:
+        self.draw, self.task, self.asked = draw, task, 0
+
+    def sample_layout(self, graph: GraphBatch, **_: Any) -> Boxes:
+        """Boxes (N) of copies of the room, others each time."""
+        self.asked += 1
+        floor = self.task.room.floor_polygon
+        middle = (floor.min(0) + floor.max(0)) / 2 if len(floor) else np.zeros(2)
+        rooms = self.draw([self.task] * (graph.num_nodes // len(self.task.room)), self.asked)
+        size, position, yaw = (
+            np.concatenate([getattr(one, of) for one in rooms]) for of in ("size", "position", "yaw")
+        )
+        return Boxes(*(of.astype(np.float32) for of in (size, position - [middle[0], 0.0, middle[1]], yaw)))
+
+
 def interval(mine: np.ndarray, first: np.ndarray) -> np.ndarray:
     """(2, 3), bounds of the differences of two sets of judgements (R, 3, 2) of the same rooms."""
     rng = np.random.default_rng(0)
@@ -74,21 +128,23 @@ def main() -> None:
     """Print a line for each way and weights."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("weights", nargs="*", default=["ships"])
-    parser.add_argument("--ways", nargs="+", default=["alone"], choices=["alone", "guided", "searched"])
+    parser.add_argument("--ways", nargs="+", default=["alone"], choices=["alone", "guided", "searched", "default"])
     parser.add_argument("--rooms", type=Path)
     parser.add_argument("--count", type=int, default=40)
-    parser.add_argument("--poses", nargs="+", type=int, default=[search.BUDGET])
+    parser.add_argument("--poses", nargs="+", type=int)
     options = parser.parse_args()
     rooms = generate_rooms(options.count, SEED) if options.rooms is None else load_rooms(options.rooms)
     rooms = [room for room in with_known_words(rooms) if len(room) > 1]
     rooms = [rooms[number * len(rooms) // options.count] for number in range(min(options.count, len(rooms)))]
     tasks = tasks_of(rooms, 0, told=1.0)
     print(f"{len(tasks)} rooms, {sum(len(task.room) for task in tasks)} objects")
-    for way, poses in [(w, p) for w in options.ways for p in (options.poses if w == "searched" else [0])]:
+    usual = {"searched": search.BUDGET, "default": layouts.POSES}
+    for way, poses in [(w, p) for w in options.ways for p in options.poses or [usual.get(w, 0)]]:
         first: np.ndarray | None = None
         for weights in options.weights:
             if way == "searched":
                 search.Search.__init__.__defaults__ = (search.TERMS, poses, *search.Search.__init__.__defaults__[2:])
+            layouts.POSES = poses
             found, missed, looked = judged(weights, way, tasks)
             total = found.sum(0)
             told, faults, clean = total[:, 0] / total[:, 1]
