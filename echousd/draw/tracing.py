@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from echomodel.triangles import along
+from echomodel.triangles import along, area_normals
 from echousd.draw.bounced import Bounced
 from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, VIEW, evened, exposure, rolled
 from echousd.draw.scenery import Scenery, between
@@ -92,6 +92,7 @@ BESIDE = np.array(sorted(product(range(-2, 3), repeat=2), key=lambda at: at[0] *
 CLOSE, EVEN = 2, 0.4  # from which ring on it matters how bright neighbours are, and the share that they may differ by
 ALIKE, FLAT = 0.97, 0.02  # cosine and metres within which two points lie on one flat piece of surface
 KEPT, NOTHING = ("primID", "u", "v", "tfar"), np.float32(-9)  # of a hit; the material of what is not there
+NEXT, NEAR, FAR = 2.5, 1.2, 0.6  # metres from a passage to the wall beyond, and what light there is on the way to it
 MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
 
 
@@ -190,8 +191,11 @@ def _seen(world: World, origin: np.ndarray, direction: np.ndarray, hit: Mapping[
     scenery, face = world.scenery, hit["primID"]
     missed = np.flatnonzero(face < 0)
     glow = np.zeros((len(face), 3), np.float32)
-    glow[missed] = outside(scenery, origin[missed], direction[missed])
-    glow *= np.float32(VIEW * scenery.lights.sky) * scenery.lights.tint if world.view.inside else np.float32(1)
+    glow[missed], through = outside(scenery, origin[missed], direction[missed])
+    if world.view.inside:
+        glow *= np.float32(VIEW * scenery.lights.sky) * scenery.lights.tint
+        past = missed[~through]
+        glow[past] = _next_room(world, origin[past], direction[past])
     u, v, far = (np.where(face < 0, np.float32(0), hit[key]) for key in ("u", "v", "tfar"))
     bary = np.stack([1 - u - v, u, v], 1)
     normal = _unit(np.einsum("ncx,nc->nx", scenery.normals[face], bary))
@@ -372,10 +376,11 @@ def embree(triangles: np.ndarray) -> Any:
     return scene
 
 
-def outside(scenery: Scenery, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """(n, 3) colour that rays which meet nothing see: through a window's pane what lies around, else the paper."""
+def outside(scenery: Scenery, origin: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) colour that rays which meet nothing see: through a window's pane what lies around, else the paper; and
+    which (n,) bool see through a pane."""
     out: np.ndarray = np.broadcast_to(BACKGROUND, direction.shape).copy()
-    around = scenery.lights.view
+    around, through = scenery.lights.view, np.zeros(len(out), bool)
     for middle, side, rise in scenery.panes:
         normal = np.cross(side, rise)
         along = direction @ normal
@@ -384,7 +389,22 @@ def outside(scenery: Scenery, origin: np.ndarray, direction: np.ndarray) -> np.n
         u, v = point @ side / (side @ side), point @ rise / (rise @ rise)
         here = (reach > 0) & (np.abs(u) <= 1) & (np.abs(v) <= 1)
         out[here] = SKY_LIGHT if around is None else _around(around, direction[here])
-    return out
+        through |= here
+    return out, through
+
+
+def _next_room(world: World, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(n, 3) radiance that rays see which leave by a passage: a wall and a floor like those here, in less light."""
+    scenery, (low, high) = world.scenery, world.scenery.bounds
+    area = area_normals(scenery.triangles)
+    floor = int((area[:, 1] * (scenery.normals[:, 0, 1] > 0)).argmax())
+    wall = int((np.linalg.norm(area, axis=1) * (scenery.wall >= 0)).argmax())
+    way = np.where(np.abs(direction) < 1e-6, 1e-6, direction)
+    leaves = np.maximum((low - origin) / way, (high - origin) / way)[:, [0, 2]].min(1)
+    down = np.where(way[:, 1] < 0, (scenery.triangles[floor, 0, 1] - origin[:, 1]) / way[:, 1], np.inf)
+    far = np.clip((down - leaves) * np.hypot(*way[:, [0, 2]].T) / NEXT, 0, 1)[:, None]
+    color = np.where(far < 1, scenery.flat_colors[floor], scenery.flat_colors[wall])
+    return np.asarray(world.white * color * (NEAR + (FAR - NEAR) * far), np.float32)
 
 
 def _around(picture: np.ndarray, way: np.ndarray) -> np.ndarray:

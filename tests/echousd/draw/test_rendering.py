@@ -11,9 +11,10 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.draw.drawables import read_drawables
+from echousd.draw.indoors import LUMA
 from echousd.draw.rendering import render, render_stage, render_turn
 from echousd.draw.scenery import class_color, read_scenery
-from echousd.draw.tracing import BACKGROUND, outside, smooth_light
+from echousd.draw.tracing import BACKGROUND, World, _next_room, outside, smooth_light
 from echousd.draw.views import stage_views
 from echousd.options import RoomOptions
 
@@ -144,10 +145,18 @@ def test_one_looks_out_of_windows_and_past_walls_that_are_away(tmp_path):
     around = scenery.lights.view
     for view in (around, None):
         plain = replace(scenery, panes=scenery.panes[:1], lights=replace(scenery.lights, view=view))
-        sky, field, beside, behind = outside(plain, np.tile(eye, (4, 1)), aims - eye)
+        (sky, field, beside, behind), through = outside(plain, np.tile(eye, (4, 1)), aims - eye)
+        assert through.tolist() == [True, True, False, False]
         assert sky[2] > sky[1] > sky[0]
         assert field[1] > field[2] if view is around else (field == sky).all()
         np.testing.assert_array_equal([beside, behind], [BACKGROUND] * 2)
+    world = World(None, scenery, None, 64, np.zeros(4), None, 0.0, white=np.full(3, 0.5, np.float32))
+    side = scenery.bounds[1][0]
+    wall, floor = _next_room(world, np.tile(eye, (2, 1)), np.array([(side, 0.0, 0.0), (side + 0.3, -1.4, 0.0)]))
+    assert wall @ LUMA < 0.5  # of white paper in the room's light
+    ground = scenery.flat_colors[np.flatnonzero(scenery.normals[:, 0, 1] > 0.9)]
+    off = np.abs(ground / (floor / floor.max()) - (ground / (floor / floor.max()))[:, :1]).max(1)
+    assert off.min() < 0.01  # a colour that lies on the floor here
     outwards = middle + 5 * (middle - eye) * (1, 0, 1)
     assert len(scenery.without_near_walls(outwards).panes) < len(scenery.panes)
 
