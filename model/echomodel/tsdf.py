@@ -15,6 +15,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from echomodel.furniture.distances import distance, inradius
 from echomodel.furniture.solids import Solid, Tube
 from echomodel.triangles import area_normals, spread
 
@@ -86,8 +87,8 @@ def tsdf_of(solids: Sequence[Solid]) -> np.ndarray:
         where = tuple(slice(a, b) for a, b in zip(start, stop, strict=True))
         x, y, z = axes[0][where[0], None, None], axes[1][None, where[1], None], axes[2][None, None, where[2]]
         thinnest = THINNEST_ROD_OR_LEAF if isinstance(solid, Tube) or solid.role == "leaf" else THINNEST
-        distance = solid.distance(x, y, z, scale) - max(0.0, thinnest - solid.inradius(scale))
-        np.minimum(grid[where], distance, out=grid[where])
+        away = distance(solid, x, y, z, scale) - max(0.0, thinnest - inradius(solid, scale))
+        np.minimum(grid[where], away, out=grid[where])
     return truncated(grid)
 
 

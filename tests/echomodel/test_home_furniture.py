@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
+from echomodel.furniture.distances import distance
 from echomodel.furniture.fronts import front
 from echomodel.vocabulary import vocabulary
 
@@ -67,8 +68,8 @@ def test_basins_and_tubs_are_hollow():
         for seed in range(4):
             parts, _ = drawn(name, seed)
             at = np.array(inside)
-            distance = min(float(part.distance(*at, np.full(3, 0.01))) for part in parts if not part.core)
-            assert distance > 0, (name, seed)
+            away = min(float(distance(part, *at, np.full(3, 0.01))) for part in parts if not part.core)
+            assert away > 0, (name, seed)
 
 
 def test_what_hangs_says_how_high():

@@ -1,9 +1,4 @@
-"""The solids that furniture is made of: each is a closed mesh and, without any mesh query, a signed distance.
-
-A distance is asked for on the box-normalised grid, where one voxel spans a different length on each axis. With `f` the
-metric distance and `n` its unit gradient, the distance in voxels is `f / |S n|`, S = diag(metres per voxel): exact for
-planes and first-order exact elsewhere, which is what the few voxels inside the truncation need.
-"""
+"""The solids that furniture is made of: each is a closed mesh, and a signed distance (`distances.py`)."""
 
 from __future__ import annotations
 
@@ -79,16 +74,6 @@ class Solid:
         vertices, faces = self.local_mesh(detail)
         return vertices @ self.turn.T + self.centre, faces
 
-    def distance(self, x: Array, y: Array, z: Array, scale: Array) -> Array:
-        """Signed distance in voxels at broadcastable coordinates x, y, z (metres); `scale` (3,) metres per voxel."""
-        x, y, z = x - self.centre[0], y - self.centre[1], z - self.centre[2]
-        if self.turn is not IDENTITY:
-            t = self.turn
-            x, y, z = (x * t[0, i] + y * t[1, i] + z * t[2, i] for i in range(3))
-        # Columns: what one metre along a local axis is worth in voxel gradients.
-        local = self.turn * np.asarray(scale)[:, None]
-        return self.local_distance(x, y, z, local.T @ local)
-
     def mirrored(self, axis: int = 0) -> Self:
         """The solid on the other side of the plane x = 0 (axis 0) or z = 0 (axis 2); its own halves are alike."""
         sign = np.where(np.arange(3) == axis, -1.0, 1.0)
@@ -98,28 +83,6 @@ class Solid:
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         raise NotImplementedError
 
-    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
-        """Distance in voxels at local coordinates; |S n| of a local direction n is sqrt(n^T metric n)."""
-        raise NotImplementedError
-
-    def inradius(self, scale: Array) -> float:
-        """Half the smallest thickness, in voxels (a lower estimate)."""
-        raise NotImplementedError
-
-
-def gradient_length(metric: Array, x: Array, y: Array, z: Array) -> Array:
-    """sqrt(n^T metric n) for directions n = (x, y, z)."""
-    m = metric
-    squared = m[0, 0] * x * x + m[1, 1] * y * y + m[2, 2] * z * z
-    if abs(m[0, 1]) + abs(m[0, 2]) + abs(m[1, 2]) > 1e-12:
-        squared = squared + 2 * (m[0, 1] * x * y + m[0, 2] * x * z + m[1, 2] * y * z)
-    return np.sqrt(np.maximum(squared, 1e-16))
-
-
-def intersection(a: Array, b: Array) -> Array:
-    """Distance to what two solids that meet at right angles have in common."""
-    return np.hypot(np.maximum(a, 0), np.maximum(b, 0)) + np.minimum(np.maximum(a, b), 0)
-
 
 @dataclass(frozen=True, eq=False)
 class Block(Solid):
@@ -127,16 +90,6 @@ class Block(Solid):
 
     half: Array = field(default_factory=lambda: np.ones(3))
     radius: float = 0.0
-
-    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
-        r = min(self.radius, *self.half)
-        q = [np.abs(c) - (h - r) for c, h in zip((x, y, z), self.half, strict=True)]
-        per_axis = np.sqrt(np.diag(metric))
-        inside = np.maximum(np.maximum((q[0] - r) / per_axis[0], (q[1] - r) / per_axis[1]), (q[2] - r) / per_axis[2])
-        k = [np.maximum(c, 0) for c in q]
-        length = np.sqrt(k[0] * k[0] + k[1] * k[1] + k[2] * k[2])
-        outside = (length - r) * length / gradient_length(metric, *k)
-        return np.where(length > 1e-9, outside, inside)
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         r = min(self.radius, *(self.half * 0.999))
@@ -155,10 +108,6 @@ class Block(Solid):
         length = np.linalg.norm(corner, axis=1, keepdims=True)
         core = np.clip(node, 0, flat) * 2 / flat - 1
         return core * (self.half - r) + r * corner / np.maximum(length, 1e-12), faces
-
-    def inradius(self, scale: Array) -> float:
-        local = self.turn * np.asarray(scale)[:, None]
-        return float(min(self.half / np.linalg.norm(local, axis=0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,9 +133,6 @@ class Bow(Block):
     """A board with round edges whose middle stands back (-z) by `bow` metres behind its ends at left and right."""
 
     bow: float = 0.03
-
-    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
-        return super().local_distance(x, y, z + self.bow * (1 - np.minimum((x / self.half[0]) ** 2, 1)), metric)
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         w, h, t = self.half
@@ -214,33 +160,6 @@ class Turned(Solid):
     power: float = 2.0
     rounding: float = 0.0
 
-    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
-        w = np.clip(y / self.height, 0, 1)
-        a, b = (np.maximum(lo + (hi - lo) * w, 1e-4) for lo, hi in zip(self.low, self.high, strict=True))
-        slope_a, slope_b = ((hi - lo) / self.height for lo, hi in zip(self.low, self.high, strict=True))
-        u, v = np.abs(x) / a, np.abs(z) / b
-        if np.isinf(self.power):
-            first = u >= v
-            q = np.maximum(u, v)
-            gx, gz = np.where(first, 1 / a, 0), np.where(first, 0, 1 / b)
-            gy = -np.where(first, u * slope_a / a, v * slope_b / b)
-        else:
-            p = self.power
-            q = np.maximum((u**p + v**p) ** (1 / p), 1e-6)
-            wx, wz = (u / q) ** (p - 1), (v / q) ** (p - 1)
-            gx, gz = wx / a, wz / b
-            gy = -(wx * u * slope_a / a + wz * v * slope_b / b)
-        side = (q - 1) / gradient_length(metric, np.sign(x) * gx, gy, np.sign(z) * gz)
-        along = np.sqrt(metric[1, 1])
-        cap = np.maximum(y - self.height, -y) / along
-        if self.rounding <= 0:
-            return intersection(side, cap)
-        across = np.sqrt((metric[0, 0] + metric[2, 2]) / 2)
-        k = np.maximum(side * across + self.rounding, 0), np.maximum(cap * along + self.rounding, 0)
-        length = np.hypot(*k)
-        rim = (length - self.rounding) * length / np.sqrt((across * k[0]) ** 2 + (along * k[1]) ** 2 + 1e-16)
-        return np.where((k[0] > 0) & (k[1] > 0), rim, np.maximum(side, cap))
-
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         low, high = np.asarray(self.low), np.asarray(self.high)
         outline = superellipse(self.power, _corners(detail, float(max(low.max(), high.max()))))
@@ -254,11 +173,6 @@ class Turned(Solid):
         rings = [np.insert(outline * np.maximum(half, 1e-4), 1, y, axis=1) for y, half in rims]
         return loft(rings)
 
-    def inradius(self, scale: Array) -> float:
-        local = np.linalg.norm(self.turn * np.asarray(scale)[:, None], axis=0)
-        thin = min(min(self.low[0], self.high[0]) / local[0], min(self.low[1], self.high[1]) / local[2])
-        return float(min(thin, self.height / 2 / local[1]))
-
 
 @dataclass(frozen=True, eq=False)
 class Ball(Solid):
@@ -267,22 +181,11 @@ class Ball(Solid):
     half: Array = field(default_factory=lambda: np.ones(3))
     power: float = 2.0
 
-    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
-        p = self.power
-        u, v, w = (np.abs(c) / h for c, h in zip((x, y, z), self.half, strict=True))
-        q = np.maximum((u**p + v**p + w**p) ** (1 / p), 1e-6)
-        g = (np.sign(c) * (t / q) ** (p - 1) / h for c, t, h in zip((x, y, z), (u, v, w), self.half, strict=True))
-        return (q - 1) / gradient_length(metric, *g)
-
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         vertices, faces = cube_surface((2, 4, 6, 8)[detail] if self.half.max() > 0.04 else 2 + detail)
         vertices = np.tan(vertices * np.pi / 4)
         length = (np.abs(vertices) ** self.power).sum(1, keepdims=True) ** (1 / self.power)
         return vertices / length * self.half, faces
-
-    def inradius(self, scale: Array) -> float:
-        local = self.turn * np.asarray(scale)[:, None]
-        return float(min(self.half / np.linalg.norm(local, axis=0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,24 +197,6 @@ class Tube(Solid):
 
     def mirrored(self, axis: int = 0) -> Self:
         return replace(super().mirrored(axis), points=self.points * np.where(np.arange(3) == axis, -1.0, 1.0))
-
-    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
-        nearest: Array = np.array(np.inf)
-        last = len(self.points) - 2
-        for i in range(last + 1):
-            a, d = self.points[i], self.points[i + 1] - self.points[i]
-            projected = (x - a[0]) * d[0] + (y - a[1]) * d[1] + (z - a[2]) * d[2]
-            t = np.clip(projected / max(d @ d, 1e-12), 0, 1)
-            off = x - a[0] - t * d[0], y - a[1] - t * d[1], z - a[2] - t * d[2]
-            length = np.sqrt(off[0] ** 2 + off[1] ** 2 + off[2] ** 2 + 1e-12)
-            found = (length - self.radius) * length / gradient_length(metric, *off)
-            voxels = gradient_length(metric, *d)  # of the step d; the ends are flat, not round
-            if i == 0:
-                found = np.maximum(found, -projected / voxels)
-            if i == last:
-                found = np.maximum(found, (projected - d @ d) / voxels)
-            nearest = np.minimum(nearest, found)
-        return nearest
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         tangents = np.gradient(self.points, axis=0)
@@ -325,9 +210,6 @@ class Tube(Solid):
             x = x / np.linalg.norm(x)
             rings.append(point + circle[:, :1] * x + circle[:, 1:] * cross(x, y))
         return loft(rings)
-
-    def inradius(self, scale: Array) -> float:
-        return float(self.radius / np.max(scale))
 
 
 @dataclass(frozen=True, eq=False)
@@ -348,20 +230,6 @@ class Shell(Solid):
     def _top(self, angle: Array) -> Array:
         return self.back + (self.front - self.back) * np.clip(np.abs(angle) / (np.pi / 2), 0, 1) ** self.ease
 
-    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
-        scale = np.sqrt(np.diag(metric))
-        behind = np.maximum(-z, 0)
-        walls = []
-        for inset, sign in ((0.0, 1.0), (self.thickness, -1.0)):
-            a, b, p = self.half[0] - inset, self.half[1] - inset, self.power
-            u, v = np.abs(x) / a, behind / b
-            q = np.maximum((u**p + v**p) ** (1 / p), 1e-6)
-            gx, gz = (u / q) ** (p - 1) / a, (v / q) ** (p - 1) / b
-            walls.append(sign * (q - 1) / gradient_length(metric, np.sign(x) * gx, 0 * gx, -gz))
-        top = self._top(np.arctan2(x / self.half[0], behind / self.half[1]))
-        upright_part = np.maximum(y - top, -y) / scale[1]
-        return intersection(intersection(np.maximum(*walls), z / scale[2]), upright_part)
-
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         angle = np.linspace(-np.pi / 2, np.pi / 2, (9, 13, 21, 33)[detail])
         s, c = np.sin(angle), np.cos(angle)
@@ -372,9 +240,6 @@ class Shell(Solid):
             (ox, oz), (ix, iz) = (np.array([sine, -cosine]) * half / length for half in (outside, inside))
             rings.append(np.array([[ix, 0, iz], [ox, 0, oz], [ox, high, oz], [ix, high, iz]]))
         return loft(rings)
-
-    def inradius(self, scale: Array) -> float:
-        return float(self.thickness / 2 / max(scale[0], scale[2]))
 
 
 def _corners(detail: int, radius: float) -> int:
@@ -475,29 +340,6 @@ class Lathe(Solid):
     squash: float = 1.0
     hollow: bool = False
 
-    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
-        radius = np.sqrt(x * x + (z / self.squash) ** 2) + 0 * y
-        outline = self._outline()
-        nearest = np.full(np.broadcast(radius, y).shape, np.inf)
-        nx, ny = np.zeros(nearest.shape), np.zeros(nearest.shape)
-        inside = np.zeros(nearest.shape, bool)
-        for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
-            d = b - a
-            t = np.clip(((radius - a[0]) * d[0] + (y - a[1]) * d[1]) / max(d @ d, 1e-12), 0, 1)
-            off_r, off_y = radius - a[0] - t * d[0], y - a[1] - t * d[1]
-            length = off_r * off_r + off_y * off_y
-            if a[0] > 0 or b[0] > 0:  # the axis itself is no surface
-                closer = length < nearest
-                nearest = np.where(closer, length, nearest)
-                nx, ny = np.where(closer, off_r, nx), np.where(closer, off_y, ny)
-            crosses = ((a[1] <= y) & (y < b[1])) | ((b[1] <= y) & (y < a[1]))
-            if abs(d[1]) > 1e-12:
-                inside ^= crosses & (radius < a[0] + (y - a[1]) / d[1] * d[0])
-        length = np.sqrt(nearest)
-        across = np.maximum(radius, 1e-9)
-        gradient = gradient_length(metric, nx * x / across, ny, nx * z / self.squash**2 / across)
-        return np.where(inside, -1.0, 1.0) * length * length / np.maximum(gradient, 1e-9)
-
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         largest = float(self.profile[:, 0].max())
         corners = ((8, 12, 20, 32) if largest > 0.05 else (6, 8, 10, 14))[detail]
@@ -512,15 +354,6 @@ class Lathe(Solid):
             low, high = ring * k, (ring + 1) % n * k
             faces += [np.stack([low + i, low + j, high + j], 1), np.stack([low + i, high + j, high + i], 1)]
         return np.concatenate(rings), np.concatenate(faces)
-
-    def inradius(self, scale: Array) -> float:
-        if not self.hollow:
-            return float(np.median(self.profile[:, 0]) / scale[0])
-        outline = self._outline()
-        after = np.roll(outline, -1, axis=0)
-        area = 0.5 * abs(np.sum(outline[:, 0] * after[:, 1] - after[:, 0] * outline[:, 1]))
-        length = np.linalg.norm(outline - np.roll(outline, -1, axis=0), axis=1).sum()
-        return float(area / length / scale[0])
 
     def _outline(self) -> Array:
         if self.hollow:
@@ -572,24 +405,3 @@ class Blade(Solid):
             out, fold, thick = reach * side, 0.25 * reach * up, self.thick / 2 * up
             rings.append(np.array([point + out + fold, point + thick, point - out + fold, point - thick]))
         return loft(rings)
-
-    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
-        points, normal, half = self._spine(5)
-        nearest: Array = np.array(np.inf)
-        for k in range(len(points) - 1):
-            centre, along = (points[k] + points[k + 1]) / 2, points[k + 1] - points[k]
-            reach, up = float(np.linalg.norm(along)) * 0.62, (normal[k] + normal[k + 1]) / 2
-            ahead = along / np.linalg.norm(along)
-            wide = max(float(half[k] + half[k + 1]) * 0.6, 0.003)
-            u = x - centre[0]
-            v = (y - centre[1]) * up[1] + (z - centre[2]) * up[2] - 0.12 * wide
-            w = (y - centre[1]) * ahead[1] + (z - centre[2]) * ahead[2]
-            tall = max(self.thick, 0.004)
-            q = np.sqrt((u / wide) ** 2 + (v / tall) ** 2 + (w / reach) ** 2 + 1e-12)
-            gu, gv, gw = u / wide**2 / q, v / tall**2 / q, w / reach**2 / q
-            found = (q - 1) / gradient_length(metric, gu, gv * up[1] + gw * ahead[1], gv * up[2] + gw * ahead[2])
-            nearest = np.minimum(nearest, found)
-        return nearest
-
-    def inradius(self, scale: Array) -> float:
-        return float(self.thick / 2 / np.max(scale))

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.furniture import mesh_of, sample_size
+from echomodel.furniture.distances import distance
 from echomodel.furniture.solids import Array, Solid
 from echomodel.furniture.style import GROUPS, HOT, STYLE
 from echomodel.graph import GraphBatch
@@ -55,7 +56,7 @@ def _surface_of(solid: Solid) -> Array:
 
 def _touches(points: Array, solid: Solid) -> bool:
     x, y, z = points.T
-    return bool((solid.distance(x, y, z, np.ones(3)) <= TOUCH).any())
+    return bool((distance(solid, x, y, z, np.ones(3)) <= TOUCH).any())
 
 
 SUITE = 4  # pieces of different classes in a suite
