@@ -15,8 +15,8 @@ from echomodel.rules import rule_set
 from echomodel.rules.placements import RULES as PLACES
 from echousd.checks import CheckReport, Collision, Fault, Misplacement
 from echousd.checks.report import LayoutReport
+from echousd.graph.difference import GraphDiff
 from echousd.graph.nodes import PlainModel
-from echousd.graph.scene import GraphDiff
 from echousd.home.assemble import Made
 from echousd.home.graph import HomeRelation, HomeRoom
 from echousd.home.importing.homes import Imported

@@ -8,10 +8,10 @@ from echousd.graph.consistency import GraphError
 from echousd.graph.fields import MAX_TEXT
 from echousd.graph.files import load_graph, save_graph
 from echousd.graph.nodes import Node, Placed, Relation, RoomSpec
-from echousd.graph.scene import GraphDiff, SceneGraph
+from echousd.graph.scene import SceneGraph
 
 starting_graph = Late("echousd.graph.starting:starting_graph")
 __all__ = [
-    "MAX_TEXT", "GraphDiff", "GraphError", "Node", "Placed", "Relation", "RoomSpec", "SceneGraph", "load_graph",
+    "MAX_TEXT", "GraphError", "Node", "Placed", "Relation", "RoomSpec", "SceneGraph", "load_graph",
     "save_graph", "starting_graph",
 ]  # fmt: skip

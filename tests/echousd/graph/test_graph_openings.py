@@ -8,9 +8,9 @@ import pytest
 
 from echomodel.openings import Opening
 from echousd.graph import GraphError, Node, RoomSpec, SceneGraph
+from echousd.graph.difference import sentence
 from echousd.graph.floors import check_doors
 from echousd.graph.openings import opening_from_words
-from echousd.graph.scene import sentence
 
 ROOM = RoomSpec("bedroom", size=(4.0, 3.0))
 TEXT = """
