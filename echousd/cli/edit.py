@@ -73,7 +73,7 @@ def edit(
 
 def edit_home(root: Path, wishes: EditRequest, output: Path | None, *, dry_run: bool, force: bool, json: bool) -> None:
     """Change how the rooms of a home lie to each other: its plan follows, and the rooms that it moves or opens."""
-    from echousd.cli.generate import generate_home
+    from echousd.cli.plan import generate_home
     from echousd.home.assemble import remembered
 
     home, options = remembered(root)

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from echousd.cli.options import Force, Made, Outside, Wait, add_room_command
-from echousd.cli.output import report, say, say_done, say_written, telling_faults
+from echousd.cli.output import report, telling_faults
 
 if TYPE_CHECKING:
-    from echousd.home.graph import HomeGraph
-    from echousd.options import RoomOptions
+    pass
 
 app = typer.Typer()
 
@@ -53,6 +51,8 @@ def generate(
 
     home = load_home(graph) if graph.is_file() and not (room or flat) else None
     if home is not None:
+        from echousd.cli.plan import generate_home
+
         generate_home(graph, home, output, options, outside or (), force=force, json=json)
         return
     with writing(output, flat=flat, force=force, wait=wait), telling_faults(), progress_bar() as listen:
@@ -71,61 +71,6 @@ def generate(
     spent |= {"other": total - sum(spent.values()), "total": total}
     more = {"timings": {stage: round(seconds, 3) for stage, seconds in spent.items()}}
     report([written], json=json, more=more)
-
-
-def generate_home(
-    graph: Path,
-    home: HomeGraph,
-    output: Path,
-    options: RoomOptions,
-    outside: Sequence[Path],
-    *,
-    force: bool,
-    json: bool,
-    dry_run: bool = False,
-) -> None:
-    """Plan a home, make its rooms side by side, and say what became of each; exit code 1 for faults.
-
-    Arguments:
-        graph: the file that it comes from; a home that was made is planned anew, from the plan that it has.
-        dry_run: say what would be made, and make nothing.
-    """
-    from echousd.cli.terminal import progress_bar
-    from echousd.folder.found import is_home
-    from echousd.home.assemble import digests_of, earlier, jobs_of, stale, write_rooms
-    from echousd.home.given import next_plan, plan_there
-
-    stated = None if is_home(graph) else plan_there(graph, home)
-    before = graph if is_home(graph) else earlier(output, options.seed)
-    plan = stated or next_plan(home, seed=options.seed, before=before)
-    if dry_run:
-        again = stale(digests_of(jobs_of(plan, output, options)), output)
-        say_done(json, [], [f"new      {name}" for name in again], {"new": again})
-        return
-    with progress_bar() as listen:
-        made = write_rooms(
-            plan, output, options, outside=[str(path) for path in outside], force=force,
-            tell=lambda done, total: listen("rooms", done, total),
-        )  # fmt: skip
-    faults = [f"{name}: {why}" for name, why in made.failed.items()]
-    lines = [f"home     {made.root}", f"plan     {len(plan.floors)} rooms, {plan.area:.1f} m²"]
-    for name, row in made.rooms.items():
-        if name in made.failed:
-            lines.append(f"failed   {name}: {made.failed[name]}")
-        elif row is None:
-            lines.append(f"kept     {name}")
-        else:
-            kept = f"{row['relations_kept']} of {row['relations_asked']} measured relations kept"
-            lines.append(f"room     {name}: {row['objects']} objects, {kept}")
-            faults += [] if row["check"] else [f"{name}: {'; '.join(row['check_errors']) or 'see echousd check'}"]
-    if json:
-        rows = {name: dict(row) if row else None for name, row in made.rooms.items()}
-        say_written([made.root], faults, {"rooms": rows})
-    else:
-        for line in [*lines, *(f"fault    {fault}" for fault in faults)]:
-            say(line)
-    if faults:
-        raise typer.Exit(1)
 
 
 add_room_command(app, generate, "echousd generate samples/bedroom.usda -o out/bedroom --seed 7")

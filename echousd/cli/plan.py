@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from echomodel.files import check_free
 from echousd.cli.options import Force, Written, group_of
-from echousd.cli.output import say_done
+from echousd.cli.output import say, say_done, say_written
+
+if TYPE_CHECKING:
+    from echousd.home.graph import HomeGraph
+    from echousd.options import RoomOptions
 
 EXAMPLES = """Examples:
 
@@ -131,3 +136,58 @@ def export(
     lines = [f"wrote {output}", *(f"plan     {len(one.floors)} rooms, {one.area:.1f} m²" for one in found)]
     areas = {name: round(float(area), 3) for name, area in found[0].areas.items()}
     say_done(json, [output], lines, {"areas": areas})
+
+
+def generate_home(
+    graph: Path,
+    home: HomeGraph,
+    output: Path,
+    options: RoomOptions,
+    outside: Sequence[Path],
+    *,
+    force: bool,
+    json: bool,
+    dry_run: bool = False,
+) -> None:
+    """Plan a home, make its rooms side by side, and say what became of each; exit code 1 for faults.
+
+    Arguments:
+        graph: the file that it comes from; a home that was made is planned anew, from the plan that it has.
+        dry_run: say what would be made, and make nothing.
+    """
+    from echousd.cli.terminal import progress_bar
+    from echousd.folder.found import is_home
+    from echousd.home.assemble import digests_of, earlier, jobs_of, stale, write_rooms
+    from echousd.home.given import next_plan, plan_there
+
+    stated = None if is_home(graph) else plan_there(graph, home)
+    before = graph if is_home(graph) else earlier(output, options.seed)
+    plan = stated or next_plan(home, seed=options.seed, before=before)
+    if dry_run:
+        again = stale(digests_of(jobs_of(plan, output, options)), output)
+        say_done(json, [], [f"new      {name}" for name in again], {"new": again})
+        return
+    with progress_bar() as listen:
+        made = write_rooms(
+            plan, output, options, outside=[str(path) for path in outside], force=force,
+            tell=lambda done, total: listen("rooms", done, total),
+        )  # fmt: skip
+    faults = [f"{name}: {why}" for name, why in made.failed.items()]
+    lines = [f"home     {made.root}", f"plan     {len(plan.floors)} rooms, {plan.area:.1f} m²"]
+    for name, row in made.rooms.items():
+        if name in made.failed:
+            lines.append(f"failed   {name}: {made.failed[name]}")
+        elif row is None:
+            lines.append(f"kept     {name}")
+        else:
+            kept = f"{row['relations_kept']} of {row['relations_asked']} measured relations kept"
+            lines.append(f"room     {name}: {row['objects']} objects, {kept}")
+            faults += [] if row["check"] else [f"{name}: {'; '.join(row['check_errors']) or 'see echousd check'}"]
+    if json:
+        rows = {name: dict(row) if row else None for name, row in made.rooms.items()}
+        say_written([made.root], faults, {"rooms": rows})
+    else:
+        for line in [*lines, *(f"fault    {fault}" for fault in faults)]:
+            say(line)
+    if faults:
+        raise typer.Exit(1)
