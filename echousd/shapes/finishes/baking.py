@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache, wraps
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 import PIL
@@ -16,30 +16,30 @@ from PIL import Image
 
 from echomodel.dressing.prints import PRINTS, TABLE
 from echomodel.files import cache_folder, digest
-from echousd.shapes.finishes import patterns
-from echousd.shapes.finishes.patterns import SIZE, Relief, noise
-from echousd.shapes.finishes.pictures import printed
+from echomodel.late import Late
 from echousd.shapes.finishes.slots import HERE, Color
 from echousd.srgb import from_linear
 
+if TYPE_CHECKING:
+    from echousd.shapes.finishes.patterns import Relief
+
 Bake = TypeVar("Bake", bound=Callable[..., "bytes | None"])
 
-PATTERNS: Mapping[str, Callable[[], Relief]] = {
-    made.__name__: made
-    for made in (
-        patterns.wood, patterns.veneer, patterns.planks, patterns.woven, patterns.knitted, patterns.linen,
-        patterns.leather, patterns.plaster, patterns.wicker, patterns.leaf, patterns.stone, patterns.papered,
-        patterns.carpet, patterns.tiles, patterns.brushed, patterns.bound,
-        patterns.herringbone, patterns.terrazzo, patterns.boarded, patterns.brick,
-    )
-}  # fmt: skip
+# What draws them is not loaded where the cache has every image.
+PROGRAMS = "echousd.shapes.finishes.patterns"
+noise, printed = Late(f"{PROGRAMS}:noise"), Late("echousd.shapes.finishes.pictures:printed")
+PATTERNS = (
+    "wood", "veneer", "planks", "woven", "knitted", "linen", "leather", "plaster", "wicker", "leaf", "stone", "papered",
+    "carpet", "tiles", "brushed", "bound", "herringbone", "terrazzo", "boarded", "brick",
+)  # fmt: skip
 QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
 
 
 @cache
 def relief(name: str) -> Relief:
-    """The pattern of that name; raises KeyError for unknown ones."""
-    return PATTERNS[name]()
+    """One of `PATTERNS`."""
+    made: Relief = Late(f"{PROGRAMS}:{name}")()
+    return made
 
 
 def kept(bake: Bake) -> Bake:
@@ -98,7 +98,7 @@ def normal_image(pattern: str, metres: float) -> bytes | None:
     height = None if pattern in PRINTS else relief(pattern).height
     if height is None:
         return None
-    step = 2 * max(metres, 0.4) / SIZE
+    step = 2 * max(metres, 0.4) / len(height)
     across = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) / step
     down = (np.roll(height, -1, 0) - np.roll(height, 1, 0)) / step
     normal = np.stack([-across, down, np.ones_like(across)], -1)
