@@ -20,11 +20,12 @@ import numpy as np
 import torch
 from PIL import Image, ImageDraw, ImageFont
 
+from echomodel.boxes2d import footprints
 from echomodel.data.roomset import load_rooms, with_known_words
 from echomodel.metrics.layouts import Task, tasks_of
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
 from echomodel.openings import segment
-from echomodel.roomboxes import RoomBoxes, footprints
+from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_rooms
 from echomodel.vocabulary import vocabulary
 from echousd.evaluation.systems import BASES

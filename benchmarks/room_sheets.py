@@ -23,8 +23,8 @@ import numpy as np
 import yaml
 from PIL import Image, ImageDraw, ImageFont
 
+from echomodel.boxes2d import footprints
 from echomodel.openings import segment, swing_area
-from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd import check, generate
 from echousd.draw.rendering import render_stage

@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
+from echomodel.boxes2d import footprints
 from echomodel.dressing import SMALL
 from echomodel.openings import SKIRTING, segment
-from echomodel.roomboxes import footprints
 from echomodel.triangles import along, area_normals, connected_pieces, distances, spread
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import HEIGHT

@@ -10,10 +10,9 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from echomodel.boxes2d import seen
+from echomodel.boxes2d import footprints, seen
 from echomodel.dressing import KINDS
 from echomodel.openings import Opening, free_area
-from echomodel.roomboxes import footprints
 from echomodel.vocabulary import Category, vocabulary
 from echousd.dressing.stories import TABLE, Story, story
 from echousd.shapes.geometry import Geometry

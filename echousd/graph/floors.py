@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from echomodel.boxes2d import footprints
 from echomodel.openings import signed_area, swing_area
-from echomodel.roomboxes import footprints
 from echomodel.sizes import footprint
 from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError

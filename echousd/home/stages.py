@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom
 
-from echomodel.roomboxes import footprints
+from echomodel.boxes2d import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError, Node, SceneGraph
 from echousd.graph.files import STAGE_FORMS

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from pxr import Gf
 
+from echomodel.boxes2d import footprints
 from echomodel.openings import inward_normal, segment
-from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.draw.sight import ASPECT, Furniture
 from echousd.draw.views import APERTURE, FOCAL_LENGTH, MARGIN, inside_view, perspective_views, shifted

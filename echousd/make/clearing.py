@@ -11,9 +11,9 @@ from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
 from echomodel.boxes import Boxes
+from echomodel.boxes2d import footprints
 from echomodel.objective.plan import plan_of
 from echomodel.objective.support import ON_CEILING
-from echomodel.roomboxes import footprints
 from echomodel.rules.geometry import Spread
 from echomodel.triangles import Mesh, connected_pieces
 from echousd.graph import Placed, Relation, SceneGraph

@@ -12,13 +12,13 @@ import numpy as np
 import shapely
 
 from echomodel.boxes import Boxes
+from echomodel.boxes2d import footprints
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.objective.physics import TOUCH
 from echomodel.openings import signed_area
 from echomodel.protocols import GraphEdit, RoomModel
-from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import floor_centre, graph_batch, one_thread, rounded_boxes, seeded

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from echomodel.boxes import Boxes
+from echomodel.boxes2d import footprints
 from echomodel.progress import StageListener
 from echomodel.protocols import RoomModel
-from echomodel.roomboxes import footprints
 from echousd.graph import SceneGraph, load_graph
 from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.consistency import faults_of

@@ -11,7 +11,7 @@ from statistics import NormalDist
 import numpy as np
 
 from echomodel.boxes2d import hull, seen
-from echomodel.rooms.statistics import USUAL_GAPS, back_gaps, quantile
+from echomodel.sizes import USUAL_GAPS, back_gaps, quantile
 from echomodel.vocabulary import vocabulary
 
 BEHIND = (0.0, 0.08)  # metres between a back and its wall: more is seen as away from it, none runs into it

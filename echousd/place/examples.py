@@ -20,8 +20,8 @@ import numpy as np
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.data.roomset import RoomSet, kept_out, pack_rooms
-from echomodel.files import claim, write_text
+from echomodel.data.roomset import RoomSet, claim, kept_out, pack_rooms
+from echomodel.files import write_text
 from echomodel.graph import GraphBatch
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
 from echomodel.rooms.generator import generate_rooms

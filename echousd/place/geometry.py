@@ -12,9 +12,8 @@ import numpy as np
 
 from echomodel import boxes2d
 from echomodel.arrays import norm
-from echomodel.boxes2d import seen
+from echomodel.boxes2d import footprints, seen
 from echomodel.floors import signed_distance
-from echomodel.roomboxes import footprints
 
 COLUMNS = 6  # numbers of a box: its position x, y, z and its sides
 PLAN, SIDES = slice(0, 3, 2), slice(3, 6, 2)  # columns of x and z and of width and depth

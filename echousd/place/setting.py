@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echomodel.boxes2d import seen
+from echomodel.boxes2d import footprints, seen
 from echomodel.objective import Plan, plan_of
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, carriers
 from echomodel.openings import Opening
-from echomodel.roomboxes import footprints
 from echomodel.vocabulary import Category, vocabulary
 from echousd.place.distances import BEHIND, kept_behind
 from echousd.place.geometry import Floor, axes, floor_from_polygon, pair_indices

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade
 
-from echomodel.boxes2d import seen
-from echomodel.roomboxes import footprints
+from echomodel.boxes2d import footprints, seen
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError, Node, RoomSpec, SceneGraph
 from echousd.graph.nodes import OBSTACLE

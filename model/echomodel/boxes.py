@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from echomodel.arrays import Array, at_least, beside, cast, clipped, kit, on_device
-from echomodel.roomboxes import RoomBoxes
+
+if TYPE_CHECKING:
+    from echomodel.roomboxes import RoomBoxes
 
 FEWEST = 50  # boxes that the statistics of a class need
 NARROWEST = 0.02  # log metres: sizes that hardly vary would turn noise into huge numbers

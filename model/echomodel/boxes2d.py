@@ -36,6 +36,11 @@ def outline(half: Array, yaw: Array, places: Array = CORNERS) -> Array:
     return turned(half[..., None, :] * cast(places, half), yaw[..., None])
 
 
+def footprints(size: Array, position: Array, yaw: Array) -> Array:
+    """(n, 4, 2): x and z of the corners of boxes in plan, in order around each; size, position (n, 3), metres."""
+    return outline(size[:, ::2] / 2, yaw) + position[:, None, ::2]
+
+
 def hull(half: Array, yaw: Array) -> Array:
     """(..., 2) half extents along x and z of what has half extents (..., 2) in its own frame."""
     xp = kit(half)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from echomodel.arrays import Array, cast, full, kit, on_device
 from echomodel.floors import area
 from echomodel.openings import Opening
-from echomodel.roomboxes import RoomBoxes
 from echomodel.surroundings import ROW, centred, extents, opening_rows, padded, trimmed
 from echomodel.vocabulary import vocabulary
+
+if TYPE_CHECKING:
+    from echomodel.roomboxes import RoomBoxes
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ import numpy as np
 
 from echomodel.boxes2d import CORNERS
 from echomodel.openings import Opening
-from echomodel.rooms.statistics import quantile, room_type_statistics
-from echomodel.sizes import filled_area, footprint, pieces
+from echomodel.rooms.statistics import room_type_statistics
+from echomodel.sizes import filled_area, footprint, pieces, quantile
 from echomodel.vocabulary import Category, vocabulary
 
 FULL = 0.55  # of the floor at most in what is proposed: beyond it nobody can walk

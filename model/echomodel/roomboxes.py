@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from echomodel.boxes2d import outline
 from echomodel.files import write_text
 from echomodel.openings import Opening, opening_from_json
 
@@ -126,12 +125,3 @@ def write_rooms(path: str | os.PathLike[str], rooms: Iterable[RoomBoxes]) -> Non
     lines = ",\n".join(json.dumps(room.to_json(), separators=(",", ":")) for room in rooms)
     text = f'{{"convention": {json.dumps(CONVENTION)}, "rooms": [\n{lines}\n]}}\n'
     write_text(Path(path), text)
-
-
-def footprints(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """(n, 4, 2) float: x and z of the corners of boxes in plan, in order around each.
-
-    Arguments:
-        size, position: (n, 3) float, metres, as in `RoomBoxes`. yaw: (n,) float, radians.
-    """
-    return np.asarray(outline(size[:, [0, 2]] / 2, yaw) + position[:, None, [0, 2]])

@@ -12,6 +12,9 @@ import numpy as np
 
 from echomodel.vocabulary import Category, vocabulary
 
+AT_WALL = 0.2  # metres: a class with a larger median gap does not belong at a wall
+USUAL_GAPS = (0.0, 0.03, 0.06)  # metres between a back and its wall: quartiles of classes without figures
+_KNOTS = {5: (-1.645, -0.674, 0.0, 0.674, 1.645), 3: (-1.645, 0.0, 1.645)}
 Z95 = 1.6449  # standard score of the 95th percentile
 TUCKED = 0.5  # share of a seat's footprint that counts: the rest is below its table
 REACH = 0.5  # metres that a piece fills around it
@@ -120,3 +123,21 @@ def _correlation(xy: float, xz: float, yz: float) -> np.ndarray:
     matrix = vectors @ np.diag(np.maximum(values, 1e-3)) @ vectors.T
     scale = np.sqrt(np.diag(matrix))
     return matrix / np.outer(scale, scale)
+
+
+@cache
+def back_gaps(category: str) -> tuple[float, float, float]:
+    """Quartiles of the gap between the backs of a category at a wall and that wall, metres."""
+    low, middle, high = room_statistics()["walls"].get(category, {}).get("back_gap", USUAL_GAPS)
+    return (low, middle, high) if middle < AT_WALL else USUAL_GAPS
+
+
+def quantile(percentiles: tuple[float, ...], z: float) -> float:
+    """The value at the standard score `z` of a distribution given by 3 or 5 percentiles, linear between them."""
+    knots = _KNOTS[len(percentiles)]
+    z = min(max(z, -2.1), 2.1)
+    if z <= knots[0] or z >= knots[-1]:
+        at = 0 if z <= knots[0] else len(knots) - 2
+        slope = (percentiles[at + 1] - percentiles[at]) / (knots[at + 1] - knots[at])
+        return percentiles[at] + slope * (z - knots[at])
+    return float(np.interp(z, knots, percentiles))

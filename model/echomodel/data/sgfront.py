@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from echomodel.boxes2d import footprints
 from echomodel.files import read_json, write_text
-from echomodel.roomboxes import RoomBoxes, footprints
+from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
 

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 import zstandard
 
-from echomodel.data.roomset import kept_out
-from echomodel.files import claim, read_note, whole_file, write_json
+from echomodel.data.roomset import claim, kept_out, read_note
+from echomodel.files import whole_file, write_json
 from echomodel.furniture import Choices, Style, sample_size, solids
 from echomodel.furniture.solids import Solid
 from echomodel.progress import StepListener

@@ -10,10 +10,11 @@ import numpy as np
 import trimesh
 from PIL import Image
 
+from echomodel.boxes2d import footprints
 from echomodel.files import whole_file
 from echomodel.furniture.assembly import MATERIALS
 from echomodel.openings import segment, swing_area
-from echomodel.roomboxes import RoomBoxes, footprints
+from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import vocabulary
 
 PALETTE = {

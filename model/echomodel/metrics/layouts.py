@@ -13,11 +13,12 @@ import shapely
 import torch
 
 from echomodel.boxes import Boxes
+from echomodel.boxes2d import footprints
 from echomodel.graph import GraphBatch
 from echomodel.metrics.statistics import Pair
 from echomodel.objective import BY_EYE, KINDS, REACHED, TERMS, faults_of, plan_of, unreached, walk
 from echomodel.openings import segment, zone
-from echomodel.roomboxes import RoomBoxes, footprints
+from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms, verdicts
 from echomodel.rules.telling import told_of_room
 from echomodel.vocabulary import vocabulary

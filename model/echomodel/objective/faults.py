@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from echomodel.arrays import Array, full, held, rows
+from echomodel.boxes2d import footprints
 from echomodel.objective.plan import CLEAR_HEIGHT, Plan, plan_of
 from echomodel.objective.table import PRICE, TERMS
 from echomodel.openings import Opening, inward_normal, segment
-from echomodel.roomboxes import footprints
 from echomodel.rules.geometry import BoxesLike, Spread
 
 ROBOT, SLACK = 0.2, 0.025  # metres, its radius, and how much narrower a way it squeezes through

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,11 +14,13 @@ from echomodel.arrays import Array, at_least, cast, dot, full, held, kit, least_
 from echomodel.floors import edges, known, signed_area, signed_distance
 from echomodel.objective.support import carriers, shared_fraction
 from echomodel.openings import Opening
-from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.geometry import BoxesLike, PairGeometry, pairs
 from echomodel.rules.placements import Stated
 from echomodel.rules.sets import rule_set
 from echomodel.vocabulary import Category, vocabulary
+
+if TYPE_CHECKING:
+    from echomodel.roomboxes import RoomBoxes
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ import numpy as np
 from echomodel.furniture.style import sample_size
 from echomodel.objective.access import INTO_BED, OF_CHAIRS, OF_LAMPS
 from echomodel.rooms.floor import Floor, Wall
-from echomodel.rooms.statistics import QUARTILE, back_gaps, room_requests
-from echomodel.sizes import size_statistics
+from echomodel.rooms.statistics import QUARTILE, room_requests
+from echomodel.sizes import back_gaps, size_statistics
 from echomodel.vocabulary import vocabulary
 
 HALF_PI = math.pi / 2

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, numbered, overlap
-from echomodel.rooms.statistics import RoomTypeStatistics, quantile
+from echomodel.rooms.statistics import RoomTypeStatistics
+from echomodel.sizes import quantile
 
 Rectangle = tuple[float, float, float, float]  # x0, z0, x1, z1
 SHARED_JAMB = 0.1  # metres of wall between two openings

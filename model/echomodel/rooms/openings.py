@@ -7,8 +7,8 @@ from itertools import product
 
 import numpy as np
 
+from echomodel.boxes2d import footprints
 from echomodel.openings import SWINGS, USUAL, Opening, edge_lengths, free_area, inward_normal, numbered, signed_area
-from echomodel.roomboxes import footprints
 
 GRID = 0.1  # metres between the places that are tried for an opening
 CORNER = 0.1  # metres from a corner to a door

@@ -14,8 +14,8 @@ from itertools import combinations, pairwise, product
 
 import numpy as np
 
+from echomodel.boxes2d import footprints
 from echomodel.openings import Opening, free_area, signed_area
-from echomodel.roomboxes import footprints
 from echomodel.rooms.floor import Wall, walls_of
 from echomodel.sizes import AISLE, LANDING, TALL, TRIANGLE, usual_range
 from echomodel.vocabulary import Category

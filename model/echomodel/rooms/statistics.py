@@ -14,10 +14,7 @@ from echomodel.rows import RoomType
 from echomodel.sizes import room_statistics
 from echomodel.vocabulary import vocabulary
 
-AT_WALL = 0.2  # metres: a class with a larger median gap does not belong at a wall
 QUARTILE = 0.674  # standard score of the third quartile
-USUAL_GAPS = (0.0, 0.03, 0.06)  # metres between a back and its wall: quartiles of classes without figures
-_KNOTS = {5: (-1.645, -0.674, 0.0, 0.674, 1.645), 3: (-1.645, 0.0, 1.645)}
 
 
 @dataclass(frozen=True)
@@ -82,27 +79,9 @@ def _planned(row: RoomType, like: RoomTypeStatistics) -> RoomTypeStatistics:
 
 
 @cache
-def back_gaps(category: str) -> tuple[float, float, float]:
-    """Quartiles of the gap between the backs of a category at a wall and that wall, metres."""
-    low, middle, high = room_statistics()["walls"].get(category, {}).get("back_gap", USUAL_GAPS)
-    return (low, middle, high) if middle < AT_WALL else USUAL_GAPS
-
-
-@cache
 def room_requests() -> dict[str, dict]:
     """What to ask for so that rooms come out like real ones (see `benchmarks/room_requests.py`).
 
     `presence`: room type -> category -> share of rooms; `size`: category -> shift of x, y, z in standard deviations.
     """
     return json.loads(resources.files("echomodel.data").joinpath("room_requests.json").read_text("utf-8"))
-
-
-def quantile(percentiles: tuple[float, ...], z: float) -> float:
-    """The value at the standard score `z` of a distribution given by 3 or 5 percentiles, linear between them."""
-    knots = _KNOTS[len(percentiles)]
-    z = min(max(z, -2.1), 2.1)
-    if z <= knots[0] or z >= knots[-1]:
-        at = 0 if z <= knots[0] else len(knots) - 2
-        slope = (percentiles[at + 1] - percentiles[at]) / (knots[at + 1] - knots[at])
-        return percentiles[at] + slope * (z - knots[at])
-    return float(np.interp(z, knots, percentiles))

@@ -5,19 +5,23 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
-MOST = 30_000  # lines of modules
+MOST = 28_700  # lines of modules
 CODE = """
 import sys
 from echousd.cli.main import run
 assert run(["generate", "samples/bedroom.usda", "-o", sys.argv[1], "--quiet"]) == 0
 ours = [m for n, m in sys.modules.items() if n.partition(".")[0] in ("echousd", "echomodel", "echoscene")]
 lines = {m.__name__: len(open(m.__file__, encoding="utf-8").readlines()) for m in ours if m.__file__}
+for drawn in ("patterns", "pictures"):  # what the first room of a machine draws once
+    lines.pop(f"echousd.shapes.finishes.{drawn}", None)
 unused = ("echousd.checks", "echousd.texturing", "echousd.batches", "echousd.exporting", "echousd.settle",
           "echousd.assets.choose", "echousd.assets.record", "echousd.graph.text", "echousd.store",
           "echousd.folder.history", "echousd.graph.starting", "echousd.stage.contents", "echomodel.training",
           "echomodel.metrics", "echomodel.compact.shape", "echomodel.tsdf", "echomodel.furniture.kitchens",
           "echomodel.furniture.kids_beds", "echomodel.rooms.runs", "echomodel.plans",
-          "echomodel.rooms.generator", "echoscene", "torch", "trimesh", "networkx", "sklearn", "scipy")
+          "echomodel.rooms.generator", "echomodel.rooms.statistics", "echomodel.roomboxes",
+          "echomodel.furniture.distances", "echousd.graph.difference", "echousd.cli.plan",
+          "echoscene", "torch", "trimesh", "networkx", "sklearn", "scipy")
 print(sum(lines.values()), [name for name in unused if name in sys.modules])
 """
 CHECK = """
