@@ -32,7 +32,7 @@ from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echoscene.config import shape_unet
 from echoscene.denoisers import ShapeUNet
-from echoscene.packed import pack_linear_maps
+from echoscene.unet import pack_linear_maps
 
 Run = Callable[[], Tensor]
 LAST = torch.channels_last_3d

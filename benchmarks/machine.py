@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import torch
 
-from echoscene.packed import PackedLayer
+from echoscene.unet import PackedLayer
 
 CLOCKS = {"wall": time.perf_counter, "cpu": time.process_time}
 clock = "wall"  # "cpu" with one thread counts this process alone, whatever else runs on the machine
