@@ -32,6 +32,7 @@ HANDLES = 0.05  # metres at the front of a box that handles and doors take, on w
 ROUNDED = 0.02  # metres at its back, where a top with rounded corners may end before its box
 NEIGHBOURS = 2.0  # metres by which neighbours at one wall rather part along it than one in front of the other
 LONGEST_STEP = 0.6  # of any number in one round, metres or ratio
+SLACK = 0.004  # metres or ratio by which what is told is to hold, so that rounding does not break it
 NEARBY = 1e-6  # metres to either side at which slopes are measured
 
 Matrix: TypeAlias = Any  # (r, m) float, an array of numpy or a sparse one
@@ -83,9 +84,8 @@ class Rows:
 class Constraints:
     """The constraints of a room whose boxes keep their headings."""
 
-    def __init__(self, start: Setting, slack: float) -> None:
-        """`slack`: metres or ratio by which what is told is to hold, so that rounding does not break it."""
-        self.setting, self.yaw, self.slack = start, start.yaw, slack
+    def __init__(self, start: Setting) -> None:
+        self.setting, self.yaw = start, start.yaw
         self.axis = axes(start.yaw)
         self.parting = parting(self.axis, start.pairs)
         self.handicap, self.barred = self._handicap(start), self._barred()
@@ -142,7 +142,7 @@ class Constraints:
 
         if len(triplets):
             margin, by = _with_slopes(relations, state[ends])
-            found.append(Rows(RELATION, ends, margin - self.slack, by))
+            found.append(Rows(RELATION, ends, margin - SLACK, by))
         for stated in setting.stated:
             who = [stated.subject, *stated.others]
 
@@ -154,7 +154,7 @@ class Constraints:
             if stated.others or setting.surroundings is not None:
                 margin, by = _with_slopes(placement, state[[who]])
                 by[..., 3:] = 0.0
-                found.append(Rows(PLACEMENT, np.array([who]), margin - self.slack, by))
+                found.append(Rows(PLACEMENT, np.array([who]), margin - SLACK, by))
         return found
 
     def _apart(self, state: np.ndarray, handicap: np.ndarray) -> tuple[Rows, np.ndarray]:

@@ -206,9 +206,9 @@ def place_boxes(
                 at, chosen = less, other
         hung = hung_lamps(at.categories, at.size, chosen.state.position, chosen.state.yaw, free)
         at = posed(hung, chosen.state.position, chosen.state.yaw, kept)
-    found = solve(at, config)
+    found = solve(at)
     if at is not drawn and unmet(found.at):  # what the graph states comes before all habits
-        plain = solve(drawn, config)
+        plain = solve(drawn)
         if unmet(plain.at) < unmet(found.at):
             found, at, held = plain, drawn, fixed
     turn = at.yaw

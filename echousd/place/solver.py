@@ -39,31 +39,22 @@ class PlaceConfig:
     """How far and how hard boxes are pushed.
 
     Arguments:
-        move: metres that cost as much as `stretch`.
-        stretch: change of the logarithm of a size that costs as much as `move`.
-        limit: largest change of the logarithm of a size.
-        slack: metres or ratio by which relations are to hold.
         arrange: first choose for every piece among the places that a person would try; False = only by millimetres.
         anew: times that a search that still misses something takes pieces out and puts them in again.
-        rounds: most linearisations in one attempt; patience: how many of them without progress end it.
-        budget: most linearisations in all attempts together: what a room may cost, the same on every machine.
         yields: names of terms that the search sees, but for which it does not begin anew: doors that may be moved.
         without: names of terms of the objective that the search does not see, so that others can judge by them.
     """
 
-    move: float = 0.3
-    stretch: float = 0.12
-    limit: float = 0.4
-    slack: float = 0.004
-    rounds: int = 16
     arrange: bool = True
     anew: int = 2
-    patience: int = 6
-    budget: int = 26
     yields: frozenset[str] = frozenset()
     without: frozenset[str] = frozenset()
 
 
+MOVE, STRETCH = 0.3, 0.12  # metres, and change of the logarithm of a size, that cost as much
+LIMIT = 0.4  # largest change of the logarithm of a size
+ROUNDS, PATIENCE = 16, 6  # most linearisations in one attempt, and how many of them without progress end it
+BUDGET = 26  # most linearisations in all attempts together: what a room may cost, the same on every machine
 # Stiffness of each kind of constraint; walls and ceilings give way to relations and collisions.
 STIFFNESS = np.full(len(KINDS), 1e5)
 STIFFNESS[[OVERHANG, CEILING, WALL]] = 1e4, 1e3, 3e2
@@ -91,16 +82,15 @@ class Solution:
     rounds: int
 
 
-def solve(start: Setting, config: PlaceConfig) -> Solution:
+def solve(start: Setting) -> Solution:
     """Move and size boxes until the constraints hold; the best attempt where they cannot all hold."""
-    constraints = Constraints(start, config.slack)
+    constraints = Constraints(start)
     handicap = constraints.handicap.copy()
     best: Solution | None = None
     through = 0
     spent = 0
-    while best is None or spent < config.budget:
-        left = replace(config, rounds=min(config.rounds, max(config.budget - spent - 1, 1)))
-        found = _descend(start, constraints, handicap, through, left)
+    while best is None or spent < BUDGET:
+        found = _descend(start, constraints, handicap, through, min(ROUNDS, max(BUDGET - spent - 1, 1)))
         spent += found.rounds
         if best is None or found.score < best.score:
             best = found
@@ -116,18 +106,16 @@ def solve(start: Setting, config: PlaceConfig) -> Solution:
     return best
 
 
-def _descend(
-    start: Setting, constraints: Constraints, handicap: np.ndarray, through: int, config: PlaceConfig
-) -> Solution:
+def _descend(start: Setting, constraints: Constraints, handicap: np.ndarray, through: int, rounds: int) -> Solution:
     n = len(start.size)
     free = np.stack([~start.fixed] * 3 + [~start.rigid] * 3, 1).ravel()
-    weight = np.tile([config.move**-2] * 3 + [config.stretch**-2] * 3, n)[free]
+    weight = np.tile([MOVE**-2] * 3 + [STRETCH**-2] * 3, n)[free]
     origin = np.concatenate((start.position, np.log(start.size)), 1)
-    limit = np.tile([np.inf] * 3 + [config.limit] * 3, n)[free]
+    limit = np.tile([np.inf] * 3 + [LIMIT] * 3, n)[free]
     state = origin.copy()
     best: Solution | None = None
     before, last = np.inf, 0
-    for number in range(config.rounds + 1):
+    for number in range(rounds + 1):
         now_size, now_position = np.exp(state[:, 3:]), state[:, :3].copy()
         at = constraints.at(now_size, now_position, handicap)
         hard = violation(at)
@@ -137,7 +125,7 @@ def _descend(
             best, last = Solution(now_size, now_position, at, score, number), number
         steady = number > 0 and hard < 1e-9 and (soft < 0.01 or abs(soft - before) < 0.005)
         before = soft
-        if number == config.rounds or steady or number - max(last, through) > config.patience:
+        if number == rounds or steady or number - max(last, through) > PATIENCE:
             break
         # Late rounds are damped: two constraints that take turns would otherwise swing for ever.
         damping = 1.0 if number < 6 + through else 4.0 * (number - through - 5)
@@ -149,7 +137,7 @@ def _descend(
         full = np.zeros(n * COLUMNS)
         full[free] = step
         state = state + np.clip(full.reshape(n, COLUMNS), -LARGEST_STEP, LARGEST_STEP)
-        state[:, 3:] = np.clip(state[:, 3:], origin[:, 3:] - config.limit, origin[:, 3:] + config.limit)
+        state[:, 3:] = np.clip(state[:, 3:], origin[:, 3:] - LIMIT, origin[:, 3:] + LIMIT)
     assert best is not None
     return replace(best, rounds=number + 1)
 
