@@ -93,6 +93,7 @@ CLOSE, EVEN = 2, 0.4  # from which ring on it matters how bright neighbours are,
 ALIKE, FLAT = 0.97, 0.02  # cosine and metres within which two points lie on one flat piece of surface
 KEPT, NOTHING = ("primID", "u", "v", "tfar"), np.float32(-9)  # of a hit; the material of what is not there
 NEXT, NEAR, FAR = 2.5, 1.2, 0.6  # metres from a passage to the wall beyond, and what light there is on the way to it
+BEFORE = np.float32(2e-3)  # metres before a surface, from where on it is no more in the way of its own light
 MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
 
 
@@ -157,7 +158,7 @@ def _met(
         mirror = np.flatnonzero((part.face >= 0) & (world.scenery.gloss[part.face] > MIRROR))
         if len(mirror):  # who looks into a mirror sees what is before it
             way = direction[mirror] - 2 * _dot(direction[mirror], part.normal[mirror])[:, None] * part.normal[mirror]
-            origin = part.point[mirror] + np.float32(2e-3) * part.normal[mirror]
+            origin = part.point[mirror] + BEFORE * part.normal[mirror]
             before = _seen(world, origin, way, world.scene.run(_f32(origin), _f32(way), output=1))
             for own, other in zip(part, before, strict=True):
                 own[mirror] = other
@@ -213,12 +214,17 @@ def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndar
         point, normal = seen.point[rows], seen.normal[rows]
         toward = np.broadcast_to(view.matrix[:3, 2], point.shape) if view.orthographic else view.matrix[:3, 3] - point
         gloss = world.scenery.gloss[seen.face[rows]]
-        hits = Hits(point + np.float32(2e-3) * normal, normal, _unit(toward.astype(np.float32)), gloss)
-        across, down = pixel[rows, None] % world.size, pixel[rows, None] // world.size
-        shift = ((across * LATTICE[0] + down * LATTICE[1] + world.shift) % 1.0).astype(np.float32)
+        hits = Hits(point + BEFORE * normal, normal, _unit(toward.astype(np.float32)), gloss)
+        shift = _shifts(world, pixel[rows])
         for sample in range(samples):
             out[rows] += _light(world, hits, sample, shift)
     return out / samples
+
+
+def _shifts(world: World, pixel: np.ndarray) -> np.ndarray:
+    """(n, 4) float32 what samples in some pixels are moved by."""
+    across, down = pixel[:, None] % world.size, pixel[:, None] // world.size
+    return ((across * LATTICE[0] + down * LATTICE[1] + world.shift) % 1.0).astype(np.float32)
 
 
 def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: int) -> np.ndarray:
@@ -233,18 +239,24 @@ def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: in
     found, light = np.zeros((*asked.shape, 6), np.float32), np.zeros((*shape, 6), np.float32)
     for here, times in ((asked & torn, often), (asked & ~torn, seldom)):
         found[here] = _asked(world, seen.of(number[here]), number[here], times)
-    for layers, rings in ((slice(3), RINGS), (slice(3, 5), RINGS[:3]), (slice(5, 6), RINGS[:1])):
+    for layers, rings in ((slice(3), RINGS), (slice(3, 5), RINGS[:3])):
         found[..., layers] = smooth_light(found[..., layers], normal[coarse], point[coarse], rings)
+    lit = smooth_light((found[..., 5:] > 0).astype(np.float32), normal[coarse], point[coarse], RINGS[:2])
+    mixed = ((lit > 0.01) & (lit < 0.99))[..., 0].repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
     weight = np.zeros((*shape, 1), np.float32)
     for steps in product((0, 1), repeat=2):  # of up to four that were asked around it, those of its own surface
         beside = np.ix_(*(np.arange(s, n + s).clip(0, n - 1) // 2 for n, s in zip(shape, steps, strict=True)))
-        fits = asked[beside] & _same(normal, point, normal[coarse][beside], point[coarse][beside])
-        light += fits[..., None] * found[beside]
-        weight += fits[..., None]
+        fits = (asked[beside] & _same(normal, point, normal[coarse][beside], point[coarse][beside]))[..., None]
+        light += fits * found[beside]
+        weight += fits
     light /= np.maximum(weight, 1)
     rest = np.flatnonzero(met & (weight[..., 0] == 0))
     found = _shared(seen.of(rest), rest, _asked(world, seen.of(rest), rest, often // 2), world.size)
     light.reshape(-1, 6)[rest] = found
+    border = np.flatnonzero(met & mixed & world.view.inside)  # of the sun's light: sharper than two pixels
+    there, facing, shift = seen.point[border], seen.normal[border], _shifts(world, border)[:, :2]
+    suns = [_sunny(world, there + BEFORE * facing, facing, _even(n, shift)) for n in range(often // 2)]
+    light.reshape(-1, 6)[border, 5] = np.mean(suns, 0)
     return smooth_light(light, normal, point, RINGS[:1]).reshape(-1, 6)
 
 
@@ -454,8 +466,7 @@ def _direct(world: World, hits: Hits, spot: np.ndarray, turn: np.ndarray) -> tup
     """
     scene, scenery = world.scene, world.scenery
     lights, point, normal, count = scenery.lights, hits.point, hits.normal, len(hits.point)
-    light, sun = np.zeros((count, 3), np.float32), np.zeros(count, np.float32)
-    inside = world.view.inside
+    light, inside = np.zeros((count, 3), np.float32), world.view.inside
     if inside and len(scenery.panes):  # one place in one window for each ray
         pane = scenery.panes[np.minimum((turn[:, 0] * len(scenery.panes)).astype(int), len(scenery.panes) - 1)]
         place = pane[:, 0] + (2 * spot[:, :1] - 1) * pane[:, 1] + (2 * spot[:, 1:] - 1) * pane[:, 2]
@@ -465,11 +476,6 @@ def _direct(world: World, hits: Hits, spot: np.ndarray, turn: np.ndarray) -> tup
         seen *= np.clip(0.65 + 1.4 * way[:, 1], 0.3, 1)  # sky above, ground below
         share = _free(scene, point, way, away, seen > 1e-4) * seen
         light += share[:, None] * (len(scenery.panes) * SKY * lights.sky / np.pi) * SKY_LIGHT * lights.tint
-    if not inside or (lights.sun is not None and len(scenery.panes)):
-        towards, soft = (ABOVE, SUN_SPREAD) if lights.sun is None or not inside else (lights.sun[0], np.float32(0.008))
-        towards = _unit(towards + soft * _on_sphere(spot))
-        facing = np.clip(_dot(normal, towards), 0, None)
-        sun = _free(scene, point, towards, np.full(count, 1e3, np.float32), facing > 0) * facing
     if inside and len(lights.bulbs):  # one lamp for each ray
         which = np.minimum((turn[:, 1] * len(lights.bulbs)).astype(int), len(lights.bulbs) - 1)
         way, away = _way(point, lights.bulbs[which, (spot[:, 0] * lights.bulbs.shape[1]).astype(int)])
@@ -477,7 +483,18 @@ def _direct(world: World, hits: Hits, spot: np.ndarray, turn: np.ndarray) -> tup
         own = np.maximum(OWN, np.ptp(lights.bulbs, axis=1).max(-1))[which]  # what is so near is its shade
         lit = _free(scene, point, way, away - own, facing > 0) * facing
         light += lit[:, None] * lights.power[which] / np.float32(np.pi)
-    return light, sun
+    return light, _sunny(world, point, normal, spot)
+
+
+def _sunny(world: World, point: np.ndarray, normal: np.ndarray, spot: np.ndarray) -> np.ndarray:
+    """(n,) float32 share of the sun that shines on points from a place of its disc, `spot` (n, 2) in [0, 1)."""
+    sun, inside = world.scenery.lights.sun, world.view.inside
+    if inside and (sun is None or not len(world.scenery.panes)):
+        return np.zeros(len(point), np.float32)
+    towards, soft = (sun[0], np.float32(0.008)) if inside and sun is not None else (ABOVE, SUN_SPREAD)
+    towards = _unit(towards + soft * _on_sphere(spot))
+    facing = np.clip(_dot(normal, towards), 0, None)
+    return _free(world.scene, point, towards, np.full(len(point), 1e3, np.float32), facing > 0) * facing
 
 
 def _gathered(world: World, hits: Hits, square: np.ndarray) -> np.ndarray:
@@ -509,7 +526,7 @@ def _lit(world: World) -> World:
         there = np.flatnonzero(hit["primID"] >= 0)
         origin, way, face, far = origin[there], way[there], hit["primID"][there], hit["tfar"][there]
         normal = -np.sign(_dot(normals[face], way))[:, None] * normals[face]
-        point = origin + far[:, None] * way + np.float32(2e-3) * normal
+        point = origin + far[:, None] * way + BEFORE * normal
         met.append((point, normal, world.thrown.rows(origin, way, far, normal), world.scenery.flat_colors[face]))
         if not len(there):
             return world  # with nothing in the picture

@@ -271,6 +271,23 @@ def test_a_glossy_floor_mirrors_the_window_and_more_so_aslant():
     assert mirrored > near + 0.04  # there one looks down on it
 
 
+def test_a_patch_of_sun_has_a_straight_border():
+    """The border of a board's shadow, slightly aslant, in the picture's rows: soft by its sun's width alone."""
+    pane = np.array([[(1.99, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.8, 0.0)]], np.float32)
+    scenery, down = box_room(sky=0.1, sun=np.array([(0.1, 0.99, 0.1), (1.0, 1.0, 1.0)], np.float32))
+    above = (scenery.triangles[..., 1] > 2.9).all(1)
+    names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "st", "texture", "wall")
+    scenery = replace(scenery, panes=pane, **{name: getattr(scenery, name)[~above] for name in names})
+    turn = np.array([[np.cos(0.2), 0, np.sin(0.2)], [0, 1, 0], [-np.sin(0.2), 0, np.cos(0.2)]])
+    picture = trace(
+        with_sheet(scenery, (level_sheet(3.0, 3.0, y=2.7) + np.array([1.5, 0, 0])) @ turn), down, 96, rays=2
+    ).mean(-1)
+    lines = picture if abs(down.matrix[0, 0]) > 0.5 else picture.T
+    lit = ((lines - lines.min()) / np.ptp(lines)).sum(1)[24:72]  # where in each line light ends, in pixels
+    rows = np.arange(len(lit))
+    assert np.abs(lit - np.polyval(np.polyfit(rows, lit, 1), rows)).max() < 0.5
+
+
 def test_what_is_white_darkens_less_where_it_touches():
     scenery, down = box_room(sky=0.0, **LAMP)
     corners = np.array([(-0.8, 0.0, 0.6), (0.8, 0.0, 0.6), (0.8, 0.4, 0.6), (-0.8, 0.4, 0.6)])
