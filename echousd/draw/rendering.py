@@ -141,11 +141,8 @@ def _seen(stage: Usd.Stage, scenery: Scenery, view: str, size: int, rays: int, *
 
 
 def _cameras(stage: Usd.Stage) -> dict[str, View]:
-    found = stage_views(stage)
-    if not found:
-        raise ValueError(
-            f"{stage.GetRootLayer().identifier}: no camera, which --cameras and the view every-camera need"
-        )
+    if not (found := stage_views(stage)):
+        raise ValueError(f"{stage.GetRootLayer().identifier}: no camera, which --cameras and view every-camera need")
     return found
 
 

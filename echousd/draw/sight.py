@@ -10,13 +10,11 @@ from echomodel.boxes2d import seen
 
 CUT = 3.0  # how much more what is cut off by a picture's border disturbs
 ASPECT = 1.6  # of a picture from inside: its width over its height
-# rays through such a picture whose half width at distance 1 is 1 and past its border, which are in it, and what each of
-# these counts
-SPREAD = np.arange(-8, 9) / 6
-RAYS = np.stack([*(g.ravel() for g in np.meshgrid(SPREAD, SPREAD / ASPECT)), np.full(289, -1.0)], 1)
-WITHIN = np.abs(RAYS[:, :2] * (1, ASPECT)).max(1) < 1.01
-AHEAD = WITHIN & (RAYS[:, 1] == 0)
-WEIGHTS = np.where(np.abs(RAYS[WITHIN, :2] * (1, ASPECT)).max(1) > 0.8, CUT, 1.0)
+# rays through such a picture whose half width at distance 1 is 1, which go level, and what each of these counts
+SPREAD = np.arange(-6, 7) / 6
+RAYS = np.stack([*(g.ravel() for g in np.meshgrid(SPREAD, SPREAD / ASPECT)), np.full(169, -1.0)], 1)
+AHEAD = RAYS[:, 1] == 0
+WEIGHTS = np.where(np.abs(RAYS[:, :2] * (1, ASPECT)).max(1) > 0.8, CUT, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +58,8 @@ class Furniture:
         return np.clip(1.0 - away / reach, 0.0, 1.0)
 
     def met(self, view: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
-        """(289,) int which box is the nearest along each of `RAYS` through a picture from inside and past its border,
-        and metres to it, inf where there is none.
+        """(169,) int which box is the nearest along each of `RAYS` through a picture from inside, and metres to it,
+        inf where there is none.
 
         `view`: (4, 4) float camera to world. `half`: half of the picture's width at distance 1.
         """
@@ -74,10 +72,6 @@ class Furniture:
         away = np.where((enter < leave) & (leave > 0), np.maximum(enter, 0.0), np.inf)
         which = away.argmin(0)
         return which, away[which, np.arange(len(RAYS))]
-
-    def hidden(self, eye: np.ndarray) -> float:
-        """How many objects are hidden behind others from `eye` (3,): shares of 27 points in each box, summed."""
-        return float(self.blocked(eye)[1].mean(1).sum())
 
     def blocked(self, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(n, 27, 3) points in each box, metres, and (n, 27) whether another box hides them from `eye` (3,)."""
@@ -103,15 +97,8 @@ class Furniture:
 
 def filled(away: np.ndarray, reach: np.ndarray) -> float:
     """Share of a picture that is nearer than `reach` metres: the nearer the more, and what its border cuts off `CUT`
-    times; `away`, `reach`: (289,) metres, as `Furniture.met` has them."""
-    return float((np.clip(1.0 - away / reach, 0.0, 1.0)[WITHIN] * WEIGHTS).mean())
-
-
-def torn(which: np.ndarray, away: np.ndarray, worth: np.ndarray) -> float:
-    """How much of the things in a picture its border cuts off, as shares of it; `which`, `away`: as `Furniture.met`,
-    `worth`: (n,) what each thing counts."""
-    inside, outside = (np.bincount(which[rows & np.isfinite(away)], minlength=len(worth)) for rows in (WITHIN, ~WITHIN))
-    return float(np.minimum(inside, 2 * outside) @ worth / WITHIN.sum())
+    times; `away`, `reach`: (169,) metres, as `Furniture.met` has them."""
+    return float((np.clip(1.0 - away / reach, 0.0, 1.0) * WEIGHTS).mean())
 
 
 def _crossing(start: np.ndarray, way: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,7 +14,7 @@ from pxr import UsdGeom
 from echomodel.openings import inward_normal
 from echomodel.triangles import cross
 from echousd.draw.scenery import Scenery
-from echousd.draw.sight import AHEAD, ASPECT, RAYS, WITHIN, Furniture, filled, torn
+from echousd.draw.sight import AHEAD, ASPECT, RAYS, Furniture, filled
 from echousd.naming import free_name
 from echousd.stage.units import metres_per_unit, up_axis
 
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
-LENSES = (24.0, 28.0, 35.0, 18.0)  # mm, of a camera inside: 74 to 54 degrees across, 90 where nothing else helps
+# mm of a camera inside: 74, 65, 81 and 90 degrees across; metres of depth that each costs: wide ones distort
+LENSES, DISTORTED = (24.0, 28.0, 21.0, 18.0), (0.0, 0.1, 2.0, 8.0)
 EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
 SLOPES = (0.05, 0.12, 0.2, 0.28)  # metres that the middle of its picture is lower for a metre ahead
 PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
@@ -34,9 +35,10 @@ LOW = 1.4  # metres: over what is so high one looks
 BARE, BAREST, DEEP = 60.0, 0.28, 0.02
 BEFORE, WALLED = 2.6, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
 FILLED = 260.0  # metres of depth that a picture full of what is near is worth
-TORN, HANGS = 140.0, 4.0  # and one full of what its border cuts off; how much more what hangs on walls counts there
-BEHIND, ASKANCE = 25.0, 0.0  # metres of depth that the main piece from behind costs, and from which cosine on
-HALVED, LACKED = 60.0, 12.0  # metres of depth that a lamp costs which the border cuts, or which is beyond it
+BEHIND = 25.0  # metres of depth that the main piece from behind costs
+# Metres of depth that each thing costs which the border cuts, and which is beyond it: lamps, what hangs from `HIGH`
+# metres on, and furniture.
+CUTS, HIGH = ((60.0, 12.0), (25.0, 0.0), (10.0, 0.0)), 0.6
 SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width over which it is cord; metres
 UNSEEN = 6.0  # metres of depth that each piece in the picture is worth
 SHOWN, FAR = 30.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
@@ -90,7 +92,7 @@ def perspective_views(points: np.ndarray, furniture: Furniture) -> list[np.ndarr
     corners = np.array([(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)])
     facing = corners @ (furniture.facing + np.array([1e-3, 2e-3]))
     views = [framed(points, np.array([0.55 * x, RISE, 0.85 * z])) for x, z in corners]
-    hidden = [furniture.hidden(view[:3, 3]) for view in views]
+    hidden = [furniture.blocked(view[:3, 3])[1].mean(1).sum() for view in views]
     return [views[corner] for corner in np.argsort(np.array(hidden) - FRONTS * facing, kind="stable")]
 
 
@@ -143,17 +145,17 @@ def inside_view(
     floor = np.asarray(floor, float)
     room = shapely.Polygon(floor)
     middle = np.asarray(room.representative_point().coords[0])
+    if not (count := len(furniture.size)):
+        furniture = Furniture(np.full((1, 3), 1e-3), np.insert(middle, 1, 0.0)[None], np.zeros(1))
     things = furniture.with_others(hung)
     everything = things.with_others(openings, _walls(floor, height))
     main = _main(furniture) if main is None else main
     row = np.arange(len(everything.size))
     reach = np.where((row < len(things.size)) & (row != main), BEFORE, WALLED)
-    worth = np.select([row < len(furniture.size), row < len(things.size)], [1.0, HANGS])
-    aim = middle if main is None else furniture.position[main, [0, 2]]
-    around = 0.5 * aim + 0.5 * (furniture.centre if len(furniture.size) else middle)
-    corners = np.empty((0, 3)) if main is None else furniture.corners[main]
-    shades = _shades(furniture, height)
-    front = np.zeros(2) if main is None else np.array([np.sin(furniture.yaw[main]), np.cos(furniture.yaw[main])])
+    aim, front = furniture.position[main, [0, 2]], np.array([np.sin(furniture.yaw[main]), np.cos(furniture.yaw[main])])
+    around = 0.5 * aim + 0.5 * furniture.centre
+    high, stands = things.position[:, 1] > HIGH, np.arange(len(things.size)) < count
+    fragile = [_shades(furniture, height), things.corners[high & ~stands], things.corners[stands & ~high]]
     wider = room.buffer(0.05)
 
     def merit(shot: Shot) -> float:
@@ -164,9 +166,8 @@ def inside_view(
         bare = bare_share(np.where(row[which] < len(row) - len(floor), np.inf, away), height, shot.view, half)
         return (
             float(np.minimum(away[AHEAD], FAR).mean() + (eye[[0, 2]] - middle) @ furniture.facing + UNSEEN * seen)
-            + SHOWN * float((np.isfinite(away) & (which < len(furniture.size)))[WITHIN].mean())
-            - FILLED * filled(away, reach[which]) - TORN * torn(which, away, worth)
-            - BARE * max(0.0, bare - BAREST) - shot.cost
+            + SHOWN * float((np.isfinite(away) & (which < count)).mean())
+            - FILLED * filled(away, reach[which]) - BARE * max(0.0, bare - BAREST) - shot.cost
         )  # fmt: skip
 
     eyes: list[list[Shot]] = []
@@ -174,14 +175,13 @@ def inside_view(
         eye = np.array([spot[0], level * height, spot[1]])
         touched = NOWHERE * float(things.nearness(eye, BEFORE).max(initial=0.0) > TOUCHED)
         points, blocked = furniture.blocked(eye)
-        hidden = 0.0 if main is None else _hidden(wider, points[main], blocked[main], eye)
+        hidden = CLEAR * _hidden(wider, points[main], blocked[main], eye)
         views = _turned(eye, np.stack([aim - spot, around - spot]))
         halves = APERTURE / 2 / np.array(LENSES)
-        cut = (_aside(corners, views)[..., None] > halves / MARGIN).mean(-2) if len(corners) else np.zeros(len(LENSES))
-        before = float((spot - aim) @ front) / max(float(np.linalg.norm(spot - aim)), 1e-9)
-        hidden = CLEAR * hidden + (BEHIND * max(0.0, ASKANCE - before) if main is not None else 0.0)
-        cost = WHOLE * cut + _shown(shades, views, halves) + hidden + touched
-        cost = (cost + np.abs(PANS)[:, None, None] + 0.1 * np.arange(len(LENSES)) ** 4).ravel()
+        cut = (_aside(furniture.corners[main], views)[..., None] > halves / MARGIN).mean(-2)
+        behind = BEHIND * max(0.0, float((aim - spot) @ front)) / max(float(np.linalg.norm(aim - spot)), 1e-9)
+        cost = WHOLE * cut + _shown(fragile, views, halves) + hidden + behind + touched
+        cost = (cost + np.abs(PANS)[:, None, None] + DISTORTED).ravel()
         eyes.append([
             Shot(float(cost[n]), views.reshape(-1, 4, 4)[n // len(LENSES)], LENSES[n % len(LENSES)], points, blocked)
             for n in np.argsort(cost, kind="stable")[:TRIED]
@@ -195,20 +195,18 @@ def inside_view(
 def bare_share(wall: np.ndarray, height: float, view: np.ndarray, half: float) -> float:
     """Share of a picture inside a room that shows walls with nothing at or before them.
 
-    `wall`: (289,) metres to bare walls along `RAYS`, inf where there is none. `height`: of the walls, metres. `view`,
+    `wall`: (169,) metres to bare walls along `RAYS`, inf where there is none. `height`: of the walls, metres. `view`,
     `half`: as `Furniture.met`.
     """
     way = RAYS[:, 1] * half * view[1, 1] - view[1, 2]  # up, over the length of the ray
     way = way / np.linalg.norm(RAYS * (half, half, 1.0), axis=1)
     with np.errstate(divide="ignore"):
         level = np.where(way < 0, -view[1, 3] / way, (height - view[1, 3]) / np.maximum(way, 1e-12))
-    return float((wall < level - DEEP)[WITHIN].mean())
+    return float((wall < level - DEEP).mean())
 
 
-def _main(furniture: Furniture) -> int | None:
-    """The largest piece that one looks over, of all where there is none; None where there is nothing."""
-    if not len(furniture.size):
-        return None
+def _main(furniture: Furniture) -> int:
+    """The largest piece that one looks over, of all where there is none."""
     low = furniture.size[:, 1] + furniture.position[:, 1] < LOW
     area = furniture.size[:, [0, 2]].prod(1) * np.where(low | ~low.any(), 1.0, 0.0)
     return int(area.argmax())
@@ -240,11 +238,12 @@ def _shades(furniture: Furniture, height: float) -> np.ndarray:
     return replace(furniture, size=size).corners[hangs]
 
 
-def _shown(shades: np.ndarray, views: np.ndarray, halves: np.ndarray) -> np.ndarray:
-    """(..., k) float: what lamps cost, boxes (n, 8, 3), in pictures whose half widths are `halves` (k,)."""
-    aside = _aside(shades.reshape(-1, 3), views).reshape(*views.shape[:-2], 1, -1, 8)
+def _shown(fragile: Sequence[np.ndarray], views: np.ndarray, halves: np.ndarray) -> np.ndarray:
+    """(..., k) float: what boxes (n, 8, 3) of all kinds of `CUTS` cost, in pictures of half widths `halves` (k,)."""
+    cut, lacked = np.repeat(CUTS, [len(boxes) for boxes in fragile], axis=0).T
+    aside = _aside(np.concatenate(fragile).reshape(-1, 3), views).reshape(*views.shape[:-2], 1, -1, 8)
     beyond, within = aside.max(-1) > (halves / MARGIN)[:, None], aside.min(-1) < halves[:, None]
-    return np.asarray((beyond * np.where(within, HALVED, LACKED)).sum(-1))
+    return np.asarray((beyond * np.where(within, cut, lacked)).sum(-1))
 
 
 def _walls(floor: np.ndarray, height: float) -> Furniture:

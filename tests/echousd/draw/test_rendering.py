@@ -231,7 +231,7 @@ def test_every_camera_draws_what_it_sees(up, unit):
 
 
 def test_every_camera_needs_one():
-    with pytest.raises(ValueError, match="no camera, which --cameras and the view every-camera need"):
+    with pytest.raises(ValueError, match="no camera, which --cameras and view every-camera need"):
         render_stage(cube_stage(), view="every-camera", size=32)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import shapely
 
-from echousd.draw.sight import ASPECT, RAYS, Furniture, filled, torn
-from echousd.draw.views import APERTURE, LENSES, _walls, bare_share, inside_view, view_matrix
+from echousd.draw.sight import ASPECT, RAYS, Furniture, filled
+from echousd.draw.views import APERTURE, LENSES, _shown, _walls, bare_share, inside_view, view_matrix
 
 FLOOR = np.array([(0.0, 0.0), (0.0, 4.0), (5.0, 4.0), (5.0, 0.0)])
 
@@ -98,7 +98,7 @@ def test_the_main_piece_is_whole_in_the_picture_and_the_eye_in_the_room(number):
 
 def test_a_wall_is_bare_where_nothing_is_at_it():
     view = view_matrix(np.array([2.5, 1.4, 0.5]), np.array([2.5, 1.4, 4.0]))
-    half = APERTURE / 2 / LENSES[0]
+    half = APERTURE / 2 / 24.0
     bare = bare_walls([], view, half)
     picture = boxes((3.5, 1.6, 0.05, 2.5, 0.6, 3.97, 0.0))
     assert 0.4 < bare < 0.9
@@ -123,20 +123,6 @@ def test_only_what_is_near_and_in_the_picture_fills_it() -> None:
     assert fills(beside, view, 0.5, 1.0) == 0  # a narrow picture does not reach so far
 
 
-def test_what_the_border_cuts_is_torn_and_what_is_whole_or_beyond_it_is_not() -> None:
-    view = view_matrix(np.array([0.0, 1.5, 0.0]), np.array([1.0, 1.5, 0.0]))
-    share = {
-        z: torn(
-            *boxes((0.8, 1.0, 0.8, 2.0, 1.0, z, 0.0), (0.1, 0.1, 0.1, -9.0, 0.0, 0.0, 0.0)).met(view, 0.7), np.ones(2)
-        )
-        for z in (0.0, 1.3, 4.0)
-    }
-    assert share[0.0] == share[4.0] == 0.0
-    assert share[1.3] > 0.03
-    picture = boxes((0.8, 1.0, 0.8, 2.0, 1.0, 1.3, 0.0))
-    assert torn(*picture.met(view, 0.7), np.array([4.0])) == pytest.approx(4 * share[1.3])
-
-
 def test_the_camera_turns_to_have_a_picture_on_the_wall_whole() -> None:
     """What its heading alone would cut off: the pictures hang at either end of what it sees without turning."""
     view, lens = inside_view(FLOOR, BED, 2.8)
@@ -144,7 +130,16 @@ def test_the_camera_turns_to_have_a_picture_on_the_wall_whole() -> None:
         at = view[:3, 3] - 3.0 * view[:3, 2] + side * 3.0 * APERTURE / 2 / lens * view[:3, 0]
         picture = boxes((0.5, 0.6, 0.03, np.clip(at[0], 0.4, 4.6), 1.3, 3.97 if at[2] > 2 else 0.03, 0.0))
         other, lens_then = inside_view(FLOOR, BED, 2.8, picture)
-        assert torn(*picture.met(other, APERTURE / 2 / lens_then), np.ones(1)) < 0.02
+        assert within(picture.corners[0], other, lens_then) in (0.0, 1.0)
+
+
+def test_a_thing_costs_what_its_kind_does_where_the_border_cuts_it_and_a_lamp_beyond_it_too() -> None:
+    view = view_matrix(np.array([0.0, 1.5, 0.0]), np.array([1.0, 1.5, 0.0]))
+    for place, share in ((0.0, (0, 0, 0)), (1.4, (60, 25, 10)), (4.0, (12, 0, 0))):  # whole, cut, beyond
+        box = boxes((0.4, 0.4, 0.4, 2.0, 1.3, place, 0.0)).corners
+        for kind, cost in enumerate(share):
+            fragile = [box if each == kind else box[:0] for each in range(3)]
+            assert _shown(fragile, view, np.array([0.7])) == pytest.approx([cost])
 
 
 def lit(at: tuple[float, float], wide: float, tall: float) -> tuple[Furniture, np.ndarray]:
