@@ -159,15 +159,15 @@ def _wall(polygon: np.ndarray, edge: int, height: float, openings: Sequence[Open
 
 
 def _cornice(polygon: np.ndarray, edge: int, height: float, tall: float) -> Mesh:
-    """A moulding of two steps in the corner of a wall and the ceiling, mitred with those of the walls beside it."""
-    inner, steps = outline(polygon, [-0.6 * tall] * len(polygon)), []
-    for share, low in ((1.0, 0.5 * tall), (0.5, tall)):
-        last = (edge + 1) % len(polygon)
-        near = [polygon[k] + share * (inner[k] - polygon[k]) for k in (last, edge)]
-        flat = shapely.Polygon(np.array([polygon[edge], polygon[last], *near]) * (1, -1))
-        step = fittings.extruded(flat, low - 0.5 * tall * (share < 1))
-        steps.append(Mesh(step.vertices[:, [0, 2, 1]] * (1, 1, -1) + (0, height - low, 0), step.faces))
-    return joined(steps)
+    """A cove in the corner of a wall and the ceiling, mitred with those of the walls beside it."""
+    turn, ends = np.linspace(0.0, np.pi / 2, 6), [edge, (edge + 1) % len(polygon)]
+    cove = 1.0 - np.stack([0.85 * np.sin(turn), np.cos(turn)], 1)
+    prism = fittings.extruded(shapely.Polygon([(0.0, 0.0), *cove, (0.0, 1.0)]), 1.0)
+    into, down, end = prism.vertices.T  # shares of its width, height and length
+    outer, inner = polygon[ends], outline(polygon, [-0.8 * tall] * len(polygon))[ends]
+    flat = (outer + into[:, None, None] * (inner - outer))[np.arange(len(end)), end.astype(int)]
+    faces = prism.faces if signed_area(polygon) > 0 else prism.faces[:, ::-1]
+    return Mesh(np.insert(flat, 1, height - tall * down, axis=1), faces)
 
 
 def _filled(
