@@ -12,14 +12,14 @@ from shapely.geometry.base import BaseGeometry
 
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import footprints
-from echomodel.objective.plan import plan_of
+from echomodel.objective import Plan, faults_of, unreached
+from echomodel.objective.copies import copies_of
 from echomodel.objective.support import ON_CEILING
-from echomodel.rules.geometry import Spread
 from echomodel.triangles import Mesh, connected_pieces
 from echousd.graph import Placed, Relation, SceneGraph
-from echousd.graph.arrays import rounded_boxes, triplets_of
+from echousd.graph.arrays import rounded_boxes
 from echousd.make.verdicts import relation_verdicts
-from echousd.place.living import living_faults
+from echousd.place.living import plan_to_live_in
 from echousd.place.report import Collision
 from echousd.room import LayoutOutcome
 from echousd.shapes.geometry import Geometry
@@ -175,12 +175,10 @@ class Scene:
 
 
 def scene_of(
-    graph: SceneGraph, boxes: Boxes, geometry: Mapping[str, Geometry], floor: np.ndarray, *, walls: bool
+    graph: SceneGraph, room: Plan, geometry: Mapping[str, Geometry], floor: np.ndarray, *, walls: bool
 ) -> Scene:
-    """The scene of a layout; arguments as `cleared`."""
-    nodes = graph.nodes
-    room = plan_of(Spread.of(boxes), [node.category for node in nodes], relations=triplets_of(graph))
-    size, position, yaw = room.size, room.position, room.yaw
+    """The scene of a layout; arguments as `cleared`, `room`: its plan."""
+    nodes, size, position, yaw = graph.nodes, room.size, room.position, room.yaw
     solids = [
         [_placed(collider.mesh.vertices, position[i], yaw[i]) for collider in geometry[node.name].colliders]
         for i, node in enumerate(nodes)
@@ -258,7 +256,8 @@ def cleared(
     (k, 2) float, corners of the floor, metres. `walls`: whether there are any; their sills and casings reach into the
     room.
     """
-    scene = scene_of(graph, boxes, geometry, floor, walls=walls)
+    room = plan_to_live_in(graph, boxes, floor)
+    scene = scene_of(graph, room, geometry, floor, walls=walls)
     holds = frozenset(_unbroken(graph, boxes))
     moves = np.zeros((len(graph.nodes), 2))
     for one in range(len(graph.nodes)):
@@ -269,7 +268,7 @@ def cleared(
         hits = [pair for pair, _ in scene.overlaps(moves, DEEP) if pair not in stuck]
         if not hits:
             break
-        found = _moved_apart(scene, graph, boxes, floor, moves, hits[0], holds)
+        found = _moved_apart(scene, graph, room, boxes, moves, hits[0], holds)
         if found is None:
             stuck.add(hits[0])
         else:
@@ -299,26 +298,35 @@ def _at(boxes: Boxes, moves: np.ndarray) -> Boxes:
 
 
 def _moved_apart(
-    scene: Scene, graph: SceneGraph, boxes: Boxes, floor: np.ndarray, moves: np.ndarray, pair: tuple[int, int],
+    scene: Scene, graph: SceneGraph, room: Plan, boxes: Boxes, moves: np.ndarray, pair: tuple[int, int],
     holds: frozenset[int],
 ) -> np.ndarray | None:  # fmt: skip
     """The moves with one of a pair moved out of everything, where most holds and it goes least far; None = nowhere.
 
     What a thing would leave behind goes with it: a nightstand with its bed.
 
-    `holds`: numbers of the relations that must hold afterwards as well.
+    `room`: plan of the boxes. `holds`: numbers of the relations that must hold afterwards as well.
     """
-    found, fewest, before = None, np.inf, len(living_faults(graph, _at(boxes, moves), floor))
+    found, fewest, before = None, np.inf, np.inf
     for together in (False, True):  # a table with its chairs, where each alone would make a fault
         trials = list(_trials(scene, graph, boxes, moves, pair, holds, together))
         most = max((kept for kept, _, _ in trials), default=0)
-        for _, _, trial in sorted((one for one in trials if one[0] == most), key=lambda one: one[1]):
-            faults = len(living_faults(graph, _at(boxes, trial), floor))
-            if faults < fewest:
-                found, fewest = trial, faults
+        tried = [moves for _, _, moves in sorted((one for one in trials if one[0] == most), key=lambda one: one[1])]
+        before, *faults = _faults(room, [_at(boxes, one) for one in (moves, *tried)])
+        for trial, count in zip(tried, faults, strict=True):
+            if count < fewest:
+                found, fewest = trial, count
             if fewest <= before:
                 return found
     return found
+
+
+def _faults(room: Plan, layouts: Sequence[Boxes]) -> list[int]:
+    """How many faults to live with the plan of a room has where its boxes stand as in each of some layouts."""
+    position = np.array([boxes.position for boxes in layouts], float)
+    yaw, moved = np.tile(room.yaw, (len(layouts), 1)), np.ptp(position, axis=0).any(1)
+    of = [fault.object // len(room) for fault in faults_of(copies_of(room, position, yaw, moved))]
+    return [of.count(k) + len(unreached(room.at(there, room.yaw))) for k, there in enumerate(position)]
 
 
 def _trials(

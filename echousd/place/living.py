@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echomodel.rules.geometry import BoxesLike
+from echomodel.rules.geometry import BoxesLike, Spread
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import triplets_of
+
+if TYPE_CHECKING:
+    from echomodel.objective import Plan
 
 
 @dataclass(frozen=True)
@@ -41,18 +45,27 @@ def living_faults(
     """
     from echomodel.objective import faults
 
-    names, corners = list(graph.names), graph.room.corners
-    found = faults(
-        boxes,
+    names = list(graph.names)
+    return tuple(
+        LivingFault(names[f.object], f.rule, names[f.other] if f.other >= 0 else None, f.margin, f.sentence(names))
+        for f in faults(plan_to_live_in(graph, boxes, floor, all_blamed=all_blamed))
+    )
+
+
+def plan_to_live_in(
+    graph: SceneGraph, boxes: BoxesLike, floor: np.ndarray | None = None, *, all_blamed: bool = False
+) -> Plan:
+    """The plan that `living_faults` judges; arguments as there."""
+    from echomodel.objective.plan import plan_of
+
+    corners = graph.room.corners
+    return plan_of(
+        Spread.of(boxes),
         [node.category for node in graph.nodes],
         floor if corners is None else np.asarray(corners, float),  # openings count the edges of the stated floor
         graph.room.openings if corners is not None else (),
         triplets_of(graph),
         given=np.array([bool(n.obstacle) or (n.position is not None and not all_blamed) for n in graph.nodes]),
-    )
-    return tuple(
-        LivingFault(names[f.object], f.rule, names[f.other] if f.other >= 0 else None, f.margin, f.sentence(names))
-        for f in found
     )
 
 

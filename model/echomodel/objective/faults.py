@@ -13,10 +13,9 @@ import numpy as np
 
 from echomodel.arrays import Array, full, held, rows
 from echomodel.boxes2d import footprints
-from echomodel.objective.plan import CLEAR_HEIGHT, Plan, plan_of
+from echomodel.objective.plan import CLEAR_HEIGHT, Plan
 from echomodel.objective.table import PRICE, TERMS
-from echomodel.openings import Opening, inward_normal, segment
-from echomodel.rules.geometry import BoxesLike, Spread
+from echomodel.openings import inward_normal, segment
 
 ROBOT, SLACK = 0.2, 0.025  # metres, its radius, and how much narrower a way it squeezes through
 STEP = 0.1  # metres beyond that between a door and where it enters
@@ -65,15 +64,8 @@ class Fault:
         return self.says.replace("{a}", names[self.object]).replace("{b}", other)
 
 
-def faults(
-    boxes: BoxesLike, categories: Sequence[str], floor: np.ndarray | None = None, openings: Sequence[Opening] = (),
-    relations: np.ndarray | None = None, *, given: np.ndarray | None = None,
-) -> list[Fault]:  # fmt: skip
-    """What a person would point at in a room, in the order of the terms; see `plan_of` for the arguments.
-
-    A term counts a box at most once. What the relations state decides whom a box attends.
-    """
-    plan = plan_of(Spread.of(boxes), categories, floor, openings, relations, given=given)
+def faults(plan: Plan) -> list[Fault]:
+    """What a person would point at in one room, in the order of the terms, each box at most once by each."""
     return faults_of(plan) + unreached(plan)
 
 

@@ -42,7 +42,7 @@ class Room:
             yaw = np.array([row.get("yaw", 0.0) for row in rows], float)
 
         options = {"floor": FLOOR, **kwargs}
-        out = faults(Boxes, [row["kind"] for row in rows], **options)
+        out = faults(plan_of(Boxes, [row["kind"] for row in rows], **options))
         return {(names[f.object], f.rule): f.sentence(names) for f in out}
 
 
@@ -499,7 +499,7 @@ def test_several_rooms_at_once_are_judged_as_one_by_one():
 
 def test_the_room_generator_rarely_breaks_them():
     rooms = generate_rooms(60, 3)
-    found = [f for room in rooms for f in faults(room, room.categories, room.floor_polygon)]
+    found = [f for room in rooms for f in faults(plan_of(room, room.categories, room.floor_polygon))]
     assert len(found) < 0.24 * sum(len(room) for room in rooms)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from echomodel.boxes import Boxes
-from echomodel.objective import faults
+from echomodel.objective import faults, plan_of
 from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
 from echousd.place.placing import lamps_along, place_boxes
@@ -26,7 +26,7 @@ def found(done, openings=()):
     import torch
 
     boxes = Boxes(*(torch.as_tensor(v) for v in (done.size, done.position, done.yaw)))
-    return [f.rule for f in faults(boxes, BEDROOM, FLOOR, openings, TOLD)]
+    return [f.rule for f in faults(plan_of(boxes, BEDROOM, FLOOR, openings, TOLD))]
 
 
 def bedroom(**options):
@@ -206,7 +206,7 @@ def hall(words, size, position, yaw, told):
     floor = np.array([(-4.5, -3.5), (4.5, -3.5), (4.5, 3.5), (-4.5, 3.5)])
     triplets = np.array([(a, ID[word], b) for a, word, b in told])
     done = place_boxes(words, np.array(size), np.array(position), np.array(yaw), triplets, floor_polygon=floor)
-    return done, [fault.rule for fault in faults(done, words, floor, (), triplets)]
+    return done, [fault.rule for fault in faults(plan_of(done, words, floor, (), triplets))]
 
 
 def test_in_a_hall_the_sofa_comes_to_its_screen_and_its_table_with_it():
