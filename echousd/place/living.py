@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echomodel.objective import Plan, faults, plan_of
+from echomodel.objective.faults import MOST
+from echomodel.objective.sizes import size_range
 from echomodel.rules.geometry import BoxesLike, Spread
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import triplets_of
-
-if TYPE_CHECKING:
-    from echomodel.objective import Plan
 
 
 @dataclass(frozen=True)
@@ -43,8 +42,6 @@ def living_faults(
         floor: (k, 2) float, corners where the graph states none, metres; None = no rule of walls.
         all_blamed: objects whose place the graph states, too.
     """
-    from echomodel.objective import faults
-
     names = list(graph.names)
     return tuple(
         LivingFault(names[f.object], f.rule, names[f.other] if f.other >= 0 else None, f.margin, f.sentence(names))
@@ -56,8 +53,6 @@ def plan_to_live_in(
     graph: SceneGraph, boxes: BoxesLike, floor: np.ndarray | None = None, *, all_blamed: bool = False
 ) -> Plan:
     """The plan that `living_faults` judges; arguments as there."""
-    from echomodel.objective.plan import plan_of
-
     corners = graph.room.corners
     return plan_of(
         Spread.of(boxes),
@@ -71,15 +66,11 @@ def plan_to_live_in(
 
 def severity(faults: Sequence[LivingFault]) -> float:
     """How bad some faults are: one for each, and as much as it misses, at most `MOST` of its unit."""
-    from echomodel.objective.faults import MOST
-
     return sum(1.0 + min(-fault.margin, MOST) for fault in faults)
 
 
 def unusual_sizes(graph: SceneGraph) -> tuple[str, ...]:
     """One sentence for every object whose stated size no such furniture has."""
-    from echomodel.objective.sizes import size_range
-
     told = []
     for node in graph.nodes:
         if node.size is None or node.obstacle or node.asset:
