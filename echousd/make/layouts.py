@@ -25,6 +25,7 @@ from echousd.graph.arrays import floor_centre, graph_batch, one_thread, rounded_
 from echousd.graph.floors import with_placed_openings
 from echousd.make.verdicts import layout_outcome
 from echousd.options import RoomOptions
+from echousd.place.living import living_faults, severity
 from echousd.place.placing import Arranged, PlacedBoxes
 from echousd.place.placing import place as placed
 from echousd.place.solver import PlaceConfig, sentence
@@ -177,8 +178,6 @@ def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int |
 
     `seed`: where nobody stated the openings, that by which they make way; None = they stay.
     """
-    from echousd.place.living import living_faults, severity
-
     boxes, conflicts = found
     faults = living_faults(graph, boxes)
     if seed is not None and any(fault.rule in OF_OPENINGS for fault in faults):
@@ -197,7 +196,6 @@ def finished_boxes(
     boxes = _alike(graph, _mounted(graph, boxes.to(None)), styles)
     if not place:
         return (rounded_boxes(graph, boxes), ()), 0
-    from echousd.place.living import living_faults, severity
 
     @cache
     def wrong(one: PlacedBoxes) -> tuple[float, ...]:
@@ -250,7 +248,6 @@ def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int) -
 
     A screen wants no window behind it.
     """
-    from echousd.place.living import living_faults
 
     def faults(graph: SceneGraph) -> int:
         return sum(len(living_faults(graph, boxes)) for boxes in layouts)
