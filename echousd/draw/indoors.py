@@ -23,7 +23,7 @@ BLURRED, HAZE = 0.45, 0.25  # degrees that it is out of focus, and the share of 
 DIM = 0.02  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
-ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.3, 0.85), (0.34, 0.61), 70, 15.0
+ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.3, 0.85), (0.43, 0.61), 70, 15.0
 EVEN = 0.18  # power of the light's brightness that eyes and those who photograph rooms take from it
 WHITE, PAPER = 92, 0.95  # what so many of a hundred points are darker than comes to no more than that
 CONTRAST, KNEE = 1.4, 0.6  # power about what is bright, and from where on highlights are rolled off
@@ -56,13 +56,13 @@ class Lights:
 
 
 def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
-    """The lights of a stage: domes, the brightest distant light, spheres; panels of light are for other renderers.
+    """The lights of a stage: domes, the brightest distant light, spheres; panels where it is dark and no lamp is.
 
     `shades`: of everything that glows its triangles (f, 3, 3) in the world, metres.
     """
     frame, cache = world_frame(stage), UsdGeom.XformCache()
     sky, suns, bulbs, power, tint = 0.0, [], [], [], np.ones(3, np.float32)
-    domes, view = 0, None
+    domes, view, panels = 0, None, list[tuple[np.ndarray, np.ndarray]]()
     for prim in stage.Traverse():
         if not prim.HasAPI(UsdLux.LightAPI) or UsdGeom.Imageable(prim).ComputeVisibility() == "invisible":
             continue
@@ -80,6 +80,11 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
         elif prim.IsA(UsdLux.SphereLight):
             bulbs.append(_spots(world[:3, 3], shades))
             power.append(color / 4)  # of what is told as radiance times area, what goes each way
+        elif prim.IsA(UsdLux.RectLight):
+            area = np.prod([prim.GetAttribute(f"inputs:{side}").Get() * frame[0, 0] for side in ("width", "height")])
+            panels.append((_spots(world[:3, 3] - (0, OWN, 0), ()), color * area / 4))
+    if not bulbs and domes and sky < DAY:
+        bulbs, power = [list(each) for each in zip(*panels, strict=True)] or [[], []]
     sun = max(suns, key=lambda one: float(one[1].sum()), default=None)
     return Lights(
         sky=sky if domes else 1.0, sun=None if sun is None else sun.astype(np.float32),

@@ -25,14 +25,13 @@ from echousd.stage.pen import Pen, ops
 LIGHTS = "/Room/Lights"
 NITS = 30.0  # cd/m² of a surface that comes to 1 in the picture: a camera in a lit room
 # Lumens and kelvin of a lamp, by what it rests on. White is 6504 to a renderer, which adapts to nothing as eyes do:
-# lamps of 2,900 K would turn a room orange. They are written as colours, as Blender reads no temperatures.
-LAMPS = {"ceiling": (1500.0, 4300.0), "floor": (1000.0, 3700.0), "table": (450.0, 3500.0), "wall": (400.0, 3500.0)}
+# lamps of 2,700 K would turn a room orange. They are written as colours, as Blender reads no temperatures.
+LAMPS = {"ceiling": (1500.0, 3700.0), "floor": (1000.0, 3100.0), "table": (450.0, 3000.0), "wall": (400.0, 3000.0)}
 # Of sky and panel: without walls, with walls, which throw back what they get, and below a ceiling, where the sky is
 # seen through the windows alone.
 SHARES = {"open": (1.0, 1.0), "walls": (1.4, 0.12), "ceiling": (3.6, 0.95)}
 SKY = "textures/sky.jpg"
 BULB = 0.04  # metres, radius
-DAYLIGHT = 6500.0  # kelvin
 # Irradiance of the sun: through windows alone a white surface that faces it gains 0.45, about what the sky gives; over
 # walls without a ceiling, which have the sky already, so much would leave them blank.
 SUN, OVERHEAD = 1.4, 0.55
@@ -79,6 +78,8 @@ def write_lights(pen: Pen, room: RoomData, bounds: np.ndarray) -> None:
         if name in LIT:
             exposed = min(1.0, BRIGHT / max(lumens, 1.0))
             radiance = max(LIT[name] - lumens, FILL) * area / flux
+            lamplight = UsdLux.BlackbodyTemperatureAsRgb(LAMPS["ceiling"][1])
+            inside.over(f"{LIGHTS}/ceiling", {"color3f inputs:color": lamplight})
         shining = {"ceiling": radiance * exposed}
         shining |= {light: intensity * TIMES[name][column] * exposed for light, (column, intensity) in full.items()}
         for light, intensity in shining.items():
@@ -103,7 +104,6 @@ def _panel(pen: Pen, bounds: np.ndarray, height: float) -> float:
     x, _, z = (bounds.sum(0) / 2).tolist()
     values = {
         "float inputs:width": width, "float inputs:height": depth,
-        "color3f inputs:color": UsdLux.BlackbodyTemperatureAsRgb(DAYLIGHT),
         **ops(translate=("double3", (x, height - 0.02, z)), rotateX=("float", -90.0)),
     }  # fmt: skip
     pen.define(f"{LIGHTS}/ceiling", "RectLight", values)

@@ -63,7 +63,8 @@ def lights_of(**power: float) -> Usd.Stage:
     UsdGeom.SetStageUpAxis(stage, "Z")
     UsdGeom.SetStageMetersPerUnit(stage, 0.01)
     for name, intensity in power.items():
-        kind = {"dome": UsdLux.DomeLight, "sun": UsdLux.DistantLight}.get(name, UsdLux.SphereLight)
+        kinds = {"dome": UsdLux.DomeLight, "sun": UsdLux.DistantLight, "panel": UsdLux.RectLight}
+        kind = kinds.get(name, UsdLux.SphereLight)
         light = kind.Define(stage, f"/{name}")
         light.CreateIntensityAttr(intensity)
         light.CreateColorAttr(Gf.Vec3f(1.0, 0.5, 0.25))
@@ -82,6 +83,14 @@ def test_lights_are_read_in_any_unit_and_axis():
     assert dark.sky == 0.0
     assert dark.sun is None
     assert read_lights(lights_of()).sky == 1.0  # a stage that tells nothing of light is seen by day
+
+
+def test_a_panel_lights_what_is_dark_and_has_no_lamp():
+    lights = read_lights(lights_of(dome=0.1, panel=40000.0))  # a square centimetre
+    np.testing.assert_allclose(lights.power, [(1.0, 0.5, 0.25)], rtol=1e-6)
+    np.testing.assert_allclose(lights.bulbs - np.float32((1, 2.75, -2)), 0, atol=0.051)
+    assert len(read_lights(lights_of(dome=1.0, panel=40000.0)).power) == 0
+    assert read_lights(lights_of(dome=0.1, panel=40000.0, lamp=8.0)).power.max() == 2.0
 
 
 def box_room(**lights) -> tuple:
