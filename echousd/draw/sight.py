@@ -33,12 +33,6 @@ class Furniture:
         return front / max(float(weight.sum()), 1e-9)
 
     @property
-    def centre(self) -> np.ndarray:
-        """(2,) float, x and z of the middle of all footprints, metres."""
-        weight = self.size[:, [0, 2]].prod(1)
-        return np.asarray(weight @ self.position[:, [0, 2]] / max(float(weight.sum()), 1e-9))
-
-    @property
     def corners(self) -> np.ndarray:
         """(n, 8, 3) float, the corners of each box, metres."""
         cube = np.stack(np.meshgrid((-0.5, 0.5), (0.0, 1.0), (-0.5, 0.5), indexing="ij"), -1).reshape(-1, 3)

@@ -40,12 +40,13 @@ BEHIND = 25.0  # metres of depth that the main piece from behind costs
 # metres on, and furniture.
 CUTS, HIGH = ((60.0, 12.0), (25.0, 0.0), (10.0, 0.0)), 0.6
 SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width over which it is cord; metres
-UNSEEN = 6.0  # metres of depth that each piece in the picture is worth
+UNSEEN, MANY = 6.0, 8.0  # metres of depth that each of so many pieces in the picture is worth
 SHOWN, FAR = 30.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
 TOUCHED, NOWHERE = 0.86, 1e4  # nearness of what the eye must not be at, a third of a metre; what that costs
 STEPS = (0.3, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
 APART = 3.0  # metres from the middle that it keeps where it stands further from its corner
 ALONG, OFF = (0.2, 0.35, 0.5, 0.65, 0.8), 0.4  # or along a wall, as shares of its length, and metres from it
+BEFORE_IT, TURNS = 3.4, np.arange(8) * np.pi / 4  # or so many metres around the main piece, where the room is so large
 MARGIN = 1.06
 RISE = 0.62  # of a camera outside over the room's middle, for a metre that it is away
 FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than their sides is worth
@@ -153,7 +154,7 @@ def inside_view(
     row = np.arange(len(everything.size))
     reach = np.where((row < len(things.size)) & (row != main), BEFORE, WALLED)
     aim, front = furniture.position[main, [0, 2]], np.array([np.sin(furniture.yaw[main]), np.cos(furniture.yaw[main])])
-    around = 0.5 * aim + 0.5 * furniture.centre
+    around = 0.5 * aim + 0.5 * furniture.position[:, [0, 2]].mean(0)
     high, stands = things.position[:, 1] > HIGH, np.arange(len(things.size)) < count
     fragile = [_shades(furniture, height), things.corners[high & ~stands], things.corners[stands & ~high]]
     wider = room.buffer(0.05)
@@ -165,13 +166,13 @@ def inside_view(
         seen = (~shot.blocked & (_aside(shot.points, shot.view) <= half)).mean(-1).sum()
         bare = bare_share(np.where(row[which] < len(row) - len(floor), np.inf, away), height, shot.view, half)
         return (
-            float(np.minimum(away[AHEAD], FAR).mean() + (eye[[0, 2]] - middle) @ furniture.facing + UNSEEN * seen)
-            + SHOWN * float((np.isfinite(away) & (which < count)).mean())
+            float(np.minimum(away[AHEAD], FAR).mean() + (eye[[0, 2]] - middle) @ furniture.facing)
+            + UNSEEN * min(seen, MANY) + SHOWN * float((np.isfinite(away) & (which < count)).mean())
             - FILLED * filled(away, reach[which]) - BARE * max(0.0, bare - BAREST) - shot.cost
         )  # fmt: skip
 
     eyes: list[list[Shot]] = []
-    for spot, level in product(_spots(floor, middle), EYES):
+    for spot, level in product(_spots(room, middle, aim), EYES):
         eye = np.array([spot[0], level * height, spot[1]])
         touched = NOWHERE * float(things.nearness(eye, BEFORE).max(initial=0.0) > TOUCHED)
         points, blocked = furniture.blocked(eye)
@@ -255,16 +256,17 @@ def _walls(floor: np.ndarray, height: float) -> Furniture:
     return Furniture(size, np.insert(middle, 1, 0.0, axis=1), np.arctan2(outwards[:, 0], outwards[:, 1]))
 
 
-def _spots(floor: np.ndarray, middle: np.ndarray) -> list[np.ndarray]:
-    """Where a camera inside may stand, (2,) x and z each, metres: in the corners, then along the walls."""
-    spots = []
+def _spots(room: shapely.Polygon, middle: np.ndarray, aim: np.ndarray) -> list[np.ndarray]:
+    """Where a camera inside may stand, (2,) x and z each, metres: in corners, along the walls, around what it sees."""
+    floor, spots = np.array(room.exterior.coords)[:-1], []
     for corner in floor:
         away = max(float(np.linalg.norm(middle - corner)), 1e-9)
         spots += [corner + step / away * (middle - corner) for step in STEPS if step < max(away - APART, 0.9)]
     for edge in range(len(floor)):
         start, end = floor[edge], floor[(edge + 1) % len(floor)]
         spots += [start + share * (end - start) + OFF * inward_normal(floor, edge) for share in ALONG]
-    return spots
+    around = aim + BEFORE_IT * np.stack([np.cos(TURNS), np.sin(TURNS)], 1)
+    return [*spots, *around[shapely.contains_xy(room.buffer(-OFF), around)]]
 
 
 def _turned(eye: np.ndarray, ways: np.ndarray) -> np.ndarray:

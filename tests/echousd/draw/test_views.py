@@ -69,6 +69,11 @@ def test_the_camera_comes_nearer_where_the_room_is_large() -> None:
     group = boxes((2.2, 0.8, 0.9, 5.0, 0.0, 4.0, 0.0), (1.1, 0.4, 0.6, 5.0, 0.0, 5.2, 0.0))
     eye = inside_view(floor, group, 2.8)[0][[0, 2], 3]
     assert 2.0 < np.linalg.norm(eye - (5.0, 4.4)) < 5.5
+    hall = np.array([(0.0, 0.0), (0.0, 8.0), (12.0, 8.0), (12.0, 0.0)])
+    many = boxes(*((0.5, 0.9, 0.5, x, 0.0, z, 0.0) for x in np.arange(1.0, 12.0) for z in (0.5, 7.5)))
+    group = boxes((2.2, 0.8, 0.9, 3.0, 0.0, 2.0, 0.0), (1.1, 0.4, 0.6, 3.0, 0.0, 3.2, 0.0))
+    eye = inside_view(hall, many.with_others(group), 2.8, main=22)[0][[0, 2], 3]
+    assert np.linalg.norm(eye - (3.0, 2.0)) < 6.0  # not where it sees most pieces
 
 
 NOTCHED = np.array([(0.0, 0.0), (0.0, 4.6), (2.8, 4.6), (2.8, 2.6), (5.2, 2.6), (5.2, 0.0)])
