@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,10 +32,10 @@ FLOORS = {
     "tiles": ("tiles", "terrazzo"),
     "wood": ("floor", "floor", "herringbone", "boards_walnut", "boards_ash", "boards_grey", "herringbone_walnut"),
 }
-# What one wall may have behind its bed or sofa, and of how many parts of all rooms; the rest has plain walls.
-COVERS = {"wallpaper": 2, "paint": 2, "boarding": 1, "brick": 1, "": 6}
+# What one wall may have, and of how many parts of all rooms; the rest has plain walls.
+COVERS = {"wallpaper": 2, "paint": 3, "boarding": 2, "brick": 1, "": 5}
 NEAR = 0.45  # metres between a wall and the back of what stands at it
-HOSTS = ("bed", "sofa")  # roles of what stands before such a wall
+HOSTS = ("bed", "sofa", "board", "storage")  # roles of what stands before such a wall, the first that stands at one
 
 
 def floor_slot(room: RoomData) -> str:
@@ -48,36 +48,35 @@ def floor_slot(room: RoomData) -> str:
 
 def covered_walls(room: RoomData) -> dict[str, str]:
     """Name of a wall -> the slot of what covers it, for walls that are not plain: tiles where it is wet, `COVERS`."""
-    wet = vocabulary().room_type(room.graph.room.type).use == "wet" and room.options.walls
-    if wet and not _behind(room, lambda row: row.task == "cook"):
+    use, at_walls = vocabulary().room_type(room.graph.room.type).use, _at_walls(room)
+    if use == "wet" and room.options.walls:
+        if any(row.task == "cook" for row, _ in at_walls):
+            return {wall: "wall_tiles" for row, wall in at_walls if row.stands == "row"}
         return {wall_name(edge): "wall_tiles" for edge in range(len(_corners(room)))}
-    if wet:
-        return dict.fromkeys(_behind(room, lambda row: row.stands == "row"), "wall_tiles")
-    row = vocabulary().known_style(room.graph.room.style)
-    words = row.covers if row else [word for word, often in COVERS.items() for _ in range(often)]
-    cover = words[drawn(room, "cover", len(words))] if room.options.walls else ""
-    behind = _behind(room, lambda row: row.role in HOSTS)[:1] if cover else []
-    return dict.fromkeys(behind, cover)
+    style = vocabulary().known_style(room.graph.room.style)
+    words = style.covers if style else [word for word, often in COVERS.items() for _ in range(often)]
+    cover = words[drawn(room, "cover", len(words))] if room.options.walls and use != "outdoor" else ""
+    longest = wall_name(int(edge_lengths(_corners(room)).argmax()))
+    behind = [wall for role in HOSTS for row, wall in at_walls if row.role == role]
+    return {[*behind, longest][0]: cover} if cover else {}
 
 
 def _corners(room: RoomData) -> np.ndarray:
     return np.asarray(room.floor if room.graph.room.corners is None else room.graph.room.corners, float)
 
 
-def _behind(room: RoomData, asked: Callable[[Category], bool]) -> list[str]:
-    """Names of the walls behind objects whose rows answer a question with yes, in the order of the graph."""
-    corners, out = _corners(room), list[str]()
+def _at_walls(room: RoomData) -> list[tuple[Category, str]]:
+    """Rows of the objects that stand at a wall, in the order of the graph, and the wall's name."""
+    corners, out = _corners(room), list[tuple[Category, str]]()
     size, position, yaw = (np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw))
     for number, node in enumerate(room.graph.nodes):
-        if not asked(vocabulary().category(node.category)):
-            continue
         front = np.array([np.sin(yaw[number]), np.cos(yaw[number])])
         back = position[number, [0, 2]] - front * size[number, 2] / 2
         for edge, length in enumerate(edge_lengths(corners)):
             inside, off = inward_normal(corners, edge), back - corners[edge]
             before = 0 <= float(off @ direction(corners, edge)) <= length  # not beside it, before another wall in line
             if length > 1.0 and front @ inside > 0.97 and before and abs(float(off @ inside)) < NEAR:
-                out.append(wall_name(edge))
+                out.append((vocabulary().category(node.category), wall_name(edge)))
                 break
     return out
 

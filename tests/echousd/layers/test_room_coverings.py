@@ -54,6 +54,17 @@ def test_of_two_walls_in_line_that_behind_the_bed_has_paper(room, x, wall):
     assert {name for cover in covered for name in cover} == {wall}
 
 
+@pytest.mark.parametrize(
+    ("word", "z", "wall"), [("desk", -1.7, "Wall_1"), ("table", 0.0, "Wall_2"), ("bookshelf", -1.7, "Wall_1")]
+)
+def test_without_bed_and_sofa_the_wall_of_a_desk_or_shelf_is_covered_else_the_longest(room, word, z, wall):
+    corners = ((-1, -2), (1, -2), (1, 2), (-1, 2))
+    graph = SceneGraph(RoomSpec("study", floor_polygon=corners), (Node("it", word),), ())
+    boxes = Boxes(torch.tensor([[1.2, 0.75, 0.6]]), torch.tensor([[0.0, 0.0, z]]), torch.zeros(1))
+    covered = [covered_walls(replace(seeded(room, seed), graph=graph, boxes=boxes)) for seed in range(12)]
+    assert {name for cover in covered for name in cover} == {wall}
+
+
 def test_coverings_are_bound_and_have_their_images(room, tmp_path):
     seed = next(
         s for s in range(999)
