@@ -14,6 +14,10 @@ import pytest
 from forked_reader import readers_are_forked
 from hypothesis import HealthCheck, settings
 
+# Every process that a test starts would compile all modules anew, and every run rewrite all tests.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 # Busy machines draw examples slowly, which says nothing about the code.
 settings.register_profile("project", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("project")
