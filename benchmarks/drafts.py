@@ -87,9 +87,10 @@ def judged_by_default(weights: str, tasks: list[Task]) -> tuple[list[RoomBoxes],
         graph = graph_of(replace(room, relations=task.told))
         nodes = tuple(node.replaced(size=None, position=None, yaw=None) for node in graph.nodes)
         graph = graph.replaced(nodes=nodes, room=graph.room.replaced(openings=room.openings))
+        model = network or Another(OTHERS[weights], task)
         boxes, _ = layouts.best_boxes(
-            network or Another(OTHERS[weights], task), graph, style_groups(graph), layouts.Draws(number),
-            drafts=layouts.usual_drafts(len(room)), timer=StageTimer(),
+            model, graph, style_groups(graph), layouts.Draws(number), drafts=layouts.most_drafts(model, len(room)),
+            timer=StageTimer(),
         )  # fmt: skip
         size, position, yaw = (np.asarray(of, float) for of in (boxes.size, boxes.position, boxes.yaw))
         rooms.append(replace(room, size=size, position=position, yaw=yaw))
@@ -99,6 +100,8 @@ def judged_by_default(weights: str, tasks: list[Task]) -> tuple[list[RoomBoxes],
 
 class Another:
     """Who draws layouts of one room without being a network, in the place of one."""
+
+    preset = "compact"
 
     def __init__(self, draw: Layouts, task: Task) -> None:
         self.draw, self.task, self.asked = draw, task, 0
