@@ -134,7 +134,8 @@ def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[Shel
         )
     if room.options.ceiling:
         parts.append(ceiling(plan, room.height))
-    forms = iter(surfaces([form for part in parts for form in _forms(part)]))
+    coverings = {"Floor": floor_slot(room)} | covered_walls(room)
+    forms = iter(surfaces([form for part in parts for form in _forms(part, coverings)]))
     return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component, forms)]
 
 
@@ -197,15 +198,14 @@ def _prims(part: ShellPart, above: str, kind: str, forms: Iterator[Surface]) -> 
         yield from prims
 
 
-def _forms(part: ShellPart) -> Iterator[tuple[Mesh, Mapping[str, np.ndarray], float]]:
-    """What the surfaces of a part and of those inside it are made from, in their own frames."""
+def _forms(part: ShellPart, coverings: Mapping[str, str]) -> Iterator[tuple[Mesh, Mapping[str, np.ndarray], float]]:
+    """What the surfaces of a part and of those inside are made from, in their frames; `coverings`: part -> slot."""
     for piece in part.pieces:
-        mesh = piece.mesh
-        if part.joint:
-            mesh = Mesh(mesh.vertices - part.joint.anchor, mesh.faces)
-        yield mesh, {piece.look: np.arange(len(mesh.faces))}, CREASE
+        mesh = Mesh(piece.mesh.vertices - part.joint.anchor, piece.mesh.faces) if part.joint else piece.mesh
+        slot = coverings.get(part.name, piece.look) if piece.look == part.label else piece.look
+        yield mesh, {slot: np.arange(len(mesh.faces))}, CREASE
     for inner in part.inner:
-        yield from _forms(inner)
+        yield from _forms(inner, coverings)
 
 
 def _mass(pieces: Sequence[Piece], at: np.ndarray) -> Mass:

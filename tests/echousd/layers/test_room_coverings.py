@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 from pxr import Usd, UsdShade
@@ -13,10 +14,10 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.layers.structure import COVERS, FLOORS, covered_walls, floor_slot
+from echousd.layers.structure import COVERS, FLOORS, covered_walls, floor_slot, shell_prims
 from echousd.options import RoomOptions
 from echousd.room import Provenance
-from echousd.shapes.finishes.slots import HARMONIES, SLOTS
+from echousd.shapes.finishes.slots import HARMONIES, SLOTS, metres_of
 from echousd.shapes.looks import palette_of_room
 
 
@@ -112,6 +113,20 @@ def wet(room, kind, word, walls=True):
     graph = SceneGraph(RoomSpec(kind, size=(3.0, 2.4)), (Node("it", word),), ())
     boxes = Boxes(torch.tensor([[0.6, 0.9, 0.6]]), torch.tensor([[0.0, 0.0, -0.89]]), torch.zeros(1))
     return replace(room, graph=graph, boxes=boxes, options=RoomOptions(walls=walls, dress="none"))
+
+
+def test_patterns_of_floors_and_walls_have_their_own_sizes(room):
+    seed = next(
+        s for s in range(999)
+        if "brick" in covered_walls(seeded(room, s)).values() and floor_slot(seeded(room, s)) == "herringbone"
+    )  # fmt: skip
+    built = {mesh.path: mesh.form for part in shell_prims(seeded(room, seed)) for mesh in part.meshes}
+    (wall,) = covered_walls(seeded(room, seed))
+    for path, slot in (("Floor/Floor_mesh", "herringbone"), (f"{wall}/{wall}_mesh", "brick")):
+        form = built[f"/Room/Shell/{path}"]
+        across = np.sort(np.ptp(form.points, axis=0))[-2:]  # of the whole, but for its thickness
+        laid = np.sort(np.ptp(form.st, axis=0)) * metres_of(slot)
+        assert laid[-1] == pytest.approx(across[-1], rel=0.2)
 
 
 def test_where_it_is_wet_there_are_tiles(room):
