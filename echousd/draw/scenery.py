@@ -22,6 +22,7 @@ SHELL = ("floor", "wall", "ceiling", "door", "window")
 SMALL = 0.35  # metres: what is no larger hides nothing that a picture is of
 SMALLEST = 6  # times that an image is halved at most
 SEEN_THROUGH = 0.5  # opacity of a window's pane below which one looks out
+GLAZED = 0.03  # m² of an upright triangle of glass, twice, from which on it glazes a front and one looks in
 HUNG = ("picture", "mirror", "curtain", "blind", "wall_shelf", "wall_clock", "coats")  # goes with its wall
 
 
@@ -148,9 +149,8 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     """
     parts: list[dict[str, np.ndarray]] = []
     images: dict[tuple, tuple[int, tuple[np.ndarray, np.ndarray]]] = {}
-    boxes, curtains = [], []
+    boxes, curtains = list[np.ndarray](), list[np.ndarray]()
     shades: dict[str, list[np.ndarray]] = {}  # by component
-    hung: list[int] = []
     words: list[str] = []
     walls: dict[str, int] = {}  # component -> number; doors and windows belong to their wall
     panes: list[tuple[str, np.ndarray]] = []
@@ -172,11 +172,11 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             "gloss": np.zeros(count, np.float32), "texture": np.full(count, -1),
             "wall": np.full(count, walls.get(mesh.component, -1)),
         }  # fmt: skip
-        plain = Paint(color=class_color(mesh.category), roughness=1.0)
+        plain, clear = Paint(color=class_color(mesh.category), roughness=1.0), np.zeros(count, bool)
         for paint, faces in ((plain, np.arange(count)),) if by_class else mesh.paints:
             part["flat_colors"][faces], part["emissive"][faces] = paint.color, paint.emissive
             part["gloss"][faces] = min(1.0, 0.5 * (1 - paint.roughness) + 0.35 * paint.metallic)
-            part["texture"][faces] = -1
+            part["texture"][faces], clear[faces] = -1, paint.opacity < SEEN_THROUGH
             if paint.texture:
                 key = (paint.texture, paint.tint)
                 if key not in images:
@@ -184,23 +184,23 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
                     images[key] = (len(images), (pixels, np.array(paint.tint, np.float32)))
                 part["texture"][faces], (pixels, tint) = images[key]
                 part["flat_colors"][faces] = LINEAR[pixels[::16, ::16]].mean((0, 1)) * tint
+        if clear.any() and not clear.all():
+            across = np.abs(area_normals(part["triangles"]))
+            keep = ~clear | (across[:, [0, 2]].max(1) < np.maximum(GLAZED, 3 * across[:, 1]))
+            part = {key: value[keep] for key, value in part.items()}
         if (glows := part["emissive"].any(1)).any():
             shades.setdefault(mesh.component, []).append(part["triangles"][glows])
         parts.append(part)
         words.append(mesh.category)
-        if mesh.category not in (*SHELL, *HUNG, "rug"):
-            box = _box(mesh)
-            boxes += [box] if box[:3].max() > SMALL else []
-        if mesh.category in HUNG:
-            hung.append(len(parts) - 1)
-            curtains.append(_box(mesh))
-    _hang(parts, [*hung, *_on_shelves(parts, words)], len(walls))
+        if mesh.category not in (*SHELL, "rug"):
+            (curtains if mesh.category in HUNG else boxes).append(_box(mesh))
+    _hang(parts, [*(n for n, word in enumerate(words) if word in HUNG), *_on_shelves(parts, words)], len(walls))
     if not parts:
         raise ValueError(f"{stage.GetRootLayer().identifier}: nothing to draw, found no visible mesh")
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     furniture, at_walls = (
         Furniture(found[:, :3], found[:, 3:6], found[:, 6])
-        for found in (np.array(each).reshape(-1, 7) for each in (boxes, curtains))
+        for found in (np.array(each).reshape(-1, 7) for each in ([b for b in boxes if b[:3].max() > SMALL], curtains))
     )
     return Scenery(
         images=tuple(image for _, image in images.values()), furniture=furniture, hung=at_walls,

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from PIL import Image
-from pxr import Gf, Sdf, Usd, UsdGeom
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 from small_room import BARE, StandIn, small_graph
 
 import echousd
@@ -159,6 +159,29 @@ def test_one_looks_out_of_windows_and_past_walls_that_are_away(tmp_path):
     assert off.min() < 0.01  # a colour that lies on the floor here
     outwards = middle + 5 * (middle - eye) * (1, 0, 1)
     assert len(scenery.without_near_walls(outwards).panes) < len(scenery.panes)
+
+
+@pytest.mark.parametrize(("opacity", "size", "faces"), [(0.3, 1.0, 2), (0.3, 0.1, 4), (0.9, 1.0, 4)])
+def test_one_looks_through_the_glass_of_a_front(opacity, size, faces):
+    """A front of two squares, the second of glass: a clear and large one is left out, no board all of glass."""
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    for name, squares in (("front", 2), ("screen", 1)):
+        mesh = UsdGeom.Mesh.Define(stage, f"/{name}")
+        corners = [(x + k, y, 0) for k in range(squares) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        mesh.CreatePointsAttr(size * np.array(corners, np.float32))
+        mesh.CreateFaceVertexCountsAttr([4] * squares)
+        mesh.CreateFaceVertexIndicesAttr(list(range(4 * squares)))
+        material = UsdShade.Material.Define(stage, f"/{name}_glass")
+        shader = UsdShade.Shader.Define(stage, f"/{name}_glass/shader")
+        shader.CreateIdAttr("UsdPreviewSurface")
+        shader.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(opacity)
+        material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+        api = UsdShade.MaterialBindingAPI(mesh.GetPrim())
+        subset = api.CreateMaterialBindSubset("glass", [squares - 1]).GetPrim()
+        UsdShade.MaterialBindingAPI.Apply(subset).Bind(material)
+    assert len(read_scenery(stage).triangles) == faces + 2
 
 
 def test_a_small_picture_is_quick(root):
