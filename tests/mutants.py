@@ -19,6 +19,7 @@ import contextlib
 import functools
 import gc
 import io
+import itertools
 import json
 import os
 import random
@@ -52,6 +53,7 @@ GROUPS = {  # modules, and what tests them
 WANTED = 0.8
 QUICK, LONG = 1.0, 15.0  # seconds of the processor: a test that comes first, one that is left out
 IMPORT = "import"  # in place of a test: lines that run before any
+TIMES = itertools.count(int(time.time()) + 1)
 SECONDS = 600  # that the tests of one change may take; what takes longer is noticed
 TURNED = {ast.Lt: ast.GtE, ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
           ast.In: ast.NotIn, ast.NotIn: ast.In, ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.Add: ast.Sub,
@@ -194,10 +196,12 @@ class Loop:
             target = self.copy / one.path.relative_to(TOP)
             names = {name for line in one.lines or () for name in found["tests"].get(f"{target}:{line}", ())}
             alone = not one.lines or names == {IMPORT}
-            if alone:  # all tests that run anything of the module
+            if alone:  # all tests that run anything of the module, and those of files that read its tables
                 names = {
                     name for line in found["tests"] if line.startswith(f"{target}:") for name in found["tests"][line]
                 }
+                module = ".".join(one.path.relative_to(TOP).with_suffix("").parts).removeprefix("model.")
+                names |= {name.partition("::")[0] for name in took if module in _text(name.partition("::")[0])}
             chosen = {name for name in took if (names | apart) & {name, name.partition("::")[0]}}
             items = [item for item in session.items if item.nodeid in chosen and took[item.nodeid] < LONG]
             total: defaultdict[str, float] = defaultdict(float)
@@ -205,11 +209,11 @@ class Loop:
                 total[str(item.path)] += took[item.nodeid]
             items.sort(key=lambda item: (took[item.nodeid] > QUICK, item.nodeid in apart, total[str(item.path)]))
             source, began = target.read_text(), time.monotonic()
-            target.write_text(ast.unparse(one.tree))  # what other processes read
+            _write(target, ast.unparse(one.tree))  # what other processes read
             try:
                 noticed = bool(items) and self.noticed(session, one, items, str(target), sum(total.values()), alone)
             finally:
-                target.write_text(source)
+                _write(target, source)
             told = f"{number}: {one.path.relative_to(TOP)}:{one.line}: {one.told}"
             said = "killed" if noticed else "survived"
             print(f"{said} {told} ({len(items)} tests, {time.monotonic() - began:.0f} s)", flush=True)  # noqa: T201
@@ -256,6 +260,19 @@ class Loop:
             return False
 
         return _forked(run)
+
+
+def _write(path: Path, text: str) -> None:
+    """A module that no byte code of another version passes for, whatever its size: each has a time of its own."""
+    path.write_text(text)
+    stamp = next(TIMES)
+    os.utime(path, (stamp, stamp))
+
+
+@functools.cache
+def _text(file: str) -> str:
+    """A file of tests, below the folder of the run."""
+    return Path(file).read_text("utf-8")
 
 
 def _silence(session: pytest.Session) -> None:

@@ -12,12 +12,16 @@ from echousd.draw.sight import Furniture
 from echousd.draw.views import perspective_views
 from echousd.layers.cameras import room_points
 from echousd.layers.compose import text
-from echousd.layers.materials import tint_factor
+from echousd.layers.materials import define_material, tint_factor
 from echousd.options import RoomOptions
 from echousd.shapes import walls
 from echousd.shapes.geometry import Origin
-from echousd.shapes.looks import Look
+from echousd.shapes.looks import Look, look
 from echousd.stage.graphs import read_graph
+from echousd.stage.pen import Pen
+
+SPECIAL = {"inputs:opacity", "inputs:emissiveColor"}
+SEEN = {"wood": set(), "glass": {"inputs:opacity"}, "shade": {"inputs:emissiveColor"}}
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +74,14 @@ def test_paintings_keep_their_colours():
     base, look = Look((0.5, 0.4, 0.2)), Look((0.25, 0.4, 0.1))
     assert tint_factor(base, look) == [0.5, 1.0, 0.5]
     assert tint_factor(replace(base, pattern="picture_fern"), look) == [1.0, 1.0, 1.0]
+
+
+def test_only_glass_is_seen_through_and_only_shades_glow():
+    pen = Pen.blank("Looks")
+    for slot in ("wood", "glass", "shade"):
+        define_material(pen, f"/Looks/{slot}", look("oak", slot))
+    written = {slot: {p.name for p in pen.layer.GetPrimAtPath(f"/Looks/{slot}/surface").properties} for slot in SEEN}
+    assert {slot: SPECIAL & names for slot, names in written.items()} == SEEN
 
 
 def test_stage_opens_whole_and_carries_its_graph(stage, room):
@@ -186,6 +198,7 @@ def test_asset_is_what_studios_expect(root):
     bed = stage.GetPrimAtPath("/bed")
     assert [str(prim.GetTypeName()) for prim in (bed.GetChild("geo"), bed.GetChild("mtl"))] == ["Scope", "Scope"]
     assert bed.GetInherits().GetAllDirectInherits() == ["/_class_/bed"]
+    assert stage.GetPrimAtPath("/_class_/bed").GetSpecifier() == Sdf.SpecifierClass
     assert bed.GetVariantSet("LOD").GetVariantNames() == ["high", "proxy"]
     palettes = bed.GetVariantSet("palette")
     color = stage.GetAttributeAtPath("/bed/mtl/wood/surface.inputs:diffuseColor")

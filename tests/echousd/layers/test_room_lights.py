@@ -222,3 +222,9 @@ def test_openings_of_the_graph_point_to_what_they_became(tmp_path) -> None:
     assert str(found["door"]["wall"]) == "/Room/Shell/Wall_2"
     turns = UsdGeom.Xformable(stage.GetPrimAtPath(found["door"]["leaf"])).GetOrderedXformOps()
     assert [op.GetOpName() for op in turns] == ["xformOp:translate", "xformOp:rotateY"]
+    cache = UsdGeom.BBoxCache(0, [UsdGeom.Tokens.default_])
+    leaf = cache.ComputeWorldBound(stage.GetPrimAtPath(found["door"]["leaf"])).ComputeAlignedRange()
+    low, high = np.array(leaf.GetMin()), np.array(leaf.GetMax())  # shut: in its wall at +x, between its two sides
+    assert (low >= (1.9, -0.01, -1.31)).all()
+    assert (high <= (2.3, 2.01, -0.39)).all()
+    assert high[2] - low[2] > 0.7
