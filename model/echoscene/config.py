@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 from echomodel.config import from_dict
@@ -137,15 +137,6 @@ class ReleasedConfig:
     def __post_init__(self) -> None:
         if self.preset not in ("released", "paper"):
             raise ValueError(f"preset is {self.preset!r}, allowed: released, paper")
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain nested dicts, for a file's metadata."""
-        return asdict(self)
-
-    @classmethod
-    def from_json(cls, raw: Mapping[str, Any]) -> ReleasedConfig:
-        """The inverse of `to_json`; raises ValueError naming an unknown or mistyped field."""
-        return from_dict(cls, dict(raw))
 
 
 # What a recipe's `[paper]` may say -> the field of each part's configuration that it is; `time_in_echo`, `echo` and

@@ -9,6 +9,7 @@ context is a single token, so cross-attention is its value path, broadcast. The 
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
 from copy import deepcopy
 from functools import cache
 from typing import Any, TypeVar
@@ -114,15 +115,6 @@ class _Gate(nn.Module):
         return value * F.gelu(gate)
 
 
-class _FeedForward(nn.Module):
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.net = nn.Sequential(_Gate(width, 4 * width), nn.Dropout(0.0), nn.Linear(4 * width, width))
-
-    def forward(self, x: Tensor) -> Tensor:
-        return self.net(x)
-
-
 class TransformerBlock(nn.Module):
     """Self-attention, cross-attention to one token, gated feed-forward, each normalised and added.
 
@@ -132,7 +124,8 @@ class TransformerBlock(nn.Module):
     def __init__(self, width: int, context: int, heads: int) -> None:
         super().__init__()
         self.attn1 = Attention(width, width, heads)
-        self.ff = _FeedForward(width)
+        feed = nn.Sequential(_Gate(width, 4 * width), nn.Dropout(0.0), nn.Linear(4 * width, width))
+        self.ff = nn.Sequential(OrderedDict(net=feed))
         self.norm1, self.norm3 = nn.LayerNorm(width), nn.LayerNorm(width)
         if context:
             self.attn2, self.norm2 = Attention(width, context, heads), nn.LayerNorm(width)

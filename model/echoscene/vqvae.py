@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
@@ -43,69 +45,35 @@ class _VoxelAttention(nn.Module):
         return x + self.proj_out(h)
 
 
-class _Middle(nn.Module):
-    def __init__(self, channels: int) -> None:
-        super().__init__()
-        self.block_1, self.attn_1 = _Residual(channels, channels), _VoxelAttention(channels)
-        self.block_2 = _Residual(channels, channels)
-
-    def forward(self, x: Tensor) -> Tensor:
-        return self.block_2(self.attn_1(self.block_1(x)))
+def _named(**parts: nn.Module) -> nn.Sequential:
+    """Parts that are called one after another, under their published names."""
+    return nn.Sequential(OrderedDict(parts))
 
 
-class _Downsample(nn.Module):
-    def __init__(self, channels: int) -> None:
-        super().__init__()
-        self.conv = nn.Conv3d(channels, channels, 3, stride=2)
-
-    def forward(self, x: Tensor) -> Tensor:
-        return self.conv(F.pad(x, (0, 1, 0, 1, 0, 1)))  # the published padding: one voxel at the far ends only
+def _middle(channels: int) -> nn.Sequential:
+    first, attention = _Residual(channels, channels), _VoxelAttention(channels)
+    return _named(block_1=first, attn_1=attention, block_2=_Residual(channels, channels))
 
 
-class _Upsample(nn.Module):
-    def __init__(self, channels: int) -> None:
-        super().__init__()
-        self.conv = nn.Conv3d(channels, channels, 3, padding=1)
-
-    def forward(self, x: Tensor) -> Tensor:
-        return self.conv(F.interpolate(x, scale_factor=2.0))
+def _level(cin: int, cout: int, blocks: int) -> nn.Sequential:
+    return _named(block=nn.Sequential(*(_Residual(cin if i == 0 else cout, cout) for i in range(blocks))))
 
 
-class _Level(nn.Module):
-    def __init__(self, cin: int, cout: int, blocks: int) -> None:
-        super().__init__()
-        self.block = nn.ModuleList([_Residual(cin if i == 0 else cout, cout) for i in range(blocks)])
-
-    def forward(self, x: Tensor) -> Tensor:
-        for block in self.block:
-            x = block(x)
-        for name in ("downsample", "upsample"):
-            if hasattr(self, name):
-                x = getattr(self, name)(x)
-        return x
-
-
-class _Encoder(nn.Module):
-    def __init__(self, config: VQConfig) -> None:
-        super().__init__()
-        widths = [config.channels * m for m in config.mult]
-        self.conv_in = nn.Conv3d(1, config.channels, 3, padding=1)
-        levels, current = [], config.channels
-        for number, width in enumerate(widths):
-            level = _Level(current, width, config.blocks)
-            if number < len(widths) - 1:
-                level.downsample = _Downsample(width)
-            levels.append(level)
-            current = width
-        self.down = nn.ModuleList(levels)
-        self.mid = _Middle(current)
-        self.norm_out, self.conv_out = _norm(current), nn.Conv3d(current, config.latent, 3, padding=1)
-
-    def forward(self, x: Tensor) -> Tensor:
-        x = self.conv_in(x)
-        for level in self.down:
-            x = level(x)
-        return self.conv_out(F.gelu(self.norm_out(self.mid(x))))
+def _encoder(config: VQConfig) -> nn.Sequential:
+    enter = nn.Conv3d(1, config.channels, 3, padding=1)
+    levels, current = [], config.channels
+    for number, factor in enumerate(config.mult):
+        width = config.channels * factor
+        level = _level(current, width, config.blocks)
+        if number < len(config.mult) - 1:
+            pad = nn.ConstantPad3d((0, 1, 0, 1, 0, 1), 0.0)  # the published padding: one voxel at the far ends only
+            level.add_module("downsample", _named(pad=pad, conv=nn.Conv3d(width, width, 3, stride=2)))
+        levels.append(level)
+        current = width
+    middle, norm = _middle(current), _norm(current)
+    leave = nn.Conv3d(current, config.latent, 3, padding=1)
+    down = nn.Sequential(*levels)
+    return _named(conv_in=enter, down=down, mid=middle, norm_out=norm, act=nn.GELU(), conv_out=leave)
 
 
 class _Decoder(nn.Module):
@@ -114,12 +82,13 @@ class _Decoder(nn.Module):
         widths = [config.channels * m for m in config.mult]
         current = widths[-1]
         self.conv_in = nn.Conv3d(config.latent, current, 3, padding=1)
-        self.mid = _Middle(current)
-        levels: list[_Level] = []
+        self.mid = _middle(current)
+        levels: list[nn.Sequential] = []
         for number, width in reversed(list(enumerate(widths))):
-            level = _Level(current, width, config.blocks)
+            level = _level(current, width, config.blocks)
             if number:
-                level.upsample = _Upsample(width)
+                conv = nn.Conv3d(width, width, 3, padding=1)
+                level.add_module("upsample", _named(larger=nn.Upsample(scale_factor=2.0), conv=conv))
             levels.insert(0, level)  # stored from fine to coarse
             current = width
         self.up = nn.ModuleList(levels)
@@ -132,13 +101,6 @@ class _Decoder(nn.Module):
         return self.conv_out(F.gelu(self.norm_out(h)))
 
 
-class _Codebook(nn.Module):
-    def __init__(self, config: VQConfig) -> None:
-        super().__init__()
-        self.embedding = nn.Embedding(config.codes, config.latent)
-        nn.init.uniform_(self.embedding.weight, -1.0 / config.codes, 1.0 / config.codes)
-
-
 class VQVAE(nn.Module):
     """The published shape autoencoder, under its published parameter names.
 
@@ -148,8 +110,10 @@ class VQVAE(nn.Module):
     def __init__(self, config: VQConfig) -> None:
         super().__init__()
         self.config = config
-        self.encoder, self.decoder = _Encoder(config), _Decoder(config)
-        self.quantize = _Codebook(config)
+        self.encoder, self.decoder = _encoder(config), _Decoder(config)
+        codebook = nn.Embedding(config.codes, config.latent)
+        nn.init.uniform_(codebook.weight, -1.0 / config.codes, 1.0 / config.codes)
+        self.quantize = _named(embedding=codebook)
         self.quant_conv = nn.Conv3d(config.latent, config.latent, 1)
         self.post_quant_conv = nn.Conv3d(config.latent, config.latent, 1)
 
@@ -165,7 +129,7 @@ class VQVAE(nn.Module):
 
         Distances are computed for `chunk` latents at a time: all at once would be 1.3 GB for ten objects.
         """
-        codes = self.quantize.embedding.weight
+        codes = self.quantize.get_parameter("embedding.weight")
         squares = codes.square().sum(1)
         flat = z.movedim(1, -1).reshape(-1, codes.shape[1])
         near = [
@@ -176,7 +140,7 @@ class VQVAE(nn.Module):
 
     def quantise(self, z: Tensor) -> tuple[Tensor, Tensor]:
         """(N, 3, d, h, w) -> the nearest codes in place, gradients passed straight through, and the codes alone."""
-        codes = self.quantize.embedding(self.indices(z)).reshape(*z.shape[:1], *z.shape[2:], -1).movedim(-1, 1)
+        codes = self.quantize(self.indices(z)).reshape(*z.shape[:1], *z.shape[2:], -1).movedim(-1, 1)
         return z + (codes - z).detach(), codes
 
     def decode(self, z: Tensor) -> Tensor:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 import torch
@@ -13,7 +14,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from echomodel.boxes import BoxStatistics
-from echomodel.config import check_numbers
+from echomodel.config import check_numbers, from_dict
 from echomodel.files import whole_file
 from echomodel.vocabulary import vocabulary
 from echoscene.config import ReleasedConfig
@@ -76,7 +77,7 @@ def write_released(
     """
     metadata = {
         "format": FORMAT,
-        "config": json.dumps(config.to_json()),
+        "config": json.dumps(asdict(config)),
         "vocabulary": json.dumps(
             {"classes": classes, "predicates": [p.name for p in vocabulary().predicates]} if config.encoder else None
         ),
@@ -109,7 +110,7 @@ def load_released(path: str | os.PathLike[str]) -> nn.Module:
                 )
             raw = json.loads(metadata["config"])
             check_numbers(raw, len(file.keys()))
-            config = ReleasedConfig.from_json(raw)
+            config = from_dict(ReleasedConfig, dict(raw))
             words, bounds = json.loads(metadata["vocabulary"]), json.loads(metadata["box_statistics"])
             tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
     except CheckpointError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ import torch
 import trimesh
 from published_shapes import fit_to_box, mesh_from_grid, vertex_points
 
+from echomodel.config import from_dict
 from echomodel.metrics.pointsets import chamfer, compare_sets
 from echomodel.vocabulary import vocabulary
 from echoscene.checkpoint import read_bounds, statistics_from_bounds
@@ -77,12 +78,12 @@ DESK = _graph([5, 4], [[1, 3, 0]])
 
 def test_presets_are_consistent() -> None:
     for config in (ReleasedConfig(encoder=EncoderConfig(classes=36)), paper()):
-        assert ReleasedConfig.from_json(config.to_json()) == config
+        assert from_dict(ReleasedConfig, asdict(config)) == config
         with torch.device("meta"):
             model = ReleasedModel(config)
     assert sum(p.numel() for p in model.layout_net.parameters()) > 150e6
     with pytest.raises(ValueError, match=r"unknown field 'encoder\.colour', allowed: classes"):
-        ReleasedConfig.from_json({"encoder": {"colour": 1}})
+        from_dict(ReleasedConfig, {"encoder": {"colour": 1}})
 
 
 def test_a_batch_is_what_single_runs_are() -> None:
