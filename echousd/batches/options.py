@@ -50,8 +50,7 @@ class BatchRequest(PlainModel):
         """The options of the room number `copy` of a graph."""
         combinations = list(itertools.product(*self.variations.values()))
         values = dict(zip(self.variations, combinations[copy % len(combinations)], strict=True))
-        chosen: BatchOptions = self.options.replaced(**values)
-        return chosen
+        return self.options.replaced(**values)
 
 
 def request_of(raw: Mapping[str, Any], where: str) -> BatchRequest:

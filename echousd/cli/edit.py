@@ -235,7 +235,6 @@ def adopt(
     The stage is not written; the room refers to the pieces in it, with --collect to copies. What a person would point
     at in their arrangement is told and left as it is.
     """
-    from echousd.cli.output import report, say, telling_faults
     from echousd.cli.terminal import progress_bar
     from echousd.folder.folder import check_output, writing
     from echousd.options import RoomOptions

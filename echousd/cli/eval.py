@@ -10,7 +10,7 @@ import typer
 
 from echomodel.files import check_free
 from echousd.cli.options import Replace, Written
-from echousd.cli.output import say, say_done
+from echousd.cli.output import say, say_done, say_json
 
 eval_app = typer.Typer(help="Scores of whoever lays out rooms, and studies with people.", no_args_is_help=True)
 app = typer.Typer()
@@ -103,7 +103,6 @@ def answers(
 
     Example: echousd eval answers answers_*.json
     """
-    from echousd.cli.output import say_json
     from echousd.evaluation.suite import preferences
 
     found = preferences(files)

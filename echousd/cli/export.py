@@ -164,9 +164,8 @@ def convert(
         raise ValueError(f"{output}: the output's name must end by .safetensors")
     check_free(output, force=force)
     from echoscene import checkpoint
-    from echoscene.checkpoint import read_bounds
 
-    statistics = read_bounds(bounds) if bounds else None
+    statistics = checkpoint.read_bounds(bounds) if bounds else None
     names = classes.read_text("utf-8").split("\n") if classes else None
     names = [name.strip() for name in names if name.strip()] if names else None
     config = checkpoint.convert(source, output, classes=names, statistics=statistics)

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from echousd.cli.options import Force, Made, Outside, Wait, add_room_command
 from echousd.cli.output import report, telling_faults
-
-if TYPE_CHECKING:
-    pass
 
 app = typer.Typer()
 

@@ -129,8 +129,7 @@ def new(
         raise GraphError("--area goes with --rooms; the floor of one room is --size")
     given = {name: value for name, value in {"size": size, "height": height}.items() if value is not None}
     if source is not None:
-        made = load_graph(source)
-        made = made.with_room(**given)
+        made = load_graph(source).with_room(**given)
         later = relate or ()
     else:
         assert room is not None
@@ -215,10 +214,8 @@ def graph(
     from echousd.graph import GraphError, SceneGraph, load_graph
     from echousd.graph.files import STAGE_FORMS
 
-    forms = {"--json": as_json, "--schema": schema}
-    chosen = [name for name, wanted in forms.items() if wanted]
-    if len(chosen) > 1:
-        raise GraphError(f"{' and '.join(chosen)} exclude each other")
+    if as_json and schema:
+        raise GraphError("--json and --schema exclude each other")
     if schema:
         say_json(SceneGraph.model_json_schema(), indent=2)
         return

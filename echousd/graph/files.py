@@ -35,8 +35,7 @@ def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGr
     if path.is_dir():
         raise GraphError(f"{path}: is a directory, allowed: a {', '.join((*TEXT_FORMS, *STAGE_FORMS))} file")
     if path.suffix.lower() in STAGE_FORMS:
-        graph: SceneGraph = read_graph(path, room=room)
-        return graph
+        return read_graph(path, room=room)
     return read_file(path, lambda *text: graph_from_text(SceneGraph, *text))
 
 

@@ -143,16 +143,14 @@ class SceneGraph(PlainModel):
 
     def diff(self, other: SceneGraph) -> GraphDiff:
         """What has to change in this graph to become `other`."""
-        found: GraphDiff = steps_between(self, other)
-        return found
+        return steps_between(self, other)
 
     # -- text forms and stages -----------------------------------------------------------------------------------------
 
     @classmethod
     def from_json(cls, text: str) -> SceneGraph:
         """Read the canonical JSON form (or the short form, as JSON); raises `GraphError` with the line at fault."""
-        graph: SceneGraph = graph_from_text(cls, text, "json")
-        return graph
+        return graph_from_text(cls, text, "json")
 
     def to_json(self) -> str:
         """The canonical JSON form: fields in a fixed order, one node and one relation a line, defaults left out."""
@@ -172,8 +170,7 @@ class SceneGraph(PlainModel):
     @classmethod
     def from_yaml(cls, text: str) -> SceneGraph:
         """Read the short YAML form (or the canonical form, as YAML); raises `GraphError` with the line at fault."""
-        graph: SceneGraph = graph_from_text(cls, text, "yaml")
-        return graph
+        return graph_from_text(cls, text, "yaml")
 
     def to_yaml(self) -> str:
         """The short YAML form that a person would write."""

@@ -30,8 +30,7 @@ TOP_KEYS = ("room", "objects", "nodes", "relations", *LISTS)
 
 def graph_from_text(kind: type[SceneGraph], text: str, form: Literal["json", "yaml"], source: str = "") -> SceneGraph:
     """Read a graph of class `kind` from YAML or JSON text; raises as `read_text`."""
-    found: SceneGraph = read_text(partial(graph_from_plain, kind), text, form, source)
-    return found
+    return read_text(partial(graph_from_plain, kind), text, form, source)
 
 
 def read_text(build: Callable[[Any], Any], text: str, form: Literal["json", "yaml"], source: str = "") -> Any:
@@ -148,8 +147,7 @@ def _with_placement(nodes: list[Node], placed: Placed, about: Path) -> list[Node
 
 
 def _node(fields: dict[str, Any], about: Path) -> Node:
-    built: Node = _built(Node, _in_radians(fields, about), about)
-    return built
+    return _built(Node, _in_radians(fields, about), about)
 
 
 def _sentence(entry: Any, about: Path, names: Mapping[str, str]) -> Relation | Placed:

@@ -39,8 +39,7 @@ def load_home(path: str | Path) -> HomeGraph | None:
 
         return read_text(home_of_plain, text, *rest)
 
-    home: HomeGraph | None = read_file(path, read)
-    return home
+    return read_file(path, read)
 
 
 def save_home(home: HomeGraph, path: Path) -> None:

@@ -74,8 +74,7 @@ def given_plan(home: HomeGraph, rooms: Placed) -> Plan | None:
 
 def _placed(graph: SceneGraph, pose: np.ndarray) -> np.ndarray:
     """(k, 2) float, the floor of a room in the home's frame, as stated."""
-    found: np.ndarray = graph.room.corners @ pose[[0, 2]][:, [0, 2]].T + pose[[0, 2], 3]
-    return found
+    return graph.room.corners @ pose[[0, 2]][:, [0, 2]].T + pose[[0, 2], 3]
 
 
 def walled(home: HomeGraph, rooms: Placed) -> Plan | None:

@@ -200,8 +200,7 @@ class HomeGraph(PlainModel):
         """With one more relation, `kitchen open to living`; one that says how the two are joined replaces another."""
         new = relation_of(sentence)
         kept = [one for one in self.relations if not (new.row.wall and one.row.wall and {*one.pair} == {*new.pair})]
-        home: HomeGraph = self.replaced(relations=(*(one for one in kept if one != new), new))
-        return home
+        return self.replaced(relations=(*(one for one in kept if one != new), new))
 
     def unrelate(self, sentence: str) -> HomeGraph:
         """Without a relation; raises `GraphError` where it is not stated."""
@@ -209,8 +208,7 @@ class HomeGraph(PlainModel):
         if gone not in self.relations:
             told = ", ".join(f"'{relation}'" for relation in self.relations)
             raise GraphError(f"no relation '{gone}' in this home, allowed: {told}")
-        home: HomeGraph = self.replaced(relations=tuple(one for one in self.relations if one != gone))
-        return home
+        return self.replaced(relations=tuple(one for one in self.relations if one != gone))
 
     def to_json(self) -> str:
         """JSON (and YAML) that `echousd.home.files.load_home` reads."""

@@ -241,26 +241,20 @@ def _write_folder(out: Path, files: dict[str, bytes]) -> None:
 
 def room_prompt(surfaces: Surfaces) -> str:
     """`a bedroom in oak style, coast colours`: the room, the styles that its graph names, and its palette."""
-    kind = _words(surfaces.graph.room.type or "room")
-    styles = list(dict.fromkeys(_words(node.style) for node in surfaces.graph.nodes if node.style))
-    return ", ".join(filter(None, (_with(kind, styles), _colors(surfaces.palette))))
+    styles = dict.fromkeys(node.style for node in surfaces.graph.nodes if node.style)
+    return _prompt(surfaces.graph.room.type or "room", list(styles), surfaces.palette)
 
 
 def object_prompt(thing: Painted, surfaces: Surfaces) -> str:
     """`a nightstand in oak style, coast colours`."""
-    kind = _words(thing.category or thing.name)
-    return ", ".join(
-        filter(None, (_with(kind, [_words(thing.style)] if thing.style else []), _colors(surfaces.palette)))
-    )
+    return _prompt(thing.category or thing.name, [thing.style] if thing.style else [], surfaces.palette)
 
 
-def _with(kind: str, styles: list[str]) -> str:
-    article = "an" if kind[:1] in "aeiou" else "a"
-    return f"{article} {kind}" + (f" in {' and '.join(styles[:3])} style" if styles else "")
-
-
-def _colors(palette: str) -> str:
-    return f"{_words(palette)} colours" if palette else ""
+def _prompt(name: str, styles: list[str], palette: str) -> str:
+    kind, told = _words(name), list(dict.fromkeys(map(_words, styles)))
+    said = f"{'an' if kind[:1] in 'aeiou' else 'a'} {kind}"
+    said += f" in {' and '.join(told[:3])} style" if told else ""
+    return said + (f", {_words(palette)} colours" if palette else "")
 
 
 def _words(name: str) -> str:

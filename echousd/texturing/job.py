@@ -118,13 +118,9 @@ def job_mesh(folder: Path, thing: JobObject) -> Unwrapped:
     path = inside(folder, thing.mesh, f"{folder / JOB}: objects.{thing.name}.mesh")
     mesh = read_obj(path)
     if len(mesh.faces) != thing.triangles:
-        raise ValueError(
-            f"object {thing.name!r}: {path} has {len(mesh.faces)} triangles, {thing.triangles} were exported; "
-            f"put what a tool changed into {RESULTS}/"
-        )
-    if layout_digest(mesh.corners) != thing.layout:
-        raise ValueError(
-            f"object {thing.name!r}: {path} has other texture coordinates than were exported; put what a tool changed "
-            f"into {RESULTS}/"
-        )
-    return mesh
+        told = f"{len(mesh.faces)} triangles, {thing.triangles} were exported"
+    elif layout_digest(mesh.corners) != thing.layout:
+        told = "other texture coordinates than were exported"
+    else:
+        return mesh
+    raise ValueError(f"object {thing.name!r}: {path} has {told}; put what a tool changed into {RESULTS}/")

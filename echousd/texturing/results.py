@@ -37,18 +37,15 @@ def read_results(folder: Path, job: Job) -> Results:
     """
     found = _one_picture(folder, job) if job.one_picture else _many_pictures(folder, job)
     if not found[0]:
-        place = (
-            f"{RESULTS}/scene.png or {OUTPUTS}/*/vsd/*/texture_<step>.png"
-            if job.one_picture
-            else (f"{RESULTS}/<object>.glb or {RESULTS}/<object>.png")
-        )
+        one, many = f"{OUTPUTS}/*/vsd/*/texture_<step>.png", f"{RESULTS}/<object>.png"
+        place = f"{RESULTS}/scene.png or {one}" if job.one_picture else f"{RESULTS}/<object>.glb or {many}"
         raise ValueError(f"{folder}: no results, expected {place}; paint the job first (see {folder / JOB})")
     return found
 
 
 def _one_picture(folder: Path, job: Job) -> Results:
     """SceneTex: a picture of everything."""
-    picture = _beside(folder, f"{RESULTS}/{SCENE}", IMAGES) or _last_step(folder)
+    picture = _beside(folder, SCENE, IMAGES) or _last_step(folder)
     if picture is None:
         return {}, {}
     name, content = image_of(texture_bytes(str(picture)) or b"", str(picture), SCENE)
@@ -77,24 +74,22 @@ def _many_pictures(folder: Path, job: Job) -> Results:
     objects: dict[str, Result] = {}
     pictures: dict[str, bytes] = {}
     for thing in job.objects:
-        mesh = _beside(folder, f"{RESULTS}/{thing.name}", (".glb",)) or _beside(
-            folder, f"{RESULTS}/glbs/{thing.name}", (".glb",)
-        )
+        mesh = _beside(folder, thing.name, (".glb",)) or _beside(folder, f"glbs/{thing.name}", (".glb",))
         if mesh is not None:
             back, raw = read_glb(mesh)
             if "color" not in raw:
                 raise ValueError(f"object {thing.name!r}: {mesh} has no base colour image")
             st, source = _aligned(job_mesh(folder, thing), back, thing), str(mesh)
         else:
-            picture = _beside(folder, f"{RESULTS}/{thing.name}", IMAGES)
+            picture = _beside(folder, thing.name, IMAGES)
             if picture is None:
                 continue
-            own = _beside(folder, f"{RESULTS}/{thing.name}", (".obj",))
+            own = _beside(folder, thing.name, (".obj",))
             given = job_mesh(folder, thing)
             st = given.corners if own is None else _aligned(given, read_obj(own), thing)
             raw, source = {"color": texture_bytes(str(picture)) or b""}, str(picture)
             for slot in ("metal_rough", "normal"):
-                more = _beside(folder, f"{RESULTS}/{thing.name}_{slot}", IMAGES)
+                more = _beside(folder, f"{thing.name}_{slot}", IMAGES)
                 if more is not None:
                     raw[slot] = texture_bytes(str(more)) or b""
         images = {}
@@ -123,11 +118,11 @@ def image_of(content: bytes, where: str, stem: str) -> tuple[str, bytes]:
 
 
 def _beside(folder: Path, stem: str, endings: tuple[str, ...]) -> Path | None:
-    """The first file of a name in the job, links inside it only."""
+    """The first file of a name among the results of a job, links inside it only."""
     for ending in endings:
-        path = folder / f"{stem}{ending}"
+        path = folder / RESULTS / f"{stem}{ending}"
         if path.is_symlink() or path.exists():
-            check_links(folder, path, f"{folder}: {stem}{ending}")
+            check_links(folder, path, f"{folder}: {RESULTS}/{stem}{ending}")
             if not path.is_file():
                 raise ValueError(f"{path}: not a regular file, allowed: a result of the tool")
             return path

@@ -39,8 +39,7 @@ def load_model(weights: str | Path | None = None, *, device: str = "cpu") -> Roo
 def _loaded(path: Path | None, stamp: tuple[tuple[str, int, int], ...], device: str | None) -> RoomModel:
     if path is not None and _format(path / RUN) in LOADERS.keys() - {COMPACT}:
         path = path / RUN  # a training of published networks; a folder of compact weights is read as a whole
-    found: RoomModel = LOADERS.get(_format(path), LOADERS[COMPACT])(path, device=device)
-    return found
+    return LOADERS.get(_format(path), LOADERS[COMPACT])(path, device=device)
 
 
 def _format(path: Path | None) -> str:

@@ -340,16 +340,12 @@ def ddim(denoise: Denoiser, x: Tensor, grid: tuple[Tensor, Tensor, Tensor]) -> I
         yield int(step), x
 
 
-def last(states: Iterator[tuple[int, Tensor]], progress: StepListener | None = None, steps: int = 0) -> Tensor:
-    """The final state of a sampler; `progress` is called with (steps done, `steps`)."""
-    final = None
-    for done, (_, state) in enumerate(states, start=1):
-        final = state
+def last(states: Iterator[tuple[int, Tensor]], progress: StepListener | None, steps: int) -> Tensor:
+    """The final state of a sampler of one step or more; `progress` is called with (steps done, `steps`)."""
+    for done, (_, state) in enumerate(states, start=1):  # noqa: B007
         if progress is not None:
             progress(done, steps)
-    if final is None:
-        raise ValueError("sampler made no step")
-    return final
+    return state
 
 
 def noised(clean: Tensor, t: Tensor, noise: Tensor, tables: Schedule) -> Tensor:

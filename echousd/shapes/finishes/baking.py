@@ -38,8 +38,7 @@ QUALITY = 86  # of JPEG; without subsampling, because normals live in the colour
 @cache
 def relief(name: str) -> Relief:
     """One of `PATTERNS`."""
-    made: Relief = Late(f"{PROGRAMS}:{name}")()
-    return made
+    return Late(f"{PROGRAMS}:{name}")()
 
 
 def kept(bake: Bake) -> Bake:

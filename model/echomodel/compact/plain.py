@@ -54,12 +54,10 @@ class Net:
 
     def __call__(self, *given: Any, **named: Any) -> np.ndarray:
         """What a network of its own kind does with these, else what `mapped` does."""
-        out: np.ndarray = getattr(self, "forward", self.mapped)(*given, **named)
-        return out
+        return getattr(self, "forward", self.mapped)(*given, **named)
 
     def __getitem__(self, number: int) -> Net:
-        found: Net = vars(self)[str(number)]
-        return found
+        return vars(self)[str(number)]
 
     def __iter__(self) -> Iterator[Net]:
         return (self[number] for number in self.numbered)
@@ -85,8 +83,7 @@ class Table:
         self.rows, self.kind, self.names = rows, kind, getattr(config, kind)
 
     def __call__(self, words: np.ndarray) -> np.ndarray:
-        found: np.ndarray = self.rows[places(self.kind, self.names, words)]
-        return found
+        return self.rows[places(self.kind, self.names, words)]
 
 
 class EchoLayer(Echo, Net):

@@ -256,8 +256,7 @@ class _Planner:
         more = np.where(soft, np.maximum(WIDEST - want, 0.0), 0.0)
         if more.sum() < spare < more.sum() + SLIVER and soft.any():  # rather a wide unit than a gap beside a wall
             more += soft * (spare - more.sum()) / soft.sum()
-        out: np.ndarray = want + more * min(spare / max(more.sum(), 1e-9), 1.0)
-        return out
+        return want + more * min(spare / max(more.sum(), 1e-9), 1.0)
 
     def spans(self, leg: Leg, part: Sequence[int]) -> list[Interval] | None:
         """From where to where along its wall each unit of a leg stands."""

@@ -38,8 +38,7 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     torch.manual_seed(recipe.seed)
     if recipe.stage in ELSEWHERE:
-        made: Trainer = ELSEWHERE[recipe.stage](recipe, folder, device, resume=resume, report=report)
-        return made
+        return ELSEWHERE[recipe.stage](recipe, folder, device, resume=resume, report=report)
     kind: type[CompactStage] = STAGES[recipe.stage].itself
     start = started(kind, recipe, device, resume=resume)
     return Trainer(recipe, start.model, kind.open(start), folder, resume=resume, report=report)

@@ -23,7 +23,7 @@ from echomodel.metrics.pointsets import surface_scores
 from echomodel.randomness import normal
 from echomodel.samplers import add_noise, output_from
 from echomodel.training.layout_losses import draw_known
-from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, draw_levels
+from echomodel.training.rooms import PackedRooms, draw_batch, draw_levels
 from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
 
@@ -100,7 +100,8 @@ def draw_suites(count: int, styles: Tensor, generator: torch.Generator) -> Shape
 
     Rooms hold few of the rare categories; suites hold all alike.
     """
-    coarse = torch.tensor([_COARSE.index(entry.coarse) for entry in vocabulary().categories])
+    words = vocabulary()
+    coarse = torch.tensor([words.coarse_categories.index(entry.coarse) for entry in words.categories])
     nodes = count * BUNDLE
     scene = torch.arange(count).repeat_interleave(BUNDLE)
     category = torch.randint(len(coarse), (nodes,), generator=generator)
@@ -116,13 +117,10 @@ def draw_suites(count: int, styles: Tensor, generator: torch.Generator) -> Shape
     edge, predicate = told.nonzero(as_tuple=True)
     graph = GraphBatch(
         category=category, triplets=torch.stack([at[edge], predicate + 13, to[edge]], dim=1), scene=scene,
-        room_type=torch.randint(len(vocabulary().room_types), (count,), generator=generator),
+        room_type=torch.randint(len(words.room_types), (count,), generator=generator),
         floor=torch.full((count, 4, 2), torch.nan),
     )  # fmt: skip
     return ShapeBatch(graph, pairs_of(graph), style * len(coarse) + category)
-
-
-_COARSE = vocabulary().coarse_categories
 
 
 class ShapeStage:
@@ -169,7 +167,9 @@ class ShapeStage:
         """Rooms on even draws, suites on odd ones."""
         if float(torch.rand(1, generator=generator)) < 0.5:
             return draw_suites(max(1, self.batch // BUNDLE), self.shapes.styles, generator)
-        return room_shapes(draw_batch(self.rooms, self.batch, generator), self.shapes)
+        room = draw_batch(self.rooms, self.batch, generator)
+        style = self.shapes.styles[room.style % len(self.shapes.styles)]  # of those that are trained on
+        return ShapeBatch(room.graph, room.pairs, style * self.shapes.categories + room.graph.category)
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch."""
@@ -189,12 +189,6 @@ class ShapeStage:
             batch = draw_suites(8, self.shapes.held, generator)
             losses.append(shape_loss(model, batch.to(model.device), *self.truth(model, batch), generator)[0])
         return {"held/shape": float(torch.stack(losses).mean())}
-
-
-def room_shapes(room: LayoutBatch, shapes: EncodedShapes) -> ShapeBatch:
-    """The shapes of a batch of rooms; their styles are mapped onto those that are trained on."""
-    style = shapes.styles[room.style % len(shapes.styles)]
-    return ShapeBatch(room.graph, room.pairs, style * shapes.categories + room.graph.category)
 
 
 @dataclass(frozen=True, eq=False)
