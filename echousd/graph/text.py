@@ -12,12 +12,12 @@ import difflib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from echomodel.vocabulary import TYPO, UnknownWord, normalised, vocabulary
 from echousd.graph.consistency import MAX_ERRORS, GraphError, listed, name_faults, raise_all, unknown_ends
 from echousd.graph.fields import IDENTIFIER, shown
-from echousd.graph.nodes import Node, Placed, Relation, RoomSpec
+from echousd.graph.nodes import Node, Placed, PlainModel, Relation, RoomSpec
 from echousd.graph.openings import LISTS, listed_words, opening_from_words
 from echousd.graph.syntax import Located, Path, parse_json, parse_yaml
 from echousd.graph.titles import composed, identifier_of, is_title, name_of, with_names
@@ -25,6 +25,7 @@ from echousd.graph.titles import composed, identifier_of, is_title, name_of, wit
 if TYPE_CHECKING:
     from echousd.graph.scene import SceneGraph
 
+Built = TypeVar("Built", bound=PlainModel)
 TOP_KEYS = ("room", "objects", "nodes", "relations", *LISTS)
 
 
@@ -33,7 +34,7 @@ def graph_from_text(kind: type[SceneGraph], text: str, form: Literal["json", "ya
     return read_text(partial(graph_from_plain, kind), text, form, source)
 
 
-def read_text(build: Callable[[Any], Any], text: str, form: Literal["json", "yaml"], source: str = "") -> Any:
+def read_text(build: Callable[[Any], Built], text: str, form: Literal["json", "yaml"], source: str = "") -> Built:
     """What `build` makes of the plain data in YAML or JSON text.
 
     Raises `GraphError` as `source:line: what was found, what is allowed`.
@@ -152,7 +153,7 @@ def _node(fields: dict[str, Any], about: Path) -> Node:
 
 def _sentence(entry: Any, about: Path, names: Mapping[str, str]) -> Relation | Placed:
     said = fields_of_sentence(entry, about, names)
-    return said if isinstance(said, Placed) else cast(Relation, _built(Relation, said, about))
+    return said if isinstance(said, Placed) else _built(Relation, said, about)
 
 
 def _named(objects: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], dict[str, str]]:
@@ -211,9 +212,9 @@ def with_openings(room: RoomSpec, words: Iterable[tuple[str, Any]]) -> RoomSpec:
     return room
 
 
-def _built(model: type, fields: dict[str, Any], about: Path) -> Any:
-    needed = [name for name, info in model.model_fields.items() if info.is_required()]  # type: ignore[attr-defined]
-    only_fields(fields, tuple(model.model_fields), about)  # type: ignore[attr-defined]
+def _built(model: type[Built], fields: dict[str, Any], about: Path) -> Built:
+    needed = [name for name, info in model.model_fields.items() if info.is_required()]
+    only_fields(fields, tuple(model.model_fields), about)
     for name in needed:
         if name not in fields:
             first = next(iter(fields.values()), None)

@@ -11,7 +11,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 
 from echomodel.boxes2d import footprints
 from echomodel.vocabulary import vocabulary
-from echousd.graph import GraphError, Node, SceneGraph
+from echousd.graph import Node, SceneGraph
 from echousd.graph.files import STAGE_FORMS
 from echousd.home.graph import RATIO, HomeGraph, HomeRelation, HomeRoom
 from echousd.home.plan import Plan
@@ -21,7 +21,7 @@ from echousd.stage.contents import read_contents
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage, save_layer, source
 from echousd.stage.pen import ops, relate, say
-from echousd.stage.read import find_rooms, place, room_graph, stated_fields, value
+from echousd.stage.read import faults, find_rooms, place, room_graph, stated_fields, value
 from echousd.stage.units import to_metres
 from echousd.stage.write import author, define, put
 
@@ -95,7 +95,7 @@ def read_home(stage: Usd.Stage) -> HomeGraph:
         found = find_rooms(stage)
         graph = next((prim for prim in stage.Traverse() if prim.GetTypeName() == usd.HOME_TYPE), None)
         names = _names([prims.room.GetPath() for prims in found])
-        try:
+        with faults(source(stage)):
             rooms = []
             for prims in found:
                 fields = stated_fields(prims.room, usd.HOME_ROOM_FIELDS)
@@ -105,8 +105,6 @@ def read_home(stage: Usd.Stage) -> HomeGraph:
             ways = [_relation(prim, names) for prim in graph.GetChildren() if prim.GetTypeName() == usd.RELATION_TYPE]
             entrance = [names.get(end, str(end)) for end in values.targets(graph, usd.ENTRANCE)]
             return HomeGraph(rooms, ways, entrance=next(iter(entrance), None), **stated_fields(graph, usd.HOME_FIELDS))
-        except GraphError as error:
-            raise StageError(f"{source(stage)}: {error}") from None
 
 
 def asked(graph: SceneGraph) -> SceneGraph:
@@ -179,7 +177,5 @@ def _relation(prim: Usd.Prim, names: Mapping[Sdf.Path, str]) -> HomeRelation:
             told = ", ".join(map(str, targets)) or "nothing"
             raise StageError(f"{place(prim)}: {end} points to {told}, allowed: one room of the home")
         ends.append(names[targets[0]])
-    try:
+    with faults(place(prim)):
         return HomeRelation(ends[0], str(value(prim, usd.PREDICATE)), ends[1])
-    except ValueError as error:
-        raise StageError(f"{place(prim)}: {error}") from None

@@ -14,7 +14,7 @@ from pxr import Usd
 
 from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import vocabulary
-from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
+from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.arrays import triplets_of
 from echousd.graph.titles import DressingGraph, SmallNode
 from echousd.stage import encoding as usd
@@ -22,7 +22,7 @@ from echousd.stage import values
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage, opened, save_layer
 from echousd.stage.foreign import boxed_graph
-from echousd.stage.read import find_rooms, node_names, place, relation_of, stated_fields, the_room
+from echousd.stage.read import faults, find_rooms, node_names, place, relation_of, stated_fields, the_room
 from echousd.stage.write import graph_layer
 
 
@@ -106,10 +106,8 @@ def read_small(prim: Usd.Prim) -> SmallNode:
     fields = stated_fields(prim, known)
     if "category" not in fields:
         raise StageError(f"{place(prim)}: no category, allowed: {usd.CATEGORY}, one of those of small things")
-    try:
+    with faults(place(prim)):
         return SmallNode(name=prim.GetName(), **fields)
-    except GraphError as error:
-        raise StageError(f"{place(prim)}: {error}") from None
 
 
 STYLE = "style_"

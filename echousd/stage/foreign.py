@@ -14,7 +14,7 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade
 
 from echomodel.boxes2d import footprints, seen
 from echomodel.vocabulary import vocabulary
-from echousd.graph import GraphError, Node, RoomSpec, SceneGraph
+from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.graph.nodes import OBSTACLE
 from echousd.naming import free_name
 from echousd.stage.encoding import StageError
@@ -28,7 +28,7 @@ from echousd.stage.labels import (
     labels,
     spaced,
 )
-from echousd.stage.read import RoomPrims, node_names, room_graph
+from echousd.stage.read import RoomPrims, faults, node_names, room_graph
 from echousd.stage.units import Z_TO_Y, to_metres
 from echousd.stage.values import lineage
 
@@ -209,10 +209,8 @@ def _graph(
     stage: Usd.Stage, nodes: list[Node], floor: Box | None, room_type: str | None, words: list[str]
 ) -> SceneGraph:
     kind = room_type or _room_type(words, [node.category for node in nodes])
-    try:
+    with faults(source(stage)):
         return SceneGraph(RoomSpec(kind, floor_polygon=_corners(floor)), tuple(nodes))
-    except GraphError as error:
-        raise StageError(f"{source(stage)}: {error}") from None
 
 
 def _is_column(prim: Usd.Prim, box: Box | None) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -117,15 +118,22 @@ def place(prim: Usd.Prim) -> str:
     return f"{source(prim.GetStage())}: <{prim.GetPath()}>"
 
 
+@contextmanager
+def faults(where: str) -> Iterator[None]:
+    """What is not valid in the graph that is built meanwhile is a fault of the stage there."""
+    try:
+        yield
+    except GraphError as error:
+        raise StageError(f"{where}: {error}") from None
+
+
 def room_graph(prims: RoomPrims) -> SceneGraph:
     """The graph of one room; raises StageError that names the prim at fault."""
     names = node_names(prims)
     nodes = tuple(read_node(prim, names[prim.GetPath()], names) for prim in prims.nodes)
     relations = tuple(facts(prims, names))
-    try:
+    with faults(place(prims.graph)):
         return SceneGraph(room=room_spec(prims), nodes=nodes, relations=relations)
-    except GraphError as error:
-        raise StageError(f"{place(prims.graph)}: {error}") from None
 
 
 class StatedTwice(UserWarning):
@@ -205,10 +213,8 @@ def room_spec(prims: RoomPrims) -> RoomSpec:
     if words not in (None, usd.VOCABULARY_NAME):
         raise StageError(f"{place(graph)}: {usd.VOCABULARY} is {words!r}, allowed: {usd.VOCABULARY_NAME}")
     fields: dict[str, Any] = {"type": None, **stated_fields(graph, usd.ROOM_FIELDS)}
-    try:
+    with faults(place(graph)):
         return RoomSpec(**fields, openings=tuple(map(read_opening, prims.openings)))
-    except GraphError as error:
-        raise StageError(f"{place(graph)}: {error}") from None
 
 
 def read_node(prim: Usd.Prim, name: str, names: dict[Sdf.Path, str]) -> Node:
@@ -227,10 +233,8 @@ def read_node(prim: Usd.Prim, name: str, names: dict[Sdf.Path, str]) -> Node:
         if not labels:
             raise StageError(f"{place(prim)}: no category, allowed: {usd.CATEGORY} or {usd.LABELS} with one word")
         fields["category"] = labels[0]
-    try:
+    with faults(place(prim)):
         return Node(name, attributes=free, **fields)
-    except GraphError as error:
-        raise StageError(f"{place(prim)}: {error}") from None
 
 
 def _title(prim: Usd.Prim) -> str | None:
@@ -277,10 +281,8 @@ def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:
         return Relation.model_construct(subject=subject, predicate=predicate, object=object_, confidence=1.0)
     if predicate is None:
         raise StageError(f"{place(prim)}: {usd.PREDICATE} has no value, allowed: one predicate")
-    try:
+    with faults(place(prim)):
         return Relation(subject, predicate, object_, 1.0 if confidence is None else confidence)
-    except GraphError as error:
-        raise StageError(f"{place(prim)}: {error}") from None
 
 
 def _ends(prim: Usd.Prim, name: str, count: int, names: dict[Sdf.Path, str]) -> list[str | None]:
