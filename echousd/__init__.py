@@ -34,38 +34,32 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# Public names and the module of each (with its name there after a colon, if it is another one), imported on first use:
-# `import echousd` loads neither pxr nor torch. docs/API.md is made of them.
-_HOME = {
-    "GraphError": "echousd.graph",
-    "HomeGraph": "echousd.home.graph",
-    "Node": "echousd.graph",
-    "Relation": "echousd.graph",
-    "RoomSpec": "echousd.graph",
-    "SceneGraph": "echousd.graph",
-    "read_dressing": "echousd.stage.boxes",
-    "read_graph": "echousd.stage.graphs",
-    "read_rooms": "echousd.stage.read",
-    "relations_from_boxes": "echousd.stage.boxes",
-    "update_graph": "echousd.stage.update",
-    "write_graph": "echousd.stage.graphs",
-    "Room": "echousd.make.finished",
-    "batch": "echousd.batches.batch",
-    "generate": "echousd.make.pipeline",
-    "generate_home": "echousd.home.assemble",
-    "import_plan": "echousd.home.importing.formats",
-    "plan_home": "echousd.home.plan",
-    "generate_many": "echousd.batches.batch",
-    "RoomOptions": "echousd.options",
-    "check": "echousd.checks",
-    "edit": "echousd.make.edit",
-    "export": "echousd.exporting.formats",
-    "export_texture_job": "echousd.texturing:export_job",
-    "import_texture_job": "echousd.texturing:import_job",
-    "load_model": "echomodel.loading",
-    "render": "echousd.draw.rendering",
-    "vocabulary": "echomodel.vocabulary",
+# Modules (with a name there after a colon, if it is public under another one) and their public names, imported on first
+# use: `import echousd` loads neither pxr nor torch. docs/API.md is made of them.
+_PUBLIC = {
+    "echomodel.loading": ("load_model",),
+    "echomodel.vocabulary": ("vocabulary",),
+    "echousd.batches.batch": ("batch", "generate_many"),
+    "echousd.checks": ("check",),
+    "echousd.draw.rendering": ("render",),
+    "echousd.exporting.formats": ("export",),
+    "echousd.graph": ("GraphError", "Node", "Relation", "RoomSpec", "SceneGraph"),
+    "echousd.home.assemble": ("generate_home",),
+    "echousd.home.graph": ("HomeGraph",),
+    "echousd.home.importing.formats": ("import_plan",),
+    "echousd.home.plan": ("plan_home",),
+    "echousd.make.edit": ("edit",),
+    "echousd.make.finished": ("Room",),
+    "echousd.make.pipeline": ("generate",),
+    "echousd.options": ("RoomOptions",),
+    "echousd.stage.boxes": ("read_dressing", "relations_from_boxes"),
+    "echousd.stage.graphs": ("read_graph", "write_graph"),
+    "echousd.stage.read": ("read_rooms",),
+    "echousd.stage.update": ("update_graph",),
+    "echousd.texturing:export_job": ("export_texture_job",),
+    "echousd.texturing:import_job": ("import_texture_job",),
 }
+_HOME = {name: module for module, names in _PUBLIC.items() for name in names}
 __all__ = [
     "GraphError", "HomeGraph", "Node", "Relation", "Room", "RoomOptions", "RoomSpec", "SceneGraph", "batch", "check",
     "edit", "export", "export_texture_job", "generate", "generate_home", "generate_many", "import_plan",

@@ -16,29 +16,21 @@ import typer
 
 from echousd.cli.output import one_line, prepare, quiet, safe
 
-# Command -> the module of its topic, whose `app` has it. A module is imported when its command is called, or
-# for the help on all; it must not import torch or pxr at module level (start-up time).
+# Module of a topic -> the commands that its `app` has. A module is imported when its command is called, or for the
+# help on all; it must not import torch or pxr at module level (start-up time).
 TOPICS = {
-    "new": "graph",
-    "graph": "graph",
-    "plan": "plan",
-    "generate": "generate",
-    "batch": "batch",
-    "store": "assets",
-    "edit": "edit",
-    "update": "edit",
-    "render": "export",
-    "export": "export",
-    "texture": "texture",
-    "assets": "assets",
-    "adopt": "edit",
-    "check": "check",
-    "train": "train",
-    "convert": "export",
-    "plugin-path": "doctor",
-    "doctor": "doctor",
-    "data": "train",
-    "eval": "eval",
+    "graph": ("new", "graph"),
+    "plan": ("plan",),
+    "generate": ("generate",),
+    "batch": ("batch",),
+    "assets": ("store", "assets"),
+    "edit": ("edit", "update", "adopt"),
+    "export": ("render", "export", "convert"),
+    "texture": ("texture",),
+    "check": ("check",),
+    "train": ("train", "data"),
+    "doctor": ("plugin-path", "doctor"),
+    "eval": ("eval",),
 }
 
 BAD_INPUT, OWN_FAULT, INTERRUPTED, CLOSED_PIPE = 2, 70, 130, 141
@@ -84,8 +76,8 @@ def run(arguments: Sequence[str]) -> int:
     arguments = [word for word in own if word not in ("--debug", "--quiet")] + arguments[len(own) :]
     try:
         _check_depth(arguments)
-        topic = TOPICS.get(next((word for word in arguments if not word.startswith("-")), ""))
-        root = command(topic) if topic else command()
+        first = next((word for word in arguments if not word.startswith("-")), "")
+        root = command(*(topic for topic, words in TOPICS.items() if first in words))
         result = root.main(args=arguments or ["--help"], prog_name="echousd", standalone_mode=False)
         sys.stdout.flush()
         if result == INTERRUPTED:  # typer's way to pass on Ctrl-C
@@ -125,7 +117,7 @@ def command(*topics: str) -> Any:
         pretty_exceptions_enable=False,
     )
     app.callback()(_options)
-    for topic in topics or dict.fromkeys(TOPICS.values()):
+    for topic in topics or TOPICS:
         own = importlib.import_module(f"echousd.cli.{topic}").app
         app.registered_commands += own.registered_commands
         app.registered_groups += own.registered_groups

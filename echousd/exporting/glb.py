@@ -352,10 +352,8 @@ def _light(prim: Usd.Prim, metres: float) -> dict[str, Any] | None:
         disc = np.pi * np.sin(np.radians(number("angle")) / 2) ** 2
         kind, intensity = {"type": "directional"}, radiance * (1.0 if normalized or disc == 0 else disc)
     elif prim.IsA(UsdLux.SphereLight):
-        kind, intensity = (
-            {"type": "point"},
-            radiance * (0.25 if normalized else np.pi * (number("radius") * metres) ** 2),
-        )
+        kind = {"type": "point"}
+        intensity = radiance * (0.25 if normalized else np.pi * (number("radius") * metres) ** 2)
     elif prim.IsA(UsdLux.RectLight) or prim.IsA(UsdLux.DiskLight):
         round_ = prim.IsA(UsdLux.DiskLight)
         area = (np.pi * number("radius") ** 2 if round_ else number("width") * number("height")) * metres**2

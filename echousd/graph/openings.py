@@ -102,12 +102,9 @@ def _words(text: str, kind: str) -> dict[str, Any]:
 def _wall(value: Any, corners: np.ndarray | None, said: str) -> int:
     """The number of a wall that is named by its number or by where it lies."""
     count = 4 if corners is None else len(corners)
-    if isinstance(value, int) and not isinstance(value, bool):
-        number: int | None = value
-    else:
-        number = int(value) if isinstance(value, str) and value.strip().isdecimal() else None
-    if number is not None:
-        if not 0 <= number < count:
+    if isinstance(value, int | str) and str(value).strip().isdecimal():
+        number = int(value)
+        if number >= count:
             raise GraphError(f"{said}: wall {number}, allowed: {_walls_allowed(corners)}")
         return number
     way = WALLS.get(str(value).strip().lower().removesuffix(" wall"))
@@ -127,14 +124,11 @@ def _walls_allowed(corners: np.ndarray | None) -> str:
 
 
 def _offset(value: Any, kind: str, width: float, edge: int, corners: np.ndarray | None, said: str) -> float:
-    place = None
-    if value is None and corners is not None:
-        place = "start" if kind == "door" else "middle"
-    elif isinstance(value, str) and value.strip().lower() in PLACES:
-        place = value.strip().lower()
-    if place is None and value is None:
+    if value is None and corners is None:
         raise GraphError(f"{said}: offset is missing, allowed: metres along the wall, or say the size of the room")
-    if place is None:
+    usual = "start" if kind == "door" else "middle"
+    place = usual if value is None else str(value).strip().lower()
+    if place not in PLACES:
         return _metres(value, f"{said}: offset")
     if corners is None:
         raise GraphError(f"{said}: offset {value!r} needs the size of the room, allowed: metres, or say the size")

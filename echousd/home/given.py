@@ -152,8 +152,7 @@ def _shared(plan: Plan, stated: Mapping[str, tuple[Opening, ...]]) -> dict[str, 
                 for o in found[other]
                 if o.edge == hole.edge and min(o.end, hole.end) - max(o.offset, hole.offset) > hole.width / 2
             ]
-            keeps = same and same[0].kind == "door" and opening.kind != "door"
-            if keeps:
+            if same and same[0].kind == "door" and opening.kind != "door":
                 continue
             taken = [o.name for o in found[other] if o not in same]
             kept = replace(hole, name=same[0].name if same else numbered(opening.kind, taken))

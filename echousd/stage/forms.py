@@ -165,10 +165,8 @@ def solid(prim: Usd.Prim) -> trimesh.Trimesh:
     def length(name: str, default: float) -> float:
         return max(values.number(prim.GetAttribute(name), default), 1e-9)
 
-    radius, height = (
-        length("radius", 0.5 if kind == "Capsule" else 1.0),
-        length("height", 1.0 if kind == "Capsule" else 2.0),
-    )
+    scale = 0.5 if kind == "Capsule" else 1.0  # of what USD takes where nothing is said
+    radius, height = length("radius", scale), length("height", 2 * scale)
     if kind == "Cube":
         return trimesh.creation.box([length("size", 2.0)] * 3)
     if kind == "Sphere":

@@ -20,7 +20,7 @@ from echousd.folder.manifest import find_manifest
 from echousd.layers import paintings
 from echousd.layers.paintings import FOLDER, MADE, RECORD, VARIANTS, primvar
 from echousd.make.save import write_preview
-from echousd.stage.files import layer_bytes, open_stage
+from echousd.stage.files import layer_bytes, open_stage, prim_specs
 from echousd.stage.paths import UNFIT
 from echousd.stage.pen import Pen
 from echousd.stage.shading import Image, preview_surface
@@ -183,14 +183,10 @@ def _fitting_again(unfit: bytes, layer: str) -> bytes:
     found = Sdf.Layer.CreateAnonymous(".usda")
     found.ImportFromString(unfit.decode("utf-8"))
     name = Path(layer).stem
-    paths: list[Sdf.Path] = []
-    found.Traverse(Sdf.Path.absoluteRootPath, paths.append)
     mine = (f"collection:{name}:includes", f"primvars:{paintings.primvar(name)}")
-    for path in paths:
-        if path.IsPropertyPath() and path.name.removesuffix(":indices") in mine:
-            prim = found.GetPrimAtPath(path.GetPrimPath())
-            if prim and path.name in prim.properties:
-                del prim.properties[path.name]
+    for prim in prim_specs(found):
+        for spec in [spec for spec in prim.properties if spec.name.removesuffix(":indices") in mine]:
+            prim.RemoveProperty(spec)
     return layer_bytes(found, ".usda")
 
 

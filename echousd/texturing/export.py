@@ -25,11 +25,10 @@ from echousd.texturing import scenetex
 from echousd.texturing.atlas import Unwrapped, layout_digest, texels, unwrap
 from echousd.texturing.job import JOB, RESULTS, TOOLS, Job, script_for
 from echousd.texturing.obj import glb_bytes, obj_bytes
-from echousd.texturing.viewpoints import FIELDS, SEEN_FROM, SPHERE, free_point, sphere_cameras, visible_shares
+from echousd.texturing.viewpoints import SPHERE, free_point, sphere_cameras, visible_shares
 
 RESOLUTION = 2048  # of a picture of one object
 IMAGE = 512  # pixels of an object's picture
-LEVELS = (-20.0, 0.0, 20.0)  # elevations of the job's cameras, degrees
 SCRIPTS = ("hunyuan", "mvpainter")  # tools that paint objects by pictures of them, with a script to run them
 
 
@@ -105,7 +104,7 @@ def _made(
         raise ValueError(f"nothing to paint; {'; '.join(f'{name}: {why}' for name, why in left.items())}")
     at, space = free_point(surfaces)
     distance = min(SPHERE, max(space - 0.05, 0.05))
-    around = sphere_cameras(at, distance, SEEN_FROM // len(LEVELS), LEVELS, FIELDS[1])
+    around = sphere_cameras(at, distance)
     shares = visible_shares(objects, laid, around)
     words, every = prompt or room_prompt(surfaces), [object_prompt(thing, surfaces) for thing in objects]
     files: dict[str, bytes] = {}

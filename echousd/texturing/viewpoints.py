@@ -17,6 +17,7 @@ from echousd.texturing.job import JobCamera
 
 HEIGHT = 1.4  # metres, of the point that cameras look through
 SPHERE = 0.5  # metres from it
+LEVELS = (-20.0, 0.0, 20.0)  # elevations of the job's cameras, degrees
 ELEVATIONS, AZIMUTHS = (-30.0, 30.0), (-180.0, 180.0)  # degrees
 FIELDS = (45.0, 75.0)  # of view, degrees
 SEEN_FROM = 48  # cameras that texels are counted with
@@ -51,18 +52,15 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
     return points[(points[:, 1] > low) & (points[:, 1] < high)][:, [0, 2]]
 
 
-def sphere_cameras(
-    at: np.ndarray, distance: float, azimuths: int, elevations: Sequence[float], fov: float
-) -> list[JobCamera]:
+def sphere_cameras(at: np.ndarray, distance: float) -> list[JobCamera]:
     """Cameras on a sphere around `at` that look through it, elevation by elevation; azimuth 0 stands at +Z."""
     found: list[JobCamera] = []
-    for up in elevations:
-        for step in range(azimuths):
-            around = AZIMUTHS[0] + (AZIMUTHS[1] - AZIMUTHS[0]) * step / azimuths
+    for up in LEVELS:
+        for around in np.linspace(*AZIMUTHS, SEEN_FROM // len(LEVELS), endpoint=False):
             e, a = np.radians(up), np.radians(around)
             eye = at + distance * np.array([np.cos(e) * np.sin(a), np.sin(e), np.cos(e) * np.cos(a)])
             rows = tuple(tuple(round(float(v), 6) + 0.0 for v in row) for row in view_matrix(eye, at))
-            camera = {"name": f"view_{len(found):03d}", "matrix": rows, "fov": fov}
+            camera = {"name": f"view_{len(found):03d}", "matrix": rows, "fov": FIELDS[1]}
             found.append(JobCamera.model_validate(camera))
     return found
 

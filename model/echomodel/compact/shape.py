@@ -268,19 +268,14 @@ class _Block(nn.Module):
         normed = self.norm(h) * (1 + scale_a) + shift_a
         q, k, v = (self._split(part) for part in self.qkv(normed).chunk(3, dim=2))
         attended = nn.functional.scaled_dot_product_attention(q, k, v)
-        h = h + (1 + gate_a) * self.attended(self._merge(attended))
+        h = h + (1 + gate_a) * self.attended(attended.transpose(1, 2).flatten(2))
         k, v = (self._split(part) for part in self.cross_kv(told).chunk(2, dim=2))
         crossed = nn.functional.scaled_dot_product_attention(self._split(self.cross_q(self.norm(h))), k, v)
-        h = h + self.cross_out(self._merge(crossed))
+        h = h + self.cross_out(crossed.transpose(1, 2).flatten(2))
         return h + (1 + gate_m) * self.mlp(self.norm(h) * (1 + scale_m) + shift_m)
 
     def _split(self, x: Tensor) -> Tensor:
-        n, t, width = x.shape
-        return x.reshape(n, t, self.heads, width // self.heads).transpose(1, 2)
-
-    def _merge(self, x: Tensor) -> Tensor:
-        n, heads, t, width = x.shape
-        return x.transpose(1, 2).reshape(n, t, heads * width)
+        return x.unflatten(2, (self.heads, -1)).transpose(1, 2)
 
 
 def shape_predictor(model: CompactModel, graph: GraphBatch, size: Tensor, pairs: Pairs, latent: Tensor) -> Predict:
