@@ -118,9 +118,7 @@ class Plan:
             return bool(shapely.distance(a, b) > 1e-3)
         if any(row.step):
             axis, sign = (0 if row.step[0] else 1), sum(row.step)
-            bounds = np.array(b.bounds)
-            box = np.array(a.bounds)
-            middle, edge = (box[axis] + box[2 + axis]) / 2, bounds[2 + axis if sign > 0 else axis]
+            middle, edge = (a.bounds[axis] + a.bounds[2 + axis]) / 2, b.bounds[2 + axis if sign > 0 else axis]
             return bool(sign * (middle - edge) >= -1e-3)
         return bool(a.area > b.area)
 
@@ -413,11 +411,9 @@ def _unplannable(problem: Problem) -> str:
 def _finished(home: HomeGraph, lie: Cells) -> Plan:
     """Floors between walls of real thickness, with doors and windows, about the middle of the home."""
     shapes = {name: shapely.union_all([shapely.box(*rect) for rect in own]) for name, own in lie.items()}
-    shift = np.zeros(2) if home.outline is None else np.array(home.outline).min(0)
-    if home.outline is None:
-        low, high = np.array(shapely.union_all([*shapes.values()]).bounds).reshape(2, 2)
-        shift = -((low + high) / 2).round(2)
     whole = shapely.union_all([*shapes.values()])
+    low, high = np.array(whole.bounds).reshape(2, 2)
+    shift = -((low + high) / 2).round(2) if home.outline is None else np.array(home.outline).min(0)
     cells = {name: _corners(shape) + shift for name, shape in shapes.items()}
     walls = {name: _thickness(cells[name] - shift, whole) for name in cells}
     return with_openings(Plan(home, cells, walls, {name: () for name in cells}, lie))

@@ -256,21 +256,13 @@ class _Editor:
             if relation:
                 related.setdefault(relation.triple, prim)
         wanted = (
-            ([prim.GetName() for prim in prims.nodes], list(graph.names), prims.nodes),
-            (
-                [related[t].GetName() for t in related],
-                [related[r.triple].GetName() for r in graph.relations],
-                prims.relations,
-            ),
-            (
-                [prim.GetName() for prim in prims.openings],
-                [opening.name for opening in graph.room.openings],
-                prims.openings,
-            ),
+            (prims.nodes, prims.nodes, [*graph.names]),
+            ([*related.values()], prims.relations, [related[r.triple].GetName() for r in graph.relations]),
+            (prims.openings, prims.openings, [opening.name for opening in graph.room.openings]),
         )
-        for have, want, siblings in wanted:
+        for have, siblings, want in wanted:
             parents = {prim.GetParent().GetPath() for prim in siblings}
-            if have != want and len(parents) == 1:
+            if [prim.GetName() for prim in have] != want and len(parents) == 1:
                 self.spec(parents.pop()).nameChildrenOrder = want
 
 

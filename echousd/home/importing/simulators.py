@@ -89,10 +89,8 @@ def read_scenesmith(data: Any) -> Found:
     holes: dict[str, Hole] = {}
     for room in data["placed_rooms"]:
         name, walls = str(room["room_id"]), room["walls"]
-        low, high = (
-            f([[p[0], p[1]] for w in walls for p in (w["start_point"], w["end_point"])], axis=0)
-            for f in (np.min, np.max)
-        )
+        ends = np.array([[p[0], p[1]] for w in walls for p in (w["start_point"], w["end_point"])])
+        low, high = ends.min(0), ends.max(0)
         corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])]) @ MAP.T
         rooms.append(Room(name, (kinds.get(name, ""), name), corners, data.get("wall_height")))
         for wall in walls:
@@ -100,9 +98,8 @@ def read_scenesmith(data: Any) -> Found:
             unit = (end - start) / np.linalg.norm(end - start)
             for one in wall.get("openings", ()):
                 kind = str(one["opening_type"]).lower().replace("open", "passage")
-                ends = start + unit * np.array(
-                    [[one["position_along_wall"]], [one["position_along_wall"] + one["width"]]]
-                )
+                along = one["position_along_wall"]
+                ends = start + unit * np.array([[along], [along + one["width"]]])
                 key = str(one["opening_id"])
                 holes.setdefault(key, Hole(key, kind, ends[None], one.get("height"), one.get("sill_height")))
     return Found(Z_UP, rooms, [*holes.values()])

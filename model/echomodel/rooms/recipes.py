@@ -199,7 +199,7 @@ def furnish(room: Builder, name: str) -> None:
         "bedroom": _bedroom,
         "living_room": _living_room,
         "dining_room": _dining_room,
-        "living_dining_room": _living_dining_room,
+        "living_dining_room": partial(_living_room, dining=True),
         "study": _study,
         "kitchen": partial(_home, kitchen),
         "utility_room": partial(_home, kitchen),
@@ -285,9 +285,11 @@ def _beside_bed(room: Builder, bed: Item, size: tuple[float, float, float], styl
     return None
 
 
-def _living_room(room: Builder) -> Anchors:
+def _living_room(room: Builder, *, dining: bool = False) -> Anchors:
     sofa = _sofas(room)
-    if room.wanted.get("dining_table") or room.wanted.get("dining_chair", 0) > 2:
+    if dining:
+        _no_chairs_without(room, _set_tables(room))
+    elif room.wanted.get("dining_table") or room.wanted.get("dining_chair", 0) > 2:
         _set_tables(room)
     _desks(room)
     return lambda: _anchors(room, sofa)
@@ -300,13 +302,6 @@ def _dining_room(room: Builder) -> Anchors:
         _sofas(room)
     _desks(room)
     return lambda: [table for table in tables if table]
-
-
-def _living_dining_room(room: Builder) -> Anchors:
-    sofa = _sofas(room)
-    _no_chairs_without(room, _set_tables(room))
-    _desks(room)
-    return lambda: _anchors(room, sofa)
 
 
 def _set_tables(room: Builder, *, central: bool = False) -> list[Item | None]:
