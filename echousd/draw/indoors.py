@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from echousd.draw.scenery import Scenery
 
 SKY = 4.0  # radiance of the sky in a window for a dome of intensity 1, whose light else comes from above as well
-SUN = 9.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
+SUN = 7.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
 CEILING = np.array([0.87, 0.86, 0.84], np.float32)
 VIEW = 0.5  # of the sky's radiance, what is seen of it through a window: eyes adapt
 BLURRED, HAZE = 0.45, 0.25  # degrees that it is out of focus, and the share of its colour that haze takes

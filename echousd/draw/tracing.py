@@ -241,7 +241,7 @@ def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: in
         found[here] = _asked(world, seen.of(number[here]), number[here], times)
     for layers, rings in ((slice(3), RINGS), (slice(3, 5), RINGS[:3])):
         found[..., layers] = smooth_light(found[..., layers], normal[coarse], point[coarse], rings)
-    lit = smooth_light((found[..., 5:] > 0).astype(np.float32), normal[coarse], point[coarse], RINGS[:2])
+    lit = smooth_light((found[..., 5:] > 0).astype(np.float32), normal[coarse], point[coarse], RINGS[:1])
     mixed = ((lit > 0.01) & (lit < 0.99))[..., 0].repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
     weight = np.zeros((*shape, 1), np.float32)
     for steps in product((0, 1), repeat=2):  # of up to four that were asked around it, those of its own surface
@@ -255,7 +255,7 @@ def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: in
     light.reshape(-1, 6)[rest] = found
     border = np.flatnonzero(met & mixed & world.view.inside)  # of the sun's light: sharper than two pixels
     there, facing, shift = seen.point[border], seen.normal[border], _shifts(world, border)[:, :2]
-    suns = [_sunny(world, there + BEFORE * facing, facing, _even(n, shift)) for n in range(often // 2)]
+    suns = [_sunny(world, there + BEFORE * facing, facing, _even(n, shift)) for n in range(often)]
     light.reshape(-1, 6)[border, 5] = np.mean(suns, 0)
     return smooth_light(light, normal, point, RINGS[:1]).reshape(-1, 6)
 
@@ -491,7 +491,7 @@ def _sunny(world: World, point: np.ndarray, normal: np.ndarray, spot: np.ndarray
     sun, inside = world.scenery.lights.sun, world.view.inside
     if inside and (sun is None or not len(world.scenery.panes)):
         return np.zeros(len(point), np.float32)
-    towards, soft = (sun[0], np.float32(0.008)) if inside and sun is not None else (ABOVE, SUN_SPREAD)
+    towards, soft = (sun[0], np.float32(0.005)) if inside and sun is not None else (ABOVE, SUN_SPREAD)
     towards = _unit(towards + soft * _on_sphere(spot))
     facing = np.clip(_dot(normal, towards), 0, None)
     return _free(world.scene, point, towards, np.full(len(point), 1e3, np.float32), facing > 0) * facing
