@@ -187,6 +187,7 @@ def _change(
     from echousd.make.edit import edit as change
     from echousd.make.edit import touched
     from echousd.make.finished import write_room
+    from echousd.make.following import carried
     from echousd.make.reading import read_room
     from echousd.progress import StageTimer
 
@@ -196,12 +197,13 @@ def _change(
             _say_finished(room_at(folder), told(room_at(folder), run), json)
             return
         root, graph = wanted()
-        old = read_room(root).graph
-        steps = old.diff(graph).lines()
+        room = read_room(root)
+        steps = room.graph.diff(graph).lines()
         if not steps:
             raise ValueError(nothing)
         if dry_run:
-            fresh, moving = touched(old, graph)
+            fresh, moving = touched(room.graph, graph, room.boxes)
+            moving |= carried(room.graph, graph, room.boxes)[1]
             plan = {"changes": list(steps), "new": sorted(fresh), "moves": sorted(moving)}
             lines = [*steps, *(f"new      {n}" for n in sorted(fresh)), *(f"moves    {n}" for n in sorted(moving))]
             say_done(json, [], lines, plan)

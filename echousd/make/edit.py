@@ -20,11 +20,13 @@ from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.floors import with_plan_of
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
+from echousd.make.following import attending, carried, in_the_way, movable
 from echousd.make.layouts import Draws, best_boxes, check_objects, model_of, most_drafts, room_floor, with_sizes
 from echousd.make.reading import SavedRoom, read_room
 from echousd.make.verdicts import layout_outcome, warn_of_faults
 from echousd.naming import free_name
 from echousd.options import OF_NEW, Look, RoomOptions, takes_options
+from echousd.place.living import plan_to_live_in
 from echousd.progress import StageTimer
 from echousd.room import Provenance
 from echousd.shapes.looks import palette_of_room
@@ -41,6 +43,8 @@ from echousd.shapes.sources.retrieval import (
 from echousd.shapes.sources.source import ShapeRequest
 from echousd.shapes.styles import asset_names, style_groups, told_styles
 
+ROUNDS = 3  # times that what is in the way of what was moved makes way
+
 
 @takes_options(OF_NEW)
 def edit(
@@ -49,8 +53,9 @@ def edit(
 ) -> Room:  # fmt: skip
     """A room whose graph was changed; objects that the change does not touch keep box, mesh and files.
 
-    New objects and objects of another category get boxes and shapes, subjects of new relations (and what stands on
-    them) get new places.
+    New objects and objects of another category get boxes and shapes, subjects of new relations (and who attends or
+    stands on them) get new places. Who attends what is put elsewhere goes with it, and what is free makes way where a
+    relation or physics would not hold otherwise.
 
     Arguments:
         room: root layer of a room that `generate` made.
@@ -77,7 +82,12 @@ def edit(
     check_objects(graph, str(room))
     beside = Path(room).parent
     graph = with_plan_of(anchored(graph, beside), saved.graph)
-    fresh, moving = touched(anchored(saved.graph, beside), graph)
+    fresh, moving = touched(anchored(saved.graph, beside), graph, saved.boxes)
+    begun = [carried(saved.graph, graph, boxes) for boxes in saved.layouts]
+    along = begun[0][1] - moving
+    stated = _pinned(graph, saved.graph, begun[0][0], fresh, moving)
+    if asked.place and all(None not in (node.size, node.position, node.yaw) for node in stated.nodes):
+        moving |= in_the_way(saved, graph, _boxes_of(stated), along, moving)  # before anything is searched in vain
     shaped_anew = fresh | restyled(saved, graph, fresh)
     check_files(graph, beside, outside, str(room), fresh)
     styles = style_groups(graph)
@@ -101,7 +111,7 @@ def edit(
         layouts: list[Boxes] = []
         pins: list[SceneGraph] = []
         notes: tuple[str, ...] = ()
-        for number, before in enumerate(saved.layouts):
+        for number, (before, _) in enumerate(begun):
             pinned = with_given_sizes(_pinned(graph, saved.graph, before, fresh, moving), sizes)
             if layouts:  # one furniture in all layouts
                 pinned = with_sizes(pinned, layouts[0])
@@ -118,6 +128,12 @@ def edit(
         return layouts, pins, notes
 
     (layouts, pins, notes), models = laid_out(own.sizes), own
+    for _ in range(ROUNDS if asked.place and moving else 0):
+        way = in_the_way(saved, graph, layouts[0], along, moving | fresh)
+        if not way:
+            break
+        moving |= way
+        layouts, pins, notes = laid_out(own.sizes)
     if shaped_anew and shapes is not None:
         palette = asked.palette or palette_of_room(manifest["seed"], graph.room.style)
         models = retrieved(
@@ -161,16 +177,23 @@ def restyled(saved: SavedRoom, graph: SceneGraph, fresh: Collection[str]) -> set
     return {node.name for node in kept if before[node.name] != after[node.name]}
 
 
-def touched(before: SceneGraph, after: SceneGraph) -> tuple[set[str], set[str]]:
-    """Names of objects that need a box and a shape, and of objects that only need another place."""
+def touched(before: SceneGraph, after: SceneGraph, boxes: Boxes | None = None) -> tuple[set[str], set[str]]:
+    """Names of objects that need a box and a shape, and of objects that only need another place.
+
+    `boxes`: of `before`, which tell who attends what is placed anew; who attends what is put somewhere is `carried`.
+    """
     diff = before.diff(after)
     fresh = {node.name for node in diff.added}
     fresh |= {new.name for old, new in diff.changed if _made_of(old) != _made_of(new)}
     moving = {relation.subject for relation in diff.related}
     moving |= {new.name for old, new in diff.changed if _placed_at(old) != _placed_at(new)}
     on = [(r.subject, r.object) for r in after.relations if vocabulary().predicate(r.predicate).follows]
-    for _ in on:  # what stands on something goes with it, and what stands on that
-        moving |= {subject for subject, carrier in on if carrier in moving | fresh}
+    pairs = [] if boxes is None else attending(plan_to_live_in(before, boxes))
+    by = [(before.names[k], before.names[i]) for k, i in pairs]
+    free = movable(after)
+    for _ in (*on, *by):  # what stands on something goes with it, and what stands on that
+        moving |= {subject for subject, carrier in on if carrier in fresh | moving & free} & free
+        moving |= {guest for guest, host in by if host in moving & free} & free
     return fresh, {name for name in moving - fresh if not after.node(name).locked}
 
 
