@@ -189,7 +189,7 @@ def _counted(text: str) -> tuple[str, int]:
 @app.command("graph", epilog=GRAPH_EXAMPLES)
 def graph(
     source: Annotated[
-        Path | None, typer.Argument(metavar="GRAPH", help="Stage (.usda .usdc .usd .usdz), YAML or JSON.")
+        Path | None, typer.Argument(metavar="GRAPH", help="Stage (.usda .usdc .usd .usdz), YAML, JSON, or a room.")
     ] = None,
     room: Annotated[str | None, typer.Option(metavar="PRIM", help="Prim path of one room of several.")] = None,
     names: Annotated[
@@ -211,6 +211,7 @@ def graph(
     ] = False,
 ) -> None:
     """Show the scene graph of a stage or a text file, as the text that a person writes."""
+    from echousd.folder.found import room_at
     from echousd.graph import GraphError, SceneGraph, load_graph
     from echousd.graph.files import STAGE_FORMS
 
@@ -220,7 +221,8 @@ def graph(
         say_json(SceneGraph.model_json_schema(), indent=2)
         return
     if source is None:
-        raise GraphError("GRAPH is missing, allowed: a stage, a YAML or a JSON file")
+        raise GraphError("GRAPH is missing, allowed: a stage, a YAML or a JSON file, or a room's folder")
+    source = room_at(source)
     if picture is not None and picture.suffix.lower() not in PICTURES:
         raise GraphError(f"{picture}: extension {picture.suffix!r}, allowed: {', '.join(PICTURES)}")
     alone = room is not None or as_json or picture is not None

@@ -65,7 +65,7 @@ def _best(
     tastes: list[float] = []
     for edge, length in enumerate(lengths):
         margin = CORNER if kind == "door" else PIER
-        width = wide if kind == "door" else float(np.clip(0.4 * length, 0.9, wide))
+        width = wide if kind == "door" else round(float(np.clip(0.4 * length, 0.9, wide)), 4)
         if length < width + 2 * margin:
             continue
         shared = [opening for opening in made if opening.edge == edge]

@@ -150,6 +150,16 @@ def test_graph_shows_what_a_stronger_layer_adds(echousd_command, tmp_path):
     assert "bigger_than" not in echousd_command("graph", weaker).out
 
 
+def test_graph_of_a_room_by_its_folder(echousd_command, tmp_path):
+    from small_room import saved_room
+
+    root = saved_room(tmp_path / "bedroom", seed=5)
+    by_folder, by_file = echousd_command("graph", root.parent), echousd_command("graph", root)
+    assert by_folder.code == 0, by_folder.err
+    assert by_folder.out == by_file.out
+    assert echousd_command("graph", tmp_path / "bedroom" / "layers").err.endswith("layers: no room in this folder\n")
+
+
 def test_graph_of_several_rooms(echousd_command, tmp_path):
     from pxr import Sdf
 
@@ -179,7 +189,7 @@ def test_graph_of_several_rooms(echousd_command, tmp_path):
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        ([], "GRAPH is missing, allowed: a stage, a YAML or a JSON file"),
+        ([], "GRAPH is missing, allowed: a stage, a YAML or a JSON file, or a room's folder"),
         (["gone.usda"], "gone.usda: no such file"),
         (["gone.json"], "gone.json: no such file or directory"),
         (["notes.txt"], "notes.txt: extension '.txt', allowed: .yaml"),
