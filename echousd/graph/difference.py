@@ -95,7 +95,7 @@ def _fields(old: Any, new: Any, but: tuple[str, ...] = ()) -> str:
 
 
 def _short(value: Any) -> str:
-    return "none" if value is None else str(value)
+    return "none" if value is None else str(round(value, 4) if isinstance(value, float) else value)
 
 
 def sentence(opening: Opening) -> str:

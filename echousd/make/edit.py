@@ -43,7 +43,7 @@ from echousd.shapes.sources.retrieval import (
 from echousd.shapes.sources.source import ShapeRequest
 from echousd.shapes.styles import asset_names, style_groups, told_styles
 
-ROUNDS = 3  # times that what is in the way of what was moved makes way
+ROUNDS = 4  # times that boxes are placed: what is in the way of what was moved makes way, and what is in its way
 
 
 @takes_options(OF_NEW)
@@ -87,7 +87,8 @@ def edit(
     along = begun[0][1] - moving
     stated = _pinned(graph, saved.graph, begun[0][0], fresh, moving)
     if asked.place and all(None not in (node.size, node.position, node.yaw) for node in stated.nodes):
-        moving |= in_the_way(saved, graph, _boxes_of(stated), along, moving)  # before anything is searched in vain
+        there = _boxes_of(stated)  # before anything is searched in vain
+        moving |= in_the_way(saved, graph, there, layout_outcome(graph, there), along, moving | fresh)
     shaped_anew = fresh | restyled(saved, graph, fresh)
     check_files(graph, beside, outside, str(room), fresh)
     styles = style_groups(graph)
@@ -128,12 +129,6 @@ def edit(
         return layouts, pins, notes
 
     (layouts, pins, notes), models = laid_out(own.sizes), own
-    for _ in range(ROUNDS if asked.place and moving else 0):
-        way = in_the_way(saved, graph, layouts[0], along, moving | fresh)
-        if not way:
-            break
-        moving |= way
-        layouts, pins, notes = laid_out(own.sizes)
     if shaped_anew and shapes is not None:
         palette = asked.palette or palette_of_room(manifest["seed"], graph.room.style)
         models = retrieved(
@@ -141,7 +136,6 @@ def edit(
         )
         if models.sizes != own.sizes:
             layouts, pins, notes = laid_out(models.sizes)
-        notes = (*models.notes, *notes)
     geometry = {name: saved.geometry[name] for name in graph.names if name not in shaped_anew}
     names = {name: saved.assets[name] for name in geometry}
     if shaped_anew and shapes is not None:
@@ -156,13 +150,19 @@ def edit(
     names = _own_names({name: names[name] for name in graph.names}, shaped_anew, saved)
     geometry = {name: geometry[name] for name in graph.names}
     floor, outcomes = room_floor(graph, layouts), tuple(layout_outcome(graph, found) for found in layouts)
-    if asked.place:
+    for number in range(ROUNDS if asked.place else 0):
         with timer.stage("place"), one_thread():
             layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=asked.walls)
+        way = in_the_way(saved, graph, layouts[0], outcomes[0], along, moving | fresh)
+        if not way or model_used is None or number == ROUNDS - 1:
+            break
+        moving |= way
+        layouts, pins, notes = laid_out(models.sizes)
     after = Room(
         name=manifest["name"], graph=graph, boxes=layouts[0], geometry=geometry, assets=names, floor=floor,
-        layouts=tuple(layouts), outcomes=outcomes, notes=notes, provenance=_provenance(manifest, model_used),
-        options=asked.replaced(seed=manifest["seed"]), timings=timer.seconds, edited=Path(room),
+        layouts=tuple(layouts), outcomes=outcomes, notes=(*models.notes, *notes),
+        provenance=_provenance(manifest, model_used), options=asked.replaced(seed=manifest["seed"]),
+        timings=timer.seconds, edited=Path(room),
         carried={asset: saved.carried[asset] for name, asset in names.items() if name not in shaped_anew},
     )  # fmt: skip
     warn_of_faults(after)

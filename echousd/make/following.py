@@ -12,8 +12,10 @@ from echomodel.objective import Plan, faults_of
 from echomodel.objective.support import ON_CEILING
 from echousd.graph import SceneGraph
 from echousd.make.reading import SavedRoom
+from echousd.make.verdicts import layout_outcome
 from echousd.place.living import plan_to_live_in
 from echousd.place.search import LIT
+from echousd.room import LayoutOutcome
 
 STILL = 1e-3  # metres or radians: less is no other place
 
@@ -55,26 +57,28 @@ def carried(before: SceneGraph, after: SceneGraph, boxes: Boxes) -> tuple[Boxes,
 
 
 def in_the_way(
-    saved: SavedRoom, graph: SceneGraph, boxes: Boxes, along: Collection[str], moving: Collection[str]
-) -> set[str]:
-    """Names of what is free and breaks a relation or physics that held in the room before, and of who attends it.
+    saved: SavedRoom, graph: SceneGraph, boxes: Boxes, outcome: LayoutOutcome, along: Collection[str],
+    moving: Collection[str],
+) -> set[str]:  # fmt: skip
+    """Names of what is free and, with what was moved, breaks a relation or physics that held before, and its company.
 
     Arguments:
-        graph, boxes: as they are now.
+        saved: the room before. graph, boxes, outcome: as they are now.
         along: those who were `carried` make way for what a person would point at, too.
-        moving: who was placed anew already; where nobody else is in the way, who is told of them makes way.
+        moving: who was placed anew; where nobody else is in the way, those who are told of them make way.
     """
 
-    def broken(graph: SceneGraph, room: Plan) -> set[tuple[str, str, str]]:
+    def broken(graph: SceneGraph, room: Plan, outcome: LayoutOutcome) -> set[tuple[str, str, str]]:
         names = [*graph.names, ""]
-        found = [fault for fault in faults_of(room) if names[fault.object] in along]
-        found += faults_of(room, ("relations", "physics"))
-        return {(fault.rule, names[fault.object], names[fault.other]) for fault in found}
+        found = [fault for fault in faults_of(room) if names[fault.object] in along] + faults_of(room, ("physics",))
+        ends = [(one.predicate, one.subject, one.object) for one in outcome.broken]
+        ends += [("apart", one.first, one.second) for one in outcome.collisions]
+        return {*ends, *((fault.rule, names[fault.object], names[fault.other]) for fault in found)}
 
-    room = plan_to_live_in(graph, boxes, all_blamed=True)
-    new = broken(graph, room) - broken(saved.graph, plan_to_live_in(saved.graph, saved.boxes, all_blamed=True))
-    free = movable(graph)
-    out = {name for _, *ends in new for name in ends} & free
+    free, room = movable(graph), plan_to_live_in(graph, boxes, all_blamed=True)
+    was = plan_to_live_in(saved.graph, saved.boxes, all_blamed=True)
+    new = broken(graph, room, outcome) - broken(saved.graph, was, layout_outcome(saved.graph, saved.boxes))
+    out = set().union(*({*ends} for _, *ends in new if {*ends} & {*moving, *along})) & free
     if out <= {*moving}:
         told = [{relation.subject, relation.object} for relation in graph.relations]
         out = out.union(*(ends for ends in told if ends & out)) & free

@@ -113,6 +113,13 @@ def test_what_is_free_makes_way(saved):
     assert any("sofa" in fault and "shelf" in fault for fault in locked.faults)
 
 
+def test_solids_that_meet_after_a_change_of_size_make_way(saved):
+    graph = read_room(saved).graph.relate("low", "front", "sofa")
+    after = edit(saved, graph.update_node("low", size=(1.9, 0.45, 1.1)))
+    assert after.faults == ()
+    np.testing.assert_allclose(after.boxes.size[1], (1.9, 0.45, 1.1))
+
+
 def test_what_is_not_in_the_way_stays(saved):
     before = read_room(saved)
     place = before.boxes.position[before.graph.names.index("shelf")] + (0.03, 0, 0)
