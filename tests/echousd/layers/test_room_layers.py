@@ -9,10 +9,10 @@ from small_room import BARE, OBJECTS, StandIn, small_graph
 
 import echousd
 from echousd.draw.sight import Furniture
-from echousd.draw.views import perspective_views
-from echousd.layers.cameras import room_points
+from echousd.draw.views import perspective_views, shifted, stage_views
+from echousd.layers.cameras import room_points, write_cameras
 from echousd.layers.compose import text
-from echousd.layers.materials import define_material, tint_factor
+from echousd.layers.materials import define_material, tint_factor, write_networks
 from echousd.options import RoomOptions
 from echousd.shapes import walls
 from echousd.shapes.geometry import Origin
@@ -311,6 +311,34 @@ def test_cameras_see_everything_and_light_is_there(stage, room):
                 assert max(abs(v) for v in seen) <= 1.0, (camera, name)
     assert stage.GetPrimAtPath("/Room/Lights/sky").IsA(UsdLux.DomeLight)
     assert stage.GetPrimAtPath("/Room/Lights/ceiling").IsA(UsdLux.RectLight)
+
+
+def test_a_camera_inside_has_the_shift_of_its_view(monkeypatch):
+    level = np.array([[1.0, 0, 0, 0], [0, 1, 0, 1.2], [0, 0, 1, 3], [0, 0, 0, 1]])
+    view = shifted(level, 0.25)
+    monkeypatch.setattr("echousd.layers.cameras.inside_view", lambda *_: (view, 24.0))
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    floor = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
+    none = Furniture(*np.zeros((2, 0, 3)), np.zeros(0))
+    write_cameras(Pen(stage.GetRootLayer()), np.insert(floor, 1, 2.5, axis=1), none, floor)
+    np.testing.assert_allclose(stage_views(stage)["perspective"].matrix, view, atol=1e-6)
+
+
+def test_looks_of_materialx_are_as_rough_as_their_picture_or_their_number():
+    pen, looks = Pen.blank("Room"), {slot: look("oak", slot) for slot in ("floor", "wood", "glass", "metal")}
+    for slot, one in looks.items():
+        define_material(pen, f"/Room/Looks/{slot}", one, "oak")
+    write_networks(pen, "oak", {"oak": looks})
+    stage = Usd.Stage.Open(pen.layer)
+    told = {}
+    for slot in looks:
+        rough = UsdShade.Shader.Get(stage, f"/Room/Looks/{slot}/mtlx_surface").GetInput("roughness")
+        if not rough.HasConnectedSource():
+            told[slot] = rough.Get()
+    assert told == {slot: pytest.approx(looks[slot].roughness) for slot in told}
+    assert {"glass"} <= {*told} < {*looks}
 
 
 def test_camera_stands_where_no_tall_piece_hides_the_others():

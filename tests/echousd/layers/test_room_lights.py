@@ -148,6 +148,7 @@ def test_evenings_and_nights_are_as_bright_as_people_have_them(lamps, lit) -> No
     fallen = {name: lumens(stage, name) for name in ("day", "evening", "night")}
     assert {name: fallen[name] for name in lit} == pytest.approx(lit, rel=1e-3)
     panel = UsdLux.RectLight(stage.GetPrimAtPath("/Room/Lights/ceiling"))
+    assert panel.GetWidthAttr().Get() < 4.0  # within the ceiling
     size = panel.GetWidthAttr().Get() * panel.GetHeightAttr().Get()
     height = panel.GetPrim().GetAttribute("xformOp:translate").Get()[1] + 0.02
     assert intensity(stage, "ceiling") == pytest.approx(0.12 * 1.6 * height**2 / size, rel=1e-3)

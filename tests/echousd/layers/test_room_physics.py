@@ -1,5 +1,7 @@
 """Masses, inertia and colliders of single pieces."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -7,6 +9,7 @@ from pxr import Usd, UsdGeom
 
 from echomodel.dressing import KINDS
 from echomodel.dressing import thing as solids_of
+from echomodel.furniture.solids import Joint
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.layers.physics import CONTACT, WOODEN, write_asset_physics
@@ -50,6 +53,19 @@ def test_written_masses_are_read_back(seed):
     assert found.mass == pytest.approx(7.25)
     np.testing.assert_allclose(found.centre, told.centre, atol=1e-4)
     np.testing.assert_allclose(tensor(found), tensor(told), atol=1e-4)
+
+
+@pytest.mark.parametrize("joints", [(), (Joint("door", "revolute", (0, 1, 0), (0.8, 0, 0.3), 1.5),)])
+def test_a_piece_with_joints_weighs_as_a_whole_only_where_it_stands_still(joints):
+    geometry = replace(solid_geometry(box_mesh(SIZE), "wardrobe", Origin("boxes")), joints=joints)
+    stage = Usd.Stage.CreateInMemory()
+    prim = UsdGeom.Xform.Define(stage, "/wardrobe").GetPrim()
+    write_asset_physics(Pen(stage.GetRootLayer()), "wardrobe", "wardrobe", geometry, ["wood"])
+    articulation, weighs = prim.GetVariantSet("articulation"), {}
+    for name in articulation.GetVariantNames() or [""]:
+        articulation.SetVariantSelection(name)
+        weighs[name] = read_mass(prim) is not None
+    assert weighs == ({"articulated": False, "static": True} if joints else {"": True})
 
 
 def test_a_prim_without_a_whole_mass_has_none():
