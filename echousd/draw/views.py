@@ -38,7 +38,7 @@ FILLED = 260.0  # metres of depth that a picture full of what is near is worth
 BEHIND = 25.0  # metres of depth that the main piece from behind costs
 # Metres of depth that each thing costs which the border cuts, and which is beyond it: lamps, what hangs from `HIGH`
 # metres on, and furniture.
-CUTS, HIGH = ((60.0, 12.0), (25.0, 0.0), (10.0, 0.0)), 0.6
+CUTS, HIGH = ((90.0, 12.0), (25.0, 0.0), (10.0, 0.0)), 0.25
 SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width over which it is cord; metres
 UNSEEN, MANY = 6.0, 8.0  # metres of depth that each of so many pieces in the picture is worth
 SHOWN, FAR = 30.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain

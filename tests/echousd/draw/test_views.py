@@ -111,7 +111,7 @@ def test_a_wall_is_bare_where_nothing_is_at_it():
 
 
 def test_the_camera_shows_no_bare_wall_where_it_need_not():
-    walls = boxes(*((2.4, 1.6, 0.05, x, 0.6, 3.96, 0.0) for x in (1.3, 3.7)))  # pictures at one long wall
+    walls = boxes(*((2.4, 2.0, 0.05, x, 0.2, 3.96, 0.0) for x in (1.3, 3.7)))  # panels at one long wall
     bed = boxes((1.8, 0.6, 2.0, 2.5, 0.0, 2.8, 0.0))
     view, lens = inside_view(FLOOR, bed, 2.8, walls)
     assert bare_walls([bed, walls], view, APERTURE / 2 / lens) < 1 / 3
@@ -140,7 +140,7 @@ def test_the_camera_turns_to_have_a_picture_on_the_wall_whole() -> None:
 
 def test_a_thing_costs_what_its_kind_does_where_the_border_cuts_it_and_a_lamp_beyond_it_too() -> None:
     view = view_matrix(np.array([0.0, 1.5, 0.0]), np.array([1.0, 1.5, 0.0]))
-    for place, share in ((0.0, (0, 0, 0)), (1.4, (60, 25, 10)), (4.0, (12, 0, 0))):  # whole, cut, beyond
+    for place, share in ((0.0, (0, 0, 0)), (1.4, (90, 25, 10)), (4.0, (12, 0, 0))):  # whole, cut, beyond
         box = boxes((0.4, 0.4, 0.4, 2.0, 1.3, place, 0.0)).corners
         for kind, cost in enumerate(share):
             fragile = [box if each == kind else box[:0] for each in range(3)]
