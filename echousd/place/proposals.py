@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.objective.access import PASSAGE
+from echomodel.objective.access import DEEP, PASSAGE, WALKED_BEHIND, to_wall
 from echomodel.objective.company import PLACE
 from echomodel.objective.sight import WATCHED_FROM
 from echomodel.objective.support import ON_CEILING
 from echomodel.vocabulary import vocabulary
 from echousd.place.distances import APART, MOST_UNDER, kept_apart, over_bed, seen_from, spread_at_walls
-from echousd.place.geometry import Floor, depth_inside
+from echousd.place.geometry import depth_inside
 from echousd.place.setting import Setting
 from echousd.place.slots import INNER, STANDS
 
@@ -176,18 +176,6 @@ def _clear(one: tuple[float, ...], other: tuple[float, ...], size: np.ndarray) -
     return abs(one[0] - other[0]) > width - 0.01 or abs(one[1] - other[1]) > depth - 0.01
 
 
-def ahead(floor: Floor, at: np.ndarray, front: np.ndarray) -> np.ndarray:
-    """(K,) float: metres from points (K, 2) along unit vectors (K, 2) to the wall."""
-    edge, normal = floor.edge, floor.normal
-    towards = -(front @ normal.T)
-    reach = np.einsum("kwd,wd->kw", at[:, None] - floor.polygon, normal) / np.where(towards > 1e-3, towards, np.nan)
-    length = np.linalg.norm(edge, axis=1)
-    along = np.einsum("kwd,wd->kw", at[:, None] + reach[..., None] * front[:, None] - floor.polygon, edge) / length
-    hit = (reach > 0) & (along > -1e-3) & (along < length + 1e-3)
-    out: np.ndarray = np.where(hit, reach, np.inf).min(1)
-    return np.where(np.isfinite(out), out, 0.0)
-
-
 def out_of(position: np.ndarray, yaw: float, slot: tuple[float, float, float, float]) -> Row:
     """Where a slot of something at a position (3,) lies in the room."""
     lateral, forward, turn, more = slot
@@ -291,9 +279,11 @@ def _in_view(setting: Setting, i: int, at_walls: Sequence[Row]) -> list[Row]:
         return []
     far, rows = WATCHED_FROM["sofa"][1], np.array(at_walls).reshape(-1, 4)
     front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
-    free = ahead(setting.floor, rows[:, :2], front)
-    rows[:, :2] += (free - AMID * far)[:, None] * front
-    return [(x, z, yaw, more) for x, z, yaw, more in rows[free > max(far, AMID * far + PASSAGE)].tolist()]
+    free = to_wall(setting.plan, np.zeros(len(rows), int), rows[:, :2], front)
+    away = [free - AMID * far, np.full(len(rows), WALKED_BEHIND - 0.01 - setting.behind[i])]
+    keep = [free > max(far, AMID * far + PASSAGE), free + float(setting.size[i, 2]) / 2 > DEEP]
+    out = [(rows + np.pad(off[:, None] * front, ((0, 0), (0, 2))))[at] for off, at in zip(away, keep, strict=True)]
+    return [(x, z, yaw, more) for x, z, yaw, more in np.concatenate(out).tolist()]
 
 
 def _nooks(setting: Setting, i: int, more: float) -> list[Row]:

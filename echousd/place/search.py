@@ -16,6 +16,7 @@ from echomodel.arrays import Array, at_least, at_most, repeat, rows, sum_of
 from echomodel.boxes2d import axes
 from echomodel.late import Late
 from echomodel.objective import TERMS, Plan, Term, unreached
+from echomodel.objective.access import to_wall
 from echomodel.objective.copies import copies_of, looks_at
 from echomodel.objective.plan import Found, found, nobody
 from echomodel.objective.table import PRICE
@@ -23,7 +24,7 @@ from echomodel.rules import margins
 from echomodel.rules.placements import Spread
 from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import beyond, depths
-from echousd.place.proposals import ahead, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
+from echousd.place.proposals import aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
 from echousd.place.setting import Setting
 from echousd.place.solver import PlaceConfig
 
@@ -315,7 +316,8 @@ class Search:
         position[:, i, 1] = height_of(setting, state.position, i)
         for k in screens:
             front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
-            free = ahead(setting.floor, rows[:, :2], front) - setting.size[k, 2] / 2 - setting.behind[k]
+            free = to_wall(setting.plan, np.zeros(len(rows), int), rows[:, :2], front)
+            free = free - setting.size[k, 2] / 2 - setting.behind[k]
             at = np.concatenate([rows[:, :2] + free[:, None] * front, rows[:, 2:3] + np.pi], 1)
             loads = [k, *(m for m in self.children[k] if setting.carrier[m] == k)]
             self._carry(position, yaw, state, k, loads, at)

@@ -63,6 +63,18 @@ def without_slopes(function: Function) -> Function:
     return run  # type: ignore[return-value]
 
 
+def once(function: Function) -> Function:
+    """The function of one object, run once for each, which keeps what it gave."""
+
+    @wraps(function)
+    def run(of: Any) -> Any:
+        if function.__name__ not in vars(of):
+            vars(of)[function.__name__] = function(of)
+        return vars(of)[function.__name__]
+
+    return run  # type: ignore[return-value]
+
+
 def rows(mask: Array) -> Array:
     """(k,) int64, where a mask (n,) is true."""
     return mask.nonzero()[0] if isinstance(mask, NUMPY) else mask.nonzero()[:, 0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from echomodel.arrays import Array, at_least, full, held, kit, least_of, norm, pairs_in, put, rows, sum_of
+from echomodel.arrays import Array, at_least, full, held, kit, least_of, norm, once, pairs_in, put, rows, sum_of
 from echomodel.boxes2d import turned
 from echomodel.floors import footprint
 from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, joined, nobody
@@ -32,8 +32,6 @@ TURNED = math.radians(45.0)  # 94 % of real nightstands look the same way as the
 def seat_faces(plan: Plan) -> Found:
     """A seat that stands at a table or desk looks at it."""
     i, j = plan.attended("at")
-    if not len(i):
-        return nobody(plan.size)
     off, xp = plan.kit.stack(plan.local(i, j), -1), plan.kit
     out = abs(off) - plan.size[j, ::2] / 2
     most = xp.amax(held(out), 1)[:, None]  # who is pushed under it came from the side where this is
@@ -47,8 +45,6 @@ def seat_faces(plan: Plan) -> Found:
 def seat_in_reach(plan: Plan) -> Found:
     """A seat whose work is at a table or desk stands at it, a stool at its dressing table, a bench at its table."""
     i, j = plan.attended("at", "foot", to=plan.of("board"))
-    if not len(i):
-        return nobody(plan.size)
     works = plan.which(lambda kind: kind.access > 0 or kind.wall)  # at a dinner table stools go anywhere
     bound = ~plan.solid[i] | works[j]
     i, j = i[bound], j[bound]
@@ -59,8 +55,6 @@ def seat_in_reach(plan: Plan) -> Found:
 def seat_before_desk(plan: Plan) -> Found:
     """Who works at a desk or dressing table sits before it, not at its corner."""
     i, j = plan.attended("at", to=plan.which(lambda kind: kind.role == "board" and (kind.access > 0 or kind.wall)))
-    if not len(i):
-        return nobody(plan.size)
     near = held(plan.gap(i, j)) < NEAR_TABLE
     i, j = i[near], j[near]
     aside, alone = abs(plan.local(i, j)[0]), plan.kit.bincount(j, minlength=len(plan)) == 1
@@ -71,8 +65,6 @@ def seat_before_desk(plan: Plan) -> Found:
 def lounger_faces(plan: Plan) -> Found:
     """An armchair of a group is turned towards it, and towards the sofa before which it stands."""
     i, j = plan.attended("company")
-    if not len(i):
-        return nobody(plan.size)
     near, sofa, xp = held(plan.gap(i, j)) < COMPANY, plan.group[i], plan.kit
     lateral, forward = plan.local(i, sofa)
     before = plan.of("sofa")[sofa] & (forward > plan.size[sofa, 2] / 2) & (abs(lateral) < plan.size[sofa, 0] / 2)
@@ -85,8 +77,6 @@ def loungers_together(plan: Plan) -> Found:
     """Armchairs without a sofa stand together, none with its back to the next one."""
     lone = plan.stands("company") & (plan.anchor < 0) & plan.standing
     i, j = plan.pairs(lone, lone)
-    if not len(i):
-        return nobody(plan.size)
     apart = plan.apart(i, j)
     first = _ranked(i, held(apart))[0] == 0
     i, j, apart = i[first], j[first], apart[first]
@@ -97,8 +87,6 @@ def loungers_together(plan: Plan) -> Found:
 def table_before_sofa(plan: Plan) -> Found:
     """A coffee table lies before its sofa, within its width and a hand's reach; of several one does."""
     i, j = plan.attended("before")
-    if not len(i):
-        return nobody(plan.size)
     lateral, _, gap = _at_edges(plan, i, j)
     ell, xp, off = plan.which(lambda kind: kind.name in vocabulary().cornered)[j], plan.kit, abs(lateral)
     least = xp.where(ell, BEFORE_SOFA[0] - plan.size[j, 2] * 0.6, BEFORE_SOFA[0])
@@ -110,8 +98,6 @@ def table_before_sofa(plan: Plan) -> Found:
 def nightstand_at_head(plan: Plan) -> Found:
     """Nightstands stand beside the bed at its head; of more than two the nearest two."""
     i, j = plan.attended("head")
-    if not len(i):
-        return nobody(plan.size)
     near = _ranked(j, held(plan.gap(i, j)))[0] < 2
     i, j = i[near], j[near]
     _, beside, before = _at_edges(plan, i, j)
@@ -145,8 +131,6 @@ def _at_edges(plan: Plan, i: Array, j: Array) -> tuple[Array, Array, Array]:
 def bench_at_foot(plan: Plan) -> Found:
     """A bench or ottoman at the foot of a bed stands close to it, within its width."""
     i, j = plan.attended("foot", to=plan.of("bed"))
-    if not len(i):
-        return nobody(plan.size)
     lateral, _, gap = _at_edges(plan, i, j)
     return first_of(i, j, [FOOT - gap, ALONG * plan.size[j, 0] - abs(lateral)], [gap, abs(lateral)])
 
@@ -170,6 +154,7 @@ EVEN = 0.16  # metres between a table's middle and the middle of its chairs, one
 PLACE = 0.62  # metres at a table that one who sits there takes: two on a bench
 ODD = 0.6  # share of the table's half side that an odd chair may shift that middle, over the number of chairs
 STAGGERED = 0.12  # metres between a chair's middle and that of the one opposite, where both sides have as many
+SPACED = 0.16  # metres by which the distances of neighbours at one side of a table differ: 95 % of real sides
 LEVEL = 0.12  # metres by which chairs are pushed under their table unlike each other
 AROUND = 0.7  # metres: chairs further from their table are not at it
 CIRCLE = math.radians(100.0)  # a sofa is turned so far at most from the middle of its group
@@ -179,6 +164,7 @@ COVERS = 0.12  # share of a sofa's width that side tables and lamps may stand be
 AHEAD = 0.1  # metres that their middles may lie before its front: 97 % of real ones lie less
 SIDE = 0.6  # metres: what is further from its seat stands for itself
 ELBOW, KNEES = 0.2, 0.3  # share of a sofa's width that an armchair may stand before, and metres from which on all of it
+FORTH = 0.6  # metres of an armchair, or more, before the line of its sofa's back: all 88 real ones
 LEFT, OWN = 1.8, 0.6  # metres from its group from which on an armchair stands apart, and to what is its own: all real
 ALONE = 0.45  # metres from everything: nothing small stands so in a room
 # Metres less from furniture: 98 % of real plants are at a wall, the others touch something; of side tables within 0.3.
@@ -228,12 +214,16 @@ class Seats:
         return one, other[one]
 
 
+@once
 def seats_at(plan: Plan) -> Seats:
     """Seats at the tables that people sit around."""
-    kept: dict[str, Seats] = vars(plan)
-    if "seats_at" not in kept:
-        kept["seats_at"] = _seats_at(plan, plan.dining)
-    return kept["seats_at"]
+    return _seats_at(plan, plan.dining)
+
+
+@once
+def seats_anywhere(plan: Plan) -> Seats:
+    """Seats at every table, desk and bar."""
+    return _seats_at(plan, plan.of("board"))
 
 
 def _seats_at(plan: Plan, boards: Array) -> Seats:
@@ -252,8 +242,6 @@ def _seats_at(plan: Plan, boards: Array) -> Seats:
 def chairs_even(plan: Plan) -> Found:
     """The chairs of a table stand evenly around it; a bench counts as the chairs that it stands for."""
     i, j, xp = seats_at(plan).i, seats_at(plan).j, plan.kit
-    if not len(i):
-        return nobody(plan.size)
     places = at_least((held(plan.size)[i, 0] / PLACE).round(), 1.0)
     count = sum_of(j, places, len(plan))
     who = rows(count > 1)
@@ -272,7 +260,7 @@ def chairs_opposite(plan: Plan) -> Found:
 
 def chairs_level(plan: Plan) -> Found:
     """The chairs of a table or bar are pushed under it alike: neighbours, and those opposite each other."""
-    seats, xp = _seats_at(plan, plan.of("board")), plan.kit
+    seats, xp = seats_anywhere(plan), plan.kit
     if not len(seats.i):
         return nobody(plan.size)
     half_width, half_depth = plan.reach(seats.i, seats.j)
@@ -281,6 +269,15 @@ def chairs_level(plan: Plan) -> Found:
     chairs = plan.stands("at")[seats.i]
     keep = chairs[one] & chairs[other]
     return _alike(plan, seats, one[keep], other[keep], out, LEVEL)
+
+
+def chairs_spaced(plan: Plan) -> Found:
+    """Three chairs and more at one side of a table or bar stand there at equal distances."""
+    seats = seats_anywhere(plan)
+    one, other = seats.beside()
+    apart = put(full(seats.along, len(seats.i), 0.0), one, seats.along[other] - seats.along[one])
+    both = apart[other] > 0
+    return _alike(plan, seats, one[both], other[both], apart, SPACED)
 
 
 def _alike(plan: Plan, seats: Seats, one: Array, other: Array, off: Array, most: float) -> Found:
@@ -295,8 +292,6 @@ def _alike(plan: Plan, seats: Seats, one: Array, other: Array, off: Array, most:
 def sofas_in_circle(plan: Plan) -> Found:
     """A second sofa looks into the group of the first, and at it where it stands before it."""
     i, j = plan.attended("with")
-    if not len(i):
-        return nobody(plan.size)
     near = held(plan.apart(i, j)) < NEAR
     i, j = i[near], j[near]
     middle, xp = plan.position[j][:, ::2] + plan.axes(j)[1] * (plan.size[j, 2] / 2 + BEFORE)[:, None], plan.kit
@@ -308,13 +303,12 @@ def sofas_in_circle(plan: Plan) -> Found:
 
 
 def at_its_side(plan: Plan) -> Found:
-    """Side tables and floor lamps stand beside their sofa or bed, not before it; armchairs leave room for its knees."""
+    """Side tables and floor lamps stand beside their sofa or bed, not before it, armchairs neither before its knees nor
+    behind it."""
     i, j = plan.attended("beside", to=plan.of("sofa", "bed"))
     keep, xp = held(plan.apart(i, j)) < SIDE if len(i) else i > 0, plan.kit
     chairs = plan.those(plan.stands("company") & plan.of("sofa")[plan.group] & ~plan.of("sofa"))
     i, j = xp.concat([i[keep], chairs]), xp.concat([j[keep], plan.group[chairs]])
-    if not len(i):
-        return nobody(plan.size)
     armchair, width = plan.stands("company")[i], plan.size[j, 0]
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)
@@ -324,7 +318,8 @@ def at_its_side(plan: Plan) -> Found:
     margin = xp.maximum(xp.where(armchair, ELBOW * width, COVERS * width) - covered, -0.05 - before)
     margin = xp.where(plan.of("seat")[i], margin, xp.minimum(margin, AHEAD - ahead))
     margin = xp.where(armchair, xp.maximum(margin, before - KNEES), margin)
-    return found(i, margin, other=j, measure=at_least(before, 0.0))
+    behind = xp.where(armchair, ahead + half_depth + plan.size[j, 2] - FORTH, FAR)
+    return found(i, xp.minimum(margin, behind), other=j, measure=at_least(before, 0.0), words=1 * (behind < margin))
 
 
 def told_of(plan: Plan, i: Array, j: Array, *words: str) -> Array:

@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, at_most, cast, full, held, least_of, norm, rows, sum_of
+from echomodel.arrays import Array, at_least, at_most, cast, full, held, least_of, norm, once, rows, sum_of
 from echomodel.floors import footprint, signed_area, signed_distance
-from echomodel.objective.company import AROUND, BESIDE, Seats, first_of, seats_at
+from echomodel.objective.company import AROUND, BESIDE, first_of, seats_at
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody
 from echomodel.sizes import REACH, filled_area
 
@@ -60,21 +60,20 @@ def floor_points(plan: Plan) -> list[tuple[Array, float, Array, Array]]:
     return [(scenes, *of) for (scenes, _, _), of in zip(plan.rooms, kept, strict=True)]
 
 
+@once
 def floor_gaps(plan: Plan) -> list[tuple[float, int, Array, Array, Array, Array]]:
     """How far the floor lies from the pieces, for rooms (s,), one after the other, of one floor.
 
     Returns its area, how many points it has, (s, n) int64, the pieces, (q, 2) the points that count: in copies of one
     room not those near to what stands alike in all, (q,) metres to the walls, and (s, q) to the nearest piece.
     """
-    kept: dict[str, list[tuple[float, int, Array, Array, Array, Array]]] = vars(plan)
-    if "floor_gaps" not in kept:
-        kept["floor_gaps"] = []
-        for scenes, area, points, walls in floor_points(plan):
-            here = (plan.scene >= int(scenes[0])) & (plan.scene <= int(scenes[-1]))
-            there = plan.those(here & plan.standing & (plan.size[:, 1] > CLEAR_HEIGHT)).reshape(len(scenes), -1)
-            far, gap = _far_points(plan, there, points)
-            kept["floor_gaps"].append((area, len(points), there, points[far], walls[far], gap))
-    return kept["floor_gaps"]
+    out = []
+    for scenes, area, points, walls in floor_points(plan):
+        here = (plan.scene >= int(scenes[0])) & (plan.scene <= int(scenes[-1]))
+        there = plan.those(here & plan.standing & (plan.size[:, 1] > CLEAR_HEIGHT)).reshape(len(scenes), -1)
+        far, gap = _far_points(plan, there, points)
+        out.append((area, len(points), there, points[far], walls[far], gap))
+    return out
 
 
 def _far_points(plan: Plan, there: Array, points: Array) -> tuple[Array, Array]:
@@ -175,7 +174,7 @@ def floor_served(plan: Plan) -> Found:
 def elbow_room(plan: Plan) -> Found:
     """Chairs share the sides of their table: who sits beside others has room for the elbows, or no side is free."""
     seats, xp = seats_at(plan), plan.kit
-    who, free = _free_sides(plan, seats)
+    who, free = _free_sides(plan)
     if not len(who):
         return nobody(plan.size)
     count = xp.bincount(seats.side, minlength=4 * len(plan)).reshape(-1, 4)[who]
@@ -190,7 +189,7 @@ def elbow_room(plan: Plan) -> Found:
 def chairs_balanced(plan: Plan) -> Found:
     """As many sit at one side of a table as opposite, but for one where their number is odd, or no room is there."""
     seats, xp = seats_at(plan), plan.kit
-    who, free = _free_sides(plan, seats)
+    who, free = _free_sides(plan)
     if not len(who):
         return nobody(plan.size)
     places = at_least((held(plan.size)[:, 0] / ELBOW).round(), 1.0)  # a bench counts for several chairs
@@ -220,13 +219,11 @@ def bench_fits(plan: Plan) -> Found:
     return first_of(seats.i, seats.j, margins, measures)
 
 
-def _free_sides(plan: Plan, seats: Seats) -> tuple[Array, Array]:
+@once
+def _free_sides(plan: Plan) -> tuple[Array, Array]:
     """(P,) int64, the tables with seats, and (P, 4) bool, whether one could sit left, right, behind and before them."""
-    kept: dict[str, tuple[Array, Array]] = vars(plan)
-    if "free_sides" not in kept:
-        who = rows(plan.kit.bincount(seats.j, minlength=len(plan)) > 0)
-        kept["free_sides"] = who, _free_beside(plan, who) > SEAT
-    return kept["free_sides"]
+    who = rows(plan.kit.bincount(seats_at(plan).j, minlength=len(plan)) > 0)
+    return who, _free_beside(plan, who) > SEAT
 
 
 def _free_beside(plan: Plan, who: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from echomodel.arrays import Array, at_least, cast, dot, held, rows
+from echomodel.objective.access import to_wall, wall_ahead
 from echomodel.objective.company import Seats, seats_at
 from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody, worst
 
@@ -121,13 +122,7 @@ def _room_behind(plan: Plan, seats: Seats) -> tuple[Array, Array]:
     covered = half(k, across[row]) + half(i, across)[row] - abs(dot(away, across[row]))
     met = (covered > MET * plan.size[i[row], 0]) & (ahead > 0)
     least, about = worst(row, xp.where(met, gap, FAR), k, len(i), FAR)
-    start, along, normal, length = (of[plan.scene[i]] for of in plan.walls)
-    back = plan.position[i][:, ::2] + way * own[:, None]
-    towards = -dot(normal, way[:, None])
-    reach = dot(back[:, None] - start, normal) / at_least(towards, 1e-3)
-    at = dot(back[:, None] + reach[..., None] * way[:, None] - start, along)
-    hit = (length > 0) & (towards > 1e-3) & (at > -1e-3) & (at < length + 1e-3) & (reach > -0.3)
-    wall = xp.amin(xp.where(hit, reach, FAR), 1)
+    wall = to_wall(plan, i, plan.position[i][:, ::2] + way * own[:, None], way)
     return xp.minimum(least, wall), xp.where(wall < least, -1, about)
 
 
@@ -151,8 +146,6 @@ def lamp_aside(plan: Plan) -> Found:
     """Lamps and plants do not stand before shelves, cupboards and drawers, nor before who sits."""
     fronts = (plan.of("storage") & plan.standing & plan.works) | _loungers(plan)
     i, j = plan.pairs(plan.of("light", "decor") & plan.standing, fronts, least=True)
-    if not len(i):
-        return nobody(plan.size)
     free = plan.kit.where(_loungers(plan), AT_SEAT, plan.kit.where(plan.stands("head"), AT_BED, LAMP))
     least, about = plan.worst(i, plan.more_ahead(j, i, cast(free, plan.size)[j], EDGE), j)
     who = rows(least < FAR)
@@ -209,9 +202,7 @@ def _clear(
     least, about = plan.worst(i, margin, j)
     least, about, needed, needed_wall = least[who], about[who], needed[who], needed_wall[who]
     if bool((needed_wall > 0).any()):
-        front = plan.axes(who)[1] * sign
-        points = plan.position[who][:, ::2] + front * (plan.size[who, 2] / 2 + needed_wall)[:, None]
-        wall = plan.inside(points[:, None], who)[:, 0]
+        wall = wall_ahead(plan, who, sign) - needed_wall
         by_wall = wall < least
         least, about = xp.minimum(least, wall), xp.where(by_wall, -1, about)
         needed = xp.where(by_wall, needed_wall, needed)

@@ -22,6 +22,7 @@ STEP = 0.1  # metres beyond that between a door and where it enters
 LEAST = 1e-4  # square metres: no smaller place to be
 BEFORE = 0.35  # metres around the place before a door from which one walks
 ARM = 0.4  # metres between the robot and what it can take hold of
+OPEN = 0.75  # share of the free floor that it gets to: in 94 % of 300 real rooms
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,10 +32,12 @@ class Ways:
     Arguments:
         reached: (n,) bool, boxes that the robot can touch.
         share: of the floor that is free for its middle, the share that it can get to; 1 where nothing is free.
+        closing: (n,) bool, boxes between that and the largest part of the rest.
     """
 
     reached: np.ndarray
     share: float
+    closing: np.ndarray
 
 
 REACHED = "reached"
@@ -88,16 +91,22 @@ def faults_of(plan: Plan, kinds: Collection[str] = BY_EYE) -> list[Fault]:
 
 
 def unreached(plan: Plan) -> list[Fault]:
-    """Pieces of one room that cannot be walked to; none where the floor is unknown."""
+    """Pieces of one room that cannot be walked to, or close the way to much of it; none where the floor is unknown."""
     walked = walk(plan)
     if walked is None:
         return []
     furniture = plan.standing & plan.of("seat", "sofa", "board", "bed", "storage")
-    reached = walked.reached
     attends = np.asarray(plan.anchor)  # a nightstand is reached from its bed, a chair with its table
-    reached = reached | ((attends >= 0) & reached[attends])
-    lost = np.flatnonzero(np.asarray(furniture & ~plan.given) & ~reached)
-    return [Fault(int(i), -1, REACHED, -1.0, "{a} cannot be walked to from the door") for i in lost]
+    reached = walked.reached | ((attends >= 0) & walked.reached[attends])
+    free = ~np.asarray(plan.given)
+    lost = np.flatnonzero(np.asarray(furniture) & free & ~reached)
+    out = [Fault(int(i), -1, REACHED, -1.0, "{a} cannot be walked to from the door") for i in lost]
+    closing = np.flatnonzero(walked.closing & free)
+    if walked.share < OPEN and len(closing):
+        smallest = int(closing[np.asarray(held(plan.size))[closing].prod(1).argmin()])
+        says = f"{{a}} closes the way to {100 * (1 - walked.share):.0f} % of the free floor"
+        out.append(Fault(smallest, -1, REACHED, walked.share - OPEN, says))
+    return out
 
 
 def walk(plan: Plan) -> Ways | None:
@@ -117,7 +126,7 @@ def walk(plan: Plan) -> Ways | None:
     parts = shapely.get_parts(free)
     parts = parts[shapely.area(parts) > LEAST]
     if not len(parts):
-        return Ways(np.zeros(len(size), bool), 1.0)
+        return Ways(np.zeros(len(size), bool), 1.0, np.zeros(len(size), bool))
     area, entered = shapely.area(parts), np.zeros(len(parts), bool)
     for opening in plan.openings[0]:
         if opening.kind != "window" and opening.edge < len(polygon):
@@ -126,8 +135,9 @@ def walk(plan: Plan) -> Ways | None:
             entered[met.argmax()] |= met.max() > 0
     if not entered.any():
         entered[area.argmax()] = True
-    walked = shapely.multipolygons(parts[entered])
-    return Ways(shapely.dwithin(walked, boxes, ROBOT + ARM), float(area[entered].sum() / area.sum()))
+    walked, rest = shapely.multipolygons(parts[entered]), parts[(area * ~entered).argmax()]
+    closing = obstacle & shapely.dwithin(walked, boxes, ROBOT) & shapely.dwithin(rest, boxes, ROBOT)
+    return Ways(shapely.dwithin(walked, boxes, ROBOT + ARM), float(area[entered].sum() / area.sum()), closing)
 
 
 def missed(plan: Plan, kinds: Collection[str] = BY_EYE, beyond: float = -math.inf) -> Array:

@@ -19,8 +19,6 @@ def row_flush(plan: Plan) -> Found:
     """Fitted units stand in a row: no gap to the next one, backs in one line, or corner to corner."""
     units, xp = plan.stands("row") & plan.standing, plan.kit
     i, j = plan.pairs(units, units)
-    if not len(i):
-        return nobody(plan.size)
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)
     level = abs(forward - half_depth + plan.size[j, 2] / 2)
@@ -56,8 +54,6 @@ def aisle(plan: Plan) -> Found:
     """One opens an oven with somebody behind: units keep an aisle to what stands opposite, and one walks along them."""
     works = plan.which(lambda kind: bool(kind.task)) & plan.standing
     i, j = plan.pairs(works, works)
-    if not len(i):
-        return nobody(plan.size)
     lateral, forward = plan.local(j, i)
     half_width, half_depth = plan.reach(j, i)
     facing = (plan.kit.cos(plan.yaw[i] - plan.yaw[j]) < -0.9) | ~plan.stands("row")[j]

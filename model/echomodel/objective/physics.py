@@ -21,8 +21,6 @@ TOUCH = 0.01  # metres that two boxes, a box and a wall, a box and its carrier m
 def apart(plan: Plan) -> Found:
     """No two pieces run into each other, but for what belongs together: a chair is pushed under its own table."""
     i, j, allowed = plan.couples
-    if not len(i):
-        return nobody(plan.size)
     rise = plan.kit.maximum(
         plan.position[j, 1] - plan.position[i, 1] - plan.size[i, 1],
         plan.position[i, 1] - plan.position[j, 1] - plan.size[j, 1],

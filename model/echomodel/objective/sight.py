@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from echomodel.arrays import Array, at_least, cast, full, held, least_of, norm, pairs_in, rows, sum_of
+from echomodel.arrays import Array, at_least, cast, full, held, least_of, norm, once, pairs_in, rows, sum_of
 from echomodel.objective.company import first_of, told_of
 from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, nobody, worst
 
@@ -41,8 +41,6 @@ def _hung(plan: Plan) -> tuple[Array, Array]:
 def pendant_centred(plan: Plan) -> Found:
     """What hangs over a table, or shall, hangs over its middle, over a bed on its axis; several pendants together."""
     i, j = _hung(plan)
-    if not len(i):
-        return nobody(plan.size)
     over = cast((plan.gap(i, j) < 1e-3) | told_of(plan, i, j, "above"), plan.size)
     away, count = plan.position[i] - plan.position[j], at_least(sum_of(j, over, len(plan)), 1.0)
     x, z = ((sum_of(j, away[:, axis] * over, len(plan)) / count)[j] for axis in (0, 2))
@@ -128,24 +126,14 @@ def screen_not_behind(plan: Plan) -> Found:
     return found(i, BACK - off, other=j, measure=plan.kit.rad2deg(off))
 
 
-Watched = tuple[Found, Array, Array, Array]
-
-
-def _watched(plan: Plan) -> Watched:
-    """What `_viewers` finds, which four rules ask for."""
-    kept: dict[str, Watched] = vars(plan)
-    if "watched" not in kept:
-        kept["watched"] = _viewers(plan)
-    return kept["watched"]
-
-
 def screens(plan: Plan) -> Array:
     """(N,) bool, what televisions stand on, and those that stand or hang elsewhere."""
     stands = plan.stands("opposite")
     return stands | (plan.of("screen") & ~(stands[plan.anchor] & (plan.anchor >= 0)))
 
 
-def _viewers(plan: Plan) -> Watched:
+@once
+def _watched(plan: Plan) -> tuple[Found, Array, Array, Array]:
     """Each screen with the viewer that sees it best, of those that the graph names where it names any.
 
     Returns what `screen_in_view` finds of these (seen from its viewer, its own front, too near, too far). ahead: (P,)

@@ -224,6 +224,8 @@ MORE = [
     (with_one(LIVING, "chair", kind="armchair", size=(0.8, 0.8, 0.8), at=(-1.4, 0.9), yaw=-2.6),
      ("chair", "screen_not_behind"), "chair turns its back on stand (1"),
     (LIVING.moved("armchair", at=(0.9, -0.45), yaw=-2.4), ("armchair", "seat_room"), "one cannot sit down on"),
+    (LIVING.moved("sofa", at=(0.0, -0.6)).moved("coffee", at=(0.0, 0.5)).moved("armchair", at=(1.0, -1.55), yaw=0.0),
+     ("armchair", "at_its_side"), "armchair stands behind sofa"),
     (LIVING.moved("armchair", at=(1.0, -0.3)), ("armchair", "seat_room"), "armchair: 0.05 m before it stands coffee"),
     (LIVING.moved("coffee", at=(-0.5, -0.4)), ("coffee", "table_before_sofa"), "0.50 m beside the middle of sofa"),
     (LIVING.moved("coffee", at=(0.0, 0.1)), ("coffee", "table_before_sofa"), "coffee lies 0.88 m before sofa"),
@@ -261,6 +263,10 @@ MORE = [
      "plant crowds chair_1_1"),
     (SET.moved("table", yaw=0.03), ("table", "parallel"), "table is turned by 2 degrees against the walls"),
     (STUDY.moved("desk", at=(0.0, -0.5)), ("desk", "desk_at_wall"), "desk stands in the open, 1.15 m from the walls"),
+    (STUDY.moved("desk", at=(1.75, -0.5)), ("desk", "desk_at_wall"), "desk stands in the open, 0.75 m from the walls"),
+    (BAR.moved("stool_0", at=(0.15, -1.4)), ("bar", "chairs_spaced"), "one side of bar stand unevenly: distances"),
+    (Room({"a": {**ARMCHAIR, "at": (-0.9, 1.5), "yaw": -HALF}, "bed": BEDROOM.things["bed"]}), ("a", "looks_in"),
+     "a looks at nothing but a wall, 1.20 m before it"),
     (Room({"a": ARMCHAIR, "b": {**ARMCHAIR, "at": (1.0, -1.0), "yaw": -HALF}}), ("a", "loungers_together"),
      "a turns its back on b (153 degrees)"),
     (Room({"a": {**ARMCHAIR, "yaw": HALF}, "b": {**ARMCHAIR, "at": (1.4, 0.0)}}), ("a", "loungers_together"),
@@ -288,7 +294,10 @@ KEPT = [
         ("books", "wardrobe_opens"),
     ),
     (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.0, 0.7)), ("plant", "plant_aside")),
-    (STUDY.moved("desk", at=(2.1, -0.5)), ("desk", "desk_at_wall")),
+    (STUDY.moved("desk", at=(2.1, -0.5), yaw=HALF), ("desk", "desk_at_wall")),
+    (with_one(LIVING, "bean", kind="lazy_sofa", size=(0.8, 0.8, 0.8), at=(0.3, 0.9), yaw=HALF), ("bean", "looks_in")),
+    (Room({"a": {**ARMCHAIR, "at": (0.1, 1.5), "yaw": -HALF}, "bed": BEDROOM.things["bed"]}), ("a", "looks_in")),
+    (BAR.moved("stool_0", at=(0.08, -1.4)), ("bar", "chairs_spaced")),
     (SET.moved("table", yaw=0.015), ("table", "parallel")),
     (
         Room({**STUDY.moved("desk", at=(0.0, -0.5)).things, "a": STUDY.things["chair"], "b": STUDY.things["chair"]}),
@@ -318,8 +327,9 @@ def test_no_table_is_shoved_to_one_side_of_a_floor_that_is_unknown():
 
 
 def test_a_sofa_stands_in_the_room_for_a_reason():
-    hall = np.array([(-4.0, -5.0), (4.0, -5.0), (4.0, 2.0), (-4.0, 2.0)])
-    assert ("sofa", "at_wall") not in LIVING.found(floor=hall)  # at its wall it would be 5 m from all else
+    hall, deeper = (np.array([(-4.0, z), (4.0, z), (4.0, 3.0), (-4.0, 3.0)]) for z in (-3.2, -4.0))
+    assert ("sofa", "at_wall") not in LIVING.found(floor=hall)  # at its wall it would be far from all else
+    assert ("sofa", "at_wall") in LIVING.found(floor=deeper)  # 2 m behind it are bare
     desk = {"kind": "desk", "size": (1.2, 0.75, 0.6), "at": (0.0, -1.68)}
     away = LIVING.moved("sofa", at=(0.0, -0.1)).moved("coffee", at=(0.0, 0.9))
     assert ("sofa", "at_wall") in away.found()
@@ -416,6 +426,14 @@ def test_a_piece_behind_others_cannot_be_walked_to():
     door = Opening("door", "door", 0, 2.0, 0.9, 2.0)
     assert ("shelf", "reached") in room.found(openings=(door,))
     assert ("shelf", "reached") not in room.moved("wall", size=(3.0, 0.9, 0.4)).found(openings=(door,))
+
+
+def test_what_closes_much_of_the_floor_off_is_seen():
+    bar = {"kind": "sideboard", "size": (4.0, 0.9, 0.4), "at": (-0.5, 0.0)}
+    room = Room({"bar": bar, "plant": {"kind": "plant", "size": (0.7, 1.2, 0.7), "at": (2.0, 0.0)}})
+    door = Opening("door", "door", 0, 2.0, 0.9, 2.0)
+    assert "plant closes the way to 50 % of the free floor" in room.found(openings=(door,))["plant", "reached"]
+    assert ("plant", "reached") not in room.moved("plant", size=(0.3, 1.2, 0.3)).found(openings=(door,))
 
 
 def test_the_walkable_share_counts_what_the_robot_gets_to():
