@@ -243,7 +243,9 @@ def materials_layer(
         assets.as_class(pen.layer, asset)
     materials.write_palettes(pen, harmony, tables)
     if room.options.materialx:
-        materials.write_networks(pen, harmony, tables)
+        from echousd.layers.materialx import write_networks
+
+        write_networks(pen, harmony, tables)
     return pen.layer
 
 

@@ -12,7 +12,8 @@ from echousd.draw.sight import Furniture
 from echousd.draw.views import perspective_views, shifted, stage_views
 from echousd.layers.cameras import room_points, write_cameras
 from echousd.layers.compose import text
-from echousd.layers.materials import define_material, tint_factor, write_networks
+from echousd.layers.materials import define_material, tint_factor
+from echousd.layers.materialx import write_networks
 from echousd.options import RoomOptions
 from echousd.shapes import walls
 from echousd.shapes.geometry import Origin

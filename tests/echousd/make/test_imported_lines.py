@@ -20,7 +20,7 @@ unused = ("echousd.checks", "echousd.texturing", "echousd.batches", "echousd.exp
           "echomodel.metrics", "echomodel.compact.shape", "echomodel.tsdf", "echomodel.furniture.kitchens",
           "echomodel.furniture.kids_beds", "echomodel.rooms.runs", "echomodel.plans",
           "echomodel.rooms.generator", "echomodel.rooms.statistics", "echomodel.roomboxes",
-          "echomodel.furniture.distances", "echousd.graph.difference", "echousd.cli.plan",
+          "echomodel.furniture.distances", "echousd.graph.difference", "echousd.cli.plan", "echousd.layers.materialx",
           "echoscene", "torch", "trimesh", "networkx", "sklearn", "scipy")
 print(sum(lines.values()), [name for name in unused if name in sys.modules])
 """
