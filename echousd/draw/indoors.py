@@ -119,11 +119,9 @@ def _spots(bulb: np.ndarray, shades: Sequence[np.ndarray]) -> np.ndarray:
 
 def with_ceiling(scenery: Scenery) -> Scenery:
     """The scene with a ceiling over its walls."""
-    lower, upper = scenery.bounds
-    walls = scenery.triangles[scenery.wall >= 0]
-    height = float(walls[..., 1].max()) if len(walls) else float(upper[1])
-    x, z = np.array([(lower[0], lower[2]), (upper[0], lower[2]), (upper[0], upper[2]), (lower[0], upper[2])]).T
-    corners = np.stack([x, np.full(4, height), z], 1).astype(np.float32)
+    (left, _, back), (right, _, front) = scenery.bounds
+    y = scenery.triangles[scenery.wall >= 0][..., 1].max()
+    corners = np.array([(left, y, back), (right, y, back), (right, y, front), (left, y, front)], np.float32)
     added: dict[str, Any] = {
         "triangles": corners[[[0, 1, 2], [0, 2, 3]]],
         "normals": np.broadcast_to(np.array([0, -1, 0], np.float32), (2, 3, 3)),

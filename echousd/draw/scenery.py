@@ -21,8 +21,8 @@ MIXED = np.array([0.3141, 0.2718, 0.1618], np.float32)  # so that no two colours
 SHELL = ("floor", "wall", "ceiling", "door", "window")
 SMALL = 0.35  # metres: what is no larger hides nothing that a picture is of
 SMALLEST = 6  # times that an image is halved at most
-SEEN_THROUGH = 0.5  # opacity of a window's pane below which one looks out
-GLAZED = 0.03  # m² of an upright triangle of glass, twice, from which on it glazes a front and one looks in
+# Opacity of a pane below which one looks through it; twice the m² of upright glass from which on it glazes a front.
+SEEN_THROUGH, GLAZED = 0.5, 0.03
 HUNG = ("picture", "mirror", "curtain", "blind", "wall_shelf", "wall_clock", "coats")  # goes with its wall
 
 
@@ -46,7 +46,7 @@ class Scenery:
     pane_wall: np.ndarray  # (p,) int, the walls of the panes
     lights: Lights  # of the stage
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper corner, (3,) float each."""
         corners = self.triangles.reshape(-1, 3).astype(float)
@@ -74,6 +74,13 @@ class Scenery:
         names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "st", "texture", "wall")
         fewer = {name: getattr(self, name)[keep] for name in names}
         return replace(self, panes=self.panes[seen], pane_wall=self.pane_wall[seen], **fewer)
+
+    @cached_property
+    def largest(self) -> tuple[int, int]:
+        """Number of the largest face that looks up, and of the largest of a wall."""
+        area = area_normals(self.triangles)
+        level, upright = area[:, 1] * (self.normals[:, 0, 1] > 0), np.linalg.norm(area, axis=1) * (self.wall >= 0)
+        return int(level.argmax()), int(upright.argmax())
 
     @cached_property
     def material(self) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from echomodel.triangles import along, area_normals
+from echomodel.triangles import along
 from echousd.draw.bounced import Bounced
 from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, VIEW, evened, exposure, rolled
 from echousd.draw.scenery import Scenery, between
@@ -195,8 +195,8 @@ def _seen(world: World, origin: np.ndarray, direction: np.ndarray, hit: Mapping[
     glow[missed], through = outside(scenery, origin[missed], direction[missed])
     if world.view.inside:
         glow *= np.float32(VIEW * scenery.lights.sky) * scenery.lights.tint
-        past = missed[~through]
-        glow[past] = _next_room(world, origin[past], direction[past])
+        if len(past := missed[~through]):
+            glow[past] = _next_room(world, origin[past], direction[past])
     u, v, far = (np.where(face < 0, np.float32(0), hit[key]) for key in ("u", "v", "tfar"))
     bary = np.stack([1 - u - v, u, v], 1)
     normal = _unit(np.einsum("ncx,nc->nx", scenery.normals[face], bary))
@@ -213,8 +213,7 @@ def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndar
     for rows in (slice(start, start + BLOCK) for start in range(0, len(pixel), BLOCK)):
         point, normal = seen.point[rows], seen.normal[rows]
         toward = np.broadcast_to(view.matrix[:3, 2], point.shape) if view.orthographic else view.matrix[:3, 3] - point
-        gloss = world.scenery.gloss[seen.face[rows]]
-        hits = Hits(point + BEFORE * normal, normal, _unit(toward.astype(np.float32)), gloss)
+        hits = Hits(point + BEFORE * normal, normal, _unit(toward.astype("f4")), world.scenery.gloss[seen.face[rows]])
         shift = _shifts(world, pixel[rows])
         for sample in range(samples):
             out[rows] += _light(world, hits, sample, shift)
@@ -408,9 +407,7 @@ def outside(scenery: Scenery, origin: np.ndarray, direction: np.ndarray) -> tupl
 def _next_room(world: World, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """(n, 3) radiance that rays see which leave by a passage: a wall and a floor like those here, in less light."""
     scenery, (low, high) = world.scenery, world.scenery.bounds
-    area = area_normals(scenery.triangles)
-    floor = int((area[:, 1] * (scenery.normals[:, 0, 1] > 0)).argmax())
-    wall = int((np.linalg.norm(area, axis=1) * (scenery.wall >= 0)).argmax())
+    floor, wall = scenery.largest
     way = np.where(np.abs(direction) < 1e-6, 1e-6, direction)
     leaves = np.maximum((low - origin) / way, (high - origin) / way)[:, [0, 2]].min(1)
     down = np.where(way[:, 1] < 0, (scenery.triangles[floor, 0, 1] - origin[:, 1]) / way[:, 1], np.inf)

@@ -34,8 +34,7 @@ LOW = 1.4  # metres: over what is so high one looks
 # bare walls: what all of a picture costs, from which share on, metres of rounding
 BARE, BAREST, DEEP = 60.0, 0.28, 0.02
 BEFORE, WALLED = 2.6, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
-FILLED = 260.0  # metres of depth that a picture full of what is near is worth
-BEHIND = 25.0  # metres of depth that the main piece from behind costs
+FILLED, BEHIND = 260.0, 25.0  # metres of depth that a picture full of what is near costs, and the main piece's back
 # Metres of depth that each thing costs which the border cuts, and which is beyond it: lamps, what hangs from `HIGH`
 # metres on, and furniture.
 CUTS, HIGH = ((90.0, 12.0), (25.0, 0.0), (10.0, 0.0)), 0.25
