@@ -78,7 +78,7 @@ def joined(first: Found, second: Found) -> Found:
 
 # Predicates that say which anchor an object attends.
 NEARNESS = ("close_by", "standing_on", "above", "facing", "opposite")
-FACING = np.cos(np.radians(30.0))  # a back turned further from a wall's normal does not lean on it
+FACING, PAST = np.cos(np.radians(30.0)), 0.25  # a back turned further, or more of it past its wall's end, is at none
 FAR = 9.0  # metres, in place of the distance to something that is not there
 CLEAR_HEIGHT = 0.05  # metres: a rug is in nobody's way
 UNKNOWN = Category("", "", "", support="floor", role="", look="", density=0.0, ade20k="")
@@ -515,7 +515,8 @@ class Plan:
         turned = dot(normal, front)
         reach = abs(dot(normal, side)) * self.size[who, None, 0] / 2 + abs(turned) * self.size[who, None, 2] / 2
         gap, at = dot(offset, normal) - reach, dot(offset, along)
-        behind = (length > 0) & (turned > FACING) & (at > -0.1) & (at < length + 0.1) & (gap > -1.0)
+        past = abs(at - length / 2) - length / 2 + self.size[who, None, 0] / 2 > PAST * self.size[who, None, 0]
+        behind = (length > 0) & (turned > FACING) & ~past & (gap > -1.0)
         return self.kit.amin(self.kit.where(behind, abs(gap), self.kit.full_like(gap, FAR)), 1)
 
     def __len__(self) -> int:
@@ -596,5 +597,4 @@ def kind_of(word: str) -> Category:
 
 def facing_angle(lateral: Array, forward: Array) -> Array:
     """Angle between a front and a direction in its frame, 0 to pi; smooth but at the front itself."""
-    xp = kit(lateral)
-    return xp.atan2(xp.sqrt(lateral * lateral + 1e-12), forward)
+    return kit(lateral).atan2((lateral * lateral + 1e-12) ** 0.5, forward)

@@ -326,6 +326,12 @@ def test_no_table_is_shoved_to_one_side_of_a_floor_that_is_unknown():
     assert ("table", "table_amid") not in room.found(floor=None)
 
 
+def test_no_back_stands_past_the_end_of_its_wall():
+    for end, seen in ((1.2, True), (1.6, False)):
+        floor = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-4.0, 2.0), (-4.0, end), (-2.5, end)])
+        assert (("wardrobe", "at_wall") in BEDROOM.found(floor=floor)) == seen
+
+
 def test_a_sofa_stands_in_the_room_for_a_reason():
     hall, deeper = (np.array([(-4.0, z), (4.0, z), (4.0, 3.0), (-4.0, 3.0)]) for z in (-3.2, -4.0))
     assert ("sofa", "at_wall") not in LIVING.found(floor=hall)  # at its wall it would be far from all else
