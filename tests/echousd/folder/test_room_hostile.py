@@ -9,6 +9,7 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.folder.folder import claim, recover
+from echousd.folder.found import layer_over
 from echousd.folder.manifest import find_manifest
 from echousd.folder.within import inside
 from echousd.make.reading import read_room
@@ -166,6 +167,23 @@ def test_links_are_not_followed_out_of_the_folder(folder, link):
             (folder / "bedroom.json").write_text(json.dumps({**manifest, "files": files}))
             with pytest.raises(ValueError, match=f"{entry} names 'assets/bed/.*is a link to .*outside/away"):
                 read_room(folder / "bedroom.usda")
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "layers/notes.txt"])
+def test_a_file_that_is_a_link_out_of_the_folder_is_none_of_its_files(tmp_path, name):
+    (tmp_path / "room/layers").mkdir(parents=True)
+    (tmp_path / "notes.txt").touch()
+    (tmp_path / "room" / name).symlink_to(tmp_path / "notes.txt")
+    with pytest.raises(ValueError, match=r"room.json: files names .*notes.txt is a link to .*, outside of"):
+        inside(tmp_path / "room", name, "room.json: files")
+
+
+def test_of_the_layers_in_a_folder_the_one_over_its_room_is_found(folder):
+    (folder / "other.usda").write_text("#usda 1.0\n")
+    with pytest.raises(ValueError, match=r"layers over bedroom.usda in this folder: none"):
+        layer_over(folder)
+    (folder / "mine.usda").write_text("#usda 1.0\n(subLayers = [@./bedroom.usda@])\n")
+    assert layer_over(folder) == folder / "mine.usda"
 
 
 def test_links_within_the_folder_work(folder):
