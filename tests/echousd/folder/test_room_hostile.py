@@ -5,12 +5,14 @@ import shutil
 import warnings
 
 import pytest
+from pxr import Sdf
 from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.folder.folder import claim, recover
 from echousd.folder.found import layer_over
 from echousd.folder.manifest import find_manifest
+from echousd.folder.ownership import loses_text
 from echousd.folder.within import inside
 from echousd.make.reading import read_room
 from echousd.pending import STAGING
@@ -184,6 +186,12 @@ def test_of_the_layers_in_a_folder_the_one_over_its_room_is_found(folder):
         layer_over(folder)
     (folder / "mine.usda").write_text("#usda 1.0\n(subLayers = [@./bedroom.usda@])\n")
     assert layer_over(folder) == folder / "mine.usda"
+
+
+def test_a_layer_as_usd_writes_it_loses_nothing_and_one_with_remarks_does():
+    written = Sdf.Layer.CreateAnonymous(".usda").ExportToString().encode()
+    assert not loses_text(written)
+    assert loses_text(written + b"# my room\n")
 
 
 def test_links_within_the_folder_work(folder):
