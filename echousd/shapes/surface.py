@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from echomodel.triangles import Mesh, area_normals, connected_pieces
-from echousd.shapes.finishes.slots import metres_of
+from echousd.shapes.finishes.slots import UPRIGHT, metres_of
 
 NUDGE = 4e-6  # metres between points of different boards at one place
 CREASE = np.radians(42.0)  # neighbours that fold more sharply than this keep a hard edge
@@ -114,14 +114,14 @@ def _corner_normals(points: np.ndarray, faces: np.ndarray, sharpest: np.ndarray)
 
 
 def _laid_out(
-    points: np.ndarray, faces: np.ndarray, groups: Iterable[tuple[str, np.ndarray]], owner: np.ndarray,
+    points: np.ndarray, faces: np.ndarray, groups: Sequence[tuple[str, np.ndarray]], owner: np.ndarray,
     board: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """(3 f, 2): texture coordinates of the corners for the patterns of our material slots.
 
     Along the axis that each face looks at most, divided by the metres that one picture of its slot covers; u runs along
-    the longer side of every board (fibres do), and boards begin at different places of the picture. Slots whose picture
-    is of the whole thing get all of it on the side that they show.
+    the longer side of every board (fibres do; bricks lie, however narrow a wall is), and boards begin at different
+    places of the picture. Slots whose picture is of the whole thing get all of it on the side that they show.
 
     `groups`: slots and the faces of each, of one mesh. `owner`, `board`: (f,) int, the numbers of each face's mesh and
     connected piece.
@@ -135,6 +135,8 @@ def _laid_out(
     rows = np.arange(len(faces))
     across, along = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
     turned = extent[rows, along] > 1.05 * extent[rows, across]
+    for slot, members in groups:
+        turned[members] &= slot not in UPRIGHT
     st[turned] = np.stack([st[turned][..., 1], -st[turned][..., 0]], -1)
     least = np.full(int(owner.max(initial=0)) + 1, len(board))
     np.minimum.at(least, owner, board)

@@ -27,6 +27,7 @@ class Slot:
     mix: str = "ffffff"
     share: float = 0.0
     material: str = ""
+    upright: bool = False
 
 
 HERE = Path(__file__).parent
@@ -34,6 +35,7 @@ _ROWS = {name: Slot(**row) for name, row in tomllib.loads((HERE / "slots.toml").
 SLOTS: Mapping[str, Slot] = _ROWS | {
     name: replace(_ROWS[name.partition("_")[0]], pattern=name, metres=0.0) for name in PRINTS
 }
+UPRIGHT = frozenset(name for name, slot in SLOTS.items() if slot.upright)
 # What every other style group takes instead.
 SECOND = {"wood": "wood2", "cloth": "cloth2", "accent": "blanket", "metal": "metal2"}
 

@@ -14,6 +14,7 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echomodel.dressing.prints import ASPECTS, PRINTS
 from echomodel.furniture.solids import Block
+from echomodel.triangles import Mesh
 from echousd.checks.validity import find_faults
 from echousd.exporting.formats import export
 from echousd.options import RoomOptions
@@ -80,6 +81,13 @@ def test_fibres_run_along_the_longer_side_of_a_board():
     long = extent.max(1) > 0.8
     assert long.any()
     assert spread[long, 0] == pytest.approx(extent[long].max(1), abs=0.02)
+
+
+@pytest.mark.parametrize(("slot", "along"), [("brick", 0), ("wallpaper", 0), ("wood", 1)])
+def test_bricks_lie_on_a_wall_that_is_higher_than_long(slot, along):
+    mesh = Mesh(np.array([(0, 0, 0), (1, 0, 0), (1, 2.6, 0), (0, 2.6, 0)], float), np.array([(0, 1, 2), (0, 2, 3)]))
+    form = surface(mesh, {slot: np.arange(2)})
+    assert np.ptp(form.st, axis=0)[along] == pytest.approx(1.0 / SLOTS[slot].metres, abs=1e-4)
 
 
 @pytest.fixture(scope="module")
