@@ -86,7 +86,8 @@ def edit(
     begun = [carried(saved.graph, graph, boxes) for boxes in saved.layouts]
     along = begun[0][1] - moving
     stated = _pinned(graph, saved.graph, begun[0][0], fresh, moving)
-    if asked.place and all(None not in (node.size, node.position, node.yaw) for node in stated.nodes):
+    whole = all(None not in (node.size, node.position, node.yaw) for node in stated.nodes)
+    if asked.place and whole and moving | fresh:
         there = _boxes_of(stated)  # before anything is searched in vain
         moving |= in_the_way(saved, graph, there, layout_outcome(graph, there), along, moving | fresh)
     shaped_anew = fresh | restyled(saved, graph, fresh)
@@ -153,8 +154,10 @@ def edit(
     for number in range(ROUNDS if asked.place else 0):
         with timer.stage("place"), one_thread():
             layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=asked.walls)
+        if model_used is None or number == ROUNDS - 1:
+            break
         way = in_the_way(saved, graph, layouts[0], outcomes[0], along, moving | fresh)
-        if not way or model_used is None or number == ROUNDS - 1:
+        if not way:
             break
         moving |= way
         layouts, pins, notes = laid_out(models.sizes)

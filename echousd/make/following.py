@@ -48,9 +48,9 @@ def carried(before: SceneGraph, after: SceneGraph, boxes: Boxes) -> tuple[Boxes,
         for one in group:
             group += [k for k, at in pairs if at == one and before.names[k] in free - names and k not in group]
         for k in group[1:]:
-            away = turned((room.position[k] - room.position[i])[::2], turn)
+            away = (room.position[k] - room.position[i])[::2]
             position[k] += shift * (1, room.carrier[k] in group, 1)
-            position[k, ::2] += away - (room.position[k] - room.position[i])[::2]
+            position[k, ::2] += turned(away, turn) - away
             yaw[k] += turn
             names.add(before.names[k])
     return Boxes(boxes.size, position.astype(np.float32), yaw.astype(np.float32)), names
