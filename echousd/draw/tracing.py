@@ -53,12 +53,12 @@ def _drawn(world: World, height: int, rays: int) -> np.ndarray:
     size, many = world.size, rays**2
     places = [((3 * (inner + 1) % (many + 1) - 0.5) / many, (inner + 0.5) / many) for inner in range(many)]
     _, seen = _met(world, np.arange(height * size), places[0])
-    near = np.flatnonzero(_at_edges(seen, (height, size)))
-    finer = [_met(world, near, place, seen) for place in places[1:]]
+    near = _at_edges(seen, (height, size))
+    finer = [_met(world, np.flatnonzero(near), place, seen) for place in places[1:]]
     edge = np.zeros(height * size, bool)
     for pixel, _ in finer:
         edge[pixel] = True
-    light = _light_of(world, seen, edge, 2 * rays, max(1, (rays - 1) ** 2))
+    light = _light_of(world, seen, near, edge, 2 * rays, max(1, (rays - 1) ** 2))
     color = seen.glow.copy()
     everywhere = np.flatnonzero(seen.face >= 0)
     for met in (everywhere[start : start + BLOCK] for start in range(0, len(everywhere), BLOCK)):
@@ -89,6 +89,7 @@ BAND = 32  # rows of a picture at a time, for the same reasons
 RINGS = (1, 2, 4, 8)  # places between neighbours, pass by pass
 # Pixels to the right and down, near ones first.
 BESIDE = np.array(sorted(product(range(-2, 3), repeat=2), key=lambda at: at[0] ** 2 + at[1] ** 2)[:13])
+POOL, CORNERS = 0.15, np.array(list(product((0, 1), repeat=3)))  # metres; of a cell of these
 CLOSE, EVEN = 2, 0.4  # from which ring on it matters how bright neighbours are, and the share that they may differ by
 ALIKE, FLAT = 0.97, 0.02  # cosine and metres within which two points lie on one flat piece of surface
 KEPT, NOTHING = ("primID", "u", "v", "tfar"), np.float32(-9)  # of a hit; the material of what is not there
@@ -226,10 +227,11 @@ def _shifts(world: World, pixel: np.ndarray) -> np.ndarray:
     return ((across * LATTICE[0] + down * LATTICE[1] + world.shift) % 1.0).astype(np.float32)
 
 
-def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: int) -> np.ndarray:
+def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, often: int, seldom: int) -> np.ndarray:
     """(n, 6) light at all pixels: asked at every second of every second row, lent to those of the same surface.
 
-    Where there is little of a surface around to smooth the light over, at an `edge` (n,), it is asked `often`.
+    Where there is little of a surface around to smooth the light over, at an `edge` (n,), it is asked `often`, and what
+    is `near` one (n,) shares it by place: trims a pixel wide have no neighbours in rows and columns.
     """
     shape = len(seen.face) // world.size, world.size
     met, coarse = seen.face.reshape(shape) >= 0, np.s_[::2, ::2]
@@ -238,6 +240,8 @@ def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: in
     found, light = np.zeros((*asked.shape, 6), np.float32), np.zeros((*shape, 6), np.float32)
     for here, times in ((asked & torn, often), (asked & ~torn, seldom)):
         found[here] = _asked(world, seen.of(number[here]), number[here], times)
+    thin = asked & near.reshape(shape)[coarse]
+    found[thin, :5] = _pooled(seen.of(number[thin]), found[thin, :5])
     for layers, rings in ((slice(3), RINGS), (slice(3, 5), RINGS[:3])):
         found[..., layers] = smooth_light(found[..., layers], normal[coarse], point[coarse], rings)
     lit = smooth_light((found[..., 5:] > 0).astype(np.float32), normal[coarse], point[coarse], RINGS[:1])
@@ -250,8 +254,7 @@ def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: in
         weight += fits
     light /= np.maximum(weight, 1)
     rest = np.flatnonzero(met & (weight[..., 0] == 0))
-    found = _shared(seen.of(rest), rest, _asked(world, seen.of(rest), rest, often // 2), world.size)
-    light.reshape(-1, 6)[rest] = found
+    light.reshape(-1, 6)[rest] = _pooled(seen.of(rest), _asked(world, seen.of(rest), rest, often // 2))
     border = np.flatnonzero(met & mixed & world.view.inside)  # of the sun's light: sharper than two pixels
     there, facing, shift = seen.point[border], seen.normal[border], _shifts(world, border)[:, :2]
     suns = [_sunny(world, there + BEFORE * facing, facing, _even(n, shift)) for n in range(often)]
@@ -259,15 +262,21 @@ def _light_of(world: World, seen: Seen, edge: np.ndarray, often: int, seldom: in
     return smooth_light(light, normal, point, RINGS[:1]).reshape(-1, 6)
 
 
-def _shared(seen: Seen, pixel: np.ndarray, light: np.ndarray, size: int) -> np.ndarray:
-    """(n, 6) mean of the light on what is seen in some pixels, ascending, over those `BESIDE` that show the same."""
-    total, count = np.zeros_like(light), np.zeros((len(pixel), 1), np.float32)
-    for apart in BESIDE @ (1, size):
-        other = np.searchsorted(pixel, pixel + apart).clip(0, len(pixel) - 1)
-        fits = (pixel[other] == pixel + apart) & _same(seen.normal, seen.point, seen.normal[other], seen.point[other])
-        total += fits[:, None] * light[other]
-        count += fits[:, None]
-    return total / np.maximum(count, 1)
+def _pooled(seen: Seen, light: np.ndarray) -> np.ndarray:
+    """(n, c) light on what was seen: its mean over what faces the same way within `POOL` metres, the nearer the more.
+
+    Places lie between the corners of cells, which they add their light to, and take the mean from.
+    """
+    place = seen.point / POOL
+    low = np.floor(place)
+    cell = np.column_stack([low, np.rint(2 * seen.normal) + 2]).astype(np.int64) @ (1 << np.arange(48, 0, -8))
+    share = np.stack([1 + low - place, place - low])
+    weight = np.stack([share[x, :, 0] * share[y, :, 1] * share[z, :, 2] for x, y, z in CORNERS])
+    _, corner = np.unique(cell + CORNERS @ (1 << np.array([48, 40, 32]))[:, None], return_inverse=True)
+    corner = corner.reshape(weight.shape)
+    held = np.stack([np.bincount(corner.ravel(), (weight * part).ravel()) for part in (np.ones(len(light)), *light.T)])
+    taken = (held[:, corner] * weight).sum(1)
+    return np.asarray((taken[1:] / np.maximum(taken[0], 1e-9)).T, np.float32)
 
 
 def _same(normal: np.ndarray, point: np.ndarray, other_normal: np.ndarray, other_point: np.ndarray) -> np.ndarray:
@@ -287,7 +296,7 @@ def _lent(world: World, met: Seen, pixel: np.ndarray, seen: Seen, light: np.ndar
         out[wanted[fits]] = light[other[fits]]
         wanted = wanted[~fits]
     rest, pixel = met.of(wanted), pixel[wanted]
-    out[wanted] = _shared(rest, pixel, _asked(world, rest, pixel, 1), world.size)
+    out[wanted] = _pooled(rest, _asked(world, rest, pixel, 1))
     return out
 
 

@@ -236,6 +236,17 @@ def test_a_bar_thinner_than_a_pixel_has_no_gaps():
     assert darker.min() > 0.35 * np.median(darker)
 
 
+def test_a_thin_slanting_trim_is_as_even_as_what_lights_it():
+    lamps = np.array([(x, 1.5, z) for x in (-1.5, 1.5) for z in (-1.5, 1.5)], np.float32)
+    scenery, down = box_room(sky=0.0, bulbs=lamps[:, None], power=np.ones((4, 3), np.float32))
+    turn = np.array([[np.cos(0.3), 0, np.sin(0.3)], [0, 1, 0], [-np.sin(0.3), 0, np.cos(0.3)]])
+    corners = level_sheet(2.4, 0.05, y=0.3) @ turn  # two pixels wide
+    glowing = trace(with_sheet(scenery, corners, emissive=np.ones((2, 3))), down, 160, rays=1)
+    trim, here = with_sheet(scenery, corners), glowing.min(-1) > 0.9
+    pictures = [trace(trim, down, 160, rays=2, seed=seed).mean(-1)[here] for seed in range(6)]
+    assert np.std(pictures, axis=0).mean() < 0.0155  # 0.018 where each of its pixels is lit by what it asked alone
+
+
 def test_a_shade_is_brightest_at_its_bulb():
     scenery, down = box_room(sky=0.0, **LAMP)
     white = replace(scenery, flat_colors=np.full_like(scenery.flat_colors, 0.8))
