@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Callable, Container
 
 HOUSE = "echousd_house"  # in the metadata of a layer that composes rooms
 HOME = "home.usda"  # that layer
 
+SPELLED = str.maketrans(
+    {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss", "æ": "ae", "ø": "o", "ł": "l"}
+)
+
+
+def in_ascii(word: str) -> str:
+    """A word as ASCII spells its letters, without those that it has none for."""
+    spelled = unicodedata.normalize("NFC", word).translate(SPELLED)
+    return "".join(c for c in unicodedata.normalize("NFKD", spelled) if c.isascii())
+
 
 def as_identifier(word: str) -> str:
     """A word, such as the name of a file or folder, as a USD identifier."""
-    name = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in word) or "room"
+    name = "".join(c if c.isalnum() else "_" for c in in_ascii(word)) or "room"
     return name if not name[0].isdigit() else f"_{name}"
 
 

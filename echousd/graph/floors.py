@@ -137,7 +137,7 @@ def check_extents(extents: tuple[float, float] | None) -> None:
 
 
 def check_space(graph: SceneGraph) -> tuple[str, ...]:
-    """Sentences where the furniture leaves hardly a way through the floor that is stated, and of what stands beside it.
+    """A sentence where the furniture leaves hardly a way through the floor that is stated.
 
     Raises `GraphError` for a floor that is too large, and where the furniture cannot fit: its least footprint covers
     more than the floor, or one piece of a stated size is longer than the room.
@@ -165,24 +165,10 @@ def check_space(graph: SceneGraph) -> tuple[str, ...]:
             "fewer or smaller objects",
             ("room",),
         )
-    out = _beside(graph, corners, said)
     usual = footprint(categories, sizes)
     if usual > CROWDED * area:
-        out = (f"{said} is small for furniture that covers about {usual:.1f} m²: expect tight ways", *out)
-    return out
-
-
-def _beside(graph: SceneGraph, corners: np.ndarray, said: str) -> tuple[str, ...]:
-    """A sentence for each object whose stated place is not on the floor."""
-    import shapely
-
-    floor = shapely.Polygon(corners).buffer(1e-3)
-    there = [(n.name, *n.position) for n in graph.nodes if n.position is not None]
-    return tuple(
-        f"{name} is stated to stand at ({x:.2f}, {z:.2f}) m, beside {said}"
-        for name, x, _, z in there
-        if not floor.covers(shapely.Point(x, z))
-    )
+        return (f"{said} is small for furniture that covers about {usual:.1f} m²: expect tight ways",)
+    return ()
 
 
 def _generator(seed: int, what: str) -> np.random.Generator:

@@ -14,11 +14,7 @@ from echomodel.vocabulary import normalised, vocabulary
 from echousd.graph import fields as field
 from echousd.graph.fields import IDENTIFIER, MAX_NAME
 from echousd.graph.nodes import PlainModel, Relation
-from echousd.naming import free_name
-
-SPELLED = str.maketrans(
-    {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss", "æ": "ae", "ø": "o", "ł": "l"}
-)
+from echousd.naming import free_name, in_ascii
 
 
 def is_title(word: Any) -> bool:
@@ -39,9 +35,7 @@ def composed(word: Any) -> Any:
 
 def identifier_of(title: str, category: str, taken: Container[str]) -> str:
     """A USD identifier for a title that none of `taken` has: its letters in ASCII, or the category where none are."""
-    spelled = composed(title).translate(SPELLED)
-    plain = "".join(c for c in unicodedata.normalize("NFKD", spelled) if c.isascii())
-    word = re.sub(r"[^A-Za-z0-9_]+", "_", plain).strip("_")
+    word = re.sub(r"[^A-Za-z0-9_]+", "_", in_ascii(title)).strip("_")
     if not re.search("[A-Za-z]", word):
         word = f"{_plain_category(category)}_{word}".rstrip("_")
     return free_name(word if IDENTIFIER.fullmatch(word) else f"_{word}", taken)

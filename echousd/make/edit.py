@@ -17,7 +17,8 @@ from echomodel.vocabulary import vocabulary
 from echousd.assets.reference import Vector
 from echousd.graph import Node, SceneGraph
 from echousd.graph.arrays import graph_batch, one_thread
-from echousd.graph.floors import with_plan_of
+from echousd.graph.consistency import faults_of
+from echousd.graph.floors import check_space, with_plan_of
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
 from echousd.make.following import attending, carried, in_the_way, movable
@@ -26,7 +27,7 @@ from echousd.make.reading import SavedRoom, read_room
 from echousd.make.verdicts import layout_outcome, warn_of_faults
 from echousd.naming import free_name
 from echousd.options import OF_NEW, Look, RoomOptions, takes_options
-from echousd.place.living import plan_to_live_in
+from echousd.place.living import plan_to_live_in, unusual
 from echousd.progress import StageTimer
 from echousd.room import Provenance
 from echousd.shapes.looks import palette_of_room
@@ -83,6 +84,10 @@ def edit(
     beside = Path(room).parent
     graph = with_plan_of(anchored(graph, beside), saved.graph)
     fresh, moving = touched(anchored(saved.graph, beside), graph, saved.boxes)
+    with faults_of(str(room)):
+        crowded = check_space(graph) if fresh else ()
+    before = unusual(saved.graph)
+    odd = tuple(sentence for sentence in unusual(graph) if sentence not in before)
     begun = [carried(saved.graph, graph, boxes) for boxes in saved.layouts]
     along = begun[0][1] - moving
     stated = _pinned(graph, saved.graph, begun[0][0], fresh, moving)
@@ -163,7 +168,7 @@ def edit(
         layouts, pins, notes = laid_out(models.sizes)
     after = Room(
         name=manifest["name"], graph=graph, boxes=layouts[0], geometry=geometry, assets=names, floor=floor,
-        layouts=tuple(layouts), outcomes=outcomes, notes=(*models.notes, *notes),
+        layouts=tuple(layouts), outcomes=outcomes, notes=(*crowded, *models.notes, *notes, *odd),
         provenance=_provenance(manifest, model_used), options=asked.replaced(seed=manifest["seed"]),
         timings=timer.seconds, edited=Path(room),
         carried={asset: saved.carried[asset] for name, asset in names.items() if name not in shaped_anew},

@@ -39,7 +39,7 @@ from echousd.make.stated import (
 )
 from echousd.make.verdicts import layout_outcome, warn_of_faults
 from echousd.options import RoomOptions, takes_options
-from echousd.place.living import unusual_sizes
+from echousd.place.living import unusual
 from echousd.progress import StageTimer
 from echousd.room import Provenance
 from echousd.shapes.sources.mixing import check_sources, default_source, mixed_shapes, shape_nearness, sources_of
@@ -176,7 +176,7 @@ def generate(
         name=graph.room.type, graph=graph, boxes=layouts[0], geometry=geometry,
         assets=asset_names(made.owners, {node.name: node.category for node in graph.nodes}), floor=floor,
         layouts=tuple(layouts), outcomes=outcomes,
-        notes=(*filter(None, [other]), *crowded, *held, *homeless, *notes, *unusual_sizes(stated)),
+        notes=(*filter(None, [other]), *crowded, *held, *homeless, *notes, *unusual(stated)),
         provenance=Provenance(seed, echo.preset, echo.hash, shapes, file), options=asked, timings=timer.seconds,
     )  # fmt: skip
     if asked.settle:

@@ -69,8 +69,10 @@ def severity(faults: Sequence[LivingFault]) -> float:
     return sum(1.0 + min(-fault.margin, MOST) for fault in faults)
 
 
-def unusual_sizes(graph: SceneGraph) -> tuple[str, ...]:
-    """One sentence for every object whose stated size no such furniture has."""
+def unusual(graph: SceneGraph) -> tuple[str, ...]:
+    """A sentence for each stated size that no such furniture has, and for each stated place beside the floor."""
+    import shapely
+
     told = []
     for node in graph.nodes:
         if node.size is None or node.obstacle or node.asset:
@@ -78,4 +80,9 @@ def unusual_sizes(graph: SceneGraph) -> tuple[str, ...]:
         for word, side, low, high in zip(("wide", "high", "deep"), node.size, *size_range(node.category), strict=True):
             if not 0.999 * low <= side <= 1.001 * high:
                 told.append(f"{node.name} is {side:.3g} m {word} as stated; such furniture: {low:.3g} to {high:.3g} m")
+    if graph.room.corners is not None:
+        floor = shapely.Polygon(graph.room.corners).buffer(1e-3)
+        there = [(node.name, *node.position) for node in graph.nodes if node.position is not None]
+        beside = [(name, x, z) for name, x, _, z in there if not floor.covers(shapely.Point(x, z))]
+        told += [f"{name} is stated to stand at ({x:.2f}, {z:.2f}) m, beside the floor" for name, x, z in beside]
     return tuple(told)

@@ -11,7 +11,7 @@ from small_room import BARE, StandIn, saved_room, small_graph, small_room
 
 import echousd
 from echomodel.protocols import GraphEdit
-from echousd.graph import Relation
+from echousd.graph import GraphError, Relation
 from echousd.make import layouts
 from echousd.make.edit import edit, graph_edit, touched
 from echousd.make.layouts import repeated
@@ -248,6 +248,23 @@ def test_command(root, echousd_command, monkeypatch):
     done = echousd_command("edit", root, "--remove", "sofa")
     assert done.code == 2
     assert "sofa" in done.err
+
+
+def test_an_edit_tells_what_is_stated_oddly(root):
+    graph = small_graph().update_node("wardrobe", position=(-5.0, 0.0, 0.6), size=(0.2, 2.2, 0.6))
+    assert edit(root, small_graph(), model=StandIn()).notes == ()
+    room = edit(root, graph, model=StandIn())
+    usual, beside = room.notes
+    assert usual.startswith("wardrobe is 0.2 m wide as stated; such furniture: ")
+    assert beside == "wardrobe is stated to stand at (-5.00, 0.60) m, beside the floor"
+    room.save(root.parent, preview=False)
+    assert edit(root, graph.remove_node("lamp"), model=StandIn()).notes == ()  # it was told
+
+
+def test_an_edit_adds_no_more_than_the_floor_holds(root):
+    graph = small_graph().update_node("wardrobe", size=(6.0, 2.2, 0.6))
+    with pytest.raises(GraphError, match=r"bedroom.usda: .* too small for 'wardrobe', which is 6.00 m long"):
+        edit(root, graph, model=StandIn())
 
 
 def test_weights_that_did_not_make_the_room_are_told(root, echousd_command, monkeypatch):

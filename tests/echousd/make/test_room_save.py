@@ -340,7 +340,10 @@ def test_room_is_shown_in_notebooks():
     assert room.scene().bounds[1][1] == pytest.approx(2.8)
 
 
-@pytest.mark.parametrize(("word", "name"), [("out", "out"), ("my room", "my_room"), ("7", "_7"), ("über", "_ber")])
+@pytest.mark.parametrize(
+    ("word", "name"),
+    [("out", "out"), ("my room", "my_room"), ("7", "_7"), ("Küche", "Kueche"), ("ré☃", "re"), ("部屋", "room")],
+)
 def test_names_of_rooms_are_identifiers(word, name):
     assert as_identifier(word) == name
     assert Sdf.Path.IsValidIdentifier(name)
