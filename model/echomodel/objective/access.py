@@ -53,7 +53,9 @@ def at_wall(plan: Plan) -> Found:
     belongs = (wall & plan.standing & ~beside) | hung
     who = plan.those(belongs & plan.walled & (plan.moved | plan.of("sofa")))
     gap = plan.back_gaps(who)
-    free, margin, xp = plan.of("sofa")[who] & (gap >= PASSAGE), TOUCHING - gap, plan.kit
+    looks = plan.stands("before", "opposite", "company") & (plan.anchor >= 0)  # at these, where it stands free
+    free = plan.of("sofa") & (plan.kit.bincount(plan.anchor[looks], minlength=len(plan)) > 0)
+    free, margin, xp = free[who] & (gap >= PASSAGE), TOUCHING - gap, plan.kit
     if bool(free.any()):
         bare = at_least(WALKED_BEHIND - gap, -BARE)
         bare = xp.where(gap + plan.size[who, 2] + wall_ahead(plan, who) >= DEEP, bare, margin)

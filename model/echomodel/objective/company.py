@@ -333,12 +333,14 @@ def told_of(plan: Plan, i: Array, j: Array, *words: str) -> Array:
 
 def not_alone(plan: Plan) -> Found:
     """Plants and small tables stand at a wall or at something, lamps at a wall, a sofa or the table that the graph says
-    they are close by, an only armchair at a wall.
+    they are close by, an only armchair or daybed at a wall.
 
     A lamp lights a seat, bed or table. An armchair that stands apart from its group has something of its own: a lamp,
     a table, shelves, another one.
     """
-    loner = plan.stands("company") & (plan.anchor < 0)
+    loner = (plan.stands("company") | plan.which(lambda kind: kind.role == "sofa" and not kind.wall)) & (
+        plan.anchor < 0
+    )
     loner = loner & (plan.kit.bincount(plan.scene[loner], minlength=len(plan))[plan.scene] == 1)
     small = (plan.of("light", "decor") | plan.stands("beside") | loner) & plan.standing
     company = plan.stands("company") & plan.of("seat") & plan.standing & (plan.anchor >= 0)

@@ -143,8 +143,10 @@ SEAT = 0.7  # metres that a side needs before it to seat somebody
 BEYOND, CORNER = 0.1, 0.1  # metres that a seat may reach beyond its side of a table, and more beyond one end of it
 # Who sits alone at a side of a table: share of it that the middle may be beside its own, metres from which on its ends.
 ALONE, OFF = 0.3, 0.05
+NOOK = 0.66  # metres between a plant and what is next to it at one of its two sides, along and across
 WORKPLACE = 1.0  # metres between the middles of two who work
-OPENS = 0.55  # metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it
+# Metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it; before storage to a low table.
+OPENS, LOW = 0.55, 0.45
 FACED, SCREENED = 0.3, 0.05  # share of a wardrobe's width, and of a screen's, from which on something is before it
 
 
@@ -247,6 +249,17 @@ def _free_beside(plan: Plan, who: Array) -> Array:
     return xp.minimum(walls, least_of(side, beyond, 4 * len(who), math.inf).reshape(-1, 4))
 
 
+def plant_in_nook(plan: Plan) -> Found:
+    """A plant fills a corner, or the end of what stands at a wall; it stands amid no bare wall and no floor."""
+    plants = plan.of("decor") & plan.standing
+    who, xp = plan.those(plants & plan.walled), plan.kit
+    if not len(who):
+        return nobody(plan.size)
+    free = _free_beside(plan, who)
+    widest = xp.maximum(xp.minimum(free[:, 0], free[:, 1]), xp.minimum(free[:, 2], free[:, 3]))
+    return found(who, NOOK - widest, measure=widest)
+
+
 def workers_apart(plan: Plan) -> Found:
     """Two who work at desks of their own sit apart from each other."""
     sits = plan.stands("at") & plan.of("seat") & (plan.anchor >= 0) & (plan.of("board") & plan.works)[plan.anchor]
@@ -258,15 +271,19 @@ def workers_apart(plan: Plan) -> Found:
 
 
 def wardrobe_opens(plan: Plan) -> Found:
-    """One can stand before an open wardrobe, also at the foot of a bed; no seat or table stands before any storage."""
+    """One can stand before an open wardrobe, also at the foot of a bed; no seat or table stands before any storage, and
+    one passes a low table there."""
     stores = plan.of("storage") & plan.works & plan.standing & ~plan.stands("near")
-    tables = plan.of("board") & ~plan.stands("before", "beside")
+    tables = plan.of("board") & ~plan.stands("beside")
     block = (plan.of("bed") | plan.stands("company", "at", "head") | tables) & plan.standing
     i, j = plan.pairs(stores, block, least=True)
     met = plan.which(lambda kind: kind.access > 0.6)[i] | ~plan.of("bed")[j]
     i, j = i[met], j[met]
+    if not len(i):
+        return nobody(plan.size)
     share = cast(plan.kit.where(plan.stands("opposite"), SCREENED, FACED)[i], plan.size)
-    return plan.nearest(i, j, plan.more_ahead(i, j, OPENS, share), OPENS) if len(i) else nobody(plan.size)
+    needed = cast(plan.kit.where(plan.stands("before"), LOW, OPENS), plan.size)
+    return plan.nearest(i, j, plan.more_ahead(i, j, needed[j], share), needed)
 
 
 def each_served(plan: Plan) -> Found:

@@ -147,9 +147,7 @@ def lamp_aside(plan: Plan) -> Found:
     fronts = (plan.of("storage") & plan.standing & plan.works) | _loungers(plan)
     i, j = plan.pairs(plan.of("light", "decor") & plan.standing, fronts, least=True)
     free = plan.kit.where(_loungers(plan), AT_SEAT, plan.kit.where(plan.stands("head"), AT_BED, LAMP))
-    least, about = plan.worst(i, plan.more_ahead(j, i, cast(free, plan.size)[j], EDGE), j)
-    who = rows(least < FAR)
-    return found(who, least[who], other=about[who], measure=least[who] + free[about[who]])
+    return plan.nearest(i, j, plan.more_ahead(j, i, cast(free, plan.size)[j], EDGE), cast(free, plan.size))
 
 
 def seat_room(plan: Plan) -> Found:

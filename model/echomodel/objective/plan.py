@@ -391,11 +391,11 @@ class Plan:
         beside = self.kit.maximum(clear - needed, share * self.size[i, 0] - covered)
         return self.kit.maximum(beside, start * self.size[i, 2] - forward)
 
-    def nearest(self, i: Array, j: Array, margin: Array, needed: float) -> Found:
-        """What a rule finds at boxes i (P,) that keep more than `needed` metres to j (P,), the least of each."""
+    def nearest(self, i: Array, j: Array, margin: Array, needed: float | Array) -> Found:
+        """What a rule finds at boxes i (P,) that keep more than `needed` metres, or (N,) by j, to j (P,): the least."""
         least, about = self.worst(i, margin, j)
-        who = rows(least < FAR)
-        return found(who, least[who], other=about[who], measure=at_least(least[who] + needed, 0.0))
+        who, needed = rows(least < FAR), self.kit.zeros_like(self.yaw) + needed
+        return found(who, least[who], other=about[who], measure=at_least((least + needed[about])[who], 0.0))
 
     @cached_property
     def couples(self) -> tuple[Array, Array, Array]:

@@ -271,6 +271,15 @@ MORE = [
      "a turns its back on b (153 degrees)"),
     (Room({"a": {**ARMCHAIR, "yaw": HALF}, "b": {**ARMCHAIR, "at": (1.4, 0.0)}}), ("a", "loungers_together"),
      "a stands 1.60 m from b"),
+    (with_one(LIVING, "table", kind="dining_table", size=(0.8, 0.75, 0.8), at=(-1.05, 0.7)), ("stand", "view_free"),
+     "table stands between stand and who watches it"),  # low, and beside the line
+    (LIVING.moved("coffee", at=(0.0, 0.85)), ("stand", "wardrobe_opens"), "stand has 0.43 m before it, then coffee"),
+    (with_one(BEDROOM, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.5, 1.75)), ("plant", "plant_in_nook"),
+     "plant stands amid the floor or a bare wall, 0.80 m from what is beside it"),
+    (Room({"sofa": {**LIVING.things["sofa"], "at": (0.0, -0.1)}, "desk": {**STUDY.things["desk"], "at": (0.0, -1.6)}}),
+     ("sofa", "at_wall"), "sofa stands 1.45 m off the wall behind it"),  # and looks at nobody
+    (Room({"a": {"kind": "chaise_longue_sofa", "size": (0.8, 0.7, 1.6), "at": (0.0, 0.0)}}), ("a", "not_alone"),
+     "a stands alone in the room, 1.20 m from"),
 ]  # fmt: skip
 KEPT = [
     (DINING.moved("chair", at=(0.5, 0.4)), ("chair", "seat_faces")),
@@ -298,6 +307,10 @@ KEPT = [
     (with_one(LIVING, "bean", kind="lazy_sofa", size=(0.8, 0.8, 0.8), at=(0.3, 0.9), yaw=HALF), ("bean", "looks_in")),
     (Room({"a": {**ARMCHAIR, "at": (0.1, 1.5), "yaw": -HALF}, "bed": BEDROOM.things["bed"]}), ("a", "looks_in")),
     (BAR.moved("stool_0", at=(0.08, -1.4)), ("bar", "chairs_spaced")),
+    (with_one(LIVING, "table", kind="dining_table", size=(0.8, 0.75, 0.8), at=(-1.25, 0.7)), ("stand", "view_free")),
+    (LIVING.moved("coffee", at=(0.0, 0.8)), ("stand", "wardrobe_opens")),
+    (with_one(BEDROOM, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.7, 1.75)), ("plant", "plant_in_nook")),
+    (Room({"a": {"kind": "chaise_longue_sofa", "size": (0.8, 0.7, 1.6), "at": (1.7, 0.0)}}), ("a", "not_alone")),
     (SET.moved("table", yaw=0.015), ("table", "parallel")),
     (
         Room({**STUDY.moved("desk", at=(0.0, -0.5)).things, "a": STUDY.things["chair"], "b": STUDY.things["chair"]}),
@@ -524,7 +537,7 @@ def test_several_rooms_at_once_are_judged_as_one_by_one():
 def test_the_room_generator_rarely_breaks_them():
     rooms = generate_rooms(60, 3)
     found = [f for room in rooms for f in faults(plan_of(room, room.categories, room.floor_polygon))]
-    assert len(found) < 0.24 * sum(len(room) for room in rooms)
+    assert len(found) < 0.25 * sum(len(room) for room in rooms)
 
 
 def test_the_sofa_that_screen_and_table_are_told_of_is_the_first_whatever_its_size():
@@ -549,6 +562,15 @@ def test_a_pendant_that_is_told_to_hang_above_a_table_hangs_over_its_middle_even
     told = beside.found(relations=above)["pendant", "pendant_centred"]
     assert "pendant hangs 0.90 m off the middle of table" in told
     assert ("pendant", "pendant_centred") not in DINING.found(relations=above)
+
+
+def test_pendants_that_are_told_to_hang_above_a_table_hang_in_a_row_even_beside_it():
+    across = PENDANTS.moved("pendant_1", at=(0.1, 0.5)).moved("pendant_-1", at=(-0.1, -0.5))  # their middle is its
+    table, *lamps = (list(across.things).index(name) for name in ("table", "pendant_-1", "pendant_1"))
+    told = [(lamp, vocabulary().predicate_id("above"), table) for lamp in lamps]
+    assert ("pendant_-1", "pendants_in_row") in across.found(relations=np.array(told))
+    assert ("pendant_-1", "pendants_in_row") not in across.found()
+    assert ("pendant_-1", "pendants_in_row") not in PENDANTS.found(relations=np.array(told))
 
 
 def test_a_lamp_that_is_told_to_be_close_by_its_table_stands_beside_it_in_the_open():
