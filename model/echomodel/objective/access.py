@@ -148,8 +148,6 @@ def bed_side_free(plan: Plan) -> Found:
     """At least one long side of a bed can be reached, below the nightstands."""
     beds = plan.of("bed") & plan.standing
     who = plan.those(beds)
-    if not len(who):
-        return nobody(plan.size)
     i, j = plan.pairs(beds, plan.standing & ~plan.stands("head") & ~plan.movable, least=True)
     lateral, aside, along = _at_side(plan, j, i)
     out, xp = [], plan.kit

@@ -110,8 +110,6 @@ def nightstand_at_head(plan: Plan) -> Found:
 def nightstands_alike(plan: Plan) -> Found:
     """The nightstands at both sides of a bed are as far from it as each other."""
     i, j = plan.attended("head")
-    if len(i) < 2:
-        return nobody(plan.size)
     lateral, beside, before = _at_edges(plan, i, j)
     at_head = (abs(before + plan.size[j, 2]) < HEAD) & (beside < BESIDE) & (beside > -IN_BED)
     right, left, xp = at_head & (lateral > 0), at_head & ~(lateral > 0), plan.kit
@@ -261,8 +259,6 @@ def chairs_opposite(plan: Plan) -> Found:
 def chairs_level(plan: Plan) -> Found:
     """The chairs of a table or bar are pushed under it alike: neighbours, and those opposite each other."""
     seats, xp = seats_anywhere(plan), plan.kit
-    if not len(seats.i):
-        return nobody(plan.size)
     half_width, half_depth = plan.reach(seats.i, seats.j)
     out = abs(seats.across) - xp.where(seats.ahead, half_depth, half_width)
     one, other = (xp.concat(of) for of in zip(seats.facing(), seats.beside(), strict=True))
@@ -282,8 +278,6 @@ def chairs_spaced(plan: Plan) -> Found:
 
 def _alike(plan: Plan, seats: Seats, one: Array, other: Array, off: Array, most: float) -> Found:
     """Tables at which some seats differ from others by less than `most` metres."""
-    if not len(one):
-        return nobody(plan.size)
     least = least_of(seats.j[one], most - abs(off[one] - off[other]), len(plan), FAR)
     who = rows(least < FAR)
     return found(who, least[who], measure=most - least[who])

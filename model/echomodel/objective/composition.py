@@ -177,8 +177,6 @@ def elbow_room(plan: Plan) -> Found:
     """Chairs share the sides of their table: who sits beside others has room for the elbows, or no side is free."""
     seats, xp = seats_at(plan), plan.kit
     who, free = _free_sides(plan)
-    if not len(who):
-        return nobody(plan.size)
     count = xp.bincount(seats.side, minlength=4 * len(plan)).reshape(-1, 4)[who]
     edge = plan.size[who][:, [2, 2, 0, 0]]
     best = at_most(xp.amax(xp.where(free, edge / (count + 1), 0.0), 1), EASY)
@@ -192,8 +190,6 @@ def chairs_balanced(plan: Plan) -> Found:
     """As many sit at one side of a table as opposite, but for one where their number is odd, or no room is there."""
     seats, xp = seats_at(plan), plan.kit
     who, free = _free_sides(plan)
-    if not len(who):
-        return nobody(plan.size)
     places = at_least((held(plan.size)[:, 0] / ELBOW).round(), 1.0)  # a bench counts for several chairs
     count = sum_of(seats.side, places[seats.i], 4 * len(plan)).reshape(-1, 2, 2)[who]
     one, other, free = count[..., 0], count[..., 1], free.reshape(-1, 2, 2)
@@ -208,8 +204,6 @@ def chairs_balanced(plan: Plan) -> Found:
 def bench_fits(plan: Plan) -> Found:
     """A seat stands within its side of a table, before its middle if alone; a bench along one that is as long as it."""
     seats, xp = seats_at(plan), plan.kit
-    if not len(seats.i):
-        return nobody(plan.size)
     half_width, half_depth = plan.reach(seats.i, seats.j)
     own = 2 * xp.where(seats.ahead, half_width, half_depth)
     side = xp.where(seats.ahead, plan.size[seats.j, 0], plan.size[seats.j, 2])
@@ -253,8 +247,6 @@ def plant_in_nook(plan: Plan) -> Found:
     """A plant fills a corner, or the end of what stands at a wall; it stands amid no bare wall and no floor."""
     plants = plan.of("decor") & plan.standing
     who, xp = plan.those(plants & plan.walled), plan.kit
-    if not len(who):
-        return nobody(plan.size)
     free = _free_beside(plan, who)
     widest = xp.maximum(xp.minimum(free[:, 0], free[:, 1]), xp.minimum(free[:, 2], free[:, 3]))
     return found(who, NOOK - widest, measure=widest)
@@ -279,8 +271,6 @@ def wardrobe_opens(plan: Plan) -> Found:
     i, j = plan.pairs(stores, block, least=True)
     met = plan.which(lambda kind: kind.access > 0.6)[i] | ~plan.of("bed")[j]
     i, j = i[met], j[met]
-    if not len(i):
-        return nobody(plan.size)
     share = cast(plan.kit.where(plan.stands("opposite"), SCREENED, FACED)[i], plan.size)
     needed = cast(plan.kit.where(plan.stands("before"), LOW, OPENS), plan.size)
     return plan.nearest(i, j, plan.more_ahead(i, j, needed[j], share), needed)

@@ -87,8 +87,6 @@ def _massive(plan: Plan) -> Array:
 def table_amid(plan: Plan) -> Found:
     """A table is not shoved to one side: chairs are not squeezed where those opposite have room to spare."""
     seats, xp = seats_at(plan), plan.kit
-    if not len(seats.i):
-        return nobody(plan.size)
     least, which = worst(seats.side, *_room_behind(plan, seats), 4 * len(plan), FAR)
     taken = xp.bincount(seats.side, minlength=4 * len(plan)) > 0
     asked = rows(taken)
@@ -189,8 +187,6 @@ def _clear(
 ) -> Found:  # fmt: skip
     """How much more than is needed is free before (or behind) some boxes, to other groups' pieces (or their own)."""
     who = plan.those(fronts)
-    if not len(who):
-        return nobody(plan.size)
     sign, xp = -1.0 if behind else 1.0, plan.kit
     needed, needed_wall = (xp.zeros_like(plan.yaw) + value for value in (needed, needed_wall))
     i, j = plan.pairs(fronts, block, least=True)

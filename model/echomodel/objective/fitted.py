@@ -33,8 +33,6 @@ def row_flush(plan: Plan) -> Found:
 def hung_over(plan: Plan) -> Found:
     """Wall units hang over worktops, a hood over the middle of its hob, a mirror over its basin."""
     hung, stores, xp = plan.stands("over"), plan.which(lambda kind: kind.task == "store"), plan.kit
-    if not bool(hung.any()):
-        return nobody(plan.size)
     i, j = plan.pairs(hung & stores, plan.stands("row") & plan.standing & (plan.size[:, 1] <= TALL))
     lateral, forward = plan.local(i, j)
     half_width, _ = plan.reach(i, j)
@@ -69,8 +67,6 @@ def work_triangle(plan: Plan) -> Found:
     tasks = {task: plan.which(lambda kind, task=task: kind.task == task) & plan.standing  # type: ignore[misc]
              for task in ("cook", "wash", "cool")}  # fmt: skip
     cook, xp = plan.those(tasks["cook"]), plan.kit
-    if not len(cook):
-        return nobody(plan.size)
     ends = [(cook, _front(plan, cook))]
     for task in ("wash", "cool"):
         i, j = plan.pairs(tasks["cook"], tasks[task])
