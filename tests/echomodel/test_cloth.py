@@ -77,10 +77,22 @@ def test_sofas_have_eight_bodies_and_each_family_builds_several():
 
 
 def test_tufted_panels_fold_along_both_diagonals():
-    vertices, faces = MADE["tufted"].mesh(3)
+    vertices, faces = MADE["tufted"].mesh(1)
     middles = vertices[faces].mean(1)
     front = np.round(middles[middles[:, 2] > 0], 6)
     assert {tuple(row) for row in front} == {tuple(row) for row in front * (-1, 1, 1) + 0.0}
+
+
+def test_a_button_is_where_folds_meet():
+    panel = Tufted(half=np.array([0.45, 0.25, 0.06]), apart=0.2)
+    cloth, *buttons = sorted(trimesh.Trimesh(*panel.mesh(3)).split(), key=lambda part: -part.volume)
+    assert len(buttons) == 10  # between four columns and two rows of diamonds
+    for button in buttons:
+        x, y, z = button.bounds.mean(0)
+        around = cloth.vertices[np.linalg.norm(cloth.vertices[:, :2] - (x, y), axis=1) < 0.08]
+        assert around[:, 2].min() == pytest.approx(around[np.linalg.norm(around[:, :2] - (x, y), axis=1).argmin(), 2])
+        assert z > around[:, 2].min()
+    assert len(trimesh.Trimesh(*replace(panel, channels=True).mesh(3)).split()) == 1
 
 
 @pytest.mark.parametrize(("arms", "softness"), [("box", 0.7), ("box", 0.2), ("slim", 0.5), ("rolled", 0.5)])

@@ -8,7 +8,9 @@ import trimesh
 
 from echomodel.furniture import MATERIALS, Choices, Style, furniture, mesh_of, sample_size, solids
 from echomodel.furniture.carpentry import back_rest
+from echomodel.furniture.chairs import BODIES
 from echomodel.furniture.solids import Ball, Block, Bow, Lathe, Pad, Shell, Tube, Turned, rotation
+from echomodel.furniture.style import OPEN
 from echomodel.metrics.furniture import loose_solids
 from echomodel.sizes import size_score, size_statistics
 from echomodel.tsdf import mesh_from_tsdf, tsdf_from_mesh, tsdf_of
@@ -188,6 +190,20 @@ def test_trestles_and_bows_hold_together():
         chair = solids("chinese_chair", *drawn(number), np.array([0.6, 0.9, 0.5]))
         assert not loose_solids(table), number
         assert not loose_solids(chair), number
+
+
+@pytest.mark.parametrize("back", [*BODIES, "cushion"])
+def test_a_back_may_have_a_body_of_its_own_which_holds_together(back):
+    made = {True: set(), False: set()}
+    for number in range(12):
+        style, choices = drawn(number, back=back)
+        for other in made:
+            values = np.where(np.arange(len(OPEN)) == OPEN.index("form"), 0.0 if other else 0.99, choices.values)
+            size = sample_size("dining_chair", np.random.default_rng(number), style)
+            parts = solids("dining_chair", style, Choices(values), size)
+            assert not loose_solids(parts), number
+            made[other].add(tuple(sorted((type(part).__name__, part.role) for part in parts)))
+    assert not made[True] & made[False]
 
 
 def test_no_stile_shows_before_the_board_of_a_back():

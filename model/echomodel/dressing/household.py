@@ -8,7 +8,7 @@ import numpy as np
 
 from echomodel.dressing import household
 from echomodel.dressing.prints import any_of
-from echomodel.furniture.carpentry import Size, box
+from echomodel.furniture.carpentry import Size, box, framed
 from echomodel.furniture.solids import Block, Solid, rotation, turned
 
 FRAMES = ("frame", "frame", "ebony", "ebony", "enamel", "metal", "")  # of what; "" = canvas without a frame
@@ -25,21 +25,11 @@ def picture(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid
         return [canvas, box((-x, 0, front - 0.001), (x, h, front), shown)]
     bar = slim * float(np.clip(0.035 * max(w, h), 0.014, 0.028))
     mount = float(np.clip(0.11 * min(w, h), 0.02, 0.09)) if mounted else 0.0
-    parts = _frame(w, h, d, bar, of)
+    parts = framed((-x, 0, back), (x, h, front), bar, of)
     parts.append(box((-x + bar / 2, bar / 2, back), (x - bar / 2, h - bar / 2, front - 0.012), "paper"))
     inset = bar + mount
     parts.append(box((-x + inset, inset, back), (x - inset, h - inset, front - 0.0105), shown))
     return parts
-
-
-def _frame(w: float, h: float, d: float, bar: float, of: str = "frame") -> list[Solid]:
-    x, z = w / 2, d / 2
-    return [
-        box((-x, 0, -z), (x, bar, z), of, 0.002),
-        box((-x, h - bar, -z), (x, h, z), of, 0.002),
-        box((-x, 0, -z), (-x + bar, h, z), of, 0.002),
-        box((x - bar, 0, -z), (x, h, z), of, 0.002),
-    ]
 
 
 def mirror(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -47,7 +37,7 @@ def mirror(size: Size, rng: np.random.Generator) -> list[Solid]:
     w, h, d = size
     bar = 0.03
     glass = box((-w / 2 + bar / 2, bar / 2, -d / 2), (w / 2 - bar / 2, h - bar / 2, d / 2 - 0.008), "mirror")
-    return [*_frame(w, h, d, bar), glass]
+    return [*framed((-w / 2, 0, -d / 2), (w / 2, h, d / 2), bar, "frame"), glass]
 
 
 def round_mirror(size: Size, rng: np.random.Generator, power: float = 2.0) -> list[Solid]:

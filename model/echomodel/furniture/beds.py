@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, both, box, core, cushion, of_role
-from echomodel.furniture.cloth import cover, pillow
-from echomodel.furniture.solids import Block, Solid, ball, rotation, turned
+from echomodel.furniture.cloth import Tufted, cover, pillow
+from echomodel.furniture.solids import Solid, ball, rotation, turned
 from echomodel.furniture.style import Choices, Style
 
 SET_BACK = 0.006  # metres between two faces that would lie in one plane
+
+
+def _padded(low: tuple, high: tuple, apart: float, *, channels: bool = False) -> Solid:
+    """A panel that is drawn in every `apart` metres, between two corners (3,)."""
+    block = box(low, high)
+    return Tufted(block.centre, material="fabric", half=block.half, apart=apart, channels=channels)
 
 
 def _headboard(style: Style, w: float, h: float, z: float) -> list[Solid]:
@@ -22,18 +28,14 @@ def _headboard(style: Style, w: float, h: float, z: float) -> list[Solid]:
     if kind == "panel":
         parts: list[Solid] = [box((-w / 2, 0.02, z), (w / 2, h, z + t * 0.8), "wood", 0.015 * style.corner)]
         if style.softness > 0.45:
-            parts.append(box((-w * 0.46, 0.35, z + t * 0.4), (w * 0.46, h - 0.06, z + t * 1.5), "fabric", 0.025))
+            low, high = (-w * 0.46, 0.35, z + t * 0.4), (w * 0.46, h - 0.06, z + t * 1.5)
+            parts.append(_padded(low, high, 0.24) if style.tufting > 0.5 else box(low, high, "fabric", 0.025))
         return parts
     if kind == "low":
         return [box((-w / 2, 0.02, z), (w / 2, h, z + t * 0.7))]
     if kind == "channels":
-        count = int(4 + 6 * style.tufting)
-        middle, tall, deep = (0.1 + h) / 2, (h - 0.1) / 2, t * 0.75
-        return [
-            Block(np.array([(a + b) / 2, middle, z + deep]), material="fabric", radius=min((b - a) * 0.4, t * 0.7),
-                  half=np.array([(b - a) / 2, tall, deep]))
-            for a, b in pairwise(np.linspace(-w / 2, w / 2, count + 1))
-        ]  # fmt: skip
+        each = w / int(4 + 6 * style.tufting)
+        return [_padded((-w / 2, 0.1, z), (w / 2, h, z + t * 1.5), 2 * each, channels=True)]
     if kind == "cushions":
         low, high = (w * 0.25 - w * 0.23, h * 0.4, z + t * 0.4), (w * 0.25 + w * 0.23, h, z + t * 1.9)
         frame = box((-w / 2, 0.02, z), (w / 2, h * 0.85, z + t * 0.6))
@@ -78,7 +80,7 @@ def bedding(
         parts.append(cover((-x, y, start), (x, top, end), "blanket", 0.085, 0.04, rng, falls=falls))
         fold = 0.16 + 0.1 * style.softness  # the sheet turned back over it
         x, y = x + 0.004, low + thick * 0.4
-        parts.append(cover((-x, y, start - 0.01), (x, top + 0.006, start + fold), "linen", 0.04, 0.02, rng))
+        parts.append(cover((-x, y, start - 0.01), (x, top + 0.014, start + fold), "linen", 0.04, 0.012, rng))
     return parts
 
 

@@ -47,6 +47,13 @@ def around(
     return [box((p, low, r), (q, high, s), material, radius, role) for p, q, r, s in bars]
 
 
+def framed(low: tuple, high: tuple, bar: float, material: str, role: str = "board") -> list[Solid]:
+    """Four bars, `bar` wide, of a frame that stands upright between two corners (3,): left, right, below, above."""
+    (x0, y0, z0), (x1, y1, z1) = low, high
+    ends = (x0, x0 + bar, y0, y1), (x1 - bar, x1, y0, y1), (x0, x1, y0, y0 + bar), (x0, x1, y1 - bar, y1)
+    return [box((a, c, z0), (b, d, z1), material, 0.002, role) for a, b, c, d in ends]
+
+
 def core(low: tuple, high: tuple, material: str = "wood") -> Block:
     """What boards enclose between two corners (3,): a body for distances, without a mesh (`Solid.core`)."""
     return replace(box(low, high, material), core=True)

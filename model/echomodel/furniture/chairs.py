@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -18,13 +19,14 @@ from echomodel.furniture.carpentry import (
     cushion,
     four,
     leaning,
+    leg,
     of_role,
     seat_of,
     slim_arms,
     top,
     within,
 )
-from echomodel.furniture.solids import Block, Solid, ball, bent, rotation, tube, turned
+from echomodel.furniture.solids import Block, Solid, ball, bent, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
 
 
@@ -88,56 +90,141 @@ def ottoman(size: Size, style: Style, choices: Choices) -> list[Solid]:
 
 
 def dining_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """Four legs or a sled, a seat, and the style's back; sometimes slim arms."""
+    """Four legs or a sled, a seat, and the style's back; or another body with such a back, see `BODIES`."""
     w, h, d = size
-    seat = float(np.clip(0.46, 0.4 * h, 0.62 * h))
+    seat = float(np.clip(0.46, 0.4 * h, 0.7 * h))
+    other = choices.chance("form", OTHER)
+    if other and style.back in BODIES:
+        return BODIES[style.back](size, style, choices, seat)
+    winged = other and style.back == "cushion"
+    style = replace(style, softness=max(style.softness, 0.5 * winged))
     thick = 0.035 + 0.05 * style.softness
-    rake = style.rake * 0.8
-    leg_thick = 0.038 * style.bulk
-    sw, sd = w * 0.94, d * 0.9
-    parts: list[Solid] = [seat_of(style, sw, sd, seat, thick, d * 0.04)]
-    parts += chair_legs(style, w * 0.86, d * 0.76, seat - thick * 0.5, leg_thick)
-    if style.back == "shell":
-        arms = seat + (h - seat) * (0.35 + 0.3 * style.arm_height)
-        wall = 0.035 + 0.04 * style.softness
-        low, power = (0, seat - wall, d * 0.15), 2.4 + style.corner  # its floor is what is sat on
-        shell = bent(low, (w / 2, d * 0.62), wall, h - seat + wall, arms - seat + wall, power=power, ease=2.5)
-        return [*parts, shell]
-    return parts + back_rest(style, style.back, w * 0.9, seat, h, -d * 0.38, 0.06, rake)
+    parts: list[Solid] = [seat_of(style, w * 0.94, d * 0.9, seat, thick, d * 0.04)]
+    parts += chair_legs(style, w * 0.86, d * 0.76, seat - thick * 0.5, 0.038 * style.bulk)
+    if winged or style.back == "shell":
+        arms, wall = (h - seat) * (0.35 + 0.3 * style.arm_height), 0.035 + 0.04 * style.softness
+        low, deep, power = (-0.05, 0.42, 4.4) if winged else (0.15, 0.62, 2.4)  # a shell's floor is what is sat on
+        form = {"power": power + style.corner, "ease": 2.5}
+        return [*parts, bent((0, seat - wall, d * low), (w / 2, d * deep), wall, h - seat + wall, arms + wall, **form)]
+    return parts + back_rest(style, style.back, w * 0.9, seat, h, -d * 0.38, 0.06, style.rake * 0.8)
+
+
+def _windsor(size: Size, style: Style, choices: Choices, seat: float) -> list[Solid]:
+    """A round board on splayed legs with stretchers; spindles below a hoop, or below a comb."""
+    w, h, d = size
+    r, tall, bow, lean = 0.013 * style.bulk, h - seat, 0.09 * d, 0.08 + 0.3 * style.rake
+    board = turned((0, seat - 0.04, d * 0.03), (w * 0.48, d * 0.47), 0.04, power=2.8, rounding=0.018, role="seat")
+    foot, head = (w * 0.47, 0, d * 0.47), (w * 0.3, seat - 0.02, d * 0.3)
+    x, y, z = 0.6 * np.array(foot) + 0.4 * np.array(head)
+    legs = four(leg(foot, head, 2.6 * r, replace(style, profile="round"), taper=0.65))
+    legs += [*both(tube([[x, y, -z], [x, y, z]], 0.7 * r)), tube([[-x, y, 0], [x, y, 0]], 0.7 * r)]
+    comb, share = choices.chance("second", 0.4), np.linspace(-1, 1, 7 + int(2.99 * style.tufting))
+
+    def behind(u: np.ndarray, up: np.ndarray) -> np.ndarray:
+        """Points (n, 3) of the back, at shares of its half width and metres over the seat; it widens upwards."""
+        wide, rear = w * (0.36 + 0.1 * np.clip(1.6 * up / tall, 0, 1)), lean * up + bow * (1 - u**2)
+        return np.stack([u * wide, seat + up, -d * 0.36 - rear], 1)
+
+    high = (tall - r) * (1 - np.abs(share) ** 2.6) ** (1 / 2.6) if not comb else 0 * share + tall - 0.06
+    ends = np.stack([behind(share, 0 * share - 0.02), behind(share, high)], 1)
+    back: list[Solid] = [tube(each, 0.55 * r) for each in (ends if comb else ends[1:-1])]
+    if comb:
+        low, top = (-w * 0.48, h - 0.1, -d * 0.36 - 0.012), (w * 0.48, h, -d * 0.36 + 0.012)
+        back.append(leaning(low, top, np.arctan(lean), seat, -d * 0.36, radius=0.03, bow=bow))
+    else:
+        u, v = (superellipse(2.6, 28)[:15] * (1, r - tall)).T
+        back.append(tube(behind(u, v - 0.02 * (v < r)), r))
+    return [board, *of_role("leg", legs), *of_role("back", back)]
+
+
+def _wishbone(size: Size, style: Style, choices: Choices, seat: float) -> list[Solid]:
+    """A woven seat between round legs; a bow that is back and arms on the rear ones and on a forked splat."""
+    w, h, d = size
+    r, x, z, arm = 0.017 * style.bulk, w * 0.44, d * 0.42, seat + 0.78 * (h - seat)
+    woven = turned((0, seat - 0.03, 0), (x, z), 0.03, power=7.0, rounding=0.012, material="linen", role="seat")
+    near = leg((x, 0, z), (x, seat, z), 2.2 * r, replace(style, profile="round"), taper=0.7)
+    far = [[x, 0, -z], [x * 0.96, seat * 0.6, -z * 0.88], [x * 0.94, seat, -z * 0.8], [x * 1.02, arm - r, -z * 0.3]]
+    y, low = seat - 0.02, seat * 0.4
+    sides = [[x, y, z], [x * 0.94, y, -z * 0.8]], [[x, low, z], [x * 0.97, low, -z * 0.9]]
+    legs = both(near, tube(far, r), *(tube(side, 0.75 * r) for side in sides))
+    legs += [tube([[-x, y, end], [x, y, end]], 0.8 * r) for end in (z, -z * 0.8)]
+    t = np.linspace(-1, 1, 13) * np.pi / 2
+    rise, rear = arm + (h - r - arm) * np.cos(t) ** 1.5, z * 0.2 - (d / 2 + z * 0.2) * np.cos(t)
+    fork = [[0.006, seat - 0.02, -z * 0.8], [0.008, seat + 0.5 * (h - seat), -d * 0.44], [w * 0.15, h - r, -d * 0.47]]
+    back = [tube(np.stack([w / 2 * np.sin(t), rise, rear], 1), 1.1 * r), *both(tube(fork, 0.6 * r))]
+    return [woven, *of_role("leg", legs), *of_role("back", back)]
+
+
+def _bent_tube(points: list[list[float]], r: float, bend: float) -> Solid:
+    """A metal tube along a polyline, its corners bent over `bend` metres."""
+    path = np.array(points, float)
+    line = [path[0]]
+    for before, here, after in zip(path[:-2], path[1:-1], path[2:], strict=True):
+        ways = [end - here for end in (before, after)]
+        one, other = (way * min(bend / max(float(np.linalg.norm(way)), 1e-9), 0.45) for way in ways)
+        line += [here + one * (1 - s) ** 2 + other * s**2 for s in (0.0, 0.3, 0.7, 1.0)]
+    return tube([*line, path[-1]], r, "metal", "leg")
+
+
+def _tubular(size: Size, style: Style, choices: Choices, seat: float) -> list[Solid]:
+    """A seat and a back on two bent tubes: of wood or metal on four legs, or of cane in frames on one that springs."""
+    w, h, d = size
+    cane, stuff = style.back == "frame", "metal" if style.family == "industrial" else "wood"
+    r, x, z, y, up = 0.012, w / 2 - 0.012, d / 2 - 0.012, seat - 0.028, h - seat
+    lean, bow = 0.05 + 0.3 * style.rake, 0.02 if cane else 0.02 + 0.02 * d
+    rear, layers = lean * up - z, [(1.0, 0.022, "wood"), (0.8, 0.027, "linen")]
+    if cane:
+        parts = both(_bent_tube([[x, r, -z], [x, r, z], [x, y, z], [x, y, rear], [x, h - r, -z]], r, 0.09))
+        parts.append(tube([[-x, r, -z], [x, r, -z]], r, "metal", "leg"))
+    else:
+        inner, high, layers = 0.85 * x, h - 0.1 * up, [(1.0, 0.016, stuff)]
+        front = [[x, 0, z], [inner, y, 0.7 * z], [inner, y, rear], [inner, high, rear - lean * (high - seat)]]
+        parts = both(_bent_tube(front, r, 0.06), tube([[x, 0, -z], [inner, y, -0.6 * z]], r, "metal", "leg"))
+    for share, thick, of in layers:
+        place, half = (0, seat - 0.012 - thick / 2, (z + rear) / 2), (x * share, (z - rear) / 2 * share)
+        parts.append(turned(place, half, thick, power=9.0 if cane else 5.0, rounding=0.004, material=of, role="seat"))
+        back = rear - bow * (1 - share**2)  # the cane is bent as its frame is there
+        low, high = (seat + (0.62 + side * 0.36 * share) * up for side in (-1, 1))
+        corner, other = (-x * share, low, back - thick / 2), (x * share, high, back + thick / 2)
+        rest = leaning(corner, other, np.arctan(lean), seat, rear, material=of, radius=0.04, bow=bow * share**2)
+        parts.append(rest)
+    return parts
+
+
+OTHER = 0.6  # share of chairs whose body is not four legs under a seat and a back
+BODIES: dict[str, Callable[[Size, Style, Choices, float], list[Solid]]] = {
+    "spindles": _windsor, "rails": _wishbone, "panel": _tubular, "frame": _tubular,
+}  # fmt: skip
 
 
 def chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """A plain chair, with arms more often than a dining chair."""
+    """A plain chair; with four legs it has arms more often than a dining chair."""
     parts = dining_chair(size, style, choices)
     w, h, d = size
-    if h > 0.7 and style.back != "shell" and choices.chance("extra", 0.45):
+    if (
+        h > 0.7
+        and style.back in ("oval", *BODIES)
+        and not choices.chance("form", OTHER)
+        and choices.chance("extra", 0.45)
+    ):
         parts += slim_arms(w * 1.04, d, 0.46, h, style, 0.03)
     return parts
 
 
 def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """Ming style: round posts, a board seat, a splat in the middle, a yoke or a horseshoe arm, stretchers all round."""
+    """Ming style: round posts, a board seat, a splat below a yoke, arms, stretchers all round; or with a bow."""
     w, h, d = size
-    r = 0.016 * (0.9 + 0.3 * style.bulk)
-    seat = min(0.46, h * 0.56)
+    r, seat = 0.016 * (0.9 + 0.3 * style.bulk), min(0.46, h * 0.56)
+    if choices.chance("kind", 0.4):
+        return _wishbone(size, style, choices, seat)
     x, z = w / 2 - r * 1.5, d / 2 - r * 1.5
     parts: list[Solid] = [box((-w / 2, seat - 0.04, -d / 2), (w / 2, seat, d / 2), "wood", 0.01, "seat")]
     legs = four(tube([[x, 0, z], [x * 0.97, seat, z * 0.97]], r))
     legs += [tube([[-x, y, cz], [x, y, cz]], r * 0.7) for y, cz in ((0.1, z), (0.16, -z))]
     legs += both(tube([[x, 0.13, -z], [x, 0.13, z]], r * 0.7))
     parts += of_role("leg", legs)
-    splat = w * choices.between("share", 0.14, 0.24)
+    splat, arm = w * choices.between("share", 0.14, 0.24), seat + (h - seat) * 0.48
     parts.append(leaning((-splat / 2, seat, -z - 0.012), (splat / 2, h - r, -z + 0.012), 0.1, seat, -z))
-    arm = seat + (h - seat) * 0.48
-    if choices.chance("kind", 0.5):
-        t = np.linspace(-np.pi / 2, np.pi / 2, 13)
-        fall = np.abs(t) / (np.pi / 2)
-        bow = np.stack([x * np.sin(t), h - r - (h - arm) * fall**1.5, z * 0.7 - (z * 1.7 + 0.05) * np.cos(t)], 1)
-        arms: list[Solid] = [tube(bow, r * 1.1)]
-        arms += both(tube([[x, seat, z * 0.6], [x, arm, z * 0.68]], r * 0.8))
-        head = bow[int(np.abs(bow[:6, 2] + z * 0.5).argmin())]  # where the posts behind meet the bow
-        arms += [tube([[s * head[0] * 1.05, seat, -z * 0.6], [s * head[0], *head[1:]]], r * 0.8) for s in (-1, 1)]
-        return parts + of_role("arm", arms)
     heights = (-0.5, h - 0.03, -0.07), (-0.25, h - r, -0.08), (0.25, h - r, -0.08), (0.5, h - 0.03, -0.07)
     yoke = tube([[w * across, y, -z + back] for across, y, back in heights], r * 1.2)
     parts += of_role("back", [yoke, *both(tube([[x, seat, -z], [x * 0.98, h - r, -z - 0.07]], r))])
@@ -146,18 +233,10 @@ def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
 
 
 def dressing_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """A vanity stool or a small chair with a low back."""
-    w, h, d = size
-    if h < 0.55:
+    """A vanity stool, or a chair with a soft seat."""
+    if size[1] < 0.55:
         return stool(size, style, choices)
-    seat = min(0.44, h * 0.7)
-    thick = 0.06 + 0.04 * style.softness
-    parts: list[Solid] = chair_legs(style, w * 0.82, d * 0.8, seat - thick * 0.5, 0.034 * style.bulk)
-    parts.append(seat_of(replace(style, softness=max(style.softness, 0.5)), w * 0.95, d * 0.92, seat, thick))
-    if style.back in ("shell", "cushion", "oval"):
-        low, half = (0, seat - thick * 0.5, d * 0.05), (w / 2, d * 0.55)
-        return [*parts, bent(low, half, 0.05, h - seat, (h - seat) * 0.6, ease=2.0)]
-    return parts + back_rest(style, style.back, w * 0.85, seat, h, -d * 0.4, 0.05, style.rake * 0.5)
+    return dining_chair(size, replace(style, softness=max(style.softness, 0.5)), choices)
 
 
 def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:

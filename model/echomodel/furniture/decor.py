@@ -38,9 +38,9 @@ def plant(size: Size, style: Style, choices: Choices) -> list[Solid]:
 def tv(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A thin panel with a bezel, its electronics in a lower box behind, on two feet, a foot plate, or none."""
     w, h, d = size
-    kinds, odds = ["feet", "plate", "arc", "wall"], [0.4, 0.25, 0.15, 0.2]
+    kinds, odds = ["feet", "plate", "wall"], [0.45, 0.35, 0.2]
     hung = d < 0.1 and w / h >= PANEL[0]
-    kind = choices.pick("kind", kinds, odds) if hung else choices.pick("kind", kinds[:3], odds[:3])
+    kind = choices.pick("kind", kinds, odds) if hung else choices.pick("kind", kinds[:2], odds[:2])
     low = 0.0 if kind == "wall" else float(np.clip(0.08 * h, 0.03, 0.09))
     low = max(low, h - w / PANEL[0])  # a box that is too high has higher feet, no higher screen
     w = min(w, PANEL[1] * (h - low))
@@ -62,9 +62,4 @@ def tv(size: Size, style: Style, choices: Choices) -> list[Solid]:
     elif kind == "plate":
         feet = [box((-w * 0.17, 0, -d / 2), (w * 0.17, 0.012, d / 2), radius=0.005)]
         feet.append(box((-w * 0.05, 0, back), (w * 0.05, low + 0.1 * h, back + 0.014)))
-    elif kind == "arc":
-        turn = np.linspace(-np.pi / 2, np.pi / 2, 9)
-        bow = np.stack([0.24 * w * np.sin(turn), 0 * turn + 0.009, d / 2 - 0.009 - (d - 0.018) * np.cos(turn)], 1)
-        feet = [tube(bow, 0.009), box((-0.03, 0, back - 0.004), (0.03, low + 0.1 * h, back + 0.012))]
-        feet.append(box((-0.03, 0, -d / 2), (0.03, 0.012, back + 0.008)))
     return parts + of_role("foot", feet, material="metal")

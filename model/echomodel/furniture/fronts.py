@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, base, both, box, core
+from echomodel.furniture.carpentry import Size, base, both, box, core, framed
 from echomodel.furniture.solids import Joint, Solid, ball, tube
 from echomodel.furniture.style import Choices, Style
 
@@ -45,7 +45,8 @@ def front(
             if glazed:
                 made = _pane(x0, x1, y0, y1, z, kind)
             elif style.fronts == "framed":
-                made += _frame(x0, x1, y0, y1, z + PANEL, 0.15 * min(x1 - x0, y1 - y0), kind)
+                wide, before = max(0.02, 0.15 * min(x1 - x0, y1 - y0)), z + PANEL + 0.012
+                made += framed((x0, y0, before - 0.016), (x1, y1, before), wide, "accent", kind)
             made += _handle(x0, x1, y0, y1, z + PANEL, kind, hinge_left=left, style=style)
             if kind == "drawer" and depth > ENOUGH:
                 made += _drawer(x0, x1, y0, y1, z - depth, z)
@@ -76,6 +77,15 @@ def sliding(low: Point, high: Point, z: float, count: int, style: Style, materia
 def case(low: tuple, high: tuple) -> list[Solid]:
     """An open-fronted case between two corners (3,), with a core."""
     return [core(low, high), *boards(low, high, 0.016, 0.008)]
+
+
+def drawers(
+    low: Point, high: Point, z: float, rows: int, columns: int, style: Style, rear: float | None = None
+) -> list[Solid]:
+    """Drawers in a case that fills a rectangle (x, y) from the plane `rear` (None = -z) to the plane z."""
+    rear = -z if rear is None else rear
+    body = case((*low, rear), (*high, z))
+    return body + front(low, high, z, rows, columns, "drawer", style, 0.95 * (z - rear))
 
 
 def boards(low: tuple, high: tuple, t: float, back: float) -> list[Solid]:
@@ -122,22 +132,11 @@ def _inside(low: Point, high: Point, z0: float, z1: float) -> list[Solid]:
     return [box((x0, y - 0.009, z0), (x1, y + 0.009, z1), role="shelf") for y in heights]
 
 
-def _frame(x0: float, x1: float, y0: float, y1: float, z: float, border: float, role: str) -> list[Solid]:
-    bars = _bars(x0, x1, y0, y1, max(border, 0.02))
-    return [box((*lo, z - 0.004), (*hi, z + 0.012), "accent", 0.002, role) for lo, hi in bars]
-
-
-def _bars(x0: float, x1: float, y0: float, y1: float, b: float) -> list[tuple[Point, Point]]:
-    """Corners of the four bars of a frame `b` wide: left, right, below, above."""
-    return [((x0, y0), (x0 + b, y1)), ((x1 - b, y0), (x1, y1)), ((x0, y0), (x1, y0 + b)), ((x0, y1 - b), (x1, y1))]
-
-
 def _pane(x0: float, x1: float, y0: float, y1: float, z: float, role: str) -> list[Solid]:
     """Glass in a frame of four bars."""
     b = min(0.045, 0.2 * (x1 - x0))
-    bars = _bars(x0, x1, y0, y1, b)
     pane = box((x0 + b / 2, y0 + b / 2, z + 0.006), (x1 - b / 2, y1 - b / 2, z + 0.01), "glass", 0.0, role)
-    return [pane, *(box((*lo, z), (*hi, z + PANEL), "accent", 0.002, role) for lo, hi in bars)]
+    return [pane, *framed((x0, y0, z), (x1, y1, z + PANEL), b, "accent", role)]
 
 
 def _handle(
@@ -227,6 +226,14 @@ def shelves(rect: tuple, d: float, z0: float, rows: int, columns: int, style: St
     ys, xs = np.linspace(y0, y1, rows + 1)[1:-1], np.linspace(x0, x1, columns + 1)[1:-1]
     parts: list[Solid] = [box((x0, y - t / 2, z0), (x1, y + t / 2, z1), role="shelf") for y in ys]
     return parts + [box((x - t / 2, y0, z0), (x + t / 2, y1, z1), role="side") for x in xs]
+
+
+def hutch(w: float, low: float, high: float, z0: float, z1: float, columns: int, rows: int) -> list[Solid]:
+    """Open shelves on top of something, from the height `low` to `high`, with a back."""
+    xs, ys = np.linspace(BOARD - w / 2, w / 2 - BOARD, columns + 1), np.linspace(low, high - BOARD, rows + 1)
+    parts: list[Solid] = [box((x - BOARD / 2, low, z0), (x + BOARD / 2, high, z1), role="side") for x in xs]
+    parts += [box((-w / 2, y, z0), (w / 2, y + BOARD, z1), role="shelf") for y in ys[1:]]
+    return [*parts, box((BOARD - w / 2, low, z0), (w / 2 - BOARD, high, z0 + 0.012), "accent", 0.0, "back")]
 
 
 def foot_height(style: Style, h: float, most: float = 0.3) -> float:

@@ -75,14 +75,20 @@ def _loft(size: Size) -> list[Solid]:
         guard.append(box((-w / 2, y, -d / 2), (w / 2, y + 0.07, -d / 2 + 0.03)))
         guard.append(box((-w / 2, y, d / 2 - 0.03), (w * 0.1, y + 0.07, d / 2)))
     parts += of_role("guard", guard)
-    x0, x1, z0, z1 = w * 0.14, w * 0.42, d / 2 - 0.03, d / 2 + 0.01
-    ladder: list[Solid] = [box((x - 0.02, 0, z0), (x + 0.02, h - 0.05, z1)) for x in (x0, x1)]
-    steps = np.linspace(0.2, deck, max(4, round(deck / 0.26)))
-    ladder += [box((x0, y, z0), (x1, y + 0.035, z1)) for y in steps]
+    parts += _ladder((w * 0.14, w * 0.42), (d / 2 - 0.03, d / 2 + 0.01), deck, h - 0.05)
     x0, x1, z0, z1 = -w * 0.45, -w * 0.1, -d * 0.45, d * 0.2
     chest: list[Solid] = [box((x0, y, z0), (x1, y + 0.02, z1)) for y in (0.03, deck * 0.36, deck * 0.7)]
     chest += [box((x - 0.01, 0, z0), (x + 0.01, deck, z1)) for x in (x0, x1)]
-    return parts + of_role("ladder", ladder) + of_role("shelf", chest)
+    return parts + of_role("shelf", chest)
+
+
+def _ladder(across: tuple[float, float], deep: tuple[float, float], deck: float, high: float) -> list[Solid]:
+    """Two uprights `high` and the steps up to a deck between them, along the longer side of a rectangle in plan."""
+    (x0, x1), (z0, z1), t = across, deep, 0.02
+    ends = ((x, x, z0, z1) for x in across) if x1 - x0 > z1 - z0 else ((x0, x1, z, z) for z in deep)
+    sides = [box((a - t, 0, c - t), (b + t, high, d + t)) for a, b, c, d in ends]
+    steps = np.linspace(0.25, deck, max(3, round(deck / 0.265)))
+    return of_role("ladder", [*sides, *(box((x0, y, z0), (x1, y + 0.035, z1)) for y in steps)])
 
 
 def _bunk(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -113,8 +119,4 @@ def _bunk(size: Size, style: Style, choices: Choices) -> list[Solid]:
             parts.append(box((x0 + wide, 0, z), (w / 2, y, z + 0.36), role="stairs"))
             parts += front((x0 + wide, 0.02), (w / 2, y), z + 0.36, 1, 1, "drawer", style) if i == 0 else []
         return parts
-    x0, x1, z0, z1 = w / 2 - 0.02, w / 2 + 0.02, d * 0.2, d * 0.42
-    ladder: list[Solid] = [box((x0, 0, z - 0.025), (x1, h - 0.05, z + 0.025)) for z in (z0, z1)]
-    steps = np.linspace(0.3, upper, max(3, round(upper / 0.27)))
-    ladder += [box((x0, y, z0), (x1, y + 0.04, z1)) for y in steps]
-    return parts + of_role("ladder", ladder)
+    return parts + _ladder((w / 2 - 0.02, w / 2 + 0.02), (d * 0.2, d * 0.42), upper, h - 0.05)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from importlib import resources
@@ -13,7 +14,7 @@ import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, both, box, chair_legs, cushion, leaning, of_role, slim_arms
 from echomodel.furniture.cloth import Tufted
-from echomodel.furniture.solids import Block, Lathe, Pad, Solid, ball, bent, rotation, superellipse, tube, turned
+from echomodel.furniture.solids import Lathe, Pad, Solid, ball, bent, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
 
 BODIES: list[dict[str, Any]] = list(
@@ -24,36 +25,28 @@ FLARED = 0.4  # softness up to which arms have no pad and flare
 
 
 def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """Upholstered: a tub with a curved wall, or a body with arms, a seat cushion and a back cushion."""
-    w, h, d = size
-    foot = min(style.leg_height * 0.9, 0.16) if style.legs not in ("plinth", "bun") else 0.05
-    seat = 0.43 if h > 0.6 else h * 0.6
-    kind = style.legs if style.legs not in ("trestle", "hairpin", "sled") else "tapered"
-    curved = style.arms == "shell" or style.back == "shell"
-    share = 0.72 if curved else 0.86
-    parts: list[Solid] = base(style, w * share, d * share, foot, 0.045 * style.bulk, kind)
-    if curved:
-        wall = 0.09 + 0.05 * style.softness
-        arms = foot + (h - foot) * (0.6 + 0.3 * style.arm_height)
-        power = 2.2 + 3 * style.corner
-        parts.append(bent((0, foot, d * 0.42), (w / 2, d * 0.92), wall, h - foot, arms - foot, power=power, ease=2.5))
-        inside = w / 2 - wall * 0.7, d * 0.45
-        low = padded((0, foot, 0), inside, (seat - foot) * 0.62, power=power + 1, role="base")
-        disc = padded((0, foot + (seat - foot) * 0.6, d * 0.04), (w / 2 - wall, d * 0.44), (seat - foot) * 0.4,
-                      power=power + 1, rounding=0.05 * style.softness, role="seat")  # fmt: skip
-        return [*parts, low, disc]
+    """Upholstered: a tub with a curved wall, a frame with cushions, or a body like a sofa's."""
+    if style.arms == "shell" or style.back == "shell":
+        return _curved(size, style)
     if style.arms in ("slim", "none"):
-        arm = 0.035
-        frame = style.arms == "slim"
-        inner = w - (2 * arm + 0.02 if frame else 0)
-        legs = chair_legs(style, w * 0.96, d * 0.9, seat - 0.12, 0.04 * style.bulk, tie=False)
-        pad = cushion((-inner / 2, seat - 0.15, -d * 0.42), (inner / 2, seat, d / 2), style)
-        z = -d * 0.42
-        one, other = (-inner / 2, seat - 0.1, z - 0.06), (inner / 2, h * 0.99, z + 0.06)
-        back = leaning(one, other, style.rake, seat, z, material="fabric", radius=0.05)
-        frame_under = box((-w * 0.47, seat - 0.17, -d * 0.43), (w * 0.47, seat - 0.13, d * 0.45), "wood", 0.006, "rail")
-        return [*legs, frame_under, pad, back, *(slim_arms(w, d, seat, h, style, arm) if frame else [])]
+        return _framed(size, style, min(0.43, 0.6 * float(size[1])), style.rake)
     return _couch(size, style, choices, 1)
+
+
+def _framed(size: Size, style: Style, seat: float, rake: float) -> list[Solid]:
+    """A seat cushion and a leaning back cushion in a frame on legs, with slim arms or without; raked seats tilt."""
+    w, h, d = size
+    tilt, deep, inner = 0.4 * rake, 0.12, w / 2 - 0.035 * (style.arms != "none")
+    parts = chair_legs(style, w * 0.96, d * 0.88, seat - deep, 0.04 * style.bulk, tie=False)
+    low, high = (-inner, seat - deep - 0.03, -d * 0.4), (inner, seat, d / 2)
+    parts.append(cushion(low, high, style, turn=rotation(x=-tilt)))
+    z = -d * 0.36
+    low, high = (-inner, seat - 0.08, z - 0.05), (inner, seat + (h - seat) / np.cos(rake), z + 0.05)
+    parts.append(leaning(low, high, rake, seat, z, material="fabric", radius=0.045))
+    x, y, t = w * 0.48, seat - deep, 0.04 * style.bulk
+    parts += both(box((x - t, y - t, -d * 0.44), (x, y, d * 0.44), role="rail"))
+    parts += [box((-x, y - t, z - t / 2), (x, y, z + t / 2), role="rail") for z in (-d * 0.3, d * 0.36)]
+    return parts + (slim_arms(w, d, seat, h, style, 0.035) if style.arms != "none" else [])
 
 
 def upholstered_arms(w: float, foot: float, y: float, d: float, arm: float, style: Style) -> list[Solid]:
@@ -82,30 +75,14 @@ def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     seat = min(0.4, h * 0.5)
     kind = choices.pick("kind", ["frame", "shell", "swivel"], [0.45, 0.35, 0.2])
     if kind == "frame":
-        tilt, rake = 0.12, 0.2 + style.rake
-        parts: list[Solid] = chair_legs(style, w * 0.96, d * 0.86, seat * 0.8, 0.04 * style.bulk, tie=False)
-        pad = cushion((-w * 0.43, seat - 0.12, -d * 0.36), (w * 0.43, seat, d * 0.5), style, turn=rotation(x=-tilt))
-        z = -d * 0.3
-        one, other = (-w * 0.43, seat - 0.06, z - 0.05), (w * 0.43, seat + (h - seat) / np.cos(rake), z + 0.05)
-        back = leaning(one, other, rake, seat, z, material="fabric", radius=0.045)
-        x, y, t = w * 0.48, seat * 0.8, 0.04 * style.bulk
-        rails = both(box((x - t, y - t, -d * 0.43), (x, y, d * 0.43), role="rail"))
-        rails += [box((-x, y - t, z - t / 2), (x, y, z + t / 2), role="rail") for z in (-d * 0.3, d * 0.36)]
-        arms = slim_arms(w, d, seat, h, style, 0.035) if style.arms != "none" else []
-        return [*parts, *rails, pad, back, *arms]
-    wall = 0.05 + 0.05 * style.softness
+        return _framed(size, style, seat, 0.2 + style.rake)
     foot = seat * 0.5
-    arms, wide = foot + (h - foot) * (0.3 + 0.25 * style.arm_height), (w * 0.46, d * 0.46)
-    body: list[Solid] = [
-        bent((0, foot, d * 0.32), (w / 2, d * 0.8), wall, h - foot, arms - foot, power=2.6 + style.corner, ease=2.6),
-        padded((0, foot, d * 0.02), (w * 0.42, d * 0.42), seat - foot, wide, power=2.6, rounding=0.05, role="seat"),
-    ]
     if kind == "swivel":
         stem = turned((0, 0, 0), 0.03, foot, material="metal")
         disc = turned((0, 0, 0), w * 0.34, 0.025, w * 0.3, material="metal")
-        return [*body, *of_role("leg", [stem, disc])]
+        return _curved(size, style, of_role("leg", [stem, disc]), seat)
     legs = style.legs if style.legs in ("tapered", "splayed", "straight", "hairpin") else "splayed"
-    return [*body, *base(style, w * 0.72, d * 0.7, foot + 0.02, 0.035 * style.bulk, legs)]
+    return _curved(size, style, base(style, w * 0.72, d * 0.7, foot + 0.02, 0.035 * style.bulk, legs), seat)
 
 
 def _foot(style: Style) -> float:
@@ -114,8 +91,6 @@ def _foot(style: Style) -> float:
 
 def _legs(style: Style, w: float, d: float, foot: float) -> list[Solid]:
     kind = style.legs if style.legs not in ("trestle", "hairpin") else "straight"
-    if kind == "sled":
-        return both(box((w * 0.42 - 0.02, 0, -d * 0.4), (w * 0.42 + 0.02, foot, d * 0.4), "metal", 0.0, "leg"))
     return base(style, w * 0.94, d * 0.88, foot, 0.05 * style.bulk, kind)
 
 
@@ -222,21 +197,21 @@ def sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
     return multi_seat_sofa(size, style, choices)
 
 
-def _curved(size: Size, style: Style) -> list[Solid]:
-    """A sofa with one wall bent round the back."""
+def _curved(size: Size, style: Style, stand: Sequence[Solid] = (), seat: float = 0.43) -> list[Solid]:
+    """An armchair or a sofa with one wall bent round the back, and a seat as round as that, on low legs or on `stand`,
+    which is half as high as the seat.
+    """
     w, h, d = size
-    foot, wall = _foot(style), 0.13
-    seat = min(0.43, h * 0.58)
-    parts: list[Solid] = _legs(style, w * 0.8, d * 0.9, foot)
-    arms = (h - foot) * (0.55 + 0.3 * style.arm_height)
-    power = 2.6 + 2 * style.corner
-    parts.append(bent((0, foot, d * 0.4), (w / 2, d * 0.9), wall, h - foot, arms, power=power, ease=3))
-    parts.append(padded((0, foot, 0.02), (w / 2 - wall * 0.6, d * 0.46), (seat - foot) * 0.6, power=3.5, role="base"))
-    pads = 2 if style.tufting > 0.4 else 1
-    edges = np.linspace(-w / 2 + wall, w / 2 - wall, pads + 1)
-    for a, b in pairwise(edges):
-        parts.append(cushion((a, foot + (seat - foot) * 0.55, -d * 0.38), (b, seat, d / 2), style))
-    return parts
+    foot = 0.5 * seat if stand else _foot(style)
+    wall, power = 0.09 + 0.05 * style.softness, 2.4 + 2.5 * style.corner
+    seat, arms = min(seat, h * 0.6), (h - foot) * (0.58 + 0.3 * style.arm_height)
+    parts = [*(stand or _legs(style, w * 0.78, d * 0.8, foot))]
+    parts.append(bent((0, foot, d * 0.4), (w / 2, d * 0.9), wall, h - foot, arms, power=power, ease=2.8))
+    tall, form = seat - foot, {"power": power + 1}
+    parts.append(padded((0, foot, 0), (w / 2 - wall * 0.7, d * 0.45), tall * 0.62, role="base", **form))
+    form["rounding"] = 0.05 * style.softness
+    middle, half = (0, foot + tall * 0.6, d * 0.04), (w / 2 - wall, d * 0.44)
+    return [*parts, padded(middle, half, tall * 0.4, role="seat", **form)]
 
 
 def l_shaped_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -251,11 +226,9 @@ def l_shaped_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
         y1 = h - 0.06
         x0, x1 = sorted((side * w / 2, side * (w / 2 - frame)))
         parts.append(box((x0, foot, -d / 2 + 0.05), (x1, y1, -d / 2 + depth - 0.05), "fabric", 0.04, "back"))
-        inner = side * (w / 2 - frame - 0.07)
-        z0, z1 = d * 0.05, -d / 2 + depth - 0.12
-        centre, half = [inner, (seat + y1) / 2, (z0 + z1) / 2], [0.075, (y1 - seat) / 2, (z1 - z0) / 2]
-        pad = Block(np.array(centre), rotation(z=-side * 0.15), "fabric", "back", half=np.array(half), radius=0.05)
-        parts.append(pad)
+        x0, x1 = sorted((side * (w / 2 - frame), side * (w / 2 - frame - 0.15)))
+        low, high = (x0, seat, d * 0.05), (x1, y1, -d / 2 + depth - 0.12)
+        parts.append(cushion(low, high, style, turn=rotation(z=-side * 0.15), role="back"))
     return parts
 
 

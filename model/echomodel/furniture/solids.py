@@ -235,10 +235,11 @@ class Shell(Solid):
         s, c = np.sin(angle), np.cos(angle)
         norm = (np.abs(s) ** self.power + np.abs(c) ** self.power) ** (1 / self.power)
         top, rings = self._top(angle), []
-        outside, inside = np.array(self.half), np.array(self.half) - self.thickness
+        turn = np.linspace(0, np.pi, (2, 4, 5, 6)[detail])  # over the wall's top, which is as round as it is thick
+        across, down = np.array([1, 0, *(1 - np.cos(turn)) / 2]), self.thickness / 2 * (1 - np.sin(turn)) * (detail > 0)
         for sine, cosine, length, high in zip(s, c, norm, top, strict=True):
-            (ox, oz), (ix, iz) = (np.array([sine, -cosine]) * half / length for half in (outside, inside))
-            rings.append(np.array([[ix, 0, iz], [ox, 0, oz], [ox, high, oz], [ix, high, iz]]))
+            wall = (np.array(self.half) - across[:, None] * self.thickness) * (sine, -cosine) / length
+            rings.append(np.insert(wall, 1, [0, 0, *(high - down)], axis=1))
         return loft(rings)
 
 

@@ -10,12 +10,13 @@ from echomodel.furniture.carpentry import Size, base, both, box, core
 from echomodel.furniture.fronts import (
     BOARD,
     carcass,
-    case,
     columns,
     depth_of,
+    drawers,
     foot_height,
     front,
     fronted,
+    hutch,
     mixed,
     pattern,
     shelves,
@@ -49,8 +50,7 @@ def nightstand(size: Size, style: Style, choices: Choices) -> list[Solid]:
         low = h - max(0.12, h * 0.25)
         legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
         parts = [box((-w / 2, h - t, -d / 2), (w / 2, h, d / 2), role="top")]
-        parts += case((-w * 0.46, low, -d * 0.44), (w * 0.46, h - t, d * 0.44))
-        parts += front((-w * 0.46, low), (w * 0.46, h - t), d * 0.44, 1, 1, "drawer", style, d * 0.85)
+        parts += drawers((-w * 0.46, low), (w * 0.46, h - t), d * 0.44, 1, 1, style)
         return parts + base(style, w * 0.95, d * 0.92, low, 0.035 * style.bulk, legs)
     return fronted(size, style, foot, choices.pick("rows", [1, 2, 2, 3]), 1, "drawer")
 
@@ -73,15 +73,8 @@ def sideboard(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A low row of doors, drawers and cells; tall ones carry a shelf or a glazed upper part."""
     w, h, d = size
     if h > 1.3:
-        lower = 0.85
-        t = BOARD
-        parts = mixed(np.array([w, lower, d]), style, choices, foot_height(style, lower, 0.25), 0.5)
-        inner, z1 = w * 0.92, -d / 2 + d * 0.7
-        upper = both(box((inner / 2 - t, lower, -d / 2), (inner / 2 + t, h, z1), role="side"))
-        levels = (lower + (h - lower) * 0.5, h - t)
-        upper += [box((-inner / 2, y, -d / 2), (inner / 2, y + t, z1), role="shelf") for y in levels]
-        upper.append(box((-inner / 2, lower, -d / 2), (inner / 2, h, -d / 2 + 0.012), "accent", 0.0, "back"))
-        return parts + upper
+        parts = mixed(np.array([w, 0.85, d]), style, choices, foot_height(style, 0.85, 0.25), 0.5)
+        return parts + hutch(w * 0.92, 0.85, h, -d / 2, 0.2 * d, 1, 2)
     return mixed(size, style, choices, foot_height(style, h, 0.3), choices.between("columns", 0.38, 0.55))
 
 

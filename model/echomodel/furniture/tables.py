@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, between_legs, both, box, of_role, pedestal, post, top, within
-from echomodel.furniture.fronts import case, front
+from echomodel.furniture.fronts import drawers, hutch
 from echomodel.furniture.solids import Block, Solid, rotation, turned
 from echomodel.furniture.style import Choices, Style
 
@@ -65,30 +65,21 @@ def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return [top(shape, w, d, h, thick, style), *of_role("leg", [drum])]
     if kind == "block" and shape != "round":
         foot = max(0.04, h * 0.15)
-        body = case((-w / 2 * 0.97, foot, -d / 2 * 0.95), (w / 2 * 0.97, h - thick, d / 2 * 0.95))
-        low, high = (-w / 2 * 0.97 + 0.01, foot + 0.01), (w / 2 * 0.97 - 0.01, h - thick - 0.01)
-        drawers = front(low, high, d / 2 * 0.95, 1, choices.whole("columns", 1, 3), "drawer", style, d * 0.9)
+        low, high, columns = (-w * 0.48, foot), (w * 0.48, h - thick), choices.whole("columns", 1, 3)
         stand = base(style, w * 0.85, d * 0.85, foot, 0.05, "plinth")
-        return [top("square", w, d, h, thick, style), *body, *drawers, *stand]
+        return [top("square", w, d, h, thick, style), *drawers(low, high, d * 0.475, 1, columns, style), *stand]
     if kind == "nested" and w > 0.7:
         low_top = turned((w * 0.28, h * 0.62, d * 0.1), w * 0.22, thick, material="accent", role="top")
         post = turned((w * 0.28, 0, d * 0.1), w * 0.14, h * 0.62, 0.03, role="leg")
         main = turned((-w * 0.14, h - thick, 0), (w * 0.36, d / 2), thick, role="top")
         stem = turned((-w * 0.14, 0, 0), (w * 0.2, d * 0.28), h - thick, (w * 0.05, d * 0.08), role="leg")
         return [main, stem, low_top, post]
-    parts: list[Solid] = [top(shape, w, d, h, thick, style, "glass" if style.contrast > 0.85 else "wood")]
-    legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
-    inner = within(shape, style)
-    leg = _leg(style, w * 0.7, h)
-    parts += base(style, w * inner, d * inner, h - thick, leg, legs)
-    if kind == "shelf":
-        under = h - thick
-        parts.append(between_legs(shape, w * inner, d * inner, under, h * 0.4, thick * 0.7, leg, style, legs))
-    return parts
+    board = top(shape, w, d, h, thick, style, "glass" if style.contrast > 0.85 else "wood")
+    return _on_legs(board, shape, size, thick, style, _leg(style, w * 0.7, h), 0.4 if kind == "shelf" else 0.0)
 
 
 def side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """Beside a sofa: legs, pedestal, drum, a cube with a niche or a C-shaped frame."""
+    """Beside a sofa: legs, a pedestal; a drum or an hourglass where it is round, else a cube or a C-shaped frame."""
     w, h, d = size
     shape, thick = _outline(style, size, choices), max(style.top * 0.8, 0.018)
     kind = choices.pick("kind", ["legs", "pedestal", "drum", "cube", "c"], [0.45, 0.2, 0.12, 0.13, 0.1])
@@ -115,33 +106,26 @@ def side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
         bars = both(box((-x, 0, z - t), (x, 2 * t, z + t), "metal"), axis=2)
         posts = both(post(-x, z, t, 0, h, "metal"), axis=2)
         return [top("square", w, d, h, thick, style), *of_role("leg", bars + posts)]
+    return _on_legs(
+        parts[0], shape, size, thick, style, _leg(style, w * 0.6, h) * 0.8, choices.chance("extra", 0.4) * 0.35
+    )
+
+
+def _on_legs(
+    board: Solid, shape: str, size: Size, thick: float, style: Style, leg: float, low: float = 0.0
+) -> list[Solid]:
+    """A top on legs that stand below it, and between them a shelf at a share `low` of its height, 0 = none."""
+    w, h, d = size
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
     inner = within(shape, style)
-    leg = _leg(style, w * 0.6, h) * 0.8
-    parts += base(style, w * inner, d * inner, h - thick, leg, legs)
-    if choices.chance("extra", 0.4):
-        parts.append(between_legs(shape, w * inner, d * inner, h - thick, h * 0.35, thick, leg, style, legs))
-    return parts
+    frame = w * inner, d * inner, h - thick
+    shelf = [between_legs(shape, *frame, h * low, thick * 0.8, leg, style, legs)] if low else []
+    return [board, *base(style, *frame, leg, legs), *shelf]
 
 
 def round_end_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """Always round: three or four legs, a pedestal or a drum, sometimes a tray rim."""
-    w, h, d = size
-    thick = max(style.top * 0.8, 0.018)
-    parts: list[Solid] = [top("round", w, d, h, thick, style)]
-    kind = choices.pick("kind", ["legs", "pedestal", "drum"], [0.5, 0.3, 0.2])
-    if kind == "pedestal":
-        return parts + pedestal(w, d, h - thick, style)
-    if kind == "drum":
-        wide = w * 0.46, d * 0.46
-        return [*parts, turned((0, 0, 0), (w * 0.36, d * 0.36), h - thick, wide, material="accent", role="leg")]
-    legs = style.legs if style.legs not in ("plinth", "bun", "trestle", "sled") else "tapered"
-    inner = 0.8 if legs == "splayed" else within("round", style)
-    parts += base(style, w * inner, d * inner, h - thick, 0.035 * style.bulk, legs)
-    if choices.chance("extra", 0.5):
-        leg = 0.035 * style.bulk
-        parts.append(between_legs("round", w * inner, d * inner, h - thick, h * 0.4, thick, leg, style, legs))
-    return parts
+    """A side table that is always round."""
+    return side_table(size, replace(style, round_tops=1.0), choices)
 
 
 def corner_side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -155,10 +139,8 @@ def corner_side_table(size: Size, style: Style, choices: Choices) -> list[Solid]
     parts += base(style, w * share, d * share, h - t, 0.035 * style.bulk, legs)
     parts += of_role("shelf", [top("square", w * share * 0.95, d * share * 0.95, h * 0.28, t, style, "accent")])
     if choices.chance("extra", 0.6):
-        edge, rear = w * share * 0.47, d * share * 0.47
-        drawer = (-edge, h * 0.68), (edge, h - t)
-        parts += case((*drawer[0], -rear), (*drawer[1], rear))
-        parts += front(*drawer, rear, 1, 1, "drawer", style, 1.9 * rear)
+        x, z = w * share * 0.47, d * share * 0.47
+        parts += drawers((-x, h * 0.68), (x, h - t), z, 1, 1, style)
     return parts
 
 
@@ -172,9 +154,8 @@ def console_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
     parts += base(style, w * 0.96, d * 0.92, h - t, _leg(style, w * 0.5, h) * 0.85, legs)
     if choices.chance("front", 0.55):
-        low, high = (-w * 0.46, h - t - 0.14), (w * 0.46, h - t)
-        parts += case((*low, -d * 0.42), (*high, d * 0.42))
-        parts += front(low, high, d * 0.42, 1, choices.whole("columns", 1, 4), "drawer", style, d * 0.8)
+        columns = choices.whole("columns", 1, 4)
+        parts += drawers((-w * 0.46, h - t - 0.14), (w * 0.46, h - t), d * 0.42, 1, columns, style)
     if choices.chance("extra", 0.5):
         parts.append(box((-w * 0.46, h * 0.18, -d * 0.42), (w * 0.46, h * 0.18 + t, d * 0.42), "accent", 0.0, "shelf"))
     return parts
@@ -183,10 +164,10 @@ def console_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
 def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A writing top at 0.75 m on legs or side panels, with drawers at one side or both; tall ones carry a hutch."""
     w, h, d = size
-    hutch = h > 1.05
-    desk_height = 0.75 if hutch else h
+    tall = h > 1.05
+    desk_height = 0.75 if tall else h
     t = max(style.top, 0.022)
-    shape = "square" if hutch or style.corner < 0.6 else "corners"
+    shape = "square" if tall or style.corner < 0.6 else "corners"
     parts: list[Solid] = [top(shape, w, d, desk_height, t, style)]
     if shape == "corners":
         w, d = w * within(shape, style), d * within(shape, style)
@@ -200,9 +181,7 @@ def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
         for s in sides:
             x0, x1 = sorted((s * w * 0.48, s * (w * 0.48 - unit)))
             foot = 0.1 if style.contrast > 0.5 else 0.02
-            parts += case((x0, foot, -d * 0.46), (x1, y1, d * 0.46))
-            rows = choices.whole("rows", 2, 4)
-            parts += front((x0, foot), (x1, y1), d * 0.46, rows, 1, "drawer", style, d * 0.88)
+            parts += drawers((x0, foot), (x1, y1), d * 0.46, choices.whole("rows", 2, 4), 1, style)
             for x in (x0 + 0.04, x1 - 0.04):
                 parts += both(post(x, d * 0.42, 0.02, 0, foot, role="leg"), axis=2)
         if len(sides) == 1:
@@ -211,21 +190,10 @@ def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
         parts += base(style, w * 0.96, d * 0.94, y1, _leg(style, w * 0.6, desk_height), legs)
         if kind == "shallow":
             low, high = (-w * 0.42, max(y1 - 0.12, LAP)), (w * 0.42, y1)
-            parts += case((*low, -d * 0.42), (*high, d * 0.42))
-            parts += front(low, high, d * 0.42, 1, choices.whole("columns", 2, 4), "drawer", style, d * 0.8)
-    if hutch:
-        parts += _hutch(w, desk_height, h, d, choices)
-    return parts
-
-
-def _hutch(w: float, low: float, high: float, d: float, choices: Choices) -> list[Solid]:
-    """Shelves above the rear of a desk."""
-    t, z0, z1 = 0.02, -d / 2, -d / 2 + min(0.28, d * 0.45)
-    columns, rows = choices.whole("second", 1, 4), int(np.clip(round((high - low) / 0.38), 1, 6))
-    xs, ys = np.linspace(-w / 2 + t, w / 2 - t, columns + 1), np.linspace(low, high - t, rows + 1)
-    parts: list[Solid] = [box((x - t / 2, low, z0), (x + t / 2, high, z1), role="side") for x in xs]
-    parts += [box((-w / 2, y, z0), (w / 2, y + t, z1), role="shelf") for y in ys[1:]]
-    parts.append(box((-w / 2 + t, low, z0), (w / 2 - t, high, z0 + 0.012), "accent", 0.0, "back"))
+            parts += drawers(low, high, d * 0.42, 1, choices.whole("columns", 2, 4), style)
+    if tall:
+        columns, rows = choices.whole("second", 1, 4), int(np.clip(round((h - desk_height) / 0.38), 1, 6))
+        parts += hutch(w, desk_height, h, -d / 2, -d / 2 + min(0.28, d * 0.45), columns, rows)
     return parts
 
 
@@ -244,16 +212,12 @@ def dressing_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     widest = 0.48 * w - KNEES / 2  # of the cupboards, which leave room for knees
     if choices.chance("kind", 0.5) or widest < 0.15:
         parts += base(style, w * 0.95, d * 0.92, low, 0.045 * style.bulk, legs)
-        parts += case((-w * 0.47, low, -d * 0.45), (w * 0.47, y1, d * 0.45))
-        columns = choices.whole("columns", 1, 4)
-        parts += front((-w * 0.47, low), (w * 0.47, y1), d * 0.45, 1, columns, "drawer", style, d * 0.86)
+        parts += drawers((-w * 0.47, low), (w * 0.47, y1), d * 0.45, 1, choices.whole("columns", 1, 4), style)
     else:
         unit = min(w * choices.between("share", 0.26, 0.36), widest)
         for s in (-1, 1):
             x0, x1 = sorted((s * w * 0.48, s * (w * 0.48 - unit)))
-            parts += case((x0, 0.06, -d * 0.45), (x1, y1, d * 0.45))
-            rows = choices.whole("rows", 2, 4)
-            parts += front((x0, 0.06), (x1, y1), d * 0.45, rows, 1, "drawer", style, d * 0.86)
+            parts += drawers((x0, 0.06), (x1, y1), d * 0.45, choices.whole("rows", 2, 4), 1, style)
             parts.append(box((x0 + 0.02, 0, -d * 0.4), (x1 - 0.02, 0.06, d * 0.4), "accent", 0.0, "leg"))
     if mirror:
         parts += of_role("mirror", mirror_of(w, table, h, d, style, choices))
