@@ -147,7 +147,7 @@ def _executor(how: RunOptions, rooms: int, device: str) -> Executor:
     if not how.ray:
         workers = max(min(how.workers or cores(), rooms), 1)
         return LocalWorkers(workers, devices=work.devices(device), timeout=how.timeout, memory=how.memory)
-    return RayCluster(how.ray, workers=how.workers, timeout=how.timeout, memory=how.memory, gpus=device != work.CPU)
+    return RayCluster(how.ray, workers=how.workers, timeout=how.timeout, memory=how.memory, gpus=device != "cpu")
 
 
 def cores() -> int:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from echomodel.loading import require_device
 from echousd.batches.options import BatchOptions
 from echousd.batches.plan import room_digest
 from echousd.batches.sources import sampled_graph
@@ -128,7 +129,6 @@ def _facts(made: Any, root: Path, stage: Usd.Stage, *, settle: bool) -> dict[str
     }
 
 
-CPU = "cpu"
 VISIBLE = "CUDA_VISIBLE_DEVICES"
 
 
@@ -140,15 +140,11 @@ def devices(device: str) -> list[dict[str, str]]:
 
     Raises ValueError where torch finds no such device.
     """
-    if device == CPU:
-        return []
+    require_device(device)
+    if device != "cuda":
+        return [] if device == "cpu" else [{}]
     import torch
 
-    if device == "cuda" and torch.cuda.is_available():
-        count = torch.cuda.device_count()
-        named = [word.strip() for word in os.environ.get(VISIBLE, "").split(",") if word.strip()]
-        return [{VISIBLE: name} for name in (named or map(str, range(count)))][:count]
-    if device == "mps" and torch.backends.mps.is_available():
-        return [{}]
-    found = [CPU, *["cuda"] * torch.cuda.is_available(), *["mps"] * torch.backends.mps.is_available()]
-    raise ValueError(f"device is {device!r}, which torch {torch.__version__} finds none of; here: {', '.join(found)}")
+    count = torch.cuda.device_count()
+    named = [word.strip() for word in os.environ.get(VISIBLE, "").split(",") if word.strip()]
+    return [{VISIBLE: name} for name in (named or map(str, range(count)))][:count]

@@ -16,7 +16,7 @@ TITLES = {
     "read": "Reading the graph",
     "load": "Loading the model",
     "assets": "Choosing models",
-    "layout": "Placing the furniture",
+    "layout": "Drawing layouts",
     "place": "Placing the furniture",
     "shapes": "Shaping the furniture",
     "meshes": "Cleaning the meshes",

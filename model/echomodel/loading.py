@@ -29,10 +29,23 @@ def load_model(weights: str | Path | None = None, *, device: str = "cpu") -> Roo
 
     `device`: where to load it, as torch calls it (`cpu`, `cuda`, `mps`); on `cpu` what ships is loaded without torch.
 
-    Raises ValueError where there is none.
+    Raises ValueError where there is none, and where torch finds no such device.
     """
+    require_device(device)
     path = None if weights is None else Path(weights).absolute()
     return _loaded(path, _stamp(path), None if path is None and device == "cpu" else device)
+
+
+def require_device(device: str) -> None:
+    """Raise ValueError where torch finds no such device."""
+    if device == "cpu":
+        return
+    import torch
+
+    here = {"cpu": True, "cuda": torch.cuda.is_available(), "mps": torch.backends.mps.is_available()}
+    if not here.get(device.partition(":")[0]):
+        found = ", ".join(name for name, there in here.items() if there)
+        raise ValueError(f"device is {device!r}, which torch {torch.__version__} finds none of; here: {found}")
 
 
 @lru_cache(maxsize=2)

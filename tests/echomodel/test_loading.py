@@ -25,6 +25,7 @@ def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
 
     read = []
     monkeypatch.setattr("echomodel.echo.EchoModel.load", lambda path, device: read.append((path, device)) or Model())
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     path = tmp_path / "weights.safetensors"
     path.write_bytes(b"1")
     first = load_model(path)
@@ -33,6 +34,14 @@ def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
     assert load_model(path) is not first
     assert load_model(path, device="cuda") is not load_model(path)
     assert read == [(path, "cpu"), (path, "cpu"), (path, "cuda")]
+
+
+@pytest.mark.parametrize("device", ["cuda", "mps", "cuda:1", "tpu"])
+def test_a_device_that_is_not_there_is_refused(device, monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    monkeypatch.setattr(torch.backends.mps, "is_available", lambda: False)
+    with pytest.raises(ValueError, match=rf"device is '{device}', which torch .* finds none of; here: cpu$"):
+        load_model(device=device)
 
 
 def test_what_ships_is_loaded_as_arrays_and_whole_where_shapes_need_it():
