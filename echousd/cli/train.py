@@ -10,6 +10,7 @@ import typer
 
 from echomodel.files import check_free
 from echousd.cli.options import Replace
+from echousd.cli.output import counted
 
 if TYPE_CHECKING:
     import trimesh
@@ -79,7 +80,7 @@ def build(
 
 @data_app.command("rooms")
 def rooms_command(
-    out: Annotated[Path, typer.Option("-o", "--output", help="Rooms file (JSON).")],
+    out: Annotated[Path, typer.Option("-o", "--output", help="A rooms file (.json), or a set to train on (.npz).")],
     count: Annotated[int, typer.Option(help="Number of rooms.")] = 100,
     seed: Seed = 0,
     room: Annotated[str | None, typer.Option(help="Room type; default a mixture.")] = None,
@@ -89,13 +90,35 @@ def rooms_command(
 
     Example: echousd data rooms --count 50 --room bedroom -o bedrooms.json
     """
-    from echomodel.roomboxes import write_rooms
     from echomodel.rooms.generator import generate_rooms
     from echomodel.vocabulary import vocabulary
 
-    check_free(out, force=force)
+    _check_one_file(out, force=force)
     kind = None if room is None else vocabulary().room_type(room).name
-    write_rooms(out, generate_rooms(count, seed, room_type=kind))
+    _write_one_file(out, generate_rooms(count, seed, room_type=kind), "generated rooms")
+
+
+def _check_one_file(out: Path, *, force: bool) -> None:
+    if out.suffix not in (".npz", ".json"):
+        raise ValueError(f"{out}: allowed are a set to train on (.npz) and a rooms file (.json)")
+    check_free(out, force=force)
+
+
+def _write_one_file(out: Path, found: list[RoomBoxes], kind: str) -> None:
+    """Rooms in a rooms file, or in a set to train on, which holds known words alone; says how many."""
+    from echomodel.data.roomset import kept_out, pack_rooms, with_known_words
+    from echomodel.roomboxes import write_rooms
+    from echousd.cli.terminal import Terminal
+
+    left = ""
+    if out.suffix == ".json":
+        write_rooms(out, found)
+    else:
+        known = [one for one in with_known_words(found) if len(one)]
+        pack_rooms(out, known, [kept_out(k) for k in range(len(known))], {"kind": kind})
+        left = f"; objects of unknown words left out: {sum(map(len, found)) - sum(map(len, known))}"
+        found = known
+    Terminal(stderr=True).print(f"{out}: {counted(len(found), 'room')}{left}")
 
 
 @data_app.command("search")
@@ -232,17 +255,13 @@ def import_rooms(
 
     Example: echousd data import my_stages more_rooms.json -o mine.npz
     """
-    from echomodel.data.roomset import kept_out, load_rooms, pack_rooms, with_known_words
+    from echomodel.data.roomset import load_rooms
     from echomodel.data.sgfront import SGFront
-    from echomodel.roomboxes import write_rooms
-    from echousd.cli.terminal import Terminal
     from echousd.folder.found import stages_at
     from echousd.graph.files import STAGE_FORMS
     from echousd.stage.boxes import read_stage
 
-    if out.suffix not in (".npz", ".json"):
-        raise ValueError(f"{out}: allowed are a set to train on (.npz) and a rooms file (.json)")
-    check_free(out, force=force)
+    _check_one_file(out, force=force)
     found: list[RoomBoxes] = []
     for source in sources:
         if (source / "classes_all.txt").exists():
@@ -255,13 +274,7 @@ def import_rooms(
             found += load_rooms(source)
     if not found:
         raise ValueError(f"{', '.join(map(str, sources))}: no room found")
-    if out.suffix == ".json":
-        write_rooms(out, found)
-        return
-    known = [one for one in with_known_words(found) if len(one)]
-    pack_rooms(out, known, [kept_out(k) for k in range(len(known))], {"kind": "imported rooms"})
-    left = sum(map(len, found)) - sum(map(len, known))
-    Terminal(stderr=True).print(f"{out}: {len(known)} rooms; objects of unknown words left out: {left}")
+    _write_one_file(out, found, "imported rooms")
 
 
 @data_app.command("to-sgfront")

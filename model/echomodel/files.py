@@ -6,7 +6,6 @@ import hashlib
 import json
 import os
 import re
-import shutil
 import socket
 import stat
 import sys
@@ -28,7 +27,7 @@ PARTIAL = re.compile(r"\..+\.(?P<host>[0-9a-f]{8})_(?P<process>[0-9]{1,9})\.\w+"
 def whole_file(path: str | os.PathLike[str], ending: str = ".partial") -> Iterator[Path]:
     """A path beside `path` to write to; renamed to `path` at the end of the block, removed where that raised.
 
-    A file that is replaced passes its rights on.
+    A file that is replaced passes its rights on; a new one has those of any, though a library gave it others.
 
     Arguments:
         path: the file.
@@ -39,10 +38,12 @@ def whole_file(path: str | os.PathLike[str], ending: str = ".partial") -> Iterat
     try:
         sweep(path.parent.absolute())
         beside.unlink(missing_ok=True)  # a link that waits under that name in a folder that somebody sent
+        beside.touch(exist_ok=False)
+        rights = (path if path.is_file() else beside).stat().st_mode
         yield beside
         flush(beside)
-        if path.is_file():
-            shutil.copymode(path, beside)
+        if beside.stat().st_mode != rights:
+            beside.chmod(stat.S_IMODE(rights))
         beside.replace(path)
     except OSError as error:
         # whoever reads the message knows the file by its own name; a full disk names none

@@ -36,3 +36,13 @@ def test_rights_stay_and_the_ending_can_be_chosen(tmp_path):
         assert beside.suffix == ".usda"
         beside.write_text("new")
     assert path.stat().st_mode & 0o777 == 0o640
+
+
+def test_a_new_file_has_the_rights_of_any_whoever_wrote_it(tmp_path):
+    (tmp_path / "any").touch()
+    path = tmp_path / "weights.safetensors"
+    with whole_file(path) as beside:
+        written = tmp_path / "own"  # as libraries do that write beside and rename
+        written.touch(0o600)
+        written.replace(beside)
+    assert path.stat().st_mode == (tmp_path / "any").stat().st_mode

@@ -74,7 +74,7 @@ def test_a_set_of_one_file(folder, tmp_path):
         pack_rooms(path, [far], [False], {})
     for content in (b"PK", pickle.dumps({})):
         (tmp_path / "bad.npz").write_bytes(content)
-        with pytest.raises(ValueError, match=r"bad.npz: not a packed set of rooms"):
+        with pytest.raises(ValueError, match=r"bad.npz: not a packed set of rooms, allowed: what `echousd"):
             RoomSet(tmp_path / "bad.npz")
 
 

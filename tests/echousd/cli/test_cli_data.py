@@ -42,6 +42,14 @@ def test_rooms_are_written_and_seeded(rooms_file, tmp_path):
     assert {room.room_type for room in read_rooms(tmp_path / "living.json")} == {"living_room"}
 
 
+def test_a_set_of_generated_rooms_is_one_to_train_on(tmp_path, capsys):
+    assert run(["data", "rooms", "--count", "1", "--seed", "4", "-o", str(tmp_path / "set.npz")]) == 0
+    assert "set.npz: 1 room; objects of unknown words left out: 0" in " ".join(capsys.readouterr().err.split())
+    assert len(RoomSet(tmp_path / "set.npz")) == 1
+    assert run(["data", "import", str(tmp_path / "set.npz"), "-o", str(tmp_path / "one.json")]) == 0
+    assert "one.json: 1 room" in " ".join(capsys.readouterr().err.split())
+
+
 def test_rooms_to_usd_and_back(rooms_file, tmp_path):
     assert run(["data", "to-usd", str(rooms_file), "-o", str(tmp_path / "usd")]) == 0
     assert run(["data", "import", str(tmp_path / "usd"), "-o", str(tmp_path / "back.json")]) == 0
@@ -116,7 +124,8 @@ def test_plot(rooms_file, tmp_path):
     [
         (["data", "plot", "missing.json", "-o", "x.png"], "missing.json: no such file or folder"),
         (["data", "build", "--recipe", "huge", "-o", "x"], "unknown recipe 'huge': allowed are smoke, packed, full"),
-        (["data", "rooms", "--room", "garage", "-o", "x"], "unknown room type 'garage'"),
+        (["data", "rooms", "--room", "garage", "-o", "x.json"], "unknown room type 'garage'"),
+        (["data", "rooms", "-o", "x.yaml"], "x.yaml: allowed are a set to train on (.npz) and a rooms file (.json)"),
         (["data", "import", "nowhere", "-o", "x.npz"], "nowhere: no such file or folder"),
     ],
 )
@@ -132,7 +141,7 @@ def test_errors_are_one_line(arguments, text, capsys, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "command",
     [
-        "data rooms --count 1 -o {tmp}/mine",
+        "data rooms --count 1 -o {tmp}/mine.json",
         "data import {rooms} -o {tmp}/mine.json",
         "data import {rooms} -o {tmp}/mine.npz",
         "data plot {rooms} -o {tmp}/mine.png",
