@@ -35,7 +35,7 @@ def train(
     Example: echousd train model/recipes/layout.toml --set data=data/full --set steps=20000
     """
     from echomodel.training.recipe import read_recipe
-    from echomodel.training.run import open_run
+    from echomodel.training.start import open_run
     from echousd.cli.terminal import Terminal
 
     console = Terminal(stderr=True)

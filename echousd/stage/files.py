@@ -199,7 +199,6 @@ def save_layer(layer: Sdf.Layer, path: str | os.PathLike[str]) -> None:
         raise StageError(f"{path}: the folder {path.parent} does not exist")
     try:
         with whole_file(path, path.suffix) as beside:
-            beside.touch()  # with the rights that the umask gives
             if not layer.Export(str(beside)):
                 raise StageError(f"{path}: cannot be written")
     except (OSError, Tf.ErrorException) as error:

@@ -76,7 +76,7 @@ def each_layout(stage: Usd.Stage, layout: int | None = None) -> Iterator[str]:
     names: tuple[str | int | None, ...] = (layout_names(stage) or (None,)) if layout is None else (layout,)
     for name in names:
         with showing_layout(stage, name) as shown:
-            yield "" if name is None else shown
+            yield shown
 
 
 @contextmanager

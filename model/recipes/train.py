@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from safetensors import safe_open
 
 from echomodel.training.recipe import Recipe, read_recipe
-from echomodel.training.run import open_run
+from echomodel.training.start import open_run
 from echomodel.training.trainer import Trainer
 
 TRIAL = 20.0  # seconds over which the rate is measured

@@ -16,10 +16,9 @@ from echomodel.metrics.pointsets import chamfer, compare_sets
 from echomodel.vocabulary import vocabulary
 from echoscene.checkpoint import read_bounds, statistics_from_bounds
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, paper, shape_unet
-from echoscene.denoisers import ShapeUNet
 from echoscene.echo import published_scene
 from echoscene.encoder import SceneGraphTensors, TripletGCN
-from echoscene.model import GraphChange, ReleasedModel, Schedule, node_budget
+from echoscene.model import GraphChange, ReleasedModel, Schedule, ShapeUNet, node_budget
 
 ENCODER = EncoderConfig(text=12, learned=4, flag=4, hidden=16, layers=2, separated=False)
 SMALL = {"hidden": 16, "layers": 2, "code": 8, "predicate": 8, "context": 32}

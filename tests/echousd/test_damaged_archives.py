@@ -9,9 +9,9 @@ import zipfile
 
 import pytest
 
+from echousd.assets.catalogues import read_library
 from echousd.assets.measure import measure
 from echousd.assets.model_file import ModelFile
-from echousd.assets.sweethome import read_library
 from echousd.folder.history import _read_archive
 from echousd.store import Store
 

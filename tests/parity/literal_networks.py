@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from echoscene.denoisers import LayoutNet, ShapeUNet
+from echoscene.model import LayoutNet, ShapeUNet
 from echoscene.unet import Down, ResBlock, SpatialTransformer, Up
 
 

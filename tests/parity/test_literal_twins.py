@@ -10,7 +10,7 @@ from literal_networks import literal_layout, literal_shape
 from parity_numbers import close, fill
 
 from echoscene.config import UNetConfig, shape_unet
-from echoscene.denoisers import LayoutNet, ShapeUNet
+from echoscene.model import LayoutNet, ShapeUNet
 from echoscene.unet import packed
 
 LAYOUT = UNetConfig(width=128, context=96, objects=40, hidden=32, layers=3, residual=True)

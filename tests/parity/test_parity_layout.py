@@ -7,8 +7,7 @@ import torch
 from parity_configs import layout_config
 from parity_numbers import Numbers, check_gradients, close
 
-from echoscene.denoisers import LayoutNet
-from echoscene.model import Schedule, ancestral, layout_loss
+from echoscene.model import LayoutNet, Schedule, ancestral, layout_loss
 from echoscene.unet import packed
 
 

@@ -7,8 +7,7 @@ import torch
 from parity_configs import shape_config, vq_config
 from parity_numbers import Numbers, check_gradients, close
 
-from echoscene.denoisers import ShapeNet
-from echoscene.model import Schedule, ddim, shape_loss
+from echoscene.model import Schedule, ShapeNet, ddim, shape_loss
 from echoscene.vqvae import VQVAE
 
 

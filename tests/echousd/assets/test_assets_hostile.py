@@ -127,7 +127,7 @@ def test_damaged_members_are_faults(folder):
 
 
 def test_bombs_are_not_unpacked(folder, monkeypatch):
-    monkeypatch.setattr("echousd.assets.sweethome.MAX_TEXT", 2**16)
+    monkeypatch.setattr("echousd.assets.catalogues.UNPACKED", 2**16)
     packed(folder, **{CATALOGUE: "#" * 2**17})
     with pytest.raises(ValueError, match=rf"{CATALOGUE} of 131072 bytes, allowed: 65536"):
         indexed(folder)

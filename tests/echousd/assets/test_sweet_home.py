@@ -9,12 +9,11 @@ import trimesh
 from echomodel.data.shapeset import ShapeSet
 from echomodel.tsdf import tsdf_from_mesh
 from echomodel.vocabulary import vocabulary
-from echousd.assets.catalogues import entries_of, reviewed
+from echousd.assets.catalogues import entries_of, read_library, reviewed
 from echousd.assets.describe import described
 from echousd.assets.index import index
 from echousd.assets.measure import measure
 from echousd.assets.naming import class_by_name
-from echousd.assets.sweethome import read_library
 from echousd.cli.main import run
 
 CATALOGUE = """# comment
