@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
-# mm of a camera inside: 74, 65, 81 and 90 degrees across; metres of depth that each costs: wide ones distort
-LENSES, DISTORTED = (24.0, 28.0, 21.0, 18.0), (0.0, 0.1, 2.0, 8.0)
+# mm of a camera inside: 74, 81, 90 and 97 degrees across; metres of depth that each costs: wide ones distort
+LENSES, DISTORTED = (24.0, 21.0, 18.0, 16.0), (0.0, 1.5, 5.0, 12.0)
 EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
-SLOPES = (0.05, 0.12, 0.2, 0.28)  # metres that the middle of its picture is lower for a metre ahead
+SLOPES = (0.05, 0.15, 0.25, 0.36)  # metres that the middle of its picture is lower for a metre ahead
 PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
 WHOLE, CLEAR = 1000.0, 30.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
 LOOKED, CHOSEN, TRIED = 48, 3, 32  # eyes of which one view is looked at closely; eyes, and of each so many views
@@ -34,15 +34,15 @@ LOW = 1.4  # metres: over what is so high one looks
 # bare walls: what all of a picture costs, from which share on, metres of rounding
 BARE, BAREST, DEEP = 60.0, 0.28, 0.02
 BEFORE, WALLED = 2.6, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
-FILLED, BEHIND = 260.0, 25.0  # metres of depth that a picture full of what is near costs, and the main piece's back
+FILLED, BEHIND = 380.0, 45.0  # metres of depth that a picture full of what is near costs, and the main piece's back
 # Metres of depth that each thing costs which the border cuts, and which is beyond it: lamps, what hangs from `HIGH`
 # metres on, and furniture.
-CUTS, HIGH = ((90.0, 12.0), (25.0, 0.0), (10.0, 0.0)), 0.25
+CUTS, HIGH = ((90.0, 12.0), (25.0, 0.0), (25.0, 0.0)), 0.25
 SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width over which it is cord; metres
 UNSEEN, MANY = 6.0, 8.0  # metres of depth that each of so many pieces in the picture is worth
 SHOWN, FAR = 30.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
 TOUCHED, NOWHERE = 0.86, 1e4  # nearness of what the eye must not be at, a third of a metre; what that costs
-STEPS = (0.3, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
+STEPS = (0.2, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
 APART = 3.0  # metres from the middle that it keeps where it stands further from its corner
 ALONG, OFF = (0.2, 0.35, 0.5, 0.65, 0.8), 0.4  # or along a wall, as shares of its length, and metres from it
 BEFORE_IT, TURNS = 3.4, np.arange(8) * np.pi / 4  # or so many metres around the main piece, where the room is so large

@@ -140,7 +140,7 @@ def test_the_camera_turns_to_have_a_picture_on_the_wall_whole() -> None:
 
 def test_a_thing_costs_what_its_kind_does_where_the_border_cuts_it_and_a_lamp_beyond_it_too() -> None:
     view = view_matrix(np.array([0.0, 1.5, 0.0]), np.array([1.0, 1.5, 0.0]))
-    for place, share in ((0.0, (0, 0, 0)), (1.4, (90, 25, 10)), (4.0, (12, 0, 0))):  # whole, cut, beyond
+    for place, share in ((0.0, (0, 0, 0)), (1.4, (90, 25, 25)), (4.0, (12, 0, 0))):  # whole, cut, beyond
         box = boxes((0.4, 0.4, 0.4, 2.0, 1.3, place, 0.0)).corners
         for kind, cost in enumerate(share):
             fragile = [box if each == kind else box[:0] for each in range(3)]
@@ -173,3 +173,12 @@ def test_a_lamp_that_the_picture_has_room_for_is_in_it_and_the_bed_whole() -> No
     both, shade = lit((2.5, 1.0), 0.5, 0.9)
     view = inside_view(FLOOR, both, 2.5)
     assert within(shade, *view) == within(both.corners[0], *view) == 1.0
+
+
+@pytest.mark.parametrize("at", [(1.5, 1.7), (1.7, 1.5), (1.4, 1.4), (1.9, 1.9)])
+def test_a_small_dining_room_has_its_chairs_whole_but_for_a_foot(at) -> None:
+    floor, (x, z) = np.array([(0.0, 0.0), (0.0, 3.2), (3.4, 3.2), (3.4, 0.0)]), at
+    chairs = [(0.5, 0.9, 0.5, x + 0.35 * a, 0.0, z + 0.65 * b, np.pi * (b > 0)) for a in (-1, 1) for b in (-1, 1)]
+    group = boxes((1.4, 0.75, 0.85, x, 0.0, z, 0.0), *chairs)
+    view = inside_view(floor, group, 2.6, main=0)
+    assert min(within(corners, *view) for corners in group.corners) >= 7 / 8
