@@ -125,6 +125,13 @@ def test_an_archive_that_was_changed_is_not_taken(root):
     assert files(root.parent) == before
 
 
+def test_an_archive_that_names_what_is_not_of_the_room_is_named_and_not_taken(root):
+    to = json.loads(root.with_suffix(".json").read_bytes())
+    for files, removes in (({"notes.txt": b""}, ()), ({}, ("notes.txt",))):
+        with pytest.raises(ValueError, match=r"bedroom/history/1.zip: names 'notes.txt', which is no file of the room"):
+            history._step(root.parent, "history/1.zip", files, removes, to["files"], to, "undo")
+
+
 def test_a_step_gives_back_what_a_person_had_edited_before_it(root):
     """The root layer that the edit merged with its own, and a layer that it replaced, beside which a copy is kept."""
     text = root.read_text().rstrip()

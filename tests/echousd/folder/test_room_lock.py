@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from filelock import SoftFileLock, Timeout
 
 from echousd.folder import lock as locks
 from echousd.folder.folder import claim, write_together
-from echousd.folder.lock import LOCK, locked, owner_of
+from echousd.folder.lock import LOCK, locked, owner_of, run_of
 
 HOLDER = textwrap.dedent("""
     import sys, time
@@ -99,6 +100,18 @@ def test_an_owner_that_nobody_can_read_is_another_process(tmp_path):
     with locked(tmp_path):
         (tmp_path / LOCK).write_bytes(b"process 1\x1b[2J")
         assert owner_of(tmp_path) == "another process"
+
+
+def test_what_a_folder_is_held_for_is_told_as_long_as_it_is_held(tmp_path, monkeypatch):
+    monkeypatch.setattr(locks.socket, "gethostname", lambda: "h" * 60)
+    assert run_of(tmp_path) == ""
+    with locked(tmp_path, run="edit 1"):
+        assert re.fullmatch(rf"process {os.getpid()} on h{{40}} \(since \d\d:\d\d:\d\d\)", owner_of(tmp_path))
+        with locked(tmp_path, run="other") as outermost:
+            assert not outermost
+            assert run_of(tmp_path) == "edit 1"
+        assert run_of(tmp_path) == "edit 1"
+    assert run_of(tmp_path) == ""
 
 
 def test_on_disks_without_locks_the_marker_decides(tmp_path, monkeypatch):

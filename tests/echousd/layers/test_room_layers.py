@@ -10,15 +10,18 @@ from small_room import BARE, OBJECTS, StandIn, small_graph
 import echousd
 from echousd.draw.sight import Furniture
 from echousd.draw.views import perspective_views, shifted, stage_views
+from echousd.layers.assets import MODEL, PLACES, carried_files
 from echousd.layers.cameras import room_points, write_cameras
 from echousd.layers.compose import text
-from echousd.layers.materials import define_material, tint_factor
+from echousd.layers.materials import define_material, look_images, tint_factor
 from echousd.layers.materialx import write_networks
 from echousd.options import RoomOptions
 from echousd.shapes import walls
-from echousd.shapes.geometry import Origin
+from echousd.shapes.finishes.baking import hexadecimal
+from echousd.shapes.geometry import Origin, Original
 from echousd.shapes.looks import Look, look
 from echousd.stage.graphs import read_graph
+from echousd.stage.paths import component_file, piece_name
 from echousd.stage.pen import Pen
 
 SPECIAL = {"inputs:opacity", "inputs:emissiveColor"}
@@ -75,6 +78,37 @@ def test_paintings_keep_their_colours():
     base, look = Look((0.5, 0.4, 0.2)), Look((0.25, 0.4, 0.1))
     assert tint_factor(base, look) == [0.5, 1.0, 0.5]
     assert tint_factor(replace(base, pattern="picture_fern"), look) == [1.0, 1.0, 1.0]
+
+
+def test_factors_of_a_tint_are_told_to_four_digits_and_black_is_no_divisor():
+    assert tint_factor(Look((0.0, 0.3, 0.7)), Look((0.1, 0.1, 0.2))) == [1000.0, 0.3333, 0.2857]
+
+
+def test_pictures_of_materials_are_called_after_what_they_show():
+    planks = look("oak", "floor")
+    files = {
+        name: path for name, (path, _) in look_images(replace(planks, metres=0.256, roughness=0.437), "oak").items()
+    }
+    tint = hexadecimal(planks.color)
+    assert files == {
+        "diffuseColor": f"textures/{planks.pattern}_{tint}.jpg", "normal": f"textures/{planks.pattern}_26cm_normal.jpg",
+        "roughness": f"textures/{planks.pattern}_44_roughness.jpg",
+    }  # fmt: skip
+
+
+def test_a_model_that_is_carried_along_keeps_its_bytes_but_for_where_another_lies(tmp_path):
+    own = Original(np.eye(4), "/chair", files={"chair.usd": b""})
+    files = {component_file("chair"): b"#usda 1.0\n"}
+    assert carried_files("chair", own, files, tmp_path) == files
+    outside, folder = replace(own, layer=tmp_path / "models/chair.usd", files={}), tmp_path / "r/assets/chair"
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    spec = Sdf.CreatePrimInLayer(layer, f"/chair/{piece_name('chair', PLACES)}/{piece_name('chair', MODEL)}")
+    spec.payloadList.prependedItems = [Sdf.Payload("../../elsewhere.usd", "/chair")]
+    moved = carried_files("chair", outside, {component_file("chair"): layer.ExportToString().encode()}, folder)
+    layer.ImportFromString(moved[component_file("chair")].decode())
+    (payload,) = layer.GetPrimAtPath(spec.path).payloadList.prependedItems
+    assert (payload.assetPath, payload.primPath) == ("../../../models/chair.usd", "/chair")
+    assert carried_files("chair", outside, moved, folder) == moved
 
 
 def test_only_glass_is_seen_through_and_only_shades_glow():

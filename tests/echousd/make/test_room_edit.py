@@ -225,6 +225,22 @@ def test_models_are_chosen_for_what_is_new_in_the_colours_of_the_room(root, monk
     assert asked == [({"chair"}, palette_of_room(5, graph.room.style))]
 
 
+@pytest.mark.parametrize(
+    ("made", "assets", "shapes"),
+    [("library", "mine.parquet", "library"), ("guided", "mine.parquet", "guided"), ("library", None, "sdf"),
+     ("boxes", "mine.parquet", "sdf"), ("parts", None, "parts")],
+)  # fmt: skip
+def test_what_is_new_is_made_as_the_room_was_where_its_library_is_at_hand(root, monkeypatch, made, assets, shapes):
+    asked = []
+    monkeypatch.setattr(sys.modules["echousd.make.edit"], "check_sources", lambda words, model: asked.append(words[0]))
+    monkeypatch.setattr(sys.modules["echousd.make.edit"], "given_pieces", lambda *given: 1 / 0)  # no further
+    manifest = root.with_suffix(".json")
+    manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "shapes": made}))
+    with pytest.raises(ZeroDivisionError):
+        edit(root, small_graph().add_node("chair", "nightstand"), model=StandIn(), assets=assets)
+    assert asked == [shapes]
+
+
 def test_only_rooms_of_ours_can_be_edited(tmp_path):
     echousd.write_graph(small_graph(), tmp_path / "graph.usda")
     with pytest.raises(ValueError, match=r"graph.usda: not a room made by `echousd generate`"):

@@ -8,8 +8,9 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.draw.drawables import read_drawables
-from echousd.stage.contents import read_contents
+from echousd.stage.contents import read_contents, shape_of
 from echousd.stage.forms import SkippedForms, polygons
+from echousd.stage.layouts import each_layout
 from echousd.stage.read import find_rooms
 from echousd.stage.subdivision import refined
 
@@ -48,6 +49,33 @@ def test_solids_are_drawn_as_they_are(kind, values, volume, extent):
     assert mesh.volume == pytest.approx(volume, rel=0.04)
     np.testing.assert_allclose(mesh.extents, extent, rtol=0.02)
     np.testing.assert_allclose(mesh.bounds.mean(0), 0, atol=0.01)
+
+
+@pytest.mark.parametrize(("lean", "size"), [(0.0, (1.0, 2.0, 3.0)), (-90.0, (1.0, 3.0, 2.0))])
+def test_a_piece_looks_where_its_front_does_and_where_its_width_says_if_that_looks_up(lean, size):
+    stage = empty()
+    thing = UsdGeom.Xform.Define(stage, "/Room/thing")
+    thing.AddRotateYOp().Set(30.0)
+    thing.AddRotateXOp().Set(lean)
+    UsdGeom.Xformable(UsdGeom.Cube.Define(stage, "/Room/thing/box")).AddScaleOp().Set((0.5, 1.0, 1.5))
+    shape = shape_of(thing.GetPrim(), UsdGeom.XformCache(), np.eye(4))
+    assert np.degrees(shape.yaw) == pytest.approx(30.0)
+    np.testing.assert_allclose(shape.size, size, atol=1e-6)
+    np.testing.assert_allclose(shape.position, (0.0, -size[1] / 2, 0.0), atol=1e-6)
+
+
+def test_layouts_are_shown_one_after_the_other_and_an_only_one_has_no_name():
+    stage = empty()
+    room = UsdGeom.Xform.Define(stage, "/Room").GetPrim()
+    assert list(each_layout(stage)) == list(each_layout(stage, 0)) == [""]
+    variants = room.GetVariantSets().AddVariantSet("layout")
+    for number in (0, 2, 10):
+        variants.AddVariant(f"layout_{number}")
+    variants.SetVariantSelection("layout_2")
+    shown = [(name, variants.GetVariantSelection()) for name in each_layout(stage)]
+    assert shown == [(f"layout_{number}",) * 2 for number in (0, 2, 10)]
+    assert list(each_layout(stage, 10)) == ["layout_10"]
+    assert variants.GetVariantSelection() == "layout_2"
 
 
 def test_cone_points_along_its_axis():
