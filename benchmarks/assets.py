@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from echomodel.data.meshes import held_out
+from echomodel.data.shapeset import held_out
 from echomodel.loading import load_model
 from echomodel.vocabulary import vocabulary
 from echousd.assets.catalogues import entries_of

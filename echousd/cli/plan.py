@@ -107,6 +107,7 @@ def export(
     """Plan a home, or take the plan that it has with what stands in it, and draw it or write it down."""
     from echousd.folder.found import room_at
     from echousd.graph import GraphError
+    from echousd.graph.consistency import faults_of
     from echousd.graph.files import STAGE_FORMS
     from echousd.home.draw import PICTURES, draw_plans, write_dxf, write_procthor
     from echousd.home.files import load_home
@@ -123,7 +124,8 @@ def export(
     if home is None:
         raise GraphError(f"{source}: no home, allowed: a file with rooms and how they lie to each other")
     there = plan_there(source, home)
-    found = [there] if there else plans(home, several, seed)
+    with faults_of(str(source)):
+        found = [there] if there else plans(home, several, seed)
     things = furniture(there, source) if there else []
     if form in PICTURES:
         draw_plans(found, output, things=things)
@@ -157,12 +159,14 @@ def generate_home(
     """
     from echousd.cli.terminal import progress_bar
     from echousd.folder.found import is_home
+    from echousd.graph.consistency import faults_of
     from echousd.home.assemble import digests_of, earlier, jobs_of, stale, write_rooms
     from echousd.home.given import next_plan, plan_there
 
     stated = None if is_home(graph) else plan_there(graph, home)
     before = graph if is_home(graph) else earlier(output, options.seed)
-    plan = stated or next_plan(home, seed=options.seed, before=before)
+    with faults_of(str(graph)):
+        plan = stated or next_plan(home, seed=options.seed, before=before)
     if dry_run:
         again = stale(digests_of(jobs_of(plan, output, options)), output)
         say_done(json, [], [f"new      {name}" for name in again], {"new": again})

@@ -189,7 +189,7 @@ def meshes(
 
     import numpy as np
 
-    from echomodel.data.meshes import MeshModel, build_meshes
+    from echomodel.data.shapeset import MeshModel, build_meshes
     from echousd.assets.measure import measure
     from echousd.assets.table import read_library
     from echousd.cli.terminal import Terminal, progress_bar

@@ -1,23 +1,135 @@
-"""Published checkpoints in, one safetensors file out; no pickle is ever executed."""
+"""Published checkpoints in, one safetensors file out, with config and vocabulary; no pickle is ever executed."""
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import pickle
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 from zipfile import is_zipfile
 
 import torch
-from torch import Tensor
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor, nn
 
 from echomodel.boxes import BoxStatistics
+from echomodel.config import check_numbers, from_dict
+from echomodel.files import whole_file
 from echomodel.vocabulary import vocabulary
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig
-from echoscene.weights import CheckpointError, build, write_released
+from echoscene.model import ReleasedModel
+from echoscene.vqvae import VQVAE
+
+FORMAT = "echousd-released-1"
+
+
+class CheckpointError(ValueError):
+    """A file that does not hold the published model; the message names the file's first keys at fault."""
+
+
+def build(config: ReleasedConfig, tensors: Mapping[str, Tensor], where: str) -> nn.Module:
+    """The model of a config with these very tensors as its weights (cast to float32, else not copied).
+
+    Returns `ReleasedModel`, or a module with `vqvae` alone where the config has no encoder.
+    Raises CheckpointError: names `where` and the first missing, unexpected and misshapen keys.
+    """
+    with torch.device("meta"):
+        model: nn.Module = ReleasedModel(config) if config.encoder else _Autoencoder(config)
+    expected = nn.Module.state_dict(model)
+    problems = []
+    missing, unexpected = [k for k in expected if k not in tensors], [k for k in tensors if k not in expected]
+    wrong = [k for k in expected if k in tensors and expected[k].shape != tensors[k].shape]
+    for word, keys in (("missing", missing), ("unexpected", unexpected), ("misshapen", wrong)):
+        if keys:
+            detail = keys[0]
+            if word == "misshapen":
+                detail += f" {list(tensors[detail].shape)} instead of {list(expected[detail].shape)}"
+            problems.append(f"{len(keys)} {word} (first: {detail})")
+    if problems:
+        raise CheckpointError(f"{where}: keys do not match the published model: {'; '.join(problems)}")
+    state = {k: v.float() if v.is_floating_point() else v for k, v in tensors.items()}
+    for key, value in state.items():
+        if value.is_floating_point() and not bool(torch.isfinite(value).all()):
+            raise CheckpointError(f"{where}: key {key} holds numbers that are not finite")
+    model.load_state_dict(state, strict=True, assign=True)
+    return model.eval()
+
+
+class _Autoencoder(nn.Module):
+    def __init__(self, config: ReleasedConfig) -> None:
+        super().__init__()
+        if config.vqvae is None:
+            raise CheckpointError("neither an encoder nor an autoencoder is there")
+        self.config, self.vqvae = config, VQVAE(config.vqvae)
+
+
+def write_released(
+    target: str | os.PathLike[str], model: nn.Module, config: ReleasedConfig, classes: Sequence[str] | None,
+    statistics: BoxStatistics | None,
+) -> None:  # fmt: skip
+    """Write a model's tensors with config, vocabulary, box statistics and the name of its text encoder, if it has one.
+
+    The file appears whole or not at all.
+
+    Arguments:
+        target: the file. model: what `config` describes. classes: names by id. statistics: box normalisation.
+    """
+    metadata = {
+        "format": FORMAT,
+        "config": json.dumps(asdict(config)),
+        "vocabulary": json.dumps(
+            {"classes": classes, "predicates": [p.name for p in vocabulary().predicates]} if config.encoder else None
+        ),
+        "box_statistics": json.dumps(statistics.to_json() if statistics else None),
+    }
+    if isinstance(model, ReleasedModel) and model.text_encoder is not None:
+        metadata["text_encoder"] = model.text_encoder
+    state = {key: value.detach().clone().contiguous() for key, value in nn.Module.state_dict(model).items()}
+    target = Path(target)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(target) as beside:
+        save_file(state, beside, metadata=metadata)
+
+
+def load_released(path: str | os.PathLike[str]) -> nn.Module:
+    """Load a converted file.
+
+    Returns `ReleasedModel` in evaluation mode, or a module with `vqvae` alone.
+
+    Raises:
+        CheckpointError: not a converted file, or damaged; names the file and the first keys at fault.
+        OSError: the file cannot be read.
+    """
+    try:
+        with safe_open(path, framework="pt") as file:
+            metadata = file.metadata() or {}
+            if metadata.get("format") != FORMAT:
+                raise CheckpointError(
+                    f"{path}: format is {metadata.get('format')!r}, expected {FORMAT!r} (echousd convert)"
+                )
+            raw = json.loads(metadata["config"])
+            check_numbers(raw, len(file.keys()))
+            config = from_dict(ReleasedConfig, dict(raw))
+            words, bounds = json.loads(metadata["vocabulary"]), json.loads(metadata["box_statistics"])
+            tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+    except CheckpointError:
+        raise
+    except (SafetensorError, KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise CheckpointError(f"{path}: truncated, or not a converted checkpoint ({reason})") from None
+    model = build(config, tensors, str(path))
+    if isinstance(model, ReleasedModel):
+        model.classes = tuple(words["classes"]) if words and words["classes"] else None
+        model.statistics = BoxStatistics.from_json(bounds) if bounds else None
+        model.text_encoder = metadata.get("text_encoder")
+    return model
+
 
 IGNORED = ("epoch", "counter", "opt")  # what the published training keeps beside the weights
 NESTED = ("vqvae", "shape_df")
@@ -71,7 +183,7 @@ def _flatten(raw: Mapping[Any, Any], path: Path) -> dict[str, Tensor]:
     if not out:
         raise CheckpointError(f"{path}: holds no tensors")
     if "quantize.embedding.weight" in out or "encoder.conv_in.weight" in out:
-        out = {f"{VQVAE}{key}": tensor for key, tensor in out.items()}
+        out = {f"{AUTOENCODER}{key}": tensor for key, tensor in out.items()}
     return out
 
 
@@ -142,7 +254,7 @@ def read_bounds(path: str | os.PathLike[str]) -> BoxStatistics:
 
 
 Shapes = Mapping[str, tuple[int, ...]]
-LAYOUT, SHAPE, VQVAE = "LayoutDiff.df.model.", "shape_df.diffusion_net.", "vqvae."
+LAYOUT, SHAPE, AUTOENCODER = "LayoutDiff.df.model.", "shape_df.diffusion_net.", "vqvae."
 
 
 def infer_config(shapes: Shapes) -> ReleasedConfig:
@@ -157,9 +269,9 @@ def infer_config(shapes: Shapes) -> ReleasedConfig:
     Raises CheckpointError for no known part, or a key that the inference rests on is missing; the message names it.
     """
     names = shapes.keys()
-    has = {part: any(key.startswith(part) for key in names) for part in (LAYOUT, SHAPE, VQVAE)}
+    has = {part: any(key.startswith(part) for key in names) for part in (LAYOUT, SHAPE, AUTOENCODER)}
     encoder = _encoder(shapes, full=has[SHAPE]) if "obj_embeddings_ec.weight" in shapes else None
-    if encoder is None and not has[VQVAE]:
+    if encoder is None and not has[AUTOENCODER]:
         some = ", ".join(sorted(names)[:3]) or "none"
         raise CheckpointError(f"no obj_embeddings_ec.weight and no autoencoder among {len(shapes)} keys ({some} ...)")
     conditioning = "crossattn"
@@ -171,7 +283,7 @@ def infer_config(shapes: Shapes) -> ReleasedConfig:
         shape=_unet(shapes, SHAPE, "shape_code_graph_cov", "shape_embeddings.5.weight", "shape_time_emb", conditioning)
         if has[SHAPE]
         else None,
-        vqvae=_vqvae(shapes) if has[VQVAE] else None,
+        vqvae=_vqvae(shapes) if has[AUTOENCODER] else None,
     )
 
 
@@ -259,12 +371,12 @@ def _unet(shapes: Shapes, prefix: str, gcn: str, code: str, time: str, condition
 
 
 def _vqvae(shapes: Shapes) -> VQConfig:
-    channels = _get(shapes, f"{VQVAE}encoder.conv_in.weight", 5)[0]
+    channels = _get(shapes, f"{AUTOENCODER}encoder.conv_in.weight", 5)[0]
     mult: list[int] = []
     blocks = 1
-    while f"{VQVAE}encoder.down.{len(mult)}.block.0.conv1.weight" in shapes:
-        mult.append(_get(shapes, f"{VQVAE}encoder.down.{len(mult)}.block.0.conv1.weight", 5)[0] // channels)
-    while f"{VQVAE}encoder.down.0.block.{blocks}.conv1.weight" in shapes:
+    while f"{AUTOENCODER}encoder.down.{len(mult)}.block.0.conv1.weight" in shapes:
+        mult.append(_get(shapes, f"{AUTOENCODER}encoder.down.{len(mult)}.block.0.conv1.weight", 5)[0] // channels)
+    while f"{AUTOENCODER}encoder.down.0.block.{blocks}.conv1.weight" in shapes:
         blocks += 1
-    codes, latent = _get(shapes, f"{VQVAE}quantize.embedding.weight", 2)
+    codes, latent = _get(shapes, f"{AUTOENCODER}quantize.embedding.weight", 2)
     return VQConfig(channels=channels, mult=tuple(mult), blocks=blocks, latent=latent, codes=codes)

@@ -20,9 +20,9 @@ from echomodel.protocols import GraphEdit, Sampling, touched_nodes
 from echomodel.randomness import SceneGenerators
 from echomodel.text import TextEncoder, edge_text, encoder_named, node_text
 from echomodel.vocabulary import vocabulary
+from echoscene.checkpoint import load_released
 from echoscene.encoder import SceneGraphTensors
 from echoscene.model import STRUCTURE, GraphChange, ReleasedModel
-from echoscene.weights import load_released
 
 DECODED = 2  # shapes at a time: one takes 67 MB for every feature map of 64 channels
 

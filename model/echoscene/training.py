@@ -23,11 +23,11 @@ from echomodel.training.shape_stage import read
 from echomodel.training.start import data_folder
 from echomodel.training.trainer import Report, Trainer
 from echomodel.vocabulary import vocabulary
+from echoscene.checkpoint import load_released, write_released
 from echoscene.config import paper
 from echoscene.echo import pack_changes, pack_scenes, pseudo_graph, published_grids, published_scene
 from echoscene.encoder import SceneGraphTensors
 from echoscene.model import GraphChange, ReleasedModel
-from echoscene.weights import load_released, write_released
 
 SHAPES, GRID, FIELD = "3D-FUTURE-SDF", "ori_sample_grid.h5", "pc_sdf_sample"
 CLAMP = 0.2  # of the published distances

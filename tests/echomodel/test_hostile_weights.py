@@ -14,7 +14,7 @@ from safetensors.torch import save_file
 from echomodel.config import CompactConfig, from_dict
 from echomodel.echo import EchoModel
 from echomodel.training.recipe import Recipe
-from echoscene.weights import load_released
+from echoscene.checkpoint import load_released
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 import pytest
 import trimesh
 
-from echomodel.data.meshes import MeshModel, attribution, build_meshes, held_out
+from echomodel.data.shapeset import MeshModel, attribution, build_meshes, held_out
 
 
 def model(key, load=lambda: trimesh.creation.box([0.5, 0.9, 0.5]), category="chair"):

@@ -12,10 +12,9 @@ import torch
 from safetensors import safe_open
 from torch import nn
 
-from echoscene.checkpoint import CheckpointError, convert, read_published, statistics_from_bounds
+from echoscene.checkpoint import CheckpointError, convert, load_released, read_published, statistics_from_bounds
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
 from echoscene.model import ReleasedModel
-from echoscene.weights import load_released
 
 ENCODER = EncoderConfig(text=16, learned=8, flag=4, hidden=8, layers=2)
 SMALL = {"hidden": 8, "layers": 2, "code": 8, "predicate": 8, "context": 32}

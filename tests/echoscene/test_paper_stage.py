@@ -16,10 +16,10 @@ from echomodel.text import RandomTextEncoder, TextEncoder
 from echomodel.training.recipe import Recipe, read_recipe
 from echomodel.training.start import open_run
 from echomodel.training.trainer import read_log, step_generator
+from echoscene.checkpoint import load_released
 from echoscene.echo import DISTANCE, ReleasedEcho, published_grids, turned_back
 from echoscene.model import ReleasedModel, Schedule
 from echoscene.training import PaperModel, PaperStage, scene_boxes, text_encoder
-from echoscene.weights import load_released
 
 RECIPE = Path(__file__).parents[2] / "model" / "recipes" / "paper.toml"
 SMALL = {

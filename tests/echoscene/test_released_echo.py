@@ -15,11 +15,10 @@ from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit
 from echomodel.vocabulary import vocabulary
-from echoscene.checkpoint import class_names, convert, statistics_from_bounds
+from echoscene.checkpoint import class_names, convert, statistics_from_bounds, write_released
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
 from echoscene.echo import ReleasedEcho, floor_relations
 from echoscene.model import ReleasedModel, Schedule
-from echoscene.weights import write_released
 from echousd.shapes.meshing import mesh_from_shape
 
 WIDTH = 12

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 import torch
 
+from echoscene.checkpoint import load_released
 from echoscene.config import VQConfig
 from echoscene.vqvae import VQVAE
-from echoscene.weights import load_released
 from echousd.cli.main import run
 
 

@@ -77,7 +77,7 @@ class Recipe:
         relation_weight: weight of the hinge on the relations' margins of the predicted boxes.
         measure_weight: weight of the difference in what predicted and true boxes measure (gaps to walls, ...).
         physics_weight: weight of collisions of the predicted boxes, and of what is through a wall or in a door's way.
-        drawn_weight: weight of what is wrong with rooms that the network draws itself (`training.draws`).
+        drawn_weight: weight of what is wrong with rooms that the network draws itself (`training.layout_stage`).
         validate_every, save_every: steps.
         precision: `float32` or `bfloat16` (autocast).
         threads: CPU threads, 0 = as many as torch likes. workers: processes that draw batches of rooms ahead of a GPU,

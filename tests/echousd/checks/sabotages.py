@@ -248,7 +248,7 @@ SABOTAGES: tuple[Sabotage, ...] = (
     Sabotage("rug in the air", move(f"{D}/rug", y=0.3), "collision", "rug"),
     Sabotage("rug through a wall", move(f"{D}/rug", x=2.0), "outside", "rug"),
     Sabotage("photo beside its table", move(f"{D}/photo", x=0.5), "floating", "photo"),
-    Sabotage("cushion through a wall", move(f"{D}/cushion", z=-1.0), "outside", "cushion"),
+    Sabotage("cushion through a wall", move(f"{D}/cushion", z=-1.2), "outside", "cushion"),
     Sabotage("cushion five times as large", scale(f"{D}/cushion", 5, 5, 5), "too large", "cushion"),
     Sabotage("cushion as a thimble", scale(f"{D}/cushion", 0.05, 0.05, 0.05), "too small", "cushion"),
     Sabotage("cushion in a basket", lambda stage: together(stage, f"{D}/cushion", f"{D}/basket"), "collision", "cushion"),

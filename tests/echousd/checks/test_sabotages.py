@@ -16,10 +16,9 @@ from pxr import Usd
 
 import echousd
 from echomodel.boxes import Boxes
-from echousd.checks import RULES, CheckReport, check, report, validity
+from echousd.checks import RULES, CheckReport, check, report
 from echousd.checks.reading import Reading
-from echousd.checks.report import check_layout
-from echousd.checks.validity import JOINED, find_faults, safely
+from echousd.checks.report import JOINED, check_layout, find_faults, safely
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.room import RoomOptions
 
@@ -92,9 +91,9 @@ def judged(rule: str) -> Callable[[Usd.Stage], Named]:
         return lambda stage: {(rule, str(found.path)) for found in safely(ours, Reading(stage))}
 
     def faults(stage: Usd.Stage) -> Named:  # OpenUSD's, or of one rule that looks at the articulated room as well
-        with patch.object(validity, "RULES", (ours,) if ours else ()), ExitStack() as stack:
+        with patch.object(report, "RULES", (ours,) if ours else ()), ExitStack() as stack:
             if ours:
-                stack.enter_context(patch.object(validity, "_faults_of_usd", lambda stage: (set(), set())))
+                stack.enter_context(patch.object(report, "_faults_of_usd", lambda stage: (set(), set())))
             return named(CheckReport("", (), (), *find_faults(stage)))
 
     def layout(stage: Usd.Stage) -> Named:

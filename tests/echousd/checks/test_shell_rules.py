@@ -6,7 +6,7 @@ import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, Vt
 
 from echousd.checks.reading import Reading
-from echousd.checks.validity import RULES, safely
+from echousd.checks.report import RULES, safely
 
 GOOD = Path(__file__).parents[1] / "bad/good.usda"
 LABELS = "semantics:labels:category"

@@ -114,6 +114,17 @@ def test_somebody_elses_file_stays(tmp_path, echousd_command):
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["home.usda"]
 
 
+@pytest.mark.parametrize("words", [("plan", "-o", "{tmp}/flat.png"), ("generate", "-o", "{tmp}/flat")])
+def test_what_cannot_be_planned_is_told_with_its_file(tmp_path, echousd_command, words):
+    rooms = "{bed: {type: bedroom, area: 40}, bath: {type: bathroom, area: 30}}"
+    (tmp_path / "small.yaml").write_text(f"home: {{area: 50}}\nrooms: {rooms}\nrelations: [bed door bath]\n")
+    command, *rest = (word.format(tmp=tmp_path) for word in words)
+    done = echousd_command(command, tmp_path / "small.yaml", *rest)
+    assert done.code == 2
+    assert "small.yaml: the rooms need 70 m² at least (bed 40, bath 30), the home has 50 m²" in done.err
+    assert [path.name for path in tmp_path.iterdir()] == ["small.yaml"]
+
+
 def test_a_room_that_cannot_be_made_is_named(tmp_path, monkeypatch, echousd_command):
     inline(monkeypatch)
     text = FLAT.replace("bed: double_bed", "bed: {category: double_bed, size: [9, 1, 9], position: [0, 0, 0]}")

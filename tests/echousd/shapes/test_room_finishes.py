@@ -15,7 +15,7 @@ import echousd
 from echomodel.dressing.prints import ASPECTS, PRINTS
 from echomodel.furniture.solids import Block
 from echomodel.triangles import Mesh
-from echousd.checks.validity import find_faults
+from echousd.checks.report import find_faults
 from echousd.exporting.formats import export
 from echousd.options import RoomOptions
 from echousd.shapes.finishes import baking
