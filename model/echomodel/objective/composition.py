@@ -143,7 +143,7 @@ SEAT = 0.7  # metres that a side needs before it to seat somebody
 BEYOND, CORNER = 0.1, 0.1  # metres that a seat may reach beyond its side of a table, and more beyond one end of it
 # Who sits alone at a side of a table: share of it that the middle may be beside its own, metres from which on its ends.
 ALONE, OFF = 0.3, 0.05
-NOOK = 0.66  # metres between a plant and what is next to it at one of its two sides, along and across
+NOOK, AT_WALL = 0.66, 0.4  # metres between a plant and what is next to it along and across, and to the next wall
 WORKPLACE = 1.0  # metres between the middles of two who work
 # Metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it; before storage to a low table.
 OPENS, LOW = 0.55, 0.45
@@ -245,11 +245,11 @@ def _free_beside(plan: Plan, who: Array) -> Array:
 
 def plant_in_nook(plan: Plan) -> Found:
     """A plant fills a corner, or the end of what stands at a wall; it stands amid no bare wall and no floor."""
-    plants = plan.of("decor") & plan.standing
-    who, xp = plan.those(plants & plan.walled), plan.kit
+    who, xp = plan.those(plan.of("decor") & plan.standing & plan.walled), plan.kit
     free = _free_beside(plan, who)
     widest = xp.maximum(xp.minimum(free[:, 0], free[:, 1]), xp.minimum(free[:, 2], free[:, 3]))
-    return found(who, NOOK - widest, measure=widest)
+    wall = xp.amin(plan.inside(footprint(plan.size[who], plan.position[who], plan.yaw[who]), who), 1)
+    return first_of(who, xp.full_like(who, -1), [NOOK - widest, AT_WALL - wall], [widest, wall])
 
 
 def workers_apart(plan: Plan) -> Found:
