@@ -15,7 +15,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.place.distances import APART, MOST_UNDER, kept_apart, over_bed, seen_from, spread_at_walls
 from echousd.place.geometry import depth_inside
 from echousd.place.setting import Setting
-from echousd.place.slots import INNER, STANDS
+from echousd.place.slots import INNER, STANDS, sides
 
 HALF_PI = math.pi / 2
 STEP = 0.2  # metres between two places at a wall
@@ -35,6 +35,10 @@ def proposals(setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np
     rows: list[Row] = []
     if anchor >= 0 and there[anchor]:
         rows += [out_of(position[anchor], float(yaw[anchor]), slot) for slot in slots_at(setting, i, anchor)]
+    for k in _mates(setting, "before", anchor) if setting.stances[i] == "with" else ():
+        rows += [
+            out_of(position[k], float(yaw[k]), slot) for slot in sides(setting.size[i], setting.size[k]) if there[k]
+        ]
     loose = LOOSE * bool(rows)
     if kind.support == "ceiling":
         rows += _overhead(setting, position, yaw, there, i)

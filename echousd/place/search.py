@@ -91,8 +91,11 @@ class Search:
         n = len(setting.size)
         self.children: list[list[int]] = [[] for _ in range(n)]
         self.screens: list[list[int]] = [[] for _ in range(n)]
+        near = setting.triplets[setting.triplets[:, 1] == vocabulary().predicate_id("close_by")]
+        beside = {int(one): int(other) for one, _, other in near if setting.kinds[one].role in ("decor", "light")}
         for k in range(n):
             parent = int(setting.carrier[k]) if setting.carrier[k] >= 0 else int(setting.anchor[k])
+            parent = beside.get(k, -1) if parent < 0 else parent
             if parent >= 0 and not setting.fixed[k] and setting.stances[k] != "near":
                 (self.screens if setting.stances[k] == "opposite" else self.children)[parent].append(k)
 
@@ -192,7 +195,7 @@ class Search:
         rows, taste = rows[keep], taste[keep]
         states = [(state.position[None], state.yaw[None]), self._carried(state, i, group, rows)]
         tastes = [state.taste[i : i + 1], taste]
-        screens = [k for k in self.screens[i] if there[k]]
+        screens = [self.group(k, there, state) for k in self.screens[i] if there[k]]
         if screens:  # it takes them along to the wall ahead
             states.append(self._carried(state, i, group, rows, screens))
             tastes.append(taste)
@@ -208,7 +211,7 @@ class Search:
             changed[stand] = True
         position, yaw = (np.concatenate(part) for part in zip(*states, strict=True))
         every = np.concatenate(tastes)
-        changed[[*group, *(m for k in screens for m in self.group(k, there, state))]] = True
+        changed[[*group, *(k for loads in screens for k in loads)]] = True
         best = self._best(there, position, yaw, changed, every)
         if best == 0:
             return state
@@ -303,24 +306,23 @@ class Search:
         return taste
 
     def _carried(
-        self, state: State, i: int, group: list[int], rows: np.ndarray, screens: Sequence[int] = ()
+        self, state: State, i: int, group: list[int], rows: np.ndarray, screens: Sequence[list[int]] = ()
     ) -> tuple[np.ndarray, np.ndarray]:
         """(K, n, 3) and (K, n): the boxes with one at each of K poses, and its group with it as one.
 
         Arguments:
-            screens: what it looks at, which goes to the wall ahead of it, with what stands on that.
+            screens: groups of what it looks at, that first, which go to the wall ahead of it.
         """
         setting = self.setting
         position, yaw = np.repeat(state.position[None], len(rows), 0), np.repeat(state.yaw[None], len(rows), 0)
         self._carry(position, yaw, state, i, group, rows)
         position[:, i, 1] = height_of(setting, state.position, i)
-        for k in screens:
+        for k, *others in screens:
             front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
             free = to_wall(setting.plan, np.zeros(len(rows), int), rows[:, :2], front)
             free = free - setting.size[k, 2] / 2 - setting.behind[k]
             at = np.concatenate([rows[:, :2] + free[:, None] * front, rows[:, 2:3] + np.pi], 1)
-            loads = [k, *(m for m in self.children[k] if setting.carrier[m] == k)]
-            self._carry(position, yaw, state, k, loads, at)
+            self._carry(position, yaw, state, k, [k, *others], at)
         return position, yaw
 
     def _carry(
@@ -359,7 +361,8 @@ class Search:
         """(K,) float: what a box with its group runs into, leaves of the floor and breaks of relations at K poses."""
         cost = self._hits(state, there, i, group, rows, group)
         told = self.setting.told(i)
-        far = ~np.isin(np.where(told[:, 0] == i, told[:, 2], told[:, 0]), group)
+        along = [*group, *self.screens[i]]  # which may go to the wall ahead
+        far = ~np.isin(np.where(told[:, 0] == i, told[:, 2], told[:, 0]), along)
         told = told[there[told[:, ::2]].all(1) & far]
         if len(told):
             at = np.stack([rows[:, 0], np.full(len(rows), height_of(self.setting, state.position, i)), rows[:, 1]], 1)

@@ -142,6 +142,16 @@ def joined(own: Size, anchor: Size, kind: Category, count: int, apart: float, ah
     return out
 
 
+def sides(own: Size, table: Size) -> list[Slot]:
+    """A second sofa again: at any side of the table that it shares, looking at it."""
+    out = []
+    for turn, half in zip((0.0, HALF_PI, math.pi, -HALF_PI), (table[2], table[0]) * 2, strict=True):
+        for gap, more in ((0.18, 0.0), (0.3, 0.1), (0.45, 0.1)):
+            away = half / 2 + own[2] / 2 + gap
+            out.append((math.sin(turn) * away, math.cos(turn) * away, turn + math.pi, more))
+    return out
+
+
 def beside(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
     """Side tables and floor lamps: at the ends of a sofa, beside an armchair, at the head of a bed."""
     out = []

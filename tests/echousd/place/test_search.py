@@ -16,6 +16,7 @@ from echomodel.rules import label_relations, margins
 from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place.placing import place_boxes
+from echousd.place.proposals import proposals
 from echousd.place.search import PRICE, Search, State, priced
 from echousd.place.setting import setting_of
 
@@ -97,9 +98,32 @@ def test_a_screen_goes_along_to_the_wall_ahead():
     words = ["multi_seat_sofa", "tv_stand"]
     search, state = searched(words, [(2.0, 0.8, 0.9), (1.6, 0.5, 0.4)], [(0, 0, -1.5), (1.0, 0, 1.8)], [0, np.pi])
     row = np.array([[-2.0, 0.3, np.pi / 2, 0.0]])
-    position, yaw = search._carried(state, 0, [0], row, screens=[1])
+    position, yaw = search._carried(state, 0, [0], row, screens=[[1]])
     assert position[0, 1, [0, 2]] == pytest.approx([2.5 - 0.2 - search.setting.behind[1], 0.3], abs=1e-6)
     assert np.cos(yaw[0, 1] + np.pi / 2) == pytest.approx(1.0)
+
+
+def test_a_sofa_turns_to_another_wall_though_its_screen_and_a_plant_beside_that_stand_ahead():
+    words = ["multi_seat_sofa", "tv_stand", "plant"]
+    size = [(2.0, 0.8, 0.9), (1.6, 0.5, 0.4), (0.4, 1.0, 0.4)]
+    told = [(1, "opposite", 0), (2, "close_by", 1)]
+    search, state = searched(words, size, [(0, 0, -1.5), (0, 0, 1.8), (1.1, 0, 1.8)], [0.0, np.pi, 0.0], told)
+    every = np.ones(3, bool)
+    there = np.array([[0.0, -1.5, 0.0, 0.0], [-2.0, 0.0, np.pi / 2, 0.0]])
+    assert search._unlikely(state, every, 0, [0], there).tolist() == [0.0, 0.0]
+    assert search.group(1, every, state) == [1, 2]
+    position, _ = search._carried(state, 0, [0], there[1:], screens=[[1, 2]])
+    assert np.hypot(*(position[0, 2] - position[0, 1])[[0, 2]]) == pytest.approx(1.1, abs=0.05)
+
+
+def test_a_second_sofa_is_tried_at_the_sides_of_the_table():
+    words = ["multi_seat_sofa", "loveseat_sofa", "coffee_table"]
+    size = [(2.2, 0.8, 0.9), (1.6, 0.8, 0.9), (1.2, 0.4, 0.6)]
+    search, state = searched(words, size, [(0, 0, -3.4), (3.0, 0, 3.0), (0, 0, -2.2)], [0.0] * 3, floor=2 * FLOOR)
+    rows = proposals(search.setting, state.position, state.yaw, np.ones(3, bool), 1)
+    near = np.hypot(rows[:, 0] - 1.2 / 2 - 0.45, rows[:, 1] + 2.2) < 0.5  # at its end
+    looks = np.sin(rows[near, 2]) < -0.99
+    assert (looks & (abs(rows[near, 1] + 2.2) < 0.01)).any()
 
 
 @pytest.mark.parametrize(("at", "goes"), [((0.0, -0.7), True), ((2.5, 2.5), False)])
