@@ -12,8 +12,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from echomodel.vocabulary import vocabulary
-from echousd.checks.findings import Finding, rule
-from echousd.checks.reading import Reading
+from echousd.checks.reading import Finding, Reading, rule
 from echousd.exporting.packing import Reach
 from echousd.stage.files import said, specs
 from echousd.stage.units import METRES, UP_AXIS, unit_faults, upwards

@@ -11,10 +11,9 @@ from importlib import resources
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
-from echousd.checks.findings import RULES, Finding, Rule, applied, rule
 from echousd.checks.mesh_rules import of_others
 from echousd.checks.placement import inside_solid
-from echousd.checks.reading import Reading, below
+from echousd.checks.reading import RULES, Finding, Reading, Rule, applied, below, rule
 from echousd.stage.contents import room_frame
 from echousd.stage.values import UNREADABLE, asset
 

@@ -9,8 +9,7 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from echomodel.triangles import area_normals, cross
-from echousd.checks.findings import Finding, applied, rule
-from echousd.checks.reading import Reading
+from echousd.checks.reading import Finding, Reading, applied, rule
 from echousd.stage.encoding import NODE_API
 from echousd.stage.layouts import ARTICULATION
 from echousd.stage.values import UNREADABLE, MeshArrays, array, lineage, matrix, readable, targets

@@ -10,8 +10,7 @@ from pxr import Kind, Usd, UsdGeom
 
 from echomodel.dressing import SMALL
 from echomodel.vocabulary import UnknownWord, normalised
-from echousd.checks.findings import Finding, applied, rule
-from echousd.checks.reading import Reading, below
+from echousd.checks.reading import Finding, Reading, applied, below, rule
 from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.joints import FRICTION_API
 from echousd.stage import encoding as usd

@@ -8,8 +8,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
 from echomodel.vocabulary import vocabulary
-from echousd.checks.findings import Finding, rule
-from echousd.checks.reading import Reading, below
+from echousd.checks.reading import Finding, Reading, below, rule
 from echousd.graph.nodes import OBSTACLE
 from echousd.stage.contents import triangulated, words_of
 from echousd.stage.encoding import CATEGORY, FREE

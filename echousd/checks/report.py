@@ -14,9 +14,8 @@ import numpy as np
 from pxr import Plug, Sdf, Tf, Usd, UsdUtils
 
 import echousd
-from echousd.checks.findings import RULES, Finding, Rule
 from echousd.checks.placement import Misplacement, Whole, find_collisions, find_misplaced
-from echousd.checks.reading import Reading
+from echousd.checks.reading import RULES, Finding, Reading, Rule
 from echousd.draw.sight import Furniture
 from echousd.folder.folder import digest_of
 from echousd.folder.manifest import find_manifest

@@ -151,9 +151,8 @@ def test_an_asset_has_joints_and_levels_of_detail_in_variants(tmp_path):
     from pxr import Usd, UsdGeom, UsdPhysics
 
     import echousd
-    from echousd.checks.findings import applied
     from echousd.checks.mesh_rules import extents
-    from echousd.checks.reading import Reading
+    from echousd.checks.reading import Reading, applied
     from echousd.graph import Node, RoomSpec, SceneGraph
 
     graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 4.0)), (Node("chest", "dresser", size=(0.9, 1.0, 0.45)),), ())
