@@ -23,7 +23,7 @@ from echomodel.objective.sizes import (
 )
 from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
-from echomodel.rules import verdicts
+from echomodel.rules import margins, verdicts
 from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
 from echousd.graph.arrays import stated_placements, triplets_of
@@ -183,11 +183,14 @@ def place_boxes(
         if planned.any():
             held, rigid, kept = fixed | planned, rigid | planned, kept | planned
             at = posed(at.size, at.position, at.yaw, kept)
-        anchor = at.anchor
+        anchor, compared = at.anchor, triplets[np.isin(triplets[:, 1], sizes)]
         free = ~rigid & ~np.isin(np.arange(n), told)
 
         def suited(to: Setting, size: np.ndarray) -> Setting:
-            laid = laid_tables(to.categories, size, anchor, free)
+            laid = laid_tables(to.categories, size, anchor, ~rigid)
+            broken = margins(Spread(laid, to.position, to.yaw), compared, rules=rules, fronts=to.fronts) < 0
+            told = compared[broken][:, ::2].ravel()
+            laid[told] = size[told]
             return to.at(fitting_loads(to.categories, laid, to.carrier, free), to.position, to.yaw)
 
         at = suited(at, at.size)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import groupby, product
 
 import numpy as np
 
@@ -151,33 +152,39 @@ def _stance(setting: Setting, i: int, anchor: int) -> str:
     return setting.stances[i]
 
 
-def seatings(setting: Setting, i: int, seats: Sequence[int]) -> list[list[tuple[float, float, float, float]]]:
-    """Ways in which boxes of one kind may stand around box i, each a slot for every one of them, the best first."""
-    seats = [k for k in seats if _stance(setting, k, i) == "around"]
-    if len(seats) < 2:
-        return []
-    largest = max(seats, key=lambda k: float(setting.size[k, 0]))
-    found = sorted(slots_at(setting, largest, i), key=lambda slot: slot[3])
-    size = setting.size[largest]
-    out: list[list[tuple[float, float, float, float]]] = []
-    for start in found:  # those that go with each slot, its likes first, without running into each other
-        chosen: list[tuple[float, float, float, float]] = []
-        for slot in (start, *(one for one in found if one[3] == start[3]), *found):
-            if len(chosen) < len(seats) and all(_clear(slot, other, size) for other in chosen):
-                chosen.append(slot)
-        if len(chosen) == len(seats) and not any({*chosen} == {*other} for other in out):
-            out.append(chosen)
-    return out
+def seatings(setting: Setting, i: int, seats: Sequence[int]) -> tuple[list[int], list[list[Row]]]:
+    """Who of some boxes stands around box i, wide ones first, and ways to do so: a slot for each, the best ways first.
+
+    Benches take the middle of a long side, chairs what is left.
+    """
+    places = np.maximum(np.round(setting.size[:, 0] / PLACE), 1.0)
+    seats = sorted((k for k in seats if _stance(setting, k, i) == "around"), key=lambda k: -places[k])
+    ways: list[list[tuple[Row, tuple[float, float]]]] = [[]] if len(seats) > 1 else []
+    for alike in (list(group) for _, group in groupby(seats, key=lambda k: places[k])):
+        largest = max(alike, key=lambda k: float(setting.size[k, 0]))
+        slots = sorted(slots_at(setting, largest, i), key=lambda slot: slot[3])
+        found = [(slot, _halves(setting.size[largest], slot[2])) for slot in slots]
+        first = found[:2] if places[largest] > 1 and len(alike) < len(seats) else found
+        after = []
+        for begun, start in product(ways, first):  # those that go with each slot, its likes first
+            chosen, count = [*begun], len(begun) + len(alike)
+            for one in (start, *(one for one in found if one[0][3] == start[0][3]), *found):
+                if len(chosen) < count and all(_clear(one, other) for other in chosen):
+                    chosen.append(one)
+            after += [chosen] * (len(chosen) == count)
+        ways = after
+    rows = [[slot for slot, _ in way] for way in ways]
+    return seats, [way for number, way in enumerate(rows) if not any({*way} == {*one} for one in rows[:number])]
 
 
-def _clear(one: tuple[float, ...], other: tuple[float, ...], size: np.ndarray) -> bool:
-    """Whether pieces of one size at two slots stand clear of each other."""
-    halves = []
-    for slot in (one, other):
-        cos, sin = abs(math.cos(slot[2])), abs(math.sin(slot[2]))
-        halves.append((cos * size[0] + sin * size[2], sin * size[0] + cos * size[2]))
-    width, depth = ((halves[0][axis] + halves[1][axis]) / 2 for axis in (0, 1))
-    return abs(one[0] - other[0]) > width - 0.01 or abs(one[1] - other[1]) > depth - 0.01
+def _halves(size: np.ndarray, turn: float) -> tuple[float, float]:
+    cos, sin = abs(math.cos(turn)), abs(math.sin(turn))
+    return float(cos * size[0] + sin * size[2]) / 2, float(sin * size[0] + cos * size[2]) / 2
+
+
+def _clear(one: tuple[Row, tuple[float, float]], other: tuple[Row, tuple[float, float]]) -> bool:
+    """Whether pieces at two slots, beside them half their extents along both axes, stand clear of each other."""
+    return any(abs(one[0][k] - other[0][k]) > one[1][k] + other[1][k] - 0.01 for k in (0, 1))
 
 
 def out_of(position: np.ndarray, yaw: float, slot: tuple[float, float, float, float]) -> Row:

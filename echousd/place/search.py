@@ -24,7 +24,7 @@ from echomodel.rules import margins
 from echomodel.rules.placements import Spread
 from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import beyond, depths
-from echousd.place.proposals import aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
+from echousd.place.proposals import Row, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
 from echousd.place.setting import Setting
 from echousd.place.solver import PlaceConfig
 
@@ -84,7 +84,7 @@ class Search:
         self.firm = np.array([term.name not in yields for term in self.terms])
         self.rooms: dict[bytes, Plan] = {}
         self.slots: dict[tuple[int, int], np.ndarray] = {}
-        self.ways: dict[tuple[int, ...], list[list[tuple[float, float, float, float]]]] = {}
+        self.ways: dict[tuple[int, ...], tuple[list[int], list[list[Row]]]] = {}
         self.lost: dict[bytes, list[int]] = {}
         self.looks: list[np.ndarray] = []
         self.urgent: list[int] = []
@@ -276,24 +276,26 @@ class Search:
         seats = [k for k in self.children[i] if there[k] and not setting.turned[k]]
         if (i, *seats) not in self.ways:
             self.ways[i, *seats] = seatings(setting, i, seats)
-        ways = self.ways[i, *seats]
+        around, ways = self.ways[i, *seats]
         if not ways:
             return state
         position, yaw = np.repeat(state.position[None], len(ways) + 1, 0), np.repeat(state.yaw[None], len(ways) + 1, 0)
+        wide = setting.size[around, 0]
+        unlike = FARTHEST * abs(wide[:, None] - wide)  # no chair goes to the slot of a bench
         for number, slots in enumerate(ways, 1):
             rows = np.array([out_of(state.position[i], float(state.yaw[i]), slot) for slot in slots])
-            way = np.hypot(*(state.position[seats][:, None, [0, 2]] - rows[None, :, :2]).transpose(2, 0, 1))
-            one, other = linear_sum_assignment(np.round(way, 6))
-            chosen = np.array(seats)[one]
+            way = np.hypot(*(state.position[around][:, None, [0, 2]] - rows[None, :, :2]).transpose(2, 0, 1))
+            one, other = linear_sum_assignment(np.round(way + unlike, 6))
+            chosen = np.array(around)[one]
             position[number, chosen, 0], position[number, chosen, 2] = rows[other, 0], rows[other, 1]
             yaw[number, chosen] = rows[other, 2]
         changed = np.zeros(len(state.yaw), bool)
-        changed[seats] = True
+        changed[around] = True
         likes = [LIKED * sum(slot[3] for slot in slots) + 0.001 * number for number, slots in enumerate(ways)]
-        taste = np.array([state.taste[seats].sum(), *likes])
+        taste = np.array([state.taste[around].sum(), *likes])
         best = self._best(there, position, yaw, changed, taste)
         own = state.taste.copy()
-        own[seats] = 0.0
+        own[around] = 0.0
         return State(position[best], yaw[best], own) if best else state
 
     def _taste(self, i: int, rows: np.ndarray) -> np.ndarray:

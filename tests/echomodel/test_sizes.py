@@ -136,3 +136,12 @@ def test_a_table_is_long_enough_for_who_sits_at_it(chairs, least):
     found = laid_tables(words, size, anchor, np.ones(len(words), bool))
     assert found[0, [0, 2]].max() == pytest.approx(max(least, 0.8))
     assert np.array_equal(laid_tables(words, size, anchor, np.zeros(len(words), bool)), size)
+
+
+@pytest.mark.parametrize(("chairs", "bench", "least"), [(4, 1.2, 1.42), (7, 1.2, 3.1), (2, 1.5, 1.5)])
+def test_a_table_is_long_enough_for_a_bench_and_who_sits_opposite(chairs, bench, least):
+    """Two chairs sit at the ends, the others along the side that the bench leaves."""
+    words = ["dining_table", "bench", *["dining_chair"] * chairs]
+    size = np.array([[0.5, 0.75, 0.8], [bench, 0.45, 0.4], *[[0.42, 0.9, 0.5]] * chairs])
+    found = laid_tables(words, size, np.array([-1, *[0] * (chairs + 1)]), np.ones(len(words), bool))
+    assert found[0, [0, 2]].max() == pytest.approx(least)

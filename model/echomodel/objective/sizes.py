@@ -9,6 +9,7 @@ import numpy as np
 
 from echomodel.arrays import at_least, rows
 from echomodel.boxes2d import seen
+from echomodel.objective.company import PLACE
 from echomodel.objective.composition import ELBOW
 from echomodel.objective.plan import Found, Plan, found, kind_of, nobody
 from echomodel.sizes import size_statistics, usual_range
@@ -22,7 +23,7 @@ USUAL = 0.6  # power of the ratio of the 5th and 95th percentile to the median
 ELBOWS = 0.05  # metres between two chairs
 TUCKED = 0.15  # metres by which chairs at the ends of a table keep off those at its sides
 LEAST_DEPTH, MOST_DEPTH = 0.75, 1.05  # metres of a table at which people sit opposite each other
-PLACE = ELBOW + 0.01  # metres of a table's side for each chair there
+CHAIR = ELBOW + 0.01  # metres of a table's side for each chair there
 SPARE = 0.8  # and in all beside that, at most
 EDGE = 0.02  # metres of a top that stay free around what stands on it
 FEET = 0.18  # metres, depth of the feet on which a screen stands
@@ -118,15 +119,18 @@ def laid_tables(categories: Sequence[str], size: np.ndarray, anchor: np.ndarray,
         chairs = [i for i in np.flatnonzero(anchor == table).tolist() if kinds[i].role == "seat"]
         if not free[table] or kinds[table].role != "board" or kinds[table].access or len(chairs) < 2:
             continue
-        width = float(np.median([min(size[i, 0], 0.7) for i in chairs]))
+        wide = np.round(size[chairs, 0] / PLACE) > 1  # benches
+        width = float(np.median(np.minimum(size[chairs, 0], 0.7)[~wide] if not wide.all() else [PLACE - ELBOWS]))
+        count = int(np.maximum(np.round(size[chairs, 0] / PLACE), 1.0).sum())
         if kinds[table].wall:  # they sit along its front
-            out[table, 0] = max(size[table, 0], len(chairs) * (width + ELBOWS))
+            out[table, 0] = max(size[table, 0], count * (width + ELBOWS))
             continue
-        at_ends = len(chairs) > 6  # of six, three sit at each long side where no end is free
-        a_side = -(-(len(chairs) - 2 * at_ends) // 2)
+        # of six, three sit at each long side where no end is free; nobody sits beside a bench
+        at_ends = count > 6 or (wide.any() and len(chairs) > 2)
+        a_side = max(-(-(count - 2 * at_ends) // 2), (~wide).sum() - 2 * at_ends if wide.sum() == 1 else 0)
         long = 0 if size[table, 0] >= size[table, 2] else 2
         ends = 2 * TUCKED * at_ends
-        least = a_side * max(PLACE, width + ELBOWS) + ends
+        least = max(a_side * max(CHAIR, width + ELBOWS) + ends, float(size[chairs, 0].max() * wide.any()))
         out[table, long] = np.clip(size[table, long], least, least + SPARE)
         if not kinds[table].like:  # a child's table is as it comes
             out[table, 2 - long] = np.clip(size[table, 2 - long], LEAST_DEPTH, MOST_DEPTH)

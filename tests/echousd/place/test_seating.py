@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from echomodel.vocabulary import vocabulary
 from echousd.place.placing import place_boxes
 
 FLOOR = np.array([(-2.5, -2.5), (2.5, -2.5), (2.5, 2.5), (-2.5, 2.5)])
@@ -50,3 +51,28 @@ def test_a_bench_has_a_side_of_its_own():
     seats, _ = laid(["bench", "dining_chair", "dining_chair"], told=[(1, CLOSE, 0), (2, CLOSE, 0), (3, CLOSE, 0)])
     assert abs(seats[0, 0]) < 0.12
     assert (seats[1:, 1] * seats[0, 1] < 0).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_chairs_and_a_bench_share_a_table(seed):
+    kinds = ["dining_chair", "dining_chair", "bench", "dining_chair", "dining_chair"]
+    seats, _ = laid(kinds, seed=seed)
+    bench, chairs = seats[2], seats[[0, 1, 3, 4]]
+    assert abs(bench[0]) < 0.25
+    ends = np.abs(chairs[:, 0]) > 0.8
+    assert ends.sum() == 2
+    assert (chairs[~ends, 1] * bench[1] < 0).all()
+
+
+@pytest.mark.parametrize(("told", "least", "most"), [("bigger_than", 1.9, 2.1), ("smaller_than", 0.9, 1.25)])
+def test_a_table_of_told_size_grows_for_its_chairs_where_that_may_be(told, least, most):
+    """Eight chairs ask for 2 m; a table that is smaller than a sideboard keeps what it has."""
+    word = vocabulary().predicate_id(told)
+    size = np.array([(1.2, 0.75, 0.8), (1.6, 0.8, 0.45), *[(0.45, 0.9, 0.5)] * 8])
+    position = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, -2.2), *((0.5 * k - 2.0, 0.0, 1.0) for k in range(8))])
+    done = place_boxes(
+        ["dining_table", "sideboard", *["dining_chair"] * 8], size, position, np.zeros(10), np.array([(0, word, 1)]),
+        floor_polygon=FLOOR, height=2.6,
+    )  # fmt: skip
+    assert done.verdict.tolist() == [1]
+    assert least < done.size[0, [0, 2]].max() < most
