@@ -100,7 +100,7 @@ class Copies(Plan):
 
     def _again(self, column: Array) -> Array:
         """(K * N, ...): a column of the room (N, ...), the same in every copy."""
-        return self.kit.tile(column, (self.count, *[1] * (column.ndim - 1)))
+        return repeat(column[None], self.count).reshape(-1, *column.shape[1:])
 
     def _tiled(self, number: Array) -> Array:
         """(K * P,) numbers of boxes of the room (P,), negative ones as they are, in every copy."""

@@ -123,7 +123,7 @@ class Plan:
     rules: str = "strict"
     stated: tuple[Stated, ...] = ()
 
-    @property
+    @cached_property
     def kit(self) -> Any:
         """The library whose arrays these are: `numpy`, or `torch` where gradients are asked for."""
         return kit(self.size)
