@@ -169,7 +169,8 @@ def seatings(setting: Setting, i: int, seats: Sequence[int]) -> tuple[list[int],
         for begun, start in product(ways, first):  # those that go with each slot, its likes first
             chosen, count = [*begun], len(begun) + len(alike)
             for one in (start, *(one for one in found if one[0][3] == start[0][3]), *found):
-                if len(chosen) < count and all(_clear(one, other) for other in chosen):
+                gaps = [max(abs(one[0][k] - at[k]) - one[1][k] - half[k] for k in (0, 1)) for at, half in chosen]
+                if len(chosen) < count and min(gaps, default=0.0) > -0.01:
                     chosen.append(one)
             after += [chosen] * (len(chosen) == count)
         ways = after
@@ -178,13 +179,9 @@ def seatings(setting: Setting, i: int, seats: Sequence[int]) -> tuple[list[int],
 
 
 def _halves(size: np.ndarray, turn: float) -> tuple[float, float]:
+    """Half the extents of a turned piece along both axes."""
     cos, sin = abs(math.cos(turn)), abs(math.sin(turn))
     return float(cos * size[0] + sin * size[2]) / 2, float(sin * size[0] + cos * size[2]) / 2
-
-
-def _clear(one: tuple[Row, tuple[float, float]], other: tuple[Row, tuple[float, float]]) -> bool:
-    """Whether pieces at two slots, beside them half their extents along both axes, stand clear of each other."""
-    return any(abs(one[0][k] - other[0][k]) > one[1][k] + other[1][k] - 0.01 for k in (0, 1))
 
 
 def out_of(position: np.ndarray, yaw: float, slot: tuple[float, float, float, float]) -> Row:
