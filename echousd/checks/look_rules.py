@@ -35,7 +35,7 @@ def materials(reading: Reading, prim: Usd.Prim) -> Iterator[Finding | str]:
     for node in (prim, *nodes):
         yield from _loose_ends(node)
     for node in nodes:
-        yield from _unread(node, reading.primvars)
+        yield from _unread(node, reading.primvars if prim.GetPath() in reading.bound else None)
 
 
 def _used(material: Usd.Prim, outputs: list[UsdShade.Output]) -> set[Sdf.Path]:
@@ -60,15 +60,15 @@ def _loose_ends(node: Usd.Prim) -> Iterator[Finding]:
                 yield Finding(attribute.GetPath(), f"connected to <{source}>, where nothing is")
 
 
-def _unread(node: Usd.Prim, primvars: set[str]) -> Iterator[Finding]:
-    """A texture without an image, and a reader of a primvar that no prim has."""
+def _unread(node: Usd.Prim, primvars: set[str] | None) -> Iterator[Finding]:
+    """A texture without an image, and a reader of a primvar that no prim has; None = of a material that none shows."""
     kind = node.GetAttribute("info:id").Get()
     try:
         if kind == "UsdUVTexture" and not UsdShade.Shader(node).GetInput("file").HasConnectedSource():
             file = asset(node.GetAttribute("inputs:file")) if node.HasAttribute("inputs:file") else None
             if not file or not file.path:
                 yield Finding(node.GetPath(), "a texture without an image, allowed: inputs:file with a path")
-        elif str(kind).startswith("UsdPrimvarReader"):
+        elif primvars is not None and str(kind).startswith("UsdPrimvarReader"):
             name = node.GetAttribute("inputs:varname").Get()
             if name is not None and str(name) not in primvars:
                 yield Finding(node.GetPath(), f"reads primvars:{name}, which no prim has")

@@ -68,6 +68,12 @@ class Reading:
         return {attribute.GetName().partition(":")[2] for attribute in self.authored}
 
     @cached_property
+    def bound(self) -> set[Sdf.Path]:
+        """Paths of the materials that some prim binds, in whatever way."""
+        bindings = [one for prim in self.distinct for one in prim.GetAuthoredPropertiesInNamespace("material")]
+        return {path for one in bindings if isinstance(one, Usd.Relationship) for path in one.GetTargets()}
+
+    @cached_property
     def rooms(self) -> list[RoomPrims]:
         """The rooms; none where they cannot be told, which echo:EdgeTargets reports."""
         try:

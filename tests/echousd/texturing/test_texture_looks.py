@@ -160,6 +160,15 @@ def test_edits_mute_what_they_change(room):
     assert np.quantile(errors_in_texels(room, fresh), 0.99) < 0.75
 
 
+def test_a_room_whose_only_painted_piece_is_gone_passes_its_check(room):
+    names = [entry["name"] for entry in json.loads((job_of(room) / "job.json").read_text())["objects"]]
+    others = [name for name in names if name != "pendant"]
+    import_job(room, job_of(room), name="oil", skip=others, preview=False)
+    with pytest.warns(UserWarning, match="pendant changed or gone since painted"):
+        edit(room, small_graph().remove_node("pendant"), model=StandIn(), place=False).save(room.parent, preview=False)
+    assert not check(room).errors
+
+
 def test_an_edit_that_goes_elsewhere_takes_the_look_along(room, tmp_path):
     import_job(room, job_of(room), name="oil", preview=False)
     before = {path: path.read_bytes() for path in room.parent.rglob("*") if path.is_file()}
