@@ -96,20 +96,6 @@ def perspective_views(points: np.ndarray, furniture: Furniture) -> list[np.ndarr
     return [views[corner] for corner in np.argsort(np.array(hidden) - FRONTS * facing, kind="stable")]
 
 
-def turning_matrices(points: np.ndarray, count: int) -> list[np.ndarray]:
-    """(4, 4) float camera to world of `count` views around the points (n, 3), metres, all from as far away."""
-    middle = (points.min(0) + points.max(0)) / 2
-    reach = float(np.linalg.norm((points - middle)[:, [0, 2]], axis=1).max())
-    turn = np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
-    x, z = middle[0] + reach * np.cos(turn), middle[2] + reach * np.sin(turn)
-    drum = np.concatenate([np.stack([x, np.full(48, y), z], 1) for y in (points[:, 1].min(), points[:, 1].max())])
-    nearest = framed(drum, np.array([1.0, RISE, 0.0]))
-    away, eye = float(nearest[0, 3] - middle[0]), float(nearest[1, 3])
-    target = np.array([middle[0], eye - away * RISE, middle[2]])
-    spots = [(away * np.cos(t), away * RISE, away * np.sin(t)) for t in 2 * np.pi * np.arange(count) / count]
-    return [view_matrix(target + np.array(spot), target) for spot in spots]
-
-
 def framed(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """(4, 4) float camera to world: the nearest in a direction (3,) that has all points (n, 3) in its picture."""
     direction = direction / np.linalg.norm(direction)
@@ -351,8 +337,16 @@ def corner_views(scenery: Scenery) -> Iterator[tuple[View, Scenery]]:
 
 def turning_views(scenery: Scenery, count: int) -> list[View]:
     """`count` views around the whole scene, all from as far away, each as far on as the last from the one before."""
-    matrices = turning_matrices(_outermost(scenery), count)
-    return [View(matrix, APERTURE / 2 / FOCAL_LENGTH, False) for matrix in matrices]
+    points, (lower, upper) = _outermost(scenery), scenery.bounds
+    middle, turn = (lower + upper) / 2, np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
+    reach = float(np.linalg.norm((points - middle)[:, [0, 2]], axis=1).max())
+    x, z = middle[0] + reach * np.cos(turn), middle[2] + reach * np.sin(turn)
+    drum = np.concatenate([np.stack([x, np.full(48, y), z], 1) for y in (lower[1], upper[1])])
+    nearest = framed(drum, np.array([1.0, RISE, 0.0]))
+    away, eye = float(nearest[0, 3] - middle[0]), float(nearest[1, 3])
+    target = np.array([middle[0], eye - away * RISE, middle[2]])
+    spots = (away * np.array([np.cos(t), RISE, np.sin(t)]) for t in 2 * np.pi * np.arange(count) / count)
+    return [View(view_matrix(target + spot, target), APERTURE / 2 / FOCAL_LENGTH, False) for spot in spots]
 
 
 def _outermost(scenery: Scenery) -> np.ndarray:

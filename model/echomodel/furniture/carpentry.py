@@ -233,10 +233,6 @@ def back_rest(
     style: Style, kind: str, w: float, y0: float, y1: float, z: float, thick: float, rake: float
 ) -> list[Solid]:
     """The back of a chair from the seat's height y0 up to y1, its foot on the plane z, leaning back by `rake`."""
-    return of_role("back", _back(style, kind, w, y0, y1, z, thick, rake))
-
-
-def _back(style: Style, kind: str, w: float, y0: float, y1: float, z: float, thick: float, rake: float) -> list[Solid]:
     length = (y1 - y0) / np.cos(rake)
     a = w / 2
 
@@ -261,7 +257,7 @@ def _back(style: Style, kind: str, w: float, y0: float, y1: float, z: float, thi
         middle = y0 + length * 0.62
         turn = rotation(x=-rake)
         centre = turn @ np.array([0, middle - y0, 0]) + [0, y0, z]
-        return [*stems, ball(centre, (a * 0.95, length * 0.4, t / 2), "fabric", power=2.6, turn=turn)]
+        return [*stems, ball(centre, (a * 0.95, length * 0.4, t / 2), "fabric", "back", 2.6, turn)]
     posts = both(lean(a - post / 2 - post / 2, a - post / 2 + post / 2, -0.08, 1, post, radius=0.006))
     rail = 0.1 + 0.12 * style.contrast
     if kind == "frame":

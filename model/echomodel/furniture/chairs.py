@@ -252,14 +252,8 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
         parts = of_role("leg", [turned((0, 0, 0), r, seat - thick), foot, rest], material="metal")
     else:
         legs = style.legs if style.legs in ("tapered", "splayed", "straight", "sled") else "splayed"
-        upright_legs = legs != "splayed"
-        share = (0.7 if style.round_tops > 0.5 else 0.86) if upright_legs else 0.98
-        parts += base(style, w * share, d * share * 0.96, seat - thick * 0.6, 0.032 * style.bulk, legs)
-        spread = min(np.tan(style.splay) * (seat - thick * 0.6), 0.3 * min(w, d * 0.96) * share)
-        lean = 0.0 if upright_legs else spread * 0.35
-        x, z, y, t = w * share / 2 - 0.02 - lean, d * share * 0.48 - 0.02 - lean, seat * 0.35, 0.011
-        parts += both(box((-x, y - t, z - t), (x, y + t, z + t), "metal", 0.0, "rail"), axis=2)
-        parts += both(box((x - t, y - t, -z), (x + t, y + t, z), "metal", 0.0, "rail"))
+        share = 0.98 if legs == "splayed" else 0.7 if style.round_tops > 0.5 else 0.86
+        parts += base(style, w * share, d * share * 0.96, seat - thick * 0.6, 0.032 * style.bulk, legs, tie=True)
     shape = "round" if style.round_tops > 0.5 else "corners"
     board = top(shape, w * 0.92, d * 0.88, seat, thick, style, "fabric")
     parts.append(replace(board, rounding=thick * 0.4, role="seat"))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, both, box
-from echomodel.furniture.solids import Lathe, Solid, Turned, ball, rotation, tube, turned, wall
+from echomodel.furniture.solids import Lathe, Solid, Tube, Turned, ball, rotation, tube, turned, wall
 from echomodel.furniture.style import Choices, Style
 
 DOWN = rotation(x=np.pi)
@@ -136,21 +136,19 @@ def _chandelier(size: Size, style: Style, choices: Choices) -> list[Solid]:
 def _rings(size: Size, style: Style) -> list[Solid]:
     """One to three glowing rings on thin wires."""
     w, h, d = size
-    angle = np.linspace(0, 2 * np.pi, 33)
     parts: list[Solid] = []
-    count = 1 if style.tufting < 0.4 else 2 if style.tufting < 0.75 else 3
-    for i in range(count):
-        share = 1 - 0.28 * i
-        y = 0.02 + i * min(0.25, h * 0.22)
-
-        def at(turn: np.ndarray, y: float = y, share: float = share) -> np.ndarray:
-            x, z = np.cos(turn) * (w / 2 - 0.02) * share, np.sin(turn) * (d / 2 - 0.02) * share
-            return np.stack([x, np.full(len(turn), y), z], 1)
-
-        parts.append(tube(at(angle), 0.02, "shade"))
-        for foot in at(np.arange(3) * 2 * np.pi / 3):
-            parts.append(tube([foot, [0, h - 0.02, 0]], 0.004, "metal"))
+    for i in range(1 if style.tufting < 0.4 else 2 if style.tufting < 0.75 else 3):
+        share, y = 1 - 0.28 * i, 0.02 + i * min(0.25, h * 0.22)
+        ring = _ring((w / 2 - 0.02) * share, (d / 2 - 0.02) * share, y, 0.02)
+        wires = (tube([foot, [0, h - 0.02, 0]], 0.004, "metal") for foot in ring.points[:-1:11])
+        parts += [ring, *wires]
     return parts
+
+
+def _ring(a: float, b: float, y: float, r: float) -> Tube:
+    """A tube that glows, about an ellipse of half axes a (x) and b (z)."""
+    angle = np.linspace(0, 2 * np.pi, 34)
+    return tube(np.stack([np.cos(angle) * a, np.full(34, y), np.sin(angle) * b], 1), r, "shade")
 
 
 def ceiling_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -177,10 +175,9 @@ def ceiling_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
         glow = box((-w / 2, 0, -d / 2), (w / 2, h * 0.85, d / 2), "shade", min(0.03, h * 0.3) * style.softness)
         return [glow, box((-w * 0.42, h * 0.6, -d * 0.42), (w * 0.42, h, d * 0.42), "metal")]
     if kind == "ring":
-        angle, r = np.linspace(0, 2 * np.pi, 33), min(h * 0.3, w * 0.08)
-        circle = np.stack([np.cos(angle) * (w / 2 - r), np.full(33, r), np.sin(angle) * (d / 2 - r)], 1)
+        r = min(h * 0.3, w * 0.08)
         spokes = [box((-x, r, -z), (x, r + 0.03, z), "metal") for x, z in ((w / 2 - r, 0.012), (0.012, d / 2 - r))]
-        return [tube(circle, r, "shade"), *spokes, _disc(0, r, 0, w * 0.16, d * 0.16, h - r)]
+        return [_ring(w / 2 - r, d / 2 - r, r, r), *spokes, _disc(0, r, 0, w * 0.16, d * 0.16, h - r)]
     if kind == "bowl":
         high = w * 0.2, d * 0.2
         bowl = turned((0, h * 0.8, 0), (w / 2, d / 2), h * 0.8, high, rounding=0.02, turn=DOWN, material="shade")

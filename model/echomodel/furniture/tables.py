@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, between_legs, both, box, of_role, pedestal, post, top, within
-from echomodel.furniture.fronts import drawers, hutch
+from echomodel.furniture.fronts import boards, drawers, hutch
 from echomodel.furniture.solids import Block, Solid, rotation, turned
 from echomodel.furniture.style import Choices, Style
 
@@ -92,14 +92,8 @@ def side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
         upper = turned((0, h / 2, 0), (w * waist, d * waist), h / 2 - thick, (w * 0.45, d * 0.45), material="accent")
         return [*parts, *of_role("leg", [lower, upper])]
     if kind == "cube" and shape != "round":
-        t = 0.02
-        return [
-            top("square", w, d, h, thick, style),
-            *both(box((w / 2 - t, 0, -d / 2), (w / 2, h - thick, d / 2), role="side")),
-            box((-w / 2, 0, -d / 2), (w / 2, t * 1.5, d / 2), role="bottom"),
-            box((-w / 2, h * 0.5, -d / 2), (w / 2, h * 0.5 + t, d / 2), role="shelf"),
-            box((-w / 2, 0, -d / 2), (w / 2, h - thick, -d / 2 + t), role="back"),
-        ]
+        shelf = box((-w / 2, h * 0.5, -d / 2), (w / 2, h * 0.5 + 0.02, d / 2), role="shelf")
+        return [*parts, *boards((-w / 2, 0, -d / 2), (w / 2, h - thick, d / 2), 0.02, 0.02), shelf]
     if kind == "c" and shape != "round":
         t = 0.014
         x, z = w / 2 * 0.9, d * 0.4
@@ -133,13 +127,9 @@ def corner_side_table(size: Size, style: Style, choices: Choices) -> list[Solid]
     w, h, d = size
     t = max(style.top * 0.8, 0.018)
     shape = "corners" if style.corner > 0.5 else "square"
-    parts: list[Solid] = [top(shape, w, d, h, t, style)]
-    legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
-    share = within(shape, style)
-    parts += base(style, w * share, d * share, h - t, 0.035 * style.bulk, legs)
-    parts += of_role("shelf", [top("square", w * share * 0.95, d * share * 0.95, h * 0.28, t, style, "accent")])
+    parts = _on_legs(top(shape, w, d, h, t, style), shape, size, t, style, 0.035 * style.bulk, 0.28)
     if choices.chance("extra", 0.6):
-        x, z = w * share * 0.47, d * share * 0.47
+        x, z = (0.47 * side * within(shape, style) for side in (w, d))
         parts += drawers((-x, h * 0.68), (x, h - t), z, 1, 1, style)
     return parts
 
@@ -149,10 +139,8 @@ def console_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     w, h, d = size
     t = max(style.top, 0.02)
     shape = "corners" if style.corner > 0.7 else "square"
-    parts: list[Solid] = [top(shape, w, d, h, t, style)]
+    parts = _on_legs(top(shape, w, d, h, t, style), shape, size, t, style, _leg(style, w * 0.5, h) * 0.85)
     w, d = w * within(shape, style), d * within(shape, style)
-    legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
-    parts += base(style, w * 0.96, d * 0.92, h - t, _leg(style, w * 0.5, h) * 0.85, legs)
     if choices.chance("front", 0.55):
         columns = choices.whole("columns", 1, 4)
         parts += drawers((-w * 0.46, h - t - 0.14), (w * 0.46, h - t), d * 0.42, 1, columns, style)
