@@ -79,6 +79,8 @@ def collider(mesh: Mesh, category: str) -> Collider:
     if kind == "convexHull":
         return standing_hull(mesh)
     light = _reduced(mesh, FACES)
+    if light.is_watertight and light.volume < 0:  # of somebody's mirrored model
+        light.invert()
     return Collider("collider", Mesh(flush(np.asarray(light.vertices), mesh.bounds), light.faces), kind)
 
 

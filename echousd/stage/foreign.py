@@ -28,7 +28,7 @@ from echousd.stage.labels import (
     labels,
     spaced,
 )
-from echousd.stage.read import RoomPrims, faults, node_names, room_graph
+from echousd.stage.read import RoomPrims, faults, node_names, room_graph, value
 from echousd.stage.units import Z_TO_Y, to_metres
 from echousd.stage.values import lineage
 
@@ -159,6 +159,10 @@ def _read(
             prims.PruneChildren()
             continue
         words = list(labels(prim))
+        if value(prim, "visibility") == UsdGeom.Tokens.invisible:
+            skipped.update(["hidden"] if words else [])
+            prims.PruneChildren()
+            continue
         said.extend((*words, prim.GetName()))
         category, told = next(filter(None, map(known_category, words)), None), {}
         if category is None and names and not words:

@@ -13,9 +13,10 @@ from shapely.geometry import MultiPoint, Point
 from echomodel.data.shapeset import piece as styled
 from echomodel.furniture import solids
 from echomodel.furniture.style import WIDTH, piece_of
-from echomodel.triangles import box
+from echomodel.triangles import Mesh, box
 from echomodel.vocabulary import vocabulary
 from echousd.shapes import joinery
+from echousd.shapes.colliders import collider as light_collider
 from echousd.shapes.geometry import FRAME, Origin
 from echousd.shapes.joinery import COLLIDERS, SLACK, assembled, convex_pieces, covering, within_budget
 
@@ -27,6 +28,13 @@ BENCHMARK = Path(__file__).parents[3] / "benchmarks" / "parts_cost.py"
 def piece(category: str, size: np.ndarray = SIZE, seed: int = 0, faces: int = 5000):
     parts = solids(category, *piece_of(np.random.default_rng(seed).uniform(-1, 1, WIDTH)), size)
     return assembled(parts, size, faces=faces, origin=Origin("parts"))
+
+
+def test_colliders_of_mirrored_models_are_not_inside_out():
+    seat = trimesh.creation.box((1.0, 0.8, 0.6))
+    for faces in (seat.faces, seat.faces[:, ::-1]):
+        made = light_collider(Mesh(np.asarray(seat.vertices), np.asarray(faces)), "sofa").mesh.trimesh
+        assert made.volume == pytest.approx(0.48)
 
 
 @pytest.mark.parametrize("category", ["dresser", "plant", "multi_seat_sofa", "bookshelf", "tv", "pendant_lamp"])

@@ -63,6 +63,20 @@ def test_y_up(metres, yaw):
     assert graph.room.type == "bedroom"
 
 
+def test_what_is_hidden_is_not_there():
+    stage = stage_of("Y", 1.0)
+    UsdGeom.Xform.Define(stage, "/World/hidden_group").MakeInvisible()
+    for name in ("bed", "hidden_bed", "hidden_blob", "hidden_group/bed"):
+        thing = UsdGeom.Xform.Define(stage, f"/World/{name}")
+        label(thing.GetPrim(), "bed" if name.endswith("bed") else "blob")
+        box_mesh(stage, f"/World/{name}/mesh", (0, 0, 0), (1, 1, 1))
+        if name in ("hidden_bed", "hidden_blob"):
+            thing.MakeInvisible()
+    with pytest.warns(SkippedPrims, match=r"labelled prims that became no node: hidden \(2\)$"):
+        graph = read_graph(stage)
+    assert graph.names == ("bed",)
+
+
 @pytest.mark.parametrize("metres", [1.0, 0.01])
 @pytest.mark.parametrize("yaw", [0.0, 0.7, -2.5])
 def test_z_up(metres, yaw):
