@@ -242,7 +242,8 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
         found[here] = _asked(world, seen.of(number[here]), number[here], times)
     thin = asked & near.reshape(shape)[coarse]
     found[thin, :5] = _pooled(seen.of(number[thin]), found[thin, :5])
-    for layers, rings in ((slice(3), RINGS), (slice(3, 5), RINGS[:3])):
+    inside = world.view.inside
+    for layers, rings in ((slice(3), RINGS), (slice(3, 5), RINGS[:3]), (slice(5, 6), () if inside else RINGS)):
         found[..., layers] = smooth_light(found[..., layers], normal[coarse], point[coarse], rings)
     lit = smooth_light((found[..., 5:] > 0).astype(np.float32), normal[coarse], point[coarse], RINGS[:1])
     mixed = ((lit > 0.01) & (lit < 0.99))[..., 0].repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
@@ -255,7 +256,7 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     light /= np.maximum(weight, 1)
     rest = np.flatnonzero(met & (weight[..., 0] == 0))
     light.reshape(-1, 6)[rest] = _pooled(seen.of(rest), _asked(world, seen.of(rest), rest, often // 2))
-    border = np.flatnonzero(met & mixed & world.view.inside)  # of the sun's light: sharper than two pixels
+    border = np.flatnonzero(met & mixed & inside)  # of the sun's light: sharper than two pixels
     there, facing, shift = seen.point[border], seen.normal[border], _shifts(world, border)[:, :2]
     suns = [_sunny(world, there + BEFORE * facing, facing, _even(n, shift)) for n in range(often)]
     light.reshape(-1, 6)[border, 5] = np.mean(suns, 0)

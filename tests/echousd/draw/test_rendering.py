@@ -130,6 +130,21 @@ def test_light_is_smoothed_within_a_plane_only():
     assert abs(smooth[:, 10:].mean() - 6) < 0.1
 
 
+def test_soft_shadows_from_above_have_no_grain():
+    """The sun outside is a wide disc: half in shadow is a gradient, no pattern of dots."""
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    for name, size, middle in (("floor", (8.0, 0.1, 8.0), (0.0, 0.0, 0.0)), ("wall", (0.2, 3.0, 8.0), (-1.0, 1.5, 0.0))):
+        box = UsdGeom.Cube.Define(stage, f"/{name}")
+        box.CreateSizeAttr(1.0)
+        box.AddTranslateOp().Set(Gf.Vec3d(*middle))
+        box.AddScaleOp().Set(Gf.Vec3f(*size))
+    bright = pixels(render_stage(stage, view="top", size=240)).mean(-1)[60:180]
+    assert np.ptp(bright) > 0.1
+    beside = np.abs(np.diff(bright, axis=0))  # along the wall nothing changes
+    assert np.quantile(beside, 0.99) < 0.004
+
+
 def test_one_looks_out_of_windows_and_past_walls_that_are_away(tmp_path):
     data = echousd.generate(
         small_graph(), model=StandIn(), shapes="boxes", place=False, options=RoomOptions(walls=True, dress="none")
