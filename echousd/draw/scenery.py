@@ -77,9 +77,10 @@ class Scenery:
 
     @cached_property
     def largest(self) -> tuple[int, int]:
-        """Number of the largest face that looks up, and of the largest of a wall."""
-        area = area_normals(self.triangles)
-        level, upright = area[:, 1] * (self.normals[:, 0, 1] > 0), np.linalg.norm(area, axis=1) * (self.wall >= 0)
+        """Number of the largest face that looks up, and of the largest pale one of a wall."""
+        area, pale = area_normals(self.triangles), self.flat_colors.mean(1) ** 2
+        level = area[:, 1] * (self.normals[:, 0, 1] > 0)
+        upright = np.linalg.norm(area, axis=1) * (self.wall >= 0) * pale
         return int(level.argmax()), int(upright.argmax())
 
     @cached_property

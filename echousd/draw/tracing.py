@@ -444,7 +444,8 @@ class Hits(NamedTuple):
 def _light(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarray:
     """(n, 6) what falls on points by one sample of the sun, a window and a lamp, and what is around, see `_asked`."""
     light, sun = _direct(world, hits, *(_even(sample, part) for part in (shift[:, :2], shift[:, 2:])))
-    light = np.pad(light + np.float32(DIM * max(world.scenery.lights.sky, 0.1)), ((0, 0), (0, 1)))
+    dim = np.float32(DIM * max(world.scenery.lights.sky, 0.1)) * world.white / max(float(world.white @ LUMA), 1e-6)
+    light = np.pad(light + dim, ((0, 0), (0, 1)))
     for ray in range(AROUND):
         light += _gathered(world, hits, _even(sample * AROUND + ray, shift[:, 2:])) / AROUND
     return np.column_stack([light[:, :3], _mirrored(world, hits, _even(sample, shift[:, :2])), light[:, 3], sun])

@@ -18,14 +18,14 @@ from echousd.stage.pen import Pen, ops
 
 FAR = 10.0  # widths of the room that the camera above is away: heights hardly show
 TENTHS = 0.01  # what a millimetre is in USD's lens unit, tenths of a scene unit, here of a metre
-MAIN = ("bed", "sofa", "board", "screen")  # roles: what a picture of a room is about, the first that is there
+MAIN = ("bed", "sofa", "board", "screen", "cook")  # roles, a task: what a picture is about, the first that is there
 
 
 def main_piece(categories: Sequence[str], furniture: Furniture) -> int | None:
-    """Row of the largest bed, else sofa, table or screen; None where there is none of these."""
-    roles = [vocabulary().category(word).role for word in categories]
-    found = [i for role in MAIN for i in sorted(
-        (i for i, own in enumerate(roles) if own == role), key=lambda i: -furniture.size[i].prod()
+    """Row of the largest bed, else sofa, table, screen or hob; None where there is none of these."""
+    kinds = [vocabulary().category(word) for word in categories]
+    found = [i for word in MAIN for i in sorted(
+        (i for i, kind in enumerate(kinds) if word in (kind.role, kind.task)), key=lambda i: -furniture.size[i].prod()
     )]  # fmt: skip
     return found[0] if found else None
 

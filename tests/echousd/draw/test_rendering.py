@@ -10,12 +10,13 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 from small_room import BARE, StandIn, small_graph
 
 import echousd
+from echousd.draw.bounced import Bounced
 from echousd.draw.drawables import read_drawables
 from echousd.draw.indoors import LUMA
 from echousd.draw.rendering import render, render_stage, render_turn
 from echousd.draw.scenery import class_color, read_scenery
-from echousd.draw.tracing import BACKGROUND, World, _next_room, outside, smooth_light
-from echousd.draw.views import stage_views
+from echousd.draw.tracing import BACKGROUND, Hits, World, _light, _next_room, embree, outside, smooth_light
+from echousd.draw.views import stage_views, turning_views
 from echousd.options import RoomOptions
 
 
@@ -134,7 +135,8 @@ def test_soft_shadows_from_above_have_no_grain():
     """The sun outside is a wide disc: half in shadow is a gradient, no pattern of dots."""
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-    for name, size, middle in (("floor", (8.0, 0.1, 8.0), (0.0, 0.0, 0.0)), ("wall", (0.2, 3.0, 8.0), (-1.0, 1.5, 0.0))):
+    boxes = ("floor", (8.0, 0.1, 8.0), (0.0, 0.0, 0.0)), ("wall", (0.2, 3.0, 8.0), (-1.0, 1.5, 0.0))
+    for name, size, middle in boxes:
         box = UsdGeom.Cube.Define(stage, f"/{name}")
         box.CreateSizeAttr(1.0)
         box.AddTranslateOp().Set(Gf.Vec3d(*middle))
@@ -172,8 +174,27 @@ def test_one_looks_out_of_windows_and_past_walls_that_are_away(tmp_path):
     ground = scenery.flat_colors[np.flatnonzero(scenery.normals[:, 0, 1] > 0.9)]
     off = np.abs(ground / (floor / floor.max()) - (ground / (floor / floor.max()))[:, :1]).max(1)
     assert off.min() < 0.01  # a colour that lies on the floor here
+    accent = scenery.wall[scenery.largest[1]]
+    dark = np.where((scenery.wall == accent)[:, None], 0.3, 1.0).astype(np.float32)
+    painted = replace(scenery, flat_colors=scenery.flat_colors * dark)
+    assert painted.wall[painted.largest[1]] != accent  # beyond a passage no wall is like an accent wall
     outwards = middle + 5 * (middle - eye) * (1, 0, 1)
     assert len(scenery.without_near_walls(outwards).panes) < len(scenery.panes)
+
+
+def test_what_light_there_is_everywhere_has_the_colour_of_the_rooms():
+    """Beside warm lamps a neutral one would look blue."""
+    scenery = read_scenery(cube_stage())
+    view = replace(turning_views(scenery, 2)[0], inside=True)
+    warm = np.array([1.0, 0.8, 0.5], np.float32)
+    world = World(
+        embree(scenery.triangles), scenery, view, 64, np.zeros(4), Bounced.dark(*scenery.bounds), 0.0, white=warm
+    )
+    up = np.array([(0.0, 1.0, 0.0)], np.float32)
+    light = _light(
+        world, Hits(np.array([(1.0, 1.2, 0.0)], np.float32), up, up, np.zeros(1)), 0, np.zeros((1, 4), np.float32)
+    )
+    np.testing.assert_allclose(light[0, :3] / light[0, 0], warm, rtol=1e-4)
 
 
 @pytest.mark.parametrize(("opacity", "size", "faces"), [(0.3, 1.0, 2), (0.3, 0.1, 4), (0.9, 1.0, 4)])

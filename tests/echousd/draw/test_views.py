@@ -8,6 +8,7 @@ import shapely
 
 from echousd.draw.sight import ASPECT, RAYS, Furniture, filled
 from echousd.draw.views import APERTURE, LENSES, _shown, _walls, bare_share, inside_view, view_matrix
+from echousd.layers.cameras import main_piece
 
 FLOOR = np.array([(0.0, 0.0), (0.0, 4.0), (5.0, 4.0), (5.0, 0.0)])
 
@@ -182,3 +183,12 @@ def test_a_small_dining_room_has_its_chairs_whole_but_for_a_foot(at) -> None:
     group = boxes((1.4, 0.75, 0.85, x, 0.0, z, 0.0), *chairs)
     view = inside_view(floor, group, 2.6, main=0)
     assert min(within(corners, *view) for corners in group.corners) >= 7 / 8
+
+
+@pytest.mark.parametrize(("words", "main"), [
+    (("fridge", "sink_unit", "hob_unit"), 2), (("hob_unit", "dining_table"), 1), (("fridge", "tall_unit"), None),
+])  # fmt: skip
+def test_a_kitchen_without_a_table_is_about_its_hob(words, main):
+    count = len(words)
+    furniture = Furniture(np.ones((count, 3)), np.zeros((count, 3)), np.zeros(count))
+    assert main_piece(words, furniture) == main
