@@ -48,6 +48,7 @@ ALONG, OFF = (0.2, 0.35, 0.5, 0.65, 0.8), 0.4  # or along a wall, as shares of i
 BEFORE_IT, TURNS = 3.4, np.arange(8) * np.pi / 4  # or so many metres around the main piece, where the room is so large
 MARGIN = 1.06
 RISE = 0.62  # of a camera outside over the room's middle, for a metre that it is away
+WIDE = 7.0  # metres of a scene from which on it is seen from higher up: over the walls of several rooms
 FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than their sides is worth
 
 
@@ -91,7 +92,8 @@ def perspective_views(points: np.ndarray, furniture: Furniture) -> list[np.ndarr
     """
     corners = np.array([(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)])
     facing = corners @ (furniture.facing + np.array([1e-3, 2e-3]))
-    views = [framed(points, np.array([0.55 * x, RISE, 0.85 * z])) for x, z in corners]
+    rise = RISE * max(1.0, np.ptp(points[:, ::2], axis=0).max() / WIDE)
+    views = [framed(points, np.array([0.55 * x, rise, 0.85 * z])) for x, z in corners]
     hidden = [furniture.blocked(view[:3, 3])[1].mean(1).sum() for view in views]
     return [views[corner] for corner in np.argsort(np.array(hidden) - FRONTS * facing, kind="stable")]
 

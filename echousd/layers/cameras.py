@@ -31,9 +31,9 @@ def main_piece(categories: Sequence[str], furniture: Furniture) -> int | None:
 
 
 def opening_boxes(room: RoomData) -> Furniture:
-    """Doors, windows and passages as boxes of 2 cm at the inner side of their walls."""
+    """Doors and windows as boxes of 2 cm at the inner side of their walls; through passages one sees bare walls."""
     corners, rows = room.graph.room.corners, []
-    for opening in room.graph.room.openings if corners is not None else ():
+    for opening in (one for one in room.graph.room.openings if corners is not None and one.kind != "passage"):
         x, z = segment(corners, opening).mean(0)
         yaw = np.arctan2(*inward_normal(corners, opening.edge))
         rows.append((opening.width, opening.height, 0.02, x, opening.sill, z, yaw))

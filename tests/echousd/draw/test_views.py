@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import shapely
 
+from echomodel.openings import Opening
 from echousd.draw.sight import ASPECT, RAYS, Furniture, filled
-from echousd.draw.views import APERTURE, LENSES, _shown, _walls, bare_share, inside_view, view_matrix
-from echousd.layers.cameras import main_piece
+from echousd.draw.views import APERTURE, LENSES, _shown, _walls, bare_share, inside_view, perspective_views, view_matrix
+from echousd.graph import Node, RoomSpec, SceneGraph
+from echousd.layers.cameras import main_piece, opening_boxes
 
 FLOOR = np.array([(0.0, 0.0), (0.0, 4.0), (5.0, 4.0), (5.0, 0.0)])
 
@@ -192,3 +196,25 @@ def test_a_kitchen_without_a_table_is_about_its_hob(words, main):
     count = len(words)
     furniture = Furniture(np.ones((count, 3)), np.zeros((count, 3)), np.zeros(count))
     assert main_piece(words, furniture) == main
+
+
+def test_wide_scenes_are_seen_from_higher_up():
+    """Over the walls between the rooms of a home."""
+    furniture = Furniture(np.ones((1, 3)), np.zeros((1, 3)), np.zeros(1))
+
+    def steep(width: float) -> float:
+        points = np.array([(x, y, z) for x in (0.0, width) for y in (0.0, 2.6) for z in (0.0, width)])
+        back = perspective_views(points, furniture)[0][:3, 2]
+        return float(back[1] / np.hypot(back[0], back[2]))
+
+    assert steep(4.0) == pytest.approx(steep(6.9))
+    assert steep(14.0) == pytest.approx(2 * steep(4.0))
+
+
+def test_one_looks_at_no_passage():
+    """What lies beyond it is not drawn, so that it counts as bare wall; doors and windows do not."""
+    corners = ((-2.0, -2.0), (-2.0, 2.0), (2.0, 2.0), (2.0, -2.0))
+    openings = tuple(Opening(kind, kind, edge, 2.0, 0.9, 2.0) for edge, kind in enumerate(("door", "passage")))
+    graph = SceneGraph(RoomSpec("hallway", floor_polygon=corners, openings=openings), (Node("bench", "bench"),), ())
+    room = SimpleNamespace(graph=graph)
+    assert opening_boxes(room).position[:, [0, 2]].round(2).tolist() == [[-2.0, 0.45]]
