@@ -25,7 +25,7 @@ DIM = 0.02  # radiance at every place of a room without lamps and windows, so th
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
 ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.6, 0.85), (0.43, 0.61), 70, 15.0
 EVEN = 0.18  # power of the light's brightness that eyes and those who photograph rooms take from it
-WHITE, PAPER = 92, 0.95  # what so many of a hundred points are darker than comes to no more than that
+WHITE, PAPER = 88, 0.95  # what so many of a hundred points are darker than comes to no more than that
 CONTRAST, KNEE = 1.4, 0.6  # power about what is bright, and from where on highlights are rolled off
 HUE = 0.6  # share of colours that keep their hue where they are bright; film bleaches them
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)

@@ -340,6 +340,8 @@ def test_exposure_brings_dark_and_bright_rooms_to_one_tone():
     assert np.percentile(bright, SHARE) == pytest.approx(BRIGHT[1], abs=0.02)
     assert np.median(exposed(room, white, day=0.0)) < 0.8 * np.median(bright)  # the evening is darker
     assert exposed(1e-3 * room, white).mean() < 0.1  # night stays night
+    sunny = np.where(np.arange(20)[:, None, None] < 2, 6.0, room)  # a tenth of the picture in the sun
+    assert np.median(exposed(sunny, white)) > 0.8 * np.median(bright)
     warm = np.array([1.0, 0.7, 0.4])
     left = exposed(warm * room, warm).mean((0, 1)) / exposed(room, white).mean((0, 1))
     assert 1.0 < left[0] / left[2] < 1.6  # of 2.5: the eye adapts to most of a lamp's colour
