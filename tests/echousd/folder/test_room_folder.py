@@ -1,16 +1,20 @@
 import errno
 import json
 import os
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 from dying_process import killed
+from pydantic import ValidationError
 from stopped_disk import stopped_disk
 
+from echousd.folder import folder
 from echousd.folder.folder import check_output, check_writable, claim, recover, write_together
 from echousd.folder.found import room_at
 from echousd.folder.lock import LOCK
-from echousd.pending import STAGING
+from echousd.folder.manifest import Manifest
+from echousd.pending import JOURNAL, STAGING
 
 OLD = {"assets/a.usda": b"a old", "layers/one.usda": b"one old", "room.usda": b"root old"}
 NEW = {"assets/a.usda": b"a new", "assets/b.usda": b"b new", "layers/one.usda": b"one new", "room.usda": b"root new"}
@@ -41,6 +45,24 @@ def test_writes_changes_only_and_leaves_other_files(tmp_path):
     assert (tmp_path / "assets/a.usda").stat().st_mtime_ns == untouched
     assert (tmp_path / "notes.txt").read_text() == "mine"
     assert not (tmp_path / STAGING).exists()
+
+
+def test_a_journal_is_on_the_disk_after_all_that_it_names(tmp_path, monkeypatch):
+    flushed = []
+    monkeypatch.setattr(folder, "flush", lambda path: flushed.append((path.name, (tmp_path / JOURNAL).exists())))
+    entry = folder.Move(staged="0", to="room.usda", digest="")
+    folder.write_journal(tmp_path, folder.Journal(move=[entry], remove=[]))
+    assert flushed == [("0", False), ("journal.new", False), (tmp_path.name, True)]
+
+
+@pytest.mark.parametrize(("field", "most"), [("restores", 4096), ("store", 4096), ("name", 255)])
+def test_paths_of_a_manifest_are_no_longer_than_paths_are(field, most):
+    told = {"echousd_room": 1, "name": "room", "files": {}}
+    for length, taken in ((most, True), (most + 1, False)):
+        step = {"number": 1, "steps": [], "restores": "a" * length, "adds": []}
+        more = {"history": [step]} if field == "restores" else {field: "a" * length}
+        with nullcontext() if taken else pytest.raises(ValidationError):
+            Manifest.model_validate(told | more)
 
 
 def test_removes_what_no_longer_belongs_and_empty_folders(tmp_path):

@@ -114,6 +114,11 @@ def test_what_a_folder_is_held_for_is_told_as_long_as_it_is_held(tmp_path, monke
     assert run_of(tmp_path) == ""
 
 
+def test_a_hundred_characters_of_a_lock_are_told(tmp_path):
+    (tmp_path / LOCK).write_text("process " + "1" * 200)
+    assert owner_of(tmp_path) == "process " + "1" * 92
+
+
 def test_on_disks_without_locks_the_marker_decides(tmp_path, monkeypatch):
     monkeypatch.setattr(locks, "FileLock", SoftFileLock)
     with locked(tmp_path):
