@@ -5,10 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from echomodel.compact.draft import PAIR_FEATURES, WALL_FEATURES
 from echomodel.compact.furniture import Furniture
 from echomodel.compact.latent import Latents
-from echomodel.compact.layout import BOX, Layout
+from echomodel.compact.layout import BOX, PAIR_FEATURES, WALL_FEATURES, Layout
 from echomodel.compact.learned import Names, places
 from echomodel.compact.pairs import Echo, Pairs
 from echomodel.config import CompactConfig

@@ -14,7 +14,7 @@ from scipy.spatial.distance import pdist, squareform
 from scipy.stats import entropy, ks_2samp
 
 from echomodel.boxes import Boxes
-from echomodel.compact.draft import measurable, seen_from, wall_features
+from echomodel.compact.layout import measurable, seen_from, wall_features
 from echomodel.metrics.pointsets import compared
 from echomodel.metrics.statistics import Figure, spread
 from echomodel.roomboxes import RoomBoxes

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
-from echomodel.compact.draft import FARTHEST, measurable, pair_features, wall_features
+from echomodel.compact.layout import FARTHEST, measurable, pair_features, wall_features
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import box_scale
 from echomodel.objective import Plan
@@ -162,7 +162,7 @@ def as_carried(batch: LayoutBatch, boxes: Boxes) -> Boxes:
 
 
 def measure_distance(batch: LayoutBatch, boxes: Boxes, floor: Tensor, level: Tensor, free: Tensor) -> Tensor:
-    """Mean difference of what predicted and true boxes measure (`compact.draft`), weighted by (1 - level)^2.
+    """Mean difference of what predicted and true boxes measure (`compact.layout`), weighted by (1 - level)^2.
 
     It asks for a back at the wall and a chair at the table to the centimetre, where the square of a normalised position
     would be content with a hand's breadth. It pulls at places and headings alone: sizes would shrink to their median.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.compact.draft import PAIR_FEATURES, WALL_FEATURES, pair_features, wall_features
+from echomodel.compact.layout import PAIR_FEATURES, WALL_FEATURES, pair_features, wall_features
 from echomodel.compact.pairs import pairs_of
 from echomodel.graph import GraphBatch
 from echomodel.surroundings import centred, padded
