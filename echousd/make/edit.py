@@ -21,7 +21,7 @@ from echousd.graph.consistency import faults_of
 from echousd.graph.floors import check_space, with_plan_of
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
-from echousd.make.following import attending, carried, in_the_way, movable
+from echousd.make.following import STILL, attending, carried, in_the_way, movable
 from echousd.make.layouts import Draws, best_boxes, check_objects, model_of, most_drafts, room_floor, with_sizes
 from echousd.make.reading import SavedRoom, read_room
 from echousd.make.verdicts import layout_outcome, warn_of_faults
@@ -92,9 +92,10 @@ def edit(
     along = begun[0][1] - moving
     stated = _pinned(graph, saved.graph, begun[0][0], fresh, moving)
     whole = all(None not in (node.size, node.position, node.yaw) for node in stated.nodes)
-    if asked.place and whole and moving | fresh:
+    put = fresh | _put_elsewhere(stated, saved)
+    if asked.place and whole and moving | put:
         there = _boxes_of(stated)  # before anything is searched in vain
-        moving |= in_the_way(saved, graph, there, layout_outcome(graph, there), along, moving | fresh)
+        moving |= in_the_way(saved, graph, there, layout_outcome(graph, there), along, moving | put)
     shaped_anew = fresh | restyled(saved, graph, fresh)
     check_files(graph, beside, outside, str(room), fresh)
     styles = style_groups(graph)
@@ -161,7 +162,7 @@ def edit(
             layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=asked.walls)
         if model_used is None or number == ROUNDS - 1:
             break
-        way = in_the_way(saved, graph, layouts[0], outcomes[0], along, moving | fresh)
+        way = in_the_way(saved, graph, layouts[0], outcomes[0], along, moving | put)
         if not way:
             break
         moving |= way
@@ -240,6 +241,16 @@ def _pinned(
             node = node.replaced(**fields)
         nodes.append(node)
     return graph.replaced(nodes=tuple(nodes))
+
+
+def _put_elsewhere(stated: SceneGraph, saved: SavedRoom) -> set[str]:
+    """Names of what stands elsewhere than in the saved room, locked or not."""
+    was = dict(zip(saved.graph.names, zip(saved.boxes.position, saved.boxes.yaw, strict=True), strict=True))
+    there = [(node.name, node.position, node.yaw) for node in stated.nodes if node.name in was]
+    return {
+        name for name, position, yaw in there if position and yaw is not None
+        and max(np.abs(was[name][0] - position).max(), abs(was[name][1] - yaw)) > STILL
+    }  # fmt: skip
 
 
 def _boxes_of(graph: SceneGraph) -> Boxes:

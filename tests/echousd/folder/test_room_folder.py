@@ -55,6 +55,17 @@ def test_a_journal_is_on_the_disk_after_all_that_it_names(tmp_path, monkeypatch)
     assert flushed == [("0", False), ("journal.new", False), (tmp_path.name, True)]
 
 
+@pytest.mark.parametrize("entry", ["move", "remove"])
+def test_a_journal_names_no_file_of_the_runs_themselves(tmp_path, entry):
+    (tmp_path / STAGING).mkdir()
+    own = f"{STAGING}/0"
+    told = {"move": [{"staged": "0", "to": own, "digest": ""}], "remove": [{"path": own, "digest": ""}]}
+    journal = folder.Journal.model_validate({"move": [], "remove": [], entry: told[entry]})
+    (tmp_path / STAGING / JOURNAL).write_text(journal.model_dump_json())
+    with pytest.raises(ValueError, match=rf"{entry}\[0\] names .*, where runs keep their own files"):
+        folder.read_journal(tmp_path)
+
+
 @pytest.mark.parametrize(("field", "most"), [("restores", 4096), ("store", 4096), ("name", 255)])
 def test_paths_of_a_manifest_are_no_longer_than_paths_are(field, most):
     told = {"echousd_room": 1, "name": "room", "files": {}}
