@@ -110,7 +110,7 @@ def sofa_ahead(plan: Plan) -> Found:
     i, j = plan.pairs(sofas, others, least=True)
     other = plan.group[i] != plan.group[j]
     i, j = i[other], j[other]
-    return plan.nearest(i, j, plan.more_ahead(i, j, AHEAD, COVERED), AHEAD) if len(i) else nobody(plan.size)
+    return plan.nearest(i, j, plan.more_ahead(i, j, AHEAD, COVERED), AHEAD)
 
 
 BARE_END = 0.45  # share of a room's length from a wall to the nearest large piece: 87 % of real rooms

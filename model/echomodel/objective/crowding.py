@@ -7,7 +7,7 @@ import math
 from echomodel.arrays import Array, at_least, cast, dot, held, rows
 from echomodel.objective.access import to_wall, wall_ahead
 from echomodel.objective.company import Seats, seats_at
-from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody, worst
+from echomodel.objective.plan import FAR, Found, Plan, found, joined, worst
 
 # Metres between pieces of different groups, by role: the 2nd to 3rd percentile in real rooms.
 APART = {
@@ -178,7 +178,7 @@ def seats_apart(plan: Plan) -> Found:
     i, j = plan.pairs(seats, seats, least=True)
     keep = (plan.smaller[i] < plan.smaller[j]) & plan.kin(i, j)
     i, j = i[keep], j[keep]
-    return plan.nearest(i, j, plan.apart(i, j) - HAND, HAND) if len(i) else nobody(plan.size)
+    return plan.nearest(i, j, plan.apart(i, j) - HAND, HAND)
 
 
 def _clear(

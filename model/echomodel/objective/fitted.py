@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from echomodel.arrays import Array, at_least, full, norm, rows, sum_of
 from echomodel.objective.access import before_fronts
-from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody, worst
+from echomodel.objective.plan import FAR, Found, Plan, found, joined, worst
 from echomodel.openings import segment
 from echomodel.sizes import AISLE, LANDING, TALL, TRIANGLE
 
@@ -75,8 +75,6 @@ def work_triangle(plan: Plan) -> Found:
         ends.append((near, _front(plan, at_least(near, 0))))
     there = (xp.stack([number for number, _ in ends]) >= 0).all(0)
     cook, points = cook[there], [point[there] for _, point in ends]
-    if not len(cook):
-        return nobody(plan.size)
     pairs = ((0, 1), (1, 2), (2, 0))
     way = sum(norm(points[a] - points[b]) for a, b in pairs)
     low, high = TRIANGLE
@@ -102,8 +100,6 @@ def hob_safe(plan: Plan) -> Found:
     hobs = plan.which(lambda kind: kind.task == "cook") & plan.standing
     i, j = plan.pairs(hobs, plan.stands("row") & plan.standing)
     who, xp = plan.those(hobs), plan.kit
-    if not len(who):
-        return nobody(plan.size)
     lateral, forward = plan.local(j, i)
     half_width, half_depth = plan.reach(j, i)
     along = xp.cos(plan.yaw[i] - plan.yaw[j])

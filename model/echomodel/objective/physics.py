@@ -32,8 +32,6 @@ def apart(plan: Plan) -> Found:
 def on_floor(plan: Plan) -> Found:
     """Every piece lies within the walls."""
     who = plan.those(plan.walled & plan.moved)
-    if not len(who):
-        return nobody(plan.size)
     inside = plan.inside(footprint(plan.size[who], plan.position[who], plan.yaw[who]), who)
     inside = plan.kit.amin(inside, 1)
     clear = inside if plan.first.rectangle is not None else plan.kit.minimum(inside, _off_corners(plan, who))

@@ -20,8 +20,6 @@ def pendant_over(plan: Plan) -> Found:
     """A pendant hangs over a table, bed or seat, or over the middle of the room."""
     lamps = plan.which(lambda kind: kind.look == "pendant_lamp")
     who, xp = plan.those(lamps & plan.walled), plan.kit
-    if not len(who):
-        return nobody(plan.size)
     i, j = plan.pairs(lamps, (plan.of("board", "bed", "sofa") | plan.stands("head")) & plan.standing)
     corners = plan.walls[0][plan.scene[who]]
     low, high = xp.amin(corners, 1), xp.amax(corners, 1)
@@ -58,8 +56,6 @@ def pendant_centred(plan: Plan) -> Found:
 def pendants_in_row(plan: Plan) -> Found:
     """Several pendants over one table hang in one line along it, apart from each other."""
     i, j = _hung(plan)
-    if len(i) < 2:
-        return nobody(plan.size)
     over, xp = _over(plan, i, j) & plan.of("board")[j], plan.kit
     i, j = i[over], j[over]
     one, other = pairs_in((j[:, None] == j[None]) & (i[:, None] < i[None]))
@@ -73,8 +69,6 @@ def pendants_in_row(plan: Plan) -> Found:
 def lamp_on_surface(plan: Plan) -> Found:
     """A table lamp or television stands on something that can carry it."""
     small = plan.which(lambda kind: kind.support == "table" and not kind.hangs)
-    if not bool(small.any()):
-        return nobody(plan.size)
     i, j = plan.pairs(small, plan.which(lambda kind: kind.carries))
     who, xp = plan.those(small), plan.kit
     lateral, forward = plan.local(i, j)
@@ -123,8 +117,6 @@ def view_free(plan: Plan) -> Found:
 def screen_not_behind(plan: Plan) -> Found:
     """Who sits in the group that watches a screen does not turn the back on it."""
     screen, viewer = _watched(plan)[0].who, _watched(plan)[0].other
-    if not len(screen):
-        return nobody(plan.size)
     chairs = plan.stands("company", "with") & plan.standing & plan.of("seat", "sofa")
     at, i = pairs_in((plan.group[None] == plan.group[viewer][:, None]) & chairs[None])
     keep = i != viewer[at]
