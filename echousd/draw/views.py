@@ -26,7 +26,7 @@ FOCAL_LENGTH = 30.0  # mm: 62 degrees across
 # mm of a camera inside: 74, 81, 90 and 97 degrees across; metres of depth that each costs: wide ones distort
 LENSES, DISTORTED = (24.0, 21.0, 18.0, 16.0), (0.0, 1.5, 5.0, 12.0)
 EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
-SLOPES = (0.05, 0.15, 0.25, 0.36)  # metres that the middle of its picture is lower for a metre ahead
+SLOPES = (0.05, 0.13, 0.22, 0.32)  # metres that the middle of its picture is lower for a metre ahead
 PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
 WHOLE, CLEAR = 1000.0, 30.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
 LOOKED, CHOSEN, TRIED = 48, 3, 32  # eyes of which one view is looked at closely; eyes, and of each so many views
@@ -37,7 +37,7 @@ BEFORE, WALLED = 2.6, 1.4  # metres: what is nearer to the eye fills the picture
 FILLED, BEHIND = 380.0, 45.0  # metres of depth that a picture full of what is near costs, and the main piece's back
 # Metres of depth that each thing costs which the border cuts, and which is beyond it: lamps, what hangs from `HIGH`
 # metres on, and furniture.
-CUTS, HIGH = ((90.0, 12.0), (25.0, 0.0), (25.0, 0.0)), 0.25
+CUTS, HIGH = ((90.0, 40.0), (25.0, 0.0), (25.0, 0.0)), 0.25
 SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width over which it is cord; metres
 UNSEEN, MANY = 6.0, 8.0  # metres of depth that each of so many pieces in the picture is worth
 SHOWN, FAR = 30.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain

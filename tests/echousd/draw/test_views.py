@@ -145,7 +145,7 @@ def test_the_camera_turns_to_have_a_picture_on_the_wall_whole() -> None:
 
 def test_a_thing_costs_what_its_kind_does_where_the_border_cuts_it_and_a_lamp_beyond_it_too() -> None:
     view = view_matrix(np.array([0.0, 1.5, 0.0]), np.array([1.0, 1.5, 0.0]))
-    for place, share in ((0.0, (0, 0, 0)), (1.4, (90, 25, 25)), (4.0, (12, 0, 0))):  # whole, cut, beyond
+    for place, share in ((0.0, (0, 0, 0)), (1.4, (90, 25, 25)), (4.0, (40, 0, 0))):  # whole, cut, beyond
         box = boxes((0.4, 0.4, 0.4, 2.0, 1.3, place, 0.0)).corners
         for kind, cost in enumerate(share):
             fragile = [box if each == kind else box[:0] for each in range(3)]
