@@ -96,7 +96,7 @@ def report(rooms: list[RoomBoxes], noise: float, arguments: argparse.Namespace) 
 def collisions_of(room: RoomBoxes) -> int:
     """Pairs that collide in a room as it is, by placing's own measure."""
     from echomodel.objective.support import allowed_overlap
-    from echousd.place.report import TOUCH
+    from echousd.place.geometry import TOUCH
     from echousd.place.setting import setting_of
 
     none = np.zeros(len(room), bool)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import trimesh
 
     from echomodel.boxes import Boxes
-    from echousd.place.report import Collision
+    from echousd.place.geometry import Collision
     from echousd.shapes.geometry import Geometry
 
 

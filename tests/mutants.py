@@ -46,7 +46,7 @@ GROUPS = {  # modules, and what tests them
                                         "echomodel/test_placement_rules.py", "echomodel/test_turned_relations.py"]),
     "graph": ("echousd/graph", ["echousd/graph"]),
     "stage": ("echousd/stage", ["echousd/stage"]),
-    "edit": ("echousd/make/edit.py", ["echousd/make/test_room_edit.py"]),
+    "edit": ("echousd/make/edit.py", ["echousd/make/test_room_edit.py", "echousd/make/test_following.py"]),
     "folder": ("echousd/folder", ["echousd/folder"]),
     "layers": ("echousd/layers", ["echousd/layers"]),
 }  # fmt: skip

@@ -2,6 +2,6 @@
 
 from echousd.checks.placement import Misplacement
 from echousd.checks.report import RULES, CheckReport, Fault, check
-from echousd.place.report import Collision
+from echousd.place.geometry import Collision
 
 __all__ = ["RULES", "CheckReport", "Collision", "Fault", "Misplacement", "check"]

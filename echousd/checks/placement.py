@@ -14,8 +14,16 @@ from echomodel.openings import SKIRTING, segment
 from echomodel.triangles import along, area_normals, connected_pieces, distances, spread
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import HEIGHT
-from echousd.place.geometry import Floor, axes, depth_inside, floor_from_polygon, pair_indices, separation
-from echousd.place.report import TOUCH, Collision
+from echousd.place.geometry import (
+    TOUCH,
+    Collision,
+    Floor,
+    axes,
+    depth_inside,
+    floor_from_polygon,
+    pair_indices,
+    separation,
+)
 from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding, read_contents, surroundings
 from echousd.stage.labels import known_category
 from echousd.stage.read import RoomPrims

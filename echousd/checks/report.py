@@ -22,8 +22,8 @@ from echousd.folder.manifest import find_manifest
 from echousd.graph import RoomSpec, SceneGraph
 from echousd.graph.consistency import GraphError
 from echousd.graph.floors import check_extents
+from echousd.place.geometry import Collision
 from echousd.place.living import LivingFault, living_faults
-from echousd.place.report import Collision
 from echousd.room import Verdict
 from echousd.stage.contents import RoomContents
 from echousd.stage.encoding import StageError

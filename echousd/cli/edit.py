@@ -184,10 +184,9 @@ def _change(
     from echousd.folder.folder import check_output, writing
     from echousd.folder.found import room_at
     from echousd.folder.history import told
+    from echousd.make.edit import carried, touched
     from echousd.make.edit import edit as change
-    from echousd.make.edit import touched
     from echousd.make.finished import write_room
-    from echousd.make.following import carried
     from echousd.make.reading import read_room
     from echousd.progress import StageTimer
 

@@ -19,8 +19,8 @@ from echomodel.triangles import Mesh, connected_pieces
 from echousd.graph import Placed, Relation, SceneGraph
 from echousd.graph.arrays import rounded_boxes
 from echousd.make.verdicts import relation_verdicts
+from echousd.place.geometry import Collision
 from echousd.place.living import plan_to_live_in
-from echousd.place.report import Collision
 from echousd.room import LayoutOutcome
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.nofit import FLUSH, Solids, depth, forbidden_moves

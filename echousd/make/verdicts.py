@@ -11,8 +11,7 @@ from echomodel.rules.geometry import BoxesLike, Spread
 from echomodel.rules.placements import placement_margins
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import floor_centre, stated_placements, triplets_of
-from echousd.place.geometry import pair_indices
-from echousd.place.report import Collision, collisions
+from echousd.place.geometry import Collision, collisions, pair_indices
 from echousd.room import LayoutOutcome, RoomData, Verdict
 
 ROUNDING = 1e-4  # metres: boxes are written to a tenth of a millimetre, meshes in single precision

@@ -1,12 +1,14 @@
-"""Oriented boxes, pairs of boxes and the floor as signed distances (numpy, vectorised over pairs).
+"""Oriented boxes, pairs of boxes and the floor as signed distances (numpy, vectorised over pairs); what collides.
 
 A box is (size, bottom-centre position, yaw about +Y).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +16,10 @@ from echomodel import boxes2d
 from echomodel.arrays import norm
 from echomodel.boxes2d import footprints, seen
 from echomodel.floors import signed_distance
+from echomodel.objective.support import allowed_overlap
+
+if TYPE_CHECKING:
+    from echousd.place.setting import Setting
 
 COLUMNS = 6  # numbers of a box: its position x, y, z and its sides
 PLAN, SIDES = slice(0, 3, 2), slice(3, 6, 2)  # columns of x and z and of width and depth
@@ -153,3 +159,40 @@ def beyond(floor: Floor, size: np.ndarray, at: np.ndarray, turn: np.ndarray) -> 
         local = np.abs(seen(floor.reflex - at[:, None, [0, 2]], turn[:, None])) - size[:, None, [0, 2]] / 2
         out = np.maximum(out, -local.max(2).min(1))
     return out
+
+
+TOUCH = 0.01  # metres: deeper than this into another box is a collision, further than this outside is outside
+
+
+@dataclass(frozen=True)
+class Collision:
+    """Two objects that run into each other, by `depth` metres."""
+
+    first: str
+    second: str
+    depth: float
+
+    def __str__(self) -> str:
+        return f"{self.first} and {self.second} collide by {self.depth:.2f} m"
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry of the manifest, and of a check's report."""
+        return {"objects": [self.first, self.second], "depth": round(self.depth, 4)}
+
+
+def collisions(
+    categories: Sequence[str], size: np.ndarray, position: np.ndarray, yaw: np.ndarray, pairs: np.ndarray
+) -> tuple[tuple[tuple[int, int], float], ...]:
+    """Pairs (p, 2) of boxes that run into each other deeper than they may, deepest first, with the excess in metres."""
+    depth = -(separation(size, position, yaw, pairs) + allowed_overlap(categories, size, pairs))
+    order = np.argsort(-depth, kind="stable")
+    return tuple(((i, j), float(depth[p])) for p, (i, j) in zip(order, pairs[order].tolist(), strict=True)
+                 if depth[p] > TOUCH)  # fmt: skip
+
+
+def outside(setting: Setting, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> tuple[tuple[int, float], ...]:
+    """Objects that leave the floor, with the depth in metres."""
+    if setting.outline is None:
+        return ()
+    depth = beyond(setting.outline, size, position, yaw)
+    return tuple((i, float(depth[i])) for i in np.flatnonzero(depth > TOUCH).tolist())

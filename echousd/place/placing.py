@@ -28,7 +28,7 @@ from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
 from echousd.graph.arrays import stated_placements, triplets_of
 from echousd.place.distances import BED_LIT
-from echousd.place.report import collisions, outside
+from echousd.place.geometry import collisions, outside
 from echousd.place.search import Arranged, Search
 from echousd.place.setting import Setting, setting_of, stacked
 from echousd.place.solver import Conflict, PlaceConfig, conflicts, solve, unmet

@@ -7,8 +7,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.arrays import triplets_of
-from echousd.make.edit import edit, touched
-from echousd.make.following import attending, carried
+from echousd.make.edit import attending, carried, edit, touched
 from echousd.make.reading import read_room
 from echousd.place.living import plan_to_live_in
 
