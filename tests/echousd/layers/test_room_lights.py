@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
-from pxr import Gf, Usd, UsdGeom, UsdLux
+from pxr import Gf, Usd, UsdGeom, UsdLux, UsdPhysics
 from small_room import BARE, StandIn, small_graph
 
 import echousd
@@ -15,7 +15,7 @@ from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.graph import RoomSpec
 from echousd.layers.cameras import room_points
-from echousd.layers.lights import ASIDE, ELEVATION, image_files, write_lights
+from echousd.layers.lights import ASIDE, ELEVATION, OVERHEAD, SHARES, image_files, write_lights
 from echousd.options import RoomOptions
 from echousd.stage.pen import Pen
 
@@ -46,6 +46,7 @@ def test_day_evening_and_night(stage) -> None:
     times.SetVariantSelection("day")
     assert seen["day"][0] > seen["evening"][0] > seen["night"][0] > 0
     assert seen["day"][1] > seen["evening"][1] == seen["night"][1] == 0
+    assert seen["day"][:2] == pytest.approx([0.5 * SHARES["walls"][0], OVERHEAD])  # as they are said, nothing taken
     assert seen["day"][2] < seen["evening"][2] == seen["night"][2]
 
 
@@ -229,3 +230,9 @@ def test_openings_of_the_graph_point_to_what_they_became(tmp_path) -> None:
     assert (low >= (1.9, -0.01, -1.31)).all()
     assert (high <= (2.3, 2.01, -0.39)).all()
     assert high[2] - low[2] > 0.7
+    stage.GetPrimAtPath(found["door"]["leaf"]).GetParent().GetVariantSet("articulation").SetVariantSelection(
+        "articulated"
+    )
+    hung = UsdPhysics.MassAPI(stage.GetPrimAtPath(found["door"]["leaf"]))
+    assert 15 < hung.GetMassAttr().Get() < 30  # kg, as light as a hollow door
+    assert np.abs(hung.GetCenterOfMassAttr().Get()).max() == pytest.approx(1.0, abs=0.1)  # half as high as it is
