@@ -174,11 +174,11 @@ def beside(own: Size, anchor: Size, kind: Category, count: int, apart: float, ah
 
 
 def foot(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
-    """Benches and ottomans: at the foot of a bed, before a sofa or armchair."""
+    """Benches and ottomans: at the foot of a bed, before a sofa or armchair: half of 28 real ones leave 0.59 m."""
     out = []
     bed = kind.role == "bed"
     askew = 1.5 if max(own[0], own[2]) > LONG * min(own[0], own[2]) else 0.3  # a bench lies along the foot
-    for gap, more in ((0.04 if bed else 0.3, 0.0), (0.1 if bed else 0.45, 0.1), (0.2 if bed else 0.6, 0.3)):
+    for gap, more in ((0.04 if bed else 0.5, 0.0), (0.1 if bed else 0.6, 0.1), (0.2 if bed else 0.35, 0.3)):
         for lateral in (0.0, -0.15, 0.15) if bed else (0.0, -0.5, 0.5, -0.9, 0.9, -1.3, 1.3):
             for turn in (0.0, HALF_PI):
                 depth = own[2] if turn == 0.0 else own[0]

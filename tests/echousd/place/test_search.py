@@ -16,7 +16,7 @@ from echomodel.rules import label_relations, margins
 from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place.placing import place_boxes
-from echousd.place.proposals import proposals
+from echousd.place.proposals import proposals, slots_at
 from echousd.place.search import PRICE, Search, State, priced
 from echousd.place.setting import setting_of
 
@@ -124,6 +124,13 @@ def test_a_second_sofa_is_tried_at_the_sides_of_the_table():
     near = np.hypot(rows[:, 0] - 1.2 / 2 - 0.45, rows[:, 1] + 2.2) < 0.5  # at its end
     looks = np.sin(rows[near, 2]) < -0.99
     assert (looks & (abs(rows[near, 1] + 2.2) < 0.01)).any()
+
+
+def test_an_ottoman_leaves_room_for_the_knees_before_its_sofa():
+    size = [(2.2, 0.8, 0.9), (0.6, 0.4, 0.6)]
+    search, _ = searched(["multi_seat_sofa", "ottoman"], size, [(0, 0, -1.5), (0, 0, 0)], [0.0, 0.0])
+    before = [slot for slot in slots_at(search.setting, 1, 0) if abs(slot[0]) < 1.1]
+    assert min(before, key=lambda slot: slot[3])[1] - 0.45 - 0.3 == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(("at", "goes"), [((0.0, -0.7), True), ((2.5, 2.5), False)])
