@@ -147,7 +147,9 @@ def _stand(
     if kind == "turned":
         return [part for sx in (-x, x) for sz in (-z, z) for part in turned_leg(sx, sz, h, thick * 1.15)]
     if kind == "sled":
-        return _sled(x, z, h, thick)
+        t = max(thick * 0.3, 0.008)
+        low, high = (box((x - t, y, -z), (x + t, y + 2 * t, z), "metal") for y in (0, h - 2 * t))
+        return both(low, *(post(x, end, t, 0, h, "metal") for end in (-z, z)), high)
     if kind == "trestle":
         return _trestle(x, z, h, thick)
     if kind == "hairpin":
@@ -166,12 +168,6 @@ def _stand(
     return parts
 
 
-def _sled(x: float, z: float, h: float, thick: float) -> list[Solid]:
-    t = max(thick * 0.3, 0.008)
-    low, high = (box((x - t, y, -z), (x + t, y + 2 * t, z), "metal") for y in (0, h - 2 * t))
-    return both(low, *(post(x, end, t, 0, h, "metal") for end in (-z, z)), high)
-
-
 def _trestle(x: float, z: float, h: float, thick: float) -> list[Solid]:
     t, side = thick / 2, x * 0.82
     slanted = turned((side, thick * 0.5, z * 0.25), t, h - thick, power=np.inf, turn=rotation(x=-0.12))
@@ -186,26 +182,19 @@ def _trestle(x: float, z: float, h: float, thick: float) -> list[Solid]:
 
 def pedestal(width: float, depth: float, height: float, style: Style) -> list[Solid]:
     """A column on a disc or a cross of feet, from the floor to `height`."""
-    return of_role("leg", _column(width, depth, height, style))
-
-
-def _column(width: float, depth: float, height: float, style: Style) -> list[Solid]:
     r = max(0.025, 0.055 * style.bulk * min(width, depth) ** 0.5)
     material = "metal" if style.family in ("modern", "industrial") else "wood"
     spread = min(width, depth) * 0.32
-    column = turned((0, 0, 0), r, height, r * 0.8, material=material)
+    parts: list[Solid] = [turned((0, 0, 0), r, height, r * 0.8, material=material)]
     if style.family in ("classic", "rustic"):
-        feet: list[Solid] = []
-        for x, z in ((-0.7, -0.7), (-0.7, 0.7), (0.7, 0.7), (0.7, -0.7)):
-            knee, toe = [spread * x, height * 0.14, spread * z * 0.9], [spread * 1.3 * x, r * 0.6, spread * 1.3 * z]
-            feet.append(tube([[0, height * 0.3, 0], knee, toe], r * 0.6))
-        bulb = ball((0, height * 0.55, 0), (r * 1.5, height * 0.12, r * 1.5))
-        return [column, bulb, *feet]
-    if style.contrast > 0.6:
-        cone = turned((0, 0, 0), spread * 0.95, height * 0.95, r, material=material)
-        return [cone, replace(column, height=height)]
-    disc = turned((0, 0, 0), spread, max(0.015, height * 0.04), spread * 0.9, material=material)
-    return [disc, column]
+        foot = [0.7 * spread, height * 0.14, 0.63 * spread], [0.91 * spread, r * 0.6, 0.91 * spread]
+        parts += four(tube([[0, height * 0.3, 0], *foot], r * 0.6))
+        parts.append(ball((0, height * 0.55, 0), (r * 1.5, height * 0.12, r * 1.5)))
+    elif style.contrast > 0.6:
+        parts.append(turned((0, 0, 0), spread * 0.95, height * 0.95, r, material=material))
+    else:
+        parts.append(turned((0, 0, 0), spread, max(0.015, height * 0.04), spread * 0.9, material=material))
+    return of_role("leg", parts)
 
 
 def seat_of(style: Style, w: float, d: float, y: float, thick: float, z: float = 0.0) -> Solid:

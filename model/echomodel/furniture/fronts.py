@@ -40,10 +40,16 @@ def front(
             x0, x1 = xs[i] + style.gap / 2, xs[i + 1] - style.gap / 2
             y0, y1 = ys[j] + style.gap / 2, ys[j + 1] - style.gap / 2
             left = i % 2 == 0 if columns > 1 else style.contrast < 0.7
-            joint = _slide(z, depth) if kind == "drawer" else _hinge(x0 if left else x1, y0, z + face, left=left)
+            joint = Joint("drawer", "prismatic", (0.0, 0.0, 1.0), (0.0, 0.0, z), PULL * max(depth, ENOUGH))
+            if kind == "door":  # about the front edge, so that it swings away from its neighbour
+                place, axis = (x0 if left else x1, y0, z + face), (0.0, -1.0 if left else 1.0, 0.0)
+                joint = Joint("door", "revolute", axis, place, OPEN)
             made: list[Solid] = [box((x0, y0, z - 0.004), (x1, y1, z + PANEL), "accent", 0.002 * style.edge, kind)]
             if glazed:
-                made = _pane(x0, x1, y0, y1, z, kind)
+                b = min(0.045, 0.2 * (x1 - x0))
+                one, other = (x0 + b / 2, y0 + b / 2, z + 0.006), (x1 - b / 2, y1 - b / 2, z + 0.01)
+                made = [box(one, other, "glass", 0.0, kind)]
+                made += framed((x0, y0, z), (x1, y1, z + PANEL), b, "accent", kind)
             elif style.fronts == "framed":
                 wide, before = max(0.02, 0.15 * min(x1 - x0, y1 - y0)), z + PANEL + 0.012
                 made += framed((x0, y0, before - 0.016), (x1, y1, before), wide, "accent", kind)
@@ -100,15 +106,6 @@ def boards(low: tuple, high: tuple, t: float, back: float) -> list[Solid]:
     ]
 
 
-def _slide(z: float, depth: float) -> Joint:
-    return Joint("drawer", "prismatic", (0.0, 0.0, 1.0), (0.0, 0.0, z), PULL * max(depth, ENOUGH))
-
-
-def _hinge(x: float, y: float, z: float, *, left: bool) -> Joint:
-    # about the front edge, so that the door swings away from its neighbour
-    return Joint("door", "revolute", (0.0, -1.0 if left else 1.0, 0.0), (x, y, z), OPEN)
-
-
 def _drawer(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float) -> list[Solid]:
     """The box behind a drawer's front."""
     t, inset = SHEET, 0.012
@@ -130,13 +127,6 @@ def _inside(low: Point, high: Point, z0: float, z1: float) -> list[Solid]:
         return [box((x0, y, z0), (x1, y + 0.018, z1), role="shelf"), rail]
     heights = np.linspace(y0, y1, int(np.clip(round(tall / SHELVES), 1, 6)) + 1)[1:-1]
     return [box((x0, y - 0.009, z0), (x1, y + 0.009, z1), role="shelf") for y in heights]
-
-
-def _pane(x0: float, x1: float, y0: float, y1: float, z: float, role: str) -> list[Solid]:
-    """Glass in a frame of four bars."""
-    b = min(0.045, 0.2 * (x1 - x0))
-    pane = box((x0 + b / 2, y0 + b / 2, z + 0.006), (x1 - b / 2, y1 - b / 2, z + 0.01), "glass", 0.0, role)
-    return [pane, *framed((x0, y0, z), (x1, y1, z + PANEL), b, "accent", role)]
 
 
 def _handle(

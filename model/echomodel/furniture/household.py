@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, both, box, four, of_role, post
@@ -51,9 +53,9 @@ def radiator(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts: list[Solid] = []
     low = 0.1
     if choices.chance("kind", 0.35):
-        for x in np.linspace(-w / 2 + 0.03, w / 2 - 0.03, max(3, round(w / 0.06))):
-            for z in (0.022 - d / 2, d / 2 - 0.022):
-                parts.append(tube([[x, low, z], [x, h - 0.022, z]], 0.022))
+        columns = np.linspace(-w / 2 + 0.03, w / 2 - 0.03, max(3, round(w / 0.06)))
+        for x, z in product(columns, (0.022 - d / 2, d / 2 - 0.022)):
+            parts.append(tube([[x, low, z], [x, h - 0.022, z]], 0.022))
         for y in (low + 0.02, h - 0.04):
             parts.append(box((-w / 2, y - 0.02, 0.02 - d / 2), (w / 2, y + 0.02, d / 2 - 0.02)))
     else:
@@ -119,11 +121,9 @@ def cot(size: Size, style: Style, choices: Choices) -> list[Solid]:
     for y in (low, h - 0.05):
         parts += both(box((-x, y, z - 0.013), (x, y + 0.04, z + 0.013), role="rail"), axis=2)
         parts += both(box((x - 0.013, y, -z), (x + 0.013, y + 0.04, z), role="rail"))
-    for s in (-1, 1):
-        for at in np.arange(-z + 0.08, z - 0.05, 0.075):
-            parts.append(tube([[s * x, low + 0.02, at], [s * x, h - 0.03, at]], 0.008, role="bar"))
-        for at in np.arange(-x + 0.08, x - 0.05, 0.075):
-            parts.append(tube([[at, low + 0.02, s * z], [at, h - 0.03, s * z]], 0.008, role="bar"))
+    along, across = (np.arange(0.08 - half, half - 0.05, 0.075) for half in (z, x))
+    for a, b in [*product((-x, x), along), *product(across, (-z, z))]:
+        parts.append(tube([[a, low + 0.02, b], [a, h - 0.03, b]], 0.008, role="bar"))
     slab = box((-x, floor - 0.03, -z), (x, floor, z), role="slats")
     mattress = box((-x + 0.03, floor - 0.002, -z + 0.03), (x - 0.03, floor + 0.1, z - 0.03), "linen", 0.02, "mattress")
     one, other = (-x + 0.025, floor + 0.03, -0.2 * d), (x - 0.025, floor + 0.125, z - 0.028)
@@ -149,9 +149,7 @@ def garden_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     w, h, d = size
     material = choices.pick("cover", ["wood", "metal"], [0.7, 0.3])
     t, x, z = 0.025, w / 2 - 0.05, d / 2 - 0.05
-    parts: list[Solid] = []
-    for z0, z1 in _slats(d):
-        parts.append(box((-w / 2, h - t, z0), (w / 2, h, z1), material, 0.003, "top"))
+    parts: list[Solid] = [box((-w / 2, h - t, z0), (w / 2, h, z1), material, 0.003, "top") for z0, z1 in _slats(d)]
     parts += both(box((x - 0.02, h - t - 0.06, -z), (x + 0.02, h - t + 0.003, z), material, 0.0, "apron"))
     parts += both(box((-x, h - t - 0.06, z - 0.02), (x, h - t, z + 0.02), material, 0.0, "apron"), axis=2)
     return parts + four(post(x, z, 0.025, 0, h - t, material, 0.003, "leg"))
@@ -161,9 +159,8 @@ def garden_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A slatted seat and back between two frames with arms."""
     w, h, d = size
     seat, t, x = 0.43, 0.02, w / 2 - 0.02
-    parts: list[Solid] = []
-    for z0, z1 in _slats(d - 0.08):
-        parts.append(box((-x, seat - t, z0), (x, seat, z1), "wood", 0.003, "seat"))
+    slats = _slats(d - 0.08)
+    parts: list[Solid] = [box((-x, seat - t, z0), (x, seat, z1), "wood", 0.003, "seat") for z0, z1 in slats]
     parts += both(
         box((x - t, 0, -d / 2), (x + t, h, -d / 2 + 0.04), "wood", 0.004, "leg"),
         box((x - t, 0, d / 2 - 0.04), (x + t, 0.64, d / 2), "wood", 0.004, "leg"),
