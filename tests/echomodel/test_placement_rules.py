@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.rules.placements import Stated, placement_margins
+from echomodel.rules.placements import WAYS, Stated, placement_margins
 
 FLOOR = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
 NOTCHED = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 0.0), (0.0, 0.0), (0.0, 2.0), (-2.0, 2.0)])
@@ -20,6 +20,12 @@ def margin(placement, boxes, categories, floor=FLOOR, subject=0, others=()) -> f
     position = torch.stack([rows[:, 2], torch.zeros(len(rows)).double(), rows[:, 3]], 1)
     stated = [Stated(placement, subject, tuple(others))]
     return float(placement_margins(Boxes(size, position, rows[:, 4]), stated, floor, categories))
+
+
+def test_the_space_between_two_others_is_looked_at_from_all_around():
+    assert np.linalg.norm(WAYS, axis=0) == pytest.approx(1.0)
+    steps = (WAYS * np.roll(WAYS, -1, 1)).sum(0)
+    assert steps == pytest.approx(np.cos(2 * np.pi / WAYS.shape[1]))
 
 
 def test_the_back_is_what_stands_against_a_wall():

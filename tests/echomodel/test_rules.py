@@ -51,6 +51,25 @@ def room_of(categories, size, position, yaw=None, **more):
     )
 
 
+@pytest.mark.parametrize(
+    ("rules", "one", "other"),
+    [("sgfront", "left", "right"), ("sgfront", "front", "behind"), ("strict", "left", "right"),
+     ("strict", "front", "behind"), ("strict", "bigger_than", "smaller_than"),
+     ("strict", "taller_than", "shorter_than")],
+)  # fmt: skip
+def test_two_words_for_one_fact_have_one_margin(rules, one, other):  # published sizes are divided by the subject's
+    boxes, triplets = random_boxes(6, 3), all_triplets(6, [P[one]])
+    turned = triplets[:, [2, 1, 0]].clone()
+    turned[:, 1] = P[other]
+    found, back = (margins(boxes, told, rules=rules) for told in (triplets, turned))
+    assert torch.allclose(found, back, atol=1e-6)
+
+
+def test_where_nothing_holds_nothing_is_told():
+    told = told_relations(torch.zeros(0, 3, dtype=torch.int64), random_boxes(3, 1), 2.0, torch.Generator())
+    assert told.shape == (0, 3)
+
+
 def test_sgfront_agrees_with_published_verdicts():
     data = load_file(FIXTURE)
     boxes = SimpleNamespace(size=data["boxes"][:, :3], position=data["boxes"][:, 3:], yaw=torch.rand(14))

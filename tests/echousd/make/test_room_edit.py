@@ -2,6 +2,7 @@ import hashlib
 import json
 import sys
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import echousd
 from echomodel.protocols import GraphEdit
 from echousd.graph import GraphError, Relation
 from echousd.make import layouts
-from echousd.make.edit import edit, graph_edit, touched
+from echousd.make.edit import edit, graph_edit, restyled, touched
 from echousd.make.layouts import repeated
 from echousd.make.reading import read_room
 from echousd.options import RoomOptions
@@ -223,6 +224,15 @@ def test_models_are_chosen_for_what_is_new_in_the_colours_of_the_room(root, monk
     graph = graph.add_node("chair", "nightstand")
     edit(root, graph, model=StandIn(), shapes="boxes", place=False)
     assert asked == [({"chair"}, palette_of_room(5, graph.room.style))]
+
+
+def test_furniture_of_ours_that_is_told_another_style_is_shaped_anew():
+    forms = {name: SimpleNamespace(description=told) for name, told in {"bed": (0.5,), "wardrobe": ()}.items()}
+    saved = SimpleNamespace(graph=small_graph(), geometry=forms)
+    after = small_graph().update_node("bed", style="art_deco").update_node("wardrobe", style="art_deco")
+    assert restyled(saved, small_graph(), ()) == set()
+    assert restyled(saved, after, ()) == {"bed"}  # the other is somebody else's model
+    assert restyled(saved, after, {"bed"}) == restyled(saved, after.lock("bed"), ()) == set()
 
 
 @pytest.mark.parametrize(
