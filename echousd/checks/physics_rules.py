@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
+from echomodel.dressing import SMALL
 from echomodel.vocabulary import vocabulary
 from echousd.checks.reading import Finding, Reading, below, rule
 from echousd.graph.nodes import OBSTACLE
@@ -169,10 +170,11 @@ def fixed_furniture(reading: Reading) -> Iterator[Finding]:
 
 
 def _stands(prim: Usd.Prim) -> bool:
-    """Whether a node is furniture that stands somewhere, rather than hangs or is an obstacle."""
+    """Whether a node is furniture that stands somewhere, rather than hangs, is fixed or an obstacle."""
     word = readable(lambda: value(prim, CATEGORY), None)
     row = vocabulary().known_category(word) if isinstance(word, str) else None
-    return row is not None and row.support in ("floor", "table") and not value(prim, f"{FREE}{OBSTACLE}")
+    fixed = row is None or (row.name in SMALL and SMALL[row.name].fixed) or row.support not in ("floor", "table")
+    return not fixed and not value(prim, f"{FREE}{OBSTACLE}")
 
 
 @rule("echo:PhysicsScene")

@@ -141,11 +141,12 @@ def _screens(whole: Whole) -> Iterator[Misplacement]:
             yield Misplacement(name, "turned")
 
 
-def _carries(one: RoomObject, thing: Shape) -> bool:
-    """Whether a thing stands on the top of another."""
+def _carries(one: Shape, thing: Shape, hung: bool = False) -> bool:
+    """Whether a thing stands on the top of another, or hangs from it."""
     local = np.abs((thing.position[[0, 2]] - one.position[[0, 2]]) @ axes(np.array([one.yaw]))[0].T)
-    on_top = abs(float(one.position[1] + one.size[1] - thing.position[1])) < FLOATING
-    return on_top and bool((local <= one.size[[0, 2]] / 2).all())
+    over = float(one.position[1] + one.size[1] - thing.position[1])
+    held = over >= thing.size[1] if hung else abs(over) < FLOATING
+    return held and bool((local <= one.size[[0, 2]] / 2).all())
 
 
 def _dressing(whole: Whole) -> Iterator[Misplacement]:
@@ -180,7 +181,7 @@ def _small_faults(
         return
     off = float(depth_inside(floor, _back(shape)[None])[0])
     if kind.fixed and not kind.lies:
-        if off > LEANING:
+        if off > LEANING and not any(_carries(carrier, shape, hung=True) for carrier in carriers):
             yield "off its wall", off
         elif one.word in ("curtain", "blind") and len(windows):
             beside = _beside(shape, windows)

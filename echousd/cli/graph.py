@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -158,17 +158,16 @@ def home_given(
     from echousd.home.files import load_home
     from echousd.home.graph import HomeGraph as Home
 
+    about: dict[str, Any] = {} if area is None else {"area": area}
+    if size is not None:
+        about["outline"] = ((0.0, 0.0), (size[0], 0.0), size, (0.0, size[1]))
     if rooms is not None:
-        home = Home.from_words(rooms)
+        home = Home.from_words(rooms, **about)
     else:
         found = load_home(source) if source is not None and source.is_file() else None
         if found is None:
             return None
-        home = found
-    if area is not None:
-        home = home.replaced(area=area)
-    if size is not None:
-        home = home.replaced(outline=((0.0, 0.0), (size[0], 0.0), size, (0.0, size[1])))
+        home = found.replaced(**about)
     for sentence in relate:
         home = home.relate(sentence)
     return home

@@ -6,30 +6,41 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import numpy as np
+import shapely
+
+from echomodel.rooms.statistics import room_type_statistics
 from echomodel.rows import Habit
+from echomodel.sizes import size_statistics
 from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError, triple_faults
 from echousd.graph.nodes import Node, Relation, RoomSpec
 from echousd.graph.scene import SceneGraph
 
 MAX_COUNT = 100
+FULL, SELDOM = 0.8, 0.09  # share of what furniture covers in half of all rooms; of the rooms that hold such a piece
+ONE = ("bed", "sofa", "screen")  # roles of which a room has one piece, if nobody says it
 DEALT = ("at", "head", "before", "foot")  # stances of what serves one anchor: no desk has two chairs, another none
 
 
 def starting_graph(
-    room: RoomSpec | str, counts: Mapping[str, int] | None = None, relations: Iterable[Relation] = ()
-) -> SceneGraph:
+    room: RoomSpec | str, counts: Mapping[str, int] | None = None, relations: Iterable[Relation] = (), *,
+    area: float = 0.0,
+) -> SceneGraph:  # fmt: skip
     """A graph to begin with: what such a room usually holds, changed by `counts`, related as such objects usually are.
 
+    Where its floor is larger than that fills, it holds more.
+
     Arguments:
-        room: the room, or its type.
+        room: the room, or its type. area: of its floor, square metres, where the room does not say it.
         counts: objects per category (or alias); 0 leaves out what the room would hold otherwise.
         relations: what has to hold; a usual relation that contradicts them is left out.
 
     Raises `GraphError` for unknown words, counts that are none and a room that is left empty.
     """
     room = RoomSpec(room) if isinstance(room, str) else room
-    wanted = dict(vocabulary().room_type(room.type).contents)
+    area = float(shapely.Polygon(room.corners).area) if room.corners is not None else area
+    wanted = _filled(room.type, dict(vocabulary().room_type(room.type).contents), area)
     for word, count in (counts or {}).items():
         if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count <= MAX_COUNT:
             raise GraphError(f"count of {word}: found {count!r}, allowed: an integer from 0 to {MAX_COUNT}")
@@ -56,6 +67,31 @@ def starting_graph(
             kept.append(relation)
     stated = len(graph.relations)
     return graph.replaced(relations=(*kept[stated:], *kept[:stated]))
+
+
+def _filled(word: str, wanted: dict[str, int], area: float) -> dict[str, int]:
+    """Counts by category, and of what else rooms of a type hold, most usual first, until a floor is as full as most."""
+    presence, kind_of = room_type_statistics(word, requests=False).presence, vocabulary().category
+    sleeps = {name for name, _ in vocabulary().room_type("bedroom").contents if kind_of(name).support == "floor"}
+    common = {name for row in vocabulary().room_types for name, _ in row.contents}
+    seats = sorted(
+        (kind for kind in vocabulary().categories if kind.stands == "at"), key=lambda one: one.name not in common
+    )
+    for name in sorted(presence, key=lambda name: (-presence[name][0], name)):
+        standing = [kind for kind in wanted if kind_of(kind).support == "floor"]
+        covered = sum(wanted[other] * float(np.prod(size_statistics(other).median[[0, 2]])) for other in standing)
+        if presence[name][0] < SELDOM or covered > FULL * vocabulary().room_type(word).cover * area:
+            break
+        kind = kind_of(name)
+        roles = {one.role for one in map(kind_of, wanted) if one.support == kind.support}
+        again = kind.role in roles and (kind.role in ONE or kind.support == "ceiling")
+        alone = kind.belongs_to and not {*kind.belongs_to} & {*wanted}
+        asleep = (name in sleeps or kind.role == "bed") and "bed" not in roles
+        if name in wanted or again or alone or asleep or kind.stands == "at":
+            continue
+        seat = next((one.name for one in seats if one.belongs_to[:1] == (name,)), None)
+        wanted = wanted | {name: 1} | ({} if seat is None else {seat: 1 if kind.access else 4})
+    return wanted
 
 
 def _node(category: str, position: int, count: int, place: str | None) -> Node:

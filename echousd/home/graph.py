@@ -12,8 +12,10 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
+import shapely
 from pydantic import BeforeValidator, Field, model_validator
 
+from echomodel.rooms.statistics import room_type_statistics
 from echomodel.rows import HomeRelation as Row
 from echomodel.vocabulary import normalised, vocabulary
 from echousd.graph import GraphError, RoomSpec, SceneGraph, starting_graph
@@ -150,7 +152,12 @@ class HomeGraph(PlainModel):
                 raise GraphError(f"rooms: {field.shown(part)}, allowed: room predicate room, such as hall door bedroom")
             middle = " ".join(words[1:-1])
             relations += [relation_of([one, middle, other]) for one in ends[0] for other in ends[1]]
-        return cls([HomeRoom(name, starting_graph(RoomSpec(_type_of(name)))) for name in names], relations, **fields)
+        outline, kinds = fields.get("outline"), {name: _type_of(name) for name in names}
+        area = fields.get("area") or (shapely.Polygon(outline).area if outline else 0.0)
+        usual = {name: room_type_statistics(kind).area[2] for name, kind in kinds.items()}
+        share = area / max(sum(usual.values()), 1.0)
+        graphs = {name: starting_graph(RoomSpec(kind), area=share * usual[name]) for name, kind in kinds.items()}
+        return cls([HomeRoom(name, graph) for name, graph in graphs.items()], relations, **fields)
 
     def room(self, name: str) -> HomeRoom:
         """The room called `name`; raises `GraphError`."""
@@ -275,6 +282,6 @@ def _room(name: str, entry: Any) -> HomeRoom:
             return HomeRoom(name, graph_from_plain(SceneGraph, {"room": spec, **inside}), **own)
         filled = starting_graph(spec["type"]).nodes[0]  # the walls' words need a graph to be read with
         bare = graph_from_plain(SceneGraph, {"room": spec, "objects": {filled.name: filled.category}})
-        return HomeRoom(name, starting_graph(bare.room), **own)
+        return HomeRoom(name, starting_graph(bare.room, area=float(own.get("area") or 0.0)), **own)
     except ValueError as error:
         raise GraphError(f"room {name!r}: {error}", where) from None

@@ -10,12 +10,14 @@ import pytest
 import trimesh
 from pxr import Gf, Usd, UsdGeom
 
+import echousd
 from echousd.checks import Collision, check
-from echousd.checks.placement import DEEP, Whole, find_collisions, mesh_depth, winding_number
+from echousd.checks.placement import DEEP, Whole, _small_faults, find_collisions, mesh_depth, winding_number
 from echousd.checks.report import find_living
 from echousd.cli.main import run
-from echousd.graph import Node, RoomSpec
-from echousd.stage.contents import RoomContents, RoomObject
+from echousd.graph import Node, RoomSpec, SceneGraph
+from echousd.place.geometry import floor_from_polygon
+from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding
 
 BAD = Path(__file__).parent.parent / "bad"
 
@@ -259,3 +261,25 @@ def test_living_rules_are_warnings_unless_strict(capsys: pytest.CaptureFixture[s
     assert run(["check", str(BAD / "good.usda"), "--strict"]) == int(bool(report.living))
     assert "living" in capsys.readouterr().out
     assert report.ok
+
+
+def test_a_radiator_is_no_body_and_nobody_asks_for_one(tmp_path: Path) -> None:
+    nodes = (Node("rack", "coat_rack"), Node("heating", "radiator"), Node("bench", "bench"))
+    graph = SceneGraph(RoomSpec("hallway", size=(2.4, 3.4)), nodes, ())
+    report = check(echousd.generate(graph, seed=0, progress=None).save(tmp_path / "hall", preview=False))
+    assert (report.placement, report.errors) == ((), ())
+
+
+@pytest.mark.parametrize(("rack", "told"), [(1.9, []), (1.0, ["off its wall"]), (0.0, ["off its wall"])])
+def test_coats_hang_from_a_rack_that_stands_off_its_wall(rack: float, told: list[str]) -> None:
+    prim = Usd.Stage.CreateInMemory().DefinePrim("/coats")
+    none = np.zeros((0, 3))
+
+    def shape(size: tuple[float, float, float], x: float, y: float) -> Shape:
+        return Shape(none, none, np.array(size), np.array([x, y, 0.0]), np.pi / 2)
+
+    coats = Surrounding(prim, "coats", shape((0.6, 1.0, 0.22), -0.7, 0.5))
+    floor = floor_from_polygon(np.array([(-1.0, -2.0), (1.0, -2.0), (1.0, 2.0), (-1.0, 2.0)]))
+    carriers = [shape((1.0, rack, 0.4), -0.7, 0.0)] if rack else []
+    found = _small_faults(coats, floor, carriers, np.zeros((0, 2, 2)))
+    assert [word for word, _ in found] == told

@@ -124,3 +124,28 @@ def test_a_bath_has_its_shower_in_a_corner_and_kitchens_one_style():
     assert {node.name: node.place for node in starting_graph("bathroom").nodes}["shower"] == "in_corner"
     assert {node.place for node in starting_graph("hallway").nodes} == {None, "against_wall"}
     assert {node.style for node in starting_graph("kitchen", {"wall_unit": 3}).nodes} == {None}
+
+
+def test_a_large_floor_holds_more_until_it_is_as_full_as_most():
+    usual = len(starting_graph("living_room").nodes)
+    small, large, huge = (starting_graph(RoomSpec("living_room", size=size)) for size in ((4, 4), (7, 5), (9, 8)))
+    assert len(small.nodes) == usual < len(large.nodes) <= len(huge.nodes) < 20
+    words = [node.category for node in large.nodes]
+    assert len(words) == len(set(words)), "one of each"
+    assert sum(word in ("multi_seat_sofa", "l_shaped_sofa", "loveseat_sofa") for word in words) == 1
+    assert "pendant_lamp" in words, "the most usual thing that it lacks"
+    assert ("desk" in words) == ("office_chair" in words), "no table without who sits at it"
+    assert starting_graph("living_room", area=35.0).names == large.names
+
+
+@pytest.mark.parametrize("room", ["study", "hallway", "bathroom"])
+def test_nobody_sleeps_where_nobody_did(room):
+    words = {node.category for node in starting_graph(room, area=60.0).nodes}
+    assert not words & {"double_bed", "single_bed", "kids_bed", "wardrobe", "nightstand", "dining_chair"}
+
+
+def test_what_is_counted_comes_after_what_fills_the_floor():
+    graph = starting_graph(RoomSpec("living_room", size=(7, 5)), {"bookshelf": 3, "ottoman": 0})
+    words = [node.category for node in graph.nodes]
+    assert words.count("bookshelf") == 3
+    assert "ottoman" not in words

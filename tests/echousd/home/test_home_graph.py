@@ -123,3 +123,13 @@ def test_new_writes_a_home(tmp_path, echousd_command):
     assert json.loads((tmp_path / "flat.yaml").read_text())["home"]["outline"][2] == [9, 8]
     done = echousd_command("new", tmp_path / "other.usda", "--room", "bedroom", "--area", 60)
     assert (done.code, "--area goes with --rooms" in done.err) == (2, True)
+
+
+def test_rooms_of_a_large_home_hold_more():
+    """Its floors are shared as rooms of their types usually are."""
+    words = "hall door living_room, hall door bedroom"
+    small, large = (HomeGraph.from_words(words, area=area) for area in (40, 120))
+    outlined = HomeGraph.from_words(words, outline=((0, 0), (12, 0), (12, 10), (0, 10)))
+    counts = [{room.name: len(room.graph.nodes) for room in home.rooms} for home in (small, large, outlined)]
+    assert all(counts[0][name] < counts[1][name] for name in ("living_room", "bedroom"))
+    assert counts[1] == counts[2]
