@@ -181,7 +181,8 @@ def _small_faults(
         return
     off = float(depth_inside(floor, _back(shape)[None])[0])
     if kind.fixed and not kind.lies:
-        if off > LEANING and not any(_carries(carrier, shape, hung=True) for carrier in carriers):
+        racks = [carrier for carrier in carriers if isinstance(carrier, RoomObject)]
+        if off > LEANING and not any(_carries(rack, shape, hung=True) for rack in racks):
             yield "off its wall", off
         elif one.word in ("curtain", "blind") and len(windows):
             beside = _beside(shape, windows)

@@ -71,16 +71,19 @@ def starting_graph(
 
 def _filled(word: str, wanted: dict[str, int], area: float) -> dict[str, int]:
     """Counts by category, and of what else rooms of a type hold, most usual first, until a floor is as full as most."""
-    presence, kind_of = room_type_statistics(word, requests=False).presence, vocabulary().category
+    row, kind_of = vocabulary().room_type(word), vocabulary().category
+    if row.like and not row.floor:
+        return wanted  # nobody knows what else such a room holds
+    presence = room_type_statistics(word, requests=False).presence
     sleeps = {name for name, _ in vocabulary().room_type("bedroom").contents if kind_of(name).support == "floor"}
-    common = {name for row in vocabulary().room_types for name, _ in row.contents}
+    common = {name for one in vocabulary().room_types for name, _ in one.contents}
     seats = sorted(
         (kind for kind in vocabulary().categories if kind.stands == "at"), key=lambda one: one.name not in common
     )
     for name in sorted(presence, key=lambda name: (-presence[name][0], name)):
         standing = [kind for kind in wanted if kind_of(kind).support == "floor"]
         covered = sum(wanted[other] * float(np.prod(size_statistics(other).median[[0, 2]])) for other in standing)
-        if presence[name][0] < SELDOM or covered > FULL * vocabulary().room_type(word).cover * area:
+        if presence[name][0] < SELDOM or covered > FULL * row.cover * area:
             break
         kind = kind_of(name)
         roles = {one.role for one in map(kind_of, wanted) if one.support == kind.support}

@@ -274,12 +274,9 @@ def test_a_radiator_is_no_body_and_nobody_asks_for_one(tmp_path: Path) -> None:
 def test_coats_hang_from_a_rack_that_stands_off_its_wall(rack: float, told: list[str]) -> None:
     prim = Usd.Stage.CreateInMemory().DefinePrim("/coats")
     none = np.zeros((0, 3))
-
-    def shape(size: tuple[float, float, float], x: float, y: float) -> Shape:
-        return Shape(none, none, np.array(size), np.array([x, y, 0.0]), np.pi / 2)
-
-    coats = Surrounding(prim, "coats", shape((0.6, 1.0, 0.22), -0.7, 0.5))
+    shape = Shape(none, none, np.array([0.6, 1.0, 0.22]), np.array([-0.7, 0.5, 0.0]), np.pi / 2)
+    coats = Surrounding(prim, "coats", shape)
     floor = floor_from_polygon(np.array([(-1.0, -2.0), (1.0, -2.0), (1.0, 2.0), (-1.0, 2.0)]))
-    carriers = [shape((1.0, rack, 0.4), -0.7, 0.0)] if rack else []
+    carriers = [thing("rack", "coat_rack", box(0.4, rack, 1.0), (-0.7, 0.0, 0.0))] if rack else []
     found = _small_faults(coats, floor, carriers, np.zeros((0, 2, 2)))
     assert [word for word, _ in found] == told
