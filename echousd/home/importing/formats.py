@@ -121,12 +121,9 @@ def read_plan(path: Path, form: str | None = None, unit: float | None = None) ->
     except OSError as error:
         raise GraphError(f"{path}: {(error.strerror or str(error)).lower()}") from None
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        said = f"{error} is missing" if isinstance(error, KeyError) else str(error).splitlines()[0]
-        raise GraphError(
-            f"{path}: not as {form or path.suffix.lstrip('.')} has it ({said})".replace(
-                f"{path}: {path}: ", f"{path}: "
-            )
-        ) from None
+        told = str(error).removeprefix(f"{path}: ").removeprefix(f"{path.name}: ").partition("\n")[0]
+        said = f"{error} is missing" if isinstance(error, KeyError) else told
+        raise GraphError(f"{path}: not as {form or path.suffix.lstrip('.')} has it ({said})") from None
 
 
 def _format_of(path: Path, form: str | None) -> tuple[Format, Any]:

@@ -419,7 +419,7 @@ BAD = {
     },
     "flat.sh3d": {
         "no Home.xml (before Sweet Home 3D 5.3": lambda path: archive(path, Home="java"),
-        "cannot be read": lambda path: unclear(path, "no archive"),
+        "not as sh3d has it (cannot be read (": lambda path: unclear(path, "no archive"),
         "Home.xml cannot be read as XML": lambda path: archive(path, Home_xml="<home"),
         "open outline": lambda path: archive(path, Home_xml="<home><room><point x='1' y='2'/></room></home>"),
     },
