@@ -81,9 +81,10 @@ def box_of(bound: Gf.BBox3d, frame: np.ndarray) -> Box | None:
 
 
 def _box(size: np.ndarray, centre: np.ndarray, yaw: float) -> Box:
-    x, y, z = (float(number) for number in centre)
-    width, height, depth = (float(number) for number in size)
-    return Box((width, height, depth), (x, y - height / 2, z), yaw)
+    """A box in whole micrometres: what lies beyond is noise of transforms, which no person wrote."""
+    width, height, depth = np.round(size, 6).tolist()
+    x, y, z = (np.round(centre - (0.0, size[1] / 2, 0.0), 6) + 0.0).tolist()
+    return Box((width, height, depth), (x, y, z), yaw)
 
 
 def foreign_graph(

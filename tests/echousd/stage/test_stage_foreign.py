@@ -60,6 +60,7 @@ def test_y_up(metres, yaw):
     graph = read_graph(stage)
     assert [(node.name, node.category) for node in graph.nodes] == [("Bed_01", "double_bed")]
     close(graph.nodes[0], (1.6, 0.9, 2.0), (2, 0.25, -1), yaw)
+    assert all(len(repr(number)) < 10 for number in (*graph.nodes[0].size, *graph.nodes[0].position))
     assert graph.room.type == "bedroom"
 
 
