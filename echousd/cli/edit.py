@@ -129,8 +129,9 @@ def _step(room: Path, wait: bool, json: bool, run: str) -> None:
 
     step = {"undo": history.undo, "redo": history.redo}[run]
     with held(room.parent, wait=wait, run=run) as finished:
+        shown = finished or room.with_suffix(".png").is_file()  # who wanted no picture gets none
         steps = history.told(room, run) if finished == run else step(room)
-        pictures = write_pictures(room)
+        pictures = write_pictures(room) if shown else []
     _say_steps(room, pictures, {"undo": "undone", "redo": "redone"}[run], steps, json)
 
 
@@ -208,8 +209,9 @@ def _change(
             say_done(json, [], lines, plan)
             return
         with telling_faults(), progress_bar() as listen:
+            shown = root.with_suffix(".png").is_file()  # who wanted no picture gets none
             made = change(root, graph, progress=listen, **options)
-            written = write_room(made, folder, StageTimer(listen), force=force)
+            written = write_room(made, folder, StageTimer(listen), force=force, preview=shown)
     for step in steps if not json else ():
         say(step)
     report([written], json=json, more={"changes": list(steps)})

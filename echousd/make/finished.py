@@ -98,8 +98,9 @@ class Written:
 
 
 def write_room(
-    room: Room, output: Path, timer: StageTimer, *, flat: bool = False, force: bool = False, store: Path | None = None
-) -> Written:
+    room: Room, output: Path, timer: StageTimer, *, flat: bool = False, force: bool = False, store: Path | None = None,
+    preview: bool | None = None,
+) -> Written:  # fmt: skip
     """Write a room as layers with pictures, or as one flat file without; raises ValueError, see `Room.save`."""
     from echousd.make.save import save_layers, write_pictures
 
@@ -109,7 +110,7 @@ def write_room(
 
             return Written(room, save_flat(room, output, force=force))
         root = save_layers(room, output, force=force, store=store)
-    if not room.options.preview:
+    if not (room.options.preview if preview is None else preview):
         return Written(room, root)
     with timer.stage("preview"):
         drawn = write_pictures(root)

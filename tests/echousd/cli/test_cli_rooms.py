@@ -128,3 +128,16 @@ def test_what_is_no_room_is_named_not_the_folder_that_it_lies_in(tmp_path, echou
     outcome = echousd_command(words[0], tmp_path / "none.usda", *words[1:])
     assert (outcome.code, "none.usda: no such file" in outcome.err) == (2, True), outcome.err
     assert [path.name for path in tmp_path.iterdir()] == ["graph.usda"]
+
+
+@pytest.mark.parametrize("asked", [(), ("--no-preview",)])
+def test_edits_draw_pictures_of_rooms_that_have_one(graph, tmp_path, echousd_command, asked):
+    folder = tmp_path / "bedroom"
+    picture = folder / "bedroom.png"
+    assert echousd_command("generate", graph, "-o", folder, "--shapes", "boxes", "--dress", "none", *asked).code == 0
+    for words in (("edit", folder, "--remove", "wardrobe"), ("edit", folder, "--undo"), ("edit", folder, "--redo")):
+        before = picture.read_bytes() if picture.is_file() else b""
+        done = echousd_command(*words)
+        assert done.code == 0, done.err
+        assert picture.is_file() == (not asked)
+        assert asked or picture.read_bytes() != before
