@@ -31,7 +31,7 @@ from echomodel.compact.pairs import pairs_of
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echoscene.config import shape_unet
-from echoscene.denoisers import ShapeUNet
+from echoscene.model import ShapeUNet
 from echoscene.unet import pack_linear_maps
 
 Run = Callable[[], Tensor]

@@ -216,7 +216,7 @@ def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     w, h, d = size
     r, seat = 0.016 * (0.9 + 0.3 * style.bulk), min(0.46, h * 0.56)
     if choices.chance("kind", 0.4):
-        return _wishbone(size, style, choices, seat)
+        return _wishbone(size, replace(style, bulk=max(style.bulk, 1.3)), choices, seat)
     x, z = w / 2 - r * 1.5, d / 2 - r * 1.5
     parts: list[Solid] = [box((-w / 2, seat - 0.04, -d / 2), (w / 2, seat, d / 2), "wood", 0.01, "seat")]
     legs = four(tube([[x, 0, z], [x * 0.97, seat, z * 0.97]], r))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, cast, dot, full, held, kit, least_of, norm, pairs_in, rows
+from echomodel.arrays import Array, at_least, cast, dot, full, held, kit, least_of, norm, on_device, pairs_in, rows
 from echomodel.floors import edges, known, signed_area, signed_distance
 from echomodel.objective.support import carriers, shared_fraction
 from echomodel.openings import Opening
@@ -248,7 +248,7 @@ class Plan:
         """Numbers (s,) of the rooms that share a floor and its openings, its corners (k, 2), and these; known ones."""
         out = []
         for number, openings in enumerate(self.openings):
-            corners = np.asarray(held(self.floor[number]))
+            corners = on_device(self.floor[number], None)
             corners = corners[np.isfinite(corners).all(1)]
             if len(corners) > 2:
                 out.append((full(self.scene, 1, number), corners, openings))
