@@ -44,12 +44,11 @@ def test_rooms_are_written_and_seeded(rooms_file, tmp_path):
 
 def test_a_set_of_generated_rooms_is_one_to_train_on(tmp_path, capsys):
     assert run(["data", "rooms", "--count", "1", "--seed", "4", "-o", str(tmp_path / "set.npz")]) == 0
-    assert "set.npz: 1 room; objects of unknown words left out: 0" in " ".join(capsys.readouterr().err.split()).replace(
-        " :", ":"
-    )
+    told = "".join(capsys.readouterr().err.split())  # lines of a long path break in its words
+    assert "set.npz:1room;objectsofunknownwordsleftout:0" in told
     assert len(RoomSet(tmp_path / "set.npz")) == 1
     assert run(["data", "import", str(tmp_path / "set.npz"), "-o", str(tmp_path / "one.json")]) == 0
-    assert "one.json: 1 room" in " ".join(capsys.readouterr().err.split()).replace(" :", ":")
+    assert "one.json:1room" in "".join(capsys.readouterr().err.split())
 
 
 def test_rooms_to_usd_and_back(rooms_file, tmp_path):
