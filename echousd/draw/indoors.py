@@ -23,7 +23,7 @@ BLURRED, HAZE = 0.45, 0.25  # degrees that it is out of focus, and the share of 
 DIM = 0.02  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
-ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.6, 0.85), (0.43, 0.61), 70, 15.0
+ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.6, 0.85), (0.38, 0.61), 70, 15.0
 EVEN = 0.18  # power of the light's brightness that eyes and those who photograph rooms take from it
 WHITE, PAPER = 88, 0.95  # what so many of a hundred points are darker than comes to no more than that
 CONTRAST, KNEE = 1.4, 0.6  # power about what is bright, and from where on highlights are rolled off

@@ -549,9 +549,8 @@ def _lit(world: World) -> World:
         squares = rng.random((OFTEN, len(point), 2), np.float32)
         light = np.mean([_gathered(world, hits, square)[:, :3] for square in squares], 0)
     white, emissive = (direct + light).mean(0), world.scenery.emissive
-    tinted = (
-        white**0.8 * (white @ LUMA) ** 0.2
-    )  # shades of the room's whole colour would be yellower than what they light
+    # shades of the room's whole colour would be yellower than what they light
+    tinted = white**0.8 * (white @ LUMA) ** 0.2
     glow = np.interp(world.scenery.lights.day, (0, 1), GLOWING) * tinted / float((emissive @ LUMA).max(initial=1e-6))
     return world._replace(glow=glow.astype(np.float32), white=white)
 

@@ -6,19 +6,18 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import numpy as np
 import shapely
 
 from echomodel.rooms.statistics import room_type_statistics
 from echomodel.rows import Habit
-from echomodel.sizes import size_statistics
+from echomodel.sizes import footprint
 from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError, triple_faults
 from echousd.graph.nodes import Node, Relation, RoomSpec
 from echousd.graph.scene import SceneGraph
 
 MAX_COUNT = 100
-FULL, SELDOM = 0.8, 0.09  # share of what furniture covers in half of all rooms; of the rooms that hold such a piece
+FULL, SELDOM = 0.7, 0.09  # share of what furniture covers in half of all rooms; of the rooms that hold such a piece
 ONE = ("bed", "sofa", "screen")  # roles of which a room has one piece, if nobody says it
 DEALT = ("at", "head", "before", "foot")  # stances of what serves one anchor: no desk has two chairs, another none
 
@@ -78,12 +77,11 @@ def _filled(word: str, wanted: dict[str, int], area: float) -> dict[str, int]:
     sleeps = {name for name, _ in vocabulary().room_type("bedroom").contents if kind_of(name).support == "floor"}
     common = {name for one in vocabulary().room_types for name, _ in one.contents}
     seats = sorted(
-        (kind for kind in vocabulary().categories if kind.stands == "at"), key=lambda one: one.name not in common
+        (one for one in vocabulary().categories if one.stands == "at"), key=lambda one: one.name not in common
     )
     for name in sorted(presence, key=lambda name: (-presence[name][0], name)):
-        standing = [kind for kind in wanted if kind_of(kind).support == "floor"]
-        covered = sum(wanted[other] * float(np.prod(size_statistics(other).median[[0, 2]])) for other in standing)
-        if presence[name][0] < SELDOM or covered > FULL * row.cover * area:
+        held = [each for each, count in wanted.items() for _ in range(count)]
+        if presence[name][0] < SELDOM or footprint(held, [None] * len(held)) > FULL * row.cover * area:
             break
         kind = kind_of(name)
         roles = {one.role for one in map(kind_of, wanted) if one.support == kind.support}

@@ -189,8 +189,8 @@ def place_boxes(
         def suited(to: Setting, size: np.ndarray) -> Setting:
             laid = laid_tables(to.categories, size, anchor, ~rigid)
             broken = margins(Spread(laid, to.position, to.yaw), compared, rules=rules, fronts=to.fronts) < 0
-            told = compared[broken][:, ::2].ravel()
-            laid[told] = size[told]
+            ends = compared[broken][:, ::2].ravel()
+            laid[ends] = size[ends]
             return to.at(fitting_loads(to.categories, laid, to.carrier, free), to.position, to.yaw)
 
         at = suited(at, at.size)

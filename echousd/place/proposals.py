@@ -9,7 +9,7 @@ from itertools import groupby, product
 import numpy as np
 
 from echomodel.objective.access import DEEP, PASSAGE, WALKED_BEHIND, to_wall
-from echomodel.objective.company import PLACE
+from echomodel.objective.company import places_of
 from echomodel.objective.sight import WATCHED_FROM
 from echomodel.objective.support import ON_CEILING
 from echomodel.vocabulary import vocabulary
@@ -115,7 +115,7 @@ def slots_at(setting: Setting, i: int, anchor: int) -> list[tuple[float, float, 
     if stands not in STANDS:
         return []
     seats = np.array([kind.role == "seat" for kind in setting.kinds]) & (setting.anchor == anchor)
-    count = int(np.maximum(np.round(setting.size[seats, 0] / PLACE), 1.0).sum())
+    count = int(places_of(setting.size[seats]).sum())
     near = _apart(setting, i, anchor, stands)
     found = STANDS[stands](setting.size[i], setting.size[anchor], setting.kinds[anchor], count, *near)
     if stands == "head":  # all with the same gap to the wall
@@ -157,7 +157,7 @@ def seatings(setting: Setting, i: int, seats: Sequence[int]) -> tuple[list[int],
 
     Benches take the middle of a long side, chairs what is left.
     """
-    places = np.maximum(np.round(setting.size[:, 0] / PLACE), 1.0)
+    places = places_of(setting.size)
     seats = sorted((k for k in seats if _stance(setting, k, i) == "around"), key=lambda k: -places[k])
     ways: list[list[tuple[Row, tuple[float, float]]]] = [[]] if len(seats) > 1 else []
     for alike in (list(group) for _, group in groupby(seats, key=lambda k: places[k])):

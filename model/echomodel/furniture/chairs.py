@@ -201,12 +201,8 @@ def chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A plain chair; with four legs it has arms more often than a dining chair."""
     parts = dining_chair(size, style, choices)
     w, h, d = size
-    if (
-        h > 0.7
-        and style.back in ("oval", *BODIES)
-        and not choices.chance("form", OTHER)
-        and choices.chance("extra", 0.45)
-    ):
+    framed = style.back in ("oval", *BODIES) and not choices.chance("form", OTHER)
+    if h > 0.7 and framed and choices.chance("extra", 0.45):
         parts += slim_arms(w * 1.04, d, 0.46, h, style, 0.03)
     return parts
 

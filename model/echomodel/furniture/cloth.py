@@ -164,9 +164,8 @@ class Tufted(Block):
         inner = (one + other < 1e-6) & (i > 0) & (i < i.max()) & (j > 0) & (j < j.max())
         buttons = points[inner] if detail > 1 else points[:0, 0]
         faces, border = _grid(*z.shape)
-        first, second = faces.reshape(
-            2, -1, 3
-        )  # of each quad, which folds where it is deeper, as its mirror image does
+        # of each quad, which folds where it is deeper, as its mirror image does
+        first, second = faces.reshape(2, -1, 3)
         (a, b, c), e, z = first.T.copy(), second[:, 2].copy(), z.ravel()
         gain = z[a] + z[c] - z[b] - z[e]
         other = np.where(np.abs(gain) > 1e-6, gain > 0, (points.reshape(-1, 3)[[a, c], 0].sum(0) > 0))

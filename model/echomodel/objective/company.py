@@ -237,10 +237,15 @@ def _seats_at(plan: Plan, boards: Array) -> Seats:
     return Seats(i, j, ahead, along, across, side, count, rank)
 
 
+def places_of(size: Array) -> Array:
+    """(...,) how many sit on seats of sizes (..., 3)."""
+    return at_least((size[..., 0] / PLACE).round(), 1.0)
+
+
 def chairs_even(plan: Plan) -> Found:
     """The chairs of a table stand evenly around it; a bench counts as the chairs that it stands for."""
     i, j, xp = seats_at(plan).i, seats_at(plan).j, plan.kit
-    places = at_least((held(plan.size)[i, 0] / PLACE).round(), 1.0)
+    places = places_of(held(plan.size)[i])
     count = sum_of(j, places, len(plan))
     who = rows(count > 1)
     n = count[who][:, None]
@@ -332,9 +337,8 @@ def not_alone(plan: Plan) -> Found:
     A lamp lights a seat, bed or table. An armchair that stands apart from its group has something of its own: a lamp,
     a table, shelves, another one.
     """
-    loner = (plan.stands("company") | plan.which(lambda kind: kind.role == "sofa" and not kind.wall)) & (
-        plan.anchor < 0
-    )
+    daybed = plan.which(lambda kind: kind.role == "sofa" and not kind.wall)
+    loner = (plan.stands("company") | daybed) & (plan.anchor < 0)
     loner = loner & (plan.kit.bincount(plan.scene[loner], minlength=len(plan))[plan.scene] == 1)
     small = (plan.of("light") | plan.stands("beside") | loner) & plan.standing
     company = plan.stands("company") & plan.of("seat") & plan.standing & (plan.anchor >= 0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from echomodel.arrays import at_least, rows
 from echomodel.boxes2d import seen
-from echomodel.objective.company import PLACE
+from echomodel.objective.company import PLACE, places_of
 from echomodel.objective.composition import ELBOW
 from echomodel.objective.plan import Found, Plan, found, kind_of, nobody
 from echomodel.sizes import size_statistics, usual_range
@@ -119,9 +119,9 @@ def laid_tables(categories: Sequence[str], size: np.ndarray, anchor: np.ndarray,
         chairs = [i for i in np.flatnonzero(anchor == table).tolist() if kinds[i].role == "seat"]
         if not free[table] or kinds[table].role != "board" or kinds[table].access or len(chairs) < 2:
             continue
-        wide = np.round(size[chairs, 0] / PLACE) > 1  # benches
+        places = places_of(size[chairs])
+        wide, count = places > 1, int(places.sum())  # benches; all who sit there
         width = float(np.median(np.minimum(size[chairs, 0], 0.7)[~wide] if not wide.all() else [PLACE - ELBOWS]))
-        count = int(np.maximum(np.round(size[chairs, 0] / PLACE), 1.0).sum())
         if kinds[table].wall:  # they sit along its front
             out[table, 0] = max(size[table, 0], count * (width + ELBOWS))
             continue
