@@ -243,7 +243,9 @@ def to_usd(
 
 @data_app.command("import")
 def import_rooms(
-    sources: Annotated[list[Path], typer.Argument(help="Rooms files, sets, stages, or folders of stages or SG-FRONT.")],
+    sources: Annotated[
+        list[Path], typer.Argument(help="Rooms files, sets, stages, SG-FRONT, folders, what eval reads.")
+    ],
     out: Annotated[Path, typer.Option("-o", "--output", help="A set to train on (.npz), or a rooms file (.json).")],
     room: Annotated[str, typer.Option(help="Of SG-FRONT: bedroom, livingroom, diningroom, library or all.")] = "all",
     split: Annotated[str, typer.Option(help="Of SG-FRONT: trainval or test.")] = "trainval",
@@ -255,23 +257,14 @@ def import_rooms(
 
     Example: echousd data import my_stages more_rooms.json -o mine.npz
     """
-    from echomodel.data.roomset import load_rooms
     from echomodel.data.sgfront import SGFront
-    from echousd.folder.found import stages_at
-    from echousd.graph.files import STAGE_FORMS
-    from echousd.stage.boxes import read_stage
+    from echousd.evaluation.runs import foreign_rooms
 
     _check_one_file(out, force=force)
     found: list[RoomBoxes] = []
     for source in sources:
-        if (source / "classes_all.txt").exists():
-            found += SGFront(source, room, split).rooms()
-        elif source.suffix in STAGE_FORMS:
-            found += read_stage(source)
-        elif source.is_dir() and not any(source.rglob("rooms*.json")):
-            found += [one for stage in stages_at(source) for one in read_stage(stage)]
-        else:
-            found += load_rooms(source)
+        sgfront = (source / "classes_all.txt").exists()
+        found += SGFront(source, room, split).rooms() if sgfront else foreign_rooms(source)
     if not found:
         raise ValueError(f"{', '.join(map(str, sources))}: no room found")
     _write_one_file(out, found, "imported rooms")

@@ -241,7 +241,7 @@ def foreign_rooms(path: Path) -> list[RoomBoxes]:
 
     Raises ValueError that names the file, for none and for what cannot be read.
     """
-    if path.is_dir():
+    if path.is_dir() and not any(path.rglob("rooms-*.npz")):
         files = sorted(file for file in path.rglob("*.json") if not {*ASSETS} & {*file.relative_to(path).parts})
         found = [room for file in files for room in _from_json(file)]
         if found:
@@ -252,7 +252,7 @@ def foreign_rooms(path: Path) -> list[RoomBoxes]:
         return [room for file in stages for room in read_stage(file)]
     if path.suffix in STAGE_FORMS:
         return read_stage(path)
-    rooms = load_rooms(path) if path.suffix == ".npz" else _from_json(path)
+    rooms = _from_json(path) if path.is_file() and path.suffix != ".npz" else load_rooms(path)
     if not rooms:
         raise ValueError(f"{path}: no rooms, a state of SceneEval, Holodeck's or SceneSmith's JSON")
     return rooms
@@ -266,15 +266,13 @@ def _from_json(file: Path) -> list[RoomBoxes]:
                 return [_sceneeval(raw["scene"], file)]
             case {"rooms": list(), "objects": list(), "walls": _}:
                 return [_holodeck(raw, room, file) for room in raw["rooms"]]
-            case {"rooms": list()}:
-                return load_rooms(file)
             case {"room_type": _, "objects": list(), "floor_polygon": _}:
                 return [RoomBoxes.from_json(raw)]
             case {"objects": dict()}:
                 return [_scenesmith(raw, file)]
-    except (KeyError, TypeError, IndexError, json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (KeyError, TypeError, IndexError, ValueError, RecursionError) as error:
         raise ValueError(f"{file}: not a room as it says ({type(error).__name__} {error})") from None
-    return []
+    return load_rooms(file) if isinstance(raw, dict) and isinstance(raw.get("rooms"), list) else []
 
 
 def _room(name: str, kind: str, floor: Iterable[Iterable[float]], height: float, found: list[Object]) -> RoomBoxes:

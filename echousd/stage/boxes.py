@@ -17,11 +17,12 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.arrays import triplets_of
 from echousd.graph.titles import DressingGraph, SmallNode
+from echousd.naming import free_name
 from echousd.stage import encoding as usd
 from echousd.stage import values
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage, opened, save_layer
-from echousd.stage.foreign import boxed_graph
+from echousd.stage.foreign import boxed_graph, foreign_rooms
 from echousd.stage.read import faults, find_rooms, node_names, place, relation_of, stated_fields, the_room
 from echousd.stage.write import graph_layer
 
@@ -151,7 +152,8 @@ def graph_of(room: RoomBoxes, rules: str | None = "strict") -> SceneGraph:
     spelled = {predicate.id: predicate.name for predicate in words.predicates}
     relations = tuple(Relation(names[s], spelled[p], names[o]) for s, p, o in ([] if edges is None else edges.tolist()))
     polygon = tuple((float(x), float(z)) for x, z in room.floor_polygon) or None
-    return SceneGraph(RoomSpec(room.room_type, floor_polygon=polygon, height=room.height), nodes, relations)
+    spec = RoomSpec(room.room_type, floor_polygon=polygon, height=room.height, openings=room.openings)
+    return SceneGraph(spec, nodes, relations)
 
 
 def room_of(graph: SceneGraph, name: str) -> RoomBoxes:
@@ -175,19 +177,22 @@ def room_of(graph: SceneGraph, name: str) -> RoomBoxes:
 def write_stages(rooms: Iterable[RoomBoxes], folder: Path, rules: str | None = "strict") -> None:
     """A stage with its scene graph for every room that holds something; `rules` as for `graph_of`."""
     folder.mkdir(parents=True, exist_ok=True)
+    taken: set[str] = set()
     for room in rooms:
         if len(room):
-            save_layer(graph_layer(graph_of(room, rules)), folder / f"{room.id}.usda")
+            name = free_name(re.sub(r"[^\w.-]", "_", room.id).lstrip(".") or "room", taken)
+            taken.add(name)
+            save_layer(graph_layer(graph_of(room, rules)), folder / f"{name}.usda")
 
 
 def read_stage(path: Path) -> list[RoomBoxes]:
     """The rooms of a stage that hold something, as stated, else as they stand there; each is called after the file.
 
-    Raises StageError for a file that is no stage, and an object without bounds.
+    Raises StageError for a file that is no stage, one without graphs and labels, and an object without bounds.
     """
     found, stage = [], open_stage(path)
-    for prims in find_rooms(stage):
-        graph, prim = boxed_graph(prims), str(prims.room.GetPath())
+    graphs = {str(prims.room.GetPath()): boxed_graph(prims) for prims in find_rooms(stage)}
+    for prim, graph in (graphs or foreign_rooms(stage)).items():
         name = path.stem if prim in ("/Room", "") else f"{path.stem}{prim.replace('/', '_')}"
         found += [room_of(graph, name)] if graph.nodes else []
     return found

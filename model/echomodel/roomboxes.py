@@ -12,6 +12,7 @@ import numpy as np
 
 from echomodel.files import write_text
 from echomodel.openings import Opening, opening_from_json
+from echomodel.vocabulary import vocabulary
 
 CONVENTION = (
     "metres; +Y up; size = (x, y, z) extents in the object frame; position = bottom centre; "
@@ -56,19 +57,27 @@ class RoomBoxes:
 
     @classmethod
     def from_json(cls, raw: dict) -> RoomBoxes:
-        """Read one entry of a rooms file; raises KeyError on a missing field."""
-        objects = raw["objects"]
-        relations = raw.get("relations")
+        """Read one entry of a rooms file; raises ValueError that names the field which is not as allowed."""
+        told = raw.get("objects") if isinstance(raw, dict) else None
+        if not isinstance(told, list) or not all(isinstance(one, dict) for one in told):
+            raise ValueError("objects is no list of objects")
+        floor, height = _numbers(raw, "floor_polygon", -1, 2), float(_numbers(raw, "height", above=0))
+        if len(floor) in (1, 2):
+            raise ValueError(f"floor_polygon has {len(floor)} corners, allowed: none, or three and more")
+        relations = None if raw.get("relations") is None else _numbers(raw, "relations", -1, 3).astype(int)
+        known = {row.id for row in vocabulary().predicates}
+        for s, p, o in () if relations is None else relations.tolist():
+            if s == o or not {s, o} <= {*range(len(told))} or p not in known:
+                raise ValueError(f"relation {[s, p, o]}, allowed: two of {len(told)} objects and a predicate's number")
         return cls(
-            id=raw["id"], room_type=raw["room_type"],
-            floor_polygon=np.asarray(raw["floor_polygon"], float).reshape(-1, 2), height=float(raw["height"]),
-            categories=tuple(o["category"] for o in objects),
-            size=np.asarray([o["size"] for o in objects], float).reshape(-1, 3),
-            position=np.asarray([o["position"] for o in objects], float).reshape(-1, 3),
-            yaw=np.asarray([o["yaw"] for o in objects], float).reshape(-1),
-            models=tuple(o.get("model", "") for o in objects), styles=tuple(o.get("style", -1) for o in objects),
-            relations=None if relations is None else np.asarray(relations, int).reshape(-1, 3),
-            openings=tuple(map(opening_from_json, raw.get("openings", ()))),
+            id=_word(raw, "id"), room_type=_word(raw, "room_type"), floor_polygon=floor, height=height,
+            categories=tuple(_word(o, "category") for o in told),
+            size=np.array([_numbers(o, "size", 3, above=0) for o in told]).reshape(-1, 3),
+            position=np.array([_numbers(o, "position", 3) for o in told]).reshape(-1, 3),
+            yaw=np.array([_numbers(o, "yaw") for o in told]).reshape(-1),
+            models=tuple(_word({"model": "", **o}, "model") for o in told),
+            styles=tuple(int(_numbers({"style": -1, **o}, "style")) for o in told),
+            relations=relations, openings=tuple(map(opening_from_json, raw.get("openings", ()))),
         )  # fmt: skip
 
     def to_json(self, digits: int = 4) -> dict:
@@ -101,22 +110,42 @@ class RoomBoxes:
         return out
 
 
+def _word(raw: dict, key: str) -> str:
+    if not isinstance(raw.get(key), str):
+        raise ValueError(f"{key} is {raw.get(key)!r}, allowed: a string")
+    return raw[key]
+
+
+def _numbers(raw: dict, key: str, *shape: int, above: float = -np.inf) -> np.ndarray:
+    """The finite numbers of a field, of one shape; -1 = as many as there are."""
+    told = raw.get(key)
+    try:
+        found = np.array(told if told != [] else np.zeros((0, *shape[1:])), float)
+        fits = all(want in (-1, has) for want, has in zip(shape, found.shape, strict=True))
+    except (TypeError, ValueError):
+        fits = False
+    if not fits or not (np.isfinite(found) & (found > above)).all():
+        what = f"{' x '.join(map(str, shape)).replace('-1', 'n')} finite numbers" if shape else "a finite number"
+        raise ValueError(f"{key} is {told!r}, allowed: {what}{f' above {above}' * (above == 0)}")
+    return found
+
+
 def read_rooms(path: str | os.PathLike[str]) -> list[RoomBoxes]:
     """Read a rooms file (`{"convention", "rooms": [...]}`); raises ValueError naming the file and the room at fault."""
     path = Path(path)
     try:
         raw = json.loads(path.read_text("utf-8"))
         entries = list(raw["rooms"])
-    except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError) as error:
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError, KeyError, TypeError) as error:
         form = '{"convention": ..., "rooms": [...]}'
         raise ValueError(f"{path}: not a rooms file, expected {form} ({error})") from None
     rooms = []
     for number, entry in enumerate(entries):
         try:
             rooms.append(RoomBoxes.from_json(entry))
-        except (KeyError, TypeError, ValueError) as error:
+        except (TypeError, ValueError) as error:
             name = entry.get("id", f"number {number}") if isinstance(entry, dict) else f"number {number}"
-            raise ValueError(f"{path}: room {name}: {type(error).__name__} {error}") from None
+            raise ValueError(f"{path}: room {name}: {error}") from None
     return rooms
 
 

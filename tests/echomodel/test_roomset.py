@@ -70,7 +70,7 @@ def test_a_set_of_one_file(folder, tmp_path):
     for number, true in enumerate(rooms):
         assert packed.room(number).to_json() == true.to_json()
     far = replace(rooms[0], position=rooms[0].position + 40)
-    with pytest.raises(ValueError, match=r"objects.position reaches \d+.* steps, a set of rooms holds 32767"):
+    with pytest.raises(ValueError, match=r"room room_3_000000: a set of rooms holds less than 32.768 m"):
         pack_rooms(path, [far], [False], {})
     for content in (b"PK", pickle.dumps({})):
         (tmp_path / "bad.npz").write_bytes(content)

@@ -42,6 +42,7 @@ ROOMS_PER_SHARD = 1000
 LABELLED = 200  # rooms at a time
 DIGITS = 4  # a tenth of a millimetre
 MILLIMETRES, STEPS = 1000.0, {"yaw": 1e4}  # steps to the unit of the numbers of a packed set
+MOST = 2**15  # such steps
 
 
 def build_rooms(
@@ -89,8 +90,8 @@ def pack_rooms(path: str | os.PathLike[str], rooms: Sequence[RoomBoxes], held_ou
     Arguments:
         held_out: which of them no training may see. info: what the set says of itself.
 
-    Raises `UnknownWord` for a category or room type that the vocabulary does not hold, and ValueError for a number of
-    32768 millimetres or more.
+    Raises `UnknownWord` for a category or room type that the vocabulary does not hold, and ValueError for a room that
+    reaches MOST steps.
     """
     note = {"kind": "rooms", "seed": 0, **info, "rooms": len(rooms), **_words()}
     columns: dict[str, np.ndarray] = {"note": np.frombuffer(json.dumps(note).encode(), np.uint8)}
@@ -98,10 +99,7 @@ def pack_rooms(path: str | os.PathLike[str], rooms: Sequence[RoomBoxes], held_ou
         for field in table.dtype.names or ("",):
             column = table[field] if field else table
             if column.dtype.kind == "f":
-                column = np.round(column * STEPS.get(field, MILLIMETRES))
-                if np.abs(column).max(initial=0) >= 2**15:
-                    raise ValueError(f"{name}.{field} reaches {np.abs(column).max()} steps, a set of rooms holds 32767")
-                column = column.astype("<i2")
+                column = np.round(column * STEPS.get(field, MILLIMETRES)).astype("<i2")
             columns[f"{name}.{field}"] = column
     with whole_file(path) as beside, beside.open("wb") as file:
         np.savez_compressed(file, **columns)  # type: ignore[arg-type]
@@ -142,16 +140,22 @@ def _tables_of(rooms: Sequence[RoomBoxes], held_out: Sequence[bool]) -> dict[str
     tables: dict[str, list[np.ndarray]] = {name: [] for name in TABLES}
     for k, room in enumerate(rooms):
         n = len(room)
-        kind = words.room_type_id(room.room_type)
+        kind, openings = words.room_type_id(room.room_type), [_entry(opening) for opening in room.openings]
+        lengths = (room.height, *(x for entry in openings for x in entry[4:]))
+        parts = (room.size, room.position, room.floor_polygon, lengths, np.divide(room.styles, MILLIMETRES))
+        if max(np.abs(part).max(initial=0) for part in parts) * MILLIMETRES > MOST - 1:
+            raise ValueError(f"room {room.id}: a set of rooms holds less than {MOST / MILLIMETRES} m and {MOST} styles")
         entry = (n, len(room.floor_polygon), len(room.openings), kind, held_out[k], room.height)
         objects = np.zeros(n, OBJECT)
         objects["category"] = [words.category_id(category) for category in room.categories]
         objects["style"] = room.styles or -1
-        objects["size"], objects["position"], objects["yaw"] = room.size, room.position, room.yaw
+        objects["size"], objects["position"] = np.maximum(room.size, 1 / MILLIMETRES), room.position
+        turned_on = np.arctan2(np.sin(room.yaw), np.cos(room.yaw))
+        objects["yaw"] = np.where(np.abs(room.yaw) * STEPS["yaw"] < MOST - 1, room.yaw, turned_on)
         tables["rooms"].append(np.array([entry], ROOM))
         tables["objects"].append(objects)
         tables["corners"].append(np.asarray(room.floor_polygon, "<f4"))
-        tables["openings"].append(np.array([_entry(opening) for opening in room.openings], OPENING))
+        tables["openings"].append(np.array(openings, OPENING))
     joined = {name: np.ascontiguousarray(np.concatenate(parts)) for name, parts in tables.items()}
     return {name: joined[name].astype(dtype.base) for name, dtype in TABLES.items()}
 

@@ -152,9 +152,10 @@ def _in_words(recipe: Recipe) -> CompactConfig:
 
 
 def data_folder(recipe: Recipe, part: str) -> Path:
-    """The folder of the recipe's data that holds `part`; raises ValueError where the recipe names none."""
-    if not recipe.data:
-        raise ValueError(f"recipe field 'data' is empty, stage {recipe.stage!r} needs a folder of `echousd data build`")
+    """The folder of the recipe's data that holds `part`; raises ValueError where the recipe names none that exists."""
+    if not recipe.data or not Path(recipe.data).exists():
+        told = f"names {recipe.data}, which does not exist" if recipe.data else "is empty"
+        raise ValueError(f"recipe field 'data' {told}; stage {recipe.stage!r} needs a folder of `echousd data build`")
     return Path(recipe.data) if part == "rooms" and Path(recipe.data).is_file() else Path(recipe.data) / part
 
 

@@ -1,18 +1,21 @@
 """`echousd data` end to end on small sets."""
 
+import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from small_room import small_room
 
-from echomodel.data.roomset import RoomSet
+from echomodel.data.roomset import RoomSet, pack_rooms
 from echomodel.roomboxes import RoomBoxes, read_rooms, write_rooms
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 from echomodel.training.rooms import PackedRooms
 from echousd.cli.main import run
-from echousd.stage.boxes import graph_of, room_of
+from echousd.stage.boxes import graph_of, read_stage, room_of, write_stages
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +34,7 @@ def same(a: RoomBoxes, b: RoomBoxes, digits: int = 4) -> bool:
         and np.allclose(a.position, b.position, atol=10**-digits)
         and np.allclose(a.yaw, b.yaw, atol=10**-digits)
         and np.allclose(a.floor_polygon, b.floor_polygon, atol=10**-digits)
+        and len(a.openings) == len(b.openings)
     )
 
 
@@ -190,3 +194,135 @@ def test_a_file_that_holds_no_rooms_is_named(tmp_path, capsys, held):
     assert run(["data", "import", str(tmp_path / "odd.json"), "-o", str(tmp_path / "x.npz")]) == 2
     assert "odd.json: " in capsys.readouterr().err
     assert not (tmp_path / "x.npz").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"category": 5}, "category is 5, allowed: a string"),
+        ({"category": None}, "category is None, allowed: a string"),
+        ({"size": [float("nan"), 1, 1]}, "size is [nan, 1, 1], allowed: 3 finite numbers above 0"),
+        ({"size": [0, 1, 1]}, "size is [0, 1, 1], allowed: 3 finite numbers above 0"),
+        ({"size": [1, 1]}, "size is [1, 1], allowed: 3 finite numbers above 0"),
+        ({"position": [1e999, 0, 0]}, "position is [inf, 0, 0], allowed: 3 finite numbers"),
+        ({"yaw": "ninety"}, "yaw is 'ninety', allowed: a finite number"),
+        ({"style": "oak"}, "style is 'oak', allowed: a finite number"),
+    ],
+)
+def test_what_is_wrong_with_an_object_of_a_rooms_file_is_told(rooms_file, tmp_path, capsys, change, told):
+    raw = json.loads(rooms_file.read_text())
+    raw["rooms"][1]["objects"][0].update(change)
+    (tmp_path / "odd.json").write_text(json.dumps(raw))
+    for out in ("x.npz", "x.json"):
+        assert run(["data", "import", str(tmp_path / "odd.json"), "-o", str(tmp_path / out)]) == 2
+        assert f"odd.json: room {raw['rooms'][1]['id']}: {told}" in " ".join(capsys.readouterr().err.split())
+        assert not (tmp_path / out).exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"id": 5}, "id is 5, allowed: a string"),
+        ({"height": -2}, "height is -2, allowed: a finite number above 0"),
+        ({"floor_polygon": [[0, 0], [1, 1]]}, "floor_polygon has 2 corners, allowed: none, or three and more"),
+        ({"floor_polygon": [[0, 0, 0]] * 4}, "allowed: n x 2 finite numbers"),
+        ({"relations": [[0, 1, 99]]}, "relation [0, 1, 99], allowed: two of"),
+        ({"relations": [[-1, 1, 0]]}, "relation [-1, 1, 0], allowed: two of"),
+        ({"relations": [[0, 1, 0]]}, "relation [0, 1, 0], allowed: two of"),
+        ({"relations": [[0, 999, 1]]}, "relation [0, 999, 1], allowed: two of"),
+        ({"relations": [[0, 1]]}, "allowed: n x 3 finite numbers"),
+        ({"objects": {"bed": 1}}, "objects is no list of objects"),
+    ],
+)
+def test_what_is_wrong_with_a_room_of_a_rooms_file_is_told(rooms_file, tmp_path, change, told):
+    raw = json.loads(rooms_file.read_text())
+    raw["rooms"][1].update(change)
+    (tmp_path / "odd.json").write_text(json.dumps(raw))
+    with pytest.raises(
+        ValueError, match=re.escape(f"odd.json: room {raw['rooms'][1]['id']}: ") + ".*" + re.escape(told)
+    ):
+        read_rooms(tmp_path / "odd.json")
+
+
+def test_what_a_set_holds_no_numbers_for_is_named_and_turns_are_whole(rooms_file, tmp_path):
+    room = read_rooms(rooms_file)[0]
+    turned = replace(room, yaw=room.yaw + 4 * np.pi)
+    with pytest.raises(ValueError, match=f"room {room.id}: a set of rooms holds .* 32768 styles"):
+        pack_rooms(tmp_path / "x.npz", [replace(room, styles=(10**5,) * len(room))], [False], {})
+    pack_rooms(tmp_path / "x.npz", [turned, replace(room, size=room.size * 1e-5)], [False] * 2, {})
+    held = RoomSet(tmp_path / "x.npz")
+    assert np.allclose(np.exp(1j * held.room(0).yaw), np.exp(1j * room.yaw), atol=2e-4)
+    assert (held.room(1).size > 0).all()
+
+
+def test_rooms_of_one_name_and_names_of_other_folders_are_stages_of_their_own(rooms_file, tmp_path):
+    one, two, *_ = read_rooms(rooms_file)
+    write_stages([one, replace(two, id=one.id), replace(one, id="../out"), replace(one, id="a/b")], tmp_path / "usd")
+    assert {path.name for path in tmp_path.rglob("*.usda")} == {
+        f"{one.id}.usda",
+        f"{one.id}_2.usda",
+        "_out.usda",
+        "a_b.usda",
+    }
+    assert [path.name for path in tmp_path.iterdir()] == ["usd"]
+    assert read_stage(tmp_path / "usd" / f"{one.id}_2.usda")[0].categories == two.categories
+
+
+LABELLED = """#usda 1.0
+(
+    defaultPrim = "World"
+    upAxis = "Z"
+    metersPerUnit = 0.01
+)
+class Xform "Nightstand" (prepend apiSchemas = ["SemanticsLabelsAPI:class"])
+{
+    token[] semantics:labels:class = ["nightstand"]
+    def Cube "box"
+    {
+        double size = 40
+    }
+}
+def Xform "World"
+{
+    def Xform "Bedroom"
+    {
+        def Xform "ns_1" (
+            instanceable = true
+            references = </Nightstand>
+        )
+        {
+            double3 xformOp:translate = (75, 20, 20)
+            uniform token[] xformOpOrder = ["xformOp:translate"]
+        }
+        def Xform "ns_2" (
+            instanceable = true
+            references = </Nightstand>
+        )
+        {
+            double3 xformOp:translate = (325, 20, 20)
+            uniform token[] xformOpOrder = ["xformOp:translate"]
+        }
+    }
+}
+"""
+
+
+def test_labelled_stages_of_others_are_imported(tmp_path, capsys):
+    (tmp_path / "usd").mkdir()
+    (tmp_path / "usd" / "scan.usda").write_text(LABELLED)
+    for source in ("usd", "usd/scan.usda"):
+        assert run(["data", "import", str(tmp_path / source), "-o", str(tmp_path / "x.json"), "--force"]) == 0
+        (room,) = read_rooms(tmp_path / "x.json")
+        assert (room.id, room.room_type, room.categories) == ("scan", "bedroom", ("nightstand", "nightstand"))
+        assert np.allclose(room.size, 0.4)
+        assert np.allclose(room.position, [(0.75, 0.0, -0.2), (3.25, 0.0, -0.2)])
+    (tmp_path / "usd" / "other.usda").write_text('#usda 1.0\ndef Cube "thing" {}\n')
+    assert run(["data", "import", str(tmp_path / "usd"), "-o", str(tmp_path / "x.npz")]) == 2
+    assert "other.usda: no scene graph" in capsys.readouterr().err
+
+
+def test_data_to_train_on_that_is_not_there_is_named(tmp_path, capsys):
+    recipe = ["train", str(Path(__file__).parents[3] / "model/recipes/layout.toml"), "-o", str(tmp_path / "run")]
+    assert run([*recipe, "--set", "data=nowhere.npz"]) == 2
+    assert "recipe field 'data' names nowhere.npz, which does not exist" in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "run").exists()
