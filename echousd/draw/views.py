@@ -28,13 +28,16 @@ LENSES, DISTORTED = (24.0, 21.0, 18.0, 16.0), (0.0, 1.5, 5.0, 12.0)
 EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
 SLOPES = (0.05, 0.13, 0.22, 0.32)  # metres that the middle of its picture is lower for a metre ahead
 PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
-WHOLE, CLEAR = 1000.0, 30.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
-LOOKED, CHOSEN, TRIED = 48, 3, 32  # eyes of which one view is looked at closely; eyes, and of each so many views
+WHOLE, CLEAR = 1000.0, 80.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
+LOOKED, CHOSEN, TRIED = 24, 3, 16  # eyes of which one view is looked at closely; eyes, and of each so many views
 LOW = 1.4  # metres: over what is so high one looks
-# bare walls: what all of a picture costs, from which share on, metres of rounding
-BARE, BAREST, DEEP = 60.0, 0.28, 0.02
+# one bare wall: what all of a picture costs, from which share on, metres of rounding; what the main piece at the border
+# costs, and from which share of half the picture's width on it is aside
+BARE, BAREST, DEEP = 300.0, 0.17, 0.02
+MIDDLE, ASIDE = 60.0, 0.33
+SMALL, LARGE = 20.0, 5.0  # what a metre costs that the main piece is further away, and from where on
 BEFORE, WALLED = 2.6, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
-FILLED, BEHIND = 380.0, 45.0  # metres of depth that a picture full of what is near costs, and the main piece's back
+FILLED, BEHIND = 560.0, 45.0  # metres of depth that a picture full of what is near costs, and the main piece's back
 # Metres of depth that each thing costs which the border cuts, and which is beyond it: lamps, what hangs from `HIGH`
 # metres on, and furniture.
 CUTS, HIGH = ((90.0, 40.0), (25.0, 0.0), (25.0, 0.0)), 0.25
@@ -114,20 +117,20 @@ def framed(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
 
 def inside_view(
     floor: np.ndarray, furniture: Furniture, height: float, hung: Furniture | None = None,
-    openings: Furniture | None = None, main: int | None = None,
+    windows: Furniture | None = None, main: int | None = None,
 ) -> tuple[np.ndarray, float]:  # fmt: skip
     """Camera to world (4, 4) float, `shifted`, and focal length in mm of a view inside a room, its main piece whole.
 
     Of all eyes, headings and lenses those count that have the main piece whole in the picture; of these the one that
     hides and cuts off least of what stands and hangs, has most furniture and depth in its picture and little that is
-    near, and no bare wall over a third of it.
+    near, the main piece in its middle third, and no bare wall over a third of it.
 
     Arguments:
         floor: (k, 2) float, x and z of the corners, metres.
         furniture: what shall be seen, its fronts rather than its backs.
         height: of the walls, metres.
         hung: what hangs or stands at the walls: none of it shall be right before the eye.
-        openings: doors and windows as boxes in the walls, which are then not bare.
+        windows: as boxes in the walls, which are then not bare.
         main: row of the furniture that must be whole in the picture; None = the largest that one looks over.
     """
     floor = np.asarray(floor, float)
@@ -136,7 +139,7 @@ def inside_view(
     if not (count := len(furniture.size)):
         furniture = Furniture(np.full((1, 3), 1e-3), np.insert(middle, 1, 0.0)[None], np.zeros(1))
     things = furniture.with_others(hung)
-    everything = things.with_others(openings, _walls(floor, height))
+    everything = things.with_others(windows, _walls(floor, height))
     main = _main(furniture) if main is None else main
     row = np.arange(len(everything.size))
     reach = np.where((row < len(things.size)) & (row != main), BEFORE, WALLED)
@@ -151,7 +154,7 @@ def inside_view(
         eye, half = shot.view[:3, 3], APERTURE / 2 / shot.lens
         which, away = everything.met(shot.view, half)
         seen = (~shot.blocked & (_aside(shot.points, shot.view) <= half)).mean(-1).sum()
-        bare = bare_share(np.where(row[which] < len(row) - len(floor), np.inf, away), height, shot.view, half)
+        bare = barest_share(which, np.where(row[which] < len(row) - len(floor), np.inf, away), height, shot.view, half)
         return (
             float(np.minimum(away[AHEAD], FAR).mean() + (eye[[0, 2]] - middle) @ furniture.facing)
             + UNSEEN * min(seen, MANY) + SHOWN * float((np.isfinite(away) & (which < count)).mean())
@@ -167,8 +170,11 @@ def inside_view(
         views = _turned(eye, np.stack([aim - spot, around - spot]))
         halves = APERTURE / 2 / np.array(LENSES)
         cut = (_aside(furniture.corners[main], views)[..., None] > halves / MARGIN).mean(-2)
-        behind = BEHIND * max(0.0, float((aim - spot) @ front)) / max(float(np.linalg.norm(aim - spot)), 1e-9)
-        cost = WHOLE * cut + _shown(fragile, views, halves) + hidden + behind + touched
+        aside, back = (np.abs(views[..., [0, 2], axis] @ (aim - spot)) for axis in (0, 2))
+        off = MIDDLE * np.clip((aside / np.maximum(back, 1e-9))[..., None] / halves - ASIDE, 0.0, 1.0)
+        far = max(float(np.linalg.norm(aim - spot)), 1e-9)
+        behind = BEHIND * max(0.0, float((aim - spot) @ front)) / far + SMALL * max(0.0, far - LARGE)
+        cost = WHOLE * cut + off + _shown(fragile, views, halves) + hidden + behind + touched
         cost = (cost + np.abs(PANS)[:, None, None] + DISTORTED).ravel()
         eyes.append([
             Shot(float(cost[n]), views.reshape(-1, 4, 4)[n // len(LENSES)], LENSES[n % len(LENSES)], points, blocked)
@@ -180,17 +186,17 @@ def inside_view(
     return shot.view, shot.lens
 
 
-def bare_share(wall: np.ndarray, height: float, view: np.ndarray, half: float) -> float:
-    """Share of a picture inside a room that shows walls with nothing at or before them.
+def barest_share(which: np.ndarray, wall: np.ndarray, height: float, view: np.ndarray, half: float) -> float:
+    """Share of a picture inside a room that one wall takes where nothing is at or before it, of all the greatest.
 
-    `wall`: (169,) metres to bare walls along `RAYS`, inf where there is none. `height`: of the walls, metres. `view`,
-    `half`: as `Furniture.met`.
+    `which`, `wall`: (169,) int walls along `RAYS` and metres to them, inf where there is none or it is not bare.
+    `height`: of the walls, metres. `view`, `half`: as `Furniture.met`.
     """
     way = RAYS[:, 1] * half * view[1, 1] - view[1, 2]  # up, over the length of the ray
     way = way / np.linalg.norm(RAYS * (half, half, 1.0), axis=1)
     with np.errstate(divide="ignore"):
         level = np.where(way < 0, -view[1, 3] / way, (height - view[1, 3]) / np.maximum(way, 1e-12))
-    return float((wall < level - DEEP).mean())
+    return float(np.bincount(which[wall < level - DEEP]).max(initial=0)) / len(RAYS)
 
 
 def _main(furniture: Furniture) -> int:

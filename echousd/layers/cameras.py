@@ -21,19 +21,22 @@ TENTHS = 0.01  # what a millimetre is in USD's lens unit, tenths of a scene unit
 MAIN = ("bed", "sofa", "board", "screen", "cook")  # roles, a task: what a picture is about, the first that is there
 
 
-def main_piece(categories: Sequence[str], furniture: Furniture) -> int | None:
-    """Row of the largest bed, else sofa, table, screen or hob; None where there is none of these."""
+def main_piece(room: str, categories: Sequence[str], furniture: Furniture) -> int | None:
+    """Row of the largest bed, else sofa, table, screen or hob, of those first that the type of a room is known by; None
+    where there is none of these."""
+    signs = vocabulary().room_type(room).signs
     kinds = [vocabulary().category(word) for word in categories]
-    found = [i for word in MAIN for i in sorted(
-        (i for i, kind in enumerate(kinds) if word in (kind.role, kind.task)), key=lambda i: -furniture.size[i].prod()
-    )]  # fmt: skip
-    return found[0] if found else None
+    found = [
+        (not {kind.name, kind.coarse}.intersection(signs), number, -furniture.size[row].prod(), row)
+        for row, kind in enumerate(kinds) for number, word in enumerate(MAIN) if word in (kind.role, kind.task)
+    ]  # fmt: skip
+    return min(found)[-1] if found else None
 
 
-def opening_boxes(room: RoomData) -> Furniture:
-    """Doors and windows as boxes of 2 cm at the inner side of their walls; through passages one sees bare walls."""
+def window_boxes(room: RoomData) -> Furniture:
+    """Windows as boxes of 2 cm at the inner side of their walls: doors and passages are as bare as these."""
     corners, rows = room.graph.room.corners, []
-    for opening in (one for one in room.graph.room.openings if corners is not None and one.kind != "passage"):
+    for opening in (one for one in room.graph.room.openings if corners is not None and one.kind == "window"):
         x, z = segment(corners, opening).mean(0)
         yaw = np.arctan2(*inward_normal(corners, opening.edge))
         rows.append((opening.width, opening.height, 0.02, x, opening.sill, z, yaw))
@@ -43,7 +46,7 @@ def opening_boxes(room: RoomData) -> Furniture:
 
 def write_cameras(
     pen: Pen, points: np.ndarray, furniture: Furniture, walled: np.ndarray | None = None,
-    hung: Furniture | None = None, openings: Furniture | None = None, main: int | None = None,
+    hung: Furniture | None = None, windows: Furniture | None = None, main: int | None = None,
 ) -> None:  # fmt: skip
     """Author `/Room/Cameras/top` (from afar, -Z up in the picture) and `/Room/Cameras/perspective`.
 
@@ -51,8 +54,8 @@ def write_cameras(
         pen: writes the cameras.
         points: what is seen, see `room_points`. furniture: as of `perspective_views`.
         walled: corners of the floor of a room with walls; its perspective camera stands inside.
-        hung: what hangs or stands at the walls and must not fill that camera's picture. openings: doors and windows.
-        main: row of the furniture that this camera has whole in its picture.
+        hung: what hangs or stands at the walls and must not fill that camera's picture.
+        windows: boxes of these. main: row of the furniture that this camera has whole in its picture.
     """
     pen.define("/Room/Cameras", "Scope")
     # from afar rather than orthographic, whose width Blender takes for ten times what it is
@@ -69,7 +72,7 @@ def write_cameras(
     }  # fmt: skip
     pen.define("/Room/Cameras/top", "Camera", top)
     if walled is not None:
-        matrix, lens = inside_view(walled, furniture, float(upper[1]), hung, openings, main)
+        matrix, lens = inside_view(walled, furniture, float(upper[1]), hung, windows, main)
     else:
         matrix, lens = perspective_views(points, furniture)[0], FOCAL_LENGTH
     slope = float(matrix[:3, 1] @ matrix[:3, 2])  # 0 of a camera that has no shift

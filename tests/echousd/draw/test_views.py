@@ -10,9 +10,18 @@ import shapely
 
 from echomodel.openings import Opening
 from echousd.draw.sight import ASPECT, RAYS, Furniture, filled
-from echousd.draw.views import APERTURE, LENSES, _shown, _walls, bare_share, inside_view, perspective_views, view_matrix
+from echousd.draw.views import (
+    APERTURE,
+    LENSES,
+    _shown,
+    _walls,
+    barest_share,
+    inside_view,
+    perspective_views,
+    view_matrix,
+)
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.layers.cameras import main_piece, opening_boxes
+from echousd.layers.cameras import main_piece, window_boxes
 
 FLOOR = np.array([(0.0, 0.0), (0.0, 4.0), (5.0, 4.0), (5.0, 0.0)])
 
@@ -28,7 +37,8 @@ def fills(things: Furniture, view: np.ndarray, half: float, reach: float) -> flo
 
 def bare_walls(things: list[Furniture], view: np.ndarray, half: float) -> float:
     which, away = boxes().with_others(*things, _walls(FLOOR, 2.8)).met(view, half)
-    return bare_share(np.where(which < sum(len(some.size) for some in things), np.inf, away), 2.8, view, half)
+    bare = np.where(which < sum(len(some.size) for some in things), np.inf, away)
+    return barest_share(which, bare, 2.8, view, half)
 
 
 BED = boxes((1.8, 0.6, 2.0, 2.5, 0.0, 1.2, 0.0))
@@ -122,6 +132,15 @@ def test_the_camera_shows_no_bare_wall_where_it_need_not():
     assert bare_walls([bed, walls], view, APERTURE / 2 / lens) < 1 / 3
 
 
+def test_the_main_piece_is_in_the_middle_third_of_the_picture() -> None:
+    floor = np.array([(0.0, 0.0), (0.0, 4.0), (9.0, 4.0), (9.0, 0.0)])
+    sofa = boxes((2.2, 0.8, 0.9, 1.6, 0.0, 0.6, 0.0))  # and many things at the other end
+    many = boxes(*((0.5, 0.9, 0.5, x, 0.0, z, 0.0) for x in (5.0, 6.0, 7.0, 8.0) for z in (0.5, 3.5)))
+    view, lens = inside_view(floor, sofa.with_others(many), 2.6, main=0)
+    x, _, z = np.linalg.inv(view[:3, :3]) @ (sofa.corners[0].mean(0) - view[:3, 3])
+    assert abs(x) < -z * APERTURE / 2 / lens / 3
+
+
 def test_only_what_is_near_and_in_the_picture_fills_it() -> None:
     view = view_matrix(np.array([0.0, 1.5, 0.0]), np.array([1.0, 1.5, 0.0]))
     ahead, behind, beside, far = (
@@ -189,13 +208,15 @@ def test_a_small_dining_room_has_its_chairs_whole_but_for_a_foot(at) -> None:
     assert min(within(corners, *view) for corners in group.corners) >= 7 / 8
 
 
-@pytest.mark.parametrize(("words", "main"), [
-    (("fridge", "sink_unit", "hob_unit"), 2), (("hob_unit", "dining_table"), 1), (("fridge", "tall_unit"), None),
+@pytest.mark.parametrize(("room", "words", "main"), [
+    ("kitchen", ("fridge", "hob_unit", "dining_table"), 1), ("dining_room", ("hob_unit", "dining_table"), 1),
+    ("kitchen", ("fridge", "tall_unit"), None), ("study", ("chaise_longue_sofa", "desk"), 1),
+    ("living_room", ("desk", "loveseat_sofa"), 1), ("living_dining_room", ("dining_table", "loveseat_sofa"), 1),
 ])  # fmt: skip
-def test_a_kitchen_without_a_table_is_about_its_hob(words, main):
+def test_a_picture_is_about_what_its_room_is_for(room, words, main):
     count = len(words)
     furniture = Furniture(np.ones((count, 3)), np.zeros((count, 3)), np.zeros(count))
-    assert main_piece(words, furniture) == main
+    assert main_piece(room, words, furniture) == main
 
 
 def test_wide_scenes_are_seen_from_higher_up():
@@ -211,10 +232,12 @@ def test_wide_scenes_are_seen_from_higher_up():
     assert steep(14.0) == pytest.approx(2 * steep(4.0))
 
 
-def test_one_looks_at_no_passage():
-    """What lies beyond it is not drawn, so that it counts as bare wall; doors and windows do not."""
+def test_one_looks_at_windows_rather_than_at_doors_and_passages():
+    """These count as bare wall."""
     corners = ((-2.0, -2.0), (-2.0, 2.0), (2.0, 2.0), (2.0, -2.0))
-    openings = tuple(Opening(kind, kind, edge, 2.0, 0.9, 2.0) for edge, kind in enumerate(("door", "passage")))
+    openings = tuple(
+        Opening(kind, kind, edge, 2.0, 0.9, 2.0) for edge, kind in enumerate(("window", "door", "passage"))
+    )
     graph = SceneGraph(RoomSpec("hallway", floor_polygon=corners, openings=openings), (Node("bench", "bench"),), ())
     room = SimpleNamespace(graph=graph)
-    assert opening_boxes(room).position[:, [0, 2]].round(2).tolist() == [[-2.0, 0.45]]
+    assert window_boxes(room).position[:, [0, 2]].round(2).tolist() == [[-2.0, 0.45]]
