@@ -58,7 +58,7 @@ def _anchored(found: Found, folder: Path, outside: Sequence[str]) -> Found:
     """What was found with the files of its models as absolute paths, or why they may not be read."""
     if '"asset"' not in found.text:
         return found
-    from echousd.shapes.sources.retrieval import anchored, check_files
+    from echousd.shapes.sources.named import anchored, check_files
 
     graph = anchored(SceneGraph.from_json(found.text), folder)
     try:

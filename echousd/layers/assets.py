@@ -1,29 +1,23 @@
-"""One piece of furniture as a USD asset: a light component layer with a payload, and the heavy geometry behind it.
-
-A model of somebody else's is one by a component that places it, and refers to it or holds it.
-"""
+"""One piece of furniture as a USD asset: a light component layer with a payload, and the heavy geometry behind it."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Gf, Kind, Sdf
+from pxr import Sdf
 
 from echomodel.late import Late
 from echomodel.triangles import area_normals
 from echousd.layers.materials import write_looks, write_palettes
 from echousd.layers.physics import write_asset_physics
 from echousd.options import Look
-from echousd.shapes.geometry import Geometry, Original
+from echousd.shapes.geometry import Geometry
 from echousd.shapes.joints import write_joints
 from echousd.shapes.looks import alternatives, look, palette_for
 from echousd.shapes.surface import CREASE, Surface, surfaces
-from echousd.stage.files import layer_bytes
 from echousd.stage.paths import (
     CLASSES,
     DESCRIPTION,
@@ -32,11 +26,7 @@ from echousd.stage.paths import (
     ROOM,
     class_path,
     coarse_name,
-    component_file,
-    original_file,
-    payload_file,
     payload_name,
-    piece_name,
     piece_path,
 )
 from echousd.stage.pen import Pen, ops, say
@@ -221,66 +211,3 @@ def _add_arcs(layer: Sdf.Layer, name: str, geometry: Geometry) -> None:
         variant.payloadList.prependedItems.append(Sdf.Payload(f"./{coarse_name(name)}", Sdf.Path(f"/{name}")))
     payload = Sdf.Payload(f"./{payload_name(name)}", Sdf.Path(f"/{name}"))
     layer.GetPrimAtPath(f"/{name}").payloadList.prependedItems.append(payload)
-
-
-PLACES, MODEL = "placed", "model"  # the prim that corrects unit, axes, pivot and front, and the model below it
-
-
-def placed_files(
-    name: str, category: str, geometry: Geometry, data: Mapping[str, Any], folder: Path, options: Look
-) -> dict[str, bytes]:
-    """Path in the room's folder -> content: the component, our collider where it has none, a converted model.
-
-    `category`: its word. `geometry`: with an original. `data`: customLayerData. `folder`: where the component will lie,
-    which the path of an original that stays where it is becomes relative to. `options`: of what is ours; the model
-    itself stays as it is.
-    """
-    original = geometry.original
-    assert original is not None
-    component = component_layer(name, category, geometry.mesh.bounds, geometry, data)
-    _place(component, name, original, _reference(name, original, folder))
-    ours = {component_file(name): component}
-    if not original.colliders:
-        ours[payload_file(name)] = geometry_layer(name, {}, geometry, data)
-    for layer in ours.values():
-        as_asked(layer, options, theirs=lambda path: path != f"./{payload_name(name)}")
-    found = {path: layer_bytes(layer, path[-5:]) for path, layer in ours.items()}
-    return found | {original_file(name, path): content for path, content in original.files.items()}
-
-
-def carried_files(name: str, original: Original, old: Mapping[str, bytes], folder: Path) -> dict[str, bytes]:
-    """The files of an asset as they are, but for the path of a model outside as seen from another folder."""
-    files = dict(old)
-    if original.layer is None:
-        return files
-    layer = Sdf.Layer.CreateAnonymous(".usda")
-    layer.ImportFromString(files[component_file(name)].decode())
-    model = layer.GetPrimAtPath(f"/{name}/{piece_name(name, PLACES)}/{piece_name(name, MODEL)}")
-    path = _reference(name, original, folder)
-    if model and all(payload.assetPath != path for payload in model.payloadList.prependedItems):
-        model.payloadList.prependedItems = [Sdf.Payload(path, Sdf.Path(original.prim))]
-        files[component_file(name)] = layer_bytes(layer, ".usda")
-    return files
-
-
-def _reference(name: str, original: Original, folder: Path) -> str:
-    """The path from an asset's component to the model: relative, with forward slashes."""
-    if original.layer is None:
-        return f"./{original_file(name, original.main).split('/', 2)[2]}"
-    try:
-        path = Path(os.path.relpath(original.layer, folder.absolute())).as_posix()
-    except ValueError:  # on another drive
-        return original.layer.as_posix()
-    return path if path.startswith(".") else f"./{path}"
-
-
-def _place(layer: Sdf.Layer, name: str, original: Original, path: str) -> None:
-    """Author, in an asset's component layer, the prim that places the model and the payload that is the model."""
-    with Sdf.ChangeBlock():
-        root = layer.GetPrimAtPath(f"/{name}")
-        places = Sdf.PrimSpec(root, piece_name(name, PLACES), Sdf.SpecifierDef, "Xform")
-        matrix = Gf.Matrix4d(*(round(float(v), 9) + 0.0 for v in np.asarray(original.pose).T.ravel()))
-        say(places, ops(transform=("matrix4d", matrix)))
-        model = Sdf.PrimSpec(places, piece_name(name, MODEL), Sdf.SpecifierDef)
-        model.kind = Kind.Tokens.subcomponent  # a component has none below it
-        model.payloadList.prependedItems.append(Sdf.Payload(path, Sdf.Path(original.prim)))

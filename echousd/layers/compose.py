@@ -13,6 +13,7 @@ from pxr import Sdf
 
 import echousd
 from echomodel.dressing import KINDS
+from echomodel.late import Late
 from echousd.draw.pictures import thumbnails
 from echousd.draw.sight import Furniture
 from echousd.dressing.dress import Dressing, dress, write_nodes
@@ -46,6 +47,7 @@ from echousd.stage.write import graph_layer as write_graph_layer
 if TYPE_CHECKING:
     from echousd.folder.stored import Shelf
 
+carried_files, placed_files = Late("echousd.layers.placed:carried_files"), Late("echousd.layers.placed:placed_files")
 FILE = "ATTRIBUTION.md"
 
 
@@ -281,10 +283,10 @@ def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Pa
             geometry, folder = replace(geometry, original=original), shelf.place
         assert geometry.original is not None
         if name in room.carried:
-            return Asset(name, {}, assets.carried_files(name, geometry.original, room.carried[name], folder))
+            return Asset(name, {}, carried_files(name, geometry.original, room.carried[name], folder))
         data = _asset_data(room, name, geometry)
         word = word_of(room.graph.node(user))
-        return Asset(name, {}, assets.placed_files(name, word, geometry, data, folder, room.options))
+        return Asset(name, {}, placed_files(name, word, geometry, data, folder, room.options))
     if name in room.carried:
         carried = {piece_path("", name, part.name, part.body): tuple(part.slots) for part in geometry.parts}
         return Asset(name, carried, room.carried[name])

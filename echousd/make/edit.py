@@ -37,16 +37,9 @@ from echousd.progress import StageTimer
 from echousd.room import LayoutOutcome, Provenance
 from echousd.shapes.looks import palette_of_room
 from echousd.shapes.sources.mixing import check_sources, default_source, mixed_shapes
-from echousd.shapes.sources.retrieval import (
-    Retrieved,
-    anchored,
-    check_files,
-    given_pieces,
-    retrieved,
-    source_of,
-    with_given_sizes,
-)
-from echousd.shapes.sources.source import ShapeRequest
+from echousd.shapes.sources.named import anchored, check_files, source_of, with_given_sizes
+from echousd.shapes.sources.retrieval import given_pieces, retrieved
+from echousd.shapes.sources.source import Retrieved, ShapeRequest
 from echousd.shapes.styles import asset_names, style_groups, told_styles
 
 ROUNDS = 4  # times that boxes are placed: what is in the way of what was moved makes way, and what is in its way

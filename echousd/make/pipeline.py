@@ -9,6 +9,7 @@ from typing import Any
 
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import footprints
+from echomodel.late import Late
 from echomodel.progress import StageListener
 from echomodel.protocols import RoomModel
 from echousd.graph import SceneGraph, load_graph
@@ -29,26 +30,22 @@ from echousd.make.layouts import (
     with_free_openings,
     with_sizes,
 )
-from echousd.make.stated import (
-    fitted,
-    with_earlier_locks,
-    with_locked_places,
-    with_own_boxes,
-    with_own_pieces,
-    with_space,
-)
+from echousd.make.stated import with_earlier_locks, with_locked_places, with_own_boxes, with_own_pieces
 from echousd.make.verdicts import layout_outcome, warn_of_faults
 from echousd.options import RoomOptions, takes_options
 from echousd.place.living import unusual
 from echousd.progress import StageTimer
 from echousd.room import Provenance
 from echousd.shapes.sources.mixing import check_sources, default_source, mixed_shapes, shape_nearness, sources_of
-from echousd.shapes.sources.retrieval import anchored, check_files, given_pieces, retrieved, with_given_sizes
-from echousd.shapes.sources.source import ShapeRequest
+from echousd.shapes.sources.named import anchored, check_files, names_models, with_given_sizes
+from echousd.shapes.sources.source import Retrieved, ShapeRequest
 from echousd.shapes.styles import asset_names, style_groups
 from echousd.stage.files import open_stage
 from echousd.stage.graphs import read_graph
 from echousd.stage.units import conventions
+
+given_pieces, retrieved = (Late(f"echousd.shapes.sources.retrieval:{name}") for name in ("given_pieces", "retrieved"))
+with_space, fitted = Late("echousd.make.fitting:with_space"), Late("echousd.make.fitting:fitted")
 
 
 @takes_options()
@@ -116,7 +113,8 @@ def generate(
         echo = model_of(asked, model)
         shapes = asked.shapes or default_source(echo)
         check_sources([shapes, *sources_of(graph, shapes).values()], echo)
-    pieces = given_pieces(graph, shapes, wishes, timer=timer)
+    theirs = names_models(graph, shapes)
+    pieces = given_pieces(graph, shapes, wishes, timer=timer) if theirs else Retrieved()
     sizes = dict(pieces.sizes)
     with faults_of(file):
         check_doors(graph)
@@ -143,9 +141,11 @@ def generate(
     near = None
     if "guided" in sources_of(graph, shapes).values():
         near = shape_nearness(graph, boxes, shapes, wishes(), seed, echo, asked.steps, timer)
-    models = retrieved(
-        graph, boxes, style_groups(graph), shapes, wishes, seed, pieces, near, palette=asked.palette, timer=timer
-    )
+    models = pieces
+    if theirs:
+        models = retrieved(
+            graph, boxes, style_groups(graph), shapes, wishes, seed, pieces, near, palette=asked.palette, timer=timer
+        )
     if models.sizes != sizes:  # real sizes shape the layout
         sizes |= models.sizes
         graph, boxes, notes, more = laid_out(graph)

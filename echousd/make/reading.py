@@ -18,7 +18,7 @@ from echousd.folder.found import manifest_of
 from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.graph import SceneGraph
-from echousd.layers.assets import MODEL, PLACES
+from echousd.layers.placed import MODEL, PLACES
 from echousd.shapes.colliders import approximation, hull_of
 from echousd.shapes.geometry import LICENCE, Collider, Geometry, Mass, Origin, Original, Part
 from echousd.shapes.joints import read_joints

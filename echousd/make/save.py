@@ -24,7 +24,7 @@ from echousd.options import Look
 from echousd.place.living import living_faults
 from echousd.room import LayoutOutcome, RoomData
 from echousd.shapes.geometry import Geometry
-from echousd.shapes.sources.retrieval import beside
+from echousd.shapes.sources.named import beside
 from echousd.stage.apart import check_harmless
 from echousd.stage.files import open_stage, write_all
 from echousd.stage.layouts import layout_names, showing_layout

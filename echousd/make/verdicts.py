@@ -56,6 +56,11 @@ def relation_verdicts(graph: SceneGraph, boxes: BoxesLike, *, rules: str = "stri
     ) + _placement_verdicts(graph, boxes)
 
 
+def unbroken(graph: SceneGraph, boxes: BoxesLike) -> set[int]:
+    """Numbers of the relations that are not broken."""
+    return {row for row, verdict in enumerate(relation_verdicts(graph, boxes)) if verdict.state != "broken"}
+
+
 def _placement_verdicts(graph: SceneGraph, boxes: BoxesLike) -> tuple[Verdict, ...]:
     categories = [node.category for node in graph.nodes]
     margin = placement_margins(Spread.of(boxes), stated_placements(graph), graph.room.corners, categories).tolist()

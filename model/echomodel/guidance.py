@@ -6,27 +6,15 @@ asked to grow or shrink, each stands at the height of what carries it, and what 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-
-import numpy as np
-
-from echomodel.arrays import Array, at_least, cast, device_of, full, kit, on_device
+from echomodel.arrays import Array, kit
 from echomodel.boxes import Boxes, BoxScale
-from echomodel.graph import GraphBatch
 from echomodel.objective import KINDS, Plan, missed
-from echomodel.objective.access import askew
-from echomodel.objective.support import ON_CEILING, ON_FLOOR
-from echomodel.openings import HINGES, STEP, Opening, inward_normal
-from echomodel.rules.placements import Stated
 from echomodel.samplers import Predict
-from echomodel.vocabulary import vocabulary
+from echomodel.standing import placed, standing
 
 LATE = 0.3  # level of noise below which boxes are where they will be, but for what guidance moves
-AFTER = 40  # steps after the last of the sampler
 MOMENTS = (0.8, 0.95)  # of Adam
 LEAST = 0.02  # share of the first step that the last one has
-ALMOST = np.radians(3.0)  # off a quarter turn to a wall: nobody turns furniture by so little
 BEYOND = 0.01  # metres or ratio that is asked for beyond a term's slack
 
 
@@ -60,7 +48,7 @@ def mended(plan: Plan, boxes: Boxes, *, strength: float, rounds: int, given: Arr
         rounds: how many.
         given: (N,) bool, boxes that stay; None = none.
     """
-    start = _standing(plan, boxes, given)
+    start = standing(plan, boxes, given)
     xp, height = kit(start.yaw), start.position[:, 1]
     place = xp.concat([start.position[:, ::2], start.yaw[:, None]], 1)
     mean, square = xp.zeros_like(place), xp.zeros_like(place)
@@ -74,81 +62,4 @@ def mended(plan: Plan, boxes: Boxes, *, strength: float, rounds: int, given: Arr
         step = mean / (1 - MOMENTS[0] ** (number + 1)) / ((square / (1 - MOMENTS[1] ** (number + 1))).sqrt() + 1e-8)
         rate = strength * (1 - (1 - LEAST) * number / rounds)
         place = xp.where(start.given[:, None], place, place - rate * step)
-    return _placed(boxes, xp.stack([place[:, 0], height, place[:, 1]], 1), place[:, 2])
-
-
-def settled(plan: Plan, boxes: Boxes, given: Array | None = None) -> Boxes:
-    """Boxes at the heights that their carriers give them and, where they almost are, square to a wall.
-
-    Only the last step does so: down a slope that begins where terms have their kinks a hair's breadth decides.
-
-    Arguments: as for `mended`, the plan in either library.
-    """
-    start = _standing(plan, boxes, given)
-    off = askew(start, start.kit.arange(len(start)))
-    return _placed(boxes, start.position, start.yaw - start.kit.where((abs(off) < ALMOST) & ~start.given, off, 0.0))
-
-
-def _standing(plan: Plan, boxes: Boxes, given: Array | None) -> Plan:
-    """The plan with boxes where they are drawn, at the heights of what carries them, but for those that stay."""
-    xp, device = kit(plan.yaw), device_of(plan.yaw)
-    drawn, like = boxes.to(device), xp.zeros(0, dtype=xp.float64)  # rounding would choose the side
-    size, position, yaw = (cast(of, like) for of in (drawn.size, drawn.position, drawn.yaw))
-    stays = xp.zeros(len(boxes), dtype=xp.bool) if given is None else on_device(given, device)
-    start = replace(plan, size=size, position=position, yaw=yaw, given=stays, floor=cast(plan.floor, like))
-    height = xp.where(stays, position[:, 1], heights(start))
-    return start.at(xp.stack([position[:, 0], height, position[:, 2]], 1), yaw)
-
-
-def _placed(boxes: Boxes, position: Array, yaw: Array) -> Boxes:
-    """Boxes (N) in other places, in the library, type and place of theirs."""
-    drawn = boxes.to(device_of(yaw))
-    return Boxes(drawn.size, cast(position, drawn.size), cast(yaw, drawn.size)).to(device_of(boxes.yaw))
-
-
-def heights(plan: Plan) -> Array:
-    """(N,) metres: the bottoms of boxes on the floor, on what carries them or at the ceiling, else where they are."""
-    xp, out, carrier, high = kit(plan.yaw), plan.position[:, 1], plan.carrier, plan.size[:, 1]
-    out = xp.where(carrier == ON_FLOOR, 0.0, out)
-    out = xp.where((carrier == ON_CEILING) & xp.isfinite(plan.ceiling), plan.ceiling - high, out)
-    for _ in range(len(out)):
-        on = xp.where(carrier >= 0, (out + high)[at_least(carrier, 0)], out)
-        if (on == out).all():
-            break
-        out = on
-    return out
-
-
-def plan_of_graph(graph: GraphBatch, rules: str) -> Plan:
-    """The rooms of a graph, on the CPU, as the objective sees them, their boxes nowhere yet."""
-    words, nowhere = vocabulary(), full(graph.floor, (graph.num_nodes, 3), 0.0)
-    rooms = zip(np.asarray(graph.floor, float), graph.openings.tolist(), strict=True)
-    kinds = [words.placements[kind].name for kind in graph.placements[:, 1].tolist()]
-    return Plan(
-        tuple(words.categories[number] for number in graph.category.tolist()), nowhere, nowhere, nowhere[:, 0],
-        graph.scene, graph.floor, tuple(openings_of(floor, rows) for floor, rows in rooms), graph.triplets,
-        graph.scene < 0, graph.height, rules,
-        stated=tuple(Stated(kind, who, tuple(other for other in others if other >= 0))
-                     for kind, (who, _, *others) in zip(kinds, graph.placements.tolist(), strict=True)),
-    )  # fmt: skip
-
-
-def openings_of(floor: np.ndarray, rows: Sequence[Sequence[float]]) -> tuple[Opening, ...]:
-    """The openings of rows (`surroundings.opening_rows`); a leaf whose hinges they do not tell swings both ways.
-
-    `floor`: (K, 2) float, corners of their floor, metres, padded with NaN.
-    """
-    corners = floor[np.isfinite(floor).all(1)]
-    out: list[Opening] = []
-    normals = np.array([inward_normal(corners, edge) for edge in range(len(corners))]).reshape(-1, 2)
-    for row in rows:
-        if not np.isfinite(row).all() or not len(corners):
-            continue
-        near, far = np.array(row[:2]), np.array(row[2:4])
-        edge = int((np.abs(((near - corners) * normals).sum(1)) - (normals @ row[4:6])).argmin())
-        offset, width = float(np.linalg.norm(near - corners[edge])), float(np.linalg.norm(far - near))
-        depth, sill, top, window = row[6:]
-        kind = "window" if window else "door" if depth > STEP + 0.01 else "passage"
-        for hinge in HINGES if kind == "door" else HINGES[:1]:
-            out.append(Opening(f"{len(out)}", kind, edge, offset, width, top - sill, sill if window else 0.0, hinge))
-    return tuple(out)
+    return placed(boxes, xp.stack([place[:, 0], height, place[:, 1]], 1), place[:, 2])

@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from echomodel.furniture import MATERIALS, Choices, Style, furniture, mesh_of, sample_size, solids
-from echomodel.furniture.carpentry import back_rest
 from echomodel.furniture.chairs import BODIES
+from echomodel.furniture.seating import back_rest
 from echomodel.furniture.solids import Ball, Block, Bow, Lathe, Pad, Shell, Tube, Turned, rotation
 from echomodel.furniture.style import OPEN
 from echomodel.metrics.furniture import loose_solids

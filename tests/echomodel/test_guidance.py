@@ -8,9 +8,10 @@ import torch
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.graph import GraphBatch
-from echomodel.guidance import LATE, guided, mended, openings_of, plan_of_graph, settled
+from echomodel.guidance import LATE, guided, mended
 from echomodel.objective import KINDS, faults_of
 from echomodel.openings import Opening
+from echomodel.standing import openings_of, plan_of_graph, settled
 from echomodel.surroundings import centred, outside
 from echomodel.vocabulary import vocabulary
 

@@ -18,7 +18,7 @@ from echousd.graph import SceneGraph
 from echousd.graph.arrays import TOLD, graph_batch, one_thread, rounded, seeded
 from echousd.shapes.geometry import Geometry, Origin
 from echousd.shapes.joinery import assembled
-from echousd.shapes.sources.retrieval import source_of
+from echousd.shapes.sources.named import source_of
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
 from echousd.shapes.styles import told_styles
 

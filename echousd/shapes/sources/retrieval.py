@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from collections.abc import Callable, Container, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
-from echousd.assets.reference import Vector, check_reach, is_file, joined, relative, split
+from echousd.assets.reference import is_file
 from echousd.graph import Node, SceneGraph
 from echousd.progress import StageTimer
 from echousd.shapes.finishes.slots import HARMONIES, linear
 from echousd.shapes.looks import palette_of_room
+from echousd.shapes.sources.named import RETRIEVED, source_of
+from echousd.shapes.sources.source import Retrieved
 from echousd.shapes.styles import ALIKE, ROOM_STYLE
 
 if TYPE_CHECKING:
@@ -25,71 +25,7 @@ if TYPE_CHECKING:
 
     Wanted = Callable[[], AssetWishes]  # what is asked of a library, made where it is needed
 
-RETRIEVED = ("library", "guided")
 TOGETHER = ("at", "head", "beside")  # stances of things that come in pairs and sets
-
-
-@dataclass(frozen=True, eq=False)
-class Retrieved:
-    """What is known of the models of a room."""
-
-    chosen: Mapping[str, AssetRecord] = field(default_factory=dict)  # object name -> model
-    files: Mapping[str, ModelFile] = field(default_factory=dict)  # object name -> where it lies
-    # object name -> (3) metres that the layout must give it, as the model cannot be stretched to another
-    sizes: Mapping[str, Vector] = field(default_factory=dict)
-    missing: tuple[str, ...] = ()  # objects that the library has nothing for
-    collect: bool = False  # take models along with all that they need
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """A sentence for what could not be had."""
-        if not self.missing:
-            return ()
-        return (f"the library has nothing for {', '.join(self.missing)}: made by the project's own programs",)
-
-
-def source_of(node: Node, shapes: str) -> str:
-    """The source of one object: its own word, what its asset asks for, else the room's."""
-    if node.shapes:
-        return node.shapes
-    return shapes if node.asset is None else "own" if is_file(node.asset) else "library"
-
-
-def anchored(graph: SceneGraph, folder: Path) -> SceneGraph:
-    """The graph with the files of assets as absolute paths; relative ones are in `folder`."""
-    return _moved(graph, lambda file: (folder.absolute() / file).as_posix())
-
-
-def check_files(
-    graph: SceneGraph, folder: Path, outside: Sequence[str | Path], file: str, among: Container[str] | None = None
-) -> None:
-    """Raises ValueError for an asset of a graph that was read whose file lies elsewhere than the graph's own.
-
-    `graph`: as `anchored` gives it. `folder`: of the graph's file. `outside`: folders that are allowed besides. `file`:
-    what the error calls the graph. `among`: names of the objects that are looked at, None = all.
-    """
-    for node in graph.nodes:
-        if node.asset is not None and is_file(node.asset) and (among is None or node.name in among):
-            path, allowed = Path(split(node.asset)[0]), [*map(Path, outside)]
-            check_reach(path, folder, allowed, f"{file}: object {node.name!r}: asset")
-
-
-def beside(graph: SceneGraph, folder: Path) -> SceneGraph:
-    """The graph with the files of assets relative to a room's folder, as a saved room tells them."""
-    return _moved(graph, lambda file: relative(Path(file), folder.absolute() / "graph"))
-
-
-def _moved(graph: SceneGraph, change: Callable[[str], str]) -> SceneGraph:
-    """The graph with the files of its assets under other names, itself where there are none."""
-
-    def node_of(node: Node) -> Node:
-        if node.asset is None or not is_file(node.asset):
-            return node
-        file, prim = split(node.asset)
-        return node.replaced(asset=joined(change(file), prim))
-
-    nodes = tuple(map(node_of, graph.nodes))
-    return graph if nodes == graph.nodes else graph.replaced(nodes=nodes)
 
 
 def given_pieces(
@@ -198,18 +134,3 @@ def _asked(graph: SceneGraph, rows: list[int], size: np.ndarray, styles: Mapping
         box = (float(size[i][0]), float(size[i][1]), float(size[i][2]))
         out.append(Asked(node.name, node.category, style, box, shares, f"{style} {node.name}".replace("_", " ")))
     return out
-
-
-def with_given_sizes(graph: SceneGraph, sizes: Mapping[str, Vector]) -> SceneGraph:
-    """The graph in which the sizes of some objects are fixed."""
-    if not sizes:
-        return graph
-    nodes = (replace_size(node, sizes) for node in graph.nodes)
-    return graph.replaced(nodes=tuple(nodes))
-
-
-def replace_size(node: Node, sizes: Mapping[str, Vector]) -> Node:
-    """The node with the size that is known for it, unless it states its own."""
-    if node.size is not None or node.name not in sizes:
-        return node
-    return node.replaced(size=sizes[node.name])

@@ -13,11 +13,32 @@ from echousd.graph import SceneGraph
 from echousd.graph.arrays import floor_centre
 from echousd.progress import StageTimer
 from echousd.shapes.geometry import FACES, Geometry
-from echousd.shapes.sources.retrieval import Retrieved
 from echousd.shapes.styles import shared_assets
 
 if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
+    from echousd.assets.model_file import ModelFile
+    from echousd.assets.record import AssetRecord
+    from echousd.assets.reference import Vector
+
+
+@dataclass(frozen=True, eq=False)
+class Retrieved:
+    """What is known of the models of a room."""
+
+    chosen: Mapping[str, AssetRecord] = field(default_factory=dict)  # object name -> model
+    files: Mapping[str, ModelFile] = field(default_factory=dict)  # object name -> where it lies
+    # object name -> (3) metres that the layout must give it, as the model cannot be stretched to another
+    sizes: Mapping[str, Vector] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()  # objects that the library has nothing for
+    collect: bool = False  # take models along with all that they need
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A sentence for what could not be had."""
+        if not self.missing:
+            return ()
+        return (f"the library has nothing for {', '.join(self.missing)}: made by the project's own programs",)
 
 
 @dataclass(frozen=True, eq=False)

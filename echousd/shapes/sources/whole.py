@@ -24,7 +24,7 @@ from echousd.progress import StageTimer
 from echousd.shapes.colliders import colliders_of
 from echousd.shapes.geometry import Geometry, Origin, Part
 from echousd.shapes.meshing import LEAST_FACES, box_mesh, mesh_from_shape
-from echousd.shapes.sources.retrieval import source_of
+from echousd.shapes.sources.named import source_of
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
 from echousd.shapes.styles import EQUAL, style_groups
 

@@ -14,10 +14,11 @@ from echomodel.compact.learned import places
 from echomodel.compact.pairs import Pairs, pairs_of
 from echomodel.config import BranchConfig, Sampler
 from echomodel.graph import GraphBatch
-from echomodel.guidance import AFTER, guided, mended, plan_of_graph, settled
+from echomodel.late import Late
 from echomodel.protocols import GraphEdit, Sampling
 from echomodel.randomness import normal
 from echomodel.samplers import Predict, clean_from, sample
+from echomodel.standing import plan_of_graph, settled
 from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from echomodel.compact.plain import PlainModel
 
 Model: TypeAlias = "CompactModel | PlainModel"
+AFTER = 40  # steps of guidance after the last of the sampler
+guided, mended = Late("echomodel.guidance:guided"), Late("echomodel.guidance:mended")
 
 
 def box_scale(model: Model, category: Array) -> BoxScale:

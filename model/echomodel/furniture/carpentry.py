@@ -1,4 +1,4 @@
-"""What all furniture shares: boards, cushions, tops, legs and bases; seats, leaning backs and slim arms of chairs."""
+"""What all furniture shares: boards, cushions, tops, legs and bases."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.furniture.solids import IDENTITY, Block, Bow, Pad, Solid, Turned, ball, rotation, tube, turned, upright
+from echomodel.furniture.solids import IDENTITY, Block, Pad, Solid, Turned, ball, rotation, tube, turned, upright
 from echomodel.furniture.style import Style
 
 Size = np.ndarray  # (3,) width x, height y, depth z, metres
@@ -125,17 +125,6 @@ def base(
     return of_role("leg", _stand(style, width, depth, height, thick, kind or style.legs, tie=tie))
 
 
-def between_legs(
-    shape: str, width: float, depth: float, height: float, y: float, thick: float, leg: float, style: Style, kind: str
-) -> Solid:
-    """A shelf at `y` that the legs of a `base` of this width, depth, height and kind pass through."""
-    spread = min(np.tan(style.splay) * height, 0.3 * min(width, depth)) if kind == "splayed" else 0.0
-    x, z = width / 2 - leg / 2 - spread * y / height, depth / 2 - leg / 2 - spread * y / height
-    wider = 2**0.5 if shape == "round" else 1.0
-    board = top("round" if shape == "round" else "square", 2 * x * wider, 2 * z * wider, y, thick, style, "accent")
-    return replace(board, role="shelf")
-
-
 def _stand(
     style: Style, width: float, depth: float, height: float, thick: float, kind: str, *, tie: bool
 ) -> list[Solid]:
@@ -178,105 +167,3 @@ def _trestle(x: float, z: float, h: float, thick: float) -> list[Solid]:
         box((side - t * 0.8, h * 0.45, -z * 0.25), (side + t * 0.8, h * 0.45 + thick, z * 0.25)),
     )
     return [*trestles, box((-side, h * 0.45, -t), (side, h * 0.45 + thick, t))]
-
-
-def pedestal(width: float, depth: float, height: float, style: Style) -> list[Solid]:
-    """A column on a disc or a cross of feet, from the floor to `height`."""
-    r = max(0.025, 0.055 * style.bulk * min(width, depth) ** 0.5)
-    material = "metal" if style.family in ("modern", "industrial") else "wood"
-    spread = min(width, depth) * 0.32
-    parts: list[Solid] = [turned((0, 0, 0), r, height, r * 0.8, material=material)]
-    if style.family in ("classic", "rustic"):
-        foot = [0.7 * spread, height * 0.14, 0.63 * spread], [0.91 * spread, r * 0.6, 0.91 * spread]
-        parts += four(tube([[0, height * 0.3, 0], *foot], r * 0.6))
-        parts.append(ball((0, height * 0.55, 0), (r * 1.5, height * 0.12, r * 1.5)))
-    elif style.contrast > 0.6:
-        parts.append(turned((0, 0, 0), spread * 0.95, height * 0.95, r, material=material))
-    else:
-        parts.append(turned((0, 0, 0), spread, max(0.015, height * 0.04), spread * 0.9, material=material))
-    return of_role("leg", parts)
-
-
-def seat_of(style: Style, w: float, d: float, y: float, thick: float, z: float = 0.0) -> Solid:
-    """A seat whose upper face lies at y: a board, or a cushion in soft styles."""
-    if style.softness > 0.4:
-        return cushion((-w / 2, y - thick, z - d / 2), (w / 2, y, z + d / 2), style, "fabric")
-    shape = "corners" if style.corner > 0.35 else "square"
-    board = top(shape, w, d, y, thick, style, "wood")
-    return replace(board, centre=np.array([0, y - thick, z]), role="seat")
-
-
-def leaning(
-    low: tuple, high: tuple, rake: float, pivot_y: float, pivot_z: float, *, bow: float = 0.0, **look: Any
-) -> Block:
-    """A block that leans back by `rake` about the horizontal line through (pivot_y, pivot_z), bent by `bow` metres."""
-    block = box(low, high, role="back", **look)
-    if bow:
-        block = Bow(block.centre, IDENTITY, block.material, "back", half=block.half, radius=block.radius, bow=bow)
-    turn = rotation(x=-rake)
-    pivot = np.array([0, pivot_y, pivot_z])
-    return replace(block, centre=turn @ (block.centre - pivot) + pivot, turn=turn)
-
-
-def back_rest(
-    style: Style, kind: str, w: float, y0: float, y1: float, z: float, thick: float, rake: float
-) -> list[Solid]:
-    """The back of a chair from the seat's height y0 up to y1, its foot on the plane z, leaning back by `rake`."""
-    length = (y1 - y0) / np.cos(rake)
-    a = w / 2
-
-    def lean(x0: float, x1: float, s0: float, s1: float, t: float, **kwargs) -> Block:
-        return leaning((x0, y0 + s0 * length, z - t / 2), (x1, y0 + s1 * length, z + t / 2), rake, y0, z, **kwargs)
-
-    post, bow = max(0.024, 0.03 * style.bulk), a * (0.12 + 0.14 * style.corner)
-    if kind == "cushion":
-        t = max(thick, 0.07 + 0.06 * style.softness)
-        return [lean(-a, a, -0.05, 1, t, radius=0.05, material="fabric", bow=bow)]
-    if kind == "panel":
-        if style.softness > 0.5:
-            soft = lean(-a, a, 0.12, 1, 0.05, radius=0.05, material="fabric", bow=bow)
-            return [soft, *both(lean(a * 0.8 - post / 2, a * 0.8 + post / 2, -0.1, 0.4, post))]
-        behind = max(0.0, post * 0.4 - 0.01)  # stiles thicker than the board stand out behind it, not before it
-        stile = lean(a - post - post / 2, a - post + post / 2, -0.1, 0.5, post * 0.8)
-        board = lean(-a, a, 0.0 if style.contrast < 0.5 else 0.3, 1, 0.025, radius=0.04, bow=bow)
-        return [board, *both(replace(stile, centre=stile.centre - [0, 0, behind]))]
-    if kind == "oval":
-        t = 0.05
-        stems = both(lean(a * 0.45 - post / 2, a * 0.45 + post / 2, -0.1, 0.4, post))
-        middle = y0 + length * 0.62
-        turn = rotation(x=-rake)
-        centre = turn @ np.array([0, middle - y0, 0]) + [0, y0, z]
-        return [*stems, ball(centre, (a * 0.95, length * 0.4, t / 2), "fabric", "back", 2.6, turn)]
-    posts = both(lean(a - post / 2 - post / 2, a - post / 2 + post / 2, -0.08, 1, post, radius=0.006))
-    rail = 0.1 + 0.12 * style.contrast
-    if kind == "frame":
-        posts += [lean(-a, a, s, t, post * 0.8, bow=bow) for s, t in ((1 - rail, 1), (0.2, 0.2 + rail * 0.6))]
-        inner, s, t = a - post * 0.6, 0.2 + rail * 0.3, 1 - rail * 0.5
-        return [*posts, lean(-inner, inner, s, t, post * 1.3, material="fabric", radius=0.012, bow=bow)]  # padded
-    if kind == "rails":
-        count = int(2 + 2.99 * style.tufting)
-        for i in range(count):
-            s0 = 0.2 + (0.98 - 0.2) * i / count
-            posts.append(lean(-a, a, s0 + 0.04, s0 + 0.78 / count * 0.72, post * 0.7, bow=bow))
-        return posts
-    posts.append(lean(-a, a, 1 - rail, 1, post * 0.9, bow=bow))
-    count = int(3 + 4.99 * style.tufting)
-    for x in np.linspace(-a * 0.78, a * 0.78, count):
-        further = np.arctan(bow * (1 - (x / a) ** 2) / length)  # from the seat to the rail, which is bent
-        t, tall = post * 0.3, (1 - rail / 2) * length
-        low, high = (x - t, y0 - 0.03, z - t), (x + t, y0 + tall, z + t)
-        posts.append(leaning(low, high, rake + further, y0, z, radius=0.004))
-    return posts
-
-
-def chair_legs(style: Style, w: float, d: float, h: float, thick: float, *, tie: bool = True) -> list[Solid]:
-    kind = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
-    return base(style, w, d, h, thick, kind, tie=tie and style.contrast > 0.55 and kind not in ("sled", "hairpin"))
-
-
-def slim_arms(w: float, d: float, seat: float, h: float, style: Style, thick: float) -> list[Solid]:
-    y = seat + min(0.22, (h - seat) * 0.55)
-    x, z0, z1 = w / 2 - thick, -d * 0.4, d * 0.34
-    rest = box((x - thick * 0.8, y - thick, z0), (x + thick * 0.8, y, z1), "wood", 0.008)
-    stay = leg((x, seat - 0.08, z1 - thick), (x, y - thick * 0.5, z1 - thick), thick, style)
-    return of_role("arm", both(rest, stay))

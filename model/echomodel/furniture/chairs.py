@@ -9,23 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.furniture.carpentry import (
-    Size,
-    back_rest,
-    base,
-    both,
-    box,
-    chair_legs,
-    cushion,
-    four,
-    leaning,
-    leg,
-    of_role,
-    seat_of,
-    slim_arms,
-    top,
-    within,
-)
+from echomodel.furniture.carpentry import Size, base, both, box, cushion, four, leg, of_role, top, within
+from echomodel.furniture.seating import back_rest, chair_legs, leaning, seat_of, slim_arms
 from echomodel.furniture.solids import Block, Solid, ball, bent, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
 

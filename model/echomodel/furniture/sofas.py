@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, base, both, box, chair_legs, cushion, leaning, of_role, slim_arms
+from echomodel.furniture.carpentry import Size, base, both, box, cushion, of_role
 from echomodel.furniture.cloth import Tufted
+from echomodel.furniture.seating import chair_legs, leaning, slim_arms
 from echomodel.furniture.solids import Lathe, Pad, Solid, ball, bent, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
 

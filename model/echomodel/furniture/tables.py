@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, base, between_legs, both, box, of_role, pedestal, post, top, within
+from echomodel.furniture.carpentry import Size, base, both, box, four, of_role, post, top, within
 from echomodel.furniture.fronts import boards, drawers, hutch
-from echomodel.furniture.solids import Block, Solid, rotation, turned
+from echomodel.furniture.solids import Block, Solid, ball, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
 
 KNEES, LAP = 0.5, 0.605  # metres between what stands on both sides of a seat, and below what is above the knees
@@ -250,3 +250,31 @@ def _framed(x: float, low: float, high: float, half: float, z: float, turn: floa
     board = Block(middle, about, half=np.array([half, upright, 0.011]), radius=0.003)
     before, inner = middle + about @ np.array([0, 0, 0.01]), np.array([half - edge, upright - edge, 0.003])
     return [board, Block(before, about, "mirror", half=inner)]
+
+
+def between_legs(
+    shape: str, width: float, depth: float, height: float, y: float, thick: float, leg: float, style: Style, kind: str
+) -> Solid:
+    """A shelf at `y` that the legs of a `base` of this width, depth, height and kind pass through."""
+    spread = min(np.tan(style.splay) * height, 0.3 * min(width, depth)) if kind == "splayed" else 0.0
+    x, z = width / 2 - leg / 2 - spread * y / height, depth / 2 - leg / 2 - spread * y / height
+    wider = 2**0.5 if shape == "round" else 1.0
+    board = top("round" if shape == "round" else "square", 2 * x * wider, 2 * z * wider, y, thick, style, "accent")
+    return replace(board, role="shelf")
+
+
+def pedestal(width: float, depth: float, height: float, style: Style) -> list[Solid]:
+    """A column on a disc or a cross of feet, from the floor to `height`."""
+    r = max(0.025, 0.055 * style.bulk * min(width, depth) ** 0.5)
+    material = "metal" if style.family in ("modern", "industrial") else "wood"
+    spread = min(width, depth) * 0.32
+    parts: list[Solid] = [turned((0, 0, 0), r, height, r * 0.8, material=material)]
+    if style.family in ("classic", "rustic"):
+        foot = [0.7 * spread, height * 0.14, 0.63 * spread], [0.91 * spread, r * 0.6, 0.91 * spread]
+        parts += four(tube([[0, height * 0.3, 0], *foot], r * 0.6))
+        parts.append(ball((0, height * 0.55, 0), (r * 1.5, height * 0.12, r * 1.5)))
+    elif style.contrast > 0.6:
+        parts.append(turned((0, 0, 0), spread * 0.95, height * 0.95, r, material=material))
+    else:
+        parts.append(turned((0, 0, 0), spread, max(0.015, height * 0.04), spread * 0.9, material=material))
+    return of_role("leg", parts)

@@ -18,12 +18,12 @@ from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import box_scale, layout_predictor
-from echomodel.guidance import heights
 from echomodel.objective import BY_EYE, TERMS, Plan, faults_of
 from echomodel.objective.support import FREE, ON_CEILING, ON_FLOOR
 from echomodel.randomness import normal
 from echomodel.rules import verdicts
 from echomodel.samplers import sample
+from echomodel.standing import heights
 from echomodel.training.layout_losses import (
     deep,
     edited_latent,

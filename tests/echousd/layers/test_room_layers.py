@@ -10,11 +10,11 @@ from small_room import BARE, OBJECTS, StandIn, small_graph
 import echousd
 from echousd.draw.sight import Furniture
 from echousd.draw.views import perspective_views, shifted, stage_views
-from echousd.layers.assets import MODEL, PLACES, carried_files
 from echousd.layers.cameras import room_points, write_cameras
 from echousd.layers.compose import text
 from echousd.layers.materials import define_material, look_images, tint_factor
 from echousd.layers.materialx import write_networks
+from echousd.layers.placed import MODEL, PLACES, carried_files
 from echousd.options import RoomOptions
 from echousd.shapes import walls
 from echousd.shapes.finishes.baking import hexadecimal

@@ -5,7 +5,7 @@ import torch
 from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.make.stated import fitted
+from echousd.make.fitting import fitted
 
 DOOR = Opening("door", "door", 0, 0.2, 0.9, 2.0)  # in the wall at -z, from x = -1.8 to -0.9
 SPEC = RoomSpec("hallway", size=(4, 3), openings=(DOOR,))

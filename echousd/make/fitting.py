@@ -1,0 +1,84 @@
+"""What has no place in a room left out (`fit="drop"`): by the floor's area, then by what collides or blocks a door."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from echomodel.boxes import Boxes
+from echomodel.vocabulary import vocabulary
+from echousd.graph import SceneGraph
+from echousd.graph.consistency import GraphError
+from echousd.graph.floors import check_space
+from echousd.make.verdicts import colliding
+from echousd.place.living import living_faults
+
+LEAST_FIRST = ("decor", "light", "seat", "screen", "storage", "board", "sofa", "bed")  # what a room misses least
+
+
+IN_THE_WAY = 0.1  # metres into the swing of a door or the way through a passage
+
+
+Layout = tuple[Boxes, tuple[str, ...]]
+
+
+def with_space(graph: SceneGraph) -> tuple[SceneGraph, tuple[str, ...]]:
+    """The graph without what the stated floor cannot hold by its area, and a sentence for each piece.
+
+    Raises `GraphError` where nothing that may be left out is left.
+    """
+    said: list[str] = []
+    while True:
+        try:
+            check_space(graph)
+            return graph, tuple(said)
+        except GraphError:
+            out = _dispensable(graph, graph.names)
+            if out is None:
+                raise
+            graph = graph.remove_node(out)
+            said.append(f"left out: {out}, the floor is too small for all that was asked for")
+
+
+def fitted(graph: SceneGraph, arranged: Callable[[SceneGraph], Layout]) -> tuple[SceneGraph, Layout, tuple[str, ...]]:
+    """The graph and its layout without the pieces that collide or stand in a door, and a sentence for each of them.
+
+    `arranged`: makes the best layout of a graph.
+    """
+    said: list[str] = []
+    while True:
+        layout = arranged(graph)
+        hits = colliding(graph, layout[0])
+        out = _dispensable(graph, [name for hit in hits[:1] for name in (hit.first, hit.second)])
+        if out is not None:
+            other = hits[0].second if out == hits[0].first else hits[0].first
+            why = f"{hits[0].depth:.2f} m deep in {other}"
+        else:
+            out, why = _in_a_way(graph, layout[0])
+        if out is None:
+            return graph, layout, tuple(said)
+        graph = graph.remove_node(out)
+        said.append(f"left out: {out}, no place for it but {why}")
+
+
+def _in_a_way(graph: SceneGraph, boxes: Boxes) -> tuple[str | None, str]:
+    """A piece that stands in the way of a door or passage and may be left out, and how; what a room is for stays."""
+    kind = vocabulary().room_type(graph.room.type)
+    spared = {name for name, _ in kind.contents[:1]} if kind.use != "wet" else {name for name, _ in kind.contents}
+    for fault in living_faults(graph, boxes) if graph.room.openings else ():
+        if (
+            fault.rule == "door_free"
+            and abs(fault.margin) > IN_THE_WAY
+            and graph.node(fault.object).category not in spared
+        ):
+            return _dispensable(graph, [fault.object]), "in the way of a door"
+    return None, ""
+
+
+def _dispensable(graph: SceneGraph, names: tuple[str, ...] | list[str]) -> str | None:
+    """Of some objects the one that a room misses least; None where there is none but what is locked or placed."""
+    free = [node for node in graph.nodes if node.name in names and not node.locked and node.position is None]
+    if not free or len(graph.nodes) < 2:
+        return None
+    order = {node.name: number for number, node in enumerate(graph.nodes)}
+    rank = {node.name: LEAST_FIRST.index(vocabulary().category(node.category).role) for node in free}
+    return min(free, key=lambda node: (rank[node.name], -order[node.name])).name
