@@ -19,7 +19,7 @@ from echousd.stage.contents import components, room_frame, words_of
 from echousd.stage.encoding import StageError
 from echousd.stage.forms import shown
 from echousd.stage.labels import is_structure, known_category, spaced
-from echousd.stage.read import RoomPrims, StatedTwice, find_rooms, node_names, relation_of, room_graph, value
+from echousd.stage.read import StatedTwice, find_rooms, node_names, relation_of, room_graph, value
 from echousd.stage.taxonomy import SHELL, ade20k
 from echousd.stage.values import UNREADABLE, lineage, targets, texts
 
@@ -97,16 +97,13 @@ def floors(reading: Reading) -> Iterator[Finding]:
             yield Finding(prim.GetPath(), f"the {word} is deactivated", warning=word != "floor")
     for room in reading.rooms:
         stated = _states(room.graph, FLOOR)
-        if stated and any("wall" in words_of(prim) for prim in components(room)) and not _has_floor(room, reading):
+        floor = any("floor" in words_of(prim) for prim in below(room.room))
+        off = any("floor" in words_of(prim) for prim in reading.inactive)  # which is told already
+        if stated and any("wall" in words_of(prim) for prim in components(room)) and not (floor or off):
             yield Finding(room.room.GetPath(), "the room has walls, but no floor")
-        if room.nodes and not stated and not any("floor" in words_of(prim) for prim in below(room.room)):
+        if room.nodes and not stated and not floor:
             allowed = f"{' or '.join(FLOOR)}, or geometry labelled 'floor'"
             yield Finding(room.graph.GetPath(), f"the room has no floor, allowed: {allowed}")
-
-
-def _has_floor(room: RoomPrims, reading: Reading) -> bool:
-    """Whether a room has geometry that is labelled as its floor, or one that is reported as switched off."""
-    return any("floor" in words_of(prim) for prim in (*below(room.room), *reading.inactive))
 
 
 @rule("echo:SomeLabel", "distinct")

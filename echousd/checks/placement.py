@@ -179,8 +179,10 @@ def _small_faults(
     if bottom < -FLOATING:
         yield "sunk", -bottom
         return
-    off = float(depth_inside(floor, _back(shape)[None])[0])
     if kind.fixed and not kind.lies:
+        front = np.array([np.sin(shape.yaw), np.cos(shape.yaw)])
+        back = shape.position[[0, 2]] - front * shape.size[2] / 2
+        off = float(depth_inside(floor, back[None])[0])
         racks = [carrier for carrier in carriers if isinstance(carrier, RoomObject)]
         if off > LEANING and not any(_carries(rack, shape, hung=True) for rack in racks):
             yield "off its wall", off
@@ -192,11 +194,6 @@ def _small_faults(
     air = _air_below(shape, carriers, draped=kind.lies)
     if air > (DRAPED if kind.lies else FLOATING):
         yield "floating", air
-
-
-def _back(shape: Shape) -> np.ndarray:
-    """(2,) float: the middle of the back of a box, in plan."""
-    return shape.position[[0, 2]] - np.array([np.sin(shape.yaw), np.cos(shape.yaw)]) * shape.size[2] / 2
 
 
 def _windows(whole: Whole) -> np.ndarray:

@@ -346,7 +346,11 @@ def without_physics(layer: Sdf.Layer) -> None:
     """Take the physics and all guides out of a flat layer, so that no engine finds half of it."""
     stage = Usd.Stage.Open(layer)
     for prim in list(stage.TraverseAll()):
-        if prim.IsValid() and (prim.GetTypeName().startswith(PHYSICS) or _is_guide(prim)):
+        if not prim.IsValid():  # what is above it is gone
+            continue
+        shown = UsdGeom.Imageable(prim)
+        guide = bool(shown) and shown.GetPurposeAttr().Get() == UsdGeom.Tokens.guide
+        if guide or prim.GetTypeName().startswith(PHYSICS):
             stage.RemovePrim(prim.GetPath())
     strip(layer, PHYSICS_PROPERTIES, (PHYSICS, "Physx"))
 
@@ -363,7 +367,3 @@ def strip(layer: Sdf.Layer, properties: str | tuple[str, ...], schemas: str | tu
                 spec.ClearInfo("apiSchemas")
             elif len(kept) < len(applied):
                 spec.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=kept))
-
-
-def _is_guide(prim: Usd.Prim) -> bool:
-    return prim.IsA(UsdGeom.Imageable) and UsdGeom.Imageable(prim).GetPurposeAttr().Get() == UsdGeom.Tokens.guide

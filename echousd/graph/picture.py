@@ -149,7 +149,7 @@ def _curves(joined: list[Arrow], where: dict[str, np.ndarray]) -> list[Curve]:
 def _draw_curve(axes: Axes, curve: Curve, shrink: float, labelled: bool) -> None:
     from matplotlib.patches import FancyArrowPatch
 
-    kind = vocabulary().predicate_kind(curve.arrow.kind)
+    kind = next(row for row in vocabulary().predicate_kinds if row.name == curve.arrow.kind)
     patch = FancyArrowPatch(
         tuple(curve.start), tuple(curve.end), connectionstyle=f"arc3,rad={curve.bend}",
         arrowstyle="-" if curve.arrow.both_ways else "-|>", mutation_scale=13 * shrink, shrinkA=0, shrinkB=0,

@@ -26,7 +26,16 @@ from echousd.shapes.matter import read_mass
 from echousd.stage.contents import room_frame, surface_of
 from echousd.stage.files import open_stage
 from echousd.stage.graphs import read_graph
-from echousd.stage.paths import DESCRIPTION, GEO, OBJECTS, asset_files, component_file, piece_name, piece_of
+from echousd.stage.paths import (
+    DESCRIPTION,
+    GEO,
+    OBJECTS,
+    coarse_file,
+    component_file,
+    payload_file,
+    piece_name,
+    piece_of,
+)
 from echousd.stage.units import Z_TO_Y, metres_per_unit
 from echousd.stage.values import matrix, reading
 
@@ -81,7 +90,7 @@ def read_room(root: str | Path) -> SavedRoom:
                 carried[asset] = asset_from(shelf, asset)
             else:
                 recorded = (path for path in manifest["files"] if path.startswith(f"assets/{asset}/"))
-                paths = dict.fromkeys((*asset_files(asset), *recorded))
+                paths = dict.fromkeys((payload_file(asset), component_file(asset), coarse_file(asset), *recorded))
                 files = {path: inside(root.parent, path, f"asset {asset!r}") for path in paths}
                 must = component_file(asset)
                 carried[asset] = {path: f.read_bytes() for path, f in files.items() if path == must or f.exists()}

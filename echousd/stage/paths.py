@@ -73,8 +73,3 @@ def thumbnail_file(asset: str) -> str:
 def class_path(asset: str) -> str:
     """Path of an asset's class, whose opinions reach all its users."""
     return f"/{CLASSES}/{asset}"
-
-
-def asset_files(asset: str) -> tuple[str, ...]:
-    """Paths of all files of an asset in the room's folder; the coarse geometry may be missing."""
-    return payload_file(asset), component_file(asset), coarse_file(asset)

@@ -156,10 +156,6 @@ class Vocabulary:
         """The names of all predicates, without aliases."""
         return frozenset(entry.name for entry in self.predicates)
 
-    def predicate_kind(self, name: str) -> PredicateKind:
-        """The kind of predicates called `name`; raises StopIteration for none."""
-        return next(kind for kind in self.predicate_kinds if kind.name == name)
-
     def category_id(self, word: str) -> int:
         """Position of a category: its class id in the compact model."""
         return self._find("category", word)

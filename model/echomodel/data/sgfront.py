@@ -156,15 +156,15 @@ ON_FLOOR = 0.04  # metres
 
 
 def write_sgfront(
-    folder: str | os.PathLike[str], rooms: Sequence[RoomBoxes], *, split: str = "trainval", room: str = "all",
-    drop: float = 0.5, seed: int = 0,
+    folder: str | os.PathLike[str], rooms: Sequence[RoomBoxes], *, split: str = "trainval", drop: float = 0.5,
+    seed: int = 0,
 ) -> None:  # fmt: skip
     """Write rooms as one split of SG-FRONT, labelled by its rules, with the floor as the last object of each scan.
 
     Arguments:
         folder: receives the files; those of another split stay, the bounds are those of `trainval`.
         rooms: at least one, in the vocabulary's words; classes that SG-FRONT lacks are written as its nearest.
-        split: `trainval` or `test`. room: the `{room}` of the file names.
+        split: `trainval` or `test`; the files are those of all rooms.
         drop: share of the relations that is left out. seed: of the dropping and of the rooms' places in the world.
 
     Raises ValueError for no room or an unknown split; `UnknownWord`: a category that the vocabulary does not hold.
@@ -182,15 +182,15 @@ def write_sgfront(
         scans.append(_graph(name, entry, edges))
         boxes[name], params = _boxes(entry, shift)
         rows.append(params - np.concatenate([np.zeros(3), shift, [0.0]]))
-    write_text(folder / f"relationships_{room}_{split}.json", json.dumps({"scans": scans}))
-    write_text(folder / f"obj_boxes_{room}_{split}.json", json.dumps(boxes))
+    write_text(folder / f"relationships_all_{split}.json", json.dumps({"scans": scans}))
+    write_text(folder / f"obj_boxes_all_{split}.json", json.dumps(boxes))
     mapping = small_mapping()
-    write_text(folder / f"classes_{room}.txt", "".join(f"{name}\n" for name in sorted(mapping)))
+    write_text(folder / "classes_all.txt", "".join(f"{name}\n" for name in sorted(mapping)))
     write_text(folder / "mapping.json", json.dumps(mapping, indent=1))
     spelled = vocabulary().sgfront_predicates
     write_text(folder / "relationships.txt", "".join(f"{word}\n" for number, word in spelled.items() if number != IN))
     if split == "trainval":
-        write_text(folder / f"centered_bounds_{room}_trainval.txt", _bounds(np.concatenate(rows)))
+        write_text(folder / "centered_bounds_all_trainval.txt", _bounds(np.concatenate(rows)))
 
 
 def _graph(name: str, room: RoomBoxes, edges: np.ndarray) -> dict:

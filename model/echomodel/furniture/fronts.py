@@ -80,18 +80,10 @@ def sliding(low: Point, high: Point, z: float, count: int, style: Style, materia
     return parts
 
 
-def case(low: tuple, high: tuple) -> list[Solid]:
-    """An open-fronted case between two corners (3,), with a core."""
-    return [core(low, high), *boards(low, high, 0.016, 0.008)]
-
-
-def drawers(
-    low: Point, high: Point, z: float, rows: int, columns: int, style: Style, rear: float | None = None
-) -> list[Solid]:
-    """Drawers in a case that fills a rectangle (x, y) from the plane `rear` (None = -z) to the plane z."""
-    rear = -z if rear is None else rear
-    body = case((*low, rear), (*high, z))
-    return body + front(low, high, z, rows, columns, "drawer", style, 0.95 * (z - rear))
+def drawers(low: Point, high: Point, z: float, rows: int, columns: int, style: Style) -> list[Solid]:
+    """Drawers in a case that fills a rectangle (x, y) from the plane -z to the plane z, open in front, with a core."""
+    body = [core((*low, -z), (*high, z)), *boards((*low, -z), (*high, z), 0.016, 0.008)]
+    return body + front(low, high, z, rows, columns, "drawer", style, 0.95 * 2 * z)
 
 
 def boards(low: tuple, high: tuple, t: float, back: float) -> list[Solid]:

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.builder import Builder
 from echomodel.rooms.floor import sample_floor
@@ -91,6 +90,9 @@ def _boxes(builder: Builder, name: str, room_type: str) -> RoomBoxes:
     chosen = [items[k] for k in order]
     plan = turned(np.array([(item.x, item.z) for item in chosen]))
     yaw = mirror * np.array([item.yaw for item in chosen]) + (math.pi if turn < 0 else 0.0)
+    openings = builder.floor.openings
+    if mirror < 0:  # the corners keep their order
+        openings = tuple(replace(one, hinge="left" if one.hinge == "right" else "right") for one in openings)
     return RoomBoxes(
         id=name, room_type=room_type, floor_polygon=turned(np.array(builder.floor.polygon)),
         height=builder.floor.height, categories=tuple(item.category for item in chosen),
@@ -98,13 +100,8 @@ def _boxes(builder: Builder, name: str, room_type: str) -> RoomBoxes:
         position=np.stack([plan[:, 0], [item.y for item in chosen], plan[:, 1]], -1),
         yaw=(yaw + math.pi) % (2 * math.pi) - math.pi,
         models=tuple(f"s{item.style}_{item.category}" for item in chosen), styles=tuple(item.style for item in chosen),
-        openings=tuple(_seen_in_a_mirror(o) if mirror < 0 else o for o in builder.floor.openings),
+        openings=openings,
     )  # fmt: skip
-
-
-def _seen_in_a_mirror(opening: Opening) -> Opening:
-    """The opening of a mirrored room, whose corners keep their order."""
-    return replace(opening, hinge="left" if opening.hinge == "right" else "right")
 
 
 def hall_of(statistics: RoomTypeStatistics, rng: np.random.Generator) -> tuple[RoomTypeStatistics, list[str]]:

@@ -136,27 +136,6 @@ def _near(pair: PairGeometry) -> Array:
     return xp.maximum(_close(pair), sides)
 
 
-def _sgfront_standing_on(pair: PairGeometry) -> Array:
-    return TOUCH - abs(pair.position_s[:, 1] - pair.position_o[:, 1])
-
-
-def _sgfront_symmetrical(pair: PairGeometry) -> Array:
-    return NEAR - pair.mirror_distance(point=True)
-
-
-def _higher(pair: PairGeometry) -> Array:
-    """SG-FRONT labels `above` by height alone: a ceiling lamp is above everything that does not reach it."""
-    return pair.position_s[:, 1] - pair.top_o
-
-
-def _standing_on(pair: PairGeometry) -> Array:
-    return pair.kit.minimum(TOUCH - abs(pair.position_s[:, 1] - pair.top_o), pair.centre_inside)
-
-
-def _above(pair: PairGeometry) -> Array:
-    return pair.kit.minimum(pair.position_s[:, 1] - pair.top_o - TOUCH, pair.footprint_penetration)
-
-
 def _symmetrical(pair: PairGeometry) -> Array:
     """One image of the subject is near the object and, where both have a front, looks the way that the object looks."""
     if pair.fronts is None:
@@ -212,22 +191,25 @@ MEANS = {
     "30 degrees where both have a front",
 }  # in the set `strict`
 
-STRICT = RuleSet("strict", True, _rules(APART, _larger, {"above": _above, "standing_on": _standing_on}, _symmetrical))
+CARRIED: dict[str, Margin] = {
+    "above": lambda pair: pair.kit.minimum(pair.position_s[:, 1] - pair.top_o - TOUCH, pair.footprint_penetration),
+    "standing_on": lambda pair: pair.kit.minimum(TOUCH - abs(pair.position_s[:, 1] - pair.top_o), pair.centre_inside),
+}
+STRICT = RuleSet("strict", True, _rules(APART, _larger, CARRIED, _symmetrical))
 STRICT.rules.update({name: replace(rule, means=MEANS[name]) for name, rule in STRICT.rules.items()})
 
+PUBLISHED: dict[str, Margin] = {"standing_on": lambda pair: TOUCH - abs(pair.position_s[:, 1] - pair.position_o[:, 1])}
+OPEN = ("standing_on", "symmetrical_to")
 SGFRONT = RuleSet(
-    "sgfront",
-    False,
-    _rules(
-        -APART, _subject, {"standing_on": _sgfront_standing_on}, _sgfront_symmetrical, ("standing_on", "symmetrical_to")
-    ),
+    "sgfront", False, _rules(-APART, _subject, PUBLISHED, lambda pair: NEAR - pair.mirror_distance(point=True), OPEN)
 )
 # Labels need a real distance where the check tolerates a wrong one; only the floor carries `standing on`, because the
 # check compares the bottoms of the two.
 SGFRONT.rules["front"] = replace(SGFRONT.rules["front"], label=_beside(0, 1.0, APART))
 SGFRONT.rules["behind"] = replace(SGFRONT.rules["behind"], label=_beside(0, -1.0, APART))
 SGFRONT.rules["standing_on"] = replace(SGFRONT.rules["standing_on"], label=None)
-SGFRONT.rules["above"] = Rule(None, _higher)
+# It labels `above` by height alone: a ceiling lamp is above everything that does not reach it.
+SGFRONT.rules["above"] = Rule(None, lambda pair: pair.position_s[:, 1] - pair.top_o)
 
 # what is learned stays what is published
 STRICT.rules["close_by"] = replace(STRICT.rules["close_by"], margin=_near, label=_close)
