@@ -26,6 +26,7 @@ from echousd.shapes.matter import read_mass
 from echousd.stage.contents import room_frame, surface_of
 from echousd.stage.files import open_stage
 from echousd.stage.graphs import read_graph
+from echousd.stage.layouts import each_layout
 from echousd.stage.paths import (
     DESCRIPTION,
     GEO,
@@ -98,7 +99,7 @@ def read_room(root: str | Path) -> SavedRoom:
     bounds = np.array([geometry[name].mesh.bounds for name in graph.names])
     sizes = np.asarray(bounds[:, 1] - bounds[:, 0], np.float32)
     boxes = _boxes(stage, objects, graph, sizes)
-    layouts = _layouts(stage, objects, graph, sizes) or (boxes,)
+    layouts = tuple(_boxes(stage, objects, graph, sizes) for _ in each_layout(stage))
     return SavedRoom(graph, boxes, layouts, geometry, assets, carried, manifest)
 
 
@@ -115,19 +116,6 @@ def _boxes(stage: Usd.Stage, objects: str, graph: SceneGraph, size: np.ndarray) 
         position.append(place * metres_per_unit(stage))
         yaw.append(np.arctan2(front[0], front[2]))
     return Boxes(size, *(np.array(v, np.float32) for v in (position, yaw)))
-
-
-def _layouts(stage: Usd.Stage, objects: str, graph: SceneGraph, size: np.ndarray) -> tuple[Boxes, ...]:
-    """Boxes under every variant of `layout`; the stage is left as it was."""
-    variants = stage.GetPrimAtPath(objects).GetParent().GetVariantSet("layout")
-    names = [name for name in variants.GetVariantNames() if name.startswith("layout_")]
-    found = []
-    for name in sorted(names, key=lambda name: (len(name), name)):
-        with Usd.EditContext(stage, stage.GetSessionLayer()):
-            variants.SetVariantSelection(name)
-            found.append(_boxes(stage, objects, graph, size))
-            variants.ClearVariantSelection()
-    return tuple(found)
 
 
 def _geometry(root: Usd.Prim, asset: str | None, category: str, manifest: Mapping[str, Any]) -> Geometry | None:

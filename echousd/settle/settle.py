@@ -231,11 +231,8 @@ def settle_layouts(stage: Usd.Stage | str | os.PathLike[str], *, layout: int | N
     return tuple(replace(settle(stage), layout=name) for name in each_layout(stage, layout))
 
 
-def settle(stage: Usd.Stage | str | os.PathLike[str], *, seconds: float = SECONDS) -> SettleReport:
-    """Simulate the physics of a stage.
-
-    Arguments:
-        stage: an open stage or a file. seconds: of simulated time.
+def settle(stage: Usd.Stage | str | os.PathLike[str]) -> SettleReport:
+    """Simulate the physics of a stage, open or a file, for `SECONDS`.
 
     Raises:
         ValueError: the file cannot be opened, or there is nothing that could move.
@@ -246,7 +243,7 @@ def settle(stage: Usd.Stage | str | os.PathLike[str], *, seconds: float = SECOND
     if not world.bodies:
         raise StageError(f"{source(stage)}: no rigid body with a collider, nothing to simulate")
     try:
-        places, overlaps = simulate(world, seconds)
+        places, overlaps = simulate(world, SECONDS)
     except SettleUnavailable:
         raise
     except ValueError as error:
@@ -256,10 +253,9 @@ def settle(stage: Usd.Stage | str | os.PathLike[str], *, seconds: float = SECOND
         shift = float(np.linalg.norm(place[:3, 3] - body.place[:3, 3]))
         cosine = (np.trace(place[:3, :3] @ body.place[:3, :3].T) - 1) / 2
         turn = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
-        rests = shift <= SHIFT and turn <= TURN
-        why = "" if rests else _why(stage, world, overlaps, body, place)
-        motions.append(Motion(body.name, body.path, shift, turn, place, why))
-    return SettleReport(source(stage), seconds, tuple(motions))
+        motion = Motion(body.name, body.path, shift, turn, place)
+        motions.append(motion if motion.rests else replace(motion, why=_why(stage, world, overlaps, body, place)))
+    return SettleReport(source(stage), SECONDS, tuple(motions))
 
 
 def _why(stage: Usd.Stage, world: World, overlaps: Sequence[Overlap], body: Body, place: np.ndarray) -> str:

@@ -17,10 +17,14 @@ ARTICULATION, ARTICULATED = "articulation", "articulated"  # variant set of what
 
 
 def layout_prims(stage: Usd.Stage) -> list[Usd.Prim]:
-    """The prims with a variant set `layout`; rooms of one layout have none."""
-    rooms = stage.GetPseudoRoot().GetChildren()
-    prims = [prim for room in rooms for prim in (room, *room.GetChildren())]
-    return [prim for prim in prims if VARIANTS in prim.GetVariantSets().GetNames()]
+    """The prims with a variant set `layout`, at whatever path; rooms of one layout have none."""
+    found, prims = [], iter(Usd.PrimRange.Stage(stage))
+    for prim in prims:
+        if VARIANTS in prim.GetVariantSets().GetNames():
+            found.append(prim)
+        if prim.IsComponent():  # no room
+            prims.PruneChildren()
+    return found
 
 
 def layout_names(stage: Usd.Stage) -> tuple[str, ...]:

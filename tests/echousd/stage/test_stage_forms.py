@@ -78,6 +78,14 @@ def test_layouts_are_shown_one_after_the_other_and_an_only_one_has_no_name():
     assert variants.GetVariantSelection() == "layout_2"
 
 
+def test_layouts_of_a_room_deep_in_a_stage_are_found():
+    stage = empty()
+    variants = stage.DefinePrim("/World/Flat/Living", "Xform").GetVariantSets().AddVariantSet("layout")
+    for name in ("layout_0", "layout_1"):
+        variants.AddVariant(name)
+    assert list(each_layout(stage)) == ["layout_0", "layout_1"]
+
+
 def test_cone_points_along_its_axis():
     stage = empty()
     UsdGeom.Cone.Define(stage, "/Thing").CreateAxisAttr("Y")
