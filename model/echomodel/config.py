@@ -183,11 +183,6 @@ def check_numbers(raw: dict[str, Any], tensors: int, where: str = "") -> None:
             raise ValueError(f"{path} is {value}, allowed: {RANGES[name][0]} to {RANGES[name][1]}")
 
 
-def from_json(kind: type[C], text: str) -> C:
-    """The configuration that `to_json` wrote; raises ValueError naming an unknown or mistyped field."""
-    return from_dict(kind, json.loads(text))
-
-
 def from_dict(kind: type[C], raw: dict[str, Any], where: str = "") -> C:
     """A configuration from nested plain values; fields left out keep their defaults, `GONE` ones have the one value.
 

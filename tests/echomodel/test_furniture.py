@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import trimesh
 
-from echomodel.furniture import MATERIALS, Choices, Style, furniture, mesh_of, sample_size, solids
+from echomodel.furniture import MATERIALS, Choices, Style, mesh_of, sample_size, solids
 from echomodel.furniture.chairs import BODIES
 from echomodel.furniture.seating import back_rest
 from echomodel.furniture.solids import Ball, Block, Bow, Lathe, Pad, Shell, Tube, Turned, rotation
@@ -27,6 +26,11 @@ SOLIDS = {
     "tube": Tube(points=np.array([[0.0, 0, 0], [0.1, 0.5, 0.02], [0.3, 0.9, 0.1], [0.6, 1.2, 0.25]]), radius=0.08),
     "shell": Shell(half=(0.4, 0.5), thickness=0.08),
 }
+
+
+def furniture(category, style, rng, size):
+    """One piece of furniture as a mesh."""
+    return mesh_of(solids(category, style, Choices.draw(rng), size), size, round=vocabulary().category(category).round)
 
 
 @pytest.mark.parametrize("name", SOLIDS)
@@ -55,7 +59,6 @@ def test_a_piece_is_watertight_fills_its_size_and_survives_the_grid(category):
         fills = [max(share[[0, 2]]), share[1]] if vocabulary().category(category).round else share
         np.testing.assert_allclose(fills, 1.0, rtol=1e-6)
         assert abs(mesh.bounds[0, 1]) < 1e-9
-        assert mesh.face_attributes["uv"].shape == (len(mesh.faces), 3, 2)
         assert set(mesh.face_attributes["material"]) <= set(range(len(MATERIALS)))
     back = mesh_from_tsdf(tsdf_of(solids(category, style, Choices.draw(np.random.default_rng(0)), size)))
     assert back.is_watertight
@@ -65,8 +68,10 @@ def test_a_piece_is_watertight_fills_its_size_and_survives_the_grid(category):
 
 
 def test_the_same_generator_makes_the_same_piece_and_another_style_another_one():
+    size = np.array([0.48, 0.9, 0.52])
     first, again, other = (
-        furniture("dining_chair", Style.draw(np.random.default_rng(s)), np.random.default_rng(5)) for s in (1, 1, 2)
+        furniture("dining_chair", Style.draw(np.random.default_rng(s)), np.random.default_rng(5), size)
+        for s in (1, 1, 2)
     )
     np.testing.assert_array_equal(first.vertices, again.vertices)
     assert len(other.vertices) != len(first.vertices) or not np.allclose(other.vertices, first.vertices)
@@ -106,19 +111,14 @@ def test_scores_of_sizes_undo_the_draw_and_shifts_move_them():
     np.testing.assert_allclose(size_score("wardrobe", ends), np.array([[-1.645], [0], [1.645]]) * np.ones(3), atol=1e-3)
 
 
-def test_texture_coordinates_are_metres():
-    mesh = mesh_of([Block(half=np.array([0.5, 0.25, 1.0]))])
-    assert isinstance(mesh, trimesh.Trimesh)
-    span = mesh.face_attributes["uv"].max((0, 1)) - mesh.face_attributes["uv"].min((0, 1))
-    np.testing.assert_allclose(span, [2.0, 2.0])
-
-
 def test_bad_words_and_sizes_are_refused_in_one_line():
     style, rng = Style.draw(np.random.default_rng(0)), np.random.default_rng(0)
     with pytest.raises(UnknownWord, match="unknown category 'sculpture'"):
-        furniture("sculpture", style, rng)
+        sample_size("sculpture", rng, style)
+    with pytest.raises(UnknownWord, match="unknown category 'sculpture'"):
+        solids("sculpture", style, Choices.draw(rng), np.ones(3))
     with pytest.raises(ValueError, match=r"size of chair is \[1.0, -1.0, 1.0\], need three positive numbers in metres"):
-        furniture("chair", style, rng, np.array([1.0, -1.0, 1.0]))
+        solids("chair", style, Choices.draw(rng), np.array([1.0, -1.0, 1.0]))
 
 
 @pytest.mark.parametrize("size", [(0.25, 1.4, 0.86), (0.86, 1.4, 0.25), (0.3, 1.5, 0.45)])

@@ -28,16 +28,12 @@ Bake = TypeVar("Bake", bound=Callable[..., "bytes | None"])
 # What draws them is not loaded where the cache has every image.
 PROGRAMS = "echousd.shapes.finishes.patterns"
 noise, printed = Late(f"{PROGRAMS}:noise"), Late("echousd.shapes.finishes.pictures:printed")
-PATTERNS = (
-    "wood", "veneer", "planks", "woven", "knitted", "linen", "leather", "plaster", "wicker", "leaf", "stone", "papered",
-    "carpet", "tiles", "brushed", "bound", "herringbone", "terrazzo", "boarded", "brick",
-)  # fmt: skip
 QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
 
 
 @cache
 def relief(name: str) -> Relief:
-    """One of `PATTERNS`."""
+    """The pattern that the function of that name there draws."""
     return Late(f"{PROGRAMS}:{name}")()
 
 

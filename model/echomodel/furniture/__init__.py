@@ -5,20 +5,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echomodel.furniture.assembly import MATERIALS, box_uv, mesh_of
+from echomodel.furniture.assembly import MATERIALS, mesh_of
 from echomodel.furniture.solids import Joint, Solid
 from echomodel.furniture.style import Choices, Style, sample_size
 from echomodel.late import Late
 from echomodel.vocabulary import vocabulary
 
-if TYPE_CHECKING:
-    import trimesh
-
-__all__ = ["MATERIALS", "Choices", "Style", "box_uv", "furniture", "mesh_of", "sample_size", "solids"]
+__all__ = ["MATERIALS", "Choices", "Style", "mesh_of", "sample_size", "solids"]
 
 Builder = Callable[[np.ndarray, Style, Choices], list[Solid]]
 # Module -> its programs, functions of these names; one is loaded when a category asks for it.
@@ -60,18 +56,6 @@ def solids(category: str, style: Style, choices: Choices, size: np.ndarray) -> l
     if size.shape != (3,) or not (np.isfinite(size).all() and (size > 0).all()):
         raise ValueError(f"size of {name} is {size.tolist()}, need three positive numbers in metres")
     return _named(_builder(name)(size, style, choices))
-
-
-def furniture(category: str, style: Style, rng: np.random.Generator, size: np.ndarray | None = None) -> trimesh.Trimesh:
-    """One piece of furniture as a watertight mesh in the object frame (+Y up, +Z front, standing on y = 0), metres.
-
-    Arguments as for `solids`; `rng` draws the choices and, where it is None, the size. The mesh fills `size`, what is
-    round at least in width or in depth. Part numbers, materials and texture coordinates are face attributes, see
-    `mesh_of`.
-    """
-    if size is None:
-        size = sample_size(category, rng, style)
-    return mesh_of(solids(category, style, Choices.draw(rng), size), size, round=vocabulary().category(category).round)
 
 
 def _named(parts: list[Solid]) -> list[Solid]:

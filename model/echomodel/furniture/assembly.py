@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echomodel.furniture.solids import FINEST, Joint, Solid
-from echomodel.triangles import area_normals
 
 if TYPE_CHECKING:
     import trimesh
@@ -68,8 +67,7 @@ def _stretched(joint: Joint | None, origin: np.ndarray, stretch: np.ndarray) -> 
 def mesh_of(solids: Sequence[Solid], size: np.ndarray | None = None, *, round: bool = False) -> trimesh.Trimesh:
     """All solids as one mesh of closed parts that overlap as boards and cushions do; arguments as for `pieces_of`.
 
-    `face_attributes["part"]` (m,) int numbers the solids, `face_attributes["material"]` (m,) int indexes `MATERIALS`,
-    `face_attributes["uv"]` (m, 3, 2) float holds texture coordinates per corner, box-projected, in metres.
+    `face_attributes["material"]` (m,) int indexes `MATERIALS`.
     """
     import trimesh
 
@@ -77,18 +75,5 @@ def mesh_of(solids: Sequence[Solid], size: np.ndarray | None = None, *, round: b
     counts = [len(piece.faces) for piece in pieces]
     joined = trimesh.util.append_faces([p.vertices for p in pieces], [p.faces for p in pieces])
     mesh = trimesh.Trimesh(*joined, process=False)
-    mesh.face_attributes["part"] = np.repeat(np.arange(len(pieces)), counts)
     mesh.face_attributes["material"] = np.repeat([MATERIALS.index(p.solid.material) for p in pieces], counts)
-    mesh.face_attributes["uv"] = box_uv(mesh.vertices, mesh.faces)
     return mesh
-
-
-def box_uv(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Texture coordinates (m, 3, 2) per corner: each triangle projected along the main axis of its normal, metres."""
-    corners = np.asarray(vertices)[faces]
-    normal = np.abs(area_normals(corners))
-    axis = normal.argmax(1)
-    first, second = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
-    rows = np.arange(len(faces))[:, None]
-    columns = np.arange(3)[None]
-    return np.stack([corners[rows, columns, first[:, None]], corners[rows, columns, second[:, None]]], axis=-1)

@@ -19,7 +19,7 @@ from echousd.checks.report import find_faults
 from echousd.exporting.formats import export
 from echousd.options import RoomOptions
 from echousd.shapes.finishes import baking
-from echousd.shapes.finishes.baking import PATTERNS, relief
+from echousd.shapes.finishes.baking import relief
 from echousd.shapes.finishes.patterns import SIZE
 from echousd.shapes.finishes.pictures import PROGRAMS, STOCK, printed
 from echousd.shapes.finishes.slots import HARMONIES, SLOTS, linear, material_of
@@ -29,7 +29,7 @@ from echousd.shapes.looks import SHOWN, alternatives, look
 from echousd.shapes.surface import surface
 
 
-@pytest.mark.parametrize("name", PATTERNS)
+@pytest.mark.parametrize("name", sorted({row.pattern for row in SLOTS.values()} - {"", *PRINTS}))
 def test_patterns_tile_and_keep_their_colour(name):
     tone = relief(name).tone
     assert np.isfinite(tone).all()
