@@ -90,7 +90,7 @@ def edit(
     along = begun[0][1] - moving
     stated = _pinned(graph, saved.graph, begun[0][0], fresh, moving)
     whole = all(None not in (node.size, node.position, node.yaw) for node in stated.nodes)
-    put = fresh | _put_elsewhere(stated, saved)
+    put = fresh | _put_elsewhere(stated, saved) - along  # who went along may be in the way where it came
     if asked.place and whole and moving | put:
         there = _boxes_of(stated)  # before anything is searched in vain
         moving |= in_the_way(saved, graph, there, layout_outcome(graph, there), along, moving | put)
@@ -185,7 +185,7 @@ def attending(room: Plan) -> list[tuple[int, int]]:
     out += [(k, i) for k, i in enumerate(room.carrier.tolist()) if i >= 0]
     away = np.linalg.norm((room.position[:, None] - room.position)[..., ::2], axis=2)
     over = (room.carrier == ON_CEILING)[:, None] & room.standing & (away < LIT)
-    return [*out, *((k, i) for k, i in np.argwhere(over).tolist())]
+    return [*dict.fromkeys([*out, *((k, i) for k, i in np.argwhere(over).tolist())])]
 
 
 def carried(before: SceneGraph, after: SceneGraph, boxes: Boxes) -> tuple[Boxes, set[str]]:

@@ -125,3 +125,35 @@ def test_what_is_not_in_the_way_stays(saved):
     place = before.boxes.position[before.graph.names.index("shelf")] + (0.03, 0, 0)
     after = edit(saved, before.graph.update_node("shelf", position=tuple(place.tolist())))
     np.testing.assert_array_equal(after.boxes.position[:2], before.boxes.position[:2])
+
+
+@pytest.fixture(scope="module")
+def bedroom(tmp_path_factory):
+    graph = SceneGraph(
+        RoomSpec("bedroom", size=(4.2, 3.6), height=2.6),
+        (Node("bed", "double_bed"), *(Node(at, "nightstand") for at in ("left", "right")), Node("lamp", "table_lamp")),
+        (Relation("left", "left", "bed"), Relation("left", "close_by", "bed"), Relation("right", "right", "bed"),
+         Relation("right", "close_by", "bed"), Relation("lamp", "standing_on", "left")),
+    )  # fmt: skip
+    made = echousd.generate(graph, seed=7, shapes="boxes", dress="none")
+    return made.save(tmp_path_factory.mktemp("bedroom") / "room", preview=False)
+
+
+def test_what_attends_and_stands_on_one_thing_goes_along_once(bedroom):
+    before = read_room(bedroom)
+    pairs = attending(plan_to_live_in(before.graph, before.boxes))
+    assert len(pairs) == len({*pairs})
+    at = dict(zip(before.graph.names, before.boxes.position, strict=True))
+    after = before.graph.update_node("bed", position=tuple((at["bed"] + (0.4, 0, 0)).tolist()))
+    there, names = carried(before.graph, after, before.boxes)
+    assert names == {"left", "right", "lamp"}
+    np.testing.assert_allclose(there.position[1:], before.boxes.position[1:] + np.float32((0.4, 0, 0)), atol=1e-5)
+
+
+@pytest.mark.parametrize("at", [(0.0, 0.0, 0.3), (0.0, 0.0, -0.3), (0.4, 0.0, 0.0)])
+def test_company_that_would_leave_the_room_is_placed_anew(bedroom, at):
+    after = edit(bedroom, read_room(bedroom).graph.update_node("bed", position=at))
+    assert after.faults == ()
+    np.testing.assert_allclose(after.boxes.position[0], at, atol=1e-3)
+    floor, half = np.array(after.graph.room.size) / 2, after.boxes.size[:, [0, 2]].min(1)[:, None] / 2
+    assert (np.abs(after.boxes.position[:, ::2]) + half < floor + 0.01).all()
