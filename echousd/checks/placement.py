@@ -15,6 +15,7 @@ from echomodel.triangles import along, area_normals, connected_pieces, distances
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import HEIGHT
 from echousd.place.geometry import (
+    SOLID,
     TOUCH,
     Collision,
     Floor,
@@ -260,7 +261,6 @@ def _held(thing: RoomObject, floor: Floor | None, height: float) -> bool:
     return False
 
 
-DEEP = 0.006  # metres: a point of one surface this far inside the other mesh is a collision
 IN_WALL = SKIRTING + 0.003  # metres: furniture stands at the wall behind its skirting
 PRESSED = 0.04  # metres: cushions and blankets press into what they lie on
 NEAR = 0.05  # metres between two boxes that are one
@@ -275,7 +275,7 @@ def find_collisions(whole: Whole) -> tuple[Collision, ...]:
         for part in (whole.strangers, whole.small, whole.shell)
     )
     things: list[tuple[str, Shape]] = [*((one.name, one) for one in whole.room.objects), *strangers]
-    found = _hits(things, None, DEEP) + _hits(things, fixed, IN_WALL)
+    found = _hits(things, None, SOLID) + _hits(things, fixed, IN_WALL)
     found += _hits(things, little, PRESSED) + _hits(little, None, IN_WALL)
     return tuple(sorted(found, key=lambda hit: -hit.depth))
 
@@ -312,7 +312,7 @@ def _one_place(one: Shape, other: Shape) -> bool:
     return bool(near and np.abs(one.size - other.size).max() < NEAR)
 
 
-def mesh_depth(first: Shape, second: Shape, deep: float = DEEP) -> float:
+def mesh_depth(first: Shape, second: Shape, deep: float = SOLID) -> float:
     """How deep one surface reaches into the other solid in metres, no more than `deep` where that is not deeper."""
     return max(_reach(first, second, deep), _reach(second, first, deep))
 

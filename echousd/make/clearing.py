@@ -12,7 +12,7 @@ from echousd.graph import SceneGraph
 from echousd.graph.arrays import rounded_boxes
 from echousd.make.obstacles import scene_of
 from echousd.make.verdicts import relation_verdicts, unbroken
-from echousd.place.geometry import Collision
+from echousd.place.geometry import SOLID, TOUCH, Collision, pair_indices, separation
 from echousd.place.living import plan_to_live_in
 from echousd.room import LayoutOutcome
 from echousd.shapes.geometry import Geometry
@@ -40,7 +40,8 @@ def cleared(
 ) -> tuple[Boxes, tuple[Collision, ...]]:
     """Move what is free as little as possible until nothing starts inside anything else.
 
-    Returns the boxes, and what still reaches into one another, or into what a wall holds, deepest first.
+    Returns the boxes, and what still reaches into one another, or into what a wall holds, as far as `check` says so,
+    deepest first.
 
     What is locked or has a position stays, and no relation that holds is broken: where only that would help, the two
     stay where they are and are among the collisions. Living rules are kept before distances.
@@ -66,5 +67,9 @@ def cleared(
             stuck.add(hits[0])
         else:
             moves = found
-    left = tuple(Collision(scene.names[i], scene.names[k], deep) for (i, k), deep in scene.overlaps(moves, DEEP))
-    return rounded_boxes(graph, moved_by(boxes, moves)) if moves.any() else boxes, left
+    boxes = rounded_boxes(graph, moved_by(boxes, moves)) if moves.any() else boxes
+    left, pairs = scene.overlaps(moves, SOLID), pair_indices(len(moves))
+    gaps = separation(*(np.asarray(v, float) for v in (boxes.size, boxes.position, boxes.yaw)), pairs)
+    apart = dict(zip(map(tuple, pairs.tolist()), gaps, strict=True))
+    names = [(scene.names[i], scene.names[k], deep) for (i, k), deep in left if -apart.get((i, k), -np.inf) > TOUCH]
+    return boxes, tuple(Collision(*told) for told in names)

@@ -162,6 +162,7 @@ def beyond(floor: Floor, size: np.ndarray, at: np.ndarray, turn: np.ndarray) -> 
 
 
 TOUCH = 0.01  # metres: deeper than this into another box is a collision, further than this outside is outside
+SOLID = 0.006  # metres: where boxes do, a point of one solid this far inside another is a collision
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,11 @@ from pxr import Gf, Usd, UsdGeom
 
 import echousd
 from echousd.checks import Collision, check
-from echousd.checks.placement import DEEP, Whole, _small_faults, find_collisions, mesh_depth, winding_number
+from echousd.checks.placement import Whole, _small_faults, find_collisions, mesh_depth, winding_number
 from echousd.checks.report import find_living
 from echousd.cli.main import run
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.place.geometry import floor_from_polygon
+from echousd.place.geometry import SOLID, floor_from_polygon
 from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding
 
 BAD = Path(__file__).parent.parent / "bad"
@@ -200,7 +200,7 @@ def test_large_faces_that_touch_by_millimetres_are_no_collision() -> None:
     for reach, deep in ((0.003, False), (0.02, True)):
         tip = box(0.02, 0.5, 0.3)
         tip.apply_translation((1.51 - reach, 0, 0))
-        assert (mesh_depth(wide, thing("b", "cabinet", tip, (0, 0, 0))) > DEEP) == deep
+        assert (mesh_depth(wide, thing("b", "cabinet", tip, (0, 0, 0))) > SOLID) == deep
 
 
 def test_winding_number_agrees_with_ray_casting() -> None:

@@ -12,7 +12,7 @@ from small_room import BARE, StandIn, saved_room, small_graph, small_room
 
 import echousd
 from echomodel.protocols import GraphEdit
-from echousd.graph import GraphError, Relation
+from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.make import layouts
 from echousd.make.edit import edit, graph_edit, restyled, touched
 from echousd.make.layouts import repeated
@@ -323,3 +323,19 @@ def test_new_meshes_keep_the_face_budget_of_the_room(root):
     assert edit(root, graph, model=StandIn(), faces=300).geometry["chair"].faces <= 300
     saved = room.save(root.parent, preview=False).with_suffix(".json")
     assert json.loads(saved.read_text())["faces"] == 600
+
+
+@pytest.mark.parametrize("deep", [0.002, 0.007, 0.009, 0.012, 0.03])
+def test_what_a_check_passes_fails_no_edit(tmp_path, deep):
+    fixed = {"yaw": 0.0, "locked": True}
+    graph = SceneGraph(
+        RoomSpec("bedroom", size=(4.0, 4.0), height=2.6),
+        (Node("desk", "desk", size=(1.0, 0.75, 0.6), position=(-1.5 + deep, 0.0, 0.0), **fixed),
+         Node("chest", "cabinet", size=(1.0, 0.8, 0.5), position=(-0.5, 0.0, 0.0), **fixed), Node("stool", "stool")),
+    )  # fmt: skip
+    root = echousd.generate(graph, seed=1, shapes="boxes", walls=False, dress="none").save(
+        tmp_path / "r", preview=False
+    )
+    after = echousd.edit(root, echousd.read_graph(root).relate("stool", "close_by", "chest"))
+    found = echousd.check(after.save(tmp_path / "r", preview=False)).collisions
+    assert bool(after.faults) == bool(found) == (deep > 0.01)
