@@ -17,6 +17,7 @@ from echomodel.boxes import Boxes
 from echomodel.data.sheet import thumbnail
 from echomodel.echo import EchoModel
 from echomodel.furniture import mesh_of, sample_size, solids
+from echomodel.furniture.assembly import pieces_of
 from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.objective.sizes import size_range
@@ -24,6 +25,14 @@ from echomodel.vocabulary import vocabulary
 
 SHEET = Path(__file__).with_name("parts.png")
 EACH, PIXELS, MARGIN = 8, 96, 130
+PALETTE = {
+    "wood": (181, 137, 94), "accent": (206, 178, 142), "fabric": (122, 143, 160), "metal": (92, 92, 98),
+    "glass": (170, 205, 214), "ceramic": (214, 206, 196), "enamel": (244, 243, 239), "worktop": (170, 164, 156),
+    "steel": (178, 180, 182), "leaf": (94, 140, 82), "soil": (90, 70, 55), "shade": (240, 230, 200),
+    "screen": (40, 44, 54), "cushion": (150, 165, 176), "linen": (232, 226, 214), "blanket": (150, 120, 104),
+    "mirror": (196, 214, 222), "book": (150, 90, 78), "stem": (118, 104, 66), "leaf_dark": (58, 104, 64),
+    "leaf_silver": (146, 168, 140), "fruit": (201, 134, 46), "petal": (240, 223, 213),
+}  # fmt: skip
 
 
 def main() -> None:
@@ -39,8 +48,10 @@ def main() -> None:
         graph = GraphBatch.pack([GraphBatch.single([row])] * EACH)
         found = np.asarray(model.sample_furniture(graph, boxes, generator=generator))
         for column, (vector, size) in enumerate(zip(found, sizes, strict=True)):
-            mesh = mesh_of(solids(word, *piece_of(vector), size), size)
-            sheet.paste(thumbnail(mesh, PIXELS), (MARGIN + column * PIXELS, row * PIXELS))
+            parts = solids(word, *piece_of(vector), size)
+            colours = [PALETTE[one.solid.material] for one in pieces_of(parts, size) for _ in one.faces]
+            drawn = thumbnail(mesh_of(parts, size), PIXELS, np.array(colours, float))
+            sheet.paste(drawn, (MARGIN + column * PIXELS, row * PIXELS))
     sheet.quantize(256).save(SHEET, optimize=True)
 
 

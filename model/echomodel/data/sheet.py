@@ -12,29 +12,20 @@ from PIL import Image
 
 from echomodel.boxes2d import footprints
 from echomodel.files import whole_file
-from echomodel.furniture.assembly import MATERIALS
 from echomodel.openings import segment, swing_area
 from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import vocabulary
 
-PALETTE = {
-    "wood": (181, 137, 94), "accent": (206, 178, 142), "fabric": (122, 143, 160), "metal": (92, 92, 98),
-    "glass": (170, 205, 214), "ceramic": (214, 206, 196), "enamel": (244, 243, 239), "worktop": (170, 164, 156),
-    "steel": (178, 180, 182), "leaf": (94, 140, 82), "soil": (90, 70, 55), "shade": (240, 230, 200),
-    "screen": (40, 44, 54), "cushion": (150, 165, 176), "linen": (232, 226, 214), "blanket": (150, 120, 104),
-    "mirror": (196, 214, 222), "book": (150, 90, 78), "stem": (118, 104, 66), "leaf_dark": (58, 104, 64),
-    "leaf_silver": (146, 168, 140), "fruit": (201, 134, 46), "petal": (240, 223, 213),
-}  # fmt: skip
-PLAIN = (176, 172, 166)
+PLAIN = np.array([176.0, 172.0, 166.0])
 YAW, PITCH = 0.6, 0.35  # radians, from where meshes are seen; 0, 0 looks at the front (+Z) face
 
 
-def thumbnail(mesh: trimesh.Trimesh, pixels: int) -> Image.Image:
+def thumbnail(mesh: trimesh.Trimesh, pixels: int, colours: np.ndarray = PLAIN) -> Image.Image:
     """Shaded orthographic picture of a mesh, seen from its front right above.
 
     Arguments:
-        mesh: triangles in the object frame; `face_attributes["material"]` colours them where present.
-        pixels: side of the picture.
+        mesh: triangles in the object frame. pixels: side of the picture.
+        colours: (3,) or (f, 3) sRGB of 0 to 255, of all or of each triangle.
     """
     side = pixels * 2  # drawn larger, then averaged down
     points, face = trimesh.sample.sample_surface(mesh, 4 * side * side, seed=0)
@@ -48,19 +39,12 @@ def thumbnail(mesh: trimesh.Trimesh, pixels: int) -> Image.Image:
     normal = mesh.face_normals @ view.T
     normal[normal[:, 2] < 0] *= -1
     light = np.maximum(normal @ (np.array([-0.35, 0.75, 0.6]) / np.linalg.norm([-0.35, 0.75, 0.6])), 0)
-    shaded = _colours(mesh) * (0.4 + 0.65 * light[:, None])
+    shaded = colours * (0.4 + 0.65 * light[:, None])
     picture = np.full((side, side, 3), 250.0)
     order = np.argsort(seen[:, 2])[:, None]  # what is nearer is drawn later, each point two pixels wide
     picture[y[order] + [0, 1, 0, 1], x[order] + [0, 0, 1, 1]] = shaded[face[order]]
     image = Image.fromarray(picture.clip(0, 255).astype(np.uint8))
     return image.resize((pixels, pixels), Image.Resampling.BOX)
-
-
-def _colours(mesh: trimesh.Trimesh) -> np.ndarray:
-    if "material" not in mesh.face_attributes:
-        return np.tile(np.array(PLAIN, float), (len(mesh.faces), 1))
-    table = np.array([PALETTE[name] for name in MATERIALS], float)
-    return table[np.asarray(mesh.face_attributes["material"])]
 
 
 CELL = 2.8  # inches

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.furniture.assembly import MATERIALS, mesh_of
+from echomodel.furniture.assembly import mesh_of
 from echomodel.furniture.solids import Joint, Solid
 from echomodel.furniture.style import Choices, Style, sample_size
 from echomodel.late import Late
 from echomodel.vocabulary import vocabulary
 
-__all__ = ["MATERIALS", "Choices", "Style", "mesh_of", "sample_size", "solids"]
+__all__ = ["Choices", "Style", "mesh_of", "sample_size", "solids"]
 
 Builder = Callable[[np.ndarray, Style, Choices], list[Solid]]
 # Module -> its programs, functions of these names; one is loaded when a category asks for it.

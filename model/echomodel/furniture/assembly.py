@@ -1,4 +1,4 @@
-"""Solids put together: one mesh with materials and texture coordinates."""
+"""Solids put together: meshed each in its place, or all as one mesh."""
 
 from __future__ import annotations
 
@@ -12,12 +12,6 @@ from echomodel.furniture.solids import FINEST, Joint, Solid
 
 if TYPE_CHECKING:
     import trimesh
-
-MATERIALS = (
-    "wood", "accent", "fabric", "metal", "glass", "ceramic", "leaf", "soil", "shade", "screen",
-    "cushion", "linen", "blanket", "mirror", "book", "stem", "enamel", "worktop", "steel",
-    "leaf_dark", "leaf_silver", "fruit", "petal",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,15 +59,9 @@ def _stretched(joint: Joint | None, origin: np.ndarray, stretch: np.ndarray) -> 
 
 
 def mesh_of(solids: Sequence[Solid], size: np.ndarray | None = None, *, round: bool = False) -> trimesh.Trimesh:
-    """All solids as one mesh of closed parts that overlap as boards and cushions do; arguments as for `pieces_of`.
-
-    `face_attributes["material"]` (m,) int indexes `MATERIALS`.
-    """
+    """All solids as one mesh of closed parts that overlap as boards and cushions do; arguments as for `pieces_of`."""
     import trimesh
 
     pieces = pieces_of(solids, size, round=round)
-    counts = [len(piece.faces) for piece in pieces]
     joined = trimesh.util.append_faces([p.vertices for p in pieces], [p.faces for p in pieces])
-    mesh = trimesh.Trimesh(*joined, process=False)
-    mesh.face_attributes["material"] = np.repeat([MATERIALS.index(p.solid.material) for p in pieces], counts)
-    return mesh
+    return trimesh.Trimesh(*joined, process=False)
