@@ -18,7 +18,7 @@ from echousd.stage.boxes import read_small
 from echousd.stage.contents import components, room_frame, words_of
 from echousd.stage.encoding import StageError
 from echousd.stage.forms import shown
-from echousd.stage.labels import is_structure, known_category, spaced
+from echousd.stage.labels import LABELS_SCHEMA, is_structure, known_category, spaced
 from echousd.stage.read import StatedTwice, find_rooms, node_names, relation_of, room_graph, value
 from echousd.stage.taxonomy import SHELL, ade20k
 from echousd.stage.values import UNREADABLE, lineage, targets, texts
@@ -199,7 +199,6 @@ def agreeing_labels(reading: Reading, prim: Usd.Prim) -> Iterator[Finding | str]
             yield f"{CLASSES} is {classes[0]!r}, allowed with {words[0]!r}: {same!r}"
 
 
-LABELS_PREFIX = "SemanticsLabelsAPI:"
 # Known to this package even in a process that opened a stage before it could register the schema plugin.
 OURS = frozenset((*usd.TYPES, usd.NODE_API, usd.ROOM_API))
 WRITTEN = OURS | {FRICTION_API}
@@ -292,8 +291,8 @@ def semantics(reading: Reading) -> Iterator[Finding]:
 
 def _labelled(prim: Usd.Prim) -> bool:
     taxonomies = (
-        (above, name.removeprefix(LABELS_PREFIX))
-        for above in lineage(prim) for name in applied(above) if name.startswith(LABELS_PREFIX)
+        (above, name.removeprefix(LABELS_SCHEMA))
+        for above in lineage(prim) for name in applied(above) if name.startswith(LABELS_SCHEMA)
     )  # fmt: skip
     found = (above.GetAttribute(f"semantics:labels:{taxonomy}") for above, taxonomy in taxonomies)
     return any(attribute and attribute.Get() for attribute in found)

@@ -213,6 +213,7 @@ def graph(
     from echousd.folder.found import room_at
     from echousd.graph import GraphError, SceneGraph, load_graph
     from echousd.graph.files import STAGE_FORMS
+    from echousd.graph.picture import PICTURES, draw_graph
 
     if as_json and schema:
         raise GraphError("--json and --schema exclude each other")
@@ -240,8 +241,6 @@ def graph(
         shown = {prim: relations_from_boxes(each, per_object=relations) for prim, each in shown.items()}
     only = next(iter(shown.values()))
     if picture is not None:
-        from echousd.graph.picture import draw_graph
-
         check_picture(picture, force=force)
         draw_graph(only, picture)
         say(f"wrote {picture}: {_summary(only)}", err=True)
@@ -267,6 +266,3 @@ def _rooms(source: Path, *, names: bool) -> dict[str, SceneGraph]:
 def _summary(made: SceneGraph) -> str:
     objects, relations = counted(len(made.nodes), "object"), counted(len(made.relations), "relation")
     return f"{made.room.type.replace('_', ' ')}, {objects}, {relations}"
-
-
-PICTURES = (".png", ".svg", ".pdf")

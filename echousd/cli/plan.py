@@ -61,7 +61,8 @@ def import_(
     Rooms without furniture get what such rooms usually hold.
     """
     from echousd.graph.files import STAGE_FORMS
-    from echousd.home.draw import PICTURES, draw_plans
+    from echousd.graph.picture import PICTURES
+    from echousd.home.draw import draw_plans
     from echousd.home.importing.formats import import_plan
     from echousd.home.stages import write_home
 
@@ -109,7 +110,8 @@ def export(
     from echousd.graph import GraphError
     from echousd.graph.consistency import faults_of
     from echousd.graph.files import STAGE_FORMS
-    from echousd.home.draw import PICTURES, draw_plans, write_dxf, write_procthor
+    from echousd.graph.picture import PICTURES
+    from echousd.home.draw import draw_plans, write_dxf, write_procthor
     from echousd.home.files import load_home
     from echousd.home.given import plan_there
     from echousd.home.plan import plans

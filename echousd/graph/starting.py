@@ -18,7 +18,7 @@ from echousd.graph.scene import SceneGraph
 
 MAX_COUNT = 100
 FULL, SELDOM = 0.7, 0.09  # share of what furniture covers in half of all rooms; of the rooms that hold such a piece
-ONE = ("bed", "sofa", "screen")  # roles of which a room has one piece, if nobody says it
+ONE_IS_ENOUGH = ("bed", "sofa", "screen")  # roles of which a room has one piece, if nobody says it
 DEALT = ("at", "head", "before", "foot")  # stances of what serves one anchor: no desk has two chairs, another none
 
 
@@ -85,7 +85,7 @@ def _filled(word: str, wanted: dict[str, int], area: float) -> dict[str, int]:
             break
         kind = kind_of(name)
         roles = {one.role for one in map(kind_of, wanted) if one.support == kind.support}
-        again = kind.role in roles and (kind.role in ONE or kind.support == "ceiling")
+        again = kind.role in roles and (kind.role in ONE_IS_ENOUGH or kind.support == "ceiling")
         alone = kind.belongs_to and not {*kind.belongs_to} & {*wanted}
         asleep = (name in sleeps or kind.role == "bed") and "bed" not in roles
         if name in wanted or again or alone or asleep or kind.stands == "at":

@@ -20,7 +20,6 @@ from echousd.home.plan import Plan, ways
 from echousd.home.stages import Standing
 from echousd.naming import free_name
 
-PICTURES = (".png", ".svg", ".pdf")
 TINTS = {"": "#f4efe4", "wet": "#e3eef4", "outdoor": "#e6f0df"}
 # Of a DXF, with their colours.
 LAYERS = {"wall": 7, "door": 3, "window": 5, "passage": 9, "room": 8, "furniture": 6, "dimension": 2}

@@ -18,7 +18,7 @@ from echomodel.openings import (
     overlap,
     signed_area,
 )
-from echomodel.rooms.openings import WINDOWS
+from echomodel.rooms.openings import PIER, WINDOWS
 from echomodel.vocabulary import vocabulary
 from echousd.home.graph import HomeGraph
 
@@ -26,7 +26,6 @@ DOOR, FRONT_DOOR = (0.9, 2.0), (1.0, 2.1)  # metres, width and height
 PASSAGE = (3.0, 2.3)  # at most
 PASSAGE_SHARE = 0.6  # of the wall that two rooms share: furniture needs the rest
 JAMB = 0.12  # metres from a corner to a hole
-PIER = 0.3  # metres from a corner, or a door, to a window
 UNEVEN = 0.15  # metres that a wall may be thicker in one place than in another
 STEP = 0.1  # metres between the places that are tried
 

@@ -9,13 +9,12 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.hulls import hull_volume
-from echousd.shapes.joints import STATIC
+from echousd.shapes.joints import GRAVITY, STATIC
 from echousd.shapes.matter import mass_of, write_mass
 from echousd.stage.layouts import ARTICULATED, ARTICULATION
 from echousd.stage.paths import MTL, SHELL, piece_path
 from echousd.stage.pen import Pen
 
-GRAVITY = 9.81  # m/s²
 SCENE = "/Room/PhysicsScene"
 # Static and dynamic friction of a material slot, and how much of its speed a thing keeps when it bounces.
 CONTACT: Mapping[str, tuple[float, float, float]] = {

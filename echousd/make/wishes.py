@@ -11,6 +11,7 @@ import numpy as np
 from echomodel.vocabulary import vocabulary
 from echousd.assets.reference import joined
 from echousd.graph import GraphError, Node, SceneGraph
+from echousd.graph.starting import ONE_IS_ENOUGH
 from echousd.graph.text import stating, without
 from echousd.graph.titles import composed, identifier_of, is_title, name_of
 from echousd.make.reading import SavedRoom, read_room
@@ -142,9 +143,6 @@ def _numbers(wish: str, text: str, rest: str, counts: tuple[int, ...], allowed: 
     if len(numbers) not in counts or not all(map(math.isfinite, numbers)):
         raise GraphError(f"{wish}: found {text!r}, allowed: {allowed}")
     return numbers
-
-
-ONE_IS_ENOUGH = ("bed", "sofa", "screen")  # roles of which a room that has one lacks none
 
 
 def adopted(

@@ -13,6 +13,7 @@ from pxr import Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from echomodel.late import extra
 from echousd.shapes.geometry import Mass
+from echousd.shapes.joints import GRAVITY
 from echousd.shapes.matter import read_mass
 from echousd.stage.contents import triangulated
 from echousd.stage.encoding import StageError
@@ -21,7 +22,6 @@ from echousd.stage.layouts import each_layout
 from echousd.stage.units import metres_per_unit, upwards
 from echousd.stage.values import array, lineage, matrix, moves
 
-GRAVITY = 9.81  # m/s², where the stage tells none
 FRICTION = 0.5  # where no physics material is bound
 SKIN = 0.05  # metres: how thick a triangle of a static concave mesh is made, inwards
 LEAST_DEPTH = 0.002  # metres, of a mesh that is a sheet

@@ -202,31 +202,6 @@ def from_dict(kind: type[C], raw: dict[str, Any], where: str = "") -> C:
     return kind(**values)
 
 
-def with_settings(config: C, settings: list[str]) -> C:
-    """The configuration with `key.sub=value` settings applied; values are read as JSON, else as text.
-
-    Raises ValueError where a setting has no `=`, names no field or has a value of the wrong type.
-    """
-    raw: dict[str, Any] = json.loads(to_json(config))
-    for setting in settings:
-        key, equals, text = setting.partition("=")
-        if not equals:
-            raise ValueError(f"setting {setting!r} has no '=', expected key=value")
-        *parents, last = key.strip().split(".")
-        here: Any = raw
-        for parent in parents:
-            if not isinstance(here, dict) or parent not in here:
-                raise ValueError(f"setting {key!r}: no field {parent!r}")
-            here = here[parent]
-        if not isinstance(here, dict):
-            raise ValueError(f"setting {key!r}: {parents[-1]!r} has no fields")
-        try:
-            here[last] = json.loads(text)
-        except json.JSONDecodeError:
-            here[last] = text.strip()
-    return from_dict(type(config), raw)
-
-
 def _typed(hint: Any, value: Any, path: str) -> Any:
     if is_dataclass(hint):
         return from_dict(hint, value, path)  # type: ignore[arg-type]

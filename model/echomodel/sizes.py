@@ -10,12 +10,12 @@ from importlib import resources
 
 import numpy as np
 
+from echomodel.boxes import Z95
 from echomodel.vocabulary import Category, vocabulary
 
 AT_WALL = 0.2  # metres: a class with a larger median gap does not belong at a wall
 USUAL_GAPS = (0.0, 0.03, 0.06)  # metres between a back and its wall: quartiles of classes without figures
 _KNOTS = {5: (-1.645, -0.674, 0.0, 0.674, 1.645), 3: (-1.645, 0.0, 1.645)}
-Z95 = 1.6449  # standard score of the 95th percentile
 TUCKED = 0.5  # share of a seat's footprint that counts: the rest is below its table
 REACH = 0.5  # metres that a piece fills around it
 TALL = 1.3  # metres: what is higher has no worktop

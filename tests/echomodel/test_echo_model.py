@@ -14,10 +14,11 @@ from torch import Tensor
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import agreeing
-from echomodel.config import CompactConfig, from_dict, to_json, with_settings
+from echomodel.config import CompactConfig, from_dict, to_json
 from echomodel.echo import EchoModel, equal_furniture
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit, touched_nodes
+from echomodel.training.recipe import with_settings
 from echomodel.vocabulary import vocabulary
 
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from echomodel.config import CompactConfig, from_dict, with_settings
+from echomodel.config import C, CompactConfig, from_dict, to_json
 
 Stage = Literal["vqvae", "layout", "shape", "parts", "paper_vqvae", "paper"]
 
@@ -141,3 +142,28 @@ def read_recipe(path: Path, settings: list[str] | None = None) -> Recipe:
         return with_settings(from_dict(Recipe, raw), settings or [])
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
+
+
+def with_settings(config: C, settings: list[str]) -> C:
+    """The configuration with `key.sub=value` settings applied; values are read as JSON, else as text.
+
+    Raises ValueError where a setting has no `=`, names no field or has a value of the wrong type.
+    """
+    raw: dict[str, Any] = json.loads(to_json(config))
+    for setting in settings:
+        key, equals, text = setting.partition("=")
+        if not equals:
+            raise ValueError(f"setting {setting!r} has no '=', expected key=value")
+        *parents, last = key.strip().split(".")
+        here: Any = raw
+        for parent in parents:
+            if not isinstance(here, dict) or parent not in here:
+                raise ValueError(f"setting {key!r}: no field {parent!r}")
+            here = here[parent]
+        if not isinstance(here, dict):
+            raise ValueError(f"setting {key!r}: {parents[-1]!r} has no fields")
+        try:
+            here[last] = json.loads(text)
+        except json.JSONDecodeError:
+            here[last] = text.strip()
+    return from_dict(type(config), raw)
