@@ -17,6 +17,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.graph.nodes import OBSTACLE
 from echousd.naming import free_name
+from echousd.stage.contents import room_frame
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.labels import (
@@ -59,15 +60,15 @@ class Box:
 def box_of(bound: Gf.BBox3d, frame: np.ndarray) -> Box | None:
     """The box around `bound`: turned like its prim where that stands upright, else along the room's axes.
 
-    `frame`: (3, 3) float, from the stage's axes and unit to the room's, `to_metres`.
+    `frame`: (4, 4) float, column vectors, from the stage's world to the room's frame in metres, as `to_metres`.
     """
     local = bound.GetRange()
     if local.IsEmpty():
         return None
     low, high = np.array(local.GetMin()), np.array(local.GetMax())
     matrix = np.array(bound.GetMatrix())
-    linear = frame @ matrix[:3, :3].T  # columns: the prim's axes in the room frame
-    centre = frame @ (matrix[:3, :3].T @ ((low + high) / 2) + matrix[3, :3])
+    linear = frame[:3, :3] @ matrix[:3, :3].T  # columns: the prim's axes in the room frame
+    centre = frame[:3, :3] @ (matrix[:3, :3].T @ ((low + high) / 2) + matrix[3, :3]) + frame[:3, 3]
     for axes in (np.eye(3), Z_TO_Y.T):  # the object's own up axis is Y or Z, whatever the stage's
         turned = linear @ axes
         scale = np.linalg.norm(turned, axis=0)
@@ -147,7 +148,7 @@ def _read(
     stage: Usd.Stage, *, names: bool, columns: bool = False
 ) -> tuple[list[tuple[Sdf.Path, Node]], list[tuple[Sdf.Path, Box]], list[str]]:
     """What a stage holds: prim path and node, prim path and box of every floor, and all words."""
-    boxed = _boxes(stage)
+    boxed = _boxes(to_metres(stage))
     nodes: list[tuple[Sdf.Path, Node]] = []
     floors: list[tuple[Sdf.Path, Box]] = []
     said: list[str] = []
@@ -252,12 +253,11 @@ def _over(node: Node, floor: Box) -> bool:
 
 def object_box(prim: Usd.Prim) -> Box | None:
     """The upright box around a prim of a stage, turned as the prim is; None where it has no bounds."""
-    return _boxes(prim.GetStage())(prim)
+    return _boxes(to_metres(prim.GetStage()))(prim)
 
 
-def _boxes(stage: Usd.Stage) -> Callable[[Usd.Prim], Box | None]:
-    """`object_box` of the prims of a stage, which share what is computed once."""
-    frame = to_metres(stage)[:3, :3]
+def _boxes(frame: np.ndarray) -> Callable[[Usd.Prim], Box | None]:
+    """`object_box` of the prims of a stage in some frame, which share what is computed once."""
     cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_, UsdGeom.Tokens.render], True)
     return lambda prim: box_of(_object_bound(cache, prim), frame)
 
@@ -266,12 +266,13 @@ def boxed_graph(prims: RoomPrims) -> SceneGraph:
     """The graph of a room whose nodes all have boxes: as stated, else as their prims stand there; raises StageError."""
     graph = room_graph(prims)
     paths = {name: path for path, name in node_names(prims).items()}
-    nodes = []
+    nodes, stage = [], prims.room.GetStage()
+    boxed = _boxes(room_frame(prims.room, UsdGeom.XformCache()))
     for node in graph.nodes:
         if None in (node.size, node.position, node.yaw):
-            box = object_box(prims.room.GetStage().GetPrimAtPath(paths[node.name]))
+            box = boxed(stage.GetPrimAtPath(paths[node.name]))
             if box is None:
-                where = f"{source(prims.room.GetStage())}: {paths[node.name]}"
+                where = f"{source(stage)}: {paths[node.name]}"
                 raise StageError(f"{where}: has no bounds, allowed: a box or geometry for every object")
             node = node.replaced(size=box.size, position=box.position, yaw=box.yaw)
         nodes.append(node)

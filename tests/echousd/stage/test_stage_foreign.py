@@ -354,3 +354,18 @@ def test_a_floor_without_an_area_bounds_no_room(deep, known):
     assert (corners is not None) == known
     if known:
         assert sorted(np.round(corners, 3).tolist()) == [[0, 0], [0, 4], [3, 0], [3, 4]]
+
+
+@pytest.mark.parametrize(("up", "metres"), [("Y", 1.0), ("Z", 0.01), ("Z", 1.0)])
+def test_boxes_of_a_room_that_stands_elsewhere_are_those_of_its_own_frame(up, metres):
+    room = Usd.Stage.Open(graph_layer(SceneGraph("bedroom", (Node("bed", "bed"),))))
+    UsdGeom.Xformable(room.GetPrimAtPath("/Room/Objects/bed")).AddTranslateOp().Set(Gf.Vec3d(1, 0, -0.5))
+    box_mesh(room, "/Room/Objects/bed/mesh", (-0.8, 0, -1), (0.8, 0.5, 1))
+    stage = stage_of(up, metres)
+    there = UsdGeom.Xform.Define(stage, "/World/flat/bedroom")
+    there.GetPrim().GetReferences().AddReference(room.GetRootLayer().identifier)
+    there.AddTranslateOp().Set(Gf.Vec3d(3, 4, 5) / metres)
+    there.AddRotateXYZOp().Set(Gf.Vec3f(90, 0, 30) if up == "Z" else Gf.Vec3f(0, 30, 0))
+    there.AddScaleOp().Set(Gf.Vec3f(1 / metres))
+    (node,) = boxed_graph(the_room(stage, None)).nodes
+    close(node, (1.6, 0.5, 2.0), (1.0, 0.0, -0.5), 0.0)
