@@ -69,7 +69,8 @@ def cleared(
             moves = found
     boxes = rounded_boxes(graph, moved_by(boxes, moves)) if moves.any() else boxes
     left, pairs = scene.overlaps(moves, SOLID), pair_indices(len(moves))
-    gaps = separation(*(np.asarray(v, float) for v in (boxes.size, boxes.position, boxes.yaw)), pairs)
+    size, position, yaw = (np.asarray(values, float) for values in (boxes.size, boxes.position, boxes.yaw))
+    gaps = separation(size, position, yaw, pairs)
     apart = dict(zip(map(tuple, pairs.tolist()), gaps, strict=True))
     names = [(scene.names[i], scene.names[k], deep) for (i, k), deep in left if -apart.get((i, k), -np.inf) > TOUCH]
     return boxes, tuple(Collision(*told) for told in names)
