@@ -27,6 +27,7 @@ from echousd.assets.licences import licence_beside
 from echousd.assets.model_file import ModelFile
 from echousd.assets.naming import class_by_name, fitted
 from echousd.assets.reference import MODELS
+from echousd.graph.files import LAYER_FORMS
 from echousd.stage.apart import fatal
 
 Told = Callable[[str], None]  # is told of what cannot be read, one line each
@@ -390,7 +391,7 @@ def parts_of_others(files: list[Path]) -> set[Path]:
     """Layers that another layer of a list refers to: payloads, sublayers, parts of one model."""
     known = {file.resolve(): file for file in files}
     found: set[Path] = set()
-    layers = [file for file in files if file.suffix.lower() in (".usd", ".usda", ".usdc")]
+    layers = [file for file in files if file.suffix.lower() in LAYER_FORMS]
     deadly = fatal(layers)
     for file in layers:
         if file in deadly:

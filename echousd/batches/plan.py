@@ -21,6 +21,7 @@ from echousd.batches.sources import find_graphs
 from echousd.folder.lock import LOCK
 from echousd.folder.manifest import MAX_SEED, find_manifest
 from echousd.folder.within import check_links, inside
+from echousd.graph.files import LAYER_FORMS
 from echousd.naming import as_identifier
 from echousd.options import told
 from echousd.pending import STAGING
@@ -227,7 +228,6 @@ def _entry(raw: Any, number: int, sets: int) -> Entry:
     return entry
 
 
-ROOTS = (".usda", ".usdc", ".usd")
 LATEST = 1e11  # seconds since 1970
 LONGEST = 16 * 2**20  # bytes of one line of a run's files
 FARTHEST = 1e6  # metres
@@ -267,7 +267,7 @@ def is_row(row: Any) -> bool:
 
 def _is_root(name: str) -> bool:
     path = PurePosixPath(name)
-    return path.name == name and path.suffix in ROOTS and ID.fullmatch(path.stem) is not None
+    return path.name == name and path.suffix in LAYER_FORMS and ID.fullmatch(path.stem) is not None
 
 
 JOURNAL = "journal.jsonl"

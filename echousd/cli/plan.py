@@ -60,13 +60,13 @@ def import_(
 
     Rooms without furniture get what such rooms usually hold.
     """
-    from echousd.graph.files import STAGE_FORMS
+    from echousd.graph.files import LAYER_FORMS
     from echousd.graph.picture import PICTURES
     from echousd.home.draw import draw_plans
     from echousd.home.importing.formats import import_plan
     from echousd.home.stages import write_home
 
-    _writable(output, STAGE_FORMS[:-1], force)
+    _writable(output, LAYER_FORMS, force)
     if picture is not None:
         _writable(picture, PICTURES, force)
     made = import_plan(source, format=form, unit=unit, storey=storey, lenient=lenient)
@@ -109,7 +109,7 @@ def export(
     from echousd.folder.found import room_at
     from echousd.graph import GraphError
     from echousd.graph.consistency import faults_of
-    from echousd.graph.files import STAGE_FORMS
+    from echousd.graph.files import LAYER_FORMS
     from echousd.graph.picture import PICTURES
     from echousd.home.draw import draw_plans, write_dxf, write_procthor
     from echousd.home.files import load_home
@@ -118,7 +118,7 @@ def export(
     from echousd.home.stages import furniture, write_home
 
     form = output.suffix.lower()
-    _writable(output, (*PICTURES, ".dxf", ".json", *STAGE_FORMS[:-1]), force)
+    _writable(output, (*PICTURES, ".dxf", ".json", *LAYER_FORMS), force)
     if several > 1 and form not in PICTURES:
         raise GraphError(f"--plans is {several}, allowed with a picture; name one by its --seed")
     source = room_at(source) if source.is_dir() else source

@@ -15,7 +15,8 @@ from echousd.graph.consistency import GraphError
 from echousd.graph.scene import SceneGraph, graph_from_text
 
 TEXT_FORMS: dict[str, Literal["yaml", "json"]] = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
-STAGE_FORMS = (".usda", ".usdc", ".usd", ".usdz")
+LAYER_FORMS = (".usda", ".usdc", ".usd")
+STAGE_FORMS = (*LAYER_FORMS, ".usdz")
 CRATE = b"PXR-USDC"  # how a binary stage begins
 MAX_BYTES = 8 * 2**20
 # what builds on this package
@@ -69,8 +70,8 @@ def save_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:
     path = Path(path)
     form = TEXT_FORMS.get(path.suffix.lower())
     if form is None:
-        if path.suffix.lower() not in STAGE_FORMS[:-1]:
-            allowed = ", ".join((*TEXT_FORMS, *STAGE_FORMS[:-1]))
+        if path.suffix.lower() not in LAYER_FORMS:
+            allowed = ", ".join((*TEXT_FORMS, *LAYER_FORMS))
             raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {allowed}")
         write_graph(graph, path)
         return

@@ -13,14 +13,13 @@ from pathlib import Path
 from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 
 from echomodel.files import whole_file
+from echousd.graph.files import LAYER_FORMS, STAGE_FORMS
 from echousd.pending import check_written
 from echousd.stage.apart import check_harmless
 from echousd.stage.encoding import StageError
 
-WRITABLE = (".usd", ".usda", ".usdc")
 # a MaterialX document, not there or no plugin
 MATERIALS = re.compile(r"Could not open asset @([^@]*\.mtlx)@", re.IGNORECASE)
-READABLE = (*WRITABLE, ".usdz")
 
 
 def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
@@ -38,12 +37,12 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
     if not there:
         raise StageError(f"{path}: no such file")
     if path.is_dir():
-        raise StageError(f"{path}: a folder, allowed: a file, {', '.join(READABLE)}")
+        raise StageError(f"{path}: a folder, allowed: a file, {', '.join(STAGE_FORMS)}")
     if not path.is_file():
-        raise StageError(f"{path}: not a regular file, allowed: a file, {', '.join(READABLE)}")
+        raise StageError(f"{path}: not a regular file, allowed: a file, {', '.join(STAGE_FORMS)}")
     check_path(path)
-    if path.suffix not in READABLE:
-        raise StageError(f"{path}: not a USD file (extension {path.suffix!r}), allowed: {', '.join(READABLE)}")
+    if path.suffix not in STAGE_FORMS:
+        raise StageError(f"{path}: not a USD file (extension {path.suffix!r}), allowed: {', '.join(STAGE_FORMS)}")
     silence = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what the exception says as well
     try:
         layers = regular_layers(path)
@@ -193,8 +192,8 @@ def save_layer(layer: Sdf.Layer, path: str | os.PathLike[str]) -> None:
     A layer of this process that was loaded from `path` is reloaded. Raises StageError, `path` left as it was.
     """
     path = Path(path)
-    if path.suffix not in WRITABLE:
-        raise StageError(f"{path}: extension {path.suffix!r}, allowed: {', '.join(WRITABLE)}")
+    if path.suffix not in LAYER_FORMS:
+        raise StageError(f"{path}: extension {path.suffix!r}, allowed: {', '.join(LAYER_FORMS)}")
     if not path.parent.is_dir():
         raise StageError(f"{path}: the folder {path.parent} does not exist")
     try:

@@ -17,6 +17,7 @@ from echousd.draw.surfaces import Painted, Surfaces, read_surfaces
 from echousd.folder import folder as folders
 from echousd.folder import ownership
 from echousd.folder.manifest import find_manifest
+from echousd.graph.files import LAYER_FORMS
 from echousd.layers import paintings
 from echousd.layers.paintings import FOLDER, MADE, RECORD, VARIANTS, primvar
 from echousd.make.save import write_preview
@@ -30,7 +31,6 @@ from echousd.texturing.job import Job, read_job
 from echousd.texturing.results import Results, read_results
 
 NAME = re.compile(r"^[A-Za-z_][A-Za-z0-9_]{0,63}$")
-ROOTS = (".usda", ".usd", ".usdc")
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,8 @@ def import_job(
     for objects that are not what they were when the job was made, by their names.
     """
     room, folder = Path(room), Path(job)
-    if room.suffix not in ROOTS:
-        raise ValueError(f"{room}: allowed: a room's root layer, {', '.join(ROOTS)}")
+    if room.suffix not in LAYER_FORMS:
+        raise ValueError(f"{room}: allowed: a room's root layer, {', '.join(LAYER_FORMS)}")
     task = read_job(folder)
     name = name or task.tool
     if not NAME.match(name) or name == paintings.MADE:

@@ -10,8 +10,9 @@ import pytest
 from pxr import Sdf, Usd
 
 from echousd.graph import Node, Relation, SceneGraph
+from echousd.graph.files import STAGE_FORMS
 from echousd.stage.encoding import StageError
-from echousd.stage.files import READABLE, open_stage, save_layer
+from echousd.stage.files import open_stage, save_layer
 from echousd.stage.graphs import read_graph, write_graph
 from echousd.stage.read import read_rooms
 from echousd.stage.write import graph_layer
@@ -44,7 +45,7 @@ def test_a_path_that_does_not_exist(tmp_path):
 
 
 def test_a_folder(tmp_path):
-    assert complaint(tmp_path) == f"{tmp_path}: a folder, allowed: a file, {', '.join(READABLE)}"
+    assert complaint(tmp_path) == f"{tmp_path}: a folder, allowed: a file, {', '.join(STAGE_FORMS)}"
 
 
 @pytest.mark.parametrize("name", ["room.usda", "room.usdc", "room.usd", "room.usdz"])
@@ -59,7 +60,7 @@ def test_a_file_that_is_not_usd(tmp_path, name, content, capfd):
 def test_another_kind_of_file(tmp_path):
     (tmp_path / "room.png").write_bytes(b"")
     assert complaint(tmp_path / "room.png") == (
-        f"{tmp_path}/room.png: not a USD file (extension '.png'), allowed: .usd, .usda, .usdc, .usdz"
+        f"{tmp_path}/room.png: not a USD file (extension '.png'), allowed: .usda, .usdc, .usd, .usdz"
     )
 
 
@@ -312,7 +313,7 @@ def test_a_folder_that_is_missing(tmp_path):
 
 
 def test_an_extension_that_cannot_be_written(tmp_path):
-    with pytest.raises(StageError, match=r"room.usdz: extension '.usdz', allowed: .usd, .usda, .usdc$"):
+    with pytest.raises(StageError, match=r"room.usdz: extension '.usdz', allowed: .usda, .usdc, .usd$"):
         save_layer(graph_layer(GRAPH), tmp_path / "room.usdz")
 
 
