@@ -164,7 +164,8 @@ class Constraints:
         side = np.where(self.barred, -np.inf, gap).argmax(2)
         gap = np.take_along_axis(gap, side[..., None], 2)[..., 0]
         axis = (gap - handicap).argmax(1)
-        allowed = np.where(setting.touching, 0.0, allowed_overlap(setting.categories, state[:, 3:], setting.pairs))
+        head = setting.plan.stands("head")[setting.pairs].any(1)  # a bed moved off its nightstand would leave its wall
+        allowed = np.where(head, 0.0, allowed_overlap(setting.categories, state[:, 3:], setting.pairs))
         value = gap[row, axis] + allowed - PART
         return Rows(COLLISION, setting.pairs, value, self.parting[row, axis, side[row, axis]]), axis
 

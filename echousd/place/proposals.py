@@ -78,6 +78,7 @@ LOOSE = 0.5  # by which poses at what a piece attends are preferred to others, a
 APART_TWINS = 2.0  # the same of beds that share a nightstand
 HUNG, AT = 0.1, 0.4  # metres between where a lamp or a piece was drawn and a place for such a one
 GAP = 0.15  # metres between a back and the wall behind it that it stands at
+NEARLY = 1.0  # metres between the middle of the room and of what a lamp hangs over, so that it does
 EDGE = 0.5  # metres between the middle of a plant or lamp and a wall that it stands at
 
 
@@ -94,8 +95,10 @@ def out_of_habit(setting: Setting, i: int) -> float:
     if rows and anchor < 0 and kind.support == "floor":
         return APART_TWINS * (min(math.hypot(row[0] - here[0], row[1] - here[1]) for row in rows) > AT)
     if rows:
-        near = min(math.hypot(row[0] - here[0], row[1] - here[1]) for row in rows if row[3] < LOOSE)
-        return LOOSE * (near > (HUNG if kind.support == "ceiling" else AT))
+        habits = ((math.hypot(row[0] - here[0], row[1] - here[1]), row[2]) for row in rows if row[3] < LOOSE)
+        near, turn = min(habits, default=(math.inf, 0.0))
+        across = kind.stands == "before" and abs(math.sin(turn - setting.yaw[i])) > AT
+        return LOOSE * (across or near > (HUNG if kind.support == "ceiling" else AT))
     inside = float(depth_inside(setting.floor, here[None])[0])
     at_wall = _leans(setting, i)
     small = kind.role in ("decor", "light") and setting.standing(i)
@@ -334,9 +337,9 @@ def _overhead(setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np
         more = 0.0 if j in told else more
         for away in _row_over(setting, i, j):  # along its long side
             rows.append((x + math.cos(long) * away, z - math.sin(long) * away, heading, more))
-    middle = (setting.floor.polygon.min(0) + setting.floor.polygon.max(0)) / 2
-    rows.append((float(middle[0]), float(middle[1]), setting.grain, LOOSE / 2 * low))
-    return rows
+    x, z = setting.centre.tolist()
+    beside = any(math.hypot(row[0] - x, row[1] - z) < NEARLY for row in rows)
+    return [*rows, (x, z, setting.grain, LOOSE / (1 if beside else 2) * low)]
 
 
 def _row_over(setting: Setting, i: int, j: int) -> list[float]:

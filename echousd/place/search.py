@@ -303,9 +303,9 @@ class Search:
         setting = self.setting
         off = np.minimum(np.hypot(rows[:, 0] - setting.position[i, 0], rows[:, 1] - setting.position[i, 2]), FARTHEST)
         turned = 0.5 * (1 - np.cos(rows[:, 2] - setting.yaw[i]))
-        share = ATTENDING if setting.anchor[i] >= 0 or setting.hanging[i] else 1.0
-        taste: np.ndarray = share * (PULL * off + TURN * turned) + 0.3 * rows[:, 3]
-        return taste
+        hangs = setting.hanging[i]  # which no one sees turned
+        share = ATTENDING if setting.anchor[i] >= 0 or hangs else 1.0
+        return np.asarray(share * (PULL * off + TURN * turned * ~hangs) + 0.3 * rows[:, 3])
 
     def _carried(
         self, state: State, i: int, group: list[int], rows: np.ndarray, screens: Sequence[list[int]] = ()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from echomodel.boxes2d import footprints, seen
 from echomodel.objective import Plan, plan_of
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, carriers
 from echomodel.openings import Opening
-from echomodel.vocabulary import Category, vocabulary
+from echomodel.vocabulary import vocabulary
 from echousd.place.distances import BEHIND, kept_behind
 from echousd.place.geometry import Floor, axes, floor_from_polygon, pair_indices
 
@@ -24,7 +24,7 @@ WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it sta
 WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's normal does not lean on it
 
 
-def _of_plan(name: str) -> cached_property[np.ndarray]:
+def _of_plan(name: str) -> cached_property[Any]:
     return cached_property(lambda setting: getattr(setting.plan, name))
 
 
@@ -78,26 +78,10 @@ class Setting:
     fixed = _of_plan("given")  # (n,) bool, boxes that must not move
     anchor = _of_plan("anchor")  # (n,) int, whom each attends, -1 = nobody
     fronts = _of_plan("fronts")  # (n,) bool, which of the boxes have a front
-
-    @property
-    def kinds(self) -> tuple[Category, ...]:
-        """Rows of the vocabulary."""
-        return self.plan.kinds
-
-    @property
-    def stances(self) -> tuple[str, ...]:
-        """How each stands to whom it attends."""
-        return self.plan.stance
-
-    @property
-    def rules(self) -> str:
-        """The rule set that the relations are meant in: `strict` or `sgfront`."""
-        return self.plan.rules
-
-    @property
-    def stated(self) -> tuple[Stated, ...]:
-        """Where single objects must stand in the room."""
-        return self.plan.stated
+    kinds = _of_plan("kinds")  # rows of the vocabulary
+    stances = _of_plan("stance")  # how each stands to whom it attends
+    rules = _of_plan("rules")  # the rule set that the relations are meant in
+    stated = _of_plan("stated")  # where single objects must stand in the room
 
     @cached_property
     def categories(self) -> tuple[str, ...]:
@@ -119,13 +103,6 @@ class Setting:
         return np.stack([i, j], 1)[apart]
 
     @cached_property
-    def touching(self) -> np.ndarray:
-        """(p,) bool, pairs that touch at most, though such a pair may overlap: a bed moved off its nightstand later
-        would leave its wall."""
-        head = np.array([kind.stands == "head" for kind in self.kinds], bool)
-        return np.asarray(head[self.pairs].any(1))
-
-    @cached_property
     def shared(self) -> np.ndarray:
         """(n, n) float: depth in metres to which two boxes may overlap; without bound for a carrier and its load."""
         i, j, allowed = self.plan.couples
@@ -144,8 +121,7 @@ class Setting:
 
     def told(self, i: int) -> np.ndarray:
         """(r, 3) int, the triplets that name a box."""
-        rows: np.ndarray = self.triplets[(self.triplets[:, [0, 2]] == i).any(1)]
-        return rows
+        return np.asarray(self.triplets[(self.triplets[:, [0, 2]] == i).any(1)])
 
     # -- the floor ---------------------------------------------------------------------------------------------------
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from echomodel.arrays import Array, at_least, cast, dot, full, held, kit, least_of, picked, put
+from echomodel.objective.company import COMPANY
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, nobody, worst
 from echomodel.objective.sight import screens
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_normal, segment
@@ -18,7 +21,7 @@ DEEP = 6.0  # metres of the room along its axis from which on it does; or someth
 # Metres behind it at most, if nothing stands there (two of 129 real sofas have more), and what of more counts.
 WALKED_BEHIND, BARE = 1.3, 0.02
 MET = 0.25  # share of its width from which on something is behind it
-# Metres to what an armchair looks at, to 45 degrees, and to a wall that it does not look at: 107 of 115 real ones.
+# Metres to what an armchair looks at, to 45 degrees, and to a wall that it does not look at.
 SEEN, NEAR = 3.0, 2.0
 
 
@@ -90,14 +93,16 @@ def _backed(plan: Plan, who: Array, gap: Array) -> Array:
 
 
 def looks_in(plan: Plan) -> Found:
-    """An armchair looks at a seat, table, bed or screen, or into its room: at no wall that is near."""
+    """An armchair looks at a seat, table, bed or screen, one without a group perhaps into its room: at no wall near."""
     chairs, xp = plan.stands("company") & plan.standing, plan.kit
     i, j = plan.pairs(chairs, (plan.of("sofa", "bed", "board", "seat") | screens(plan)) & plan.standing)
     lateral, forward = plan.local(j, i)
     within = xp.minimum(forward - abs(lateral), SEEN - xp.sqrt(lateral * lateral + forward * forward + 1e-12))
     who = plan.those(chairs & plan.walled)
-    wall = wall_ahead(plan, who)
-    return found(who, xp.maximum(-least_of(i, -within, len(plan), FAR)[who], wall - NEAR), measure=wall)
+    wall, anchor = wall_ahead(plan, who), plan.anchor[who]
+    seated = (anchor >= 0) & plan.of("seat")[who] & (held(plan.gap(who, anchor)) < COMPANY)
+    into = xp.where(seated, -FAR, wall - NEAR)
+    return found(who, xp.maximum(-least_of(i, -within, len(plan), FAR)[who], into), measure=wall)
 
 
 def desk_at_wall(plan: Plan) -> Found:
@@ -115,6 +120,7 @@ NEEDED = 0.45  # share of the vocabulary's access depth below which a front coun
 SHARE = 0.3  # share of a front's width that may be covered
 BEDSIDE = 0.3  # metres beside a bed
 INTO_BED, OF_LAMPS, OF_CHAIRS = 0.4, 0.6, 0.1  # metres between a plant and a bed's side, a floor lamp, a chair
+LEAF = 0.1  # share of storage's front at either end that a door may open before
 GRAZE = 0.01  # metres that furniture may reach into a door's way, as layouts are rounded
 WALKED = 0.6  # metres, the width of a way on which one walks in, straight ahead through an open door
 TALL, STORED = 0.3, 0.1  # metres over a window's sill: what is higher, and storage that is, takes its light
@@ -182,26 +188,32 @@ def plant_aside(plan: Plan) -> Found:
 
 def door_free(plan: Plan) -> Found:
     """Doors swing, and passages are passed, without meeting furniture."""
-    return _before_openings(plan, window=False)
+    low = (held(plan.position)[:, 1] < CLEARANCE) & (plan.kit.amax(held(plan.size), 1) > 0.3)
+    hangs = ~plan.standing & low & plan.of("storage", "seat", "sofa", "board", "bed")
+    return _before_openings(plan, plan.standing | hangs, window=False)
+
+
+def leaf_aside(plan: Plan) -> Found:
+    """No door opens before the front of storage, where its leaf rests or meets who takes something out."""
+    opens = plan.of("storage") & plan.works & plan.standing
+    return _before_openings(plan, opens, window=False, depth=plan.column(lambda kind: kind.access) * NEEDED)
 
 
 def window_free(plan: Plan) -> Found:
     """Windows are not covered by tall furniture, nor are screens watched against their light."""
-    return _before_openings(plan, window=True)
-
-
-def _before_openings(plan: Plan, *, window: bool) -> Found:
-    rows: list[tuple[Array, Array, int]] = []
     on_wall = plan.which(lambda kind: kind.support == "wall" and kind.role == "storage")
-    low = (held(plan.position)[:, 1] < CLEARANCE) & (plan.kit.amax(held(plan.size), 1) > 0.3)
-    hangs = ~plan.standing & low & plan.of("storage", "seat", "sofa", "board", "bed")
-    asked = (plan.standing | (on_wall | screens(plan) if window else hangs)) & plan.moved
+    return _before_openings(plan, plan.standing | on_wall | screens(plan), window=True)
+
+
+def _before_openings(plan: Plan, asked: Array, *, window: bool, depth: Array | None = None) -> Found:
+    """What boxes keep off openings; `depth` (N,): what their fronts keep off leaves, so many metres before them."""
+    rows: list[tuple[Array, Array, int]] = []
     for scenes, polygon, openings in plan.rooms:
         here = plan.scene == scenes[0] if len(scenes) < 2 else plan.scene >= 0  # one room, or all are copies of one
-        who = plan.those(here & asked)
+        who = plan.those(here & asked & plan.moved)
         for number, opening in enumerate(openings):
             if (opening.kind == "window") == window and opening.edge < len(polygon):
-                rows.append((who, _clearance(plan, who, polygon, opening), number))
+                rows.append((who, _clearance(plan, who, polygon, opening, depth), number))
     if not rows:
         return nobody(plan.size)
     xp = plan.kit
@@ -212,33 +224,36 @@ def _before_openings(plan: Plan, *, window: bool) -> Found:
     return found(met, least[met], measure=GRAZE - least[met], words=which[met])
 
 
-def _clearance(plan: Plan, who: Array, polygon, opening: Opening) -> Array:  # type: ignore[no-untyped-def]
-    """(P,): how far boxes stay out of an opening's way, beyond what is tolerated, metres."""
+def _clearance(plan: Plan, who: Array, polygon: np.ndarray, opening: Opening, depth: Array | None) -> Array:
+    """(P,): how far boxes, or what is before them, stay out of an opening's way, beyond what is tolerated, metres."""
     near, far = map(plan.numbers, segment(polygon, opening))
     inward = plan.numbers(inward_normal(polygon, opening.edge))
     along = (far - near) / opening.width
     swings = opening.kind == "door" and opening.swing == "in"
-    depth = WINDOW_DEPTH if opening.kind == "window" else opening.width if swings else STEP
-    offset, xp = plan.position[who][:, ::2] - near, plan.kit
-    side, front = plan.axes(who)
+    if depth is not None and not swings:
+        return full(plan.yaw, len(who), FAR)
+    deepest = WINDOW_DEPTH if opening.kind == "window" else opening.width if swings else STEP
+    (side, front), middle, xp = plan.axes(who), plan.position[who][:, ::2], plan.kit
     width, length = plan.size[who, 0] / 2, plan.size[who, 2] / 2
+    if depth is not None:
+        middle = middle + front * (length + depth[who] / 2)[:, None]
+        width, length = width * (1 - 2 * LEAF), depth[who] / 2
 
     def reach(axis: Array) -> Array:
         return abs(side @ axis) * width + abs(front @ axis) * length
 
-    at, deep = offset @ along, offset @ inward
+    at, deep = (middle - near) @ along, (middle - near) @ inward - reach(inward) - deepest
     beside = abs(at - opening.width / 2) - opening.width / 2 - reach(along)
-    out = xp.maximum(beside, deep - reach(inward) - depth)
+    out = xp.maximum(beside, deep)
     if opening.kind == "window":
         over = xp.where(plan.of("storage"), STORED, TALL + HEADBOARD * plan.of("bed"))[who]
         low = opening.sill + over - (plan.position[who, 1] + plan.size[who, 1])
         return xp.maximum(out + 0.15, xp.where(screens(plan)[who], -FAR, low))
     if swings:  # of the corner of the square that the leaf does not sweep what one walks through
         hinge, closed = map(plan.numbers, hinge_point(polygon, opening))
-        off = plan.position[who][:, ::2] - hinge
-        x = at_least(abs(off @ closed) - reach(closed), 0.0)
-        z = at_least(abs(off @ inward) - reach(inward), 0.0)
-        walked = xp.maximum(beside + max(opening.width - WALKED, 0.0) / 2, deep - reach(inward) - depth)
-        swept = xp.sqrt(at_least(x * x + z * z, 1e-12)) - opening.width
-        out = xp.minimum(walked, xp.maximum(out, swept))
+        x = at_least(abs((middle - hinge) @ closed) - reach(closed), 0.0)
+        z = at_least(abs((middle - hinge) @ inward) - reach(inward), 0.0)
+        out = xp.maximum(out, xp.sqrt(at_least(x * x + z * z, 1e-12)) - opening.width)
+        walked = xp.maximum(beside + max(opening.width - WALKED, 0.0) / 2, deep)
+        out = out if depth is not None else xp.minimum(walked, out)
     return out + GRAZE

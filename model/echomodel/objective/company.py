@@ -159,7 +159,7 @@ CIRCLE = math.radians(85.0)  # a sofa is turned so far at most from the middle o
 BEFORE = 0.8  # metres before the larger sofa, where the middle of the group is
 NEAR = 3.0  # metres: a sofa further away stands for itself
 COVERS = 0.12  # share of a sofa's width that side tables and lamps may stand before
-AHEAD = 0.1  # metres that their middles may lie before its front: 97 % of real ones lie less
+AHEAD, OF_TABLES = 0.1, -0.15  # metres that the middles of lamps and tables may lie before its front: 97 % of real ones
 SIDE = 0.6  # metres: what is further from its seat stands for itself
 ELBOW, KNEES = 0.2, 0.3  # share of a sofa's width that an armchair may stand before, and metres from which on all of it
 FORTH = 0.6  # metres of an armchair, or more, before the line of its sofa's back: all 88 real ones
@@ -169,7 +169,7 @@ ALONE = 0.45  # metres from everything: nothing small stands so in a room
 # 0.4 of a wall, the other one is at a sofa.
 OF_SMALL = 0.15
 LIT = 1.1  # metres between a floor lamp and the next seat, bed or table: 95 % of real ones
-EDGE = 0.5  # metres between a wall and an only armchair that belongs to no group
+EDGE, LAID = 0.5, 0.3  # metres between a wall and an only armchair that belongs to no group, and such a daybed
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,7 +315,8 @@ def at_its_side(plan: Plan) -> Found:
     ahead = forward - plan.size[j, 2] / 2  # of its middle, where it stands off the end as well
     before = ahead - half_depth
     margin = xp.maximum(xp.where(armchair, ELBOW * width, COVERS * width) - covered, -0.05 - before)
-    margin = xp.where(plan.of("seat")[i], margin, xp.minimum(margin, AHEAD - ahead))
+    most = xp.where(plan.of("board")[i], OF_TABLES, AHEAD)
+    margin = xp.where(plan.of("seat")[i], margin, xp.minimum(margin, most - ahead))
     margin = xp.where(armchair, xp.maximum(margin, before - KNEES), margin)
     behind = xp.where(armchair, ahead + half_depth + plan.size[j, 2] - FORTH, FAR)
     return found(i, xp.minimum(margin, behind), other=j, measure=at_least(before, 0.0), words=1 * (behind < margin))
@@ -334,8 +335,8 @@ def not_alone(plan: Plan) -> Found:
     """Small tables stand at a wall or at something, lamps at a wall, a sofa or the table that the graph says they are
     close by, an only armchair or daybed at a wall.
 
-    A lamp lights a seat, bed or table. An armchair that stands apart from its group has something of its own: a lamp,
-    a table, shelves, another one.
+    Behind a seat a table is at nothing. A lamp lights a seat, bed or table. An armchair that stands apart from its
+    group has something of its own: a lamp, a table, shelves, another one.
     """
     daybed = plan.which(lambda kind: kind.role == "sofa" and not kind.wall)
     loner = (plan.stands("company") | daybed) & (plan.anchor < 0)
@@ -347,14 +348,17 @@ def not_alone(plan: Plan) -> Found:
         i, j = plan.pairs(small, plan.standing, least=True)
         lamp, apart = plan.of("light")[i], plan.apart(i, j)
         beside = plan.of("sofa")[j] | (plan.of("board")[j] & told_of(plan, i, j, "close_by"))
-        gap, _ = plan.worst(i, xp.where(lamp & ~beside, FAR, apart), j)
+        behind = plan.local(i, j)[1] + plan.reach(i, j)[1] + plan.size[j, 2] / 2 < 0
+        strange = xp.where(lamp, ~beside, plan.of("sofa", "seat")[j] & behind)
+        gap, _ = plan.worst(i, xp.where(strange, FAR, apart), j)
         used = plan.of("sofa", "seat", "bed", "board")[j]
         lit, _ = plan.worst(i, xp.where(lamp & used, apart, FAR), j)
         who = plan.those(small & plan.walled)
         gap, loner, lit = gap[who], loner[who], lit[who]
         wall = xp.amin(plan.inside(footprint(plan.size[who], plan.position[who], plan.yaw[who]), who), 1)
         free = xp.where((plan.stands("beside") & ~plan.of("light"))[who], gap + OF_SMALL, gap)
-        away = xp.where(loner, wall - (EDGE - ALONE), xp.minimum(free, wall))
+        edge = xp.where(daybed[who], LAID, EDGE)
+        away = xp.where(loner, wall - (edge - ALONE), xp.minimum(free, wall))
         near, lit = xp.where(loner, wall, xp.minimum(gap, wall)), xp.where(lit < FAR, lit, 0.0)
         lonely = first_of(who, xp.full_like(who, -1), [ALONE - away, LIT - lit], [near, lit])
     if not bool(company.any()):

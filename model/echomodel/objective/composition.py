@@ -263,13 +263,14 @@ def workers_apart(plan: Plan) -> Found:
 
 
 def wardrobe_opens(plan: Plan) -> Found:
-    """One can stand before an open wardrobe, also at the foot of a bed; no seat or table stands before any storage, and
-    one passes a low table there."""
+    """One can stand before an open wardrobe, also at the foot of a bed; no seat or table stands before any storage, no
+    sofa or bed before a screen's, and one passes a low table there."""
     stores = plan.of("storage") & plan.works & plan.standing & ~plan.stands("near")
     tables = plan.of("board") & ~plan.stands("beside")
-    block = (plan.of("bed") | plan.stands("company", "at", "head") | tables) & plan.standing
+    block = (plan.of("bed", "sofa") | plan.stands("company", "at", "head") | tables) & plan.standing
     i, j = plan.pairs(stores, block, least=True)
-    met = plan.which(lambda kind: kind.access > 0.6)[i] | ~plan.of("bed")[j]
+    deep = plan.stands("opposite") | plan.which(lambda kind: kind.access > 0.6)
+    met = deep[i] | ~(plan.of("bed") | (plan.of("sofa") & ~plan.stands("company")))[j]
     i, j = i[met], j[met]
     share = cast(plan.kit.where(plan.stands("opposite"), SCREENED, FACED)[i], plan.size)
     needed = cast(plan.kit.where(plan.stands("before"), LOW, OPENS), plan.size)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -280,6 +280,16 @@ MORE = [
      ("sofa", "at_wall"), "sofa stands 1.45 m off the wall behind it"),  # and looks at nobody
     (Room({"a": {"kind": "chaise_longue_sofa", "size": (0.8, 0.7, 1.6), "at": (0.0, 0.0)}}), ("a", "not_alone"),
      "a stands alone in the room, 1.20 m from"),
+    (Room({"a": {"kind": "chaise_longue_sofa", "size": (0.8, 0.7, 1.6), "at": (1.75, 0.0)}}), ("a", "not_alone"),
+     "a stands alone in the room, 0.35 m from"),
+    (with_one(LIVING.moved("armchair", at=(1.2, 0.3)), "side", kind="side_table", size=(0.4, 0.5, 0.4), at=(1.83, 0.3)),
+     ("side", "not_alone"), "side stands alone in the room"),  # behind it
+    (Room({"bed": BEDROOM.things["bed"], "stand": {**LIVING.things["stand"], "at": (1.6, 0.8)}}),
+     ("stand", "wardrobe_opens"), "stand has 0.48 m before it, then bed"),  # its end alone
+    (LIVING.moved("armchair", at=(1.6, -0.9), yaw=0.0), ("armchair", "looks_in"),
+     "armchair looks at nothing but a wall, 2.50 m before it"),  # while it is of a group
+    (with_one(LIVING, "low", kind="side_table", size=(0.4, 0.5, 0.4), at=(-1.4, -1.2)), ("low", "at_its_side"),
+     "low stands before sofa, not beside it"),
 ]  # fmt: skip
 KEPT = [
     (DINING.moved("chair", at=(0.5, 0.4)), ("chair", "seat_faces")),
@@ -310,7 +320,22 @@ KEPT = [
     (with_one(LIVING, "table", kind="dining_table", size=(0.8, 0.75, 0.8), at=(-1.25, 0.7)), ("stand", "view_free")),
     (LIVING.moved("coffee", at=(0.0, 0.8)), ("stand", "wardrobe_opens")),
     (with_one(BEDROOM, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.7, 1.75)), ("plant", "plant_in_nook")),
-    (Room({"a": {"kind": "chaise_longue_sofa", "size": (0.8, 0.7, 1.6), "at": (1.7, 0.0)}}), ("a", "not_alone")),
+    (Room({"a": {"kind": "chaise_longue_sofa", "size": (0.8, 0.7, 1.6), "at": (1.85, 0.0)}}), ("a", "not_alone")),
+    (
+        with_one(
+            LIVING.moved("armchair", at=(1.2, 0.3)), "side", kind="side_table", size=(0.4, 0.5, 0.4), at=(1.2, 0.95)
+        ),
+        ("side", "not_alone"),
+    ),
+    (
+        Room({"bed": BEDROOM.things["bed"], "stand": {**LIVING.things["stand"], "at": (1.6, 0.9)}}),
+        ("stand", "wardrobe_opens"),
+    ),
+    (LIVING.moved("armchair", at=(1.6, -0.9), yaw=-0.9), ("armchair", "looks_in")),
+    (
+        with_one(LIVING, "low", kind="side_table", size=(0.4, 0.5, 0.4), at=(-1.4, -1.3)),
+        ("low", "at_its_side"),
+    ),
     (SET.moved("table", yaw=0.015), ("table", "parallel")),
     (
         Room({**STUDY.moved("desk", at=(0.0, -0.5)).things, "a": STUDY.things["chair"], "b": STUDY.things["chair"]}),
@@ -381,7 +406,7 @@ def test_doors_swing_free_and_windows_are_not_covered():
     window = Opening("window", "window", 3, 0.3, 1.4, 1.3, sill=0.9)
     found = BEDROOM.found(openings=(door,))
     assert "wardrobe reaches 0.88 m into the way of a door" in found["wardrobe", "door_free"]
-    assert found.keys() - {("wardrobe", "door_free")} == set()
+    assert found.keys() == {("wardrobe", "door_free"), ("wardrobe", "leaf_aside")}
     assert set(BEDROOM.found(openings=(window,))) == {("wardrobe", "window_free")}
     for height, seen in ((0.95, False), (1.05, True)):  # storage a hand over the sill
         low = BEDROOM.moved("wardrobe", size=(1.8, height, 0.6))
@@ -413,6 +438,17 @@ def test_nothing_stands_at_the_edge_of_a_leaf(off, reached):
     door = Opening("door", "door", 3, 0.3, 0.9, 2.0)  # to x = -1.6
     room = SMALL.moved("plant", at=(-1.4 + off, 1.25))
     assert (("plant", "door_free") in room.found(openings=(door,))) == reached
+
+
+@pytest.mark.parametrize(("hinge", "met"), [("left", True), ("right", False)])
+def test_no_leaf_rests_before_the_front_of_storage(hinge, met):
+    door = Opening("door", "door", 3, 0.3, 0.9, 2.0, hinge=hinge)  # which opens along the shelf, or away from it
+    shelf = Room({"shelf": {"kind": "bookshelf", "size": (0.8, 2.0, 0.3), "at": (-1.4, 1.85), "yaw": np.pi}})
+    found = shelf.found(openings=(door,))
+    assert found == ({("shelf", "leaf_aside"): "a door opens before the front of shelf"} if met else {})
+    assert ("shelf", "leaf_aside") not in shelf.moved("shelf", at=(-1.25, 1.85)).found(openings=(door,))
+    assert ("shelf", "leaf_aside") not in shelf.moved("shelf", kind="plant").found(openings=(door,))
+    assert shelf.found(openings=(replace(door, swing="out"),)) == {}
 
 
 def test_what_the_graph_states_decides_whom_a_seat_attends():

@@ -16,7 +16,7 @@ from echomodel.rules import label_relations, margins
 from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place.placing import place_boxes
-from echousd.place.proposals import proposals, slots_at
+from echousd.place.proposals import out_of_habit, proposals, slots_at
 from echousd.place.search import PRICE, Search, State, priced
 from echousd.place.setting import setting_of
 
@@ -131,6 +131,27 @@ def test_an_ottoman_leaves_room_for_the_knees_before_its_sofa():
     search, _ = searched(["multi_seat_sofa", "ottoman"], size, [(0, 0, -1.5), (0, 0, 0)], [0.0, 0.0])
     before = [slot for slot in slots_at(search.setting, 1, 0) if abs(slot[0]) < 1.1]
     assert min(before, key=lambda slot: slot[3])[1] - 0.45 - 0.3 == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("table", "drawn", "habit"), [(0.5, 0.0, 0.5), (0.5, 0.45, 0.0), (1.5, 0.0, 0.0)])
+def test_a_pendant_hangs_over_a_table_that_is_near_the_middle_of_the_room(table, drawn, habit):
+    size = [(1.2, 0.4, 0.7), (0.4, 0.6, 0.4)]
+    search, _ = searched(["coffee_table", "pendant_lamp"], size, [(0, 0, table), (0, 2.0, drawn)], [0.0, 0.0])
+    assert out_of_habit(search.setting, 1) == habit
+
+
+def test_of_two_pendants_at_a_small_table_neither_is_where_it_belongs():
+    size = [(0.5, 0.5, 0.5), (0.4, 0.6, 0.4), (0.4, 0.6, 0.4)]
+    words = ["side_table", "pendant_lamp", "pendant_lamp"]
+    search, _ = searched(words, size, [(0, 0, 0), (0, 2.0, 0), (0, 2.0, 0)], [0.0] * 3)
+    assert [out_of_habit(search.setting, k) for k in (1, 2)] == [0.5, 0.5]
+
+
+@pytest.mark.parametrize(("turn", "habit"), [(0.0, 0.0), (np.pi / 2, 0.5), (np.pi, 0.0)])
+def test_a_coffee_table_is_wanted_along_its_sofa(turn, habit):
+    size = [(2.2, 0.8, 0.9), (1.2, 0.4, 0.6)]
+    search, _ = searched(["multi_seat_sofa", "coffee_table"], size, [(0, 0, -1.5), (0, 0, -0.4)], [0.0, turn])
+    assert out_of_habit(search.setting, 1) == habit
 
 
 @pytest.mark.parametrize(("at", "goes"), [((0.0, -0.7), True), ((2.5, 2.5), False)])
