@@ -331,13 +331,14 @@ class Search:
         self, position: np.ndarray, yaw: np.ndarray, state: State, i: int, group: list[int], rows: np.ndarray
     ) -> None:
         """Put box i at K poses in K states, and a group with it."""
-        turn = rows[:, 2] - state.yaw[i]
+        turn = (rows[:, 2] - state.yaw[i]) * (self.setting.stances[i] != "before")  # seats stay at its sofa's sides
         cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
         away = (state.position[group] - state.position[i])[:, [0, 2]]
         position[:, group, 0] = rows[:, :1] + cos * away[:, 0] + sin * away[:, 1]
         position[:, group, 2] = rows[:, 1:2] - sin * away[:, 0] + cos * away[:, 1]
         free = np.array(group)[~self.setting.turned[group]]
         yaw[:, free] = state.yaw[free] + turn[:, None]
+        yaw[:, i] = state.yaw[i] if self.setting.turned[i] else rows[:, 2]
 
     def _promising(
         self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray, taste: np.ndarray

@@ -13,7 +13,7 @@ from echomodel.objective.plan import FAR, Found, Plan, found, joined, worst
 APART = {
     ("sofa", "board"): 0.2, ("sofa", "seat"): 0.12, ("board", "board"): 0.1, ("board", "seat"): 0.05,
     ("seat", "seat"): 0.06, ("seat", "storage"): 0.12, ("bed", "seat"): 0.05, ("bed", "sofa"): 0.12,
-    ("bed", "bed"): 0.15,
+    ("bed", "bed"): 0.15, ("bed", "board"): 0.25,
 }  # fmt: skip
 ROLES = sorted({role for pair in APART for role in pair})
 PULL, PULL_WALL = 0.22, 0.1  # metres behind a chair at a table, before furniture and before a wall
@@ -42,7 +42,9 @@ def groups_apart(plan: Plan) -> Found:
     table = plan.numbers([[APART.get((a, b), APART.get((b, a), 0.0)) for b in ROLES] for a in ROLES])
     number = cast(plan.column(lambda kind: ROLES.index(kind.role) if kind.role in ROLES else 0), plan.scene)
     wanted = table[number[i], number[j]]
-    keep = (wanted > 0) & ~_side_by_side(plan, i, j)
+    works = plan.of("board") & ~plan.dining  # which stand beside beds
+    bedside = (works[i] & plan.of("bed")[j]) | (works[j] & plan.of("bed")[i])
+    keep = (wanted > 0) & ~_side_by_side(plan, i, j) & ~bedside
     i, j, wanted = i[keep], j[keep], wanted[keep]
     least, about = plan.worst(i, plan.apart(i, j) - wanted, j)
     who = rows(least < FAR)
@@ -157,8 +159,6 @@ def seat_room(plan: Plan) -> Found:
     chairs, ottomans = (plan.stands(word) & plan.of("seat") & plan.standing for word in ("company", "foot"))
     i, j = plan.pairs((plan.stands("with") & plan.standing) | chairs | ottomans, tables, least=True)
     one, sofa = plan.pairs(chairs, plan.of("sofa") & plan.standing, least=True)
-    if not len(i) + len(one):
-        return close
     lateral, forward = plan.local(one, sofa)
     aside = (abs(lateral) > plan.size[sofa, 0] / 2) & (forward < plan.size[sofa, 2] / 2)
     ends = plan.kit.where(aside, plan.more_ahead(one, sofa, END, MET), FAR)

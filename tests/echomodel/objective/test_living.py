@@ -290,6 +290,8 @@ MORE = [
      "armchair looks at nothing but a wall, 2.50 m before it"),  # while it is of a group
     (with_one(LIVING, "low", kind="side_table", size=(0.4, 0.5, 0.4), at=(-1.4, -1.2)), ("low", "at_its_side"),
      "low stands before sofa, not beside it"),
+    (with_one(BEDROOM, "table", kind="dining_table", size=(0.8, 0.75, 0.8), at=(0.0, 0.72)), ("table", "groups_apart"),
+     "table leaves only 0.20 m to bed"),
 ]  # fmt: skip
 KEPT = [
     (DINING.moved("chair", at=(0.5, 0.4)), ("chair", "seat_faces")),
@@ -332,6 +334,8 @@ KEPT = [
         ("stand", "wardrobe_opens"),
     ),
     (LIVING.moved("armchair", at=(1.6, -0.9), yaw=-0.9), ("armchair", "looks_in")),
+    (with_one(BEDROOM, "table", kind="dining_table", size=(0.8, 0.75, 0.8), at=(0.0, 0.8)), ("table", "groups_apart")),
+    (with_one(BEDROOM, "desk", kind="desk", size=(0.8, 0.75, 0.6), at=(1.35, -1.0)), ("desk", "groups_apart")),
     (
         with_one(LIVING, "low", kind="side_table", size=(0.4, 0.5, 0.4), at=(-1.4, -1.3)),
         ("low", "at_its_side"),

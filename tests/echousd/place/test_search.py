@@ -182,6 +182,18 @@ def test_a_group_goes_as_one():
     assert yaw[0, 1] - yaw[0, 0] == pytest.approx(0.3)
 
 
+def test_seats_stay_where_they_are_when_the_table_of_their_sofa_is_turned():
+    words = ["multi_seat_sofa", "coffee_table", "armchair"]
+    size = [(2.2, 0.8, 0.9), (1.2, 0.4, 0.6), (0.8, 0.8, 0.8)]
+    places, turns = [(0, 0, -1.5), (0, 0, -0.4), (1.5, 0, -0.4)], [0.0, np.pi / 2, -np.pi / 2]
+    search, state = searched(words, size, places, turns, [(2, "close_by", 1)])
+    group = search.group(1, np.ones(3, bool), state)
+    position, yaw = search._carried(state, 1, group, np.array([(0.2, -0.3, 0.0, 0.0)]))
+    assert set(group) == {1, 2}
+    np.testing.assert_allclose(position[0, 1:, ::2], [(0.2, -0.3), (1.7, -0.3)])
+    np.testing.assert_allclose(yaw[0], [0.0, 0.0, -np.pi / 2])
+
+
 def test_chairs_are_seated_together():
     words = ["dining_table", *["dining_chair"] * 4]
     drawn = [(0, 0, 0), (0.3, 0, 0.7), (0.35, 0, -0.7), (-0.5, 0, 0.6), (1.2, 0, -0.1)]
