@@ -62,7 +62,8 @@ def proposals(setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np
         rows += _as_stated(setting, position, yaw, i)
         beside = twins(setting, position, yaw, i)
         rows = [*beside, *((*row[:3], row[3] + APART_TWINS) for row in rows)] if beside else rows
-    drawn, more = setting.position[i, [0, 2]].tolist(), loose + out_of_habit(setting, i)
+    now = (position, yaw) if kind.support == "ceiling" else (setting.position, setting.yaw)
+    drawn, more = setting.position[i, [0, 2]].tolist(), loose + out_of_habit(setting, i, *now)
     carrier = int(setting.carrier[i])
     turns = (_squared(setting, i), float(setting.yaw[i])) if carrier < 0 else (float(yaw[carrier]),)
     rows += [(*drawn, turn, more) for turn in turns]
@@ -82,16 +83,15 @@ NEARLY = 1.0  # metres between the middle of the room and of what a lamp hangs o
 EDGE = 0.5  # metres between the middle of a plant or lamp and a wall that it stands at
 
 
-def out_of_habit(setting: Setting, i: int) -> float:
-    """By how much other poses of a box are preferred to where it was drawn: nothing where such a piece may stand so."""
+def out_of_habit(setting: Setting, i: int, position: np.ndarray, yaw: np.ndarray) -> float:
+    """By how much other poses of a box are preferred to where it was drawn: nothing where such a piece may stand so,
+    the others at position (n, 3) and yaw (n,)."""
     kind, anchor, here = setting.kinds[i], int(setting.anchor[i]), setting.position[i, [0, 2]]
-    every = np.ones(len(setting.size), bool)
-    rows = twins(setting, setting.position, setting.yaw, i)
+    rows = twins(setting, position, yaw, i)
     if kind.support == "ceiling":
-        rows = _overhead(setting, setting.position, setting.yaw, every, i)
+        rows = _overhead(setting, position, yaw, np.ones(len(yaw), bool), i)
     elif anchor >= 0 and setting.carrier[i] < 0 and not rows:
-        frame = setting.position[anchor], float(setting.yaw[anchor])
-        rows = [out_of(*frame, slot) for slot in slots_at(setting, i, anchor)]
+        rows = [out_of(position[anchor], float(yaw[anchor]), slot) for slot in slots_at(setting, i, anchor)]
     if rows and anchor < 0 and kind.support == "floor":
         return APART_TWINS * (min(math.hypot(row[0] - here[0], row[1] - here[1]) for row in rows) > AT)
     if rows:

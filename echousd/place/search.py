@@ -148,7 +148,7 @@ class Search:
     # -- moves -------------------------------------------------------------------------------------------------------
 
     def group(self, i: int, there: np.ndarray, state: State) -> list[int]:
-        """A box, whoever attends or stands on it and is not astray, and the lamps that hang over it."""
+        """A box, whoever attends or stands on it and is not astray, and the lamps that hang over them."""
         out, at = [i], 0
         while at < len(out):
             for k in self.children[out[at]]:
@@ -156,8 +156,8 @@ class Search:
                     out.append(k)
             at += 1
         for k in np.flatnonzero(self.setting.hanging & there).tolist():
-            away = (state.position[k] - state.position[i])[[0, 2]]
-            if k not in out and np.hypot(*away) < LIT:
+            away = (state.position[out] - state.position[k])[:, ::2]
+            if k not in out and np.hypot(*away.T).min() < LIT:
                 out.append(k)
         return out
 
@@ -508,12 +508,12 @@ class Search:
     def _first(self) -> tuple[State, float, list[int]]:
         """Where all were moved once from where they were drawn and what is missed was mended, as `mended`."""
         setting, n = self.setting, len(self.setting.size)
-        habits = [0.02 + 0.3 * out_of_habit(setting, i) for i in range(n)]
-        state = State(setting.position.copy(), setting.yaw.copy(), np.array(habits))
+        at = setting.position.copy(), setting.yaw.copy()
+        state = State(*at, np.array([0.02 + 0.3 * out_of_habit(setting, i, *at) for i in range(n)]))
         _, wrong = self.faults(state)
-        at = np.array([stance == "at" for stance in setting.stances], bool)
-        mates = np.array([((setting.anchor == a) & at).sum() for a in setting.anchor])
-        seated = at & (setting.anchor >= 0) & (mates > 1) & ~np.isin(np.arange(n), wrong)  # together with their table
+        seat = np.array([stance == "at" for stance in setting.stances], bool)
+        mates = np.array([((setting.anchor == a) & seat).sum() for a in setting.anchor])
+        seated = seat & (setting.anchor >= 0) & (mates > 1) & ~np.isin(np.arange(n), wrong)  # together with their table
         state = self.swept(state, [i for i in range(n) if not seated[i]])
         return self.mended(state, *self.faults(state))
 

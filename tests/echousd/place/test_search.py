@@ -136,22 +136,31 @@ def test_an_ottoman_leaves_room_for_the_knees_before_its_sofa():
 @pytest.mark.parametrize(("table", "drawn", "habit"), [(0.5, 0.0, 0.5), (0.5, 0.45, 0.0), (1.5, 0.0, 0.0)])
 def test_a_pendant_hangs_over_a_table_that_is_near_the_middle_of_the_room(table, drawn, habit):
     size = [(1.2, 0.4, 0.7), (0.4, 0.6, 0.4)]
-    search, _ = searched(["coffee_table", "pendant_lamp"], size, [(0, 0, table), (0, 2.0, drawn)], [0.0, 0.0])
-    assert out_of_habit(search.setting, 1) == habit
+    search, state = searched(["coffee_table", "pendant_lamp"], size, [(0, 0, table), (0, 2.0, drawn)], [0.0, 0.0])
+    assert out_of_habit(search.setting, 1, state.position, state.yaw) == habit
+
+
+def test_a_pendant_is_no_longer_where_it_belongs_when_its_table_has_moved():
+    size = [(1.2, 0.4, 0.7), (0.4, 0.6, 0.4)]
+    search, state = searched(["coffee_table", "pendant_lamp"], size, [(0, 0, 1.0), (0, 2.0, 1.0)], [0.0, 0.0])
+    state.position[0, 2] = 1.5
+    rows = proposals(search.setting, state.position, state.yaw, np.ones(2, bool), 1)
+    over, drawn = (rows[np.hypot(rows[:, 0], rows[:, 1] - z) < 0.01, 3].min() for z in (1.5, 1.0))
+    assert (over, drawn) == (0.0, 0.5)
 
 
 def test_of_two_pendants_at_a_small_table_neither_is_where_it_belongs():
     size = [(0.5, 0.5, 0.5), (0.4, 0.6, 0.4), (0.4, 0.6, 0.4)]
     words = ["side_table", "pendant_lamp", "pendant_lamp"]
-    search, _ = searched(words, size, [(0, 0, 0), (0, 2.0, 0), (0, 2.0, 0)], [0.0] * 3)
-    assert [out_of_habit(search.setting, k) for k in (1, 2)] == [0.5, 0.5]
+    search, state = searched(words, size, [(0, 0, 0), (0, 2.0, 0), (0, 2.0, 0)], [0.0] * 3)
+    assert [out_of_habit(search.setting, k, state.position, state.yaw) for k in (1, 2)] == [0.5, 0.5]
 
 
 @pytest.mark.parametrize(("turn", "habit"), [(0.0, 0.0), (np.pi / 2, 0.5), (np.pi, 0.0)])
 def test_a_coffee_table_is_wanted_along_its_sofa(turn, habit):
     size = [(2.2, 0.8, 0.9), (1.2, 0.4, 0.6)]
-    search, _ = searched(["multi_seat_sofa", "coffee_table"], size, [(0, 0, -1.5), (0, 0, -0.4)], [0.0, turn])
-    assert out_of_habit(search.setting, 1) == habit
+    search, state = searched(["multi_seat_sofa", "coffee_table"], size, [(0, 0, -1.5), (0, 0, -0.4)], [0.0, turn])
+    assert out_of_habit(search.setting, 1, state.position, state.yaw) == habit
 
 
 @pytest.mark.parametrize(("at", "goes"), [((0.0, -0.7), True), ((2.5, 2.5), False)])
@@ -180,6 +189,14 @@ def test_a_group_goes_as_one():
     lateral = np.cos(-np.pi / 2) * x - np.sin(-np.pi / 2) * z
     assert lateral == pytest.approx(1.1, abs=0.1)
     assert yaw[0, 1] - yaw[0, 0] == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize(("away", "goes"), [(0.2, True), (0.6, False)])
+def test_a_lamp_over_the_table_of_a_sofa_goes_with_the_sofa(away, goes):
+    words = ["multi_seat_sofa", "coffee_table", "pendant_lamp"]
+    size = [(2.2, 0.8, 0.9), (1.2, 0.4, 0.6), (0.4, 0.6, 0.4)]
+    search, state = searched(words, size, [(0, 0, -1.5), (0, 0, -0.4), (away, 2.0, -0.4)], [0.0] * 3)
+    assert (2 in search.group(0, np.ones(3, bool), state)) == goes
 
 
 def test_seats_stay_where_they_are_when_the_table_of_their_sofa_is_turned():
