@@ -16,6 +16,7 @@ from echomodel.openings import Opening, direction, hinge_point, inward_normal, s
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError
 from echousd.graph.picture import save_figure
+from echousd.home.importing.homes import room_kind
 from echousd.home.plan import Plan, ways
 from echousd.home.stages import Standing
 from echousd.naming import free_name
@@ -150,8 +151,10 @@ def write_dxf(plan: Plan, path: Path, things: Sequence[Standing] = ()) -> None:
         space.add_lwpolyline(line.points.round(4).tolist(), close=line.closed, dxfattribs={"layer": line.layer})
     for name, floor in plan.floors.items():
         at = shapely.Polygon(on_paper(floor)).representative_point()
-        text = space.add_text(name, height=0.25, dxfattribs={"layer": "room"})
-        text.set_placement((at.x, at.y))
+        kind = plan.home.room(name).type
+        for number, word in enumerate([name] if room_kind([name]) == kind else [name, kind.replace("_", " ")]):
+            text = space.add_text(word, height=0.25, dxfattribs={"layer": "room"})
+            text.set_placement((at.x, at.y - 0.3 * number))
     for thing in things:
         name = thing.node.category
         block = drawing.blocks.new(free_name(name, {one.name for one in drawing.blocks}))

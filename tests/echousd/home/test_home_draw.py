@@ -6,10 +6,13 @@ import ezdxf
 import pytest
 import shapely
 
-from echousd.home.draw import lines_of
+from echomodel.vocabulary import vocabulary
+from echousd.home.draw import lines_of, write_dxf
 from echousd.home.files import load_home
 from echousd.home.given import plan_there
 from echousd.home.graph import HomeGraph
+from echousd.home.importing.formats import read_plan
+from echousd.home.importing.homes import room_kind
 from echousd.home.plan import plan_home
 
 WORDS = "hall door bedroom, hall open_to kitchen"
@@ -66,3 +69,15 @@ def test_what_cannot_be_planned_is_one_line(file, tmp_path, monkeypatch, echousd
     assert done.code == 2
     assert said in done.err
     assert done.err.count("\n") == 1
+
+
+def test_a_drawing_tells_what_rooms_are_whatever_their_names(tmp_path):
+    kinds = {f"r{number}": row.name for number, row in enumerate(vocabulary().room_types)} | {"hall": "hallway"}
+    rooms = [{name: kind for name, kind in kinds.items() if name in (one, "hall")} for one in kinds if one != "hall"]
+    for asked in rooms:
+        one = next(iter(asked))
+        text = f"home: {{area: 30}}\nrooms: {json.dumps(asked)}\nrelations: [hall door {one}]\n"
+        (tmp_path / "flat.yaml").write_text(text)
+        write_dxf(plan_home(load_home(tmp_path / "flat.yaml")), tmp_path / "flat.dxf")
+        _, found = read_plan(tmp_path / "flat.dxf")
+        assert {room.name: room_kind(room.words) for room in found.rooms} == asked
