@@ -19,7 +19,7 @@ from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.graph import SceneGraph
 from echousd.layers.placed import MODEL, PLACES
-from echousd.shapes.colliders import approximation, hull_of
+from echousd.shapes.colliders import approximation, collider_of
 from echousd.shapes.geometry import LICENCE, Collider, Geometry, Mass, Origin, Original, Part
 from echousd.shapes.joints import read_joints
 from echousd.shapes.matter import read_mass
@@ -185,9 +185,8 @@ def read_original(root: Usd.Prim, asset: str | None, category: str, manifest: Ma
     told = manifest["meshes"][asset]
     words = (told.get("shapes", ""), told.get("licence", LICENCE), told.get("credit", ""))
     origin = Origin(*words, asset=told.get("asset", ""), sha256=told.get("sha256", ""))
-    return Geometry(
-        (Part("mesh", mesh, {}),), (hull_of(mesh, category),), origin, read_mass(root), original=_original(root, asset)
-    )
+    shape = collider_of(mesh, category)
+    return Geometry((Part("mesh", mesh, {}),), (shape,), origin, read_mass(root), original=_original(root, asset))
 
 
 def _original(root: Usd.Prim, asset: str) -> Original:

@@ -96,7 +96,7 @@ def _reduced(mesh: Mesh, faces: int) -> trimesh.Trimesh:
     return out
 
 
-def hull_of(mesh: Mesh, category: str) -> Collider:
+def collider_of(mesh: Mesh, category: str) -> Collider:
     """What an object collides with, whatever its mesh is like."""
     try:
         return collider(mesh, category)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echomodel.triangles import connected_pieces
+from echomodel.triangles import linked
 from echomodel.vocabulary import RoomStyle, vocabulary
 from echousd.naming import free_name
 
@@ -36,9 +36,9 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
     for relation in graph.relations:
         if "style" in vocabulary().predicate(relation.predicate).unites:
             alike.append((place[relation.subject], place[relation.object]))
-    alike += _rows(graph, _joined(alike, len(place)))
-    alike += _sets(graph, _joined(alike, len(place)))
-    group_of = _joined(alike, len(place))
+    alike += _rows(graph, linked(alike, len(place)).tolist())
+    alike += _sets(graph, linked(alike, len(place)).tolist())
+    group_of = linked(alike, len(place)).tolist()
     members: dict[int, list[str]] = {}
     for node, number in zip(graph.nodes, group_of, strict=True):
         members.setdefault(number, []).append(node.name)
@@ -61,12 +61,6 @@ def told_styles(graph: SceneGraph) -> dict[str, RoomStyle | None]:
     """Object name -> the style of the vocabulary that its group is called by, else that of the room, else None."""
     known = vocabulary().known_style
     return {name: known(group) or known(graph.room.style) for name, group in style_groups(graph).items()}
-
-
-def _joined(alike: Sequence[tuple[int, int]], count: int) -> list[int]:
-    """Number of the group of each of `count` objects, given pairs that are alike."""
-    links = np.array([*((number, number) for number in range(count)), *alike], int).reshape(-1, 2)
-    return connected_pieces(links, count)[:count].tolist()
 
 
 def _rows(graph: SceneGraph, group_of: Sequence[int]) -> list[tuple[int, int]]:

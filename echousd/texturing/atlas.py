@@ -12,7 +12,7 @@ import numpy as np
 from echomodel.triangles import connected_pieces
 from echousd.shapes.charts import charts
 
-Mesh = tuple[np.ndarray, np.ndarray]
+Corners = tuple[np.ndarray, np.ndarray]  # of a mesh: (t, 3, 3) float, metres, and (t, 3) int, its vertices
 PADDING = 4  # texels between charts
 DIGITS = 7  # of a texture coordinate in a job's files
 
@@ -41,11 +41,11 @@ class Unwrapped:
         return self.points[self.faces]
 
 
-def unwrap(objects: Sequence[Sequence[Mesh]], resolution: int, *, together: bool = True) -> list[Unwrapped]:
+def unwrap(objects: Sequence[Sequence[Corners]], resolution: int, *, together: bool = True) -> list[Unwrapped]:
     """Lay objects out, all in one picture or each in its own, charts apart from each other.
 
     Arguments:
-        objects: for every object its meshes: (t, 3, 3) float corners of triangles, metres, and (t, 3) int vertices.
+        objects: the meshes of every object.
         resolution: texels along the picture's sides, roughly: charts may fill a part of it.
 
     Raises ValueError where xatlas is not installed, or does not survive the meshes.
@@ -66,7 +66,7 @@ def unwrap(objects: Sequence[Sequence[Mesh]], resolution: int, *, together: bool
     return out
 
 
-def _boards(meshes: Sequence[Mesh]) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def _boards(meshes: Sequence[Corners]) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """The connected parts of an object: (v, 3) points, (f, 3) faces, and (f,) which triangles of the object they are.
 
     xatlas would join what touches, and lay one over the other.

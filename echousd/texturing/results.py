@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 from scipy.spatial import cKDTree
-from trimesh.graph import connected_component_labels
 
+from echomodel.triangles import linked
 from echousd.folder.within import check_links
 from echousd.textures import TextureError, decoded, encoded, texture_bytes
 from echousd.texturing.atlas import Unwrapped
@@ -241,6 +241,4 @@ def _places(points: np.ndarray, near: float) -> np.ndarray:
     """(n,) int, points within `near` of each other have one number."""
     unique, index = np.unique(np.rint(points / (near / 4)).astype(np.int64), axis=0, return_inverse=True)
     pairs = cKDTree(unique * (near / 4)).query_pairs(near, output_type="ndarray")
-    if not len(pairs):
-        return index.reshape(-1)
-    return connected_component_labels(pairs, len(unique))[index.reshape(-1)]
+    return linked(pairs, len(unique))[index.reshape(-1)]

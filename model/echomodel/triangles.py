@@ -135,3 +135,10 @@ def connected_pieces(faces: np.ndarray, points: int) -> np.ndarray:
         np.minimum.at(lowest, faces.ravel(), least)
         lowest = lowest[lowest]
     return np.unique(lowest[faces[:, 0]], return_inverse=True)[1]
+
+
+def linked(pairs: Sequence[tuple[int, int]] | np.ndarray, count: int) -> np.ndarray:
+    """(count,) int, the group of each thing, by pairs (p, 2) of one group, numbered in the order of their first."""
+    alone = np.arange(count)
+    links = np.concatenate([np.stack([alone, alone], 1), np.asarray(pairs, int).reshape(-1, 2)])
+    return connected_pieces(links, count)[:count]

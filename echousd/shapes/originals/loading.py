@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 import trimesh
 from pxr import Sdf, Tf, UsdUtils
-from trimesh.graph import connected_component_labels
 
 from echomodel.files import within_memory
-from echomodel.triangles import Mesh
+from echomodel.triangles import Mesh, connected_pieces
 from echousd.assets.catalogues import Entry
 from echousd.assets.describe import described, digest_of
 from echousd.assets.measure import Measured, measure
@@ -28,7 +27,7 @@ from echousd.assets.reference import Vector, check_reach, joined, split
 from echousd.assets.table import Library
 from echousd.exporting.packing import PACKED, LeftOut, asset_paths
 from echousd.graph.files import STAGE_FORMS
-from echousd.shapes.colliders import hull_of
+from echousd.shapes.colliders import collider_of
 from echousd.shapes.geometry import CONVERTED, Geometry, Origin, Original, Part
 from echousd.shapes.surface import box_projection, creased_normals
 from echousd.srgb import to_linear
@@ -82,7 +81,7 @@ def geometry_of(
     mesh = Mesh(points, found.faces)
     original = _original(model, found, pose, collect)
     origin = Origin(source, record.licence, record.author, asset=record.id, sha256=record.sha256)
-    return Geometry((Part("mesh", mesh, {}),), (hull_of(mesh, category),), origin, original=original)
+    return Geometry((Part("mesh", mesh, {}),), (collider_of(mesh, category),), origin, original=original)
 
 
 def _original(model: ModelFile, found: Measured, pose: np.ndarray, collect: bool) -> Original:
@@ -341,12 +340,12 @@ def outward(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     corner = place[faces]
     count = int(place.max()) + 1
     start, end = corner[:, [0, 1, 2]].ravel(), corner[:, [1, 2, 0]].ravel()
-    piece = connected_component_labels(np.stack([start, end], 1), count)
     forth, back = start * count + end, end * count + start
     known, often = np.unique(forth, return_counts=True)
     once = often[np.searchsorted(known, forth)] == 1
     paired = np.isin(back, known)
-    of_edge, of_face, pieces = piece[start], piece[corner[:, 0]], int(piece.max()) + 1
+    of_face = connected_pieces(corner, count)
+    of_edge, pieces = np.repeat(of_face, 3), int(of_face.max()) + 1
     edges = np.maximum(np.bincount(of_edge, minlength=pieces), 1)
     even = np.bincount(of_edge, once, pieces) == edges
     closed = np.bincount(of_edge, paired, pieces) >= CLOSED * edges

@@ -17,7 +17,7 @@ from echomodel.furniture.style import GROUPS, HOT, STYLE
 from echomodel.graph import GraphBatch
 from echomodel.objective.sizes import size_range
 from echomodel.protocols import FurnitureModel
-from echomodel.triangles import connected_pieces, spread
+from echomodel.triangles import linked, spread
 from echomodel.vocabulary import vocabulary
 
 TOUCH = 0.006  # metres between solids that still count as joined
@@ -44,7 +44,7 @@ def group_of(solids: Sequence[Solid]) -> tuple[Array, int]:
     for i, j in zip(*np.nonzero(np.triu(near, 1)), strict=True):
         if _touches(surfaces[i], solids[j]) or _touches(surfaces[j], solids[i]):
             joined.append((i, j))
-    group = connected_pieces(np.array([*((n, n) for n in range(len(solids))), *joined]), len(solids))[: len(solids)]
+    group = linked(joined, len(solids))
     return group, int(np.bincount(group).argmax())
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from echomodel.boxes2d import CORNERS
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, numbered, overlap
 from echomodel.rooms.statistics import RoomTypeStatistics
 from echomodel.sizes import quantile
@@ -136,9 +137,6 @@ def sample_floor(statistics: RoomTypeStatistics, rng: np.random.Generator) -> Fl
     )  # fmt: skip
 
 
-CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-
-
 def _cuts(half_x: float, half_z: float, counts: tuple[float, ...], rng: np.random.Generator) -> list:
     """Width and depth of the piece cut from each corner, (0, 0) where none is."""
     sizes = [(0.0, 0.0)] * 4
@@ -170,7 +168,7 @@ def _arm(half_x: float, half_z: float, rng: np.random.Generator) -> list:
     corridor = rng.uniform(CORRIDOR, 1.7)
     first = round((side - corridor) * rng.random(), 2)
     second = round(side - corridor - first, 2)
-    pieces = {1: (first if first > 0.3 else 0.0), -1: (second if second > 0.3 else 0.0)}
+    pieces = {1.0: (first if first > 0.3 else 0.0), -1.0: (second if second > 0.3 else 0.0)}
     sign = 1 if rng.random() < 0.5 else -1
     sizes = [(0.0, 0.0)] * 4
     for k, (sx, sz) in enumerate(CORNERS):
@@ -181,7 +179,7 @@ def _arm(half_x: float, half_z: float, rng: np.random.Generator) -> list:
     return sizes
 
 
-def _cut(half_x: float, half_z: float, sx: int, sz: int, width: float, depth: float) -> Rectangle:
+def _cut(half_x: float, half_z: float, sx: float, sz: float, width: float, depth: float) -> Rectangle:
     x = sorted((sx * half_x, sx * (half_x - width)))
     z = sorted((sz * half_z, sz * (half_z - depth)))
     # What is cut away reaches outwards, so that furniture cannot slip through a thin gap behind it.
