@@ -30,7 +30,7 @@ from echousd.stage.values import reading
 from echousd.texturing.job import Job, read_job
 from echousd.texturing.results import Results, read_results
 
-NAME = re.compile(r"^[A-Za-z_][A-Za-z0-9_]{0,63}$")
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def import_job(
         raise ValueError(f"{room}: allowed: a room's root layer, {', '.join(LAYER_FORMS)}")
     task = read_job(folder)
     name = name or task.tool
-    if not NAME.match(name) or name == paintings.MADE:
+    if not NAME.fullmatch(name) or name == paintings.MADE:
         raise ValueError(
             f"name is {name!r:.80}, allowed: letters, digits and _, not beginning with a digit, not {paintings.MADE!r}"
         )

@@ -255,7 +255,7 @@ def test_jobs_are_read_with_doubt(room):
 
 
 def test_names_of_looks(room):
-    for name in ("made", "3d", "a b", "../x", "x" * 99):
+    for name in ("made", "3d", "a b", "a\n", "../x", "x" * 99):
         refused(room, "name is .*, allowed: letters, digits and _", name=name)
     refused(room, "--skip names chair, allowed: ", skip=("chair",))
     import_job(room, job_of(room), name="oil", preview=False)
