@@ -173,12 +173,7 @@ class RoomSet:
         self.directory, info = Path(directory), None
         files = [self.directory]
         if not self.directory.is_file():
-            index = self.directory / "rooms.json"
-            if not index.exists():
-                unfinished = (self.directory / "plan.json").exists()
-                hint = "unfinished set, run the build again" if unfinished else "no rooms.json"
-                raise ValueError(f"{self.directory}: not a room set ({hint})")
-            info, files = read_note(index, rooms=int), sorted(self.directory.glob("rooms-*.npz"))
+            info, files = set_note(self.directory, "room", rooms=int), sorted(self.directory.glob("rooms-*.npz"))
         held = [_unpacked(path) for path in files]
         count = sum(len(tables["rooms"]) for _, tables in held)
         self.info: dict = info or held[0][0]
@@ -304,6 +299,15 @@ def read_note(path: Path, **kinds: type) -> dict:
         told = ", ".join(f"{key} ({kinds[key].__name__})" for key in wrong) or "an object"
         raise ValueError(f"{path}: not what a set of data says of itself, missing: {told}")
     return found
+
+
+def set_note(folder: Path, what: str, **kinds: type) -> dict:
+    """What a set of rooms or shapes says of itself, as `read_note`; raises ValueError where it is not finished, too."""
+    index = folder / f"{what}s.json"
+    if not index.exists():
+        hint = "unfinished set, run the build again" if (folder / "plan.json").exists() else f"no {index.name}"
+        raise ValueError(f"{folder}: not a {what} set ({hint})")
+    return read_note(index, **kinds)
 
 
 def claim(folder: Path, plan: dict) -> None:

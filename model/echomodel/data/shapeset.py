@@ -19,7 +19,7 @@ import numpy as np
 import trimesh
 import zstandard
 
-from echomodel.data.roomset import claim, kept_out, read_note
+from echomodel.data.roomset import claim, kept_out, set_note
 from echomodel.files import whole_file, write_json, write_text
 from echomodel.furniture import Choices, Style, sample_size, solids
 from echomodel.furniture.solids import Solid
@@ -142,12 +142,7 @@ class ShapeSet:
 
     def __init__(self, directory: str | os.PathLike[str]):
         self.directory = Path(directory)
-        index = self.directory / "shapes.json"
-        if not index.exists():
-            unfinished = (self.directory / "plan.json").exists()
-            hint = "unfinished set, run the build again" if unfinished else "no shapes.json"
-            raise ValueError(f"{self.directory}: not a shape set ({hint})")
-        self.info: dict = read_note(index, count=int, categories=list)
+        self.info: dict = set_note(self.directory, "shape", count=int, categories=list)
         self.categories: tuple[str, ...] = tuple(self.info["categories"])
         paths = sorted(self.directory.glob("shapes-*.bin"))
         self._shards = [np.memmap(path, np.uint8, mode="r") for path in paths]
