@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from echomodel.files import check_free
-from echousd.cli.options import AsJson, Layout, Replace, Room, Written
+from echousd.cli.options import AsJson, Layout, Replace, ReplacePicture, Room, Written
 from echousd.cli.output import check_picture, say_done
 
 app = typer.Typer()
@@ -93,7 +93,7 @@ def render(
     colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
     layout: Layout = None,
     light: Annotated[str | None, typer.Option(help="day, evening or night; else as the room shows.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that is no picture of ours.")] = False,
+    force: ReplacePicture = False,
     json: Written = False,
 ) -> None:
     """Draw a room from inside, from above, from a corner, from all around, or through each of its cameras."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from echomodel.files import check_free
-from echousd.cli.options import AsJson, Replace
+from echousd.cli.options import AsJson, Replace, ReplacePicture
 from echousd.cli.output import check_picture, counted, say, say_done, say_json
 
 if TYPE_CHECKING:
@@ -204,7 +204,7 @@ def graph(
     picture: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="FILE", help="Draw a picture (.png, .svg, .pdf).")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that is no picture of ours.")] = False,
+    force: ReplacePicture = False,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON schema of the canonical form; needs no GRAPH.")
     ] = False,

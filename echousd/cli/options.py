@@ -19,6 +19,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print what was found as JS
 Made = Annotated[bool, typer.Option("--json", help="Say what was made as JSON.")]
 Force = Annotated[bool, typer.Option("--force", help="Write over what is not ours.")]
 Replace = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
+ReplacePicture = Annotated[bool, typer.Option("--force", help="Replace a file that is no picture of ours.")]
 Wait = Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.", hidden=True)]
 Outside = Annotated[
     list[Path] | None,

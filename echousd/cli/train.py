@@ -215,7 +215,7 @@ def meshes(
 
 @data_app.command("to-usd")
 def to_usd(
-    rooms: Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")],
+    rooms: Rooms,
     out: Annotated[Path, typer.Option("-o", "--output", help="Folder for the stages, one per room.")],
     limit: Annotated[int | None, typer.Option(help="Only the first rooms.")] = None,
     rules: Annotated[str, typer.Option(help="Label rooms without relations: strict, sgfront or none.")] = "strict",
@@ -272,7 +272,7 @@ def import_rooms(
 
 @data_app.command("to-sgfront")
 def to_sgfront(
-    rooms: Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")],
+    rooms: Rooms,
     out: Annotated[Path, typer.Option("-o", "--output", help="Folder for the files.")],
     split: Annotated[str, typer.Option(help="trainval or test.")] = "trainval",
     drop: Annotated[float, typer.Option(help="Share of the relations that is left out.")] = 0.5,

@@ -18,6 +18,7 @@ from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.pending import check_written
 from echousd.stage.apart import check_harmless, just_written
+from echousd.stage.encoding import LABELS
 from echousd.stage.files import layer_bytes, write_all
 from echousd.stage.paths import coarse_file, coarse_name, component_file, payload_file, payload_name
 from echousd.stage.turning import rescale, turn_up
@@ -104,7 +105,7 @@ def _facts(main: Path, author: str, source: str) -> dict[str, Any]:
     return {
         "asset_name": root.GetName(), "asset_type": "Prop", "author": author,
         "asset_license": stage.GetRootLayer().customLayerData.get("asset_license", "Apache-2.0"),
-        "category": root.GetAttribute("semantics:labels:category").Get()[0], "source_file": source,
+        "category": root.GetAttribute(LABELS).Get()[0], "source_file": source,
         "usd_date_generated": DATE, "generator": f"echousd {echousd.__version__}", "qcode": FURNITURE,
         "rigid_body_count": len(bodies), "asset_extents": Gf.Vec3f(*map(float, size)), "mass": float(sum(masses)),
     }  # fmt: skip
