@@ -24,20 +24,20 @@ if TYPE_CHECKING:
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
 # mm of a camera inside: 74, 81, 90 and 97 degrees across; metres of depth that each costs: wide ones distort
-LENSES, DISTORTED = (24.0, 21.0, 18.0, 16.0), (0.0, 1.5, 5.0, 12.0)
+LENSES, DISTORTED = (24.0, 21.0, 18.0, 16.0), (0.0, 3.0, 10.0, 24.0)
 EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
 SLOPES = (0.05, 0.13, 0.22, 0.32)  # metres that the middle of its picture is lower for a metre ahead
 PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
 WHOLE, CLEAR = 1000.0, 80.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
-LOOKED, CHOSEN, TRIED = 24, 3, 16  # eyes of which one view is looked at closely; eyes, and of each so many views
+LOOKED, CHOSEN, TRIED = 64, 3, 16  # eyes of which one view is looked at closely; eyes, and of each so many views
 LOW = 1.4  # metres: over what is so high one looks
 # one bare wall: what all of a picture costs, from which share on, metres of rounding; what the main piece at the border
 # costs, and from which share of half the picture's width on it is aside
-BARE, BAREST, DEEP = 300.0, 0.17, 0.02
+BARE, BAREST, DEEP = 650.0, 0.22, 0.02
 MIDDLE, ASIDE = 60.0, 0.33
 SMALL, LARGE = 20.0, 5.0  # what a metre costs that the main piece is further away, and from where on
 BEFORE, WALLED = 2.6, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
-FILLED, BEHIND = 560.0, 45.0  # metres of depth that a picture full of what is near costs, and the main piece's back
+FILLED, BEHIND = 650.0, 45.0  # metres of depth that a picture full of what is near costs, and the main piece's back
 # Metres of depth that each thing costs which the border cuts, and which is beyond it: lamps, what hangs from `HIGH`
 # metres on, and furniture.
 CUTS, HIGH = ((90.0, 40.0), (25.0, 0.0), (25.0, 0.0)), 0.25

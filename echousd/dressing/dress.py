@@ -37,7 +37,7 @@ from echousd.stage.pen import apply_apis
 from echousd.stage.write import author_relation, put
 
 ORIGIN = Origin("dressing")
-TALL = 0.7  # metres: what reaches or hangs higher may stand in a camera's way
+TALL, SEEN = 0.7, 0.3  # metres: what is or hangs higher may stand in a camera's way if it is so large
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,8 @@ class Dressing:
     @property
     def hung(self) -> Furniture:
         """Boxes of what a camera at a wall would have right before it, in the first layout."""
-        things = [t for t in next(iter(self.layouts), {}).values() if t.size[1] > TALL or t.position[1] > TALL]
+        every = next(iter(self.layouts), {}).values()
+        things = [t for t in every if max(t.size[1], t.position[1]) > TALL and t.size.max() > SEEN]
         size = np.array([t.size for t in things]).reshape(-1, 3)
         position = np.array([t.position for t in things]).reshape(-1, 3)
         return Furniture(size, position, np.array([t.yaw for t in things]))
@@ -137,7 +138,7 @@ def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: 
     return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, weighed(pieces))
 
 
-STRETCH, FULLER, LONG = 1.2, 1.0, 3.0  # metres of bare wall that ask for a picture, in full rooms, and for three
+STRETCH, LONG = 1.0, 3.0  # metres of bare wall that ask for a picture, and for three
 STEP = 0.1  # metres from spot to spot along a wall
 PROBE = np.array([0.3, 0.8, 0.03])  # a picture that tells whether a spot is bare
 EMPTY = 0.65  # metres around a corner where nothing stands
@@ -145,11 +146,12 @@ FLOORS = (5.0, 13.0, 24.0)  # m² of floor from which on one, two, three corners
 
 
 def bare_walls(setting: Setting) -> None:
-    """A picture as wide as suits the stretch on the three longest bare ones, three equal ones where it is very long."""
+    """A picture as wide as suits the stretch on the longest bare one of every wall, three equal ones where it is very
+    long."""
     if not setting.walls or setting.use:
         return
     found = [(length, middle, wall) for wall in walls_of(setting) for length, middle in stretches(setting, wall)]
-    for length, middle, wall in sorted(found, key=lambda one: -one[0])[: None if setting.full else 3]:
+    for length, middle, wall in sorted(found, key=lambda one: -one[0]):
         rng = setting.rng(f"wall {wall.edge}", "bare")
         wide = float(np.clip(0.4 * length, 0.6, 1.3))
         size = np.round([wide, wide * rng.uniform(0.66, 0.75), 0.03], 2)
@@ -171,7 +173,7 @@ def stretches(setting: Setting, wall: Wall) -> list[tuple[float, float]]:
     runs = [[n for n, _ in run] for free, run in groupby(enumerate(bare), key=lambda one: one[1]) if free]
     ends = [(float(spots[run[0]]), float(spots[run[-1]])) for run in runs]
     long = [(last - first + float(PROBE[0]), (first + last) / 2) for first, last in ends]
-    return [one for one in sorted(long)[-1:] if one[0] >= (FULLER if setting.full else STRETCH)]
+    return [one for one in sorted(long)[-1:] if one[0] >= STRETCH]
 
 
 def bare_corners(setting: Setting) -> None:

@@ -124,7 +124,7 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
     return np.array([*lines, *areas], object)
 
 
-LAID = 0.4  # share of rooms whose dining table is set
+LAID = 0.6  # share of rooms whose dining table is set
 COVER = {"plate": (0.0, 0.17), "napkin": (-0.225, 0.15), "glass": (0.2, 0.28)}  # metres to the right, and from the edge
 VOLUMES = 7  # kinds of single books that a row is of
 BETWEEN = 0.002  # metres from book to book

@@ -19,7 +19,7 @@ PILLOW = 3.2  # exponent of the outline of a cushion
 STEP = 0.02  # metres from place to place
 WIDE_BED = 1.3  # metres
 LEVEL = 0.005  # metres: what is as high as that is one height
-DRAPED = 0.9  # share of sofas with a blanket over an arm
+DRAPED = {"sofa": 0.9, "seat": 0.4}  # shares of sofas and armchairs with a blanket over an arm
 # Metres between folds of a bed, and over its middle from where on it is a board; places behind pillows for cushions.
 SOFT, BOARD, BEYOND = 0.04, 0.12, 12
 RIDGE = 0.1  # metres that an arm is higher than the seat at least so that a throw hangs over it
@@ -34,10 +34,11 @@ def cushions(setting: Setting) -> None:
         if seat is None:
             continue
         wide, pair, odd = float(host.size[0]), *_designs(setting, rng)
+        narrow = min(pair, odd, key=lambda design: float(design[1][0]))
         ends = [(-1.0, pair), (1.0, pair if rng.random() < 0.6 else odd)]
         if wide > 1.7 and (setting.full or rng.random() < 0.6):
             ends.append((float(rng.choice((-0.62, 0.62))), odd))
-        for end, (kind, size, variant) in ends if wide > 1.3 else [(float(rng.choice([-0.6, 0.6])), odd)]:
+        for end, (kind, size, variant) in ends if wide > 1.3 else [(float(rng.choice([-0.6, 0.6])), narrow)]:
             spot = seat.resting(end, size)
             turn = -0.12 * end * float(rng.uniform(0.3, 1.6))
             spot = None if spot is None else _clear_of(host, spot, turn, size)
@@ -59,13 +60,11 @@ def _designs(setting: Setting, rng: np.random.Generator) -> tuple[Design, Design
 
 
 def bed_cushions(setting: Setting) -> None:
-    """Two cushions before the pillows of a wide bed, or one; in full rooms one on a narrow bed, too."""
+    """Two cushions before the pillows of a wide bed, or one, as on a narrow one."""
     for host in setting.of("bed"):
         rng, seat = setting.rng(host.name, "bed cushion"), _Seat.of(host)
         wide, (kind, size, variant) = float(host.size[0]), _designs(setting, rng)[int(rng.integers(2))]
-        if seat is None or not (setting.full or wide > WIDE_BED):
-            continue
-        for side in (-1.0, 1.0) if wide > WIDE_BED and size[0] < 1.3 * size[1] else (0.0,):
+        for side in () if seat is None else (-1.0, 1.0) if wide > WIDE_BED and size[0] < 1.3 * size[1] else (0.0,):
             turn = float(rng.uniform(-0.12, 0.12))
             spot = seat.before_pillows(side * 0.21 * wide, size)
             spot = None if spot is None else _lying(host, seat, spot, turn, size)
@@ -246,12 +245,13 @@ def _heights(corners: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def throws(setting: Setting) -> None:
-    """A blanket across the foot of every bed that lets it lie flat and hang down; over an arm of most sofas."""
-    for host in setting.of("bed", "sofa"):
-        rng, seat = setting.rng(host.name, "throw"), _Seat.of(host)
-        if seat is None or (host.row.role == "sofa" and not setting.has(DRAPED, rng)):
+    """A blanket across the foot of every bed that lets it lie flat and hang down; over an arm of most sofas and of some
+    armchairs."""
+    for host in dict.fromkeys([*setting.of("bed", "sofa"), *setting.inviting("cushions")]):
+        rng, seat, role = setting.rng(host.name, "throw"), _Seat.of(host), host.row.role
+        if seat is None or (role in DRAPED and not setting.has(DRAPED[role], rng)):
             continue
-        if host.row.role == "sofa":
+        if role in DRAPED:
             over = (_over_arm(host, seat, side, rng) for side in rng.permutation((-1.0, 1.0)))
         else:
             deep, everywhere = float(np.clip(0.3 * host.size[2], 0.4, 0.75)), np.full(len(seat.x), True)

@@ -268,7 +268,7 @@ WALL_SHELVES = ("wall_shelf", "ledge", "box_shelf")  # of a room both are alike
 ABOVE, STANDING = 0.3, 0.6  # metres that stay free over a shelf, and before a mirror in which one sees all of oneself
 # Shares of rooms with a clock, of those where people sit together or work; with shelves, coats, a tall mirror; of the
 # pieces with a picture above them, those that have three.
-CLOCKS, WITH_SHELVES, COATS, MIRRORS, GROUPS = 0.4, 0.4, 0.3, 0.6, 0.5
+CLOCKS, WITH_SHELVES, COATS, MIRRORS, GROUPS = 0.4, 0.5, 0.3, 0.6, 0.5
 
 
 def shelves(setting: Setting) -> None:

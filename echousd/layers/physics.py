@@ -19,6 +19,7 @@ SCENE = "/Room/PhysicsScene"
 # Static and dynamic friction of a material slot, and how much of its speed a thing keeps when it bounces.
 CONTACT: Mapping[str, tuple[float, float, float]] = {
     "fabric": (0.8, 0.7, 0.0), "cushion": (0.8, 0.7, 0.0), "linen": (0.8, 0.7, 0.0), "blanket": (0.8, 0.7, 0.0),
+    "blanket_striped": (0.8, 0.7, 0.0), "blanket_checked": (0.8, 0.7, 0.0), "linen_striped": (0.8, 0.7, 0.0),
     "metal": (0.5, 0.4, 0.1), "glass": (0.5, 0.4, 0.1), "ceramic": (0.5, 0.4, 0.1), "enamel": (0.5, 0.4, 0.1),
     "steel": (0.5, 0.4, 0.1), "worktop": (0.5, 0.4, 0.1), "mirror": (0.5, 0.4, 0.1),
 }  # fmt: skip

@@ -50,7 +50,11 @@ def assembled(
         prefix = f"{body}_" if body != fixed else ""
         parts += _parts(prefix, members, body)
         own = _bodies(plain, fixed)[body]
-        corners = [covering(each.vertices, shown.vertices) for each, shown in zip(own, members, strict=True)]
+        corners = [
+            covering(*run)
+            for each, shown in zip(own, members, strict=True)
+            for run in zip(each.solid.runs(each.vertices), shown.solid.runs(shown.vertices), strict=True)
+        ]
         hulls = convex_pieces(corners, float(np.prod(size)))
         words = [f"{prefix}collider", *(f"{prefix}collider_{n}" for n in range(2, len(hulls) + 1))]
         colliders += [Collider(word, hull, "convexHull", body) for word, hull in zip(words, hulls, strict=True)]

@@ -159,6 +159,21 @@ def linen() -> Relief:
     return Relief(1 + 0.028 * slubs + 0.012 * crease, 0.0002 * slubs + 0.002 * crease)
 
 
+def striped(pairs: int = 4) -> Relief:
+    """Linen with broad stripes along u, a narrow one beside each."""
+    cloth, place = linen(), (pairs * _grid()[1]) % 1.0
+    stripe = (np.abs(place - 0.3) < 0.2) + 0.7 * (np.abs(place - 0.62) < 0.04)
+    tone = cloth.tone * (1 + 0.55 * stripe)
+    return Relief(tone / tone.mean(), cloth.height)
+
+
+def checked(pairs: int = 6) -> Relief:
+    """Linen woven in squares, darkest where its stripes cross."""
+    cloth, (u, v) = linen(), _grid()
+    tone = cloth.tone * (1 + 0.3 * sum((np.abs((pairs * way) % 1.0 - 0.5) < 0.25).astype(float) for way in (u, v)))
+    return Relief(tone / tone.mean(), cloth.height)
+
+
 def leather() -> Relief:
     """Grain of small cells."""
     rng = np.random.default_rng(61)

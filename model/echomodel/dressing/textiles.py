@@ -15,7 +15,9 @@ LIES = (11, 16)  # cells in which a throw knows what it lies on
 FOLD = 0.125  # metres of curtain from one fold to the next
 # where in a fold its cloth has points, radians from where it is foremost: it bends alike at each
 BENDS = np.array([0.5, np.pi / 2, np.pi - 0.5, np.pi, np.pi + 0.5, 1.5 * np.pi, 2 * np.pi - 0.5, 2 * np.pi])
-DRAPES = {"curtain": 0.3, "linen": 0.15, "drape": 0.3, "velvet": 0.25}  # what curtains are of, how often
+# what curtains are of, how often
+DRAPES = {"curtain": 0.25, "linen": 0.15, "drape": 0.25, "velvet": 0.2, "drape_striped": 0.15}
+THROWS = ("accent_cloth", "accent_cloth", "accent_striped", "accent_checked")
 
 
 def rug(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
@@ -135,7 +137,10 @@ def roman_blind(size: Size, rng: np.random.Generator) -> list[Solid]:
     return solids
 
 
-CLOTHS = {"accent_cloth": 0.25, "accent_plain": 0.2, "blanket": 0.15, "velvet": 0.15, "linen": 0.15, "drape": 0.1}
+CLOTHS = {
+    "accent_cloth": 0.2, "accent_plain": 0.1, "blanket": 0.1, "velvet": 0.15, "linen": 0.1, "drape": 0.05,
+    "accent_striped": 0.15, "accent_checked": 0.15,
+}  # fmt: skip
 TRIMS = ("", "", "cord", "cord", "button", "tassels")  # of cushions
 
 
@@ -186,4 +191,4 @@ def throw(size: Size, rng: np.random.Generator, lie: tuple[float, ...] = ()) -> 
         y = line[:, 1] - lower * (1 - hanging) - 0.006 * folds(x, 2.5 * deep, phase) * (hanging < 0.1)
         return np.stack([x + np.sign(x) * ripple, y, deep + skew], -1)
 
-    return [Sheet(front=spread(profile), back=spread(inner), material="accent_cloth")]
+    return [Sheet(front=spread(profile), back=spread(inner), material=str(rng.choice(THROWS)))]

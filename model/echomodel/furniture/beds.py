@@ -12,6 +12,7 @@ from echomodel.furniture.cloth import Tufted, cover, pillow
 from echomodel.furniture.solids import Solid, ball, rotation, turned
 from echomodel.furniture.style import Choices, Style
 
+COVERS = ("blanket", "blanket", "blanket_striped", "blanket_checked", "linen_striped")  # of beds
 SET_BACK = 0.006  # metres between two faces that would lie in one plane
 
 
@@ -77,7 +78,8 @@ def bedding(
         start = z0 + (z1 - z0) * choices.between("spread", 0.28, 0.42)
         x, y, top = w * 0.53 + 0.02 + 0.03 * style.softness, low - 0.09, low + thick + 0.09
         end = z1 + (0.08 + 0.02 * style.softness if falls else 0.03)
-        parts.append(cover((-x, y, start), (x, top, end), "blanket", 0.085, 0.04, rng, falls=falls))
+        cloth = str(choices.stream("cover").choice(COVERS))
+        parts.append(cover((-x, y, start), (x, top, end), cloth, 0.085, 0.04, rng, falls=falls))
         fold = 0.16 + 0.1 * style.softness  # the sheet turned back over it
         x, y = x + 0.004, low + thick * 0.4
         parts.append(cover((-x, y, start - 0.01), (x, top + 0.014, start + fold), "linen", 0.04, 0.012, rng))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -82,6 +83,10 @@ class Solid:
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         raise NotImplementedError
+
+    def runs(self, vertices: Array) -> list[Array]:
+        """Its vertices (n, 3) by the parts of it that are about convex."""
+        return [vertices]
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,6 +217,9 @@ class Tube(Solid):
         return loft(rings)
 
 
+RINGS = (9, 13, 21, 33)  # of a `Shell`, by detail
+
+
 @dataclass(frozen=True, eq=False)
 class Shell(Solid):
     """A standing wall bent round the back: half a superellipse, `half` = half width and depth behind z = 0, metres.
@@ -231,7 +239,7 @@ class Shell(Solid):
         return self.back + (self.front - self.back) * np.clip(np.abs(angle) / (np.pi / 2), 0, 1) ** self.ease
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        angle = np.linspace(-np.pi / 2, np.pi / 2, (9, 13, 21, 33)[detail])
+        angle = np.linspace(-np.pi / 2, np.pi / 2, RINGS[detail])
         s, c = np.sin(angle), np.cos(angle)
         norm = (np.abs(s) ** self.power + np.abs(c) ** self.power) ** (1 / self.power)
         top, rings = self._top(angle), []
@@ -241,6 +249,11 @@ class Shell(Solid):
             wall = (np.array(self.half) - across[:, None] * self.thickness) * (sine, -cosine) / length
             rings.append(np.insert(wall, 1, [0, 0, *(high - down)], axis=1))
         return loft(rings)
+
+    def runs(self, vertices: Array) -> list[Array]:
+        count = next(n for n in RINGS if (len(vertices) - 2) % n == 0)
+        rings, ends = vertices[:-2].reshape(count, -1, 3), np.linspace(0, count - 1, 7).round().astype(int)
+        return [rings[first : last + 1].reshape(-1, 3) for first, last in pairwise(ends)]
 
 
 def _corners(detail: int, radius: float) -> int:

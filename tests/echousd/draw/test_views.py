@@ -107,7 +107,7 @@ def test_the_main_piece_is_whole_in_the_picture_and_the_eye_in_the_room(number):
         at = (at[1], at[0])
     piece = boxes((*size, at[0], 0.0, at[1], 0.0), (0.5, 1.9, 0.4, 0.3, 0.0, 0.3, 0.0))
     view, lens = inside_view(floor, piece, 2.6, main=0)
-    assert 20.0 <= lens <= 35.0  # the widest of all only where nothing else helps
+    assert 17.0 <= lens <= 35.0  # the widest of all only where nothing else helps
     assert lens in LENSES
     assert room.contains(shapely.Point(view[0, 3], view[2, 3]))
     assert np.allclose(view[:3, 1], (0, 1, 0))  # walls stay upright in the picture

@@ -20,7 +20,7 @@ from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.checks import check
 from echousd.dressing import tabletops, upholstery
-from echousd.dressing.dress import RULES, dress, placed, setting_of
+from echousd.dressing.dress import RULES, TALL, Dressing, dress, placed, setting_of
 from echousd.dressing.setting import Setting, Thing, meets, standing
 from echousd.dressing.tabletops import surfaces
 from echousd.dressing.upholstery import STEP, _Seat
@@ -295,7 +295,7 @@ def test_long_bare_walls_get_pictures_and_large_floors_plants():
     things = placed(room)
     alone = [thing for thing in things if KINDS[thing.kind].name == "picture" and not thing.on]
     yaws = {round(thing.yaw, 3) for thing in alone}
-    assert 1 <= len(yaws) <= 3  # the three barest walls
+    assert len(yaws) == 4  # all walls
     for yaw in yaws:
         row = [thing for thing in alone if round(thing.yaw, 3) == yaw]
         assert len(row) in (1, 3)
@@ -381,6 +381,16 @@ def test_cushions_lie_before_the_pillows_of_wide_beds():
             assert y == pytest.approx(0.45, abs=0.01)
             assert z > -deep / 2 + 0.5  # not in the pillow
     assert counts == {1, 2}
+
+
+def test_cameras_ask_about_nothing_small_that_hangs_or_stands_high():
+    kinds = {"book": (0.03, 0.22, 0.15), "picture": (0.5, 0.4, 0.03), "floor_plant": (0.4, 1.0, 0.4)}
+    things = {
+        kind: Thing(kind, np.array(size), np.array([0.0, 0.0 if size[1] > TALL else 1.4, 0.0]), 0.0)
+        for kind, size in kinds.items()
+    }
+    low = {"bowl": Thing("bowl", np.array([0.35, 0.1, 0.35]), np.zeros(3), 0.0)}
+    assert Dressing((things | low,), {}, {}).hung.size.tolist() == [list(kinds["picture"]), list(kinds["floor_plant"])]
 
 
 def test_what_stands_at_a_height_reaches_there_with_its_foot():

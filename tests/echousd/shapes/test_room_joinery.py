@@ -12,6 +12,8 @@ from shapely.geometry import MultiPoint, Point
 
 from echomodel.data.shapeset import piece as styled
 from echomodel.furniture import solids
+from echomodel.furniture.carpentry import box as solid_box
+from echomodel.furniture.solids import bent
 from echomodel.furniture.style import WIDTH, piece_of
 from echomodel.triangles import Mesh, box
 from echomodel.vocabulary import vocabulary
@@ -227,6 +229,14 @@ def test_nothing_collides_above_the_free_half_of_a_dressing_table():
             points = [mesh.trimesh.ray.intersects_location(places, np.full((6, 3), [0, -1.0, 0]))[0] for mesh in meshes]
             met.append(max(found[:, 1].max() for found in points if len(found)))
         assert met[1] - met[0] < 0.002, seed
+
+
+def test_nothing_collides_over_the_seat_within_a_bent_wall():
+    """One hull of the wall would fill a tub chair: nobody could sit in it, and no cushion would lie there."""
+    wall = bent((0, 0.1, 0.3), (0.4, 0.7), 0.1, 0.7, 0.5)
+    made = assembled([wall, solid_box((-0.3, 0.1, -0.3), (0.3, 0.4, 0.3))], SIZE, faces=2000, origin=Origin("parts"))
+    inside = np.array([(x, 0.6, z) for x in (-0.15, 0.0, 0.15) for z in (-0.05, 0.05)])
+    assert not any(collider.mesh.trimesh.contains(inside).any() for collider in made.colliders)
 
 
 def test_a_corner_that_the_hull_does_not_take_is_asked_for_once(monkeypatch):
