@@ -152,7 +152,7 @@ def tabletops(setting: Setting) -> None:
         if host.row.role == "storage" and host.row.look in CASES and name not in BARE:
             for surface in levels:
                 if surface is not (tops[0] if tops and name in setting.story.tops else None):
-                    _shelf(setting, host, surface)
+                    stocked(setting, host, surface)
 
 
 def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
@@ -207,7 +207,7 @@ def _laid(setting: Setting, host: Standing, surface: Surface) -> None:
             surface.put(setting, kind, [tuple(share)], size=size, turn=turn, variant=variant, word=seat.name)
 
 
-def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
+def stocked(setting: Setting, host: Standing, surface: Surface) -> None:
     """A row of books against one side of a shelf, and something beside it."""
     if not 0.1 < host.position[1] + surface.y < EYE or surface.area.area < 0.03 or surface.closed:
         return
@@ -216,7 +216,7 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
     side = 1.0 if rng.random() < 0.5 else -1.0
     ware = WARE if host.row.task else LINEN if setting.use == "wet" else ()
     if rng.random() < (0.95 if setting.full else 0.85) and not ware:
-        length = min(wide * rng.uniform(0.5, 0.85), ROW)
+        length = min(wide * rng.uniform(0.4, 0.75), ROW)
         for share in (1.0, 0.6, 0.35):
             tall = min(surface.air - 0.015, rng.uniform(0.2, 0.27))
             size = np.round([length * share, tall, min(deep - 0.03, rng.uniform(0.15, 0.2))], 3)
@@ -232,7 +232,7 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
     for number in range(2):
         if rng.random() < 0.85:
             places = [(x * side, 0.2) for x in (0.75, 0.4, 0.95, 0.1, -0.2, -0.6)]
-            for kind in wanted[number * 4 : number * 4 + 4]:
+            for kind in wanted[number::2]:
                 if surface.put(setting, kind, places, word=str(number)):
                     break
 

@@ -42,10 +42,7 @@ def cushions(setting: Setting) -> None:
             spot = seat.resting(end, size)
             turn = -0.12 * end * float(rng.uniform(0.3, 1.6))
             spot = None if spot is None else _clear_of(host, spot, turn, size)
-            if spot is not None:
-                spot = seat.pressed(spot, size)
-                thing = Thing(kind, size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
-                setting.put_first([thing], host=host.name, margin=0.0, floor=False)
+            _put(setting, host, None if spot is None else seat.pressed(spot, size), kind, size, turn, variant)
 
 
 Design = tuple[str, np.ndarray, int]  # kind, extents and variant of a cushion
@@ -66,11 +63,8 @@ def bed_cushions(setting: Setting) -> None:
         wide, (kind, size, variant) = float(host.size[0]), _designs(setting, rng)[int(rng.integers(2))]
         for side in () if seat is None else (-1.0, 1.0) if wide > WIDE_BED and size[0] < 1.3 * size[1] else (0.0,):
             turn = float(rng.uniform(-0.12, 0.12))
-            spot = seat.before_pillows(side * 0.21 * wide, size)
-            spot = None if spot is None else _lying(host, seat, spot, turn, size)
-            if spot is not None:
-                thing = Thing(kind, size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
-                setting.put_first([thing], host=host.name, margin=0.0, floor=False)
+            spot = _lying(host, seat, seat.before_pillows(side * 0.21 * wide, size), turn, size)
+            _put(setting, host, spot, kind, size, turn, variant)
 
 
 def on_covers(setting: Setting) -> None:
@@ -86,11 +80,18 @@ def on_covers(setting: Setting) -> None:
             for at in wish.at:
                 x, z = (0.0, 0.0) if at == "pillows" else np.array(at) * host.size[[0, 2]] / 2
                 spot = seat.before_pillows(x, size) if at == "pillows" else np.array([x, seat.level, z])
-                spot = None if spot is None else _lying(host, seat, spot, turn, size)
-                if spot is not None:
-                    thing = Thing(kind, size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
-                    if setting.put_first([thing], host=host.name, floor=False):
-                        break
+                if _put(setting, host, _lying(host, seat, spot, turn, size), kind, size, turn, variant):
+                    break
+
+
+def _put(
+    setting: Setting, host: Standing, spot: np.ndarray | None, kind: str, size: np.ndarray, turn: float, variant: int
+) -> Thing | None:
+    """Put a thing on a spot (3,) of its host, turned in its frame; None where there is none or it is not clear."""
+    if spot is None:
+        return None
+    thing = Thing(kind, size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
+    return setting.put_first([thing], host=host.name, margin=0.0, floor=False)
 
 
 def _upon(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | None:
@@ -128,11 +129,11 @@ def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -
     return spot + np.array([way[0], 0.0, way[1]])
 
 
-def _lying(host: Standing, seat: _Seat, spot: np.ndarray, turn: float, size: np.ndarray) -> np.ndarray | None:
+def _lying(host: Standing, seat: _Seat, spot: np.ndarray | None, turn: float, size: np.ndarray) -> np.ndarray | None:
     """A place near a spot (3,) that is clear of the host and on what is below; None where there is none."""
     for _ in range(3):
-        down = seat.below(spot, size)
-        upon = None if down is None else _upon(host, np.array([spot[0], down, spot[2]]), size)
+        down = None if spot is None else seat.below(spot, size)
+        upon = None if spot is None or down is None else _upon(host, np.array([spot[0], down, spot[2]]), size)
         clear = None if upon is None else _clear_of(host, upon + np.array([0.0, 0.002, 0.0]), turn, size)
         if upon is None or clear is None:
             return None

@@ -14,7 +14,7 @@ from echomodel.dressing.prints import printed
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal
 from echomodel.vocabulary import vocabulary
 from echousd.dressing.setting import Setting, Standing, Thing, rectangle, standing
-from echousd.dressing.tabletops import shelved_books, surfaces
+from echousd.dressing.tabletops import stocked, surfaces
 from echousd.shapes.fittings import RAIL
 from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
@@ -282,27 +282,13 @@ def shelves(setting: Setting) -> None:
         one, spots = Thing(kind, size, np.zeros(3), 0.0, "", variant), [(wall, share) for share in SHARES]
         board = _hang_first(setting, one, spots, SHELF - float(size[1]), above=ABOVE)
         if board:
-            _filled(setting, board, f"wall shelf {wall.edge}")
+            solids, name = solids_of(kind, size, np.random.default_rng(variant)), f"wall shelf {wall.edge}"
+            made = assembled(solids, size, faces=1200, origin=Origin("dressing"))
+            carrier = setting.carriers[name] = standing(name, "shelf", size, board.position, board.yaw, made)
+            stocked(setting, carrier, max(surfaces(carrier), key=lambda level: level.area.area))
             done += 1
         if done == 2:
             return
-
-
-def _filled(setting: Setting, board: Thing, name: str) -> None:
-    """Books and small things on a shelf."""
-    rng = setting.rng(name, "filled")
-    parts = solids_of(board.kind, board.size, np.random.default_rng(board.variant))
-    made = assembled(parts, board.size, faces=1200, origin=Origin("dressing"))
-    carrier = setting.carriers[name] = standing(name, "shelf", board.size, board.position, board.yaw, made)
-    for surface in sorted(surfaces(carrier), key=lambda level: -level.area.area)[:1]:
-        side = float(rng.choice((-1.0, 1.0)))
-        size = np.array([round(float(board.size[0]) * rng.uniform(0.25, 0.4), 3), 0.25, 0.16])
-        row = surface.put(setting, "book_row", [(0.97 * side, 0.3), (-0.97 * side, 0.3)], size=size, word="row")
-        if row:
-            shelved_books(setting, row, rng)
-        kinds, places = rng.permutation(setting.story.shelves), [(x * side, 0.0) for x in (-0.9, -0.45, 0.0, 0.35)]
-        put = (surface.put(setting, str(kind), places, word=str(number)) for number, kind in enumerate(kinds))
-        list(islice(filter(None, put), 3))
 
 
 def clock(setting: Setting) -> None:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from pxr import Gf
 
-from echomodel.boxes2d import footprints
 from echomodel.openings import inward_normal, segment
 from echomodel.vocabulary import vocabulary
 from echousd.draw.sight import ASPECT, Furniture
@@ -90,10 +89,8 @@ def write_cameras(
 
 def room_points(room: RoomData) -> np.ndarray:
     """(n, 3) float, metres: corners of the floor (and the walls) and of all boxes, in the frame of `/Room`."""
-    size, position = np.asarray(room.boxes.size, float), np.asarray(room.boxes.position, float)
-    plan = footprints(size, position, np.asarray(room.boxes.yaw, float)).reshape(-1, 2)
-    low, high = np.repeat(position[:, 1], 4), np.repeat(position[:, 1] + size[:, 1], 4)
-    points = [np.insert(plan, 1, low, axis=1), np.insert(plan, 1, high, axis=1)]
+    boxes = (room.boxes.size, room.boxes.position, room.boxes.yaw)
+    points = [Furniture(*(np.asarray(values, float) for values in boxes)).corners.reshape(-1, 3)]
     points += [np.insert(room.floor, 1, height, axis=1) for height in (-walls.THICKNESS, 0.0)]
     if room.options.walls:
         spec = room.graph.room

@@ -449,7 +449,7 @@ def test_rows_of_books_on_long_shelves_are_drawn_whole():
     surface.area, surface.put = shapely.box(-1.2, -0.15, 1.2, 0.15), lambda *_, size=None, **__: rows.append(size)
     host = SimpleNamespace(name="shelf", position=np.zeros(3), row=SimpleNamespace(task=""))
     for seed in range(20):
-        tabletops._shelf(Setting({}, SQUARE, (), 2.7, True, False, seed), host, surface)
+        tabletops.stocked(Setting({}, SQUARE, (), 2.7, True, False, seed), host, surface)
     size = max((size for size in rows if size is not None), key=lambda size: size[0])
     for seed in range(20):
         books = pieces_of(solids_of("book_row", size, np.random.default_rng(seed)), size, detail=0)
