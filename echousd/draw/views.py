@@ -37,7 +37,7 @@ BARE, BAREST, DEEP = 650.0, 0.22, 0.02
 MIDDLE, ASIDE = 60.0, 0.33
 SMALL, LARGE = 20.0, 5.0  # what a metre costs that the main piece is further away, and from where on
 BEFORE, WALLED = 2.6, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
-FILLED, BEHIND = 650.0, 45.0  # metres of depth that a picture full of what is near costs, and the main piece's back
+FILLED, BEHIND = 650.0, 90.0  # metres of depth that a picture full of what is near costs, and the main piece's back
 # Metres of depth that each thing costs which the border cuts, and which is beyond it: lamps, what hangs from `HIGH`
 # metres on, and furniture.
 CUTS, HIGH = ((90.0, 40.0), (25.0, 0.0), (25.0, 0.0)), 0.25
