@@ -32,6 +32,7 @@ PALETTE = {
     "screen": (40, 44, 54), "cushion": (150, 165, 176), "linen": (232, 226, 214), "blanket": (150, 120, 104),
     "mirror": (196, 214, 222), "book": (150, 90, 78), "stem": (118, 104, 66), "leaf_dark": (58, 104, 64),
     "leaf_silver": (146, 168, 140), "fruit": (201, 134, 46), "petal": (240, 223, 213),
+    "blanket_striped": (160, 130, 114), "blanket_checked": (160, 130, 114), "linen_striped": (222, 214, 202),
 }  # fmt: skip
 
 
