@@ -61,7 +61,9 @@ def bed_cushions(setting: Setting) -> None:
     for host in setting.of("bed"):
         rng, seat = setting.rng(host.name, "bed cushion"), _Seat.of(host)
         wide, (kind, size, variant) = float(host.size[0]), _designs(setting, rng)[int(rng.integers(2))]
-        for side in () if seat is None else (-1.0, 1.0) if wide > WIDE_BED and size[0] < 1.3 * size[1] else (0.0,):
+        if seat is None:
+            continue
+        for side in (-1.0, 1.0) if wide > WIDE_BED and size[0] < 1.3 * size[1] else (0.0,):
             turn = float(rng.uniform(-0.12, 0.12))
             spot = _lying(host, seat, seat.before_pillows(side * 0.21 * wide, size), turn, size)
             _put(setting, host, spot, kind, size, turn, variant)
