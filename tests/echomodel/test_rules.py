@@ -16,7 +16,7 @@ from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import fronts, label_relations, label_rooms, margins, measured, rule_set, verdicts
 from echomodel.rules.geometry import pairs
-from echomodel.rules.margins import pair_margins
+from echomodel.rules.margins import judged, pair_margins
 from echomodel.rules.telling import told_relations
 from echomodel.vocabulary import vocabulary
 
@@ -301,3 +301,23 @@ def test_what_is_told_is_near_and_grows():
         assert {tuple(row) for row in few.tolist()} <= {tuple(row) for row in edges.tolist()}
         pairs = {frozenset(row[::2]) for row in few.tolist()}
         assert len(pairs) == len(few)  # one relation for each pair
+
+
+@pytest.mark.parametrize("gaps", [(0.02, 0.05, 0.1, 0.2), (0.1, 0.4, 0.9, 1.5), (0.5, 0.9, 1.4, 2.0)])
+def test_the_nearest_pairs_are_told_first_at_every_distance(gaps):
+    """Of things in a row, whose gaps grow by more than luck blurs them; those that overlap are nearest."""
+    at = np.cumsum([0.0, 0.3, *(0.5 + gap for gap in gaps)])
+    room = boxes_of(np.full((len(at), 3), 0.5), np.stack([at, 0 * at, 0 * at], 1))
+    edges = torch.tensor([[number + 1, P["front"], number] for number in range(len(at) - 1)])
+    for seed in range(5):
+        told = told_relations(edges, room, 5.0, torch.Generator().manual_seed(seed))
+        assert told.tolist() == edges.tolist()
+
+
+def test_a_bound_that_is_met_exactly_is_kept_but_for_open_ones():
+    for rules, broken in (("strict", set()), ("sgfront", {"standing_on", "symmetrical_to"})):
+        chosen = rule_set(rules)
+        at_bound = torch.tensor([[0, predicate, 1] for predicate in chosen.margins])
+        found = judged(torch.zeros(len(at_bound)), at_bound, rules).tolist()
+        names = {row.id: row.name for row in vocabulary().predicates}
+        assert {names[p] for p, one in zip(chosen.margins, found, strict=True) if one != 1} == broken

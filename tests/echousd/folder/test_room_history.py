@@ -125,6 +125,20 @@ def test_an_archive_that_was_changed_is_not_taken(root):
     assert files(root.parent) == before
 
 
+@pytest.mark.parametrize("content", [b"", b"PK", b"no archive"])
+def test_a_damaged_archive_is_told_where_it_might_be_the_one_that_is_asked_for(root, content):
+    change(root, with_chair())
+    history.undo(root)
+    (place,) = (root.parent / ".redo").iterdir()
+    whole = place.read_bytes()
+    place.write_bytes(content or whole[: len(whole) // 2])
+    with pytest.raises(ValueError, match=f"{place.name}: "):
+        history.redo(root)
+    place.with_name("7.zip").write_bytes(whole)  # another beside it is the one
+    history.redo(root)
+    assert "chair" in (root.parent / "layers/graph.usda").read_text()
+
+
 def test_an_archive_that_names_what_is_not_of_the_room_is_named_and_not_taken(root):
     to = json.loads(root.with_suffix(".json").read_bytes())
     for files, removes in (({"notes.txt": b""}, ()), ({}, ("notes.txt",))):

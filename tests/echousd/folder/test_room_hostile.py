@@ -10,10 +10,11 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.folder.folder import claim, recover
-from echousd.folder.found import layer_over
+from echousd.folder.found import layer_over, manifest_of
 from echousd.folder.manifest import find_manifest
 from echousd.folder.ownership import loses_text
-from echousd.folder.within import inside
+from echousd.folder.stored import unit_of
+from echousd.folder.within import check_links, inside
 from echousd.make.reading import read_room
 from echousd.pending import STAGING
 
@@ -231,3 +232,34 @@ def test_paths_inside(tmp_path, name):
 def test_paths_outside(tmp_path, name):
     with pytest.raises(ValueError, match=r"^room.json: files (names|is) .*allowed: a relative path inside the folder"):
         inside(tmp_path, name, "room.json: files")
+
+
+@pytest.mark.parametrize("way", ["../b", "a/../../b", "..", "a/b/../../../c"])
+def test_ways_that_go_up_are_ways_out_where_no_link_is(tmp_path, way):
+    (tmp_path / "room/a/b").mkdir(parents=True)
+    with pytest.raises(ValueError, match="entry"):
+        check_links(tmp_path / "room", tmp_path / "room" / way, "entry")
+    check_links(tmp_path / "room", tmp_path / "room/a/../a/b", "entry")
+
+
+def test_what_is_no_room_and_what_is_not_there_are_told_apart(tmp_path):
+    (tmp_path / "other.usda").write_text("#usda 1.0\n")
+    with pytest.raises(
+        ValueError, match=r"other.usda: not a room made by `echousd generate` \(no manifest beside it\)$"
+    ):
+        manifest_of(tmp_path / "other.usda")
+    with pytest.raises(ValueError, match=r"none.usda: no such file$"):
+        manifest_of(tmp_path / "none.usda")
+
+
+@pytest.mark.parametrize(
+    ("path", "unit"),
+    [
+        ("assets/bed/bed.usda", "assets/bed"), ("assets/bed/original/a/b.png", "assets/bed"),
+        ("assets/bed", "assets/bed"), ("textures/wood.jpg", "textures/wood.jpg"),
+        ("assets", ""), ("textures", ""), ("layers/graph.usda", ""),
+        ("bedroom.usda", ""), ("my/assets/bed.usda", ""),
+    ],
+)  # fmt: skip
+def test_what_of_a_room_lies_in_a_store_together(path, unit):
+    assert unit_of(path) == unit

@@ -10,8 +10,10 @@ from small_room import BARE, OBJECTS, StandIn, small_graph
 import echousd
 from echousd.draw.sight import Furniture
 from echousd.draw.views import perspective_views, shifted, stage_views
+from echousd.dressing.dress import dress
 from echousd.layers.cameras import room_points, write_cameras
-from echousd.layers.compose import text
+from echousd.layers.compose import _asset as made
+from echousd.layers.compose import room_files, simready_data, text
 from echousd.layers.materials import define_material, look_images, tint_factor
 from echousd.layers.materialx import write_networks
 from echousd.layers.placed import MODEL, PLACES, carried_files
@@ -20,6 +22,7 @@ from echousd.shapes import walls
 from echousd.shapes.finishes.baking import hexadecimal
 from echousd.shapes.geometry import Origin, Original
 from echousd.shapes.looks import Look, look
+from echousd.stage.boxes import read_dressing
 from echousd.stage.graphs import read_graph
 from echousd.stage.paths import component_file, piece_name
 from echousd.stage.pen import Pen
@@ -462,3 +465,58 @@ def test_a_floor_that_nobody_stated_lies_under_all_furniture():
     )
     assert (room.floor.min(0) <= corners[:, [0, 2]].min(0)).all()
     assert (room.floor.max(0) >= corners[:, [0, 2]].max(0)).all()
+
+
+@pytest.fixture(scope="module")
+def dressed():
+    asked = {"walls": True, "dress": "some", "layouts": 2, "dress_graph": True}
+    return echousd.generate(small_graph(), seed=3, drafts=1, faces=500, **asked)
+
+
+def test_small_things_stand_and_are_told_where_they_were_put_in_every_layout(dressed, tmp_path):
+    stage, found = Usd.Stage.Open(str(dressed.save(tmp_path / "bedroom", preview=False))), dress(dressed)
+    chosen = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
+    assert len(found.layouts) == len(found.graphs) == len(chosen.GetVariantNames()) == 2
+    for number, things in enumerate(found.layouts):
+        chosen.SetVariantSelection(f"layout_{number}")
+        prims = {prim.GetName(): prim for prim in stage.GetPrimAtPath("/Room/Dressing").GetChildren()}
+        assert {*things} == {*prims}
+        for name, thing in things.items():
+            pose = np.array(UsdGeom.Xformable(prims[name]).GetLocalTransformation())
+            np.testing.assert_allclose(pose[3, :3], thing.position, atol=1e-4)
+            np.testing.assert_allclose(pose[2, :3], (np.sin(thing.yaw), 0, np.cos(thing.yaw)), atol=1e-5)
+        told = read_dressing(stage)
+        assert {node.name: node.category for node in told.nodes} == {
+            n.name: n.category for n in found.graphs[number].nodes
+        }
+        assert {one.triple for one in told.relations} == {one.triple for one in found.graphs[number].relations}
+
+
+def test_every_asset_has_the_joints_of_its_piece_and_others_none(dressed):
+    files, moving = room_files(dressed), set()
+    for name, user in dressed.asset_users.items():
+        layer = Sdf.Layer.CreateAnonymous(".usda")
+        layer.ImportFromString(files[component_file(name)].decode())
+        kinds = [joint.kind for joint in dressed.geometry[user].joints]
+        written = layer.ExportToString()
+        assert written.count("def PhysicsPrismaticJoint") == kinds.count("prismatic")
+        assert written.count("def PhysicsRevoluteJoint") == kinds.count("revolute")
+        assert ("articulation" in written) == bool(kinds)
+        moving |= {name} if kinds else set()
+    assert 0 < len(moving) < len(dressed.asset_users)
+
+
+def test_a_room_that_nobody_saves_is_told_as_from_the_present_folder(room, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    seen = []
+    monkeypatch.setattr("echousd.layers.compose._asset", lambda *given: seen.append(given[-1]) or made(*given))
+    for folder in (None, tmp_path / "there"):
+        seen.clear()
+        room_files(room, folder=folder)
+        assert {*seen} == {(folder or tmp_path) / "assets" / name for name in room.asset_users}
+
+
+@pytest.mark.parametrize("source", [None, "", "graphs/bedroom.yaml"])
+def test_a_root_tells_what_it_was_made_from(room, source):
+    told = simready_data(replace(room, provenance=replace(room.provenance, source=source)))
+    assert told["source_file"] == told["SimReady_Metadata"]["source_file"] == (source or "none")

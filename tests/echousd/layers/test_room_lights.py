@@ -236,3 +236,21 @@ def test_openings_of_the_graph_point_to_what_they_became(tmp_path) -> None:
     hung = UsdPhysics.MassAPI(stage.GetPrimAtPath(found["door"]["leaf"]))
     assert 15 < hung.GetMassAttr().Get() < 30  # kg, as light as a hollow door
     assert np.abs(hung.GetCenterOfMassAttr().Get()).max() == pytest.approx(1.0, abs=0.1)  # half as high as it is
+
+
+def test_rooms_of_a_home_have_one_sun_and_others_their_own() -> None:
+    def suns(**spec) -> set:
+        graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(WINDOW,), **spec))
+        found = set()
+        for seed in range(6):
+            room = echousd.generate(
+                graph, seed=seed, model=StandIn(), place=False, shapes="boxes", walls=True, dress="none"
+            )
+            pen = Pen.blank("lights", ".usda", {})
+            write_lights(pen, room, room_points(room))
+            sun = pen.layer.GetAttributeAtPath("/Room/Lights/sun.xformOp:transform").default
+            found.add(tuple(np.array(sun).round(6).flatten().tolist()))
+        return found
+
+    assert len(suns(walls=(0.1, 0.1, 0.1, 0.1))) == 1
+    assert len(suns()) > 3

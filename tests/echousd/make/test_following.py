@@ -66,6 +66,13 @@ def test_company_turns_with_what_is_turned():
     np.testing.assert_allclose(places["light"][0], (-1.5, 0.75, 0.2), atol=1e-5)
 
 
+def test_company_of_what_has_a_place_and_no_heading_keeps_its_own():
+    _, places = moved(room(table={"position": (1.0, 0.0, 0.4)}))
+    for name in ("west", "east", "light"):
+        np.testing.assert_allclose(places[name][0], np.add(STANDS[name][2], (2.4, 0, 0)), atol=1e-5)
+        assert places[name][1] == pytest.approx(STANDS[name][3])
+
+
 def test_what_is_locked_or_put_somewhere_itself_stays_and_what_is_lifted_lifts_what_stands_on_it():
     put = {"table": {"position": (1.0, 0.1, 0.4), "yaw": 0.0}, "west": {"locked": True}}
     put["east"] = {"position": STANDS["east"][2]}
