@@ -61,7 +61,7 @@ class RoomBoxes:
         told = raw.get("objects") if isinstance(raw, dict) else None
         if not isinstance(told, list) or not all(isinstance(one, dict) for one in told):
             raise ValueError("objects is no list of objects")
-        floor, height = _numbers(raw, "floor_polygon", -1, 2), float(_numbers(raw, "height", above=0))
+        floor, height = _numbers(raw, "floor_polygon", -1, 2), float(_numbers(raw, "height", least=0))
         if len(floor) in (1, 2):
             raise ValueError(f"floor_polygon has {len(floor)} corners, allowed: none, or three and more")
         relations = None if raw.get("relations") is None else _numbers(raw, "relations", -1, 3).astype(int)
@@ -72,7 +72,7 @@ class RoomBoxes:
         return cls(
             id=_word(raw, "id"), room_type=_word(raw, "room_type"), floor_polygon=floor, height=height,
             categories=tuple(_word(o, "category") for o in told),
-            size=np.array([_numbers(o, "size", 3, above=0) for o in told]).reshape(-1, 3),
+            size=np.array([_numbers(o, "size", 3, least=0) for o in told]).reshape(-1, 3),
             position=np.array([_numbers(o, "position", 3) for o in told]).reshape(-1, 3),
             yaw=np.array([_numbers(o, "yaw") for o in told]).reshape(-1),
             models=tuple(_word({"model": "", **o}, "model") for o in told),
@@ -116,7 +116,7 @@ def _word(raw: dict, key: str) -> str:
     return raw[key]
 
 
-def _numbers(raw: dict, key: str, *shape: int, above: float = -np.inf) -> np.ndarray:
+def _numbers(raw: dict, key: str, *shape: int, least: float = -np.inf) -> np.ndarray:
     """The finite numbers of a field, of one shape; -1 = as many as there are."""
     told = raw.get(key)
     try:
@@ -124,9 +124,9 @@ def _numbers(raw: dict, key: str, *shape: int, above: float = -np.inf) -> np.nda
         fits = all(want in (-1, has) for want, has in zip(shape, found.shape, strict=True))
     except (TypeError, ValueError):
         fits = False
-    if not fits or not (np.isfinite(found) & (found > above)).all():
+    if not fits or not (np.isfinite(found) & (found >= least)).all():
         what = f"{' x '.join(map(str, shape)).replace('-1', 'n')} finite numbers" if shape else "a finite number"
-        raise ValueError(f"{key} is {told!r}, allowed: {what}{f' above {above}' * (above == 0)}")
+        raise ValueError(f"{key} is {told!r}, allowed: {what}{' of 0 and more' * (least == 0)}")
     return found
 
 

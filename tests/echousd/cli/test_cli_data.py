@@ -196,14 +196,21 @@ def test_a_file_that_holds_no_rooms_is_named(tmp_path, capsys, held):
     assert not (tmp_path / "x.npz").exists()
 
 
+def test_real_rooms_hold_flat_things(rooms_file, tmp_path):
+    raw = json.loads(rooms_file.read_text())
+    raw["rooms"][1]["objects"][0]["size"] = [0.09, 0.0, 0.09]
+    (tmp_path / "flat.json").write_text(json.dumps(raw))
+    assert read_rooms(tmp_path / "flat.json")[1].size[0].tolist() == [0.09, 0.0, 0.09]
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [
         ({"category": 5}, "category is 5, allowed: a string"),
         ({"category": None}, "category is None, allowed: a string"),
-        ({"size": [float("nan"), 1, 1]}, "size is [nan, 1, 1], allowed: 3 finite numbers above 0"),
-        ({"size": [0, 1, 1]}, "size is [0, 1, 1], allowed: 3 finite numbers above 0"),
-        ({"size": [1, 1]}, "size is [1, 1], allowed: 3 finite numbers above 0"),
+        ({"size": [float("nan"), 1, 1]}, "size is [nan, 1, 1], allowed: 3 finite numbers of 0 and more"),
+        ({"size": [-1, 1, 1]}, "size is [-1, 1, 1], allowed: 3 finite numbers of 0 and more"),
+        ({"size": [1, 1]}, "size is [1, 1], allowed: 3 finite numbers of 0 and more"),
         ({"position": [1e999, 0, 0]}, "position is [inf, 0, 0], allowed: 3 finite numbers"),
         ({"yaw": "ninety"}, "yaw is 'ninety', allowed: a finite number"),
         ({"style": "oak"}, "style is 'oak', allowed: a finite number"),
@@ -223,7 +230,7 @@ def test_what_is_wrong_with_an_object_of_a_rooms_file_is_told(rooms_file, tmp_pa
     ("change", "told"),
     [
         ({"id": 5}, "id is 5, allowed: a string"),
-        ({"height": -2}, "height is -2, allowed: a finite number above 0"),
+        ({"height": -2}, "height is -2, allowed: a finite number of 0 and more"),
         ({"floor_polygon": [[0, 0], [1, 1]]}, "floor_polygon has 2 corners, allowed: none, or three and more"),
         ({"floor_polygon": [[0, 0, 0]] * 4}, "allowed: n x 2 finite numbers"),
         ({"relations": [[0, 1, 99]]}, "relation [0, 1, 99], allowed: two of"),
