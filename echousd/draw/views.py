@@ -84,7 +84,8 @@ def shifted(view: np.ndarray, slope: np.ndarray | float) -> np.ndarray:
     picture, as whoever photographs interiors has them.
     """
     view = np.array(view, float)
-    view[..., :3, 2] += np.asarray(slope)[..., None] * view[..., :3, 1]
+    down: np.ndarray = np.asarray(slope, float)[..., None]
+    view[..., :3, 2] += down * view[..., :3, 1]
     return view
 
 

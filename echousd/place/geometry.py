@@ -156,8 +156,8 @@ def beyond(floor: Floor, size: np.ndarray, at: np.ndarray, turn: np.ndarray) -> 
     corner = footprints(size, at, turn)
     out: np.ndarray = -depth_inside(floor, corner.reshape(-1, 2)).reshape(-1, 4).min(1)
     if len(floor.reflex):
-        local = np.abs(seen(floor.reflex - at[:, None, [0, 2]], turn[:, None])) - size[:, None, [0, 2]] / 2
-        out = np.maximum(out, -local.max(2).min(1))
+        away: np.ndarray = seen(floor.reflex - at[:, None, ::2], turn[:, None])
+        out = np.maximum(out, -(np.abs(away) - size[:, None, ::2] / 2).max(2).min(1))
     return out
 
 

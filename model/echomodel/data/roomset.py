@@ -181,7 +181,8 @@ class RoomSet:
             raise ValueError(f"{self.directory}: its files hold {count} rooms, said are {self.info['rooms']}")
         self._tables = {name: np.concatenate([tables[name] for _, tables in held]) for name in TABLES}
         rooms = self._tables["rooms"]
-        self._begin = {name: np.cumsum(rooms[name], dtype=np.int64) - rooms[name] for name in list(TABLES)[1:]}
+        many: dict[str, np.ndarray] = {name: rooms[name].astype(np.int64) for name in list(TABLES)[1:]}
+        self._begin = {name: np.cumsum(counts) - counts for name, counts in many.items()}
         self.held_out = rooms["held_out"].astype(bool)
         self.counts = rooms["objects"].astype(np.int64)
         self._labels: dict[tuple[str, int], list[np.ndarray]] = {}
