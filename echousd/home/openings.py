@@ -96,7 +96,7 @@ def openings_of(home: HomeGraph, floors: Sequence[Floor]) -> dict[str, tuple[Ope
     """The openings of every room: doors and passages of the graph, a front door, windows in outer walls."""
     by_name = {floor.name: floor for floor in floors}
     options = [_passage_options(home, by_name, *r.pair, r.predicate) for r in home.relations if r.row.passes]
-    options.append(_front_doors(home, by_name[home.entered_by], floors))
+    options.append(_front_doors(by_name[home.entered_by], floors))
     order = sorted(range(len(options)), key=lambda number: len(options[number]))
     picked: dict[int, _Hole] = {}
     for _ in range(2):  # the second time, each knows where all the others are
@@ -174,7 +174,7 @@ def _leaves(home: HomeGraph, floors: dict[str, Floor], side: Facing) -> Iterator
         yield _Hole(((side.one, mine), (side.other, side.across(mine))), cost)
 
 
-def _front_doors(home: HomeGraph, floor: Floor, floors: Sequence[Floor]) -> list[_Hole]:
+def _front_doors(floor: Floor, floors: Sequence[Floor]) -> list[_Hole]:
     out: list[_Hole] = []
     for side in outer_spans(floor, floors):
         length = float(edge_lengths(floor.corners)[side.edge])

@@ -109,7 +109,7 @@ def edit(
             again = made_of in ("parts", "sdf") or (made_of in ("library", "guided") and asked.assets is not None)
             shapes = shapes or (made_of if again else default_source(model_used))
             check_sources([shapes, *(source_of(graph.node(name), shapes) for name in shaped_anew)], model_used)
-            own = given_pieces(graph, shapes, wishes, fresh)
+            own = given_pieces(graph, wishes, fresh)
         change = graph_edit(saved.graph, graph)
 
     def laid_out(sizes: Mapping[str, Vector]) -> tuple[list[Boxes], list[SceneGraph], tuple[str, ...]]:
@@ -152,7 +152,7 @@ def edit(
         made = mixed_shapes(request, shapes)
         geometry |= {name: made.geometry[owner] for name, owner in made.owners.items()}
         names |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
-    names = _own_names({name: names[name] for name in graph.names}, shaped_anew, saved)
+    names = _own_names({name: names[name] for name in graph.names}, shaped_anew)
     geometry = {name: geometry[name] for name in graph.names}
     floor, outcomes = room_floor(graph, layouts), tuple(layout_outcome(graph, found) for found in layouts)
     for number in range(ROUNDS if asked.place else 0):
@@ -333,7 +333,7 @@ def _boxes_of(graph: SceneGraph) -> Boxes:
     )
 
 
-def _own_names(assets: Mapping[str, str], fresh: set[str], saved: SavedRoom) -> dict[str, str]:
+def _own_names(assets: Mapping[str, str], fresh: set[str]) -> dict[str, str]:
     """A new asset whose name an asset that stays has already gets another name."""
     kept = {asset for name, asset in assets.items() if name not in fresh}
     renamed: dict[str, str] = {}

@@ -114,7 +114,7 @@ def generate(
         shapes = asked.shapes or default_source(echo)
         check_sources([shapes, *sources_of(graph, shapes).values()], echo)
     theirs = names_models(graph, shapes)
-    pieces = given_pieces(graph, shapes, wishes, timer=timer) if theirs else Retrieved()
+    pieces = given_pieces(graph, wishes, timer=timer) if theirs else Retrieved()
     sizes = dict(pieces.sizes)
     with faults_of(file):
         check_doors(graph)

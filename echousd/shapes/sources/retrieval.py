@@ -29,11 +29,11 @@ TOGETHER = ("at", "head", "beside")  # stances of things that come in pairs and 
 
 
 def given_pieces(
-    graph: SceneGraph, shapes: str, wishes: Wanted, among: Container[str] | None = None, timer: StageTimer | None = None
+    graph: SceneGraph, wishes: Wanted, among: Container[str] | None = None, timer: StageTimer | None = None
 ) -> Retrieved:
     """The models that the graph names itself, with their real sizes; raises ValueError that names object and file.
 
-    `shapes`: the room's source. `among`: names of the objects that are looked at, None = all.
+    `among`: names of the objects that are looked at, None = all.
     """
     nodes = [node for node in graph.nodes if among is None or node.name in among]
     named = [node for node in nodes if node.asset is not None]

@@ -62,7 +62,7 @@ def front(
     return parts
 
 
-def sliding(low: Point, high: Point, z: float, count: int, style: Style, material: str) -> list[Solid]:
+def sliding(low: Point, high: Point, z: float, count: int, material: str) -> list[Solid]:
     """Doors that slide along x before one another."""
     xs = np.linspace(low[0], high[0], count + 1).tolist()
     wide = (high[0] - low[0]) / count
@@ -201,10 +201,10 @@ def depth_of(d: float, z: float) -> float:
     return z + d / 2 - 0.015
 
 
-def shelves(rect: tuple, d: float, z0: float, rows: int, columns: int, style: Style) -> list[Solid]:
-    """Boards that divide an open case into rows and columns."""
+def shelves(rect: tuple, d: float, rows: int, columns: int, style: Style) -> list[Solid]:
+    """Boards that divide an open case, `d` deep, into rows and columns."""
     x0, y0, x1, y1, z1 = rect
-    t, z1 = BOARD * (0.8 + 0.5 * style.bulk), z1 - 0.01
+    t, z0, z1 = BOARD * (0.8 + 0.5 * style.bulk), -d / 2, z1 - 0.01
     ys, xs = np.linspace(y0, y1, rows + 1)[1:-1], np.linspace(x0, x1, columns + 1)[1:-1]
     parts: list[Solid] = [box((x0, y - t / 2, z0), (x1, y + t / 2, z1), role="shelf") for y in ys]
     return parts + [box((x - t / 2, y0, z0), (x + t / 2, y1, z1), role="side") for x in xs]

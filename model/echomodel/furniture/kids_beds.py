@@ -19,7 +19,7 @@ def kids_bed(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if w < 0.85 or d < 1.4:
         return cot(size, style, choices)
     if h > 1.55:
-        return _bunk(size, style, choices)
+        return _bunk(size, style)
     if h > 1.2 and choices.chance("kind", 0.45):
         return _loft(size)
     house = h > 1.25 and choices.chance("extra", 0.7)
@@ -91,7 +91,7 @@ def _ladder(across: tuple[float, float], deep: tuple[float, float], deck: float,
     return of_role("ladder", [*sides, *(box((x0, y, z0), (x1, y + 0.035, z1)) for y in steps)])
 
 
-def _bunk(size: Size, style: Style, choices: Choices) -> list[Solid]:
+def _bunk(size: Size, style: Style) -> list[Solid]:
     """Two decks on four posts, a rail above and a ladder or stairs with drawers."""
     w, h, d = size
     stairs = w > 1.9

@@ -33,7 +33,7 @@ def bookshelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
     foot = min(0.08, style.leg_height) if choices.chance("raised", 0.5) else 0.02
     kind, back = "plinth" if foot < 0.04 else None, choices.chance("back", 0.8)
     parts, rect = carcass(size, style, foot, kind=kind, solid=False, back=back)
-    parts += shelves(rect, d, -d / 2, rows, columns, style)
+    parts += shelves(rect, d, rows, columns, style)
     x0, y0, x1, y1, z = rect
     xs, ys = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
     closed = int(rows > 2 and choices.chance("front", 0.4))  # rows behind doors

@@ -91,7 +91,7 @@ def cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
         parts.append(box((x0, split - BOARD / 2, -d / 2), (x1, split + BOARD / 2, z), role="shelf"))
         parts += front((x0, y0), (x1, split), z, rows, columns, low_kind, style, depth_of(d, z))
         if style.fronts == "open" or choices.chance("extra", 0.4):
-            parts += shelves((x0, split, x1, y1, z), d, -d / 2, choices.whole("count", 2, 5), columns, style)
+            parts += shelves((x0, split, x1, y1, z), d, choices.whole("count", 2, 5), columns, style)
             return parts
         parts.append(core((x0, split, -d / 2), (x1, y1, z)))
         return parts + front((x0, split), (x1, y1), z, 1, columns, "door", style, depth_of(d, z))
@@ -108,7 +108,7 @@ def children_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     foot = min(0.06, style.leg_height)
     parts, (x0, y0, x1, y1, z) = carcass(np.array([w, body, d]), style, foot, kind="plinth", solid=False)
     columns, rows = int(np.clip(round((x1 - x0) / 0.36), 1, 8)), int(np.clip(round((y1 - y0) / 0.34), 2, 7))
-    parts += shelves((x0, y0, x1, y1, z), d, -d / 2, rows, columns, style)
+    parts += shelves((x0, y0, x1, y1, z), d, rows, columns, style)
     xs, ys = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
     rng = choices.stream("pattern")
     for i in range(columns):
@@ -137,7 +137,7 @@ def wardrobe(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if choice == "sliding" and w > 1.2:
         count = 2 if w < 2.0 else 3
         material = "mirror" if choices.chance("second", 0.3) else "accent"
-        return parts + sliding((x0, y0), (x1, y1), z, count, style, material)
+        return parts + sliding((x0, y0), (x1, y1), z, count, material)
     if choice == "drawers":
         split = y0 + (y1 - y0) * choices.between("split", 0.2, 0.32)
         rows = choices.whole("rows", 1, 3)
@@ -149,7 +149,7 @@ def wardrobe(size: Size, style: Style, choices: Choices) -> list[Solid]:
         cabin, (_, cy0, _, cy1, cz) = carcass(size, style, foot, kind=kind, solid=False)
         cabin.append(core((x0, cy0, -d / 2), (edge, cy1, z)))
         cabin.append(box((edge - BOARD / 2, cy0, -d / 2), (edge + BOARD / 2, cy1, z), role="side"))
-        cabin += shelves((edge, cy0, x1, cy1, cz), d, -d / 2, choices.whole("rows", 4, 7), 1, style)
+        cabin += shelves((edge, cy0, x1, cy1, cz), d, choices.whole("rows", 4, 7), 1, style)
         return cabin + front((x0, y0), (edge, y1), z, 1, doors - 1, "door", style, depth_of(d, z))
     return parts + front((x0, y0), (x1, y1), z, 1, doors, "door", style, depth_of(d, z))
 

@@ -18,7 +18,7 @@ def _leg(style: Style, width: float, height: float) -> float:
     return float(np.clip(0.045 * style.bulk * (0.6 + 0.3 * width + 0.3 * height), 0.025, 0.14))
 
 
-def _outline(style: Style, size: Size, choices: Choices) -> str:
+def _outline(style: Style, size: Size) -> str:
     """Round where width and depth are alike and the style likes it, else with square or rounded corners."""
     alike = max(size[0], size[2]) / min(size[0], size[2]) < 1.12
     if style.round_tops > (0.35 if alike else 0.8):
@@ -29,7 +29,7 @@ def _outline(style: Style, size: Size, choices: Choices) -> str:
 def dining_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Four legs, a trestle, a sled or a pedestal under a plain, rounded or round top, with an apron or without."""
     w, h, d = size
-    shape, thick = _outline(style, size, choices), max(style.top * 1.1, 0.022)
+    shape, thick = _outline(style, size), max(style.top * 1.1, 0.022)
     parts: list[Solid] = [top(shape, w, d, h, thick, style)]
     if shape == "round":
         inner = within(shape, style) if style.legs not in ("splayed", "hairpin") else 0.86
@@ -58,7 +58,7 @@ def dining_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
 def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Low: legs, a shelf below, a solid block with drawers, a drum, a bowl or two nested tops."""
     w, h, d = size
-    shape, thick = _outline(style, size, choices), max(style.top, 0.025)
+    shape, thick = _outline(style, size), max(style.top, 0.025)
     kind = choices.pick("kind", ["legs", "shelf", "block", "drum", "nested"], [0.36, 0.24, 0.2, 0.12, 0.08])
     if kind == "drum" and shape == "round":
         drum = turned((0, 0, 0), (w * 0.4, d * 0.4), h - thick, (w * 0.47, d * 0.47), material="accent")
@@ -81,7 +81,7 @@ def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
 def side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Beside a sofa: legs, a pedestal; a drum or an hourglass where it is round, else a cube or a C-shaped frame."""
     w, h, d = size
-    shape, thick = _outline(style, size, choices), max(style.top * 0.8, 0.018)
+    shape, thick = _outline(style, size), max(style.top * 0.8, 0.018)
     kind = choices.pick("kind", ["legs", "pedestal", "drum", "cube", "c"], [0.45, 0.2, 0.12, 0.13, 0.1])
     parts: list[Solid] = [top(shape, w, d, h, thick, style)]
     if kind == "pedestal":

@@ -154,7 +154,7 @@ def make_batch(rooms: PackedRooms, picked: Tensor, generator: torch.Generator, *
         category=rooms.category[nodes], triplets=torch.zeros(0, 3, dtype=torch.int64), scene=scene,
         room_type=rooms.room_type[picked], floor=floor, openings=openings,
     )  # fmt: skip
-    before, added, touched = _pseudo_edit(pairs, predicates, counts, pair_scene, generator)
+    before, added, touched = _pseudo_edit(pairs, predicates, counts, generator)
     kinds = {"rules": rooms.rules[picked], "style": rooms.style[nodes]}
     allowed = rooms.allowed[places]
     return LayoutBatch(
@@ -250,7 +250,7 @@ def _told(predicates: Tensor, receiver: Tensor, sender: Tensor, counts: Tensor) 
 
 
 def _pseudo_edit(
-    pairs: Pairs, predicates: Tensor, counts: Tensor, pair_scene: Tensor, generator: torch.Generator
+    pairs: Pairs, predicates: Tensor, counts: Tensor, generator: torch.Generator
 ) -> tuple[Pairs, Tensor, Tensor]:
     """Draw per scene none, addition or relation change, and undo it in the pseudo graph (SPEC 4)."""
     scenes = len(counts)
