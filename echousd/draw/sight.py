@@ -6,8 +6,6 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from echomodel.boxes2d import seen
-
 CUT = 3.0  # how much more what is cut off by a picture's border disturbs
 ASPECT = 1.6  # of a picture from inside: its width over its height
 # rays through such a picture whose half width at distance 1 is 1, which go level, and what each of these counts
@@ -43,13 +41,6 @@ class Furniture:
         """These boxes, then some others."""
         every = [self, *(other for other in others if other is not None)]
         return Furniture(*(np.concatenate([getattr(one, f.name) for one in every]) for f in fields(Furniture)))
-
-    def nearness(self, eye: np.ndarray, reach: float) -> np.ndarray:
-        """(n,) how near each box is to `eye` (3,): 0 at `reach` metres and beyond, 1 where the eye touches it."""
-        local = eye - self.position - self.size * (0.0, 0.5, 0.0)
-        local[:, [0, 2]] = seen(local[:, [0, 2]], self.yaw)
-        away = np.linalg.norm(np.maximum(np.abs(local) - self.size / 2, 0.0), axis=1)
-        return np.clip(1.0 - away / reach, 0.0, 1.0)
 
     def met(self, view: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
         """(169,) int which box is the nearest along each of `RAYS` through a picture from inside, and metres to it,

@@ -44,7 +44,6 @@ CUTS, HIGH = ((90.0, 40.0), (25.0, 0.0), (25.0, 0.0)), 0.25
 SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width over which it is cord; metres
 UNSEEN, MANY = 6.0, 8.0  # metres of depth that each of so many pieces in the picture is worth
 SHOWN, FAR = 30.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
-TOUCHED, NOWHERE = 0.86, 1e4  # nearness of what the eye must not be at, a third of a metre; what that costs
 STEPS = (0.2, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
 APART = 3.0  # metres from the middle that it keeps where it stands further from its corner
 ALONG, OFF = (0.2, 0.35, 0.5, 0.65, 0.8), 0.4  # or along a wall, as shares of its length, and metres from it
@@ -165,7 +164,6 @@ def inside_view(
     eyes: list[list[Shot]] = []
     for spot, level in product(_spots(room, middle, aim), EYES):
         eye = np.array([spot[0], level * height, spot[1]])
-        touched = NOWHERE * float(things.nearness(eye, BEFORE).max(initial=0.0) > TOUCHED)
         points, blocked = furniture.blocked(eye)
         hidden = CLEAR * _hidden(wider, points[main], blocked[main], eye)
         views = _turned(eye, np.stack([aim - spot, around - spot]))
@@ -175,7 +173,7 @@ def inside_view(
         off = MIDDLE * np.clip((aside / np.maximum(back, 1e-9))[..., None] / halves - ASIDE, 0.0, 1.0)
         far = max(float(np.linalg.norm(aim - spot)), 1e-9)
         behind = BEHIND * max(0.0, float((aim - spot) @ front)) / far + SMALL * max(0.0, far - LARGE)
-        cost = WHOLE * cut + off + _shown(fragile, views, halves) + hidden + behind + touched
+        cost = WHOLE * cut + off + _shown(fragile, views, halves) + hidden + behind
         cost = (cost + np.abs(PANS)[:, None, None] + DISTORTED).ravel()
         eyes.append([
             Shot(float(cost[n]), views.reshape(-1, 4, 4)[n // len(LENSES)], LENSES[n % len(LENSES)], points, blocked)

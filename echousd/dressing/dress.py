@@ -22,7 +22,7 @@ from echousd.dressing import floors, tabletops, upholstery, walls
 from echousd.dressing.floors import CORNER_AIR, GREEN
 from echousd.dressing.setting import Setting, Standing, Thing, standing
 from echousd.dressing.stories import guessed, story
-from echousd.dressing.walls import EYE, Wall, hung_at, shown, walls_of
+from echousd.dressing.walls import EYE, Wall, hung_at, hung_together, walls_of
 from echousd.graph import Relation
 from echousd.graph.titles import DressingGraph, SmallNode
 from echousd.naming import free_name
@@ -60,9 +60,8 @@ class Dressing:
         """Boxes of what a camera at a wall would have right before it, in the first layout."""
         every = next(iter(self.layouts), {}).values()
         things = [t for t in every if max(t.size[1], t.position[1]) > TALL and t.size.max() > SEEN]
-        size = np.array([t.size for t in things]).reshape(-1, 3)
-        position = np.array([t.position for t in things]).reshape(-1, 3)
-        return Furniture(size, position, np.array([t.yaw for t in things]))
+        rows = np.array([(*t.size, *t.position, t.yaw) for t in things]).reshape(-1, 7)
+        return Furniture(rows[:, :3], rows[:, 3:6], rows[:, 6])
 
 
 def dress(room: RoomData) -> Dressing:
@@ -95,11 +94,6 @@ def dress(room: RoomData) -> Dressing:
         if room.options.dress_graph:
             graphs.append(graph_of(setting, named))
     return Dressing(tuple(layouts), assets, geometry, frozenset(bare), tuple(graphs))
-
-
-def placed(room: RoomData, layout: int = 0) -> list[Thing]:
-    """The things of one layout, in the order in which they were placed."""
-    return dressed(room, layout).placed
 
 
 def dressed(room: RoomData, layout: int = 0) -> Setting:
@@ -138,7 +132,8 @@ def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: 
     return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, weighed(pieces))
 
 
-STRETCH, LONG = 1.0, 3.0  # metres of bare wall that ask for a picture, and for three
+# metres of bare wall that ask for a picture, for a wide one, and for three
+STRETCH, UPRIGHT, LONG = 1.0, 2.0, 3.0
 STEP = 0.1  # metres from spot to spot along a wall
 PROBE = np.array([0.3, 0.8, 0.03])  # a picture that tells whether a spot is bare
 EMPTY = 0.65  # metres around a corner where nothing stands
@@ -155,14 +150,14 @@ def bare_walls(setting: Setting) -> None:
         rng = setting.rng(f"wall {wall.edge}", "bare")
         wide = float(np.clip(0.4 * length, 0.6, 1.3))
         size = np.round([wide, wide * rng.uniform(0.66, 0.75), 0.03], 2)
+        if length < UPRIGHT:
+            size[:2] = rng.permutation(size[:2])
         spots = [middle]
         if length > LONG:
             size = np.array([0.6, 0.82, 0.03])
             spots = [middle + step * 0.72 for step in (-1, 0, 1)]
-        low, variant = EYE - float(size[1]) / 2, int(rng.integers(1 << 30))
-        series = shown(setting, size, len(spots), f"wall {wall.edge}")
-        row = [hung_at(setting, wall, x, kind, size, low, variant) for kind, x in zip(series, spots, strict=True)]
-        setting.placed += [one for one in row if one is not None] if None not in row else []
+        places = [(x, EYE - float(size[1]) / 2) for x in spots]
+        hung_together(setting, wall, size, places, int(rng.integers(1 << 30)))
 
 
 def stretches(setting: Setting, wall: Wall) -> list[tuple[float, float]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice, product
 
@@ -176,7 +176,7 @@ def shown(setting: Setting, size: np.ndarray, count: int, *words: str) -> list[s
     """Pictures of one kind that hang together, for who lives there; new to the room while there are enough."""
     hung, rng = {thing.kind for thing in setting.placed}, setting.rng(*words, "shown")
     kinds = list(printed("picture", "wide" if size[0] > size[1] else "tall", setting.resident).values())
-    series = [kinds[k] for k in rng.permutation(len(kinds))]
+    series = sorted(kinds, key=lambda names: -(rng.random() ** (1 / len(names))))  # every picture alike often
     new = ([name for name in names if name not in hung] for names in series)
     names = next((names for names in new if len(names) >= count), max(series, key=len) * count)
     return [names[k] for k in rng.permutation(len(names))[:count]]
@@ -193,18 +193,21 @@ def _group(setting: Setting, wall: Wall, along: float, host: Standing, rng: np.r
     h = round(min(w * 1.3, (free - 0.08 * (rows - 1)) / rows), 2)
     if h < 0.3:
         return False
-    size, before, variant = np.array([round(w, 2), h, 0.03]), len(setting.placed), int(rng.integers(1 << 30))
-    series = iter(shown(setting, size, 3 * rows, host.name))
-    for row in range(rows):
-        for column in (-1, 0, 1):
-            least = max(host.top + OVER, LOWEST if rows == 1 else 0.0) + row * (h + 0.08)
-            spot = along + column * (float(size[0]) + 0.08)
-            one = hung_at(setting, wall, spot, next(series), size, least, variant, host.name)
-            if one is None:
-                del setting.placed[before:]
-                return False
-            setting.placed.append(one)
-    return True
+    size, low = np.array([round(w, 2), h, 0.03]), max(host.top + OVER, LOWEST if rows == 1 else 0.0)
+    steps = product(range(rows), (-1, 0, 1))
+    places = [(along + column * (float(size[0]) + 0.08), low + row * (h + 0.08)) for row, column in steps]
+    return hung_together(setting, wall, size, places, int(rng.integers(1 << 30)), host.name)
+
+
+def hung_together(
+    setting: Setting, wall: Wall, size: np.ndarray, places: Sequence[tuple[float, float]], variant: int, on: str = ""
+) -> bool:
+    """Hang pictures of one kind and size at places (along and low) of a wall; all of them or none."""
+    kinds = shown(setting, size, len(places), on or f"wall {wall.edge}")
+    every = zip(kinds, places, strict=True)
+    row = [hung_at(setting, wall, along, kind, size, low, variant, on) for kind, (along, low) in every]
+    setting.placed += [one for one in row if one is not None and None not in row]
+    return None not in row
 
 
 def _behind(host: Standing, walls: list[Wall]) -> tuple[Wall, float] | None:

@@ -22,7 +22,7 @@ from echomodel.rules import margins, rule, rule_set
 from echomodel.vocabulary import Category, Predicate, RoomType, speaking, vocabulary
 from echousd.checks import check
 from echousd.cli.main import command
-from echousd.dressing.dress import placed
+from echousd.dressing.dress import dressed
 from echousd.dressing.stories import story
 from echousd.dressing.walls import HUNG_OVER
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph, load_graph, starting_graph
@@ -165,7 +165,7 @@ def test_made_of_parts_dressed_weighed_and_made_in_batches(music, tmp_path, monk
     assert np.all(size["spinet"] > np.array((1.2, 0.8, 0.5)) * 0.5)
     assert np.all(size["spinet"] < np.array((1.6, 1.0, 0.7)) * 1.2)
     assert len(room.geometry["spinet"].description) == len(room.geometry["harp"].description) > 0
-    small = placed(room)
+    small = dressed(room).placed
     assert {thing.kind for thing in small if thing.on == "spinet"} & {"flowers", "vase", "book_stack", "bowl", "photo"}
     assert "wall_clock" in {thing.kind for thing in small}
 

@@ -162,15 +162,14 @@ def linen() -> Relief:
 def striped(pairs: int = 4) -> Relief:
     """Linen with broad stripes along u, a narrow one beside each."""
     cloth, place = linen(), (pairs * _grid()[1]) % 1.0
-    stripe = (np.abs(place - 0.3) < 0.2) + 0.7 * (np.abs(place - 0.62) < 0.04)
-    tone = cloth.tone * (1 + 0.55 * stripe)
+    tone = cloth.tone * (1 + 0.55 * (np.abs(place - 0.3) < 0.2) + 0.4 * (np.abs(place - 0.62) < 0.04))
     return Relief(tone / tone.mean(), cloth.height)
 
 
 def checked(pairs: int = 6) -> Relief:
     """Linen woven in squares, darkest where its stripes cross."""
-    cloth, (u, v) = linen(), _grid()
-    tone = cloth.tone * (1 + 0.3 * sum((np.abs((pairs * way) % 1.0 - 0.5) < 0.25).astype(float) for way in (u, v)))
+    cloth, band = linen(), np.where((pairs * np.arange(SIZE) / SIZE) % 1.0 < 0.5, 0.3, 0.0)
+    tone = cloth.tone * (1 + band + band[:, None])
     return Relief(tone / tone.mean(), cloth.height)
 
 
@@ -235,12 +234,6 @@ def bound() -> Relief:
     bands = np.exp(-((((3 * v) % 1.0 - 0.5) / 0.04) ** 2))
     tone = 1 + 0.035 * weave + 0.10 * bands
     return Relief(tone / tone.mean(), 0.0001 * weave)
-
-
-def pile() -> Relief:
-    """Short pile."""
-    fine = noise(81, 160.0, 160.0, 4.0)
-    return Relief(1 + 0.05 * fine + 0.03 * noise(82, 8.0, 8.0), 0.003 * fine)
 
 
 def wicker(strands: int = 24) -> Relief:

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from echomodel.dressing.prints import ASPECTS, PRINTS
-from echousd.shapes.finishes.patterns import SIZE, noise, pile
+from echousd.shapes.finishes.patterns import SIZE, carpet, noise
 from echousd.shapes.finishes.slots import HARMONIES
 from echousd.srgb import to_linear
 
@@ -198,5 +198,5 @@ def printed(name: str, harmony: str) -> np.ndarray:
     for row in sheet.row["of"]:
         PROGRAMS[next(iter(row))](sheet, row)
     drawn = np.asarray(sheet.image.resize((SIZE, SIZE), Image.Resampling.BOX), float) / 255
-    grain = 1 + 0.02 * noise(101, 90.0, 90.0) if name.startswith("picture_") else pile().tone
+    grain = 1 + 0.02 * noise(101, 90.0, 90.0) if name.startswith("picture_") else carpet().tone
     return np.clip(to_linear(drawn) * grain[..., None], 0, 1)

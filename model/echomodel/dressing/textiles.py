@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -48,16 +49,6 @@ def tied_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
 def eyelet_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     """One curtain in even waves from its rod to its foot, as eyelets make them."""
     return [*_hung(size, rng, FOLD, top=1.0, drift=0.15), *_rings(size, FOLD, below=0.02)]
-
-
-def pleated_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """One curtain whose head is pinched into narrow pleats and whose foot is wide."""
-    return _hung(size, rng, 0.9 * FOLD, top=0.3, drift=0.5, narrow=0.16)
-
-
-def sheer_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """One thin curtain in many small folds, through which light comes."""
-    return _hung(size, rng, 0.85 * FOLD, top=0.5, drift=0.8, material="sheer")
 
 
 def cafe_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -110,6 +101,11 @@ def _hung(
         rows.append(np.stack([x, np.full_like(x, share * (h - head)), z], 1))
     front, thick = np.stack(rows), np.array([0, 0, 0.004])
     return [Sheet(front=front + thick, back=front - thick, material=cloth)]
+
+
+# narrow pleats at its head and a wide foot; thin cloth in many small folds, through which light comes
+pleated_curtain = partial(_hung, fold=0.9 * FOLD, top=0.3, drift=0.5, narrow=0.16)
+sheer_curtain = partial(_hung, fold=0.85 * FOLD, top=0.5, drift=0.8, material="sheer")
 
 
 def blind(size: Size, rng: np.random.Generator) -> list[Solid]:

@@ -20,7 +20,7 @@ from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.checks import check
 from echousd.dressing import tabletops, upholstery
-from echousd.dressing.dress import RULES, TALL, Dressing, dress, placed, setting_of
+from echousd.dressing.dress import RULES, TALL, Dressing, dress, dressed, setting_of
 from echousd.dressing.setting import Setting, Thing, meets, standing
 from echousd.dressing.tabletops import surfaces
 from echousd.dressing.upholstery import STEP, _Seat
@@ -103,7 +103,7 @@ def test_every_thing_is_a_proper_prim(root):
 
 def test_things_stay_in_the_room_and_out_of_each_other(room):
     setting = setting_of(room)
-    things = placed(room)
+    things = dressed(room).placed
     upright = [t for t in things if not KINDS[t.kind].lies]
     assert len(things) >= 30
     for number, one in enumerate(upright):
@@ -192,7 +192,7 @@ def test_nothing_stands_over_an_edge_or_in_the_air(room):
     for rule in RULES:
         rule(setting)
     objects = {**setting.objects, **setting.carriers}
-    standing = [t for t in placed(room) if not KINDS[t.kind].fixed and t.on and KINDS[t.kind].name != "cushion"]
+    standing = [t for t in dressed(room).placed if not KINDS[t.kind].fixed and t.on and KINDS[t.kind].name != "cushion"]
     assert standing
     for thing in standing:
         host = objects[thing.on]
@@ -203,7 +203,7 @@ def test_nothing_stands_over_an_edge_or_in_the_air(room):
 @pytest.mark.parametrize(("name", "least"), [("living_room", 40), ("bedroom", 25)])
 def test_full_rooms_are_full_and_clean(name, least, tmp_path):
     room = echousd.generate(f"samples/{name}.usda", seed=1, options=RoomOptions(walls=True, dress="full"))
-    things = placed(room)
+    things = dressed(room).placed
     assert len(things) >= least
     assert len({thing.kind for thing in things}) >= 15
     assert len(dress(room).geometry) < 50  # single books share their assets
@@ -233,7 +233,7 @@ def test_kinds_of_one_category_agree():
 
 def test_doors_stay_free(room):
     setting = setting_of(room)
-    for thing in placed(room):
+    for thing in dressed(room).placed:
         if KINDS[thing.kind].name != "curtain":
             assert not any(way.intersects(thing.footprint) and thing.position[1] < o.height for way, o in setting.ways)
 
@@ -292,7 +292,7 @@ def large_room(**options):
 def test_long_bare_walls_get_pictures_and_large_floors_plants():
     room = large_room()
     setting = setting_of(room)
-    things = placed(room)
+    things = dressed(room).placed
     alone = [thing for thing in things if KINDS[thing.kind].name == "picture" and not thing.on]
     yaws = {round(thing.yaw, 3) for thing in alone}
     assert len(yaws) == 4  # all walls
@@ -310,7 +310,7 @@ def test_long_bare_walls_get_pictures_and_large_floors_plants():
 
 def test_rugs_are_as_large_as_fits_each_way():
     room = large_room()
-    rug = next(thing for thing in placed(room) if thing.kind.startswith("rug"))
+    rug = next(thing for thing in dressed(room).placed if thing.kind.startswith("rug"))
     wide, _, deep = room.boxes.size[room.names.index("bed")].tolist()
     assert rug.size[0] < wide + 1.2  # the wardrobe stands there
     assert rug.size[2] == pytest.approx(min(0.75 * deep + 0.5, 2.4), abs=0.01)
@@ -326,7 +326,9 @@ def test_armchairs_around_a_table_share_a_rug():
     graph = SceneGraph(RoomSpec("living_room", size=(5.0, 4.4)), (*chairs, table))
     made = echousd.generate(graph, shapes="boxes", place=False, **BARE)
     rugs = [
-        t for t in placed(replace(made, options=RoomOptions(walls=True, dress="some"))) if KINDS[t.kind].name == "rug"
+        t
+        for t in dressed(replace(made, options=RoomOptions(walls=True, dress="some"))).placed
+        if KINDS[t.kind].name == "rug"
     ]
     assert [rug.on for rug in rugs] == ["table"]
     assert rugs[0].size[0] > 1.6  # under the chairs' feet, too
