@@ -29,7 +29,7 @@ EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
 SLOPES = (0.05, 0.13, 0.22, 0.32)  # metres that the middle of its picture is lower for a metre ahead
 PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
 WHOLE, CLEAR = 1000.0, 80.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
-LOOKED, CHOSEN, TRIED = 64, 3, 16  # eyes of which one view is looked at closely; eyes, and of each so many views
+LOOKED, CHOSEN, TRIED = 64, 6, 16  # eyes of which one view is looked at closely; eyes, and of each so many views
 LOW = 1.4  # metres: over what is so high one looks
 # one bare wall: what all of a picture costs, from which share on, metres of rounding; what the main piece at the border
 # costs, and from which share of half the picture's width on it is aside
