@@ -16,7 +16,7 @@ eval_app = typer.Typer(help="Scores of whoever lays out rooms, and studies with 
 app = typer.Typer()
 app.add_typer(eval_app, name="eval")
 Against = Annotated[
-    str, typer.Option(help="Rooms file, room set or SG-FRONT folder; generated: held-out rooms of the generator.")
+    str, typer.Option(help="Rooms of any source, of a set those held out; generated: held-out rooms of the generator.")
 ]
 Count = Annotated[int, typer.Option(help="Rooms that every system lays out.", min=2)]
 Seed = Annotated[int, typer.Option(help="Seed of every draw.")]

@@ -47,7 +47,7 @@ class SuiteSettings:
 
     Arguments:
         systems: as `System.parse` reads them; the first is what others are compared with.
-        against: rooms file, room set (its held-out rooms), SG-FRONT folder (its test split), or `generated`: rooms of
+        against: rooms, room set (its held-out rooms), SG-FRONT folder (its test split), or `generated`: rooms of
             the room generator that no training saw.
         count: rooms that are laid out. seed: of every draw. only: sections, () = all.
         relations: an object where people would tell them. drafts: of `+half`, of which the best is kept.
@@ -135,14 +135,15 @@ def rooms_against(settings: SuiteSettings) -> tuple[list[RoomBoxes], list[RoomBo
     elif published:
         rooms = SGFront(path, split="test").rooms()
     else:
-        rooms = load_rooms(path, held_out=path.is_dir() or path.suffix == ".npz")
+        rooms = foreign_rooms(path, held_out=True)
     known = [
         replace(new, relations=old.relations if published and len(new) == len(old) else None)
         for new, old in zip(known_rooms(settings.against, rooms), rooms, strict=True)
     ]
     rooms = [room for room in known if len(room) > 1 and len(room.floor_polygon) > 2]
     if len(rooms) < 4:
-        raise ValueError(f"{settings.against}: {len(rooms)} rooms with a floor and two known objects, 4 are needed")
+        needed = "4 are needed (of a set among those held out, every twentieth)"
+        raise ValueError(f"{settings.against}: {len(rooms)} rooms with a floor and two known objects, {needed}")
     chosen = _spread(rooms, min(wanted, len(rooms) // 2 * 2))
     return chosen[::2], chosen[1::2]
 
@@ -236,8 +237,8 @@ BUFFER = 0.1  # metres that Holodeck adds to what an object covers
 Object = tuple[str, np.ndarray, np.ndarray, float]  # word, size, position, yaw
 
 
-def foreign_rooms(path: Path) -> list[RoomBoxes]:
-    """The rooms at a path, whatever wrote them; the words are theirs.
+def foreign_rooms(path: Path, *, held_out: bool = False) -> list[RoomBoxes]:
+    """The rooms at a path, whatever wrote them; the words are theirs. `held_out`: of a set those that it holds out.
 
     Raises ValueError that names the file, for none and for what cannot be read.
     """
@@ -252,8 +253,8 @@ def foreign_rooms(path: Path) -> list[RoomBoxes]:
         return [room for file in stages for room in read_stage(file)]
     if path.suffix in STAGE_FORMS:
         return read_stage(path)
-    rooms = _from_json(path) if path.is_file() and path.suffix != ".npz" else load_rooms(path)
-    if not rooms:
+    rooms = _from_json(path) if path.is_file() and path.suffix != ".npz" else load_rooms(path, held_out=held_out)
+    if not rooms and not held_out:
         raise ValueError(f"{path}: no rooms, a state of SceneEval, Holodeck's or SceneSmith's JSON")
     return rooms
 

@@ -244,7 +244,7 @@ def _openings(entries: np.ndarray) -> tuple[Opening, ...]:
 
 
 def load_rooms(path: Path, limit: int | None = None, *, held_out: bool = False) -> list[RoomBoxes]:
-    """Rooms of a rooms file or a room set (its held-out ones only, if so asked).
+    """Rooms of a rooms file, or of a room set (its held-out ones only, if so asked).
 
     Raises ValueError for anything else.
     """
@@ -254,8 +254,6 @@ def load_rooms(path: Path, limit: int | None = None, *, held_out: bool = False) 
         rooms = RoomSet(path / "rooms" if (path / "rooms").is_dir() else path)
         numbers = rooms.held_out.nonzero()[0] if held_out else range(len(rooms))
         return [rooms.room(int(k)) for k in numbers[:limit]]
-    if held_out:
-        raise ValueError(f"{path}: a rooms file holds nothing out, allowed with --held-out: a folder of a room set")
     return read_rooms(path)[:limit]
 
 

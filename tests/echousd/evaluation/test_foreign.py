@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from echomodel.data.roomset import pack_rooms
 from echomodel.metrics.layouts import tasks_of
 from echomodel.roomboxes import write_rooms
 from echomodel.rooms.generator import generate_rooms
 from echousd.evaluation import runs
-from echousd.evaluation.runs import SuiteSettings, foreign_rooms, rooms_of
+from echousd.evaluation.runs import SuiteSettings, foreign_rooms, rooms_against, rooms_of
 from echousd.evaluation.suite import evaluate
 from echousd.evaluation.systems import System
 from echousd.stage.boxes import write_stages
@@ -149,3 +150,16 @@ def test_they_stand_in_the_tables_with_what_was_left_out(rooms, tmp_path, monkey
     with pytest.raises(ValueError, match="1 rooms with known objects, 2 or more are needed for an interval"):
         rooms_of(System.parse(str(tmp_path / "one.json")), SuiteSettings())
     assert len(tasks_of(rooms, 0)) == 3
+
+
+def test_systems_are_asked_rooms_of_any_source_and_of_sets_those_held_out(tmp_path):
+    rooms = [room for room in generate_rooms(60, 5) if len(room) > 1][:24]
+    write_stages(rooms[:4], tmp_path / "usd")
+    write_rooms(tmp_path / "rooms.json", rooms[:6])
+    pack_rooms(tmp_path / "set.npz", rooms, [k % 4 == 3 for k in range(24)], {})
+    for name, count in (("usd", 4), ("rooms.json", 6), ("set.npz", 6)):
+        asked, beside = rooms_against(SuiteSettings(against=str(tmp_path / name), count=8))
+        assert len(asked) + len(beside) == count
+    pack_rooms(tmp_path / "small.npz", rooms[:8], [False] * 8, {})
+    with pytest.raises(ValueError, match=r"small.npz: 0 rooms .* 4 are needed \(of a set among those held out, every"):
+        rooms_against(SuiteSettings(against=str(tmp_path / "small.npz")))

@@ -74,7 +74,7 @@ def test_every_table_holds_the_honest_rows_and_two_runs_are_equal(rooms, tmp_pat
         (["random+luck"], "finish is 'luck', allowed after +: search, half"),
         (["--only", "beauty"], "no section 'beauty', allowed: relations"),
         (["--against", "nowhere.json"], "nowhere.json: no such file or folder"),
-        (["--against", "{}/empty"], "empty: not a room set"),
+        (["--against", "{}/empty"], "empty: no room in this folder"),
         (["--against", "{}/one.json"], "one.json: 1 rooms with a floor and two known objects, 4 are needed"),
         (["--against", "{}/bare.json"], "bare.json: 0 rooms with a floor and two known objects"),
         (
