@@ -147,7 +147,8 @@ NOOK, AT_WALL = 0.66, 0.4  # metres between a plant and what is next to it along
 WORKPLACE = 1.0  # metres between the middles of two who work
 # Metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it; before storage to a low table.
 OPENS, LOW = 0.55, 0.45
-FACED, SCREENED = 0.3, 0.05  # share of a wardrobe's width, and of a screen's, from which on something is before it
+# Share of the width of storage from which on seats and tables, and beds and sofas, are before it; of a screen's all.
+FACED, LARGE_FACED, SCREENED = 0.3, 0.1, 0.05
 
 
 def served_limit(area: float, width: Array, depth: Array) -> float:
@@ -263,17 +264,16 @@ def workers_apart(plan: Plan) -> Found:
 
 
 def wardrobe_opens(plan: Plan) -> Found:
-    """One can stand before an open wardrobe, also at the foot of a bed; no seat or table stands before any storage, no
-    sofa or bed before a screen's, and one passes a low table there."""
+    """One can stand before an open wardrobe, also at the foot of a bed; no sofa, seat or table stands before any
+    storage, nor a bed before a screen's, and one passes a low table there."""
     stores = plan.of("storage") & plan.works & plan.standing & ~plan.stands("near")
+    large, xp = plan.of("bed") | (plan.of("sofa") & ~plan.stands("company")), plan.kit
     tables = plan.of("board") & ~plan.stands("beside")
-    block = (plan.of("bed", "sofa") | plan.stands("company", "at", "head") | tables) & plan.standing
-    i, j = plan.pairs(stores, block, least=True)
-    deep = plan.stands("opposite") | plan.which(lambda kind: kind.access > 0.6)
-    met = deep[i] | ~(plan.of("bed") | (plan.of("sofa") & ~plan.stands("company")))[j]
+    i, j = plan.pairs(stores, (large | plan.stands("company", "at", "head") | tables) & plan.standing, least=True)
+    met = (plan.stands("opposite") | plan.which(lambda kind: kind.access > 0.6))[i] | ~plan.of("bed")[j]
     i, j = i[met], j[met]
-    share = cast(plan.kit.where(plan.stands("opposite"), SCREENED, FACED)[i], plan.size)
-    needed = cast(plan.kit.where(plan.stands("before"), LOW, OPENS), plan.size)
+    share = cast(xp.where(plan.stands("opposite")[i], SCREENED, xp.where(large[j], LARGE_FACED, FACED)), plan.size)
+    needed = cast(xp.where(plan.stands("before"), LOW, OPENS), plan.size)
     return plan.nearest(i, j, plan.more_ahead(i, j, needed[j], share), needed)
 
 

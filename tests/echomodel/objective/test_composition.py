@@ -58,13 +58,15 @@ def test_seats_at_desks_and_single_chairs_need_no_elbow_room():
     assert seen(composition.elbow_room, desk)[0] == {}
 
 
-@pytest.mark.parametrize(("gap", "aside", "margin"), [(0.5, 0.0, -0.05), (0.6, 0.0, 0.05), (0.5, 1.4, 0.10)])
+@pytest.mark.parametrize(
+    ("gap", "aside", "margin"), [(0.5, 0.0, -0.05), (0.6, 0.0, 0.05), (0.5, 1.4, None), (0.5, 1.6, None)]
+)
 def test_one_stands_before_an_open_wardrobe(gap, aside, margin):
     bed = ("double_bed", (1.8, 0.5, 2.0), (0.0, 0.0), 0.0)
     wardrobe = ("wardrobe", (1.6, 2.2, 0.6), (aside, 1.0 + gap + 0.3), np.pi)
     found, *_ = seen(composition.wardrobe_opens, [bed, wardrobe])
-    # beside the bed's foot only 0.3 m of its front are faced
-    expected = 0.3 * 1.6 - (0.9 + 0.8 - aside) if aside else margin
+    # beside the bed's foot only 0.3 or 0.1 m of its front are faced
+    expected = max(0.1 * 1.6 - (0.9 + 0.8 - aside), -0.05) if aside else margin
     assert found == {1: pytest.approx(expected)}
 
 
@@ -239,6 +241,13 @@ def test_desks_side_by_side_are_in_line(back, margin):
     assert seen(crowding.desks_in_line, desks)[0] == {0: pytest.approx(margin)}
     opposite = [desks[0], ("desk", (1.2, 0.75, 0.8), (0.65, 1.5), np.pi)]
     assert seen(crowding.desks_in_line, opposite)[0] == {}
+
+
+@pytest.mark.parametrize(("gap", "margin"), [(0.3, -0.08), (0.6, 0.05)])
+def test_no_sofa_stands_before_storage_with_its_back_to_it(gap, margin):
+    shelf = ("bookshelf", (0.8, 2.0, 0.4), (0.9, -1.8), 0.0)  # a fifth of whose front it covers
+    sofa = ("multi_seat_sofa", (2.2, 0.8, 0.9), (-0.44, -1.6 + gap + 0.45), 0.0)
+    assert seen(composition.wardrobe_opens, [shelf, sofa])[0] == {0: pytest.approx(margin)}
 
 
 def test_nobody_sits_before_a_wardrobe():
