@@ -15,7 +15,7 @@ from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.graph import RoomSpec
 from echousd.layers.cameras import room_points
-from echousd.layers.lights import ASIDE, ELEVATION, OVERHEAD, SHARES, image_files, write_lights
+from echousd.layers.lights import ASIDE, ELEVATION, HUES, OVERHEAD, SHARES, TIMES, image_files, write_lights
 from echousd.options import RoomOptions
 from echousd.stage.pen import Pen
 
@@ -254,3 +254,10 @@ def test_rooms_of_a_home_have_one_sun_and_others_their_own() -> None:
 
     assert len(suns(walls=(0.1, 0.1, 0.1, 0.1))) == 1
     assert len(suns()) > 3
+
+
+def test_what_is_left_of_lights_and_colours_of_the_sky_are_shares_and_the_sky_makes_up_for_what_is_closed() -> None:
+    assert {*TIMES} == {*HUES}
+    numbers = np.array([*TIMES.values(), *HUES.values(), *((panel,) * 3 for _, panel in SHARES.values())])
+    assert ((numbers >= 0) & (numbers <= 1)).all()
+    assert SHARES["open"][0] < SHARES["walls"][0] < SHARES["ceiling"][0]

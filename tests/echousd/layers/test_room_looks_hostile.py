@@ -7,7 +7,7 @@ from pxr import Sdf, Vt
 from small_room import BARE, StandIn, small_graph
 
 import echousd
-from echousd.layers.paintings import RECORD, read_look
+from echousd.layers.paintings import RECORD, brought, read_look
 from echousd.make.reading import read_room
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage
@@ -60,3 +60,34 @@ def test_a_place_that_is_none_is_told(root, kind, value):
     root.write_text(layer.ExportToString())
     with pytest.raises(StageError, match=r"bedroom.usda: (cannot be read|</Room/Objects/bed>)"):
         read_room(root)
+
+
+def painted(root, name="oil"):
+    """A look in the folder of a room, with a picture beside it, which the room's root layer names."""
+    (root.parent / "looks" / name).mkdir(parents=True)
+    layer_of(name=name).Export(str(root.parent / f"looks/{name}.usda"))
+    (root.parent / f"looks/{name}/bed.png").write_bytes(b"picture")
+    layer = Sdf.Layer.OpenAsAnonymous(str(root))
+    layer.subLayerPaths = [f"./looks/{name}.usda", *layer.subLayerPaths]
+    root.write_text(layer.ExportToString())
+
+
+def test_looks_of_an_edited_room_go_along_to_another_folder_alone(root, tmp_path):
+    painted(root)
+    files = {path: (root.parent / path).read_bytes() for path in ("looks/oil/bed.png", "looks/oil.usda")}
+    (tmp_path / "link").symlink_to(root.parent)
+    assert brought(root, tmp_path / "new") == {"./looks/oil.usda": files}
+    assert brought(None, tmp_path / "new") == {}
+    for same in (root.parent, tmp_path / "new/../bedroom", tmp_path / "link"):
+        assert brought(root, same) == {}
+
+
+def test_a_look_in_the_place_of_one_that_would_go_along_stays(root, tmp_path):
+    painted(root)
+    (tmp_path / "new/looks").mkdir(parents=True)
+    there = tmp_path / "new/looks/oil.usda"
+    there.write_bytes((root.parent / "looks/oil.usda").read_bytes())
+    assert [*brought(root, tmp_path / "new")] == ["./looks/oil.usda"]  # the same one is no other
+    there.write_text("#usda 1.0\n")
+    with pytest.warns(UserWarning, match=r"new/looks/oil.usda: is another look; that of .*bedroom is not taken along"):
+        assert brought(root, tmp_path / "new") == {}

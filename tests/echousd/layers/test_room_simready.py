@@ -5,7 +5,9 @@ from pxr import Usd, UsdGeom, UsdPhysics
 from small_room import BARE, StandIn, small_graph
 
 import echousd
+from echousd.layers import simready
 from echousd.layers.simready import FURNITURE, pack
+from echousd.stage.paths import payload_file
 
 
 @pytest.fixture(scope="module")
@@ -56,3 +58,24 @@ def test_wrong_names_and_packages_in_the_way_are_told(room, tmp_path, echousd_co
     done = echousd_command("assets", "pack", tmp_path / "other.usda", "-o", tmp_path / "out")
     assert done.code == 2
     assert "not a room made by `echousd generate`" in done.err
+
+
+def test_a_room_that_is_half_written_is_not_packed(room, tmp_path, monkeypatch):
+    monkeypatch.setattr("echousd.pending.half_written", lambda folder: folder == room.parent)
+    with pytest.raises(ValueError, match="bedroom: half-written, by a run that was interrupted or has not ended"):
+        pack(room, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_models_that_are_anothers_wholly_or_in_part_are_left_out(room, tmp_path, monkeypatch):
+    def files(root, manifest, name):
+        found = read(root, manifest, name)
+        if name == "bed":
+            return {**found, "assets/bed/original/bed.png": b"picture"}
+        return {path: held for path, held in found.items() if name != "lamp" or path != payload_file("lamp")}
+
+    read = simready._files
+    monkeypatch.setattr(simready, "_files", files)
+    layers, left, _ = pack(room, tmp_path, names=["bed", "lamp", "wardrobe"])
+    assert [path.stem for path in layers] == ["wardrobe"]
+    assert [sentence.partition(":")[0] for sentence in left] == ["bed", "lamp"]
