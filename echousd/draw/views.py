@@ -31,10 +31,9 @@ PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from wh
 WHOLE, CLEAR = 1000.0, 80.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
 LOOKED, CHOSEN, TRIED = 64, 6, 16  # eyes of which one view is looked at closely; eyes, and of each so many views
 LOW = 1.4  # metres: over what is so high one looks
-# one bare wall: what all of a picture costs, from which share on, metres of rounding; what the main piece at the border
-# costs, and from which share of half the picture's width on it is aside
+# one bare wall: what all of a picture costs, from which share on, metres of rounding
 BARE, BAREST, DEEP = 650.0, 0.22, 0.02
-MIDDLE, ASIDE = 60.0, 0.33
+MIDDLE, ASIDE = 60.0, 0.33  # what the main piece at the border costs, from which share of half the width on
 SMALL, LARGE = 20.0, 5.0  # what a metre costs that the main piece is further away, and from where on
 BEFORE, WALLED = 2.6, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
 FILLED, BEHIND = 650.0, 90.0  # metres of depth that a picture full of what is near costs, and the main piece's back

@@ -132,8 +132,7 @@ def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: 
     return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, weighed(pieces))
 
 
-# metres of bare wall that ask for a picture, for a wide one, and for three
-STRETCH, UPRIGHT, LONG = 1.0, 2.0, 3.0
+STRETCH, UPRIGHT, LONG = 1.0, 2.0, 3.0  # metres of bare wall that ask for a picture, a wide one, three
 STEP = 0.1  # metres from spot to spot along a wall
 PROBE = np.array([0.3, 0.8, 0.03])  # a picture that tells whether a spot is bare
 EMPTY = 0.65  # metres around a corner where nothing stands

@@ -248,8 +248,7 @@ def _heights(corners: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def throws(setting: Setting) -> None:
-    """A blanket across the foot of every bed that lets it lie flat and hang down; over an arm of most sofas and of some
-    armchairs."""
+    """A blanket across the foot of every bed that lets it lie flat and hang down, over an arm of most other seats."""
     for host in dict.fromkeys([*setting.of("bed", "sofa"), *setting.inviting("cushions")]):
         rng, seat, role = setting.rng(host.name, "throw"), _Seat.of(host), host.row.role
         if seat is None or (role in DRAPED and not setting.has(DRAPED[role], rng)):

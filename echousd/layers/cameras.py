@@ -21,8 +21,7 @@ MAIN = ("bed", "sofa", "board", "screen", "cook")  # roles, a task: what a pictu
 
 
 def main_piece(room: str, categories: Sequence[str], furniture: Furniture) -> int | None:
-    """Row of the largest bed, else sofa, table, screen or hob, of those first that the type of a room is known by; None
-    where there is none of these."""
+    """Row of the largest bed, else sofa, table, screen or hob, what the room is known by first; None without one."""
     signs = vocabulary().room_type(room).signs
     kinds = [vocabulary().category(word) for word in categories]
     found = [

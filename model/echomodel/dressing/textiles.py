@@ -16,8 +16,7 @@ LIES = (11, 16)  # cells in which a throw knows what it lies on
 FOLD = 0.125  # metres of curtain from one fold to the next
 # where in a fold its cloth has points, radians from where it is foremost: it bends alike at each
 BENDS = np.array([0.5, np.pi / 2, np.pi - 0.5, np.pi, np.pi + 0.5, 1.5 * np.pi, 2 * np.pi - 0.5, 2 * np.pi])
-# what curtains are of, how often
-DRAPES = {"curtain": 0.25, "linen": 0.15, "drape": 0.25, "velvet": 0.2, "drape_striped": 0.15}
+DRAPES = ("curtain", "curtain", "linen", "drape", "drape", "velvet", "drape_striped")  # what curtains are of
 THROWS = ("accent_cloth", "accent_cloth", "accent_striped", "accent_checked")
 
 
@@ -61,7 +60,7 @@ def cafe_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 
 def _drape(rng: np.random.Generator) -> str:
-    return str(rng.choice(list(DRAPES), p=list(DRAPES.values())))
+    return str(rng.choice(DRAPES))
 
 
 def _rings(size: Size, apart: float, below: float = 0.0) -> list[Solid]:
@@ -133,17 +132,14 @@ def roman_blind(size: Size, rng: np.random.Generator) -> list[Solid]:
     return solids
 
 
-CLOTHS = {
-    "accent_cloth": 0.2, "accent_plain": 0.1, "blanket": 0.1, "velvet": 0.15, "linen": 0.1, "drape": 0.05,
-    "accent_striped": 0.15, "accent_checked": 0.15,
-}  # fmt: skip
+CLOTHS = ("accent_cloth", "accent_plain", "accent_striped", "accent_checked", "blanket", "velvet", "linen", "drape")
 TRIMS = ("", "", "cord", "cord", "button", "tassels")  # of cushions
 
 
 def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
     """A cushion on one of its sides, full or slack, of one of some cloths or of a print, trimmed in some way."""
     w, h, d = size
-    cloth, trim = str(rng.choice(list(CLOTHS), p=list(CLOTHS.values()))), str(rng.choice(TRIMS))
+    cloth, trim = str(rng.choice(CLOTHS)), str(rng.choice(TRIMS))
     cord = str(rng.choice(("linen", "ebony", "blanket", "accent_plain")))
     body = pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), shown or cloth)
     made: list[Solid] = [replace(body, power=float(rng.choice((3.0, 4.0, 5.5))))]
@@ -155,9 +151,7 @@ def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid
     return made + [ball((x, y, 0), (0.016, 0.022, 0.014), cord) for x, y in ends]
 
 
-def lumbar_cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
-    """A long low cushion for the small of the back, as `cushion`."""
-    return cushion(size, rng, shown)
+lumbar_cushion = cushion  # long and low, for the small of the back
 
 
 def throw(size: Size, rng: np.random.Generator, lie: tuple[float, ...] = ()) -> list[Solid]:

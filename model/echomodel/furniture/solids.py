@@ -217,9 +217,6 @@ class Tube(Solid):
         return loft(rings)
 
 
-RINGS = (9, 13, 21, 33)  # of a `Shell`, by detail
-
-
 @dataclass(frozen=True, eq=False)
 class Shell(Solid):
     """A standing wall bent round the back: half a superellipse, `half` = half width and depth behind z = 0, metres.
@@ -234,12 +231,13 @@ class Shell(Solid):
     front: float = 0.6
     power: float = 2.5
     ease: float = 3.0
+    RINGS = (9, 13, 21, 33)  # by detail
 
     def _top(self, angle: Array) -> Array:
         return self.back + (self.front - self.back) * np.clip(np.abs(angle) / (np.pi / 2), 0, 1) ** self.ease
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        angle = np.linspace(-np.pi / 2, np.pi / 2, RINGS[detail])
+        angle = np.linspace(-np.pi / 2, np.pi / 2, self.RINGS[detail])
         s, c = np.sin(angle), np.cos(angle)
         norm = (np.abs(s) ** self.power + np.abs(c) ** self.power) ** (1 / self.power)
         top, rings = self._top(angle), []
@@ -251,7 +249,7 @@ class Shell(Solid):
         return loft(rings)
 
     def runs(self, vertices: Array) -> list[Array]:
-        count = next(n for n in RINGS if (len(vertices) - 2) % n == 0)
+        count = next(n for n in self.RINGS if (len(vertices) - 2) % n == 0)
         rings, ends = vertices[:-2].reshape(count, -1, 3), np.linspace(0, count - 1, 7).round().astype(int)
         return [rings[first : last + 1].reshape(-1, 3) for first, last in pairwise(ends)]
 
