@@ -181,7 +181,7 @@ def test_json_of_libraries_and_of_jobs_for_painters(graph, tmp_path, echousd_com
     told = read(echousd_command("assets", "index", root.parent / "assets", "-o", index, "--workers", 1, "--json").out)
     assert told["written"] == [str(index)]
     words = [{*path.name.split("_")} for path in (root.parent / "assets").iterdir()]
-    furniture = sum(bool(of & {"plant", "radiator"}) for of in words)  # of small things
+    furniture = sum(bool(of & {"plant", "radiator", "shelf"}) for of in words)  # of small things
     assert told["usable"] == 5 + furniture  # the two nightstands are one
     assert told["models"] - told["usable"] == len(told["left_out"])
     told = read(echousd_command("assets", "review", index, "--json").out)
