@@ -24,6 +24,7 @@ from echousd.shapes.geometry import Origin, Original
 from echousd.shapes.looks import Look, look
 from echousd.stage.boxes import read_dressing
 from echousd.stage.graphs import read_graph
+from echousd.stage.labels import labels
 from echousd.stage.paths import component_file, piece_name
 from echousd.stage.pen import Pen
 
@@ -520,3 +521,17 @@ def test_a_room_that_nobody_saves_is_told_as_from_the_present_folder(room, monke
 def test_a_root_tells_what_it_was_made_from(room, source):
     told = simready_data(replace(room, provenance=replace(room.provenance, source=source)))
     assert told["source_file"] == told["SimReady_Metadata"]["source_file"] == (source or "none")
+
+
+@pytest.mark.parametrize("asked", [{}, {"ceiling": True}, {"materialx": True}, {"ceiling": True, "materialx": True}])
+def test_ceilings_and_networks_are_there_where_they_are_asked_for(tmp_path, asked):
+    made = echousd.generate(
+        small_graph(), seed=3, model=StandIn(), place=False, shapes="boxes", walls=True, dress="none", **asked
+    )
+    stage = Usd.Stage.Open(str(made.save(tmp_path / "bedroom", preview=False)))
+    words = {word for prim in stage.Traverse() for word in labels(prim)}
+    assert ("ceiling" in words) == ("ceiling" in asked)
+    materials = [UsdShade.Material(prim) for prim in stage.Traverse() if prim.IsA(UsdShade.Material)]
+    own = [one for one in materials if str(one.GetPath()).startswith("/Room/Looks")]
+    assert own
+    assert {bool(one.GetSurfaceOutput("mtlx").GetAttr()) for one in own} == {"materialx" in asked}
