@@ -255,8 +255,8 @@ class Shell(Solid):
 
 
 def _corners(detail: int, radius: float) -> int:
-    """Corners of a round outline: fewer for what is small."""
-    return ((8, 12, 20, 32) if radius > 0.05 else (6, 8, 12, 16))[detail]
+    """Corners of a round outline: fewer for what is small, more for what would show them, as a bed's arched head."""
+    return ((8, 16, 28, 48) if radius > 0.3 else (8, 12, 20, 32) if radius > 0.05 else (6, 8, 12, 16))[detail]
 
 
 def superellipse(power: float, corners: int = 32) -> Array:
