@@ -140,8 +140,7 @@ FLOORS = (5.0, 13.0, 24.0)  # m² of floor from which on one, two, three corners
 
 
 def bare_walls(setting: Setting) -> None:
-    """A picture as wide as suits the stretch on the longest bare one of every wall, three equal ones where it is very
-    long."""
+    """A picture on the longest bare stretch of every wall, as wide as suits it; three equal ones on a very long one."""
     if not setting.walls or setting.use:
         return
     found = [(length, middle, wall) for wall in walls_of(setting) for length, middle in stretches(setting, wall)]

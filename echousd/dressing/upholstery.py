@@ -133,9 +133,11 @@ def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -
 
 def _lying(host: Standing, seat: _Seat, spot: np.ndarray | None, turn: float, size: np.ndarray) -> np.ndarray | None:
     """A place near a spot (3,) that is clear of the host and on what is below; None where there is none."""
+    if spot is None:
+        return None
     for _ in range(3):
-        down = None if spot is None else seat.below(spot, size)
-        upon = None if spot is None or down is None else _upon(host, np.array([spot[0], down, spot[2]]), size)
+        down = seat.below(spot, size)
+        upon = None if down is None else _upon(host, np.array([spot[0], down, spot[2]]), size)
         clear = None if upon is None else _clear_of(host, upon + np.array([0.0, 0.002, 0.0]), turn, size)
         if upon is None or clear is None:
             return None

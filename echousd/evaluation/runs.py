@@ -47,8 +47,8 @@ class SuiteSettings:
 
     Arguments:
         systems: as `System.parse` reads them; the first is what others are compared with.
-        against: rooms, room set (its held-out rooms), SG-FRONT folder (its test split), or `generated`: rooms of
-            the room generator that no training saw.
+        against: rooms of any source, of a set those held out, of SG-FRONT the test split, or `generated`: rooms of the
+            room generator that no training saw.
         count: rooms that are laid out. seed: of every draw. only: sections, () = all.
         relations: an object where people would tell them. drafts: of `+half`, of which the best is kept.
         shapes: set of shapes to compare pieces with, None = the programs' own, drawn anew.

@@ -13,11 +13,7 @@ from echousd.make.verdicts import colliding
 from echousd.place.living import living_faults
 
 LEAST_FIRST = ("decor", "light", "seat", "screen", "storage", "board", "sofa", "bed")  # what a room misses least
-
-
 IN_THE_WAY = 0.1  # metres into the swing of a door or the way through a passage
-
-
 Layout = tuple[Boxes, tuple[str, ...]]
 
 
