@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pxr import Gf, Usd, UsdGeom, UsdLux
+from pxr import Usd, UsdGeom, UsdLux
 
 from echomodel.triangles import area_normals
 from echousd.draw.drawables import image_of, world_frame
+from echousd.stage.lights import emitted
 
 if TYPE_CHECKING:
     from echousd.draw.scenery import Scenery
@@ -56,7 +57,7 @@ class Lights:
 
 
 def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
-    """The lights of a stage: domes, the brightest distant light, spheres; panels where it is dark and no lamp is.
+    """The lights of a stage: domes, the brightest distant light, spheres; flat ones where it is dark and no lamp is.
 
     `shades`: of everything that glows its triangles (f, 3, 3) in the world, metres.
     """
@@ -66,11 +67,10 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
     for prim in stage.Traverse():
         if not prim.HasAPI(UsdLux.LightAPI) or UsdGeom.Imageable(prim).ComputeVisibility() == "invisible":
             continue
-        light = UsdLux.LightAPI(prim)
-        strength = float(light.GetIntensityAttr().Get() or 0.0) * 2.0 ** float(light.GetExposureAttr().Get() or 0.0)
-        color = strength * np.array(light.GetColorAttr().Get() or Gf.Vec3f(1.0), np.float32)
+        color = emitted(prim, float(frame[0, 0])).astype(np.float32)
         world = frame @ np.array(cache.GetLocalToWorldTransform(prim)).T
         if prim.IsA(UsdLux.DomeLight):
+            strength = float(color.max())
             domes, sky, tint = domes + 1, sky + strength, color / max(strength, 1e-9)
             picture = UsdLux.DomeLight(prim).GetTextureFileAttr().Get()
             view = view if picture is None else _out_of_focus(image_of(str(prim.GetPath()), picture.resolvedPath))
@@ -79,10 +79,9 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
             suns.append(np.stack([towards, color]))
         elif prim.IsA(UsdLux.SphereLight):
             bulbs.append(_spots(world[:3, 3], shades))
-            power.append(color / 4)  # of what is told as radiance times area, what goes each way
-        elif prim.IsA(UsdLux.RectLight):
-            area = np.prod([prim.GetAttribute(f"inputs:{side}").Get() * frame[0, 0] for side in ("width", "height")])
-            panels.append((_spots(world[:3, 3] - (0, OWN, 0), ()), color * area / 4))
+            power.append(color / 4)  # what goes each way
+        elif prim.IsA(UsdLux.RectLight) or prim.IsA(UsdLux.DiskLight):
+            panels.append((_spots(world[:3, 3] - (0, OWN, 0), ()), color / 4))
     if not bulbs and domes and sky < DAY:
         bulbs, power = [list(each) for each in zip(*panels, strict=True)] or [[], []]
     sun = max(suns, key=lambda one: float(one[1].sum()), default=None)

@@ -19,6 +19,7 @@ from echousd.draw.drawables import Drawable, Paint, Texture, image_of, own_categ
 from echousd.exporting.packing import Reach
 from echousd.stage import values
 from echousd.stage.layouts import selected_layout
+from echousd.stage.lights import emitted
 from echousd.stage.read import facts, find_rooms, node_names, room_spec
 from echousd.textures import encoded, texture_bytes
 
@@ -337,30 +338,17 @@ def _tilt(found: Gf.Camera) -> float:
 def _light(prim: Usd.Prim, metres: float) -> dict[str, Any] | None:
     """A light in the words of KHR_lights_punctual; None for one that is out, and for kinds that it does not know."""
 
-    def number(name: str) -> float:
-        return values.number(prim.GetAttribute(f"inputs:{name}"), 0.0)
-
-    api = UsdLux.LightAPI(prim)
-    color = np.array(values.given(api.GetColorAttr()) or (1, 1, 1), float)
-    if values.given(api.GetEnableColorTemperatureAttr()):
-        color = color * UsdLux.BlackbodyTemperatureAsRgb(number("colorTemperature"))
-    color = np.clip(color, 0.0, None)
-    radiance = number("intensity") * 2.0 ** np.clip(number("exposure"), -60, 60) * color.max(initial=0.0)
-    normalized = bool(values.given(api.GetNormalizeAttr()))
+    color = emitted(prim, metres)
     kind: dict[str, Any]
     if prim.IsA(UsdLux.DistantLight):
-        disc = np.pi * np.sin(np.radians(number("angle")) / 2) ** 2
-        kind, intensity = {"type": "directional"}, radiance * (1.0 if normalized or disc == 0 else disc)
+        kind, share = {"type": "directional"}, 1.0
     elif prim.IsA(UsdLux.SphereLight):
-        kind = {"type": "point"}
-        intensity = radiance * (0.25 if normalized else np.pi * (number("radius") * metres) ** 2)
+        kind, share = {"type": "point"}, 0.25  # of its surface is seen from anywhere
     elif prim.IsA(UsdLux.RectLight) or prim.IsA(UsdLux.DiskLight):
-        round_ = prim.IsA(UsdLux.DiskLight)
-        area = (np.pi * number("radius") ** 2 if round_ else number("width") * number("height")) * metres**2
-        kind = {"type": "spot", "spot": {"outerConeAngle": np.pi / 2}}
-        intensity = radiance * (1.0 if normalized else area)
+        kind, share = {"type": "spot", "spot": {"outerConeAngle": np.pi / 2}}, 1.0
     else:
         return None
-    if not (np.isfinite(intensity) and np.isfinite(color).all() and intensity > 0):
+    intensity = color.max() * share
+    if not (np.isfinite(color).all() and intensity > 0):
         return None
     return kind | {"color": [round(float(c), 6) for c in color / color.max()], "intensity": round(float(intensity), 6)}

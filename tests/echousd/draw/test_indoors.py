@@ -67,6 +67,7 @@ def lights_of(**power: float) -> Usd.Stage:
         kind = kinds.get(name, UsdLux.SphereLight)
         light = kind.Define(stage, f"/{name}")
         light.CreateIntensityAttr(intensity)
+        light.CreateNormalizeAttr(name in ("sun", "lamp"))
         light.CreateColorAttr(Gf.Vec3f(1.0, 0.5, 0.25))
         if name not in ("dome", "sun"):
             light.AddTranslateOp().Set(Gf.Vec3d(100, 200, 300))
@@ -74,7 +75,7 @@ def lights_of(**power: float) -> Usd.Stage:
 
 
 def test_lights_are_read_in_any_unit_and_axis():
-    lights = read_lights(lights_of(dome=0.5, sun=2.0, lamp=8.0))
+    lights = read_lights(lights_of(dome=0.5, sun=2.0, lamp=80000.0))  # 8 m²
     assert lights.sky == 0.5
     np.testing.assert_allclose(lights.sun, [(0, 1, 0), (2.0, 1.0, 0.5)], atol=1e-6)  # straight down from +Z
     np.testing.assert_allclose(lights.bulbs - np.float32((1, 3, -2)), 0, atol=0.051)
@@ -90,7 +91,7 @@ def test_a_panel_lights_what_is_dark_and_has_no_lamp():
     np.testing.assert_allclose(lights.power, [(1.0, 0.5, 0.25)], rtol=1e-6)
     np.testing.assert_allclose(lights.bulbs - np.float32((1, 2.75, -2)), 0, atol=0.051)
     assert len(read_lights(lights_of(dome=1.0, panel=40000.0)).power) == 0
-    assert read_lights(lights_of(dome=0.1, panel=40000.0, lamp=8.0)).power.max() == 2.0
+    assert read_lights(lights_of(dome=0.1, panel=40000.0, lamp=80000.0)).power.max() == 2.0
 
 
 def box_room(**lights) -> tuple:

@@ -241,3 +241,15 @@ def test_a_room_says_which_layout_it_is(tmp_path):
     room = made.save(tmp_path / "bedroom", preview=False)
     said = read_gltf(export(room, tmp_path / "room.glb", layout=1)).tree["nodes"][0]["extras"]
     assert said["layout"] == "layout_1"
+
+
+def test_a_lamp_of_a_stage_in_centimetres_shines_as_in_metres(tmp_path):
+    stage = Usd.Stage.CreateNew(str(tmp_path / "lamp.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    UsdGeom.Cube.Define(stage, "/cube")
+    lamp = UsdLux.SphereLight.Define(stage, "/lamp")
+    lamp.CreateIntensityAttr(80000.0)  # radiance times a surface in square centimetres
+    lamp.CreateNormalizeAttr(True)
+    stage.Save()
+    gltf = read_gltf(export(tmp_path / "lamp.usda", tmp_path / "lamp.glb"))
+    assert [one["intensity"] for one in gltf.tree["extensions"]["KHR_lights_punctual"]["lights"]] == [2.0]

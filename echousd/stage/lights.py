@@ -1,0 +1,41 @@
+"""What a light of a stage gives, whoever wrote it: UsdLux has its size within or without its intensity, in any unit."""
+
+from __future__ import annotations
+
+import numpy as np
+from pxr import Usd, UsdLux
+
+from echousd.stage import values
+
+MAX_STOPS = 60  # of exposure, either way
+
+
+def emitted(prim: Usd.Prim, metres: float) -> np.ndarray:
+    """(3,) float by colour: a dome's radiance, a distant light's irradiance, else radiance times surface in m²; zeros
+    for kinds without a known surface.
+
+    `metres`: in the stage's unit. Source: UsdLux.LightAPI, `inputs:normalize`. Raises StageError for what is no number.
+    """
+
+    def number(name: str) -> float:
+        return values.number(prim.GetAttribute(f"inputs:{name}"), 0.0)
+
+    light = UsdLux.LightAPI(prim)
+    color = np.array(values.given(light.GetColorAttr()) or (1, 1, 1), float)
+    if values.given(light.GetEnableColorTemperatureAttr()):
+        color = color * UsdLux.BlackbodyTemperatureAsRgb(number("colorTemperature"))
+    color = np.clip(color, 0.0, None) * number("intensity") * 2.0 ** np.clip(number("exposure"), -MAX_STOPS, MAX_STOPS)
+    if prim.IsA(UsdLux.DomeLight):
+        return color
+    whole = bool(values.given(light.GetNormalizeAttr()))
+    if prim.IsA(UsdLux.DistantLight):
+        disc = np.pi * np.sin(np.radians(number("angle")) / 2) ** 2
+        return color if whole or disc == 0 else color * disc
+    surface = 0.0
+    if prim.IsA(UsdLux.SphereLight):
+        surface = 4 * np.pi * number("radius") ** 2
+    elif prim.IsA(UsdLux.DiskLight):
+        surface = np.pi * number("radius") ** 2
+    elif prim.IsA(UsdLux.RectLight):
+        surface = number("width") * number("height")
+    return color * metres**2 * (float(surface > 0) if whole else surface)
