@@ -87,8 +87,7 @@ def write_physics(pen: Pen, shell: Mapping[str, str]) -> None:
     `pen`: of a layer in metres and kilograms, whose up axis is Y below `/Room`. `shell`: path of a solid mesh -> how it
     collides.
     """
-    down = {"float physics:gravityMagnitude": GRAVITY, "vector3f physics:gravityDirection": (0, -1, 0)}
-    pen.define(SCENE, "PhysicsScene", down)
+    pen.define(SCENE, "PhysicsScene", {"float physics:gravityMagnitude": GRAVITY})  # down by the stage, whoever's it is
     for path, form in shell.items():
         collides(pen, path, form)
     bind_contact(pen, SHELL, f"{SHELL}/contact", WOODEN)

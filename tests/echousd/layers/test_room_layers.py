@@ -8,6 +8,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdSemantics, UsdShad
 from small_room import BARE, OBJECTS, StandIn, small_graph
 
 import echousd
+from echousd.checks.physics_rules import gravity
+from echousd.checks.reading import Reading
 from echousd.draw.sight import Furniture
 from echousd.draw.views import perspective_views, shifted, stage_views
 from echousd.dressing.dress import dress
@@ -18,6 +20,7 @@ from echousd.layers.materials import define_material, look_images, tint_factor
 from echousd.layers.materialx import write_networks
 from echousd.layers.placed import MODEL, PLACES, carried_files
 from echousd.options import RoomOptions
+from echousd.settle.settle import read_world
 from echousd.shapes import walls
 from echousd.shapes.finishes.baking import hexadecimal
 from echousd.shapes.geometry import Origin, Original
@@ -437,8 +440,19 @@ def test_z_up_room_is_turned_as_a_whole(room, tmp_path):
     )
     np.testing.assert_allclose(place, (-1.25, 1.4, 0.5), atol=1e-4)
     gravity = UsdPhysics.Scene(stage.GetPrimAtPath("/Room/PhysicsScene")).GetGravityDirectionAttr().Get()
-    assert gravity == Gf.Vec3f(0, 0, -1)
+    assert gravity == Gf.Vec3f(0, 0, 0)  # down by the up axis of the stage that it is opened in
     assert read_graph(stage) == room.graph
+
+
+def test_gravity_points_down_in_whatever_stage_refers_to_a_room(root):
+    world = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(world, UsdGeom.Tokens.z)
+    room = UsdGeom.Xform.Define(world, "/World/Room")
+    room.AddRotateXOp().Set(90)
+    room.GetPrim().GetReferences().AddReference(str(root))
+    assert world.GetPrimAtPath("/World/Room/PhysicsScene").IsA(UsdPhysics.Scene)
+    assert list(gravity(Reading(world))) == []
+    np.testing.assert_allclose(read_world(world).gravity, (0, 0, -9.81), atol=1e-3)
 
 
 def test_walls_stand_around_the_floor(tmp_path):
