@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from echousd.assets.reference import STRETCH
-from echousd.graph.fields import RESIDENTS, SHAPES
+from echousd.graph.fields import IDENTIFIER, RESIDENTS, SHAPES
 from echousd.graph.nodes import PlainModel
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ class Look(BaseModel):
     )
     meters_per_unit: float = row(1.0, FILES, "unit of the files, in assets too", ge=1e-6, le=1e6)
     room_path: str = row(
-        "/Room", FILES, "prim path of the room", words="path", pattern=r"^(/[A-Za-z_][A-Za-z0-9_]*)+$", max_length=200
+        "/Room", FILES, "prim path of the room", words="path", pattern=f"^(/{IDENTIFIER.pattern})+$", max_length=200
     )
     faces: int = row(FACES, FILES, "face budget of each mesh", ge=100)
     atlas: bool = row(False, FILES, "unwrap without overlaps, not along the axes (extra: texture)")

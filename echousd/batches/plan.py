@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache, cached_property
@@ -19,8 +18,9 @@ from echomodel.files import bounded_lines, whole_file
 from echousd.batches.options import BatchOptions, BatchRequest
 from echousd.batches.sources import find_graphs
 from echousd.folder.lock import LOCK
-from echousd.folder.manifest import MAX_SEED, find_manifest
+from echousd.folder.manifest import MAX_SEED, Name, find_manifest
 from echousd.folder.within import check_links, inside
+from echousd.graph.fields import IDENTIFIER
 from echousd.graph.files import LAYER_FORMS
 from echousd.naming import as_identifier
 from echousd.options import told
@@ -32,7 +32,6 @@ STORE = "store"  # folder of the assets that the rooms share
 PLAN, GRAPHS = "plan.jsonl", "graphs.jsonl"
 MOST = 1_000_000  # rooms of a run: a plan is held in memory
 SHELF = 1000  # rooms in one folder
-ID = re.compile(r"^[A-Za-z_][A-Za-z0-9_]{0,254}$")  # name of a room's folder and root layer
 Seed = Annotated[int, Field(strict=True, ge=0, le=MAX_SEED)]
 Text = Annotated[str, Field(min_length=0)]  # which UTF-8 can hold: a length is asked of no other
 
@@ -52,7 +51,7 @@ class Entry:
     __pydantic_config__ = ConfigDict(extra="forbid")
 
     number: Seed
-    id: Annotated[str, Field(pattern=ID.pattern)]
+    id: Name
     origin: Text
     graph: Text
     seed: Seed
@@ -267,7 +266,7 @@ def is_row(row: Any) -> bool:
 
 def _is_root(name: str) -> bool:
     path = PurePosixPath(name)
-    return path.name == name and path.suffix in LAYER_FORMS and ID.fullmatch(path.stem) is not None
+    return path.name == name and path.suffix in LAYER_FORMS and IDENTIFIER.fullmatch(path.stem) is not None
 
 
 JOURNAL = "journal.jsonl"

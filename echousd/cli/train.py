@@ -258,13 +258,13 @@ def import_rooms(
     Example: echousd data import my_stages more_rooms.json -o mine.npz
     """
     from echomodel.data.sgfront import SGFront
-    from echousd.evaluation.runs import foreign_rooms
+    from echousd.evaluation.runs import rooms_from
 
     _check_one_file(out, force=force)
     found: list[RoomBoxes] = []
     for source in sources:
         sgfront = (source / "classes_all.txt").exists()
-        found += SGFront(source, room, split).rooms() if sgfront else foreign_rooms(source)
+        found += SGFront(source, room, split).rooms() if sgfront else rooms_from(source)
     if not found:
         raise ValueError(f"{', '.join(map(str, sources))}: no room found")
     _write_one_file(out, found, "imported rooms")

@@ -135,7 +135,7 @@ def rooms_against(settings: SuiteSettings) -> tuple[list[RoomBoxes], list[RoomBo
     elif published:
         rooms = SGFront(path, split="test").rooms()
     else:
-        rooms = foreign_rooms(path, held_out=True)
+        rooms = rooms_from(path, held_out=True)
     known = [
         replace(new, relations=old.relations if published and len(new) == len(old) else None)
         for new, old in zip(known_rooms(settings.against, rooms), rooms, strict=True)
@@ -194,7 +194,7 @@ def _timed(work: Callable[..., Any], *given: Any) -> tuple[Any, float]:
 def rooms_of(system: System, settings: SuiteSettings) -> tuple[list[Task], list[str]]:
     """Rooms from elsewhere as tasks that they answered themselves, and what was left out of them, a sentence each."""
     assert system.foreign is not None
-    found = foreign_rooms(system.foreign)
+    found = rooms_from(system.foreign)
     known = known_rooms(system.name, found)
     odd = sorted({word for old, new in zip(found, known, strict=True) for word in {*old.categories}
                   if vocabulary().known_category(word) is None})  # fmt: skip
@@ -237,7 +237,7 @@ BUFFER = 0.1  # metres that Holodeck adds to what an object covers
 Object = tuple[str, np.ndarray, np.ndarray, float]  # word, size, position, yaw
 
 
-def foreign_rooms(path: Path, *, held_out: bool = False) -> list[RoomBoxes]:
+def rooms_from(path: Path, *, held_out: bool = False) -> list[RoomBoxes]:
     """The rooms at a path, whatever wrote them; the words are theirs. `held_out`: of a set those that it holds out.
 
     Raises ValueError that names the file, for none and for what cannot be read.
@@ -245,12 +245,10 @@ def foreign_rooms(path: Path, *, held_out: bool = False) -> list[RoomBoxes]:
     if path.is_dir() and not any(path.rglob("rooms-*.npz")):
         files = sorted(file for file in path.rglob("*.json") if not {*ASSETS} & {*file.relative_to(path).parts})
         found = [room for file in files for room in _from_json(file)]
-        if found:
-            return found
-        stages = stages_at(path)
-        if not stages:
+        found += [room for file in stages_at(path) for room in read_stage(file)]
+        if not found:
             raise ValueError(f"{path}: no room in this folder, allowed: rooms of ours, USD, rooms or scene JSON")
-        return [room for file in stages for room in read_stage(file)]
+        return found
     if path.suffix in STAGE_FORMS:
         return read_stage(path)
     rooms = _from_json(path) if path.is_file() and path.suffix != ".npz" else load_rooms(path, held_out=held_out)

@@ -9,12 +9,13 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from echousd.folder.within import check_links, inside
+from echousd.graph.fields import IDENTIFIER
 from echousd.options import MAX_SEED, Look, told
 
 MANIFEST_KEY = "echousd_room"
 LARGEST = 64 * 2**20  # bytes of a manifest or journal that are read
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=255)]
+Name = Annotated[str, Field(pattern=f"^{IDENTIFIER.pattern}$", max_length=255)]
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]*$", max_length=128)]
 
 

@@ -134,7 +134,7 @@ class HomeGraph(PlainModel):
         relations: list[HomeRelation] = []
 
         def rooms(word: str) -> list[str]:
-            match = re.fullmatch(r"([A-Za-z_][A-Za-z0-9_]*)(?:\*([1-9]|[1-3][0-9]))?", word)
+            match = re.fullmatch(rf"({field.IDENTIFIER.pattern})(?:\*([1-9]|[1-3][0-9]))?", word)
             if match is None:
                 raise GraphError(f"rooms: {field.shown(word)}, allowed: a room type, or several of it as in bedroom*2")
             many = match[2] and match[2] != "1"

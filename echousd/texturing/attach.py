@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from echousd.draw.surfaces import Painted, Surfaces, read_surfaces
 from echousd.folder import folder as folders
 from echousd.folder import ownership
 from echousd.folder.manifest import find_manifest
+from echousd.graph.fields import IDENTIFIER
 from echousd.graph.files import LAYER_FORMS
 from echousd.layers import paintings
 from echousd.layers.paintings import FOLDER, MADE, RECORD, VARIANTS, primvar
@@ -30,7 +30,7 @@ from echousd.stage.values import reading
 from echousd.texturing.job import Job, read_job
 from echousd.texturing.results import Results, read_results
 
-NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
+LONGEST = 64  # characters of a name
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def import_job(
         raise ValueError(f"{room}: allowed: a room's root layer, {', '.join(LAYER_FORMS)}")
     task = read_job(folder)
     name = name or task.tool
-    if not NAME.fullmatch(name) or name == paintings.MADE:
+    if not IDENTIFIER.fullmatch(name) or len(name) > LONGEST or name == paintings.MADE:
         raise ValueError(
             f"name is {name!r:.80}, allowed: letters, digits and _, not beginning with a digit, not {paintings.MADE!r}"
         )

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from echomodel.files import read_bounded, telling
 from echousd.folder.within import inside
+from echousd.graph.fields import IDENTIFIER
 from echousd.options import told
 from echousd.texturing.atlas import Unwrapped, layout_digest
 from echousd.texturing.obj import read_obj
@@ -22,7 +23,7 @@ JOB = "job.json"
 LARGEST = 32 * 2**20  # bytes of a job.json
 RESULTS = "results"
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=200)]
+Name = Annotated[str, Field(pattern=f"^{IDENTIFIER.pattern}$", max_length=200)]
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]
 Row = tuple[float, float, float, float]
 

@@ -12,7 +12,7 @@ from echomodel.metrics.layouts import tasks_of
 from echomodel.roomboxes import write_rooms
 from echomodel.rooms.generator import generate_rooms
 from echousd.evaluation import runs
-from echousd.evaluation.runs import SuiteSettings, foreign_rooms, rooms_against, rooms_of
+from echousd.evaluation.runs import SuiteSettings, rooms_against, rooms_from, rooms_of
 from echousd.evaluation.suite import evaluate
 from echousd.evaluation.systems import System
 from echousd.stage.boxes import write_stages
@@ -38,9 +38,15 @@ def test_rooms_files_and_stages(rooms, tmp_path):
     (tmp_path / "single").mkdir()
     (tmp_path / "single" / "one.json").write_text(json.dumps(rooms[0].to_json()))
     for path, count in (("rooms.json", 3), ("usd", 3), ("single", 1)):
-        found = sorted(foreign_rooms(tmp_path / path), key=lambda room: room.id)
+        found = sorted(rooms_from(tmp_path / path), key=lambda room: room.id)
         assert len(found) == count
         assert all(same(a, b) for a, b in zip(found, sorted(rooms, key=lambda room: room.id), strict=False))
+
+
+def test_a_folder_is_read_whole_whatever_its_rooms_are_written_as(rooms, tmp_path):
+    write_rooms(tmp_path / "rooms.json", rooms[:2])
+    write_stages(rooms[2:], tmp_path)
+    assert sorted(room.id for room in rooms_from(tmp_path)) == sorted(room.id for room in rooms)
 
 
 def state(matrix, model="data.m1"):
@@ -61,7 +67,7 @@ def test_sceneeval_tells_sizes_by_its_models(tmp_path):
     turn = trimesh.transformations.rotation_matrix(math.pi / 2, [0, 0, 1], [0, 0, 0])
     matrix = trimesh.transformations.translation_matrix((1, 2, 0)) @ turn @ upright
     (tmp_path / "scene_0.json").write_text(json.dumps(state(matrix)))
-    (room,) = foreign_rooms(tmp_path)
+    (room,) = rooms_from(tmp_path)
     assert room.categories == ("coffee_table",)
     assert room.room_type == "bedroom"
     assert room.height == 2.5
@@ -71,7 +77,7 @@ def test_sceneeval_tells_sizes_by_its_models(tmp_path):
     assert room.floor_polygon.tolist() == [[0, 0], [4, 0], [4, -6], [0, -6]]
     (tmp_path / "scene_1.json").write_text(json.dumps(state(matrix, "data.gone")))
     with pytest.raises(ValueError, match=r"scene_1.json: model data.gone is not there, wanted: _data/<data set>/gone"):
-        foreign_rooms(tmp_path)
+        rooms_from(tmp_path)
 
 
 def test_holodeck_is_mirrored_and_in_centimetres(tmp_path):
@@ -82,7 +88,7 @@ def test_holodeck_is_mirrored_and_in_centimetres(tmp_path):
     house = {"rooms": [{"id": "living", "roomType": "living room", "floorPolygon": corners}], "walls": [],
              "objects": [sofa], "wall_height": 2.7}  # fmt: skip
     (tmp_path / "house.json").write_text(json.dumps(house))
-    (room,) = foreign_rooms(tmp_path / "house.json")
+    (room,) = rooms_from(tmp_path / "house.json")
     assert room.size[0] == pytest.approx([2.0, 0.8, 1.0])
     assert room.position[0] == pytest.approx([-1.0, 0.0, 2.0])
     assert math.sin(room.yaw[0]) == pytest.approx(-1.0)  # +x there is -x here
@@ -101,7 +107,7 @@ def test_scenesmith_has_boxes_and_quaternions(tmp_path):
         "room_geometry": {"length": 4, "width": 5},
     }
     (tmp_path / "state.json").write_text(json.dumps(raw))
-    (room,) = foreign_rooms(tmp_path)
+    (room,) = rooms_from(tmp_path)
     assert room.categories == ("double_bed",)
     assert room.size[0] == pytest.approx([1.6, 0.6, 2.0])
     assert room.position[0] == pytest.approx([1.0, 0.0, -2.0])
@@ -121,11 +127,11 @@ def test_scenesmith_has_boxes_and_quaternions(tmp_path):
 def test_bad_files_are_named(name, text, told, tmp_path):
     (tmp_path / name).write_text(text)
     with pytest.raises(ValueError) as error:  # noqa: PT011
-        foreign_rooms(tmp_path / name)
+        rooms_from(tmp_path / name)
     assert told in str(error.value)
     (tmp_path / "empty").mkdir()
     with pytest.raises(ValueError, match="empty: no room in this folder, allowed: rooms of ours, USD, rooms or scene"):
-        foreign_rooms(tmp_path / "empty")
+        rooms_from(tmp_path / "empty")
 
 
 def test_they_stand_in_the_tables_with_what_was_left_out(rooms, tmp_path, monkeypatch):

@@ -9,7 +9,7 @@ import trimesh
 import echousd
 from echomodel.roomboxes import RoomBoxes
 from echousd.cli.main import run
-from echousd.evaluation.runs import foreign_rooms
+from echousd.evaluation.runs import rooms_from
 from echousd.graph import SceneGraph
 
 GRAPH = """
@@ -80,7 +80,7 @@ def test_models_stand_where_they_stood_with_z_up(exported):
 
 def test_what_was_exported_is_read_as_it_was(exported):
     room, out = exported
-    (found,) = foreign_rooms(out / "input" / "EchoUSD")
+    (found,) = rooms_from(out / "input" / "EchoUSD")
     assert isinstance(found, RoomBoxes)
     assert found.categories == tuple(node.category for node in room.graph.nodes)
     assert np.allclose(found.position, room.boxes.position, atol=4e-3)
