@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from echomodel.boxes2d import upright
 from echousd.graph import SceneGraph
 from echousd.options import RoomOptions
 from echousd.shapes.styles import style_groups
@@ -172,14 +173,17 @@ class RoomData:
         top = float((np.asarray(self.boxes.position)[:, 1] + np.asarray(self.boxes.size)[:, 1]).max(initial=0.0))
         return max(self.graph.room.tall, top)
 
+    @property
+    def corners(self) -> np.ndarray:
+        """(k, 2) float: the floor's corners in the order in which the openings of the graph count its edges."""
+        stated = self.graph.room.corners
+        return np.asarray(self.floor if stated is None else stated, float)
+
     def pose(self, number: int, layout: int = 0) -> np.ndarray:
         """(4, 4) float: object frame -> room frame of one object in one layout."""
         boxes = self.layouts[layout] if self.layouts else self.boxes
-        yaw = float(boxes.yaw[number])
         matrix = np.eye(4)
-        matrix[0, 0] = matrix[2, 2] = np.cos(yaw)
-        matrix[0, 2], matrix[2, 0] = np.sin(yaw), -np.sin(yaw)
-        matrix[:3, 3] = np.asarray(boxes.position[number], float)
+        matrix[:3, :3], matrix[:3, 3] = upright(float(boxes.yaw[number])), np.asarray(boxes.position[number], float)
         return matrix
 
     def scene(self) -> trimesh.Scene:

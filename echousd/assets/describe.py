@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 from trimesh.sample import sample_surface
 
+from echomodel.boxes2d import upright
 from echomodel.data.sheet import thumbnail
 from echomodel.files import within_memory
 from echomodel.vocabulary import vocabulary
@@ -62,8 +63,7 @@ def left_out(entry: Entry, library: Path, fault: str) -> AssetRecord:
 def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool, encoder: object) -> AssetRecord:
     turn = np.array(Z_UP if found.z_up else UPRIGHT).reshape(3, 3) if entry.turn is None else entry.turn
     if found.yaw:
-        c, s = np.cos(found.yaw), np.sin(found.yaw)
-        turn = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]) @ turn
+        turn = upright(-found.yaw) @ turn
     placed = found.points @ turn.T
     low, high = placed.min(0), placed.max(0)
     extents = high - low

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from echomodel.boxes2d import footprints
+from echomodel.boxes2d import axes, footprints
 from echomodel.dressing import SMALL
 from echomodel.openings import SKIRTING, segment
 from echomodel.triangles import along, area_normals, connected_pieces, distances, spread
@@ -19,7 +19,6 @@ from echousd.place.geometry import (
     TOUCH,
     Collision,
     Floor,
-    axes,
     depth_inside,
     floor_from_polygon,
     pair_indices,
@@ -134,7 +133,7 @@ def _screens(whole: Whole) -> Iterator[Misplacement]:
     screens: list[tuple[str, Shape]] = [(one.name, one) for one in objects if one.node.category in SCREENS]
     screens += [(one.name, one.shape) for one in whole.small if one.word in SCREENS and one.shape is not None]
     for name, screen in screens:
-        front = np.array([np.sin(screen.yaw), np.cos(screen.yaw)])
+        front = axes(screen.yaw)[1]
         before = screen.position[[0, 2]] + front * (screen.size[2] / 2 + CLOSE)
         below = [one for one in objects if one is not screen and _carries(one, screen)]
         across = any(np.cos(one.yaw - screen.yaw) < ACROSS for one in below)
@@ -144,7 +143,7 @@ def _screens(whole: Whole) -> Iterator[Misplacement]:
 
 def _carries(one: Shape, thing: Shape, hung: bool = False) -> bool:
     """Whether a thing stands on the top of another, or hangs from it."""
-    local = np.abs((thing.position[[0, 2]] - one.position[[0, 2]]) @ axes(np.array([one.yaw]))[0].T)
+    local = np.abs((thing.position[[0, 2]] - one.position[[0, 2]]) @ np.stack(axes(one.yaw), 1))
     over = float(one.position[1] + one.size[1] - thing.position[1])
     held = over >= thing.size[1] if hung else abs(over) < FLOATING
     return held and bool((local <= one.size[[0, 2]] / 2).all())
@@ -181,7 +180,7 @@ def _small_faults(
         yield "sunk", -bottom
         return
     if kind.fixed and not kind.lies:
-        front = np.array([np.sin(shape.yaw), np.cos(shape.yaw)])
+        front = axes(shape.yaw)[1]
         back = shape.position[[0, 2]] - front * shape.size[2] / 2
         off = float(depth_inside(floor, back[None])[0])
         racks = [carrier for carrier in carriers if isinstance(carrier, RoomObject)]
@@ -231,7 +230,7 @@ def _air_below(thing: Shape, others: Sequence[Shape], *, draped: bool = False) -
     for other in others:
         if other is thing:
             continue
-        local = np.abs((feet - other.position[[0, 2]]) @ axes(np.array([other.yaw]))[0].T)
+        local = np.abs((feet - other.position[[0, 2]]) @ np.stack(axes(other.yaw), 1))
         if (local <= other.size[[0, 2]] / 2).all(1).any():
             air = min(air, abs(bottom - float(other.position[1] + other.size[1])))
             # Things stand on shelves and seats, below the top of the whole box.
@@ -360,7 +359,7 @@ def _scatter(points: np.ndarray, faces: np.ndarray, count: int) -> np.ndarray:
 
 
 def _local(points: np.ndarray, solid: Shape) -> np.ndarray:
-    u = axes(np.array([solid.yaw]))[0]
+    u = np.stack(axes(solid.yaw))
     offset = points - solid.position
     plan = offset[..., [0, 2]] @ u.T
     return np.stack((plan[..., 0], offset[..., 1] - solid.size[1] / 2, plan[..., 1]), -1)

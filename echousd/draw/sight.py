@@ -6,6 +6,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from echomodel.boxes2d import axes, upright
+
 CUT = 3.0  # how much more what is cut off by a picture's border disturbs
 ASPECT = 1.6  # of a picture from inside: its width over its height
 # rays through such a picture whose half width at distance 1 is 1, which go level, and what each of these counts
@@ -27,7 +29,7 @@ class Furniture:
     def facing(self) -> np.ndarray:
         """(2,) float, x and z of the mean front, weighted by volume."""
         weight = self.size.prod(1)
-        front = np.array([(np.sin(self.yaw) * weight).sum(), (np.cos(self.yaw) * weight).sum()])
+        front = (axes(self.yaw)[1] * weight[:, None]).sum(0)
         return front / max(float(weight.sum()), 1e-9)
 
     @property
@@ -74,10 +76,7 @@ class Furniture:
 
     def _turns(self) -> np.ndarray:
         """(n, 3, 3) from the room's frame to each object's."""
-        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        turn = np.zeros((len(self.size), 3, 3))
-        turn[:, 0, 0], turn[:, 0, 2], turn[:, 1, 1], turn[:, 2, 0], turn[:, 2, 2] = cos, -sin, 1.0, sin, cos
-        return turn
+        return upright(-self.yaw)
 
 
 def filled(away: np.ndarray, reach: np.ndarray) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from pxr import UsdGeom
 
+from echomodel.boxes2d import axes
 from echomodel.openings import inward_normal
 from echomodel.triangles import cross
 from echousd.draw.scenery import Scenery
@@ -142,7 +143,7 @@ def inside_view(
     main = _main(furniture) if main is None else main
     row = np.arange(len(everything.size))
     reach = np.where((row < len(things.size)) & (row != main), BEFORE, WALLED)
-    aim, front = furniture.position[main, [0, 2]], np.array([np.sin(furniture.yaw[main]), np.cos(furniture.yaw[main])])
+    aim, front = furniture.position[main, [0, 2]], axes(furniture.yaw[main])[1]
     around = 0.5 * aim + 0.5 * furniture.position[:, [0, 2]].mean(0)
     high, stands = things.position[:, 1] > HIGH, np.arange(len(things.size)) < count
     fragile = [_shades(furniture, height), things.corners[high & ~stands], things.corners[stands & ~high]]

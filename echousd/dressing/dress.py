@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from pxr import Sdf
 
+from echomodel.boxes2d import CORNERS, turned
 from echomodel.dressing import KINDS, usual_size
 from echomodel.dressing import thing as solids_of
 from echomodel.openings import inward_normal
@@ -112,11 +113,9 @@ def setting_of(room: RoomData, layout: int = 0) -> Setting:
         node.name: standing(node.name, node.category, size[i], position[i], yaw[i], room.geometry[node.name])
         for i, node in enumerate(room.graph.nodes)
     }
-    corners = room.graph.room.corners
-    floor = np.asarray(room.floor if corners is None else corners, float)
     who = room.graph.room.resident or guessed(room.graph.room.type, [o.row for o in objects.values()])
     return Setting(
-        objects, floor, tuple(room.graph.room.openings), room.height, room.options.walls,
+        objects, room.corners, tuple(room.graph.room.openings), room.height, room.options.walls,
         room.options.dress == "full", room.provenance.seed, vocabulary().room_type(room.graph.room.type).use,
         story(who), who if any(o.row.role == "bed" for o in objects.values()) else "",
         room.graph.room.style,
@@ -248,9 +247,7 @@ def _hangs(setting: Setting, thing: Thing) -> bool:
     kind = KINDS[thing.kind]
     if not (setting.walls and kind.fixed) or kind.lies:
         return False
-    cos, sin, deep = np.cos(thing.yaw), np.sin(thing.yaw), thing.size[2] / 2
-    ends = (-thing.size[0] / 2, thing.size[0] / 2)
-    back = [thing.position[[0, 2]] + (side * cos - deep * sin, -side * sin - deep * cos) for side in ends]
+    back = turned(thing.size[::2] / 2 * CORNERS[:2], thing.yaw) + thing.position[::2]
     return bool((shapely.distance(setting.room.exterior, shapely.points(back)) <= AT_WALL).all())
 
 

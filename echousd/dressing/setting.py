@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from echomodel.boxes2d import footprints, seen
+from echomodel.boxes2d import footprints, seen, turned
 from echomodel.dressing import KINDS
 from echomodel.openings import Opening, free_area
 from echomodel.vocabulary import Category, vocabulary
@@ -79,9 +79,9 @@ class Standing:
 
     def to_room(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) points of the object's frame in the room's."""
-        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        x, y, z = np.asarray(points, float).T
-        return np.stack([cos * x + sin * z, y, cos * z - sin * x], 1) + self.position
+        there = np.array(points, float)
+        there[:, ::2] = turned(there[:, ::2], self.yaw)
+        return there + self.position
 
     def on_floor(self, x: float, z: float) -> np.ndarray:
         """(3,) the point of the room's floor below or above a point (x, z) of the object's frame."""

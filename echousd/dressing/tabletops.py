@@ -9,6 +9,7 @@ from itertools import islice
 import numpy as np
 import shapely
 
+from echomodel.boxes2d import turned
 from echomodel.dressing import KINDS, usual_size
 from echomodel.dressing.books import BOUND, bound
 from echomodel.triangles import area_normals
@@ -242,7 +243,6 @@ def shelved_books(setting: Setting, row: Thing, rng: np.random.Generator) -> Non
     setting.placed.remove(row)
     wide, tall, deep = (float(v) for v in row.size)
     at, front = -wide / 2, deep / 2
-    cos, sin = np.cos(row.yaw), np.sin(row.yaw)
     order = setting.rng("books").permutation(BOUND).tolist()
     fitting = list(islice((n for n in order if bound(n)[1] <= tall and bound(n)[2] <= deep), VOLUMES))
     while fitting:
@@ -250,8 +250,8 @@ def shelved_books(setting: Setting, row: Thing, rng: np.random.Generator) -> Non
         size = bound(number)
         if at + size[0] > wide / 2:
             return
-        x, z = at + size[0] / 2, front - size[2] / 2
-        place = row.position + np.array([cos * x + sin * z, 0.0, cos * z - sin * x])
-        setting.placed.append(Thing("book", size, place, row.yaw, row.on, number))
+        place = np.array([at + size[0] / 2, 0.0, front - size[2] / 2])
+        place[::2] = turned(place[::2], row.yaw)
+        setting.placed.append(Thing("book", size, row.position + place, row.yaw, row.on, number))
         at += size[0] + BETWEEN
     setting.placed.append(row)

@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 import shapely
 
+from echomodel.boxes2d import upright
 from echomodel.dressing import usual_size
 from echomodel.dressing.prints import names_of
 from echomodel.dressing.textiles import LIES
@@ -121,8 +122,7 @@ def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -
     pillow = np.concatenate([
         np.stack([ring[:, 0] * size[0], np.full(24, y), ring[:, 1] * size[2]], 1) for y in (0.0, size[1])
     ])  # fmt: skip
-    cos, sin = np.cos(turn), np.sin(turn)
-    stood = pillow @ np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]]) + spot
+    stood = pillow @ upright(-turn) + spot
     taken = forbidden_moves([stood], [collider.mesh.vertices for collider in host.geometry.colliders], ASIDE)
     free = shapely.Point(0, 0).buffer(ASIDE).difference(taken)
     if free.is_empty:

@@ -8,6 +8,7 @@ from itertools import islice, product
 
 import numpy as np
 
+from echomodel.boxes2d import axes
 from echomodel.dressing import KINDS, usual_size
 from echomodel.dressing import thing as solids_of
 from echomodel.dressing.prints import printed
@@ -212,7 +213,7 @@ def hung_together(
 
 def _behind(host: Standing, walls: list[Wall]) -> tuple[Wall, float] | None:
     """The wall at an object's back and where along it the object's middle is."""
-    front = np.array([np.sin(host.yaw), np.cos(host.yaw)])
+    front = axes(host.yaw)[1]
     back = host.position[[0, 2]] - front * host.size[2] / 2
     for wall in walls:
         along = float((back - wall.start) @ wall.along)

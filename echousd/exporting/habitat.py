@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdPhysics
 
+from echomodel.boxes2d import upright
 from echousd.exporting.glb import glb, object_glb
 from echousd.exporting.packing import Reach
 from echousd.graph import SceneGraph
@@ -159,9 +160,7 @@ def scene_state(graph: SceneGraph) -> dict[str, Any]:
         if node.position is None or node.yaw is None:
             raise ValueError(f"object {node.name!r} has no place, allowed: a position and a yaw for every object")
         pose = np.eye(4)
-        cos, sin = np.cos(node.yaw), np.sin(node.yaw)
-        pose[:3, :3] = [[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]]
-        pose[:3, 3] = node.position
+        pose[:3, :3], pose[:3, 3] = upright(node.yaw), node.position
         data = [round(float(v), 6) for v in (Z_UP @ pose).T.flatten()]
         objects.append(
             {"id": str(index), "index": index, "modelId": f"{PREFIX}.{model_name(node.name)}", "parentId": "",

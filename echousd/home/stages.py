@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom
 
-from echomodel.boxes2d import footprints
+from echomodel.boxes2d import footprints, upright
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, SceneGraph
 from echousd.graph.files import STAGE_FORMS
@@ -156,9 +156,7 @@ def furniture(plan: Plan, path: Path) -> list[Standing]:
 
 def _upright(rotation: np.ndarray) -> np.ndarray:
     """The turn about +Y nearest to a rotation: rooms stand on their floor."""
-    angle = np.arctan2(rotation[0, 2] - rotation[2, 0], rotation[0, 0] + rotation[2, 2])
-    cos, sin = np.cos(angle), np.sin(angle)
-    return np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
+    return upright(np.arctan2(rotation[0, 2] - rotation[2, 0], rotation[0, 0] + rotation[2, 2]))
 
 
 def _names(paths: list[Sdf.Path]) -> dict[Sdf.Path, str]:

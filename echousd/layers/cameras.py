@@ -33,10 +33,10 @@ def main_piece(room: str, categories: Sequence[str], furniture: Furniture) -> in
 
 def window_boxes(room: RoomData) -> Furniture:
     """Windows as boxes of 2 cm at the inner side of their walls: doors and passages are as bare as these."""
-    corners, rows = room.graph.room.corners, []
-    for opening in (one for one in room.graph.room.openings if corners is not None and one.kind == "window"):
-        x, z = segment(corners, opening).mean(0)
-        yaw = np.arctan2(*inward_normal(corners, opening.edge))
+    rows = []
+    for opening in (one for one in room.graph.room.openings if one.kind == "window"):
+        x, z = segment(room.corners, opening).mean(0)
+        yaw = np.arctan2(*inward_normal(room.corners, opening.edge))
         rows.append((opening.width, opening.height, 0.02, x, opening.sill, z, yaw))
     table = np.array(rows, float).reshape(-1, 7)
     return Furniture(table[:, :3], table[:, 3:6], table[:, 6])
@@ -92,8 +92,7 @@ def room_points(room: RoomData) -> np.ndarray:
     points = [Furniture(*(np.asarray(values, float) for values in boxes)).corners.reshape(-1, 3)]
     points += [np.insert(room.floor, 1, height, axis=1) for height in (-walls.THICKNESS, 0.0)]
     if room.options.walls:
-        spec = room.graph.room
-        outer = walls.outline(room.floor if spec.corners is None else spec.corners, spec.walls)
+        outer = walls.outline(room.corners, room.graph.room.walls)
         points += [np.insert(outer, 1, height, axis=1) for height in (-walls.THICKNESS, room.height)]
     if room.options.ceiling:
         points.append(np.insert(room.floor, 1, room.height + walls.THICKNESS, axis=1))

@@ -111,9 +111,8 @@ def _panel(pen: Pen, bounds: np.ndarray, height: float) -> float:
 
 def _sun(pen: Pen, room: RoomData) -> Intensities:
     """The sun through the widest window, from a little aside."""
-    corners = room.graph.room.corners
-    windows = [opening for opening in room.graph.room.openings if opening.kind == "window"]
-    if corners is None or not windows:
+    corners, windows = room.corners, [opening for opening in room.graph.room.openings if opening.kind == "window"]
+    if not windows:
         return {}
     window = max(windows, key=lambda opening: opening.width * opening.height)
     near, far = segment(corners, window)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from pxr import Kind, Sdf
 
+from echomodel.boxes2d import axes
 from echomodel.furniture.solids import Joint
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal
 from echomodel.triangles import Mesh
@@ -52,25 +53,21 @@ def covered_walls(room: RoomData) -> dict[str, str]:
     if use == "wet" and room.options.walls:
         if any(row.task == "cook" for row, _ in at_walls):
             return {wall: "wall_tiles" for row, wall in at_walls if row.stands == "row"}
-        return {wall_name(edge): "wall_tiles" for edge in range(len(_corners(room)))}
+        return {wall_name(edge): "wall_tiles" for edge in range(len(room.corners))}
     style = vocabulary().known_style(room.graph.room.style)
     words = style.covers if style else [word for word, often in COVERS.items() for _ in range(often)]
     cover = words[drawn(room, "cover", len(words))] if room.options.walls and use != "outdoor" else ""
-    longest = wall_name(int(edge_lengths(_corners(room)).argmax()))
+    longest = wall_name(int(edge_lengths(room.corners).argmax()))
     behind = [wall for role in HOSTS for row, wall in at_walls if row.role == role]
     return {[*behind, longest][0]: cover} if cover else {}
 
 
-def _corners(room: RoomData) -> np.ndarray:
-    return np.asarray(room.floor if room.graph.room.corners is None else room.graph.room.corners, float)
-
-
 def _at_walls(room: RoomData) -> list[tuple[Category, str]]:
     """Rows of the objects that stand at a wall, in the order of the graph, and the wall's name."""
-    corners, out = _corners(room), list[tuple[Category, str]]()
+    corners, out = room.corners, list[tuple[Category, str]]()
     size, position, yaw = (np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw))
     for number, node in enumerate(room.graph.nodes):
-        front = np.array([np.sin(yaw[number]), np.cos(yaw[number])])
+        front = axes(yaw[number])[1]
         back = position[number, [0, 2]] - front * size[number, 2] / 2
         for edge, length in enumerate(edge_lengths(corners)):
             inside, off = inward_normal(corners, edge), back - corners[edge]
@@ -123,17 +120,16 @@ class ShellPrim:
 
 def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[ShellPrim]:
     """All parts of a room's shell, walls before what is in them; `bare`: windows that need no curtain rail."""
-    corners = room.graph.room.corners
-    plan = room.floor if corners is None else corners
     parts = [floor(room.floor)]
     if room.options.walls:
-        outdoor = vocabulary().room_type(room.graph.room.type).use == "outdoor"
         spec = room.graph.room
+        outdoor = vocabulary().room_type(spec.type).use == "outdoor"
         parts += walls(
-            plan, room.height, spec.openings, bare, outdoor=outdoor, thickness=spec.walls, millwork=millwork(room)
-        )
+            room.corners, room.height, spec.openings, bare, outdoor=outdoor, thickness=spec.walls,
+            millwork=millwork(room),
+        )  # fmt: skip
     if room.options.ceiling:
-        parts.append(ceiling(plan, room.height))
+        parts.append(ceiling(room.corners, room.height))
     coverings = {"Floor": floor_slot(room)} | covered_walls(room)
     forms = iter(surfaces([form for part in parts for form in _forms(part, coverings)]))
     return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component, forms)]

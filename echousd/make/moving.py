@@ -10,6 +10,7 @@ from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
 from echomodel.boxes import Boxes
+from echomodel.boxes2d import axes
 from echomodel.objective import Plan, faults_of, unreached
 from echomodel.objective.copies import copies_of
 from echomodel.objective.support import ON_CEILING
@@ -187,7 +188,7 @@ def pushed(scene: Scene, group: Sequence[int], moves: np.ndarray, way: np.ndarra
 
 def price(scene: Scene, mover: int, way: np.ndarray) -> float:
     """What a move costs: its length, more for what is large, and for a seat that does not go back."""
-    back = -np.array([np.sin(scene.heading[mover]), np.cos(scene.heading[mover])])
+    back = -axes(scene.heading[mover])[1]
     far = float(np.linalg.norm(way))
     aside = scene.seat[mover] and way @ back < 0.9 * far
     return far * float(scene.bulk[mover]) * (ASIDE if aside else 1.0)

@@ -10,7 +10,7 @@ import shapely
 from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
-from echomodel.boxes2d import footprints
+from echomodel.boxes2d import footprints, upright
 from echomodel.objective import Plan
 from echomodel.triangles import Mesh, connected_pieces
 from echousd.graph import SceneGraph
@@ -144,6 +144,4 @@ def _boards(mesh: Mesh) -> Solids:
 
 
 def _placed(points: np.ndarray, position: np.ndarray, yaw: float) -> np.ndarray:
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    turn = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])
-    return np.asarray(points, float) @ turn.T + position
+    return np.asarray(points, float) @ upright(yaw).T + position

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from echomodel.boxes2d import CORNERS, hull
+from echomodel.boxes2d import CORNERS, axes, hull
 from echomodel.floors import signed_distance
 from echomodel.late import Late
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, allowed_overlap
@@ -21,7 +21,7 @@ from echomodel.rules.geometry import PairGeometry
 from echomodel.rules.margins import pair_margins
 from echomodel.rules.placements import Spread, Stated, margin_of
 from echomodel.vocabulary import vocabulary
-from echousd.place.geometry import COLUMNS, PLAN, SIDES, axes, parting
+from echousd.place.geometry import COLUMNS, PLAN, SIDES, parting
 from echousd.place.setting import Setting
 
 csr_array = Late("scipy.sparse:csr_array")
@@ -86,7 +86,7 @@ class Constraints:
 
     def __init__(self, start: Setting) -> None:
         self.setting, self.yaw = start, start.yaw
-        self.axis = axes(start.yaw)
+        self.axis = np.stack(axes(start.yaw), 1)
         self.parting = parting(self.axis, start.pairs)
         self.handicap, self.barred = self._handicap(start), self._barred()
 

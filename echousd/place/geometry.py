@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from echomodel import boxes2d
 from echomodel.arrays import norm
 from echomodel.boxes2d import footprints, seen
 from echomodel.floors import signed_distance
@@ -23,11 +22,6 @@ if TYPE_CHECKING:
 
 COLUMNS = 6  # numbers of a box: its position x, y, z and its sides
 PLAN, SIDES = slice(0, 3, 2), slice(3, 6, 2)  # columns of x and z and of width and depth
-
-
-def axes(yaw: np.ndarray) -> np.ndarray:
-    """(n, 2, 2) float: unit vectors in (x, z) of the width axis [:, 0] and of the front [:, 1]."""
-    return np.stack(boxes2d.axes(yaw), 1)
 
 
 def pair_indices(n: int) -> np.ndarray:
@@ -42,7 +36,7 @@ def parting(axis: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     ahead along that, and where it is behind; by the numbers of the first, and of the second.
 
     Arguments:
-        axis: (n, 2, 2) float, `axes` of the boxes. pairs: (p, 2) int.
+        axis: (n, 2, 2) float, unit vectors in (x, z) to the side and to the front of the boxes. pairs: (p, 2) int.
     """
     out = np.zeros((len(pairs), 5, 2, 2, COLUMNS))
     along = axis[pairs].reshape(-1, 4, 2)

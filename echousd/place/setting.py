@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from echomodel.boxes2d import footprints, seen
+from echomodel.boxes2d import axes, footprints, seen
 from echomodel.objective import Plan, plan_of
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, carriers
 from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
 from echousd.place.distances import BEHIND, kept_behind
-from echousd.place.geometry import Floor, axes, floor_from_polygon, pair_indices
+from echousd.place.geometry import Floor, floor_from_polygon, pair_indices
 
 if TYPE_CHECKING:
     from echomodel.rules.placements import Stated, Walls
@@ -238,7 +238,7 @@ def lean(
     ]
     length = np.linalg.norm(floor.edge, axis=1)
     along = floor.edge / length[:, None]
-    facing = axes(yaw)[:, 1] @ floor.normal.T > np.cos(WALL_TURN)
+    facing = axes(yaw)[1] @ floor.normal.T > np.cos(WALL_TURN)
     corner = footprints(size, position, yaw)
     gap = ((corner[:, None] - floor.polygon[:, None]) * floor.normal[:, None]).sum(-1).min(2)
     at = ((position[:, None, [0, 2]] - floor.polygon) * along).sum(-1)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Usd, UsdGeom
 
+from echomodel.boxes2d import upright
 from echomodel.files import telling
 from echousd.draw.surfaces import Painted, Surfaces, read_surfaces
 from echousd.stage.contents import room_frame
@@ -168,8 +169,7 @@ def _frame(stage: Usd.Stage, thing: Painted) -> np.ndarray:
         own = room_frame(room, cache) @ np.array(cache.GetLocalToWorldTransform(stage.GetPrimAtPath(thing.path))).T
         front = own[:3, :3] @ (0.0, 0.0, 1.0)
         yaw = float(np.arctan2(front[0], front[2])) if np.hypot(front[0], front[2]) > 1e-3 else 0.0
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    turn = np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]])
+    turn = upright(-yaw)
     turned = corners @ turn.T
     low, high = turned.min(0), turned.max(0)
     out = np.eye(4)

@@ -5,6 +5,8 @@ Yaws are in radians; a yaw of shape (...) belongs to points or half extents (...
 
 from __future__ import annotations
 
+import numpy as np
+
 from echomodel.arrays import Array, cast, kit
 
 CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))  # of a footprint, those of the back first
@@ -29,6 +31,14 @@ def seen(points: Array, yaw: Array) -> Array:
     xp = kit(points)
     cos, sin, x, z = xp.cos(yaw), xp.sin(yaw), points[..., 0], points[..., 1]
     return xp.stack([cos * x - sin * z, sin * x + cos * z], -1)
+
+
+def upright(yaw: Array) -> np.ndarray:
+    """(..., 3, 3) float: what turns points of a frame, as columns, into the room's."""
+    turn = np.zeros((*np.shape(yaw), 3, 3))
+    turn[..., 0, 0] = turn[..., 2, 2] = np.cos(yaw)
+    turn[..., 0, 2], turn[..., 2, 0], turn[..., 1, 1] = np.sin(yaw), -np.sin(yaw), 1.0
+    return turn
 
 
 def outline(half: Array, yaw: Array, places: Array = CORNERS) -> Array:

@@ -238,5 +238,5 @@ def test_one_looks_at_windows_rather_than_at_doors_and_passages():
         Opening(kind, kind, edge, 2.0, 0.9, 2.0) for edge, kind in enumerate(("window", "door", "passage"))
     )
     graph = SceneGraph(RoomSpec("hallway", floor_polygon=corners, openings=openings), (Node("bench", "bench"),), ())
-    room = SimpleNamespace(graph=graph)
+    room = SimpleNamespace(graph=graph, corners=graph.room.corners)
     assert window_boxes(room).position[:, [0, 2]].round(2).tolist() == [[-2.0, 0.45]]
