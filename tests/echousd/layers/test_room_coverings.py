@@ -14,7 +14,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.layers.structure import COVERS, FLOORS, covered_walls, floor_slot, shell_prims
+from echousd.layers.structure import COVERS, FLOORS, covered_walls, floor_slot, millwork, shell_prims
 from echousd.options import RoomOptions
 from echousd.room import Provenance
 from echousd.shapes.finishes.slots import HARMONIES, SLOTS, metres_of
@@ -51,7 +51,7 @@ def test_of_two_walls_in_line_that_behind_the_bed_has_paper(room, x, wall):
     corners = ((-3, -3), (-1, -3), (-1, 0), (1, 0), (1, -3), (3, -3), (3, 3), (-3, 3))
     graph = SceneGraph(RoomSpec("bedroom", floor_polygon=corners), (Node("bed", "double_bed"),), ())
     boxes = Boxes(torch.tensor([[1.8, 0.5, 2.0]]), torch.tensor([[x, 0.0, -2.0]]), torch.zeros(1))
-    covered = [covered_walls(replace(seeded(room, seed), graph=graph, boxes=boxes)) for seed in range(12)]
+    covered = [covered_walls(replace(seeded(room, seed), graph=graph, layouts=(boxes,))) for seed in range(12)]
     assert {name for cover in covered for name in cover} == {wall}
 
 
@@ -62,7 +62,7 @@ def test_without_bed_and_sofa_the_wall_of_a_desk_or_shelf_is_covered_else_the_lo
     corners = ((-1, -2), (1, -2), (1, 2), (-1, 2))
     graph = SceneGraph(RoomSpec("study", floor_polygon=corners), (Node("it", word),), ())
     boxes = Boxes(torch.tensor([[1.2, 0.75, 0.6]]), torch.tensor([[0.0, 0.0, z]]), torch.zeros(1))
-    covered = [covered_walls(replace(seeded(room, seed), graph=graph, boxes=boxes)) for seed in range(12)]
+    covered = [covered_walls(replace(seeded(room, seed), graph=graph, layouts=(boxes,))) for seed in range(12)]
     assert {name for cover in covered for name in cover} == {wall}
 
 
@@ -112,7 +112,7 @@ def test_pieces_of_no_set_are_of_two_woods_at_most_and_not_all_of_one(room):
 def wet(room, kind, word, walls=True):
     graph = SceneGraph(RoomSpec(kind, size=(3.0, 2.4)), (Node("it", word),), ())
     boxes = Boxes(torch.tensor([[0.6, 0.9, 0.6]]), torch.tensor([[0.0, 0.0, -0.89]]), torch.zeros(1))
-    return replace(room, graph=graph, boxes=boxes, options=RoomOptions(walls=walls, dress="none"))
+    return replace(room, graph=graph, layouts=(boxes,), options=RoomOptions(walls=walls, dress="none"))
 
 
 def test_patterns_of_floors_and_walls_have_their_own_sizes(room):
@@ -127,6 +127,16 @@ def test_patterns_of_floors_and_walls_have_their_own_sizes(room):
         across = np.sort(np.ptp(form.points, axis=0))[-2:]  # of the whole, but for its thickness
         laid = np.sort(np.ptp(form.st, axis=0)) * metres_of(slot)
         assert laid[-1] == pytest.approx(across[-1], rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("kind", "word", "private"),
+    [("bedroom", "double_bed", True), ("bathroom", "toilet", True), ("living_room", "sofa", False)],
+)
+def test_nobody_looks_through_the_door_of_a_bedroom_or_bathroom(room, kind, word, private):
+    doors = {millwork(seeded(wet(room, kind, word), seed)).door for seed in range(30)}
+    assert ("glazed" not in doors) == private
+    assert len(doors) > 2
 
 
 def test_where_it_is_wet_there_are_tiles(room):

@@ -8,15 +8,16 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdSemantics, UsdShad
 from small_room import BARE, OBJECTS, StandIn, small_graph
 
 import echousd
+from echomodel.boxes import Boxes
 from echousd.checks.physics_rules import gravity
 from echousd.checks.reading import Reading
-from echousd.draw.sight import Furniture
+from echousd.draw.sight import ASPECT, Furniture
 from echousd.draw.views import perspective_views, shifted, stage_views
 from echousd.dressing.dress import dress
-from echousd.layers.cameras import room_points, write_cameras
+from echousd.layers.cameras import main_piece, room_points, write_cameras
 from echousd.layers.compose import _asset as made
 from echousd.layers.compose import room_files, simready_data, text
-from echousd.layers.materials import define_material, look_images, tint_factor
+from echousd.layers.materials import define_material, look_images, tint_factor, write_palettes
 from echousd.layers.materialx import write_networks
 from echousd.layers.placed import MODEL, PLACES, carried_files
 from echousd.options import RoomOptions
@@ -24,6 +25,7 @@ from echousd.settle.settle import read_world
 from echousd.shapes import walls
 from echousd.shapes.finishes.baking import hexadecimal
 from echousd.shapes.geometry import Origin, Original
+from echousd.shapes.hulls import hull_volume
 from echousd.shapes.looks import Look, look
 from echousd.stage.boxes import read_dressing
 from echousd.stage.graphs import read_graph
@@ -329,6 +331,47 @@ def test_bindings_are_no_custom_properties(stage):
     assert not any(spec.custom for binding in bindings for spec in binding.GetPropertyStack())
 
 
+def test_nothing_in_a_room_is_without_a_type(stage):
+    root = stage.GetPseudoRoot()
+    assert [str(prim.GetPath()) for prim in stage.Traverse() if not prim.GetTypeName()] == []
+    assert {prim.GetName() for prim in root.GetFilteredChildren(Usd.PrimIsDefined & ~Usd.PrimIsAbstract)} == {"Room"}
+    for name in ("Lights", "Cameras", "Looks"):
+        assert stage.GetPrimAtPath(f"/Room/{name}").GetTypeName() == "Scope"
+
+
+def test_every_layout_has_the_places_of_its_boxes(room, tmp_path):
+    moved = Boxes(room.boxes.size, room.boxes.position + 0.1, room.boxes.yaw + 0.5)
+    two = replace(room, layouts=(room.boxes, moved))
+    stage = Usd.Stage.Open(str(two.save(tmp_path / "two", preview=False)))
+    layouts = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
+    for number, word in enumerate(layouts.GetVariantNames()):
+        layouts.SetVariantSelection(word)
+        for row, name in enumerate(room.names):
+            prim = UsdGeom.Xformable(stage.GetPrimAtPath(f"/Room/Objects/{name}"))
+            found = np.array(prim.ComputeLocalToWorldTransform(0)).T
+            np.testing.assert_allclose(found, two.pose(row, number), atol=1e-4)
+    assert number == 1
+
+
+def test_what_many_hosts_read_is_said_as_they_read_it(root):
+    """Subsets that part the faces, guides that are not drawn, materials that are weaker than those below them."""
+    stage = Usd.Stage.Open(str(root.parent / "assets/bed/bed.usda"))
+    mesh = stage.GetPrimAtPath("/bed/geo/bed_mesh")
+    for subset in UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(mesh)):
+        assert (subset.GetElementTypeAttr().Get(), subset.GetFamilyNameAttr().Get()) == ("face", "materialBind")
+    assert UsdGeom.Subset.GetFamilyType(UsdGeom.Imageable(mesh), "materialBind") == "partition"
+    assert UsdGeom.Subset.ValidateFamily(UsdGeom.Imageable(mesh), "face", "materialBind")[0]
+    guides = [prim for prim in stage.Traverse() if prim.GetName().startswith("bed_collider")]
+    assert {UsdGeom.Imageable(prim).ComputePurpose() for prim in guides} == {"guide"}
+    contact = stage.GetPrimAtPath("/bed").GetRelationship("material:binding:physics")
+    assert UsdShade.MaterialBindingAPI.GetMaterialBindingStrength(contact) == "weakerThanDescendants"
+    bed = stage.GetPrimAtPath("/bed")
+    volume = sum(hull_volume(np.array(UsdGeom.Mesh(prim).GetPointsAttr().Get(), float)) for prim in guides)
+    told = UsdPhysics.MaterialAPI(stage.GetPrimAtPath("/bed/mtl/contact"))
+    assert told.GetDensityAttr().Get() * volume == pytest.approx(UsdPhysics.MassAPI(bed).GetMassAttr().Get(), rel=0.02)
+    assert 0 <= told.GetRestitutionAttr().Get() < 0.2  # nothing in a home bounces
+
+
 def test_lenses_are_told_in_tenths_of_a_metre(stage):
     camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective"))
     assert camera.GetHorizontalApertureAttr().Get() == pytest.approx(0.36)
@@ -355,6 +398,62 @@ def test_cameras_see_everything_and_light_is_there(stage, room):
     assert stage.GetPrimAtPath("/Room/Lights/ceiling").IsA(UsdLux.RectLight)
 
 
+def test_the_camera_above_has_the_whole_room_and_little_else_in_its_picture(stage, room):
+    points = room_points(room)
+    low, high = points.min(0), points.max(0)
+    camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/top")).GetCamera(0)
+    eye = np.array(camera.transform.ExtractTranslation())
+    np.testing.assert_allclose(eye[[0, 2]], ((low + high) / 2)[[0, 2]], atol=1e-5)
+    assert np.array(camera.transform.TransformDir(Gf.Vec3d(0, 0, -1))).round(6).tolist() == [0, -1, 0]
+    assert np.array(camera.transform.TransformDir(Gf.Vec3d(0, 1, 0))).round(6).tolist() == [0, 0, -1]
+    assert camera.horizontalAperture == camera.verticalAperture
+    side = camera.horizontalAperture / camera.focalLength * (eye[1] - high[1])  # of the picture at the tops, metres
+    assert 1.0 < side / (high - low)[[0, 2]].max() < 1.1
+    assert eye[1] > 5 * side  # from afar, so that heights hardly show
+    near, far = camera.clippingRange.min, camera.clippingRange.max
+    assert near < eye[1] - high[1]
+    assert eye[1] - low[1] < far < 1.2 * eye[1]
+    assert camera.focusDistance == pytest.approx(eye[1])
+
+
+def test_a_camera_is_sharp_where_what_the_room_is_for_stands():
+    floor = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
+    size, position = np.array([(1.8, 0.6, 2.0), (0.4, 0.4, 0.4)]), np.array([(0.9, 0, -0.9), (-1.5, 0, 1.5)])
+    furniture, points = Furniture(size, position, np.zeros(2)), np.insert(floor, 1, 2.5, axis=1)
+    for main, at in ((0, (0.9, 0.3, -0.9)), (1, (-1.5, 0.2, 1.5)), (None, (0, 2.5, 0))):
+        stage = Usd.Stage.CreateInMemory()
+        write_cameras(Pen(stage.GetRootLayer()), points, furniture, floor, main=main)
+        camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective")).GetCamera(0)
+        away = np.linalg.norm(np.array(camera.transform.ExtractTranslation()) - at)
+        assert camera.focusDistance == pytest.approx(away, rel=1e-5)
+        assert camera.clippingRange.min < 0.1
+        assert 10 < camera.clippingRange.max < 50
+        assert camera.horizontalAperture / camera.verticalAperture == pytest.approx(ASPECT)
+
+
+def test_what_a_room_is_for_is_its_largest_bed_or_what_its_type_is_known_by():
+    def main(room, *words):
+        size = np.array([(1.0 + 0.1 * row, 0.5, 1.0) for row in range(len(words))])
+        return main_piece(room, words, Furniture(size, np.zeros_like(size), np.zeros(len(words))))
+
+    assert main("bedroom", "desk", "single_bed", "double_bed", "wardrobe") == 2
+    assert main("bedroom", "wardrobe", "nightstand") is None
+    assert main("living_room", "dining_table", "sofa", "tv_stand") == 1
+    assert main("dining_room", "sofa", "dining_table") == 1
+    assert main("living_room", "sofa", "sofa") == 1  # the larger
+
+
+@pytest.mark.parametrize(("ceiling", "top"), [(False, 3.0), (True, 3.0 + walls.THICKNESS)])
+def test_the_volume_of_a_room_with_walls_reaches_to_their_outside(room, ceiling, top):
+    walled = replace(
+        room, graph=small_graph(height=3.0), options=RoomOptions(walls=True, ceiling=ceiling, dress="none")
+    )
+    points = room_points(walled)
+    wide = np.array([2.0, 1.7]) + walls.WALL
+    np.testing.assert_allclose([points.min(0), points.max(0)], [
+        (-wide[0], -walls.THICKNESS, -wide[1]), (wide[0], top, wide[1])], atol=1e-6)  # fmt: skip
+
+
 def test_a_camera_inside_has_the_shift_of_its_view(monkeypatch):
     level = np.array([[1.0, 0, 0, 0], [0, 1, 0, 1.2], [0, 0, 1, 3], [0, 0, 0, 1]])
     view = shifted(level, 0.25)
@@ -366,6 +465,60 @@ def test_a_camera_inside_has_the_shift_of_its_view(monkeypatch):
     none = Furniture(*np.zeros((2, 0, 3)), np.zeros(0))
     write_cameras(Pen(stage.GetRootLayer()), np.insert(floor, 1, 2.5, axis=1), none, floor)
     np.testing.assert_allclose(stage_views(stage)["perspective"].matrix, view, atol=1e-6)
+
+
+def test_a_palette_turns_images_and_plain_colours_alike_in_both_kinds_of_networks():
+    slots = ("floor", "wood", "glass", "metal")
+    tables = {word: {slot: look(word, slot) for slot in slots} for word in ("oak", "walnut")}
+    pen = Pen.blank("Room")
+    for slot, one in tables["oak"].items():
+        define_material(pen, f"/Room/Looks/{slot}", one, "oak", tinted=True)
+    write_palettes(pen, "oak", tables)
+    write_networks(pen, "oak", tables)
+    stage = Usd.Stage.Open(pen.layer)
+    palettes = stage.GetPrimAtPath("/Room").GetVariantSet("palette")
+    assert palettes.GetVariantSelection() == "oak"
+    for word, looks in tables.items():
+        palettes.SetVariantSelection(word)
+        for slot, one in looks.items():
+            at = f"/Room/Looks/{slot}"
+            if one.pattern:
+                factor = [b / a for a, b in zip(tables["oak"][slot].color, one.color, strict=True)]
+                scale = stage.GetAttributeAtPath(f"{at}/image.inputs:scale").Get()
+                assert list(scale) == pytest.approx([*factor, 1.0], abs=1e-3)
+                tint = UsdShade.Shader.Get(stage, f"{at}/mtlx_tint").GetInput("in2").Get()
+                assert list(tint) == pytest.approx(factor, abs=1e-3)
+            else:
+                for surface in ("surface", "mtlx_surface"):
+                    color = UsdShade.Shader.Get(stage, f"{at}/{surface}").GetInput("diffuseColor").Get()
+                    assert list(color) == pytest.approx(one.color, abs=1e-6)
+
+
+def test_an_image_of_directions_is_told_between_minus_one_and_one_in_both_kinds_of_networks():
+    pen, planks = Pen.blank("Room"), look("oak", "floor")
+    define_material(pen, "/Room/Looks/floor", planks, "oak")
+    write_networks(pen, "oak", {"oak": {"floor": planks}})
+    stage = Usd.Stage.Open(pen.layer)
+    image = UsdShade.Shader.Get(stage, "/Room/Looks/floor/normal")
+    scale, bias = (np.array(image.GetInput(name).Get()) for name in ("scale", "bias"))
+    assert (scale * 0.5 + bias)[:3].tolist() == [0, 0, 0]
+    assert (scale * 1.0 + bias)[:3].tolist() == [1, 1, 1]
+    steps = {name: UsdShade.Shader.Get(stage, f"/Room/Looks/floor/mtlx_{name}") for name in ("doubled", "centred")}
+    by = {name: step.GetInput("in2").Get() for name, step in steps.items()}
+    assert (steps["doubled"].GetIdAttr().Get(), by["doubled"]) == ("ND_multiply_vector3FA", 2.0)
+    assert (steps["centred"].GetIdAttr().Get(), by["centred"]) == ("ND_subtract_vector3FA", 1.0)
+    for name in ("image", "normal"):
+        spaces = {"image": "sRGB", "normal": "raw"}
+        assert (
+            UsdShade.Shader.Get(stage, f"/Room/Looks/floor/{name}").GetInput("sourceColorSpace").Get() == spaces[name]
+        )
+        file = UsdShade.Shader.Get(stage, f"/Room/Looks/floor/mtlx_{name}").GetInput("file")
+        assert file.Get().path.startswith("../textures/")
+        assert (file.GetAttr().GetColorSpace() == "srgb_texture") == (name == "image")
+    surface = UsdShade.Shader.Get(stage, "/Room/Looks/floor/surface")
+    for name, channel in (("diffuseColor", "rgb"), ("normal", "rgb"), ("roughness", "r")):
+        source, output, _ = surface.GetInput(name).GetConnectedSource()
+        assert (source.GetPrim().GetName(), output) == ({"diffuseColor": "image"}.get(name, name), channel)
 
 
 def test_looks_of_materialx_are_as_rough_as_their_picture_or_their_number():
@@ -447,6 +600,7 @@ def test_z_up_room_is_turned_as_a_whole(room, tmp_path):
 def test_gravity_points_down_in_whatever_stage_refers_to_a_room(root):
     world = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageUpAxis(world, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(world, 1.0)
     room = UsdGeom.Xform.Define(world, "/World/Room")
     room.AddRotateXOp().Set(90)
     room.GetPrim().GetReferences().AddReference(str(root))

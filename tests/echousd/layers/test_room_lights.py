@@ -15,7 +15,7 @@ from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.graph import RoomSpec
 from echousd.layers.cameras import room_points
-from echousd.layers.lights import ASIDE, ELEVATION, HUES, OVERHEAD, SHARES, TIMES, image_files, write_lights
+from echousd.layers.lights import ASIDE, ELEVATION, HUES, LAMPS, OVERHEAD, SHARES, TIMES, image_files, write_lights
 from echousd.options import RoomOptions
 from echousd.stage.pen import Pen
 
@@ -107,6 +107,32 @@ def test_there_is_a_sky_to_look_at_and_a_sun_that_blanks_no_wall(stage, tmp_path
         tmp_path / "bare", preview=False
     )
     assert not (bare.parent / "textures/sky.jpg").exists()  # nobody looks past walls that are not there
+
+
+def test_sun_panel_and_bulbs_are_as_large_as_real_ones(stage) -> None:
+    sun = UsdLux.DistantLight(stage.GetPrimAtPath("/Room/Lights/sun"))
+    assert sun.GetAngleAttr().Get() == pytest.approx(0.53, abs=0.02)  # degrees
+    assert sun.GetNormalizeAttr().Get()
+    bulb = UsdLux.SphereLight(stage.GetPrimAtPath("/Room/Lights/lamp_lamp"))
+    assert 0.02 < bulb.GetRadiusAttr().Get() < 0.06
+    panel = UsdLux.RectLight(stage.GetPrimAtPath("/Room/Lights/ceiling"))
+    sides = panel.GetWidthAttr().Get(), panel.GetHeightAttr().Get()
+    assert sides == pytest.approx((0.3 * 4.3, 0.3 * 3.7), abs=0.01)
+    place = UsdGeom.Xformable(panel).ComputeLocalToWorldTransform(0)
+    assert np.array(place.TransformDir(Gf.Vec3d(0, 0, -1))).round(6).tolist() == [0, -1, 0]
+    x, y, z = place.ExtractTranslation()
+    assert (x, z) == pytest.approx((0, 0), abs=1e-6)
+    assert 2.7 < y < 2.8
+    dome = UsdLux.DomeLight(stage.GetPrimAtPath("/Room/Lights/sky"))
+    assert dome.GetTextureFormatAttr().Get() == "latlong"
+
+
+def test_lamps_give_what_bulbs_give_that_one_buys() -> None:
+    sold = {"ceiling": (1500, 4000), "floor": (1000, 3000), "table": (450, 3000), "wall": (400, 3000)}
+    assert {*LAMPS} == {*sold}
+    for where, (lumens, kelvin) in LAMPS.items():
+        assert lumens == pytest.approx(sold[where][0], rel=1e-6)
+        assert kelvin == pytest.approx(sold[where][1], rel=0.1)
 
 
 def test_lights_are_coloured_without_temperatures_which_blender_does_not_read(stage) -> None:
