@@ -101,11 +101,10 @@ class RoomData:
     Arguments:
         name: valid identifier; file and default prim's asset name.
         graph: the graph that was asked for.
-        boxes: N boxes in the order of `graph.nodes`.
+        layouts: all arrangements of the furniture, N boxes each, in the order of `graph.nodes`; at least one.
         geometry: object name -> parts and colliders in the object's frame, metres, filling its box.
         assets: object name -> name of the asset that it references; objects with one asset have one geometry.
         floor: (k, 2) float, x and z of the floor's corners, counter-clockwise seen from above.
-        layouts: all arrangements of the same furniture; the first is `boxes`.
         outcomes: what became of each layout, in their order.
         notes: what the graph asks for in vain, one sentence each.
         timings: stage of the pipeline -> seconds.
@@ -116,11 +115,10 @@ class RoomData:
 
     name: str
     graph: SceneGraph
-    boxes: Boxes
+    layouts: tuple[Boxes, ...]
     geometry: Mapping[str, Geometry]
     assets: Mapping[str, str]
     floor: np.ndarray
-    layouts: tuple[Boxes, ...] = ()
     outcomes: tuple[LayoutOutcome, ...] = ()
     notes: tuple[str, ...] = ()
     provenance: Provenance = Provenance()
@@ -128,6 +126,11 @@ class RoomData:
     timings: Mapping[str, float] = field(default_factory=dict)
     carried: Mapping[str, Mapping[str, bytes]] = field(default_factory=dict)
     edited: Path | None = None
+
+    @property
+    def boxes(self) -> Boxes:
+        """The first layout."""
+        return self.layouts[0]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -181,7 +184,7 @@ class RoomData:
 
     def pose(self, number: int, layout: int = 0) -> np.ndarray:
         """(4, 4) float: object frame -> room frame of one object in one layout."""
-        boxes = self.layouts[layout] if self.layouts else self.boxes
+        boxes = self.layouts[layout]
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = upright(float(boxes.yaw[number])), np.asarray(boxes.position[number], float)
         return matrix

@@ -75,7 +75,7 @@ def dress(room: RoomData) -> Dressing:
     kinds: dict[str, tuple] = {}
     taken = {*room.names, *room.assets.values()}
     bare = {o.name for o in room.graph.room.openings if o.kind == "window"}
-    for number in range(max(len(room.layouts), 1)):
+    for number in range(len(room.layouts)):
         named: dict[str, Thing] = {}
         setting = dressed(room, number)
         bare -= setting.curtained
@@ -107,7 +107,7 @@ def dressed(room: RoomData, layout: int = 0) -> Setting:
 
 def setting_of(room: RoomData, layout: int = 0) -> Setting:
     """What the rules look at."""
-    boxes = room.layouts[layout] if room.layouts else room.boxes
+    boxes = room.layouts[layout]
     size, position, yaw = (np.asarray(v, float) for v in (boxes.size, boxes.position, boxes.yaw))
     objects = {
         node.name: standing(node.name, node.category, size[i], position[i], yaw[i], room.geometry[node.name])

@@ -181,7 +181,7 @@ def layout_layer(room: RoomData) -> Sdf.Layer:
     pen = _pen(room, "layout")
     pen.layer.pseudoRoot.SetInfo("upAxis", room.options.up_axis)  # its places are so already
     pen.over("/Room")
-    for number, inside in enumerate(layout_pens(pen, len(room.layouts or (room.boxes,)), "layout_0")):
+    for number, inside in enumerate(layout_pens(pen, len(room.layouts), "layout_0")):
         _place(inside, room, number)
     return pen.layer
 
@@ -345,7 +345,7 @@ def _pen(room: RoomData, layer: str) -> Pen:
 
 
 def _place(pen: Pen, room: RoomData, layout: int) -> None:
-    boxes = room.layouts[layout] if room.layouts else room.boxes
+    boxes = room.layouts[layout]
     for number, name in enumerate(room.names):
         x, y, z = (round(float(v), 5) + 0.0 for v in boxes.position[number])
         turn = ("float", round(float(np.degrees(float(boxes.yaw[number]))), 4) + 0.0)

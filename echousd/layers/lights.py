@@ -146,8 +146,7 @@ def _lamps(pen: Pen, room: RoomData) -> Intensities:
     for number, bulb in bulbs.items():
         colour = UsdLux.BlackbodyTemperatureAsRgb(LAMPS[rows[number].support][1])
         pen.define(f"{LIGHTS}/{bulb}", "SphereLight", {**values, "color3f inputs:color": colour})
-    for layout, inside in enumerate(layout_pens(pen, max(len(room.layouts), 1))):
-        boxes = room.layouts[layout] if len(room.layouts) > 1 else room.boxes
+    for boxes, inside in zip(room.layouts, layout_pens(pen, len(room.layouts)), strict=True):
         for number, bulb in bulbs.items():
             x, y, z = (float(v) for v in boxes.position[number])
             height = y - 0.06 if rows[number].support == "ceiling" else y + float(boxes.size[number][1]) + 0.06

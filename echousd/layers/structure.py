@@ -150,8 +150,6 @@ def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any], openings: S
     `data`: customLayerData. `openings`: of the graph, which point to their wall, frame and leaf.
     """
     pen = Pen.blank("Room", ".usdc", data)
-    for path in ("/Room", SHELL):
-        pen.define(path, "Xform")
     write_shell(pen, built)
     paths = {path for part in built for path in (part.path, *(mesh.path for mesh in part.meshes))}
     for opening in openings:

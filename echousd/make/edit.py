@@ -166,8 +166,8 @@ def edit(
         moving |= way
         layouts, pins, notes = laid_out(models.sizes)
     after = Room(
-        name=manifest["name"], graph=graph, boxes=layouts[0], geometry=geometry, assets=names, floor=floor,
-        layouts=tuple(layouts), outcomes=outcomes, notes=(*crowded, *models.notes, *notes, *odd),
+        name=manifest["name"], graph=graph, layouts=tuple(layouts), geometry=geometry, assets=names, floor=floor,
+        outcomes=outcomes, notes=(*crowded, *models.notes, *notes, *odd),
         provenance=_provenance(manifest, model_used), options=asked.replaced(seed=manifest["seed"]),
         timings=timer.seconds, edited=Path(room),
         carried={asset: saved.carried[asset] for name, asset in names.items() if name not in shaped_anew},

@@ -173,9 +173,9 @@ def generate(
         with timer.stage("place"), one_thread():
             layouts, outcomes = cleared_layouts([graph] * asked.layouts, layouts, geometry, floor, walls=asked.walls)
     made_room = Room(
-        name=graph.room.type, graph=graph, boxes=layouts[0], geometry=geometry,
+        name=graph.room.type, graph=graph, layouts=tuple(layouts), geometry=geometry,
         assets=asset_names(made.owners, {node.name: node.category for node in graph.nodes}), floor=floor,
-        layouts=tuple(layouts), outcomes=outcomes,
+        outcomes=outcomes,
         notes=(*filter(None, [other]), *crowded, *held, *homeless, *notes, *unusual(stated)),
         provenance=Provenance(seed, echo.preset, echo.hash, shapes, file), options=asked, timings=timer.seconds,
     )  # fmt: skip

@@ -27,8 +27,7 @@ def settled(room: Room) -> Room:
     reports = settle_layouts(_as_ours(room).stage)
     if all(report.ok for report in reports):
         return room
-    layouts = room.layouts or (room.boxes,)
-    rested = [_rested(room, boxes, report) for boxes, report in zip(layouts, reports, strict=True)]
+    rested = [_rested(room, boxes, report) for boxes, report in zip(room.layouts, reports, strict=True)]
     moved = sorted({name for _, names in rested for name in names})
     if moved:
         found = tuple(boxes for boxes, _ in rested)
@@ -37,7 +36,7 @@ def settled(room: Room) -> Room:
             for boxes, before in zip(found, room.outcomes, strict=True)
         )
         notes = (*room.notes, *(f"{name} stands where it comes to rest" for name in moved))
-        room = replace(room, boxes=found[0], layouts=found, outcomes=outcomes, notes=notes)
+        room = replace(room, layouts=found, outcomes=outcomes, notes=notes)
         reports = settle_layouts(_as_ours(room).stage)
     told = [replace(report, layout="").sentences for report in reports]
     outcomes = tuple(replace(one, restless=each) for one, each in zip(room.outcomes, told, strict=True))

@@ -77,7 +77,7 @@ def test_layout_alone_rewrites_its_layer_and_what_frames_it(tmp_path):
     room.save(folder, preview=False)
     before = hashes(folder)
     moved = replace(room.boxes, position=room.boxes.position + 0.1)
-    replace(room, boxes=moved, layouts=(moved,)).save(folder, preview=False)
+    replace(room, layouts=(moved,)).save(folder, preview=False)
     assert changed(before, hashes(folder)) == {"layers/layout.usda", "bedroom.usda", "bedroom.json"}
 
 
