@@ -20,7 +20,7 @@ from echousd.folder.within import inside
 from echousd.graph import SceneGraph
 from echousd.layers.placed import MODEL, PLACES
 from echousd.shapes.colliders import approximation, collider_of
-from echousd.shapes.geometry import LICENCE, Collider, Geometry, Mass, Origin, Original, Part
+from echousd.shapes.geometry import LICENCE, Collider, Geometry, Origin, Original, Part
 from echousd.shapes.joints import read_joints
 from echousd.shapes.matter import read_mass
 from echousd.stage.contents import room_frame, surface_of
@@ -228,9 +228,7 @@ def in_our_frame(geometry: Geometry, metres: float, *, z_up: bool) -> Geometry:
         pose = np.eye(4)
         pose[:3, :3] = metres * turn
         original = replace(original, pose=pose @ original.pose)
-    mass = geometry.mass
-    if mass is not None:
-        mass = Mass(mass.mass, metres * turn @ mass.centre, metres**2 * mass.inertia, turn @ mass.axes)
+    mass = geometry.mass and geometry.mass.seen(metres * turn)
     return replace(geometry, parts=parts, colliders=colliders, mass=mass, original=original)
 
 

@@ -44,7 +44,7 @@ class Body:
 
     Arguments:
         name, path: of the prim. place: (4, 4) float, prim to world without scale, column vectors, metres.
-        solids: its pieces, at least one. mass: in the prim's frame, None = by volume.
+        solids: its pieces, at least one. mass: in the prim's frame, metres, None = by volume.
     """
 
     name: str
@@ -91,7 +91,8 @@ def read_world(stage: Usd.Stage) -> World:
         place[:3, :3] /= np.linalg.norm(place[:3, :3], axis=0)
         place[:3, 3] *= metres
         if owned[path]:
-            bodies.append(Body(root.GetName(), path, place, tuple(owned[path]), read_mass(root)))
+            mass = read_mass(root)
+            bodies.append(Body(root.GetName(), path, place, tuple(owned[path]), mass and mass.seen(metres * np.eye(3))))
     return World(tuple(bodies), tuple(fixed), _gravity(stage, metres))
 
 

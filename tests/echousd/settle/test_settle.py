@@ -107,11 +107,21 @@ def test_the_world_is_in_metres_and_leaves_out_what_is_switched_off():
         cube.CreateSizeAttr(20.0)
         UsdPhysics.CollisionAPI.Apply(cube.GetPrim())
     UsdPhysics.CollisionAPI(stage.GetPrimAtPath("/off/cube")).CreateCollisionEnabledAttr(False)
+    weighed = UsdPhysics.MassAPI.Apply(stage.GetPrimAtPath("/two"))
+    weighed.CreateMassAttr(8.0)
+    weighed.CreateCenterOfMassAttr(Gf.Vec3f(0, 0, -5))
+    weighed.CreateDiagonalInertiaAttr(Gf.Vec3f(100, 200, 300))
+    weighed.CreatePrincipalAxesAttr(Gf.Quatf(1))
     world = read_world(stage)
     assert [body.name for body in world.bodies] == ["one", "two"]
     np.testing.assert_allclose(world.bodies[1].place[:3, 3], (3, 0, 0))
     points = world.bodies[1].solids[0].points
     np.testing.assert_allclose([points.min(0), points.max(0)], [(2.9, -0.1, -0.1), (3.1, 0.1, 0.1)], atol=1e-6)
+    mass = world.bodies[1].mass
+    assert world.bodies[0].mass is None
+    assert mass.mass == 8.0
+    np.testing.assert_allclose([mass.centre, mass.inertia], [(0, 0, -0.05), (0.01, 0.02, 0.03)], atol=1e-7)
+    np.testing.assert_allclose(mass.axes, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(world.gravity, (0, 0, -9.81), atol=1e-3)
 
 
