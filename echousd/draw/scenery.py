@@ -14,6 +14,7 @@ from echomodel.triangles import area_normals
 from echousd.draw.drawables import Drawable, Paint, image_of, read_drawables
 from echousd.draw.indoors import Lights, read_lights
 from echousd.draw.sight import Furniture
+from echousd.stage.contents import upright_box
 
 GOLDEN = 0.61803398875
 LINEAR = (np.arange(256, dtype=np.float32) / 255) ** 2.2  # of a byte of sRGB
@@ -254,10 +255,8 @@ def _hang(parts: list[dict[str, np.ndarray]], hung: list[int], count: int) -> No
 
 
 def _box(mesh: Drawable) -> np.ndarray:
-    """(7,) float: size and bottom centre in metres and yaw of the box around a mesh in its own frame."""
-    points = mesh.triangles.reshape(-1, 3)
-    low, high = points.min(0), points.max(0)
-    turn, shift = mesh.world[:3, :3], mesh.world[:3, 3]
-    bottom = turn @ [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2] + shift
-    size = (high - low) * np.linalg.norm(turn, axis=0)
-    return np.concatenate([size, bottom, [np.arctan2(turn[0, 2], turn[2, 2])]])
+    """(7,) float: size and bottom centre in metres and yaw of the upright box around a mesh, with its own heading."""
+    points, turn = mesh.triangles.reshape(-1, 3), mesh.world[:3, :3]
+    corners = np.stack(np.meshgrid(*np.stack([points.min(0), points.max(0)], 1)), -1).reshape(-1, 3)
+    size, bottom, yaw = upright_box(corners @ turn.T + mesh.world[:3, 3], turn)
+    return np.concatenate([size, bottom, [yaw]])

@@ -16,7 +16,7 @@ from pxr import Usd, UsdGeom
 from echomodel.boxes2d import upright
 from echomodel.files import telling
 from echousd.draw.surfaces import Painted, Surfaces, read_surfaces
-from echousd.stage.contents import room_frame
+from echousd.stage.contents import room_frame, upright_box
 from echousd.stage.files import open_stage
 from echousd.stage.layouts import showing_layout
 from echousd.stage.read import the_room
@@ -162,18 +162,15 @@ def _whole(surfaces: Surfaces, laid: Sequence[Unwrapped]) -> tuple[list[int], di
 
 def _frame(stage: Usd.Stage, thing: Painted) -> np.ndarray:
     """(4, 4) float, the room to the object's frame: its box's bottom centre, its front along +Z."""
-    corners = thing.triangles.reshape(-1, 3)
-    yaw = 0.0
+    own = np.eye(3)
     if thing.kind == "things":
         room, cache = the_room(stage, None).room, UsdGeom.XformCache()
-        own = room_frame(room, cache) @ np.array(cache.GetLocalToWorldTransform(stage.GetPrimAtPath(thing.path))).T
-        front = own[:3, :3] @ (0.0, 0.0, 1.0)
-        yaw = float(np.arctan2(front[0], front[2])) if np.hypot(front[0], front[2]) > 1e-3 else 0.0
-    turn = upright(-yaw)
-    turned = corners @ turn.T
-    low, high = turned.min(0), turned.max(0)
+        world = np.array(cache.GetLocalToWorldTransform(stage.GetPrimAtPath(thing.path))).T
+        own = (room_frame(room, cache) @ world)[:3, :3]
+    _, bottom, yaw = upright_box(thing.triangles.reshape(-1, 3), own)
     out = np.eye(4)
-    out[:3, :3], out[:3, 3] = turn, -np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    out[:3, :3] = upright(-yaw)
+    out[:3, 3] = -out[:3, :3] @ bottom
     return out
 
 

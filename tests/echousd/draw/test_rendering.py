@@ -56,6 +56,17 @@ def test_up_axis_and_units_are_taken_care_of(up, unit):
     assert (outward.sum(1) > 0).all()
 
 
+@pytest.mark.parametrize("written", [{"up_axis": "Z"}, {"meters_per_unit": 0.01}])
+def test_a_room_is_seen_from_the_same_corner_in_any_unit_and_axis(root, tmp_path, written):
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE, **written)
+    path = room.save(tmp_path / "bedroom", preview=False)
+    one, other = (read_scenery(Usd.Stage.Open(str(of))).furniture for of in (root, path))
+    for values in ("size", "position", "facing"):
+        np.testing.assert_allclose(getattr(one, values), getattr(other, values), atol=1e-4)
+    pictures = [pixels(render(of, view="dollhouse", size=48, colors="class", rays=1)) for of in (root, path)]
+    assert np.abs(pictures[0] - pictures[1]).mean() < 0.002
+
+
 def test_top_view_shows_things_where_they_are(root):
     image = pixels(render(root, view="top", size=96, colors="class"))
     assert image.shape == (96, 96, 3)

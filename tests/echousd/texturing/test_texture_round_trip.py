@@ -239,10 +239,13 @@ def test_colours_are_a_function_of_the_place():
     assert len(np.unique(color_at(points).round(3), axis=0)) == 50
 
 
-def test_rooms_with_z_up_are_painted_alike(tmp_path):
+def test_rooms_with_z_up_are_painted_alike(small, tmp_path):
     data = small_room(shapes="boxes", place=False, up_axis="Z", walls=True)
     root = data.save(tmp_path / "bedroom", preview=False)
     job = export_job(root, tmp_path / "job", "generic", resolution=256)
+    frames = {thing.name: thing.to_room for thing in job.objects}
+    for thing in export_job(small, tmp_path / "y_up", "generic").objects:  # a painter is shown each from its front
+        np.testing.assert_allclose(frames[thing.name], thing.to_room, atol=1e-5)
     paint(tmp_path / "job")
     import_job(root, tmp_path / "job", preview=False)
     assert np.quantile(errors_in_texels(root, job), 0.99) < 0.75
