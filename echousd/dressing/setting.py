@@ -140,9 +140,9 @@ class Setting:
         """How many plants the graph has."""
         return sum(o.row.look == "plant" for o in self.objects.values())
 
-    def stands(self, *stances: str) -> list[Standing]:
+    def stands(self, *slot_roles: str) -> list[Standing]:
         """The objects that stand so to what they attend, in the order of the graph."""
-        return [o for o in self.objects.values() if o.row.stands in stances]
+        return [o for o in self.objects.values() if o.row.stands in slot_roles]
 
     def clear(self, thing: Thing, *, host: str = "", margin: float = APART, floor: bool = True) -> bool:
         """Whether a thing stands in the room, in nobody's way, and meets neither an object but its host nor a thing."""

@@ -19,7 +19,7 @@ from echousd.graph.scene import SceneGraph
 MAX_COUNT = 100
 FULL, SELDOM = 0.7, 0.09  # share of what furniture covers in half of all rooms; of the rooms that hold such a piece
 ONE_IS_ENOUGH = ("bed", "sofa", "screen")  # roles of which a room has one piece, if nobody says it
-DEALT = ("at", "head", "before", "foot")  # stances of what serves one anchor: no desk has two chairs, another none
+DEALT = ("at", "head", "before", "foot")  # slot_roles of what serves one anchor: no desk has two chairs, another none
 
 
 def starting_graph(
@@ -116,11 +116,11 @@ def _related(habit: Habit, nodes: list[Node], anchors: list[Node], served: Count
     relations: list[Relation] = []
     sets: dict[str, list[Node]] = {}
     for i, node in enumerate(nodes):
-        stance, anchor = vocabulary().category(node.category).stands, anchors[0]
-        if near and stance in DEALT:
+        slot_role, anchor = vocabulary().category(node.category).stands, anchors[0]
+        if near and slot_role in DEALT:
             alike = [other for other in anchors if other.category == anchor.category]
-            anchor = min(alike, key=lambda other: served[stance, other.name])
-            served[stance, anchor.name] += "close_by" in habit.predicates
+            anchor = min(alike, key=lambda other: served[slot_role, other.name])
+            served[slot_role, anchor.name] += "close_by" in habit.predicates
         elif not near:
             anchor = anchors[i % len(anchors)]
         there = sets.setdefault(anchor.name, [])

@@ -202,22 +202,22 @@ def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.L
 def room_slots(
     room: RoomData, made: Mapping[str, Asset], built: Sequence[structure.ShellPrim], small: Collection[str]
 ) -> tuple[dict[str, tuple[str, int]], dict[str, str]]:
-    """Material name -> slot and voice of its look, and prim path -> material name; the dressing binds its own.
+    """Material name -> slot and variant of its look, and prim path -> material name; the dressing binds its own.
 
     `made`: the furniture. `built`: the shell. `small`: material slots of the dressing.
     """
     table: dict[str, tuple[str, int]] = {}
     bindings: dict[str, str] = {}
-    voices, slugs, alike = {ROOM_STYLE: 0}, _slugs(room), instanced(room)
+    variants, slugs, alike = {ROOM_STYLE: 0}, _slugs(room), instanced(room)
     for node in room.graph.nodes:
         asset, style = room.assets[node.name], room.styles[node.name]
-        slug, voice = slugs[style], voices.setdefault(style, len(voices))
+        slug, variant = slugs[style], variants.setdefault(style, len(variants))
         if style == ROOM_STYLE and looks.second(room.provenance.seed, node.category):
-            slug, voice = OTHERS, 1
+            slug, variant = OTHERS, 1
         above = class_path(asset) if node.name in alike else f"{OBJECTS}/{node.name}"
         for path, slot in assets.slot_paths(above, made[asset].slots).items():
             name = f"{slug}_{slot}"
-            table[name] = slot, voice
+            table[name] = slot, variant
             bindings[path] = name
     table |= {f"{ROOM_STYLE}_{slot}": (slot, 0) for slot in small}
     covered = {f"{SHELL}/{name}": slot for name, slot in structure.covered_walls(room).items()}

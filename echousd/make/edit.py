@@ -181,7 +181,7 @@ STILL = 1e-3  # metres or radians: less is no other place
 
 def attending(room: Plan) -> list[tuple[int, int]]:
     """Numbers of boxes of one room, and of what they attend, stand on or hang over; a screen is nobody's company."""
-    out = [(k, i) for k, i in enumerate(room.anchor.tolist()) if i >= 0 and room.stance[k] != "opposite"]
+    out = [(k, i) for k, i in enumerate(room.anchor.tolist()) if i >= 0 and room.slot_role[k] != "opposite"]
     out += [(k, i) for k, i in enumerate(room.carrier.tolist()) if i >= 0]
     away = np.linalg.norm((room.position[:, None] - room.position)[..., ::2], axis=2)
     over = (room.carrier == ON_CEILING)[:, None] & room.standing & (away < LIT)

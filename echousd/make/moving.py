@@ -105,7 +105,7 @@ def _trials(
                 kept = unbroken(graph, moved_by(boxes, trial))
                 broken = holds - kept
                 if not broken:
-                    yield len(kept), price(scene, mover, way) * (1 + len(group) - len(groups[0])), trial
+                    yield len(kept), cost(scene, mover, way) * (1 + len(group) - len(groups[0])), trial
                 elif (more := _with_partners(scene, graph, group, broken)) not in groups and len(groups) <= GROUPS:
                     groups.append(more)
 
@@ -186,7 +186,7 @@ def pushed(scene: Scene, group: Sequence[int], moves: np.ndarray, way: np.ndarra
     return out
 
 
-def price(scene: Scene, mover: int, way: np.ndarray) -> float:
+def cost(scene: Scene, mover: int, way: np.ndarray) -> float:
     """What a move costs: its length, more for what is large, and for a seat that does not go back."""
     back = -axes(scene.heading[mover])[1]
     far = float(np.linalg.norm(way))

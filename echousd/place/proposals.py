@@ -36,7 +36,7 @@ def proposals(setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np
     rows: list[Row] = []
     if anchor >= 0 and there[anchor]:
         rows += [out_of(position[anchor], float(yaw[anchor]), slot) for slot in slots_at(setting, i, anchor)]
-    for k in _mates(setting, "before", anchor) if setting.stances[i] == "with" else ():
+    for k in _mates(setting, "before", anchor) if setting.slot_roles[i] == "with" else ():
         rows += [
             out_of(position[k], float(yaw[k]), slot) for slot in sides(setting.size[i], setting.size[k]) if there[k]
         ]
@@ -114,7 +114,7 @@ def _leans(setting: Setting, i: int) -> bool:
 
 def slots_at(setting: Setting, i: int, anchor: int) -> list[tuple[float, float, float, float]]:
     """Where box i may stand in the frame of its anchor; empty where its row does not say."""
-    stands = _stance(setting, i, anchor)
+    stands = _slot_role(setting, i, anchor)
     if stands not in STANDS:
         return []
     seats = np.array([kind.role == "seat" for kind in setting.kinds]) & (setting.anchor == anchor)
@@ -140,19 +140,19 @@ def _apart(setting: Setting, i: int, anchor: int, stands: str) -> tuple[float, f
 
 def _mates(setting: Setting, stands: str, anchor: int) -> list[int]:
     """All who stand so to a box."""
-    return [j for j in np.flatnonzero(setting.anchor == anchor).tolist() if _stance(setting, j, anchor) == stands]
+    return [j for j in np.flatnonzero(setting.anchor == anchor).tolist() if _slot_role(setting, j, anchor) == stands]
 
 
-def _stance(setting: Setting, i: int, anchor: int) -> str:
+def _slot_role(setting: Setting, i: int, anchor: int) -> str:
     """How box i stands to what it attends: the name of its slots, or of the row's own word where it has none."""
     kind, to = setting.kinds[i], setting.kinds[anchor]
     if setting.carrier[i] == anchor:
         return "on_top"
     if kind.support != "floor":
-        return "over" if setting.stances[i] == "over" else ""
+        return "over" if setting.slot_roles[i] == "over" else ""
     if kind.stands in ("at", "foot") and to.role == "board":
         return "at_front" if to.access else "around"
-    return setting.stances[i]
+    return setting.slot_roles[i]
 
 
 def seatings(setting: Setting, i: int, seats: Sequence[int]) -> tuple[list[int], list[list[Row]]]:
@@ -161,7 +161,7 @@ def seatings(setting: Setting, i: int, seats: Sequence[int]) -> tuple[list[int],
     Benches take the middle of a long side, chairs what is left.
     """
     places = places_of(setting.size)
-    seats = sorted((k for k in seats if _stance(setting, k, i) == "around"), key=lambda k: -places[k])
+    seats = sorted((k for k in seats if _slot_role(setting, k, i) == "around"), key=lambda k: -places[k])
     ways: list[list[tuple[Row, tuple[float, float]]]] = [[]] if len(seats) > 1 else []
     for alike in (list(group) for _, group in groupby(seats, key=lambda k: places[k])):
         largest = max(alike, key=lambda k: float(setting.size[k, 0]))
@@ -224,7 +224,7 @@ def twins(setting: Setting, position: np.ndarray, yaw: np.ndarray, i: int) -> li
     """For a bed that is told to share a nightstand: beside the other one, with room for it between."""
     rows: list[Row] = []
     for one in setting.stated:
-        if i in one.others and len(one.others) == 2 and setting.stances[one.subject] == "head":
+        if i in one.others and len(one.others) == 2 and setting.slot_roles[one.subject] == "head":
             other = next(k for k in one.others if k != i)
             apart = (setting.size[i, 0] + setting.size[other, 0]) / 2 + setting.size[one.subject, 0] + 0.1
             back = (setting.size[i, 2] - setting.size[other, 2]) / 2
@@ -286,7 +286,7 @@ def _corners(setting: Setting, i: int, more: float) -> list[Row]:
 
 def _in_view(setting: Setting, i: int, at_walls: Sequence[Row]) -> list[Row]:
     """In the room before a screen at the far wall, where a sofa at its own wall would be too far from it."""
-    if not any(stance == "opposite" and a == i for stance, a in zip(setting.stances, setting.anchor, strict=True)):
+    if not any(role == "opposite" and a == i for role, a in zip(setting.slot_roles, setting.anchor, strict=True)):
         return []
     far, rows = WATCHED_FROM["sofa"][1], np.array(at_walls).reshape(-1, 4)
     front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)

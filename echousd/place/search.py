@@ -19,7 +19,7 @@ from echomodel.objective import TERMS, Plan, Term, unreached
 from echomodel.objective.access import to_wall
 from echomodel.objective.copies import copies_of, looks_at
 from echomodel.objective.plan import Found, found, nobody
-from echomodel.objective.table import PRICE
+from echomodel.objective.table import COST
 from echomodel.rules import margins
 from echomodel.rules.placements import Spread
 from echomodel.vocabulary import vocabulary
@@ -96,8 +96,8 @@ class Search:
         for k in range(n):
             parent = int(setting.carrier[k]) if setting.carrier[k] >= 0 else int(setting.anchor[k])
             parent = beside.get(k, -1) if parent < 0 else parent
-            if parent >= 0 and not setting.fixed[k] and setting.stances[k] != "near":
-                (self.screens if setting.stances[k] == "opposite" else self.children)[parent].append(k)
+            if parent >= 0 and not setting.fixed[k] and setting.slot_roles[k] != "near":
+                (self.screens if setting.slot_roles[k] == "opposite" else self.children)[parent].append(k)
 
     # -- what it costs -----------------------------------------------------------------------------------------------
 
@@ -107,8 +107,8 @@ class Search:
         self.judged += len(yaw)
         copies = copies_of(room, position[:, there], yaw[:, there], moved[there])
         asked = [term for term in self.terms_of(moved) if whole or term.name not in WHOLE]
-        seen, paid = priced([(term, term.find(copies)) for term in asked], copies)
-        return np.asarray(sum_of(copies.scene[seen.who], paid, len(yaw)))
+        seen, cost = costs_of([(term, term.find(copies)) for term in asked], copies)
+        return np.asarray(sum_of(copies.scene[seen.who], cost, len(yaw)))
 
     def terms_of(self, moved: np.ndarray) -> list[Term]:
         """The terms that look at any of some boxes (n,) bool; all before any room was judged."""
@@ -132,17 +132,17 @@ class Search:
         else:
             looked = [looks_at(room, term.find) for term in self.terms]
             self.looks, every = [looks for looks, _ in looked], [found for _, found in looked]
-        seen, paid = priced(list(zip(self.terms, every, strict=True)), room)
-        total = float(paid.sum())
+        seen, cost = costs_of(list(zip(self.terms, every, strict=True)), room)
+        total = float(cost.sum())
         firm = self.firm.repeat([len(found.who) for found in every])
-        for row in rows(firm & (paid > 0.5)).tolist():
+        for row in rows(firm & (cost > 0.5)).tolist():
             for box in {int(seen.who[row]), int(seen.other[row])} - {-1}:
-                worst[box] = worst.get(box, 0.0) + float(paid[row])
+                worst[box] = worst.get(box, 0.0) + float(cost[row])
         lost = self._unreached(state.position, state.yaw)
         self.walked = bool(lost)
         for box in lost:
-            worst[box] = worst.get(box, 0.0) + PRICE["living"][0]
-            total += PRICE["living"][0]
+            worst[box] = worst.get(box, 0.0) + COST["living"][0]
+            total += COST["living"][0]
         return total, sorted(worst, key=lambda box: (-round(worst[box], 4), box))
 
     # -- moves -------------------------------------------------------------------------------------------------------
@@ -258,7 +258,7 @@ class Search:
             least = np.inf
             for k in dict.fromkeys([0, *first]):
                 if cost[k] <= least:  # else it is dearer even if all is reached
-                    cost[k] += GRAIN * PRICE["living"][0] * len(self._unreached(position[k], yaw[k]))
+                    cost[k] += GRAIN * COST["living"][0] * len(self._unreached(position[k], yaw[k]))
                     least = min(least, cost[k])
                 cost[k] -= GRAIN * 10.0
         best = int(cost.argmin())
@@ -331,7 +331,7 @@ class Search:
         self, position: np.ndarray, yaw: np.ndarray, state: State, i: int, group: list[int], rows: np.ndarray
     ) -> None:
         """Put box i at K poses in K states, and a group with it."""
-        turn = (rows[:, 2] - state.yaw[i]) * (self.setting.stances[i] != "before")  # seats stay at its sofa's sides
+        turn = (rows[:, 2] - state.yaw[i]) * (self.setting.slot_roles[i] != "before")  # seats stay at its sofa's sides
         cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
         away = (state.position[group] - state.position[i])[:, [0, 2]]
         position[:, group, 0] = rows[:, :1] + cos * away[:, 0] + sin * away[:, 1]
@@ -413,7 +413,7 @@ class Search:
             while setting.anchor[at] >= 0 and steps < 4:
                 steps, at = steps + 1, int(setting.anchor[at])
             area = float(setting.size[i, 0] * setting.size[i, 2])
-            first = 0.3 if setting.stances[i] == "opposite" else FIRST.get(kind.role, 6.0)
+            first = 0.3 if setting.slot_roles[i] == "opposite" else FIRST.get(kind.role, 6.0)
             late = 20.0 if setting.carrier[i] >= 0 else 15.0 if kind.support == "ceiling" else 0.0
             late -= 5.0 * (i in self.urgent)
             return late + first + 0.5 * steps - 0.3 * min(area, 3.0), i
@@ -511,20 +511,20 @@ class Search:
         at = setting.position.copy(), setting.yaw.copy()
         state = State(*at, np.array([0.02 + 0.3 * out_of_habit(setting, i, *at) for i in range(n)]))
         _, wrong = self.faults(state)
-        seat = np.array([stance == "at" for stance in setting.stances], bool)
+        seat = np.array([slot_role == "at" for slot_role in setting.slot_roles], bool)
         mates = np.array([((setting.anchor == a) & seat).sum() for a in setting.anchor])
         seated = seat & (setting.anchor >= 0) & (mates > 1) & ~np.isin(np.arange(n), wrong)  # together with their table
         state = self.swept(state, [i for i in range(n) if not seated[i]])
         return self.mended(state, *self.faults(state))
 
 
-def priced(rows_of: Sequence[tuple[Term, Found]], room: Plan) -> tuple[Found, Array]:
+def costs_of(rows_of: Sequence[tuple[Term, Found]], room: Plan) -> tuple[Found, Array]:
     """The rows (P,) of what terms found in a room or its copies, all together, and what each costs (P,) float."""
     every = [(term, seen) for term, seen in rows_of if len(seen.who)]
     if not every:
         return nobody(room.size), room.size[:0, 0]
     xp, count = room.kit, [len(seen.who) for _, seen in every]
-    row = [(term.slack, *PRICE[term.kind], term.weight, term.kind in ("relations", "physics")) for term, _ in every]
+    row = [(term.slack, *COST[term.kind], term.weight, term.kind in ("relations", "physics")) for term, _ in every]
     slack, broken, each, weight, always = repeat(room.numbers(row), xp.asarray(count)).T
     who, other, margin = (xp.concat([getattr(seen, name) for _, seen in every]) for name in ("who", "other", "margin"))
     missed = at_most(at_least(slack - margin, 0.0), 2.0)
@@ -534,7 +534,7 @@ def priced(rows_of: Sequence[tuple[Term, Found]], room: Plan) -> tuple[Found, Ar
 
 def cost_of(room: Plan) -> float:
     """What a plan of one room costs by all terms."""
-    return float(priced([(term, term.find(room)) for term in TERMS], room)[1].sum())
+    return float(costs_of([(term, term.find(room)) for term in TERMS], room)[1].sum())
 
 
 def part_of(room: Plan, there: np.ndarray) -> Plan:
@@ -559,6 +559,6 @@ def part_of(room: Plan, there: np.ndarray) -> Plan:
     )  # fmt: skip
     vars(out).update(
         anchor=mapped(room.anchor), carrier=mapped(room.carrier), joins=mapped(room.joins),
-        stance=tuple(room.stance[k] for k in keep.tolist()),
+        slot_role=tuple(room.slot_role[k] for k in keep.tolist()),
     )  # fmt: skip
     return out

@@ -79,7 +79,7 @@ class Setting:
     anchor = _of_plan("anchor")  # (n,) int, whom each attends, -1 = nobody
     fronts = _of_plan("fronts")  # (n,) bool, which of the boxes have a front
     kinds = _of_plan("kinds")  # rows of the vocabulary
-    stances = _of_plan("stance")  # how each stands to whom it attends
+    slot_roles = _of_plan("slot_role")  # how each stands to whom it attends
     rules = _of_plan("rules")  # the rule set that the relations are meant in
     stated = _of_plan("stated")  # where single objects must stand in the room
 

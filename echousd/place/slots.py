@@ -1,4 +1,4 @@
-"""Slots: where things stand around what they attend, in its frame, as (lateral, forward, turn, price).
+"""Slots: where things stand around what they attend, in its frame, as (lateral, forward, turn, cost).
 
 Each is asked with the metres that are kept between the two, negative under a table, and those that what stands beside
 something is before the middle of that (`distances.kept_apart`).
@@ -60,7 +60,7 @@ def around(own: Size, anchor: Size, kind: Category, count: int, apart: float, ah
         return _around(own, length, depth, count, -apart)
     # the long sides are the left and the right one: the same, turned by a quarter
     quarter = _around(own, depth, length, count, -apart)
-    return [(forward, -lateral, turn + HALF_PI, price) for lateral, forward, turn, price in quarter]
+    return [(forward, -lateral, turn + HALF_PI, cost) for lateral, forward, turn, cost in quarter]
 
 
 def _around(own: Size, length: float, depth: float, count: int, tuck: float) -> list[Slot]:
@@ -75,9 +75,9 @@ def _around(own: Size, length: float, depth: float, count: int, tuck: float) -> 
             lateral = (k - (per_side - 1) / 2) * spacing
             for tucked, push in ((tuck, 0.0), (DEEPER, 0.5), (-0.1, 0.7)):
                 forward = depth / 2 + own[2] / 2 - tucked
-                price = more + push
-                out.append((lateral, -forward, 0.0, price))
-                out.append((lateral, forward, math.pi, price))
+                cost = more + push
+                out.append((lateral, -forward, 0.0, cost))
+                out.append((lateral, forward, math.pi, cost))
     at_ends = (0.9 if count <= 2 * wanted else 0.1) + (1.5 if own[0] > depth + 0.1 else 0.0)  # no bench across an end
     for tucked, push in ((tuck, 0.0), (DEEPER, 0.5), (-0.1, 0.7)):
         out.append((length / 2 + own[2] / 2 - tucked, 0.0, -HALF_PI, at_ends + push))
@@ -88,9 +88,9 @@ def _around(own: Size, length: float, depth: float, count: int, tuck: float) -> 
 def _along_front(own: Size, length: float, depth: float, count: int, tuck: float) -> list[Slot]:
     spacing = max(min(length / max(count, 1), 0.7), float(own[0]) + 0.05)
     return [
-        ((k - (count - 1) / 2) * spacing, depth / 2 + own[2] / 2 - tuck + off, math.pi, price)
+        ((k - (count - 1) / 2) * spacing, depth / 2 + own[2] / 2 - tuck + off, math.pi, cost)
         for k in range(count)
-        for off, price in ((0.0, 0.0), (-0.15, 0.3), (0.2, 0.3))
+        for off, cost in ((0.0, 0.0), (-0.15, 0.3), (0.2, 0.3))
     ]
 
 

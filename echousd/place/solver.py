@@ -166,8 +166,8 @@ def newton(
 
     Arguments:
         rows: (r, m) float, sparse or not; value, stiffness: (r,) float; equal: (r,) bool.
-        weight, moved: (m,) float: price of and present distance from the starting boxes; limit: the most of that.
-        damping: factor >= 1 on the price of this step.
+        weight, moved: (m,) float: cost of and present distance from the starting boxes; limit: the most of that.
+        damping: factor >= 1 on the cost of this step.
 
     Returns: d (m,) float.
     """

@@ -30,14 +30,14 @@ GLOW = tuple(round(0.55 * c, 5) for c in linear("ffe2ae"))  # of a lamp's shade
 
 
 @cache
-def look(palette: str, slot: str, voice: int = 0) -> Look:
+def look(palette: str, slot: str, variant: int = 0) -> Look:
     """The look of a material slot in a palette; raises KeyError for unknown words.
 
-    `palette`: a word of `HARMONIES`. `slot`: a word of `SLOTS`. `voice`: odd ones take the second wood and cloth of the
-    harmony, so that style groups can be told apart.
+    `palette`: a word of `HARMONIES`. `slot`: a word of `SLOTS`. `variant`: odd ones take the second wood and cloth of
+    the harmony, so that style groups can be told apart.
     """
     harmony, made = HARMONIES[palette], SLOTS[slot]
-    word = SECOND.get(made.color, made.color) if voice % 2 else made.color
+    word = SECOND.get(made.color, made.color) if variant % 2 else made.color
     color = mixed(getattr(harmony, word, word), made.mix, made.share)
     emissive = (GLOW[0], GLOW[1], GLOW[2]) if slot == "shade" else (0.0, 0.0, 0.0)
     return Look(color, made.roughness, made.metallic, made.opacity, emissive, made.pattern, made.metres)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Wanted = Callable[[], AssetWishes]  # what is asked of a library, made where it is needed
 
-TOGETHER = ("at", "head", "beside")  # stances of things that come in pairs and sets
+TOGETHER = ("at", "head", "beside")  # slot_roles of things that come in pairs and sets
 
 
 def given_pieces(

@@ -112,8 +112,8 @@ class Copies(Plan):
     def of(self, *roles: str) -> Array:
         return self._kept(("of", *roles), lambda: self._again(self.template.of(*roles)))
 
-    def stands(self, *stances: str) -> Array:
-        return self._kept(("stands", *stances), lambda: self._again(self.template.stands(*stances)))
+    def stands(self, *slot_roles: str) -> Array:
+        return self._kept(("stands", *slot_roles), lambda: self._again(self.template.stands(*slot_roles)))
 
     def which(self, asked: Callable[[Category], object]) -> Array:
         return self._again(self.template.which(asked))
@@ -122,8 +122,8 @@ class Copies(Plan):
         return self._again(self.template.column(asked))
 
     @cached_property
-    def stance(self) -> tuple[str, ...]:
-        return self.template.stance * self.count
+    def slot_role(self) -> tuple[str, ...]:
+        return self.template.slot_role * self.count
 
     standing, movable, solid = _repeated("standing"), _repeated("movable"), _repeated("solid")
     works, dining, fronts = _repeated("works"), _repeated("dining"), _repeated("fronts")

@@ -14,7 +14,7 @@ import numpy as np
 from echomodel.arrays import Array, full, held, rows
 from echomodel.boxes2d import footprints
 from echomodel.objective.plan import CLEAR_HEIGHT, Plan
-from echomodel.objective.table import PRICE, TERMS
+from echomodel.objective.table import COST, TERMS
 from echomodel.openings import inward_normal, segment
 
 ROBOT, SLACK = 0.2, 0.025  # metres, its radius, and how much narrower a way it squeezes through
@@ -154,5 +154,5 @@ def missed(plan: Plan, kinds: Collection[str] = BY_EYE, beyond: float = -math.in
         miss = (max(term.slack + beyond, 0.0) - seen.margin).clip(0.0, MOST)
         if term.kind in BY_EYE:
             miss = miss * ~plan.given[seen.who]
-        total = total + PRICE[term.kind][1] * term.weight * miss.sum()
+        total = total + COST[term.kind][1] * term.weight * miss.sum()
     return total

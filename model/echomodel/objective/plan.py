@@ -84,7 +84,7 @@ CLEAR_HEIGHT = 0.05  # metres: a rug is in nobody's way
 UNKNOWN = Category("", "", "", support="floor", role="", look="", density=0.0, ade20k="")
 # What of a plan stays as it is while its boxes move.
 OF_WORDS = (
-    "anchor", "carrier", "group", "joins", "stance", "standing", "movable", "solid", "works", "dining", "fronts",
+    "anchor", "carrier", "group", "joins", "slot_role", "standing", "movable", "solid", "works", "dining", "fronts",
     "smaller", "walls", "walled", "rectangle", "_masks", "_words",
 )  # fmt: skip
 
@@ -141,12 +141,12 @@ class Plan:
         """(N,) bool, boxes with one of these roles."""
         return self._kept(("of", *roles), lambda: self.which(lambda kind: kind.role in roles))
 
-    def stands(self, *stances: str) -> Array:
-        """(N,) bool, boxes that stand so to what they attend (`stance`)."""
-        return self._kept(("stands", *stances), lambda: self._mask([one in stances for one in self.stance]))
+    def stands(self, *slot_roles: str) -> Array:
+        """(N,) bool, boxes that stand so to what they attend (`slot_role`)."""
+        return self._kept(("stands", *slot_roles), lambda: self._mask([one in slot_roles for one in self.slot_role]))
 
     @cached_property
-    def stance(self) -> tuple[str, ...]:
+    def slot_role(self) -> tuple[str, ...]:
         """How each box stands to what it attends: `Category.stands`, and `with` for a sofa that joins a larger one."""
         joins = self.joins.tolist()
         return tuple("with" if j >= 0 else kind.stands for kind, j in zip(self.kinds, joins, strict=True))
@@ -468,9 +468,9 @@ class Plan:
             gaps.append(abs(forward) - half_depth - self.size[b, 2] / 2)
         return self.kit.amax(self.kit.stack(gaps), 0)
 
-    def attended(self, *stances: str, to: Array | None = None) -> tuple[Array, Array]:
+    def attended(self, *slot_roles: str, to: Array | None = None) -> tuple[Array, Array]:
         """Numbers (P,), (P,) of boxes that stand so to what they attend, one of `to` (N,) bool, and of that."""
-        attends = (self.anchor >= 0) & self.stands(*stances)
+        attends = (self.anchor >= 0) & self.stands(*slot_roles)
         i = self.those(attends if to is None else attends & to[self.anchor])
         return i, self.anchor[i]
 

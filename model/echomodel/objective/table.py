@@ -19,8 +19,8 @@ from echomodel.objective.plan import Found, Plan
 from echomodel.vocabulary import vocabulary
 
 # What a broken term costs, and a unit that is missed of it, by its kind.
-PRICE = {"relations": (6.0, 4.0), "physics": (3.0, 10.0), "living": (2.0, 1.0), "composition": (1.5, 1.0)}
-KINDS = tuple(PRICE)
+COST = {"relations": (6.0, 4.0), "physics": (3.0, 10.0), "living": (2.0, 1.0), "composition": (1.5, 1.0)}
+KINDS = tuple(COST)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from echousd.place.geometry import axes, depth_inside
+from echomodel.boxes2d import axes
+from echousd.place.geometry import depth_inside
 from echousd.place.placing import place_boxes
 from echousd.place.proposals import proposals, slots_at
 from echousd.place.search import Search, State
@@ -27,7 +28,7 @@ def test_a_lamp_on_the_sideboard_of_a_table_does_not_slide_with_the_table() -> N
     words = ["dining_table", "dining_chair", "sideboard", "table_lamp"]
     size = [(1.4, 0.75, 0.9), (0.5, 0.9, 0.5), (1.4, 0.9, 0.4), (0.3, 0.5, 0.3)]
     found = setting(words, size, [(0, 0, 0), (0.3, 0, 0.6), (0, 0, -1.78), (0.3, 0.9, -1.78)], [0, np.pi, 0, 0])
-    assert found.stances[2] == "near"
+    assert found.slot_roles[2] == "near"
     assert found.carrier[3] == 2
     state = State(found.position, found.yaw, np.zeros(4))
     assert Search(found).group(0, np.ones(4, bool), state) == [0, 1]
@@ -63,7 +64,7 @@ def test_plants_have_no_pose_that_leaves_the_floor(size: tuple[float, float, flo
     search = Search(found)
     state = State(found.position, found.yaw, np.zeros(1))
     kept = rows[search._promising(state, np.ones(1, bool), 0, [0], rows, rows[:, 3])]
-    side = axes(kept[:, 2]) * np.array([[size[0] / 2], [size[2] / 2]])  # (K, 2, 2)
+    side = np.stack(axes(kept[:, 2]), 1) * np.array([[size[0] / 2], [size[2] / 2]])  # (K, 2, 2)
     signs = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)])
     corners = kept[:, None, :2] + signs @ side
     assert len(kept) > 20

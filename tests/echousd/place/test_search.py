@@ -17,7 +17,7 @@ from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place.placing import place_boxes
 from echousd.place.proposals import out_of_habit, proposals, slots_at
-from echousd.place.search import PRICE, Search, State, priced
+from echousd.place.search import COST, Search, State, costs_of
 from echousd.place.setting import setting_of
 
 ID = {row.name: row.id for row in vocabulary().predicates}
@@ -65,9 +65,9 @@ def missed():
     return found
 
 
-def price(term, seen, plan):
+def cost(term, seen, plan):
     """What the rows of a term cost."""
-    return priced([(term, seen)], plan)[1]
+    return costs_of([(term, seen)], plan)[1]
 
 
 @pytest.mark.parametrize("term", TERMS, ids=[term.name for term in TERMS])
@@ -75,11 +75,11 @@ def test_every_term_and_its_weight_count(missed, term):
     if term.name not in missed:
         pytest.skip("no shaken room breaks it")
     seen, plan = missed[term.name]
-    full = price(term, seen, plan)
-    assert float(full.max()) > PRICE[term.kind][0]
-    assert float(price(replace(term, weight=0.0), seen, plan).sum()) < float(full.sum())
+    full = cost(term, seen, plan)
+    assert float(full.max()) > COST[term.kind][0]
+    assert float(cost(replace(term, weight=0.0), seen, plan).sum()) < float(full.sum())
     kept = replace(seen, margin=abs(seen.margin) + 1.0)
-    assert float(price(term, kept, plan).sum()) == 0.0
+    assert float(cost(term, kept, plan).sum()) == 0.0
 
 
 def test_most_terms_are_broken_by_shaken_rooms(missed):
@@ -91,7 +91,7 @@ def test_what_is_given_is_blamed_for_relations_and_collisions_alone(missed):
         seen, plan = missed[name]
         given = replace(plan, given=np.ones(len(plan), bool))
         term = next(term for term in TERMS if term.name == name)
-        assert (float(price(term, seen, given).sum()) > 0) == (name == "apart")
+        assert (float(cost(term, seen, given).sum()) > 0) == (name == "apart")
 
 
 def test_a_screen_goes_along_to_the_wall_ahead():
