@@ -16,6 +16,7 @@ from echomodel.boxes2d import footprints
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
+from echomodel.objective.access import LEAF, NEEDED
 from echomodel.objective.physics import TOUCH
 from echomodel.openings import signed_area
 from echomodel.protocols import GraphEdit, RoomModel
@@ -252,20 +253,25 @@ def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int) -
     def faults(graph: SceneGraph) -> int:
         return sum(len(living_faults(graph, boxes)) for boxes in layouts)
 
-    size, position, yaw = plan_boxes(layouts)
-    size[np.tile(screens(graph), len(layouts)), 1] += TALL
     bare = graph.with_room(openings=())
     before = faults(graph)
     if graph.room.openings and (not before or before <= faults(bare)):
         return graph
-    moved = with_placed_openings(bare, (size, position, yaw), seed)
+    moved = with_placed_openings(bare, _obstacles(graph, layouts), seed)
     return moved if not graph.room.openings or faults(moved) < before else graph
 
 
-def screens(graph: SceneGraph) -> np.ndarray:
-    """(n,) bool, televisions and what they stand on."""
-    kinds = [vocabulary().category(node.category) for node in graph.nodes]
-    return np.array([kind.role == "screen" or kind.stands == "opposite" for kind in kinds], bool)
+def _obstacles(graph: SceneGraph, layouts: Sequence[Boxes]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What openings keep off, as `plan_boxes`: all boxes, screens higher, and flat ones where storage is opened."""
+    kinds = [vocabulary().category(node.category) for node in graph.nodes] * len(layouts)
+    size, position, yaw = plan_boxes(layouts)
+    size[[kind.role == "screen" or kind.stands == "opposite" for kind in kinds], 1] += TALL
+    opens = [k for k, kind in enumerate(kinds) if kind.role == "storage" and kind.support == "floor" and kind.access]
+    depth = NEEDED * np.array([kinds[k].access for k in opens])
+    before = np.stack([size[opens, 0] * (1 - 2 * LEAF), np.full(len(opens), 0.1), depth], 1)
+    front = np.stack([np.sin(yaw[opens]), np.zeros(len(opens)), np.cos(yaw[opens])], 1)
+    at = position[opens] + front * (size[opens, 2] + depth)[:, None] / 2
+    return np.concatenate([size, before]), np.concatenate([position, at]), np.concatenate([yaw, yaw[opens]])
 
 
 def with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:

@@ -91,13 +91,20 @@ class Search:
         n = len(setting.size)
         self.children: list[list[int]] = [[] for _ in range(n)]
         self.screens: list[list[int]] = [[] for _ in range(n)]
-        near = setting.triplets[setting.triplets[:, 1] == vocabulary().predicate_id("close_by")]
-        beside = {int(one): int(other) for one, _, other in near if setting.kinds[one].role in ("decor", "light")}
+        near, opposed = map(vocabulary().predicate_id, ("close_by", "opposite"))
+        kinds, beside, ahead = setting.kinds, dict[int, int](), dict[int, int]()
+        for one, word, other in setting.triplets.tolist():
+            if word == near and kinds[one].role in ("decor", "light"):
+                beside[one] = other
+            for k, i in ((one, other), (other, one)) if word == opposed else ():
+                if kinds[k].role == "storage" and kinds[i].role in ("bed", "sofa"):
+                    ahead[k] = i
         for k in range(n):
             parent = int(setting.carrier[k]) if setting.carrier[k] >= 0 else int(setting.anchor[k])
-            parent = beside.get(k, -1) if parent < 0 else parent
+            parent = ahead.get(k, beside.get(k, -1)) if parent < 0 else parent
             if parent >= 0 and not setting.fixed[k] and setting.slot_roles[k] != "near":
-                (self.screens if setting.slot_roles[k] == "opposite" else self.children)[parent].append(k)
+                looked_at = setting.slot_roles[k] == "opposite" or ahead.get(k) == parent
+                (self.screens if looked_at else self.children)[parent].append(k)
 
     # -- what it costs -----------------------------------------------------------------------------------------------
 

@@ -69,6 +69,21 @@ def test_windows_that_nobody_stated_are_not_put_behind_the_television():
     assert not living_faults(moved, boxes)
 
 
+def test_a_door_that_nobody_stated_opens_before_no_drawers():
+    """In a narrow bedroom it goes between the bed's foot and the wardrobe, not before the dresser at the end."""
+    words = ("double_bed", "wardrobe", "dresser")
+    door = Opening("door", "door", 1, 3.4, 0.9, 2.0)
+    room = RoomSpec("bedroom", size=(2.4, 5.0), openings=(door,))
+    boxes = Boxes(
+        torch.tensor([(1.7, 0.9, 2.0), (2.0, 2.2, 0.6), (1.1, 0.9, 0.5)]),
+        torch.tensor([(-0.35, 0.0, -1.48), (-0.88, 0.0, 1.1), (0.6, 0.0, 2.23)]),
+        torch.tensor([0.0, np.pi / 2, np.pi]),
+    )
+    graph = SceneGraph(room, tuple(Node(word, word) for word in words))
+    assert [fault.rule for fault in living_faults(graph, boxes)] == ["leaf_aside"]
+    assert not living_faults(with_free_openings(graph, [boxes], seed=0), boxes)
+
+
 def test_a_door_that_may_make_way_asks_for_no_further_draft():
     """What stands before an opening that nobody stated is worth no second layout: the opening goes elsewhere."""
     room = RoomSpec("living_room", size=(4.6, 4.4))

@@ -103,6 +103,16 @@ def test_a_screen_goes_along_to_the_wall_ahead():
     assert np.cos(yaw[0, 1] + np.pi / 2) == pytest.approx(1.0)
 
 
+def test_a_bed_takes_the_dresser_that_is_told_opposite_along_to_a_shorter_wall():
+    words, floor = ["double_bed", "dresser"], FLOOR * np.array([1.0, 0.6])  # 5 x 2.4 m
+    at, turn = [(0.0, 0.0, -0.15), (0.0, 0.0, 0.95)], [0.0, np.pi]  # 0.05 m before its foot
+    search, state = searched(words, [(1.8, 0.9, 2.05), (1.1, 0.9, 0.4)], at, turn, [(1, "opposite", 0)], floor=floor)
+    after = search.moved(state, np.ones(2, bool), 0)
+    assert abs(np.sin(after.yaw[0])) == pytest.approx(1.0)
+    assert np.hypot(*(after.position[1] - after.position[0])[[0, 2]]) > 2.0
+    assert search.faults(after)[1] == []
+
+
 def test_a_sofa_turns_to_another_wall_though_its_screen_and_a_plant_beside_that_stand_ahead():
     words = ["multi_seat_sofa", "tv_stand", "plant"]
     size = [(2.0, 0.8, 0.9), (1.6, 0.5, 0.4), (0.4, 1.0, 0.4)]
