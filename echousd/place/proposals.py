@@ -291,8 +291,9 @@ def _in_view(setting: Setting, i: int, at_walls: Sequence[Row]) -> list[Row]:
     far, rows = WATCHED_FROM["sofa"][1], np.array(at_walls).reshape(-1, 4)
     front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
     free = to_wall(setting.plan, np.zeros(len(rows), int), rows[:, :2], front)
-    away = [free - AMID * far, np.full(len(rows), WALKED_BEHIND - 0.01 - setting.behind[i])]
-    keep = [free > max(far, AMID * far + PASSAGE), free + float(setting.size[i, 2]) / 2 > DEEP]
+    deep = free + float(setting.size[i, 2]) / 2 > DEEP
+    away = [free - AMID * far, np.full(len(rows), WALKED_BEHIND - 0.01 - setting.behind[i]), free - far]
+    keep = [free > max(far, AMID * far + PASSAGE), deep, deep & (free > far + WALKED_BEHIND)]
     out = [(rows + np.pad(off[:, None] * front, ((0, 0), (0, 2))))[at] for off, at in zip(away, keep, strict=True)]
     return [(x, z, yaw, more) for x, z, yaw, more in np.concatenate(out).tolist()]
 

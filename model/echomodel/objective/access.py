@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, cast, dot, full, held, kit, least_of, picked, put
+from echomodel.arrays import Array, at_least, at_most, cast, dot, full, held, kit, least_of, picked, put
 from echomodel.objective.company import COMPANY
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, nobody, worst
-from echomodel.objective.sight import screens
+from echomodel.objective.sight import WATCHED_FROM, screens
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_normal, segment
 
 CROOKED = math.radians(1.0)  # 98 % of such furniture in real rooms is turned less
@@ -18,8 +18,9 @@ NEAR_WALL = 0.2  # metres between a wall and the front or back of a desk
 DINERS = 3  # chairs that make a dining table of a desk
 PASSAGE = 0.75  # metres: a sofa so far from the wall may stand in the room on purpose, one walks behind it
 DEEP = 6.0  # metres of the room along its axis from which on it does; or something of another group stands behind it
-# Metres behind it at most, if nothing stands there (two of 129 real sofas have more), and what of more counts.
-WALKED_BEHIND, BARE = 1.3, 0.02
+# Metres behind it at most, if nothing stands there (two of 129 real sofas have more), and what of more counts; in a
+# hall so deep that from there no screen at the wall ahead is watched more, beside the depth of both halves.
+WALKED_BEHIND, BARE, IN_HALL, HALVES = 1.3, 0.02, 2.5, 0.4
 MET = 0.25  # share of its width from which on something is behind it
 # Metres to what an armchair looks at, to 45 degrees, and to a wall that it does not look at.
 SEEN, NEAR = 3.0, 2.0
@@ -60,8 +61,10 @@ def at_wall(plan: Plan) -> Found:
     free = plan.of("sofa") & (plan.kit.bincount(plan.anchor[looks], minlength=len(plan)) > 0)
     free, margin, xp = free[who] & (gap >= PASSAGE), TOUCHING - gap, plan.kit
     if bool(free.any()):
-        bare = at_least(WALKED_BEHIND - gap, -BARE)
-        bare = xp.where(gap + plan.size[who, 2] + wall_ahead(plan, who) >= DEEP, bare, margin)
+        depth = gap + plan.size[who, 2] + wall_ahead(plan, who)
+        most = (depth - WATCHED_FROM["sofa"][1] - HALVES).clip(WALKED_BEHIND, IN_HALL)
+        bare = at_least(most - gap, -BARE)
+        bare = xp.where(depth >= DEEP, bare, margin)
         bare = xp.where(_backed(plan, who, held(gap)), FAR, bare)
         margin = xp.where(free, xp.minimum(gap - PASSAGE, bare), margin)
     return found(who, margin, measure=gap, words=1 * (gap < FAR))
@@ -85,9 +88,9 @@ def to_wall(plan: Plan, who: Array, points: Array, way: Array) -> Array:
 
 
 def _backed(plan: Plan, who: Array, gap: Array) -> Array:
-    """(P,) bool: something of another group stands between a box and the wall behind it."""
+    """(P,) bool: something of another group stands between a box and the wall behind it, as far off at most."""
     i, j = plan.pairs(plan.of("sofa"), plan.standing & plan.of("board", "storage", "bed", "seat", "sofa"))
-    room = put(full(plan.size, len(plan), -1.0), who, cast(gap, plan.size))
+    room = put(full(plan.size, len(plan), -1.0), who, cast(at_most(gap, WALKED_BEHIND), plan.size))
     behind = (plan.more_ahead(i, j, room[i], MET, sign=-1.0) < 0) & ~plan.kin(i, j)
     return plan.kit.isin(who, i[behind])
 

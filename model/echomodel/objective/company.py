@@ -18,6 +18,7 @@ COMPANY = 2.5  # metres: an armchair further away stands for itself
 TOGETHER = 1.5  # metres between armchairs without a sofa: all real ones are nearer
 REACH = 0.25  # metres between a seat's front and its table: 95 % of real chairs are nearer
 BEFORE_SOFA = (0.12, 0.85)  # metres between a sofa and its coffee table: 90 % of real straight ones lie within
+LONG = 1.5  # times as long as deep: 90 % of such coffee tables lie along their only sofa
 AT_DESK = 0.33  # share of a desk's width that a seat's middle may lie beside its own: 19 of 20 real ones
 WITHIN = (0.2, 0.25)  # share of a sofa's width, and of a cornered one's, that the table's middle may lie beside its own
 BESIDE = 0.4  # metres between a bed and its nightstand: 95 % of real ones are nearer
@@ -85,13 +86,18 @@ def loungers_together(plan: Plan) -> Found:
 
 
 def table_before_sofa(plan: Plan) -> Found:
-    """A coffee table lies before its sofa, within its width and a hand's reach; of several one does."""
+    """A coffee table lies before its sofa, within its width and a hand's reach, a long one along it where it is alone;
+    of several one does."""
     i, j = plan.attended("before")
     lateral, _, gap = _at_edges(plan, i, j)
+    size, (wide, deep) = held(plan.size)[i], plan.reach(i, j)
     ell, xp, off = plan.which(lambda kind: kind.name in vocabulary().cornered)[j], plan.kit, abs(lateral)
     least = xp.where(ell, BEFORE_SOFA[0] - plan.size[j, 2] * 0.6, BEFORE_SOFA[0])
     within = xp.where(ell, WITHIN[1], WITHIN[0]) * plan.size[j, 0]
-    out = first_of(i, j, [gap - least, BEFORE_SOFA[1] - gap, within - off], [gap, gap, off])
+    long = xp.maximum(size[:, 0], size[:, 2]) > LONG * xp.minimum(size[:, 0], size[:, 2])
+    alone = xp.bincount(plan.joins[plan.joins >= 0], minlength=len(plan))[j] == 0
+    lies = xp.where(long & alone, wide - deep, FAR)
+    out = first_of(i, j, [gap - least, BEFORE_SOFA[1] - gap, within - off, lies], [gap, gap, off, gap])
     return out.take(held(-out.margin) <= least_of(j, held(-out.margin), len(plan), math.inf)[j])
 
 
@@ -302,9 +308,9 @@ def sofas_in_circle(plan: Plan) -> Found:
 
 
 def at_its_side(plan: Plan) -> Found:
-    """Side tables and floor lamps stand beside their sofa or bed, not before it, armchairs neither before its knees nor
-    behind it."""
-    i, j = plan.attended("beside", to=plan.of("sofa", "bed"))
+    """Side tables and floor lamps stand beside their sofa, armchair or bed, not before it, armchairs neither before its
+    knees nor behind it."""
+    i, j = plan.attended("beside", to=plan.of("sofa", "bed") | plan.stands("company"))
     keep, xp = held(plan.apart(i, j)) < SIDE if len(i) else i > 0, plan.kit
     chairs = plan.those(plan.stands("company") & plan.of("sofa")[plan.group] & ~plan.of("sofa"))
     i, j = xp.concat([i[keep], chairs]), xp.concat([j[keep], plan.group[chairs]])

@@ -113,14 +113,14 @@ def sofa_ahead(plan: Plan) -> Found:
     return plan.nearest(i, j, plan.more_ahead(i, j, AHEAD, COVERED), AHEAD)
 
 
-BARE_END = 0.45  # share of a room's length from a wall to the nearest large piece: 87 % of real rooms
+BARE_END = 0.42  # share of a room's length from a wall to the nearest large piece: 80 % of real rooms
 
 
 def ends_used(plan: Plan) -> Found:
     """No end of a room is bare: its large pieces stand about its middle; the nearest one is told."""
     out, xp = nobody(plan.size), plan.kit
     for (_, polygon, _), (_, _, there, *_) in zip(plan.rooms, floor_gaps(plan), strict=True):
-        large = plan.size[there[0], 0] * plan.size[there[0], 2] > LARGE
+        large = (plan.size[there[0], 0] * plan.size[there[0], 2] > LARGE) & ~plan.of("decor")[there[0]]
         if there.shape[1] - max(int(plan.stands("row")[there[0]].sum()) - 1, 0) < FEW or not bool(large.any()):
             continue  # a row of units is one piece
         there = there[:, large]
@@ -147,8 +147,8 @@ NOOK, AT_WALL = 0.66, 0.4  # metres between a plant and what is next to it along
 WORKPLACE = 1.0  # metres between the middles of two who work
 # Metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it; before storage to a low table.
 OPENS, LOW = 0.55, 0.45
-# Share of the width of storage from which on seats and tables, and beds and sofas, are before it; of a screen's all.
-FACED, LARGE_FACED, SCREENED = 0.3, 0.1, 0.05
+# Share of the width of storage from which on nightstands, and other pieces, are before it; of a screen's all.
+BESIDES, FACED, SCREENED = 0.3, 0.1, 0.05
 
 
 def served_limit(area: float, width: Array, depth: Array) -> float:
@@ -264,15 +264,15 @@ def workers_apart(plan: Plan) -> Found:
 
 
 def wardrobe_opens(plan: Plan) -> Found:
-    """One can stand before an open wardrobe, also at the foot of a bed; no sofa, seat or table stands before any
-    storage, nor a bed before a screen's, and one passes a low table there."""
-    stores = plan.of("storage") & plan.works & plan.standing & ~plan.stands("near")
-    large, xp = plan.of("bed") | (plan.of("sofa") & ~plan.stands("company")), plan.kit
-    tables = plan.of("board") & ~plan.stands("beside")
-    i, j = plan.pairs(stores, (large | plan.stands("company", "at", "head") | tables) & plan.standing, least=True)
+    """One can stand before an open wardrobe, also at the foot of a bed; no sofa, seat, table or other storage stands
+    before any storage, nor a bed before a screen's, and one passes a low table there."""
+    stores, xp = plan.of("storage") & plan.works & plan.standing & ~plan.stands("near"), plan.kit
+    massive = plan.of("bed", "sofa", "board", "storage") & ~plan.stands("row")
+    i, j = plan.pairs(stores, (massive | plan.stands("company", "at")) & plan.standing, least=True)
     met = (plan.stands("opposite") | plan.which(lambda kind: kind.access > 0.6))[i] | ~plan.of("bed")[j]
     i, j = i[met], j[met]
-    share = cast(xp.where(plan.stands("opposite")[i], SCREENED, xp.where(large[j], LARGE_FACED, FACED)), plan.size)
+    share = xp.where(plan.stands("opposite")[i], SCREENED, xp.where(plan.stands("head")[j], BESIDES, FACED))
+    share = cast(share, plan.size)
     needed = cast(xp.where(plan.stands("before"), LOW, OPENS), plan.size)
     return plan.nearest(i, j, plan.more_ahead(i, j, needed[j], share), needed)
 

