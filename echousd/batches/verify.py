@@ -11,6 +11,7 @@ from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom
 
 from echomodel.files import read_bounded, read_json, whole_file, write_json
@@ -20,6 +21,8 @@ from echousd.folder.within import inside
 from echousd.pages import template
 from echousd.stage.apart import check_apart
 from echousd.stage.files import layer_bytes, write_all
+from echousd.stage.pen import ops, say
+from echousd.stage.units import metres_from
 from echousd.textures import MAX_BYTES
 
 SHEET = "index.html"
@@ -138,34 +141,36 @@ INDEX = "index.usda"
 GAP = 2.0  # metres between two rooms
 
 
-def write_index(folder: Path, rows: Iterable[dict[str, Any]]) -> Path:
+def write_index(plan: Plan, folder: Path) -> Path:
     """Write `index.usda`; rooms are payloads, so that it opens without them (`Usd.Stage.LoadNone`).
 
-    Arguments:
-        rows: of the manifest; those without a room take no place.
+    Rooms that are missing take no place. Unit and up axis are the first that the plan has; rooms of others are turned.
     """
-    made = [row for row in rows if row["state"] == "done"]
+    rows = zip(plan.entries, manifest_rows(plan, folder), strict=True)
+    made = [(entry.options, row) for entry, row in rows if row["state"] == "done"]
     width = max(
-        (max(row["bounds"][3] - row["bounds"][0], row["bounds"][5] - row["bounds"][2]) for row in made), default=0
+        (max(row["bounds"][3] - row["bounds"][0], row["bounds"][5] - row["bounds"][2]) for _, row in made), default=0
     )
     pitch, columns = math.ceil(width + GAP), max(1, math.ceil(math.sqrt(len(made))))
     layer = Sdf.Layer.CreateAnonymous(".usda")
     stage = Usd.Stage.Open(layer, Usd.Stage.LoadNone)
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, plan.options[0].up_axis)
+    UsdGeom.SetStageMetersPerUnit(stage, plan.options[0].meters_per_unit)
     stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/Rooms").GetPrim())
+    frames = [metres_from(options.meters_per_unit, options.up_axis) for options in plan.options]
     with Sdf.ChangeBlock():
-        for number, row in enumerate(made):
+        for number, (options, row) in enumerate(made):
             prim = Sdf.CreatePrimInLayer(layer, f"/Rooms/{row['id']}")
             prim.specifier, prim.typeName = Sdf.SpecifierDef, "Xform"
             prim.payloadList.Prepend(Sdf.Payload(f"./{row['root']}"))
-            low, high = row["bounds"][:3], row["bounds"][3:]
-            middle = [(a + b) / 2 for a, b in zip(low, high, strict=True)]
-            at = Gf.Vec3d(number % columns * pitch - middle[0], 0, number // columns * pitch - middle[2])
-            move = Sdf.AttributeSpec(prim, "xformOp:translate:grid", Sdf.ValueTypeNames.Double3)
-            move.default = at
-            order = Sdf.AttributeSpec(prim, "xformOpOrder", Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
-            order.default = ["xformOp:translate:grid"]
+            low, high = np.array(row["bounds"]).reshape(2, 3)
+            at = np.eye(4)
+            at[[0, 2], 3] = np.array([number % columns, number // columns]) * pitch - ((low + high) / 2)[[0, 2]]
+            place = np.round(np.linalg.inv(frames[0]) @ at @ frames[options], 9) + 0.0
+            if np.array_equal(place[:3, :3], np.eye(3)):
+                say(prim, ops(**{"translate:grid": ("double3", Gf.Vec3d(*place[:3, 3]))}))
+            else:
+                say(prim, ops(**{"transform:grid": ("matrix4d", Gf.Matrix4d(np.ascontiguousarray(place.T)))}))
     write_all({folder / INDEX: layer_bytes(layer, ".usda")})
     return folder / INDEX
 
@@ -214,7 +219,7 @@ def finish(folder: Path, *, webdataset: bool = False) -> dict[str, Any]:
     found = write_manifest(plan, folder)
     title = f"{folder.resolve().name}: {found['done']} of {found['rooms']} rooms"
     write_sheet(folder, manifest_rows(plan, folder), title)
-    write_index(folder, manifest_rows(plan, folder))
+    write_index(plan, folder)
     if webdataset:
         write_webdataset(folder, manifest_rows(plan, folder))
     return found

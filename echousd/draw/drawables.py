@@ -13,7 +13,7 @@ from echomodel.triangles import area_normals
 from echousd.stage import values
 from echousd.stage.encoding import LABELS, StageError
 from echousd.stage.forms import forms, polygons
-from echousd.stage.units import metres_per_unit, up_axis
+from echousd.stage.units import to_metres
 from echousd.textures import TextureError, read_image
 
 
@@ -65,20 +65,12 @@ class Drawable:
     double_sided: bool = False  # whether its back is seen, too
 
 
-def world_frame(stage: Usd.Stage) -> np.ndarray:
-    """(4, 4) float: from the stage's world to y up and metres."""
-    frame = np.diag([metres_per_unit(stage)] * 3 + [1.0])
-    if up_axis(stage) == UsdGeom.Tokens.z:
-        frame[:3] = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]) @ frame[:3]
-    return frame
-
-
 def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
     """Every visible surface of purpose default or render, instances included; Z-up and other units are converted.
 
     Surfaces without polygons (curves, volumes ...) are left out with a warning.
     """
-    to_world = world_frame(stage)
+    to_world = to_metres(stage)
     cache = UsdGeom.XformCache()
     known: dict[str, Paint] = {}
     shapes: dict[Usd.Prim, tuple | None] = {}  # of what an instancer places often

@@ -10,8 +10,9 @@ import numpy as np
 from pxr import Usd, UsdGeom, UsdLux
 
 from echomodel.triangles import area_normals
-from echousd.draw.drawables import image_of, world_frame
+from echousd.draw.drawables import image_of
 from echousd.stage.lights import emitted
+from echousd.stage.units import to_metres
 
 if TYPE_CHECKING:
     from echousd.draw.scenery import Scenery
@@ -61,7 +62,7 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
 
     `shades`: of everything that glows its triangles (f, 3, 3) in the world, metres.
     """
-    frame, cache = world_frame(stage), UsdGeom.XformCache()
+    frame, cache = to_metres(stage), UsdGeom.XformCache()
     sky, suns, bulbs, power, tint = 0.0, [], [], [], np.ones(3, np.float32)
     domes, view, panels = 0, None, list[tuple[np.ndarray, np.ndarray]]()
     for prim in stage.Traverse():

@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
-from echousd.draw.drawables import Drawable, Paint, Texture, image_of, own_category, read_drawables, world_frame
+from echousd.draw.drawables import Drawable, Paint, Texture, image_of, own_category, read_drawables
 from echousd.exporting.packing import Reach
 from echousd.stage import values
 from echousd.stage.layouts import selected_layout
 from echousd.stage.lights import emitted
 from echousd.stage.read import facts, find_rooms, node_names, room_spec
+from echousd.stage.units import to_metres
 from echousd.textures import encoded, texture_bytes
 
 ENCODED = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}  # what glTF takes, by how it begins
@@ -87,7 +88,7 @@ class _Tree:
         self.extensions: set[str] = set()
         self.roots: list[int] = []
         self.binary = bytearray()
-        self.frame = world_frame(self.stage)
+        self.frame = to_metres(self.stage)
         self.cache = UsdGeom.XformCache()
         self.known: dict[Any, int] = {}  # what is there already -> its index
 

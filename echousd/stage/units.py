@@ -35,8 +35,13 @@ def upwards(stage: Usd.Stage) -> np.ndarray:
 
 def to_metres(stage: Usd.Stage) -> np.ndarray:
     """(4, 4) float, column vectors: from a stage's world to metres with +Y up."""
+    return metres_from(metres_per_unit(stage), up_axis(stage))
+
+
+def metres_from(unit: float, up: str) -> np.ndarray:
+    """(4, 4) float, column vectors: from a world with so many metres a unit, `Y` or `Z` up, to metres with +Y up."""
     out = np.eye(4)
-    out[:3, :3] = (Z_TO_Y if up_axis(stage) == "Z" else np.eye(3)) * metres_per_unit(stage)
+    out[:3, :3] = (Z_TO_Y if up == "Z" else np.eye(3)) * unit
     return out
 
 

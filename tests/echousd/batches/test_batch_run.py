@@ -5,9 +5,10 @@ import shutil
 import tarfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 from inline_batches import QUICK, Inline, batch, digests, small
-from pxr import Usd
+from pxr import Usd, UsdGeom
 
 from echousd.batches import batch as front
 from echousd.batches import batch as running
@@ -60,6 +61,29 @@ def test_manifest_sheet_and_index_hold_every_room(calm):
     assert len(stage.GetPrimAtPath("/Rooms").GetAllChildren()) == 2
     stage.Load()
     assert stage.GetPrimAtPath("/Rooms/graphs_000000/Objects").IsValid()
+
+
+def test_the_index_has_rooms_upright_and_apart_whatever_their_unit_and_axis(tmp_path):
+    bed = "{category: double_bed, size: [1.6, 0.9, 2], position: [0, 0, 0], yaw: 0}"
+    (tmp_path / "bed.yaml").write_text(f"room: {{type: bedroom, size: [4, 5]}}\nobjects: {{bed: {bed}}}\n")
+    varied = {"up_axis": ["Z", "Y"], "meters_per_unit": [0.01, 1.0]}
+    folder = tmp_path / "run"
+    batch(tmp_path / "bed.yaml", folder, executor=Inline(), workers=1, count=4, variations=varied, **QUICK)
+    finish(folder)
+    stage = Usd.Stage.Open(str(folder / "index.usda"))
+    assert (UsdGeom.GetStageUpAxis(stage), UsdGeom.GetStageMetersPerUnit(stage)) == ("Z", 0.01)
+    cache = UsdGeom.BBoxCache(0, ["default"])
+    beds = [
+        cache.ComputeWorldBound(stage.GetPrimAtPath(f"{room.GetPath()}/Objects/bed")).ComputeAlignedRange()
+        for room in stage.GetPrimAtPath("/Rooms").GetChildren()
+    ]
+    sizes = np.array([bed.GetSize() for bed in beds])
+    assert len(beds) == 4
+    np.testing.assert_allclose(sizes, [(160, 200, 90)] * 4, atol=0.1)
+    assert all(bed.GetMin()[2] == pytest.approx(0, abs=0.01) for bed in beds)
+    middles = np.array([bed.GetMidpoint() for bed in beds])[:, :2]
+    apart = np.linalg.norm(middles[:, None] - middles[None], axis=-1)
+    assert apart[~np.eye(4, dtype=bool)].min() > 400
 
 
 def test_the_sheet_says_why_a_room_fails_the_check(calm, tmp_path):
