@@ -171,8 +171,9 @@ def solid(prim: Usd.Prim) -> trimesh.Trimesh:
         return trimesh.creation.box([length("size", 2.0)] * 3)
     if kind == "Sphere":
         return trimesh.creation.icosphere(3, radius)
-    if kind == "Plane":
-        x, y = length("width", 2.0) / 2, length("length", 2.0) / 2
+    axis = str(values.given(prim.GetAttribute("axis")) or "Z")
+    if kind == "Plane":  # its width runs along x, along z where x is its axis; a turn takes x to y, or to z
+        x, y = (length(name, 2.0) / 2 for name in (("width", "length") if axis == "Z" else ("length", "width")))
         mesh = trimesh.Trimesh([(-x, -y, 0), (x, -y, 0), (x, y, 0), (-x, y, 0)], [(0, 1, 2), (0, 2, 3)], process=False)
     elif kind == "Cylinder":
         mesh = trimesh.creation.cylinder(radius, height, sections=SIDES)
@@ -181,7 +182,6 @@ def solid(prim: Usd.Prim) -> trimesh.Trimesh:
     else:
         mesh = trimesh.creation.capsule(height, radius, count=[SIDES, SIDES // 2])
     mesh.apply_translation(-mesh.bounds.mean(0))  # USD's solids lie around their origin
-    axis = str(values.given(prim.GetAttribute("axis")) or "Z")
     turn = {"X": [[0, 0, 1], [1, 0, 0], [0, 1, 0]], "Y": [[0, 1, 0], [0, 0, 1], [1, 0, 0]]}.get(axis)
     if turn is not None:
         mesh.apply_transform(np.block([[np.array(turn, float), np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]]))

@@ -7,7 +7,7 @@ import pytest
 
 from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import vocabulary
-from echousd.stage.boxes import graph_of
+from echousd.stage.boxes import graph_of, room_of
 
 ROOM = RoomBoxes(
     "one", "bedroom", np.array([(-2, -2), (2, -2), (2, 2), (-2, 2.0)]), 2.6, ("double_bed", "nightstand", "nightstand"),
@@ -27,6 +27,20 @@ def test_a_room_without_relations_is_labelled_by_rules_alone():
     assert graph_of(ROOM, None).relations == ()
     labelled = {str(relation) for relation in graph_of(ROOM, "strict").relations}
     assert {"nightstand_1 close_by double_bed", "double_bed bigger_than nightstand_2"} <= labelled
+
+
+@pytest.mark.parametrize("relations", [TOLD, np.zeros((0, 3), int)])
+def test_a_room_comes_back_from_its_graph(relations):
+    room = replace(ROOM, relations=relations)
+    again = room_of(graph_of(room), "one")
+    for name in ("size", "position", "yaw", "floor_polygon", "relations"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(room, name))
+    for name in ("id", "room_type", "height", "categories", "models", "styles"):
+        assert getattr(again, name) == getattr(room, name)
+    bare = replace(room, styles=(), models=())
+    assert room_of(graph_of(bare), "one").styles == (-1, -1, -1)
+    theirs = graph_of(room).update_node("double_bed", style="art_deco")  # a style that nobody counted
+    assert room_of(theirs, "one").styles == (0, -1, 1)
 
 
 def test_names_styles_and_models_of_the_nodes():

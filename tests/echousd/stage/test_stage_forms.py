@@ -9,7 +9,7 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echousd.draw.drawables import read_drawables
 from echousd.stage.contents import read_contents, shape_of
-from echousd.stage.forms import SkippedForms, polygons
+from echousd.stage.forms import SkippedForms, polygons, solid
 from echousd.stage.layouts import each_layout
 from echousd.stage.read import find_rooms
 from echousd.stage.subdivision import refined
@@ -113,6 +113,52 @@ def test_subdivision_surfaces_are_round_and_others_keep_their_edges():
         assert mesh.is_watertight
         assert mesh.extents[0] == pytest.approx(extent, abs=0.1), scheme
         assert len(polygons(prim).counts) == (96 if scheme == "catmullClark" else 6)
+
+
+def test_one_level_of_a_cube_has_the_points_of_catmull_and_clark():
+    stage = empty()
+    mesh = cube(stage, "/Thing", "catmullClark")
+    faces = np.array(mesh.GetFaceVertexCountsAttr().Get()), np.array(mesh.GetFaceVertexIndicesAttr().Get())
+    points, counts, _, face = refined(np.array(mesh.GetPointsAttr().Get(), float), *faces, 1)
+    found = {tuple(sorted(np.abs(point).round(6).tolist())) for point in points}
+    assert found == {(round(5 / 9, 6),) * 3, (0.0, 0.75, 0.75), (0.0, 0.0, 1.0)}  # of corners, edges and faces
+    assert len(points) == 8 + 12 + 6
+    assert counts.tolist() == [4] * 24
+    assert np.bincount(face).tolist() == [4] * 6
+
+
+def test_borders_are_splines_and_corners_of_three_pieces_stay():
+    square = np.array([(0.0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
+    points, *_ = refined(square, np.array([4]), np.arange(4), 1)
+    assert points[0].tolist() == [0.125, 0.125, 0]  # (two halves of edges, 0.5 each, and twice itself) / 4
+    assert points[2].tolist() == [0.875, 0.875, 0]
+    assert sorted(points[4:8].tolist()) == [[0, 0.5, 0], [0.5, 0, 0], [0.5, 1, 0], [1, 0.5, 0]]
+    assert points[8].tolist() == [0.5, 0.5, 0]
+    lone = np.concatenate([square, [(5.0, 5, 5)]])  # a point of no face
+    assert refined(lone, np.array([4]), np.arange(4), 1)[0][4].tolist() == [5, 5, 5]
+
+
+@pytest.mark.parametrize(
+    ("kind", "said", "extents"),
+    [
+        ("Cube", {}, (2, 2, 2)), ("Cube", {"size": 0.5}, (0.5, 0.5, 0.5)),
+        ("Sphere", {}, (2, 2, 2)), ("Sphere", {"radius": 0.3}, (0.6, 0.6, 0.6)),
+        ("Cylinder", {}, (2, 2, 2)), ("Cylinder", {"radius": 0.2, "height": 3.0, "axis": "X"}, (3, 0.4, 0.4)),
+        ("Cone", {"radius": 0.5, "height": 2.0, "axis": "Y"}, (1, 2, 1)),
+        ("Capsule", {}, (1, 1, 2)), ("Capsule", {"radius": 0.1, "height": 1.0}, (0.2, 0.2, 1.2)),
+        ("Plane", {"width": 3.0, "length": 0.5}, (3, 0.5, 0)),
+        ("Plane", {"width": 3.0, "length": 0.5, "axis": "Y"}, (3, 0, 0.5)),
+        ("Plane", {"width": 3.0, "length": 0.5, "axis": "X"}, (0, 0.5, 3)),
+    ],
+)  # fmt: skip
+def test_solids_have_the_size_that_usd_gives_them(kind, said, extents):
+    stage = Usd.Stage.CreateInMemory()
+    prim = stage.DefinePrim("/Thing", kind)
+    for name, value in said.items():
+        prim.GetAttribute(name).Set(value)
+    box = UsdGeom.BBoxCache(0, ["default"]).ComputeLocalBound(prim).ComputeAlignedRange()
+    np.testing.assert_allclose(solid(prim).bounds, [box.GetMin(), box.GetMax()], atol=0.01)
+    np.testing.assert_allclose(solid(prim).extents, extents, atol=0.01)
 
 
 def test_catmull_clark_on_a_flat_sheet_keeps_it_flat_and_its_border():

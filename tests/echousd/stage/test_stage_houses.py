@@ -1,16 +1,19 @@
 """Stages of others: without labels, with several rooms, with materials that cannot be read."""
 
+import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics
 
 import echousd
+from echomodel.boxes2d import turned
 from echousd.checks import check
-from echousd.graph import SceneGraph
+from echousd.graph import Node, SceneGraph
 from echousd.options import RoomOptions
+from echousd.stage import foreign
 from echousd.stage.boxes import relations_from_boxes
 from echousd.stage.encoding import StageError
 from echousd.stage.files import MissingMaterials, open_stage
-from echousd.stage.foreign import SkippedPrims, foreign_graph, foreign_rooms
+from echousd.stage.foreign import Box, SkippedPrims, foreign_graph, foreign_rooms
 from echousd.stage.graphs import read_graph
 from echousd.stage.labels import spaced
 
@@ -61,6 +64,19 @@ def test_a_house_is_split_by_its_floors_where_no_names_tell(tmp_path):
     ]  # fmt: skip
     assert len(foreign_graph(stage).nodes) == 4
     assert read_graph(stage, "/House/West/Floor") == rooms["/House/West/Floor"]
+
+
+@pytest.mark.parametrize(
+    ("place", "held"),
+    [((1.9, 0.0, 0.0), True), ((2.1, 0.0, 0.0), False), ((0.0, 0.0, 0.9), True), ((0.0, 0.0, 1.1), False),
+     ((0.0, -0.3, 0.0), True), ((0.0, -1.0, 0.0), False), ((0.0, 2.0, 0.0), True), ((0.0, 3.2, 0.0), False)],
+)  # fmt: skip
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_a_floor_holds_what_is_over_it_in_its_storey(place, held, turn):
+    floor = Box((4.0, 0.1, 2.0), (5.0, 0.0, 3.0), turn)
+    x, z = turned(np.array(place)[[0, 2]], np.float64(turn))
+    node = Node("it", "stool", position=(5.0 + x, place[1], 3.0 + z))
+    assert foreign._over(node, floor) == held
 
 
 def test_names_count_only_when_asked_and_the_error_says_so(tmp_path):
