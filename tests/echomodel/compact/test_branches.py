@@ -13,7 +13,7 @@ from torch import nn
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.model import CompactModel, load_weights
 from echomodel.compact.pairs import pairs_of
-from echomodel.compact.weights import PARTS, Part, branches
+from echomodel.compact.weights import PARTS, ModelPart, branches
 from echomodel.config import CompactConfig, LatentConfig
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
@@ -67,7 +67,7 @@ class ColourStage:
 
 @pytest.fixture
 def colours(monkeypatch):
-    monkeypatch.setitem(PARTS, "colours", Part(Colours, ("latent",), branch=True))
+    monkeypatch.setitem(PARTS, "colours", ModelPart(Colours, ("latent",), branch=True))
     monkeypatch.setitem(STAGES, "colours", SimpleNamespace(itself=ColourStage))
     monkeypatch.setattr("echomodel.compact.weights.CompactConfig", WithColours)
 

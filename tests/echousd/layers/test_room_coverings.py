@@ -143,5 +143,10 @@ def test_where_it_is_wet_there_are_tiles(room):
     bath = wet(room, "bathroom", "toilet")
     assert covered_walls(bath) == {f"Wall_{n}": "wall_tiles" for n in range(1, 5)}
     assert covered_walls(wet(room, "kitchen", "hob_unit")) == {"Wall_1": "wall_tiles"}  # behind the run alone
+    kitchen = wet(room, "kitchen", "hob_unit")
+    table = Boxes(*(torch.cat([values, values]) for values in vars(kitchen.boxes).values()))
+    table.position[1] = torch.tensor([0.0, 0.0, 0.3])
+    both = kitchen.graph.replaced(nodes=(*kitchen.graph.nodes, Node("table", "dining_table")))
+    assert covered_walls(replace(kitchen, graph=both, layouts=(table,))) == {"Wall_1": "wall_tiles"}
     assert covered_walls(wet(room, "bathroom", "toilet", walls=False)) == {}
     assert {floor_slot(seeded(bath, seed)) for seed in range(9)} == {"tiles", "terrazzo"}

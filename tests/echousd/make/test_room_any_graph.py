@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from small_room import BARE
 
 import echousd
+from echomodel.boxes2d import footprints
 from echomodel.vocabulary import vocabulary
-from echousd.graph import GraphError, Node, RoomSpec, SceneGraph
+from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.make.verdicts import RoomWarning
 
 WORDS = st.sampled_from([row.name for row in vocabulary().categories])
@@ -46,3 +47,26 @@ def test_graphs_without_relations_become_rooms(graph, seed):
             assert room.boxes.position[row].tolist() == pytest.approx(node.position, abs=1e-4)
             assert room.boxes.size[row].tolist() == pytest.approx(node.size, abs=1e-4)
     assert np.isfinite(np.asarray(room.boxes.position)).all()
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_what_cannot_be_kept_drives_nothing_out_of_the_room(seed):
+    """Tall lamps above one another and furniture above furniture in a room of 2.4 m: broken, told, and within it."""
+    graph = SceneGraph(
+        RoomSpec("bedroom", size=(3.0, 3.2), height=2.4),
+        (
+            Node("bed", "double_bed"), Node("stand", "nightstand"),
+            *(Node(f"lamp_{n}", "pendant_lamp", size=(0.4, 1.4, 0.4)) for n in (1, 2)),
+        ),
+        tuple(
+            Relation(one, "above", other)
+            for one, other in (("lamp_1", "lamp_2"), ("stand", "bed"), ("lamp_2", "stand"))
+        ),
+    )  # fmt: skip
+    with pytest.warns(RoomWarning, match="is broken"):
+        room = echousd.generate(graph, seed=seed, shapes="boxes", drafts=1, **BARE)
+    low, size = np.asarray(room.boxes.position, float), np.asarray(room.boxes.size, float)
+    assert low[:, 1].min() > -1e-3
+    assert (low[:, 1] + size[:, 1]).max() < 2.4 + 1e-3
+    corners = footprints(size, low, np.asarray(room.boxes.yaw, float))
+    assert (np.abs(corners).max((0, 1)) < np.array([1.5, 1.6]) + 0.01).all()
