@@ -21,7 +21,7 @@ from echousd.batches.plan import (
     STORE,
     Entry,
     Journal,
-    Plan,
+    RunPlan,
     difference,
     fault_of,
     load_plan,
@@ -167,7 +167,7 @@ def weights_hash(weights: str | None) -> str:
     return digest.hexdigest()[:12]
 
 
-def _with_libraries(plan: Plan, outside: tuple[str, ...]) -> Plan:
+def _with_libraries(plan: RunPlan, outside: tuple[str, ...]) -> RunPlan:
     """The plan that knows its libraries by their bytes; raises ValueError for what its rooms would miss."""
     for options in plan.options:
         options.wishes(outside)
@@ -179,7 +179,7 @@ def _with_libraries(plan: Plan, outside: tuple[str, ...]) -> Plan:
     return replace(plan, head={**plan.head, "libraries": found}) if found else plan
 
 
-def _agree_on(plan: Plan, out: Path, *, resume: bool) -> None:
+def _agree_on(plan: RunPlan, out: Path, *, resume: bool) -> None:
     """Write the plan, or make sure that the one that lies there is the same."""
     if not (out / STATE / "plan.jsonl").is_file():
         others = sorted(entry.name for entry in out.iterdir() if entry.name != STATE)
@@ -195,7 +195,7 @@ def _agree_on(plan: Plan, out: Path, *, resume: bool) -> None:
         raise ValueError(f"{out}: holds a run of {len(old.entries)} rooms; go on with it (--resume) or choose another")
 
 
-def _valid(plan: Plan, out: Path, shard: tuple[int, int]) -> frozenset[str]:
+def _valid(plan: RunPlan, out: Path, shard: tuple[int, int]) -> frozenset[str]:
     """Ids of the shard's rooms that are there as the journal says; a damaged one is set aside."""
     rows, stored = read_journals(out), whole_keys(out, mend=True)
     valid = set()
@@ -292,7 +292,7 @@ class Run:
         folder: of the run. journal: of the shard. how: when it stops, and who is told.
     """
 
-    plan: Plan
+    plan: RunPlan
     rooms: Sequence[Entry]
     skip: frozenset[str]
     folder: Path

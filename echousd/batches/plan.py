@@ -70,7 +70,7 @@ class Entry:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class RunPlan:
     """All rooms of a run.
 
     Arguments:
@@ -109,7 +109,7 @@ class Plan:
         return self.entries[shard[0] :: shard[1]]
 
 
-def make_plan(request: BatchRequest, weights: str, outside: Sequence[str] = ()) -> Plan:
+def make_plan(request: BatchRequest, weights: str, outside: Sequence[str] = ()) -> RunPlan:
     """The plan of a request; the same for the same request, files and weights.
 
     Arguments:
@@ -147,10 +147,10 @@ def make_plan(request: BatchRequest, weights: str, outside: Sequence[str] = ()) 
         "rooms": len(entries),
         "request": request.model_dump(),
     }
-    return Plan(head, tuple(sets), tuple(entries), graphs)
+    return RunPlan(head, tuple(sets), tuple(entries), graphs)
 
 
-def save_plan(plan: Plan, folder: Path) -> None:
+def save_plan(plan: RunPlan, folder: Path) -> None:
     """Write the plan and its graphs, each whole or not at all; the plan last."""
     state = folder / STATE
     state.mkdir(parents=True, exist_ok=True)
@@ -160,7 +160,7 @@ def save_plan(plan: Plan, folder: Path) -> None:
         file.writelines(plan.lines())
 
 
-def load_plan(folder: Path) -> Plan:
+def load_plan(folder: Path) -> RunPlan:
     """The plan of the run in `folder`; raises ValueError where there is none or it cannot be read."""
     path = inside(folder, f"{STATE}/{PLAN}", f"{folder}: the run")
     if not path.is_file():
@@ -181,10 +181,10 @@ def load_plan(folder: Path) -> Plan:
             raise ValueError("it is not whole")
     except (OSError, StopIteration, KeyError, TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"{path}: not a plan of this version ({error})") from None
-    return Plan(head, sets, entries, graphs)
+    return RunPlan(head, sets, entries, graphs)
 
 
-def difference(old: Plan, new: Plan) -> str:
+def difference(old: RunPlan, new: RunPlan) -> str:
     """What the new plan says otherwise, in one line; "" where both are equal."""
     if old.digest == new.digest:
         return ""

@@ -23,7 +23,7 @@ FORMS = (*TEXT_FORMS, *STAGE_FORMS)
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundGraph:
     """A graph of the sources, or why there is none.
 
     Arguments:
@@ -39,7 +39,7 @@ class Found:
     error: str = ""
 
 
-def find_graphs(sources: Sequence[str], outside: Sequence[str] = ()) -> Iterator[Found]:
+def find_graphs(sources: Sequence[str], outside: Sequence[str] = ()) -> Iterator[FoundGraph]:
     """All graphs of the sources in their order; raises ValueError for a source that matches nothing.
 
     Arguments:
@@ -54,7 +54,7 @@ def find_graphs(sources: Sequence[str], outside: Sequence[str] = ()) -> Iterator
             yield from (_anchored(found, path.parent, outside) for found in read(path))
 
 
-def _anchored(found: Found, folder: Path, outside: Sequence[str]) -> Found:
+def _anchored(found: FoundGraph, folder: Path, outside: Sequence[str]) -> FoundGraph:
     """What was found with the files of its models as absolute paths, or why they may not be read."""
     if '"asset"' not in found.text:
         return found
@@ -100,18 +100,18 @@ def _files(source: str) -> list[Path]:
     return sorted(Path(p) for p in glob.glob(source, recursive=True) if Path(p).is_file())  # noqa: PTH207
 
 
-def _file(path: Path) -> Iterator[Found]:
+def _file(path: Path) -> Iterator[FoundGraph]:
     try:
-        yield Found(path.as_posix(), path.stem, load_graph(path).to_json())
+        yield FoundGraph(path.as_posix(), path.stem, load_graph(path).to_json())
     except ValueError as error:
         rooms = _rooms_of(path)
         if len(rooms) < 2:
-            yield Found(path.as_posix(), path.stem, error=str(error))
+            yield FoundGraph(path.as_posix(), path.stem, error=str(error))
         for room in rooms if len(rooms) > 1 else ():
             try:
-                yield Found(f"{path.as_posix()}<{room}>", path.stem, load_graph(path, room=room).to_json())
+                yield FoundGraph(f"{path.as_posix()}<{room}>", path.stem, load_graph(path, room=room).to_json())
             except ValueError as wrong:
-                yield Found(f"{path.as_posix()}<{room}>", path.stem, error=str(wrong))
+                yield FoundGraph(f"{path.as_posix()}<{room}>", path.stem, error=str(wrong))
 
 
 def _rooms_of(path: Path) -> list[str]:
@@ -127,7 +127,7 @@ def _rooms_of(path: Path) -> list[str]:
         return []
 
 
-def _lines(path: Path) -> Iterator[Found]:
+def _lines(path: Path) -> Iterator[FoundGraph]:
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
             for number, line in enumerate(iter(lambda: file.readline(MAX_BYTES + 1), ""), 1):
@@ -139,7 +139,7 @@ def _lines(path: Path) -> Iterator[Found]:
         raise ValueError(f"{path}: {(error.strerror or str(error)).lower()}") from None
 
 
-def _rows(path: Path) -> Iterator[Found]:
+def _rows(path: Path) -> Iterator[FoundGraph]:
     parquet = extra("pyarrow.parquet", f"{path}: reading Parquet needs pyarrow", "batch")
     from pyarrow import ArrowException
 
@@ -164,7 +164,7 @@ def _rows(path: Path) -> Iterator[Found]:
         raise ValueError(f"{path}: no Parquet file with a column 'graph' ({str(error).splitlines()[0]:.160})") from None
 
 
-def _text(path: Path, number: int, text: str) -> Found:
+def _text(path: Path, number: int, text: str) -> FoundGraph:
     origin = f"{path.as_posix()}:{number}"
     try:
         with within_memory(path, "it", size=len(text)):
@@ -172,6 +172,6 @@ def _text(path: Path, number: int, text: str) -> Found:
             inner = raw.get("graph") if isinstance(raw, dict) else None
             if isinstance(inner, dict | str):  # a record around the graph, such as a room's manifest
                 text = inner if isinstance(inner, str) else json.dumps(inner)
-            return Found(origin, path.stem, SceneGraph.from_json(text).to_json())
+            return FoundGraph(origin, path.stem, SceneGraph.from_json(text).to_json())
     except (GraphError, ValueError, RecursionError) as error:
-        return Found(origin, path.stem, error=f"{origin}: {error}")
+        return FoundGraph(origin, path.stem, error=f"{origin}: {error}")

@@ -15,7 +15,7 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom
 
 from echomodel.files import read_bounded, read_json, whole_file, write_json
-from echousd.batches.plan import COLUMNS, Plan, fault_of, load_plan, read_journals, whole_keys
+from echousd.batches.plan import COLUMNS, RunPlan, fault_of, load_plan, read_journals, whole_keys
 from echousd.folder.manifest import LARGEST
 from echousd.folder.within import inside
 from echousd.pages import template
@@ -66,7 +66,7 @@ MANIFEST, TABLE, SUMMARY = "manifest.jsonl", "manifest.parquet", "summary.json"
 SUMS = ("objects", "relations_asked", "relations_kept", "collisions", "restless", "faces", "bytes", "seconds")
 
 
-def manifest_rows(plan: Plan, folder: Path) -> Iterator[dict[str, Any]]:
+def manifest_rows(plan: RunPlan, folder: Path) -> Iterator[dict[str, Any]]:
     """One row for every room of the plan, whatever became of it; `root` is relative to the run's folder."""
     journals = read_journals(folder)
     for entry in plan.entries:
@@ -102,7 +102,7 @@ def summary(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def write_manifest(plan: Plan, folder: Path) -> dict[str, Any]:
+def write_manifest(plan: RunPlan, folder: Path) -> dict[str, Any]:
     """Write `manifest.jsonl`, `manifest.parquet` (extra `batch`) and `summary.json`, and return the summary.
 
     Parquet holds categories as JSON text, so that every run has the same columns.
@@ -115,7 +115,7 @@ def write_manifest(plan: Plan, folder: Path) -> dict[str, Any]:
     return found
 
 
-def _write_table(plan: Plan, folder: Path) -> None:
+def _write_table(plan: RunPlan, folder: Path) -> None:
     try:
         import pyarrow
         import pyarrow.parquet as parquet
@@ -141,7 +141,7 @@ INDEX = "index.usda"
 GAP = 2.0  # metres between two rooms
 
 
-def write_index(plan: Plan, folder: Path) -> Path:
+def write_index(plan: RunPlan, folder: Path) -> Path:
     """Write `index.usda`; rooms are payloads, so that it opens without them (`Usd.Stage.LoadNone`).
 
     Rooms that are missing take no place. Unit and up axis are the first that the plan has; rooms of others are turned.

@@ -13,7 +13,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from echousd.checks.mesh_rules import of_others
 from echousd.checks.placement import inside_solid
-from echousd.checks.reading import RULES, Finding, Reading, Rule, applied, below, rule
+from echousd.checks.reading import RULES, Finding, Reading, StageRule, applied, below, rule
 from echousd.stage.contents import room_frame
 from echousd.stage.values import UNREADABLE, asset
 
@@ -247,4 +247,4 @@ def _numbers(attribute: Usd.Attribute) -> np.ndarray:
 
 
 for _name in ("echo:PhysicsValues", "echo:MaterialValues", "echo:LightValues", "echo:CameraValues"):
-    RULES.append(Rule(_name, partial(out_of_range, rule=_name)))
+    RULES.append(StageRule(_name, partial(out_of_range, rule=_name)))

@@ -166,14 +166,14 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Rule:
+class StageRule:
     """A rule of our own, called `name`, and what finds its faults."""
 
     name: str
     find: Callable[[Reading], Iterator[Finding]]
 
 
-RULES: list[Rule] = []  # filled by the modules of rules as they are imported
+RULES: list[StageRule] = []  # filled by the modules of rules as they are imported
 
 
 def rule(name: str, over: str = "", of: type | None = None) -> Callable[[Function], Callable[[Reading], Any]]:
@@ -195,7 +195,7 @@ def rule(name: str, over: str = "", of: type | None = None) -> Callable[[Functio
                     except UNREADABLE:
                         continue
 
-        RULES.append(Rule(name, find if over else function))
+        RULES.append(StageRule(name, find if over else function))
         return RULES[-1].find
 
     return made

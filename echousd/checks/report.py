@@ -15,7 +15,7 @@ from pxr import Plug, Sdf, Tf, Usd, UsdUtils
 
 import echousd
 from echousd.checks.placement import Misplacement, Whole, find_collisions, find_misplaced
-from echousd.checks.reading import RULES, Finding, Reading, Rule
+from echousd.checks.reading import RULES, Finding, Reading, StageRule
 from echousd.draw.sight import Furniture
 from echousd.folder.folder import digest_of
 from echousd.folder.manifest import find_manifest
@@ -58,7 +58,7 @@ class Fault:
         return {"rule": self.rule, "prim": self.prim, "message": self.message}
 
 
-def safely(rule: Rule, reading: Reading) -> list[Finding]:
+def safely(rule: StageRule, reading: Reading) -> list[Finding]:
     """What a rule finds; a stage that it cannot read through is a finding as well."""
     found: list[Finding] = []
     try:

@@ -24,7 +24,7 @@ DRESSING = ("none", "grouped", "each")
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class SurfacePiece:
     """One mesh of an object."""
 
     path: str  # prim path of the mesh
@@ -49,7 +49,7 @@ class Painted:
     kind: str  # `things`, or `stuff` for floor, walls and ceiling
     category: str  # category, style: words of the graph, "" where it has none
     style: str
-    pieces: tuple[Piece, ...]  # at least one
+    pieces: tuple[SurfacePiece, ...]  # at least one
 
     @property
     def triangles(self) -> np.ndarray:
@@ -144,7 +144,7 @@ def _owner(stage: Usd.Stage, path: str, prims: RoomPrims, nodes: Mapping[str, st
     return component or str(prim.GetPath())
 
 
-def _piece(stage: Usd.Stage, drawable: Drawable) -> Piece:
+def _piece(stage: Usd.Stage, drawable: Drawable) -> SurfacePiece:
     if "[" in drawable.path:
         raise _Unpaintable(f"<{drawable.path}> is placed by an instancer")
     prim = stage.GetPrimAtPath(drawable.path)
@@ -164,7 +164,7 @@ def _piece(stage: Usd.Stage, drawable: Drawable) -> Piece:
     if clear == shown:
         kept = [drawable.path]
     world = drawable.triangles @ drawable.world[:3, :3].T + drawable.world[:3, 3]
-    return Piece(
+    return SurfacePiece(
         drawable.path, corners, arrays.indices[corners], int(arrays.counts.sum()), polygon, drawable.triangles, world,
         tuple(kept), _instances(prim),
     )  # fmt: skip

@@ -21,7 +21,7 @@ from echousd.shapes.fittings import PLAIN, Millwork, millwork_of
 from echousd.shapes.geometry import Mass
 from echousd.shapes.matter import hull_moments
 from echousd.shapes.surface import CREASE, Surface, surfaces
-from echousd.shapes.walls import Piece, ShellPart, ceiling, floor, wall_name, walls
+from echousd.shapes.walls import ShellPart, ShellPiece, ceiling, floor, wall_name, walls
 from echousd.stage import encoding
 from echousd.stage.paths import OPENINGS, SHELL, piece_name
 from echousd.stage.pen import Pen, ops
@@ -202,7 +202,7 @@ def _forms(part: ShellPart, coverings: Mapping[str, str]) -> Iterator[tuple[Mesh
         yield from _forms(inner, coverings)
 
 
-def _mass(pieces: Sequence[Piece], at: np.ndarray) -> Mass:
+def _mass(pieces: Sequence[ShellPiece], at: np.ndarray) -> Mass:
     """Of a leaf, as light as a hollow door."""
     volume, middle, tensor = hull_moments([np.concatenate([piece.mesh.vertices for piece in pieces])])
     moments, axes = np.linalg.eigh(LEAF * volume * tensor)

@@ -22,7 +22,7 @@ PARAPET = 1.05  # metres, height of a wall outdoors that nothing opens
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class ShellPiece:
     """One mesh of the shell in the room's frame: its prim's name, its material, whether things bump into it."""
 
     name: str
@@ -37,7 +37,7 @@ class ShellPart:
 
     name: str  # of its prim
     label: str  # what it is, "" for a part of what is labelled
-    pieces: tuple[Piece, ...]  # its meshes
+    pieces: tuple[ShellPiece, ...]  # its meshes
     inner: tuple[ShellPart, ...] = ()  # parts that belong to it
     joint: Joint | None = None  # how it moves against the part that it belongs to, None = not at all
 
@@ -76,13 +76,12 @@ def _walls(
         here = [opening for opening in openings if opening.edge == edge]
         frame = wall_frame(polygon, edge)
         tall = min(height, PARAPET) if outdoor and not here else height
-        pieces = [Piece(piece_name(name, "mesh"), "wall", _placed(_wall(polygon, edge, tall, here, deep), frame))]
-        boards = fittings.skirting(here, float(length), millwork.skirting)
-        if boards is not None:
-            pieces.append(Piece(piece_name(name, "skirting"), "trim", _placed(boards, frame), solid=False))
+        pieces = [ShellPiece(piece_name(name, "mesh"), "wall", _placed(_wall(polygon, edge, tall, here, deep), frame))]
+        if (boards := fittings.skirting(here, float(length), millwork.skirting)) is not None:
+            pieces.append(ShellPiece(piece_name(name, "skirting"), "trim", _placed(boards, frame), solid=False))
         if millwork.cornice and tall == height >= COVED:
             coving = _cornice(polygon, edge, height, millwork.cornice)
-            pieces.append(Piece(piece_name(name, "cornice"), "trim", coving, solid=False))
+            pieces.append(ShellPiece(piece_name(name, "cornice"), "trim", coving, solid=False))
         left_first = signed_area(polygon) > 0
         inner = [
             _filled(
@@ -102,18 +101,19 @@ def wall_name(edge: int) -> str:
 
 def ceiling(polygon: np.ndarray, height: float) -> ShellPart:
     """A slab over the room, from the ceiling upwards."""
-    return ShellPart("Ceiling", "ceiling", (Piece(piece_name("Ceiling", "mesh"), "ceiling", _slab(polygon, height)),))
+    return _slab("Ceiling", polygon, height)
 
 
 def floor(polygon: np.ndarray) -> ShellPart:
     """A slab whose top is at height 0."""
-    return ShellPart("Floor", "floor", (Piece(piece_name("Floor", "mesh"), "floor", _slab(polygon, -THICKNESS)),))
+    return _slab("Floor", polygon, -THICKNESS)
 
 
-def _slab(polygon: np.ndarray, bottom: float) -> Mesh:
+def _slab(name: str, polygon: np.ndarray, bottom: float) -> ShellPart:
     flat = shapely.Polygon(np.stack([polygon[:, 0], -polygon[:, 1]], 1))  # x right, -z up: seen from above
     slab = fittings.extruded(flat, THICKNESS)
-    return Mesh(slab.vertices[:, [0, 2, 1]] * (1, 1, -1) + (0, bottom, 0), slab.faces)
+    mesh = Mesh(slab.vertices[:, [0, 2, 1]] * (1, 1, -1) + (0, bottom, 0), slab.faces)
+    return ShellPart(name, name.lower(), (ShellPiece(piece_name(name, "mesh"), name.lower(), mesh),))
 
 
 def outline(polygon: np.ndarray, thickness: Sequence[float] | np.ndarray = ()) -> np.ndarray:
@@ -180,8 +180,8 @@ def _filled(
     """
     name = f"{wall}_{opening.name}"
 
-    def made(what: str, look: str, mesh: Mesh | None, solid: bool = True) -> tuple[Piece, ...]:
-        return () if mesh is None else (Piece(piece_name(name, what), look, _placed(mesh, frame), solid),)
+    def made(what: str, look: str, mesh: Mesh | None, solid: bool = True) -> tuple[ShellPiece, ...]:
+        return () if mesh is None else (ShellPiece(piece_name(name, what), look, _placed(mesh, frame), solid),)
 
     if opening.kind == "window":
         pieces = (

@@ -15,7 +15,7 @@ from echousd.srgb import of_hexadecimal
 
 
 @dataclass(frozen=True)
-class Slot:
+class MaterialSlot:
     """How one kind of material looks: a row of `slots.toml`, which says what its words mean."""
 
     color: str
@@ -31,8 +31,8 @@ class Slot:
 
 
 HERE = Path(__file__).parent
-_ROWS = {name: Slot(**row) for name, row in tomllib.loads((HERE / "slots.toml").read_text("utf-8")).items()}
-SLOTS: Mapping[str, Slot] = _ROWS | {
+_ROWS = {name: MaterialSlot(**row) for name, row in tomllib.loads((HERE / "slots.toml").read_text("utf-8")).items()}
+SLOTS: Mapping[str, MaterialSlot] = _ROWS | {
     name: replace(_ROWS[name.partition("_")[0]], pattern=name, metres=0.0) for name in PRINTS
 }
 UPRIGHT = frozenset(name for name, slot in SLOTS.items() if slot.upright)

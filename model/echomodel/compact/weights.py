@@ -21,7 +21,7 @@ from echomodel.late import Late
 
 
 @dataclass(frozen=True)
-class Part:
+class ModelPart:
     """What weights files and the model know of a part.
 
     Arguments:
@@ -36,12 +36,12 @@ class Part:
 
 
 MODULES = "echomodel.compact.modules"
-PARTS: dict[str, Part] = {
-    "latent": Part(Late(f"{MODULES}:LatentGraph")),
-    "layout": Part(Late(f"{MODULES}:LayoutDenoiser"), ("latent",), branch=True),
-    "autoencoder": Part(Late("echomodel.compact.shape:Autoencoder")),
-    "shape": Part(Late("echomodel.compact.shape:ShapeDenoiser"), ("latent", "autoencoder"), branch=True),
-    "furniture": Part(Late(f"{MODULES}:FurnitureDenoiser"), ("latent",), branch=True),
+PARTS: dict[str, ModelPart] = {
+    "latent": ModelPart(Late(f"{MODULES}:LatentGraph")),
+    "layout": ModelPart(Late(f"{MODULES}:LayoutDenoiser"), ("latent",), branch=True),
+    "autoencoder": ModelPart(Late("echomodel.compact.shape:Autoencoder")),
+    "shape": ModelPart(Late("echomodel.compact.shape:ShapeDenoiser"), ("latent", "autoencoder"), branch=True),
+    "furniture": ModelPart(Late(f"{MODULES}:FurnitureDenoiser"), ("latent",), branch=True),
 }
 
 
