@@ -396,15 +396,23 @@ def test_openings_that_nobody_stated_make_way_for_furniture(monkeypatch, propose
     [
         (100, [0], [0]),
         (100, [3, 2, 0], [0, 0, 0]),
-        (100, [3, 2, 3, 1, 0], [0, 0, 0, 2, 2]),  # all drafts in passing, then the best in earnest
-        (100, [3, 2, 3, 3, 3, 3], [0, 0, 0, 2, 2, 2]),
-        (3500, [3, 2, 1], [0, 2]),  # of 12000 one quarter goes to drafts in passing
+        (100, [3, 2, 4, 1, 0], [0, 0, 0, 2, 2]),  # all drafts in passing, then the best in earnest
+        (100, [3, 2, 4, 3, 3, 3], [0, 0, 0, 2, 2, 2]),
+        (3500, [3, 2, 1], [0, 2]),  # of 8000 three eighths go to drafts in passing
         (2500, [3, 2, 1, 1], [0, 0, 2, 2]),
+        (2900, [3, 2, 1, 1], [0, 0, 2]),
     ],
 )
 def test_a_room_has_so_many_poses_for_all_its_searches(monkeypatch, poses, faults, anew):
     asked = searches(monkeypatch, faults, poses=poses, drafts=3)
     assert [search[2] for search in asked] == anew
+
+
+def test_drafts_that_end_alike_are_searched_once_in_earnest(monkeypatch):
+    asked = searches(monkeypatch, [3, 2, 3, 2, 3, 3, *[1] * 8], drafts=8)
+    assert [search[2:] for search in asked] == [*((0, number) for number in range(6)), (2, 1), (2, 0)]
+    asked = searches(monkeypatch, [1] * 16, drafts=8)
+    assert [search[2] for search in asked] == [0, 0, 0, 0, 2]
 
 
 def test_a_search_in_earnest_goes_on_from_the_one_in_passing(monkeypatch):
