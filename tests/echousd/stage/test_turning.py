@@ -150,6 +150,26 @@ def test_joints_of_drawers_slide_as_far_in_another_unit():
     assert rescale(layer, 0.01).ExportToString() == once
 
 
+def test_a_matrix_above_a_model_of_others_scales_it_and_others_only_move():
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.pseudoRoot.SetInfo("metersPerUnit", 1.0)
+    pose = Gf.Matrix4d().SetScale(0.5) * Gf.Matrix4d().SetTranslate((1, 2, 3))
+    for name, files in (("theirs", ("model.usd", "")), ("ours", ("ours_geo.usdc",)), ("bare", ("",))):
+        spec = Sdf.CreatePrimInLayer(layer, f"/{name}")
+        attribute = Sdf.AttributeSpec(spec, "xformOp:transform", Sdf.ValueTypeNames.Matrix4d)
+        attribute.default = pose
+        for number, file in enumerate(files):
+            child = Sdf.CreatePrimInLayer(layer, f"/{name}/part_{number}")
+            if file:
+                child.payloadList.prependedItems.append(Sdf.Payload(file, "/model"))
+    rescale(layer, 0.01, theirs=lambda path: path == "model.usd")
+    assert layer.pseudoRoot.GetInfo("metersPerUnit") == 0.01
+    found = {name: np.array(layer.GetAttributeAtPath(f"/{name}.xformOp:transform").default) for name in
+             ("theirs", "ours", "bare")}  # fmt: skip
+    for name, side in (("theirs", 50.0), ("ours", 0.5), ("bare", 0.5)):
+        np.testing.assert_allclose(found[name], [*np.diag([side] * 3 + [0])[:3], (100, 200, 300, 1)], atol=1e-9)
+
+
 @pytest.mark.parametrize("other", ["Z", "theirs"])
 def test_it_passes_check_and_is_read_and_edited_like_the_other(roots, tmp_path, other):
     assert not check(roots[other]).errors

@@ -42,6 +42,20 @@ def test_tables_have_their_width_and_kind(kind, value, width, whole, shape):
 
 
 @pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        ("short", "str short"),
+        ("two\n  lines", "str two lines"),
+        ("x" * 40, f"str {'x' * 40}"),
+        ("x" * 41, f"str {'x' * 37}..."),
+        (1.5, "float 1.5"),
+    ],
+)
+def test_a_value_of_another_type_is_shown_by_its_type_and_forty_letters(value, told):
+    assert values.shown(value) == told
+
+
+@pytest.mark.parametrize(
     ("kind", "value", "width", "whole", "allowed"),
     [
         (NAMES.Float2Array, [Gf.Vec2f(1, 2)], 3, False, "a list of 3 numbers each"),
