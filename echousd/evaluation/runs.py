@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from echomodel.boxes2d import seen
 from echomodel.data.roomset import load_rooms, with_known_words
 from echomodel.data.sgfront import SGFront
 from echomodel.metrics.layouts import Task
@@ -349,9 +350,8 @@ def _scenesmith(raw: dict[str, Any], file: Path) -> RoomBoxes:
         low, high = np.array(entry["bbox_min"], float), np.array(entry["bbox_max"], float)
         w, x, y, z = entry["transform"]["rotation_wxyz"]
         turn = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-        cos, sin, middle = math.cos(turn), math.sin(turn), (low + high) / 2
         at = np.array(entry["transform"]["translation"], float)
-        plan = at[:2] + np.array([cos * middle[0] - sin * middle[1], sin * middle[0] + cos * middle[1]])
+        plan = at[:2] + seen((low + high)[:2] / 2, turn)
         size = (high - low)[[0, 2, 1]]
         place = np.array([plan[0], at[2] + low[2], -plan[1]])
         found.append((entry["name"], size, place, turn + math.pi))

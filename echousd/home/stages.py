@@ -123,7 +123,8 @@ def read_poses(path: Path) -> dict[str, tuple[SceneGraph, np.ndarray]]:
         cache, turn, out = UsdGeom.XformCache(), to_metres(stage), {}
         for prims in found:
             pose = turn @ values.matrix(cache.GetLocalToWorldTransform(prims.room), prims.room)
-            pose[:3, :3] = _upright(pose[:3, :3])  # rooms are made upright and in metres
+            lean = np.arctan2(pose[0, 2] - pose[2, 0], pose[0, 0] + pose[2, 2])
+            pose[:3, :3] = upright(lean)  # the nearest: rooms are made upright and in metres
             out[names[prims.room.GetPath()]] = (room_graph(prims), pose)
         return out
 
@@ -152,11 +153,6 @@ def furniture(plan: Plan, path: Path) -> list[Standing]:
             corners = around @ pose[[0, 2]][:, [0, 2]].T + pose[[0, 2], 3]
             found.append(Standing(thing.node, corners, float(thing.position[1])))
     return found
-
-
-def _upright(rotation: np.ndarray) -> np.ndarray:
-    """The turn about +Y nearest to a rotation: rooms stand on their floor."""
-    return upright(np.arctan2(rotation[0, 2] - rotation[2, 0], rotation[0, 0] + rotation[2, 2]))
 
 
 def _names(paths: list[Sdf.Path]) -> dict[Sdf.Path, str]:

@@ -146,7 +146,8 @@ def brought(root: Path | None, folder: Path) -> dict[str, dict[str, bytes]]:
         beside = sorted(place.with_suffix("").rglob("*"))
         paths = [f"{FOLDER}/{each.relative_to(place.parent).as_posix()}" for each in (*beside, place) if each.is_file()]
         content = {path: inside(root.parent, path, "a look").read_bytes() for path in paths}
-        other = [path for path in content if (folder / path).exists() and _bytes(folder / path) != content[path]]
+        taken = {path: folder / path for path in content if (folder / path).exists()}
+        other = [path for path, it in taken.items() if not it.is_file() or it.read_bytes() != content[path]]
         if other:
             told = f"{folder / other[0]}: is another look; that of {root.parent} is not taken along"
             warnings.warn(told, stacklevel=5)
@@ -193,10 +194,6 @@ def refitted(
         "as made, export and paint again"
         for path, names in unfit.items()
     ]
-
-
-def _bytes(path: Path) -> bytes | None:
-    return path.read_bytes() if path.is_file() else None
 
 
 def _alone(root: bytes, files: Mapping[str, bytes]) -> bytes:

@@ -106,7 +106,10 @@ def scene_of(
     """The scene of a layout; arguments as `cleared`, `room`: its plan."""
     nodes, size, position, yaw = graph.nodes, room.size, room.position, room.yaw
     solids = [
-        [_placed(collider.mesh.vertices, position[i], yaw[i]) for collider in geometry[node.name].colliders]
+        [
+            np.asarray(one.mesh.vertices, float) @ upright(yaw[i]).T + position[i]
+            for one in geometry[node.name].colliders
+        ]
         for i, node in enumerate(nodes)
     ]
     plan = floor if graph.room.corners is None else graph.room.corners
@@ -141,7 +144,3 @@ def _boards(mesh: Mesh) -> Solids:
     """Points of the connected pieces of a mesh."""
     board = connected_pieces(mesh.faces, len(mesh.vertices))
     return [mesh.vertices[np.unique(mesh.faces[board == number])] for number in range(int(board.max()) + 1)]
-
-
-def _placed(points: np.ndarray, position: np.ndarray, yaw: float) -> np.ndarray:
-    return np.asarray(points, float) @ upright(yaw).T + position
