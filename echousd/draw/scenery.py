@@ -10,11 +10,11 @@ from functools import cache, cached_property
 import numpy as np
 from pxr import Usd
 
+from echomodel.boxes2d import upright_box
 from echomodel.triangles import area_normals
 from echousd.draw.drawables import Drawable, Paint, image_of, read_drawables
 from echousd.draw.indoors import Lights, read_lights
 from echousd.draw.sight import Furniture
-from echousd.stage.contents import upright_box
 
 GOLDEN = 0.61803398875
 LINEAR = (np.arange(256, dtype=np.float32) / 255) ** 2.2  # of a byte of sRGB

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from pxr import Kind, Sdf, Usd, UsdGeom
 
-from echomodel.boxes2d import seen, turned
+from echomodel.boxes2d import upright_box
 from echomodel.triangles import Mesh, joined
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import LABELS
@@ -185,23 +185,6 @@ def shape_of(
     if not len(faces):
         return None
     return Shape(vertices, faces, *upright_box(vertices, own[:3, :3]))
-
-
-def upright_box(points: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Size (3,), bottom centre (3,) and yaw of the box that stands around points (n, 3), +Y up, with a prim's heading.
-
-    `own`: (3, 3) float, column vectors, turns the prim's own axes.
-    """
-    front, width = own[:, 2], own[:, 0]
-    # The front is horizontal in our rooms; in a prim whose own up is +Z it is not, then the width tells the heading.
-    level = np.hypot(front[0], front[2]) > np.hypot(width[0], width[2]) * 1e-3
-    yaw = float(np.arctan2(front[0], front[2])) if level else float(np.arctan2(-width[2], width[0]))
-    ahead = points.copy()
-    ahead[:, [0, 2]] = seen(points[:, [0, 2]], yaw)
-    low, high = ahead.min(0), ahead.max(0)
-    position = low.copy()
-    position[[0, 2]] = turned((low + high)[[0, 2]] / 2, yaw)
-    return high - low, position, yaw
 
 
 def triangulated(prim: Usd.Prim) -> tuple[np.ndarray, np.ndarray]:
