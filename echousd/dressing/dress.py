@@ -118,7 +118,7 @@ def setting_of(room: RoomData, layout: int = 0) -> Setting:
         objects, room.corners, tuple(room.graph.room.openings), room.height, room.options.walls,
         room.options.dress == "full", room.provenance.seed, vocabulary().room_type(room.graph.room.type).use,
         story(who), who if any(o.row.role == "bed" for o in objects.values()) else "",
-        room.graph.room.style,
+        vocabulary().known_style(room.graph.room.style),
     )  # fmt: skip
 
 

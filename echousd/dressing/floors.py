@@ -67,7 +67,7 @@ def _rug(setting: Setting, host: Standing | None, spot: np.ndarray, extents: np.
     form = "runner" if long > RUNNER * short else "oval" if rng.random() < OVALS else "rug"
     if long < 1.3 * short and (seat or rng.random() < ROUNDS):
         form, long = "round", short
-    names = names_of("rug", form, rng.choice((setting.resident, "")))
+    names = names_of("rug", form, rng.choice((setting.resident, "")), setting.style)
     new = [name for name in names if all(thing.kind != name for thing in setting.placed)]
     yaw = own if extents[0] >= extents[1] else own + np.pi / 2
     return Thing(str(rng.choice(new or names)), np.array([long, PILE, short]), spot, yaw, of)

@@ -13,7 +13,7 @@ import shapely
 from echomodel.boxes2d import footprints, seen, turned
 from echomodel.dressing import KINDS
 from echomodel.openings import Opening, free_area
-from echomodel.vocabulary import Category, vocabulary
+from echomodel.vocabulary import Category, RoomStyle, vocabulary
 from echousd.dressing.stories import TABLE, Story, story
 from echousd.shapes.geometry import Geometry
 
@@ -104,7 +104,7 @@ class Setting:
     use: str = ""  # of the room (`echomodel.rows.RoomType`)
     story: Story = field(default_factory=story)  # of who lives there
     resident: str = ""  # who sleeps there (`echousd.graph.fields.RESIDENTS`)
-    style: str | None = None  # of the room, a word of `RoomStyle`
+    style: RoomStyle | None = None  # of the room
     placed: list[Thing] = field(default_factory=list)  # the things so far
     carriers: dict[str, Standing] = field(default_factory=dict)  # those of them that others stand on
     curtained: set[str] = field(default_factory=set)  # names of the windows that have curtains

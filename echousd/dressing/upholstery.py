@@ -52,7 +52,7 @@ Design = tuple[str, np.ndarray, int]  # kind, extents and variant of a cushion
 def _designs(setting: Setting, rng: np.random.Generator) -> tuple[Design, Design]:
     """Two cushions that go together: one plain, one of a print, either of them first; the second often a long one."""
     form = str(rng.choice(("square", "lumbar")))
-    kinds = [str(rng.choice(names_of("cushion", form, setting.resident) or ["cushion"])), "cushion"]
+    kinds = [str(rng.choice(names_of("cushion", form, setting.resident, setting.style) or ["cushion"])), "cushion"]
     made = [(kind, usual_size(kind, rng), int(rng.integers(1 << 30))) for kind in kinds]
     return (made[0], made[1]) if form == "square" and rng.random() < 0.5 else (made[1], made[0])
 

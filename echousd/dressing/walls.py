@@ -13,7 +13,6 @@ from echomodel.dressing import KINDS, usual_size
 from echomodel.dressing import thing as solids_of
 from echomodel.dressing.prints import printed
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal
-from echomodel.vocabulary import vocabulary
 from echousd.dressing.setting import Setting, Standing, Thing, rectangle, standing
 from echousd.dressing.tabletops import stocked, surfaces
 from echousd.shapes.fittings import RAIL
@@ -79,7 +78,8 @@ def curtains(setting: Setting) -> None:
                 _blind(setting, wall, window)
                 continue
             rng = setting.rng("curtains")
-            kind, variant, short = str(rng.choice(CURTAINS)), int(rng.integers(1 << 30)), rng.random() < 0.5
+            kind, variant = str(rng.choice(_styled(setting, CURTAINS))), int(rng.integers(1 << 30))
+            short = rng.random() < 0.5
             wide = round(min(0.45, 0.16 + 0.14 * window.width), 3)
             over = [max(0.3, window.sill - 0.12), window.sill - 0.01]
             feet = [0.015, *(over if short and _under(setting, wall, window) else ())]
@@ -100,6 +100,11 @@ def curtains(setting: Setting) -> None:
                 _blind(setting, wall, window)
 
 
+def _styled(setting: Setting, kinds: Sequence[str]) -> Sequence[str]:
+    """Those of some curtains that go with the style of a room; all where none is told."""
+    return [kind for kind in kinds if kind in setting.style.curtains] if setting.style else kinds
+
+
 def _under(setting: Setting, wall: Wall, window: Opening) -> bool:
     """Whether something stands under a window or right before it."""
     middle = wall.at((window.offset + window.end) / 2, BEFORE / 2, 0.0)
@@ -110,7 +115,8 @@ def _under(setting: Setting, wall: Wall, window: Opening) -> bool:
 def _blind(setting: Setting, wall: Wall, window: Opening) -> None:
     """A blind, let down over a part of the pane, or a curtain on a rod before its lower half."""
     rng, alike = setting.rng(window.name, "blind"), setting.rng("blinds")
-    kind, variant = BLINDS[0 if setting.use == "wet" else alike.integers(len(BLINDS))], int(alike.integers(1 << 30))
+    kinds = BLINDS[:1] if setting.use == "wet" else _styled(setting, BLINDS)
+    kind, variant = str(alike.choice(kinds)), int(alike.integers(1 << 30))
     half = kind == "cafe_curtain"
     tall = round(window.height * float(0.52 if half else rng.choice((0.2, 0.3, 0.4))), 3)
     thick = KINDS[kind].low[2]
@@ -124,8 +130,8 @@ def radiators(setting: Setting) -> None:
     """A radiator under every window where nothing stands, as wide as curtains leave it; in a room all are alike."""
     if not setting.walls or setting.use == "outdoor":
         return
-    style, rng = vocabulary().known_style(setting.style), setting.rng("radiators")
-    kind, variant = str(rng.choice(style.radiators if style else RADIATORS)), int(rng.integers(1 << 30))
+    kinds, rng = setting.style.radiators if setting.style else RADIATORS, setting.rng("radiators")
+    kind, variant = str(rng.choice(kinds)), int(rng.integers(1 << 30))
     low, high = np.array(KINDS[kind].low), np.array(KINDS[kind].high)
     for wall in walls_of(setting):
         for window in (o for o in setting.openings if o.kind == "window" and o.edge == wall.edge):
@@ -145,7 +151,7 @@ def sockets(setting: Setting) -> None:
         if wall is not None:
             ways = [side * (float(host.size[0]) / 2 + off) for off in (0.15, 0.3, 0.6, 0.8) for side in (1, -1)]
             spots = [(wall, (along + way) / wall.length) for way in ways]
-            _hang_first(setting, Thing("socket", size, np.zeros(3), 0.0, "", variant), spots, 0.3)
+            _hung(setting, Thing("socket", size, np.zeros(3), 0.0, "", variant), spots, 0.3)
 
 
 def pictures(setting: Setting) -> None:
@@ -176,7 +182,7 @@ def pictures(setting: Setting) -> None:
 def shown(setting: Setting, size: np.ndarray, count: int, *words: str) -> list[str]:
     """Pictures of one kind that hang together, for who lives there; new to the room while there are enough."""
     hung, rng = {thing.kind for thing in setting.placed}, setting.rng(*words, "shown")
-    kinds = list(printed("picture", "wide" if size[0] > size[1] else "tall", setting.resident).values())
+    kinds = list(printed("picture", "wide" if size[0] > size[1] else "tall", setting.resident, setting.style).values())
     series = sorted(kinds, key=lambda names: -(rng.random() ** (1 / len(names))))  # every picture alike often
     new = ([name for name in names if name not in hung] for names in series)
     names = next((names for names in new if len(names) >= count), max(series, key=len) * count)
@@ -284,7 +290,7 @@ def shelves(setting: Setting) -> None:
     for wall in _roomiest(setting):
         size = usual_size(kind, setting.rng(f"wall {wall.edge}", "shelf"))
         one, spots = Thing(kind, size, np.zeros(3), 0.0, "", variant), [(wall, share) for share in SHARES]
-        board = _hang_first(setting, one, spots, SHELF - float(size[1]), above=ABOVE)
+        board = _hung(setting, one, spots, SHELF - float(size[1]), above=ABOVE)
         if board:
             solids, name = solids_of(kind, size, np.random.default_rng(variant)), f"wall shelf {wall.edge}"
             made = assembled(solids, size, faces=1200, origin=Origin("dressing"))
@@ -298,10 +304,8 @@ def shelves(setting: Setting) -> None:
 def clock(setting: Setting) -> None:
     """A clock on a wall where people sit together or work."""
     rng = setting.rng("wall clock")
-    if not (setting.walls and setting.inviting("clock") and setting.has(CLOCKS, rng)):
-        return
-    spots = [(wall, share) for wall in _roomiest(setting) for share in SHARES]
-    _hang_first(setting, _new("wall_clock", rng), spots, 1.72)
+    if setting.walls and setting.inviting("clock") and setting.has(CLOCKS, rng):
+        _hung(setting, _new("wall_clock", rng), product(_roomiest(setting), SHARES), 1.72)
 
 
 def coats(setting: Setting) -> None:
@@ -311,7 +315,7 @@ def coats(setting: Setting) -> None:
             one = _new("coats", setting.rng(door.name, "coats"))
             half = float(one.size[0]) / 2 + 0.12
             spots = [(wall, along / wall.length) for along in (door.end + half, door.offset - half)]
-            if _hang_first(setting, one, spots, 1.78 - float(one.size[1])):
+            if _hung(setting, one, spots, 1.78 - float(one.size[1])):
                 return
 
 
@@ -352,8 +356,8 @@ def tall_mirror(setting: Setting) -> None:
     """A mirror for the whole person where somebody dresses and can stand before it: in rooms with a wardrobe or bed."""
     rng = setting.rng("tall mirror")
     if setting.walls and setting.inviting("tall_mirror") and setting.has(MIRRORS, rng):
-        spots = [(wall, share) for wall in _roomiest(setting) for share in (0.18, 0.82, *SHARES)]
-        _hang_first(setting, _new("tall_mirror", rng), spots, 0.3, before=STANDING)
+        spots = product(_roomiest(setting), (0.18, 0.82, *SHARES))
+        _hung(setting, _new("tall_mirror", rng), spots, 0.3, before=STANDING)
 
 
 def _new(kind: str, rng: np.random.Generator) -> Thing:
@@ -376,14 +380,11 @@ def _roomiest(setting: Setting) -> Iterable[Wall]:
     return sorted(walls_of(setting), key=lambda wall: (round(used(wall), 6), wall.edge))
 
 
-def _hang_first(
-    setting: Setting, one: Thing, spots: Iterable[tuple[Wall, float]], low: float, *, above: float = 0.02,
-    before: float = 0.02,
-) -> Thing | None:  # fmt: skip
+def _hung(setting: Setting, one: Thing, spots: Iterable[tuple[Wall, float]], low: float, **free: float) -> Thing | None:
     """Hang a thing at the first of some shares of walls' lengths where it fits; None where none is."""
     for wall, share in spots:
-        place = wall, share * wall.length, one.kind, one.size, low, one.variant
-        if found := hung_at(setting, *place, above=above, before=before):
+        at, room = share * wall.length, {"above": 0.02, "before": 0.02} | free
+        if found := hung_at(setting, wall, at, one.kind, one.size, low, one.variant, "", **room):
             setting.placed.append(found)
             return found
     return None

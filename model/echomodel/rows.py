@@ -229,7 +229,8 @@ class RoomStyle:
         family: of furniture making. kinds: (part, kinds of it) where the style has others than its family.
         palettes: harmonies. windows, doors, cornices: of the millwork (metres of a cornice's height, 0 = none).
         covers: what a wall behind a bed or sofa has, "" = nothing. floors: slots of those of wood or the like.
-        radiators: small things that stand under windows.
+        radiators, curtains: small things that stand under windows, and that hang before them.
+        prints: kinds of pictures and names of rugs and cushions (`prints.toml`).
         aliases: other words for it.
     """
 
@@ -240,6 +241,8 @@ class RoomStyle:
     doors: tuple[str, ...]
     covers: tuple[str, ...]
     floors: tuple[str, ...]
+    curtains: tuple[str, ...]
+    prints: tuple[str, ...]
     cornices: tuple[float, ...] = (0.0,)
     radiators: tuple[str, ...] = ("panel_radiator",)
     kinds: tuple[tuple[str, tuple[str, ...]], ...] = ()

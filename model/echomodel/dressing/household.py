@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from functools import partial
 
 import numpy as np
 
@@ -32,21 +32,15 @@ def picture(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid
     return parts
 
 
-def mirror(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A framed mirror."""
+def mirror(size: Size, rng: np.random.Generator, power: float = 60.0) -> list[Solid]:
+    """A mirror in a narrow frame, an ellipse of `power` 2, the more of a rectangle the larger that is."""
     w, h, d = size
-    bar = 0.03
-    glass = box((-w / 2 + bar / 2, bar / 2, -d / 2), (w / 2 - bar / 2, h - bar / 2, d / 2 - 0.008), "mirror")
-    return [*framed((-w / 2, 0, -d / 2), (w / 2, h, d / 2), bar, "frame"), glass]
+    back, turn = np.array([0.0, h / 2, -d / 2]), rotation(x=np.pi / 2)
+    rim = turned(back, (w / 2, h / 2), d * 0.8, material="frame", turn=turn, power=power)
+    return [rim, turned(back, (w / 2 - 0.018, h / 2 - 0.018), d, material="mirror", turn=turn, power=power)]
 
 
-def round_mirror(size: Size, rng: np.random.Generator, power: float = 2.0) -> list[Solid]:
-    """A round mirror in a narrow frame, the more of a rectangle with round corners the larger `power`."""
-    w, h, d = size
-    form: dict[str, Any] = {"turn": rotation(x=np.pi / 2), "power": power}
-    back, inner = np.array([0.0, h / 2, -d / 2]), (w / 2 - 0.018, h / 2 - 0.018)
-    rim = turned(back, (w / 2, h / 2), d * 0.8, material="frame", **form)
-    return [rim, turned(back, inner, d, material="mirror", **form)]
+round_mirror = partial(mirror, power=2.0)
 
 
 def clock(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -78,5 +72,5 @@ def wall_clock(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 
 def tall_mirror(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A mirror for the whole person."""
-    return household.mirror(size, rng) if rng.random() < 0.5 else round_mirror(size, rng, 4.0)
+    """A mirror for the whole person, its corners round or not."""
+    return household.mirror(size, rng, float(rng.choice((4.0, 60.0))))

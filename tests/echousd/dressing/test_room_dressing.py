@@ -14,6 +14,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.dressing import KINDS, SMALL
 from echomodel.dressing import thing as solids_of
+from echomodel.dressing.prints import PRINTS, printed
 from echomodel.furniture.assembly import pieces_of
 from echomodel.openings import Opening
 from echomodel.triangles import Mesh
@@ -24,10 +25,11 @@ from echousd.dressing.dress import RULES, TALL, Dressing, dress, dressed, settin
 from echousd.dressing.setting import Setting, Thing, meets, standing
 from echousd.dressing.tabletops import surfaces
 from echousd.dressing.upholstery import STEP, _Seat
-from echousd.dressing.walls import RADIATORS, curtains, radiators, sockets
+from echousd.dressing.walls import BLINDS, CURTAINS, RADIATORS, curtains, radiators, sockets
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.compose import room_files
 from echousd.options import RoomOptions
+from echousd.room import Provenance
 from echousd.shapes.fittings import SKIRTING
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
 from echousd.shapes.sources.whole import material_groups, solid_geometry
@@ -136,7 +138,7 @@ def test_a_window_without_room_for_curtains_has_a_blind_and_no_rail():
 @pytest.mark.parametrize("style", [None, "industrial", "modern"])
 def test_a_radiator_stands_under_a_window_between_its_curtains(style):
     window = Opening("window", "window", 0, 1.1, 1.8, 1.3, 0.9)
-    setting = Setting({}, SQUARE, (window,), 2.7, True, False, 0, style=style)
+    setting = Setting({}, SQUARE, (window,), 2.7, True, False, 0, style=vocabulary().known_style(style))
     curtains(setting)
     hung = len(setting.placed)
     radiators(setting)
@@ -149,6 +151,25 @@ def test_a_radiator_stands_under_a_window_between_its_curtains(style):
     assert -0.9 < low[0] < -0.3 < 0.3 < low[1] < 0.9  # below the pane
     assert -2.0 + SKIRTING < high[0] < high[1] < -1.8
     assert not any(found.footprint.intersects(one.footprint) for one in setting.placed[:hung])
+
+
+def test_a_told_style_has_its_own_curtains_pictures_rugs_and_cushions(bare):
+    for style in vocabulary().styles:
+        assert set(style.curtains) <= {*CURTAINS, *BLINDS}
+        assert min(len({*style.curtains} & {*kinds}) for kinds in (CURTAINS, BLINDS)) > 0
+        kinds = {row.get("kind", name) for name, row in PRINTS.items() if "for" not in row}
+        assert set(style.prints) <= kinds
+        for form in ("tall", "wide"):
+            assert {*printed("picture", form, style=style)} <= {*style.prints}
+    graph = bare.graph.replaced(room=bare.graph.room.replaced(style="boho"))
+    told = replace(bare, graph=graph, options=RoomOptions(walls=True, dress="full"))
+    style, found = vocabulary().style("boho"), set()
+    for seed in range(4):
+        names = [thing.kind for thing in dressed(replace(told, provenance=Provenance(seed))).placed]
+        found |= {PRINTS[name].get("kind", name) for name in names if name in PRINTS}
+        assert {name for name in names if name in (*CURTAINS, *BLINDS)} <= {*style.curtains}
+    assert found
+    assert found <= {*style.prints}
 
 
 def block(category, size, z):
