@@ -39,6 +39,7 @@ class Millwork:
     door: str = "panelled"
     skirting: float = 0.08  # skirting, cornice: their heights, metres; 0 = no cornice
     cornice: float = 0.0
+    boxed: bool = False  # curtains hang from behind boards, in a fifth of rooms without a style
 
 
 PLAIN = Millwork()
@@ -53,7 +54,7 @@ def millwork_of(seed: int, style: str | None = None, *, private: bool = False) -
         str(rng.choice(list(odds), p=np.array(list(odds.values())) / sum(odds.values()))) for odds in (windows, doors)
     )
     skirting, cornice = rng.choice(SKIRTINGS), rng.choice(row.cornices if row else CORNICES)
-    return Millwork(window, door, float(skirting), float(cornice))
+    return Millwork(window, door, float(skirting), float(cornice), rng.random() < (row.boxed if row else 0.2))
 
 
 def board(u: tuple[float, float], v: tuple[float, float], w: tuple[float, float]) -> Mesh:
@@ -201,13 +202,17 @@ def window_sill(opening: Opening) -> Mesh:
     return board((opening.offset - 0.05, opening.end + 0.05), (opening.sill - 0.03, opening.sill), (-0.04, 0.0))
 
 
-def curtain_rail(opening: Opening, length: float, height: float) -> Mesh | None:
-    """A rail above a window with two holders, None where the ceiling is too near."""
+def curtain_rail(opening: Opening, length: float, height: float, *, boxed: bool = False) -> Mesh | None:
+    """A rail above a window with two holders, or the box that hides it; None where the ceiling is too near."""
     above, before, beyond = RAIL
     level = opening.sill + opening.height + above
     if level > height - 0.05:
         return None
     start, end = max(opening.offset - beyond, 0.02), min(opening.end + beyond, length - 0.02)
+    if boxed:
+        (low, high), front = (level - 0.07, level + 0.045), -before - 0.07  # before the folds of what hangs there
+        sides = [board((at, at + 0.018), (low, high), (front, 0.0)) for at in (start - 0.018, end)]
+        return joined([*sides, board((start - 0.018, end + 0.018), (low, high), (front - 0.018, front))])
     rod = extruded(shapely.Point(-before, level).buffer(0.012, quad_segs=3), end - start)
     rod = Mesh(rod.vertices[:, [2, 1, 0]] + (start, 0, 0), rod.faces[:, ::-1])
     holders = [

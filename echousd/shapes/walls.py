@@ -184,11 +184,12 @@ def _filled(
         return () if mesh is None else (ShellPiece(piece_name(name, what), look, _placed(mesh, frame), solid),)
 
     if opening.kind == "window":
+        look = "trim" if millwork.boxed else "rail"
         pieces = (
             *made("frame", "trim", fittings.window_frame(opening, millwork.window)),
             *made("glass", "glass", fittings.window_glass(opening)),
             *made("sill", "trim", fittings.window_sill(opening)),
-            *made("rail", "rail", fittings.curtain_rail(opening, length, height), solid=False),
+            *made("rail", look, fittings.curtain_rail(opening, length, height, boxed=millwork.boxed), solid=False),
         )
         return ShellPart(name, "window", pieces)
     if opening.kind != "door":

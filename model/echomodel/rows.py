@@ -228,6 +228,7 @@ class RoomStyle:
     Arguments:
         family: of furniture making. kinds: (part, kinds of it) where the style has others than its family.
         palettes: harmonies. windows, doors, cornices: of the millwork (metres of a cornice's height, 0 = none).
+        boxed: share of rooms whose curtains hang from behind boards.
         covers: what a wall behind a bed or sofa has, "" = nothing. floors: slots of those of wood or the like.
         radiators, curtains: small things that stand under windows, and that hang before them.
         prints: kinds of pictures and names of rugs and cushions (`prints.toml`).
@@ -244,6 +245,7 @@ class RoomStyle:
     curtains: tuple[str, ...]
     prints: tuple[str, ...]
     cornices: tuple[float, ...] = (0.0,)
+    boxed: float = 0.0
     radiators: tuple[str, ...] = ("panel_radiator",)
     kinds: tuple[tuple[str, tuple[str, ...]], ...] = ()
     aliases: tuple[str, ...] = ()

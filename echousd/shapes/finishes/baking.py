@@ -7,6 +7,7 @@ import os
 import tomllib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
@@ -33,8 +34,9 @@ QUALITY = 86  # of JPEG; without subsampling, because normals live in the colour
 
 @cache
 def relief(name: str) -> Relief:
-    """The pattern that the function of that name there draws."""
-    return Late(f"{PROGRAMS}:{name}")()
+    """The pattern that the function of that name there draws, its tone 1 in the mean."""
+    drawn = Late(f"{PROGRAMS}:{name}")()
+    return replace(drawn, tone=drawn.tone / drawn.tone.mean((0, 1)))
 
 
 def kept(bake: Bake) -> Bake:

@@ -20,7 +20,7 @@ SIZE = 512  # pixels on each side
 class Relief:
     """One pattern."""
 
-    tone: np.ndarray  # (SIZE, SIZE) or (SIZE, SIZE, 3) float, what the tint is multiplied with, 1 in the mean
+    tone: np.ndarray  # (SIZE, SIZE) or (SIZE, SIZE, 3) float, over its mean what the tint is multiplied with
     height: np.ndarray | None = None  # (SIZE, SIZE) float, metres above the mean, None for what is flat
     rough: np.ndarray | None = None  # (SIZE, SIZE) float, added to the roughness, None where it is even
 
@@ -48,7 +48,7 @@ def wood(seed: int = 1, rings: int = 9, contrast: float = 0.75) -> Relief:
     bands = np.sin(2 * np.pi * (rings * v + 0.55 * noise(seed, 1.2, 3.0, 3.0)))
     streaks, pores = noise(seed + 1, 2.0, 60.0), noise(seed + 2, 12.0, 160.0)
     tone = 1 + contrast * (0.05 * bands + 0.045 * streaks - 0.10 * np.clip(pores - 1.1, 0, 1))
-    return Relief(tone / tone.mean(), None, 0.05 * streaks)
+    return Relief(tone, None, 0.05 * streaks)
 
 
 veneer = partial(wood, 11, 24, 0.25)  # fine and even
@@ -70,8 +70,7 @@ def planks(rows: int = 8) -> Relief:
         gap[row * board] = 1
         for end in ends:
             gap[rowed, end % SIZE] = 1
-    tone = tone * (1 - 0.35 * gap)
-    return Relief(tone / tone.mean(), -0.0006 * gap, 0.06 * noise(23, 3.0, 40.0) + 0.2 * gap)
+    return Relief(tone * (1 - 0.35 * gap), -0.0006 * gap, 0.06 * noise(23, 3.0, 40.0) + 0.2 * gap)
 
 
 def herringbone(length: int = 4) -> Relief:
@@ -91,8 +90,7 @@ def herringbone(length: int = 4) -> Relief:
     tone = base[(across + shift) % SIZE, (along + 2 * shift) % SIZE] * own
     ends = np.where(lies, step == 0, step == 2 * length - 1) & (along % cell == 0)
     gap = ((across % cell == 0) | ends).astype(float)
-    tone = tone * (1 - 0.35 * gap)
-    return Relief(tone / tone.mean(), -0.0006 * gap, 0.2 * gap)
+    return Relief(tone * (1 - 0.35 * gap), -0.0006 * gap, 0.2 * gap)
 
 
 def terrazzo(chips: int = 900) -> Relief:
@@ -105,7 +103,7 @@ def terrazzo(chips: int = 900) -> Relief:
     chip = away < np.append(radius, 0.0)[nearest]
     hues = np.array([(0.72, 0.70, 0.68), (1.12, 1.10, 1.06), (0.98, 0.80, 0.66), (0.86, 0.90, 0.86)])
     tone = np.where(chip[:, None], hues[rng.integers(len(hues), size=chips + 1)[nearest]], 1.0).reshape(SIZE, SIZE, 3)
-    return Relief(tone / tone.mean((0, 1)))
+    return Relief(tone)
 
 
 def boarded(boards: int = 8) -> Relief:
@@ -113,8 +111,7 @@ def boarded(boards: int = 8) -> Relief:
     u, v = _grid()
     apart = np.abs((boards * u + 0.5) % 1.0 - 0.5) + 0 * v
     groove = np.clip(1 - apart / 0.035, 0, 1)
-    tone = 1 - 0.28 * groove
-    return Relief(tone / tone.mean(), -0.004 * groove)
+    return Relief(1 - 0.28 * groove, -0.004 * groove)
 
 
 def brick(rows: int = 16, across: int = 4) -> Relief:
@@ -128,7 +125,7 @@ def brick(rows: int = 16, across: int = 4) -> Relief:
     grain = noise(11, 60.0, 60.0)
     tone = ((own + 0.05 * grain) * (1 - joint) + 1.35 * joint)[..., None] * np.ones(3)
     tone[..., 1:] += joint[..., None] * (0.3, 0.5)  # mortar is no red
-    return Relief(tone / tone.mean((0, 1)), 0.0006 * grain * (1 - joint) - 0.004 * joint, 0.1 * joint)
+    return Relief(tone, 0.0006 * grain * (1 - joint) - 0.004 * joint, 0.1 * joint)
 
 
 def woven(threads: int = 64) -> Relief:
@@ -138,8 +135,7 @@ def woven(threads: int = 64) -> Relief:
     over = np.sign(np.sin(np.pi * threads * u) * np.sin(np.pi * threads * v))
     height = np.where(over > 0, np.abs(warp), np.abs(weft))
     fleck = 0.6 * noise(31, 20.0, 120.0) + 0.6 * noise(32, 120.0, 20.0)
-    tone = 1 + 0.16 * (height - 0.6) + 0.045 * fleck
-    return Relief(tone / tone.mean(), 0.0004 * height)
+    return Relief(1 + 0.16 * (height - 0.6) + 0.045 * fleck, 0.0004 * height)
 
 
 def knitted(stitches: int = 32) -> Relief:
@@ -147,8 +143,7 @@ def knitted(stitches: int = 32) -> Relief:
     u, v = _grid()
     slant = np.abs((u * stitches) % 1.0 - 0.5)
     height = np.abs(np.sin(np.pi * (v * stitches + slant))) * (1 - (2 * slant - 0.5) ** 2)
-    tone = 1 + 0.32 * (height - height.mean()) + 0.03 * noise(41, 30.0, 30.0)
-    return Relief(tone / tone.mean(), 0.002 * height)
+    return Relief(1 + 0.32 * (height - height.mean()) + 0.03 * noise(41, 30.0, 30.0), 0.002 * height)
 
 
 def linen() -> Relief:
@@ -161,15 +156,14 @@ def linen() -> Relief:
 def striped(pairs: int = 4) -> Relief:
     """Linen with broad stripes along u, a narrow one beside each."""
     cloth, place = linen(), (pairs * _grid()[1]) % 1.0
-    tone = cloth.tone * (1 + 0.55 * (np.abs(place - 0.3) < 0.2) + 0.4 * (np.abs(place - 0.62) < 0.04))
-    return Relief(tone / tone.mean(), cloth.height)
+    broad, narrow = np.abs(place - 0.3) < 0.2, np.abs(place - 0.62) < 0.04
+    return Relief(cloth.tone * (1 + 0.55 * broad + 0.4 * narrow), cloth.height)
 
 
 def checked(pairs: int = 6) -> Relief:
     """Linen woven in squares, darkest where its stripes cross."""
     cloth, band = linen(), np.where((pairs * np.arange(SIZE) / SIZE) % 1.0 < 0.5, 0.3, 0.0)
-    tone = cloth.tone * (1 + band + band[:, None])
-    return Relief(tone / tone.mean(), cloth.height)
+    return Relief(cloth.tone * (1 + band + band[:, None]), cloth.height)
 
 
 def leather() -> Relief:
@@ -180,8 +174,7 @@ def leather() -> Relief:
     where = np.stack(np.meshgrid(np.arange(SIZE), np.arange(SIZE), indexing="ij"), -1).reshape(-1, 2)
     near = cKDTree(tiled).query(where, k=2)[0]
     height = np.clip((near[:, 1] - near[:, 0]) / 6, 0, 1).reshape(SIZE, SIZE)
-    tone = 1 + 0.14 * (height - height.mean()) + 0.05 * noise(62, 5.0, 5.0)
-    return Relief(tone, 0.0004 * height)
+    return Relief(1 + 0.14 * (height - height.mean()) + 0.05 * noise(62, 5.0, 5.0), 0.0004 * height)
 
 
 def plaster() -> Relief:
@@ -200,8 +193,7 @@ def papered() -> Relief:
     sprig = sum(
         np.exp(-(((x - a) / 0.035) ** 2 + ((y - b) / 0.075) ** 2)) for a, b in ((0, 0.1), (-0.07, 0), (0.07, 0))
     )
-    tone = 1 + 0.035 * stripe - 0.06 * line - 0.07 * sprig
-    return Relief(tone / tone.mean())
+    return Relief(1 + 0.035 * stripe - 0.06 * line - 0.07 * sprig)
 
 
 def carpet() -> Relief:
@@ -210,14 +202,21 @@ def carpet() -> Relief:
     return Relief(1 + 0.06 * fine + 0.012 * soft, 0.002 * fine)
 
 
+def carpet_tiles(across: int = 4) -> Relief:
+    """Squares of carpet, their rows of loops one way and the other in turns, each of a tone of its own."""
+    own, cell = np.random.default_rng(89).normal(1.0, 0.06, (across, across)), np.ones((SIZE // across,) * 2)
+    rows, odd = noise(83, 40.0, 240.0, 4.0), np.kron(np.indices(own.shape).sum(0) % 2, cell)
+    loops = np.where(odd > 0, rows, rows.T)
+    return Relief(np.kron(own, cell) + 0.05 * loops, 0.001 * loops)
+
+
 def tiles(across: int = 4) -> Relief:
     """Square floor tiles with joints, each of a tone of its own."""
     u, v = _grid()
     edge = np.minimum(*(np.minimum(w * across % 1.0, 1 - w * across % 1.0) + 0 * u * v for w in (u, v)))
     joint = np.clip(1 - edge / 0.012, 0, 1)
     own = np.kron(np.random.default_rng(85).normal(1.0, 0.02, (across, across)), np.ones((SIZE // across,) * 2))
-    tone = (own + 0.015 * noise(86, 10.0, 10.0)) * (1 - 0.32 * joint)
-    return Relief(tone / tone.mean(), -0.001 * joint, 0.35 * joint)
+    return Relief((own + 0.015 * noise(86, 10.0, 10.0)) * (1 - 0.32 * joint), -0.001 * joint, 0.35 * joint)
 
 
 def brushed() -> Relief:
@@ -231,8 +230,7 @@ def bound() -> Relief:
     _, v = _grid()
     weave = noise(88, 150.0, 150.0, 4.0)
     bands = np.exp(-((((3 * v) % 1.0 - 0.5) / 0.04) ** 2))
-    tone = 1 + 0.035 * weave + 0.10 * bands
-    return Relief(tone / tone.mean(), 0.0001 * weave)
+    return Relief(1 + 0.035 * weave + 0.10 * bands, 0.0001 * weave)
 
 
 def wicker(strands: int = 24) -> Relief:
@@ -240,17 +238,14 @@ def wicker(strands: int = 24) -> Relief:
     u, v = _grid()
     over = np.sign(np.sin(np.pi * strands * u)) * np.sign(np.sin(np.pi * strands * v))
     height = np.where(over > 0, np.abs(np.sin(np.pi * strands * v)), 0.7 * np.abs(np.sin(np.pi * strands * u)))
-    tone = 0.6 + 0.55 * height + 0.05 * noise(91, 20.0, 20.0)
-    return Relief(tone / tone.mean(), 0.003 * height)
+    return Relief(0.6 + 0.55 * height + 0.05 * noise(91, 20.0, 20.0), 0.003 * height)
 
 
 def leaf() -> Relief:
     """Green of two depths."""
-    tone = 1 + 0.14 * noise(95, 6.0, 6.0) + 0.05 * noise(96, 60.0, 60.0)
-    return Relief(np.clip(tone, 0.5, 1.6))
+    return Relief(np.clip(1 + 0.14 * noise(95, 6.0, 6.0) + 0.05 * noise(96, 60.0, 60.0), 0.5, 1.6))
 
 
 def stone() -> Relief:
     """Glazed clay with specks."""
-    specks = np.clip(noise(97, 90.0, 90.0, 4.0) - 1.9, 0, 1)
-    return Relief(1 + 0.02 * noise(98, 6.0, 6.0) - 0.5 * specks)
+    return Relief(1 + 0.02 * noise(98, 6.0, 6.0) - 0.5 * np.clip(noise(97, 90.0, 90.0, 4.0) - 1.9, 0, 1))

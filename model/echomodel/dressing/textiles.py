@@ -54,8 +54,7 @@ def cafe_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A thin curtain on a rod across a window, below eye level: thick cloth before the light would be a dark fence."""
     w, h, d = size
     rod = tube([(-w / 2, h - 0.012, 0), (w / 2, h - 0.012, 0)], 0.006, "metal")
-    within = np.array([0.97 * w, h - 0.02, d])
-    cloth = _hung(within, rng, FOLD, top=0.7, drift=0.3, narrow=0.0, material="sheer")
+    cloth = _hung(np.array([0.97 * w, h - 0.02, d]), rng, FOLD, top=0.7, drift=0.3, narrow=0.0, material="sheer")
     return [*cloth, *_rings(np.array([w, h, d]), 1.5 * FOLD), rod]
 
 
@@ -122,14 +121,11 @@ def roman_blind(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A blind drawn up: cloth that falls flat from its head, and below in folds one before the other."""
     (w, h, d), cloth = size, _drape(rng)
     stack = min(0.16, 0.5 * h)
-    solids: list[Solid] = [box((-w / 2, h - 0.03, -d / 2), (w / 2, h, d / 2), cloth, 0.2 * d)]
-    solids.append(box((-0.495 * w, 0.8 * stack, -0.002), (0.495 * w, h - 0.03, 0.002), cloth))
-    for number in range(3):
-        low = 0.2 * stack * number
-        solids.append(
-            box((-0.495 * w, low, -d / 2), (0.495 * w, low + 0.5 * stack, d * (0.5 - 0.2 * number)), cloth, 0.3 * d)
-        )
-    return solids
+    x, shares, back = 0.495 * w, (0.0, 0.2, 0.4), -d / 2
+    head = box((-w / 2, h - 0.03, back), (w / 2, h, d / 2), cloth, 0.2 * d)
+    flat = box((-x, 0.8 * stack, -0.002), (x, h - 0.03, 0.002), cloth)
+    folded = (((x, (s + 0.5) * stack, d * (0.5 - s)), s * stack) for s in shares)
+    return [head, flat, *(box((-x, low, back), high, cloth, 0.3 * d) for high, low in folded)]
 
 
 CLOTHS = ("accent_cloth", "accent_plain", "accent_striped", "accent_checked", "blanket", "velvet", "linen", "drape")
@@ -142,13 +138,12 @@ def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid
     cloth, trim = str(rng.choice(CLOTHS)), str(rng.choice(TRIMS))
     cord = str(rng.choice(("linen", "ebony", "blanket", "accent_plain")))
     body = pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), shown or cloth)
-    made: list[Solid] = [replace(body, power=float(rng.choice((3.0, 4.0, 5.5))))]
-    if trim == "cord":
-        made.append(tube(seam(w / 2, h / 2) + np.array([0, h / 2, 0]), 0.004, cord))
-    if trim == "button":
-        made.append(ball((0, h / 2, 0), (0.016, 0.016, 0.51 * d), cord))
-    ends = [(x, y) for x in (-0.47 * w, 0.47 * w) for y in (0.03 * h, 0.97 * h)] if trim == "tassels" else ()
-    return made + [ball((x, y, 0), (0.016, 0.022, 0.014), cord) for x, y in ends]
+    trims: dict[str, list[Solid]] = {
+        "cord": [tube(seam(w / 2, h / 2) + np.array([0, h / 2, 0]), 0.004, cord)],
+        "button": [ball((0, h / 2, 0), (0.016, 0.016, 0.51 * d), cord)],
+        "tassels": [ball((x * w, y * h, 0), (0.016, 0.022, 0.014), cord) for x in (-0.47, 0.47) for y in (0.03, 0.97)],
+    }
+    return [replace(body, power=float(rng.choice((3.0, 4.0, 5.5)))), *trims.get(trim, [])]
 
 
 lumbar_cushion = cushion  # long and low, for the small of the back

@@ -16,7 +16,7 @@ from echousd.checks.mesh_rules import extents
 from echousd.checks.reading import Reading
 from echousd.graph import RoomSpec
 from echousd.options import RoomOptions
-from echousd.shapes.fittings import DOORS, WINDOWS, Millwork, millwork_of
+from echousd.shapes.fittings import DOORS, RAIL, WINDOWS, Millwork, millwork_of
 from echousd.shapes.walls import WALL, ceiling, outline, walls
 
 NOTCHED = np.array([(0, 0), (1, 0), (1, 1), (4, 1), (4, 3), (0, 3)], float)
@@ -95,6 +95,8 @@ def test_rooms_of_other_seeds_have_other_millwork_and_private_ones_no_glass_in_t
     assert {one.door for one in drawn} == {*DOORS}
     assert "glazed" not in {millwork_of(seed, private=True).door for seed in range(60)}
     assert millwork_of(3) == millwork_of(3)
+    assert {work.boxed for work in drawn} == {False, True}
+    assert not any(millwork_of(seed, "industrial").boxed for seed in range(60))
 
 
 def test_ceiling_lies_on_the_walls() -> None:
@@ -192,3 +194,17 @@ def test_outdoors_walls_without_an_opening_are_parapets():
     for outdoor, heights in ((False, [2.6] * 4), (True, [1.05, 1.05, 2.6, 1.05])):
         made = walls(plan, 2.6, (door,), outdoor=outdoor)
         assert [round(float(part.pieces[0].mesh.bounds[1, 1]), 3) for part in made] == heights
+
+
+def test_boards_hide_the_rail_and_the_heads_of_what_hangs_there() -> None:
+    rod, boards = (
+        pieces(walls(rectangle(4.0, 3.0), 2.6, (WINDOW,), millwork=Millwork(boxed=boxed)))["Wall_1_window_rail"]
+        for boxed in (False, True)
+    )
+    assert boards.is_watertight
+    above, before, _ = RAIL
+    assert boards.bounds[0, 1] < WINDOW.sill + WINDOW.height + above - 0.05 < boards.bounds[1, 1] < 2.6
+    assert boards.bounds[0, 0] < rod.bounds[0, 0] < rod.bounds[1, 0] < boards.bounds[1, 0]
+    wall = boards.bounds[0, 2]
+    assert boards.bounds[1, 2] > wall + before + 0.045 + 0.01  # curtains are 9 cm deep at most
+    assert boards.volume < 0.02
