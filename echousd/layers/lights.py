@@ -78,7 +78,8 @@ def write_lights(pen: Pen, room: RoomData, bounds: np.ndarray) -> None:
         if name in LIT:
             exposed = min(1.0, BRIGHT / max(lumens, 1.0))
             radiance = max(LIT[name] - lumens, FILL) * area / flux
-            inside.over(f"{LIGHTS}/ceiling", {"color3f inputs:color": UsdLux.BlackbodyTemperatureAsRgb(3700.0)})
+            colour = UsdLux.BlackbodyTemperatureAsRgb(LAMPS["ceiling"][1])
+            inside.over(f"{LIGHTS}/ceiling", {"color3f inputs:color": colour})
         shining = {"ceiling": radiance * exposed}
         shining |= {light: intensity * TIMES[name][column] * exposed for light, (column, intensity) in full.items()}
         for light, intensity in shining.items():

@@ -48,6 +48,14 @@ def test_day_evening_and_night(stage) -> None:
     assert seen["day"][1] > seen["evening"][1] == seen["night"][1] == 0
     assert seen["day"][:2] == pytest.approx([0.5 * SHARES["walls"][0], OVERHEAD])  # as they are said, nothing taken
     assert seen["day"][2] < seen["evening"][2] == seen["night"][2]
+    for name in ("evening", "night"):  # the panel stands for lamps then, and has the colour of those at ceilings
+        times.SetVariantSelection(name)
+        panel, lamp = (
+            UsdLux.LightAPI(stage.GetPrimAtPath(f"/Room/Lights/{light}")).GetColorAttr().Get()
+            for light in ("ceiling", "lamp_pendant")
+        )
+        assert panel == lamp
+    times.SetVariantSelection("day")
 
 
 def test_the_sun_falls_in_through_the_window(stage) -> None:

@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from pxr import Usd, UsdGeom
+from pxr import Usd, UsdGeom, UsdPhysics
 
 from echomodel.dressing import KINDS
 from echomodel.dressing import thing as solids_of
 from echomodel.furniture.solids import Joint
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
-from echousd.layers.physics import CONTACT, WOODEN, write_asset_physics
+from echousd.graph.nodes import OBSTACLE
+from echousd.layers.physics import CONTACT, WOODEN, movable, write_asset_physics
 from echousd.shapes.colliders import collider, colliders_of
 from echousd.shapes.geometry import Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.hulls import convex_hull, hull_volume, standing_hull
@@ -27,6 +28,22 @@ SIZE = np.array([1.6, 2.2, 0.6])
 
 def tensor(mass: Mass) -> np.ndarray:
     return mass.axes @ np.diag(mass.inertia) @ mass.axes.T
+
+
+@pytest.mark.parametrize(
+    ("word", "moves"),
+    [("chair", True), ("table_lamp", True), ("pendant_lamp", False), ("vase", True), ("books", True),
+     ("picture", False), ("curtain", False), (OBSTACLE, False)],
+)  # fmt: skip
+def test_what_stands_is_a_body_and_what_hangs_or_is_built_in_is_none(word, moves):
+    assert movable(word) is moves
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.Xform.Define(stage, "/it")
+    if word != OBSTACLE:
+        block = solid_geometry(box_mesh((0.3, 0.2, 0.1)), "chair", Origin("boxes"))
+        geometry = replace(block, mass=mass_of(block, "chair"))
+        write_asset_physics(Pen(stage.GetRootLayer()), "it", word, geometry, ["wood"])
+        assert stage.GetPrimAtPath("/it").HasAPI(UsdPhysics.RigidBodyAPI) == moves
 
 
 def test_mass_of_a_box_is_that_of_the_textbook():

@@ -43,6 +43,15 @@ def test_a_room_comes_back_from_its_graph(relations):
     assert room_of(theirs, "one").styles == (0, -1, 1)
 
 
+def test_without_a_floor_a_room_is_the_rectangle_around_its_furniture_however_it_is_turned():
+    graph = graph_of(replace(ROOM, floor_polygon=np.zeros((0, 2))), None)
+    corners = room_of(graph, "one").floor_polygon
+    bed, stand = np.hypot(1.6, 2.0) / 2, np.hypot(0.5, 0.4) / 2
+    low, high = (-1.1 - stand, -1.7 - stand), (1.1 + stand, -0.9 + bed)
+    low = min(low[0], -bed), min(low[1], -0.9 - bed)
+    assert corners.tolist() == [pytest.approx(one) for one in (low, (high[0], low[1]), high, (low[0], high[1]))]
+
+
 def test_names_styles_and_models_of_the_nodes():
     graph = graph_of(ROOM, None)
     assert graph.names == ("double_bed", "nightstand_1", "nightstand_2")
