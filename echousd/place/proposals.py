@@ -54,7 +54,7 @@ def proposals(setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np
         if kind.role in ("decor", "light", "storage"):
             rows += _corners(setting, i, loose)
         if kind.stands == "company":
-            rows += _nooks(setting, i, loose)
+            rows += _corners(setting, i, loose, across=True)
         if kind.role == "sofa":
             rows += _in_view(setting, i, walls)
         if not at_wall and kind.role not in ("decor", "light", "storage"):
@@ -214,7 +214,7 @@ def _as_stated(setting: Setting, position: np.ndarray, yaw: np.ndarray, i: int) 
     for one in setting.stated:
         if one.subject == i and not one.others:
             rows += along_walls(setting, i, 0.0) + _corners(setting, i, 0.0)
-            rows += _nooks(setting, i, 0.0) if setting.kinds[i].front else []
+            rows += _corners(setting, i, 0.0, across=True) if setting.kinds[i].front else []
         elif one.subject == i:
             rows += _in_the_open(setting, i, 0.2) + _midway(position, yaw, one.others)
     return rows
@@ -272,15 +272,17 @@ def along_walls(setting: Setting, i: int, more: float) -> list[Row]:
     return rows
 
 
-def _corners(setting: Setting, i: int, more: float) -> list[Row]:
-    """In the corners of the room: plants and lamps like them."""
-    half = float(max(setting.size[i, 0], setting.size[i, 2])) / 2
-    other = spread_at_walls(f"{setting.kinds[i].name} aside", setting.size[i])
+def _corners(setting: Setting, i: int, more: float, *, across: bool = False) -> list[Row]:
+    """In the corners of the room: plants and lamps at their walls, or armchairs that look across it."""
+    width, depth = setting.size[i, [0, 2]].tolist()
+    half, other = max(width, depth) / 2, spread_at_walls(f"{setting.kinds[i].name} aside", setting.size[i])
+    away = 0.5 * (width + depth) * math.sqrt(0.5) + 0.1  # half the diagonal of the turned footprint's hull
     rows = []
     for k, corner in enumerate(setting.floor.polygon):
         one, two = setting.floor.normal[k], setting.floor.normal[k - 1]
-        x, z = corner + one * (half + setting.behind[i]) + two * (half + other)
-        rows.append((float(x), float(z), setting.walls[k][3], more))
+        at = away * (one + two) if across else one * (half + setting.behind[i]) + two * (half + other)
+        turn = math.atan2(*(one + two).tolist()) if across else setting.walls[k][3]
+        rows.append((float(corner[0] + at[0]), float(corner[1] + at[1]), turn, more))
     return rows
 
 
@@ -296,18 +298,6 @@ def _in_view(setting: Setting, i: int, at_walls: Sequence[Row]) -> list[Row]:
     keep = [free > max(far, AMID * far + PASSAGE), deep, deep & (free > far + WALKED_BEHIND)]
     out = [(rows + np.pad(off[:, None] * front, ((0, 0), (0, 2))))[at] for off, at in zip(away, keep, strict=True)]
     return [(x, z, yaw, more) for x, z, yaw, more in np.concatenate(out).tolist()]
-
-
-def _nooks(setting: Setting, i: int, more: float) -> list[Row]:
-    """In the corners, looking across the room."""
-    width, depth = setting.size[i, [0, 2]].tolist()
-    away = 0.5 * (width + depth) * math.sqrt(0.5) + 0.1  # half the diagonal of the turned footprint's hull
-    rows = []
-    for k, corner in enumerate(setting.floor.polygon):
-        inward = setting.floor.normal[k] + setting.floor.normal[k - 1]
-        x, z = corner + inward * away
-        rows.append((float(x), float(z), math.atan2(inward[0], inward[1]), more))
-    return rows
 
 
 def _in_the_open(setting: Setting, i: int, more: float) -> list[Row]:

@@ -92,13 +92,10 @@ class Search:
         self.children: list[list[int]] = [[] for _ in range(n)]
         self.screens: list[list[int]] = [[] for _ in range(n)]
         near, opposed = map(vocabulary().predicate_id, ("close_by", "opposite"))
-        kinds, beside, ahead = setting.kinds, dict[int, int](), dict[int, int]()
-        for one, word, other in setting.triplets.tolist():
-            if word == near and kinds[one].role in ("decor", "light"):
-                beside[one] = other
-            for k, i in ((one, other), (other, one)) if word == opposed else ():
-                if kinds[k].role == "storage" and kinds[i].role in ("bed", "sofa"):
-                    ahead[k] = i
+        kinds, told = setting.kinds, setting.triplets.tolist()
+        beside = {one: other for one, word, other in told if word == near and kinds[one].role in ("decor", "light")}
+        either = [pair for one, word, other in told if word == opposed for pair in ((one, other), (other, one))]
+        ahead = {k: i for k, i in either if kinds[k].role == "storage" and kinds[i].role in ("bed", "sofa")}
         for k in range(n):
             parent = int(setting.carrier[k]) if setting.carrier[k] >= 0 else int(setting.anchor[k])
             parent = ahead.get(k, beside.get(k, -1)) if parent < 0 else parent
