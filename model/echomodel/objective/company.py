@@ -367,7 +367,7 @@ def not_alone(plan: Plan) -> Found:
         away = xp.where(loner, wall - (edge - ALONE), xp.minimum(free, wall))
         near, lit = xp.where(loner, wall, xp.minimum(gap, wall)), xp.where(lit < FAR, lit, 0.0)
         lonely = first_of(who, xp.full_like(who, -1), [ALONE - away, LIT - lit], [near, lit])
-    others = plan.of("light", "storage", "board") | plan.stands("beside", "company")
+    others = plan.of("light", "storage") | plan.stands("beside", "before", "company")
     i, j = plan.pairs(company, others & plan.standing, least=True)
     gap, _ = plan.worst(i, plan.apart(i, j), j)
     who = plan.those(company)

@@ -113,7 +113,8 @@ def sofa_ahead(plan: Plan) -> Found:
     return plan.nearest(i, j, plan.more_ahead(i, j, AHEAD, COVERED), AHEAD)
 
 
-BARE_END = 0.42  # share of a room's length from a wall to the nearest large piece: 80 % of real rooms
+# Share of a room's length from a wall to the nearest large piece: 87 % of real rooms; metres that are never bare.
+BARE_END, SHORT = 0.45, 1.6
 
 
 def ends_used(plan: Plan) -> Found:
@@ -130,8 +131,9 @@ def ends_used(plan: Plan) -> Found:
         ends = xp.concat([(corners - low) / (high - low), (high - corners) / (high - low)], -1)
         side = held(xp.amin(ends, 1)).argmax(1)
         nearest = held(ends)[row, :, side].argmin(1)
+        limit = at_least(SHORT / (high - low), BARE_END)[side % 2]
         share, piece = ends[row, nearest, side], nearest * there.shape[1] // ends.shape[1]  # of several points each
-        out = joined(out, found(there[row, piece], BARE_END - share, measure=100.0 * share))
+        out = joined(out, found(there[row, piece], limit - share, measure=100.0 * share))
     return out
 
 
@@ -148,7 +150,7 @@ WORKPLACE = 1.0  # metres between the middles of two who work
 # Metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it; before storage to a low table.
 OPENS, LOW = 0.55, 0.45
 # Share of the width of storage from which on nightstands, and other pieces, are before it; of a screen's all.
-BESIDES, FACED, SCREENED = 0.3, 0.1, 0.05
+BESIDES, FACED, SCREENED = 0.2, 0.1, 0.05
 
 
 def served_limit(area: float, width: Array, depth: Array) -> float:
@@ -268,7 +270,7 @@ def wardrobe_opens(plan: Plan) -> Found:
     before any storage, nor a bed before a screen's, and one passes a low table there."""
     stores, xp = plan.of("storage") & plan.works & plan.standing & ~plan.stands("near"), plan.kit
     massive = plan.of("bed", "sofa", "board", "storage") & ~plan.stands("row")
-    i, j = plan.pairs(stores, (massive | plan.stands("company", "at")) & plan.standing, least=True)
+    i, j = plan.pairs(stores, (massive | plan.stands("company", "at", "foot")) & plan.standing, least=True)
     met = (plan.stands("opposite") | plan.which(lambda kind: kind.access > 0.6))[i] | ~plan.of("bed")[j]
     i, j = i[met], j[met]
     share = xp.where(plan.stands("opposite")[i], SCREENED, xp.where(plan.stands("head")[j], BESIDES, FACED))

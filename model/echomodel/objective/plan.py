@@ -78,7 +78,7 @@ def joined(first: Found, second: Found) -> Found:
 
 # Predicates that say which anchor an object attends.
 NEARNESS = ("close_by", "standing_on", "above", "facing", "opposite")
-FACING, PAST = np.cos(np.radians(30.0)), 0.25  # a back turned further, or more of it past its wall's end, is at none
+FACING, PAST = np.cos(np.radians(30.0)), 0.15  # a back turned further, or more of it past its wall's end, is at none
 FAR = 9.0  # metres, in place of the distance to something that is not there
 CLEAR_HEIGHT = 0.05  # metres: a rug is in nobody's way
 UNKNOWN = Category("", "", "", support="floor", role="", look="", density=0.0, ade20k="")

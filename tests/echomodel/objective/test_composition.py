@@ -78,6 +78,13 @@ def test_no_table_stands_before_storage(gap, margin):
     assert seen_of.other.tolist() == [1]
 
 
+@pytest.mark.parametrize(("gap", "margin"), [(0.3, -0.25), (0.6, 0.05)])
+def test_a_bench_at_the_foot_of_a_bed_is_not_before_a_wardrobe(gap, margin):
+    bed, wardrobe = ("double_bed", (1.8, 0.5, 2.0), (0.0, 0.0), 0.0), ("wardrobe", (1.6, 2.2, 0.6), (0.0, 2.2), np.pi)
+    bench = ("bench", (1.2, 0.45, 0.1), (0.0, 1.85 - gap), 0.0)
+    assert seen(composition.wardrobe_opens, [bed, wardrobe, bench])[0][1] == pytest.approx(margin)
+
+
 def test_a_bed_behind_a_wardrobe_is_not_before_it():
     bed = ("double_bed", (1.8, 0.5, 2.0), (0.0, 0.0), 0.0)
     assert seen(composition.wardrobe_opens, [bed, ("wardrobe", (1.6, 2.2, 0.6), (0.0, 1.5), 0.0)])[0][1] > 0
@@ -112,17 +119,21 @@ def test_a_small_room_has_no_circle_so_bare_as_a_hall_may():
     assert composition.bare_limit(100.0, 25) == pytest.approx(1.0 * 2)
 
 
-@pytest.mark.parametrize(("middle", "margin"), [(-2.0, -0.205), (-0.2, 0.02)])
+@pytest.mark.parametrize(("middle", "margin"), [(-2.0, -0.175), (-0.2, 0.05)])
 def test_no_end_of_a_hall_is_bare(middle, margin):
     group = [("sofa", (2.0, 0.85, 0.95), (middle, -1.6), 0.0), ("coffee_table", (1.2, 0.4, 0.6), (middle, -0.5), 0.0)]
     stand = ("tv_stand", (1.6, 0.5, 0.4), (middle, 2.0), np.pi)
     plants = [("plant", (0.7, 1.2, 0.7), (x, 2.0), 0.0) for x in (-3.6, 3.6)]  # no plant fills an end
     found, rows, boxes = seen(composition.ends_used, [*group, stand, *plants], (8.0, 5.0))
     assert found == {0: pytest.approx(margin)}  # from the sofa's end to the wall at the right
-    assert rows.measure.tolist() == [pytest.approx(100 * (0.42 - margin))]
+    assert rows.measure.tolist() == [pytest.approx(100 * (0.45 - margin))]
     rows.margin.sum().backward()
     assert float(boxes.position.grad[0, 0]) == pytest.approx(1 / 8)
     assert seen(composition.ends_used, group, (8.0, 5.0))[0] == {}  # so few fill no hall
+    table = ("dining_table", (1.2, 0.75, 0.9), (-0.5, 0.0), 0.0)  # 1.5 m of 3.2 m are no bare end
+    assert seen(composition.ends_used, [table, *plants, *plants], (3.2, 2.8))[0] == {
+        0: pytest.approx((1.6 - 1.5) / 3.2)
+    }
 
 
 @pytest.mark.parametrize(("aside", "margin"), [(0.05, 0.05), (0.2, -0.1)])

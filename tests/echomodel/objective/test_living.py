@@ -278,6 +278,8 @@ MORE = [
     (with_one(STUDY, "books", kind="bookshelf", size=(0.8, 2.0, 0.3), at=(2.35, -0.98), yaw=-HALF).moved(
         "chair", kind="side_table", size=(0.4, 0.5, 0.4), at=(1.8, -0.9)),
      ("books", "wardrobe_opens"), "books has 0.20 m before it, then chair"),
+    (with_one(SET, "lamp2", kind="floor_lamp", size=(0.4, 1.6, 0.4), at=(1.9, 1.2)), ("lamp2", "plant_aside"),
+     "lamp2 crowds lamp"),
     (LIVING.moved("armchair", at=(0.9, 1.05), yaw=np.pi), ("armchair", "seats_apart"),
      "armchair leaves only 0.13 m to stand"),
     (Room({**LIVING.moved("sofa", at=(0.0, 0.4)).things, "cabinet": CABINET}),
@@ -327,7 +329,8 @@ KEPT = [
         with_one(STUDY, "books", kind="bookshelf", size=(0.8, 2.0, 0.3), at=(1.45, -0.98), yaw=-HALF),
         ("books", "wardrobe_opens"),
     ),
-    (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.0, 0.7)), ("plant", "plant_aside")),
+    (with_one(SET, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.1, 0.7)), ("plant", "plant_aside")),
+    (with_one(SET, "lamp2", kind="floor_lamp", size=(0.4, 1.6, 0.4), at=(1.9, 0.65)), ("lamp2", "plant_aside")),
     (STUDY.moved("desk", at=(2.1, -0.5), yaw=HALF), ("desk", "desk_at_wall")),
     (with_one(LIVING, "bean", kind="lazy_sofa", size=(0.8, 0.8, 0.8), at=(0.3, 0.9), yaw=HALF), ("bean", "looks_in")),
     (Room({"a": {**ARMCHAIR, "at": (0.1, 1.5), "yaw": -HALF}, "bed": BEDROOM.things["bed"]}), ("a", "looks_in")),
@@ -392,7 +395,7 @@ def test_no_table_is_shoved_to_one_side_of_a_floor_that_is_unknown():
 
 
 def test_no_back_stands_past_the_end_of_its_wall():
-    for end, seen in ((1.2, True), (1.6, False)):
+    for end, seen in ((1.5, True), (1.7, False)):
         floor = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-4.0, 2.0), (-4.0, end), (-2.5, end)])
         assert (("wardrobe", "at_wall") in BEDROOM.found(floor=floor)) == seen
 
@@ -431,6 +434,15 @@ def test_in_a_deep_hall_a_sofa_stands_where_it_sees_its_screen(deep, behind, kep
     stand = {"kind": "tv_stand", "size": (1.8, 0.5, 0.4), "at": (0.0, deep - 0.22), "yaw": np.pi}
     found = Room({"sofa": sofa, "stand": stand}).found(floor=floor)
     assert (("sofa", "at_wall") not in found) == kept
+
+
+def test_an_armchair_far_from_its_group_has_more_of_its_own_than_a_dining_table():
+    far = {"floor": np.array([(-2.5, -2.0), (5.5, -2.0), (5.5, 2.0), (-2.5, 2.0)])}
+    room = with_one(LIVING.moved("armchair", at=(4.0, 0.0)), "table", kind="dining_table", size=(0.8, 0.75, 0.8),
+                    at=(4.0, 1.1))  # fmt: skip
+    assert ("armchair", "not_alone") in room.found(**far)
+    lit = with_one(room, "lamp", kind="floor_lamp", size=(0.4, 1.6, 0.4), at=(4.0, -0.8))
+    assert ("armchair", "not_alone") not in lit.found(**far)
 
 
 def test_a_bed_between_two_walls_cannot_be_got_into():
