@@ -60,16 +60,16 @@ class Furniture:
         which = away.argmin(0)
         return which, away[which, np.arange(len(RAYS))]
 
-    def blocked(self, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 27, 3) points in each box, metres, and (n, 27) whether another box hides them from `eye` (3,)."""
-        n, turn = len(self.size), self._turns()
-        middle = self.position + self.size * (0.0, 0.5, 0.0)
+    def blocked(self, eye: np.ndarray, others: Furniture | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 27, 3) points in each box, metres, and (n, 27) whether another or one of `others` hides them."""
+        n, boxes = len(self.size), self.with_others(others)
+        turn, middle = boxes._turns(), boxes.position + boxes.size * (0.0, 0.5, 0.0)
         grid = np.stack(np.meshgrid(*[(-0.45, 0.0, 0.45)] * 3, indexing="ij"), -1).reshape(-1, 3)
-        points = middle[:, None] + np.einsum("nij,nkj->nki", turn.transpose(0, 2, 1), grid * self.size[:, None])
+        points = middle[:n, None] + np.einsum("nji,nkj->nki", turn[:n], grid * self.size[:, None])
         # every line of sight (object a, point k) in the frame of every box b
         start = np.einsum("bij,bj->bi", turn, eye - middle)[:, None, None]
         way = np.einsum("bij,akj->baki", turn, points - eye)
-        enter, leave = _crossing(start, way, 0.5 * self.size[:, None, None])
+        enter, leave = _crossing(start, way, 0.5 * boxes.size[:, None, None])
         hides = (enter < leave) & (leave > 0) & (enter < 1)
         hides[np.arange(n), np.arange(n)] = False
         return points, np.asarray(hides.any(0))

@@ -164,7 +164,7 @@ def inside_view(
     eyes: list[list[Shot]] = []
     for spot, level in product(_spots(room, middle, aim), EYES):
         eye = np.array([spot[0], level * height, spot[1]])
-        points, blocked = furniture.blocked(eye)
+        points, blocked = furniture.blocked(eye, hung)
         hidden = CLEAR * _hidden(wider, points[main], blocked[main], eye)
         views = _turned(eye, np.stack([aim - spot, around - spot]))
         halves = APERTURE / 2 / np.array(LENSES)

@@ -65,6 +65,21 @@ def test_the_camera_turns_away_from_what_its_picture_would_cut_off() -> None:
     assert fills(plant, other, APERTURE / 2 / lens, 2.0) < 0.25 * fills(plant, free, half, 2.0)
 
 
+def test_a_plant_hides_what_stands_behind_it_as_furniture_does() -> None:
+    eye = np.array([2.5, 1.3, 3.8])
+    plant = boxes((0.5, 1.6, 0.5, 2.5, 0.0, 2.6, 0.0))
+    assert not BED.blocked(eye)[1].any()
+    points, hidden = BED.blocked(eye, plant)
+    assert 0.2 < hidden.mean() < 0.9
+    assert points.shape == (1, 27, 3)
+    free, _ = inside_view(FLOOR, BED, 2.8)
+    x, _, z = free[:3, 3] + 0.75 * (BED.position[0] - free[:3, 3])  # so far away that it fills nothing
+    plant = boxes((0.5, 1.6, 0.5, x, 0.0, z, 0.0))
+    other, _ = inside_view(FLOOR, BED, 2.8, plant)
+    shares = [BED.blocked(view[:3, 3], plant)[1].mean() for view in (free, other)]
+    assert shares[1] < 0.6 * shares[0]
+
+
 def test_the_camera_looks_down_a_little_in_the_smallest_room() -> None:
     floor = np.array([(0.0, 0.0), (0.0, 2.2), (2.2, 2.2), (2.2, 0.0)])
     view, _ = inside_view(floor, boxes((1.0, 0.75, 0.5, 1.1, 0.0, 0.3, 0.0)), 2.8)
