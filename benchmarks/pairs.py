@@ -8,13 +8,14 @@
     python benchmarks/pairs.py shuffle FOLDER
     python benchmarks/pairs.py open FOLDER CHOICES
 
-Debian's packages sweethome3d and sweethome3d-furniture; INDEX is `echousd assets index` of the latter. `make` draws
-graphs and seeds by LOT and writes of each our picture as `generate` leaves it, and what the other program gets of the
-same room: floor, walls, doors, windows, the same pieces at the same places and sizes, each as the model of its class in
-its catalogues that `--shapes library` would take, small things of which they have a class where ours lie, the same eye.
-Floors, lights, sky and quality are that program's own. `shuffle` makes FOLDER/pair_N.png, A beside B, of which a lot
-says whose is whose, and FOLDER/key.json. `open` reads lines `N WHOLE MATERIALS SHAPES LIVELINESS`, each A, B or =, and
-says who won.
+Debian's packages sweethome3d and sweethome3d-furniture; INDEX is `echousd assets index` of the latter, and of the
+models in sweethome3d.jar, packed with their DefaultFurnitureCatalog.properties (as PluginFurnitureCatalog) into a
+.sh3f. `make` draws graphs and seeds by LOT and writes of each our picture as `generate` leaves it, and what the other
+program gets of the same room: floor, walls, doors, windows, the same pieces at the same places and sizes, each as the
+model of its class in its catalogues that `--shapes library` would take, small things of which they have a class where
+ours lie, the same eye. Floors, lights, sky and quality are that program's own. `shuffle` makes FOLDER/pair_N.png, A
+beside B, of which a lot says whose is whose, and FOLDER/key.json. `open` reads lines `N WHOLE MATERIALS SHAPES
+LIVELINESS`, each A, B or =, and says who won.
 """
 
 from __future__ import annotations
