@@ -19,17 +19,16 @@ TURN = Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d(1, 0, 0), 90.0))
 QUARTER = Gf.Quatd(Gf.Rotation(Gf.Vec3d(1, 0, 0), 90.0).GetQuat())
 # These look along an axis of their own, which an up axis does not change; a bulb looks everywhere.
 AIMED = ("Camera", "DomeLight", "RectLight", "DistantLight", "DiskLight", "CylinderLight")
-POINTS = ("points", "normals", "primvars:normals", "velocities", "accelerations")
+POINTS = ("points", "normals", "primvars:normals")
 BOXES = ("extent", "extentsHint")
 PLACES = ("physics:centerOfMass", "physics:localPos0", "physics:localPos1", "physics:gravityDirection")
 FRAMES = ("physics:principalAxes", "physics:localRot0", "physics:localRot1")
 AXES = {"Y": "Z", "Z": "Y"}
 OPS = {"rotateY": ("rotateZ", 1.0), "rotateZ": ("rotateY", -1.0), "rotateX": ("rotateX", 1.0)}
-LENGTHS = {  # attribute -> power of the unit that it is given in
-    "points": 1, "velocities": 1, "accelerations": 1, "widths": 1, "extent": 1, "extentsHint": 1,
-    "clippingRange": 1, "focalLength": 1, "focusDistance": 1, "horizontalAperture": 1, "verticalAperture": 1,
-    "horizontalApertureOffset": 1, "verticalApertureOffset": 1,
-    "inputs:radius": 1, "inputs:width": 1, "inputs:height": 1, "inputs:length": 1,
+LENGTHS = {  # attribute that we write -> power of the unit that it is given in
+    "points": 1, "extent": 1, "extentsHint": 1, "clippingRange": 1, "focalLength": 1, "focusDistance": 1,
+    "horizontalAperture": 1, "verticalAperture": 1, "verticalApertureOffset": 1,
+    "inputs:radius": 1, "inputs:width": 1, "inputs:height": 1,
     "physics:centerOfMass": 1, "physics:localPos0": 1, "physics:localPos1": 1, "physics:gravityMagnitude": 1,
     "physics:diagonalInertia": 2, "drive:angular:physics:damping": 2, "physics:density": -3,
     "drive:linear:physics:maxForce": 1, "drive:angular:physics:maxForce": 2,

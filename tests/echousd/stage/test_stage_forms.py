@@ -10,7 +10,7 @@ import echousd
 from echousd.draw.drawables import read_drawables
 from echousd.stage.contents import read_contents, shape_of
 from echousd.stage.forms import SkippedForms, polygons, solid
-from echousd.stage.layouts import each_layout
+from echousd.stage.layouts import each_layout, showing_variant
 from echousd.stage.read import find_rooms
 from echousd.stage.subdivision import refined
 
@@ -76,6 +76,25 @@ def test_layouts_are_shown_one_after_the_other_and_an_only_one_has_no_name():
     assert shown == [(f"layout_{number}",) * 2 for number in (0, 2, 10)]
     assert list(each_layout(stage, 10)) == ["layout_10"]
     assert variants.GetVariantSelection() == "layout_2"
+
+
+def test_a_variant_is_shown_for_a_while_and_whether_another_was_seen_is_said():
+    stage = empty()
+    sets = []
+    for name in ("a", "b"):
+        times = UsdGeom.Xform.Define(stage, f"/{name}").GetPrim().GetVariantSets().AddVariantSet("light")
+        for word in ("day", "night"):
+            times.AddVariant(word)
+        times.SetVariantSelection("day")
+        sets.append(times)
+    with showing_variant(stage, "light", "day") as other:
+        assert other is False
+    with showing_variant(stage, "light", "night") as other:
+        assert other is True
+        assert [times.GetVariantSelection() for times in sets] == ["night"] * 2
+    assert [times.GetVariantSelection() for times in sets] == ["day"] * 2
+    with showing_variant(stage, "season", "summer") as other:
+        assert other is False
 
 
 def test_layouts_of_a_room_deep_in_a_stage_are_found():

@@ -150,6 +150,36 @@ def test_joints_of_drawers_slide_as_far_in_another_unit():
     assert rescale(layer, 0.01).ExportToString() == once
 
 
+@pytest.mark.parametrize(
+    ("schema", "power", "names"),
+    [
+        ("Camera", 1, ("focalLength", "focusDistance", "horizontalAperture", "verticalAperture",
+                       "verticalApertureOffset", "clippingRange")),
+        ("SphereLight", 1, ("inputs:radius",)), ("RectLight", 1, ("inputs:width", "inputs:height")),
+        ("PhysicsScene", 1, ("physics:gravityMagnitude",)),
+        ("Mesh", 1, ("points", "extent")),
+        ("Xform", 1, ("physics:centerOfMass",)), ("Xform", 2, ("physics:diagonalInertia",)),
+        ("Xform", -3, ("physics:density",)), ("Xform", 0, ("physics:mass", "inputs:intensity")),
+    ],
+)  # fmt: skip
+def test_what_is_measured_in_lengths_is_rescaled_by_as_many_as_it_has(schema, power, names):
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.pseudoRoot.SetInfo("metersPerUnit", 1.0)
+    spec = Sdf.CreatePrimInLayer(layer, "/it")
+    spec.typeName = schema
+    kinds = {"points": "point3f[]", "extent": "float3[]", "clippingRange": "float2",
+             "physics:centerOfMass": "point3f", "physics:diagonalInertia": "float3"}  # fmt: skip
+    ones = {"float2": Gf.Vec2f(1), "point3f": Gf.Vec3f(1), "float3": Gf.Vec3f(1), "float": 1.0}
+    for name in names:
+        kind = kinds.get(name, "float")
+        attribute = Sdf.AttributeSpec(spec, name, Sdf.ValueTypeNames.Find(kind))
+        attribute.default = ones.get(kind, [Gf.Vec3f(1)])
+    rescale(layer, 0.1)
+    for name in names:
+        found = np.array(spec.attributes[name].default, float)
+        np.testing.assert_allclose(found, np.full(found.shape, 10.0**power), rtol=1e-5, err_msg=name)
+
+
 def test_a_matrix_above_a_model_of_others_scales_it_and_others_only_move():
     layer = Sdf.Layer.CreateAnonymous(".usda")
     layer.pseudoRoot.SetInfo("metersPerUnit", 1.0)
