@@ -24,7 +24,7 @@ BOXES = ("extent", "extentsHint")
 PLACES = ("physics:centerOfMass", "physics:localPos0", "physics:localPos1", "physics:gravityDirection")
 FRAMES = ("physics:principalAxes", "physics:localRot0", "physics:localRot1")
 AXES = {"Y": "Z", "Z": "Y"}
-OPS = {"rotateY": ("rotateZ", 1.0), "rotateZ": ("rotateY", -1.0), "rotateX": ("rotateX", 1.0)}
+OPS = {"rotateY": "rotateZ", "rotateZ": "rotateY", "rotateX": "rotateX"}  # Z the other way round
 LENGTHS = {  # attribute that we write -> power of the unit that it is given in
     "points": 1, "extent": 1, "extentsHint": 1, "clippingRange": 1, "focalLength": 1, "focusDistance": 1,
     "horizontalAperture": 1, "verticalAperture": 1, "verticalApertureOffset": 1,
@@ -164,7 +164,7 @@ def _turn_ops(spec: Sdf.PrimSpec) -> None:
     for attribute in [each for each in spec.attributes if each.name.startswith("xformOp:")]:
         kind, value = attribute.name.split(":")[1], attribute.default
         if kind in OPS:
-            if OPS[kind][1] < 0 and value is not None:
+            if kind == "rotateZ" and value is not None:
                 attribute.default = 0.0 - value
             if (name := _renamed(attribute.name)) != attribute.name:
                 attribute.name = name
@@ -186,7 +186,7 @@ def _turn_ops(spec: Sdf.PrimSpec) -> None:
 
 
 def _renamed(op: str) -> str:
-    for kind, (to, _) in OPS.items():
+    for kind, to in OPS.items():
         if f"xformOp:{kind}" in op:
             return op.replace(f"xformOp:{kind}", f"xformOp:{to}", 1)
     return op
