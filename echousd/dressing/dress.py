@@ -128,7 +128,7 @@ def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: 
     solids = solids_of(kind, np.array(size), np.random.default_rng(variant), **({"lie": lie} if lie else {}))
     pieces = within_budget(solids, np.array(size), KINDS[kind].faces)
     part = part_of("mesh", pieces)
-    return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, weighed(pieces))
+    return Geometry((part,), (standing_hull(part.mesh, KINDS[kind].gives),), ORIGIN, weighed(pieces))
 
 
 STRETCH, UPRIGHT, LONG = 1.0, 2.0, 3.0  # metres of bare wall that ask for a picture, a wide one, three

@@ -24,8 +24,9 @@ DRAPED = {"sofa": 0.9, "seat": 0.4}  # shares of sofas and armchairs with a blan
 # Metres between folds of a bed, and over its middle from where on it is a board; places behind pillows for cushions.
 SOFT, BOARD, BEYOND = 0.04, 0.12, 12
 RIDGE = 0.1  # metres that an arm is higher than the seat at least so that a throw hangs over it
-PRESS = 0.035  # metres that what is soft presses into a seat at most
-RAISED = 0.04  # metres that a flat thing is raised at most so that it lies on the solids of a seat
+RAISED = 0.04  # metres that a thing is raised, or let down, at most so that it lies on the solids of a seat
+# Shares of a cushion's extents that it stands on, and the part of that which must be level, to so many metres.
+BASE, STEADY, FLAT = np.array([0.9, 1.0, 0.6]), 0.6, 0.003
 
 
 def cushions(setting: Setting) -> None:
@@ -43,7 +44,7 @@ def cushions(setting: Setting) -> None:
             spot = seat.resting(end, size)
             turn = -0.12 * end * float(rng.uniform(0.3, 1.6))
             spot = None if spot is None else _clear_of(host, spot, turn, size)
-            _put(setting, host, None if spot is None else seat.pressed(spot, size), kind, size, turn, variant)
+            _put(setting, host, _standing(host, spot, size), kind, size, turn, variant)
 
 
 Design = tuple[str, np.ndarray, int]  # kind, extents and variant of a cushion
@@ -67,7 +68,7 @@ def bed_cushions(setting: Setting) -> None:
         for side in (-1.0, 1.0) if wide > WIDE_BED and size[0] < 1.3 * size[1] else (0.0,):
             turn = float(rng.uniform(-0.12, 0.12))
             spot = _lying(host, seat, seat.before_pillows(side * 0.21 * wide, size), turn, size)
-            _put(setting, host, spot, kind, size, turn, variant)
+            _put(setting, host, _standing(host, spot, size), kind, size, turn, variant)
 
 
 def on_covers(setting: Setting) -> None:
@@ -99,9 +100,24 @@ def _put(
 
 def _upon(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | None:
     """The spot (3,) for a flat thing, raised onto the solids below it; None where one of them stands far out."""
+    top = max(float(spot[1]), float(_tops(host, spot, size).max()))
+    return np.array([spot[0], top, spot[2]]) if top - spot[1] < RAISED else None
+
+
+def _standing(host: Standing, spot: np.ndarray | None, size: np.ndarray) -> np.ndarray | None:
+    """The spot (3,) let down onto what of its seat is level; None where that is too little for a cushion to stand."""
+    if spot is None:
+        return None
+    tops = _tops(host, spot, size * BASE)
+    top = float(tops[tops < spot[1] + RAISED].max(initial=-np.inf))
+    return np.array([spot[0], top, spot[2]]) if (tops > top - FLAT).mean() > STEADY and top > spot[1] - RAISED else None
+
+
+def _tops(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """(49,) float: heights of the host's solids all over the base of a thing at a spot (3,), -inf where none is."""
     x, z = (spot[axis] + size[axis] * np.linspace(-0.5, 0.5, 7) for axis in (0, 2))
     points = np.stack(np.meshgrid(x, z), -1).reshape(-1, 2)
-    top = float(spot[1])
+    tops = np.full(len(points), -np.inf)
     for collider in host.geometry.colliders:
         normal = area_normals(collider.mesh.triangles)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
@@ -110,8 +126,8 @@ def _upon(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | No
         high = (beyond[:, up] / normal[up, 1]).min(1)
         low = (beyond[:, down] / normal[down, 1]).max(1)
         over = (high > low) & (beyond[:, ~up & ~down] > 0).all(1)
-        top = max(top, float(high[over].max(initial=top)))
-    return np.array([spot[0], top, spot[2]]) if top - spot[1] < RAISED else None
+        tops[over] = np.maximum(tops[over], high[over])
+    return tops
 
 
 def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -> np.ndarray | None:
@@ -188,20 +204,11 @@ class _Seat:
 
     def below(self, spot: np.ndarray, size: np.ndarray) -> float | None:
         """Height of the level surface below most of what lies at a spot (3,); None where it is not level."""
-        under = self._under(spot, size)
+        # without its edges, which touch an arm's or a back's foot
+        rows, columns = np.abs(self.x - spot[0]) < 0.4 * size[0], np.abs(self.z - spot[2]) < 0.4 * size[2]
+        under = self.height[np.ix_(rows, columns)]
         top = float(under.max(initial=-np.inf))
         return top if np.isfinite(top) and (under > top - SOFT).mean() > 0.6 else None
-
-    def _under(self, spot: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """(n, m) heights below what lies at a spot (3,), without its edges, which touch an arm's or a back's foot."""
-        rows, columns = np.abs(self.x - spot[0]) < 0.4 * size[0], np.abs(self.z - spot[2]) < 0.4 * size[2]
-        return self.height[np.ix_(rows, columns)]
-
-    def pressed(self, spot: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """The spot (3,) let down into a seat that is fuller in its middle, onto half of it, by `PRESS` at most."""
-        under = self._under(spot, size)
-        down = max(float(np.median(under)), float(under.max()) - PRESS) if under.size else spot[1]
-        return np.array([spot[0], min(spot[1], down), spot[2]])
 
     def resting(self, end: float, size: np.ndarray) -> np.ndarray | None:
         """(3,) a place on the seat against the back, towards one end (-1 to 1); None where there is none."""
@@ -216,10 +223,8 @@ class _Seat:
             return None
         wish = (1 + end) * (len(self.x) - wide) / 2
         i, k = fits[int(np.argmin(fits[:, 1] * 1.5 + np.abs(fits[:, 0] - wish)))]
-        spot = np.array([self.x[i] + (wide - 1) * STEP / 2, 0.0, self.z[k] + (deep - 1) * STEP / 2])
-        under = self._under(spot, size)
-        spot[1] = float(under[np.abs(under - self.level) < 0.07].max()) + 0.002  # it may be fuller in its middle
-        return spot
+        above = self.level + RAISED / 2  # it may be fuller in its middle
+        return np.array([self.x[i] + (wide - 1) * STEP / 2, above, self.z[k] + (deep - 1) * STEP / 2])
 
 
 def _heights(corners: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fast_simplification
 import numpy as np
+import shapely
 from manifold3d import Manifold
 
 from echomodel.triangles import Mesh, area_normals, box
@@ -12,6 +13,7 @@ from echousd.shapes.geometry import Collider
 FACES = 120  # of the hull of what stands
 DIGITS = 4  # of metres, corners of a hull
 FLAT = 0.012  # metres: what is as near to the top or the bottom belongs to it
+APART = 0.015  # metres, a quarter of its extent at most, between corners of a base: engines take four of all of them
 THIN = 1e-4  # metres, least extent of the box of points in one plane
 FINE = 1e-6  # metres: a corner that is nearer than that to a line or plane between others is none
 PLANE = 1e-9  # share of the cube of their extent that the hull of points in one plane may have by rounding
@@ -50,16 +52,24 @@ def rounded_hull(points: np.ndarray) -> Mesh:
     return convex_hull(np.unique(points.round(DIGITS), axis=0))
 
 
-def standing_hull(mesh: Mesh) -> Collider:
-    """One hull of a mesh (metres) that stands on a plane, however its base is rounded."""
+def standing_hull(mesh: Mesh, gives: float = FLAT) -> Collider:
+    """One hull of a mesh (metres) that stands on a plane, however its base is rounded.
+
+    `gives`: metres that its base gives way where it stands.
+    """
     hull = convex_hull(mesh.vertices)
     corners = hull.vertices
     if len(hull.faces) > FACES:
         points, faces = corners.astype(np.float32), hull.faces.astype(np.int32)
         points, faces = fast_simplification.simplify(points, faces, target_count=FACES, agg=5)
         corners = points[np.unique(faces)].astype(float)
-    corners = flush(corners, mesh.bounds)
-    return Collider("collider", rounded_hull(np.concatenate([corners, soles(mesh)])), "convexHull")
+    corners, (low, high) = flush(corners, mesh.bounds), mesh.bounds[:, 1]
+    between = corners[(corners[:, 1] > low) & (corners[:, 1] < high)]
+    return Collider(
+        "collider",
+        rounded_hull(np.concatenate([between, sole(mesh, low, gives), sole(mesh, high, FLAT)])),
+        "convexHull",
+    )
 
 
 def flush(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
@@ -81,16 +91,9 @@ def snapped(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
     return np.column_stack([points[:, 0], height, points[:, 2]])
 
 
-def soles(mesh: Mesh) -> np.ndarray:
-    """(32, 3) float: outlines of what a mesh stands on and of its top, each in one plane."""
-    points, (low, high) = mesh.vertices, mesh.bounds[:, 1]
-    reach = min(FLAT, 0.1 * (high - low))
-    angle = np.arange(16) * np.pi / 8
-    rays = np.stack([np.cos(angle), np.sin(angle)])
-    found = []
-    for level in (low, high):
-        near = points[np.abs(points[:, 1] - level) <= reach]
-        outline = near[(near[:, [0, 2]] @ rays).argmax(0)]
-        outline[:, 1] = level
-        found.append(outline)
-    return np.concatenate(found)
+def sole(mesh: Mesh, level: float, reach: float) -> np.ndarray:
+    """(k, 3) float: the outline of what of a mesh is within `reach` metres of a height `level`, in the plane there."""
+    near = np.abs(mesh.vertices[:, 1] - level) <= min(reach, 0.1 * float(np.ptp(mesh.bounds[:, 1])))
+    outline = shapely.convex_hull(shapely.multipoints(mesh.vertices[near][:, [0, 2]]))
+    outline = shapely.remove_repeated_points(outline, min(APART, outline.length / 16))
+    return np.insert(shapely.get_coordinates(outline), 1, level, axis=1)

@@ -9,7 +9,7 @@ from pxr import Usd, UsdGeom, UsdPhysics
 
 from echomodel.dressing import KINDS
 from echomodel.dressing import thing as solids_of
-from echomodel.furniture.solids import Joint
+from echomodel.furniture.solids import Joint, Solid
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
@@ -17,7 +17,7 @@ from echousd.layers.physics import CONTACT, WOODEN, movable, write_asset_physics
 from echousd.shapes.colliders import collider, colliders_of
 from echousd.shapes.geometry import Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.hulls import convex_hull, hull_volume, standing_hull
-from echousd.shapes.joinery import part_of, within_budget
+from echousd.shapes.joinery import level, part_of, within_budget
 from echousd.shapes.matter import ballasted, mass_of, read_mass
 from echousd.shapes.meshing import box_mesh
 from echousd.shapes.sources.whole import solid_geometry
@@ -112,6 +112,38 @@ def test_hulls_of_small_things_are_closed_as_they_are_written(kind, number):
     assert written.is_watertight
     assert written.is_winding_consistent
     assert written.area_faces.min() > 1e-12
+
+
+def test_a_rounded_foot_has_a_corner_for_each_of_its_own():
+    """An engine takes four corners of a base, which shall not be two and two that are next to each other."""
+    turn = np.linspace(0, np.pi / 2, 5)
+    arc = 0.008 * np.stack([np.cos(turn), np.sin(turn)], 1) + (0.292, 0.092)
+    outline = np.concatenate([arc * sign for sign in ((1, 1), (-1, 1), (-1, -1), (1, -1))])
+    points = np.concatenate([np.insert(outline, 1, height, axis=1) for height in (0.0, 0.5)])
+    made = standing_hull(convex_hull(points)).mesh.vertices
+    base = made[made[:, 1] == 0.0][:, [0, 2]]
+    assert len(base) == 4
+    np.testing.assert_allclose(np.abs(base), [(0.3, 0.1)] * 4, atol=0.009)
+
+
+def test_what_gives_way_stands_on_more_of_it():
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.2)
+    ball.apply_translation((0, 0.2, 0))
+    wide = [np.ptp(of[of[:, 1] < 1e-9][:, 0]) for of in (
+        standing_hull(Mesh.of(ball), gives).mesh.vertices for gives in (0.012, 0.035))]  # fmt: skip
+    assert wide[0] == pytest.approx(2 * np.sqrt(0.2**2 - 0.188**2), abs=0.03)
+    assert wide[1] == pytest.approx(2 * np.sqrt(0.2**2 - 0.165**2), abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("role", "material", "top"), [("seat", "fabric", 0.405), ("seat", "wood", 0.42), ("cover", "linen", 0.42)]
+)
+def test_soft_seats_and_covers_are_level_for_what_lies_on_them(role, material, top):
+    corners = np.array([(x, y, z) for x in (-0.3, 0.3) for z in (-0.3, 0.3) for y in (0.2, 0.4)] + [(0, 0.42, 0)])
+    found = level(Solid(role=role, material=material), corners)
+    assert found[:, 1].max() == pytest.approx(top)
+    assert (found[:, 1] > top - 1e-9).sum() == (5 if role == "cover" else 1)
+    assert found[:, 1].min() == 0.2
 
 
 def test_a_convex_piece_as_thin_as_a_table_top_keeps_its_thickness(monkeypatch):
