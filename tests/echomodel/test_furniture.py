@@ -221,3 +221,13 @@ def test_no_two_faces_of_an_arched_headboard_lie_in_one_plane(softness):
              if p.role == "headboard"]  # fmt: skip
     fronts, rears = ([round(float(end(part[:, 2])), 4) for part in parts] for end in (np.max, np.min))
     assert len(set(fronts)) == len(set(rears)) == len(parts) == 2
+
+
+def test_office_chairs_have_a_net_in_a_frame_and_a_pad_for_the_head_or_a_padded_back():
+    size, choices = np.array([0.62, 1.15, 0.6]), Choices.draw(np.random.default_rng(0))
+    for tufting, count in ((0.9, 4), (0.1, 1)):
+        style = replace(Style.draw(np.random.default_rng(1)), tufting=tufting, back="panel")
+        parts = solids("office_chair", style, choices, size)
+        assert sum(part.role == "back" for part in parts) == count
+        assert not loose_solids(parts)
+        assert mesh_of(parts, size).bounds[1, 1] == pytest.approx(size[1], abs=1e-6)

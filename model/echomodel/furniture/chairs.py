@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, both, box, cushion, four, leg, of_role, top, within
+from echomodel.furniture.cloth import seam
 from echomodel.furniture.seating import back_rest, chair_legs, leaning, seat_of, slim_arms
 from echomodel.furniture.solids import Block, Solid, ball, bent, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
@@ -249,8 +249,7 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
 def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Five feet with casters, a column, a seat, a raked back, and arms."""
     w, h, d = size
-    seat, reach = min(0.46, h * 0.56), min(w, d) * 0.48
-    wheel = 0.028
+    seat, reach, wheel = min(0.46, h * 0.56), min(w, d) * 0.48, 0.028
     parts: list[Solid] = []
     for angle in np.arange(5) * 2 * np.pi / 5 + np.pi / 2:
         x, z = reach * np.cos(angle), reach * np.sin(angle)
@@ -269,19 +268,20 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if style.back == "shell":
         low, arms = (0, seat - 0.05, d * 0.05), 0.12 + 0.1 * style.arm_height
         return [*parts, bent(low, (sw / 2 + 0.02, d * 0.5), 0.05, h - seat + 0.05, arms)]
-    if style.corner > 0.45 or style.back == "oval":
-        tall, turn, power = (h - y0) / np.cos(rake), rotation(x=-rake), 2.6 + 2 * style.contrast
-        centre = turn @ np.array([0, y0 - seat + tall / 2, 0]) + [0, seat, -d * 0.4]
-        parts.append(ball(centre, (sw * 0.47, tall / 2, 0.04), "fabric", "back", power=power, turn=turn))
-    elif style.tufting > 0.6:
-        for a, b in pairwise(np.linspace(y0, h, 5)):
-            parts.append(lean(sw * 0.44, a + 0.01, b, -0.02, 0.02, material="fabric", radius=0.018, bow=0.04))
-        parts.append(lean(0.03, y0, h * 0.98, -0.04, -0.015, material="metal"))
+    tall, turn, foot = (h - y0) / np.cos(rake), rotation(x=-rake), np.array([0.0, seat, -d * 0.4])
+    if style.tufting > 0.45:  # a net in a frame, and a pad for the head
+        frame = (seam(sw * 0.46, 0.4 * tall) + np.array([0, y0 - seat + 0.41 * tall, 0])) @ turn.T + foot
+        parts.append(tube(frame, 0.022, "metal", "back"))
+        parts.append(lean(sw * 0.43, y0 + 0.03, y0 + 0.8 * tall, -0.005, 0.005, material="fabric", bow=0.02))
+        parts.append(lean(0.03, y0 + 0.1, y0 + 0.95 * tall, -0.055, -0.03, material="metal", radius=0.01))
+        parts.append(lean(sw * 0.27, y0 + 0.86 * tall, y0 + tall, -0.035, 0.03, material="fabric", radius=0.028))
+    elif style.corner > 0.45 or style.back == "oval":
+        centre, half = turn @ np.array([0, y0 - seat + tall / 2, 0]) + foot, (sw * 0.47, tall / 2, 0.04)
+        parts.append(ball(centre, half, "fabric", "back", power=2.6 + 2 * style.contrast, turn=turn))
     else:
-        tall = (h - y0) / np.cos(rake)
         parts.append(lean(sw * 0.46, y0, y0 + tall, -0.03, 0.03, material="fabric", radius=0.06, bow=0.05))
     rise = y0 + 0.15 - seat  # the bracket ends in the middle of the back, which leans away from it
-    rest = [0, y0 + 0.15, -d * 0.4 - rise * np.tan(rake) - 0.012]
+    rest = [0, y0 + 0.15, -d * 0.4 - rise * np.tan(rake) - 0.03]
     parts.append(tube([[0, seat - 0.05, -d * 0.1], [0, seat - 0.05, -d * 0.43], rest], 0.016, "metal", "stem"))
     if choices.chance("extra", 0.75):
         x, y = w / 2 - 0.025, seat + 0.2
