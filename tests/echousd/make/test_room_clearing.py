@@ -73,10 +73,10 @@ def test_a_chair_is_tucked_as_far_as_it_fits_its_back_a_millimetre_before_the_ta
 
 def test_a_table_goes_with_its_other_chairs_where_one_would_be_pushed_to_the_wall():
     things = (
-        ("table", "dining_table", table_piece(), (0, 0, 1.4), 0.0, False),
-        ("back", "dining_chair", chair_piece(), (0, 0, 1.6), np.pi, False),
-        ("front", "dining_chair", chair_piece(), (0, 0, 1.105), 0.0, False),
-        ("lamp", "pendant_lamp", piece(board((0.3, 0.4, 0.3), (0, 0, 0))), (0, 1.8, 1.4), 0.0, False),
+        ("table", "dining_table", table_piece(), (0, 0, 1.35), 0.0, False),
+        ("back", "dining_chair", chair_piece(), (0, 0, 1.55), np.pi, False),
+        ("front", "dining_chair", chair_piece(), (0, 0, 1.055), 0.0, False),
+        ("lamp", "pendant_lamp", piece(board((0.3, 0.4, 0.3), (0, 0, 0))), (0, 1.8, 1.35), 0.0, False),
     )
     graph, boxes, geometry = room(*things)
     found, left = cleared(graph, boxes, geometry, FLOOR, walls=False)
