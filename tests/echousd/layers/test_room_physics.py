@@ -13,6 +13,8 @@ from echomodel.furniture.solids import Joint, Solid
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
+from echousd.layers.assets import coarse_layer, component_layer, geometry_layer
+from echousd.layers.compose import _forms
 from echousd.layers.physics import CONTACT, WOODEN, movable, write_asset_physics
 from echousd.shapes.colliders import collider, colliders_of
 from echousd.shapes.geometry import Collider, Geometry, Mass, Origin, Part
@@ -44,6 +46,32 @@ def test_what_stands_is_a_body_and_what_hangs_or_is_built_in_is_none(word, moves
         geometry = replace(block, mass=mass_of(block, "chair"))
         write_asset_physics(Pen(stage.GetRootLayer()), "it", word, geometry, ["wood"])
         assert stage.GetPrimAtPath("/it").HasAPI(UsdPhysics.RigidBodyAPI) == moves
+
+
+def test_a_piece_has_few_faces_where_that_is_asked_for(tmp_path):
+    fine, few = (Mesh.of(trimesh.creation.icosphere(subdivisions=count, radius=0.3)) for count in (3, 1))
+    parts = [(Part("mesh", mesh, {"wood": np.arange(len(mesh.faces))}),) for mesh in (fine, few)]
+    hull = Collider("collider", few, "convexHull")
+    geometry = replace(solid_geometry(box_mesh(SIZE), "chair", Origin("boxes")), parts=parts[0], coarse=parts[1],
+                       colliders=(hull,))  # fmt: skip
+    forms = [_forms("ball", each) for each in parts]
+    payload = geometry_layer("ball", forms[0], geometry, {})
+    for name, layer in (("ball", component_layer("ball", "chair", fine.bounds, geometry, {})),
+                        ("ball_geo", payload), ("ball_low", coarse_layer("ball", forms[1], {}))):  # fmt: skip
+        layer.Export(str(tmp_path / f"{name}.{'usda' if name == 'ball' else 'usdc'}"))
+    stage = Usd.Stage.Open(str(tmp_path / "ball.usda"))
+    levels = stage.GetDefaultPrim().GetVariantSet("LOD")
+    assert (levels.GetVariantNames(), levels.GetVariantSelection()) == (["high", "low", "proxy"], "high")
+    seen = {}
+    for level in levels.GetVariantNames():
+        levels.SetVariantSelection(level)
+        shown = [
+            prim for prim in stage.Traverse()
+            if prim.IsA(UsdGeom.Mesh) and UsdGeom.Imageable(prim).ComputeVisibility() != "invisible"
+            and UsdGeom.Imageable(prim).ComputePurpose() == "default"
+        ]  # fmt: skip
+        seen[level] = [(prim.GetName(), len(UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get())) for prim in shown]
+    assert seen == {"high": [("ball_mesh", 1280)], "low": [("ball_mesh", 80)], "proxy": [("ball_collider", 80)]}
 
 
 def test_mass_of_a_box_is_that_of_the_textbook():
