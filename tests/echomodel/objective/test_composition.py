@@ -191,6 +191,30 @@ def test_chairs_do_not_crowd_a_short_side_while_the_long_ones_are_free():
     assert seen(composition.elbow_room, turned, (4.0, 5.0))[0] == {0: pytest.approx(0.45 - 0.6)}
 
 
+def sides(front, back):
+    """A table with so many chairs before it and behind it."""
+    return seated(*(
+        ((0.42 * (number - (count - 1) / 2), side * 0.65), np.pi * (side > 0))
+        for count, side in ((front, 1), (back, -1)) for number in range(count)
+    ))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("front", "back", "margin", "more"),
+    [(2, 2, 0.5, 0.0), (2, 1, 0.5, 1.0), (3, 1, -1.5, 2.0), (1, 3, -1.5, 2.0), (3, 0, -1.5, 3.0)],
+)
+def test_as_many_sit_at_one_side_of_a_table_as_opposite(front, back, margin, more):
+    found, rows, _ = seen(composition.chairs_balanced, sides(front, back))
+    assert found == {0: pytest.approx(margin)}
+    assert rows.measure.tolist() == [pytest.approx(more)]
+
+
+def test_two_sit_as_they_like_and_nobody_is_missed_where_no_room_is():
+    assert seen(composition.chairs_balanced, sides(2, 0))[0] == {}
+    shelf = [("bookshelf", (1.6, 2.0, 0.3), (0.0, -1.0), 0.0)]
+    assert seen(composition.chairs_balanced, sides(3, 0) + shelf)[0] == {0: pytest.approx(1.5)}
+
+
 def test_a_side_at_a_wall_or_at_furniture_is_not_free():
     shelves = [("bookshelf", (1.6, 2.0, 0.3), (0.0, z), 0.0) for z in (-1.0, 1.0)]
     both, narrow = (seated(*CROWDED) + shelves, (5.0, 4.0)), (seated(*CROWDED), (5.0, 2.0))
