@@ -32,6 +32,12 @@ def test_records_name_prims_inside_a_room():
         assert read_look(layer_of(name=name), "") is None
 
 
+@pytest.mark.parametrize(("said", "taken"), [("each", "each"), ("grouped", "grouped"), ("all", "none"), (3, "none")])
+def test_a_record_says_whether_small_things_were_painted_or_nothing(said, taken):
+    assert read_look(layer_of(dressing=said), "looks/oil.usda").dressing == taken
+    assert read_look(layer_of(), "looks/oil.usda").dressing == "none"
+
+
 @pytest.fixture
 def root(tmp_path):
     made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
