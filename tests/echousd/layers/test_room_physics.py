@@ -63,14 +63,14 @@ def test_a_piece_has_few_faces_where_that_is_asked_for(tmp_path):
     levels = stage.GetDefaultPrim().GetVariantSet("LOD")
     assert (levels.GetVariantNames(), levels.GetVariantSelection()) == (["high", "low", "proxy"], "high")
     seen = {}
-    for level in levels.GetVariantNames():
-        levels.SetVariantSelection(level)
+    for detail in levels.GetVariantNames():
+        levels.SetVariantSelection(detail)
         shown = [
             prim for prim in stage.Traverse()
             if prim.IsA(UsdGeom.Mesh) and UsdGeom.Imageable(prim).ComputeVisibility() != "invisible"
             and UsdGeom.Imageable(prim).ComputePurpose() == "default"
         ]  # fmt: skip
-        seen[level] = [(prim.GetName(), len(UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get())) for prim in shown]
+        seen[detail] = [(prim.GetName(), len(UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get())) for prim in shown]
     assert seen == {"high": [("ball_mesh", 1280)], "low": [("ball_mesh", 80)], "proxy": [("ball_collider", 80)]}
 
 

@@ -1,8 +1,12 @@
 """The pen authors what USD's own classes author, without a stage."""
 
+import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade, Vt
 
+from echomodel.openings import Opening
+from echousd.stage import encoding
 from echousd.stage.pen import Pen, ops
+from echousd.stage.read import is_home
 from echousd.stage.shading import Image, preview_surface
 
 
@@ -65,3 +69,45 @@ def test_a_material_of_images_is_a_network_that_usd_reads():
     assert rough.GetInput("sourceColorSpace").Get() == "raw"
     primvar = UsdShade.Shader(source.GetInput("st").GetConnectedSources()[0][0].source)
     assert primvar.GetInput("varname").Get() == "st"
+
+
+def test_a_surface_reads_colours_directions_and_numbers_of_its_images_each_in_its_type():
+    pen = Pen.blank("Looks")
+    images = [
+        Image("color", "c.jpg", {"diffuseColor": "rgb"}, tint=(0.5, 1.0, 1.0), fallback=(0.1, 0.2, 0.3)),
+        Image("rough", "r.jpg", {"roughness": "r"}), Image("directions", "n.jpg", {"normal": "rgb"}),
+    ]  # fmt: skip
+    preview_surface(pen, "/Looks/wood", {"metallic": 0.0}, images)
+    stage = Usd.Stage.Open(pen.layer)
+    surface = UsdShade.Shader.Get(stage, "/Looks/wood/surface")
+    kinds = {}
+    for name in ("diffuseColor", "roughness", "normal"):
+        source, output, _ = surface.GetInput(name).GetConnectedSource()
+        kinds[name] = (output, str(source.GetOutput(output).GetTypeName()))
+    assert kinds == {"diffuseColor": ("rgb", "float3"), "roughness": ("r", "float"), "normal": ("rgb", "float3")}
+    color = UsdShade.Shader.Get(stage, "/Looks/wood/color")
+    assert list(color.GetInput("scale").Get()) == [0.5, 1.0, 1.0, 1.0]
+    assert list(color.GetInput("fallback").Get()) == pytest.approx([0.1, 0.2, 0.3, 1.0])
+    assert UsdShade.Material.Get(stage, "/Looks/wood").ComputeSurfaceSource()[0].GetPath() == surface.GetPath()
+
+
+def test_an_opening_says_what_is_not_usual_of_its_kind():
+    window = Opening("w", "window", 0, 0.5, 1.0, 1.2, 0.9)
+    assert {encoding.SILL} <= {*encoding.opening_values(window)}
+    assert {encoding.HINGE, encoding.SWING}.isdisjoint(encoding.opening_values(window))
+    low = encoding.opening_values(Opening("w", "window", 0, 0.5, 1.0, 2.2, 0.0))
+    assert encoding.SILL not in low
+    door = encoding.opening_values(Opening("d", "door", 0, 0.5, 0.9, 2.0, hinge="right", swing="out"))
+    assert (door[encoding.HINGE], door[encoding.SWING]) == ("right", "out")
+    assert {encoding.HINGE, encoding.SWING} <= {*encoding.opening_values(Opening("d", "door", 0, 0.5, 0.9, 2.0))}
+
+
+@pytest.mark.parametrize(
+    ("types", "home"),
+    [((), False), (("EchoSceneGraph",), False), (("EchoSceneGraph",) * 2, True), ((encoding.HOME_TYPE,), True)],
+)
+def test_a_home_is_a_stage_of_several_rooms_or_one_that_says_so(types, home):
+    stage = Usd.Stage.CreateInMemory()
+    for number, kind in enumerate(types):
+        stage.DefinePrim(f"/Room_{number}/Graph", kind)
+    assert is_home(stage) is home
