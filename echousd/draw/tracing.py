@@ -482,7 +482,7 @@ def _direct(world: World, hits: Hits, spot: np.ndarray, turn: np.ndarray) -> tup
         area = np.cross(pane[:, 1], pane[:, 2])  # a quarter of it
         seen = np.clip(_dot(way, normal), 0, None) * 4 * np.abs(_dot(way, area)) / np.maximum(away, 0.2) ** 2
         seen *= np.clip(0.65 + 1.4 * way[:, 1], 0.3, 1)  # sky above, ground below
-        share = _free(scene, point, way, away, seen > 1e-4) * seen
+        share = _free(scene, point, way, away, seen > 1e-4) * np.minimum(seen, 1.5)  # none a spark near a pane
         light += share[:, None] * (len(scenery.panes) * SKY * lights.sky / np.pi) * SKY_LIGHT * lights.tint
     if inside and len(lights.bulbs):  # one lamp for each ray
         which = np.minimum((turn[:, 1] * len(lights.bulbs)).astype(int), len(lights.bulbs) - 1)

@@ -129,6 +129,15 @@ def test_a_lamp_lights_what_is_near_it_and_a_window_what_is_before_it():
     assert near.mean() > far.mean() + 0.02
 
 
+def test_right_before_a_window_nothing_sparks():
+    pane = np.array([[(1.99, 0.8, 0.0), (0.0, 0.0, 1.0), (0.0, 0.8, 0.0)]], np.float32)  # down to the floor
+    scenery, _ = box_room(sky=1.0, sun=None)
+    view = View(view_matrix(np.array([1.7, 1.2, 0.0]), np.array([1.701, 0.0, 0.0])), 0.25, False, inside=True)
+    along = trace(replace(scenery, panes=pane), view, 64, rays=1).mean(-1)
+    assert along.mean() > 0.5
+    assert np.abs(np.diff(along, axis=1)).mean() < 0.003  # from pixel to pixel along the window
+
+
 def test_what_a_wall_throws_back_has_its_colour_and_corners_are_darker_than_open_walls():
     lamp = {"bulbs": np.array([[(0.0, 1.5, 0.0)]], np.float32), "power": np.ones((1, 3), np.float32)}
     scenery, down = box_room(sky=0.0, **lamp)
