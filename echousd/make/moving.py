@@ -62,7 +62,8 @@ def moved_apart(
         trials = list(_trials(scene, graph, boxes, moves, pair, holds, together))
         most = max((kept for kept, _, _ in trials), default=0)
         tried = [moves for _, _, moves in sorted((one for one in trials if one[0] == most), key=lambda one: one[1])]
-        before, *faults = _faults(room, [moved_by(boxes, one) for one in (moves, *tried)])
+        faults = _faults(room, [moved_by(boxes, one) for one in (moves, *tried)])
+        before = next(faults)
         for trial, count in zip(tried, faults, strict=True):
             if count < fewest:
                 found, fewest = trial, count
@@ -71,12 +72,12 @@ def moved_apart(
     return found
 
 
-def _faults(room: Plan, layouts: Sequence[Boxes]) -> list[int]:
-    """How many faults to live with the plan of a room has where its boxes stand as in each of some layouts."""
+def _faults(room: Plan, layouts: Sequence[Boxes]) -> Iterator[int]:
+    """How many faults to live with a room has where its boxes stand as in each of some layouts, walked when asked."""
     position = np.array([boxes.position for boxes in layouts], float)
     yaw, moved = np.tile(room.yaw, (len(layouts), 1)), np.ptp(position, axis=0).any(1)
     of = [fault.object // len(room) for fault in faults_of(copies_of(room, position, yaw, moved))]
-    return [of.count(k) + len(unreached(room.at(there, room.yaw))) for k, there in enumerate(position)]
+    return (of.count(k) + len(unreached(room.at(there, room.yaw))) for k, there in enumerate(position))
 
 
 def _trials(
