@@ -204,11 +204,8 @@ BY_OWNER = {at: [row for row in TABLE if at in row.at] for row in TABLE for at i
 
 def out_of_range(reading: Reading, rule: str) -> Iterator[Finding]:
     """What the rows of a rule do not allow."""
-    return (
-        finding
-        for name, finding in reading.once("ranges", reading.stage.GetPseudoRoot(), lambda: _findings(reading))
-        if name == rule
-    )
+    every = reading.once("ranges", reading.stage.GetPseudoRoot(), lambda: _findings(reading))
+    return (finding for name, finding in every if name == rule)
 
 
 def _findings(reading: Reading) -> list[tuple[str, Finding]]:

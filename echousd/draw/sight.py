@@ -66,13 +66,17 @@ class Furniture:
         turn, middle = boxes._turns(), boxes.position + boxes.size * (0.0, 0.5, 0.0)
         grid = np.stack(np.meshgrid(*[(-0.45, 0.0, 0.45)] * 3, indexing="ij"), -1).reshape(-1, 3)
         points = middle[:n, None] + np.einsum("nji,nkj->nki", turn[:n], grid * self.size[:, None])
+        far, wide = (middle - eye)[:, ::2], np.hypot(*boxes.size.T[::2]) / 2
+        share = np.clip(far[:n] @ far.T / (far[:n] ** 2).sum(1)[:, None].clip(1e-12), 0.0, 1.0)[..., None]
+        beside = np.linalg.norm(far - share * far[:n, None], axis=2) - wide - wide[:n, None]  # of b from lines to a
+        a, b = np.nonzero((beside < 1e-6) & ~np.eye(n, len(wide), dtype=bool))
         # every line of sight (object a, point k) in the frame of every box b
-        start = np.einsum("bij,bj->bi", turn, eye - middle)[:, None, None]
-        way = np.einsum("bij,akj->baki", turn, points - eye)
-        enter, leave = _crossing(start, way, 0.5 * boxes.size[:, None, None])
-        hides = (enter < leave) & (leave > 0) & (enter < 1)
-        hides[np.arange(n), np.arange(n)] = False
-        return points, np.asarray(hides.any(0))
+        start = np.einsum("bij,bj->bi", turn, eye - middle)[b, None]
+        way = np.einsum("bij,bkj->bki", turn[b], points[a] - eye)
+        enter, leave = _crossing(start, way, 0.5 * boxes.size[b, None])
+        hidden = np.zeros(points.shape[:2], bool)
+        np.logical_or.at(hidden, a, (enter < leave) & (leave > 0) & (enter < 1))
+        return points, hidden
 
     def _turns(self) -> np.ndarray:
         """(n, 3, 3) from the room's frame to each object's."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
+from echomodel.boxes2d import seen
 from echomodel.openings import Opening
 from echousd.draw.sight import ASPECT, RAYS, Furniture, filled
 from echousd.draw.views import (
@@ -255,3 +256,21 @@ def test_one_looks_at_windows_rather_than_at_doors_and_passages():
     graph = SceneGraph(RoomSpec("hallway", floor_polygon=corners, openings=openings), (Node("bench", "bench"),), ())
     room = SimpleNamespace(graph=graph, corners=graph.room.corners)
     assert window_boxes(room).position[:, [0, 2]].round(2).tolist() == [[-2.0, 0.45]]
+
+
+def test_what_a_line_of_sight_passes_through_hides_its_end():
+    rng = np.random.default_rng(4)
+    size, yaw = rng.uniform(0.2, 1.4, (12, 3)), rng.uniform(-3, 3, 12)
+    furniture = Furniture(size, np.insert(rng.uniform(0, 5, (12, 2)), 1, 0.0, axis=1), yaw)
+    eye = np.array([0.1, 1.5, 0.1])
+    points, hidden = furniture.blocked(eye)
+    along = eye + np.linspace(0, 1, 400)[:, None, None, None] * (points - eye)
+    passed = np.zeros(hidden.shape, bool)
+    for other in range(12):  # the same, step by step along every line
+        away = along - furniture.position[other]
+        flat = (np.abs(seen(away[..., ::2], yaw[other])) < size[other, ::2] / 2).all(-1)
+        within = flat & (away[..., 1] > 0) & (away[..., 1] < size[other, 1])
+        passed |= within.any(0) & (np.arange(12) != other)[:, None]
+    assert 0.1 < hidden.mean() < 0.9
+    assert (hidden == passed).mean() > 0.98
+    assert hidden[passed].all()
