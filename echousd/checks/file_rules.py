@@ -217,9 +217,9 @@ def variants(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """Every chosen variant exists."""
     if prim.IsInstanceProxy():
         return
-    sets = prim.GetVariantSets()
-    names = sets.GetNames()
     chosen = {key: word for spec in reversed(prim.GetPrimStack()) for key, word in spec.variantSelections.items()}
+    sets = prim.GetVariantSets()
+    names = sets.GetNames() if chosen else ()
     for name, word in chosen.items():
         there = sets.GetVariantSet(name).GetVariantNames() if name in names else []
         if word and word not in there:

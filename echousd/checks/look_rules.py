@@ -215,7 +215,9 @@ def _findings(reading: Reading) -> list[tuple[str, Finding]]:
         for owner, instance in _owners(prim):
             for row in BY_OWNER.get(owner, ()):
                 attribute = prim.GetAttribute(row.attribute.replace("*", instance))
-                values = _numbers(attribute) if attribute and attribute.HasAuthoredValue() else np.zeros(0)
+                if not attribute or not attribute.HasAuthoredValue():
+                    continue
+                values = _numbers(attribute)
                 values = values[values > -UNLIMITED]  # physics: as the engine likes
                 if not row.allows(values, reading.metres):
                     shown = ", ".join(f"{value:g}" for value in values[:4])

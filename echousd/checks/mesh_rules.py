@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 
-from echomodel.triangles import area_normals, cross
+from echomodel.triangles import cross
 from echousd.checks.reading import Finding, Reading, applied, rule
 from echousd.stage.encoding import NODE_API
 from echousd.stage.layouts import ARTICULATION
@@ -38,12 +38,10 @@ def mesh_indices(_reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
 @rule("echo:Degenerate", "meshes")
 def degenerate(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[Finding]:
     """No face uses a point twice or has no area; models of others may, in few faces."""
-    arrays = reading.mesh(mesh)
-    triangles = arrays.indices[reading.corners(mesh)]
-    twice = (triangles == triangles[:, [2, 0, 1]]).any(1)
-    corners = arrays.points[triangles]
+    faces, corners, normals = reading.triangles(mesh)
+    twice = (faces == faces[:, [2, 0, 1]]).any(1)
     sides = ((corners - corners[:, [2, 0, 1]]) ** 2).sum(2).max(1, initial=0.0)  # squares
-    flat = twice | ((area_normals(corners) ** 2).sum(1) <= (THIN * sides) ** 2)
+    flat = twice | ((normals**2).sum(1) <= (THIN * sides) ** 2)
     if flat.any():
         told = f"{int(flat.sum())} of {len(flat)} triangles have no area"
         yield Finding(mesh.GetPath(), told, warning=not twice.any() or of_others(mesh.GetPrim()))
@@ -157,13 +155,11 @@ def _placed(prim: Usd.Prim, above: Usd.Prim) -> bool:
 @rule("echo:Winding", "meshes")
 def winding(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     """Faces turn outwards: closed surfaces enclose a positive volume, and faces agree with their normals."""
-    arrays = reading.mesh(mesh)
-    faces = reading.corners(mesh)
+    faces, triangles, turned = reading.triangles(mesh)
     if not len(faces):
         return
     sign = -1.0 if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded else 1.0
-    triangles = arrays.points[arrays.indices[faces]]
-    if _closed(arrays.indices[faces]):
+    if _closed(faces):
         a, b, c = np.moveaxis(triangles - triangles.mean((0, 1)), 1, 0)
         if sign * float((a * cross(b, c)).sum()) < 0:
             yield "closed and turned inside out: its faces wind the wrong way round"
@@ -171,8 +167,8 @@ def winding(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     found = _normals(reading, mesh)
     if found is None or found.interpolation != UsdGeom.Tokens.faceVarying or found.fault:
         return
-    turned = sign * area_normals(triangles)
-    against = (turned * found.values[faces].sum(1)).sum(1) < 0
+    turned = sign * turned
+    against = (turned * found.values[reading.corners(mesh)].sum(1)).sum(1) < 0
     area = np.linalg.norm(turned, axis=1)
     if area[against].sum() > AGAINST * area.sum() > 0:
         yield f"{area[against].sum() / area.sum():.0%} of its surface winds against its normals, allowed: outwards"

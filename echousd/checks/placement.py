@@ -13,6 +13,7 @@ from echomodel.dressing import SMALL
 from echomodel.openings import SKIRTING, segment
 from echomodel.triangles import along, area_normals, connected_pieces, distances, spread
 from echomodel.vocabulary import vocabulary
+from echousd.checks.reading import Reading
 from echousd.graph.nodes import HEIGHT
 from echousd.place.geometry import (
     SOLID,
@@ -24,7 +25,7 @@ from echousd.place.geometry import (
     pair_indices,
     separation,
 )
-from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding, read_contents, surroundings
+from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding, surroundings
 from echousd.stage.labels import known_category
 from echousd.stage.read import RoomPrims
 from echousd.stage.taxonomy import SHELL
@@ -78,8 +79,8 @@ class Whole:
     strangers: tuple[Surrounding, ...] = ()
 
     @classmethod
-    def of(cls, prims: RoomPrims) -> Whole:
-        """All of a room on a stage."""
+    def of(cls, prims: RoomPrims, reading: Reading) -> Whole:
+        """All of a room on the stage that is read."""
         small, shell, strangers = [], [], []
         for one in surroundings(prims):
             if one.word in SMALL and one.prim.GetParent().GetName() == DRESSED:
@@ -88,7 +89,7 @@ class Whole:
                 shell += [one] if one.word != "floor" else []
             elif known_category(one.word) is not None:
                 strangers.append(one)
-        return cls(read_contents(prims), tuple(small), tuple(shell), tuple(strangers))
+        return cls(reading.contents(prims), tuple(small), tuple(shell), tuple(strangers))
 
     @cached_property
     def polygon(self) -> np.ndarray | None:
@@ -375,7 +376,9 @@ def inside_solid(points: np.ndarray, solid: Shape) -> np.ndarray:
 
     Around its closed pieces nothing turns but within their boxes, so that most points are compared with few triangles.
     """
-    faces = solid.faces
+    faces, inside = solid.faces, ((points >= solid.points.min(0)) & (points <= solid.points.max(0))).all(1)
+    if not inside.any():
+        return np.asarray(inside)
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     count = len(solid.points)
     piece = connected_pieces(faces, count)

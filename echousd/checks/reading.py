@@ -10,6 +10,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdUtils
 
+from echomodel.triangles import area_normals
 from echousd.stage.contents import HIDDEN, RoomContents, components, read_contents
 from echousd.stage.encoding import StageError
 from echousd.stage.files import prim_specs
@@ -117,6 +118,16 @@ class Reading:
     def corners(self, mesh: UsdGeom.Mesh) -> np.ndarray:
         """(t, 3) int: fan triangles of a mesh's faces, as positions in its indices; raises as `mesh` does."""
         return self.once("corners", mesh.GetPrim(), lambda: fans(self.mesh(mesh).counts)[1])
+
+    def triangles(self, mesh: UsdGeom.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of these triangles their points (t, 3) int, these in space (t, 3, 3), `area_normals`; raises as `mesh`."""
+
+        def read() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            arrays = self.mesh(mesh)
+            faces = arrays.indices[self.corners(mesh)]
+            return faces, arrays.points[faces], area_normals(arrays.points[faces])
+
+        return self.once("triangles", mesh.GetPrim(), read)
 
     def is_guide(self, prim: Usd.Prim) -> bool:
         """Whether a prim is there for tools rather than for the eye (purpose guide or proxy)."""

@@ -70,13 +70,13 @@ def safely(rule: StageRule, reading: Reading) -> list[Finding]:
     return found
 
 
-def find_faults(stage: Usd.Stage) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]:
+def find_faults(reading: Reading) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]:
     """Errors and warnings of all validators, in a stable order; ours share what they read of the stage.
 
     An OpenUSD without UsdValidation runs our rules alone and says so in a warning.
     """
     assert echousd.__version__  # importing the package registers the schema plugin
-    reading = Reading(stage)
+    stage = reading.stage
     own = [(rule, found) for rule in RULES for found in safely(rule, reading)]
     with showing_variant(stage, ARTICULATION, ARTICULATED) as changed:  # doors and drawers are joined in it alone
         own += [(rule, found) for rule in JOINED if changed for found in safely(rule, Reading(stage))]
@@ -283,8 +283,9 @@ def check(
 
     rule_set(rules)
     stage = opened(stage)
-    errors, warnings = find_faults(stage)
-    found = [check_layout(stage, name, rules) for name in each_layout(stage, layout)]
+    reading = Reading(stage)
+    errors, warnings = find_faults(reading)
+    found = [check_layout(Reading(stage) if name else reading, name, rules) for name in each_layout(stage, layout)]
     rooms = found[0][0]
     if not rooms and not errors:
         raise StageError(f"{source(stage)}: no room (no EchoSceneGraph prim), nothing to check")
@@ -299,10 +300,10 @@ def check(
     return CheckReport(source(stage), rooms, tuple(report for _, report in found), errors, warnings, settled)
 
 
-def check_layout(stage: Usd.Stage, name: str, rules: str) -> tuple[tuple[str, ...], LayoutReport]:
+def check_layout(reading: Reading, name: str, rules: str) -> tuple[tuple[str, ...], LayoutReport]:
     """Prim paths of the rooms, and what is wrong with them as a stage shows them, in the layout of that name."""
-    none: list[RoomPrims] = []
-    rooms = [Whole.of(prims) for prims in readable(lambda: find_rooms(stage), none)]  # echo:EdgeTargets tells why not
+    none: list[RoomPrims] = []  # echo:EdgeTargets tells why not
+    rooms = [Whole.of(prims, reading) for prims in readable(lambda: find_rooms(reading.stage), none)]
     report = LayoutReport(
         name,
         tuple(relation for whole in rooms for relation in verdicts_of(whole.room, rules)),

@@ -94,13 +94,13 @@ def judged(rule: str) -> Callable[[Usd.Stage], Named]:
         with patch.object(report, "RULES", (ours,) if ours else ()), ExitStack() as stack:
             if ours:
                 stack.enter_context(patch.object(report, "_faults_of_usd", lambda stage: (set(), set())))
-            return named(CheckReport("", (), (), *find_faults(stage)))
+            return named(CheckReport("", (), (), *find_faults(Reading(stage))))
 
     def layout(stage: Usd.Stage) -> Named:
         with ExitStack() as stack:
             if rule != "collision":  # meshes that reach into one another take longest to find
                 stack.enter_context(patch.object(report, "find_collisions", lambda whole: ()))
-            return named(CheckReport("", (), (check_layout(stage, "", "strict")[1],), (), ()))
+            return named(CheckReport("", (), (check_layout(Reading(stage), "", "strict")[1],), (), ()))
 
     return faults if ":" in rule else layout
 

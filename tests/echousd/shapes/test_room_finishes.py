@@ -15,6 +15,7 @@ import echousd
 from echomodel.dressing.prints import ASPECTS, PRINTS
 from echomodel.furniture.solids import Block
 from echomodel.triangles import Mesh
+from echousd.checks.reading import Reading
 from echousd.checks.report import find_faults
 from echousd.exporting.formats import export
 from echousd.options import RoomOptions
@@ -147,7 +148,7 @@ def test_materialx_stands_beside_preview_surfaces(root, tmp_path):
                 scale = UsdShade.Shader(prim.GetChild("image")).GetInput("scale").Get()
                 factor = shader.GetInput("in2").Get()
                 assert tuple(factor) == pytest.approx(tuple(scale)[:3] if scale else (1, 1, 1))
-    assert find_faults(stage) == ((), ())
+    assert find_faults(Reading(stage)) == ((), ())
     flat = Usd.Stage.Open(str(export(made, tmp_path / "flat.usdc", pictures=False)))
     floor = UsdShade.Material(flat.GetPrimAtPath("/Room/Looks/floor"))
     assert not floor.GetSurfaceOutput("mtlx")
