@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 
+from echomodel.objective.faults import ROUNDING
 from echomodel.rules import fronts, judged, margins
 from echomodel.rules.geometry import BoxesLike, Spread
 from echomodel.rules.placements import placement_margins
@@ -14,7 +15,6 @@ from echousd.graph.arrays import floor_centre, stated_placements, triplets_of
 from echousd.place.geometry import Collision, collisions, pair_indices
 from echousd.room import LayoutOutcome, RoomData, Verdict
 
-ROUNDING = 1e-4  # metres: boxes are written to a tenth of a millimetre, meshes in single precision
 STATES = {1: "kept", 0: "broken", -1: "unmeasured"}
 
 

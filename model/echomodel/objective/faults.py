@@ -42,6 +42,7 @@ class Ways:
 
 REACHED = "reached"
 MOST = 2.0  # of a missed unit counts
+ROUNDING = 1e-4  # metres: boxes are written to a tenth of a millimetre, meshes in single precision
 BY_EYE = ("living", "composition")  # kinds of terms; relations and collisions have verdicts of their own
 
 
@@ -79,7 +80,7 @@ def faults_of(plan: Plan, kinds: Collection[str] = BY_EYE) -> list[Fault]:
         if term.kind not in kinds:
             continue
         seen = term.find(plan)
-        for row in rows(seen.margin < 0).tolist():
+        for row in rows(seen.margin < -ROUNDING).tolist():
             who, other = int(seen.who[row]), int(seen.other[row])
             if bool(plan.given[who]):
                 continue

@@ -10,6 +10,7 @@ import torch
 from plans import tensors_of
 
 from echomodel.objective import TERMS, faults, plan_of
+from echomodel.objective.company import STAGGERED
 from echomodel.objective.plan import kinds_of
 from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
@@ -385,6 +386,12 @@ def test_crowded_rooms_are_seen(room, fault, said):
     found = room.found()
     assert fault in found
     assert said in found[fault]
+
+
+def test_what_boxes_lose_when_they_are_written_is_no_fault():
+    for more, seen in ((5e-5, False), (5e-4, True)):
+        staggered = SET.moved("chair_1_1", at=(0.4 + STAGGERED + more, 0.7))
+        assert (("table", "chairs_opposite") in staggered.found()) == seen
 
 
 def test_no_table_is_shoved_to_one_side_of_a_floor_that_is_unknown():
