@@ -63,7 +63,7 @@ def _rescale(attribute: Sdf.AttributeSpec, spec: Sdf.PrimSpec, units: float, *, 
         whole: below the prim stands somebody else's model, whose points its transform brings to ours.
     """
     name, value = attribute.name, attribute.default
-    if name == "xformOp:transform":
+    if name.startswith("xformOp:transform"):
         scaled = value * Gf.Matrix4d().SetScale(units)
         attribute.default = scaled if whole else Gf.Matrix4d(value).SetTranslateOnly(scaled.ExtractTranslation())
         return

@@ -92,6 +92,25 @@ def test_floors_meet_in_the_doorway(made):
     assert gaps == pytest.approx([0, 0], abs=2e-3)
 
 
+def test_rooms_stand_in_their_places_in_another_unit_and_with_z_up(made, tmp_path, echousd_command):
+    written = ("--meters-per-unit", "0.01", "--up-axis", "Z")
+    done = echousd_command("generate", tmp_path / "flat.yaml", "-o", tmp_path / "other", *QUICK, *written)
+    assert done.code == 0, done.err
+    places = []
+    for folder in (made[0], tmp_path / "other"):
+        stage = Usd.Stage.Open(str(folder / "home.usda"))
+        cache = UsdGeom.BBoxCache(0, ["default"])
+        for name in ("living", "bedroom"):
+            found = cache.ComputeWorldBound(stage.GetPrimAtPath(f"/House/Rooms/{name}")).ComputeAlignedRange()
+            places.append(np.array([found.GetMin(), found.GetMax()]) * UsdGeom.GetStageMetersPerUnit(stage))
+    for ours, other in zip(places[:2], places[2:], strict=True):
+        turned = np.sort(np.stack([other[:, 0], other[:, 2], -other[:, 1]], 1), axis=0)
+        np.testing.assert_allclose(turned, ours, atol=1e-4)
+    done = echousd_command("check", tmp_path / "other")
+    assert done.code == 0, done.out + done.err
+    assert "ok  walls  0 faults where rooms meet" in done.out
+
+
 def test_a_room_that_changes_leaves_the_others_as_they_are(made, tmp_path, echousd_command):
     folder, _ = made
     before = digests(folder)
