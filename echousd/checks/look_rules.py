@@ -217,8 +217,7 @@ def _findings(reading: Reading) -> list[tuple[str, Finding]]:
                 attribute = prim.GetAttribute(row.attribute.replace("*", instance))
                 if not attribute or not attribute.HasAuthoredValue():
                     continue
-                values = _numbers(attribute)
-                values = values[values > -UNLIMITED]  # physics: as the engine likes
+                values = (numbers := _numbers(attribute))[numbers > -UNLIMITED]  # physics: as the engine likes
                 if not row.allows(values, reading.metres):
                     shown = ", ".join(f"{value:g}" for value in values[:4])
                     told = f"is {shown}, allowed: {row.allowed} ({row.why})"

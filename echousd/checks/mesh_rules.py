@@ -38,7 +38,7 @@ def mesh_indices(_reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
 @rule("echo:Degenerate", "meshes")
 def degenerate(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[Finding]:
     """No face uses a point twice or has no area; models of others may, in few faces."""
-    faces, corners, normals = reading.triangles(mesh)
+    _, faces, corners, normals = reading.triangles(mesh)
     twice = (faces == faces[:, [2, 0, 1]]).any(1)
     sides = ((corners - corners[:, [2, 0, 1]]) ** 2).sum(2).max(1, initial=0.0)  # squares
     flat = twice | ((normals**2).sum(1) <= (THIN * sides) ** 2)
@@ -155,7 +155,7 @@ def _placed(prim: Usd.Prim, above: Usd.Prim) -> bool:
 @rule("echo:Winding", "meshes")
 def winding(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     """Faces turn outwards: closed surfaces enclose a positive volume, and faces agree with their normals."""
-    faces, triangles, turned = reading.triangles(mesh)
+    corners, faces, triangles, turned = reading.triangles(mesh)
     if not len(faces):
         return
     sign = -1.0 if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded else 1.0
@@ -168,7 +168,7 @@ def winding(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     if found is None or found.interpolation != UsdGeom.Tokens.faceVarying or found.fault:
         return
     turned = sign * turned
-    against = (turned * found.values[reading.corners(mesh)].sum(1)).sum(1) < 0
+    against = (turned * found.values[corners].sum(1)).sum(1) < 0
     area = np.linalg.norm(turned, axis=1)
     if area[against].sum() > AGAINST * area.sum() > 0:
         yield f"{area[against].sum() / area.sum():.0%} of its surface winds against its normals, allowed: outwards"

@@ -115,17 +115,14 @@ class Reading:
         """Points and faces of a mesh; raises StageError or Tf.ErrorException where they cannot be read."""
         return self.once("mesh", mesh.GetPrim(), lambda: mesh_arrays(mesh))
 
-    def corners(self, mesh: UsdGeom.Mesh) -> np.ndarray:
-        """(t, 3) int: fan triangles of a mesh's faces, as positions in its indices; raises as `mesh` does."""
-        return self.once("corners", mesh.GetPrim(), lambda: fans(self.mesh(mesh).counts)[1])
+    def triangles(self, mesh: UsdGeom.Mesh) -> tuple[np.ndarray, ...]:
+        """Fan triangles of a mesh's faces, as positions in its indices (t, 3) int, as points (t, 3) int and in space
+        (t, 3, 3), and their `area_normals`; raises as `mesh` does."""
 
-    def triangles(self, mesh: UsdGeom.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of these triangles their points (t, 3) int, these in space (t, 3, 3), `area_normals`; raises as `mesh`."""
-
-        def read() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        def read() -> tuple[np.ndarray, ...]:
             arrays = self.mesh(mesh)
-            faces = arrays.indices[self.corners(mesh)]
-            return faces, arrays.points[faces], area_normals(arrays.points[faces])
+            faces = arrays.indices[corners := fans(arrays.counts)[1]]
+            return corners, faces, arrays.points[faces], area_normals(arrays.points[faces])
 
         return self.once("triangles", mesh.GetPrim(), read)
 

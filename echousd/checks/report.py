@@ -31,7 +31,7 @@ from echousd.stage.files import opened, said, source
 from echousd.stage.foreign import UNTOLD
 from echousd.stage.layouts import ARTICULATED, ARTICULATION, each_layout, showing_variant
 from echousd.stage.read import RoomPrims, find_rooms
-from echousd.stage.values import readable
+from echousd.stage.values import UNREADABLE, readable
 
 if TYPE_CHECKING:
     from echousd.settle.settle import SettleReport
@@ -63,10 +63,9 @@ def safely(rule: StageRule, reading: Reading) -> list[Finding]:
     found: list[Finding] = []
     try:
         found.extend(rule.find(reading))
-    except Tf.ErrorException as error:
-        found.append(Finding(Sdf.Path.absoluteRootPath, f"cannot be read through: {said(error)}"))
-    except StageError as error:
-        found.append(Finding(Sdf.Path.absoluteRootPath, str(error)))
+    except UNREADABLE as error:
+        told = f"cannot be read through: {said(error)}" if isinstance(error, Tf.ErrorException) else str(error)
+        found.append(Finding(Sdf.Path.absoluteRootPath, told))
     return found
 
 
@@ -246,21 +245,12 @@ class CheckReport:
     def to_json(self) -> dict[str, Any]:
         """The report as `echousd check --json` prints it; of several layouts, each has its entry."""
         several = len(self.layouts) > 1 or any(layout.name for layout in self.layouts)
-        found = (
-            {"layouts": {layout.name: {"ok": layout.ok, **layout.to_json()} for layout in self.layouts}}
-            if several
-            else self.layouts[0].to_json()
-        )
+        each = {layout.name: {"ok": layout.ok, **layout.to_json()} for layout in self.layouts}
+        found = {"layouts": each} if several else self.layouts[0].to_json()
         rest = {} if self.settled is None else {"settle": [each.to_json() for each in self.settled]}
-        return {
-            "ok": self.ok,
-            **found,
-            "usd": {
-                "errors": [fault.to_json() for fault in self.errors],
-                "warnings": [fault.to_json() for fault in self.warnings],
-            },
-            **rest,
-        }
+        usd = {"errors": self.errors, "warnings": self.warnings}
+        told = {word: [fault.to_json() for fault in faults] for word, faults in usd.items()}
+        return {"ok": self.ok, **found, "usd": told, **rest}
 
 
 def check(
@@ -282,8 +272,7 @@ def check(
     from echomodel.rules import rule_set
 
     rule_set(rules)
-    stage = opened(stage)
-    reading = Reading(stage)
+    reading = Reading(stage := opened(stage))
     errors, warnings = find_faults(reading)
     found = [check_layout(Reading(stage) if name else reading, name, rules) for name in each_layout(stage, layout)]
     rooms = found[0][0]

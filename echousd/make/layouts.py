@@ -178,8 +178,7 @@ def draft_rounds(drafts: int) -> list[tuple[int, int]]:
 
 
 def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int | None) -> tuple[float, ...]:
-    """What a layout leaves to be wished for, the worse first: what is broken or collides, conflicts, living faults to a
-    hundredth.
+    """What a layout leaves to be wished for, the worse first: what is broken or collides, conflicts, rounded faults.
 
     `seed`: where nobody stated the openings, that by which they make way; None = they stay.
     """

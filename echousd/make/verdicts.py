@@ -37,8 +37,7 @@ def colliding(graph: SceneGraph, boxes: BoxesLike) -> tuple[Collision, ...]:
 
 def warn_of_faults(room: RoomData) -> None:
     """A `RoomWarning` with what is wrong with a finished room, if anything is."""
-    faults = room.faults
-    if faults:
+    if faults := room.faults:
         more = f" and {len(faults) - 3} more" if len(faults) > 3 else ""
         warnings.warn(f"the room has faults: {'; '.join(faults[:3])}{more}", RoomWarning, stacklevel=3)
 
