@@ -269,11 +269,11 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         low, arms = (0, seat - 0.05, d * 0.05), 0.12 + 0.1 * style.arm_height
         return [*parts, bent(low, (sw / 2 + 0.02, d * 0.5), 0.05, h - seat + 0.05, arms)]
     tall, turn, foot = (h - y0) / np.cos(rake), rotation(x=-rake), np.array([0.0, seat, -d * 0.4])
-    if style.tufting > 0.45:  # a net in a frame, and a pad for the head
+    if style.tufting > 0.6:  # a net in a frame, and a pad for the head
         frame = (seam(sw * 0.46, 0.4 * tall) + np.array([0, y0 - seat + 0.41 * tall, 0])) @ turn.T + foot
         parts.append(tube(frame, 0.022, "metal", "back"))
         parts.append(lean(sw * 0.43, y0 + 0.03, y0 + 0.8 * tall, -0.005, 0.005, material="fabric", bow=0.02))
-        parts.append(lean(0.03, y0 + 0.1, y0 + 0.95 * tall, -0.055, -0.03, material="metal", radius=0.01))
+        parts.append(lean(0.03, y0 + 0.1, y0 + 0.95 * tall, -0.055, -0.02, material="metal", radius=0.01))
         parts.append(lean(sw * 0.27, y0 + 0.86 * tall, y0 + tall, -0.035, 0.03, material="fabric", radius=0.028))
     elif style.corner > 0.45 or style.back == "oval":
         centre, half = turn @ np.array([0, y0 - seat + tall / 2, 0]) + foot, (sw * 0.47, tall / 2, 0.04)
@@ -281,7 +281,7 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     else:
         parts.append(lean(sw * 0.46, y0, y0 + tall, -0.03, 0.03, material="fabric", radius=0.06, bow=0.05))
     rise = y0 + 0.15 - seat  # the bracket ends in the middle of the back, which leans away from it
-    rest = [0, y0 + 0.15, -d * 0.4 - rise * np.tan(rake) - 0.03]
+    rest = [0, y0 + 0.15, -d * 0.4 - rise * np.tan(rake) - 0.05]
     parts.append(tube([[0, seat - 0.05, -d * 0.1], [0, seat - 0.05, -d * 0.43], rest], 0.016, "metal", "stem"))
     if choices.chance("extra", 0.75):
         x, y = w / 2 - 0.025, seat + 0.2
