@@ -9,6 +9,7 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echousd.draw.drawables import read_drawables
 from echousd.stage.contents import read_contents, shape_of
+from echousd.stage.encoding import StageError
 from echousd.stage.forms import SkippedForms, polygons, solid
 from echousd.stage.layouts import each_layout, showing_variant
 from echousd.stage.read import find_rooms
@@ -75,6 +76,8 @@ def test_layouts_are_shown_one_after_the_other_and_an_only_one_has_no_name():
     shown = [(name, variants.GetVariantSelection()) for name in each_layout(stage)]
     assert shown == [(f"layout_{number}",) * 2 for number in (0, 2, 10)]
     assert list(each_layout(stage, 10)) == ["layout_10"]
+    with pytest.raises(StageError, match="no layout 7, allowed: layout_0, layout_2, layout_10"):
+        list(each_layout(stage, 7))
     assert variants.GetVariantSelection() == "layout_2"
 
 
