@@ -4,17 +4,14 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdSemantics, UsdShade, UsdUtils, UsdValidation
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade, UsdUtils, UsdValidation
 from small_room import BARE, OBJECTS, StandIn, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
 from echousd.checks.physics_rules import gravity
 from echousd.checks.reading import Reading
-from echousd.draw.sight import ASPECT, Furniture
-from echousd.draw.views import perspective_views, shifted, stage_views
 from echousd.dressing.dress import dress
-from echousd.layers.cameras import main_piece, room_points, write_cameras
 from echousd.layers.compose import _asset as made
 from echousd.layers.compose import room_files, simready_data, text
 from echousd.layers.materials import define_material, look_images, tint_factor, write_palettes
@@ -22,7 +19,6 @@ from echousd.layers.materialx import write_networks
 from echousd.layers.placed import MODEL, PLACES, carried_files
 from echousd.options import RoomOptions
 from echousd.settle.settle import read_world
-from echousd.shapes import walls
 from echousd.shapes.finishes.baking import hexadecimal
 from echousd.shapes.geometry import Origin, Original
 from echousd.shapes.hulls import hull_volume
@@ -73,14 +69,6 @@ def test_assets_of_ours_name_nobody_and_those_of_others_their_author(stage, root
         "| sofa | sofa.glb | CC-BY-4.0 | A Person |",
         "| bed |  | CC0-1.0 | unknown |",
     ]
-
-
-def test_the_volume_of_a_room_holds_floor_and_furniture(room):
-    points, position, size = room_points(room), room.boxes.position, room.boxes.size
-    tops = position[:, 1] + size[:, 1]
-    heights = {round(float(y), 4) for y in points[:, 1]}
-    assert {round(float(y), 4) for y in (*position[:, 1], *tops, 0.0)} <= heights
-    assert (points[:, 1].min(), points[:, 1].max()) == pytest.approx((-walls.THICKNESS, tops.max()))
 
 
 def test_paintings_keep_their_colours():
@@ -372,99 +360,11 @@ def test_what_many_hosts_read_is_said_as_they_read_it(root):
     assert 0 <= told.GetRestitutionAttr().Get() < 0.2  # nothing in a home bounces
 
 
-def test_lenses_are_told_in_tenths_of_a_metre(stage):
-    camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective"))
-    assert camera.GetHorizontalApertureAttr().Get() == pytest.approx(0.36)
-    assert camera.GetFocalLengthAttr().Get() == pytest.approx(0.30)
-
-
 def test_colliders_end_where_the_meshes_do(room):
     for name, geometry in room.geometry.items():
         bounds = np.array([collider.mesh.bounds for collider in geometry.colliders])
         box = np.stack([bounds[:, 0].min(0), bounds[:, 1].max(0)])
         np.testing.assert_allclose(box, geometry.mesh.bounds, atol=2e-3, err_msg=name)
-
-
-def test_cameras_see_everything_and_light_is_there(stage, room):
-    for camera in ("perspective", "top"):
-        frustum = UsdGeom.Camera(stage.GetPrimAtPath(f"/Room/Cameras/{camera}")).GetCamera(0).frustum
-        to_view = frustum.ComputeViewMatrix() * frustum.ComputeProjectionMatrix()
-        for number, name in enumerate(room.names):
-            low, high = room.meshes[name].bounds
-            for corner in np.stack(np.meshgrid(*zip(low, high, strict=True)), -1).reshape(-1, 3):
-                seen = to_view.Transform(Gf.Vec3d(*(room.pose(number) @ [*corner, 1])[:3]))
-                assert max(abs(v) for v in seen) <= 1.0, (camera, name)
-    assert stage.GetPrimAtPath("/Room/Lights/sky").IsA(UsdLux.DomeLight)
-    assert stage.GetPrimAtPath("/Room/Lights/ceiling").IsA(UsdLux.RectLight)
-
-
-def test_the_camera_above_has_the_whole_room_and_little_else_in_its_picture(stage, room):
-    points = room_points(room)
-    low, high = points.min(0), points.max(0)
-    camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/top")).GetCamera(0)
-    eye = np.array(camera.transform.ExtractTranslation())
-    np.testing.assert_allclose(eye[[0, 2]], ((low + high) / 2)[[0, 2]], atol=1e-5)
-    assert np.array(camera.transform.TransformDir(Gf.Vec3d(0, 0, -1))).round(6).tolist() == [0, -1, 0]
-    assert np.array(camera.transform.TransformDir(Gf.Vec3d(0, 1, 0))).round(6).tolist() == [0, 0, -1]
-    assert camera.horizontalAperture == camera.verticalAperture
-    side = camera.horizontalAperture / camera.focalLength * (eye[1] - high[1])  # of the picture at the tops, metres
-    assert 1.0 < side / (high - low)[[0, 2]].max() < 1.1
-    assert eye[1] > 5 * side  # from afar, so that heights hardly show
-    near, far = camera.clippingRange.min, camera.clippingRange.max
-    assert near < eye[1] - high[1]
-    assert eye[1] - low[1] < far < 1.2 * eye[1]
-    assert camera.focusDistance == pytest.approx(eye[1])
-
-
-def test_a_camera_is_sharp_where_what_the_room_is_for_stands():
-    floor = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
-    size, position = np.array([(1.8, 0.6, 2.0), (0.4, 0.4, 0.4)]), np.array([(0.9, 0, -0.9), (-1.5, 0, 1.5)])
-    furniture, points = Furniture(size, position, np.zeros(2)), np.insert(floor, 1, 2.5, axis=1)
-    for main, at in ((0, (0.9, 0.3, -0.9)), (1, (-1.5, 0.2, 1.5)), (None, (0, 2.5, 0))):
-        stage = Usd.Stage.CreateInMemory()
-        write_cameras(Pen(stage.GetRootLayer()), points, furniture, floor, main=main)
-        camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective")).GetCamera(0)
-        away = np.linalg.norm(np.array(camera.transform.ExtractTranslation()) - at)
-        assert camera.focusDistance == pytest.approx(away, rel=1e-5)
-        assert camera.clippingRange.min < 0.1
-        assert 10 < camera.clippingRange.max < 50
-        assert camera.horizontalAperture / camera.verticalAperture == pytest.approx(ASPECT)
-
-
-def test_what_a_room_is_for_is_its_largest_bed_or_what_its_type_is_known_by():
-    def main(room, *words):
-        size = np.array([(1.0 + 0.1 * row, 0.5, 1.0) for row in range(len(words))])
-        return main_piece(room, words, Furniture(size, np.zeros_like(size), np.zeros(len(words))))
-
-    assert main("bedroom", "desk", "single_bed", "double_bed", "wardrobe") == 2
-    assert main("bedroom", "wardrobe", "nightstand") is None
-    assert main("living_room", "dining_table", "sofa", "tv_stand") == 1
-    assert main("dining_room", "sofa", "dining_table") == 1
-    assert main("living_room", "sofa", "sofa") == 1  # the larger
-
-
-@pytest.mark.parametrize(("ceiling", "top"), [(False, 3.0), (True, 3.0 + walls.THICKNESS)])
-def test_the_volume_of_a_room_with_walls_reaches_to_their_outside(room, ceiling, top):
-    walled = replace(
-        room, graph=small_graph(height=3.0), options=RoomOptions(walls=True, ceiling=ceiling, dress="none")
-    )
-    points = room_points(walled)
-    wide = np.array([2.0, 1.7]) + walls.WALL
-    np.testing.assert_allclose([points.min(0), points.max(0)], [
-        (-wide[0], -walls.THICKNESS, -wide[1]), (wide[0], top, wide[1])], atol=1e-6)  # fmt: skip
-
-
-def test_a_camera_inside_has_the_shift_of_its_view(monkeypatch):
-    level = np.array([[1.0, 0, 0, 0], [0, 1, 0, 1.2], [0, 0, 1, 3], [0, 0, 0, 1]])
-    view = shifted(level, 0.25)
-    monkeypatch.setattr("echousd.layers.cameras.inside_view", lambda *_: (view, 24.0))
-    stage = Usd.Stage.CreateInMemory()
-    UsdGeom.SetStageMetersPerUnit(stage, 1)
-    UsdGeom.SetStageUpAxis(stage, "Y")
-    floor = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
-    none = Furniture(*np.zeros((2, 0, 3)), np.zeros(0))
-    write_cameras(Pen(stage.GetRootLayer()), np.insert(floor, 1, 2.5, axis=1), none, floor)
-    np.testing.assert_allclose(stage_views(stage)["perspective"].matrix, view, atol=1e-6)
 
 
 def test_a_palette_turns_images_and_plain_colours_alike_in_both_kinds_of_networks():
@@ -534,23 +434,6 @@ def test_looks_of_materialx_are_as_rough_as_their_picture_or_their_number():
             told[slot] = rough.Get()
     assert told == {slot: pytest.approx(looks[slot].roughness) for slot in told}
     assert {"glass"} <= {*told} < {*looks}
-
-
-def test_camera_stands_where_no_tall_piece_hides_the_others():
-    low = [(0.6, 0.5, 0.6)] * 3
-    size = np.array([*low, (1.8, 2.3, 0.6)])
-    position = np.array([(-1.0, 0, -0.5), (0.0, 0, -0.5), (1.0, 0, -0.5), (0.6, 0, 1.0)])
-    furniture = Furniture(size, position, np.array([0, 0, 0, np.pi]))
-    assert furniture.blocked(np.array([0.6, 1.5, 4.0]))[1].mean(1).sum() > 1.5  # from behind the wardrobe
-    assert not furniture.blocked(np.array([0.0, 6.0, 0.0]))[1].any()
-    corners = np.concatenate([position - size / 2, position + size * (0.5, 1, 0.5)])
-    for turn in range(4):  # wherever the wardrobe stands, the camera stands elsewhere
-        cos, sin = np.cos(turn * np.pi / 2), np.sin(turn * np.pi / 2)
-        rotate = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
-        turned = Furniture(size, position @ rotate.T, furniture.yaw + turn * np.pi / 2)
-        eye = perspective_views(corners @ rotate.T, turned)[0][:3, 3]
-        assert turned.blocked(eye)[1].mean(1).sum() < 1.0
-        assert (rotate.T @ eye)[2] < 0
 
 
 def test_provenance_in_every_layer_and_in_the_manifest(root, room, stage):
