@@ -1,11 +1,12 @@
 """Placing measured: told relations kept, terms missed, CPU seconds; the same drafts by several ways, room by room.
 
     python benchmarks/placing.py [--rooms ROOMS.json] [--count 30] [--off TERM ...] [--sheet sheets] [--cache FOLDER]
+    python benchmarks/placing.py --each
 
 Rooms of the room generator from a seed that no training used, or every so many of a rooms file, with one near relation
 an object told. Each is drawn once by the network (kept in the cache), then placed. Faults are those of all terms of the
 objective, and that all can be walked to; times are CPU times of one thread. `--off` leaves terms out of the search and
-tells what the others find then.
+tells what the others find then; `--each` does so for each term in turn, as the rows of a table.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from PIL import Image, ImageDraw, ImageFont
 from echomodel.boxes2d import footprints
 from echomodel.data.roomset import load_rooms, with_known_words
 from echomodel.metrics.layouts import Task, tasks_of
-from echomodel.objective import KINDS, faults_of, plan_of, unreached
+from echomodel.objective import KINDS, TERMS, faults_of, plan_of, unreached
 from echomodel.openings import segment
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_rooms
@@ -101,6 +102,22 @@ def placed(
     return (size, position, yaw), [f"{fault.rule}: {fault.sentence(names)}" for fault in seen], kept, seconds
 
 
+def without_each(rooms: list[RoomBoxes], drafts: list[tuple[np.ndarray, ...]], told: list[np.ndarray]) -> None:
+    """Print for each term what a search without it leaves of itself and of all others, beside one with all terms."""
+
+    def found(off: str) -> tuple[Counter[str], int]:
+        config = PlaceConfig(without=frozenset({off} - {""}))
+        said = [placed(*each, config)[1] for each in zip(rooms, drafts, told, strict=True)]
+        return Counter(one.partition(":")[0] for room in said for one in room), sum(not room for room in said)
+
+    usual, clean = found("")
+    print(f"all terms: {usual.total()} faults, {clean} of {len(rooms)} rooms without any")
+    for term in [term.name for term in TERMS if term.kind != "relations"]:
+        left, free = found(term)
+        others, before = left.total() - left[term], usual.total() - usual[term]
+        print(f"| {term} | {usual[term]} -> {left[term]} | {before} -> {others} | {clean} -> {free} |", flush=True)
+
+
 def main() -> None:
     """Print one line for each way, and what it misses."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -110,6 +127,7 @@ def main() -> None:
     parser.add_argument("--sheet", type=Path)
     parser.add_argument("--ways", nargs="+", default=["drawn", "placed"])
     parser.add_argument("--only", type=int, nargs="*")
+    parser.add_argument("--each", action="store_true")
     parser.add_argument("--off", nargs="*", default=[], help="terms that the search does without")
     options = parser.parse_args()
     torch.set_num_threads(1)
@@ -120,6 +138,9 @@ def main() -> None:
     told = [task.told for task in tasks]
     name = "generated" if options.rooms is None else options.rooms.stem
     drafts = drawn(tasks, options.cache / f"{name}_{options.count}.json")
+    if options.each:
+        without_each(rooms, drafts, told)
+        return
     ways = {"drawn": None, "placed": PlaceConfig(without=frozenset(options.off))}
     objects = sum(len(room) for room in rooms)
     for way in options.ways:

@@ -24,7 +24,11 @@ def page() -> str:
         "Made by `python docs/make_rules.py` from `echomodel.objective`, the one table by which rooms are searched,",
         "learned, placed, checked and explained. In a conflict the kinds count in this order. A term is kept where",
         "its margin is not negative; a search asks for its slack on top, and pays 2 for a broken term and its weight",
-        "for each unit that is missed.",
+        "for each unit that is missed.", "",
+        "![Rooms that break a term each](rules.png)", "",
+        "*A room from above for each term that breaks it; what is at fault red, what it is about orange, a thick side",
+        "the front; `python docs/make_rule_pictures.py`. Terms of fitted kitchens and baths are missing, as the room",
+        "generator has none.*",
     ]  # fmt: skip
     for kind in KINDS:
         rows = [term for term in TERMS if term.kind == kind]
