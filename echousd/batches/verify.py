@@ -158,6 +158,7 @@ def write_index(plan: RunPlan, folder: Path) -> Path:
     UsdGeom.SetStageMetersPerUnit(stage, plan.options[0].meters_per_unit)
     stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/Rooms").GetPrim())
     frames = [metres_from(options.meters_per_unit, options.up_axis) for options in plan.options]
+    back = np.linalg.inv(frames[0])
     with Sdf.ChangeBlock():
         for number, (options, row) in enumerate(made):
             prim = Sdf.CreatePrimInLayer(layer, f"/Rooms/{row['id']}")
@@ -166,7 +167,7 @@ def write_index(plan: RunPlan, folder: Path) -> Path:
             low, high = np.array(row["bounds"]).reshape(2, 3)
             at = np.eye(4)
             at[[0, 2], 3] = np.array([number % columns, number // columns]) * pitch - ((low + high) / 2)[[0, 2]]
-            place = np.round(np.linalg.inv(frames[0]) @ at @ frames[options], 9) + 0.0
+            place = np.round(back @ at @ frames[options], 9) + 0.0
             if np.array_equal(place[:3, :3], np.eye(3)):
                 say(prim, ops(**{"translate:grid": ("double3", Gf.Vec3d(*place[:3, 3]))}))
             else:

@@ -19,14 +19,14 @@ ASIDE = 0.15  # metres that a cushion moves at most so that it stands in nothing
 PILLOW = 3.2  # exponent of the outline of a cushion
 STEP = 0.02  # metres from place to place
 WIDE_BED = 1.3  # metres
-LEVEL = 0.005  # metres: what is as high as that is one height
+LEVEL = 0.003  # metres: what is as high as that is one height
 DRAPED = {"sofa": 0.9, "seat": 0.4}  # shares of sofas and armchairs with a blanket over an arm
 # Metres between folds of a bed, and over its middle from where on it is a board; places behind pillows for cushions.
 SOFT, BOARD, BEYOND = 0.04, 0.12, 12
 RIDGE = 0.1  # metres that an arm is higher than the seat at least so that a throw hangs over it
 RAISED = 0.04  # metres that a thing is raised, or let down, at most so that it lies on the solids of a seat
-# Shares of a cushion's extents that it stands on, and the part of that which must be level, to so many metres.
-BASE, STEADY, FLAT = np.array([0.9, 1.0, 0.6]), 0.6, 0.003
+# Shares of a cushion's extents that it stands on, and the part of that which must be level.
+BASE, STEADY = np.array([0.9, 1.0, 0.6]), 0.6
 
 
 def cushions(setting: Setting) -> None:
@@ -44,7 +44,7 @@ def cushions(setting: Setting) -> None:
             spot = seat.resting(end, size)
             turn = -0.12 * end * float(rng.uniform(0.3, 1.6))
             spot = None if spot is None else _clear_of(host, spot, turn, size)
-            _put(setting, host, _standing(host, spot, size), kind, size, turn, variant)
+            _put(setting, host, _let_down(host, spot, size), kind, size, turn, variant)
 
 
 Design = tuple[str, np.ndarray, int]  # kind, extents and variant of a cushion
@@ -68,7 +68,7 @@ def bed_cushions(setting: Setting) -> None:
         for side in (-1.0, 1.0) if wide > WIDE_BED and size[0] < 1.3 * size[1] else (0.0,):
             turn = float(rng.uniform(-0.12, 0.12))
             spot = _lying(host, seat, seat.before_pillows(side * 0.21 * wide, size), turn, size)
-            _put(setting, host, _standing(host, spot, size), kind, size, turn, variant)
+            _put(setting, host, _let_down(host, spot, size), kind, size, turn, variant)
 
 
 def on_covers(setting: Setting) -> None:
@@ -104,13 +104,14 @@ def _upon(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | No
     return np.array([spot[0], top, spot[2]]) if top - spot[1] < RAISED else None
 
 
-def _standing(host: Standing, spot: np.ndarray | None, size: np.ndarray) -> np.ndarray | None:
+def _let_down(host: Standing, spot: np.ndarray | None, size: np.ndarray) -> np.ndarray | None:
     """The spot (3,) let down onto what of its seat is level; None where that is too little for a cushion to stand."""
     if spot is None:
         return None
     tops = _tops(host, spot, size * BASE)
     top = float(tops[tops < spot[1] + RAISED].max(initial=-np.inf))
-    return np.array([spot[0], top, spot[2]]) if (tops > top - FLAT).mean() > STEADY and top > spot[1] - RAISED else None
+    level = (tops > top - LEVEL).mean() > STEADY and top > spot[1] - RAISED
+    return np.array([spot[0], top, spot[2]]) if level else None
 
 
 def _tops(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray:

@@ -52,10 +52,10 @@ def rounded_hull(points: np.ndarray) -> Mesh:
     return convex_hull(np.unique(points.round(DIGITS), axis=0))
 
 
-def standing_hull(mesh: Mesh, gives: float = FLAT) -> Collider:
+def standing_hull(mesh: Mesh, gives: float = 0.0) -> Collider:
     """One hull of a mesh (metres) that stands on a plane, however its base is rounded.
 
-    `gives`: metres that its base gives way where it stands.
+    `gives`: metres that a soft base gives way where it stands.
     """
     hull = convex_hull(mesh.vertices)
     corners = hull.vertices
@@ -65,11 +65,8 @@ def standing_hull(mesh: Mesh, gives: float = FLAT) -> Collider:
         corners = points[np.unique(faces)].astype(float)
     corners, (low, high) = flush(corners, mesh.bounds), mesh.bounds[:, 1]
     between = corners[(corners[:, 1] > low) & (corners[:, 1] < high)]
-    return Collider(
-        "collider",
-        rounded_hull(np.concatenate([between, sole(mesh, low, gives), sole(mesh, high, FLAT)])),
-        "convexHull",
-    )
+    outlines = sole(mesh, low, max(FLAT, gives)), sole(mesh, high, FLAT)
+    return Collider("collider", rounded_hull(np.concatenate([between, *outlines])), "convexHull")
 
 
 def flush(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:

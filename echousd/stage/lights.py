@@ -31,11 +31,12 @@ def emitted(prim: Usd.Prim, metres: float) -> np.ndarray:
     if prim.IsA(UsdLux.DistantLight):
         disc = np.pi * np.sin(np.radians(number("angle")) / 2) ** 2
         return color if whole or disc == 0 else color * disc
-    surface = 0.0
     if prim.IsA(UsdLux.SphereLight):
         surface = 4 * np.pi * number("radius") ** 2
     elif prim.IsA(UsdLux.DiskLight):
         surface = np.pi * number("radius") ** 2
     elif prim.IsA(UsdLux.RectLight):
         surface = number("width") * number("height")
-    return color * metres**2 * (float(surface > 0) if whole else surface)
+    else:
+        return np.zeros(3)
+    return color * metres**2 * (1.0 if whole else surface)  # whole, also of a point without any

@@ -47,12 +47,12 @@ def outline(half: Array, yaw: Array, places: Array = CORNERS) -> Array:
 
 
 def upright_box(points: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Size (3,), bottom centre (3,) and yaw of the box that stands around points (n, 3), +Y up, with a prim's heading.
+    """Size (3,), bottom centre (3,) and yaw of the box that stands around points (n, 3), +Y up, as their own axes head.
 
-    `own`: (3, 3) float, column vectors, turns the prim's own axes.
+    `own`: (3, 3) float, column vectors, turns these axes.
     """
     front, width = own[:, 2], own[:, 0]
-    # The front is horizontal in our rooms; in a prim whose own up is +Z it is not, then the width tells the heading.
+    # The front is horizontal in our rooms; in a frame whose up is +Z it is not, then the width tells the heading.
     level = np.hypot(front[0], front[2]) > np.hypot(width[0], width[2]) * 1e-3
     yaw = float(np.arctan2(front[0], front[2])) if level else float(np.arctan2(-width[2], width[0]))
     ahead = points.copy()

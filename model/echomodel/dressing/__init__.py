@@ -33,7 +33,7 @@ class Kind:
         fixed: hangs or lies still; others are rigid bodies.
         lies: cloth that lies on something and carries nothing itself.
         yields: cloth that hangs and gives way, to the door of a wardrobe say.
-        faces: most triangles of its mesh. gives: metres that its base gives way where it stands.
+        faces: most triangles of its mesh. gives: metres that its soft base gives way where it stands.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Kind:
     lies: bool = False
     yields: bool = False
     faces: int = 1200
-    gives: float = 0.012
+    gives: float = 0.0
 
 
 BUILT = {"round": "round_rug", "oval": "round_rug", "lumbar": "lumbar_cushion"}  # form of a print -> what shows it

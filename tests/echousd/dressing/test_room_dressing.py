@@ -25,7 +25,7 @@ from echousd.dressing import tabletops, upholstery
 from echousd.dressing.dress import ORIGIN, RULES, TALL, Dressing, dress, dressed, setting_of
 from echousd.dressing.setting import Setting, Thing, meets, standing
 from echousd.dressing.tabletops import surfaces
-from echousd.dressing.upholstery import STEP, _Seat, _standing
+from echousd.dressing.upholstery import STEP, _let_down, _Seat
 from echousd.dressing.walls import BLINDS, CURTAINS, RADIATORS, curtains, radiators, sockets
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.compose import room_files
@@ -367,12 +367,12 @@ def seat_of(*solids):
 def test_a_cushion_stands_on_what_of_its_seat_is_level():
     corners = np.array(list(itertools.product((-0.4, 0.4), (0.0, 0.42), (-0.4, 0.4))))
     size = np.array([0.45, 0.42, 0.15])
-    assert _standing(seat_of(corners), np.array([0.1, 0.435, 0.0]), size) == pytest.approx([0.1, 0.42, 0.0])
-    assert _standing(seat_of(corners), np.array([0.1, 0.5, 0.0]), size) is None  # far above it
-    assert _standing(seat_of(corners), np.array([0.5, 0.42, 0.0]), size) is None  # half beside it
+    assert _let_down(seat_of(corners), np.array([0.1, 0.435, 0.0]), size) == pytest.approx([0.1, 0.42, 0.0])
+    assert _let_down(seat_of(corners), np.array([0.1, 0.5, 0.0]), size) is None  # far above it
+    assert _let_down(seat_of(corners), np.array([0.5, 0.42, 0.0]), size) is None  # half beside it
     raked = corners.copy()
     raked[:, 1] += np.where(corners[:, 1] > 0.2, 0.2 * corners[:, 2], 0.0)
-    assert _standing(seat_of(raked), np.array([0.1, 0.43, 0.0]), size) is None
+    assert _let_down(seat_of(raked), np.array([0.1, 0.43, 0.0]), size) is None
 
 
 def test_cushions_lie_on_their_seat_not_on_the_foot_of_its_back():

@@ -46,7 +46,8 @@ def test_a_sun_gives_its_disc_or_what_it_says():
 def test_colour_temperature_and_what_is_no_surface():
     warm = given(UsdLux.DomeLight, 1.0, enableColorTemperature=True, colorTemperature=2700.0)
     np.testing.assert_allclose(warm, np.clip(UsdLux.BlackbodyTemperatureAsRgb(2700.0), 0, None), rtol=1e-6)
-    assert not given(UsdLux.SphereLight, 1.0, radius=0.0, normalize=True).any()
+    assert not given(UsdLux.SphereLight, 1.0, radius=0.0).any()
+    assert given(UsdLux.SphereLight, 8e4, 0.01, radius=0.0, normalize=True) == pytest.approx([8.0] * 3)  # a point
     assert not given(UsdLux.CylinderLight, 1.0).any()
     with pytest.raises(StageError, match=r"</light>: inputs:intensity is nan"):
         given(UsdLux.DomeLight, float("nan"))
