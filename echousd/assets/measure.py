@@ -28,7 +28,7 @@ from echousd.stage.foreign import object_box
 from echousd.stage.forms import Form, Polygons, SkippedForms, forms, polygons
 from echousd.stage.labels import labels
 from echousd.stage.units import metres_per_unit, up_axis
-from echousd.stage.values import fans
+from echousd.stage.values import NOW, fans
 from echousd.textures import TextureError, texture_bytes
 
 
@@ -179,7 +179,7 @@ def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) ->
     """
     stage = open_stage(path)
     root = root_prim(stage, path) if not prim_path else named_prim(stage, path, prim_path)
-    cache = UsdGeom.XformCache()
+    cache = UsdGeom.XformCache(NOW)
     box = object_box(root) if prim_path else None
     points, faces = [NOTHING[0]], [NOTHING[1]]
     coats: list[Coat] = []

@@ -15,7 +15,7 @@ from echousd.checks.mesh_rules import of_others
 from echousd.checks.placement import inside_solid
 from echousd.checks.reading import RULES, Finding, Reading, StageRule, applied, below, rule
 from echousd.stage.contents import room_frame
-from echousd.stage.values import UNREADABLE, asset
+from echousd.stage.values import NOW, UNREADABLE, asset
 
 UNDER = 0.02  # metres below its floor that a camera or a lamp is not
 
@@ -110,7 +110,7 @@ def lights(reading: Reading) -> Iterator[Finding]:
 
 
 def _shines(light: Usd.Prim) -> bool:
-    visible = UsdGeom.Imageable(light).ComputeVisibility() != UsdGeom.Tokens.invisible
+    visible = UsdGeom.Imageable(light).ComputeVisibility(NOW) != UsdGeom.Tokens.invisible
     intensity = light.GetAttribute("inputs:intensity").Get()
     return visible and (not isinstance(intensity, float) or intensity > 0)
 

@@ -12,7 +12,7 @@ from echomodel.triangles import cross
 from echousd.checks.reading import Finding, Reading, applied, rule
 from echousd.stage.encoding import NODE_API
 from echousd.stage.layouts import ARTICULATION
-from echousd.stage.values import UNREADABLE, MeshArrays, array, lineage, matrix, readable, targets
+from echousd.stage.values import NOW, UNREADABLE, MeshArrays, array, lineage, matrix, readable, targets
 
 THIN = 1e-9  # area of a triangle in shares of the square of its longest side that is none
 UNIT = 0.05  # how far the length of a normal may be from 1
@@ -98,7 +98,7 @@ def extents(reading: Reading) -> Iterator[Finding]:
 
 def _hints(reading: Reading) -> Iterator[Finding]:
     """Components that state another box (`extentsHint`) than that of what they show."""
-    cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_], useExtentsHint=False)
+    cache = UsdGeom.BBoxCache(NOW, [UsdGeom.Tokens.default_], useExtentsHint=False)
     for prim in reading.prims:
         attribute = prim.GetAttribute(UsdGeom.Tokens.extentsHint)
         if not attribute or not attribute.HasAuthoredValue() or not prim.IsModel() or prim.IsGroup():

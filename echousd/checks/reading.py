@@ -16,7 +16,7 @@ from echousd.stage.encoding import StageError
 from echousd.stage.files import prim_specs
 from echousd.stage.read import RoomPrims, find_rooms
 from echousd.stage.units import metres_per_unit
-from echousd.stage.values import UNREADABLE, MeshArrays, fans, matrix, mesh_arrays
+from echousd.stage.values import NOW, UNREADABLE, MeshArrays, fans, matrix, mesh_arrays
 
 Found = TypeVar("Found")
 
@@ -26,7 +26,7 @@ class Reading:
 
     def __init__(self, stage: Usd.Stage) -> None:
         self.stage = stage
-        self.cache = UsdGeom.XformCache()
+        self.cache = UsdGeom.XformCache(NOW)
         self._kept: dict[tuple[str, Sdf.Path], object] = {}
 
     @cached_property

@@ -71,7 +71,7 @@ def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
     Surfaces without polygons (curves, volumes ...) are left out with a warning.
     """
     to_world = to_metres(stage)
-    cache = UsdGeom.XformCache()
+    cache = UsdGeom.XformCache(values.NOW)
     known: dict[str, Paint] = {}
     shapes: dict[Usd.Prim, tuple | None] = {}  # of what an instancer places often
     for form in forms(stage.GetPseudoRoot(), cache):

@@ -13,6 +13,7 @@ from echomodel.triangles import area_normals
 from echousd.draw.drawables import image_of
 from echousd.stage.lights import emitted
 from echousd.stage.units import to_metres
+from echousd.stage.values import NOW
 
 if TYPE_CHECKING:
     from echousd.draw.scenery import Scenery
@@ -62,18 +63,18 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
 
     `shades`: of everything that glows its triangles (f, 3, 3) in the world, metres.
     """
-    frame, cache = to_metres(stage), UsdGeom.XformCache()
+    frame, cache = to_metres(stage), UsdGeom.XformCache(NOW)
     sky, suns, bulbs, power, tint = 0.0, [], [], [], np.ones(3, np.float32)
     domes, view, panels = 0, None, list[tuple[np.ndarray, np.ndarray]]()
     for prim in stage.Traverse():
-        if not prim.HasAPI(UsdLux.LightAPI) or UsdGeom.Imageable(prim).ComputeVisibility() == "invisible":
+        if not prim.HasAPI(UsdLux.LightAPI) or UsdGeom.Imageable(prim).ComputeVisibility(NOW) == "invisible":
             continue
         color = emitted(prim, float(frame[0, 0])).astype(np.float32)
         world = frame @ np.array(cache.GetLocalToWorldTransform(prim)).T
         if prim.IsA(UsdLux.DomeLight):
             strength = float(color.max())
             domes, sky, tint = domes + 1, sky + strength, color / max(strength, 1e-9)
-            picture = UsdLux.DomeLight(prim).GetTextureFileAttr().Get()
+            picture = UsdLux.DomeLight(prim).GetTextureFileAttr().Get(NOW)
             view = view if picture is None else _out_of_focus(image_of(str(prim.GetPath()), picture.resolvedPath))
         elif prim.IsA(UsdLux.DistantLight):
             towards = world[:3, 2] / max(float(np.linalg.norm(world[:3, 2])), 1e-9)

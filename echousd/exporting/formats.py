@@ -19,7 +19,7 @@ from echousd.exporting.packing import Package, Reach, images_beside, take_assets
 from echousd.stage.files import layer_bytes, open_stage, prim_specs, source, write_all
 from echousd.stage.layouts import selected_layout, showing_layout
 from echousd.stage.units import set_units
-from echousd.stage.values import check_types, given, reading, targets
+from echousd.stage.values import check_types, reading, targets
 from echousd.textures import file_of
 
 
@@ -187,18 +187,13 @@ def for_arkit(layer: Sdf.Layer) -> None:
 
 
 def _turn(stage: Usd.Stage) -> None:
-    """Z up to Y up by a matrix on every prim that has a place and none above it that counts; gravity turns along."""
+    """Z up to Y up by a matrix before the places of every prim with none above it that counts; gravity turns along."""
     turn = Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d.XAxis(), -90.0))
     for placed in list(_outermost(stage.GetPseudoRoot())):
-        matrix, alone = placed.GetLocalTransformation() * turn, placed.GetResetXformStack()
-        placed.ClearXformOpOrder()
-        for attribute in placed.GetPrim().GetAttributes():
-            if attribute.GetName().startswith("xformOp:"):
-                placed.GetPrim().RemoveProperty(attribute.GetName())
-        if not Gf.IsClose(matrix, Gf.Matrix4d(1.0), 1e-9):
-            placed.AddTransformOp().Set(matrix)
-        if alone:
-            placed.SetResetXformStack(True)
+        alone, old = placed.GetResetXformStack(), placed.GetOrderedXformOps()
+        added = placed.AddTransformOp(opSuffix="upright")
+        added.Set(turn)
+        placed.SetXformOpOrder([added, *old], alone)
     for prim in stage.Traverse():
         scene = UsdPhysics.Scene(prim)
         if scene and scene.GetGravityDirectionAttr().HasAuthoredValue():
@@ -265,11 +260,13 @@ def _without_instances(stage: Usd.Stage) -> Iterator[None]:
 
 
 def _as_float(attribute: Usd.Attribute) -> None:
-    value, prim, name = given(attribute), attribute.GetPrim(), attribute.GetName()
-    if not isinstance(value, Gf.Vec3d):
-        return
+    prim, name, times = attribute.GetPrim(), attribute.GetName(), attribute.GetTimeSamples()
+    found = {time: attribute.Get(time) for time in (Usd.TimeCode.Default(), *times)}
     prim.RemoveProperty(name)
-    prim.CreateAttribute(name, Sdf.ValueTypeNames.Float3, False).Set(tuple(float(v) for v in value))
+    single = prim.CreateAttribute(name, Sdf.ValueTypeNames.Float3, False)
+    for time, value in found.items():
+        if value is not None:
+            single.Set(Gf.Vec3f(value), time)
 
 
 def _is_image(prim: Usd.Prim) -> bool:

@@ -58,7 +58,8 @@ def glb(stage: Usd.Stage, reach: Reach) -> bytes:
     for index, shown in parts.items():
         tree.add_mesh(index, shown)
     for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()):
-        if UsdGeom.Imageable(prim) and UsdGeom.Imageable(prim).ComputeVisibility() != UsdGeom.Tokens.invisible:
+        image = UsdGeom.Imageable(prim)
+        if image and image.ComputeVisibility(values.NOW) != UsdGeom.Tokens.invisible:
             tree.add_view_or_light(prim)
     for room in find_rooms(stage):
         names = node_names(room)
@@ -89,7 +90,7 @@ class _Tree:
         self.roots: list[int] = []
         self.binary = bytearray()
         self.frame = to_metres(self.stage)
-        self.cache = UsdGeom.XformCache()
+        self.cache = UsdGeom.XformCache(values.NOW)
         self.known: dict[Any, int] = {}  # what is there already -> its index
 
     def add(self, table: str, entry: dict[str, Any], key: Any = None) -> int:

@@ -20,6 +20,7 @@ from echousd.stage.foreign import boxed_graph
 from echousd.stage.read import RoomPrims, find_rooms, node_names, room_graph, the_room
 from echousd.stage.turning import TURN
 from echousd.stage.units import metres_per_unit, up_axis
+from echousd.stage.values import NOW
 
 UP = {"up": [0, 1, 0], "front": [0, 0, -1]}  # Habitat's own, and of every glb
 FOLDERS = {"stages": "stages", "objects": "objects", "scene_instances": "scenes"}
@@ -40,7 +41,7 @@ def habitat_files(stage: Usd.Stage, out: Path, reach: Reach) -> dict[Path, bytes
     files: dict[str, bytes | dict[str, Any]] = {top: b""}
     objects: list[dict[str, Any]] = []
     names: dict[str, str] = {}
-    cache = UsdGeom.XformCache()
+    cache = UsdGeom.XformCache(NOW)
     with Usd.EditContext(stage, stage.GetSessionLayer()):
         for prims, prim, called in _objects(rooms):
             word = names[str(prim.GetPath())] = free_name(called, set(names.values()))
@@ -97,7 +98,7 @@ def _metric(stage: Usd.Stage, matrix: Gf.Matrix4d) -> Gf.Matrix4d:
 def _region(stage: Usd.Stage, prims: RoomPrims) -> dict[str, Any]:
     """The floor of a room as a region."""
     graph = room_graph(prims)
-    pose = _metric(stage, UsdGeom.XformCache().GetLocalToWorldTransform(prims.room))
+    pose = _metric(stage, UsdGeom.XformCache(NOW).GetLocalToWorldTransform(prims.room))
     corners = graph.room.corners if graph.room.corners is not None else np.zeros((0, 2))
     points = [pose.Transform(Gf.Vec3d(float(x), 0.0, float(z))) for x, z in corners]
     floor = round(pose.ExtractTranslation()[1], 4)

@@ -120,7 +120,7 @@ def read_poses(path: Path) -> dict[str, tuple[SceneGraph, np.ndarray]]:
     with values.reading(stage):
         found = find_rooms(stage)
         names = _names([prims.room.GetPath() for prims in found])
-        cache, turn, out = UsdGeom.XformCache(), to_metres(stage), {}
+        cache, turn, out = UsdGeom.XformCache(values.NOW), to_metres(stage), {}
         for prims in found:
             pose = turn @ values.matrix(cache.GetLocalToWorldTransform(prims.room), prims.room)
             lean = np.arctan2(pose[0, 2] - pose[2, 0], pose[0, 0] + pose[2, 2])

@@ -38,7 +38,7 @@ from echousd.stage.paths import (
     piece_of,
 )
 from echousd.stage.units import Z_TO_Y, metres_per_unit
-from echousd.stage.values import matrix, reading
+from echousd.stage.values import NOW, matrix, reading
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def read_room(root: str | Path) -> SavedRoom:
 
 def _boxes(stage: Usd.Stage, objects: str, graph: SceneGraph, size: np.ndarray) -> Boxes:
     """Boxes of the objects below a path as the stage places them now."""
-    position, yaw, cache, room = [], [], UsdGeom.XformCache(), stage.GetPrimAtPath(objects).GetParent()
+    position, yaw, cache, room = [], [], UsdGeom.XformCache(NOW), stage.GetPrimAtPath(objects).GetParent()
     turn, ahead = (Z_TO_Y, (0, -1, 0)) if stands_z_up(room) else (np.eye(3), (0, 0, 1))
     for name in graph.names:
         prim = stage.GetPrimAtPath(f"{objects}/{name}")
@@ -177,7 +177,7 @@ def read_original(root: Usd.Prim, asset: str | None, category: str, manifest: Ma
     """
     if not root or not asset:
         return None
-    cache = UsdGeom.XformCache()
+    cache = UsdGeom.XformCache(NOW)
     points, faces = surface_of(root, cache, np.linalg.inv(matrix(cache.GetLocalToWorldTransform(root), root)))
     if not len(faces):
         return None
@@ -202,13 +202,13 @@ def _original(root: Usd.Prim, asset: str) -> Original:
             ):
                 layer = Path(path)
             prim = payload.primPath or prim
-    pose = np.array(UsdGeom.Xformable(places).GetLocalTransformation()).T if places else np.eye(4)
+    pose = np.array(UsdGeom.Xformable(places).GetLocalTransformation(NOW)).T if places else np.eye(4)
     return Original(pose, str(prim), layer)
 
 
 def stands_z_up(room: Usd.Prim) -> bool:
     """Whether a room's own axes have +Z up: not where a prim of +Y up is turned as a whole."""
-    cache = UsdGeom.XformCache()
+    cache = UsdGeom.XformCache(NOW)
     own = room_frame(room, cache) @ matrix(cache.GetLocalToWorldTransform(room), room)
     return bool(abs(own[1, 2]) > abs(own[1, 1]))
 

@@ -20,7 +20,7 @@ from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.layouts import each_layout
 from echousd.stage.units import metres_per_unit, upwards
-from echousd.stage.values import array, lineage, matrix, moves
+from echousd.stage.values import NOW, array, lineage, matrix, moves
 
 FRICTION = 0.5  # where no physics material is bound
 SKIN = 0.05  # metres: how thick a triangle of a static concave mesh is made, inwards
@@ -69,7 +69,7 @@ def read_world(stage: Usd.Stage) -> World:
     A piece with joints counts as one body, its drawers and doors closed.
     """
     metres = metres_per_unit(stage)
-    cache = UsdGeom.XformCache()
+    cache = UsdGeom.XformCache(NOW)
     owned: dict[str, list[Solid]] = {}
     roots: dict[str, Usd.Prim] = {}
     fixed: list[Solid] = []

@@ -16,7 +16,7 @@ from echousd.stage.encoding import LABELS
 from echousd.stage.forms import Polygons, forms, polygons
 from echousd.stage.read import RoomPrims, node_names, read_node, relation_of, room_spec
 from echousd.stage.units import Z_TO_Y, metres_per_unit, upwards
-from echousd.stage.values import fans, matrix, readable, texts
+from echousd.stage.values import NOW, fans, matrix, readable, texts
 
 NOTHING = (np.zeros((0, 3)), np.zeros((0, 3), int))  # points and triangles of what has no surface
 HIDDEN = (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
@@ -90,7 +90,7 @@ class RoomContents:
 def read_contents(prims: RoomPrims) -> RoomContents:
     """The contents of one room; what is not valid is left out here, the validators report it."""
     stage = prims.room.GetStage()
-    cache = UsdGeom.XformCache()
+    cache = UsdGeom.XformCache(NOW)
     to_room = readable(lambda: room_frame(prims.room, cache), np.eye(4))
     nameless: dict[Sdf.Path, str] = {}
     names = readable(lambda: node_names(prims), nameless)
@@ -148,7 +148,7 @@ def _object(
 
 def surroundings(prims: RoomPrims) -> tuple[Surrounding, ...]:
     """The components of a room that are no nodes of its furniture's graph; what cannot be read has no shape."""
-    cache = UsdGeom.XformCache()
+    cache = UsdGeom.XformCache(NOW)
     to_room = readable(lambda: room_frame(prims.room, cache), None)
     found = []
     for prim in components(prims):

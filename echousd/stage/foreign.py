@@ -31,7 +31,7 @@ from echousd.stage.labels import (
 )
 from echousd.stage.read import RoomPrims, faults, node_names, room_graph, value
 from echousd.stage.units import Z_TO_Y, to_metres
-from echousd.stage.values import lineage
+from echousd.stage.values import NOW, lineage
 
 TAKEN_FOR = "cabinet"  # what the networks take a fixed thing of an unknown class for
 LARGE = 0.3  # metres: a thing of an unknown class with two longer sides is in the way
@@ -39,8 +39,6 @@ COLUMN = (1.2, 0.1, 1.2)  # metres: least height, least and largest side of what
 STOREY = 2.6  # metres above a floor that its furniture stands in
 _UPRIGHT = 1e-3  # how far an axis may lean, as the deviation of a rotation matrix's entries
 _FLAT = 1e-18  # the determinant of a transform that leaves no volume
-
-
 UNTOLD = "living_room"  # what a room is whose furniture tells nothing
 
 
@@ -167,6 +165,10 @@ def _read(
             continue
         said.extend((*words, prim.GetName()))
         category, told = next(filter(None, map(known_category, words)), None), {}
+        if category is None and prim.IsA(UsdGeom.PointInstancer):  # prototypes stand nowhere by themselves
+            skipped.update(["of an instancer"] if names or _holds_furniture(prim) else [])
+            prims.PruneChildren()
+            continue
         if category is None and names and not words:
             category = category_of_name(prim)
         if category is None:
@@ -258,7 +260,7 @@ def object_box(prim: Usd.Prim) -> Box | None:
 
 def _boxes(frame: np.ndarray) -> Callable[[Usd.Prim], Box | None]:
     """`object_box` of the prims of a stage in some frame, which share what is computed once."""
-    cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_, UsdGeom.Tokens.render], True)
+    cache = UsdGeom.BBoxCache(NOW, [UsdGeom.Tokens.default_, UsdGeom.Tokens.render], True)
     return lambda prim: box_of(_object_bound(cache, prim), frame)
 
 
@@ -267,7 +269,7 @@ def boxed_graph(prims: RoomPrims) -> SceneGraph:
     graph = room_graph(prims)
     paths = {name: path for path, name in node_names(prims).items()}
     nodes, stage = [], prims.room.GetStage()
-    boxed = _boxes(room_frame(prims.room, UsdGeom.XformCache()))
+    boxed = _boxes(room_frame(prims.room, UsdGeom.XformCache(NOW)))
     for node in graph.nodes:
         if None in (node.size, node.position, node.yaw):
             box = boxed(stage.GetPrimAtPath(paths[node.name]))
@@ -284,7 +286,7 @@ def _object_bound(cache: UsdGeom.BBoxCache, prim: Usd.Prim) -> Gf.BBox3d:
     imageable = UsdGeom.Imageable(prim)
     if not imageable:
         return Gf.BBox3d()
-    to_world = imageable.ComputeLocalToWorldTransform(Usd.TimeCode.Default())
+    to_world = imageable.ComputeLocalToWorldTransform(NOW)
     if abs(to_world.GetDeterminant3()) < _FLAT:
         return Gf.BBox3d()
     whole = Gf.Range3d()

@@ -50,7 +50,7 @@ def shown(prim: Usd.Prim) -> bool:
     """Whether pictures have a prim: visible, and of purpose default or render."""
     image = UsdGeom.Imageable(prim)
     of_pictures = image.ComputePurpose() in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
-    return of_pictures and image.ComputeVisibility() != UsdGeom.Tokens.invisible
+    return of_pictures and image.ComputeVisibility(values.NOW) != UsdGeom.Tokens.invisible
 
 
 def forms(
@@ -96,10 +96,9 @@ def _instances(instancer: UsdGeom.PointInstancer, cache: UsdGeom.XformCache) -> 
             f"<{prim.GetPath()}>: protoIndices reach from {which.min()} to {which.max()}, "
             f"allowed: 0 to {len(prototypes) - 1}"
         )
-    now = Usd.TimeCode.Default()
-    keep = UsdGeom.PointInstancer.IncludeProtoXform
-    places = instancer.ComputeInstanceTransformsAtTime(now, now, keep, UsdGeom.PointInstancer.IgnoreMask) or []
-    seen = instancer.ComputeMaskAtTime(now) or [True] * len(places)
+    how = UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
+    places = instancer.ComputeInstanceTransformsAtTime(values.NOW, values.NOW, *how) or []
+    seen = instancer.ComputeMaskAtTime(values.NOW) or [True] * len(places)
     own = values.matrix(cache.GetLocalToWorldTransform(prim), prim)
     known: dict[int, list[tuple[Form, np.ndarray]]] = {}
     for number, place in enumerate(places):

@@ -14,6 +14,7 @@ from echousd.graph import MAX_TEXT
 from echousd.stage.encoding import StageError
 from echousd.stage.files import said, source, specs
 
+NOW = Usd.TimeCode.EarliestTime()  # what stages are read at: some tools write even what never moves as samples
 LARGEST = 1e9  # in the stage's unit; what is further away is a fault, and its square overflows single precision
 MAX_CORNERS = 50_000_000  # face corners of one mesh
 UNREADABLE = (StageError, Tf.ErrorException)  # what reading a value raises
@@ -40,11 +41,11 @@ def owner(attribute: Usd.Attribute | None) -> str:
 
 
 def given(attribute: Usd.Attribute | None) -> Any:
-    """The default value, None where there is none; raises StageError where OpenUSD cannot read it."""
+    """The value at `NOW`, None where there is none; raises StageError where OpenUSD cannot read it."""
     if not attribute:
         return None
     try:
-        return attribute.Get()
+        return attribute.Get(NOW)
     except Tf.ErrorException as error:
         raise StageError(f"{owner(attribute)}: a value that cannot be read ({said(error)})") from None
 

@@ -20,7 +20,7 @@ from echousd.stage.contents import room_frame
 from echousd.stage.files import open_stage
 from echousd.stage.layouts import showing_layout
 from echousd.stage.read import the_room
-from echousd.stage.values import reading
+from echousd.stage.values import NOW, reading
 from echousd.textures import encoded
 from echousd.texturing import scenetex
 from echousd.texturing.atlas import Unwrapped, layout_digest, texels, unwrap
@@ -164,7 +164,7 @@ def _frame(stage: Usd.Stage, thing: Painted) -> np.ndarray:
     """(4, 4) float, the room to the object's frame: its box's bottom centre, its front along +Z."""
     own = np.eye(3)
     if thing.kind == "things":
-        room, cache = the_room(stage, None).room, UsdGeom.XformCache()
+        room, cache = the_room(stage, None).room, UsdGeom.XformCache(NOW)
         world = np.array(cache.GetLocalToWorldTransform(stage.GetPrimAtPath(thing.path))).T
         own = (room_frame(room, cache) @ world)[:3, :3]
     _, bottom, yaw = upright_box(thing.triangles.reshape(-1, 3), own)

@@ -127,6 +127,22 @@ def test_usdz_for_arkit_turns_all_of_a_foreign_stage(tmp_path):
     assert UsdGeom.Xformable(turned.GetPrimAtPath("/Placed/Free")).GetResetXformStack()
 
 
+@pytest.mark.parametrize(("name", "arkit"), [("out.usda", False), ("out.usdz", True)])
+def test_what_moves_in_a_foreign_stage_moves_on(tmp_path, name, arkit):
+    stage = Usd.Stage.CreateNew(str(tmp_path / "foreign.usda"))
+    UsdGeom.SetStageUpAxis(stage, "Z")
+    fan = UsdGeom.Cube.Define(stage, "/Fan")
+    place = fan.AddTranslateOp()
+    for time, height in ((Usd.TimeCode.Default(), 0), (1, 2), (24, 3)):
+        place.Set(Gf.Vec3d(1, 0, height), time)
+    stage.Save()
+    made = Usd.Stage.Open(str(export(tmp_path / "foreign.usda", tmp_path / name, arkit=arkit)))
+    fan = UsdGeom.Xformable(made.GetPrimAtPath("/Fan"))
+    middles = [fan.ComputeLocalToWorldTransform(time).ExtractTranslation() for time in (Usd.TimeCode.Default(), 1, 24)]
+    for middle, height in zip(middles, (0, 2, 3), strict=True):
+        assert Gf.IsClose(middle, Gf.Vec3d(1, height, 0) if arkit else Gf.Vec3d(1, 0, height), 1e-6)
+
+
 def test_usdz_for_arkit_has_no_empty_scopes(tmp_path):
     stage = Usd.Stage.CreateNew(str(tmp_path / "foreign.usda"))
     stage.SetDefaultPrim(stage.DefinePrim("/World", "Xform"))

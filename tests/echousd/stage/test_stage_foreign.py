@@ -12,9 +12,11 @@ from echousd.graph import Node, Relation, SceneGraph
 from echousd.stage.boxes import relations_from_boxes, room_boxes
 from echousd.stage.encoding import StageError
 from echousd.stage.foreign import SkippedPrims, boxed_graph, foreign_graph, foreign_pieces
+from echousd.stage.forms import forms
 from echousd.stage.graphs import read_graph
 from echousd.stage.read import the_room
 from echousd.stage.update import update_graph
+from echousd.stage.values import NOW
 from echousd.stage.write import graph_layer
 
 CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
@@ -76,6 +78,41 @@ def test_what_is_hidden_is_not_there():
     with pytest.warns(SkippedPrims, match=r"labelled prims that became no node: hidden \(2\)$"):
         graph = read_graph(stage)
     assert graph.names == ("bed",)
+
+
+def test_what_is_told_by_time_stands_where_it_is_first():
+    stage = stage_of("Y", 1.0)
+    for name in ("bed", "desk"):
+        box_mesh(stage, f"/World/{name}", (-0.5, 0, -1), (0.5, 0.6, 1))
+        label(stage.GetPrimAtPath(f"/World/{name}"), name)
+    place = UsdGeom.Xformable(stage.GetPrimAtPath("/World/bed")).AddTranslateOp()
+    place.Set(Gf.Vec3d(2, 0, 1), 1001)
+    place.Set(Gf.Vec3d(3, 0, 1), 1024)
+    seen = UsdGeom.Imageable(stage.GetPrimAtPath("/World/desk")).CreateVisibilityAttr()
+    seen.Set(UsdGeom.Tokens.invisible, 1001)
+    with pytest.warns(SkippedPrims, match="hidden \\(1\\)$"):
+        bed = read_graph(stage).nodes[0]
+    close(bed, (1, 0.6, 2), (2, 0, 1), 0)
+    (form,) = forms(stage.GetPseudoRoot(), UsdGeom.XformCache(NOW))
+    assert form.path == "/World/bed"
+    assert form.world[:3, 3] == pytest.approx((2, 0, 1))
+
+
+@pytest.mark.parametrize("names", [False, True])
+def test_what_an_instancer_places_is_told_instead_of_where_its_prototype_is(names):
+    stage = stage_of("Y", 1.0)
+    for path in ("/World/bed", "/World/Many/Prototypes/stool"):
+        box_mesh(stage, path, (0, 0, 0), (1, 0.5, 1))
+        if not names:
+            label(stage.GetPrimAtPath(path), path.rpartition("/")[2])
+    many = UsdGeom.PointInstancer.Define(stage, "/World/Many")
+    many.CreatePrototypesRel().AddTarget("/World/Many/Prototypes/stool")
+    many.CreatePositionsAttr([Gf.Vec3f(3, 0, 0), Gf.Vec3f(3, 0, 2)])
+    many.CreateProtoIndicesAttr([0, 0])
+    with pytest.warns(SkippedPrims, match="became no node: of an instancer \\(1\\)$"):
+        assert foreign_graph(stage, names=names).names == ("bed",)
+    label(many.GetPrim(), "stool")  # all that it places is one thing
+    assert foreign_graph(stage, names=names).node("Many").size == pytest.approx((1, 0.5, 3))
 
 
 @pytest.mark.parametrize("metres", [1.0, 0.01])
