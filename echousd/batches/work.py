@@ -73,25 +73,11 @@ def generated(job: Job) -> Room:
     """The room of a job; raises ValueError as `generate` does."""
     from echousd.make.pipeline import generate
 
-    return generate(_checked(job), options=job.options, seed=job.seed, outside=job.outside)
-
-
-def _checked(job: Job) -> Any:
-    """The graph, if a room can be made of it; raises ValueError."""
-    from echousd.graph.floors import check_doors, check_space
-    from echousd.make.layouts import check_objects
-
     if job.draw is not None and not job.text:
         graph = sampled_graph(*job.draw, job.options.relations)
     else:
         graph = SceneGraph.from_json(job.text)
-    if job.options.openings == "drawn":
-        graph = graph.with_room(openings=())
-    check_objects(graph)
-    check_doors(graph)
-    if job.options.fit == "keep":
-        check_space(graph)
-    return graph
+    return generate(graph, options=job.options, seed=job.seed, outside=job.outside)
 
 
 def _facts(made: Any, root: Path, stage: Usd.Stage, *, settle: bool) -> dict[str, Any]:
