@@ -14,7 +14,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 from echomodel.vocabulary import vocabulary
 from echousd.checks.reading import Finding, Reading, rule
 from echousd.exporting.packing import Reach
-from echousd.stage.files import said, specs
+from echousd.stage.files import said
 from echousd.stage.units import METRES, UP_AXIS, unit_faults, upwards
 from echousd.stage.values import LARGEST, UNREADABLE, asset, misfit, shown
 from echousd.textures import READABLE, TextureError, file_of, read_image
@@ -31,13 +31,13 @@ def relative_paths(reading: Reading) -> Iterator[Finding]:
     """Every asset path is relative and written with forward slashes."""
     told = set()
     for layer, paths in reading.named_files.items():
-        for path in paths:
+        for holder, path in paths:
             if (layer.identifier, path) in told or not (ABSOLUTE.match(path) or "\\" in path):
                 continue
             told.add((layer.identifier, path))
             what = "absolute" if ABSOLUTE.match(path) else "written with backslashes"
             where = layer.GetDisplayName()
-            yield Finding(_holder(layer, path), f"{where}: asset path {path!r} is {what}, allowed: ./relative/path")
+            yield Finding(holder, f"{where}: asset path {path!r} is {what}, allowed: ./relative/path")
 
 
 @rule("echo:PathsInside")
@@ -50,17 +50,15 @@ def paths_inside(reading: Reading) -> Iterator[Finding]:
     for layer, paths in reading.named_files.items():
         if layer.realPath and not reach.holds(layer.realPath):
             continue  # what a layer outside names is outside with it; the layer itself is told
-        for path in paths:
-            if not path or (layer.identifier, path) in told or ABSOLUTE.match(path):
+        for holder, path in paths:
+            if (layer.identifier, path) in told or ABSOLUTE.match(path):
                 continue
             told.add((layer.identifier, path))
             full = layer.ComputeAbsolutePath(path)
             if full and not reach.holds(full):
                 where = f"{layer.GetDisplayName()}: asset path {path!r} leads out of the room's folder"
                 is_layer = bool(Sdf.FileFormat.FindByExtension(full))
-                yield Finding(
-                    _holder(layer, path), f"{where} {reach.places[0]}, allowed: a file below it", warning=is_layer
-                )
+                yield Finding(holder, f"{where} {reach.places[0]}, allowed: a file below it", warning=is_layer)
 
 
 @rule("echo:Images", "prims", UsdShade.Shader)
@@ -92,19 +90,6 @@ def _image_fault(path: str, _stamp: tuple[int, ...]) -> str:
     except TextureError as error:
         return str(error)
     return ""
-
-
-def _holder(layer: Sdf.Layer, path: str) -> Sdf.Path:
-    """The prim of a layer whose opinions mention an asset path; the pseudo-root for sublayers."""
-    for spec in specs(layer):
-        if isinstance(spec, Sdf.AttributeSpec) and getattr(spec.default, "path", None) == path:
-            return spec.path.GetPrimPath()
-        if isinstance(spec, Sdf.PrimSpec):
-            arcs = [*spec.referenceList.GetAddedOrExplicitItems(), *spec.payloadList.GetAddedOrExplicitItems()]
-            identifier = (spec.assetInfo or {}).get("identifier")
-            if any(arc.assetPath == path for arc in arcs) or getattr(identifier, "path", None) == path:
-                return spec.path
-    return Sdf.Path.absoluteRootPath
 
 
 @rule("echo:Units")

@@ -8,9 +8,10 @@ from functools import cached_property
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
-from pxr import Sdf, Usd, UsdGeom, UsdUtils
+from pxr import Sdf, Usd, UsdGeom
 
 from echomodel.triangles import area_normals
+from echousd.exporting.packing import asset_paths
 from echousd.stage.contents import HIDDEN, RoomContents, components, read_contents
 from echousd.stage.encoding import StageError
 from echousd.stage.files import prim_specs
@@ -93,8 +94,8 @@ class Reading:
         return [*self.nodes, *(prim for room in self.rooms for prim in components(room))]
 
     @cached_property
-    def named_files(self) -> dict[Sdf.Layer, list[str]]:
-        """The layers in use, but for the session's, and all asset paths that each authors."""
+    def named_files(self) -> dict[Sdf.Layer, list[tuple[Sdf.Path, str]]]:
+        """The layers in use, but for the session's, and all asset paths that each authors with their prims."""
         session = self.stage.GetSessionLayer()
         return {layer: _asset_paths(layer) for layer in self.stage.GetUsedLayers() if layer != session}
 
@@ -143,21 +144,15 @@ def below(prim: Usd.Prim) -> list[Usd.Prim]:
     return list(Usd.PrimRange(prim, Usd.TraverseInstanceProxies()))
 
 
-def _asset_paths(layer: Sdf.Layer) -> list[str]:
-    """All asset paths that a layer authors: sublayers, references, payloads, clips, attributes, metadata."""
-    copy = Sdf.Layer.CreateAnonymous(".usda")
-    copy.TransferContent(layer)
-    found: list[str] = []
-
-    def note(path: str) -> str:
-        found.append(path)
-        return path
-
-    UsdUtils.ModifyAssetPaths(copy, note)
+def _asset_paths(layer: Sdf.Layer) -> list[tuple[Sdf.Path, str]]:
+    """All asset paths that a layer authors, in sublayers, references, payloads, values or metadata, and their prims."""
+    found = [(Sdf.Path.absoluteRootPath, path) for path in layer.subLayerPaths]
+    found += [(path.GetPrimPath(), named) for path, named in asset_paths(layer)]
     for spec in prim_specs(layer):
+        arcs = (*spec.referenceList.GetAddedOrExplicitItems(), *spec.payloadList.GetAddedOrExplicitItems())
+        found += [(spec.path, arc.assetPath) for arc in arcs if arc.assetPath]
         identifier = (spec.assetInfo or {}).get("identifier")
-        if identifier:
-            found.append(getattr(identifier, "path", str(identifier)))
+        found += [(spec.path, identifier)] if isinstance(identifier, str) and identifier else []
     return found
 
 

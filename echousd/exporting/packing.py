@@ -156,7 +156,7 @@ def take_assets(layer: Sdf.Layer, package: Package | None) -> Mapping[str, str]:
     """
     renamed: dict[str, str] = {}
     for where, path in asset_paths(layer):
-        renamed[path] = package.take(path, where) if package is not None else ""
+        renamed[path] = package.take(path, f"<{where}>") if package is not None else ""
     UsdUtils.ModifyAssetPaths(layer, lambda path: renamed.get(path, ""))
     return renamed
 
@@ -173,9 +173,9 @@ def without_clock(archive: bytes) -> bytes:
     return bytes(out)
 
 
-def asset_paths(layer: Sdf.Layer) -> Iterator[tuple[str, str]]:
-    """(where, path) of every asset path in the values and metadata of a layer; where is `<prim or property path>`."""
+def asset_paths(layer: Sdf.Layer) -> Iterator[tuple[Sdf.Path, str]]:
+    """Every asset path in the values and metadata of a layer, behind the path of its prim or property."""
     for spec in specs(layer):
-        for key in spec.ListInfoKeys():
+        for key in (key for key in spec.ListInfoKeys() if key != "subLayerOffsets"):  # which Python cannot hold
             for path in assets_in(spec.GetInfo(key)):
-                yield f"<{spec.path}>", path
+                yield spec.path, path

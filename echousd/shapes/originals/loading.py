@@ -141,7 +141,7 @@ def _named_by(layers: Sequence[Sdf.Layer], path: str) -> str:
     for layer in layers:
         for where, name in asset_paths(layer):
             if os.path.realpath(layer.ComputeAbsolutePath(name)) == real:
-                return f"{where} "
+                return f"<{where}> "
     return ""
 
 
