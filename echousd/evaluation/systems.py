@@ -146,11 +146,8 @@ def _edit(tasks: Sequence[Task]) -> GraphEdit | None:
 
 def _with_boxes(room: RoomBoxes, boxes: Boxes) -> RoomBoxes:
     """The room with other boxes, which lie about the middle of its floor."""
-    centre = np.zeros(3)
-    if len(room.floor_polygon):
-        centre[[0, 2]] = (room.floor_polygon.min(0) + room.floor_polygon.max(0)) / 2
     size, position, yaw = (np.asarray(value, float) for value in (boxes.size, boxes.position, boxes.yaw))
-    return replace(room, size=size, position=position + centre, yaw=yaw, relations=None)
+    return replace(room, size=size, position=position + room.centre, yaw=yaw, relations=None)
 
 
 @cache

@@ -60,9 +60,7 @@ class Boxes:
     @classmethod
     def from_room(cls, room: RoomBoxes) -> Boxes:
         """The boxes of a room as tensors, moved so that the centre of its floor's bounding box is the origin."""
-        position = np.asarray(room.position, np.float32).reshape(-1, 3).copy()
-        if len(room.floor_polygon):
-            position[:, ::2] -= ((room.floor_polygon.max(0) + room.floor_polygon.min(0)) / 2).astype(np.float32)
+        position = np.asarray(room.position, np.float32).reshape(-1, 3) - room.centre.astype(np.float32)
         size, yaw = np.asarray(room.size, np.float32).reshape(-1, 3), np.asarray(room.yaw, np.float32).reshape(-1)
         return cls(size, position, yaw).to("cpu")
 

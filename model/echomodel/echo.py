@@ -27,6 +27,7 @@ from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
 from echomodel.late import Late
 from echomodel.protocols import GraphEdit, touched_nodes
+from echomodel.triangles import firsts
 from echomodel.vocabulary import vocabulary
 
 CHECKPOINT = "checkpoint.safetensors"  # beside the weights in the folder of a training
@@ -173,7 +174,7 @@ def equal_furniture(graph: GraphBatch) -> Array:
     own = graph.to(None)
     joins = np.isin(own.triplets[:, 1], vocabulary().uniting("shape"))
     joins &= own.category[own.triplets[:, 0]] == own.category[own.triplets[:, 2]]
-    return beside(_first_joined(own.num_nodes, own.triplets[joins][:, [0, 2]]), graph.category)
+    return beside(firsts(own.triplets[joins][:, [0, 2]], own.num_nodes), graph.category)
 
 
 def joined(graph: GraphBatch, styles: Array | None = None) -> Array:
@@ -184,15 +185,4 @@ def joined(graph: GraphBatch, styles: Array | None = None) -> Array:
         styles = on_device(styles, None)
         same = (styles[:, None] == styles) & (own.scene[:, None] == own.scene) & (styles >= 0)
         ends = np.concatenate([ends, np.argwhere(same)])
-    return beside(_first_joined(own.num_nodes, ends), graph.category)
-
-
-def _first_joined(nodes: int, ends: np.ndarray) -> np.ndarray:
-    """(N,) int64: for every node the first that a chain of the pairs `ends` (E, 2) joins it to."""
-    first = np.arange(nodes)
-    while True:
-        lower = first.copy()
-        np.minimum.at(lower, ends.ravel(), first[ends].min(1).repeat(2))
-        if np.array_equal(lower, first):
-            return first
-        first = lower
+    return beside(firsts(ends, own.num_nodes), graph.category)

@@ -55,6 +55,12 @@ class RoomBoxes:
     def __len__(self) -> int:
         return len(self.categories)
 
+    @property
+    def centre(self) -> np.ndarray:
+        """(3,) float, the middle of the bounding box of its floor, the origin without one."""
+        corners = self.floor_polygon if len(self.floor_polygon) else np.zeros((1, 2))
+        return np.insert((corners.max(0) + corners.min(0)) / 2, 1, 0.0)
+
     @classmethod
     def from_json(cls, raw: dict) -> RoomBoxes:
         """Read one entry of a rooms file; raises ValueError that names the field which is not as allowed."""

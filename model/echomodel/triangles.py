@@ -142,3 +142,9 @@ def linked(pairs: Sequence[tuple[int, int]] | np.ndarray, count: int) -> np.ndar
     alone = np.arange(count)
     links = np.concatenate([np.stack([alone, alone], 1), np.asarray(pairs, int).reshape(-1, 2)])
     return connected_pieces(links, count)[:count]
+
+
+def firsts(pairs: np.ndarray, count: int) -> np.ndarray:
+    """(count,) int, the first thing of each thing's group; arguments as for `linked`."""
+    group = linked(pairs, count)
+    return np.unique(group, return_index=True)[1][group]

@@ -65,10 +65,11 @@ def _label(rooms: Sequence[RoomBoxes], starts: np.ndarray, rules: RuleSet, headi
     subject, object_ = _ordered_pairs(starts)
     if not len(subject):
         return np.zeros((0, 3), np.int64)
-    size, position, yaw, centre = (
+    size, position, yaw = (
         np.concatenate([np.asarray(of, float) for of in every])
-        for every in zip(*((room.size, room.position, room.yaw, _centres(room)) for room in rooms), strict=True)
+        for every in zip(*((room.size, room.position, room.yaw) for room in rooms), strict=True)
     )
+    centre = np.repeat([room.centre for room in rooms], np.diff(starts), axis=0)
     headed = fronts(word for room in rooms for word in room.categories) if headings else None
     pair = pairs(Spread(size, position, yaw), subject, object_, centre, oriented=rules.oriented, fronts=headed)
     same_category, same = _likeness(rooms, subject, object_)
@@ -93,13 +94,6 @@ def _ordered_pairs(starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         subjects.append(first + i[keep])
         objects.append(first + j[keep])
     return np.concatenate(subjects).astype(np.int64), np.concatenate(objects).astype(np.int64)
-
-
-def _centres(room: RoomBoxes) -> np.ndarray:
-    out = np.zeros((len(room), 3))
-    if len(room.floor_polygon):
-        out[:, [0, 2]] = (room.floor_polygon.min(0) + room.floor_polygon.max(0)) / 2
-    return out
 
 
 def _likeness(
