@@ -12,7 +12,7 @@ import math
 from collections import OrderedDict
 from copy import deepcopy
 from functools import cache
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -268,27 +268,19 @@ class UNet(nn.Module):
         return convolve(conv, act(norm(h)))
 
 
-class PackedLayer(nn.Linear):
-    """A linear layer for inference alone; its parameters stay, for looking at and saving.
+class PackedLayer(nn.Module):
+    """A linear layer of float32 for inference alone, in this process.
 
     On a CPU the weight goes into oneDNN's blocked layout, which reads it two to three times faster than a plain
     product does for a handful of rows; elsewhere, or where torch lacks the operator, it is an ordinary linear map.
-
-    `layer`: with floating-point weights, which are computed with in float32.
     """
 
     def __init__(self, layer: nn.Linear) -> None:
-        nn.Module.__init__(self)
-        self.in_features, self.out_features = layer.in_features, layer.out_features
-        self.weight, self.bias = layer.weight, layer.bias
-        self.train(layer.training)
-        self._pack()
-
-    def _pack(self) -> None:
+        super().__init__()
         self._product, self._added = (
-            None if part is None else part.detach().float().contiguous() for part in (self.weight, self.bias)
+            None if part is None else part.detach().float().contiguous() for part in (layer.weight, layer.bias)
         )
-        self._packed = self.weight.device.type == "cpu" and packing_available()
+        self._packed = layer.weight.device.type == "cpu" and packing_available()
         if self._packed:
             self._product = torch.ops.mkldnn._reorder_linear_weight(self._product, None)
 
@@ -297,13 +289,6 @@ class PackedLayer(nn.Linear):
         if not self._packed:
             return F.linear(x, self._product, self._added)
         return torch.ops.mkldnn._linear_pointwise(x, self._product, self._added, "none", [], "")
-
-    def __getstate__(self) -> dict[str, Any]:  # packed weights are of this process
-        return {key: value for key, value in vars(self).items() if key != "_product"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        super().__setstate__(state)
-        self._pack()
 
 
 def pack_linear_maps(net: nn.Module) -> None:
