@@ -74,7 +74,8 @@ def curtains(setting: Setting) -> None:
     for wall in walls_of(setting):
         for window in (o for o in setting.openings if o.kind == "window" and o.edge == wall.edge):
             rail = window.sill + window.height + above
-            if setting.use == "wet" or rail > setting.height - 0.05:
+            beside = _near(setting, wall, window, window.width + 2 * beyond, before + 0.09)
+            if setting.use == "wet" or rail > setting.height - 0.05 or any(one.top > rail - 0.03 for one in beside):
                 _blind(setting, wall, window)
                 continue
             rng = setting.rng("curtains")
@@ -82,7 +83,8 @@ def curtains(setting: Setting) -> None:
             short = rng.random() < 0.5
             wide = round(min(0.45, 0.16 + 0.14 * window.width), 3)
             over = [max(0.3, window.sill - 0.12), window.sill - 0.01]
-            feet = [0.015, *(over if short and _under(setting, wall, window) else ())]
+            under = any(o.position[1] < window.sill for o in _near(setting, wall, window, 0.8 * window.width, BEFORE))
+            feet = [0.015, *(over if short and under else ())]
             left = max(window.offset - beyond + wide / 2, 0.02 + wide / 2)
             right = min(window.end + beyond - wide / 2, wall.length - 0.02 - wide / 2)
             inner = np.linspace(0.0, 0.5 * (right - left) - wide / 2, 4)  # over the pane where something is beside
@@ -105,11 +107,11 @@ def _styled(setting: Setting, kinds: Sequence[str]) -> Sequence[str]:
     return [kind for kind in kinds if kind in setting.style.curtains] if setting.style else kinds
 
 
-def _under(setting: Setting, wall: Wall, window: Opening) -> bool:
-    """Whether something stands under a window or right before it."""
-    middle = wall.at((window.offset + window.end) / 2, BEFORE / 2, 0.0)
-    strip = rectangle(middle[[0, 2]], np.array([0.8 * window.width, BEFORE]), wall.yaw)
-    return any(one.position[1] < window.sill and one.footprint.intersects(strip) for one in setting.objects.values())
+def _near(setting: Setting, wall: Wall, window: Opening, wide: float, deep: float) -> list[Standing]:
+    """What stands or hangs within a strip, metres wide and deep, under and right before a window."""
+    middle = wall.at((window.offset + window.end) / 2, deep / 2, 0.0)
+    strip = rectangle(middle[[0, 2]], np.array([wide, deep]), wall.yaw)
+    return [one for one in setting.objects.values() if one.footprint.intersects(strip)]
 
 
 def _blind(setting: Setting, wall: Wall, window: Opening) -> None:

@@ -137,6 +137,20 @@ def test_a_window_without_room_for_curtains_has_a_blind_and_no_rail():
         assert sum(name.endswith("rail") for name in pieces) == rails
 
 
+@pytest.mark.parametrize(("tall", "x", "kind"), [(2.37, 1.4, "blind"), (2.2, 1.4, "curtain"), (2.37, 1.7, "curtain")])
+def test_no_rail_runs_into_what_stands_beside_a_window(tall, x, kind):
+    window = Opening("window", "window", 0, 1.1, 1.8, 1.3, 0.9)  # its rail reaches to 1.15 at 2.32
+    size = np.array([0.6, tall, 0.5])
+    box = trimesh.creation.box(size, trimesh.transformations.translation_matrix((0, tall / 2, 0)))
+    part = Part("mesh", Mesh.of(box), {"wood": np.arange(12)})
+    geometry = Geometry((part,), (Collider("collider", part.mesh, "convexHull"),), Origin("test"))
+    wardrobe = standing("wardrobe", "wardrobe", size, np.array([x, 0.0, -1.75]), 0.0, geometry)
+    setting = Setting({"wardrobe": wardrobe}, SQUARE, (window,), 2.7, True, False, 0)
+    curtains(setting)
+    assert {KINDS[thing.kind].name for thing in setting.placed} == {kind}
+    assert bool(setting.curtained) == (kind == "curtain")
+
+
 @pytest.mark.parametrize("style", [None, "industrial", "modern"])
 def test_a_radiator_stands_under_a_window_between_its_curtains(style):
     window = Opening("window", "window", 0, 1.1, 1.8, 1.3, 0.9)
