@@ -37,7 +37,6 @@ from echousd.make import layouts
 from echousd.place import search
 from echousd.place.placing import place_boxes
 from echousd.progress import StageTimer
-from echousd.shapes.styles import style_groups
 from echousd.stage.boxes import graph_of
 
 SEED = 770_000  # of the generated rooms, as in `placing.py`
@@ -88,10 +87,8 @@ def judged_by_default(weights: str, tasks: list[Task]) -> tuple[list[RoomBoxes],
         nodes = tuple(node.replaced(size=None, position=None, yaw=None) for node in graph.nodes)
         graph = graph.replaced(nodes=nodes, room=graph.room.replaced(openings=room.openings))
         model = network or Another(OTHERS[weights], task)
-        boxes, _ = layouts.best_boxes(
-            model, graph, style_groups(graph), layouts.Draws(number), drafts=layouts.most_drafts(model, len(room)),
-            timer=StageTimer(),
-        )  # fmt: skip
+        drafts = layouts.most_drafts(model, len(room))
+        boxes, _ = layouts.LayoutSearch(model, number, StageTimer(), drafts=drafts).best(graph)
         size, position, yaw = (np.asarray(of, float) for of in (boxes.size, boxes.position, boxes.yaw))
         rooms.append(replace(room, size=size, position=position, yaw=yaw))
     layouts.finished_boxes = usual

@@ -74,9 +74,8 @@ def cold(text: str, seed: int) -> dict[str, float]:
     from echomodel.loading import load_model
     from echousd.graph import SceneGraph
     from echousd.graph.floors import with_plan
-    from echousd.make.layouts import Draws, best_boxes, most_drafts
+    from echousd.make.layouts import LayoutSearch, most_drafts
     from echousd.progress import StageTimer
-    from echousd.shapes.styles import style_groups
 
     out["imports"] = time.process_time() - sum(out.values())
     model = load_model(None)
@@ -85,10 +84,8 @@ def cold(text: str, seed: int) -> dict[str, float]:
     began = time.process_time()
     with parted() as spent:
         planned = with_plan(graph, seed)
-        best_boxes(
-            model, planned, style_groups(planned), Draws(seed), drafts=most_drafts(model, len(planned.nodes)),
-            proposed=not graph.room.openings, timer=StageTimer(),
-        )  # fmt: skip
+        most, proposed = most_drafts(model, len(planned.nodes)), not graph.room.openings
+        LayoutSearch(model, seed, StageTimer(), drafts=most, proposed=proposed).best(planned)
     whole = time.process_time() - began
     return {**out, **spent, "rest": whole - sum(spent.values())}
 
@@ -144,9 +141,8 @@ def batch(rooms: int, first: int, product: float) -> None:
     from echomodel.loading import load_model
     from echousd.batches.sources import sampled_graph
     from echousd.graph.floors import with_plan
-    from echousd.make.layouts import Draws, best_boxes, most_drafts
+    from echousd.make.layouts import LayoutSearch, most_drafts
     from echousd.progress import StageTimer
-    from echousd.shapes.styles import style_groups
 
     model = load_model(None)
     graphs = [sampled_graph(TYPES[n % len(TYPES)], first, n // len(TYPES), 1.0) for n in range(rooms)]
@@ -157,9 +153,7 @@ def batch(rooms: int, first: int, product: float) -> None:
         began = time.process_time()
         for graph, seed, most in zip(graphs, seeds, drafts, strict=True):
             planned = with_plan(graph, seed)
-            best_boxes(
-                model, planned, style_groups(planned), Draws(seed), drafts=most, proposed=True, timer=StageTimer()
-            )
+            LayoutSearch(model, seed, StageTimer(), drafts=most, proposed=True).best(planned)
         whole = time.process_time() - began
     objects = sum(len(graph.nodes) for graph in graphs)
     print(f"batch of {rooms} rooms, {objects} objects")
@@ -173,13 +167,12 @@ def batch(rooms: int, first: int, product: float) -> None:
 def best_of_one(model: Any, graph: Any, seed: int) -> float:
     """CPU seconds of one draft of a warm model, placed."""
     from echousd.graph.floors import with_plan
-    from echousd.make.layouts import Draws, best_boxes
+    from echousd.make.layouts import LayoutSearch
     from echousd.progress import StageTimer
-    from echousd.shapes.styles import style_groups
 
     planned = with_plan(graph, seed)
     began = time.process_time()
-    best_boxes(model, planned, style_groups(planned), Draws(seed), drafts=1, timer=StageTimer())
+    LayoutSearch(model, seed, StageTimer()).best(planned)
     return time.process_time() - began
 
 

@@ -26,7 +26,7 @@ from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.floors import check_space, with_plan_of
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
-from echousd.make.layouts import Draws, best_boxes, check_objects, model_of, most_drafts, room_floor, with_sizes
+from echousd.make.layouts import LayoutSearch, check_objects, model_of, most_drafts, room_floor, with_sizes
 from echousd.make.reading import SavedRoom, read_room
 from echousd.make.verdicts import layout_outcome, warn_of_faults
 from echousd.naming import free_name
@@ -97,20 +97,23 @@ def edit(
     shaped_anew = fresh | restyled(saved, graph, fresh)
     check_files(graph, beside, outside, str(room), fresh)
     styles = style_groups(graph)
-    model_used: RoomModel | None = None
-    change: GraphEdit | None = None
+    used: RoomModel | None = None
+    search: LayoutSearch | None = None
     own = Retrieved()
     if shaped_anew or moving:
         with timer.stage("load"), one_thread():
-            model_used = model_of(asked, model)
-            _compare(saved.manifest, model_used, given=bool(model or asked.weights), root=Path(room))
+            used = model_of(asked, model)
+            _compare(saved.manifest, used, given=bool(model or asked.weights), root=Path(room))
         if shaped_anew:
             made_of = saved.manifest["shapes"]
             again = made_of in ("parts", "sdf") or (made_of in ("library", "guided") and asked.assets is not None)
-            shapes = shapes or (made_of if again else default_source(model_used))
-            check_sources([shapes, *(source_of(graph.node(name), shapes) for name in shaped_anew)], model_used)
+            shapes = shapes or (made_of if again else default_source(used))
+            check_sources([shapes, *(source_of(graph.node(name), shapes) for name in shaped_anew)], used)
             own = given_pieces(graph, wishes, fresh)
-        change = graph_edit(saved.graph, graph)
+        search = LayoutSearch(
+            used, asked.seed, timer, asked.steps, graph_edit(saved.graph, graph), place=asked.place,
+            drafts=asked.drafts or most_drafts(used, len(graph.nodes)),
+        )  # fmt: skip
 
     def laid_out(sizes: Mapping[str, Vector]) -> tuple[list[Boxes], list[SceneGraph], tuple[str, ...]]:
         """The boxes of all layouts, the graphs that they are of, and what is to be told of the first."""
@@ -122,32 +125,30 @@ def edit(
             if layouts:  # one furniture in all layouts
                 pinned = with_sizes(pinned, layouts[0])
             pins.append(pinned)
-            if model_used is None:
-                layouts.append(_boxes_of(pinned))
-                continue
-            found, told = best_boxes(
-                model_used, pinned, styles, Draws(asked.seed, number, asked.steps, change), place=asked.place,
-                drafts=asked.drafts or most_drafts(model_used, len(pinned.nodes)), timer=timer,
-            )  # fmt: skip
+            found, told = (_boxes_of(pinned), ()) if search is None else search.best(pinned, number)
             layouts.append(found)
-            notes = (*model_used.unlearned(graph_batch(pinned)), *told) if number == 0 else notes
+            if search is not None and number == 0:
+                notes = (*search.model.unlearned(graph_batch(pinned)), *told)
         return layouts, pins, notes
 
-    (layouts, pins, notes), models = laid_out(own.sizes), own
-    if shaped_anew and shapes is not None:
-        palette = asked.palette or palette_of_room(manifest["seed"], graph.room.style)
-        models = retrieved(
-            graph, layouts[0], styles, shapes, wishes, asked.seed, own, among=shaped_anew, palette=palette
-        )
-        if models.sizes != own.sizes:
-            layouts, pins, notes = laid_out(models.sizes)
+    models = own
+    for drawn in (False, True):
+        sizes = models.sizes
+        layouts, pins, notes = laid_out(sizes)
+        if shaped_anew and shapes is not None and not drawn:
+            palette = asked.palette or palette_of_room(manifest["seed"], graph.room.style)
+            models = retrieved(
+                graph, layouts[0], styles, shapes, wishes, asked.seed, own, among=shaped_anew, palette=palette
+            )
+        if models.sizes == sizes:  # else real ones shape the layout
+            break
     geometry = {name: saved.geometry[name] for name in graph.names if name not in shaped_anew}
     names = {name: saved.assets[name] for name in geometry}
     if shaped_anew and shapes is not None:
         wanted = tuple(name for name in graph.names if name in shaped_anew)
         request = ShapeRequest(
-            graph, layouts[0], styles, asked.seed, model_used, asked.steps, asked.faces, wanted, dict(geometry), change,
-            timer, models,
+            graph, layouts[0], styles, asked.seed, used, asked.steps, asked.faces, wanted, dict(geometry),
+            search.change if search else None, timer, models,
         )  # fmt: skip
         made = mixed_shapes(request, shapes)
         geometry |= {name: made.geometry[owner] for name, owner in made.owners.items()}
@@ -158,17 +159,17 @@ def edit(
     for number in range(ROUNDS if asked.place else 0):
         with timer.stage("place"), one_thread():
             layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=asked.walls)
-        if model_used is None or number == ROUNDS - 1:
+        if search is None or number == ROUNDS - 1:
             break
         way = in_the_way(saved, graph, layouts[0], outcomes[0], along, moving | put)
         if not way:
             break
         moving |= way
-        layouts, pins, notes = laid_out(models.sizes)
+        layouts, pins, notes = laid_out(sizes)
     after = Room(
         name=manifest["name"], graph=graph, layouts=tuple(layouts), geometry=geometry, assets=names, floor=floor,
         outcomes=outcomes, notes=(*crowded, *models.notes, *notes, *odd),
-        provenance=_provenance(manifest, model_used), options=asked.replaced(seed=manifest["seed"]),
+        provenance=_provenance(manifest, used), options=asked.replaced(seed=manifest["seed"]),
         timings=timer.seconds, edited=Path(room),
         carried={asset: saved.carried[asset] for name, asset in names.items() if name not in shaped_anew},
     )  # fmt: skip

@@ -31,7 +31,7 @@ from echousd.place.placing import Arranged, PlacedBoxes
 from echousd.place.placing import place as placed
 from echousd.place.solver import PlaceConfig, sentence
 from echousd.progress import StageTimer
-from echousd.shapes.styles import equal_sizes, unequal_pairs
+from echousd.shapes.styles import equal_sizes, style_groups, unequal_pairs
 
 DRAFTS = 8  # of which the best is kept
 ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
@@ -61,96 +61,89 @@ def model_of(asked: RoomOptions, model: RoomModel | None) -> RoomModel:
 
 
 @dataclass(frozen=True, eq=False)
-class Draws:
-    """Which drafts are drawn, and how."""
+class LayoutSearch:
+    """How the layouts of a room are found: drafts of a model, of which a search makes the best that it can."""
 
-    seed: int  # seed, number: of the draws; equal ones, and equal counts, give equal drafts
-    number: int = 0
+    model: RoomModel
+    seed: int  # of the draws; equal ones, and equal numbers and counts, give equal drafts
+    timer: StageTimer
     steps: int | None = None  # of the sampler, None = the model's own
     change: GraphEdit | None = None  # what was edited in the graph, None = nothing
-    # at every step by what is specified; where boxes are placed by search afterwards that changes nothing
-    guided: bool = True
+    drafts: int = 1  # at most
+    place: bool = True  # whether drafts are placed by search
+    proposed: bool = False  # nobody stated the openings, which may still be moved: what is in their way counts least
 
+    def sampled(self, graph: SceneGraph, number: int, count: int = 1) -> list[Boxes]:
+        """So many drafts at once from the layout branch, in the room's frame; what the graph fixes comes back."""
+        centre, nodes = floor_centre(graph), graph.nodes
+        batch = GraphBatch.pack([graph_batch(graph)] * count)
+        given = np.array([None not in (n.size, n.position, n.yaw) for n in nodes] * count)
+        known = Boxes.cat([Boxes(
+            np.array([n.size or (1.0, 1.0, 1.0) for n in nodes], np.float32),
+            np.array([n.position or (0.0, 0.0, 0.0) for n in nodes], np.float32) - centre,
+            np.array([n.yaw or 0.0 for n in nodes], np.float32),
+        )] * count)  # fmt: skip
+        extra: dict[str, Any] = {"known": known, "known_mask": given} if given.any() else {}
+        if self.steps is not None:
+            extra["steps"] = self.steps
+        if self.place and isinstance(self.model, EchoModel):
+            extra["relation_guidance"] = 0.0  # where boxes are placed by search afterwards guidance changes nothing
+        if self.change is not None:
+            extra["edit"] = repeated(self.change, len(nodes), count)
+        generator = seeded(self.seed, "layout", number)
+        with self.timer.stage("layout") as tell, one_thread():
+            drawn = not given.all()  # else nothing is left to draw
+            draw = self.model.sample_layout
+            found = draw(batch, generator=generator, progress=tell, **extra).to(None) if drawn else known
+        return [
+            rounded_boxes(graph, Boxes(found.size[rows], found.position[rows] + centre, found.yaw[rows]))
+            for rows in np.arange(count * len(nodes)).reshape(count, -1)
+        ]
 
-def sample_boxes(
-    model: RoomModel, graph: SceneGraph, draws: Draws, *, count: int = 1, timer: StageTimer
-) -> list[Boxes]:
-    """So many drafts at once from the layout branch, in the room's frame; what the graph fixes comes back."""
-    centre, nodes = floor_centre(graph), graph.nodes
-    batch = GraphBatch.pack([graph_batch(graph)] * count)
-    given = np.array([None not in (n.size, n.position, n.yaw) for n in nodes] * count)
-    known = Boxes.cat([Boxes(
-        np.array([n.size or (1.0, 1.0, 1.0) for n in nodes], np.float32),
-        np.array([n.position or (0.0, 0.0, 0.0) for n in nodes], np.float32) - centre,
-        np.array([n.yaw or 0.0 for n in nodes], np.float32),
-    )] * count)  # fmt: skip
-    extra: dict[str, Any] = {"known": known, "known_mask": given} if given.any() else {}
-    if draws.steps is not None:
-        extra["steps"] = draws.steps
-    if not draws.guided and isinstance(model, EchoModel):
-        extra["relation_guidance"] = 0.0
-    if draws.change is not None:
-        extra["edit"] = repeated(draws.change, len(nodes), count)
-    generator = seeded(draws.seed, "layout", draws.number)
-    with timer.stage("layout") as tell, one_thread():
-        drawn = not given.all()  # else nothing is left to draw
-        found = model.sample_layout(batch, generator=generator, progress=tell, **extra).to(None) if drawn else known
-    return [
-        rounded_boxes(graph, Boxes(found.size[rows], found.position[rows] + centre, found.yaw[rows]))
-        for rows in np.arange(count * len(nodes)).reshape(count, -1)
-    ]
+    def best(self, graph: SceneGraph, number: int = 0, sized: Boxes | None = None) -> tuple[Boxes, tuple[str, ...]]:
+        """The best of several drafts after place: kept relations first, then collisions, then the living rules.
 
+        Further drafts are drawn, a few at once, only where those before leave something to be wished for. Each is
+        searched in passing; what is left then is searched for in earnest, the best first and one of those that ended
+        alike, until the room's `POSES` are judged.
 
-def best_boxes(
-    model: RoomModel, graph: SceneGraph, styles: Mapping[str, str], draws: Draws, *, drafts: int = 1,
-    place: bool = True, sized: Boxes | None = None, proposed: bool = False, timer: StageTimer,
-) -> tuple[Boxes, tuple[str, ...]]:  # fmt: skip
-    """The best of several drafts after place: kept relations first, then collisions, then the living rules.
+        Arguments:
+            number: of the layout. sized: boxes whose sizes the graph states for all layouts.
+        """
+        best: tuple[Boxes, tuple[str, ...]] | None = None
+        worth: tuple[float, ...] = ()
+        ways, judged, budget = [(graph, DEFAULTS)], 0, POSES * max(1.0, self.drafts / DRAFTS)
+        # what a draft leaves to be wished for, its number, it, and the searches that were begun from it
+        left: list[tuple[tuple[float, ...], int, Boxes, dict[bytes, Arranged]]] = []
+        if self.proposed and graph.room.openings:  # which make way for the furniture of every other draft
+            bare = graph.with_room(openings=())
+            ways = [(graph, PlaceConfig(yields=OF_OPENINGS)), (bare, DEFAULTS)]
 
-    Further drafts are drawn, a few at once, only where those before leave something to be wished for. Each is searched
-    in passing; what is left then is searched for in earnest, the best first and one of those that ended alike, until
-    the room's `POSES` are judged.
+        def drawn() -> Iterator[tuple[int, Boxes, dict[bytes, Arranged], int]]:
+            for start, count in draft_rounds(self.drafts):
+                for draft in self.sampled(graph, number + start, count) if judged < budget * SHARE else ():
+                    ends = [wishes for wishes, *_ in left]
+                    if judged < budget * SHARE and max(map(ends.count, ends), default=0) < ALIKE:
+                        draft = draft if sized is None else Boxes(sized.size, draft.position, draft.yaw)
+                        yield len(left), draft, {}, 0 if self.drafts > 1 else DEFAULTS.anew
+            for _, rank, draft, begun in sorted({one[0]: one for one in left[::-1]}.values(), key=lambda one: one[0]):
+                yield rank, draft, begun, DEFAULTS.anew
 
-    Arguments:
-        draws: of the first draft. drafts: how many at most. sized: boxes whose sizes the graph states for all layouts.
-        proposed: nobody stated the openings, which may still be moved: what is in their way counts least.
-        others: as `sample_boxes` and `finished_boxes`.
-    """
-    best: tuple[Boxes, tuple[str, ...]] | None = None
-    worth: tuple[float, ...] = ()
-    ways, judged, budget = [(graph, DEFAULTS)], 0, POSES * max(1.0, drafts / DRAFTS)
-    # what a draft leaves to be wished for, its number, it, and the searches that were begun from it
-    left: list[tuple[tuple[float, ...], int, Boxes, dict[bytes, Arranged]]] = []
-    if proposed and graph.room.openings:  # which make way for the furniture of every other draft
-        bare = graph.with_room(openings=())
-        ways = [(graph, PlaceConfig(yields=OF_OPENINGS)), (bare, DEFAULTS)]
-
-    def drawn() -> Iterator[tuple[int, Boxes, dict[bytes, Arranged], int]]:
-        for start, count in draft_rounds(drafts):
-            by = replace(draws, number=draws.number + start, guided=not place)
-            for draft in sample_boxes(model, graph, by, count=count, timer=timer) if judged < budget * SHARE else ():
-                ends = [wishes for wishes, *_ in left]
-                if judged < budget * SHARE and max(map(ends.count, ends), default=0) < ALIKE:
-                    draft = draft if sized is None else Boxes(sized.size, draft.position, draft.yaw)
-                    yield len(left), draft, {}, 0 if drafts > 1 else DEFAULTS.anew
-        for _, number, draft, begun in sorted({one[0]: one for one in left[::-1]}.values(), key=lambda one: one[0]):
-            yield number, draft, begun, DEFAULTS.anew
-
-    for number, draft, begun, anew in drawn():
-        room, config = ways[number % len(ways)]
-        found, poses = finished_boxes(room, draft, styles, place, timer, replace(config, anew=anew), begun)
-        if drafts == 1 or not place:
-            return found
-        judged += poses
-        with timer.stage("place"), one_thread():
-            wishes = _wishes(graph, found, draws.seed if proposed else None)
-        if best is None or wishes < worth:
-            best, worth = found, wishes
-        left += [] if anew else [(wishes, number, draft, begun)]
-        if not any(worth) or (anew and judged > budget):
-            break
-    assert best is not None
-    return best
+        for rank, draft, begun, anew in drawn():
+            room, config = ways[rank % len(ways)]
+            found, poses = finished_boxes(room, draft, self.place, self.timer, replace(config, anew=anew), begun)
+            if self.drafts == 1 or not self.place:
+                return found
+            judged += poses
+            with self.timer.stage("place"), one_thread():
+                wishes = _wishes(graph, found, self.seed if self.proposed else None)
+            if best is None or wishes < worth:
+                best, worth = found, wishes
+            left += [] if anew else [(wishes, rank, draft, begun)]
+            if not any(worth) or (anew and judged > budget):
+                break
+        assert best is not None
+        return best
 
 
 def repeated(change: GraphEdit, nodes: int, count: int) -> GraphEdit:
@@ -193,10 +186,11 @@ def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int |
 
 
 def finished_boxes(
-    graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], place: bool, timer: StageTimer,
-    config: PlaceConfig = DEFAULTS, begun: dict[bytes, Arranged] | None = None,
+    graph: SceneGraph, boxes: Boxes, place: bool, timer: StageTimer, config: PlaceConfig = DEFAULTS,
+    begun: dict[bytes, Arranged] | None = None,
 ) -> tuple[tuple[Boxes, tuple[str, ...]], int]:  # fmt: skip
     """Sampled boxes, of equal sizes within style groups, placed if wanted, and demands in conflict; poses judged."""
+    styles = style_groups(graph)
     boxes = _alike(graph, _mounted(graph, boxes.to(None)), styles)
     if not place:
         return (rounded_boxes(graph, boxes), ()), 0

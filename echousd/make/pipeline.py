@@ -20,8 +20,7 @@ from echousd.graph.floors import check_doors, check_space, with_plan, with_wider
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
 from echousd.make.layouts import (
-    Draws,
-    best_boxes,
+    LayoutSearch,
     check_objects,
     model_of,
     most_drafts,
@@ -85,7 +84,7 @@ def generate(
     asked = (options or RoomOptions()).replaced(**given)
     timer = StageTimer(progress)
     file, beside, other = "", Path.cwd(), ""
-    seed, drafts, wishes = asked.seed, asked.drafts, partial(asked.wishes, outside)
+    seed, wishes = asked.seed, partial(asked.wishes, outside)
     if asked.assets:  # what is absent is told before any long work
         wishes()
     if asked.settle:
@@ -115,56 +114,42 @@ def generate(
         check_sources([shapes, *sources_of(graph, shapes).values()], echo)
     theirs = names_models(graph, shapes)
     pieces = given_pieces(graph, wishes, timer=timer) if theirs else Retrieved()
-    sizes = dict(pieces.sizes)
     with faults_of(file):
         check_doors(graph)
         graph, left_out = with_space(graph) if asked.fit == "drop" else (graph, ())
         crowded = check_space(graph)
     stated, graph = graph, with_plan(graph, seed)
-    drafts = drafts or most_drafts(echo, len(graph.nodes))
+    search = LayoutSearch(
+        echo, seed, timer, asked.steps, drafts=asked.drafts or most_drafts(echo, len(graph.nodes)), place=asked.place,
+        proposed=not stated.room.openings,
+    )  # fmt: skip
 
     def arranged(graph: SceneGraph) -> tuple[Boxes, tuple[str, ...]]:
-        styles = style_groups(graph)
-        return best_boxes(
-            echo, with_given_sizes(graph, sizes), styles, Draws(seed, steps=asked.steps), drafts=drafts,
-            place=asked.place, proposed=not stated.room.openings, timer=timer,
-        )  # fmt: skip
+        return search.best(with_given_sizes(graph, sizes))
 
-    def laid_out(graph: SceneGraph) -> tuple[SceneGraph, Boxes, tuple[str, ...], tuple[str, ...]]:
-        if asked.fit == "drop":
-            graph, (boxes, notes), more = fitted(graph, arranged)
-            return graph, boxes, notes, more
-        return graph, *arranged(graph), ()
-
-    graph, boxes, notes, more = laid_out(graph)
-    left_out = (*left_out, *more)
-    near = None
-    if "guided" in sources_of(graph, shapes).values():
-        near = shape_nearness(graph, boxes, shapes, wishes(), seed, echo, asked.steps, timer)
     models = pieces
-    if theirs:
-        models = retrieved(
-            graph, boxes, style_groups(graph), shapes, wishes, seed, pieces, near, palette=asked.palette, timer=timer
-        )
-    if models.sizes != sizes:  # real sizes shape the layout
-        sizes |= models.sizes
-        graph, boxes, notes, more = laid_out(graph)
-        left_out = (*left_out, *more)
-    styles = style_groups(graph)
+    for drawn in (False, True):
+        sizes = models.sizes
+        graph, (first, notes), more = fitted(graph, arranged) if asked.fit == "drop" else (graph, arranged(graph), ())
+        left_out, styles = (*left_out, *more), style_groups(graph)
+        if theirs and not drawn:
+            near = None
+            if "guided" in sources_of(graph, shapes).values():
+                near = shape_nearness(graph, first, shapes, wishes(), seed, echo, asked.steps, timer)
+            models = retrieved(
+                graph, first, styles, shapes, wishes, seed, pieces, near, palette=asked.palette, timer=timer
+            )
+        if models.sizes == sizes:  # else real ones shape the layout
+            break
     notes = (*left_out, *models.notes, *echo.unlearned(graph_batch(graph)), *notes)
-    layouts, sized = [boxes], with_sizes(graph, boxes)
-    for number in range(1, asked.layouts):
-        found, _ = best_boxes(
-            echo, sized, styles, Draws(seed, number, asked.steps), drafts=drafts, place=asked.place,
-            sized=boxes, proposed=not stated.room.openings, timer=timer,
-        )  # fmt: skip
-        layouts.append(found)
+    sized = with_sizes(graph, first)
+    layouts = [first, *(search.best(sized, number, first)[0] for number in range(1, asked.layouts))]
     plan = plan_boxes(layouts)
     if stated.room.extents is None:  # unplaced, or by weights that know of no floor, furniture may stand beyond
         graph = with_wider_floor(graph, footprints(*plan).reshape(-1, 2))
     if not stated.room.openings:
         graph = with_free_openings(graph, layouts, seed)
-    request = ShapeRequest(graph, boxes, styles, seed, echo, asked.steps, asked.faces, timer=timer, retrieved=models)
+    request = ShapeRequest(graph, first, styles, seed, echo, asked.steps, asked.faces, timer=timer, retrieved=models)
     made = mixed_shapes(request, shapes)
     floor = room_floor(graph, layouts)
     geometry = {name: made.geometry[owner] for name, owner in made.owners.items()}

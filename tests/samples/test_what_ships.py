@@ -25,7 +25,6 @@ from echousd.graph.floors import with_plan
 from echousd.make.layouts import finished_boxes
 from echousd.make.verdicts import layout_outcome
 from echousd.progress import StageTimer
-from echousd.shapes.styles import style_groups
 
 SAMPLES = sorted((Path(__file__).parents[2] / "samples").glob("*.usda"))
 SEEDS = (0, 1, 2)
@@ -114,7 +113,7 @@ def test_the_network_alone_draws_most_of_what_the_graph_says():
     for number, graph in enumerate(graphs):
         rows = batch.scene == number
         boxes = Boxes(found.size[rows], found.position[rows] + torch.from_numpy(floor_centre(graph)), found.yaw[rows])
-        (drawn, _), _ = finished_boxes(graph, boxes, style_groups(graph), False, StageTimer())
+        (drawn, _), _ = finished_boxes(graph, boxes, False, StageTimer())
         outcome = layout_outcome(graph, drawn)
         total += Counter(verdict.state for verdict in outcome.verdicts)
         hits += outcome.collisions

@@ -128,13 +128,13 @@ def test_rooms_that_want_further_drafts_are_the_same_whatever_was_ended(tmp_path
         lambda graph, found, proposed: (max(float(found[0].position[0, 0]) - limit[len(graph.nodes)], 0.0),),
     )
     further = []
-    sample = layouts.sample_boxes
+    sample = layouts.LayoutSearch.sampled
 
-    def noted(model, graph, draws, **how):
-        further.append((len(graph.nodes), how.get("count", 1)))
-        return sample(model, graph, draws, **how)
+    def noted(self, graph, number, count=1):
+        further.append((len(graph.nodes), count))
+        return sample(self, graph, number, count)
 
-    monkeypatch.setattr(layouts, "sample_boxes", noted)
+    monkeypatch.setattr(layouts.LayoutSearch, "sampled", noted)
     options, out = {**QUICK, "drafts": 5}, tmp_path / "run"
     batch(source, tmp_path / "calm", executor=Inline(), workers=1, **options)
     assert [row.get("error", "") for row in read_journals(tmp_path / "calm").values()] == [""] * 5

@@ -342,7 +342,7 @@ def test_lamps_that_are_told_to_be_near_something_low_hang_on_longer_cords():
     drawn = Boxes(size, np.array([(0, 0, 0), (0, 0, 1), (0, 2.4, 0)], np.float32), np.zeros(3, np.float32))
 
     def lamp(graph):
-        (boxes, _), _ = layouts.finished_boxes(graph, drawn, style_groups(graph), True, StageTimer())
+        (boxes, _), _ = layouts.finished_boxes(graph, drawn, True, StageTimer())
         return boxes.position[2, 1], boxes.size[2, 1]
 
     low, long = lamp(graph)
@@ -366,14 +366,14 @@ def searches(monkeypatch, faults, *, poses=100, **options):
     graph = graph.replaced(room=graph.room.replaced(size=(4.0, 3.4), floor_polygon=None, openings=(window,)))
     asked = []
 
-    def finished(graph, boxes, styles, place, timer, config, begun):
+    def finished(graph, boxes, place, timer, config, begun):
         before = begun.setdefault(b"size", len(asked))  # the number of the search that it goes on from
         asked.append((len(graph.room.openings), config.yields, config.anew, before))
         return (boxes, ()), poses
 
     monkeypatch.setattr(layouts, "finished_boxes", finished)
     monkeypatch.setattr(layouts, "_wishes", lambda *_: (faults[len(asked) - 1],))
-    layouts.best_boxes(StandIn(), graph, {}, layouts.Draws(seed=1), timer=StageTimer(), **options)
+    layouts.LayoutSearch(StandIn(), 1, StageTimer(), **options).best(graph)
     return asked
 
 
