@@ -39,7 +39,9 @@ HELD_OUT = 770_000  # seed of generated rooms that no training used
 UNTRAINED = ("random", "generator", "shuffled")
 HONEST = (*UNTRAINED, *(f"{name}+search" for name in UNTRAINED), "retrieval", "real")
 SYSTEMS = ("default", "network", "guided")
-SECTIONS = ("relations", "faults", "selection", "field", "realism", "pictures", "steps", "shapes", "physics")
+SECTIONS = (
+    "relations", "faults", "selection", "field", "realism", "pictures", "steps", "shapes", "physics", "repetition",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

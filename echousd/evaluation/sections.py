@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import warnings
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -11,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import torch
 import trimesh
+from pxr import Usd
 
 from echomodel.boxes import Boxes
 from echomodel.data.shapeset import ShapeSet
@@ -38,11 +41,14 @@ from echomodel.protocols import FurnitureModel, RoomModel, furnishes
 from echomodel.roomboxes import RoomBoxes
 from echomodel.tsdf import mesh_from_tsdf
 from echomodel.vocabulary import vocabulary
+from echousd.draw.drawables import read_drawables
 from echousd.evaluation.runs import Run, Table, figures, note, run_systems
 from echousd.evaluation.systems import System, networks, shuffled_model
+from echousd.make.finished import Room
 from echousd.stage.boxes import graph_of
+from echousd.stage.paths import DRESSING
 
-AGAIN, ALIKE = 1, 8  # added to the seed for a second layout of the same graph; rooms that are laid out twice
+AGAIN, TWICE = 1, 8  # added to the seed for a second layout of the same graph; rooms that are laid out twice
 OTHERS = "other rooms"  # of the source
 NAMES = {"inception": ("FID", "KID x 1000"), "clip": ("FID-CLIP",)}
 ROOMS: dict[str, tuple[str, ...]] = {  # of the paper: a living and dining room counts as both; all of them
@@ -51,7 +57,7 @@ ROOMS: dict[str, tuple[str, ...]] = {  # of the paper: a living and dining room 
 }  # fmt: skip
 LEAST, SHOWN = 4, 6  # rooms of a type that have a figure of their own; that are shown
 SWEPT = (2, 5, 10, 20, 50)  # steps of sampling
-SETTLED = 4  # rooms that are simulated
+SETTLED, DRESSED = 4, 50  # rooms that are simulated, that are dressed
 
 
 def relations(run: Run) -> list[Table]:
@@ -116,14 +122,14 @@ def field(run: Run) -> list[Table]:
     for name, rooms in run.made.items():
         for row, room in zip(scores[name], rooms, strict=True):
             row.update(body_scores(room, seed))
-    again, _ = run_systems(run.asked, run.tasks[:ALIKE], replace(run.settings, seed=seed + AGAIN))
+    again, _ = run_systems(run.asked, run.tasks[:TWICE], replace(run.settings, seed=seed + AGAIN))
     for name, others in again.items():
         for row, one, other in zip(scores[name], run.made[name], others, strict=False):
             row["diversity, m"] = layout_distance(one, other), 1.0
     columns = ["colliding", "rooms colliding", "out of bounds", "navigability", "clearance", "walkable", "fullness",
                "diversity, m"]  # fmt: skip
     rows = figures(scores, columns, seed, next(iter(scores)))
-    return [Table("field", "Collision, bounds, ways", note("field", alike=ALIKE), rows)]
+    return [Table("field", "Collision, bounds, ways", note("field", alike=TWICE), rows)]
 
 
 def realism(run: Run) -> list[Table]:
@@ -197,20 +203,14 @@ def steps(run: Run) -> list[Table]:
 
 def physics(run: Run) -> list[Table]:
     """Whole rooms as `generate` writes them, simulated for two seconds."""
-    from echousd.make.pipeline import generate
     from echousd.settle.settle import SettleUnavailable, settle
 
     chosen = [name for name in dict.fromkeys([run.asked[0].name, "random+search", "real"]) if name in run.made]
     scores: dict[str, list] = {name: [] for name in chosen}
     for name in chosen:
         for made in run.made[name][:SETTLED]:
-            room = replace(made, yaw=np.remainder(made.yaw, 2 * np.pi))
-            boxes = Boxes(*(torch.from_numpy(value).float() for value in (room.size, room.position, room.yaw)))
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of what boxes of others do not keep
-                whole = generate(graph_of(room, None), boxes=boxes, seed=run.settings.seed, dress="none")
             try:
-                moved = settle(whole.stage).motions
+                moved = settle(_generated(made, run.settings.seed, "none").stage).motions
             except SettleUnavailable as error:
                 run.missing.append(f"physical stability: {error}")
                 return []
@@ -222,6 +222,43 @@ def physics(run: Run) -> list[Table]:
     columns = ["at rest", "rooms at rest", "furthest, m"]
     rows = figures(scores, columns, run.settings.seed, chosen[0])
     return [Table("physics", "At rest", note("physics", rooms=SETTLED), rows)]
+
+
+PRINT, ALIKE = re.compile("(?:picture|rug|cushion)_.*"), 0.02  # how a print's material ends; of a shape's extents
+
+
+def repetition(run: Run) -> list[Table]:
+    """How often the same small thing is met in the rooms of a system, each dressed by a seed of its own."""
+    seed, rows = run.settings.seed, dict[str, dict[str, Figure]]()
+    for name in (name for name in dict.fromkeys([run.asked[0].name, "real"]) if name in run.made):
+        rooms = [things(_generated(room, seed + k, "full").stage) for k, room in enumerate(run.made[name][:DRESSED])]
+        met = Counter(thing for room in rooms for thing in room)
+        again = [(sum(met[thing] - 1 for thing in room) / max(len(rooms) - 1, 1), float(len(room))) for room in rooms]
+        most = {"different things": len(met), "rooms with the most frequent": max(met.values(), default=0)}
+        rows[name] = {"met again": figure(Counts.of(again), seed)} | {key: Figure(float(most[key])) for key in most}
+    return [Table("repetition", "Small things met again", note("repetition"), rows)]
+
+
+def things(stage: Usd.Stage) -> set[tuple[str, ...]]:
+    """The different small things of a room: label and prints, without prints the shape in a box of one metre."""
+    found = set[tuple[str, ...]]()
+    for mesh in (mesh for mesh in read_drawables(stage) if mesh.path.startswith(f"{DRESSING}/")):
+        prints = {name[0] for paint, _ in mesh.paints if (name := PRINT.search(paint.name))}
+        corners = mesh.triangles.reshape(-1, 3) - mesh.triangles.min((0, 1))
+        shape = np.round(corners / np.maximum(corners.max(0), 1e-6) / ALIKE).astype(int).tobytes()
+        found.add((mesh.category, *(sorted(prints) or [f"shape {hash(shape):x}"])))
+    return found
+
+
+def _generated(made: RoomBoxes, seed: int, dress: str) -> Room:
+    """A room as `generate` makes it around boxes."""
+    from echousd.make.pipeline import generate
+
+    room = replace(made, yaw=np.remainder(made.yaw, 2 * np.pi))
+    boxes = Boxes(*(torch.from_numpy(value).float() for value in (room.size, room.position, room.yaw)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what boxes of others do not keep
+        return generate(graph_of(room, None), boxes=boxes, seed=seed, dress=dress)
 
 
 def _scored(made: Mapping[str, Sequence[RoomBoxes]], of: Mapping[str, Sequence[Task]]) -> dict[str, list[dict]]:
@@ -372,5 +409,5 @@ def _set_clouds(folder: Path, count: int, seed: int) -> dict[str, np.ndarray]:
 
 RUNNERS: dict[str, Callable[[Run], list[Table]]] = {
     section.__name__: section
-    for section in (relations, faults, selection, field, realism, pictures, steps, shapes, physics)
+    for section in (relations, faults, selection, field, realism, pictures, steps, shapes, physics, repetition)
 }

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,14 @@ from echomodel.metrics.layouts import tasks_of
 from echomodel.roomboxes import write_rooms
 from echomodel.rooms.generator import generate_rooms
 from echousd.cli.main import run
-from echousd.evaluation import suite, systems
+from echousd.evaluation import sections, suite, systems
+from echousd.evaluation.runs import Run
+from echousd.evaluation.sections import things
 from echousd.evaluation.suite import SuiteSettings, run_systems
 from echousd.evaluation.systems import BASES, System, borrowed, finished
+from echousd.graph.nodes import Node, RoomSpec
+from echousd.graph.scene import SceneGraph
+from echousd.make.pipeline import generate
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +39,8 @@ def quick(monkeypatch):
     monkeypatch.setattr("echousd.evaluation.sections.PUBLISHED", ("wardrobe", "nightstand"))
     monkeypatch.setattr("echousd.evaluation.sections.CONSISTENT", ("wardrobe",))
     monkeypatch.setattr("echousd.evaluation.sections.SWEPT", (2, 4))
-    monkeypatch.setattr("echousd.evaluation.sections.SETTLED", 1)
+    for few in ("SETTLED", "DRESSED"):
+        monkeypatch.setattr(f"echousd.evaluation.sections.{few}", 1)
 
 
 def test_every_table_holds_the_honest_rows_and_two_runs_are_equal(rooms, tmp_path, quick, capsys):
@@ -138,6 +145,26 @@ def test_half_chooses_by_one_half_of_the_terms_alone(rooms, monkeypatch):
     monkeypatch.setattr(systems, "searched", lambda task, draft, config: seen.append(config.without) or draft)
     assert finished(System.parse("random+half"), task, drafts).id == "better"
     assert seen == [systems.HALVES[1]] * 2
+
+
+def test_repetition_is_the_share_of_other_rooms_that_hold_the_same(rooms, monkeypatch):
+    held = [{("cup", "a"), ("rug", "b")}, {("cup", "a")}, {("cup", "a"), ("rug", "c")}]
+    monkeypatch.setattr(sections, "_generated", lambda room, seed, dress: SimpleNamespace(stage=seed))
+    monkeypatch.setattr(sections, "things", lambda stage: held[stage])
+    run = Run(SuiteSettings(), [System.parse("random")], [], [], {"random": rooms[:3]}, {}, {})
+    row = sections.repetition(run)[0].rows["random"]
+    assert row["met again"].value == pytest.approx(3 / 5)  # of five things the cup, in all other rooms
+    assert row["different things"].value == 3
+    assert row["rooms with the most frequent"].value == 3
+
+
+def test_small_things_are_told_apart_by_prints_and_shapes_not_by_colours():
+    chair = SceneGraph(room=RoomSpec(type="bedroom", size=(4.0, 3.5)), nodes=(Node("bed", "double_bed"),))
+    one, again, other = (things(generate(chair, seed=seed, palette=palette).stage) for seed, palette in
+                         ((3, "oak"), (3, "ink"), (4, "oak")))  # fmt: skip
+    assert one == again
+    assert {word for word, *_ in one} & {word for word, *_ in other}
+    assert len(one & other) < len(one) / 2
 
 
 def test_workers_change_nothing(rooms):
