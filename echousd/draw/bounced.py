@@ -27,15 +27,14 @@ class Bounced:
         shape = np.maximum(np.ceil((high - low) / CELL), 1).astype(int)
         return cls(low.astype(np.float32), shape, np.zeros((6 * shape.prod(), 3), np.float32))
 
-    def rows(self, origin: np.ndarray, way: np.ndarray, far: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    def rows(self, origin: np.ndarray, way: np.ndarray, far: np.ndarray, axis: np.ndarray) -> np.ndarray:
         """(n,) int, the rows of `radiance` where rays, `origin` and `way` (n, 3), met surfaces after `far` (n,) metres.
 
-        `normal`: (n, 3) of the surfaces, on either side of them.
+        `axis`: (n,) int, along which of them the surfaces look.
         """
-        axis = np.abs(normal).argmax(1)
-        side = 2 * axis + (way[np.arange(len(way)), axis] < 0)
+        side = 2 * axis + (way.ravel().take(np.arange(0, way.size, 3) + axis) < 0)
         before = origin + np.maximum(far - 0.05, 0)[:, None] * way - self.low
-        x, y, z = np.clip((before / CELL).astype(int), 0, self.shape - 1).T
+        x, y, z = (np.clip((at / CELL).astype(int), 0, many - 1) for at, many in zip(before.T, self.shape, strict=True))
         return np.asarray(((x * self.shape[1] + y) * self.shape[2] + z) * 6 + side)
 
     def lit(self, rows: np.ndarray, thrown: np.ndarray) -> Bounced:

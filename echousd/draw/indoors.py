@@ -96,9 +96,9 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
 
 def _out_of_focus(view: np.ndarray) -> np.ndarray:
     """What lies around (h, w, 3), uint8, as it is behind a room that is in focus: soft, and in a little haze."""
-    from PIL import Image, ImageFilter
+    from PIL import Image
 
-    soft = Image.fromarray(view).filter(ImageFilter.BoxBlur(BLURRED * view.shape[1] / 360))
+    soft = Image.fromarray(view).reduce(max(1, round(2 * BLURRED * view.shape[1] / 360)))  # between its pixels it is
     return np.asarray(Image.blend(soft, Image.merge("RGB", [soft.convert("L")] * 3), HAZE))
 
 

@@ -62,14 +62,9 @@ def _showing(path: str | Path, layout: int | str | None, light: str | None) -> I
 
 
 def render_cameras(
-    path: str | Path,
-    *,
-    size: int = 512,
-    colors: str = "materials",
-    rays: int = FINE,
-    layout: int | str | None = None,
-    light: str | None = None,
-) -> dict[str, Image.Image]:
+    path: str | Path, *, size: int = 512, colors: str = "materials", rays: int = FINE,
+    layout: int | str | None = None, light: str | None = None,
+) -> dict[str, Image.Image]:  # fmt: skip
     """A picture of the room in a file through each of its cameras, by the camera's name; see `render`.
 
     Raises ValueError as `render` does, and where the stage holds no camera.

@@ -11,7 +11,7 @@ import numpy as np
 from pxr import Usd
 
 from echomodel.boxes2d import upright_box
-from echomodel.triangles import area_normals
+from echomodel.triangles import area_normals, box
 from echousd.draw.drawables import Drawable, Paint, image_of, read_drawables
 from echousd.draw.indoors import Lights, read_lights
 from echousd.draw.sight import Furniture
@@ -85,6 +85,11 @@ class Scenery:
         return int(level.argmax()), int(upright.argmax())
 
     @cached_property
+    def axis(self) -> np.ndarray:
+        """(f,) int, along which axis each face looks most."""
+        return np.abs(self.normals[:, 0]).argmax(1)
+
+    @cached_property
     def material(self) -> np.ndarray:
         """(f,) float32, a number that differs where colour, glow or texture do."""
         return (self.flat_colors @ MIXED + 3 * self.emissive @ MIXED + self.texture).astype(np.float32)
@@ -103,13 +108,14 @@ class Scenery:
 
         It is that of an image reduced until its pixels are so wide: finer ones would flicker ("mip map").
         """
-        out, texture = self.flat_colors[face], self.texture[face]
-        level = np.clip(np.log2(np.maximum(breadth * self.texels[face], 1)), 0, SMALLEST).astype(np.int8)
+        out, texture = self.flat_colors.take(face, 0), self.texture.take(face)
+        level = np.clip(np.log2(np.maximum(breadth * self.texels.take(face), 1)), 0, SMALLEST).astype(np.int8)
         for number, (_, tint) in enumerate(self.images):
             own = np.flatnonzero(texture == number)
-            for halved in np.unique(level[own]).tolist():
-                here = own[level[own] == halved]
-                out[here] = between(self.reduced(number, halved), st[here, 0], 1 - st[here, 1]) * tint
+            for halved in np.flatnonzero(np.bincount(level.take(own))).tolist():
+                here = own[level.take(own) == halved]
+                right, up = st.take(here, 0).T
+                out[here] = between(self.reduced(number, halved), right, 1 - up) * tint
         return out
 
     @cached_property
@@ -131,12 +137,14 @@ def between(image: np.ndarray, right: np.ndarray, down: np.ndarray) -> np.ndarra
         (first + k).astype(np.int32) % n for first, n in ((column, width), (row, height)) for k in (0, 1)
     )
     first, second = (
-        (1 - x) * LINEAR[pixels[line * width + left]] + x * LINEAR[pixels[line * width + right]]
+        (1 - x) * LINEAR.take(pixels.take(line * width + left, 0))
+        + x * LINEAR.take(pixels.take(line * width + right, 0))
         for line in (above, below)
     )
     return (1 - y) * first + y * second
 
 
+@cache
 def class_color(category: str) -> tuple[float, float, float]:
     """One linear colour per word, spread around the colour circle, the same in every run."""
     from echomodel.vocabulary import vocabulary
@@ -257,6 +265,5 @@ def _hang(parts: list[dict[str, np.ndarray]], hung: list[int], count: int) -> No
 def _box(mesh: Drawable) -> np.ndarray:
     """(7,) float: size and bottom centre in metres and yaw of the upright box around a mesh, with its own heading."""
     points, turn = mesh.triangles.reshape(-1, 3), mesh.world[:3, :3]
-    corners = np.stack(np.meshgrid(*np.stack([points.min(0), points.max(0)], 1)), -1).reshape(-1, 3)
-    size, bottom, yaw = upright_box(corners @ turn.T + mesh.world[:3, 3], turn)
-    return np.concatenate([size, bottom, [yaw]])
+    corners = box(points.min(0), points.max(0)).vertices
+    return np.hstack(upright_box(corners @ turn.T + mesh.world[:3, 3], turn))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -62,7 +62,7 @@ def _drawn(world: World, height: int, rays: int) -> np.ndarray:
     color = seen.glow.copy()
     everywhere = np.flatnonzero(seen.face >= 0)
     for met in (everywhere[start : start + BLOCK] for start in range(0, len(everywhere), BLOCK)):
-        color[met] = _colored(world, seen.of(met), light[met])
+        color[met] = _colored(world, seen.of(met), light.take(met, 0))
     own = everywhere[world.scenery.emissive[seen.face[everywhere]].sum(1) == 0]  # no lamp, and nothing outside
     tone = exposure(color[own] if len(own) else color, world.white, world.scenery.lights.day)
     tone = tone if world.view.inside else rolled
@@ -85,7 +85,7 @@ def _softened(picture: np.ndarray) -> np.ndarray:
 
 
 BLOCK = 32_000  # rays at a time, which bounds the memory and stays in the cache
-BAND = 32  # rows of a picture at a time, for the same reasons
+BAND = 64  # rows of a picture at a time, for the same reasons
 RINGS = (1, 2, 4, 8)  # places between neighbours, pass by pass
 # Pixels to the right and down, near ones first.
 BESIDE = np.array(sorted(product(range(-2, 3), repeat=2), key=lambda at: at[0] ** 2 + at[1] ** 2)[:13])
@@ -124,9 +124,9 @@ class Seen(NamedTuple):
     glow: np.ndarray
     material: np.ndarray
 
-    def of(self, rows: Any) -> Seen:
-        """Those of some rays."""
-        return Seen(*(value[rows] for value in self))
+    def of(self, rows: np.ndarray) -> Seen:
+        """Those of some rays, by their numbers: `take` is four times as fast as an index is."""
+        return Seen(*(value.take(rows, 0) for value in self))
 
 
 def _rays(world: World, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -153,10 +153,11 @@ def _met(
         origin, direction = _rays(world, rows % world.size + place[0], rows // world.size + place[1])
         hit = world.scene.run(_f32(origin), _f32(direction), output=1)
         if first is not None:
-            new = np.flatnonzero(hit["primID"] != first.face[rows])
-            origin, direction, rows, hit = origin[new], direction[new], rows[new], {key: hit[key][new] for key in KEPT}
+            new = np.flatnonzero(hit["primID"] != first.face.take(rows))
+            origin, direction, rows = (each.take(new, 0) for each in (origin, direction, rows))
+            hit = {key: hit[key].take(new) for key in KEPT}
         part = _seen(world, origin, direction, hit)
-        mirror = np.flatnonzero((part.face >= 0) & (world.scenery.gloss[part.face] > MIRROR))
+        mirror = np.flatnonzero((part.face >= 0) & (world.scenery.gloss.take(part.face) > MIRROR))
         if len(mirror):  # who looks into a mirror sees what is before it
             way = direction[mirror] - 2 * _dot(direction[mirror], part.normal[mirror])[:, None] * part.normal[mirror]
             origin = part.point[mirror] + BEFORE * part.normal[mirror]
@@ -164,8 +165,8 @@ def _met(
             for own, other in zip(part, before, strict=True):
                 own[mirror] = other
         if first is not None:
-            differs = _other(part, first.of(rows))
-            part, rows = part.of(differs), rows[differs]
+            differs = np.flatnonzero(_other(part, first.of(rows)))
+            part, rows = part.of(differs), rows.take(differs)
         parts.append(part)
         pixels.append(rows)
     return np.concatenate(pixels), Seen(*map(np.concatenate, zip(*parts, strict=True)))
@@ -178,10 +179,10 @@ def _other(one: Seen, two: Seen) -> np.ndarray:
 
 def _at_edges(seen: Seen, shape: tuple[int, int]) -> np.ndarray:
     """(n,) bool of a picture's pixels: whether another surface is seen beside them, or beside their neighbours."""
-    seen, out = Seen(*(value.reshape(*shape, *value.shape[1:]) for value in seen)), np.zeros(shape, bool)
+    values, out = [value.reshape(*shape, *value.shape[1:]) for value in seen], np.zeros(shape, bool)
     across = (slice(None), slice(None, -1)), (slice(None), slice(1, None))
     for one, two in (across, (slice(None, -1), slice(1, None))):
-        differs = _other(seen.of(one), seen.of(two))
+        differs = _other(*(Seen(*(value[part] for value in values)) for part in (one, two)))
         out[one] |= differs
         out[two] |= differs
     wide = np.pad(out, 1)
@@ -193,18 +194,18 @@ def _seen(world: World, origin: np.ndarray, direction: np.ndarray, hit: Mapping[
     scenery, face = world.scenery, hit["primID"]
     missed = np.flatnonzero(face < 0)
     glow = np.zeros((len(face), 3), np.float32)
-    glow[missed], through = outside(scenery, origin[missed], direction[missed])
+    glow[missed], through = outside(scenery, origin.take(missed, 0), direction.take(missed, 0))
     if world.view.inside:
         glow *= np.float32(VIEW * scenery.lights.sky) * scenery.lights.tint
         if len(past := missed[~through]):
             glow[past] = _next_room(world, origin[past], direction[past])
     u, v, far = (np.where(face < 0, np.float32(0), hit[key]) for key in ("u", "v", "tfar"))
     bary = np.stack([1 - u - v, u, v], 1)
-    normal = _unit(np.einsum("ncx,nc->nx", scenery.normals[face], bary))
+    normal = _unit(np.einsum("ncx,nc->nx", scenery.normals.take(face, 0), bary))
     normal[_dot(normal, direction) > 0] *= -1
     point = origin + far[:, None] * direction
-    st = np.einsum("ncx,nc->nx", scenery.st[face], bary)
-    return Seen(face, point, normal, st, glow, np.where(face < 0, NOTHING, scenery.material[face]))
+    st = np.einsum("ncx,nc->nx", scenery.st.take(face, 0), bary)
+    return Seen(face, point, normal, st, glow, np.where(face < 0, NOTHING, scenery.material.take(face)))
 
 
 def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndarray:
@@ -212,9 +213,9 @@ def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndar
     free the place is of what stands near, see `CREVICE`, and the share of the sun that shines there."""
     view, out = world.view, np.zeros((len(pixel), 6), np.float32)
     for rows in (slice(start, start + BLOCK) for start in range(0, len(pixel), BLOCK)):
-        point, normal = seen.point[rows], seen.normal[rows]
+        point, normal, gloss = seen.point[rows], seen.normal[rows], world.scenery.gloss.take(seen.face[rows])
         toward = np.broadcast_to(view.matrix[:3, 2], point.shape) if view.orthographic else view.matrix[:3, 3] - point
-        hits = Hits(point + BEFORE * normal, normal, _unit(toward.astype("f4")), world.scenery.gloss[seen.face[rows]])
+        hits = Hits(point + BEFORE * normal, normal, _unit(toward.astype("f4")), gloss)
         shift = _shifts(world, pixel[rows])
         for sample in range(samples):
             out[rows] += _light(world, hits, sample, shift)
@@ -224,7 +225,8 @@ def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndar
 def _shifts(world: World, pixel: np.ndarray) -> np.ndarray:
     """(n, 4) float32 what samples in some pixels are moved by."""
     across, down = pixel[:, None] % world.size, pixel[:, None] // world.size
-    return ((across * LATTICE[0] + down * LATTICE[1] + world.shift) % 1.0).astype(np.float32)
+    moved = across * LATTICE[0] + down * LATTICE[1] + world.shift
+    return (moved - np.floor(moved)).astype(np.float32)
 
 
 def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, often: int, seldom: int) -> np.ndarray:
@@ -247,12 +249,16 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
         found[..., layers] = smooth_light(found[..., layers], normal[coarse], point[coarse], rings)
     lit = smooth_light((found[..., 5:] > 0).astype(np.float32), normal[coarse], point[coarse], RINGS[:1])
     mixed = ((lit > 0.01) & (lit < 0.99))[..., 0].repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
-    weight = np.zeros((*shape, 1), np.float32)
-    for steps in product((0, 1), repeat=2):  # of up to four that were asked around it, those of its own surface
-        beside = np.ix_(*(np.arange(s, n + s).clip(0, n - 1) // 2 for n, s in zip(shape, steps, strict=True)))
-        fits = (asked[beside] & _same(normal, point, normal[coarse][beside], point[coarse][beside]))[..., None]
-        light += fits * found[beside]
-        weight += fits
+    weight, more = np.zeros((*shape, 1), np.float32), ((0, 1), (0, 1), (0, 0))
+    known = [np.pad(each, more, "edge") for each in (asked[..., None], normal[coarse], point[coarse], found)]
+    for odd in product((0, 1), repeat=2):  # of the one, two or four that were asked around it, those of its own surface
+        here = tuple(slice(each, None, 2) for each in odd)
+        for steps in product(*(range(each + 1) for each in odd)):
+            beside = tuple(slice(step, step + many) for step, many in zip(steps, light[here].shape, strict=False))
+            there, *surface, lent = (each[beside] for each in known)
+            fits = there & _same(normal[here], point[here], *surface)[..., None]
+            light[here] += fits * lent
+            weight[here] += fits
     light /= np.maximum(weight, 1)
     rest = np.flatnonzero(met & (weight[..., 0] == 0))
     light.reshape(-1, 6)[rest] = _pooled(seen.of(rest), _asked(world, seen.of(rest), rest, often // 2))
@@ -282,19 +288,17 @@ def _pooled(seen: Seen, light: np.ndarray) -> np.ndarray:
 
 def _same(normal: np.ndarray, point: np.ndarray, other_normal: np.ndarray, other_point: np.ndarray) -> np.ndarray:
     """Whether points lie on one flat piece of surface, (...) bool of (..., 3)."""
-    turn = np.einsum("...x,...x->...", normal, other_normal)
-    return (turn > ALIKE) & (np.abs(np.einsum("...x,...x->...", normal, point - other_point)) < FLAT)
+    return (_dot(normal, other_normal) > ALIKE) & (np.abs(_dot(normal, point - other_point)) < FLAT)
 
 
 def _lent(world: World, met: Seen, pixel: np.ndarray, seen: Seen, light: np.ndarray) -> np.ndarray:
     """(n, 6) light of what further rays in some pixels met: that of the same surface there or beside it, else asked."""
     out, wanted = np.zeros((len(pixel), 6), np.float32), np.arange(len(pixel))
     for apart in BESIDE @ (1, world.size):
-        other = np.clip(pixel[wanted] + apart, 0, len(light) - 1)
-        fits = (seen.face[other] >= 0) & _same(
-            met.normal[wanted], met.point[wanted], seen.normal[other], seen.point[other]
-        )
-        out[wanted[fits]] = light[other[fits]]
+        other = np.clip(pixel.take(wanted) + apart, 0, len(light) - 1)
+        own = met.normal.take(wanted, 0), met.point.take(wanted, 0)
+        fits = (seen.face.take(other) >= 0) & _same(*own, seen.normal.take(other, 0), seen.point.take(other, 0))
+        out[wanted[fits]] = light.take(other[fits], 0)
         wanted = wanted[~fits]
     rest, pixel = met.of(wanted), pixel[wanted]
     out[wanted] = _pooled(rest, _asked(world, rest, pixel, 1))
@@ -307,9 +311,9 @@ def _colored(world: World, seen: Seen, light: np.ndarray) -> np.ndarray:
     color = scenery.colors(seen.face, seen.st, _breadth(world, seen))
     sun = light[:, 5:] * world.sun
     fallen = (light[:, :3] * light[:, 4:5] ** np.float32(DEPTH) + sun) * evened(light[:, :3] + sun, world.white)
-    emissive = scenery.emissive[seen.face]
+    emissive = scenery.emissive.take(seen.face, 0)
     glow = light[:, 3:4] + emissive
-    if len(metal := np.flatnonzero(scenery.gloss[seen.face] > METAL)):
+    if len(metal := np.flatnonzero(scenery.gloss.take(seen.face) > METAL)):
         glow[metal] *= color[metal]
         fallen[metal] *= MATT
     if len(shade := np.flatnonzero(emissive.any(1))):
@@ -342,37 +346,26 @@ def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, rings
     Far passes leave out what is much lighter or darker, so that shadows keep their edges. `normal`, `point`: (h, w, 3)
     of the surface.
     """
-    height, width = light.shape[:2]
+    light, normal, point = (np.ascontiguousarray(each.transpose(2, 0, 1)) for each in (light, normal, point))
+    _, height, width = light.shape
     for apart in rings:  # passes with ever wider holes reach far with few neighbours ("a trous")
-        edge = ((0, 0), (apart, apart), (apart, apart))
-        padded = [np.pad(a.transpose(2, 0, 1), edge, mode="edge") for a in (light, normal, point)]
-        light = np.empty((height, width, light.shape[2]), np.float32)
-        for rows in (slice(top, min(top + BAND, height)) for top in range(0, height, BAND)):
-            light[rows] = _smoothed(rows, width, apart, padded).transpose(1, 2, 0)
-    return light
-
-
-def _smoothed(rows: slice, width: int, apart: int, padded: Sequence[np.ndarray]) -> np.ndarray:
-    """(c, rows, w) the light of some rows after one pass; `padded`: light, normals and points with an edge around."""
-
-    def shifted(down: int, across: int) -> Iterator[np.ndarray]:
-        return (a[:, rows.start + down : rows.stop + down, across : across + width] for a in padded)
-
-    light, normal, point = shifted(apart, apart)
-    here, total = along(normal, point), np.zeros(light.shape, np.float32)
-    weight, bright = np.zeros_like(here), light.mean(0) if apart > CLOSE else None
-    for down, across in product((0, apart, 2 * apart), repeat=2):
-        other_light, other_normal, other_point = shifted(down, across)
-        turn = np.clip(along(normal, other_normal), 0, 1)
-        step = np.abs(along(normal, other_point) - here)
-        for _ in range(5):  # to the 32nd power
-            turn *= turn
-        share = turn * (step < 0.02)
-        if bright is not None:
-            share /= 1 + np.square((other_light.mean(0) - bright) / (EVEN * bright + 1e-4)) ** 2
-        total += share * other_light
-        weight += share
-    return np.where(weight > 1e-6, total / np.maximum(weight, 1e-6), light)
+        total, weight, bright = light.copy(), np.ones((height, width), np.float32), light.mean(0)
+        # what two share they give each other: half of all eight are met
+        for down, across in ((0, apart), (apart, -apart), (apart, 0), (apart, apart)):
+            for top in range(0, height - down, BAND):
+                bottom, left, right = min(top + BAND, height - down), max(-across, 0), width - max(across, 0)
+                here = np.s_[..., top:bottom, left:right]
+                there = np.s_[..., top + down : bottom + down, left + across : right + across]
+                share = np.maximum(along(normal[here], normal[there]), 0) ** 32
+                share *= np.abs(along(normal[here], point[there] - point[here])) < FLAT
+                for one, other in ((here, there), (there, here)):
+                    part = share
+                    if apart > CLOSE:
+                        part = share / (1 + np.square((bright[other] - bright[one]) / (EVEN * bright[one] + 1e-4)) ** 2)
+                    total[one] += part * light[other]
+                    weight[one] += part
+        light = total / weight
+    return np.ascontiguousarray(light.transpose(1, 2, 0))
 
 
 ABOVE = np.array([0.38, 0.84, 0.32], np.float32) / np.float32(0.9759)
@@ -454,13 +447,13 @@ def _light(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarr
 def _mirrored(world: World, hits: Hits, square: np.ndarray) -> np.ndarray:
     """(n,) how bright the windows, lamps and walls are that glossy points mirror to the eye, by `square` (n, 2)."""
     out, some = np.zeros(len(hits.point), np.float32), np.flatnonzero(hits.gloss > GLOSSY)
-    point, normal, toward, gloss = (each[some] for each in hits)
+    point, normal, toward, gloss = (each.take(some, 0) for each in hits)
     facing, rough = np.clip(_dot(toward, normal), 0, 1), np.clip(1 - 2 * gloss, 0, 1)
-    way = _unit(2 * facing[:, None] * normal - toward + (BLUR * rough**2)[:, None] * _on_sphere(square[some]))
+    way = _unit(2 * facing[:, None] * normal - toward + (BLUR * rough**2)[:, None] * _on_sphere(square.take(some, 0)))
     hit, scenery = world.scene.run(_f32(point), _f32(way), output=1), world.scenery
     face = np.maximum(hit["primID"], 0)
-    rows = world.thrown.rows(point, way, np.minimum(hit["tfar"], 100), scenery.normals[face, 0])
-    within = (world.thrown.radiance[rows] + scenery.emissive[face] * world.glow) @ LUMA
+    rows = world.thrown.rows(point, way, np.minimum(hit["tfar"], 100), scenery.axis.take(face))
+    within = (world.thrown.radiance.take(rows, 0) + scenery.emissive.take(face, 0) * world.glow) @ LUMA
     sky = np.float32(VIEW * scenery.lights.sky) * np.clip(0.65 + 1.4 * way[:, 1], 0.3, 1)
     share = np.where(gloss > METAL, 1, 0.04 + (0.96 - rough) * (1 - facing) ** 5)  # Schlick's, of Fresnel's law
     out[some] = share * np.where(hit["primID"] < 0, sky, within)
@@ -490,7 +483,7 @@ def _direct(world: World, hits: Hits, spot: np.ndarray, turn: np.ndarray) -> tup
         facing = np.clip(_dot(normal, way), 0, None) * len(lights.bulbs) / (away**2 + OWN**2)
         own = np.maximum(OWN, np.ptp(lights.bulbs, axis=1).max(-1))[which]  # what is so near is its shade
         lit = _free(scene, point, way, away - own, facing > 0) * facing
-        light += lit[:, None] * lights.power[which] / np.float32(np.pi)
+        light += lit[:, None] * lights.power.take(which, 0) / np.float32(np.pi)
     return light, _sunny(world, point, normal, spot)
 
 
@@ -509,11 +502,14 @@ def _gathered(world: World, hits: Hits, square: np.ndarray) -> np.ndarray:
     """(n, 4) what surfaces throw on points by one ray each, which goes to `square` (n, 2), and shares of `CREVICE`."""
     way = _unit(hits.normal + _on_sphere(square))  # cosine-weighted
     other = world.scene.run(_f32(hits.point), _f32(way), output=1)
-    normal = world.scenery.normals[np.maximum(other["primID"], 0), 0]
-    rows = world.thrown.rows(hits.point, way, np.minimum(other["tfar"], 100), normal)
-    thrown, missed = world.thrown.radiance[rows], np.flatnonzero(other["primID"] < 0)
-    thrown[missed] = 0 if world.view.inside else (0.92 + 0.35 * way[missed, 1:2]) * SKY_LIGHT
-    free, pale = np.clip(other["tfar"] / CREVICE, 0, 1), PALE * world.scenery.flat_colors[other["primID"]] @ LUMA
+    axis = world.scenery.axis.take(other["primID"])
+    rows = world.thrown.rows(hits.point, way, np.minimum(other["tfar"], 100), axis)
+    thrown, missed = world.thrown.radiance.take(rows, 0), np.flatnonzero(other["primID"] < 0)
+    thrown[missed] = 0 if world.view.inside else (0.92 + 0.35 * way.take(missed, 0)[:, 1:2]) * SKY_LIGHT
+    free, pale = (
+        np.clip(other["tfar"] / CREVICE, 0, 1),
+        PALE * world.scenery.flat_colors.take(other["primID"], 0) @ LUMA,
+    )
     return np.column_stack([thrown, free + (1 - free) * pale])
 
 
@@ -535,7 +531,14 @@ def _lit(world: World) -> World:
         origin, way, face, far = origin[there], way[there], hit["primID"][there], hit["tfar"][there]
         normal = -np.sign(_dot(normals[face], way))[:, None] * normals[face]
         point = origin + far[:, None] * way + BEFORE * normal
-        met.append((point, normal, world.thrown.rows(origin, way, far, normal), world.scenery.flat_colors[face]))
+        met.append(
+            (
+                point,
+                normal,
+                world.thrown.rows(origin, way, far, world.scenery.axis[face]),
+                world.scenery.flat_colors[face],
+            )
+        )
         if not len(there):
             return world  # with nothing in the picture
     point, normal, rows, albedo = (np.concatenate(values) for values in zip(*met, strict=True))
@@ -568,12 +571,12 @@ def _free(scene: Any, point: np.ndarray, way: np.ndarray, away: np.ndarray, aske
     out[asked & (away <= 0.02)] = 1.0
     if len(ask):
         far = np.ascontiguousarray(away[ask] - 0.01, np.float32)
-        out[ask] = scene.run(_f32(point[ask]), _f32(way[ask]), dists=far, query="OCCLUDED") != 0
+        out[ask] = scene.run(_f32(point.take(ask, 0)), _f32(way.take(ask, 0)), dists=far, query="OCCLUDED") != 0
     return out
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.einsum("nx,nx->n", a, b)
+    return along(np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0))
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
@@ -582,7 +585,8 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 def _even(number: int, shift: np.ndarray) -> np.ndarray:
     """Point `number` of the R2 sequence, which fills the unit square evenly, moved by a shift per pixel."""
-    return (shift + R2 * (number + 1) % 1.0) % 1.0
+    moved = shift + R2 * (number + 1) % 1.0
+    return moved - np.floor(moved)  # four times as fast as a remainder
 
 
 def _on_sphere(square: np.ndarray) -> np.ndarray:

@@ -74,17 +74,9 @@ READERS = tuple(word for word in FORMATS if word not in ENDINGS)
 
 
 def export(
-    room: str | Path,
-    out: str | Path,
-    *,
-    reader: str | None = None,
-    arkit: bool = False,
-    force: bool = False,
-    search: Sequence[str | Path] = (),
-    layout: int | None = None,
-    physics: bool | None = None,
-    pictures: bool = True,
-) -> Path:
+    room: str | Path, out: str | Path, *, reader: str | None = None, arkit: bool = False, force: bool = False,
+    search: Sequence[str | Path] = (), layout: int | None = None, physics: bool | None = None, pictures: bool = True,
+) -> Path:  # fmt: skip
     """Write a room (any stage) as one file, or as the folder that one `reader` expects, and return what to open.
 
     Arguments:

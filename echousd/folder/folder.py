@@ -154,13 +154,9 @@ def check_writable(folder: Path) -> None:
 
 
 def write_together(
-    folder: Path,
-    files: Mapping[str, bytes],
-    *,
-    last: Iterable[str],
-    remove: Iterable[str],
+    folder: Path, files: Mapping[str, bytes], *, last: Iterable[str], remove: Iterable[str],
     kept: Mapping[str, str] | None = None,
-) -> list[str]:
+) -> list[str]:  # fmt: skip
     """Write all files of a room as one step and return the paths that changed.
 
     Files whose bytes are already there are not touched.
