@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import socket
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,8 +18,7 @@ LOCK = ".echousd.lock"
 POLL = 0.05  # seconds between two tries of one who waits
 SHORT = 100  # characters of a lock file that are told
 
-_held: dict[str, tuple[int, int, str]] = {}  # folder -> (thread, how often, for what)
-_guard = threading.Lock()
+_runs: dict[str, str] = {}  # folder -> for what this process has it
 
 
 @contextmanager
@@ -38,37 +36,22 @@ def locked(folder: Path, *, wait: bool = False, run: str = "") -> Iterator[bool]
 
     Raises ValueError that names the other writer, or says why nothing can be written.
     """
-    key, thread = os.path.realpath(folder), threading.get_ident()
-    with _guard:
-        owner, times, first = _held.get(key, (thread, 0, run))
-        if times and owner == thread:
-            _held[key] = (thread, times + 1, first)
-    if times and owner == thread:
-        try:
-            yield False
-        finally:
-            with _guard:
-                _held[key] = (thread, _held[key][1] - 1, first)
-        return
-    created = _create(folder)
-    lock = None
+    key, created, lock = os.path.realpath(folder), _create(folder), None
     try:
-        while lock is None:
-            lock = _take(folder)
-            if lock is None and not wait:
+        while (lock := _take(folder)) is None:
+            if not wait:
                 raise ValueError(f"{folder}: {owner_of(folder)} is writing it; try later, or wait for it (--wait)")
-            if lock is None:
-                time.sleep(POLL)
-                created += _create(folder)  # the other writer may have removed it with the last of its files
-        with _guard:
-            _held[key] = (thread, 1, run)
-        yield True
+            time.sleep(POLL)
+            created += _create(folder)  # the other writer may have removed it with the last of its files
+        outermost = lock.lock_counter == 1
+        _runs.setdefault(key, run)
+        yield outermost
     finally:
         if lock is not None:
-            with _guard:
-                _held.pop(key, None)
             try:
-                (folder / LOCK).unlink(missing_ok=True)  # before it is let go, so that nobody else's is removed
+                if lock.lock_counter == 1:
+                    _runs.pop(key, None)
+                    (folder / LOCK).unlink(missing_ok=True)  # before it is let go, so that nobody else's is removed
             finally:
                 lock.release()
         for place in created:
@@ -78,8 +61,7 @@ def locked(folder: Path, *, wait: bool = False, run: str = "") -> Iterator[bool]
 
 def run_of(folder: Path) -> str:
     """What this process has the folder for, "" where nobody said."""
-    with _guard:
-        return _held.get(os.path.realpath(folder), (0, 0, ""))[2]
+    return _runs.get(os.path.realpath(folder), "")
 
 
 def owner_of(folder: Path) -> str:
@@ -107,13 +89,13 @@ def _take(folder: Path) -> FileLock | None:
         raise ValueError(f"{path}: is a link; remove it, the lock is a file of the folder itself")
     if path.exists() and not path.is_file():
         raise ValueError(f"{path}: is no plain file; remove it")
-    lock = FileLock(path, timeout=0, thread_local=False)
+    lock = FileLock(os.path.realpath(path), timeout=0, is_singleton=True)  # one a thread, which counts its own blocks
     with telling(folder, then="; nothing was changed"):
         try:
             lock.acquire()
         except (Timeout, FileNotFoundError):  # or the folder was removed in between
             return None
-    if not isinstance(lock, SoftFileLock):  # which, on disks without locks, writes its own owner
+    if lock.lock_counter == 1 and not isinstance(lock, SoftFileLock):  # which writes its own owner
         told = f"process {os.getpid()} on {socket.gethostname()[:40]} (since {time.strftime('%H:%M:%S')})"
         with contextlib.suppress(OSError):  # of a full disk, which what comes next meets, too
             path.write_text(told, encoding="ascii", errors="replace")
