@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import trimesh
+from trimesh.intersections import slice_mesh_plane
+from trimesh.util import append_faces
 
 from echomodel.arrays import on_device
 from echomodel.boxes import Boxes
@@ -222,42 +224,9 @@ def cut(mesh: trimesh.Trimesh, axis: int, offset: float) -> trimesh.Trimesh:
 
     Vertices within 2 mm are moved onto the plane first, so that no slivers appear.
     """
-    vertices, faces = np.array(mesh.vertices), np.asarray(mesh.faces)
-    span = vertices[:, axis].max() - vertices[:, axis].min()
+    vertices = np.array(mesh.vertices)
     distance = vertices[:, axis] - offset
-    near = np.abs(distance) < min(0.002, 0.01 * span)
-    vertices[near, axis] = offset
-    side = np.where(near, 0, np.sign(distance)).astype(int)
-    corner = side[faces]
-    crossing = (corner.min(1) < 0) & (corner.max(1) > 0)
-    if not crossing.any():
-        return trimesh.Trimesh(vertices, faces, process=False)
-    kept, split, corner = faces[~crossing], faces[crossing], corner[crossing]
-    edges = np.sort(np.concatenate([split[:, [0, 1]], split[:, [1, 2]], split[:, [2, 0]]]), axis=1)
-    edges = np.unique(edges[side[edges[:, 0]] * side[edges[:, 1]] < 0], axis=0)
-    a, b = distance[edges[:, 0]], distance[edges[:, 1]]
-    fresh = vertices[edges[:, 0]] + (a / (a - b))[:, None] * (vertices[edges[:, 1]] - vertices[edges[:, 0]])
-    fresh[:, axis] = offset
-    key = edges[:, 0] * len(vertices) + edges[:, 1]
-
-    def middle(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-        wanted = np.minimum(p, q) * len(vertices) + np.maximum(p, q)
-        return len(vertices) + np.searchsorted(key, wanted)
-
-    pieces = [kept]
-    touching = (corner == 0).any(1)
-    if touching.any():  # one corner on the plane: two triangles
-        turned = _roll(split[touching], np.argmax(corner[touching] == 0, axis=1))
-        p, q, r = turned.T
-        m = middle(q, r)
-        pieces += [np.stack([p, q, m], 1), np.stack([p, m, r], 1)]
-    if (~touching).any():  # one corner alone on its side: three triangles
-        alone = corner[~touching] == -np.sign(corner[~touching].sum(1))[:, None]
-        p, q, r = _roll(split[~touching], np.argmax(alone, axis=1)).T
-        m, n = middle(p, q), middle(r, p)
-        pieces += [np.stack([p, m, n], 1), np.stack([m, q, r], 1), np.stack([m, r, n], 1)]
-    return trimesh.Trimesh(np.concatenate([vertices, fresh]), np.concatenate(pieces), process=False)
-
-
-def _roll(faces: np.ndarray, first: np.ndarray) -> np.ndarray:
-    return np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
+    vertices[np.abs(distance) < min(0.002, 0.01 * np.ptp(distance)), axis] = offset
+    whole, normal = trimesh.Trimesh(vertices, mesh.faces, process=False), np.eye(3)[axis]
+    halves = [slice_mesh_plane(whole, way * normal, offset * normal) for way in (1, -1)]
+    return trimesh.Trimesh(*append_faces([half.vertices for half in halves], [half.faces for half in halves]))
