@@ -214,6 +214,7 @@ def graph(
     from echousd.graph import GraphError, SceneGraph, load_graph
     from echousd.graph.files import STAGE_FORMS
     from echousd.graph.picture import PICTURES, draw_graph
+    from echousd.home.files import load_home
 
     if as_json and schema:
         raise GraphError("--json and --schema exclude each other")
@@ -226,8 +227,13 @@ def graph(
     if picture is not None and picture.suffix.lower() not in PICTURES:
         raise GraphError(f"{picture}: extension {picture.suffix!r}, allowed: {', '.join(PICTURES)}")
     alone = room is not None or as_json or picture is not None
-    if source.suffix.lower() in STAGE_FORMS and (names or not alone):
-        shown = _rooms(source, names=names)
+    stage = source.suffix.lower() in STAGE_FORMS
+    home = None if stage else load_home(source)
+    if home and not (room or picture or relations is not None):
+        typer.echo(home.to_json() if as_json else home.to_yaml(), nl=False)
+        return
+    if home or (stage and (names or not alone)):
+        shown = {each.name: each.graph for each in home.rooms} if home else _rooms(source, names=names)
         if room is not None and room not in shown:
             raise GraphError(f"{source}: no room {room!r}, allowed: {', '.join(filter(None, shown)) or 'none'}")
         shown = shown if room is None else {"": shown[room]}

@@ -176,14 +176,14 @@ class SceneGraph(PlainModel):
         """The short YAML form that a person would write."""
         form = plain(self)
         room = form["room"]
-        lines = [f"room: {_flow(room['type'] if len(room) == 1 else room)}", "objects:"]
+        lines = [f"room: {flow(room['type'] if len(room) == 1 else room)}", "objects:"]
         for node in form["nodes"]:
             name = node.pop("name")
-            lines.append(f"  {_flow(name)}: {_flow(node['category'] if len(node) == 1 else node)}")
+            lines.append(f"  {flow(name)}: {flow(node['category'] if len(node) == 1 else node)}")
         if self.relations:
             lines.append("relations:")
         for relation, said in zip(self.relations, form["relations"], strict=True):
-            lines.append(f"  - {relation if len(said) == 3 else _flow(said)}")
+            lines.append(f"  - {relation if len(said) == 3 else flow(said)}")
         return "\n".join(lines) + "\n"
 
 
@@ -219,7 +219,7 @@ def _of_opening(opening: Opening) -> dict[str, Any]:
     return {key: value for key, value in values.items() if known[key] is MISSING or value != known[key]}
 
 
-def _flow(value: Any) -> str:
+def flow(value: Any) -> str:
     """`value` on one line of YAML."""
     import yaml
 

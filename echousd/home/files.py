@@ -45,7 +45,7 @@ def load_home(path: str | Path) -> HomeGraph | None:
 def save_home(home: HomeGraph, path: Path) -> None:
     """Write a home to a file in the form of its extension; raises `GraphError` or StageError."""
     if path.suffix.lower() in TEXT_FORMS:
-        write_text(path, home.to_json())
+        write_text(path, home.to_json() if TEXT_FORMS[path.suffix.lower()] == "json" else home.to_yaml())
         return
     from echousd.home.stages import write_home
 

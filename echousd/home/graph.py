@@ -22,7 +22,7 @@ from echousd.graph import GraphError, RoomSpec, SceneGraph, starting_graph
 from echousd.graph import fields as field
 from echousd.graph.nodes import PlainModel
 from echousd.graph.openings import LISTS
-from echousd.graph.scene import plain
+from echousd.graph.scene import flow, plain
 from echousd.graph.text import graph_from_plain, only_fields
 
 if TYPE_CHECKING:
@@ -218,20 +218,34 @@ class HomeGraph(PlainModel):
         return self.replaced(relations=tuple(one for one in self.relations if one != gone))
 
     def to_json(self) -> str:
-        """JSON (and YAML) that `echousd.home.files.load_home` reads."""
-        about = {"area": self.area, "outline": self.outline, "entrance": self.entrance}
+        """JSON that `echousd.home.files.load_home` reads."""
         rooms = {}
         for room in self.rooms:
-            said = plain(room.graph)
-            spec = {key: value for key, value in said.pop("room").items()}
-            own = {"area": room.area, "ratio": room.ratio if room.ratio != RATIO else None}
-            rooms[room.name] = {**spec, **{k: v for k, v in own.items() if v is not None}, **said}
-        told = {
-            "home": {key: value for key, value in about.items() if value is not None},
-            "rooms": rooms,
-            "relations": [str(relation) for relation in self.relations],
-        }
+            inside = plain(room.graph)
+            del inside["room"]
+            rooms[room.name] = {**_about_room(room), **inside}
+        told = {"home": self._about(), "rooms": rooms, "relations": [str(relation) for relation in self.relations]}
         return json.dumps(told, ensure_ascii=False, indent=1) + "\n"
+
+    def to_yaml(self) -> str:
+        """The short YAML form that a person would write, which `echousd.home.files.load_home` reads."""
+        lines = [f"home: {flow(about)}"] if (about := self._about()) else []
+        lines.append("rooms:")
+        for room in self.rooms:
+            inside = room.graph.to_yaml().splitlines()[1:]  # what it says of the room is said here
+            of_room = [f"{key}: {flow(value)}" for key, value in _about_room(room).items()]
+            lines += [f"  {flow(room.name)}:", *(f"    {line}" for line in (*of_room, *inside))]
+        lines += ["relations:", *(f"  - {relation}" for relation in self.relations)] if self.relations else []
+        return "\n".join(lines) + "\n"
+
+    def _about(self) -> dict[str, Any]:
+        about = {"area": self.area, "outline": self.outline, "entrance": self.entrance}
+        return {key: value for key, value in about.items() if value is not None}
+
+
+def _about_room(room: HomeRoom) -> dict[str, Any]:
+    own = {"area": room.area, "ratio": room.ratio if room.ratio != RATIO else None}
+    return {**plain(room.graph)["room"], **{key: value for key, value in own.items() if value is not None}}
 
 
 def relation_of(sentence: Any) -> HomeRelation:

@@ -51,11 +51,33 @@ def test_one_file_holds_the_home_and_its_rooms(tmp_path):
         assert load_home(tmp_path / name) == home, name
 
 
+def test_a_home_in_yaml_is_what_a_person_would_write(tmp_path):
+    (tmp_path / "flat.yaml").write_text(TEXT)
+    save_home(load_home(tmp_path / "flat.yaml"), tmp_path / "again.yaml")
+    text = (tmp_path / "again.yaml").read_text()
+    assert text.startswith("home: {area: 60.0, outline: [[0.0, 0.0], [10.0, 0.0], ")
+    living = """  living:
+    type: living_room
+    area: 24.0
+    objects:
+      sofa: sofa
+      lamp: floor_lamp
+    relations:
+      - lamp close_by sofa
+  bedroom_2:
+    type: bedroom
+    ratio: 1.5
+    objects:
+"""
+    assert living in text
+    assert text.endswith("relations:\n  - hall door living\n  - hall door bedroom_2\n  - living north_of bedroom_2\n")
+
+
 @settings(max_examples=15)
 @given(homes())
 def test_a_home_comes_back_from_text_and_stage(tmp_path_factory, home):
     folder = tmp_path_factory.mktemp("homes")
-    for name in ("home.json", "home.usda"):
+    for name in ("home.json", "home.yaml", "home.usda"):
         save_home(home, folder / name)
         assert load_home(folder / name) == home
 
@@ -120,7 +142,14 @@ def test_new_writes_a_home(tmp_path, echousd_command):
     assert isinstance(load_home(tmp_path / "flat.usda"), HomeGraph)
     done = echousd_command("new", tmp_path / "flat.yaml", "--from", tmp_path / "flat.usda", "--size", 9, 8)
     assert done.code == 0, done.err
-    assert json.loads((tmp_path / "flat.yaml").read_text())["home"]["outline"][2] == [9, 8]
+    text = (tmp_path / "flat.yaml").read_text()
+    assert "outline: [[0.0, 0.0], [9.0, 0.0], [9.0, 8.0], [0.0, 8.0]]" in text.splitlines()[0]
+    assert echousd_command("graph", tmp_path / "flat.yaml").out == text
+    assert echousd_command("graph", tmp_path / "flat.yaml", "--room", "hall").out.startswith("# hallway, ")
+    done = echousd_command("graph", tmp_path / "flat.yaml", "-o", tmp_path / "flat.png")
+    assert done.err.endswith("5 rooms, say which one of kitchen, living, hall, bedroom_1, bedroom_2 (--room)\n")
+    asked = json.loads(echousd_command("graph", tmp_path / "flat.yaml", "--json").out)
+    assert asked["relations"][0] == "kitchen open_to living"
     done = echousd_command("new", tmp_path / "other.usda", "--room", "bedroom", "--area", 60)
     assert (done.code, "--area goes with --rooms" in done.err) == (2, True)
 
