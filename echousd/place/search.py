@@ -285,14 +285,18 @@ class Search:
             return state
         position, yaw = np.repeat(state.position[None], len(ways) + 1, 0), np.repeat(state.yaw[None], len(ways) + 1, 0)
         wide = setting.size[around, 0]
-        unlike = FARTHEST * abs(wide[:, None] - wide)  # no chair goes to the slot of a bench
-        for number, slots in enumerate(ways, 1):
-            rows = np.array([out_of(state.position[i], float(state.yaw[i]), slot) for slot in slots])
-            way = np.hypot(*(state.position[around][:, None, [0, 2]] - rows[None, :, :2]).transpose(2, 0, 1))
-            one, other = linear_sum_assignment(np.round(way + unlike, 6))
+        rows = np.array([[out_of(state.position[i], float(state.yaw[i]), slot) for slot in way] for way in ways])
+        far = FARTHEST * abs(
+            wide[:, None] - wide
+        )  # no chair goes to the slot of a bench, nor where it is told not to be
+        far = far + np.linalg.norm(state.position[around][:, None, [0, 2]] - rows[:, None, :, :2], axis=-1)
+        for at, k in enumerate(around):
+            far[:, at] += self._broken(state, there, k, rows.reshape(-1, 4), around).reshape(far[:, at].shape)
+        for number, slots in enumerate(rows, 1):
+            one, other = linear_sum_assignment(np.round(far[number - 1], 6))
             chosen = np.array(around)[one]
-            position[number, chosen, 0], position[number, chosen, 2] = rows[other, 0], rows[other, 1]
-            yaw[number, chosen] = rows[other, 2]
+            position[number, chosen, 0], position[number, chosen, 2] = slots[other, 0], slots[other, 1]
+            yaw[number, chosen] = slots[other, 2]
         changed = np.zeros(len(state.yaw), bool)
         changed[around] = True
         likes = [LIKED * sum(slot[3] for slot in slots) + 0.001 * number for number, slots in enumerate(ways)]
@@ -366,16 +370,18 @@ class Search:
 
     def _unlikely(self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray) -> np.ndarray:
         """(K,) float: what a box with its group runs into, leaves of the floor and breaks of relations at K poses."""
-        cost = self._hits(state, there, i, group, rows, group)
-        told = self.setting.told(i)
         along = [*group, *self.screens[i]]  # which may go to the wall ahead
-        far = ~np.isin(np.where(told[:, 0] == i, told[:, 2], told[:, 0]), along)
-        told = told[there[told[:, ::2]].all(1) & far]
-        if len(told):
-            at = np.stack([rows[:, 0], np.full(len(rows), height_of(self.setting, state.position, i)), rows[:, 1]], 1)
-            margin = self.margins_at(state, i, at, rows[:, 2], told)
-            cost += MISSED * (np.maximum(-margin, 0.0) + (margin < 0)).sum(1)
-        return cost
+        return self._hits(state, there, i, group, rows, group) + self._broken(state, there, i, rows, along)
+
+    def _broken(self, state: State, there: np.ndarray, i: int, rows: np.ndarray, along: list[int]) -> np.ndarray:
+        """(K,) float: what a box at K poses breaks of its relations to those who do not go along with it."""
+        told = self.setting.told(i)
+        told = told[there[told[:, ::2]].all(1) & ~np.isin(np.where(told[:, 0] == i, told[:, 2], told[:, 0]), along)]
+        if not len(told):
+            return np.zeros(len(rows))
+        at = np.stack([rows[:, 0], np.full(len(rows), height_of(self.setting, state.position, i)), rows[:, 1]], 1)
+        margin = self.margins_at(state, i, at, rows[:, 2], told)
+        return np.asarray(MISSED * (np.maximum(-margin, 0.0) + (margin < 0)).sum(1))
 
     def _hits(
         self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray, which: list[int]

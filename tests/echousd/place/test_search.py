@@ -231,6 +231,16 @@ def test_chairs_are_seated_together():
     assert after < before - 1.9
 
 
+def test_chairs_are_seated_where_they_are_told_to_be():
+    """Each stands in the other one's place, so that none of them gets to its own alone."""
+    words, at = ["dining_table", "dining_chair", "dining_chair"], [(0, 0, 0), (0, 0, -0.6), (0, 0, 0.6)]
+    told = [(1, "right", 0), (2, "left", 0)]
+    search, state = searched(words, [(0.8, 0.75, 0.8), *[(0.45, 0.9, 0.5)] * 2], at, [0, 0, np.pi], told)
+    after = search.reseated(state, np.ones(3, bool), 0)
+    assert after.position[2, 2] < -0.4 < 0.4 < after.position[1, 2]
+    assert search.faults(state)[0] - search.faults(after)[0] > 2 * COST["relations"][0]
+
+
 def test_two_pieces_that_stand_in_each_others_place_are_put_right():
     words, size = ["wardrobe", "bookshelf"], [(2.4, 2.2, 0.6), (0.8, 2.0, 0.3)]
     search, state = searched(words, size, [(-1.2, 0, 1.7), (-1.2, 0, -1.8)], [np.pi, 0.0], [(0, "left", 1)])
