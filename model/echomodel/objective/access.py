@@ -122,7 +122,7 @@ def desk_at_wall(plan: Plan) -> Found:
 NEEDED = 0.45  # share of the vocabulary's access depth below which a front counts as blocked
 SHARE = 0.3  # share of a front's width that may be covered
 BEDSIDE = 0.3  # metres beside a bed
-INTO_BED, OF_LAMPS, OF_CHAIRS = 0.4, 0.6, 0.2  # metres between a plant and a bed's side, a floor lamp, a chair
+INTO_BED, OF_LAMPS, OF_CHAIRS = 0.6, 0.6, 0.2  # metres between a plant and a bed's side, a floor lamp, a chair
 LEAF = 0.1  # share of storage's front at either end that a door may open before
 GRAZE = 0.01  # metres that furniture may reach into a door's way, as layouts are rounded
 WALKED = 0.6  # metres, the width of a way on which one walks in, straight ahead through an open door

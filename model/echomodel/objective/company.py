@@ -16,16 +16,17 @@ LOUNGE = math.radians(100.0)  # an armchair takes part in its group, it does not
 NEAR_TABLE = 1.5  # metres: a seat further from its table is judged for its distance alone
 COMPANY = 2.5  # metres: an armchair further away stands for itself
 TOGETHER = 1.5  # metres between armchairs without a sofa: all real ones are nearer
-REACH = 0.25  # metres between a seat's front and its table: 95 % of real chairs are nearer
+REACH, BENCH = 0.25, 0.12  # metres between a seat's front and its table: 95 % of real chairs are nearer; a bench's
 BEFORE_SOFA = (0.12, 0.85)  # metres between a sofa and its coffee table: 90 % of real straight ones lie within
-LONG = 1.5  # times as long as deep: 90 % of such coffee tables lie along their only sofa
+LONG = 1.5  # times as long as deep: 90 % of such coffee tables lie along their only sofa, benches along their bed
 AT_DESK = 0.33  # share of a desk's width that a seat's middle may lie beside its own: 19 of 20 real ones
 WITHIN = (0.2, 0.25)  # share of a sofa's width, and of a cornered one's, that the table's middle may lie beside its own
 BESIDE = 0.4  # metres between a bed and its nightstand: 95 % of real ones are nearer
 PAIR = 0.15  # metres by which the gaps of the two nightstands of a bed may differ: 98 % of real ones differ less
 IN_BED = 0.4  # metres by which a nightstand may reach into the box of a bed whose board is wider than it is
 FOOT = 0.35  # metres between a bed's foot and the bench there: 95 % of real ones
-ALONG = 0.38  # share of the bed's width by which its middle may lie beside the bed's: 95 % of real ones
+# Share of the bed's width by which its middle may lie beside the bed's: of one alone 4 of 5 real ones, else 95 %.
+MIDDLE, ALONG = 0.12, 0.38
 HEAD = 0.45  # metres between the level of the headboard and the nightstand's back
 TURNED = math.radians(45.0)  # 94 % of real nightstands look the same way as their bed
 
@@ -50,7 +51,7 @@ def seat_in_reach(plan: Plan) -> Found:
     bound = ~plan.solid[i] | works[j]
     i, j = i[bound], j[bound]
     off = plan.gap(i, j) - plan.size[i, 2] / 2
-    return found(i, REACH - off, other=j, measure=off)
+    return found(i, plan.kit.where(plan.stands("foot")[i], BENCH, REACH) - off, other=j, measure=off)
 
 
 def seat_before_desk(plan: Plan) -> Found:
@@ -90,15 +91,20 @@ def table_before_sofa(plan: Plan) -> Found:
     of several one does."""
     i, j = plan.attended("before")
     lateral, _, gap = _at_edges(plan, i, j)
-    size, (wide, deep) = held(plan.size)[i], plan.reach(i, j)
     ell, xp, off = plan.which(lambda kind: kind.name in vocabulary().cornered)[j], plan.kit, abs(lateral)
     least = xp.where(ell, BEFORE_SOFA[0] - plan.size[j, 2] * 0.6, BEFORE_SOFA[0])
     within = xp.where(ell, WITHIN[1], WITHIN[0]) * plan.size[j, 0]
-    long = xp.maximum(size[:, 0], size[:, 2]) > LONG * xp.minimum(size[:, 0], size[:, 2])
     alone = xp.bincount(plan.joins[plan.joins >= 0], minlength=len(plan))[j] == 0
-    lies = xp.where(long & alone, wide - deep, FAR)
+    lies = xp.where(alone, _along(plan, i, j), FAR)
     out = first_of(i, j, [gap - least, BEFORE_SOFA[1] - gap, within - off, lies], [gap, gap, off, gap])
     return out.take(held(-out.margin) <= least_of(j, held(-out.margin), len(plan), math.inf)[j])
+
+
+def _along(plan: Plan, i: Array, j: Array) -> Array:
+    """(P,): by how many metres long pieces lie along others, not across; `FAR` of those that are as wide as deep."""
+    size, (wide, deep), xp = held(plan.size)[i], plan.reach(i, j), plan.kit
+    long = xp.maximum(size[:, 0], size[:, 2]) > LONG * xp.minimum(size[:, 0], size[:, 2])
+    return xp.where(long, wide - deep, FAR)
 
 
 def nightstand_at_head(plan: Plan) -> Found:
@@ -133,10 +139,12 @@ def _at_edges(plan: Plan, i: Array, j: Array) -> tuple[Array, Array, Array]:
 
 
 def bench_at_foot(plan: Plan) -> Found:
-    """A bench or ottoman at the foot of a bed stands close to it, within its width."""
+    """A bench or ottoman at the foot of a bed stands close to it, within its width, one alone before its middle; a long
+    one lies along it."""
     i, j = plan.attended("foot", to=plan.of("bed"))
-    lateral, _, gap = _at_edges(plan, i, j)
-    return first_of(i, j, [FOOT - gap, ALONG * plan.size[j, 0] - abs(lateral)], [gap, abs(lateral)])
+    (lateral, _, gap), xp = _at_edges(plan, i, j), plan.kit
+    most = xp.where(xp.bincount(j, minlength=len(plan))[j] == 1, MIDDLE, ALONG) * plan.size[j, 0]
+    return first_of(i, j, [FOOT - gap, most - abs(lateral), _along(plan, i, j)], [gap, abs(lateral), gap])
 
 
 def _ranked(anchor: Array, distance: Array) -> tuple[Array, Array]:
@@ -339,7 +347,7 @@ def told_of(plan: Plan, i: Array, j: Array, *words: str) -> Array:
 
 def not_alone(plan: Plan) -> Found:
     """Small tables stand at a wall or at something, lamps at a wall, a sofa or the table that the graph says they are
-    close by, an only armchair or daybed at a wall.
+    close by, an only armchair or daybed at a wall, the latter with a long side.
 
     Behind a seat a table is at nothing. A lamp lights a seat, bed or table. An armchair that stands apart from its
     group has something of its own: a lamp, a table, shelves, another one.
@@ -347,6 +355,8 @@ def not_alone(plan: Plan) -> Found:
     daybed = plan.which(lambda kind: kind.role == "sofa" and not kind.wall)
     loner = (plan.stands("company") | daybed) & (plan.anchor < 0)
     loner = loner & (plan.kit.bincount(plan.scene[loner], minlength=len(plan))[plan.scene] == 1)
+    watches = plan.kit.bincount(plan.anchor[plan.anchor >= 0], minlength=len(plan)) > 0
+    sticks = daybed & ~watches & (plan.size[:, 2] > LONG * plan.size[:, 0])  # into the room from its back
     small = (plan.of("light") | plan.stands("beside") | loner) & plan.standing
     company = plan.stands("company") & plan.of("seat") & plan.standing & (plan.anchor >= 0)
     lonely, xp = nobody(plan.size), plan.kit
@@ -361,7 +371,9 @@ def not_alone(plan: Plan) -> Found:
         lit, _ = plan.worst(i, xp.where(lamp & used, apart, FAR), j)
         who = plan.those(small & plan.walled)
         gap, loner, lit = gap[who], loner[who], lit[who]
-        wall = xp.amin(plan.inside(footprint(plan.size[who], plan.position[who], plan.yaw[who]), who), 1)
+        corners = plan.inside(footprint(plan.size[who], plan.position[who], plan.yaw[who]), who)
+        sides = xp.minimum(xp.amax(corners[:, [0, 6]], 1), xp.amax(corners[:, [2, 4]], 1))
+        wall = xp.where(sticks[who], sides, xp.amin(corners, 1))
         free = xp.where((plan.stands("beside") & ~plan.of("light"))[who], gap + OF_SMALL, gap)
         edge = xp.where(daybed[who], LAID, EDGE)
         away = xp.where(loner, wall - (edge - ALONE), xp.minimum(free, wall))

@@ -12,7 +12,7 @@ import numpy as np
 from echomodel.arrays import Array, at_least, at_most, cast, full, held, least_of, norm, once, rows, sum_of
 from echomodel.floors import footprint, signed_area, signed_distance
 from echomodel.objective.company import AROUND, BESIDE, first_of, seats_at
-from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody
+from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
 from echomodel.sizes import REACH, filled_area
 
 # Radius of an empty circle, of the side of a square of each piece's share of the floor; more a square metre; at most.
@@ -113,12 +113,13 @@ def sofa_ahead(plan: Plan) -> Found:
     return plan.nearest(i, j, plan.more_ahead(i, j, AHEAD, COVERED), AHEAD)
 
 
-# Share of a room's length from a wall to the nearest large piece: 87 % of real rooms; metres that are never bare.
-BARE_END, SHORT = 0.45, 1.6
+# Share of a room's length from a wall to the nearest large piece: 87 % of real rooms; from one such piece to the next:
+# 98 %; metres of each that are never bare.
+BARE_END, BARE_STRIP, SHORT, SPARE = 0.45, 0.4, 1.6, 2.5
 
 
 def ends_used(plan: Plan) -> Found:
-    """No end of a room is bare: its large pieces stand about its middle; the nearest one is told."""
+    """No end of a room is bare, nor a strip right across it: its large pieces stand about all of it; one is told."""
     out, xp = nobody(plan.size), plan.kit
     for (_, polygon, _), (_, _, there, *_) in zip(plan.rooms, floor_gaps(plan), strict=True):
         large = (plan.size[there[0], 0] * plan.size[there[0], 2] > LARGE) & ~plan.of("decor")[there[0]]
@@ -127,13 +128,19 @@ def ends_used(plan: Plan) -> Found:
         there = there[:, large]
         low, high = (plan.numbers(of(polygon, axis=0).tolist()) for of in (np.min, np.max))
         who, row = there.reshape(-1), xp.arange(len(there))
-        corners = footprint(plan.size[who], plan.position[who], plan.yaw[who]).reshape(len(there), -1, 2)
-        ends = xp.concat([(corners - low) / (high - low), (high - corners) / (high - low)], -1)
-        side = held(xp.amin(ends, 1)).argmax(1)
-        nearest = held(ends)[row, :, side].argmin(1)
-        limit = at_least(SHORT / (high - low), BARE_END)[side % 2]
-        share, piece = ends[row, nearest, side], nearest * there.shape[1] // ends.shape[1]  # of several points each
-        out = joined(out, found(there[row, piece], limit - share, measure=100.0 * share))
+        at = (footprint(plan.size[who], plan.position[who], plan.yaw[who]) - low) / (high - low)
+        first, last = (of(at, 1).reshape(len(there), -1, 2) for of in (xp.amin, xp.amax))
+        start = xp.concat([0.0 * last[:, :1], last], 1)  # of what may be bare: the wall, the far side of each piece
+        beyond = held(last[:, None]) > held(start[:, :, None]) + 1e-6  # (s, n + 1, n, 2), what ends further on
+        end = xp.amin(xp.where(beyond, first[:, None], 1.0), 2)
+        ends, width = (start <= 0.0) | (end >= 1.0), high - low
+        most = xp.where(ends, at_least(SHORT / width, BARE_END), at_least(SPARE / width, BARE_STRIP))
+        margin = (most - end + start).reshape(len(there), -1)
+        widest = held(margin).argmin(1)
+        nearest = held(first)[row, :, widest % 2].argmin(1)
+        piece = xp.where(widest < 2, nearest, widest // 2 - 1)
+        share = (end - start).reshape(len(there), -1)[row, widest]
+        out = joined(out, found(there[row, piece], margin[row, widest], measure=100.0 * share))
     return out
 
 
@@ -142,13 +149,14 @@ SOFT = 0.2  # metres on both sides of it over which a point of the floor counts 
 ELBOW = 0.55  # metres of a table's edge a seat: 96 % of real sides with two seats or more (0.6 m in DIN 68880)
 EASY = 0.6  # metres of edge a seat that are enough for anybody: DIN 68880
 SEAT = 0.7  # metres that a side needs before it to seat somebody
+SQUEEZED, ROOMY = 0.17, 0.6  # metres behind chairs of one side, and how much more behind those opposite is to spare
 BEYOND, CORNER = 0.1, 0.1  # metres that a seat may reach beyond its side of a table, and more beyond one end of it
 # Who sits alone at a side of a table: share of it that the middle may be beside its own, metres from which on its ends.
 ALONE, OFF = 0.3, 0.05
 NOOK, AT_WALL = 0.66, 0.4  # metres between a plant and what is next to it along and across, and to the next wall
 WORKPLACE = 1.0  # metres between the middles of two who work
-# Metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it; before storage to a low table.
-OPENS, LOW = 0.55, 0.45
+# Metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it; before storage to a low table, a sofa.
+OPENS, LOW, PASSED = 0.55, 0.45, 0.8
 # Share of the width of storage from which on nightstands, and other pieces, are before it; of a screen's all.
 BESIDES, FACED, SCREENED = 0.2, 0.1, 0.05
 
@@ -218,6 +226,21 @@ def bench_fits(plan: Plan) -> Found:
     return first_of(seats.i, seats.j, margins, measures)
 
 
+def table_amid(plan: Plan) -> Found:
+    """A table is not shoved to one side: chairs are not squeezed where those opposite have room to spare."""
+    seats, xp = seats_at(plan), plan.kit
+    half_width, half_depth = plan.reach(seats.i, seats.j)
+    edge = xp.where(seats.ahead, plan.size[seats.j, 2], plan.size[seats.j, 0]) / 2
+    out = abs(seats.across) + xp.where(seats.ahead, half_depth, half_width) - edge
+    who, _ = _free_sides(plan)
+    most = -least_of(seats.side, -out, 4 * len(plan), FAR).reshape(-1, 4)[who]
+    behind = (_free_beside(plan, who) - most).reshape(-1, 2, 2)
+    least, both = xp.amin(behind, 2), (most > -FAR).reshape(-1, 2, 2).all(2)
+    margin = xp.where(both, xp.maximum(least - SQUEEZED, ROOMY - xp.amax(behind, 2) + least), FAR)
+    at = xp.arange(len(who)), held(margin).argmin(1)
+    return found(who, margin[at], measure=at_least(least[at], 0.0)).take(rows(both.any(1) & plan.walled[who]))
+
+
 @once
 def _free_sides(plan: Plan) -> tuple[Array, Array]:
     """(P,) int64, the tables with seats, and (P, 4) bool, whether one could sit left, right, behind and before them."""
@@ -275,7 +298,8 @@ def wardrobe_opens(plan: Plan) -> Found:
     i, j = i[met], j[met]
     share = xp.where(plan.stands("opposite")[i], SCREENED, xp.where(plan.stands("head")[j], BESIDES, FACED))
     share = cast(share, plan.size)
-    needed = cast(xp.where(plan.stands("before"), LOW, OPENS), plan.size)
+    needed = xp.where(plan.stands("before"), LOW, xp.where(plan.of("sofa") & ~plan.stands("company"), PASSED, OPENS))
+    needed = cast(needed, plan.size)
     return plan.nearest(i, j, plan.more_ahead(i, j, needed[j], share), needed)
 
 
@@ -293,11 +317,9 @@ def each_served(plan: Plan) -> Found:
         if not len(one):
             continue
         i, j = plan.pairs(guests & plan.standing, hosts)
-        close = plan.apart(i, j) < near
-        served = plan.kit.bincount(j[close], minlength=len(plan))
+        served = plan.kit.bincount(j[plan.apart(i, j) < near], minlength=len(plan))
         unfair = (served[one] == 0) & (served[other] > 1)
-        about = plan.kit.full_like(plan.scene, -1)
-        about[one[unfair]] = other[unfair]
-        who = rows(about >= 0)
-        out = joined(out, found(who, full(plan.yaw, len(who), -1.0), other=about[who]))
+        least, about = worst(one, -1.0 * cast(unfair, plan.yaw), other, len(plan), FAR)
+        who = rows(least < 0)
+        out = joined(out, found(who, least[who], other=about[who]))
     return out

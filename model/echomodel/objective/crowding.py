@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
-from echomodel.arrays import Array, at_least, cast, dot, held, rows
-from echomodel.objective.access import to_wall, wall_ahead
-from echomodel.objective.company import Seats, seats_at
-from echomodel.objective.plan import FAR, Found, Plan, found, joined, worst
+from echomodel.arrays import Array, at_least, cast, rows
+from echomodel.objective.access import wall_ahead
+from echomodel.objective.plan import FAR, Found, Plan, found, joined
 
 # Metres between pieces of different groups, by role: the 2nd to 3rd percentile in real rooms.
 APART = {
@@ -19,7 +16,6 @@ ROLES = sorted({role for pair in APART for role in pair})
 LOW = 0.2  # metres between a coffee table and tables and chairs at which people eat or work: 94 % of real ones
 PULL, PULL_WALL = 0.22, 0.2  # metres behind a chair at a table, before furniture and before a wall
 DESK, DESK_WALL = 0.33, 0.19  # the same at a desk, where one works
-SQUEEZED, SPARE = 0.17, 0.6  # metres behind chairs of one side, and how much more behind those opposite is to spare
 AT = 0.5  # metres: a chair further from its table is not pulled back from it
 KNEES, KNEES_WALL = 0.4, 0.6  # metres before a sofa or armchair, before furniture of other groups and before a wall
 ROOM = 0.25  # metres before a seat to its own group's lamps and other seats
@@ -80,53 +76,9 @@ def chair_pulls_out(plan: Plan) -> Found:
     chairs = plan.stands("at") & (plan.anchor >= 0) & ~plan.solid
     works, xp = plan.works[at_least(plan.anchor, 0)], plan.kit
     needed, wall = xp.where(works, DESK, PULL), xp.where(works, DESK_WALL, PULL_WALL)
-    seen = _clear(plan, chairs, _massive(plan), needed, wall, behind=True)
+    massive = (plan.of("board", "bed", "storage", "sofa") | plan.stands("company")) & plan.standing
+    seen = _clear(plan, chairs, massive, needed, wall, behind=True)
     return seen.take(plan.apart(seen.who, plan.anchor[seen.who]) < AT) if len(seen.who) else seen
-
-
-def _massive(plan: Plan) -> Array:
-    """(N,) bool, what chairs are moved against."""
-    return (plan.of("board", "bed", "storage", "sofa") | plan.stands("company")) & plan.standing
-
-
-def table_amid(plan: Plan) -> Found:
-    """A table is not shoved to one side: chairs are not squeezed where those opposite have room to spare."""
-    seats, xp = seats_at(plan), plan.kit
-    least, which = worst(seats.side, *_room_behind(plan, seats), 4 * len(plan), FAR)
-    taken = xp.bincount(seats.side, minlength=4 * len(plan)) > 0
-    asked = rows(taken)
-    asked = asked[taken[asked ^ 1] & plan.walled[asked // 4]]  # chairs sit opposite
-    margin = xp.maximum(least[asked] - SQUEEZED, SPARE - least[asked ^ 1] + least[asked])
-    at, other = worst(asked // 4, margin, asked, len(plan), FAR)
-    who = rows(xp.bincount(asked // 4) > 0)
-    return found(who, at[who], other=which[other[who]], measure=at_least(least[other[who]], 0.0))
-
-
-def _room_behind(plan: Plan, seats: Seats) -> tuple[Array, Array]:
-    """(P,) and (P,): metres from seats away from their tables to furniture or a wall, and which, -1 = a wall."""
-    i, j, xp = seats.i, seats.j, plan.kit
-    axis = plan.yaw[j] + xp.where(seats.ahead, 0.0, math.pi / 2)
-    way = xp.stack([xp.sin(axis), xp.cos(axis)], -1) * xp.sign(held(seats.across))[:, None]
-    across = xp.stack([way[:, 1], -way[:, 0]], -1)
-    cos, sin = plan.turn
-
-    def half(k: Array, along: Array) -> Array:
-        side = cos[k] * along[:, 0] - sin[k] * along[:, 1]
-        front = sin[k] * along[:, 0] + cos[k] * along[:, 1]
-        return (abs(side) * plan.size[k, 0] + abs(front) * plan.size[k, 2]) / 2
-
-    row, k = plan.beside(i, _massive(plan))
-    keep = k != j[row]
-    row, k = row[keep], k[keep]
-    away = (plan.position[k] - plan.position[i[row]])[:, ::2]
-    own = half(i, way)
-    ahead = dot(away, way[row])
-    gap = ahead - half(k, way[row]) - own[row]
-    covered = half(k, across[row]) + half(i, across)[row] - abs(dot(away, across[row]))
-    met = (covered > MET * plan.size[i[row], 0]) & (ahead > 0)
-    least, about = worst(row, xp.where(met, gap, FAR), k, len(i), FAR)
-    wall = to_wall(plan, i, plan.position[i][:, ::2] + way * own[:, None], way)
-    return xp.minimum(least, wall), xp.where(wall < least, -1, about)
 
 
 def knees_free(plan: Plan) -> Found:

@@ -136,6 +136,14 @@ def test_no_end_of_a_hall_is_bare(middle, margin):
     }
 
 
+@pytest.mark.parametrize(("right", "margin"), [(3.0, -0.0625), (2.0, 0.0625)])
+def test_no_strip_between_two_islands_is_bare(right, margin):
+    group = [("sofa", (2.0, 0.85, 0.95), (-2.0, -1.6), 0.0), ("coffee_table", (1.2, 0.4, 0.6), (-2.0, -0.5), 0.0)]
+    stand, shelf = ("tv_stand", (1.6, 0.5, 0.4), (-2.0, 2.0), np.pi), ("bookshelf", (0.6, 2.0, 0.8), (right, 0.0), 0.0)
+    room = [*group, stand, shelf, ("plant", (0.7, 1.2, 0.7), (0.5, 0.0), 0.0)]  # which fills none either
+    assert seen(composition.ends_used, room, (8.0, 5.0))[0] == {0: pytest.approx(margin)}
+
+
 @pytest.mark.parametrize(("aside", "margin"), [(0.05, 0.05), (0.2, -0.1)])
 def test_a_bench_alone_at_its_side_lies_before_the_middle(aside, margin):
     bench = ("bench", (1.2, 0.45, 0.4), (aside, 0.75), np.pi)
@@ -278,7 +286,7 @@ def test_desks_side_by_side_are_in_line(back, margin):
     assert seen(crowding.desks_in_line, opposite)[0] == {}
 
 
-@pytest.mark.parametrize(("gap", "margin"), [(0.3, -0.08), (0.6, 0.05)])
+@pytest.mark.parametrize(("gap", "margin"), [(0.3, -0.08), (0.75, -0.05), (0.85, 0.05)])
 def test_no_sofa_stands_before_storage_with_its_back_to_it(gap, margin):
     shelf = ("bookshelf", (0.8, 2.0, 0.4), (0.9, -1.8), 0.0)  # a fifth of whose front it covers
     sofa = ("multi_seat_sofa", (2.2, 0.8, 0.9), (-0.44, -1.6 + gap + 0.45), 0.0)
