@@ -23,6 +23,7 @@ from echomodel.boxes import Boxes
 from echomodel.data.roomset import RoomSet, claim, kept_out, pack_rooms
 from echomodel.files import write_text
 from echomodel.graph import GraphBatch
+from echomodel.loading import load_model
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_rooms
@@ -31,7 +32,6 @@ from echousd.place.placing import place_boxes
 from echousd.place.search import cost_of
 
 if TYPE_CHECKING:
-    from echomodel.echo import EchoModel
     from echomodel.roomboxes import RoomBoxes
 
 GRAPHS, PLAIN = 20, 200  # of a shard: graphs that are searched, and rooms of the generator that are looked through
@@ -147,7 +147,7 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
 
 def _drafts(plan: ExamplesPlan, rooms: list[RoomBoxes], told: list[np.ndarray], number: int) -> list[list[Boxes]]:
     """Boxes that the network draws of some rooms from noise, `plan.drafts` of each."""
-    model, counts = _model(plan.weights), [len(room) for room in rooms]
+    model, counts = load_model(plan.weights), [len(room) for room in rooms]
     labelled = [replace(room, relations=triplets) for room, triplets in zip(rooms, told, strict=True)]
     graph = GraphBatch.pack([GraphBatch.from_room(room) for room in labelled])
     out: list[list[Boxes]] = [[] for _ in rooms]
@@ -158,17 +158,6 @@ def _drafts(plan: ExamplesPlan, rooms: list[RoomBoxes], told: list[np.ndarray], 
         for mine, size, position, yaw in zip(out, *columns, strict=True):
             mine.append(Boxes(size, position, yaw))
     return out
-
-
-_MODELS: dict[str | None, EchoModel] = {}
-
-
-def _model(weights: str | None) -> EchoModel:
-    from echomodel.loading import load_model
-
-    if weights not in _MODELS:
-        _MODELS[weights] = load_model(weights)  # type: ignore[assignment]
-    return _MODELS[weights]
 
 
 def _searched(room: RoomBoxes, triplets: np.ndarray, start: Boxes) -> tuple[float, RoomBoxes] | None:

@@ -12,7 +12,7 @@ from echomodel.openings import Opening
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.arrays import graph_batch
 from echousd.make import layouts
-from echousd.make.stated import with_locked_places
+from echousd.make.pipeline import with_locked_places
 from echousd.make.verdicts import relation_verdicts
 from echousd.progress import StageTimer
 from echousd.shapes.styles import asset_names, equal_sizes, shared_assets, style_groups
