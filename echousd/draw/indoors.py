@@ -119,7 +119,7 @@ def _spots(bulb: np.ndarray, shades: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def with_ceiling(scenery: Scenery) -> Scenery:
-    """The scene with a ceiling over its walls."""
+    """The scene with a ceiling over its walls, and its beams."""
     (left, _, back), (right, _, front) = scenery.bounds
     y = scenery.triangles[scenery.wall >= 0][..., 1].max()
     corners = np.array([(left, y, back), (right, y, back), (right, y, front), (left, y, front)], np.float32)
@@ -130,8 +130,9 @@ def with_ceiling(scenery: Scenery) -> Scenery:
         "gloss": np.zeros(2, np.float32), "st": np.zeros((2, 3, 2), np.float32), "texture": np.full(2, -1),
         "wall": np.full(2, -1),
     }  # fmt: skip
-    joined: dict[str, Any] = {key: np.concatenate([getattr(scenery, key), more]) for key, more in added.items()}
-    return replace(scenery, **joined)
+    parts = [{key: getattr(scenery, key) for key in added}, *scenery.above, added]
+    joined: dict[str, Any] = {key: np.concatenate([part[key] for part in parts]) for key in added}
+    return replace(scenery, above=(), **joined)
 
 
 def evened(light: np.ndarray, white: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ SMALL = 0.35  # metres: what is no larger hides nothing that a picture is of
 SMALLEST = 6  # times that an image is halved at most
 # Opacity of a pane below which one looks through it; twice the m² of upright glass from which on it glazes a front.
 SEEN_THROUGH, GLAZED = 0.5, 0.03
-HUNG = ("picture", "mirror", "curtain", "blind", "wall_shelf", "wall_clock", "coats")  # goes with its wall
+HUNG = ("picture", "mirror", "curtain", "blind", "wall_shelf", "wall_clock", "coats", "radiator")  # goes with its wall
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +46,7 @@ class Scenery:
     panes: np.ndarray  # (p, 3, 3) float32: middle, half of the width and half of the height of every window's pane
     pane_wall: np.ndarray  # (p,) int, the walls of the panes
     lights: Lights  # of the stage
+    above: tuple[dict[str, np.ndarray], ...] = ()  # what only a ceiling shows: the fields with an f of beams
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -169,6 +170,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     boxes, curtains = list[np.ndarray](), list[np.ndarray]()
     shades: dict[str, list[np.ndarray]] = {}  # by component
     words: list[str] = []
+    above = list[dict[str, np.ndarray]]()
     walls: dict[str, int] = {}  # component -> number; doors and windows belong to their wall
     panes: list[tuple[str, np.ndarray]] = []
     for mesh in read_drawables(stage):
@@ -201,6 +203,9 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
                     images[key] = (len(images), (pixels, np.array(paint.tint, np.float32)))
                 part["texture"][faces], (pixels, tint) = images[key]
                 part["flat_colors"][faces] = LINEAR[pixels[::16, ::16]].mean((0, 1)) * tint
+        if mesh.category == "beam":
+            above.append(part)
+            continue
         if clear.any() and not clear.all():
             across = np.abs(area_normals(part["triangles"]))
             keep = ~clear | (across[:, [0, 2]].max(1) < np.maximum(GLAZED, 3 * across[:, 1]))
@@ -223,7 +228,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
         images=tuple(image for _, image in images.values()), furniture=furniture, hung=at_walls,
         panes=np.array([pane for _, pane in panes], np.float32).reshape(-1, 3, 3),
         pane_wall=np.array([walls.get(wall, -1) for wall, _ in panes], int),
-        lights=read_lights(stage, [np.concatenate(each) for each in shades.values()]), **joined,
+        lights=read_lights(stage, [np.concatenate(each) for each in shades.values()]), above=tuple(above), **joined,
     )  # fmt: skip
 
 

@@ -142,7 +142,7 @@ def bare_walls(setting: Setting) -> None:
     """A picture on the longest bare stretch of every wall, as wide as suits it; three equal ones on a very long one."""
     if not setting.walls or setting.use:
         return
-    found = [(length, middle, wall) for wall in walls_of(setting) for length, middle in stretches(setting, wall)]
+    found = [(length, middle, wall) for wall in walls_of(setting.floor) for length, middle in stretches(setting, wall)]
     for length, middle, wall in sorted(found, key=lambda one: -one[0]):
         rng = setting.rng(f"wall {wall.edge}", "bare")
         wide = float(np.clip(0.4 * length, 0.6, 1.3))

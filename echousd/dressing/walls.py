@@ -53,13 +53,11 @@ class Wall:
         return np.array([x, y, z])
 
 
-def walls_of(setting: Setting) -> list[Wall]:
-    """All walls of a room."""
-    floor, lengths = setting.floor, edge_lengths(setting.floor)
+def walls_of(floor: np.ndarray) -> list[Wall]:
+    """All walls around the corners (k, 2) of a floor."""
+    every = enumerate(zip(np.asarray(floor, float), edge_lengths(floor).tolist(), strict=True))
     return [
-        Wall(k, np.asarray(floor[k], float), direction(floor, k), inward_normal(floor, k), float(lengths[k]))
-        for k in range(len(floor))
-        if lengths[k] > 0.3
+        Wall(k, at, direction(floor, k), inward_normal(floor, k), length) for k, (at, length) in every if length > 0.3
     ]
 
 
@@ -71,7 +69,7 @@ def curtains(setting: Setting) -> None:
     if not setting.walls or setting.use == "outdoor":
         return
     above, before, beyond = RAIL
-    for wall in walls_of(setting):
+    for wall in walls_of(setting.floor):
         for window in (o for o in setting.openings if o.kind == "window" and o.edge == wall.edge):
             rail = window.sill + window.height + above
             beside = _near(setting, wall, window, window.width + 2 * beyond, before + 0.09)
@@ -135,7 +133,7 @@ def radiators(setting: Setting) -> None:
     kinds, rng = setting.style.radiators if setting.style else RADIATORS, setting.rng("radiators")
     kind, variant = str(rng.choice(kinds)), int(rng.integers(1 << 30))
     low, high = np.array(KINDS[kind].low), np.array(KINDS[kind].high)
-    for wall in walls_of(setting):
+    for wall in walls_of(setting.floor):
         for window in (o for o in setting.openings if o.kind == "window" and o.edge == wall.edge):
             tall = round(min(float(high[1]), window.sill - BELOW), 2)
             wide = [round(share * window.width, 2) for share in (0.95, 0.8, 0.65, 0.5)] if tall >= low[1] else ()
@@ -146,10 +144,10 @@ def radiators(setting: Setting) -> None:
 
 def sockets(setting: Setting) -> None:
     """A socket in the wall beside every bed, desk and screen that stands at one."""
-    every, rng = walls_of(setting) if setting.walls else [], setting.rng("sockets")
+    every, rng = walls_of(setting.floor) if setting.walls else [], setting.rng("sockets")
     size, variant = np.array(rng.choice([KINDS["socket"].low, KINDS["socket"].high])), int(rng.integers(1 << 30))
     for host in (one for word in PLUGGED for one in setting.near(word)):
-        wall, along = _behind(host, every) or (None, 0.0)
+        wall, along = behind(host.size, host.position, host.yaw, every) or (None, 0.0)
         if wall is not None:
             ways = [side * (float(host.size[0]) / 2 + off) for off in (0.15, 0.3, 0.6, 0.8) for side in (1, -1)]
             spots = [(wall, (along + way) / wall.length) for way in ways]
@@ -160,12 +158,11 @@ def pictures(setting: Setting) -> None:
     """A picture or a mirror over what stands at a wall."""
     if not setting.walls or setting.use:
         return
-    every = walls_of(setting)
+    every = walls_of(setting.floor)
     for host in setting.inviting("picture", "mirror"):
-        behind = _behind(host, every)
-        if behind is None:
+        wall, along = behind(host.size, host.position, host.yaw, every) or (None, 0.0)
+        if wall is None:
             continue
-        wall, along = behind
         rng = setting.rng(host.name, "picture")
         for (kind, size), aside in product(_over(host, setting, rng), ASIDE):
             if kind == "picture" and setting.has(GROUPS, rng) and _group(setting, wall, along, host, rng):
@@ -219,10 +216,10 @@ def hung_together(
     return None not in row
 
 
-def _behind(host: Standing, walls: list[Wall]) -> tuple[Wall, float] | None:
-    """The wall at an object's back and where along it the object's middle is."""
-    front = axes(host.yaw)[1]
-    back = host.position[[0, 2]] - front * host.size[2] / 2
+def behind(size: np.ndarray, position: np.ndarray, yaw: float, walls: list[Wall]) -> tuple[Wall, float] | None:
+    """The wall at the back of a box and where along it its middle is."""
+    front = axes(yaw)[1]
+    back = position[[0, 2]] - front * size[2] / 2
     for wall in walls:
         along = float((back - wall.start) @ wall.along)
         off = float((back - wall.start) @ wall.inside)
@@ -312,7 +309,7 @@ def clock(setting: Setting) -> None:
 
 def coats(setting: Setting) -> None:
     """A rail with a coat and a bag beside a door."""
-    for wall in walls_of(setting) if setting.walls and setting.has(COATS, setting.rng("coats")) else ():
+    for wall in walls_of(setting.floor) if setting.walls and setting.has(COATS, setting.rng("coats")) else ():
         for door in (o for o in setting.openings if o.kind == "door" and o.edge == wall.edge):
             one = _new("coats", setting.rng(door.name, "coats"))
             half = float(one.size[0]) / 2 + 0.12
@@ -379,7 +376,7 @@ def _roomiest(setting: Setting) -> Iterable[Wall]:
                 here += float(thing.size[0])
         return here - wall.length
 
-    return sorted(walls_of(setting), key=lambda wall: (round(used(wall), 6), wall.edge))
+    return sorted(walls_of(setting.floor), key=lambda wall: (round(used(wall), 6), wall.edge))
 
 
 def _hung(setting: Setting, one: Thing, spots: Iterable[tuple[Wall, float]], low: float, **free: float) -> Thing | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from echomodel.boxes2d import footprints
-from echomodel.openings import signed_area, swing_area
+from echomodel.openings import signed_area, sliding, swing_area
 from echomodel.sizes import footprint
 from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError
@@ -13,6 +13,7 @@ from echousd.graph.nodes import HEIGHT
 from echousd.graph.scene import SceneGraph
 
 LARGEST = 10_000.0  # m² of the box around a floor; what is rasterized on it takes 0.1 MB for each
+SLIDING = 0.08  # share of rooms without a style whose door slides, where there is room for it
 CROWDED = 0.62  # share of the floor, from which on a person is told
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -99,6 +100,9 @@ def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGr
         corners, graph.room.tall, _generator(seed, "openings"), boxes=boxes, stated=graph.room.openings,
         use=use if use in WINDOWS else "",
     )  # fmt: skip
+    share = style.sliding if (style := words.known_style(graph.room.style)) else SLIDING
+    if not use and not len(boxes[0]) and _generator(seed, "sliding").random() < share:
+        placed = tuple(one if one in graph.room.openings else sliding(corners, one, placed) for one in placed)
     return graph.with_room(openings=placed)
 
 

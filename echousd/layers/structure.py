@@ -8,20 +8,22 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import shapely
 from pxr import Kind, Sdf
 
-from echomodel.boxes2d import axes
+from echomodel.boxes2d import footprints
 from echomodel.furniture.solids import Joint
-from echomodel.openings import Opening, direction, edge_lengths, inward_normal
+from echomodel.openings import Opening, edge_lengths
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import Category, vocabulary
+from echousd.dressing.walls import behind, walls_of
 from echousd.layers import assets
 from echousd.room import RoomData
 from echousd.shapes.fittings import PLAIN, Millwork, millwork_of
 from echousd.shapes.geometry import Mass
 from echousd.shapes.matter import hull_moments
 from echousd.shapes.surface import CREASE, Surface, surfaces
-from echousd.shapes.walls import ShellPart, ShellPiece, ceiling, floor, wall_name, walls
+from echousd.shapes.walls import BEAM, COVED, THICKNESS, ShellPart, ShellPiece, beams, slab, wall_name, walls
 from echousd.stage import encoding
 from echousd.stage.paths import OPENINGS, SHELL, piece_name
 from echousd.stage.pen import Pen, ops
@@ -35,7 +37,6 @@ FLOORS = {
 }
 # What one wall may have, and of how many parts of all rooms; the rest has plain walls.
 COVERS = {"wallpaper": 2, "paint": 3, "boarding": 2, "brick": 1, "": 5}
-NEAR = 0.45  # metres between a wall and the back of what stands at it
 HOSTS = ("bed", "sofa", "board", "storage")  # roles of what stands before such a wall, the first that stands at one
 
 
@@ -58,24 +59,16 @@ def covered_walls(room: RoomData) -> dict[str, str]:
     words = style.covers if style else [word for word, often in COVERS.items() for _ in range(often)]
     cover = words[drawn(room, "cover", len(words))] if room.options.walls and use != "outdoor" else ""
     longest = wall_name(int(edge_lengths(room.corners).argmax()))
-    behind = [wall for role in HOSTS for row, wall in at_walls if row.role == role]
-    return {[*behind, longest][0]: cover} if cover else {}
+    hosts = [wall for role in HOSTS for row, wall in at_walls if row.role == role]
+    return {[*hosts, longest][0]: cover} if cover else {}
 
 
 def _at_walls(room: RoomData) -> list[tuple[Category, str]]:
     """Rows of the objects that stand at a wall, in the order of the graph, and the wall's name."""
-    corners, out = room.corners, list[tuple[Category, str]]()
     size, position, yaw = (np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw))
-    for number, node in enumerate(room.graph.nodes):
-        front = axes(yaw[number])[1]
-        back = position[number, [0, 2]] - front * size[number, 2] / 2
-        for edge, length in enumerate(edge_lengths(corners)):
-            inside, off = inward_normal(corners, edge), back - corners[edge]
-            before = 0 <= float(off @ direction(corners, edge)) <= length  # not beside it, before another wall in line
-            if length > 1.0 and front @ inside > 0.97 and before and abs(float(off @ inside)) < NEAR:
-                out.append((vocabulary().category(node.category), wall_name(edge)))
-                break
-    return out
+    every, rows = walls_of(room.corners), [vocabulary().category(node.category) for node in room.graph.nodes]
+    found = (behind(size[k], position[k], float(yaw[k]), every) for k in range(len(rows)))
+    return [(row, wall_name(at[0].edge)) for row, at in zip(rows, found, strict=True) if at]
 
 
 def drawn(room: RoomData, what: str, among: int) -> int:
@@ -120,7 +113,7 @@ class ShellPrim:
 
 def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[ShellPrim]:
     """All parts of a room's shell, walls before what is in them; `bare`: windows that need no curtain rail."""
-    parts = [floor(room.floor)]
+    parts = [slab("Floor", room.floor, -THICKNESS)]
     if room.options.walls:
         spec = room.graph.room
         outdoor = vocabulary().room_type(spec.type).use == "outdoor"
@@ -129,7 +122,12 @@ def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[Shel
             millwork=millwork(room),
         )  # fmt: skip
     if room.options.ceiling:
-        parts.append(ceiling(room.corners, room.height))
+        parts.append(slab("Ceiling", room.corners, room.height))
+    if (look := millwork(room).beams) and room.options.walls and room.height >= COVED:
+        size, position, yaw = (np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw))
+        tall = position[:, 1] + size[:, 1] > room.height - BEAM[1]
+        plans = shapely.polygons(footprints(size, position, yaw)[tall])
+        parts += beams(room.corners, room.height, look, shapely.union_all(plans).buffer(0.05))
     coverings = {"Floor": floor_slot(room)} | covered_walls(room)
     forms = iter(surfaces([form for part in parts for form in _forms(part, coverings)]))
     return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component, forms)]

@@ -6,29 +6,31 @@ All in a wall's own frame: u along the wall from its first corner, v up, w outwa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import manifold3d
 import numpy as np
 import shapely
 
-from echomodel.openings import SKIRTING, Opening
+from echomodel.openings import SKIRTING, SLID, Opening
 from echomodel.triangles import Mesh, box, joined
 from echomodel.vocabulary import vocabulary
 
 WALL = 0.15  # metres, thickness of walls
 CASING, PROUD = 0.06, 0.012  # width of the trim around a door, and how far it stands before the wall
 LINING = 0.03
-LEAF = 0.04  # thickness of a door's leaf
+LEAF, OVER, TRACK = 0.04, 0.03, 0.07  # thickness of a leaf; what one that slides covers beside its hole; above it
 GAP = 0.004
 FRAME, BAR, PANE = 0.055, 0.022, 0.42  # width of a window's frame and of its glazing bars, and about what lies between
 PLATE, REACH = 0.085, 0.12  # side of a switch's plate, and how far beside a door's trim it is
+BAY = (0.35, 0.45)  # of a bay window: along the wall to where its front begins, and how far that is before it
 RAIL = (0.12, 0.09, 0.25)  # curtain rail: above the window, before the wall, beyond its sides
 
 WINDOWS = {"plain": 3, "sash": 2, "bars": 2, "transom": 2}
 DOORS = {"panelled": 3, "four_panels": 2, "flush": 3, "boarded": 1, "glazed": 2}
 SKIRTINGS, CORNICES = (0.06, 0.08, 0.1, 0.14), (0.0, 0.0, 0.06, 0.09)  # heights, metres
+BEAMS, BAYS = (*[""] * 11, "beam"), 0.1  # of rooms without a style
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,8 @@ class Millwork:
     skirting: float = 0.08  # skirting, cornice: their heights, metres; 0 = no cornice
     cornice: float = 0.0
     boxed: bool = False  # curtains hang from behind boards, in a fifth of rooms without a style
+    bay: bool = False  # the widest window stands out before its wall
+    beams: str = ""  # slot of beams below the ceiling, "" = none; cornices are in rooms without them
 
 
 PLAIN = Millwork()
@@ -54,7 +58,9 @@ def millwork_of(seed: int, style: str | None = None, *, private: bool = False) -
         str(rng.choice(list(odds), p=np.array(list(odds.values())) / sum(odds.values()))) for odds in (windows, doors)
     )
     skirting, cornice = rng.choice(SKIRTINGS), rng.choice(row.cornices if row else CORNICES)
-    return Millwork(window, door, float(skirting), float(cornice), rng.random() < (row.boxed if row else 0.2))
+    boxed, beams = rng.random() < (row.boxed if row else 0.2), str(rng.choice(row.beams if row else BEAMS))
+    bay = rng.random() < (row.bays if row else BAYS)
+    return Millwork(window, door, float(skirting), 0.0 if beams else float(cornice), boxed, bay, beams)
 
 
 def board(u: tuple[float, float], v: tuple[float, float], w: tuple[float, float]) -> Mesh:
@@ -65,21 +71,17 @@ def board(u: tuple[float, float], v: tuple[float, float], w: tuple[float, float]
 def door_frame(opening: Opening, wall: float = WALL, *, both: bool = True) -> Mesh:
     """Lining of the hole in a wall of this thickness, and the trim around it, on both sides or on the inner one."""
     far = wall + PROUD if both else wall
-    start, end, top = opening.offset, opening.end, opening.height
-    boards = [
-        board((start, start + LINING), (0, top), (-PROUD, far)),
-        board((end - LINING, end), (0, top), (-PROUD, far)),
-        board((start + LINING, end - LINING), (top - LINING, top), (-PROUD, far)),
-    ]
-    for w in ((-PROUD, 0.0), (wall, far))[: 1 + both]:
-        boards.append(board((start - CASING, start), (0, top + CASING), w))
-        boards.append(board((end, end + CASING), (0, top + CASING), w))
-        boards.append(board((start, end), (top, top + CASING), w))
+    start, end, top, boards = opening.offset, opening.end, opening.height, list[Mesh]()
+    trims = [(0.0, CASING, w) for w in ((-PROUD, 0.0), (wall, far))[: 1 + both]]
+    for inside, outside, w in ((LINING, 0.0, (-PROUD, far)), *trims):
+        for u in ((start - outside, start + inside), (end - inside, end + outside)):
+            boards.append(board(u, (0, top + outside), w))
+        boards.append(board((start + inside, end - inside), (top - inside, top + outside), w))
     return joined(boards)
 
 
 def door_leaf(opening: Opening, wall: float = WALL, kind: str = "panelled") -> Mesh:
-    """The closed leaf, flush with the side that it opens to; `kind` of `DOORS`."""
+    """The closed leaf, flush with the side that it opens to or sliding before the wall; `kind` of `DOORS`."""
     start, end, low, top, w = _leaf(opening, wall)
     if kind == "glazed":
         (left, right), (bottom, above) = _lights(start, end, low, top)
@@ -109,6 +111,8 @@ def door_glass(opening: Opening, wall: float = WALL) -> Mesh:
 
 def _leaf(opening: Opening, wall: float) -> tuple[float, float, float, float, tuple[float, float]]:
     """Where a leaf begins and ends along the wall, above the floor, and through the wall."""
+    if opening.swing == "slide":
+        return opening.offset - OVER, opening.end + OVER, 0.008, opening.height + OVER, (-SLID, LEAF - SLID)
     w = 0.0 if opening.swing == "in" else wall - LEAF
     start, end = opening.offset + LINING + GAP, opening.end - LINING - GAP
     return start, end, 0.008, opening.height - LINING - GAP, (w, w + LEAF)
@@ -119,10 +123,10 @@ def _lights(start: float, end: float, low: float, top: float) -> tuple[tuple[flo
     return (start + 0.11, end - 0.11), (low + 0.38 * (top - low), top - 0.12)
 
 
-def light_switch(opening: Opening, left_first: bool, length: float) -> Mesh | None:
+def light_switch(opening: Opening, hinge_first: bool, length: float) -> Mesh | None:
     """A switch beside a door, where its handle is; None where the wall ends there."""
     beside = CASING + REACH
-    at = opening.end + beside if _hinge_first(opening, left_first) else opening.offset - beside
+    at = opening.end + beside if hinge_first else opening.offset - beside
     if not PLATE < at < length - PLATE:
         return None
     half, rocker = PLATE / 2, 0.55 * PLATE / 2
@@ -130,13 +134,17 @@ def light_switch(opening: Opening, left_first: bool, length: float) -> Mesh | No
     return joined([board((at - r, at + r), (1.05 - r, 1.05 + r), w) for r, w in plates])
 
 
-def door_handle(opening: Opening, left_first: bool, wall: float = WALL) -> Mesh:
-    """A lever on both sides of the leaf, away from the hinges.
+def door_handle(opening: Opening, hinge_first: bool, wall: float = WALL) -> Mesh:
+    """A lever on both sides of the leaf, away from the hinges; of one that slides a bar, and what it hangs on.
 
-    `left_first`: whether someone inside who looks at the wall has its first corner on the left. `wall`: its thickness,
+    `hinge_first`: whether its hinges are at the jamb that the wall's first corner is nearer to. `wall`: its thickness,
     metres.
     """
-    hinge_first = _hinge_first(opening, left_first)
+    if opening.swing == "slide":
+        start, end, _, top, (w, _) = _leaf(opening, wall)
+        hung = [(x, (top - 0.2, top + TRACK)) for x in (start + 0.15, end - 0.15)]
+        every = [*hung, (end - 0.07 if hinge_first else start + 0.07, (0.9, 1.2))]
+        return joined([board((x - 0.02, x + 0.02), v, (w - 0.008, w)) for x, v in every])
     at = opening.end - LINING - 0.07 if hinge_first else opening.offset + LINING + 0.07
     toward = -0.11 if hinge_first else 0.11
     w = 0.0 if opening.swing == "in" else wall - LEAF
@@ -149,21 +157,18 @@ def door_handle(opening: Opening, left_first: bool, wall: float = WALL) -> Mesh:
     return joined(boards)
 
 
-def hinge_line(opening: Opening, left_first: bool, wall: float = WALL) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(3,) each: foot of the line that a leaf turns about, and the unit vectors along it when closed and when open.
-
-    Arguments: see `door_handle`.
-    """
-    first = _hinge_first(opening, left_first)
-    u = opening.offset + LINING + GAP if first else opening.end - LINING - GAP
-    inwards = opening.swing == "in"
-    closed = np.array([1.0 if first else -1.0, 0.0, 0.0])
-    return np.array([u, 0.0, 0.0 if inwards else wall]), closed, np.array([0.0, 0.0, -1.0 if inwards else 1.0])
+def slid(opening: Opening, hinge_first: bool, length: float) -> float:
+    """Metres along a wall of some length that a leaf slides, below 0 towards its first corner; 0 where it turns."""
+    if opening.swing != "slide":
+        return 0.0
+    beside = opening.offset if hinge_first else length - opening.end
+    return min(opening.width, beside - OVER) * (-1.0 if hinge_first else 1.0)
 
 
-def _hinge_first(opening: Opening, left_first: bool) -> bool:
-    """Whether the hinges are at the jamb that the wall's first corner is nearer to."""
-    return (opening.hinge == "left") == left_first
+def door_track(opening: Opening, way: float) -> Mesh:
+    """What a leaf slides below, as long as its `way` (`slid`)."""
+    start, end, _, top, _ = _leaf(opening, WALL)
+    return board((start + min(way, 0.0), end + max(way, 0.0)), (top + 0.02, top + TRACK), (0.005 - SLID, 0.0))
 
 
 def window_frame(opening: Opening, kind: str = "plain") -> Mesh:
@@ -195,6 +200,24 @@ def window_glass(opening: Opening) -> Mesh:
     """One pane behind the frame."""
     u = (opening.offset + FRAME / 2, opening.end - FRAME / 2)
     return board(u, (opening.sill + FRAME / 2, opening.sill + opening.height - FRAME / 2), (0.078, 0.084))
+
+
+def bay(opening: Opening, kind: str, wall: float = WALL) -> tuple[Mesh, list[Mesh], Mesh, Mesh]:
+    """Frame, panes, board, and what is below and above, of a window on three sides before a wall of some thickness."""
+    lean, out = min(BAY[0], opening.width / 4), wall + BAY[1]
+    start, end, low, top = opening.offset, opening.end, opening.sill, opening.sill + opening.height
+    corners = np.array([(start, wall), (start + lean, out), (end - lean, out), (end, wall)])
+    frames, panes = list[Mesh](), list[Mesh]()
+    for corner, side in zip(corners, np.diff(corners, axis=0), strict=False):
+        width = float(np.linalg.norm(side))
+        (x, z), one = side / width, replace(opening, offset=0.0, width=width)
+        turn, middle = np.array([(x, 0, z), (0, 1, 0), (-z, 0, x)]), np.array([0.0, 0.0, 0.08])
+        for mesh, made in ((window_frame(one, kind), frames), (window_glass(one), panes)):
+            made.append(Mesh((mesh.vertices - middle) @ turn + (corner[0], 0.0, corner[1]), mesh.faces))
+    over = corners + np.array([(-0.05, 0.0), (-0.05, 0.05), (0.05, 0.05), (0.05, 0.0)])
+    below = [upright(over, -0.1, low), upright(over, top, top + 0.12)]
+    within = upright(np.array([(start, 0.0), *corners, (end, 0.0)]), low, low + 0.02)
+    return joined(frames), panes, within, joined(below)
 
 
 def window_sill(opening: Opening) -> Mesh:
@@ -231,6 +254,12 @@ def skirting(openings: Sequence[Opening], length: float, tall: float = 0.08) -> 
             boards.append(board((at, start - trim), (0.0, tall), (-SKIRTING, 0.0)))
         at = max(at, end + trim)
     return joined(boards) if boards else None
+
+
+def upright(plan: np.ndarray, low: float, high: float) -> Mesh:
+    """A closed prism over a polygon (k, 2) in the first and third coordinate, between two values of the second."""
+    prism = extruded(shapely.Polygon(plan * (1, -1)), high - low)
+    return Mesh(prism.vertices[:, [0, 2, 1]] * (1, 1, -1) + (0, low, 0), prism.faces)
 
 
 def extruded(flat: shapely.Polygon, height: float) -> Mesh:

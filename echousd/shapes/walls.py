@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 
 from echomodel.furniture.solids import Joint
-from echomodel.openings import Opening, direction, edge_lengths, inward_normal, signed_area
+from echomodel.openings import Opening, direction, edge_lengths, inward_normal, signed_area, zone
 from echomodel.triangles import Mesh, joined
 from echousd.shapes import fittings
-from echousd.shapes.fittings import PLAIN, WALL, Millwork
+from echousd.shapes.fittings import BAY, PLAIN, WALL, Millwork
 from echousd.stage.paths import piece_name
 
 THICKNESS = 0.1  # metres, of floor and ceiling
 COVED = 2.5  # metres, height of rooms from which on there may be a cornice
+BEAM, BETWEEN = (0.13, 0.15), 1.0  # metres, width and depth of beams, and from one to the next
+BROAD = 1.3  # metres, width of windows from which on one may stand out before its wall
 PARAPET = 1.05  # metres, height of a wall outdoors that nothing opens
 
 
@@ -56,20 +57,9 @@ def walls(
         thickness: of the wall along each edge, metres; those of a home, which has other rooms behind them.
         millwork: how doors, windows and mouldings are made.
     """
-    corners = np.ascontiguousarray(polygon, float)
-    return list(_walls(corners.tobytes(), height, tuple(openings), bare, outdoor, tuple(thickness), millwork))
-
-
-@lru_cache(maxsize=4)  # furniture is moved away from them before they are written
-def _walls(
-    corners: bytes, height: float, openings: tuple[Opening, ...], bare: frozenset[str], outdoor: bool,
-    thickness: tuple[float, ...], millwork: Millwork,
-) -> tuple[ShellPart, ...]:  # fmt: skip
-    polygon = np.frombuffer(corners).reshape(-1, 2)
-    lengths = edge_lengths(polygon)
     deep = np.array(thickness or [WALL] * len(polygon))
-    parts = []
-    for edge, length in enumerate(lengths):
+    bay, parts = _bay(polygon, openings) if millwork.bay and not outdoor else None, []
+    for edge, length in enumerate(edge_lengths(polygon).tolist()):
         if length < 1e-3:
             continue
         name = wall_name(edge)
@@ -77,21 +67,26 @@ def _walls(
         frame = wall_frame(polygon, edge)
         tall = min(height, PARAPET) if outdoor and not here else height
         pieces = [ShellPiece(piece_name(name, "mesh"), "wall", _placed(_wall(polygon, edge, tall, here, deep), frame))]
-        if (boards := fittings.skirting(here, float(length), millwork.skirting)) is not None:
+        if (boards := fittings.skirting(here, length, millwork.skirting)) is not None:
             pieces.append(ShellPiece(piece_name(name, "skirting"), "trim", _placed(boards, frame), solid=False))
         if millwork.cornice and tall == height >= COVED:
             coving = _cornice(polygon, edge, height, millwork.cornice)
             pieces.append(ShellPiece(piece_name(name, "cornice"), "trim", coving, solid=False))
-        left_first = signed_area(polygon) > 0
-        inner = [
-            _filled(
-                name, opening, frame, float(length), 0.0 if opening.name in bare else height, left_first,
-                float(deep[edge]), millwork, both=not thickness,
-            )
-            for opening in here
-        ]  # fmt: skip
-        parts.append(ShellPart(name, "wall", tuple(pieces), tuple(part for part in inner if part.pieces)))
-    return tuple(parts)
+        inner = []
+        for opening in here:
+            own, rail = replace(millwork, bay=opening == bay), 0.0 if opening.name in bare else height
+            inner.append(_filled(name, opening, frame, length, rail, float(deep[edge]), own, both=not thickness))
+        parts.append(ShellPart(name, "wall", tuple(pieces), tuple(inner)))
+    return parts
+
+
+def _bay(polygon: np.ndarray, openings: Sequence[Opening]) -> Opening | None:
+    """The widest window that can stand out before its wall."""
+    around = shapely.Polygon(polygon).buffer(WALL, join_style="mitre")
+    windows = [one for one in openings if one.kind == "window" and one.width >= BROAD]
+    free = [shapely.Polygon(zone(polygon, one, -WALL - BAY[1])).difference(around).area for one in windows]
+    can = [one for one, area in zip(windows, free, strict=True) if area > 0.98 * one.width * BAY[1]]
+    return max(can, key=lambda one: one.width, default=None)
 
 
 def wall_name(edge: int) -> str:
@@ -99,20 +94,28 @@ def wall_name(edge: int) -> str:
     return f"Wall_{edge + 1}"
 
 
-def ceiling(polygon: np.ndarray, height: float) -> ShellPart:
-    """A slab over the room, from the ceiling upwards."""
-    return _slab("Ceiling", polygon, height)
+def beams(polygon: np.ndarray, height: float, look: str, below: shapely.Geometry) -> list[ShellPart]:
+    """Beams of a material along the shorter side of a room, where nothing is `below` that reaches up to them."""
+    room, (low, high) = shapely.Polygon(polygon), (polygon.min(0), polygon.max(0))
+    long, (wide, deep) = int(np.ptp(polygon, axis=0).argmax()), BEAM
+    usual, free = max(round(float((high - low)[long]) / BETWEEN), 2), list[shapely.Geometry]()
+    for count in (usual, usual + 1, usual - 1):
+        strips = list[shapely.Geometry]()
+        for middle in low[long] + (np.arange(count) + 0.5) / count * (high - low)[long]:
+            ends = np.array([low, high])
+            ends[:, long] = middle - wide / 2, middle + wide / 2
+            cut = room.intersection(shapely.box(*ends.ravel()))
+            strips += [one for one in getattr(cut, "geoms", [cut]) if one.area > 0]
+        free = [one for one in strips if not one.intersects(below)]
+        if len(free) == len(strips):
+            break
+    bars = [fittings.upright(np.array(one.exterior.coords)[:-1], height - deep, height) for one in free]
+    return [ShellPart("Beams", "beam", (ShellPiece(piece_name("Beams", "mesh"), look, joined(bars)),))] if bars else []
 
 
-def floor(polygon: np.ndarray) -> ShellPart:
-    """A slab whose top is at height 0."""
-    return _slab("Floor", polygon, -THICKNESS)
-
-
-def _slab(name: str, polygon: np.ndarray, bottom: float) -> ShellPart:
-    flat = shapely.Polygon(np.stack([polygon[:, 0], -polygon[:, 1]], 1))  # x right, -z up: seen from above
-    slab = fittings.extruded(flat, THICKNESS)
-    mesh = Mesh(slab.vertices[:, [0, 2, 1]] * (1, 1, -1) + (0, bottom, 0), slab.faces)
+def slab(name: str, polygon: np.ndarray, bottom: float) -> ShellPart:
+    """A floor or ceiling `THICKNESS` thick from a height upwards, labelled by its name."""
+    mesh = fittings.upright(polygon, bottom, bottom + THICKNESS)
     return ShellPart(name, name.lower(), (ShellPiece(piece_name(name, "mesh"), name.lower(), mesh),))
 
 
@@ -171,8 +174,8 @@ def _cornice(polygon: np.ndarray, edge: int, height: float, tall: float) -> Mesh
 
 
 def _filled(
-    wall: str, opening: Opening, frame: np.ndarray, length: float, height: float, left_first: bool, deep: float,
-    millwork: Millwork, *, both: bool,
+    wall: str, opening: Opening, frame: np.ndarray, length: float, height: float, deep: float, millwork: Millwork,
+    *, both: bool,
 ) -> ShellPart:  # fmt: skip
     """What stands in an opening; passages have a frame and nothing else.
 
@@ -184,32 +187,44 @@ def _filled(
         return () if mesh is None else (ShellPiece(piece_name(name, what), look, _placed(mesh, frame), solid),)
 
     if opening.kind == "window":
-        look = "trim" if millwork.boxed else "rail"
+        look, glass = "trim" if millwork.boxed else "rail", [fittings.window_glass(opening)]
+        panes, board, body = fittings.window_frame(opening, millwork.window), None, None
+        if millwork.bay:
+            panes, glass, board, body = fittings.bay(opening, millwork.window, deep)
         pieces = (
-            *made("frame", "trim", fittings.window_frame(opening, millwork.window)),
-            *made("glass", "glass", fittings.window_glass(opening)),
+            *made("frame", "trim", panes),
+            *made("board", "trim", board),
+            *made("body", "wall", body),
+            *(one for number, pane in enumerate(glass) for one in made(f"glass{number or ''}", "glass", pane)),
             *made("sill", "trim", fittings.window_sill(opening)),
             *made("rail", look, fittings.curtain_rail(opening, length, height, boxed=millwork.boxed), solid=False),
         )
         return ShellPart(name, "window", pieces)
     if opening.kind != "door":
         return ShellPart(name, "door", made("frame", "trim", fittings.door_frame(opening, deep, both=both)))
+    hinge_first = (opening.hinge == "left") == (np.linalg.det(frame[:3, :3]) < 0)
+    way = fittings.slid(opening, hinge_first, length)
     leaf = made("leaf", "door_leaf", fittings.door_leaf(opening, deep, millwork.door))
     if millwork.door == "glazed":
         leaf += made("pane", "glass", fittings.door_glass(opening, deep), solid=False)
-    handle = made("handle", "rail", fittings.door_handle(opening, left_first, deep), solid=False)
-    hinge = ShellPart(piece_name(name, "hinge"), "", (*leaf, *handle), joint=_hinge(opening, frame, left_first, deep))
+    handle = made("handle", "rail", fittings.door_handle(opening, hinge_first, deep), solid=False)
+    joint = _joint(opening, frame, hinge_first, deep, way)
+    hinge = ShellPart(piece_name(name, "hinge"), "", (*leaf, *handle), joint=joint)
     frames = made("frame", "trim", fittings.door_frame(opening, deep, both=both))
-    switch = made("switch", "trim", fittings.light_switch(opening, left_first, length), solid=False)
-    return ShellPart(name, "door", (*frames, *switch), (hinge,))
+    switch = made("switch", "trim", fittings.light_switch(opening, hinge_first, length), solid=False)
+    track = made("track", "rail", fittings.door_track(opening, way) if way else None)
+    return ShellPart(name, "door", (*frames, *switch, *track), (hinge,))
 
 
-def _hinge(opening: Opening, frame: np.ndarray, left_first: bool, deep: float) -> Joint:
-    """How a door's leaf turns about its edge, by a right angle to the side that it opens to."""
-    at, closed, opened = fittings.hinge_line(opening, left_first, deep)
-    anchor = frame[:3, :3] @ at + frame[:3, 3]
-    up = np.cross(frame[:3, :3] @ closed, frame[:3, :3] @ opened)  # from closed to open it turns about this
-    return Joint("hinge", "revolute", (0.0, float(np.sign(up[1])), 0.0), tuple(anchor.round(6).tolist()), np.pi / 2)
+def _joint(opening: Opening, frame: np.ndarray, hinge_first: bool, deep: float, way: float) -> Joint:
+    """How a door's leaf turns about its edge, by a right angle to the side that it opens to, or slides its `way`."""
+    out, inset = opening.swing == "out", fittings.LINING + fittings.GAP
+    u = opening.offset + inset if hinge_first else opening.end - inset
+    anchor = tuple((frame[:3, :3] @ (u, 0.0, deep if out else 0.0) + frame[:3, 3]).round(6).tolist())
+    if way:
+        return Joint("hinge", "prismatic", tuple((np.sign(way) * frame[:3, 0]).round(6).tolist()), anchor, abs(way))
+    turn = np.sign(np.linalg.det(frame[:3, :3])) * (1.0 if hinge_first != out else -1.0)  # from closed to open
+    return Joint("hinge", "revolute", (0.0, float(turn), 0.0), anchor, np.pi / 2)
 
 
 def _placed(mesh: Mesh, frame: np.ndarray) -> Mesh:

@@ -7,7 +7,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph import Node
 from echousd.graph.nodes import OBSTACLE
 
-SHELL = {"floor": "floor", "wall": "wall", "ceiling": "ceiling", "door": "door", "window": "windowpane"}
+SHELL = {name: name for name in ("floor", "wall", "ceiling", "door")} | {"beam": "ceiling", "window": "windowpane"}
 
 
 def word_of(node: Node) -> str:

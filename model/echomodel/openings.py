@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from echomodel.boxes2d import CORNERS
 
 KINDS = ("door", "window", "passage")
 HINGES = ("left", "right")
-SWINGS = ("in", "out")
+SWINGS = ("in", "out", "slide")
 USUAL = {  # metres, where nobody says otherwise
     "door": {"width": 0.9, "height": 2.0, "sill": 0.0},
     "window": {"width": 1.4, "height": 1.3, "sill": 0.9},
@@ -21,6 +21,7 @@ USUAL = {  # metres, where nobody says otherwise
 }
 WINDOW_DEPTH = 0.35  # metres before a window where nothing tall stands
 STEP = 0.6  # metres before a door that a person needs to stand
+SLID = 0.08  # metres before a wall that a leaf takes which slides there, and its rail
 SKIRTING = 0.012  # metres, thickness of the boards along the foot of a wall
 HIGHEST = 100.0  # metres of an opening's height and sill: more than any room has
 LONGEST = 10_000.0  # metres of its offset and width: longer than any wall
@@ -42,7 +43,8 @@ class Opening:
         width, height: of the hole, metres.
         sill: from the floor to the lower side of the hole, metres; 0 for doors and passages.
         hinge: side of a door's hinges, `left` or `right` as seen by someone inside the room who looks at it.
-        swing: whether a door's leaf opens `in` to the room or `out` of it.
+        swing: whether a door's leaf opens `in` to the room or `out` of it, or does `slide` before the wall, inside, to
+            the side of `hinge`.
 
     Raises ValueError for a value that no opening has.
     """
@@ -83,6 +85,13 @@ class Opening:
     def end(self) -> float:
         """From corner `edge` to the far jamb, metres."""
         return self.offset + self.width
+
+    @property
+    def depth(self) -> float:
+        """How deep the floor before it stays free, metres: the way of its leaf, a step, or what gets light."""
+        if self.kind == "window":
+            return WINDOW_DEPTH
+        return self.width if (self.kind, self.swing) == ("door", "in") else STEP
 
     def to_json(self) -> dict[str, Any]:
         """The mapping that `opening_from_json` reads."""
@@ -216,14 +225,28 @@ def swing_area(polygon: Any, opening: Opening) -> np.ndarray:
 
 
 def free_area(polygon: Any, opening: Opening) -> np.ndarray:
-    """(k, 2) float, what must stay free: a door's swing, the step before other doors and passages, a window's zone.
-
-    Before windows only what is higher than the sill is in the way.
+    """(k, 2) float, what must stay free: a door's swing, the step before other doors and passages, where a leaf slides,
+    a window's zone, where only what is higher than the sill is in the way.
     """
     swing = swing_area(polygon, opening)
     if len(swing):
         return swing
-    return zone(polygon, opening, WINDOW_DEPTH if opening.kind == "window" else STEP)
+    if opening.swing == "slide":
+        (hinge, closed), inside = hinge_point(polygon, opening), inward_normal(polygon, opening.edge)
+        way = np.array([(1, 0), (1, STEP), (0, STEP), (0, SLID), (-1, SLID), (-1, 0)])
+        return hinge + opening.width * way[:, :1] * closed + way[:, 1:] * inside
+    return zone(polygon, opening, opening.depth)
+
+
+def sliding(polygon: np.ndarray, door: Opening, openings: Sequence[Opening]) -> Opening:
+    """A door with a leaf that slides to a side where the wall is free of all openings; else the opening itself."""
+    length, turned = float(edge_lengths(polygon)[door.edge]), signed_area(polygon) > 0
+    for start, hinge in ((door.end, HINGES[turned]), (door.offset - door.width, HINGES[not turned])):
+        rest = replace(door, offset=max(start, 0.0))
+        within = door.kind == "door" and start > 0.05 and rest.end < length - 0.05
+        if within and not any(overlap(rest, other) > 0.0 for other in openings if other is not door):
+            return replace(door, swing="slide", hinge=hinge)
+    return door
 
 
 def numbered(kind: str, taken: Iterable[str]) -> str:

@@ -228,8 +228,9 @@ class RoomStyle:
     Arguments:
         family: of furniture making. kinds: (part, kinds of it) where the style has others than its family.
         palettes: harmonies. windows, doors, cornices: of the millwork (metres of a cornice's height, 0 = none).
-        boxed: share of rooms whose curtains hang from behind boards.
+        boxed, sliding, bays: shares of rooms whose curtains hang from behind boards, whose door slides, with a bay.
         covers: what a wall behind a bed or sofa has, "" = nothing. floors: slots of those of wood or the like.
+        beams: slots of what lies below the ceiling, "" = nothing.
         radiators, curtains: small things that stand under windows, and that hang before them.
         prints: kinds of pictures and names of rugs and cushions (`prints.toml`).
         aliases: other words for it.
@@ -245,7 +246,10 @@ class RoomStyle:
     curtains: tuple[str, ...]
     prints: tuple[str, ...]
     cornices: tuple[float, ...] = (0.0,)
+    beams: tuple[str, ...] = ("",)
     boxed: float = 0.0
+    bays: float = 0.0
+    sliding: float = 0.0
     radiators: tuple[str, ...] = ("panel_radiator",)
     kinds: tuple[tuple[str, tuple[str, ...]], ...] = ()
     aliases: tuple[str, ...] = ()

@@ -10,7 +10,7 @@ from echomodel.arrays import Array, at_least, at_most, cast, dot, full, held, ki
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import axes
 from echomodel.floors import edges, footprint, known, meeting, signed_area, signed_distance
-from echomodel.openings import STEP, WINDOW_DEPTH, Opening, inward_normal, rectangle, segment
+from echomodel.openings import Opening, inward_normal, rectangle, segment
 
 GRID = 6  # the floor's plan is told as signed distances at GRID x GRID places of its bounding box
 FAR = 1e3  # metres: no wall is so far away
@@ -127,11 +127,10 @@ def opening_rows(openings: Sequence[Opening], polygon: np.ndarray) -> np.ndarray
     middle = (corners.max(0) + corners.min(0)) / 2 if len(openings) else np.zeros(2)
     rows = []
     for opening in openings:
-        window = opening.kind == "window"
-        depth = WINDOW_DEPTH if window else opening.width if (opening.kind, opening.swing) == ("door", "in") else STEP
+        window = float(opening.kind == "window")
         near, far = segment(corners, opening) - middle
         top = opening.sill + opening.height
-        rows.append([*near, *far, *inward_normal(corners, opening.edge), depth, opening.sill, top, float(window)])
+        rows.append([*near, *far, *inward_normal(corners, opening.edge), opening.depth, opening.sill, top, window])
     return np.array(rows, np.float32).reshape(-1, ROW)
 
 

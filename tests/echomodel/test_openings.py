@@ -48,7 +48,7 @@ def window(name: str = "window", edge: int = 1, offset: float = 0.5, **fields: o
     [
         ({"kind": "gate"}, "opening 'door': kind is 'gate', allowed: door, window, passage"),
         ({"hinge": "top"}, "opening 'door': hinge is 'top', allowed: left, right"),
-        ({"swing": "up"}, "opening 'door': swing is 'up', allowed: in, out"),
+        ({"swing": "up"}, "opening 'door': swing is 'up', allowed: in, out, slide"),
         ({"edge": -1}, "opening 'door': edge is -1, allowed: the number of a corner, 0 or more"),
         ({"edge": True}, "opening 'door': edge is True, allowed: the number of a corner, 0 or more"),
         ({"offset": -0.1}, "opening 'door': offset is -0.1, allowed: 0 or more, metres"),
@@ -138,13 +138,17 @@ def test_what_openings_keep_free() -> None:
     assert len(swing_area(ROOM, door(swing="out"))) == len(swing_area(ROOM, window())) == 0
     out = shapely.Polygon(free_area(ROOM, door(swing="out")))
     assert out.area == pytest.approx(0.9 * 0.6)
+    for hinge, (low, high) in {"left": (-1.5, 0.3), "right": (-0.6, 1.2)}.items():  # the jambs are at -1.5 and -0.6
+        slides = shapely.Polygon(free_area(ROOM, door(swing="slide", hinge=hinge)))
+        assert slides.area == pytest.approx(0.9 * (0.6 + 0.08))
+        assert np.ptp(slides.bounds[::2]) == pytest.approx(high - low)
     assert shapely.Polygon(free_area(ROOM, window())).bounds == pytest.approx((1.65, -1.0, 2.0, 0.2))
     assert shapely.Polygon(zone(ROOM, window(), 1.0)).area == pytest.approx(1.2)
 
 
 @given(
     st.sampled_from(["door", "window", "passage"]), st.integers(0, 30), st.floats(0, 50), st.floats(0.1, 9),
-    st.floats(0.1, 4), st.floats(0, 2), st.sampled_from(["left", "right"]), st.sampled_from(["in", "out"]),
+    st.floats(0.1, 4), st.floats(0, 2), st.sampled_from(["left", "right"]), st.sampled_from(["in", "out", "slide"]),
 )  # fmt: skip
 def test_fields_come_back_from_json(kind, edge, offset, width, height, sill, hinge, swing) -> None:
     one = Opening("o", kind, edge, offset, width, height, sill if kind == "window" else 0, hinge, swing)

@@ -39,7 +39,7 @@ def openings(draw: st.DrawFn, corners: np.ndarray | None, height: float | None) 
         width = draw(st.floats(0.1, room * 0.9))
         offset = third * room + draw(st.floats(0, (room - width) * 0.9))
         kind = draw(st.sampled_from(["door", "window", "passage"]))
-        hinge, swing = draw(st.sampled_from(["left", "right"])), draw(st.sampled_from(["in", "out"]))
+        hinge, swing = draw(st.sampled_from(["left", "right"])), draw(st.sampled_from(["in", "out", "slide"]))
         sill = draw(st.floats(0, min((height or 1.0) * 0.4, 100.0))) if kind == "window" else 0.0
         top = draw(st.floats(0.1, min((height or 9) / 2, 100.0)))
         made.append(Opening(name, kind, wall, offset, width, top, sill, hinge, swing))

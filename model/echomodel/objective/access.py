@@ -10,7 +10,7 @@ from echomodel.arrays import Array, at_least, at_most, cast, dot, full, held, ki
 from echomodel.objective.company import COMPANY
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, nobody, worst
 from echomodel.objective.sight import WATCHED_FROM, screens
-from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_normal, segment
+from echomodel.openings import SLID, Opening, hinge_point, inward_normal, segment
 
 CROOKED = math.radians(1.0)  # 98 % of such furniture in real rooms is turned less
 TOUCHING = 0.3  # metres: 93 % of real beds, nightstands and tv stands have a smaller gap behind
@@ -237,7 +237,6 @@ def _clearance(plan: Plan, who: Array, polygon: np.ndarray, opening: Opening, de
     swings = opening.kind == "door" and opening.swing == "in"
     if depth is not None and not swings:
         return full(plan.yaw, len(who), FAR)
-    deepest = WINDOW_DEPTH if opening.kind == "window" else opening.width if swings else STEP
     (side, front), middle, xp = plan.axes(who), plan.position[who][:, ::2], plan.kit
     width, length = plan.size[who, 0] / 2, plan.size[who, 2] / 2
     if depth is not None:
@@ -247,13 +246,17 @@ def _clearance(plan: Plan, who: Array, polygon: np.ndarray, opening: Opening, de
     def reach(axis: Array) -> Array:
         return abs(side @ axis) * width + abs(front @ axis) * length
 
-    at, deep = (middle - near) @ along, (middle - near) @ inward - reach(inward) - deepest
+    at, deep = (middle - near) @ along, (middle - near) @ inward - reach(inward) - opening.depth
     beside = abs(at - opening.width / 2) - opening.width / 2 - reach(along)
     out = xp.maximum(beside, deep)
     if opening.kind == "window":
         over = xp.where(plan.of("storage"), STORED, TALL + HEADBOARD * plan.of("bed"))[who]
         low = opening.sill + over - (plan.position[who, 1] + plan.size[who, 1])
         return xp.maximum(out + 0.15, xp.where(screens(plan)[who], -FAR, low))
+    if opening.swing == "slide":  # to the side of what would be its hinges
+        hinge, closed = map(plan.numbers, hinge_point(polygon, opening))
+        aside = abs((middle - hinge) @ closed + opening.width / 2) - opening.width / 2 - reach(closed)
+        out = xp.minimum(out, xp.maximum(aside, deep + opening.depth - SLID))
     if swings:  # of the corner of the square that the leaf does not sweep what one walks through
         hinge, closed = map(plan.numbers, hinge_point(polygon, opening))
         x = at_least(abs((middle - hinge) @ closed) - reach(closed), 0.0)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from echomodel.boxes2d import CORNERS
-from echomodel.openings import STEP, WINDOW_DEPTH, Opening, numbered, overlap
+from echomodel.openings import Opening, numbered, overlap
 from echomodel.rooms.statistics import RoomTypeStatistics
 from echomodel.sizes import quantile
 
@@ -128,11 +128,11 @@ def sample_floor(statistics: RoomTypeStatistics, rng: np.random.Generator) -> Fl
     for _ in range(1 + (area > 25)):
         _open(openings, "window", walls, height, rng)
     at = {wall.edge: wall for wall in walls}
-    windows = [_before(at[o.edge], o, WINDOW_DEPTH) for o in openings if o.kind == "window"]
+    windows = [_before(at[o.edge], o, o.depth) for o in openings if o.kind == "window"]
     tops = [o.sill + OVER_SILL for o in openings if o.kind == "window"]
     return Floor(
         half_x, half_z, polygon, height, removed, walls, tuple(openings),
-        tuple(_before(at[o.edge], o, needed(o)) for o in openings if o.kind != "window"),
+        tuple(_before(at[o.edge], o, o.depth) for o in openings if o.kind != "window"),
         tuple(zip(windows, tops, strict=True)), area,
     )  # fmt: skip
 
@@ -212,11 +212,6 @@ def walls_of(polygon: tuple[tuple[float, float], ...]) -> tuple[Wall, ...]:
         dx, dz = (x1 - x0) / length, (z1 - z0) / length
         walls.append(Wall(x0, z0, dx, dz, length, math.atan2(-dz, dx), edge))  # inside is where the turn goes
     return tuple(walls)
-
-
-def needed(opening: Opening) -> float:
-    """How deep the floor before a door or passage stays free, metres: its leaf's way, or a step."""
-    return opening.width if opening.kind == "door" and opening.swing == "in" else STEP
 
 
 def _open(openings: list[Opening], kind: str, walls: tuple[Wall, ...], height: float, rng: np.random.Generator) -> None:

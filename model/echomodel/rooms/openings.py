@@ -77,7 +77,7 @@ def _best(
         step = GRID if boxes is not None and len(boxes[0]) else 3 * GRID
         offsets = np.arange(margin, length - width - margin + 1e-9, step)
         offsets = np.unique(np.round([*offsets, length - width - margin, (length - width) / 2], 3))
-        for offset, swing in product(offsets, SWINGS if kind == "door" else ("in",)):
+        for offset, swing in product(offsets, SWINGS[:2] if kind == "door" else ("in",)):
             near, far = float(offset), float(length - width - offset)
             hinge = "left" if kind != "door" or (near <= far) == turned else "right"
             if any(min(near + width, other.end) - max(near, other.offset) > -PIER for other in shared):

@@ -408,6 +408,17 @@ def test_one_walks_in_straight_ahead_beside_the_leaf(hinge, at):
         assert (("plant", "door_free") in room.found(openings=(door,))) == reached
 
 
+@pytest.mark.parametrize(("hinge", "met"), [("left", True), ("right", False)])
+def test_nothing_stands_before_the_wall_where_a_leaf_slides(hinge, met):
+    door = Opening("door", "door", 3, 1.2, 0.8, 2.0, hinge=hinge, swing="slide")  # from z = 0 to 0.8 in the wall at -x
+    shelf = {"kind": "bookshelf", "size": (0.6, 2.0, 0.3), "yaw": np.pi / 2}
+    for off, there in ((0.16, met), (0.24, False), (0.8, False)):  # its back at the wall, before the leaf; a turned way
+        found = Room({"shelf": shelf | {"at": (-2.5 + off, 1.2)}}).found(openings=(door,))
+        assert (("shelf", "door_free") in found) == there
+    before = Room({"shelf": shelf | {"at": (-2.2, 0.4)}}).found(openings=(door,))
+    assert ("shelf", "door_free") in before
+
+
 @pytest.mark.parametrize(("off", "reached"), [(0.02, False), (-0.02, True)])
 def test_nothing_stands_at_the_edge_of_a_leaf(off, reached):
     door = Opening("door", "door", 3, 0.3, 0.9, 2.0)  # to x = -1.6

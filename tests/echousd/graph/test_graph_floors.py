@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from echomodel.openings import USUAL, swing_area
+from echomodel.openings import USUAL, Opening, free_area, segment, swing_area
 from echomodel.rooms.runs import WORKTOP
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.floors import (
@@ -70,6 +70,26 @@ def test_a_plan_is_a_floor_and_openings_out_of_the_way_of_what_is_fixed() -> Non
         assert fixed.room.corners is not None
         swing = shapely.Polygon(swing_area(fixed.room.corners, door))
         assert swing.intersection(shapely.box(x - 0.8, z - 0.3, x + 0.8, z + 0.3)).area < 0.01
+
+
+def test_doors_slide_by_the_style_of_the_room_where_the_wall_beside_is_free() -> None:
+    made = {
+        style: [with_plan(GRAPH.with_room(style=style), seed).room for seed in range(40)]
+        for style in (None, "industrial", "classic")
+    }
+    slid = {
+        style: [(room, one) for room in rooms for one in room.openings if one.swing == "slide"]
+        for style, rooms in made.items()
+    }
+    assert len(slid["classic"]) == 0 < len(slid[None]) < len(slid["industrial"]) < 30
+    for room, door in (one for found in slid.values() for one in found):
+        assert door.kind == "door"
+        free = shapely.Polygon(free_area(room.corners, door))
+        assert shapely.Polygon(room.corners).buffer(1e-6).covers(free)
+        for other in (other for other in room.openings if other.kind == "window"):
+            assert free.intersection(shapely.LineString(segment(room.corners, other))).length < 1e-3
+    stated = GRAPH.with_room(size=(4.0, 3.2), style="industrial", openings=(Opening("d", "door", 0, 1.5, 0.9, 2.0),))
+    assert {with_plan(stated, seed).room.openings[0].swing for seed in range(20)} == {"in"}
 
 
 def test_floors_that_do_not_hold_their_furniture_grow() -> None:

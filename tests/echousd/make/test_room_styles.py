@@ -5,7 +5,9 @@ import pytest
 
 import echousd
 from echomodel.vocabulary import vocabulary
-from echousd.layers.structure import covered_walls, millwork
+from echousd.draw.indoors import with_ceiling
+from echousd.draw.scenery import read_scenery
+from echousd.layers.structure import covered_walls, millwork, shell_prims
 from echousd.shapes.looks import palette_of_room
 
 DECO = vocabulary().style("Art Deco")
@@ -46,5 +48,23 @@ def test_all_of_a_room_keeps_to_its_style(room):
     assert millwork(told).cornice == 0.09
     assert {millwork(told).window} <= set(DECO.windows)
     assert set(covered_walls(told).values()) <= set(DECO.covers)
+    assert not any(one.label == "beam" for one in shell_prims(told))
     assert {palette_of_room(seed, "art_deco") for seed in range(30)} == set(DECO.palettes)
     assert not all(same(told.meshes[name], room.meshes[name]) for name in room.names)
+
+
+def test_beams_lie_below_ceilings_of_country_rooms_and_are_drawn_below_them_alone():
+    lamp = echousd.Node("lamp", "pendant_lamp", size=(0.5, 0.9, 0.5), position=(0.1, 1.7, 0.2), yaw=0.0)
+    spec = echousd.RoomSpec("bedroom", size=(4.0, 3.4), style="country")
+    made = [echousd.generate(echousd.SceneGraph(spec, (lamp,)), seed=seed, dress="none") for seed in range(4)]
+    found = [[one for one in shell_prims(room) if one.label == "beam"] for room in made]
+    assert {len(one) for one in found} == {0, 1}
+    room, (beams,) = next((room, one) for room, one in zip(made, found, strict=True) if one)
+    assert millwork(room).cornice == 0
+    corners = beams.meshes[0].form.points
+    assert (corners[:, 1] > 2.4).all()
+    assert not ((abs(corners[:, 0] - 0.1) < 0.25) & (abs(corners[:, 2] - 0.2) < 0.25)).any()
+    scenery = read_scenery(room.stage)
+    above = np.concatenate([part["triangles"] for part in scenery.above]).reshape(-1, 3)
+    assert above[:, 1].min() == corners[:, 1].min()
+    assert len(with_ceiling(scenery).triangles) == len(scenery.triangles) + len(above) // 3 + 2

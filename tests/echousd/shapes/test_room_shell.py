@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -10,14 +12,14 @@ from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
 from small_room import StandIn, small_graph
 
 import echousd
-from echomodel.openings import Opening, hinge_point, inward_normal, rectangle, swing_area
+from echomodel.openings import Opening, hinge_point, inward_normal, rectangle, segment, swing_area
 from echousd.checks import check
 from echousd.checks.mesh_rules import extents
 from echousd.checks.reading import Reading
 from echousd.graph import RoomSpec
 from echousd.options import RoomOptions
 from echousd.shapes.fittings import DOORS, RAIL, WINDOWS, Millwork, millwork_of
-from echousd.shapes.walls import WALL, ceiling, outline, walls
+from echousd.shapes.walls import WALL, beams, outline, slab, walls
 
 NOTCHED = np.array([(0, 0), (1, 0), (1, 1), (4, 1), (4, 3), (0, 3)], float)
 DOOR = Opening("door", "door", 2, 0.4, 0.9, 2.0, hinge="right")
@@ -95,14 +97,17 @@ def test_rooms_of_other_seeds_have_other_millwork_and_private_ones_no_glass_in_t
     assert {one.door for one in drawn} == {*DOORS}
     assert "glazed" not in {millwork_of(seed, private=True).door for seed in range(60)}
     assert millwork_of(3) == millwork_of(3)
-    assert {work.boxed for work in drawn} == {False, True}
+    assert {work.boxed for work in drawn} == {work.bay for work in drawn} == {False, True}
+    assert not any(work.beams and work.cornice for work in drawn)
+    assert {millwork_of(seed, "country").beams for seed in range(60)} == {"", "beam"}
+    assert not any(work.bay or work.beams for work in (millwork_of(seed, "modern") for seed in range(60)))
     assert not any(millwork_of(seed, "industrial").boxed for seed in range(60))
 
 
 def test_ceiling_lies_on_the_walls() -> None:
-    slab = ceiling(NOTCHED, 2.6).pieces[0].mesh.trimesh
-    assert slab.bounds[0, 1] == pytest.approx(2.6)
-    assert slab.volume == pytest.approx(shapely.Polygon(NOTCHED).area * 0.1)
+    made = slab("Ceiling", NOTCHED, 2.6).pieces[0].mesh.trimesh
+    assert made.bounds[0, 1] == pytest.approx(2.6)
+    assert made.volume == pytest.approx(shapely.Polygon(NOTCHED).area * 0.1)
 
 
 def test_prims_of_the_shell(tmp_path) -> None:
@@ -149,6 +154,88 @@ def test_a_leaf_opens_about_its_hinge_to_the_side_that_it_should(swing, hinge, t
         assert shapely.Polygon(swing_area(plan, door)).buffer(0.05).covers(shapely.MultiPoint(mesh.vertices[:, [0, 2]]))
     else:
         assert off.min() < -0.8 - WALL
+
+
+@pytest.mark.parametrize("kind", DOORS)
+@pytest.mark.parametrize(("turn", "hinge"), [(1, "left"), (1, "right"), (-1, "left")])
+def test_a_leaf_slides_before_the_wall_and_sets_its_door_free(kind, turn, hinge) -> None:
+    plan = rectangle(4.0, 3.0)[::turn].copy()
+    door = Opening("door", "door", 2, 1.4, 0.9, 2.0, hinge=hinge, swing="slide")
+    made = walls(plan, 2.6, (door,), millwork=Millwork(door=kind))[2].inner[0]
+    (leaf,), (jamb, closed), inside = made.inner, hinge_point(plan, door), inward_normal(plan, 2)
+    assert leaf.joint.kind == "prismatic"
+    moved = np.array(leaf.joint.axis) * leaf.joint.reach
+    hole = shapely.box(*(jamb + 0.01 * closed), *(jamb + 0.89 * closed + 0.01 * inside))
+    for mesh in (piece.mesh.trimesh for piece in leaf.pieces):
+        assert mesh.is_watertight
+        off = (mesh.vertices[:, [0, 2]] - jamb) @ inside
+        assert 0.012 < off.min() < off.max() < 0.09  # before the casing
+    corners = leaf.pieces[0].mesh.vertices
+    assert shapely.MultiPoint(corners[:, [0, 2]]).envelope.buffer(0.1).covers(hole)
+    along = (corners + moved)[:, [0, 2]] @ closed - jamb @ closed
+    assert along.max() < 0.04
+    assert shapely.Polygon(plan).covers(shapely.MultiPoint((corners + moved)[:, [0, 2]]))
+    track = next(piece.mesh for piece in made.pieces if piece.name.endswith("track"))
+    assert np.ptp(track.vertices, axis=0).max() == pytest.approx(2 * 0.9 + 0.06, abs=0.01)
+
+
+def test_a_leaf_slides_no_further_than_its_wall() -> None:
+    door = Opening("door", "door", 2, 0.5, 0.9, 2.0, hinge="left", swing="slide")
+    assert walls(rectangle(4.0, 3.0), 2.6, (door,))[2].inner[0].inner[0].joint.reach == pytest.approx(0.47)
+
+
+@pytest.mark.parametrize(
+    "polygon", [rectangle(4.6, 3.0), rectangle(3.0, 4.6), NOTCHED], ids=["wide", "deep", "notched"]
+)
+def test_beams_lie_from_wall_to_wall_below_the_ceiling_but_for_what_hangs_there(polygon) -> None:
+    middle = shapely.Point(polygon.mean(0)).buffer(0.3)
+    (free,), (hung,) = (beams(polygon, 2.6, "beam", below) for below in (shapely.Polygon(), middle))
+    room = shapely.Polygon(polygon)
+    for part, below in ((free, shapely.Polygon()), (hung, middle)):
+        for one in part.pieces[0].mesh.trimesh.split():
+            assert one.is_watertight
+            np.testing.assert_allclose(one.bounds[:, 1], [2.45, 2.6])
+            plan = shapely.MultiPoint(one.vertices[:, [0, 2]]).envelope
+            assert room.buffer(1e-6).covers(plan)
+            assert plan.boundary.intersection(room.boundary).length == pytest.approx(2 * 0.13)
+            assert not plan.intersects(below)
+    assert beams(polygon, 2.6, "beam", room) == []
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+@pytest.mark.parametrize("window", WINDOWS)
+def test_the_widest_window_stands_out_before_its_wall_on_three_sides(turn, window) -> None:
+    plan, other = rectangle(4.0, 3.0)[::turn].copy(), Opening("small", "window", 2, 0.8, 1.2, 1.3, 0.9)
+    made = pieces(walls(plan, 2.6, (WINDOW, other), millwork=Millwork(window, bay=True)))
+    flat = pieces(walls(plan, 2.6, (WINDOW, other), millwork=Millwork(window)))
+    assert all(mesh.is_watertight and mesh.volume > 0 for mesh in made.values())
+    inside, (near, far) = inward_normal(plan, 0), segment(plan, WINDOW)
+    panes = [made[f"Wall_1_window_glass{number}"] for number in ("", 1, 2)]
+    offs = [(pane.vertices[:, [0, 2]] - near) @ -inside for pane in panes]
+    assert min(off.min() for off in offs) > WALL - 0.06
+    assert offs[1].min() == pytest.approx(offs[1].max(), abs=0.01)
+    assert offs[1].max() > WALL + 0.4
+    along = [(pane.vertices[:, [0, 2]] - near) @ (far - near) / WINDOW.width for pane in panes]
+    assert min(a.min() for a in along) < 0.06
+    assert max(a.max() for a in along) > WINDOW.width - 0.06
+    assert ("Wall_3_small_glass1" in made, "Wall_3_small_body" in made) == (False, False)
+    for name in ("Wall_1_mesh", "Wall_3_small_frame"):
+        np.testing.assert_array_equal(made[name].vertices, flat[name].vertices)
+    assert (made["Wall_1_window_body"].vertices[:, [0, 2]] - near) @ -inside == pytest.approx(WALL, abs=0.6)
+
+
+def test_no_window_stands_out_that_is_narrow_or_before_another_wall_or_outdoors() -> None:
+    def bays(polygon, window, **how):
+        made = pieces(walls(polygon, 2.6, (window,), millwork=Millwork(bay=True), **how))
+        return sum("glass" in name for name in made) == 3
+
+    plan, wide = rectangle(4.0, 3.0), Opening("window", "window", 2, 0.8, 1.4, 1.3, 0.9)
+    assert bays(plan, wide)
+    assert not bays(plan, replace(wide, width=1.2))
+    assert not bays(plan, wide, outdoor=True)
+    cut = np.array([(0, 0), (2, 0), (2, 1.2), (4, 1.2), (4, 4), (0, 4)], float)  # wall 1 and 2 meet in the inner corner
+    assert not bays(cut, replace(wide, edge=2, offset=0.1))
+    assert bays(cut, replace(wide, edge=2, offset=0.6, width=1.3))
 
 
 def test_doors_articulate(tmp_path) -> None:
