@@ -26,20 +26,23 @@ def next_plan(home: HomeGraph, *, seed: int = 0, before: Path | None = None) -> 
     """The plan of a home of which one may be there already; raises `GraphError`.
 
     Arguments:
-        before: layer of that home: its plan stays where nothing is asked but what stands in its rooms, and else is
-            begun with.
+        before: layer of that home: its plan stays where nothing is asked but what stands in its rooms, its floors where
+            they do for other relations, and else it is begun with.
     """
     old = plan_there(before) if before is not None and before.is_file() else None
     home = home.connected()
     if old is not None and _asks(old.home) == _asks(home):
-        return replace(old, home=home)
+        if old.home.relations == home.relations:
+            return replace(old, home=home)
+        if not (plan := with_openings(replace(old, home=home), old.home)).broken():
+            return plan
     return plan_home(home, seed=seed, before=old)
 
 
 def _asks(home: HomeGraph) -> tuple[object, ...]:
-    """What a home asks of its plan."""
+    """What a home asks of its plan besides relations."""
     rooms = tuple((room.name, room.type, room.area, room.ratio) for room in home.rooms)
-    return rooms, home.relations, home.area, home.outline, home.entrance
+    return rooms, home.area, home.outline, home.entrance
 
 
 def plan_there(path: Path, home: HomeGraph | None = None) -> Plan | None:

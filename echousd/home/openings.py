@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from echomodel.openings import (
 )
 from echomodel.rooms.openings import PIER, WINDOWS
 from echomodel.vocabulary import vocabulary
-from echousd.home.graph import HomeGraph
+from echousd.home.graph import HomeGraph, HomeRelation
 
 DOOR, FRONT_DOOR = (0.9, 2.0), (1.0, 2.1)  # metres, width and height
 PASSAGE = (3.0, 2.3)  # at most
@@ -92,26 +92,36 @@ def counterpart(floor: Floor, opening: Opening, floors: Iterable[Floor]) -> tupl
     return None
 
 
-def openings_of(home: HomeGraph, floors: Sequence[Floor]) -> dict[str, tuple[Opening, ...]]:
-    """The openings of every room: doors and passages of the graph, a front door, windows in outer walls."""
+def openings_of(
+    home: HomeGraph, floors: Sequence[Floor], there: Mapping[str, Sequence[Opening]], done: Container[HomeRelation]
+) -> dict[str, tuple[Opening, ...]]:
+    """The openings of every room: doors and passages of the graph, a front door, windows in outer walls.
+
+    Arguments:
+        there: those that stay where they are; only a room without any gets windows. done: the relations that they keep,
+            and if there are any, the front door.
+    """
     by_name = {floor.name: floor for floor in floors}
-    options = [_passage_options(home, by_name, *r.pair, r.predicate) for r in home.relations if r.row.passes]
-    options.append(_front_doors(by_name[home.entered_by], floors))
+    wanted = [r for r in home.relations if r.row.passes and r not in done]
+    options = [_passage_options(home, by_name, *r.pair, r.predicate) for r in wanted]
+    if not any(there.values()):
+        options.append(_front_doors(by_name[home.entered_by], floors))
     order = sorted(range(len(options)), key=lambda number: len(options[number]))
+    fixed = [_Hole(((room, opening),), 0.0) for room, own in there.items() for opening in own]
     picked: dict[int, _Hole] = {}
     for _ in range(2):  # the second time, each knows where all the others are
         for number in order:
-            others = [hole for which, hole in picked.items() if which != number]
+            others = [*fixed, *(hole for which, hole in picked.items() if which != number)]
             costs = [hole.cost + sum(hole.meets(other, by_name) for other in others) for hole in options[number]]
             if costs:
                 picked[number] = options[number][int(np.argmin(costs))]
-    found: dict[str, list[Opening]] = {floor.name: [] for floor in floors}
+    found = {floor.name: list(there.get(floor.name, ())) for floor in floors}
     for number in sorted(picked):
         for room, opening in picked[number].sides:
             name = numbered(opening.kind, [one.name for one in found[room]])
             found[room].append(replace(opening, name=name))
     for floor in floors:
-        found[floor.name] += _windows(home, floor, floors, found[floor.name])
+        found[floor.name] += () if there.get(floor.name) else _windows(home, floor, floors, found[floor.name])
     return {name: tuple(own) for name, own in found.items()}
 
 

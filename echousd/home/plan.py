@@ -419,9 +419,22 @@ def _finished(home: HomeGraph, lie: Cells) -> Plan:
     return with_openings(Plan(home, cells, walls, {name: () for name in cells}, lie))
 
 
-def with_openings(plan: Plan) -> Plan:
-    """The plan with the doors, passages and windows that its graph asks for."""
-    return replace(plan, openings=openings_of(plan.home, [*plan.sides.values()]))
+def with_openings(plan: Plan, before: HomeGraph | None = None) -> Plan:
+    """The plan with the doors, passages and windows that its graph asks for.
+
+    Arguments:
+        before: the graph that its openings are of, which stay but for those between rooms that it joins in another way.
+    """
+    if before is None:
+        return replace(plan, openings=openings_of(plan.home, [*plan.sides.values()], {}, ()))
+    other = {frozenset(r.pair) for r in {*before.relations} ^ {*plan.home.relations} if r.row.passes}
+
+    def stays(name: str, opening: Opening) -> bool:
+        behind = plan.behind(name, opening)
+        return behind is None or frozenset((name, behind[0])) not in other
+
+    there = {name: [one for one in own if stays(name, one)] for name, own in plan.openings.items()}
+    return replace(plan, openings=openings_of(plan.home, [*plan.sides.values()], there, before.relations))
 
 
 def _corners(shape: shapely.Geometry) -> np.ndarray:

@@ -10,8 +10,10 @@ from hypothesis import assume, given, settings
 
 from echomodel.openings import segment, signed_area, swing_area
 from echousd.graph import GraphError
+from echousd.home.given import next_plan
 from echousd.home.graph import HomeGraph
 from echousd.home.plan import INNER, OUTER, conflicts, plan_home, plans, ways
+from echousd.home.stages import home_layer
 
 FLAT = "kitchen open_to living, hall door living, hall door bedroom*2, hall door bathroom"
 
@@ -98,11 +100,26 @@ def test_a_given_outline_is_filled():
 
 
 def test_an_edit_begins_with_the_plan_of_before(flat):
-    home = HomeGraph.from_words(FLAT, area=75)
-    after = plan_home(home.relate("kitchen adjacent hall"), before=flat)
+    home = HomeGraph.from_words(FLAT, area=75).relate("kitchen adjacent hall")
+    after, fresh = plan_home(home, before=flat), plan_home(home, seed=1)
     assert after.broken() == ()
-    moved = sum(not np.array_equal(flat.cells[name], after.cells[name]) for name in flat.cells)
-    assert moved <= len(flat.cells)
+    old, new, other = ({name: np.sort(cell, 0) for name, cell in each.cells.items()} for each in (flat, after, fresh))
+    moved, without = (sum(np.abs(old[name] - each[name]).max() > 2.0 for name in old) for each in (new, other))
+    assert moved < without
+
+
+def test_other_ways_between_rooms_leave_the_floors_and_other_rooms_as_they_are(tmp_path, flat):
+    home_layer(flat.home, flat).Export(str(tmp_path / "flat.usda"))
+    home = flat.home.relate("kitchen door living")
+    after = next_plan(home, before=tmp_path / "flat.usda")
+    assert after.broken() == ()
+    for name in flat.cells:
+        np.testing.assert_allclose(after.cells[name], flat.cells[name], atol=1e-6)
+        same = after.graph(name).room.openings == flat.graph(name).room.openings
+        assert same == (name not in ("kitchen", "living")), name
+    assert {o.kind for o in flat.openings["kitchen"]} - {o.kind for o in after.openings["kitchen"]} == {"passage"}
+    further = next_plan(home.relate("bathroom larger_than living"), before=tmp_path / "flat.usda")
+    assert further.areas["bathroom"] > further.areas["living"]
 
 
 @pytest.mark.parametrize(
