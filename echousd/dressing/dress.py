@@ -25,7 +25,7 @@ from echousd.dressing.setting import Setting, Standing, Thing, standing
 from echousd.dressing.stories import guessed, story
 from echousd.dressing.walls import EYE, Wall, hung_at, hung_together, walls_of
 from echousd.graph import Relation
-from echousd.graph.titles import DressingGraph, SmallNode
+from echousd.graph.nodes import DressingGraph, SmallNode
 from echousd.naming import free_name
 from echousd.room import RoomData
 from echousd.shapes.geometry import Geometry, Origin

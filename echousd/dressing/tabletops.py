@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import islice
 
 import numpy as np
 import shapely
 
 from echomodel.boxes2d import turned
 from echomodel.dressing import KINDS, usual_size
-from echomodel.dressing.books import BOUND, bound
+from echomodel.late import Late
 from echomodel.triangles import area_normals
 from echousd.dressing.setting import APART, Setting, Standing, Thing, around, rectangle
+
+book_size, fitting_books = (Late(f"echomodel.dressing.books:{name}") for name in ("book_size", "fitting_books"))
 
 LEVEL = 0.006  # metres: what differs less in height is one level
 LEAST = 0.012  # m² of a level
@@ -243,11 +244,10 @@ def shelved_books(setting: Setting, row: Thing, rng: np.random.Generator) -> Non
     setting.placed.remove(row)
     wide, tall, deep = (float(v) for v in row.size)
     at, front = -wide / 2, deep / 2
-    order = setting.rng("books").permutation(BOUND).tolist()
-    fitting = list(islice((n for n in order if bound(n)[1] <= tall and bound(n)[2] <= deep), VOLUMES))
+    fitting = fitting_books(tall, deep, VOLUMES, setting.rng("books"))
     while fitting:
         number = int(rng.choice(fitting))
-        size = bound(number)
+        size = book_size(number)
         if at + size[0] > wide / 2:
             return
         place = np.array([at + size[0] / 2, 0.0, front - size[2] / 2])

@@ -16,13 +16,13 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph import fields as field
 from echousd.graph.consistency import GraphError, listed, name_faults, raise_all, triple_faults
 from echousd.graph.nodes import Node, Placed, PlainModel, Relation, RoomSpec
-from echousd.graph.titles import name_of
 
 if TYPE_CHECKING:
     from echousd.graph.difference import GraphDiff
 
 graph_from_text = Late("echousd.graph.text:graph_from_text")
 steps_between = Late("echousd.graph.difference:GraphDiff.between")
+name_of = Late("echousd.graph.titles:name_of")
 
 
 class SceneGraph(PlainModel):

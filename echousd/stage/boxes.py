@@ -16,7 +16,7 @@ from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.arrays import triplets_of
-from echousd.graph.titles import DressingGraph, SmallNode
+from echousd.graph.nodes import DressingGraph, SmallNode
 from echousd.naming import free_name
 from echousd.stage import encoding as usd
 from echousd.stage import values

@@ -12,7 +12,7 @@ from echousd.naming import free_name
 if TYPE_CHECKING:
     from echomodel.openings import Opening
     from echousd.graph import Node, RoomSpec
-    from echousd.graph.titles import SmallNode
+    from echousd.graph.nodes import SmallNode
 
 GRAPH_TYPE = "EchoSceneGraph"
 RELATION_TYPE = "EchoRelation"

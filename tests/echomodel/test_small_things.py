@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from echomodel.dressing import KINDS, thing, usual_size
-from echomodel.dressing.books import bound
+from echomodel.dressing.books import book_size
 from echomodel.furniture.assembly import pieces_of
 
 
@@ -47,7 +47,7 @@ def test_what_many_rooms_have_is_of_many_forms(kind, least):
     """Forms differ in a box of one metre, to 2 %, as repetition is counted."""
     found = set()
     for seed in range(48):
-        size = bound(seed) if kind == "book" else np.array(KINDS[kind].low)
+        size = book_size(seed) if kind == "book" else np.array(KINDS[kind].low)
         points = np.concatenate([p.vertices for p in pieces_of(thing(kind, size, np.random.default_rng(seed)), size)])
         found.add(np.round((points - points.min(0)) / np.ptp(points, axis=0) / 0.02).astype(int).tobytes())
     assert len(found) >= least

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, box
@@ -31,7 +33,13 @@ def book_row(size: Size, rng: np.random.Generator) -> list[Solid]:
 BOUND = 400  # kinds of single books, of which a room has a few, so that a wall of them shares few assets
 
 
-def bound(number: int) -> np.ndarray:
+def fitting_books(tall: float, deep: float, most: int, rng: np.random.Generator) -> list[int]:
+    """Numbers of at most so many single books, as they are drawn, that are no taller and no deeper, metres."""
+    order = ((number, book_size(number)) for number in rng.permutation(BOUND).tolist())
+    return list(islice((number for number, size in order if size[1] <= tall and size[2] <= deep), most))
+
+
+def book_size(number: int) -> np.ndarray:
     """(3,) float, metres: extents of single book `number`, 0 to `BOUND` - 1."""
     thick, tall, deep = np.random.default_rng([number, 1]).uniform((0.014, 0.17, 0.62), (0.044, 0.26, 0.75))
     return np.round([thick, tall, tall * deep], 3)
