@@ -13,7 +13,7 @@ import numpy as np
 
 from echomodel.sizes import size_statistics
 from echomodel.vocabulary import Category, vocabulary
-from echousd.assets.colors import MOST, apart, oklab, told_colors
+from echousd.assets.colors import MOST, apart, oklab, stated_colors
 from echousd.assets.colors import costs as color_costs
 from echousd.assets.colors import table as color_table
 from echousd.assets.licences import allowed
@@ -118,7 +118,7 @@ class Shelf:
 class Asked:
     """One object that needs a model: name, category, style, box (3) in metres, who shares its model.
 
-    `told` are words of its graph, whose colours it shall have where they name any.
+    `stated` are words of its graph, whose colours it shall have where they name any.
     """
 
     name: str
@@ -126,7 +126,7 @@ class Asked:
     style: str
     size: tuple[float, float, float]
     shares: str = ""
-    told: str = ""
+    stated: str = ""
 
 
 def choose(
@@ -155,7 +155,7 @@ def choose(
     used = {record.id for record in chosen.values()}
     tones = oklab(np.asarray(palette, float).reshape(-1, 3)) if palette is not None else np.zeros((0, 3))
     if len(tones):
-        tones = np.concatenate([tones, np.reshape(told_colors(wishes.text), (-1, 3))])
+        tones = np.concatenate([tones, np.reshape(stated_colors(wishes.text), (-1, 3))])
     for one in asked:
         if one.name in chosen:
             continue
@@ -191,14 +191,14 @@ def _best(
     tones: np.ndarray,
 ) -> AssetRecord | None:
     ranked: list[tuple[float, str, AssetRecord]] = []
-    told = np.reshape(told_colors(one.told), (-1, 3))
+    wanted = np.reshape(stated_colors(one.stated), (-1, 3))
     worn = np.array([other.colors[1:4] for other in company if other.colors]).reshape(-1, 3)  # their main ones
     loud = True  # until there is one whose colours are not
     for category, cost in _shelves_for(one.category, wishes):
         if category != one.category and one.category in wishes.shelves and not loud:
             break  # kin of what is there stand in for it alone where all of it is loud
         shelf = wishes.shelves[category]
-        colors = color_costs(shelf.colors, one.category, tones, told)
+        colors = color_costs(shelf.colors, one.category, tones, wanted)
         loud = loud and bool((colors > OTHER_WORD).all())
         ratio = np.abs(np.log(np.array(one.size) / shelf.sizes))
         costs = cost + ratio.mean(1) + BEYOND * np.maximum(ratio - math.log(wishes.stretch), 0).sum(1)

@@ -128,7 +128,7 @@ LIVELY = ("plant",)  # looks that may have any colour
 
 
 @cache
-def told_colors(text: str) -> tuple[tuple[float, float, float], ...]:
+def stated_colors(text: str) -> tuple[tuple[float, float, float], ...]:
     """OKLab of the words for colours in a text (a style, a name), as they come."""
     return tuple(_named()[word] for word in dict.fromkeys(re.findall(r"[a-z]+", text.lower())) if word in _named())
 

@@ -76,7 +76,7 @@ def sampled_graph(room_type: str, seed: int, number: int, relations: float) -> S
     """
     from echomodel.rooms.generator import generate_room
     from echomodel.rules import label_relations
-    from echomodel.rules.telling import told_of_room
+    from echomodel.rules.telling import stated_of_room
     from echousd.stage.boxes import graph_of
 
     types = [row.name for row in sorted(vocabulary().room_types, key=lambda row: -row.share)]
@@ -84,7 +84,7 @@ def sampled_graph(room_type: str, seed: int, number: int, relations: float) -> S
         raise ValueError(f"sample: no rooms of type {room_type!r} are drawn, allowed: {', '.join(types)}")
     kind = types.index(room_type)
     room = generate_room(np.random.Generator(np.random.PCG64([seed, kind, number])), room_type)
-    edges = told_of_room(label_relations(room, headings=True), room, relations, number)
+    edges = stated_of_room(label_relations(room, headings=True), room, relations, number)
     made = graph_of(replace(room, relations=edges))
     floor = tuple(map(tuple, room.floor_polygon.round(4).tolist()))
     spec = RoomSpec(room_type, floor_polygon=floor, height=round(room.height, 4), openings=room.openings)

@@ -40,7 +40,7 @@ from echousd.shapes.sources.mixing import check_sources, default_source, mixed_s
 from echousd.shapes.sources.named import anchored, check_files, source_of, with_given_sizes
 from echousd.shapes.sources.retrieval import given_pieces, retrieved
 from echousd.shapes.sources.source import Retrieved, ShapeRequest
-from echousd.shapes.styles import asset_names, style_groups, told_styles
+from echousd.shapes.styles import asset_names, stated_styles, style_groups
 
 ROUNDS = 4  # times that boxes are placed: what is in the way of what was moved makes way, and what is in its way
 
@@ -255,7 +255,7 @@ def movable(graph: SceneGraph) -> set[str]:
 
 def restyled(saved: SavedRoom, graph: SceneGraph, fresh: Collection[str]) -> set[str]:
     """Names of furniture of ours that keeps its place and gets another shape: a style of another name is told."""
-    before, after = told_styles(saved.graph), told_styles(graph)
+    before, after = stated_styles(saved.graph), stated_styles(graph)
     ours = {name for name, form in saved.geometry.items() if form.description}
     kept = [node for node in graph.nodes if node.name in ours and node.name not in fresh and not node.locked]
     return {node.name for node in kept if before[node.name] != after[node.name]}

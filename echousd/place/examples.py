@@ -27,7 +27,7 @@ from echomodel.loading import load_model
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_rooms
-from echomodel.rules.telling import told_of_room
+from echomodel.rules.telling import stated_of_room
 from echousd.place.placing import place_boxes
 from echousd.place.search import cost_of
 
@@ -116,7 +116,7 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
     luck = np.random.Generator(np.random.PCG64([plan.seed, number, 5]))
     labels = label_rooms(drawn, rules="strict") if drawn else []
     told = [
-        told_of_room(relations, room, float(luck.uniform(*TOLD)), seed=int(luck.integers(2**31)))
+        stated_of_room(relations, room, float(luck.uniform(*TOLD)), seed=int(luck.integers(2**31)))
         for relations, room in zip(labels, drawn, strict=True)
     ]
     starts = [[Boxes.from_room(room)] for room in drawn]

@@ -57,7 +57,7 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
     return {node.name: out[node.name] for node in graph.nodes}
 
 
-def told_styles(graph: SceneGraph) -> dict[str, RoomStyle | None]:
+def stated_styles(graph: SceneGraph) -> dict[str, RoomStyle | None]:
     """Object name -> the style of the vocabulary that its group is called by, else that of the room, else None."""
     known = vocabulary().known_style
     return {name: known(group) or known(graph.room.style) for name, group in style_groups(graph).items()}

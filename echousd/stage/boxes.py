@@ -43,9 +43,9 @@ def relations_from_boxes(graph: SceneGraph, *, rules: str = "strict", per_object
     boxes = room_boxes(graph)
     found = label_relations(boxes, rules=rules, headings=True)
     if per_object is not None:
-        from echomodel.rules.telling import told_of_room
+        from echomodel.rules.telling import stated_of_room
 
-        found = told_of_room(found, boxes, per_object)
+        found = stated_of_room(found, boxes, per_object)
     names = {predicate.id: predicate.name for predicate in vocabulary().predicates}
     stated = {frozenset((relation.subject, relation.object)) for relation in graph.relations}
     nodes = graph.names

@@ -17,7 +17,7 @@ from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import fronts, label_relations, label_rooms, margins, measured, rule_set, verdicts
 from echomodel.rules.geometry import pairs
 from echomodel.rules.margins import judged, pair_margins
-from echomodel.rules.telling import told_relations
+from echomodel.rules.telling import stated_relations
 from echomodel.vocabulary import vocabulary
 
 FIXTURE = Path(__file__).parent / "fixtures" / "metrics_constraints.safetensors"
@@ -66,7 +66,7 @@ def test_two_words_for_one_fact_have_one_margin(rules, one, other):  # published
 
 
 def test_where_nothing_holds_nothing_is_told():
-    told = told_relations(torch.zeros(0, 3, dtype=torch.int64), random_boxes(3, 1), 2.0, torch.Generator())
+    told = stated_relations(torch.zeros(0, 3, dtype=torch.int64), random_boxes(3, 1), 2.0, torch.Generator())
     assert told.shape == (0, 3)
 
 
@@ -295,7 +295,7 @@ def test_rigid_margins_pull_at_sizes_for_sizes_alone(rules):
 def test_what_is_told_is_near_and_grows():
     for room in generate_rooms(8, seed=71):
         edges = torch.from_numpy(label_relations(room))
-        few, many = (told_relations(edges, room, per, torch.Generator().manual_seed(0)) for per in (0.5, 2.0))
+        few, many = (stated_relations(edges, room, per, torch.Generator().manual_seed(0)) for per in (0.5, 2.0))
         assert len(few) == round(0.5 * len(room))
         assert len(few) <= len(many) <= 2 * len(room)
         assert {tuple(row) for row in few.tolist()} <= {tuple(row) for row in edges.tolist()}
@@ -310,7 +310,7 @@ def test_the_nearest_pairs_are_told_first_at_every_distance(gaps):
     room = boxes_of(np.full((len(at), 3), 0.5), np.stack([at, 0 * at, 0 * at], 1))
     edges = torch.tensor([[number + 1, P["front"], number] for number in range(len(at) - 1)])
     for seed in range(5):
-        told = told_relations(edges, room, 5.0, torch.Generator().manual_seed(seed))
+        told = stated_relations(edges, room, 5.0, torch.Generator().manual_seed(seed))
         assert told.tolist() == edges.tolist()
 
 

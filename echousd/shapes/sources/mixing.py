@@ -20,7 +20,7 @@ from echousd.shapes.geometry import Geometry, Origin
 from echousd.shapes.joinery import assembled
 from echousd.shapes.sources.named import source_of
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
-from echousd.shapes.styles import told_styles
+from echousd.shapes.styles import stated_styles
 
 WHOLE = "echousd.shapes.sources.whole"
 shape_nearness = Late(f"{WHOLE}:shape_nearness")
@@ -35,7 +35,7 @@ def needs_furniture(model: RoomModel | None) -> None:
 def furniture_of_parts(request: ShapeRequest) -> Shapes:
     """Pieces built by programs from the descriptions that the model samples, sharp and of several materials."""
     described, size = descriptions(request), np.asarray(request.boxes.size, float)
-    named = told_styles(request.graph)
+    named = stated_styles(request.graph)
 
     def make(row: int) -> Geometry:
         told = tuple(round(float(v), 4) for v in described[row])

@@ -20,7 +20,7 @@ from echomodel.objective import BY_EYE, KINDS, REACHED, TERMS, faults_of, plan_o
 from echomodel.openings import segment, zone
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms, verdicts
-from echomodel.rules.telling import told_of_room
+from echomodel.rules.telling import stated_of_room
 from echomodel.vocabulary import vocabulary
 
 # Predicates that an evaluation changes, and into what (the four pairs of opposites of the published one).
@@ -71,7 +71,7 @@ def tasks_of(
     rng = np.random.default_rng([seed, 11])
     labels = label_rooms(rooms, rules=rules, drop=drop if told is None else 0.0, rng=rng)
     if told is not None:
-        labels = [told_of_room(edges, room, told, seed) for edges, room in zip(labels, rooms, strict=True)]
+        labels = [stated_of_room(edges, room, told, seed) for edges, room in zip(labels, rooms, strict=True)]
     else:
         labels = [edges if r.relations is None else r.relations for edges, r in zip(labels, rooms, strict=True)]
     return [Task(room, np.asarray(edges, np.int64), rules=rules) for room, edges in zip(rooms, labels, strict=True)]

@@ -336,7 +336,7 @@ def at_its_side(plan: Plan) -> Found:
     return found(i, xp.minimum(margin, behind), other=j, measure=at_least(before, 0.0), words=1 * (behind < margin))
 
 
-def told_of(plan: Plan, i: Array, j: Array, *words: str) -> Array:
+def stated_of(plan: Plan, i: Array, j: Array, *words: str) -> Array:
     """(P,) bool: the graph says one of these words of i and j, or of j and i."""
     count = len(plan.first)
     said = full(plan.given, (count, count), False)
@@ -363,7 +363,7 @@ def not_alone(plan: Plan) -> Found:
     if bool(small.any()):
         i, j = plan.pairs(small, plan.standing, least=True)
         lamp, apart = plan.of("light")[i], plan.apart(i, j)
-        beside = plan.of("sofa")[j] | (plan.of("board")[j] & told_of(plan, i, j, "close_by"))
+        beside = plan.of("sofa")[j] | (plan.of("board")[j] & stated_of(plan, i, j, "close_by"))
         behind = plan.local(i, j)[1] + plan.reach(i, j)[1] + plan.size[j, 2] / 2 < 0
         strange = xp.where(lamp, ~beside, plan.of("sofa", "seat")[j] & behind)
         gap, _ = plan.worst(i, xp.where(strange, FAR, apart), j)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from echomodel.arrays import Array, at_least, cast, full, held, least_of, norm, once, pairs_in, rows, sum_of
-from echomodel.objective.company import first_of, told_of
+from echomodel.objective.company import first_of, stated_of
 from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, nobody, worst
 
 OVER = 0.25  # metres by which a pendant's middle may lie beyond the edge of what it hangs over
@@ -38,7 +38,7 @@ def _hung(plan: Plan) -> tuple[Array, Array]:
 
 def _over(plan: Plan, i: Array, j: Array) -> Array:
     """(P,) bool: lamp i hangs over j, or shall."""
-    return (held(plan.gap(i, j)) < 1e-3) | told_of(plan, i, j, "above")
+    return (held(plan.gap(i, j)) < 1e-3) | stated_of(plan, i, j, "above")
 
 
 def pendant_centred(plan: Plan) -> Found:
@@ -144,7 +144,7 @@ def _watched(plan: Plan) -> tuple[Found, Array, Array, Array]:
     if not len(i):
         return nobody(plan.size), i > 0, full(plan.size, 0, 0.0), i
     main = plan.of("sofa", "bed") & ~plan.stands("company")  # armchairs watch where there is neither
-    for better in (lambda plan, i, j: told_of(plan, i, j, *TOLD), lambda _plan, _i, j: main[j]):
+    for better in (lambda plan, i, j: stated_of(plan, i, j, *TOLD), lambda _plan, _i, j: main[j]):
         good = better(plan, i, j)
         keep = good | (xp.bincount(i[good], minlength=len(plan))[i] == 0)
         i, j = i[keep], j[keep]

@@ -52,7 +52,7 @@ def near_first(
     return found[order[torch.argsort(key)]]
 
 
-def told_relations(relations: Tensor, boxes: BoxesLike, per_object: float, generator: torch.Generator) -> Tensor:
+def stated_relations(relations: Tensor, boxes: BoxesLike, per_object: float, generator: torch.Generator) -> Tensor:
     """Of the relations of one room so many as a person would write: (e, 3) int64.
 
     Arguments:
@@ -68,7 +68,7 @@ def told_relations(relations: Tensor, boxes: BoxesLike, per_object: float, gener
     return torch.stack([one[ranked[:, 0]], ranked[:, 1], other[ranked[:, 0]]], 1)
 
 
-def told_of_room(relations: np.ndarray | Tensor, room: RoomBoxes, per_object: float, seed: int = 0) -> np.ndarray:
-    """`told_relations` of a room's boxes as (e, 3) int64 numpy; `seed` of the draws."""
+def stated_of_room(relations: np.ndarray | Tensor, room: RoomBoxes, per_object: float, seed: int = 0) -> np.ndarray:
+    """`stated_relations` of a room's boxes as (e, 3) int64 numpy; `seed` of the draws."""
     luck = torch.Generator().manual_seed(seed)
-    return np.asarray(told_relations(torch.as_tensor(relations), Boxes.from_room(room), per_object, luck))
+    return np.asarray(stated_relations(torch.as_tensor(relations), Boxes.from_room(room), per_object, luck))

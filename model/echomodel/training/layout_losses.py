@@ -23,7 +23,7 @@ from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import LayoutBatch, draw_levels
 from echomodel.vocabulary import vocabulary
 
-TOLD_SLACK = 0.02  # the hinge asks for this much more than the rule does (metres or ratio)
+STATED_SLACK = 0.02  # the hinge asks for this much more than the rule does (metres or ratio)
 
 
 def relation_hinge(batch: LayoutBatch, decoded: Boxes, level: Tensor, known: Tensor, rules: tuple[str, ...]) -> Tensor:
@@ -31,7 +31,7 @@ def relation_hinge(batch: LayoutBatch, decoded: Boxes, level: Tensor, known: Ten
     # ratios to a height near or below zero would explode or change their sign
     lifted = torch.cat([decoded.position[:, :1], decoded.position[:, 1:2].clamp_min(0), decoded.position[:, 2:]], dim=1)
     boxes = Boxes(decoded.size.clamp(0.05, 8.0), lifted, decoded.yaw)
-    triplets = told_triplets(batch)
+    triplets = stated_triplets(batch)
     ids = [entry.id for entry in vocabulary().predicates if entry.measures]
     triplets = triplets[torch.isin(triplets[:, 1], triplets.new_tensor(ids))]
     total, weights = level.new_zeros(()), level.new_zeros(())
@@ -45,12 +45,12 @@ def relation_hinge(batch: LayoutBatch, decoded: Boxes, level: Tensor, known: Ten
         weight = (1 - level[ends].amax(1)).square() * ~known[ends].all(1)
         margin = margins(boxes, chosen, rules=name, rigid=True)
         weight = weight * emphasis[chosen[:, 1]]
-        total = total + (torch.log1p((TOLD_SLACK - margin).clamp_min(0)) * weight).sum()
+        total = total + (torch.log1p((STATED_SLACK - margin).clamp_min(0)) * weight).sum()
         weights = weights + weight.sum()
     return total / weights.clamp_min(1)
 
 
-def told_triplets(batch: LayoutBatch) -> Tensor:
+def stated_triplets(batch: LayoutBatch) -> Tensor:
     """(E, 3) int64, [subject, predicate id, object], the relations that the graphs tell."""
     pair, predicate = batch.predicates.nonzero(as_tuple=True)
     return torch.stack([batch.pairs.receiver[pair], predicate, batch.pairs.sender[pair]], dim=1)
@@ -93,7 +93,7 @@ def plan_of_batch(batch: LayoutBatch, boxes: Boxes, known: Tensor) -> Plan:
     return Plan(
         tuple(kinds[number] for number in graph.category.tolist()),
         free.size, free.position, free.yaw, graph.scene, graph.floor, ((),) * graph.num_scenes,
-        told_triplets(batch), known,
+        stated_triplets(batch), known,
     )  # fmt: skip
 
 

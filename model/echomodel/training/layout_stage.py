@@ -31,7 +31,7 @@ from echomodel.training.layout_losses import (
     physics_loss,
     plan_of_batch,
     relation_hinge,
-    told_triplets,
+    stated_triplets,
 )
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
@@ -104,7 +104,7 @@ class LayoutStage:
             out[f"{name}/faults"] = len(found) / len(made)
             wrong = {int(cpu.graph.scene[fault.object]) for fault in found}
             out[f"{name}/rooms_without"] = 1 - len(wrong) / cpu.graph.num_scenes
-            triplets = told_triplets(batch)
+            triplets = stated_triplets(batch)
             kept = verdicts(boxes, triplets, rules=name)
             for entry in vocabulary().predicates:
                 mine = kept[(triplets[:, 1] == entry.id) & (kept >= 0)]

@@ -22,7 +22,7 @@ from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts
 from echomodel.surroundings import outside
 from echomodel.training import trainer
-from echomodel.training.layout_losses import as_carried, measure_distance, told_triplets
+from echomodel.training.layout_losses import as_carried, measure_distance, stated_triplets
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.recipe import OptimizerConfig, Recipe, read_recipe
 from echomodel.training.rooms import PackedRooms, draw_batch, make_batch
@@ -42,7 +42,7 @@ def test_told_relations_hold_in_mirrored_rooms(packed: PackedRooms) -> None:
     seen = 0
     for seed in range(2):
         batch = draw_batch(packed, 100, torch.Generator().manual_seed(seed))
-        triplets = told_triplets(batch)
+        triplets = stated_triplets(batch)
         for number, rules in enumerate(("sgfront", "strict")):
             mine = triplets[batch.rules[batch.graph.scene[triplets[:, 0]]] == number]
             kept = verdicts(batch.boxes, mine, rules=rules)
@@ -92,7 +92,7 @@ def test_measures_of_true_boxes_are_met_and_pull_at_places_alone(packed: PackedR
 def test_batches_keep_the_node_budget_and_merge_like_graphs(packed: PackedRooms) -> None:
     batch = draw_batch(packed, 100, torch.Generator().manual_seed(0))
     assert 80 < batch.graph.num_nodes <= 100
-    triplets = told_triplets(batch)
+    triplets = stated_triplets(batch)
     assert torch.equal(pairs_of(batch.graph.with_triplets(triplets)).told, batch.pairs.told)
 
 

@@ -4,7 +4,7 @@ from small_models import chest, picture, seat, write_glb, write_obj, write_usd
 
 from echousd.assets import table
 from echousd.assets.choose import Asked, AssetWishes, choose
-from echousd.assets.colors import costs, dominant, flat, oklab, swatches, texels, told_colors
+from echousd.assets.colors import costs, dominant, flat, oklab, stated_colors, swatches, texels
 from echousd.assets.colors import table as rows_of
 from echousd.assets.index import index
 from echousd.assets.table import read_library
@@ -73,8 +73,8 @@ def test_plants_may_have_any_color_and_unknown_ones_cost_nothing():
     assert costs(rows, "armchair", tones, none)[0] > 0.5
     assert costs(rows, "armchair", tones, none)[1] == 0
     assert costs(rows, "plant", tones, none).tolist() == [0, 0]
-    assert told_colors("a navy-blue sofa") == (*told_colors("navy"), *told_colors("blue"))
-    assert told_colors("set_chair") == ()
+    assert stated_colors("a navy-blue sofa") == (*stated_colors("navy"), *stated_colors("blue"))
+    assert stated_colors("set_chair") == ()
 
 
 def test_an_index_of_another_version_is_refused_and_made_anew(tmp_path, monkeypatch):
