@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -131,26 +132,24 @@ def edit(
                 notes = (*search.model.unlearned(graph_batch(pinned)), *told)
         return layouts, pins, notes
 
+    geometry = {name: saved.geometry[name] for name in graph.names if name not in shaped_anew}
+    names = {name: saved.assets[name] for name in geometry}
+    wanted = tuple(name for name in graph.names if name in shaped_anew)
     models = own
     for drawn in (False, True):
         sizes = models.sizes
         layouts, pins, notes = laid_out(sizes)
-        if shaped_anew and shapes is not None and not drawn:
-            palette = asked.palette or palette_of_room(manifest["seed"], graph.room.style)
-            models = retrieved(
-                graph, layouts[0], styles, shapes, wishes, asked.seed, own, among=shaped_anew, palette=palette
-            )
-        if models.sizes == sizes:  # else real ones shape the layout
-            break
-    geometry = {name: saved.geometry[name] for name in graph.names if name not in shaped_anew}
-    names = {name: saved.assets[name] for name in geometry}
-    if shaped_anew and shapes is not None:
-        wanted = tuple(name for name in graph.names if name in shaped_anew)
         request = ShapeRequest(
             graph, layouts[0], styles, asked.seed, used, asked.steps, asked.faces, wanted, dict(geometry),
-            search.change if search else None, timer, models,
+            search.change if search else None, timer,
         )  # fmt: skip
-        made = mixed_shapes(request, shapes)
+        if wanted and shapes is not None and not drawn:
+            palette = asked.palette or palette_of_room(manifest["seed"], graph.room.style)
+            models = retrieved(request, shapes, wishes, own, palette=palette)
+        if models.sizes == sizes:  # else real ones shape the layout
+            break
+    if wanted and shapes is not None:
+        made = mixed_shapes(replace(request, retrieved=models), shapes)
         geometry |= {name: made.geometry[owner] for name, owner in made.owners.items()}
         names |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
     names = _own_names({name: names[name] for name in graph.names}, shaped_anew)

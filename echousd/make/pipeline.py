@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -133,14 +134,12 @@ def generate(
     for drawn in (False, True):
         sizes = models.sizes
         graph, (first, notes), more = fitted(graph, arranged) if asked.fit == "drop" else (graph, arranged(graph), ())
-        left_out, styles = (*left_out, *more), style_groups(graph)
+        left_out = (*left_out, *more)
+        request = ShapeRequest(graph, first, style_groups(graph), seed, echo, asked.steps, asked.faces, timer=timer)
         if theirs and not drawn:
-            near = None
-            if "guided" in sources_of(graph, shapes).values():
-                near = shape_nearness(graph, first, shapes, wishes(), seed, echo, asked.steps, timer)
-            models = retrieved(
-                graph, first, styles, shapes, wishes, seed, pieces, near, palette=asked.palette, timer=timer
-            )
+            guided = "guided" in sources_of(graph, shapes).values()
+            near = shape_nearness(request, shapes, wishes()) if guided else None
+            models = retrieved(request, shapes, wishes, pieces, near, asked.palette)
         if models.sizes == sizes:  # else real ones shape the layout
             break
     notes = (*left_out, *models.notes, *echo.unlearned(graph_batch(graph)), *notes)
@@ -151,8 +150,7 @@ def generate(
         graph = with_wider_floor(graph, footprints(*plan).reshape(-1, 2))
     if not stated.room.openings:
         graph = with_free_openings(graph, layouts, seed)
-    request = ShapeRequest(graph, first, styles, seed, echo, asked.steps, asked.faces, timer=timer, retrieved=models)
-    made = mixed_shapes(request, shapes)
+    made = mixed_shapes(replace(request, graph=graph, retrieved=models), shapes)
     floor = room_floor(graph, layouts)
     geometry = {name: made.geometry[owner] for name, owner in made.owners.items()}
     outcomes = tuple(layout_outcome(graph, found) for found in layouts)

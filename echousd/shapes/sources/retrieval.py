@@ -14,11 +14,10 @@ from echousd.progress import StageTimer
 from echousd.shapes.finishes.slots import HARMONIES, linear
 from echousd.shapes.looks import palette_of_room
 from echousd.shapes.sources.named import RETRIEVED, source_of
-from echousd.shapes.sources.source import Retrieved
+from echousd.shapes.sources.source import Retrieved, ShapeRequest
 from echousd.shapes.styles import ALIKE, ROOM_STYLE
 
 if TYPE_CHECKING:
-    from echomodel.boxes import Boxes
     from echousd.assets.choose import Asked, AssetWishes
     from echousd.assets.model_file import ModelFile
     from echousd.assets.record import AssetRecord
@@ -68,32 +67,32 @@ def _given(node: Node, wishes: AssetWishes) -> tuple[AssetRecord, ModelFile]:
 
 
 def retrieved(
-    graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], shapes: str, wishes: Wanted, seed: int,
-    given: Retrieved, nearness: Mapping[str, Mapping[str, float]] | None = None, among: Container[str] | None = None,
-    palette: str = "", timer: StageTimer | None = None,
+    request: ShapeRequest, shapes: str, wishes: Wanted, given: Retrieved,
+    nearness: Mapping[str, Mapping[str, float]] | None = None, palette: str = "",
 ) -> Retrieved:  # fmt: skip
     """The models of all objects that come from a library, and the sizes of those that their boxes do not fit.
 
-    `boxes`: n boxes in the order of the nodes. `styles`: object name -> style. `shapes`: the room's source. `given`:
-    what `given_pieces` found. `nearness`: as for `choose`. `among`, `timer`: as for `given_pieces`. `palette`: harmony
-    of the room, whose colours models shall go with; "" = that which the seed chooses.
+    `shapes`: the room's source. `given`: what `given_pieces` found. `nearness`: as for `choose`. `palette`: harmony of
+    the room, whose colours models shall go with; "" = that which the seed chooses.
     """
-    wanted = [
-        i
-        for i, node in enumerate(graph.nodes)
-        if source_of(node, shapes) in RETRIEVED and (among is None or node.name in among)
-    ]
+    graph, seed = request.graph, request.seed
+    wanted = [i for i in request.rows if source_of(graph.nodes[i], shapes) in RETRIEVED]
     if not wanted:
         return given
     from echousd.assets.choose import choose, fits
     from echousd.shapes.originals.loading import library_file
 
     asked = wishes()
-    size = np.asarray(boxes.size, float)
-    with (timer or StageTimer()).stage("assets"):
+    size = np.asarray(request.boxes.size, float)
+    with request.timer.stage("assets"):
         tones = np.array([linear(color) for color in HARMONIES[palette or palette_of_room(seed, graph.room.style)]])
         chosen, missing = choose(
-            asked, _asked(graph, wanted, size, styles), seed, kept=given.chosen, nearness=nearness, palette=tones
+            asked,
+            _asked(graph, wanted, size, request.styles),
+            seed,
+            kept=given.chosen,
+            nearness=nearness,
+            palette=tones,
         )
         files, sizes = dict(given.files), dict(given.sizes)
         for i in wanted:

@@ -14,21 +14,18 @@ from trimesh.intersections import slice_mesh_plane
 from trimesh.util import append_faces
 
 from echomodel.arrays import on_device
-from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
 from echomodel.late import Late
 from echomodel.protocols import RoomModel
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
-from echousd.graph import SceneGraph
 from echousd.graph.arrays import DISTANCE, graph_batch, one_thread, rounded, seeded
-from echousd.progress import StageTimer
 from echousd.shapes.colliders import colliders_of
 from echousd.shapes.geometry import Geometry, Origin, Part
 from echousd.shapes.meshing import LEAST_FACES, box_mesh, mesh_from_shape
 from echousd.shapes.sources.named import source_of
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
-from echousd.shapes.styles import EQUAL, style_groups
+from echousd.shapes.styles import EQUAL
 
 if TYPE_CHECKING:
     from echousd.assets.choose import AssetWishes
@@ -157,24 +154,21 @@ def chosen_models(request: ShapeRequest, source: str) -> Shapes:
     return Shapes(owners, geometry)
 
 
-def shape_nearness(
-    graph: SceneGraph, boxes: Boxes, shapes: str, wishes: AssetWishes, seed: int, model: RoomModel | None,
-    steps: int | None, timer: StageTimer,
-) -> Mapping[str, Mapping[str, float]] | None:  # fmt: skip
+def shape_nearness(request: ShapeRequest, shapes: str, wishes: AssetWishes) -> Mapping[str, Mapping[str, float]] | None:
     """Object name -> id of a model -> cost of its shape against the generated one; None where nothing is guided.
 
-    Raises ValueError for a library without descriptors. Arguments as for `retrieved` and `ShapeRequest`.
+    Raises ValueError for a library without descriptors. Arguments as for `retrieved`.
     """
-    rows = [i for i, node in enumerate(graph.nodes) if source_of(node, shapes) == "guided" and node.asset is None]
+    nodes = request.graph.nodes
+    rows = [i for i, node in enumerate(nodes) if source_of(node, shapes) == "guided" and node.asset is None]
     records = [record for shelf in wishes.shelves.values() for record in shelf.records]
     if not rows or not records:
         return None
     if not any(record.descriptor for record in records):
         assert wishes.library is not None
         raise ValueError(f"{wishes.library.file}: holds no descriptors; index the library with --descriptors")
-    grids = sampled_grids(ShapeRequest(graph, boxes, style_groups(graph), seed, model, steps, timer=timer))
-    found = descriptors(model, np.asarray(grids)[rows])
-    return nearness(found, [graph.names[i] for i in rows], records)
+    found = descriptors(request.model, np.asarray(sampled_grids(request))[rows])
+    return nearness(found, [nodes[i].name for i in rows], records)
 
 
 @dataclass(frozen=True)

@@ -213,9 +213,9 @@ def test_the_model_is_told_of_relations_between_what_stays():
 def test_models_are_chosen_for_what_is_new_in_the_colours_of_the_room(root, monkeypatch):
     asked = []
 
-    def chosen(*given, among, palette, **more):
-        asked.append((among, palette))
-        return retrieved(*given, among=among, palette=palette, **more)
+    def chosen(request, *given, palette):
+        asked.append((set(request.wanted), palette))
+        return retrieved(request, *given, palette=palette)
 
     monkeypatch.setattr(sys.modules["echousd.make.edit"], "retrieved", chosen)
     graph = small_graph()
