@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,16 +44,9 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
         members.setdefault(number, []).append(node.name)
     style_of = {node.name: node.style for node in graph.nodes}
     out: dict[str, str] = {}
-    for node in graph.nodes:
-        if node.name in out:
-            continue
-        group = members[group_of[place[node.name]]]
+    for group in members.values():
         named = next((style_of[name] for name in group if style_of[name]), None)
-        if named is None and len(group) == 1:
-            out[node.name] = ROOM_STYLE
-            continue
-        named = named or f"set_{group[0]}"
-        out.update(dict.fromkeys(group, named))
+        out.update(dict.fromkeys(group, named or (f"set_{group[0]}" if len(group) > 1 else ROOM_STYLE)))
     return {node.name: out[node.name] for node in graph.nodes}
 
 
@@ -155,18 +148,20 @@ def shared_assets(
     `names`, `categories`: n words each. `styles`: object name -> style, see `style_groups`. `size`: (n, 3) float,
     metres.
     """
-    owners: list[int] = []
-    out: dict[str, str] = {}
-    for i, name in enumerate(names):
-        for j in owners:
-            same = categories[i] == categories[j] and styles[name] == styles[names[j]] != ROOM_STYLE
-            if same and np.abs(size[i] / size[j] - 1).max() <= EQUAL:
-                out[name] = names[j]
-                break
-        else:
-            owners.append(i)
-            out[name] = name
-    return out
+
+    def same(i: int, j: int) -> bool:
+        agree = categories[i] == categories[j] and styles[names[i]] == styles[names[j]] != ROOM_STYLE
+        return agree and bool(np.abs(size[i] / size[j] - 1).max() <= EQUAL)
+
+    return {names[i]: names[j] for i, j in first_alike(range(len(names)), same).items()}
+
+
+def first_alike(rows: Iterable[int], same: Callable[[int, int], bool]) -> dict[int, int]:
+    """Row -> the first of the rows that are no copies which it is the `same` as, itself if there is none."""
+    first: dict[int, int] = {}
+    for i in rows:
+        first[i] = next((j for j in first if first[j] == j and same(i, j)), i)
+    return first
 
 
 def asset_names(owners: Mapping[str, str], categories: Mapping[str, str]) -> dict[str, str]:

@@ -15,7 +15,7 @@ from echousd.shapes.finishes.slots import HARMONIES, linear
 from echousd.shapes.looks import palette_of_room
 from echousd.shapes.sources.named import RETRIEVED, source_of
 from echousd.shapes.sources.source import Retrieved, ShapeRequest
-from echousd.shapes.styles import ALIKE, ROOM_STYLE
+from echousd.shapes.styles import ALIKE, ROOM_STYLE, first_alike
 
 if TYPE_CHECKING:
     from echousd.assets.choose import Asked, AssetWishes
@@ -111,25 +111,20 @@ def _asked(graph: SceneGraph, rows: list[int], size: np.ndarray, styles: Mapping
     """The objects with who shares a model with whom: those of one category and style group, and sets."""
     from echousd.assets.choose import Asked
 
-    heads: list[tuple[int, str]] = []
+    nodes = graph.nodes
+
+    def same(i: int, j: int) -> bool:
+        near = 2 * ALIKE if styles[nodes[i].name] == ROOM_STYLE else np.inf
+        agree = nodes[i].category == nodes[j].category and styles[nodes[i].name] == styles[nodes[j].name]
+        return agree and bool(np.abs(np.log(size[i] / size[j])).max() <= near)
+
+    shared = [i for i in rows if styles[nodes[i].name] != ROOM_STYLE
+              or vocabulary().category(nodes[i].category).stands in TOGETHER]  # fmt: skip
+    first = first_alike(shared, same)
     out = []
     for i in rows:
-        node = graph.nodes[i]
-        style = styles[node.name]
-        shares = ""
-        if style != ROOM_STYLE or vocabulary().category(node.category).stands in TOGETHER:
-            near = 2 * ALIKE if style == ROOM_STYLE else np.inf
-            shares = next(
-                (
-                    name
-                    for first, name in heads
-                    if (graph.nodes[first].category, styles[graph.nodes[first].name]) == (node.category, style)
-                    and np.abs(np.log(size[i] / size[first])).max() <= near
-                ),
-                node.name,
-            )
-            if shares == node.name:
-                heads.append((i, node.name))
+        node, style = nodes[i], styles[nodes[i].name]
         box = (float(size[i][0]), float(size[i][1]), float(size[i][2]))
+        shares = nodes[first[i]].name if i in first else ""
         out.append(Asked(node.name, node.category, style, box, shares, f"{style} {node.name}".replace("_", " ")))
     return out

@@ -25,7 +25,7 @@ from echousd.shapes.geometry import Geometry, Origin, Part
 from echousd.shapes.meshing import LEAST_FACES, box_mesh, mesh_from_shape
 from echousd.shapes.sources.named import source_of
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
-from echousd.shapes.styles import EQUAL
+from echousd.shapes.styles import EQUAL, first_alike
 
 if TYPE_CHECKING:
     from echousd.assets.choose import AssetWishes
@@ -128,30 +128,23 @@ def _grids(request: ShapeRequest, batch: GraphBatch, stream: str, extra: dict[st
 def chosen_models(request: ShapeRequest, source: str) -> Shapes:
     """What `ShapeRequest.retrieved` holds, as geometry of a source; objects with one model and size share an asset."""
     size = np.asarray(request.boxes.size, float)
-    owners: dict[str, str] = {}
     geometry: dict[str, Geometry] = {}
-    heads: list[int] = []
-    chosen, files = request.retrieved.chosen, request.retrieved.files
-    with request.timer.stage("meshes", len(request.rows)) as tell:
+    nodes, chosen, files = request.graph.nodes, request.retrieved.chosen, request.retrieved.files
+
+    def same(i: int, j: int) -> bool:
+        agree = chosen[nodes[i].name] == chosen[nodes[j].name] and nodes[i].category == nodes[j].category
+        return agree and bool(np.abs(size[j] / size[i] - 1).max() <= EQUAL)
+
+    first = first_alike(request.rows, same)
+    with request.timer.stage("meshes", len(first)) as tell:
         for done, row in enumerate(request.rows, 1):
-            node = request.graph.nodes[row]
-            record = chosen[node.name]
-            same = (
-                other
-                for other in heads
-                if chosen[request.graph.nodes[other].name] == record
-                and request.graph.nodes[other].category == node.category
-                and np.abs(size[other] / size[row] - 1).max() <= EQUAL
-            )
-            first = next(same, None)
-            if first is None:
-                heads.append(row)
+            name, category = nodes[row].name, nodes[row].category
+            if first[row] == row:
                 box = (float(size[row][0]), float(size[row][1]), float(size[row][2]))
                 collect = request.retrieved.collect
-                geometry[node.name] = geometry_of(files[node.name], record, node.category, box, source, collect=collect)
-            owners[node.name] = node.name if first is None else request.graph.nodes[first].name
-            tell(done, len(request.rows))
-    return Shapes(owners, geometry)
+                geometry[name] = geometry_of(files[name], chosen[name], category, box, source, collect=collect)
+            tell(done, len(first))
+    return Shapes({nodes[i].name: nodes[j].name for i, j in first.items()}, geometry)
 
 
 def shape_nearness(request: ShapeRequest, shapes: str, wishes: AssetWishes) -> Mapping[str, Mapping[str, float]] | None:
