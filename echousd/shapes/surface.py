@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.triangles import Mesh, area_normals, connected_pieces
+from echomodel.triangles import Mesh, along, area_normals, connected_pieces
 from echousd.shapes.finishes.slots import UPRIGHT, metres_of
 
 NUDGE = 4e-6  # metres between points of different boards at one place
@@ -100,16 +100,15 @@ def _corner_normals(points: np.ndarray, faces: np.ndarray, sharpest: np.ndarray)
     here = np.repeat(np.arange(len(corner_vertex)), fan)
     step = np.arange(len(here)) - np.repeat(np.cumsum(fan) - fan, fan)
     other = order[np.repeat(first[corner_vertex], fan) + step]
-    face = corner_face[here]
-    near = (unit[face] * unit[corner_face[other]]).sum(1) >= sharpest[face]
-    total = np.zeros((len(corner_vertex), 3))
-    for axis in range(3):
-        weight = area_normal[corner_face[other[near]], axis]
-        total[:, axis] = np.bincount(here[near], weights=weight, minlength=len(corner_vertex))
-    length = np.linalg.norm(total, axis=1, keepdims=True)
+    face, met = corner_face.take(here), corner_face.take(other)
+    near = along(unit.T.take(face, 1), unit.T.take(met, 1)) >= sharpest.take(face)
+    here, met = here[near], met[near]
+    weights = area_normal.T.take(met, 1)
+    total = np.stack([np.bincount(here, weight, len(corner_vertex)) for weight in weights], 1)
+    length = np.sqrt(along(total.T, total.T))[:, None]
     total = np.where(length > 1e-12, total / np.maximum(length, 1e-12), unit[corner_face])
-    flat = np.linalg.norm(total, axis=1) < 0.5  # corners of triangles without area
-    total[flat] = (0.0, 1.0, 0.0)
+    flat = np.flatnonzero(length <= 1e-12)
+    total[flat[np.linalg.norm(total[flat], axis=1) < 0.5]] = (0.0, 1.0, 0.0)  # of triangles without area
     return total
 
 
@@ -128,9 +127,7 @@ def _laid_out(
     """
     axis, way = facing_axis(points[faces])
     st = _projected(points[faces], axis, way)
-    low, high = (np.full((int(board.max(initial=0)) + 1, 3), sign * np.inf) for sign in (1, -1))
-    np.minimum.at(low, np.repeat(board, 3), points[faces].reshape(-1, 3))
-    np.maximum.at(high, np.repeat(board, 3), points[faces].reshape(-1, 3))
+    low, high = _corners(points[faces], board)
     extent = (high - low)[board]
     rows = np.arange(len(faces))
     across, along = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
@@ -172,10 +169,7 @@ def unshared(points: np.ndarray, faces: np.ndarray, owner: np.ndarray, piece: np
         return points
     board = np.full(len(points), -1)
     board[faces] = piece[:, None]
-    low, high = (np.full((int(board.max()) + 1, 3), sign * np.inf) for sign in (1, -1))
-    used = board >= 0
-    np.minimum.at(low, board[used], points[used])
-    np.maximum.at(high, board[used], points[used])
+    (low, high), used = _corners(points[faces].astype(float), piece), board >= 0
     out = points.astype(float)
     seen: dict[int, list[int]] = {}
     times: Counter[tuple[int, int]] = Counter()
@@ -192,6 +186,14 @@ def unshared(points: np.ndarray, faces: np.ndarray, owner: np.ndarray, piece: np
             out[vertex] -= NUDGE * times[again] * outwards / max(float(np.linalg.norm(outwards)), 1e-20)
         times[again] += 1
     return out.astype(np.float32)
+
+
+def _corners(triangles: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corners (p, 3) of the pieces that triangles (f, 3, 3) belong to, all from 0 on, (f,) int."""
+    order = np.argsort(piece, kind="stable")
+    first = np.searchsorted(piece[order], np.arange(piece.max(initial=-1) + 1))
+    triangles = triangles[order]
+    return np.minimum.reduceat(triangles.min(1), first), np.maximum.reduceat(triangles.max(1), first)
 
 
 def facing_axis(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -218,13 +220,13 @@ def _indexed(values: np.ndarray, digits: int, owner: np.ndarray) -> list[tuple[n
     """For each owner of rows (n,) int: the different ones of its `values`, rounded, in lexicographic order, and for
     every row the number of its value.
     """
-    whole = np.column_stack([owner, np.rint(values * 10.0**digits).astype(np.int64)])
-    low = whole.min(0)
-    span = whole.max(0) - low + 1
+    whole = np.stack([owner, *np.rint(values.T * 10.0**digits).astype(np.int64)])
+    low = whole.min(1)
+    span = whole.max(1) - low + 1
     if float(np.prod(span.astype(float))) > 2**62:  # rows as one number each sort ten times as fast
-        unique, index = np.unique(whole, axis=0, return_inverse=True)
+        unique, index = np.unique(whole.T, axis=0, return_inverse=True)
     else:
-        keys = np.ravel_multi_index(tuple((whole - low).T), tuple(span))
+        keys = np.ravel_multi_index(tuple(whole - low[:, None]), tuple(span))
         found, index = np.unique(keys, return_inverse=True)
         unique = np.stack(np.unravel_index(found, tuple(span)), 1) + low
     mine, rows = (np.searchsorted(each, np.arange(owner.max() + 2)) for each in (unique[:, 0], owner))

@@ -130,11 +130,14 @@ def connected_pieces(faces: np.ndarray, points: int) -> np.ndarray:
     lowest, before = np.arange(points), None
     while before is None or not np.array_equal(lowest, before):
         before, lowest = lowest, lowest.copy()
-        least = np.repeat(before[faces].min(1), faces.shape[1])
-        np.minimum.at(lowest, before[faces].ravel(), least)
-        np.minimum.at(lowest, faces.ravel(), least)
+        known = before.take(faces.T)
+        least = np.tile(known.min(0), len(known))
+        np.minimum.at(lowest, known.ravel(), least)
+        np.minimum.at(lowest, faces.T.ravel(), least)
         lowest = lowest[lowest]
-    return np.unique(lowest[faces[:, 0]], return_inverse=True)[1]
+    number = np.zeros(points, int)
+    number[lowest[faces[:, 0]]] = 1
+    return (number.cumsum() - 1)[lowest[faces[:, 0]]]
 
 
 def linked(pairs: Sequence[tuple[int, int]] | np.ndarray, count: int) -> np.ndarray:
