@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import platform
-import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module, metadata, resources, util
 from pathlib import Path
 
+from echomodel.files import tables
 from echousd import plugin
 
-EXTRAS = tomllib.loads(Path(__file__).with_name("extras.toml").read_text("utf-8"))
+EXTRAS = tables("extras.toml", __file__)
 GPUS = ("/dev/nvidiactl", "/dev/dxg", "/dev/kfd", "/dev/accel")  # on Linux; without one torch finds the processor alone
 OLDEST = (0, 24, 11)  # the first OpenUSD with UsdSemantics
 

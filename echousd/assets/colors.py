@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import io
 import re
-import tomllib
 import warnings
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
+from echomodel.files import tables
 from echomodel.vocabulary import vocabulary
 from echousd.srgb import from_linear, of_hexadecimal, to_linear
 from echousd.textures import FORMATS, MAX_BYTES, MAX_PIXELS
@@ -136,7 +135,7 @@ def stated_colors(text: str) -> tuple[tuple[float, float, float], ...]:
 @cache
 def _named() -> dict[str, tuple[float, float, float]]:
     """Word for a colour -> OKLab."""
-    rows = tomllib.loads(Path(__file__).with_name("colors.toml").read_text("utf-8"))
+    rows = tables("colors.toml", __file__)
     found = oklab(np.array([of_hexadecimal(row) for row in rows.values()]))
     return dict(zip(rows, map(tuple, found.tolist()), strict=True))
 

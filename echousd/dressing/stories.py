@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from typing import Any
 
+from echomodel.files import tables
 from echomodel.vocabulary import Category
 from echousd.graph.fields import RESIDENTS
 
-TABLE = tomllib.loads(resources.files(__package__).joinpath("stories.toml").read_text("utf-8"))
+TABLE = tables("stories.toml", __file__)
 
 
 @dataclass(frozen=True)

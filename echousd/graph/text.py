@@ -14,18 +14,20 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
+from echomodel.late import Late
 from echomodel.vocabulary import TYPO, UnknownWord, normalised, vocabulary
 from echousd.graph.consistency import MAX_ERRORS, GraphError, listed, name_faults, raise_all, unknown_ends
 from echousd.graph.fields import IDENTIFIER, shown
 from echousd.graph.nodes import Node, Placed, PlainModel, Relation, RoomSpec
 from echousd.graph.openings import LISTS, listed_words, opening_from_words
-from echousd.graph.syntax import Located, Path, parse_json, parse_yaml
 from echousd.graph.titles import composed, identifier_of, is_title, name_of, with_names
 
 if TYPE_CHECKING:
     from echousd.graph.scene import SceneGraph
+    from echousd.graph.syntax import Located, Path
 
 Built = TypeVar("Built", bound=PlainModel)
+parse_json, parse_yaml = Late("echousd.graph.syntax:parse_json"), Late("echousd.graph.syntax:parse_yaml")
 TOP_KEYS = ("room", "objects", "nodes", "relations", *LISTS)
 
 

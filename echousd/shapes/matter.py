@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import shapely
@@ -13,6 +11,7 @@ from pxr import Gf, Usd, UsdPhysics
 from shapely.affinity import scale
 
 from echomodel.dressing.prints import PRINTS
+from echomodel.files import tables
 from echomodel.furniture.assembly import Piece
 from echomodel.late import Late
 from echomodel.triangles import cross
@@ -34,8 +33,7 @@ class Matter:
 
 
 _ROWS = {
-    part: {name: Matter(**row) for name, row in rows.items()}
-    for part, rows in tomllib.loads(Path(__file__).with_name("matter.toml").read_text("utf-8")).items()
+    part: {name: Matter(**row) for name, row in rows.items()} for part, rows in tables("matter.toml", __file__).items()
 }
 # Material of a solid -> what it stands for; role and material -> the same, where the material alone tells how it looks.
 MATTER = _ROWS["materials"] | {name: _ROWS["materials"][name.partition("_")[0]] for name in PRINTS}

@@ -115,6 +115,22 @@ def cache_folder() -> Path:
     return Path(os.environ.get("ECHOUSD_CACHE") or Path.home() / ".cache" / "echousd")
 
 
+def tables(name: str, beside: str) -> dict[str, Any]:
+    """What a TOML file of ours beside a module's file holds; the cache keeps it as JSON, which is read at once."""
+    text = Path(beside).with_name(name).read_bytes()
+    kept = cache_folder() / "tables" / f"{digest(text)}.json"
+    with suppress(OSError, ValueError):
+        return dict(json.loads(kept.read_bytes()))
+    import tomllib
+
+    found = tomllib.loads(text.decode())
+    with suppress(OSError):
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(kept) as whole:
+            whole.write_text(json.dumps(found), "utf-8")
+    return found
+
+
 def flush(path: Path) -> None:
     """Have the system write a file, or the names in a folder, to the disk before anything that comes after it."""
     if path.is_dir() and os.name != "posix":

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from importlib import resources
 
 import numpy as np
 import shapely
+
+from echomodel.files import tables
 
 # What takes (x, y) of a source to (x, z) of the home: north is +X, east +Z.
 MAP = np.array([[0.0, 1.0], [1.0, 0.0]])  # x east, y north: maps, z-up; also x and z of Unity
@@ -91,8 +91,8 @@ class Found:
 
 @cache
 def _words() -> dict[str, dict[str, re.Pattern[str]]]:
-    text = resources.files("echousd.home.importing").joinpath("words.toml").read_text("utf-8")
-    return {about: {kind: re.compile(w) for kind, w in table.items()} for about, table in tomllib.loads(text).items()}
+    rows = tables("words.toml", __file__)
+    return {about: {kind: re.compile(w) for kind, w in table.items()} for about, table in rows.items()}
 
 
 def kind_of(about: str, text: str) -> str | None:

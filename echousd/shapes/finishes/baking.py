@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import tomllib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -16,7 +15,7 @@ import PIL
 from PIL import Image
 
 from echomodel.dressing.prints import PRINTS, TABLE
-from echomodel.files import cache_folder, digest
+from echomodel.files import cache_folder, digest, tables
 from echomodel.late import Late
 from echousd.shapes.finishes.slots import HERE, Color
 from echousd.srgb import from_linear
@@ -128,7 +127,7 @@ def _encoded(value: np.ndarray, quality: int) -> bytes:
 
 
 SKY_SIZE = (512, 1024)  # pixels: a window some metres away shows about a hundred of them
-SKIES: Mapping[str, Any] = tomllib.loads((HERE / "skies.toml").read_text("utf-8"))
+SKIES: Mapping[str, Any] = tables("skies.toml", __file__)
 SOFT = 0.5  # degrees that outlines take
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echomodel.dressing.prints import PRINTS
+from echomodel.files import tables
 from echousd.srgb import of_hexadecimal
 
 
@@ -31,7 +31,7 @@ class MaterialSlot:
 
 
 HERE = Path(__file__).parent
-_ROWS = {name: MaterialSlot(**row) for name, row in tomllib.loads((HERE / "slots.toml").read_text("utf-8")).items()}
+_ROWS = {name: MaterialSlot(**row) for name, row in tables("slots.toml", __file__).items()}
 SLOTS: Mapping[str, MaterialSlot] = _ROWS | {
     name: replace(_ROWS[name.partition("_")[0]], pattern=name, metres=0.0) for name in PRINTS
 }
@@ -78,7 +78,7 @@ class Harmony(NamedTuple):
 
 HARMONIES: Mapping[str, Harmony] = {
     name: Harmony(**{word: color for shares in row.values() for word, color in shares.items()})
-    for name, row in tomllib.loads((HERE / "harmonies.toml").read_text("utf-8")).items()
+    for name, row in tables("harmonies.toml", __file__).items()
 }
 
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +12,7 @@ from trimesh.intersections import slice_mesh_plane
 from trimesh.util import append_faces
 
 from echomodel.arrays import on_device
+from echomodel.files import tables
 from echomodel.graph import GraphBatch
 from echomodel.late import Late
 from echomodel.protocols import RoomModel
@@ -173,10 +172,7 @@ class Band:
     metres: bool = False
 
 
-BANDS = {
-    kind: tuple(Band(**row) for row in rows)
-    for kind, rows in tomllib.loads(Path(__file__).with_name("bands.toml").read_text("utf-8")).items()
-}
+BANDS = {kind: tuple(Band(**row) for row in rows) for kind, rows in tables("bands.toml", __file__).items()}
 HEADBOARD = 0.09  # metres at the back of a bed that are wood to the top
 FOLD = 0.42  # share of a bed's length, from the foot, that the blanket covers
 FRONT = 0.012  # metres behind the foremost plane that count as the front of a cabinet

@@ -6,16 +6,15 @@ know them.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib import resources
 
 import numpy as np
 
 from echomodel.dressing.forms import form
 from echomodel.dressing.prints import PRINTS
+from echomodel.files import tables
 from echomodel.furniture.solids import Solid
 from echomodel.late import Late
 
@@ -53,7 +52,7 @@ BUILT = {"round": "round_rug", "oval": "round_rug", "lumbar": "lumbar_cushion"} 
 
 def _kinds() -> dict[str, Kind]:
     """Rows of `things.toml` by the names of their programs, and those of `prints.toml` as things that show them."""
-    rows = tomllib.loads(resources.files(__name__).joinpath("things.toml").read_text("utf-8"))
+    rows = tables("things.toml", __file__)
     made = {}
     for name, row in rows.items():
         forms = row.pop("forms", [row.pop("parts")] if "parts" in row else [])

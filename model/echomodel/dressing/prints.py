@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from echomodel.files import tables
 from echomodel.rows import RoomStyle
 
 # of sheets
@@ -16,7 +16,7 @@ ASPECTS = {
     "tall": 0.74, "wide": 1.45, "rug": 1.5, "round": 1.0, "oval": 1.5, "runner": 3.0, "square": 1.0, "lumbar": 1.7,
 }  # fmt: skip
 TABLE = Path(__file__).with_name("prints.toml")
-PRINTS: Mapping[str, Mapping[str, Any]] = tomllib.loads(TABLE.read_text("utf-8"))
+PRINTS: Mapping[str, Mapping[str, Any]] = tables(TABLE.name, __file__)
 
 
 def printed(what: str, form: str, resident: str = "", style: RoomStyle | None = None) -> dict[str, list[str]]:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
-from importlib import resources
 from typing import Any
 
 import numpy as np
 
+from echomodel.files import tables
 from echomodel.furniture.solids import Blade, Solid, ball, rotation, tube
 
-SPECIES: dict[str, dict[str, Any]] = tomllib.loads(
-    resources.files(__package__).joinpath("plants.toml").read_text("utf-8")
-)
+SPECIES: dict[str, dict[str, Any]] = tables("plants.toml", __file__)
 GOLDEN = 2 * np.pi * 0.382  # radians from leaf to leaf
 
 

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from importlib import resources
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from echomodel.files import tables
 from echomodel.furniture.carpentry import Size, base, both, box, cushion, of_role
 from echomodel.furniture.cloth import Tufted
 from echomodel.furniture.seating import chair_legs, leaning, slim_arms
 from echomodel.furniture.solids import Lathe, Pad, Solid, ball, bent, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
 
-BODIES: list[dict[str, Any]] = list(
-    tomllib.loads(resources.files(__package__).joinpath("bodies.toml").read_text("utf-8")).values()
-)
+BODIES: list[dict[str, Any]] = list(tables("bodies.toml", __file__).values())
 padded = partial(turned, material="fabric")
 FLARED = 0.4  # softness up to which arms have no pad and flare
 

@@ -8,19 +8,18 @@ A kind is told by one number per word, +1 for the one that holds; a proportion o
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
 from itertools import accumulate
 from typing import Any, TypeVar
 
 import numpy as np
 
+from echomodel.files import tables
 from echomodel.rows import RoomStyle
 from echomodel.sizes import Z95, size_statistics
 
-_ROWS = tomllib.loads(resources.files(__package__).joinpath("families.toml").read_text("utf-8"))
+_ROWS = tables("families.toml", __file__)
 BUILD: dict[str, tuple[float, float]] = {name: (row.pop("bulk"), row.pop("soft")) for name, row in _ROWS.items()}
 FAMILIES: dict[str, dict[str, dict[str, float]]] = _ROWS  # per family and part: how often each kind occurs
 KINDS: dict[str, tuple[str, ...]] = {

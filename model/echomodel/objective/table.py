@@ -9,11 +9,10 @@ explains a room asks this table and holds no distance of his own.
 from __future__ import annotations
 
 import inspect
-import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from importlib import resources
 
+from echomodel.files import tables
 from echomodel.objective import access, company, composition, crowding, fitted, physics, sight, sizes
 from echomodel.objective.plan import Found, Plan
 from echomodel.vocabulary import vocabulary
@@ -69,7 +68,7 @@ RELATIONS = (
 
 def _read() -> Iterator[Term]:
     """The rows of `terms.toml`, kind by kind."""
-    rows = tomllib.loads(resources.files("echomodel.objective").joinpath("terms.toml").read_text("utf-8"))
+    rows = tables("terms.toml", __file__)
     for kind in KINDS:
         for row in rows.get(kind, ()):
             module, _, name = row.pop("find").partition(".")
