@@ -282,7 +282,7 @@ def _pooled(seen: Seen, light: np.ndarray) -> np.ndarray:
     _, corner = np.unique(cell + CORNERS @ (1 << np.array([48, 40, 32]))[:, None], return_inverse=True)
     corner = corner.reshape(weight.shape)
     held = np.stack([np.bincount(corner.ravel(), (weight * part).ravel()) for part in (np.ones(len(light)), *light.T)])
-    taken = (held[:, corner] * weight).sum(1)
+    taken = (held.take(corner, 1) * weight).sum(1)
     return np.asarray((taken[1:] / np.maximum(taken[0], 1e-9)).T, np.float32)
 
 
