@@ -11,8 +11,6 @@ from echousd.graph.files import STAGE_FORMS
 from echousd.naming import HOME, HOUSE
 from echousd.pending import half_written
 
-HEAD = 2**16  # bytes in which a layer's own metadata stand
-
 
 def rooms_at(place: Path) -> list[Path]:
     """The root layers of the rooms at a path, sorted; raises ValueError for a folder or pattern without any."""
@@ -70,7 +68,7 @@ def check_ours(root: Path) -> None:
 def is_home(place: Path) -> bool:
     """Whether a path is a layer of ours that composes rooms, or the folder of one."""
     file = place / HOME if place.is_dir() else place
-    return file.suffix == ".usda" and file.is_file() and f"int {HOUSE} ".encode() in file.read_bytes()[:HEAD]
+    return file.suffix == ".usda" and file.is_file() and f"int {HOUSE} ".encode() in file.read_bytes()
 
 
 def refuse_house(place: Path) -> None:

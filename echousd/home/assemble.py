@@ -21,6 +21,7 @@ from echousd.batches.batch import MEMORY, cores, weights_hash
 from echousd.batches.executor import LocalWorkers, Task
 from echousd.batches.options import BatchOptions
 from echousd.batches.work import Job, room
+from echousd.folder.found import is_home
 from echousd.folder.manifest import find_manifest
 from echousd.home.given import next_plan
 from echousd.home.graph import HomeGraph, home_of_plain
@@ -117,7 +118,8 @@ def write_rooms(
     Raises ValueError for a folder that holds something else, and where edits of a room would be lost.
     """
     root = output / ROOT_FILE
-    check_root(root, force=force)
+    if root.exists() and not force and not is_home(root):
+        raise ValueError(f"{root}: exists and is no home of echousd; choose another place or use --force")
     jobs = jobs_of(plan, output, options, outside)
     digests = digests_of(jobs)
     wanted = [jobs[name] for name in stale(digests, output)]
@@ -187,14 +189,6 @@ def earlier(output: Path, seed: int) -> Path | None:
     root = output / ROOT_FILE
     layer = _layer(root)
     return root if layer and layer.customLayerData.get("seed") == seed else None
-
-
-def check_root(root: Path, *, force: bool = False) -> None:
-    """Raises ValueError where a home cannot be written for a file that is not ours."""
-    if force or not root.exists():
-        return
-    if not (root.is_file() and f"int {MARK}".encode() in root.read_bytes()):
-        raise ValueError(f"{root}: exists and is no home of echousd; choose another place or use --force")
 
 
 def home_files(
