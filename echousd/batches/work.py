@@ -32,6 +32,7 @@ class Job:
         text: canonical JSON of its graph; draw: else the graph to draw (`plan.Entry.draw`).
         seed, options: as in the plan.
         outside: as of the run (`RunOptions`).
+        begin: whether the room that its folder holds is edited to become that of the graph.
     """
 
     id: str
@@ -42,6 +43,7 @@ class Job:
     draw: tuple[str, int, int] | None = None
     store: str = ""
     outside: tuple[str, ...] = ()
+    begin: bool = False
 
 
 def room(job: Job) -> dict[str, Any]:
@@ -71,8 +73,12 @@ def room(job: Job) -> dict[str, Any]:
 
 def generated(job: Job) -> Room:
     """The room of a job; raises ValueError as `generate` does."""
+    from echousd.folder.found import room_at
+    from echousd.make.edit import edit
     from echousd.make.pipeline import generate
 
+    if job.begin:
+        return edit(room_at(Path(job.folder)), SceneGraph.from_json(job.text), outside=job.outside)
     if job.draw is not None and not job.text:
         graph = sampled_graph(*job.draw, job.options.relations)
     else:

@@ -6,7 +6,7 @@ import hashlib
 import json
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from echousd.batches.options import BatchOptions
 from echousd.batches.work import Job, room
 from echousd.folder.found import is_home
 from echousd.folder.manifest import find_manifest
+from echousd.graph import SceneGraph
 from echousd.home.given import next_plan
 from echousd.home.graph import HomeGraph, home_of_plain
 from echousd.home.plan import Plan, doorways
@@ -122,8 +123,8 @@ def write_rooms(
         raise ValueError(f"{root}: exists and is no home of echousd; choose another place or use --force")
     jobs = jobs_of(plan, output, options, outside)
     digests = digests_of(jobs)
-    wanted = [jobs[name] for name in stale(digests, output)]
-    edited = [job.id for job in wanted if (find_manifest(Path(job.folder)) or {}).get("history")]
+    wanted = [_begun(jobs[name], plan, output, options) for name in stale(digests, output)]
+    edited = [job.id for job in wanted if not job.begin and (find_manifest(Path(job.folder)) or {}).get("history")]
     if edited and not force:
         raise ValueError(
             f"{output}: {', '.join(edited)} would be made anew, which gives up what was edited in it since; allowed: "
@@ -141,6 +142,17 @@ def write_rooms(
         marks = {name: digests[name] for name in made}
         write_all(home_files(plan, output, made, marks, options))
     return Made(root, done, failed)
+
+
+def _begun(job: Job, plan: Plan, output: Path, options: RoomOptions) -> Job:
+    """The job as an edit of the room that is there, where nothing but its openings is another than it was."""
+    root, manifest = earlier(output, options.seed), find_manifest(Path(job.folder))
+    if root is None or manifest is None:
+        return job
+    (before, asked), there = remembered(root), SceneGraph.from_json(json.dumps(manifest["graph"]))
+    spec, same = plan.graph(job.id).room, asked == options and plan.home.room(job.id) in before.rooms
+    same &= there.room.replaced(openings=spec.openings) == spec
+    return replace(job, text=there.replaced(room=spec).to_json(), begin=True) if same else job
 
 
 def stale(digests: Mapping[str, str], output: Path) -> list[str]:

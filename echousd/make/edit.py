@@ -88,11 +88,12 @@ def edit(
     before = unusual(saved.graph)
     odd = tuple(sentence for sentence in unusual(graph) if sentence not in before)
     begun = [carried(saved.graph, graph, boxes) for boxes in saved.layouts]
-    along = begun[0][1] - moving
+    rebuilt = graph.room.replaced(style=saved.graph.room.style) != saved.graph.room
+    along = (movable(graph) if rebuilt else begun[0][1]) - moving
     stated = _pinned(graph, saved.graph, begun[0][0], fresh, moving)
     whole = all(None not in (node.size, node.position, node.yaw) for node in stated.nodes)
     put = fresh | _put_elsewhere(stated, saved) - along  # who went along may be in the way where it came
-    if asked.place and whole and moving | put:
+    if asked.place and whole and (rebuilt or moving | put):
         there = _boxes_of(stated)  # before anything is searched in vain
         moving |= in_the_way(saved, graph, there, layout_outcome(graph, there), along, moving | put)
     shaped_anew = fresh | restyled(saved, graph, fresh)
@@ -223,7 +224,8 @@ def in_the_way(
 
     Arguments:
         saved: the room before. graph, boxes, outcome: as they are now.
-        along: those who were `carried` make way for what a person would point at, too.
+        along: those who were `carried`, or all where the room has other openings, make way for what a person would
+            point at, too.
         moving: who was placed anew; where nobody else is in the way, those who are told of them make way.
     """
 

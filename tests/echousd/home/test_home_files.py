@@ -11,10 +11,12 @@ from pxr import Usd, UsdGeom
 
 import echousd
 from echousd.batches.plan import room_digest
+from echousd.folder.found import room_at
 from echousd.folder.manifest import find_manifest
 from echousd.home.files import load_home
 from echousd.home.given import plan_there
 from echousd.home.stages import furniture
+from echousd.make.reading import read_room
 
 FLAT = """home: {area: 34}
 rooms:
@@ -182,12 +184,31 @@ def test_edits_inside_a_room_are_not_lost_unsaid(made, tmp_path, echousd_command
     assert done.code == 0, done.err
     assert done.out.count("kept     ") == 2
     assert digests(folder) == before
-    done = echousd_command("edit", folder, "--relate", "living open to bedroom")
+    moved = ("--relate", "bedroom larger than living")  # its floor is another then
+    done = echousd_command("edit", folder, *moved)
     assert done.code == 2
     assert "bedroom would be made anew, which gives up what was edited in it since" in done.err
     assert digests(folder) == before
-    assert echousd_command("edit", folder, "--relate", "living open to bedroom", "--force").code == 0
-    assert digests(folder) != before
+    assert echousd_command("edit", folder, *moved, "--force").code == 0
+    assert "chair" not in read_room(room_at(room)).graph.names
+
+
+def test_furniture_stays_where_a_room_only_gets_other_openings(made, echousd_command):
+    folder, _ = made
+    room = folder / "rooms" / "bedroom"
+    assert echousd_command("edit", room, "--add", "chair:chair").code == 0
+    before = read_room(room_at(room))
+    done = echousd_command("edit", folder, "--relate", "living open to bedroom")
+    assert done.code == 0, done.err
+    after = read_room(room_at(room))
+    assert after.graph.names == before.graph.names == ("bed", "chair")
+    np.testing.assert_allclose(after.boxes.position[0], before.boxes.position[0], atol=1e-4)
+    assert after.graph.room.openings != before.graph.room.openings
+    assert echousd_command("check", folder).code == 0
+    made_again = echousd_command("edit", folder, "--relate", "living open to bedroom", "--dry-run")
+    assert "bedroom would" not in made_again.err
+    options = echousd_command("generate", folder / "home.usda", "-o", folder, *QUICK, "--palette", "coast")
+    assert "gives up what was edited in it since" in options.err  # in other colours all is another
 
 
 def test_a_plan_is_drawn_with_what_stands_in_it(made, tmp_path, echousd_command):

@@ -11,6 +11,7 @@ from pxr import Sdf, Usd
 from small_room import BARE, StandIn, saved_room, small_graph, small_room
 
 import echousd
+from echomodel.openings import Opening, segment
 from echomodel.protocols import GraphEdit
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.make import layouts
@@ -18,6 +19,7 @@ from echousd.make.edit import edit, graph_edit, restyled, touched
 from echousd.make.layouts import repeated
 from echousd.make.reading import read_room
 from echousd.options import RoomOptions
+from echousd.place.living import living_faults
 from echousd.shapes.looks import palette_of_room
 from echousd.shapes.sources.retrieval import retrieved
 
@@ -339,3 +341,27 @@ def test_what_a_check_passes_fails_no_edit(tmp_path, deep):
     after = echousd.edit(root, echousd.read_graph(root).relate("stool", "close_by", "chest"))
     found = echousd.check(after.save(tmp_path / "r", preview=False)).collisions
     assert bool(after.faults) == bool(found) == (deep > 0.01)
+
+
+@pytest.mark.parametrize("nearest", [True, False])
+def test_who_is_in_the_way_of_a_new_door_makes_way_and_no_other(tmp_path, nearest):
+    nodes = (Node("bed", "double_bed"), Node("wardrobe", "wardrobe"), Node("desk", "desk"), Node("chair", "chair"))
+    graph = SceneGraph(RoomSpec("bedroom", size=(4.6, 4.4), height=2.6), nodes)
+    room = echousd.generate(graph, seed=1, shapes="boxes", walls=False, dress="none")
+    root, wardrobe = room.save(tmp_path / "r", preview=False), room.boxes.position[1, ::2]
+
+    def away(door):
+        return float(np.linalg.norm(np.mean(segment(room.floor, door), 0) - wardrobe))
+
+    doors = [
+        Opening("new", "door", wall, at, 0.9, 2.0) for wall in range(4) for at in np.arange(0.1, 3.4, 0.1).round(2)
+    ]
+    door = min(doors, key=away) if nearest else max(doors, key=away)
+    after = echousd.edit(root, echousd.read_graph(root).with_room(openings=(door,)))
+    moved = np.abs(after.boxes.position - room.boxes.position).max(1) > 0.01
+    assert moved[1] == nearest
+    assert not moved.all()
+    reached = [
+        fault.says for fault in living_faults(after.graph, after.boxes, after.floor) if fault.rule == "door_free"
+    ]
+    assert reached == []
