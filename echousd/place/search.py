@@ -91,14 +91,15 @@ class Search:
         n = len(setting.size)
         self.children: list[list[int]] = [[] for _ in range(n)]
         self.screens: list[list[int]] = [[] for _ in range(n)]
-        near, opposed = map(vocabulary().predicate_id, ("close_by", "opposite"))
+        near, opposed, above = map(vocabulary().predicate_id, ("close_by", "opposite", "above"))
         kinds, told = setting.kinds, setting.triplets.tolist()
         beside = {one: other for one, word, other in told if word == near and kinds[one].role in ("decor", "light")}
         either = [pair for one, word, other in told if word == opposed for pair in ((one, other), (other, one))]
         ahead = {k: i for k, i in either if kinds[k].role == "storage" and kinds[i].role in ("bed", "sofa")}
+        over = {one: other for one, word, other in told if word == above and setting.hanging[one]}
         for k in range(n):
             parent = int(setting.carrier[k]) if setting.carrier[k] >= 0 else int(setting.anchor[k])
-            parent = ahead.get(k, beside.get(k, -1)) if parent < 0 else parent
+            parent = ahead.get(k, beside.get(k, over.get(k, -1))) if parent < 0 else parent
             if parent >= 0 and not setting.fixed[k] and setting.slot_roles[k] != "near":
                 looked_at = setting.slot_roles[k] == "opposite" or ahead.get(k) == parent
                 (self.screens if looked_at else self.children)[parent].append(k)
@@ -286,19 +287,18 @@ class Search:
         position, yaw = np.repeat(state.position[None], len(ways) + 1, 0), np.repeat(state.yaw[None], len(ways) + 1, 0)
         wide = setting.size[around, 0]
         rows = np.array([[out_of(state.position[i], float(state.yaw[i]), slot) for slot in way] for way in ways])
-        far = FARTHEST * abs(
-            wide[:, None] - wide
-        )  # no chair goes to the slot of a bench, nor where it is told not to be
-        far = far + np.linalg.norm(state.position[around][:, None, [0, 2]] - rows[:, None, :, :2], axis=-1)
+        far = np.linalg.norm(state.position[around][:, None, ::2] - rows[:, None, :, :2], axis=-1)
+        far += FARTHEST * abs(wide[:, None] - wide)  # no chair goes to the slot of a bench, nor where it shall not be
+        loads = [[lamp for lamp in self.children[k] if there[lamp]] for k in around]  # which are told to be over it
         for at, k in enumerate(around):
-            far[:, at] += self._broken(state, there, k, rows.reshape(-1, 4), around).reshape(far[:, at].shape)
+            broken = self._broken(state, there, k, rows.reshape(-1, 4), [*around, *loads[at]])
+            far[:, at] += broken.reshape(len(ways), -1)
         for number, slots in enumerate(rows, 1):
-            one, other = linear_sum_assignment(np.round(far[number - 1], 6))
-            chosen = np.array(around)[one]
-            position[number, chosen, 0], position[number, chosen, 2] = slots[other, 0], slots[other, 1]
-            yaw[number, chosen] = slots[other, 2]
-        changed = np.zeros(len(state.yaw), bool)
-        changed[around] = True
+            _, other = linear_sum_assignment(np.round(far[number - 1], 6))
+            position[number, around, ::2], yaw[number, around] = slots[other, :2], slots[other, 2]
+            for k, load in zip(around, loads, strict=True):
+                position[number, load] += position[number, k] - state.position[k]
+        changed = np.isin(np.arange(len(state.yaw)), [*around, *(lamp for load in loads for lamp in load)])
         likes = [LIKED * sum(slot[3] for slot in slots) + 0.001 * number for number, slots in enumerate(ways)]
         taste = np.array([state.taste[around].sum(), *likes])
         best = self._best(there, position, yaw, changed, taste)

@@ -23,7 +23,8 @@ END = 0.8  # metres before an armchair that looks at a sofa's end, to that
 TOUCHED = 0.1  # metres between a coffee table and other seats than its sofa: 95 % of real ottomans keep 0.12
 HAND = 0.05  # metres between two seats of a group: 90 % of real ones, most others overlap
 OF_ITS_OWN = 0.25  # metres between a side table and a coffee table, a seat and a screen's stand
-FOOT = 0.35  # metres between the foot of a bed and furniture: one passes sideways
+# Metres between the foot of a bed and furniture: one passes sideways; share of the foot from which on something is so.
+FOOT, AT_FOOT = 0.35, 0.1
 # Metres before a front that lamps and plants keep free, before a nightstand's, before who sits (33 of 34 real ones).
 LAMP, AT_BED, AT_SEAT = 0.6, 0.35, 0.35
 IN_LINE, NEXT = 0.15, 0.5  # metres between the backs of desks in a row, and between them
@@ -94,7 +95,7 @@ def _loungers(plan: Plan) -> Array:
 def bed_foot_free(plan: Plan) -> Found:
     """One passes between the foot of a bed and what stands opposite."""
     others = plan.standing & plan.of("storage", "board", "sofa", "seat", "bed")
-    return _clear(plan, plan.of("bed") & plan.standing, others, FOOT, -FAR)
+    return _clear(plan, plan.of("bed") & plan.standing, others, FOOT, -FAR, share=AT_FOOT)
 
 
 def lamp_aside(plan: Plan) -> Found:
@@ -145,7 +146,7 @@ def seats_apart(plan: Plan) -> Found:
 
 def _clear(
     plan: Plan, fronts: Array, block: Array, needed: float | Array, needed_wall: float | Array, *,
-    behind: bool = False, kin: bool = False,
+    behind: bool = False, kin: bool = False, share: float = MET,
 ) -> Found:  # fmt: skip
     """How much more than is needed is free before (or behind) some boxes, to other groups' pieces (or their own)."""
     who = plan.those(fronts)
@@ -154,7 +155,7 @@ def _clear(
     i, j = plan.pairs(fronts, block, least=True)
     other = plan.kin(i, j) == kin
     i, j = i[other], j[other]
-    margin = plan.more_ahead(i, j, needed[i], MET, start=0.25, sign=sign)
+    margin = plan.more_ahead(i, j, needed[i], share, start=0.25, sign=sign)
     least, about = plan.worst(i, margin, j)
     least, about, needed, needed_wall = least[who], about[who], needed[who], needed_wall[who]
     if bool((needed_wall > 0).any()):

@@ -232,12 +232,13 @@ def test_chairs_are_seated_together():
 
 
 def test_chairs_are_seated_where_they_are_told_to_be():
-    """Each stands in the other one's place, so that none of them gets to its own alone."""
-    words, at = ["dining_table", "dining_chair", "dining_chair"], [(0, 0, 0), (0, 0, -0.6), (0, 0, 0.6)]
-    told = [(1, "right", 0), (2, "left", 0)]
-    search, state = searched(words, [(0.8, 0.75, 0.8), *[(0.45, 0.9, 0.5)] * 2], at, [0, 0, np.pi], told)
-    after = search.reseated(state, np.ones(3, bool), 0)
+    """Each stands in the other one's place, so that none gets to its own alone, nor without what hangs over it."""
+    words, at = ["dining_table", *["dining_chair"] * 2, "pendant_lamp"], [(0, 0, -0.6), (0, 0, 0.6), (0, 2.0, -0.6)]
+    size, told = [(0.8, 0.75, 0.8), *[(0.45, 0.9, 0.5)] * 2, (0.4, 0.6, 0.4)], [(1, "right", 0), (2, "left", 0)]
+    search, state = searched(words, size, [(0, 0, 0), *at], [0, 0, np.pi, 0], [*told, (3, "above", 1)])
+    after = search.reseated(state, np.ones(4, bool), 0)
     assert after.position[2, 2] < -0.4 < 0.4 < after.position[1, 2]
+    np.testing.assert_allclose(after.position[3, ::2], after.position[1, ::2], atol=0.05)
     assert search.faults(state)[0] - search.faults(after)[0] > 2 * COST["relations"][0]
 
 
