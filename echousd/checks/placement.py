@@ -154,14 +154,14 @@ def _dressing(whole: Whole) -> Iterator[Misplacement]:
     """Small things that are outside the floor, in the air, off their wall or window, hidden or of no usual size."""
     if whole.floor is None:
         return
-    windows, around = _windows(whole), (*whole.small, *whole.shell)  # sills carry things, too
-    carriers: list[Shape] = [*whole.room.objects, *(one.shape for one in around if one.shape is not None)]
+    small, shell = ([one.shape for one in found if one.shape is not None] for found in (whole.small, whole.shell))
+    carriers, windows = [*whole.room.objects, *small, *shell], _windows(whole)  # sills carry things, too
     for one in whole.small:
-        yield from (Misplacement(one.name, *told) for told in _small_faults(one, whole.floor, carriers, windows))
+        yield from (Misplacement(one.name, *told) for told in _small_faults(one, whole.floor, carriers, windows, shell))
 
 
 def _small_faults(
-    one: Surrounding, floor: Floor, carriers: Sequence[Shape], windows: np.ndarray
+    one: Surrounding, floor: Floor, carriers: Sequence[Shape], windows: np.ndarray, shell: Sequence[Shape] = ()
 ) -> Iterator[tuple[str, float | None]]:
     kind, shape = SMALL[one.word], one.shape
     if shape is None:
@@ -173,7 +173,7 @@ def _small_faults(
     elif float((shape.size / np.array(kind.low)).max()) < LITTLE:
         yield "too small", float(shape.size.max())
     beyond = _beyond(shape, floor)
-    if beyond > OUTSIDE:
+    if beyond > OUTSIDE and not _recessed(shape, beyond, shell):
         yield "outside", beyond
         return
     bottom = float(shape.position[1])
@@ -195,6 +195,12 @@ def _small_faults(
     air = _air_below(shape, carriers, draped=kind.lies)
     if air > (DRAPED if kind.lies else FLOATING):
         yield "floating", air
+
+
+def _recessed(shape: Shape, beyond: float, shell: Sequence[Shape]) -> bool:
+    """Whether a thing that reaches beyond the floor stands in a recess: no deeper than walls, and inside none."""
+    within = 0.98 * shape.points + 0.02 * shape.points.mean(0)
+    return beyond < LEANING and bool(shell) and not any(inside_solid(within, wall).any() for wall in shell)
 
 
 def _windows(whole: Whole) -> np.ndarray:

@@ -250,7 +250,7 @@ def _on_shelves(parts: list[dict[str, np.ndarray]], words: list[str]) -> list[in
         for number, (least, most) in enumerate(bounds):
             middle = (least + most) / 2
             inside = (middle[[0, 2]] > low[[0, 2]]).all() and (middle[[0, 2]] < high[[0, 2]]).all()
-            if inside and abs(least[1] - high[1]) < 0.03:
+            if inside and low[1] < least[1] < high[1] + 0.03:
                 out.append(number)
     return out
 

@@ -14,7 +14,7 @@ from pxr import Sdf
 from echomodel.boxes2d import CORNERS, turned
 from echomodel.dressing import KINDS, usual_size
 from echomodel.dressing import thing as solids_of
-from echomodel.openings import inward_normal
+from echomodel.openings import Opening, inward_normal
 from echomodel.rules import verdicts
 from echomodel.rules.placements import AT_WALL
 from echomodel.vocabulary import vocabulary
@@ -49,6 +49,7 @@ class Dressing:
     assets: Mapping[str, str]  # name of a thing -> name of its asset; one name is one asset in all layouts
     geometry: Mapping[str, Geometry]  # name of an asset -> its geometry
     bare: frozenset[str] = frozenset()  # names of the windows that have curtains in no layout
+    cuts: tuple[Opening, ...] = ()  # of walls, for what is sunk into them
     graphs: tuple[DressingGraph, ...] = ()  # the things of every layout as nodes, none without `dress_graph`
 
     @property
@@ -94,7 +95,7 @@ def dress(room: RoomData) -> Dressing:
         layouts.append(named)
         if room.options.dress_graph:
             graphs.append(graph_of(setting, named))
-    return Dressing(tuple(layouts), assets, geometry, frozenset(bare), tuple(graphs))
+    return Dressing(tuple(layouts), assets, geometry, frozenset(bare), tuple(setting.cuts), tuple(graphs))
 
 
 def dressed(room: RoomData, layout: int = 0) -> Setting:
@@ -118,7 +119,7 @@ def setting_of(room: RoomData, layout: int = 0) -> Setting:
         objects, room.corners, tuple(room.graph.room.openings), room.height, room.options.walls,
         room.options.dress == "full", room.provenance.seed, vocabulary().room_type(room.graph.room.type).use,
         story(who), who if any(o.row.role == "bed" for o in objects.values()) else "",
-        vocabulary().known_style(room.graph.room.style),
+        vocabulary().known_style(room.graph.room.style), not room.graph.room.walls and len(room.layouts) == 1,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from echomodel.dressing.prints import names_of
 from echomodel.openings import hinge_point, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, around, rectangle
 from echousd.dressing.stories import Wish
+from echousd.dressing.walls import walls_of
 
 PILE = 0.008  # metres; furniture stands on the floor below, through the rug
 FROM_WALL = 0.12
@@ -175,16 +176,14 @@ def _ways_to_walls(setting: Setting, host: Standing, rng: np.random.Generator) -
     """Cables straight to the walls, the nearest first."""
     start = host.position[[0, 2]]
     out, variant = [], int(rng.integers(1 << 30))
-    for edge in range(len(setting.floor)):
-        inside = inward_normal(setting.floor, edge)
-        off = float((start - setting.floor[edge]) @ inside)
+    for wall in walls_of(setting.floor):
+        off = float((start - wall.start) @ wall.inside)
         length = round(off - FOOT - 0.016, 3)
         if not 0.12 < length < KINDS["cable"].high[2]:
             continue
         size = np.array([round(min(0.12, 0.04 + 0.06 * length), 3), KINDS["cable"].low[1], length])
-        middle = start - inside * (off - 0.016 - length / 2)
-        yaw = float(np.arctan2(inside[0], inside[1]))
-        out.append(Thing("cable", size, np.array([middle[0], 0.0, middle[1]]), yaw, host.name, variant))
+        x, z = start - wall.inside * (off - 0.016 - length / 2)
+        out.append(Thing("cable", size, np.array([x, 0.0, z]), wall.yaw, host.name, variant))
     return sorted(out, key=lambda thing: float(thing.size[2]))
 
 

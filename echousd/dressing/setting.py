@@ -105,8 +105,10 @@ class Setting:
     story: Story = field(default_factory=story)  # of who lives there
     resident: str = ""  # who sleeps there (`echousd.graph.fields.RESIDENTS`)
     style: RoomStyle | None = None  # of the room
+    own: bool = True  # whether niches may be cut into its walls: not where another room is behind them
     placed: list[Thing] = field(default_factory=list)  # the things so far
     carriers: dict[str, Standing] = field(default_factory=dict)  # those of them that others stand on
+    cuts: list[Opening] = field(default_factory=list)  # of walls, for what is sunk into them
     curtained: set[str] = field(default_factory=set)  # names of the windows that have curtains
 
     def __post_init__(self) -> None:
@@ -162,6 +164,7 @@ class Setting:
             other.footprint.intersects(around)
             for other in self.placed
             if KINDS[other.kind].name != "rug"
+            and not (other.kind == "niche" and host in self.carriers)
             and other.position[1] < high
             and other.position[1] + other.size[1] > low + 1e-4
         )

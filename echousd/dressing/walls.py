@@ -15,7 +15,7 @@ from echomodel.dressing.prints import printed
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, rectangle, standing
 from echousd.dressing.tabletops import stocked, surfaces
-from echousd.shapes.fittings import RAIL
+from echousd.shapes.fittings import NICHE, RAIL
 from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
 
@@ -261,7 +261,9 @@ def hung_at(
             return None
     room = np.array([2 * half + 0.1, high - low + 0.1, deep + before])
     free = Thing(kind, room, wall.at(along, room[2] / 2 + 0.012, max(low - 0.1, 0.002)), wall.yaw, on)
-    hung = Thing(kind, size, wall.at(along, deep / 2 + 0.002, low), wall.yaw, on, variant)
+    hung = Thing(
+        kind, size, wall.at(along, deep / 2 + 0.002 - (NICHE if kind == "niche" else 0.0), low), wall.yaw, on, variant
+    )
     return hung if setting.clear(free, margin=0.0, floor=False, host=on) else None
 
 
@@ -272,8 +274,8 @@ def meets(opening: Opening, along: float, half: float, low: float, high: float) 
 
 
 SHARES = (0.5, 0.3, 0.7, 0.18, 0.82)  # of a wall's length, the middle first
-SHELF = 1.38  # metres from the floor to the board of a wall shelf
-WALL_SHELVES = ("wall_shelf", "ledge", "box_shelf")  # of a room both are alike
+SHELF, LOW = 1.38, 0.85  # metres from the floor to the board of a wall shelf, and to a niche
+WALL_SHELVES = ("wall_shelf", "ledge", "box_shelf", "niche")  # without a style; of a room both are alike
 ABOVE, STANDING = 0.3, 0.6  # metres that stay free over a shelf, and before a mirror in which one sees all of oneself
 # Shares of rooms with a clock, of those where people sit together or work; with shelves, coats, a tall mirror; of the
 # pieces with a picture above them, those that have three.
@@ -281,20 +283,25 @@ CLOCKS, WITH_SHELVES, COATS, MIRRORS, GROUPS = 0.4, 0.5, 0.3, 0.6, 0.5
 
 
 def shelves(setting: Setting) -> None:
-    """Up to two shelves on walls that have room, with books and small things on them, where it is dry."""
+    """Up to two shelves on walls that have room, or niches in them, with books and small things, where it is dry."""
     done, rng = 0, setting.rng("shelves")
     if setting.use or not (setting.walls and setting.has(WITH_SHELVES, rng)):
         return
-    kind, variant = str(rng.choice(WALL_SHELVES)), int(rng.integers(1 << 30))
+    kinds = [
+        kind for kind in (setting.style.shelves if setting.style else WALL_SHELVES) if setting.own or kind != "niche"
+    ]
+    kind, variant = str(rng.choice(kinds)), int(rng.integers(1 << 30))
     for wall in _roomiest(setting):
         size = usual_size(kind, setting.rng(f"wall {wall.edge}", "shelf"))
         one, spots = Thing(kind, size, np.zeros(3), 0.0, "", variant), [(wall, share) for share in SHARES]
-        board = _hung(setting, one, spots, SHELF - float(size[1]), above=ABOVE)
+        board = _hung(setting, one, spots, max(SHELF - float(size[1]), LOW), above=ABOVE)
         if board:
             solids, name = solids_of(kind, size, np.random.default_rng(variant)), f"wall shelf {wall.edge}"
             made = assembled(solids, size, faces=1200, origin=Origin("dressing"))
             carrier = setting.carriers[name] = standing(name, "shelf", size, board.position, board.yaw, made)
-            stocked(setting, carrier, max(surfaces(carrier), key=lambda level: level.area.area))
+            levels = surfaces(carrier)
+            for level in levels[1:] if kind == "niche" else [max(levels, key=lambda level: level.area.area)]:
+                stocked(setting, carrier, level)
             done += 1
         if done == 2:
             return
@@ -382,8 +389,10 @@ def _roomiest(setting: Setting) -> Iterable[Wall]:
 def _hung(setting: Setting, one: Thing, spots: Iterable[tuple[Wall, float]], low: float, **free: float) -> Thing | None:
     """Hang a thing at the first of some shares of walls' lengths where it fits; None where none is."""
     for wall, share in spots:
-        at, room = share * wall.length, {"above": 0.02, "before": 0.02} | free
+        at, room, size = share * wall.length, {"above": 0.02, "before": 0.02} | free, one.size.tolist()
         if found := hung_at(setting, wall, at, one.kind, one.size, low, one.variant, "", **room):
             setting.placed.append(found)
+            if one.kind == "niche":
+                setting.cuts.append(Opening("niche", "window", wall.edge, at - size[0] / 2, size[0], size[1], low))
             return found
     return None

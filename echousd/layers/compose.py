@@ -104,7 +104,7 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
         files.update(asset.files)
     if room.options.thumbnails:
         files |= thumbnails(files, [*made, *small])
-    built = structure.shell_prims(room, dressing.bare)
+    built = structure.shell_prims(room, dressing.bare, dressing.cuts)
     harmony = room.options.palette or looks.palette_of_room(room.provenance.seed, room.graph.room.style)
     slots = sorted({slot for asset in small.values() for slots in asset.slots.values() for slot in slots})
     named, bindings = room_slots(room, made, built, slots)

@@ -111,15 +111,16 @@ class ShellPrim:
         return np.array(self.joint.anchor) if self.joint else np.zeros(3)
 
 
-def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[ShellPrim]:
-    """All parts of a room's shell, walls before what is in them; `bare`: windows that need no curtain rail."""
+def shell_prims(room: RoomData, bare: frozenset[str] = frozenset(), cuts: Sequence[Opening] = ()) -> list[ShellPrim]:
+    """All parts of a room's shell, walls before what is in them; `bare`: windows that need no curtain rail, `cuts`:
+    recesses of the walls."""
     parts = [slab("Floor", room.floor, -THICKNESS)]
     if room.options.walls:
         spec = room.graph.room
         outdoor = vocabulary().room_type(spec.type).use == "outdoor"
         parts += walls(
             room.corners, room.height, spec.openings, bare, outdoor=outdoor, thickness=spec.walls,
-            millwork=millwork(room),
+            millwork=millwork(room), cuts=cuts,
         )  # fmt: skip
     if room.options.ceiling:
         parts.append(slab("Ceiling", room.corners, room.height))

@@ -17,7 +17,7 @@ from echomodel.openings import SKIRTING, SLID, Opening
 from echomodel.triangles import Mesh, box, joined
 from echomodel.vocabulary import vocabulary
 
-WALL = 0.15  # metres, thickness of walls
+WALL, NICHE = 0.15, 0.12  # metres, thickness of walls, and how deep niches are cut into them
 CASING, PROUD = 0.06, 0.012  # width of the trim around a door, and how far it stands before the wall
 LINING = 0.03
 LEAF, OVER, TRACK = 0.04, 0.03, 0.07  # thickness of a leaf; what one that slides covers beside its hole; above it

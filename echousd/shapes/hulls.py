@@ -91,6 +91,7 @@ def snapped(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
 def sole(mesh: Mesh, level: float, reach: float) -> np.ndarray:
     """(k, 3) float: the outline of what of a mesh is within `reach` metres of a height `level`, in the plane there."""
     near = np.abs(mesh.vertices[:, 1] - level) <= min(reach, 0.1 * float(np.ptp(mesh.bounds[:, 1])))
-    outline = shapely.convex_hull(shapely.multipoints(mesh.vertices[near][:, [0, 2]]))
-    outline = shapely.remove_repeated_points(outline, min(APART, outline.length / 16))
+    plan = mesh.vertices[near][:, [0, 2]]
+    outline = shapely.convex_hull(shapely.multipoints(plan))
+    outline = shapely.remove_repeated_points(outline, min(APART, outline.length / 16, np.ptp(plan, axis=0).min() / 2))
     return np.insert(shapely.get_coordinates(outline), 1, level, axis=1)

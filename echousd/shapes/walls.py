@@ -12,7 +12,7 @@ from echomodel.furniture.solids import Joint
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal, signed_area, zone
 from echomodel.triangles import Mesh, joined
 from echousd.shapes import fittings
-from echousd.shapes.fittings import BAY, PLAIN, WALL, Millwork
+from echousd.shapes.fittings import BAY, NICHE, PLAIN, WALL, Millwork
 from echousd.stage.paths import piece_name
 
 THICKNESS = 0.1  # metres, of floor and ceiling
@@ -45,7 +45,7 @@ class ShellPart:
 
 def walls(
     polygon: np.ndarray, height: float, openings: Sequence[Opening] = (), bare: frozenset[str] = frozenset(),
-    *, outdoor: bool = False, thickness: Sequence[float] = (), millwork: Millwork = PLAIN,
+    *, outdoor: bool = False, thickness: Sequence[float] = (), millwork: Millwork = PLAIN, cuts: Sequence[Opening] = (),
 ) -> list[ShellPart]:  # fmt: skip
     """`Wall_1` ... for the edges of the floor, with skirting, and a part for every door and window in it.
 
@@ -55,7 +55,7 @@ def walls(
         openings: in these walls. bare: names of the windows that have no curtain rail.
         outdoor: walls without an opening are parapets.
         thickness: of the wall along each edge, metres; those of a home, which has other rooms behind them.
-        millwork: how doors, windows and mouldings are made.
+        millwork: how doors, windows and mouldings are made. cuts: `NICHE` deep into these walls.
     """
     deep = np.array(thickness or [WALL] * len(polygon))
     bay, parts = _bay(polygon, openings) if millwork.bay and not outdoor else None, []
@@ -66,7 +66,8 @@ def walls(
         here = [opening for opening in openings if opening.edge == edge]
         frame = wall_frame(polygon, edge)
         tall = min(height, PARAPET) if outdoor and not here else height
-        pieces = [ShellPiece(piece_name(name, "mesh"), "wall", _placed(_wall(polygon, edge, tall, here, deep), frame))]
+        mesh = _wall(polygon, edge, tall, here, deep, [cut for cut in cuts if cut.edge == edge])
+        pieces = [ShellPiece(piece_name(name, "mesh"), "wall", _placed(mesh, frame))]
         if (boards := fittings.skirting(here, length, millwork.skirting)) is not None:
             pieces.append(ShellPiece(piece_name(name, "skirting"), "trim", _placed(boards, frame), solid=False))
         if millwork.cornice and tall == height >= COVED:
@@ -141,15 +142,23 @@ def wall_frame(polygon: np.ndarray, edge: int) -> np.ndarray:
     return frame
 
 
-def _wall(polygon: np.ndarray, edge: int, height: float, openings: Sequence[Opening], thickness: np.ndarray) -> Mesh:
-    """The wall with its holes, in its own frame."""
+def _wall(
+    polygon: np.ndarray, edge: int, height: float, openings: Sequence[Opening], thickness: np.ndarray,
+    cuts: Sequence[Opening],
+) -> Mesh:  # fmt: skip
+    """The wall with its holes and recesses, in its own frame."""
     length = float(edge_lengths(polygon)[edge])
     face = shapely.box(0.0, -THICKNESS, length, height)
     for opening in openings:
         low = opening.sill if opening.sill > 0 else 0.0
         face = face.difference(shapely.box(opening.offset, low, opening.end, min(low + opening.height, height)))
+    backs = []
+    for cut in cuts:
+        high = cut.sill + cut.height
+        face = face.difference(shapely.box(cut.offset, cut.sill, cut.end, high))
+        backs.append(fittings.board((cut.offset, cut.end), (cut.sill, high), (NICHE, float(thickness[edge]))))
     pieces = [p for p in getattr(face, "geoms", [face]) if p.area > 1e-6]
-    mesh = joined([fittings.extruded(p, thickness[edge]) for p in pieces])
+    mesh = joined([*(fittings.extruded(p, thickness[edge]) for p in pieces), *backs])
     outer = outline(polygon, thickness)
     along = direction(polygon, edge)
     first = float((outer[edge] - polygon[edge]) @ along)

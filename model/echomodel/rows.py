@@ -231,7 +231,7 @@ class RoomStyle:
         boxed, sliding, bays: shares of rooms whose curtains hang from behind boards, whose door slides, with a bay.
         covers: what a wall behind a bed or sofa has, "" = nothing. floors: slots of those of wood or the like.
         beams: slots of what lies below the ceiling, "" = nothing.
-        radiators, curtains: small things that stand under windows, and that hang before them.
+        radiators, curtains, shelves: small things that stand under windows, hang before them, and on walls.
         prints: kinds of pictures and names of rugs and cushions (`prints.toml`).
         aliases: other words for it.
     """
@@ -251,6 +251,7 @@ class RoomStyle:
     bays: float = 0.0
     sliding: float = 0.0
     radiators: tuple[str, ...] = ("panel_radiator",)
+    shelves: tuple[str, ...] = ("wall_shelf", "ledge", "box_shelf")
     kinds: tuple[tuple[str, tuple[str, ...]], ...] = ()
     aliases: tuple[str, ...] = ()
 

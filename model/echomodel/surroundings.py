@@ -127,9 +127,8 @@ def opening_rows(openings: Sequence[Opening], polygon: np.ndarray) -> np.ndarray
     middle = (corners.max(0) + corners.min(0)) / 2 if len(openings) else np.zeros(2)
     rows = []
     for opening in openings:
-        window = float(opening.kind == "window")
         near, far = segment(corners, opening) - middle
-        top = opening.sill + opening.height
+        top, window = opening.sill + opening.height, float(opening.kind == "window")
         rows.append([*near, *far, *inward_normal(corners, opening.edge), opening.depth, opening.sill, top, window])
     return np.array(rows, np.float32).reshape(-1, ROW)
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
-from echomodel.dressing import household
 from echomodel.dressing.prints import any_of
 from echomodel.furniture.carpentry import Size, box, framed
 from echomodel.furniture.solids import Block, Solid, rotation, turned
@@ -32,19 +32,19 @@ def picture(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid
     return parts
 
 
-def mirror(size: Size, rng: np.random.Generator, power: float = 60.0) -> list[Solid]:
-    """A mirror in a narrow frame, an ellipse of `power` 2, the more of a rectangle the larger that is."""
-    w, h, d = size
+def mirror(size: Size, rng: np.random.Generator, powers: Sequence[float] = (60.0,)) -> list[Solid]:
+    """A mirror in a narrow frame, an ellipse of power 2, the more of a rectangle the larger one of `powers` is."""
+    (w, h, d), power = size, float(rng.choice(powers))
     back, turn = np.array([0.0, h / 2, -d / 2]), rotation(x=np.pi / 2)
     rim = turned(back, (w / 2, h / 2), d * 0.8, material="frame", turn=turn, power=power)
     return [rim, turned(back, (w / 2 - 0.018, h / 2 - 0.018), d, material="mirror", turn=turn, power=power)]
 
 
-round_mirror = partial(mirror, power=2.0)
+round_mirror, tall_mirror = partial(mirror, powers=(2.0,)), partial(mirror, powers=(4.0, 60.0))
 
 
-def clock(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A clock, its case round or nearly square, its rim narrow or wide, at some time of the day."""
+def clock(size: Size, rng: np.random.Generator, marks: int = 0) -> list[Solid]:
+    """A clock with its back at the wall, its case round or nearly square, its rim narrow or wide, at some time."""
     w, h, d = size
     face, middle = rotation(x=np.pi / 2), np.array([0.0, h / 2, -d / 2])
     power, rim = float(rng.choice((2.0, 2.0, 4.0, 8.0))), float(rng.choice((0.38, 0.42, 0.46)))
@@ -52,25 +52,13 @@ def clock(size: Size, rng: np.random.Generator) -> list[Solid]:
     parts: list[Solid] = [turned(middle, (w / 2, h / 2), d * 0.9, turn=face, power=power, material=case)]
     parts.append(turned(middle, (w * rim, h * rim), d * 0.92, turn=face, power=power, material="paper"))
     hour = float(rng.uniform(0, 12))
-    for angle, length in ((-2 * np.pi * hour / 12, 0.24), (-2 * np.pi * hour, 0.36)):
-        turn = rotation(z=angle)
-        half3 = np.array([0.012 * w + 0.001, length * h / 2, d * 0.02])
-        centre = np.array([0, h / 2, d * 0.45]) + turn @ np.array([0, length * h / 2, 0])
+    hands = [(-hour / 12, 0.0, 0.24, 0.012 * w + 0.001), (-hour, 0.0, 0.36, 0.012 * w + 0.001)]
+    for share, low, high, half in (*hands, *((number / marks, 0.342, 0.398, 0.008 * w) for number in range(marks))):
+        turn = rotation(z=2 * np.pi * share)
+        centre = np.array([0, h / 2, d * 0.45]) + turn @ np.array([0, (low + high) / 2 * h, 0])
+        half3 = np.array([half, (high - low) / 2 * h, d * 0.02])
         parts.append(Block(centre=centre, half=half3, turn=turn, material="soil"))
     return parts
 
 
-def wall_clock(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A round clock with twelve marks and two hands; its back is at the wall."""
-    w, h, d = size
-    parts = household.clock(size, rng)
-    for number in range(12):
-        turn = rotation(z=2 * np.pi * number / 12)
-        centre = np.array([0, h / 2, d * 0.44]) + turn @ np.array([0, 0.37 * h, 0])
-        parts.append(Block(centre=centre, half=np.array([0.008 * w, 0.028 * h, d * 0.02]), turn=turn, material="soil"))
-    return parts
-
-
-def tall_mirror(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A mirror for the whole person, its corners round or not."""
-    return household.mirror(size, rng, float(rng.choice((4.0, 60.0))))
+wall_clock = partial(clock, marks=12)

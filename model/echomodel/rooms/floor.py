@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from echomodel.boxes2d import CORNERS
-from echomodel.openings import Opening, numbered, overlap
+from echomodel.openings import Opening, numbered, overlap, zone
 from echomodel.rooms.statistics import RoomTypeStatistics
 from echomodel.sizes import quantile
 
@@ -127,13 +127,12 @@ def sample_floor(statistics: RoomTypeStatistics, rng: np.random.Generator) -> Fl
         _open(openings, "passage" if openings and rng.random() < PASSAGES else "door", walls, height, rng)
     for _ in range(1 + (area > 25)):
         _open(openings, "window", walls, height, rng)
-    at = {wall.edge: wall for wall in walls}
-    windows = [_before(at[o.edge], o, o.depth) for o in openings if o.kind == "window"]
-    tops = [o.sill + OVER_SILL for o in openings if o.kind == "window"]
+    before = {o: zone(polygon, o, o.depth) for o in openings}
+    free = {o: (*area.min(0).tolist(), *area.max(0).tolist()) for o, area in before.items()}
     return Floor(
         half_x, half_z, polygon, height, removed, walls, tuple(openings),
-        tuple(_before(at[o.edge], o, o.depth) for o in openings if o.kind != "window"),
-        tuple(zip(windows, tops, strict=True)), area,
+        tuple(free[o] for o in openings if o.kind != "window"),
+        tuple((free[o], o.sill + OVER_SILL) for o in openings if o.kind == "window"), area,
     )  # fmt: skip
 
 
@@ -237,9 +236,3 @@ def _open(openings: list[Opening], kind: str, walls: tuple[Wall, ...], height: f
         if all(overlap(one, other) < -SHARED_JAMB for other in openings if other.edge == one.edge):
             openings.append(one)
             return
-
-
-def _before(wall: Wall, opening: Opening, depth: float) -> Rectangle:
-    """The rectangle of `depth` metres before an opening."""
-    a, b = wall.point(opening.offset, 0.0), wall.point(opening.end, depth)
-    return (min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1]))

@@ -514,3 +514,29 @@ def test_cushions_of_a_sofa_are_a_pair_or_go_together():
             seen[who] |= {kind for kind, _, _ in both} - {"cushion"}
     assert len(seen[""]) >= 14
     assert {"cushion_bear", "cushion_smile"} <= seen["child"] - seen[""]
+
+
+def test_niches_are_cut_into_walls_and_hold_what_stands_in_them(tmp_path):
+    spec = RoomSpec("living_room", size=(4.6, 4.0), style="japandi")
+    graph = SceneGraph(spec, (Node("sofa", "multi_seat_sofa"), Node("table", "coffee_table")))
+    made = (echousd.generate(graph, seed=seed, shapes="boxes", drafts=1, dress="full") for seed in range(9))
+    room, dressing = next((room, found) for room in made if (found := dress(room)).cuts)
+    niches = {name: one for name, one in dressing.layouts[0].items() if one.kind == "niche"}
+    assert len(niches) == len(dressing.cuts)
+    inside = [one for one in dressing.layouts[0].values() if one.on.startswith("wall shelf")]
+    assert inside
+    for one in inside:
+        (niche,) = (n for n in niches.values() if np.abs(n.position - one.position)[[0, 2]].max() < 0.5)
+        assert niche.position[1] < one.position[1] < one.position[1] + one.size[1] < niche.position[1] + niche.size[1]
+    for other in (room.graph.with_room(walls=(0.1,) * 4), room.graph.with_room(style="industrial")):
+        assert not dress(replace(room, graph=other)).cuts
+    assert not dress(replace(room, layouts=room.layouts * 2)).cuts
+    root = room.save(tmp_path / "room", preview=False)
+    assert check(root).ok
+    stage = Usd.Stage.Open(str(root))
+    name, niche = next(iter(niches.items()))
+    place = UsdGeom.Xformable(stage.GetPrimAtPath(f"/Room/Dressing/{name}")).GetOrderedXformOps()[0]
+    place.Set(place.Get() + type(place.Get())(0.0, 0.2, 0.0))
+    stage.Save()
+    told = [one for layout in check(root).layouts for one in layout.placement]
+    assert ("outside", name) in [(one.problem, one.object) for one in told]  # it is in the wall

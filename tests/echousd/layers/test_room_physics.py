@@ -142,6 +142,11 @@ def test_hulls_of_small_things_are_closed_as_they_are_written(kind, number):
     assert written.area_faces.min() > 1e-12
 
 
+def test_the_hull_of_what_is_thin_is_as_thick_as_it() -> None:
+    book = trimesh.creation.box((0.015, 0.185, 0.121))
+    assert standing_hull(Mesh.of(book)).mesh.trimesh.volume == pytest.approx(book.volume, rel=0.01)
+
+
 def test_a_rounded_foot_has_a_corner_for_each_of_its_own():
     """An engine takes four corners of a base, which shall not be two and two that are next to each other."""
     turn = np.linspace(0, np.pi / 2, 5)

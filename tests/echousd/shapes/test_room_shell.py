@@ -18,7 +18,7 @@ from echousd.checks.mesh_rules import extents
 from echousd.checks.reading import Reading
 from echousd.graph import RoomSpec
 from echousd.options import RoomOptions
-from echousd.shapes.fittings import DOORS, RAIL, WINDOWS, Millwork, millwork_of
+from echousd.shapes.fittings import DOORS, NICHE, RAIL, WINDOWS, Millwork, millwork_of
 from echousd.shapes.walls import WALL, beams, outline, slab, walls
 
 NOTCHED = np.array([(0, 0), (1, 0), (1, 1), (4, 1), (4, 3), (0, 3)], float)
@@ -236,6 +236,21 @@ def test_no_window_stands_out_that_is_narrow_or_before_another_wall_or_outdoors(
     cut = np.array([(0, 0), (2, 0), (2, 1.2), (4, 1.2), (4, 4), (0, 4)], float)  # wall 1 and 2 meet in the inner corner
     assert not bays(cut, replace(wide, edge=2, offset=0.1))
     assert bays(cut, replace(wide, edge=2, offset=0.6, width=1.3))
+
+
+def test_walls_are_cut_where_something_is_sunk_into_them_and_closed_behind() -> None:
+    niche = Opening("niche", "window", 1, 0.8, 0.7, 0.9, 0.9)
+    plan = rectangle(4.0, 3.0)
+    whole, cut = (pieces(walls(plan, 2.6, (DOOR, WINDOW), cuts=cuts)) for cuts in ((), (niche,)))
+    assert whole["Wall_2_mesh"].volume - cut["Wall_2_mesh"].volume == pytest.approx(0.7 * 0.9 * NICHE)
+    assert cut["Wall_2_mesh"].is_watertight
+    assert 0 < WALL - NICHE < 0.05
+    middle = segment(plan, niche).mean(0)
+    outward = -inward_normal(plan, 1)
+    held = [(*(middle + off * outward), 1.3) for off in (0.01, NICHE - 0.01, NICHE + 0.01, WALL - 0.01)]
+    assert cut["Wall_2_mesh"].contains([(x, y, z) for x, z, y in held]).tolist() == [False, False, True, True]
+    for name in set(whole) - {"Wall_2_mesh"}:
+        np.testing.assert_array_equal(whole[name].vertices, cut[name].vertices)
 
 
 def test_doors_articulate(tmp_path) -> None:
