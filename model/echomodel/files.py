@@ -11,7 +11,7 @@ import stat
 import sys
 import traceback
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -115,20 +115,33 @@ def cache_folder() -> Path:
     return Path(os.environ.get("ECHOUSD_CACHE") or Path.home() / ".cache" / "echousd")
 
 
+def from_cache(kind: str, key: bytes, make: Callable[[], bytes]) -> bytes:
+    """What `make` gives for a key: from the cache where that has it whole, else made and kept there if it can be."""
+    file = cache_folder() / kind / digest(key)
+    content = b""
+    with suppress(OSError):
+        content = file.read_bytes()
+    told, found = content[:32], content[32:]
+    if told != digest(found).encode():
+        found = make()
+        with suppress(OSError):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            beside = file.with_name(f".{file.name}.{os.getpid()}")
+            beside.write_bytes(digest(found).encode() + found)
+            beside.replace(file)
+    return found
+
+
 def tables(name: str, beside: str) -> dict[str, Any]:
     """What a TOML file of ours beside a module's file holds; the cache keeps it as JSON, which is read at once."""
     text = Path(beside).with_name(name).read_bytes()
-    kept = cache_folder() / "tables" / f"{digest(text)}.json"
-    with suppress(OSError, ValueError):
-        return dict(json.loads(kept.read_bytes()))
-    import tomllib
 
-    found = tomllib.loads(text.decode())
-    with suppress(OSError):
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(kept) as whole:
-            whole.write_text(json.dumps(found), "utf-8")
-    return found
+    def read() -> bytes:
+        import tomllib
+
+        return json.dumps(tomllib.loads(text.decode())).encode()
+
+    return dict(json.loads(from_cache("tables", text, read)))
 
 
 def flush(path: Path) -> None:

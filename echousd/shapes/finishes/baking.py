@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import replace
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, TypeVar, cast
@@ -15,7 +13,7 @@ import PIL
 from PIL import Image
 
 from echomodel.dressing.prints import PRINTS, TABLE
-from echomodel.files import cache_folder, digest, tables
+from echomodel.files import digest, from_cache, tables
 from echomodel.late import Late
 from echousd.shapes.finishes.slots import HERE, Color
 from echousd.srgb import from_linear
@@ -48,20 +46,8 @@ def kept(bake: Bake) -> Bake:
     @cache
     @wraps(bake)
     def found(*asked: object) -> bytes | None:
-        file = cache_folder() / "images" / digest(repr((bake.__name__, asked, _code())).encode())
-        try:
-            content = file.read_bytes()
-        except OSError:
-            content = b""
-        told, image = content[:32], content[32:]
-        if told != digest(image).encode():
-            image = bake(*asked) or b""
-            with suppress(OSError):
-                file.parent.mkdir(parents=True, exist_ok=True)
-                beside = file.with_name(f".{file.name}.{os.getpid()}")
-                beside.write_bytes(digest(image).encode() + image)
-                beside.replace(file)
-        return image or None
+        key = repr((bake.__name__, asked, _code())).encode()
+        return from_cache("images", key, lambda: bake(*asked) or b"") or None
 
     return cast("Bake", found)
 
