@@ -20,7 +20,6 @@ import resource
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
@@ -55,9 +54,8 @@ def one_by_one(request: BatchRequest, folder: Path) -> tuple[float, float]:
 
 
 def network(request: BatchRequest, folder: Path) -> tuple[float, float, float, float]:
-    """CPU seconds a room in one process: of the layout branch as it is packed, of the other branches, of placing, of
-    everything."""
-    plan, spent = make_plan(request, ""), {"network": 0.0, "placing": 0.0}
+    """CPU seconds a room in one process: of the layout branch, of the other branches, of placing, of everything."""
+    plan, spent = make_plan(request, ""), {"layouts": 0.0, "shapes": 0.0, "placing": 0.0}
 
     def timed(method: Callable[..., Any], part: str) -> Callable[..., Any]:
         def call(*given: Any, **more: Any) -> Any:
@@ -69,24 +67,14 @@ def network(request: BatchRequest, folder: Path) -> tuple[float, float, float, f
 
         return call
 
-    for name in ("sample_shapes", "sample_furniture"):
-        setattr(EchoModel, name, timed(getattr(EchoModel, name), "network"))
+    parts = {"sample_layout": "layouts", "sample_shapes": "shapes", "sample_furniture": "shapes"}
+    for name, part in parts.items():
+        setattr(EchoModel, name, timed(getattr(EchoModel, name), part))
     layouts_module.finished_boxes = timed(layouts_module.finished_boxes, "placing")
-    packed, rooms = 0.0, 0.0
-    for pack in plan.packs():
-        jobs = [
-            work.Job(e.id, str(folder / e.path), e.seed, plan.options[0], draw=e.draw, store=str(folder / "store"))
-            for e in pack
-        ]
-        began = time.process_time()
-        found = work.layouts(jobs)
-        packed += time.process_time() - began
-        began = time.process_time()
-        for job, new in zip(jobs, found, strict=True):
-            work.room(replace(job, text=new.text, first=new.first))
-        rooms += time.process_time() - began
-    count = len(plan.entries)
-    return packed / count, spent["network"] / count, spent["placing"] / count, (packed + rooms) / count
+    began, store, count = time.process_time(), str(folder / "store"), len(plan.entries)
+    for e in plan.entries:
+        work.room(work.Job(e.id, str(folder / e.path), e.seed, plan.options[0], draw=e.draw, store=store))
+    return (*(seconds / count for seconds in spent.values()), (time.process_time() - began) / count)
 
 
 def stored(request: BatchRequest, folder: Path) -> None:
@@ -128,7 +116,7 @@ def memory(request: BatchRequest, folder: Path) -> None:
             told.add(progress.done)
             print(f"{progress.done:6d} rooms  {progress.megabytes:6.0f} MiB, {progress.failed} failed", flush=True)
 
-    Run(plan, plan.packs(), frozenset(), folder, journal, RunOptions(progress=tell)).execute(pool)
+    Run(plan, plan.entries, frozenset(), folder, journal, RunOptions(progress=tell)).execute(pool)
     pool.close()
 
 
@@ -145,7 +133,7 @@ class Paper:
         self.workers, self._seen = workers, seen
         self.now, self._times, self._busy = 0.0, dict[str, int](), list[tuple[float, int, Task, tuple[str, Any]]]()
 
-    def free(self, *, network: bool = False) -> int:
+    def free(self) -> int:
         return self.workers - len(self._busy)
 
     def submit(self, task: Task) -> None:
@@ -173,7 +161,7 @@ def on_paper(request: BatchRequest, folder: Path) -> None:
     work.room(work.Job("warm", str(folder / "warm"), 0, plan.options[0], draw=("bedroom", 9, 0)))
     for workers in (1, 2):
         pool, journal = Paper(workers, seen), Journal(shard_folder(folder / str(workers), (0, 1)))
-        Run(plan, plan.packs(), frozenset(), folder, journal, RunOptions()).execute(pool)
+        Run(plan, plan.entries, frozenset(), folder, journal, RunOptions()).execute(pool)
         alone = alone or pool.now
         print(f"{workers} workers  {pool.now:6.1f} s on paper: {alone / pool.now:.2f} times one", flush=True)
 
@@ -195,7 +183,7 @@ def together(request: BatchRequest, folder: Path, workers: int) -> tuple[float, 
         ended += len(pool.outcomes(1.0))
     begun = sum(_cpu_of(process.pid) for process in active_children())
     wall = time.perf_counter()
-    Run(plan, plan.packs(), frozenset(), folder, journal, RunOptions()).execute(pool)
+    Run(plan, plan.entries, frozenset(), folder, journal, RunOptions()).execute(pool)
     wall = time.perf_counter() - wall
     used = sum(_cpu_of(process.pid) for process in active_children()) - begun
     pool.close()
