@@ -232,26 +232,25 @@ def _heights(corners: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
     """(len(x), len(z)) float: height of the highest surface over each cell of a grid, -inf where there is none."""
     out = np.full((len(x), len(z)), -np.inf)
     # Small triangles fill the cells that their corners and middles lie in; large ones are drawn cell by cell.
-    points = np.concatenate(
-        [corners.reshape(-1, 3), corners.mean(1), (corners[:, :2] + corners[:, 1:]).reshape(-1, 3) / 2]
-    )
+    middles = (corners[:, :2] + corners[:, 1:]).reshape(-1, 3) / 2
+    points = np.concatenate([corners.reshape(-1, 3), corners.mean(1), middles])
     i, k = ((points[:, axis] - line[0]) / STEP + 0.5 for axis, line in ((0, x), (2, z)))
     inside = (i >= 0) & (i < len(x)) & (k >= 0) & (k < len(z))
     np.maximum.at(out, (i[inside].astype(int), k[inside].astype(int)), points[inside, 1])
     flat = corners[:, :, [0, 2]]
     one, two = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-    low, high = flat.min(1), flat.max(1)
-    for n in np.flatnonzero((np.abs(area) > 1e-10) & ((high - low).max(1) > 1.5 * STEP)):
-        rows, columns = (slice(*np.searchsorted(line, (low[n, a], high[n, a]))) for a, line in ((0, x), (1, z)))
-        if rows.start == rows.stop or columns.start == columns.stop:
-            continue
-        px, pz = x[rows, None] - flat[n, 0, 0], z[None, columns] - flat[n, 0, 1]
-        u = (px * two[n, 1] - pz * two[n, 0]) / area[n]
-        v = (one[n, 0] * pz - one[n, 1] * px) / area[n]
-        y0, y1, y2 = corners[n, :, 1]
-        y = np.where((u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9), y0 + u * (y1 - y0) + v * (y2 - y0), -np.inf)
-        np.maximum(out[rows, columns], y, out=out[rows, columns])
+    large = np.flatnonzero((np.abs(area) > 1e-10) & (np.ptp(flat, 1).max(1) > 1.5 * STEP))
+    ends = np.stack([flat.min(1), flat.max(1)])[:, large]
+    (top, bottom), (left, right) = (np.searchsorted(line, ends[..., axis]) for axis, line in enumerate((x, z)))
+    count = (bottom - top) * (right - left)  # of cells that its box covers
+    cell, n = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count), np.repeat(large, count)
+    wide = np.repeat(right - left, count)
+    i, k = np.repeat(top, count) + cell // wide, np.repeat(left, count) + cell % wide
+    px, pz = x[i] - flat[n, 0, 0], z[k] - flat[n, 0, 1]
+    u, v = (px * two[n, 1] - pz * two[n, 0]) / area[n], (one[n, 0] * pz - one[n, 1] * px) / area[n]
+    inside, (y0, y1, y2) = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9), corners[n, :, 1].T
+    np.maximum.at(out, (i[inside], k[inside]), (y0 + u * (y1 - y0) + v * (y2 - y0))[inside])
     return out
 
 
