@@ -174,8 +174,7 @@ def cables(setting: Setting) -> None:
 
 def _ways_to_walls(setting: Setting, host: Standing, rng: np.random.Generator) -> list[Thing]:
     """Cables straight to the walls, the nearest first."""
-    start = host.position[[0, 2]]
-    out, variant = [], int(rng.integers(1 << 30))
+    start, out, variant = host.position[[0, 2]], list[Thing](), int(rng.integers(1 << 30))
     for wall in walls_of(setting.floor):
         off = float((start - wall.start) @ wall.inside)
         length = round(off - FOOT - 0.016, 3)

@@ -96,6 +96,7 @@ def surfaces(host: Standing) -> list[Surface]:
     if not len(up):
         return []
     height, area = corners[up, :, 1].mean(1), double[up] / 2
+    under = corners[normal[:, 1] < -0.97 * np.maximum(double, 1e-9), :, 1].mean(1)  # of boards, however thick
     order = np.argsort(height)
     groups = np.split(order, np.flatnonzero(np.diff(height[order]) > LEVEL) + 1)
     found: list[Surface] = []
@@ -107,6 +108,7 @@ def surfaces(host: Standing) -> list[Surface]:
         level = shapely.union_all(shapely.polygons(corners[faces][:, :, [0, 2]]), grid_size=1e-4)
         covered = [s.y - y - 0.04 for s in found if s.area.intersection(level).area > 0.3 * level.area]
         air = min([*covered, AIR])
+        air = min([air, *(under[(under > y + air / 2) & (under < y + air)] - y - 0.004)])
         if air < 0.06:
             continue
         found.append(Surface(host, y, air, level, shapely.STRtree(_between(corners, y + 0.004, y + air))))

@@ -294,6 +294,21 @@ def test_levels_of_a_shelf_have_air_and_what_stands_there_is_left_alone():
         assert shapely.box(-0.51, -0.18, 0.51, 0.18).contains(level.area)
 
 
+@pytest.mark.parametrize(("thick", "front", "closed"), [(0.02, False, False), (0.09, False, False), (0.02, True, True)])
+def test_a_thick_board_above_closes_no_shelf_and_a_front_does(thick, front, closed):
+    from echomodel.furniture.carpentry import box
+    from echousd.shapes.joinery import assembled
+
+    size = np.array([0.8, 0.6, 0.4])
+    parts = [box((-0.4, 0, -0.2), (0.4, 0.02, 0.2), "wood"), box((-0.4, 0.6 - thick, -0.2), (0.4, 0.6, 0.2), "wood")]
+    parts += [box((x, 0, -0.2), (x + 0.02, 0.6, 0.2), "wood") for x in (-0.4, 0.38)]
+    parts += [box((-0.36, 0.1, 0.19), (0.36, 0.5, 0.2), "wood")] * front
+    host = standing("shelf", "bookshelf", size, np.zeros(3), 0.0, assembled(parts, size, faces=500, origin=Origin("x")))
+    level = min((one for one in surfaces(host) if one.area.area > 0.1), key=lambda one: one.y)
+    assert level.closed == closed
+    assert level.air == pytest.approx(0.58 - max(thick, 0.04), abs=0.006)
+
+
 def test_layouts_have_dressings_of_their_own(tmp_path):
     graph = small_graph()
     room = echousd.generate(
