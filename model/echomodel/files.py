@@ -117,14 +117,14 @@ def cache_folder() -> Path:
 
 def from_cache(kind: str, key: bytes, make: Callable[[], bytes]) -> bytes:
     """What `make` gives for a key: from the cache where that has it whole, else made and kept there if it can be."""
-    file = cache_folder() / kind / digest(key)
-    content = b""
-    with suppress(OSError):
+    file, content = Path(), b""
+    with suppress(OSError, RuntimeError):  # of a user without a home
+        file = cache_folder() / kind / digest(key)
         content = file.read_bytes()
     told, found = content[:32], content[32:]
     if told != digest(found).encode():
         found = make()
-        with suppress(OSError):
+        with suppress(OSError, ValueError):  # that of a path without a name
             file.parent.mkdir(parents=True, exist_ok=True)
             beside = file.with_name(f".{file.name}.{os.getpid()}")
             beside.write_bytes(digest(found).encode() + found)

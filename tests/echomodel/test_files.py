@@ -68,6 +68,15 @@ def test_tables_are_those_of_their_files_from_the_cache_and_without(tmp_path, mo
             path.write_text(path.read_text("utf-8")[:-9], "utf-8")
 
 
+def test_tables_are_read_where_a_user_has_no_home(tmp_path, monkeypatch):
+    monkeypatch.delenv("ECHOUSD_CACHE", raising=False)
+    monkeypatch.setattr(Path, "home", classmethod(lambda cls: (_ for _ in ()).throw(RuntimeError("no home"))))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.toml").write_text("a = 1")
+    assert tables("own.toml", str(tmp_path / "own.py")) == {"a": 1}
+    assert [path.name for path in tmp_path.iterdir()] == ["own.toml"]
+
+
 def test_tables_are_read_from_the_cache_and_anew_once_their_file_changed(tmp_path, monkeypatch):
     monkeypatch.setenv("ECHOUSD_CACHE", str(tmp_path / "cache"))
     (tmp_path / "own.toml").write_text("a = 1")
