@@ -28,8 +28,8 @@ from echousd.graph import Relation
 from echousd.graph.nodes import DressingGraph, SmallNode
 from echousd.naming import free_name
 from echousd.room import RoomData
-from echousd.shapes.geometry import Geometry, Origin
-from echousd.shapes.hulls import standing_hull
+from echousd.shapes.geometry import Collider, Geometry, Origin
+from echousd.shapes.hulls import rounded_hull, standing_hull
 from echousd.shapes.joinery import part_of, within_budget
 from echousd.shapes.matter import weighed
 from echousd.stage import encoding as usd
@@ -125,11 +125,13 @@ def setting_of(room: RoomData, layout: int = 0) -> Setting:
 
 @lru_cache(maxsize=100)  # a room that is edited keeps most of its things
 def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: tuple[float, ...] = ()) -> Geometry:
-    """The geometry of a thing, with one hull to bump into that stands."""
+    """The geometry of a thing, with one hull to bump into that stands; a niche holds things, and has one a board."""
     solids = solids_of(kind, np.array(size), np.random.default_rng(variant), **({"lie": lie} if lie else {}))
     pieces = within_budget(solids, np.array(size), KINDS[kind].faces)
     part = part_of("mesh", pieces)
-    return Geometry((part,), (standing_hull(part.mesh, KINDS[kind].gives),), ORIGIN, weighed(pieces))
+    boards = [rounded_hull(piece.vertices) for piece in pieces] if kind == "niche" else []
+    hulls = [Collider(f"collider_{n}", hull, "convexHull") for n, hull in enumerate(boards)]
+    return Geometry((part,), (*hulls,) or (standing_hull(part.mesh, KINDS[kind].gives),), ORIGIN, weighed(pieces))
 
 
 STRETCH, UPRIGHT, LONG = 1.0, 2.0, 3.0  # metres of bare wall that ask for a picture, a wide one, three
@@ -160,12 +162,11 @@ def bare_walls(setting: Setting) -> None:
 
 def stretches(setting: Setting, wall: Wall) -> list[tuple[float, float]]:
     """Length and middle (metres along the wall) of its longest bare stretch at eye height, [] where it is short."""
-    spots = np.arange(0.3, wall.length - 0.25, STEP)
+    spots = np.arange(0.3, wall.length - 0.25, STEP).tolist()
     low = EYE - float(PROBE[1]) / 2
-    bare = [hung_at(setting, wall, float(spot), "picture", PROBE, low, 0) is not None for spot in spots]
-    runs = [[n for n, _ in run] for free, run in groupby(enumerate(bare), key=lambda one: one[1]) if free]
-    ends = [(float(spots[run[0]]), float(spots[run[-1]])) for run in runs]
-    long = [(last - first + float(PROBE[0]), (first + last) / 2) for first, last in ends]
+    bare = [hung_at(setting, wall, spot, "picture", PROBE, low, 0) is not None for spot in spots]
+    runs = [[spots[n] for n, _ in run] for free, run in groupby(enumerate(bare), key=lambda one: one[1]) if free]
+    long = [(run[-1] - run[0] + float(PROBE[0]), (run[0] + run[-1]) / 2) for run in runs]
     return [one for one in sorted(long)[-1:] if one[0] >= STRETCH]
 
 

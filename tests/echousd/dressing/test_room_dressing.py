@@ -13,6 +13,7 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
+from echomodel.boxes2d import turned
 from echomodel.dressing import KINDS, SMALL
 from echomodel.dressing import thing as solids_of
 from echomodel.dressing.prints import PRINTS, printed
@@ -543,6 +544,11 @@ def test_niches_are_cut_into_walls_and_hold_what_stands_in_them(tmp_path):
     for one in inside:
         (niche,) = (n for n in niches.values() if np.abs(n.position - one.position)[[0, 2]].max() < 0.5)
         assert niche.position[1] < one.position[1] < one.position[1] + one.size[1] < niche.position[1] + niche.size[1]
+        hulls = dressing.geometry[next(a for a, kind in dressing.kinds.items() if kind == "niche")].colliders
+        middle = turned((one.position - niche.position)[None, ::2], -niche.yaw)
+        local = np.array([*middle[0], one.position[1] + one.size[1] / 2 - niche.position[1]])[[0, 2, 1]]
+        assert len(hulls) > 4
+        assert not any(hull.mesh.trimesh.contains(local[None])[0] for hull in hulls)
     for other in (room.graph.with_room(walls=(0.1,) * 4), room.graph.with_room(style="industrial")):
         assert not dress(replace(room, graph=other)).cuts
     assert not dress(replace(room, layouts=room.layouts * 2)).cuts
