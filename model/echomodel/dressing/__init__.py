@@ -6,20 +6,22 @@ know them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from echomodel.dressing.forms import form
 from echomodel.dressing.prints import PRINTS
 from echomodel.files import tables
-from echomodel.furniture.solids import Solid
+from echomodel.furniture.carpentry import Size, both
+from echomodel.furniture.solids import Block, Lathe, Solid, ball, rotation, tube
 from echomodel.late import Late
 
 Program = Callable[..., list[Solid]]  # of extents (3,) and a generator; `shown`, a row of `prints.toml`, by name
 Size3 = tuple[float, float, float]
+Row = Mapping[str, Any]  # as `things.toml` says
 
 
 @dataclass(frozen=True)
@@ -56,12 +58,44 @@ def _kinds() -> dict[str, Kind]:
     made = {}
     for name, row in rows.items():
         forms = row.pop("forms", [row.pop("parts")] if "parts" in row else [])
-        program = form(forms) if forms else Late(f"{__name__}.{row.pop('module')}:{name}")
+        program = _form(forms) if forms else Late(f"{__name__}.{row.pop('module')}:{name}")
         made[name] = Kind(program=program, low=tuple(row.pop("low")), high=tuple(row.pop("high")), **row)
     for name, row in PRINTS.items():
         kind = made[BUILT.get(row["form"], name.partition("_")[0])]
         made[name] = replace(kind, program=partial(kind.program, shown=name))
     return made
+
+
+def _form(forms: Sequence[Sequence[Row]]) -> Callable[[Size, np.random.Generator], list[Solid]]:
+    """The program that builds a thing of the rows of one of its forms."""
+
+    def built(size: Size, rng: np.random.Generator) -> list[Solid]:
+        parts: list[Solid] = []
+        luck = rng.random()
+        for row in forms[int(rng.integers(len(forms)))]:
+            among = [row["of"]] if isinstance(row["of"], str) else row["of"]
+            count = max(1, round(size[0] / row["every"])) if "every" in row else 1
+            solid = _solid(row, np.asarray(size, float) / (count, 1, 1), among[int(luck * len(among))])
+            for step in size[0] * ((np.arange(count) + 0.5) / count - 0.5):
+                copy = replace(solid, centre=solid.centre + np.array([step, 0, 0]))
+                parts += both(copy) if row.get("both") else [copy]
+        return parts
+
+    return built
+
+
+def _solid(row: Row, size: Size, material: str) -> Solid:
+    turn = rotation(*np.radians(row.get("turn", (0, 0, 0))))
+    if "box" in row:
+        low, high = (np.array(corner) * size for corner in (row["box"][:3], row["box"][3:]))
+        return Block((low + high) / 2, turn, material, half=(high - low) / 2, radius=row.get("round", 0.0))
+    if "ball" in row:
+        middle, half = (np.array(numbers) * size for numbers in (row["ball"][:3], row["ball"][3:]))
+        return ball(middle, half, material, power=row.get("power", 2.0), turn=turn)
+    if "rod" in row:
+        return tube(np.array(row["rod"]) * size, row["thick"] / 2, material)
+    profile = np.array(row["turned"]) * (row.get("wide", 1.0) * min(size[0], size[2]) / 2, size[1])
+    return Lathe(np.array(row.get("at", (0, 0, 0))) * size, turn, material, profile=profile)
 
 
 KINDS: dict[str, Kind] = _kinds()
