@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from echousd.graph.syntax import Located, Path
 
 Built = TypeVar("Built", bound=PlainModel)
+Read = TypeVar("Read")
 parse_json, parse_yaml = Late("echousd.graph.syntax:parse_json"), Late("echousd.graph.syntax:parse_yaml")
 TOP_KEYS = ("room", "objects", "nodes", "relations", *LISTS)
 
@@ -36,7 +37,7 @@ def graph_from_text(kind: type[SceneGraph], text: str, form: Literal["json", "ya
     return read_text(partial(graph_from_plain, kind), text, form, source)
 
 
-def read_text(build: Callable[[Any], Built], text: str, form: Literal["json", "yaml"], source: str = "") -> Built:
+def read_text(build: Callable[[Any], Read], text: str, form: Literal["json", "yaml"], source: str = "") -> Read:
     """What `build` makes of the plain data in YAML or JSON text.
 
     Raises `GraphError` as `source:line: what was found, what is allowed`.

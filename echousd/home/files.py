@@ -32,12 +32,12 @@ def load_home(path: str | Path) -> HomeGraph | None:
         return None
 
     def read(text: str, *rest: Any) -> HomeGraph | None:
-        if not re.search(r"""^[{\s]*["']?rooms["']?\s*:""", text, re.MULTILINE):
+        if not re.search(r"""(^|[{,])\s*["']?rooms["']?\s*:""", text, re.MULTILINE):
             return None
         from echousd.graph.text import read_text
         from echousd.home.graph import home_of_plain
 
-        return read_text(home_of_plain, text, *rest)
+        return read_text(lambda d: home_of_plain(d) if isinstance(d, dict) and "rooms" in d else None, text, *rest)
 
     return read_file(path, read)
 

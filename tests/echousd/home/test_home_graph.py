@@ -88,6 +88,17 @@ def test_a_room_is_no_home(tmp_path):
     assert load_home(tmp_path / "none.txt") is None
 
 
+def test_a_home_may_stand_on_one_line(tmp_path):
+    (tmp_path / "flat.yaml").write_text(TEXT)
+    home = load_home(tmp_path / "flat.yaml")
+    (tmp_path / "flat.json").write_text(json.dumps(json.loads(home.to_json())))
+    assert load_home(tmp_path / "flat.json") == home
+    (tmp_path / "flat.yaml").write_text("{home: {area: 40}, rooms: {bedroom: bedroom, hall: hallway}}")
+    assert [room.name for room in load_home(tmp_path / "flat.yaml").rooms] == ["bedroom", "hall"]
+    (tmp_path / "room.yaml").write_text("room: bedroom\nobjects: {bed: {category: bed, attributes: {rooms: 3}}}\n")
+    assert load_home(tmp_path / "room.yaml") is None
+
+
 def test_another_way_replaces_the_one_before():
     home = HomeGraph.from_words("kitchen door living, hall door living").relate("kitchen open to living")
     assert [str(relation) for relation in home.relations] == ["hall door living", "kitchen open_to living"]
