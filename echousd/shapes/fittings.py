@@ -162,7 +162,7 @@ def slid(opening: Opening, hinge_first: bool, length: float) -> float:
     if opening.swing != "slide":
         return 0.0
     beside = opening.offset if hinge_first else length - opening.end
-    return min(opening.width, beside - OVER) * (-1.0 if hinge_first else 1.0)
+    return max(min(opening.width, beside - OVER), 0.01) * (-1.0 if hinge_first else 1.0)
 
 
 def door_track(opening: Opening, way: float) -> Mesh:

@@ -179,9 +179,12 @@ def test_a_leaf_slides_before_the_wall_and_sets_its_door_free(kind, turn, hinge)
     assert np.ptp(track.vertices, axis=0).max() == pytest.approx(2 * 0.9 + 0.06, abs=0.01)
 
 
-def test_a_leaf_slides_no_further_than_its_wall() -> None:
-    door = Opening("door", "door", 2, 0.5, 0.9, 2.0, hinge="left", swing="slide")
-    assert walls(rectangle(4.0, 3.0), 2.6, (door,))[2].inner[0].inner[0].joint.reach == pytest.approx(0.47)
+@pytest.mark.parametrize(("offset", "reach"), [(1.5, 0.9), (0.5, 0.47), (0.03, 0.01), (0.0, 0.01)])
+def test_a_leaf_slides_no_further_than_its_wall(offset, reach) -> None:
+    door = Opening("door", "door", 2, offset, 0.9, 2.0, hinge="left", swing="slide")
+    joint = walls(rectangle(4.0, 3.0), 2.6, (door,))[2].inner[0].inner[0].joint
+    assert (joint.kind, joint.axis[0]) == ("prismatic", 1.0)  # towards the first corner, at +x
+    assert joint.reach == pytest.approx(reach)
 
 
 @pytest.mark.parametrize(
