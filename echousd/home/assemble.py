@@ -123,7 +123,7 @@ def write_rooms(
         raise ValueError(f"{root}: exists and is no home of echousd; choose another place or use --force")
     jobs = jobs_of(plan, output, options, outside)
     digests = digests_of(jobs)
-    wanted = [_begun(jobs[name], plan, output, options) for name in stale(digests, output)]
+    wanted = [begun(jobs[name], plan, output, options) for name in stale(digests, output)]
     edited = [job.id for job in wanted if not job.begin and (find_manifest(Path(job.folder)) or {}).get("history")]
     if edited and not force:
         raise ValueError(
@@ -144,7 +144,7 @@ def write_rooms(
     return Made(root, done, failed)
 
 
-def _begun(job: Job, plan: Plan, output: Path, options: RoomOptions) -> Job:
+def begun(job: Job, plan: Plan, output: Path, options: RoomOptions) -> Job:
     """The job as an edit of the room that is there, where nothing but its openings is another than it was."""
     root, manifest = earlier(output, options.seed), find_manifest(Path(job.folder))
     if root is None or manifest is None:

@@ -160,7 +160,7 @@ def test_an_edit_follows_through(made, echousd_command):
     folder, _ = made
     before = digests(folder)
     done = echousd_command("edit", folder, "--relate", "living open to bedroom", "--dry-run")
-    assert (done.code, sorted(done.out.split())) == (0, ["bedroom", "living", "new", "new"])
+    assert (done.code, sorted(done.out.split())) == (0, ["bedroom", "living", "opened", "opened"])
     assert digests(folder) == before
     done = echousd_command("edit", folder / "home.usda", "--relate", "living open to bedroom", "--json")
     assert done.code == 0, done.err
@@ -185,6 +185,8 @@ def test_edits_inside_a_room_are_not_lost_unsaid(made, tmp_path, echousd_command
     assert done.out.count("kept     ") == 2
     assert digests(folder) == before
     moved = ("--relate", "bedroom larger than living")  # its floor is another then
+    told = json.loads(echousd_command("edit", folder, *moved, "--dry-run", "--json").out)
+    assert (sorted(told["new"]), told["opened"]) == (["bedroom", "living"], [])
     done = echousd_command("edit", folder, *moved)
     assert done.code == 2
     assert "bedroom would be made anew, which gives up what was edited in it since" in done.err
