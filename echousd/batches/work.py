@@ -73,12 +73,13 @@ def room(job: Job) -> dict[str, Any]:
 
 def generated(job: Job) -> Room:
     """The room of a job; raises ValueError as `generate` does."""
-    from echousd.folder.found import room_at
-    from echousd.make.edit import edit
+    if job.begin:
+        from echousd.folder.found import room_at
+        from echousd.make.edit import edit
+
+        return edit(room_at(Path(job.folder)), SceneGraph.from_json(job.text), outside=job.outside)
     from echousd.make.pipeline import generate
 
-    if job.begin:
-        return edit(room_at(Path(job.folder)), SceneGraph.from_json(job.text), outside=job.outside)
     if job.draw is not None and not job.text:
         graph = sampled_graph(*job.draw, job.options.relations)
     else:

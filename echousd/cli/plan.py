@@ -162,7 +162,7 @@ def generate_home(
     from echousd.cli.terminal import progress_bar
     from echousd.folder.found import is_home
     from echousd.graph.consistency import faults_of
-    from echousd.home.assemble import begun, digests_of, earlier, jobs_of, stale, write_rooms
+    from echousd.home.assemble import earlier, wanted_jobs, write_rooms
     from echousd.home.given import next_plan, plan_there
 
     stated = None if is_home(graph) else plan_there(graph, home)
@@ -170,12 +170,9 @@ def generate_home(
     with faults_of(str(graph)):
         plan = stated or next_plan(home, seed=options.seed, before=before)
     if dry_run:
-        jobs = jobs_of(plan, output, options)
-        again = [begun(jobs[name], plan, output, options) for name in stale(digests_of(jobs), output)]
+        again, _ = wanted_jobs(plan, output, options)
         lines = [f"{'opened' if job.begin else 'new':8} {job.id}" for job in again]
-        facts = {
-            word: [job.id for job in again if job.begin == kept] for word, kept in (("new", False), ("opened", True))
-        }
+        facts = {"new": [job.id for job in again if not job.begin], "opened": [job.id for job in again if job.begin]}
         say_done(json, [], lines, facts)
         return
     with progress_bar() as listen:

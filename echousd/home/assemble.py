@@ -121,46 +121,54 @@ def write_rooms(
     root = output / ROOT_FILE
     if root.exists() and not force and not is_home(root):
         raise ValueError(f"{root}: exists and is no home of echousd; choose another place or use --force")
-    jobs = jobs_of(plan, output, options, outside)
-    digests = digests_of(jobs)
-    wanted = [begun(jobs[name], plan, output, options) for name in stale(digests, output)]
+    wanted, digests = wanted_jobs(plan, output, options, outside)
     edited = [job.id for job in wanted if not job.begin and (find_manifest(Path(job.folder)) or {}).get("history")]
     if edited and not force:
         raise ValueError(
             f"{output}: {', '.join(edited)} would be made anew, which gives up what was edited in it since; allowed: "
             "--force, or the same edit in the home's graph"
         )
-    done: dict[str, Mapping[str, Any] | None] = dict.fromkeys(jobs)
+    done: dict[str, Mapping[str, Any] | None] = dict.fromkeys(digests)
     failed: dict[str, str] = {}
     for name, value, error in _run(wanted, workers):
         done[name] = value
         if error:
             failed[name] = error
         tell(sum(value is not None for value in done.values()) + len(failed), len(wanted))
-    made = [name for name in jobs if name not in failed]
+    made = [name for name in digests if name not in failed]
     if made:
         marks = {name: digests[name] for name in made}
         write_all(home_files(plan, output, made, marks, options))
     return Made(root, done, failed)
 
 
-def begun(job: Job, plan: Plan, output: Path, options: RoomOptions) -> Job:
-    """The job as an edit of the room that is there, where nothing but its openings is another than it was."""
-    root, manifest = earlier(output, options.seed), find_manifest(Path(job.folder))
-    if root is None or manifest is None:
+def wanted_jobs(
+    plan: Plan, output: Path, options: RoomOptions, outside: Sequence[str] = ()
+) -> tuple[list[Job], dict[str, str]]:
+    """The jobs of the rooms that a folder does not hold as they would be made, and the digest of every room.
+
+    Where nothing but a room's openings is to be another, its job is to edit what is there.
+    """
+    jobs, root, layer = (
+        jobs_of(plan, output, options, outside),
+        earlier(output, options.seed),
+        _layer(output / ROOT_FILE),
+    )
+    digests, marks = digests_of(jobs), dict(layer.customLayerData.get("rooms", {})) if layer else {}
+    there = {name: find_manifest(output / FOLDER / name) for name in jobs}
+    again = [name for name in jobs if not there[name] or marks.get(name) != digests[name]]
+    before, asked = remembered(root) if again and root else (None, None)
+    kept = before.rooms if before and asked == options else ()
+    same = {name: manifest for name in again if (manifest := there[name]) and plan.home.room(name) in kept}
+    return [_opened(jobs[name], same[name], plan) if name in same else jobs[name] for name in again], digests
+
+
+def _opened(job: Job, manifest: Mapping[str, Any], plan: Plan) -> Job:
+    spec, there = plan.graph(job.id).room, SceneGraph.from_json(json.dumps(manifest["graph"]))
+    if not there.room.replaced(openings=spec.openings) == spec != there.room:
         return job
-    (before, asked), there = remembered(root), SceneGraph.from_json(json.dumps(manifest["graph"]))
-    spec, same = plan.graph(job.id).room, asked == options and plan.home.room(job.id) in before.rooms
-    same &= there.room.replaced(openings=spec.openings) == spec
-    return replace(job, text=there.replaced(room=spec).to_json(), begin=True) if same else job
-
-
-def stale(digests: Mapping[str, str], output: Path) -> list[str]:
-    """The rooms that a folder does not hold as they would be made, by their `digests_of`."""
-    layer = _layer(output / ROOT_FILE)
-    before = dict(layer.customLayerData.get("rooms", {})) if layer else {}
-    there = [name for name in digests if find_manifest(output / FOLDER / name) is not None]
-    return [name for name, digest in digests.items() if name not in there or before.get(name) != digest]
+    ours = manifest.get("generator") == f"echousd {echousd.__version__}"
+    return replace(job, text=there.replaced(room=spec).to_json(), begin=True) if ours else job
 
 
 def remembered(root: Path) -> tuple[HomeGraph, RoomOptions]:

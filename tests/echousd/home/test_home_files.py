@@ -213,6 +213,17 @@ def test_furniture_stays_where_a_room_only_gets_other_openings(made, echousd_com
     assert "gives up what was edited in it since" in options.err  # in other colours all is another
 
 
+def test_rooms_of_another_version_are_made_anew(made, monkeypatch, echousd_command):
+    folder, _ = made
+    ways = (("door", []), ("open to", ["bedroom", "living"]))
+    told = [("edit", folder, "--relate", f"living {way} bedroom", "--dry-run", "--json") for way, _ in ways]
+    assert [sorted(json.loads(echousd_command(*words).out)["opened"]) for words in told] == [names for _, names in ways]
+    monkeypatch.setattr(echousd, "__version__", "9.9.9")
+    for words in told:
+        facts = json.loads(echousd_command(*words).out)
+        assert (sorted(facts["new"]), facts["opened"]) == (["bedroom", "living"], [])
+
+
 def test_a_plan_is_drawn_with_what_stands_in_it(made, tmp_path, echousd_command):
     done = echousd_command("plan", "export", made[0], "-o", tmp_path / "flat.dxf")
     assert done.code == 0, done.err
