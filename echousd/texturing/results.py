@@ -10,7 +10,6 @@ import numpy as np
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from echomodel.triangles import linked
 from echousd.folder.within import check_links
 from echousd.textures import TextureError, decoded, encoded, texture_bytes
 from echousd.texturing.atlas import Unwrapped
@@ -201,44 +200,21 @@ def _found(corners: np.ndarray, wanted: np.ndarray, st: np.ndarray) -> np.ndarra
 
     Returns how many are missing where some are, or where there are others besides.
     """
-    diagonal = float(np.linalg.norm(np.ptp(wanted.reshape(-1, 3), axis=0)))
-    group = _places(np.concatenate([wanted, corners]).reshape(-1, 3), TOLERANCE * max(diagonal, 1e-9)).reshape(-1, 3)
-    ours, theirs = group[: len(wanted)], group[len(wanted) :]
-    (mine, first), (other, start) = _turned(ours), _turned(theirs)
-    both = np.unique(np.concatenate([mine, other]), axis=0, return_inverse=True)[1].reshape(-1)
-    mine_key, other_key = both[: len(mine)], both[len(mine) :]
-    order = np.argsort(other_key, kind="stable")
-    low = np.searchsorted(other_key[order], mine_key)
-    many = np.searchsorted(other_key[order], mine_key, side="right") - low
-    flat = (ours == np.roll(ours, 1, axis=1)).any(1)
-    missing = int(((many == 0) & ~flat).sum())
-    strange = ~np.isin(other_key, mine_key) & ~(theirs == np.roll(theirs, 1, axis=1)).any(1)
-    if missing or strange.any():
-        return max(missing, int(strange.sum()))
-    turn = np.zeros(len(mine_key), int)  # equal triangles take turns
-    rows = np.argsort(mine_key, kind="stable")
-    turn[rows] = np.arange(len(rows)) - np.searchsorted(mine_key[rows], mine_key[rows])
-    pick = order[np.minimum(low + turn % np.maximum(many, 1), len(order) - 1)]
-    corner = (np.arange(3) - first[:, None] + start[pick][:, None]) % 3
-    out = st[pick][np.arange(len(pick))[:, None], corner]
-    lost = (many == 0).nonzero()[0]  # without area: where their places are
-    if len(lost):
-        where = np.zeros((int(group.max()) + 1, 2))
-        where[theirs.reshape(-1)] = st.reshape(-1, 2)
-        out[lost] = where[ours[lost]]
+    near = TOLERANCE * max(float(np.linalg.norm(np.ptp(wanted.reshape(-1, 3), axis=0))), 1e-9)
+    begun, coordinates = (np.concatenate([np.roll(each, -k, axis=1) for k in range(3)]) for each in (corners, st))
+    ours, theirs = wanted.reshape(-1, 9), begun.reshape(-1, 9)
+    _, row = cKDTree(theirs).query(ours, p=np.inf, distance_upper_bound=near)
+    _, back = cKDTree(ours).query(theirs, p=np.inf, distance_upper_bound=near)
+    lost, strange = row == len(theirs), (back == len(ours)).reshape(3, -1).all(0)
+    missing = max(int((lost & ~_flat(wanted, near)).sum()), int((strange & ~_flat(corners, near)).sum()))
+    if missing:
+        return missing
+    out = coordinates[np.where(lost, 0, row)]
+    _, corner = cKDTree(corners.reshape(-1, 3)).query(wanted[lost])  # without area: where their places are
+    out[lost] = st.reshape(-1, 2)[corner]
     return out
 
 
-def _turned(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles begun at the corner that makes them smallest as a row, the turn kept, and which corner that is."""
-    turns = np.stack([np.roll(places, -step, axis=1) for step in range(3)], 1)  # (t, 3, 3)
-    most = int(places.max(initial=0)) + 1
-    first = (turns @ np.array([most**2, most, 1])).argmin(1)
-    return turns[np.arange(len(places)), first], first
-
-
-def _places(points: np.ndarray, near: float) -> np.ndarray:
-    """(n,) int, points within `near` of each other have one number."""
-    unique, index = np.unique(np.rint(points / (near / 4)).astype(np.int64), axis=0, return_inverse=True)
-    pairs = cKDTree(unique * (near / 4)).query_pairs(near, output_type="ndarray")
-    return linked(pairs, len(unique))[index.reshape(-1)]
+def _flat(triangles: np.ndarray, near: float) -> np.ndarray:
+    """(t,) bool: triangles (t, 3, 3) two corners of which are at one place."""
+    return np.asarray((np.abs(triangles - np.roll(triangles, 1, axis=1)) < near).all(2).any(1))
