@@ -21,7 +21,6 @@ from echousd.place.geometry import (
     Collision,
     Floor,
     depth_inside,
-    floor_from_polygon,
     pair_indices,
     separation,
 )
@@ -99,7 +98,7 @@ class Whole:
     @cached_property
     def floor(self) -> Floor | None:
         """Its floor."""
-        return None if self.polygon is None else floor_from_polygon(self.polygon)
+        return None if self.polygon is None else Floor(self.polygon)
 
 
 def find_misplaced(whole: Whole) -> tuple[Misplacement, ...]:

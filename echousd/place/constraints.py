@@ -149,9 +149,9 @@ class Constraints:
             def placement(boxes: np.ndarray, stated: Stated = stated, who: list[int] = who) -> np.ndarray:
                 poses = {box: Spread(boxes[:, at, 3:], boxes[:, at, :3], self.yaw[box].repeat(len(boxes)))
                          for at, box in enumerate(who)}  # fmt: skip
-                return margin_of(stated, poses, setting.surroundings, setting.categories)
+                return margin_of(stated, poses, setting.outline, setting.categories)
 
-            if stated.others or setting.surroundings is not None:
+            if stated.others or setting.outline is not None:
                 margin, by = _with_slopes(placement, state[[who]])
                 by[..., 3:] = 0.0
                 found.append(Rows(PLACEMENT, np.array([who]), margin - SLACK, by))

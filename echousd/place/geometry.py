@@ -16,6 +16,8 @@ from echomodel.arrays import norm
 from echomodel.boxes2d import footprints, seen
 from echomodel.floors import signed_distance
 from echomodel.objective.support import allowed_overlap
+from echomodel.openings import edge_lengths, signed_area
+from echomodel.rules.placements import Walls
 
 if TYPE_CHECKING:
     from echousd.place.setting import Setting
@@ -89,24 +91,24 @@ def _gaps(
     return gap
 
 
-@dataclass(frozen=True, eq=False)
-class Floor:
+class Floor(Walls):
     """The floor polygon, counter-clockwise seen with z up on paper.
 
     Arguments:
-        polygon: (k, 2) float, x and z of the corners, metres.
-        normal: (k, 2) float, unit vector into the room for the wall from corner i to corner i + 1.
-        reflex: (m, 2) float, corners that point into the room.
+        polygon: (k, 2) float, x and z of the corners in either order, metres; those at one place count once.
+
+    `reflex`: (m, 2) float, corners that point into the room. Raises ValueError for fewer than three corners or no area.
     """
 
-    polygon: np.ndarray
-    normal: np.ndarray
-    reflex: np.ndarray
-
-    @cached_property
-    def edge(self) -> np.ndarray:
-        """(k, 2) float: from each corner to the following one, metres."""
-        return np.roll(self.polygon, -1, 0) - self.polygon
+    def __init__(self, polygon: np.ndarray) -> None:
+        polygon = np.asarray(polygon, float).reshape(-1, 2)
+        polygon = polygon[edge_lengths(polygon) > 1e-6]
+        area = signed_area(polygon)
+        if len(polygon) < 3 or abs(area) < 1e-6:
+            told = f"floor polygon with {len(polygon)} different corners and area {abs(area):g} m2"
+            raise ValueError(f"{told}: not a floor")
+        super().__init__(polygon if area > 0 else polygon[::-1])
+        self.polygon, self.reflex = self.start, self.start[self.turn < -1e-6]
 
     @cached_property
     def rectangle(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -114,24 +116,6 @@ class Floor:
         low, high = self.polygon.min(0), self.polygon.max(0)
         at_corners = ((self.polygon == low) | (self.polygon == high)).all()
         return ((low + high) / 2, (high - low) / 2) if len(self.polygon) == 4 and at_corners else None
-
-
-def floor_from_polygon(polygon: np.ndarray) -> Floor:
-    """The floor with its walls' normals; raises ValueError for fewer than three corners or no area."""
-    polygon = np.asarray(polygon, float).reshape(-1, 2)
-    keep = np.linalg.norm(polygon - np.roll(polygon, -1, 0), axis=1) > 1e-6
-    polygon = polygon[keep]
-    following = np.roll(polygon, -1, 0)
-    area = 0.5 * float((polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]).sum())
-    if len(polygon) < 3 or abs(area) < 1e-6:
-        raise ValueError(f"floor polygon with {len(polygon)} different corners and area {abs(area):g} m2: not a floor")
-    if area < 0:
-        polygon = polygon[::-1].copy()
-    edge = np.roll(polygon, -1, 0) - polygon
-    edge /= np.linalg.norm(edge, axis=1, keepdims=True)
-    before = np.roll(edge, 1, 0)
-    turn = before[:, 0] * edge[:, 1] - before[:, 1] * edge[:, 0]
-    return Floor(polygon, np.stack((-edge[:, 1], edge[:, 0]), -1), polygon[turn < -1e-6])
 
 
 def depth_inside(floor: Floor, points: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from echomodel.objective.sizes import (
     usual_sizes,
 )
 from echomodel.objective.support import ON_FLOOR
-from echomodel.openings import Opening
+from echomodel.openings import Opening, signed_area
 from echomodel.rules import margins, verdicts
 from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
@@ -234,9 +234,7 @@ def place_boxes(
 def fullness(at: Setting) -> float:
     """Share of the floor that furniture covers."""
     standing = at.carrier == ON_FLOOR
-    x, z = at.floor.polygon.T
-    area = float(abs(x @ np.roll(z, -1) - z @ np.roll(x, -1)) / 2)
-    return float((at.size[standing, 0] * at.size[standing, 2]).sum()) / area
+    return float((at.size[standing, 0] * at.size[standing, 2]).sum()) / abs(signed_area(at.floor.polygon))
 
 
 def lamps_along(

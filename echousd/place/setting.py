@@ -15,10 +15,10 @@ from echomodel.objective.support import ON_CEILING, ON_FLOOR, carriers
 from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
 from echousd.place.distances import BEHIND, kept_behind
-from echousd.place.geometry import Floor, floor_from_polygon, pair_indices
+from echousd.place.geometry import Floor, pair_indices
 
 if TYPE_CHECKING:
-    from echomodel.rules.placements import Stated, Walls
+    from echomodel.rules.placements import Stated
 
 WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it stands free
 WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's normal does not lean on it
@@ -140,19 +140,10 @@ class Setting:
         return np.asarray((corners.max(0) + corners.min(0)) / 2)
 
     @cached_property
-    def surroundings(self) -> Walls | None:
-        """The walls as placements are measured to them, None where the room has none."""
-        from echomodel.rules.placements import Walls
-
-        return None if self.outline is None else Walls(self.outline.polygon)
-
-    @cached_property
     def walls(self) -> list[tuple[np.ndarray, np.ndarray, float, float]]:
         """Start (2,), direction (2,), length and the heading of what stands with its back to it, for each wall."""
-        start, edge = self.floor.polygon, self.floor.edge
-        length = np.linalg.norm(edge, axis=1)
-        yaw = np.arctan2(self.floor.normal[:, 0], self.floor.normal[:, 1])
-        return [(start[k], edge[k] / length[k], float(length[k]), float(yaw[k])) for k in range(len(start))]
+        floor, yaw = self.floor, np.arctan2(*self.floor.normal.T)
+        return list(zip(floor.start, floor.along, floor.length.tolist(), yaw.tolist(), strict=True))
 
     @cached_property
     def grain(self) -> float:
@@ -176,7 +167,7 @@ def setting_of(
 
     words = tuple(vocabulary().category(word).name for word in categories)
     told = np.flatnonzero(np.isin(triplets[:, 1], sorted(measured(rules))))
-    floor = None if floor_polygon is None else floor_from_polygon(floor_polygon)
+    floor = None if floor_polygon is None else Floor(floor_polygon)
     carrier = carriers([vocabulary().category(word) for word in words], size, position, yaw, triplets)
     position, yaw = stacked(size, position, carrier, height, fixed), yaw.copy()
     wall = np.full((len(words), 2, 2), np.nan)
@@ -236,13 +227,11 @@ def lean(
     leaning = [
         ((row.wall or i in told) and carrier[i] == ON_FLOOR) or row.support == "wall" for i, row in enumerate(rows)
     ]
-    length = np.linalg.norm(floor.edge, axis=1)
-    along = floor.edge / length[:, None]
     facing = axes(yaw)[1] @ floor.normal.T > np.cos(WALL_TURN)
     corner = footprints(size, position, yaw)
     gap = ((corner[:, None] - floor.polygon[:, None]) * floor.normal[:, None]).sum(-1).min(2)
-    at = ((position[:, None, [0, 2]] - floor.polygon) * along).sum(-1)
-    near = facing & (at > -0.2) & (at < length + 0.2) & (gap < WALL_REACH) & (gap > -1.5)
+    at = ((position[:, None, [0, 2]] - floor.polygon) * floor.along).sum(-1)
+    near = facing & (at > -0.2) & (at < floor.length + 0.2) & (gap < WALL_REACH) & (gap > -1.5)
     distance = np.where(near & np.array(leaning, bool)[:, None], np.abs(gap), np.inf)
     best = distance.argmin(1)
     found = np.stack([floor.polygon[best], floor.normal[best]], 1)

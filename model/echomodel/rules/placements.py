@@ -39,7 +39,8 @@ class Stated:
 
 
 class Walls:
-    """The walls of a floor: starts and inward normals (E, 2), lengths (E,), and which corners look into the room (E,).
+    """The walls of a floor: starts, directions and inward normals (E, 2), lengths (E,), how far the room turns at each
+    start, as a sine, below 0 at corners that point into it, and which are `inner` corners (E,).
 
     Arguments:
         floor: (E, 2) float, corners of the floor in either order, metres.
@@ -53,7 +54,8 @@ class Walls:
         sign = 1.0 if signed_area(floor) > 0 else -1.0
         self.normal = sign * np.stack([-self.along[:, 1], self.along[:, 0]], 1)
         before = np.concatenate([self.along[-1:], self.along[:-1]])
-        self.inner = sign * (before[:, 0] * self.along[:, 1] - before[:, 1] * self.along[:, 0]) > 0.1
+        self.turn = sign * (before[:, 0] * self.along[:, 1] - before[:, 1] * self.along[:, 0])
+        self.inner = self.turn > 0.1
 
     def away(self, points: Array) -> Array:
         """(..., E) distance of points (..., 2) from the line of every wall, inwards positive."""

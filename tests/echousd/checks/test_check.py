@@ -16,7 +16,7 @@ from echousd.checks.placement import Whole, _small_faults, find_collisions, mesh
 from echousd.checks.report import find_living
 from echousd.cli.main import run
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.place.geometry import SOLID, floor_from_polygon
+from echousd.place.geometry import SOLID, Floor
 from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding
 
 BAD = Path(__file__).parent.parent / "bad"
@@ -276,7 +276,7 @@ def test_coats_hang_from_a_rack_that_stands_off_its_wall(rack: float, told: list
     none = np.zeros((0, 3))
     shape = Shape(none, none, np.array([0.6, 1.0, 0.22]), np.array([-0.7, 0.5, 0.0]), np.pi / 2)
     coats = Surrounding(prim, "coats", shape)
-    floor = floor_from_polygon(np.array([(-1.0, -2.0), (1.0, -2.0), (1.0, 2.0), (-1.0, 2.0)]))
+    floor = Floor(np.array([(-1.0, -2.0), (1.0, -2.0), (1.0, 2.0), (-1.0, 2.0)]))
     carriers = [thing("rack", "coat_rack", box(0.4, rack, 1.0), (-0.7, 0.0, 0.0))] if rack else []
     found = _small_faults(coats, floor, carriers, np.zeros((0, 2, 2)))
     assert [word for word, _ in found] == told

@@ -12,7 +12,7 @@ from echomodel.objective.support import allowed_overlap
 from echomodel.rules import margins, verdicts
 from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
-from echousd.place.geometry import depth_inside, floor_from_polygon, separation
+from echousd.place.geometry import Floor, depth_inside, separation
 from echousd.place.placing import PlacedBoxes, place, place_boxes
 from echousd.place.solver import PlaceConfig, sentence
 
@@ -226,7 +226,7 @@ def test_verdicts_are_those_of_the_returned_boxes(monkeypatch) -> None:
 
 
 def test_inside_of_a_floor_with_a_notch() -> None:
-    floor = floor_from_polygon(np.array([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], float)[::-1])
+    floor = Floor(np.array([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], float)[::-1])
     distance = depth_inside(floor, np.array([(0.5, 0.5), (1.5, 1.5), (1.2, 0.9), (-0.25, 1.0)]))
     np.testing.assert_allclose(distance, [0.5, -0.5, 0.1, -0.25], atol=1e-12)
     assert floor.reflex.tolist() == [[1.0, 1.0]]
@@ -297,7 +297,7 @@ def test_two_beds_that_mirror_each_other_are_turned_alike() -> None:
 def test_the_depth_of_points_is_their_distance_to_the_border(corners: np.ndarray) -> None:
     import shapely
 
-    floor, polygon = floor_from_polygon(corners), shapely.Polygon(corners)
+    floor, polygon = Floor(corners), shapely.Polygon(corners)
     points = np.random.default_rng(0).uniform(-3, 6, (200, 2))
     there = shapely.points(points)
     away = shapely.distance(there, polygon.exterior)
