@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
 
-import fast_simplification
 import numpy as np
 
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.shapes.geometry import Collider
 from echousd.shapes.hulls import box_around, convex_hull, flush, hull_volume, rounded_hull, snapped, standing_hull
-
-if TYPE_CHECKING:
-    import trimesh
 
 FACES, PIECES_FACES = 400, 1200
 PIECES, CORNERS = 16, 32  # convex pieces of a shape at most, corners of each
@@ -78,22 +73,12 @@ def collider(mesh: Mesh, category: str) -> Collider:
     kind = approximation(category)
     if kind == "convexHull":
         return standing_hull(mesh)
-    light = _reduced(mesh, FACES)
+    from echousd.shapes.meshing import quadric
+
+    light = quadric(mesh.trimesh, FACES)
     if light.is_watertight and light.volume < 0:  # of somebody's mirrored model
         light.invert()
     return Collider("collider", Mesh(flush(np.asarray(light.vertices), mesh.bounds), light.faces), kind)
-
-
-def _reduced(mesh: Mesh, faces: int) -> trimesh.Trimesh:
-    """The mesh with at most about `faces` triangles, used vertices only."""
-    out = mesh.trimesh
-    if len(mesh.faces) > faces:
-        points, triangles = mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32)
-        out = Mesh(*fast_simplification.simplify(points, triangles, target_count=faces, agg=5)).trimesh
-        out.merge_vertices()
-    out.update_faces(out.nondegenerate_faces())
-    out.remove_unreferenced_vertices()
-    return out
 
 
 def collider_of(mesh: Mesh, category: str) -> Collider:
