@@ -189,6 +189,11 @@ class LayoutReport:
         }
 
 
+def _of_layouts(name: str, says: str) -> Any:
+    """What is found in any layout under a name of `LayoutReport`."""
+    return property(lambda report: tuple(one for each in report.layouts for one in getattr(each, name)), doc=says)
+
+
 @dataclass(frozen=True)
 class CheckReport:
     """What a check found.
@@ -207,30 +212,11 @@ class CheckReport:
     warnings: tuple[Fault, ...]
     settled: tuple[SettleReport, ...] | None = None
 
-    @property
-    def relations(self) -> tuple[Verdict, ...]:
-        """The relations of all layouts."""
-        return tuple(relation for layout in self.layouts for relation in layout.relations)
-
-    @property
-    def collisions(self) -> tuple[Collision, ...]:
-        """The collisions of all layouts."""
-        return tuple(hit for layout in self.layouts for hit in layout.collisions)
-
-    @property
-    def placement(self) -> tuple[Misplacement, ...]:
-        """What is misplaced in any layout."""
-        return tuple(wrong for layout in self.layouts for wrong in layout.placement)
-
-    @property
-    def living(self) -> tuple[LivingFault, ...]:
-        """What a person would point at in any layout."""
-        return tuple(fault for layout in self.layouts for fault in layout.living)
-
-    @property
-    def broken(self) -> tuple[Verdict, ...]:
-        """The relations that do not hold, of all layouts."""
-        return tuple(relation for layout in self.layouts for relation in layout.broken)
+    relations = _of_layouts("relations", "The relations of all layouts.")
+    collisions = _of_layouts("collisions", "The collisions of all layouts.")
+    placement = _of_layouts("placement", "What is misplaced in any layout.")
+    living = _of_layouts("living", "What a person would point at in any layout.")
+    broken = _of_layouts("broken", "The relations that do not hold, of all layouts.")
 
     @property
     def ok(self) -> bool:
