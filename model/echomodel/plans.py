@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.boxes2d import CORNERS
-from echomodel.openings import Opening
+from echomodel.openings import Opening, cut_rectangle
 from echomodel.rooms.statistics import room_type_statistics
 from echomodel.sizes import filled_area, footprint, pieces, quantile
 from echomodel.vocabulary import Category, vocabulary
@@ -132,14 +131,8 @@ def floor_outline(
     cut_x, cut_z = round(width * x, 1), round(depth * z, 1)
     if min(x - cut_x, z - cut_z) < ARM or max(x - cut_x, z - cut_z) < longest + WAY / 2:
         return None
-    sx, sz = CORNERS[corner]
-    points = [(side_x * x / 2, side_z * z / 2) for side_x, side_z in CORNERS]
-    inner = [
-        (sx * x / 2, sz * (z / 2 - cut_z)), (sx * (x / 2 - cut_x), sz * (z / 2 - cut_z)),
-        (sx * (x / 2 - cut_x), sz * z / 2),
-    ]  # fmt: skip
-    points[corner : corner + 1] = inner if sx == sz else inner[::-1]
-    return np.array(points).round(3)
+    cuts = [(cut_x, cut_z) if at == corner else (0.0, 0.0) for at in range(4)]
+    return np.array(cut_rectangle(x / 2, z / 2, cuts)).round(3)
 
 
 def _dines(kind: Category) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from echomodel.boxes2d import CORNERS
-from echomodel.openings import Opening, numbered, overlap, zone
+from echomodel.openings import Opening, cut_rectangle, numbered, overlap, zone
 from echomodel.rooms.statistics import RoomTypeStatistics
 from echomodel.sizes import quantile
 
@@ -115,7 +115,7 @@ def sample_floor(statistics: RoomTypeStatistics, rng: np.random.Generator) -> Fl
         area = 4 * x * z - sum(w * d for w, d in cuts)
         if abs(math.log(area) - target) < best:
             best, half_x, half_z, sizes = abs(math.log(area) - target), x, z, cuts
-    polygon = _trace(half_x, half_z, sizes)
+    polygon = cut_rectangle(half_x, half_z, sizes)
     removed = tuple(
         _cut(half_x, half_z, sx, sz, *size) for (sx, sz), size in zip(CORNERS, sizes, strict=True) if size[0]
     )
@@ -183,22 +183,6 @@ def _cut(half_x: float, half_z: float, sx: float, sz: float, width: float, depth
     z = sorted((sz * half_z, sz * (half_z - depth)))
     # What is cut away reaches outwards, so that furniture cannot slip through a thin gap behind it.
     return (x[0] - (sx < 0), z[0] - (sz < 0), x[1] + (sx > 0), z[1] + (sz > 0))
-
-
-def _trace(half_x: float, half_z: float, sizes: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-    """The polygon, corner by corner in one turn."""
-    points: list[tuple[float, float]] = []
-    for (sx, sz), (width, depth) in zip(CORNERS, sizes, strict=True):
-        if not width:
-            points.append((sx * half_x, sz * half_z))
-            continue
-        step = [
-            (sx * (half_x - width), sz * half_z),
-            (sx * (half_x - width), sz * (half_z - depth)),
-            (sx * half_x, sz * (half_z - depth)),
-        ]
-        points.extend(step if sx == -sz else step[::-1])
-    return tuple(points)
 
 
 def walls_of(polygon: tuple[tuple[float, float], ...]) -> tuple[Wall, ...]:

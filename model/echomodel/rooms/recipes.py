@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from echomodel.rooms.builder import BODY, HALF_PI, Builder, Item, Size
+from echomodel.rooms.builder import BODY, HALF_PI, Builder, Item, Size, overlaps
 from echomodel.rooms.floor import Wall
 from echomodel.rooms.groups import (
     SOFAS,
@@ -539,19 +539,9 @@ def _hang(
     item = Item(category, size, x, bottom, z, yaw)
     if not room.floor.holds(x - item.hull_x, z - item.hull_z, x + item.hull_x, z + item.hull_z):
         return
-    if any(overlap(item, other) for other in room.items if other.category.endswith("_lamp")):
+    if any(overlaps(item, other, 0.0) for other in room.items if other.category.endswith("_lamp")):
         return
     room.add(item, room.style() if style is None else style)
-
-
-def overlap(a: Item, b: Item) -> bool:
-    """Whether the hulls of two lamps meet in plan and height."""
-    return (
-        abs(a.x - b.x) < a.hull_x + b.hull_x
-        and abs(a.z - b.z) < a.hull_z + b.hull_z
-        and a.y < b.y + b.size[1]
-        and b.y < a.y + a.size[1]
-    )
 
 
 def on_top(room: Builder) -> None:
