@@ -18,7 +18,7 @@ MAX_TEXT = 65_536  # characters in one string: what an attribute may hold before
 MAX_NODES = 5000  # of a graph
 MAX_CORNERS = 500  # of a floor: the work on walls and furniture grows with their square
 MAX_NAME = 100  # characters: names become file names of assets
-SHAPES = ("parts", "sdf", "boxes", "library", "guided", "independent", "own")  # of the geometry of one object
+SHAPES = ("parts", "sdf", "boxes", "library", "guided", "own")  # of the geometry of one object
 # what `echousd.dressing` has stories of
 RESIDENTS = ("child", "teen", "couple", "senior", "student", "office", "guest")
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")

@@ -100,15 +100,14 @@ class LayoutSearch:
             for rows in np.arange(count * len(nodes)).reshape(count, -1)
         ]
 
-    def best(self, graph: SceneGraph, number: int = 0, sized: Boxes | None = None) -> tuple[Boxes, tuple[str, ...]]:
+    def best(self, graph: SceneGraph, number: int = 0) -> tuple[Boxes, tuple[str, ...]]:
         """The best of several drafts after place: kept relations first, then collisions, then the living rules.
 
         Further drafts are drawn, a few at once, only where those before leave something to be wished for. Each is
         searched in passing; what is left then is searched for in earnest, the best first and one of those that ended
         alike, until the room's `POSES` are judged.
 
-        Arguments:
-            number: of the layout. sized: boxes whose sizes the graph states for all layouts.
+        `number`: of the layout.
         """
         best: tuple[Boxes, tuple[str, ...]] | None = None
         worth: tuple[float, ...] = ()
@@ -124,7 +123,6 @@ class LayoutSearch:
                 for draft in self.sampled(graph, number + start, count) if judged < budget * SHARE else ():
                     ends = [wishes for wishes, *_ in left]
                     if judged < budget * SHARE and max(map(ends.count, ends), default=0) < ALIKE:
-                        draft = draft if sized is None else Boxes(sized.size, draft.position, draft.yaw)
                         yield len(left), draft, {}, 0 if self.drafts > 1 else DEFAULTS.anew
             for _, rank, draft, begun in sorted({one[0]: one for one in left[::-1]}.values(), key=lambda one: one[0]):
                 yield rank, draft, begun, DEFAULTS.anew

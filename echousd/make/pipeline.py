@@ -144,7 +144,7 @@ def generate(
             break
     notes = (*left_out, *models.notes, *echo.unlearned(graph_batch(graph)), *notes)
     sized = with_sizes(graph, first)
-    layouts = [first, *(search.best(sized, number, first)[0] for number in range(1, asked.layouts))]
+    layouts = [first, *(search.best(sized, number)[0] for number in range(1, asked.layouts))]
     plan = plan_boxes(layouts)
     if stated.room.extents is None:  # unplaced, or by weights that know of no floor, furniture may stand beyond
         graph = with_wider_floor(graph, footprints(*plan).reshape(-1, 2))

@@ -182,12 +182,3 @@ def _with(room: RoomBoxes, size: np.ndarray, position: np.ndarray, yaw: np.ndarr
 def _missed(room: RoomBoxes, triplets: np.ndarray) -> list:
     plan = plan_of(room, room.categories, room.floor_polygon, room.openings, triplets, height=room.height)
     return faults_of(plan, KINDS) + unreached(plan)
-
-
-if __name__ == "__main__":  # where the command line's libraries are not installed
-    import sys
-
-    search_examples(
-        Path(sys.argv[1]), ExamplesPlan(int(sys.argv[4])), shards=1000, workers=int(sys.argv[2]),
-        minutes=float(sys.argv[3]),
-    )  # fmt: skip

@@ -338,14 +338,15 @@ class ReleasedModel(GraphEncoder):
 
     @torch.no_grad()
     def sample_shapes(
-        self, graph: SceneGraphTensors, *, generator: Randomness, steps: int = 100, shared_noise: bool = True,
+        self, graph: SceneGraphTensors, *, generator: Randomness, steps: int = 100,
         change: GraphChange | None = None, progress: StepListener | None = None,
     ) -> Tensor:  # fmt: skip
         """Shape latents of all nodes by deterministic DDIM (EchoScene, section 3.4); decode them with `vqvae.decode`.
 
+        All nodes start from one draw, as in the published code; the paper's text takes one for each.
+
         Arguments:
             graph: one or many scenes. generator: source of all randomness. steps: DDIM steps.
-            shared_noise: all nodes start from one draw (published code) rather than from one each (paper).
             change: as `conditions`. progress: called with (steps done, steps).
 
         Returns (N, 3, 16, 16, 16) float32; floor and `_scene_` nodes have latents that mean nothing.
@@ -356,9 +357,7 @@ class ReleasedModel(GraphEncoder):
         graph, change = graph.to(self.device), self._here(change)
         _, nodes, edge_attr = self.eval().conditions(graph, change, generator)
         count, grid = len(graph.classes), self.config.shape.grid
-        drawn = normal(
-            (1 if shared_noise else count, self.config.shape.channels, grid, grid, grid), generator, self.device
-        )
+        drawn = normal((1, self.config.shape.channels, grid, grid, grid), generator, self.device)
         start = drawn.expand(count, -1, -1, -1, -1).contiguous()
 
         def denoise(x: Tensor, t: Tensor) -> Tensor:
@@ -480,7 +479,7 @@ def layout_loss(
 
     Arguments:
         net: `LayoutNet`.
-        boxes: (N, 8) float32, normalised boxes (or (N, 7) with the angle in radians in the last place).
+        boxes: (N, 8) float32, normalised boxes.
         objects, triples, edge_attr: as `LayoutNet.forward`.
         t: (N,) int64; the published training draws one step per scene.
         noise: (N, 8) float32.
@@ -488,8 +487,6 @@ def layout_loss(
 
     Returns `loss`, and its parts `size`, `trans`, `angle` (scalars), each the mean over the nodes.
     """
-    if boxes.shape[1] == 7:
-        boxes = torch.cat([boxes[:, :6], boxes[:, 6:].sin(), boxes[:, 6:].cos()], dim=1)
     error = (net(noised(boxes, t, noise, tables), objects, triples, t, edge_attr) - noise).square()
     size, trans, angle = error[:, :3], error[:, 3:6], error[:, 6:]
     return {"loss": error.mean(1).mean(), "size": size.mean(), "trans": trans.mean(), "angle": angle.mean()}

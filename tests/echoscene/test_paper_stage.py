@@ -77,7 +77,7 @@ def test_both_branches_train_on_one_latent_graph_and_sample(data: Path, autoenco
     graph = stage.scene(stage.rooms.room(0, rules="sgfront"))
     model.layout_tables = Schedule.linear(1e-3, 0.2, 20)  # 1,000 steps would take too long here
     boxes = model.sample_layout(graph, generator=torch.Generator().manual_seed(0))
-    latents = model.sample_shapes(graph, generator=torch.Generator().manual_seed(0), steps=2, shared_noise=False)
+    latents = model.sample_shapes(graph, generator=torch.Generator().manual_seed(0), steps=2)
     assert len(boxes) == len(latents) == len(graph.classes)
     assert torch.isfinite(boxes.position).all()
     with torch.inference_mode():

@@ -106,8 +106,6 @@ def test_sampling_is_seeded_and_finite() -> None:
     assert all(torch.isfinite(v).all() for v in (boxes[0].size, boxes[0].position, boxes[0].yaw))
     latents = model.sample_shapes(BED, generator=torch.Generator().manual_seed(3), steps=3)
     assert latents.shape == (5, 3, 8, 8, 8)
-    own = model.sample_shapes(BED, generator=torch.Generator().manual_seed(3), steps=3, shared_noise=False)
-    assert not torch.equal(latents, own)
     with torch.inference_mode():
         assert model.vqvae.decode(latents[:1]).shape == (1, 1, 32, 32, 32)
 

@@ -87,7 +87,6 @@ SOURCES = {  # those of `echousd.graph.fields.SHAPES`
     "boxes": ShapeSource(Late(f"{WHOLE}:plain_boxes")),
     "library": ShapeSource(partial(Late(f"{WHOLE}:chosen_models"), source="library")),
     "guided": ShapeSource(partial(Late(f"{WHOLE}:chosen_models"), source="guided"), Late(f"{WHOLE}:needs_shapes")),
-    "independent": ShapeSource(Late(f"{WHOLE}:lone_shapes"), Late(f"{WHOLE}:needs_shapes")),
     "own": ShapeSource(partial(Late(f"{WHOLE}:chosen_models"), source="own")),
 }
 

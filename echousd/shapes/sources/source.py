@@ -86,19 +86,16 @@ class Shapes:
     geometry: Mapping[str, Geometry]  # every owner -> its geometry
 
 
-def per_asset(request: ShapeRequest, make: Callable[[int], Geometry], *, alike: bool = True) -> Shapes:
+def per_asset(request: ShapeRequest, make: Callable[[int], Geometry]) -> Shapes:
     """Geometry for the first object of each group that can share an asset (`shared_assets`).
 
-    `make`: number of an object in the graph -> its geometry. `alike`: False gives every object geometry of its own, for
-    comparisons.
+    `make`: number of an object in the graph -> its geometry.
     """
     rows, names = request.rows, request.graph.names
     chosen = [names[i] for i in rows]
     categories = [request.graph.nodes[i].category for i in rows]
     size = np.asarray(request.boxes.size, float)[rows]
-    owners = (
-        shared_assets(chosen, categories, request.styles, size) if alike else dict(zip(chosen, chosen, strict=True))
-    )
+    owners = shared_assets(chosen, categories, request.styles, size)
     geometry: dict[str, Geometry] = {}
     with request.timer.stage("meshes", len(rows)) as tell:
         for done, (i, name) in enumerate(zip(rows, chosen, strict=True), 1):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import trimesh
@@ -13,7 +13,6 @@ from trimesh.util import append_faces
 
 from echomodel.arrays import on_device
 from echomodel.files import tables
-from echomodel.graph import GraphBatch
 from echomodel.late import Late
 from echomodel.protocols import RoomModel
 from echomodel.triangles import Mesh
@@ -61,33 +60,16 @@ def sampled_shapes(request: ShapeRequest) -> Shapes:
 
     Objects of an edited graph that stay are sampled along, the others hear them.
     """
-    return _meshed(request, sampled_grids(request), within_budget)
-
-
-def lone_shapes(request: ShapeRequest) -> Shapes:
-    """Meshes of shapes that were sampled one by one: no object hears of another.
-
-    For comparisons (the paper's rows of layout + class-to-shape generation).
-    """
-
-    def make(grid: np.ndarray, size: np.ndarray, category: str, faces: int) -> Geometry:
-        return solid_geometry(mesh_from_shape(grid, size, faces=faces), category, Origin("independent"))
-
-    alone = [graph_batch(request.graph.replaced(nodes=(node,), relations=())) for node in request.graph.nodes]
-    return _meshed(request, _grids(request, GraphBatch.pack(alone), "independent"), make, alike=False)
-
-
-def _meshed(request: ShapeRequest, grids: np.ndarray, mesh: Callable[..., Geometry], *, alike: bool = True) -> Shapes:
-    size = np.asarray(request.boxes.size, float)
+    size, grids = np.asarray(request.boxes.size, float), sampled_grids(request)
 
     def make(row: int) -> Geometry:
         node = request.graph.nodes[row]
         try:
-            return mesh(grids[row], size[row], node.category, request.faces)
+            return within_budget(grids[row], size[row], node.category, request.faces)
         except ValueError as error:
             raise ValueError(f"shape of {node.name!r}: {error}; try another seed or shapes 'boxes'") from None
 
-    return per_asset(request, make, alike=alike)
+    return per_asset(request, make)
 
 
 def within_budget(grid: np.ndarray, size: np.ndarray, category: str, faces: int) -> Geometry:
@@ -109,17 +91,12 @@ def within_budget(grid: np.ndarray, size: np.ndarray, category: str, faces: int)
 
 def sampled_grids(request: ShapeRequest) -> np.ndarray:
     """(n, 64, 64, 64) float32 TSDFs of all objects; raises ValueError for a model without a shape branch."""
-    return _grids(request, graph_batch(request.graph), "shapes", request.edited)
-
-
-def _grids(request: ShapeRequest, batch: GraphBatch, stream: str, extra: dict[str, Any] | None = None) -> np.ndarray:
-    """As `sampled_grids`, of any graph with one node for each box; `stream` is that of the random numbers."""
     needs_shapes(request.model)
     assert request.model is not None
     with request.timer.stage("shapes") as tell, one_thread():
         grids = request.model.sample_shapes(
-            batch, request.centred, generator=seeded(request.seed, stream), steps=request.steps, progress=tell,
-            **(extra or {}),
+            graph_batch(request.graph), request.centred, generator=seeded(request.seed, "shapes"), steps=request.steps,
+            progress=tell, **request.edited,
         )  # fmt: skip
         return rounded(on_device(grids, None), DISTANCE).astype(np.float32)
 
