@@ -97,15 +97,15 @@ def collisions_of(room: RoomBoxes) -> int:
     """Pairs that collide in a room as it is, by placing's own measure."""
     from echomodel.objective.support import allowed_overlap
     from echousd.place.geometry import TOUCH
-    from echousd.place.setting import setting_of
+    from echousd.place.problem import problem_of
 
     none = np.zeros(len(room), bool)
-    setting = setting_of(
+    problem = problem_of(
         room.categories, room.size, room.position, room.yaw, np.zeros((0, 3), int),
         floor_polygon=None, height=None, fixed=none, rigid=none, turned=none,
     )  # fmt: skip
-    allowed = allowed_overlap(setting.categories, room.size, setting.pairs)
-    return int((separation(room.size, room.position, room.yaw, setting.pairs) + allowed < -TOUCH).sum())
+    allowed = allowed_overlap(problem.categories, room.size, problem.pairs)
+    return int((separation(room.size, room.position, room.yaw, problem.pairs) + allowed < -TOUCH).sum())
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ from echomodel.rules.margins import pair_margins
 from echomodel.rules.placements import Spread, Stated, margin_of
 from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import COLUMNS, PLAN, SIDES, parting
-from echousd.place.setting import Setting
+from echousd.place.problem import Problem
 
 csr_array = Late("scipy.sparse:csr_array")
 KINDS = RELATION, PLACEMENT, COLLISION, FLOOR, OVERHANG, WALL, SUPPORT, CEILING = range(8)  # from `WALL` on equalities
@@ -46,7 +46,7 @@ class Linearised:
         value: (r,) float, metres or ratio, the wanted slack already taken off.
         gradient: (r, n * 6) float, by the positions and the logarithms of the sides; sparse for very many boxes.
         kind: (r,) int, one of `KINDS`.
-        number: (r,) int, which one of its kind: row of the setting's triplets, of its pairs; of others any.
+        number: (r,) int, which one of its kind: row of the problem's triplets, of its pairs; of others any.
         axis: (p,) int, separating axis chosen for each pair.
     """
 
@@ -84,16 +84,16 @@ class Rows:
 class Constraints:
     """The constraints of a room whose boxes keep their headings."""
 
-    def __init__(self, start: Setting) -> None:
-        self.setting, self.yaw = start, start.yaw
+    def __init__(self, start: Problem) -> None:
+        self.problem, self.yaw = start, start.yaw
         self.axis = np.stack(axes(start.yaw), 1)
         self.parting = parting(self.axis, start.pairs)
         self.handicap, self.barred = self._handicap(start), self._barred()
 
-    def _handicap(self, start: Setting) -> np.ndarray:
+    def _handicap(self, start: Problem) -> np.ndarray:
         """(p, 5) float, metres by which an axis has to part better than others: pairs pass over one another only where
         they do already; neighbours at one wall part along it."""
-        wall, pairs = self.setting.wall, self.setting.pairs
+        wall, pairs = self.problem.wall, self.problem.pairs
         gap = np.einsum("psbc,pbc->ps", self.parting[:, 4], np.concatenate([start.position, start.size], 1)[pairs])
         (one, other), axis = wall[pairs].swapaxes(0, 1), self.axis[pairs].reshape(-1, 4, 2)
         across = np.abs(np.einsum("pad,pd->pa", axis, np.nan_to_num(one[:, 1]))) > 0.7
@@ -102,7 +102,7 @@ class Constraints:
 
     def _barred(self) -> np.ndarray:
         """(p, 5, 2) bool: to which sides of the first of each pair the relations do not have the second."""
-        triplets, pairs = self.setting.triplets, self.setting.pairs
+        triplets, pairs = self.problem.triplets, self.problem.pairs
         step = np.array([predicate.step for predicate in vocabulary().predicates])[triplets[:, 1]]
         order = np.zeros((len(self.yaw), len(self.yaw), 2))
         np.add.at(order, (triplets[:, 2], triplets[:, 0]), step)
@@ -127,14 +127,14 @@ class Constraints:
 
     def _told(self, state: np.ndarray) -> list[Rows]:
         """Relations, and placements, for which furniture moves, but none grows or shrinks."""
-        setting, triplets, found = self.setting, self.setting.triplets, []
-        rules, ends = rule_set(setting.rules), triplets[:, [0, 2]]
-        middle = np.array([setting.centre[0], 0.0, setting.centre[1]])
+        problem, triplets, found = self.problem, self.problem.triplets, []
+        rules, ends = rule_set(problem.rules), triplets[:, [0, 2]]
+        middle = np.array([problem.centre[0], 0.0, problem.centre[1]])
 
         def relations(boxes: np.ndarray) -> np.ndarray:
             times = len(boxes) // len(ends)
             (one, other), (yaw, turn) = boxes.swapaxes(0, 1), np.tile(self.yaw[ends], (times, 1)).T
-            fronts = np.tile(setting.fronts[ends].all(1), times)
+            fronts = np.tile(problem.fronts[ends].all(1), times)
             pair = PairGeometry(
                 one[:, 3:], other[:, 3:], one[:, :3] - middle, other[:, :3] - middle, yaw, turn, rules.oriented, fronts
             )
@@ -143,15 +143,15 @@ class Constraints:
         if len(triplets):
             margin, by = _with_slopes(relations, state[ends])
             found.append(Rows(RELATION, ends, margin - SLACK, by))
-        for stated in setting.stated:
+        for stated in problem.stated:
             who = [stated.subject, *stated.others]
 
             def placement(boxes: np.ndarray, stated: Stated = stated, who: list[int] = who) -> np.ndarray:
                 poses = {box: Spread(boxes[:, at, 3:], boxes[:, at, :3], self.yaw[box].repeat(len(boxes)))
                          for at, box in enumerate(who)}  # fmt: skip
-                return margin_of(stated, poses, setting.outline, setting.categories)
+                return margin_of(stated, poses, problem.outline, problem.categories)
 
-            if stated.others or setting.outline is not None:
+            if stated.others or problem.outline is not None:
                 margin, by = _with_slopes(placement, state[[who]])
                 by[..., 3:] = 0.0
                 found.append(Rows(PLACEMENT, np.array([who]), margin - SLACK, by))
@@ -159,19 +159,19 @@ class Constraints:
 
     def _apart(self, state: np.ndarray, handicap: np.ndarray) -> tuple[Rows, np.ndarray]:
         """Pairs, each parted along the axis and to the side that are best."""
-        setting, row = self.setting, np.arange(len(self.setting.pairs))
-        gap = np.einsum("pasbc,pbc->pas", self.parting, state[setting.pairs])
+        problem, row = self.problem, np.arange(len(self.problem.pairs))
+        gap = np.einsum("pasbc,pbc->pas", self.parting, state[problem.pairs])
         side = np.where(self.barred, -np.inf, gap).argmax(2)
         gap = np.take_along_axis(gap, side[..., None], 2)[..., 0]
         axis = (gap - handicap).argmax(1)
-        head = setting.plan.stands("head")[setting.pairs].any(1)  # a bed moved off its nightstand would leave its wall
-        allowed = np.where(head, 0.0, allowed_overlap(setting.categories, state[:, 3:], setting.pairs))
+        head = problem.plan.stands("head")[problem.pairs].any(1)  # a bed moved off its nightstand would leave its wall
+        allowed = np.where(head, 0.0, allowed_overlap(problem.categories, state[:, 3:], problem.pairs))
         value = gap[row, axis] + allowed - PART
-        return Rows(COLLISION, setting.pairs, value, self.parting[row, axis, side[row, axis]]), axis
+        return Rows(COLLISION, problem.pairs, value, self.parting[row, axis, side[row, axis]]), axis
 
     def _floor(self, state: np.ndarray) -> list[Rows]:
         """Corners of footprints within the floor, and corners of the floor that look into it outside of footprints."""
-        floor, who = self.setting.outline, np.flatnonzero(~self.setting.fixed)
+        floor, who = self.problem.outline, np.flatnonzero(~self.problem.fixed)
         if floor is None:
             return []
         place, side, axis = state[who][:, PLAN], state[who][:, SIDES], self.axis[who]
@@ -197,31 +197,31 @@ class Constraints:
 
     def _walls(self, state: np.ndarray) -> Rows:
         """The backs of what leans on a wall as far from it as they are meant to be."""
-        setting = self.setting
-        who = np.flatnonzero(~setting.fixed & ~np.isnan(setting.wall[:, 0, 0]))
-        (start, normal), by = setting.wall[who].transpose(1, 0, 2), np.zeros((len(who), COLUMNS))
+        problem = self.problem
+        who = np.flatnonzero(~problem.fixed & ~np.isnan(problem.wall[:, 0, 0]))
+        (start, normal), by = problem.wall[who].transpose(1, 0, 2), np.zeros((len(who), COLUMNS))
         by[:, PLAN], by[:, SIDES] = normal, -np.abs(np.einsum("nsd,nd->ns", self.axis[who], normal)) / 2
-        return _of_one(WALL, who, (by * state[who]).sum(1) - (start * normal).sum(1) - setting.behind[who], by)
+        return _of_one(WALL, who, (by * state[who]).sum(1) - (start * normal).sum(1) - problem.behind[who], by)
 
     def _support(self, state: np.ndarray) -> Rows:
         """Bottoms on the floor or on what carries them, tops of what hangs at the ceiling."""
-        setting, carrier = self.setting, self.setting.carrier
-        hangs = (carrier == ON_CEILING) & (setting.height is not None)
-        who = np.flatnonzero(~setting.fixed & ((carrier >= ON_FLOOR) | hangs))
+        problem, carrier = self.problem, self.problem.carrier
+        hangs = (carrier == ON_CEILING) & (problem.height is not None)
+        who = np.flatnonzero(~problem.fixed & ((carrier >= ON_FLOOR) | hangs))
         on, hung, by = carrier[who] >= 0, hangs[who], np.zeros((len(who), 2, COLUMNS))
         by[:, 0, 1], by[hung, 0, 4] = 1.0, 1.0
         by[on, 1, 1], by[on, 1, 4] = -1.0, -1.0
         ends = np.stack([who, np.where(on, carrier[who], who)], 1)
-        value = (by * state[ends]).sum((1, 2)) - np.where(hung, setting.height or 0.0, 0.0)
+        value = (by * state[ends]).sum((1, 2)) - np.where(hung, problem.height or 0.0, 0.0)
         return Rows(np.where(hung, CEILING, SUPPORT), ends, value, by)
 
     def _overhang(self, state: np.ndarray) -> Rows:
         """Footprints of what stands on something within that one's, or the middle where it is the larger one; none
         grows or shrinks for it."""
-        setting = self.setting
-        who = np.flatnonzero(setting.carrier >= 0)
-        who = who[~(setting.fixed[who] & setting.fixed[setting.carrier[who]])]
-        on = setting.carrier[who]
+        problem = self.problem
+        who = np.flatnonzero(problem.carrier >= 0)
+        who = who[~(problem.fixed[who] & problem.fixed[problem.carrier[who]])]
+        on = problem.carrier[who]
         reach = hull(state[who][:, SIDES] / 2, self.yaw[who] - self.yaw[on])
         room = (state[on][:, SIDES] / 2 - reach)[..., None] - [[0.0, 0.0], [HANDLES, ROUNDED]]
         by = np.zeros((*room.shape, 2, COLUMNS))  # along both sides of the one below, to its right or front and back

@@ -7,14 +7,14 @@ import numpy as np
 from echomodel.rooms.runs import Run, Site, obstacles, runs
 from echomodel.rules import margins
 from echomodel.vocabulary import vocabulary
+from echousd.place.problem import Problem
 from echousd.place.search import cost_of, part_of
-from echousd.place.setting import Setting
 
 MISSED = 3.0  # what a relation costs that a plan breaks
 SHARE = 0.5  # of what a plan costs by itself beside what the objective says of it
 
 
-def fitted(at: Setting, rigid: np.ndarray) -> tuple[Setting, np.ndarray]:
+def fitted(at: Problem, rigid: np.ndarray) -> tuple[Problem, np.ndarray]:
     """The room with its fitted units in the best run that there is, and (n,) bool which these are; none = as it was.
 
     Arguments:
@@ -34,7 +34,7 @@ def fitted(at: Setting, rigid: np.ndarray) -> tuple[Setting, np.ndarray]:
     outline = at.plan.floor[0]
     site = Site(outline, obstacles(outline, at.plan.openings[0], at.size[fixed], at.position[fixed], at.yaw[fixed]))
 
-    def built(run: Run) -> tuple[np.ndarray, Setting]:
+    def built(run: Run) -> tuple[np.ndarray, Problem]:
         who = np.flatnonzero(mine)[run.which]
         size, position, yaw = at.size.copy(), at.position.copy(), at.yaw.copy()
         size[who], position[who], yaw[who] = run.size, run.position, run.yaw

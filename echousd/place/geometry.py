@@ -20,7 +20,7 @@ from echomodel.openings import edge_lengths, signed_area
 from echomodel.rules.placements import Walls
 
 if TYPE_CHECKING:
-    from echousd.place.setting import Setting
+    from echousd.place.problem import Problem
 
 COLUMNS = 6  # numbers of a box: its position x, y, z and its sides
 PLAN, SIDES = slice(0, 3, 2), slice(3, 6, 2)  # columns of x and z and of width and depth
@@ -169,9 +169,9 @@ def collisions(
                  if depth[p] > TOUCH)  # fmt: skip
 
 
-def outside(setting: Setting, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> tuple[tuple[int, float], ...]:
+def outside(problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> tuple[tuple[int, float], ...]:
     """Objects that leave the floor, with the depth in metres."""
-    if setting.outline is None:
+    if problem.outline is None:
         return ()
-    depth = beyond(setting.outline, size, position, yaw)
+    depth = beyond(problem.outline, size, position, yaw)
     return tuple((i, float(depth[i])) for i in np.flatnonzero(depth > TOUCH).tolist())

@@ -29,8 +29,8 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph.arrays import stated_placements, triplets_of
 from echousd.place.distances import BED_LIT
 from echousd.place.geometry import collisions, outside
+from echousd.place.problem import Problem, problem_of, stacked
 from echousd.place.search import Arranged, Search
-from echousd.place.setting import Setting, setting_of, stacked
 from echousd.place.solver import Conflict, PlaceConfig, conflicts, solve, unmet
 
 if TYPE_CHECKING:
@@ -165,8 +165,8 @@ def place_boxes(
     told = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
     held: np.ndarray = fixed
 
-    def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, kept: np.ndarray) -> Setting:
-        return setting_of(
+    def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, kept: np.ndarray) -> Problem:
+        return problem_of(
             categories, size, position, yaw, triplets, floor_polygon=floor_polygon, height=height,
             fixed=held, rigid=kept, turned=turned, openings=openings, stated=stated, rules=rules,
         )  # fmt: skip
@@ -186,7 +186,7 @@ def place_boxes(
         anchor, compared = at.anchor, triplets[np.isin(triplets[:, 1], sizes)]
         free = ~rigid & ~np.isin(np.arange(n), told)
 
-        def suited(to: Setting, size: np.ndarray) -> Setting:
+        def suited(to: Problem, size: np.ndarray) -> Problem:
             laid = laid_tables(to.categories, size, anchor, ~rigid)
             broken = margins(Spread(laid, to.position, to.yaw), compared, rules=rules, fronts=to.fronts) < 0
             ends = compared[broken][:, ::2].ravel()
@@ -195,7 +195,7 @@ def place_boxes(
 
         at = suited(at, at.size)
 
-        def searched(of: Setting) -> Arranged:
+        def searched(of: Problem) -> Arranged:
             key = of.size.tobytes()
             tried.append(Search(of.spread(), terms, yields=config.yields).run(config.anew, known.get(key)))
             known[key] = tried[-1]
@@ -231,7 +231,7 @@ def place_boxes(
     return PlacedBoxes(size_end, end, turn, verdict, against, hit, beyond, judged)
 
 
-def fullness(at: Setting) -> float:
+def fullness(at: Problem) -> float:
     """Share of the floor that furniture covers."""
     standing = at.carrier == ON_FLOOR
     return float((at.size[standing, 0] * at.size[standing, 2]).sum()) / abs(signed_area(at.floor.polygon))

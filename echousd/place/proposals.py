@@ -15,7 +15,7 @@ from echomodel.objective.support import ON_CEILING
 from echomodel.vocabulary import vocabulary
 from echousd.place.distances import APART, MOST_UNDER, kept_apart, over_bed, seen_from, spread_at_walls
 from echousd.place.geometry import depth_inside
-from echousd.place.setting import Setting
+from echousd.place.problem import Problem
 from echousd.place.slots import INNER, STANDS, sides
 
 HALF_PI = math.pi / 2
@@ -26,52 +26,52 @@ AMID = 0.7  # share of the farthest watching distance at which a sofa stands in 
 Row = tuple[float, float, float, float]  # x, z, yaw, and how much others are preferred
 
 
-def proposals(setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np.ndarray, i: int) -> np.ndarray:
+def proposals(problem: Problem, position: np.ndarray, yaw: np.ndarray, there: np.ndarray, i: int) -> np.ndarray:
     """(K, 4) float: x, z, yaw of all poses to try for box i, and how much of a metre other poses are preferred.
 
     Arguments:
         position: (n, 3) float, yaw: (n,) float, where the others stand. there: (n,) bool, which of them do.
     """
-    kind, anchor = setting.kinds[i], int(setting.anchor[i])
+    kind, anchor = problem.kinds[i], int(problem.anchor[i])
     rows: list[Row] = []
     if anchor >= 0 and there[anchor]:
-        rows += [out_of(position[anchor], float(yaw[anchor]), slot) for slot in slots_at(setting, i, anchor)]
-    for k in _mates(setting, "before", anchor) if setting.slot_roles[i] == "with" else ():
+        rows += [out_of(position[anchor], float(yaw[anchor]), slot) for slot in slots_at(problem, i, anchor)]
+    for k in _mates(problem, "before", anchor) if problem.slot_roles[i] == "with" else ():
         rows += [
-            out_of(position[k], float(yaw[k]), slot) for slot in sides(setting.size[i], setting.size[k]) if there[k]
+            out_of(position[k], float(yaw[k]), slot) for slot in sides(problem.size[i], problem.size[k]) if there[k]
         ]
     loose = LOOSE * bool(rows)
     if kind.support == "ceiling":
-        rows += _overhead(setting, position, yaw, there, i)
-    elif setting.carrier[i] >= 0:
+        rows += _overhead(problem, position, yaw, there, i)
+    elif problem.carrier[i] >= 0:
         pass
     elif kind.support == "wall":
-        rows += along_walls(setting, i, 0.0)
+        rows += along_walls(problem, i, 0.0)
     else:
-        at_wall = _leans(setting, i)
-        walls = along_walls(setting, i, loose)
+        at_wall = _leans(problem, i)
+        walls = along_walls(problem, i, loose)
         rows += walls
         if kind.role in ("decor", "light", "storage"):
-            rows += _corners(setting, i, loose)
+            rows += _corners(problem, i, loose)
         if kind.stands == "company":
-            rows += _corners(setting, i, loose, across=True)
+            rows += _corners(problem, i, loose, across=True)
         if kind.role == "sofa":
-            rows += _in_view(setting, i, walls)
+            rows += _in_view(problem, i, walls)
         if not at_wall and kind.role not in ("decor", "light", "storage"):
-            rows += _in_the_open(setting, i, loose)
-        rows += _as_stated(setting, position, yaw, i)
-        beside = twins(setting, position, yaw, i)
+            rows += _in_the_open(problem, i, loose)
+        rows += _as_stated(problem, position, yaw, i)
+        beside = twins(problem, position, yaw, i)
         rows = [*beside, *((*row[:3], row[3] + APART_TWINS) for row in rows)] if beside else rows
-    now = (position, yaw) if kind.support == "ceiling" else (setting.position, setting.yaw)
-    drawn, more = setting.position[i, [0, 2]].tolist(), loose + out_of_habit(setting, i, *now)
-    carrier = int(setting.carrier[i])
-    turns = (_squared(setting, i), float(setting.yaw[i])) if carrier < 0 else (float(yaw[carrier]),)
+    now = (position, yaw) if kind.support == "ceiling" else (problem.position, problem.yaw)
+    drawn, more = problem.position[i, [0, 2]].tolist(), loose + out_of_habit(problem, i, *now)
+    carrier = int(problem.carrier[i])
+    turns = (_squared(problem, i), float(problem.yaw[i])) if carrier < 0 else (float(yaw[carrier]),)
     rows += [(*drawn, turn, more) for turn in turns]
     out = np.array(rows, float)
-    if setting.turned[i]:
-        like = np.abs(np.sin((out[:, 2] - setting.yaw[i]) / 2)) < 0.05
+    if problem.turned[i]:
+        like = np.abs(np.sin((out[:, 2] - problem.yaw[i]) / 2)) < 0.05
         out = out[like] if like.any() else out
-        out[:, 2] = setting.yaw[i]
+        out[:, 2] = problem.yaw[i]
     return out
 
 
@@ -83,90 +83,90 @@ NEARLY = 1.0  # metres between the middle of the room and of what a lamp hangs o
 EDGE = 0.5  # metres between the middle of a plant or lamp and a wall that it stands at
 
 
-def out_of_habit(setting: Setting, i: int, position: np.ndarray, yaw: np.ndarray) -> float:
+def out_of_habit(problem: Problem, i: int, position: np.ndarray, yaw: np.ndarray) -> float:
     """By how much other poses of a box are preferred to where it was drawn: nothing where such a piece may stand so,
     the others at position (n, 3) and yaw (n,)."""
-    kind, anchor, here = setting.kinds[i], int(setting.anchor[i]), setting.position[i, [0, 2]]
-    rows = twins(setting, position, yaw, i)
+    kind, anchor, here = problem.kinds[i], int(problem.anchor[i]), problem.position[i, [0, 2]]
+    rows = twins(problem, position, yaw, i)
     if kind.support == "ceiling":
-        rows = _overhead(setting, position, yaw, np.ones(len(yaw), bool), i)
-    elif anchor >= 0 and setting.carrier[i] < 0 and not rows:
-        rows = [out_of(position[anchor], float(yaw[anchor]), slot) for slot in slots_at(setting, i, anchor)]
+        rows = _overhead(problem, position, yaw, np.ones(len(yaw), bool), i)
+    elif anchor >= 0 and problem.carrier[i] < 0 and not rows:
+        rows = [out_of(position[anchor], float(yaw[anchor]), slot) for slot in slots_at(problem, i, anchor)]
     if rows and anchor < 0 and kind.support == "floor":
         return APART_TWINS * (min(math.hypot(row[0] - here[0], row[1] - here[1]) for row in rows) > AT)
     if rows:
         habits = ((math.hypot(row[0] - here[0], row[1] - here[1]), row[2]) for row in rows if row[3] < LOOSE)
         near, turn = min(habits, default=(math.inf, 0.0))
-        across = kind.stands == "before" and abs(math.sin(turn - setting.yaw[i])) > AT
+        across = kind.stands == "before" and abs(math.sin(turn - problem.yaw[i])) > AT
         return LOOSE * (across or near > (HUNG if kind.support == "ceiling" else AT))
-    inside = float(depth_inside(setting.floor, here[None])[0])
-    at_wall = _leans(setting, i)
-    small = kind.role in ("decor", "light") and setting.standing(i)
-    return LOOSE * (inside > float(setting.size[i, 2]) / 2 + GAP if at_wall else small and inside > EDGE)
+    inside = float(depth_inside(problem.floor, here[None])[0])
+    at_wall = _leans(problem, i)
+    small = kind.role in ("decor", "light") and problem.standing(i)
+    return LOOSE * (inside > float(problem.size[i, 2]) / 2 + GAP if at_wall else small and inside > EDGE)
 
 
-def _leans(setting: Setting, i: int) -> bool:
+def _leans(problem: Problem, i: int) -> bool:
     """Whether a box belongs with its back to a wall, by its kind or because the graph has it there."""
-    told = any(one.subject == i and one.placement == "against_wall" for one in setting.stated)
-    kind = setting.kinds[i]
+    told = any(one.subject == i and one.placement == "against_wall" for one in problem.stated)
+    kind = problem.kinds[i]
     return told or kind.wall or (kind.role == "board" and kind.access > 0)
 
 
-def slots_at(setting: Setting, i: int, anchor: int) -> list[tuple[float, float, float, float]]:
+def slots_at(problem: Problem, i: int, anchor: int) -> list[tuple[float, float, float, float]]:
     """Where box i may stand in the frame of its anchor; empty where its row does not say."""
-    stands = _slot_role(setting, i, anchor)
+    stands = _slot_role(problem, i, anchor)
     if stands not in STANDS:
         return []
-    seats = np.array([kind.role == "seat" for kind in setting.kinds]) & (setting.anchor == anchor)
-    count = int(places_of(setting.size[seats]).sum())
-    near = _apart(setting, i, anchor, stands)
-    found = STANDS[stands](setting.size[i], setting.size[anchor], setting.kinds[anchor], count, *near)
+    seats = np.array([kind.role == "seat" for kind in problem.kinds]) & (problem.anchor == anchor)
+    count = int(places_of(problem.size[seats]).sum())
+    near = _apart(problem, i, anchor, stands)
+    found = STANDS[stands](problem.size[i], problem.size[anchor], problem.kinds[anchor], count, *near)
     if stands == "head":  # all with the same gap to the wall
-        level = float(setting.behind[_mates(setting, stands, anchor)[0]] - setting.behind[anchor])
+        level = float(problem.behind[_mates(problem, stands, anchor)[0]] - problem.behind[anchor])
         found = [(lateral, forward + level, turn, more) for lateral, forward, turn, more in found]
     return found
 
 
-def _apart(setting: Setting, i: int, anchor: int, stands: str) -> tuple[float, float]:
+def _apart(problem: Problem, i: int, anchor: int, stands: str) -> tuple[float, float]:
     """Metres between box i and its anchor and those it stands before its middle, as `distances.kept_apart`."""
     if stands not in APART:
         return 0.0, 0.0
-    drawn = seen_from(setting.size, setting.position, setting.yaw, anchor)[_mates(setting, stands, anchor)]
-    if stands == "before" and setting.kinds[anchor].name in vocabulary().cornered:
+    drawn = seen_from(problem.size, problem.position, problem.yaw, anchor)[_mates(problem, stands, anchor)]
+    if stands == "before" and problem.kinds[anchor].name in vocabulary().cornered:
         drawn = drawn + np.array([0.0, 0.0, 0.0, INNER])
-    kept, ahead = kept_apart(stands, drawn, setting.kinds[anchor].name, setting.size[anchor])
-    return max(kept, -MOST_UNDER * float(setting.size[i, 2])), ahead
+    kept, ahead = kept_apart(stands, drawn, problem.kinds[anchor].name, problem.size[anchor])
+    return max(kept, -MOST_UNDER * float(problem.size[i, 2])), ahead
 
 
-def _mates(setting: Setting, stands: str, anchor: int) -> list[int]:
+def _mates(problem: Problem, stands: str, anchor: int) -> list[int]:
     """All who stand so to a box."""
-    return [j for j in np.flatnonzero(setting.anchor == anchor).tolist() if _slot_role(setting, j, anchor) == stands]
+    return [j for j in np.flatnonzero(problem.anchor == anchor).tolist() if _slot_role(problem, j, anchor) == stands]
 
 
-def _slot_role(setting: Setting, i: int, anchor: int) -> str:
+def _slot_role(problem: Problem, i: int, anchor: int) -> str:
     """How box i stands to what it attends: the name of its slots, or of the row's own word where it has none."""
-    kind, to = setting.kinds[i], setting.kinds[anchor]
-    if setting.carrier[i] == anchor:
+    kind, to = problem.kinds[i], problem.kinds[anchor]
+    if problem.carrier[i] == anchor:
         return "on_top"
     if kind.support != "floor":
-        return "over" if setting.slot_roles[i] == "over" else ""
+        return "over" if problem.slot_roles[i] == "over" else ""
     if kind.stands in ("at", "foot") and to.role == "board":
         return "at_front" if to.access else "around"
-    return setting.slot_roles[i]
+    return problem.slot_roles[i]
 
 
-def seatings(setting: Setting, i: int, seats: Sequence[int]) -> tuple[list[int], list[list[Row]]]:
+def seatings(problem: Problem, i: int, seats: Sequence[int]) -> tuple[list[int], list[list[Row]]]:
     """Who of some boxes stands around box i, wide ones first, and ways to do so: a slot for each, the best ways first.
 
     Benches take the middle of a long side, chairs what is left.
     """
-    places = places_of(setting.size)
-    seats = sorted((k for k in seats if _slot_role(setting, k, i) == "around"), key=lambda k: -places[k])
+    places = places_of(problem.size)
+    seats = sorted((k for k in seats if _slot_role(problem, k, i) == "around"), key=lambda k: -places[k])
     ways: list[list[tuple[Row, tuple[float, float]]]] = [[]] if len(seats) > 1 else []
     for alike in (list(group) for _, group in groupby(seats, key=lambda k: places[k])):
-        largest = max(alike, key=lambda k: float(setting.size[k, 0]))
-        slots = sorted(slots_at(setting, largest, i), key=lambda slot: slot[3])
-        found = [(slot, _halves(setting.size[largest], slot[2])) for slot in slots]
+        largest = max(alike, key=lambda k: float(problem.size[k, 0]))
+        slots = sorted(slots_at(problem, largest, i), key=lambda slot: slot[3])
+        found = [(slot, _halves(problem.size[largest], slot[2])) for slot in slots]
         first = found[:2] if places[largest] > 1 and len(alike) < len(seats) else found
         after = []
         for begun, start in product(ways, first):  # those that go with each slot, its likes first
@@ -195,39 +195,39 @@ def out_of(position: np.ndarray, yaw: float, slot: tuple[float, float, float, fl
     return float(x), float(z), yaw + turn, more
 
 
-def aside(setting: Setting, position: np.ndarray, yaw: np.ndarray, i: int) -> np.ndarray:
+def aside(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int) -> np.ndarray:
     """(K, 4) float: a little aside of where the box stands, and turned there; rows as `proposals`."""
     here, turn = position[i], float(yaw[i])
     rows: list[Row] = []
-    if setting.carrier[i] >= 0:
-        turn = float(yaw[setting.carrier[i]])
-    elif setting.kinds[i].support == "floor" and not setting.turned[i]:
+    if problem.carrier[i] >= 0:
+        turn = float(yaw[problem.carrier[i]])
+    elif problem.kinds[i].support == "floor" and not problem.turned[i]:
         rows += [(float(here[0]), float(here[2]), turn + quarter * HALF_PI, 0.1) for quarter in (1, 2, 3)]
     ways = [sign * way for way in SLIDES for sign in (-1, 1)]
-    slots = [(way, 0.0) for way in ways] + [(0.0, way) for way in ways if not setting.kinds[i].wall]
+    slots = [(way, 0.0) for way in ways] + [(0.0, way) for way in ways if not problem.kinds[i].wall]
     return np.array(rows + [out_of(here, turn, (*slot, 0.0, 0.05 + 0.1 * abs(sum(slot)))) for slot in slots])
 
 
-def _as_stated(setting: Setting, position: np.ndarray, yaw: np.ndarray, i: int) -> list[Row]:
+def _as_stated(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int) -> list[Row]:
     """Where the graph says that the box stands in the room: at walls, in corners, between two others, beside a twin."""
     rows: list[Row] = []
-    for one in setting.stated:
+    for one in problem.stated:
         if one.subject == i and not one.others:
-            rows += along_walls(setting, i, 0.0) + _corners(setting, i, 0.0)
-            rows += _corners(setting, i, 0.0, across=True) if setting.kinds[i].front else []
+            rows += along_walls(problem, i, 0.0) + _corners(problem, i, 0.0)
+            rows += _corners(problem, i, 0.0, across=True) if problem.kinds[i].front else []
         elif one.subject == i:
-            rows += _in_the_open(setting, i, 0.2) + _midway(position, yaw, one.others)
+            rows += _in_the_open(problem, i, 0.2) + _midway(position, yaw, one.others)
     return rows
 
 
-def twins(setting: Setting, position: np.ndarray, yaw: np.ndarray, i: int) -> list[Row]:
+def twins(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int) -> list[Row]:
     """For a bed that is told to share a nightstand: beside the other one, with room for it between."""
     rows: list[Row] = []
-    for one in setting.stated:
-        if i in one.others and len(one.others) == 2 and setting.slot_roles[one.subject] == "head":
+    for one in problem.stated:
+        if i in one.others and len(one.others) == 2 and problem.slot_roles[one.subject] == "head":
             other = next(k for k in one.others if k != i)
-            apart = (setting.size[i, 0] + setting.size[other, 0]) / 2 + setting.size[one.subject, 0] + 0.1
-            back = (setting.size[i, 2] - setting.size[other, 2]) / 2
+            apart = (problem.size[i, 0] + problem.size[other, 0]) / 2 + problem.size[one.subject, 0] + 0.1
+            back = (problem.size[i, 2] - problem.size[other, 2]) / 2
             slots = [(side * apart, back, 0.0, 0.0) for side in (-1.0, 1.0)]
             rows += [out_of(position[other], float(yaw[other]), slot) for slot in slots]
     return rows
@@ -246,24 +246,24 @@ def _midway(position: np.ndarray, yaw: np.ndarray, others: Sequence[int]) -> lis
     ]
 
 
-def _squared(setting: Setting, i: int) -> float:
+def _squared(problem: Problem, i: int) -> float:
     """The heading parallel to the walls that is nearest to the drawn one."""
-    return float(HALF_PI * np.round((setting.yaw[i] - setting.grain) / HALF_PI) + setting.grain)
+    return float(HALF_PI * np.round((problem.yaw[i] - problem.grain) / HALF_PI) + problem.grain)
 
 
-def along_walls(setting: Setting, i: int, more: float) -> list[Row]:
+def along_walls(problem: Problem, i: int, more: float) -> list[Row]:
     """With the back to every wall that is long enough, from corner to corner and where the draft is nearest."""
-    width, depth = float(setting.size[i, 0]), float(setting.size[i, 2])
-    gap = 0.0 if setting.kinds[i].support == "wall" else float(setting.behind[i])
-    told = {(one.placement, one.subject) for one in setting.stated}
-    fills = setting.kinds[i].clear > 0 and ("in_corner", i) in told  # a tub does, other things stand near one
+    width, depth = float(problem.size[i, 0]), float(problem.size[i, 2])
+    gap = 0.0 if problem.kinds[i].support == "wall" else float(problem.behind[i])
+    told = {(one.placement, one.subject) for one in problem.stated}
+    fills = problem.kinds[i].clear > 0 and ("in_corner", i) in told  # a tub does, other things stand near one
     rows = []
-    for start, along, length, yaw in setting.walls:
+    for start, along, length, yaw in problem.walls:
         free = length - width
         if free < -0.005:
             continue
         low, high = min(0.01, max(free, 0) / 2), max(free - 0.01, max(free, 0) / 2)
-        drawn = float((setting.position[i, [0, 2]] - start) @ along) - width / 2
+        drawn = float((problem.position[i, [0, 2]] - start) @ along) - width / 2
         steps = [] if fills else [free / 2, drawn, *np.arange(low, high, STEP)]
         offsets = np.unique(np.clip([low, high, *steps], low, high).round(3))
         normal = np.array([math.sin(yaw), math.cos(yaw)])
@@ -272,89 +272,89 @@ def along_walls(setting: Setting, i: int, more: float) -> list[Row]:
     return rows
 
 
-def _corners(setting: Setting, i: int, more: float, *, across: bool = False) -> list[Row]:
+def _corners(problem: Problem, i: int, more: float, *, across: bool = False) -> list[Row]:
     """In the corners of the room: plants and lamps at their walls, or armchairs that look across it."""
-    width, depth = setting.size[i, [0, 2]].tolist()
-    half, other = max(width, depth) / 2, spread_at_walls(f"{setting.kinds[i].name} aside", setting.size[i])
+    width, depth = problem.size[i, [0, 2]].tolist()
+    half, other = max(width, depth) / 2, spread_at_walls(f"{problem.kinds[i].name} aside", problem.size[i])
     away = 0.5 * (width + depth) * math.sqrt(0.5) + 0.1  # half the diagonal of the turned footprint's hull
     rows = []
-    for k, corner in enumerate(setting.floor.polygon):
-        one, two = setting.floor.normal[k], setting.floor.normal[k - 1]
-        at = away * (one + two) if across else one * (half + setting.behind[i]) + two * (half + other)
-        turn = math.atan2(*(one + two).tolist()) if across else setting.walls[k][3]
+    for k, corner in enumerate(problem.floor.polygon):
+        one, two = problem.floor.normal[k], problem.floor.normal[k - 1]
+        at = away * (one + two) if across else one * (half + problem.behind[i]) + two * (half + other)
+        turn = math.atan2(*(one + two).tolist()) if across else problem.walls[k][3]
         rows.append((float(corner[0] + at[0]), float(corner[1] + at[1]), turn, more))
     return rows
 
 
-def _in_view(setting: Setting, i: int, at_walls: Sequence[Row]) -> list[Row]:
+def _in_view(problem: Problem, i: int, at_walls: Sequence[Row]) -> list[Row]:
     """In the room before a screen at the far wall, where a sofa at its own wall would be too far from it."""
-    if not any(role == "opposite" and a == i for role, a in zip(setting.slot_roles, setting.anchor, strict=True)):
+    if not any(role == "opposite" and a == i for role, a in zip(problem.slot_roles, problem.anchor, strict=True)):
         return []
     far, rows = WATCHED_FROM["sofa"][1], np.array(at_walls).reshape(-1, 4)
     front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
-    free = to_wall(setting.plan, np.zeros(len(rows), int), rows[:, :2], front)
-    deep = free + float(setting.size[i, 2]) / 2 > DEEP
-    away = [free - AMID * far, np.full(len(rows), WALKED_BEHIND - 0.01 - setting.behind[i]), free - far]
+    free = to_wall(problem.plan, np.zeros(len(rows), int), rows[:, :2], front)
+    deep = free + float(problem.size[i, 2]) / 2 > DEEP
+    away = [free - AMID * far, np.full(len(rows), WALKED_BEHIND - 0.01 - problem.behind[i]), free - far]
     keep = [free > max(far, AMID * far + PASSAGE), deep, deep & (free > far + WALKED_BEHIND)]
     out = [(rows + np.pad(off[:, None] * front, ((0, 0), (0, 2))))[at] for off, at in zip(away, keep, strict=True)]
     return [(x, z, yaw, more) for x, z, yaw, more in np.concatenate(out).tolist()]
 
 
-def _in_the_open(setting: Setting, i: int, more: float) -> list[Row]:
+def _in_the_open(problem: Problem, i: int, more: float) -> list[Row]:
     """On a grid over the floor and at the draft, parallel to the walls."""
-    low, high = setting.floor.polygon.min(0), setting.floor.polygon.max(0)
+    low, high = problem.floor.polygon.min(0), problem.floor.polygon.max(0)
     step = max(GRID, math.sqrt(float(np.prod(high - low)) / PLACES))
     xs, zs = (np.arange(a + 0.3, b - 0.2, step) for a, b in zip(low, high, strict=True))
     points = np.stack(np.meshgrid(xs, zs), -1).reshape(-1, 2)
-    points = points[depth_inside(setting.floor, points) > 0.25 * float(setting.size[i, [0, 2]].min())]
-    quarters = range(4 if setting.kinds[i].role in ("seat", "sofa") else 2)
-    turns = [_squared(setting, i) + quarter * HALF_PI for quarter in quarters]
+    points = points[depth_inside(problem.floor, points) > 0.25 * float(problem.size[i, [0, 2]].min())]
+    quarters = range(4 if problem.kinds[i].role in ("seat", "sofa") else 2)
+    turns = [_squared(problem, i) + quarter * HALF_PI for quarter in quarters]
     return [(x, z, yaw, more) for x, z in points.tolist() for yaw in turns]
 
 
-def _overhead(setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np.ndarray, i: int) -> list[Row]:
+def _overhead(problem: Problem, position: np.ndarray, yaw: np.ndarray, there: np.ndarray, i: int) -> list[Row]:
     """Over the middle of tables, beds and sofas' tables, and over the middle of the room."""
     above = vocabulary().predicate_id("above")
-    told = [b for a, word, b in setting.triplets.tolist() if a == i and word == above]
-    low = setting.kinds[i].look == "pendant_lamp"  # it would meet heads
+    told = [b for a, word, b in problem.triplets.tolist() if a == i and word == above]
+    low = problem.kinds[i].look == "pendant_lamp"  # it would meet heads
     rows: list[Row] = []
-    for j, kind in enumerate(setting.kinds):
+    for j, kind in enumerate(problem.kinds):
         lit = kind.role == "bed" or (kind.role == "board" and not kind.access)
-        if not there[j] or not (j in told or (lit and setting.standing(j))):
+        if not there[j] or not (j in told or (lit and problem.standing(j))):
             continue
         (x, _, z), heading = position[j].tolist(), float(yaw[j])
-        long = heading if setting.size[j, 0] >= setting.size[j, 2] else heading - HALF_PI
-        more = 0.3 * _lamps_over(setting, position, there, i, j) + 0.2 * (kind.stands == "beside") + LOOSE * (not low)
+        long = heading if problem.size[j, 0] >= problem.size[j, 2] else heading - HALF_PI
+        more = 0.3 * _lamps_over(problem, position, there, i, j) + 0.2 * (kind.stands == "beside") + LOOSE * (not low)
         more = 0.0 if j in told else more
-        for away in _row_over(setting, i, j):  # along its long side
+        for away in _row_over(problem, i, j):  # along its long side
             rows.append((x + math.cos(long) * away, z - math.sin(long) * away, heading, more))
-    x, z = setting.centre.tolist()
+    x, z = problem.centre.tolist()
     beside = any(math.hypot(row[0] - x, row[1] - z) < NEARLY for row in rows)
-    return [*rows, (x, z, setting.grain, LOOSE / (1 if beside else 2) * low)]
+    return [*rows, (x, z, problem.grain, LOOSE / (1 if beside else 2) * low)]
 
 
-def _row_over(setting: Setting, i: int, j: int) -> list[float]:
+def _row_over(problem: Problem, i: int, j: int) -> list[float]:
     """Where lamps hang over box j, metres from its middle: as many in a row as are told to."""
     above = vocabulary().predicate_id("above")
-    lamps = {k for k, predicate, other in setting.triplets.tolist() if predicate == above and other == j}
+    lamps = {k for k, predicate, other in problem.triplets.tolist() if predicate == above and other == j}
     if i not in lamps or len(lamps) < 2:
-        return [over_bed(setting.size, setting.position, setting.yaw, i, j) if setting.kinds[j].role == "bed" else 0.0]
-    length = float(setting.size[j, [0, 2]].max())
+        return [over_bed(problem.size, problem.position, problem.yaw, i, j) if problem.kinds[j].role == "bed" else 0.0]
+    length = float(problem.size[j, [0, 2]].max())
     return [((k + 0.5) / len(lamps) - 0.5) * length for k in range(len(lamps))]
 
 
-def _lamps_over(setting: Setting, position: np.ndarray, there: np.ndarray, i: int, j: int) -> int:
+def _lamps_over(problem: Problem, position: np.ndarray, there: np.ndarray, i: int, j: int) -> int:
     """How many other lamps hang over box j."""
-    lamps = there & np.array([kind.support == "ceiling" for kind in setting.kinds])
+    lamps = there & np.array([kind.support == "ceiling" for kind in problem.kinds])
     lamps[i] = False
     return int((np.hypot(*(position[lamps] - position[j])[:, [0, 2]].T) < 0.5).sum())
 
 
-def height_of(setting: Setting, position: np.ndarray, i: int) -> float:
+def height_of(problem: Problem, position: np.ndarray, i: int) -> float:
     """Height of the bottom of a box, metres, where its carrier stands so."""
-    carrier = int(setting.carrier[i])
+    carrier = int(problem.carrier[i])
     if carrier >= 0:
-        return float(position[carrier, 1] + setting.size[carrier, 1])
-    if carrier == ON_CEILING and setting.height is not None:
-        return setting.height - float(setting.size[i, 1])
-    return 0.0 if setting.standing(i) else float(setting.position[i, 1])
+        return float(position[carrier, 1] + problem.size[carrier, 1])
+    if carrier == ON_CEILING and problem.height is not None:
+        return problem.height - float(problem.size[i, 1])
+    return 0.0 if problem.standing(i) else float(problem.position[i, 1])

@@ -24,8 +24,8 @@ from echomodel.rules import margins
 from echomodel.rules.placements import Spread
 from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import beyond, depths
+from echousd.place.problem import Problem
 from echousd.place.proposals import Row, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
-from echousd.place.setting import Setting
 from echousd.place.solver import PlaceConfig
 
 linear_sum_assignment = Late("scipy.optimize:linear_sum_assignment")  # which rooms without seats at tables do without
@@ -70,14 +70,14 @@ class Arranged:
 
 
 class Search:
-    """One search in a setting; for terms that yield it does not begin anew."""
+    """One search in a problem; for terms that yield it does not begin anew."""
 
     def __init__(
-        self, setting: Setting, terms: tuple[Term, ...] = TERMS, budget: int = BUDGET,
+        self, problem: Problem, terms: tuple[Term, ...] = TERMS, budget: int = BUDGET,
         yields: frozenset[str] = frozenset(),
     ) -> None:  # fmt: skip
-        self.setting, self.budget, self.judged, self.walked = setting, budget, 0, False
-        said, words = {int(number) for number in setting.triplets[:, 1]}, vocabulary().predicates
+        self.problem, self.budget, self.judged, self.walked = problem, budget, 0, False
+        said, words = {int(number) for number in problem.triplets[:, 1]}, vocabulary().predicates
         told = {row.name for row in words if row.id in said} | {"placed"}
         sizes = {row.name for row in words if row.measures == "size"} | {"scale"}  # which no pose changes
         self.terms = tuple(t for t in terms if t.name not in sizes and (t.kind != "relations" or t.name in told))
@@ -88,20 +88,20 @@ class Search:
         self.lost: dict[bytes, list[int]] = {}
         self.looks: list[np.ndarray] = []
         self.urgent: list[int] = []
-        n = len(setting.size)
+        n = len(problem.size)
         self.children: list[list[int]] = [[] for _ in range(n)]
         self.screens: list[list[int]] = [[] for _ in range(n)]
         near, opposed, above = map(vocabulary().predicate_id, ("close_by", "opposite", "above"))
-        kinds, told = setting.kinds, setting.triplets.tolist()
+        kinds, told = problem.kinds, problem.triplets.tolist()
         beside = {one: other for one, word, other in told if word == near and kinds[one].role in ("decor", "light")}
         either = [pair for one, word, other in told if word == opposed for pair in ((one, other), (other, one))]
         ahead = {k: i for k, i in either if kinds[k].role == "storage" and kinds[i].role in ("bed", "sofa")}
-        over = {one: other for one, word, other in told if word == above and setting.hanging[one]}
+        over = {one: other for one, word, other in told if word == above and problem.hanging[one]}
         for k in range(n):
-            parent = int(setting.carrier[k]) if setting.carrier[k] >= 0 else int(setting.anchor[k])
+            parent = int(problem.carrier[k]) if problem.carrier[k] >= 0 else int(problem.anchor[k])
             parent = ahead.get(k, beside.get(k, over.get(k, -1))) if parent < 0 else parent
-            if parent >= 0 and not setting.fixed[k] and setting.slot_roles[k] != "near":
-                looked_at = setting.slot_roles[k] == "opposite" or ahead.get(k) == parent
+            if parent >= 0 and not problem.fixed[k] and problem.slot_roles[k] != "near":
+                looked_at = problem.slot_roles[k] == "opposite" or ahead.get(k) == parent
                 (self.screens if looked_at else self.children)[parent].append(k)
 
     # -- what it costs -----------------------------------------------------------------------------------------------
@@ -123,16 +123,16 @@ class Search:
     def _room(self, there: np.ndarray) -> Plan:
         key = there.tobytes()
         if key not in self.rooms:
-            self.rooms[key] = self.setting.plan if there.all() else part_of(self.setting.plan, there)
+            self.rooms[key] = self.problem.plan if there.all() else part_of(self.problem.plan, there)
         return self.rooms[key]
 
     def faults(self, state: State) -> tuple[float, list[int]]:
         """What a room costs in all, and the boxes that its broken terms are about, the worst first."""
-        setting = self.setting
+        problem = self.problem
         worst: dict[int, float] = {}
-        room = setting.plan.at(state.position, state.yaw)
+        room = problem.plan.at(state.position, state.yaw)
         if self.looks:
-            room = copies_of(setting.plan, room.position[None], room.yaw[None], np.ones_like(room.given))
+            room = copies_of(problem.plan, room.position[None], room.yaw[None], np.ones_like(room.given))
             every = [term.find(room) for term in self.terms]
         else:
             looked = [looks_at(room, term.find) for term in self.terms]
@@ -160,7 +160,7 @@ class Search:
                 if there[k] and k not in out and not self._astray(state, k, out[at]):
                     out.append(k)
             at += 1
-        for k in np.flatnonzero(self.setting.hanging & there).tolist():
+        for k in np.flatnonzero(self.problem.hanging & there).tolist():
             away = (state.position[out] - state.position[k])[:, ::2]
             if k not in out and np.hypot(*away.T).min() < LIT:
                 out.append(k)
@@ -169,7 +169,7 @@ class Search:
     def _astray(self, state: State, k: int, i: int) -> bool:
         """Whether a box stands too far from where it belongs at another one to go with it."""
         if (k, i) not in self.slots:
-            self.slots[k, i] = np.array(slots_at(self.setting, k, i)).reshape(-1, 4)
+            self.slots[k, i] = np.array(slots_at(self.problem, k, i)).reshape(-1, 4)
         side, front = axes(state.yaw[i])
         away = (state.position[k] - state.position[i])[::2]
         off = self.slots[k, i][:, :2] - (away @ side, away @ front)
@@ -187,13 +187,13 @@ class Search:
 
     def moved(self, state: State, there: np.ndarray, i: int) -> State:
         """The state with box i, and its group with it, at the best of its poses."""
-        setting = self.setting
-        if setting.fixed[i]:
+        problem = self.problem
+        if problem.fixed[i]:
             return state
         group = self.group(i, there, state)
-        drawn = proposals(setting, state.position, state.yaw, there, i)
+        drawn = proposals(problem, state.position, state.yaw, there, i)
         rows = np.concatenate([drawn, self._joining(state, there, i)])
-        near = aside(setting, state.position, state.yaw, i)
+        near = aside(problem, state.position, state.yaw, i)
         taste = np.concatenate([self._taste(i, rows), state.taste[i] + 0.3 * near[:, 3]])
         rows = np.concatenate([rows, near])
         keep = self._promising(state, there, i, group, rows, taste)
@@ -227,7 +227,7 @@ class Search:
     def _mirrored(self, state: State, i: int, group: list[int]) -> State | None:
         """The state with a box's group on its other sides; None where nobody of it stands to one side."""
         side, front = axes(state.yaw[i])
-        others = [k for k in group if k != i and not self.setting.turned[k]]
+        others = [k for k in group if k != i and not self.problem.turned[k]]
         away = (state.position[others] - state.position[i])[:, ::2]
         if not (abs(away @ side) > ASIDE).any():
             return None
@@ -238,14 +238,14 @@ class Search:
 
     def _beside_twin(self, state: State, there: np.ndarray, i: int) -> list[tuple[int, tuple[np.ndarray, np.ndarray]]]:
         """For a bed that shares a nightstand: that one, and the states with it between both, side by side."""
-        setting, out = self.setting, []
-        rows = np.array(twins(setting, state.position, state.yaw, i)).reshape(-1, 4)
-        for one in setting.stated if len(rows) else ():
+        problem, out = self.problem, []
+        rows = np.array(twins(problem, state.position, state.yaw, i)).reshape(-1, 4)
+        for one in problem.stated if len(rows) else ():
             stand = one.subject
-            if i in one.others and there[[stand, *one.others]].all() and not setting.fixed[stand]:
+            if i in one.others and there[[stand, *one.others]].all() and not problem.fixed[stand]:
                 other = next(k for k in one.others if k != i)
                 position, yaw = self._carried(state, i, [k for k in self.group(i, there, state) if k != stand], rows)
-                level = (setting.size[stand, 2] - setting.size[[i, other], 2].mean()) / 2
+                level = (problem.size[stand, 2] - problem.size[[i, other], 2].mean()) / 2
                 front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
                 middle = (rows[:, :2] + state.position[other, [0, 2]]) / 2
                 position[:, stand, 0], position[:, stand, 2] = (middle + level * front).T
@@ -272,20 +272,20 @@ class Search:
     def _unreached(self, position: np.ndarray, yaw: np.ndarray) -> list[int]:
         key = position.tobytes() + yaw.tobytes()
         if key not in self.lost:
-            self.lost[key] = [fault.object for fault in unreached(self.setting.plan.at(position, yaw))]
+            self.lost[key] = [fault.object for fault in unreached(self.problem.plan.at(position, yaw))]
         return self.lost[key]
 
     def reseated(self, state: State, there: np.ndarray, i: int) -> State:
         """The state with those who stand around box i at one of the ways in which as many sit there."""
-        setting = self.setting
-        seats = [k for k in self.children[i] if there[k] and not setting.turned[k]]
+        problem = self.problem
+        seats = [k for k in self.children[i] if there[k] and not problem.turned[k]]
         if (i, *seats) not in self.ways:
-            self.ways[i, *seats] = seatings(setting, i, seats)
+            self.ways[i, *seats] = seatings(problem, i, seats)
         around, ways = self.ways[i, *seats]
         if not ways:
             return state
         position, yaw = np.repeat(state.position[None], len(ways) + 1, 0), np.repeat(state.yaw[None], len(ways) + 1, 0)
-        wide = setting.size[around, 0]
+        wide = problem.size[around, 0]
         rows = np.array([[out_of(state.position[i], float(state.yaw[i]), slot) for slot in way] for way in ways])
         far = np.linalg.norm(state.position[around][:, None, ::2] - rows[:, None, :, :2], axis=-1)
         far += FARTHEST * abs(wide[:, None] - wide)  # no chair goes to the slot of a bench, nor where it shall not be
@@ -308,11 +308,11 @@ class Search:
 
     def _taste(self, i: int, rows: np.ndarray) -> np.ndarray:
         """(K,) float: how much others are liked better than these poses of a box."""
-        setting = self.setting
-        off = np.minimum(np.hypot(rows[:, 0] - setting.position[i, 0], rows[:, 1] - setting.position[i, 2]), FARTHEST)
-        turned = 0.5 * (1 - np.cos(rows[:, 2] - setting.yaw[i]))
-        hangs = setting.hanging[i]  # which no one sees turned
-        share = ATTENDING if setting.anchor[i] >= 0 or hangs else 1.0
+        problem = self.problem
+        off = np.minimum(np.hypot(rows[:, 0] - problem.position[i, 0], rows[:, 1] - problem.position[i, 2]), FARTHEST)
+        turned = 0.5 * (1 - np.cos(rows[:, 2] - problem.yaw[i]))
+        hangs = problem.hanging[i]  # which no one sees turned
+        share = ATTENDING if problem.anchor[i] >= 0 or hangs else 1.0
         return np.asarray(share * (PULL * off + TURN * turned * ~hangs) + 0.3 * rows[:, 3])
 
     def _carried(
@@ -323,14 +323,14 @@ class Search:
         Arguments:
             screens: groups of what it looks at, that first, which go to the wall ahead of it.
         """
-        setting = self.setting
+        problem = self.problem
         position, yaw = np.repeat(state.position[None], len(rows), 0), np.repeat(state.yaw[None], len(rows), 0)
         self._carry(position, yaw, state, i, group, rows)
-        position[:, i, 1] = height_of(setting, state.position, i)
+        position[:, i, 1] = height_of(problem, state.position, i)
         for k, *others in screens:
             front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
-            free = to_wall(setting.plan, np.zeros(len(rows), int), rows[:, :2], front)
-            free = free - setting.size[k, 2] / 2 - setting.behind[k]
+            free = to_wall(problem.plan, np.zeros(len(rows), int), rows[:, :2], front)
+            free = free - problem.size[k, 2] / 2 - problem.behind[k]
             at = np.concatenate([rows[:, :2] + free[:, None] * front, rows[:, 2:3] + np.pi], 1)
             self._carry(position, yaw, state, k, [k, *others], at)
         return position, yaw
@@ -339,14 +339,14 @@ class Search:
         self, position: np.ndarray, yaw: np.ndarray, state: State, i: int, group: list[int], rows: np.ndarray
     ) -> None:
         """Put box i at K poses in K states, and a group with it."""
-        turn = (rows[:, 2] - state.yaw[i]) * (self.setting.slot_roles[i] != "before")  # seats stay at its sofa's sides
+        turn = (rows[:, 2] - state.yaw[i]) * (self.problem.slot_roles[i] != "before")  # seats stay at its sofa's sides
         cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
         away = (state.position[group] - state.position[i])[:, [0, 2]]
         position[:, group, 0] = rows[:, :1] + cos * away[:, 0] + sin * away[:, 1]
         position[:, group, 2] = rows[:, 1:2] - sin * away[:, 0] + cos * away[:, 1]
-        free = np.array(group)[~self.setting.turned[group]]
+        free = np.array(group)[~self.problem.turned[group]]
         yaw[:, free] = state.yaw[free] + turn[:, None]
-        yaw[:, i] = state.yaw[i] if self.setting.turned[i] else rows[:, 2]
+        yaw[:, i] = state.yaw[i] if self.problem.turned[i] else rows[:, 2]
 
     def _promising(
         self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray, taste: np.ndarray
@@ -375,11 +375,11 @@ class Search:
 
     def _broken(self, state: State, there: np.ndarray, i: int, rows: np.ndarray, along: list[int]) -> np.ndarray:
         """(K,) float: what a box at K poses breaks of its relations to those who do not go along with it."""
-        told = self.setting.told(i)
+        told = self.problem.told(i)
         told = told[there[told[:, ::2]].all(1) & ~np.isin(np.where(told[:, 0] == i, told[:, 2], told[:, 0]), along)]
         if not len(told):
             return np.zeros(len(rows))
-        at = np.stack([rows[:, 0], np.full(len(rows), height_of(self.setting, state.position, i)), rows[:, 1]], 1)
+        at = np.stack([rows[:, 0], np.full(len(rows), height_of(self.problem, state.position, i)), rows[:, 1]], 1)
         margin = self.margins_at(state, i, at, rows[:, 2], told)
         return np.asarray(MISSED * (np.maximum(-margin, 0.0) + (margin < 0)).sum(1))
 
@@ -387,28 +387,28 @@ class Search:
         self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray, which: list[int]
     ) -> np.ndarray:
         """(K,) float: what some boxes of a group run into and leave of the floor where one of it is at K poses."""
-        setting = self.setting
+        problem = self.problem
         position, yaw = self._carried(state, i, which, rows)
         apart = there.copy()
         apart[group] = False
         others, cost = np.flatnonzero(apart), np.zeros(len(rows))
         for k in which:
-            deep = depths(setting.size[k], position[:, k], yaw[:, k], setting.size[others], state.position[others],
+            deep = depths(problem.size[k], position[:, k], yaw[:, k], problem.size[others], state.position[others],
                           state.yaw[others])  # fmt: skip
-            deep = np.maximum(deep - setting.shared[k, others], 0.0)
-            out = np.maximum(beyond(setting.floor, setting.size[k], position[:, k], yaw[:, k]), 0.0)
+            deep = np.maximum(deep - problem.shared[k, others], 0.0)
+            out = np.maximum(beyond(problem.floor, problem.size[k], position[:, k], yaw[:, k]), 0.0)
             cost += (HIT * (deep > 0.01) + DEEP * deep).sum(1) + HIT * (out > 0.01) + DEEP * out
         return cost
 
     def margins_at(self, state: State, i: int, at: np.ndarray, turn: np.ndarray, told: np.ndarray) -> np.ndarray:
         """(K, e) float: margins of relations (e, 3) of box i at poses (K, 3) and (K,), the others where they are."""
-        setting, ends, count = self.setting, told[:, [0, 2]], len(turn) * len(told)
+        problem, ends, count = self.problem, told[:, [0, 2]], len(turn) * len(told)
         own = (ends == i)[None]
         position = np.where(own[..., None], at[:, None, None], state.position[ends]).reshape(-1, 3)
         yaw = np.where(own, turn[:, None, None], state.yaw[ends]).ravel()
-        size, fronts = (np.tile(of[ends], (len(turn), *[1] * of.ndim)) for of in (setting.size, setting.fronts))
+        size, fronts = (np.tile(of[ends], (len(turn), *[1] * of.ndim)) for of in (problem.size, problem.fronts))
         asked = np.stack([2 * np.arange(count), np.tile(told[:, 1], len(turn)), 2 * np.arange(count) + 1], 1)
-        found = margins(Spread(size.reshape(-1, 3), position, yaw), asked, rules=setting.rules, center=setting.centre,
+        found = margins(Spread(size.reshape(-1, 3), position, yaw), asked, rules=problem.rules, center=problem.centre,
                         fronts=fronts.ravel())  # fmt: skip
         return np.asarray(found.reshape(len(turn), -1))
 
@@ -416,15 +416,15 @@ class Search:
 
     def order(self, boxes: list[int]) -> list[int]:
         """Anchors first, the large before the small, what stands on others and what hangs last."""
-        setting = self.setting
+        problem = self.problem
 
         def rank(i: int) -> tuple[float, int]:
-            kind, steps, at = setting.kinds[i], 0, i
-            while setting.anchor[at] >= 0 and steps < 4:
-                steps, at = steps + 1, int(setting.anchor[at])
-            area = float(setting.size[i, 0] * setting.size[i, 2])
-            first = 0.3 if setting.slot_roles[i] == "opposite" else FIRST.get(kind.role, 6.0)
-            late = 20.0 if setting.carrier[i] >= 0 else 15.0 if kind.support == "ceiling" else 0.0
+            kind, steps, at = problem.kinds[i], 0, i
+            while problem.anchor[at] >= 0 and steps < 4:
+                steps, at = steps + 1, int(problem.anchor[at])
+            area = float(problem.size[i, 0] * problem.size[i, 2])
+            first = 0.3 if problem.slot_roles[i] == "opposite" else FIRST.get(kind.role, 6.0)
+            late = 20.0 if problem.carrier[i] >= 0 else 15.0 if kind.support == "ceiling" else 0.0
             late -= 5.0 * (i in self.urgent)
             return late + first + 0.5 * steps - 0.3 * min(area, 3.0), i
 
@@ -445,7 +445,7 @@ class Search:
         """
         there = np.ones(len(state.yaw), bool)
         there[out] = False
-        there |= self.setting.fixed
+        there |= self.problem.fixed
         for i in self.order([k for k in out if not there[k]]):
             there[i] = True
             state = self._expecting(state, there, i)
@@ -454,20 +454,20 @@ class Search:
 
     def _expecting(self, state: State, there: np.ndarray, i: int) -> State:
         """The state with those who attend box i, and are not there, at their slots; they are there then."""
-        setting = self.setting
+        problem = self.problem
         for k in [*self.children[i], *self.screens[i]]:
             if there[k]:
                 continue
-            slots = sorted(slots_at(setting, k, i), key=lambda slot: slot[3])
+            slots = sorted(slots_at(problem, k, i), key=lambda slot: slot[3])
             if not slots and k not in self.screens[i]:
                 continue
             rows = np.array([out_of(state.position[i], float(state.yaw[i]), slot) for slot in slots]).reshape(-1, 4)
             if len(rows):
                 at, turn = self._carried(state, k, self.group(k, there, state), rows)
-                others = [m for m in np.flatnonzero(there).tolist() if setting.anchor[m] == i or m == i]
-                deep = depths(setting.size[k], at[:, k], turn[:, k], setting.size[others], state.position[others],
+                others = [m for m in np.flatnonzero(there).tolist() if problem.anchor[m] == i or m == i]
+                deep = depths(problem.size[k], at[:, k], turn[:, k], problem.size[others], state.position[others],
                               state.yaw[others])  # fmt: skip
-                hit = np.maximum(deep - setting.shared[k, others], 0.0).max(1, initial=0.0)
+                hit = np.maximum(deep - problem.shared[k, others], 0.0).max(1, initial=0.0)
                 best = int(np.round(hit * 100).argmin())
                 state = State(at[best], turn[best], state.taste)
             there[k] = True
@@ -477,7 +477,7 @@ class Search:
         """Boxes, whom they attend, and who attends these."""
         out = list(boxes)
         for i in boxes:
-            anchor = int(self.setting.anchor[i])
+            anchor = int(self.problem.anchor[i])
             out += [anchor] if anchor >= 0 else []
             out += self.children[anchor if anchor >= 0 else i]
         return [i for n, i in enumerate(out) if i not in out[:n]]
@@ -500,7 +500,7 @@ class Search:
 
         `begun`: what the same search found before, from where it goes on.
         """
-        n = len(self.setting.size)
+        n = len(self.problem.size)
         state, total, wrong = self._first() if begun is None else (begun.state, *self.faults(begun.state))
         for number in range(anew):
             if not wrong or self.judged >= self.budget:
@@ -517,13 +517,13 @@ class Search:
 
     def _first(self) -> tuple[State, float, list[int]]:
         """Where all were moved once from where they were drawn and what is missed was mended, as `mended`."""
-        setting, n = self.setting, len(self.setting.size)
-        at = setting.position.copy(), setting.yaw.copy()
-        state = State(*at, np.array([0.02 + 0.3 * out_of_habit(setting, i, *at) for i in range(n)]))
+        problem, n = self.problem, len(self.problem.size)
+        at = problem.position.copy(), problem.yaw.copy()
+        state = State(*at, np.array([0.02 + 0.3 * out_of_habit(problem, i, *at) for i in range(n)]))
         _, wrong = self.faults(state)
-        seat = np.array([slot_role == "at" for slot_role in setting.slot_roles], bool)
-        mates = np.array([((setting.anchor == a) & seat).sum() for a in setting.anchor])
-        seated = seat & (setting.anchor >= 0) & (mates > 1) & ~np.isin(np.arange(n), wrong)  # together with their table
+        seat = np.array([slot_role == "at" for slot_role in problem.slot_roles], bool)
+        mates = np.array([((problem.anchor == a) & seat).sum() for a in problem.anchor])
+        seated = seat & (problem.anchor >= 0) & (mates > 1) & ~np.isin(np.arange(n), wrong)  # together with their table
         state = self.swept(state, [i for i in range(n) if not seated[i]])
         return self.mended(state, *self.faults(state))
 

@@ -26,7 +26,7 @@ from echousd.place.constraints import (
     Matrix,
 )
 from echousd.place.geometry import COLUMNS
-from echousd.place.setting import Setting
+from echousd.place.problem import Problem
 
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
@@ -82,7 +82,7 @@ class Solution:
     rounds: int
 
 
-def solve(start: Setting) -> Solution:
+def solve(start: Problem) -> Solution:
     """Move and size boxes until the constraints hold; the best attempt where they cannot all hold."""
     constraints = Constraints(start)
     handicap = constraints.handicap.copy()
@@ -106,7 +106,7 @@ def solve(start: Setting) -> Solution:
     return best
 
 
-def _descend(start: Setting, constraints: Constraints, handicap: np.ndarray, through: int, rounds: int) -> Solution:
+def _descend(start: Problem, constraints: Constraints, handicap: np.ndarray, through: int, rounds: int) -> Solution:
     n = len(start.size)
     free = np.stack([~start.fixed] * 3 + [~start.rigid] * 3, 1).ravel()
     weight = np.tile([MOVE**-2] * 3 + [STRETCH**-2] * 3, n)[free]
@@ -238,7 +238,7 @@ class Conflict:
 
 
 def conflicts(
-    setting: Setting, found: Solution, failures: tuple[set[int], set[tuple[int, int]], set[int]]
+    problem: Problem, found: Solution, failures: tuple[set[int], set[tuple[int, int]], set[int]]
 ) -> tuple[Conflict, ...]:
     """Groups of demands that could not all be met: violated constraints that share objects that could have moved.
 
@@ -251,7 +251,7 @@ def conflicts(
     at = found.at
     groups: list[tuple[set[int], list[int]]] = []  # of boxes that could have moved, and of the rows around them
     for row in np.flatnonzero((at.value < -0.002) & np.isin(at.kind, (RELATION, COLLISION, FLOOR))).tolist():
-        joined, members = {i for i in at.boxes_of(row) if not (setting.fixed[i] and setting.rigid[i])}, [row]
+        joined, members = {i for i in at.boxes_of(row) if not (problem.fixed[i] and problem.rigid[i])}, [row]
         touched = [group for group in groups if group[0] & joined]
         for boxes, rows in touched:
             joined, members = joined | boxes, rows + members
@@ -260,8 +260,8 @@ def conflicts(
     def conflict(members: list[int]) -> Conflict:
         told, pairs = ([at.number[r] for r in members if at.kind[r] == kind] for kind in (RELATION, COLLISION))
         beyond = {i for r in members if at.kind[r] == FLOOR for i in at.boxes_of(r)}
-        rows: list[int] = setting.rows[told].tolist()
-        return Conflict(tuple(rows), tuple((i, j) for i, j in setting.pairs[pairs].tolist()), tuple(sorted(beyond)))
+        rows: list[int] = problem.rows[told].tolist()
+        return Conflict(tuple(rows), tuple((i, j) for i, j in problem.pairs[pairs].tolist()), tuple(sorted(beyond)))
 
     relations, pairs, outside = failures
     return tuple(

@@ -10,14 +10,14 @@ from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place.constraints import KINDS, OVERHANG, PLACEMENT, RELATION, SLACK, Constraints, Linearised
 from echousd.place.geometry import COLUMNS
-from echousd.place.setting import Setting, setting_of
+from echousd.place.problem import Problem, problem_of
 
 WORDS = ["wardrobe", "dresser", "bookshelf", "table_lamp", "pendant_lamp", "cabinet", "armchair"]
 NOTCHED = np.array([(0, 0), (4, 0), (4, 2), (2, 2), (2, 3.5), (0, 3)], float)
 STATED = (Stated("in_corner", 5), Stated("between", 6, (0, 2)))
 
 
-def posed(rules: str, square: bool, seed: int) -> Setting:
+def posed(rules: str, square: bool, seed: int) -> Problem:
     """A room in which little is right, with all relations at once."""
     luck, n = np.random.default_rng(seed), len(WORDS)
     size, position = luck.uniform(0.4, 1.2, (n, 3)), luck.uniform(0, 4, (n, 3)) * (1, 0.3, 0.8)
@@ -27,13 +27,13 @@ def posed(rules: str, square: bool, seed: int) -> Setting:
     triplets, shelf = np.array([*every, (3, on, 2)]), WORDS.index("bookshelf")
     position[shelf], yaw[shelf] = (1.5, 0.0, size[shelf, 2] / 2 + 0.1), 0.0
     none = np.zeros(n, bool)
-    return setting_of(
+    return problem_of(
         WORDS, size, position, yaw, triplets, floor_polygon=NOTCHED, height=2.6, fixed=none, rigid=none, turned=none,
         stated=STATED, rules=rules,
     )  # fmt: skip
 
 
-def at(start: Setting, size: np.ndarray, position: np.ndarray) -> Linearised:
+def at(start: Problem, size: np.ndarray, position: np.ndarray) -> Linearised:
     found = Constraints(start)
     return found.at(size, position, found.handicap)
 

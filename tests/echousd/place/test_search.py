@@ -16,9 +16,9 @@ from echomodel.rules import label_relations, margins
 from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place.placing import place_boxes
+from echousd.place.problem import problem_of
 from echousd.place.proposals import out_of_habit, proposals, slots_at
 from echousd.place.search import COST, Search, State, costs_of
-from echousd.place.setting import setting_of
 
 ID = {row.name: row.id for row in vocabulary().predicates}
 FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
@@ -28,12 +28,12 @@ def searched(words, size, position, yaw, told=(), *, turned=(), fixed=(), floor=
     """A search in a room, and the state that its boxes were drawn in."""
     still, kept = np.isin(np.arange(len(words)), fixed), np.isin(np.arange(len(words)), turned)
     triplets = np.array([(a, ID[word], b) for a, word, b in told], int).reshape(-1, 3)
-    setting = setting_of(
+    problem = problem_of(
         words, np.array(size, float), np.array(position, float), np.array(yaw, float), triplets,
         floor_polygon=floor, height=2.7, fixed=still, rigid=still, turned=still | kept,
     )  # fmt: skip
-    setting = setting.spread()
-    return Search(setting), State(setting.position, setting.yaw, np.zeros(len(words)))
+    problem = problem.spread()
+    return Search(problem), State(problem.position, problem.yaw, np.zeros(len(words)))
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +99,7 @@ def test_a_screen_goes_along_to_the_wall_ahead():
     search, state = searched(words, [(2.0, 0.8, 0.9), (1.6, 0.5, 0.4)], [(0, 0, -1.5), (1.0, 0, 1.8)], [0, np.pi])
     row = np.array([[-2.0, 0.3, np.pi / 2, 0.0]])
     position, yaw = search._carried(state, 0, [0], row, screens=[[1]])
-    assert position[0, 1, [0, 2]] == pytest.approx([2.5 - 0.2 - search.setting.behind[1], 0.3], abs=1e-6)
+    assert position[0, 1, [0, 2]] == pytest.approx([2.5 - 0.2 - search.problem.behind[1], 0.3], abs=1e-6)
     assert np.cos(yaw[0, 1] + np.pi / 2) == pytest.approx(1.0)
 
 
@@ -130,7 +130,7 @@ def test_a_second_sofa_is_tried_at_the_sides_of_the_table():
     words = ["multi_seat_sofa", "loveseat_sofa", "coffee_table"]
     size = [(2.2, 0.8, 0.9), (1.6, 0.8, 0.9), (1.2, 0.4, 0.6)]
     search, state = searched(words, size, [(0, 0, -3.4), (3.0, 0, 3.0), (0, 0, -2.2)], [0.0] * 3, floor=2 * FLOOR)
-    rows = proposals(search.setting, state.position, state.yaw, np.ones(3, bool), 1)
+    rows = proposals(search.problem, state.position, state.yaw, np.ones(3, bool), 1)
     near = np.hypot(rows[:, 0] - 1.2 / 2 - 0.45, rows[:, 1] + 2.2) < 0.5  # at its end
     looks = np.sin(rows[near, 2]) < -0.99
     assert (looks & (abs(rows[near, 1] + 2.2) < 0.01)).any()
@@ -139,7 +139,7 @@ def test_a_second_sofa_is_tried_at_the_sides_of_the_table():
 def test_an_ottoman_leaves_room_for_the_knees_before_its_sofa():
     size = [(2.2, 0.8, 0.9), (0.6, 0.4, 0.6)]
     search, _ = searched(["multi_seat_sofa", "ottoman"], size, [(0, 0, -1.5), (0, 0, 0)], [0.0, 0.0])
-    before = [slot for slot in slots_at(search.setting, 1, 0) if abs(slot[0]) < 1.1]
+    before = [slot for slot in slots_at(search.problem, 1, 0) if abs(slot[0]) < 1.1]
     assert min(before, key=lambda slot: slot[3])[1] - 0.45 - 0.3 == pytest.approx(0.5)
 
 
@@ -147,14 +147,14 @@ def test_an_ottoman_leaves_room_for_the_knees_before_its_sofa():
 def test_a_pendant_hangs_over_a_table_that_is_near_the_middle_of_the_room(table, drawn, habit):
     size = [(1.2, 0.4, 0.7), (0.4, 0.6, 0.4)]
     search, state = searched(["coffee_table", "pendant_lamp"], size, [(0, 0, table), (0, 2.0, drawn)], [0.0, 0.0])
-    assert out_of_habit(search.setting, 1, state.position, state.yaw) == habit
+    assert out_of_habit(search.problem, 1, state.position, state.yaw) == habit
 
 
 def test_a_pendant_is_no_longer_where_it_belongs_when_its_table_has_moved():
     size = [(1.2, 0.4, 0.7), (0.4, 0.6, 0.4)]
     search, state = searched(["coffee_table", "pendant_lamp"], size, [(0, 0, 1.0), (0, 2.0, 1.0)], [0.0, 0.0])
     state.position[0, 2] = 1.5
-    rows = proposals(search.setting, state.position, state.yaw, np.ones(2, bool), 1)
+    rows = proposals(search.problem, state.position, state.yaw, np.ones(2, bool), 1)
     over, drawn = (rows[np.hypot(rows[:, 0], rows[:, 1] - z) < 0.01, 3].min() for z in (1.5, 1.0))
     assert (over, drawn) == (0.0, 0.5)
 
@@ -163,14 +163,14 @@ def test_of_two_pendants_at_a_small_table_neither_is_where_it_belongs():
     size = [(0.5, 0.5, 0.5), (0.4, 0.6, 0.4), (0.4, 0.6, 0.4)]
     words = ["side_table", "pendant_lamp", "pendant_lamp"]
     search, state = searched(words, size, [(0, 0, 0), (0, 2.0, 0), (0, 2.0, 0)], [0.0] * 3)
-    assert [out_of_habit(search.setting, k, state.position, state.yaw) for k in (1, 2)] == [0.5, 0.5]
+    assert [out_of_habit(search.problem, k, state.position, state.yaw) for k in (1, 2)] == [0.5, 0.5]
 
 
 @pytest.mark.parametrize(("turn", "habit"), [(0.0, 0.0), (np.pi / 2, 0.5), (np.pi, 0.0)])
 def test_a_coffee_table_is_wanted_along_its_sofa(turn, habit):
     size = [(2.2, 0.8, 0.9), (1.2, 0.4, 0.6)]
     search, state = searched(["multi_seat_sofa", "coffee_table"], size, [(0, 0, -1.5), (0, 0, -0.4)], [0.0, turn])
-    assert out_of_habit(search.setting, 1, state.position, state.yaw) == habit
+    assert out_of_habit(search.problem, 1, state.position, state.yaw) == habit
 
 
 @pytest.mark.parametrize(("at", "goes"), [((0.0, -0.7), True), ((2.5, 2.5), False)])
@@ -192,7 +192,7 @@ def test_who_is_astray_is_left_where_it_is_and_met_there(at, goes):
 def test_a_group_goes_as_one():
     words, size = ["double_bed", "nightstand"], [(1.6, 1.0, 2.0), (0.5, 0.5, 0.4)]
     search, state = searched(words, size, [(0, 0, -1.0), (1.1, 0, -1.8)], [0.0, 0.3], turned=[1])
-    search.setting.turned[1] = False  # it was drawn askew
+    search.problem.turned[1] = False  # it was drawn askew
     row = np.array([[1.5, 0.0, -np.pi / 2, 0.0]])
     position, yaw = search._carried(state, 0, [0, 1], row)
     x, z = position[0, 1, [0, 2]] - row[0, :2]
@@ -288,14 +288,14 @@ def test_what_stands_on_a_nightstand_comes_with_it_to_its_bed():
 
 def test_a_door_that_may_make_way_is_no_reason_to_begin_anew():
     none, door = np.zeros(1, bool), Opening("door", "door", 0, 0.75, 0.9, 2.0, 0.0)
-    setting = setting_of(
+    problem = problem_of(
         ["wardrobe"], np.array([(2.4, 2.2, 0.6)]), np.zeros((1, 3)), np.zeros(1), np.zeros((0, 3), int),
         floor_polygon=FLOOR * (0.5, 0.3), height=2.7, fixed=none, rigid=~none, turned=none, openings=(door,),
     )  # fmt: skip
-    firm = Search(setting.spread(), tuple(term for term in TERMS if term.name in ("door_free", "on_floor")))
+    firm = Search(problem.spread(), tuple(term for term in TERMS if term.name in ("door_free", "on_floor")))
     found = firm.run()
     assert found.wrong == (0,)
-    late = Search(setting.spread(), firm.terms, yields=frozenset({"door_free"}))
+    late = Search(problem.spread(), firm.terms, yields=frozenset({"door_free"}))
     sooner = late.run()
     assert sooner.wrong == ()
     assert sooner.cost > 1.0  # it is seen all the same
@@ -321,7 +321,7 @@ def test_no_more_poses_are_judged_than_were_allowed():
     found = search.run()
     assert found.judged < 100 + 150  # the move that was begun
     assert search.faults(found.state)[0] == pytest.approx(found.cost)
-    more = Search(search.setting).run(0, found)
+    more = Search(search.problem).run(0, found)
     assert (more.cost, more.judged) == (pytest.approx(found.cost), 0)  # it goes on from there
 
 
@@ -349,17 +349,17 @@ def test_margins_of_many_poses_are_those_of_one_after_the_other():
     size, position, yaw = luck.uniform(0.3, 2.0, (4, 3)), luck.normal(0, 1, (4, 3)), luck.uniform(-4, 4, 4)
     search, state = searched(words, size, position, yaw, told, turned=range(4))
     poses, turns = luck.normal(0, 1, (7, 3)), luck.uniform(-4, 4, 7)
-    setting = search.setting
-    found = search.margins_at(state, 0, poses, turns, setting.triplets)
+    problem = search.problem
+    found = search.margins_at(state, 0, poses, turns, problem.triplets)
     assert (found > 0).any()
     assert (found < 0).any()
     for k in range(7):
         places, headings = state.position.copy(), state.yaw.copy()
         places[0], headings[0] = poses[k], turns[k]
         alone = margins(
-            Boxes(*(torch.from_numpy(of) for of in (search.setting.size, places, headings))),
-            torch.from_numpy(setting.triplets), center=torch.from_numpy(setting.centre),
-            fronts=torch.from_numpy(setting.fronts),
+            Boxes(*(torch.from_numpy(of) for of in (search.problem.size, places, headings))),
+            torch.from_numpy(problem.triplets), center=torch.from_numpy(problem.centre),
+            fronts=torch.from_numpy(problem.fronts),
         )  # fmt: skip
         np.testing.assert_allclose(found[k], alone.numpy(), atol=1e-9)
 

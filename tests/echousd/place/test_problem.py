@@ -8,17 +8,17 @@ import pytest
 from echomodel.boxes2d import axes
 from echousd.place.geometry import depth_inside
 from echousd.place.placing import place_boxes
+from echousd.place.problem import Problem, problem_of
 from echousd.place.proposals import proposals, slots_at
 from echousd.place.search import Search, State
-from echousd.place.setting import Setting, setting_of
 
 FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
 
 
-def setting(words: list[str], size: list, position: list, yaw: list, fixed: tuple[int, ...] = ()) -> Setting:
-    """The setting of boxes in a room of 5 by 4 metres, some of them fixed."""
+def problem(words: list[str], size: list, position: list, yaw: list, fixed: tuple[int, ...] = ()) -> Problem:
+    """The problem of boxes in a room of 5 by 4 metres, some of them fixed."""
     still, none = np.isin(np.arange(len(words)), fixed), np.zeros(len(words), bool)
-    return setting_of(
+    return problem_of(
         words, np.array(size, float), np.array(position, float), np.array(yaw, float), np.zeros((0, 3), int),
         floor_polygon=FLOOR, height=2.7, fixed=still, rigid=none, turned=still,
     ).spread()  # fmt: skip
@@ -27,7 +27,7 @@ def setting(words: list[str], size: list, position: list, yaw: list, fixed: tupl
 def test_a_lamp_on_the_sideboard_of_a_table_does_not_slide_with_the_table() -> None:
     words = ["dining_table", "dining_chair", "sideboard", "table_lamp"]
     size = [(1.4, 0.75, 0.9), (0.5, 0.9, 0.5), (1.4, 0.9, 0.4), (0.3, 0.5, 0.3)]
-    found = setting(words, size, [(0, 0, 0), (0.3, 0, 0.6), (0, 0, -1.78), (0.3, 0.9, -1.78)], [0, np.pi, 0, 0])
+    found = problem(words, size, [(0, 0, 0), (0.3, 0, 0.6), (0, 0, -1.78), (0.3, 0.9, -1.78)], [0, np.pi, 0, 0])
     assert found.slot_roles[2] == "near"
     assert found.carrier[3] == 2
     state = State(found.position, found.yaw, np.zeros(4))
@@ -38,7 +38,7 @@ def test_a_lamp_on_the_sideboard_of_a_table_does_not_slide_with_the_table() -> N
 def test_a_nightstand_comes_close_to_a_fixed_bed_that_is_flush_with_its_wall(width: float) -> None:
     size = [(width, 1.0, 2.1), (0.5, 0.5, 0.4)]
     drawn, still = [(0.0, 0.0, -0.95), (1.6, 0.0, 0.8)], [True, False]
-    found = setting(["double_bed", "nightstand"], size, drawn, [0.0, 0.0], (0,))
+    found = problem(["double_bed", "nightstand"], size, drawn, [0.0, 0.0], (0,))
     assert found.behind[0] == pytest.approx(0.0, abs=1e-9)
     done = place_boxes(
         ["double_bed", "nightstand"], np.array(size), np.array(drawn), np.zeros(2), np.zeros((0, 3), int),
@@ -52,14 +52,14 @@ def test_the_coffee_table_of_a_corner_sofa_keeps_the_distance_that_was_drawn() -
     """0.35 m before the seats, which is 0.1 m before the box: it reaches into the corner."""
     sofa, table = (2.6, 0.8, 1.6), (0.9, 0.4, 0.6)
     ahead = 0.8 + 0.3 + 0.1
-    found = setting(["l_shaped_sofa", "coffee_table"], [sofa, table], [(0, 0, -1.2), (0, 0, ahead - 1.2)], [0, 0])
+    found = problem(["l_shaped_sofa", "coffee_table"], [sofa, table], [(0, 0, -1.2), (0, 0, ahead - 1.2)], [0, 0])
     _, forward, _, _ = min(slots_at(found, 1, 0), key=lambda slot: slot[3])
     assert forward == pytest.approx(ahead)
 
 
 @pytest.mark.parametrize("size", [(0.8, 1.0, 0.3), (0.3, 1.0, 0.8), (0.5, 1.0, 0.5)])
 def test_plants_have_no_pose_that_leaves_the_floor(size: tuple[float, float, float]) -> None:
-    found = setting(["plant"], [size], [(0.4, 0.0, 0.3)], [0.0])
+    found = problem(["plant"], [size], [(0.4, 0.0, 0.3)], [0.0])
     rows = proposals(found, found.position, found.yaw, np.ones(1, bool), 0)
     search = Search(found)
     state = State(found.position, found.yaw, np.zeros(1))

@@ -1,4 +1,4 @@
-"""A room to be placed: what is fixed, what stands on what, which wall each piece leans on, who may overlap whom."""
+"""A problem of placing: what is fixed, what stands on what, on which wall each piece leans, who may overlap whom."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's norm
 
 
 def _of_plan(name: str) -> cached_property[Any]:
-    return cached_property(lambda setting: getattr(setting.plan, name))
+    return cached_property(lambda problem: getattr(problem.plan, name))
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
+class Problem:
     """Everything about one room that stays the same while its boxes move, and where they start from.
 
     Arguments:
@@ -52,12 +52,12 @@ class Setting:
     wall: np.ndarray
     behind: np.ndarray
 
-    def at(self, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> Setting:
+    def at(self, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> Problem:
         """The same room with boxes of size and at position (n, 3), metres, and yaw (n,), radians."""
         return replace(self, plan=replace(self.plan, size=size, position=position, yaw=yaw))
 
-    def spread(self) -> Setting:
-        """The setting whose pieces keep usual distances to walls where drawn ones are too alike, at those walls."""
+    def spread(self) -> Problem:
+        """The problem whose pieces keep usual distances to walls where drawn ones are too alike, at those walls."""
         usual = kept_behind(self.categories, self.size, np.full(len(self.size), np.nan))
         told = np.isin(np.arange(len(usual)), [one.subject for one in self.stated if not one.others])  # of walls
         usual = np.where(told, np.minimum(usual, BEHIND[1]), usual)
@@ -151,12 +151,12 @@ class Setting:
         return max(self.walls, key=lambda wall: wall[2])[3]
 
 
-def setting_of(
+def problem_of(
     categories: Sequence[str], size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: np.ndarray, *,
     floor_polygon: np.ndarray | None, height: float | None, fixed: np.ndarray, rigid: np.ndarray, turned: np.ndarray,
     openings: Sequence[Opening] = (), stated: tuple[Stated, ...] = (), rules: str = "strict",
-) -> Setting:  # fmt: skip
-    """The setting of a room, its boxes put at their height and wall furniture turned square to its wall.
+) -> Problem:  # fmt: skip
+    """The problem of a room, its boxes put at their height and wall furniture turned square to its wall.
 
     Arguments:
         turned: (n,) bool, boxes that must keep their yaw.
@@ -181,11 +181,11 @@ def setting_of(
         Spread(size, position, yaw), words, floor_polygon, openings, triplets[told], given=fixed, height=height,
         rules=rules, stated=stated,
     )  # fmt: skip
-    return Setting(plan, told, rigid, turned, floor, carrier, wall, behind)
+    return Problem(plan, told, rigid, turned, floor, carrier, wall, behind)
 
 
 def wall_gaps(wall: np.ndarray, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """(n,) float: metres between the back of each leaning piece and its wall (`Setting.wall`); NaN for the others."""
+    """(n,) float: metres between the back of each leaning piece and its wall (`Problem.wall`); NaN for the others."""
     normal = wall[:, 1]
     reach = (np.abs(seen(normal, yaw)) * size[:, [0, 2]]).sum(-1) / 2
     return ((position[:, [0, 2]] - wall[:, 0]) * normal).sum(-1) - reach
