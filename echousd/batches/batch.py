@@ -124,13 +124,11 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
     return BatchResult(out, end.total, end.done, end.failed, end.seconds, run.stopped)
 
 
-def generate_many(
-    graphs: Iterable[SceneGraph], *, seed: int = 0, seeds: Sequence[int] | None = None, **options: Any
-) -> Iterator[Room]:
+def generate_many(graphs: Iterable[SceneGraph], *, seed: int = 0, **options: Any) -> Iterator[Room]:
     """Rooms of many graphs in one process, as `echousd.batch` of the same graphs makes them.
 
     Arguments:
-        graphs: taken a few at a time. seed: of every room, or `seeds`, one each.
+        graphs: taken one at a time. seed: of every room.
         options: those of `RoomOptions`.
 
     Raises ValueError for the first graph that no room can be made of.
@@ -138,7 +136,7 @@ def generate_many(
     asked = request_of({"sources": ["graphs"], "options": options}, "generate_many").options
     for number, graph in enumerate(graphs):
         try:
-            yield work.generated(work.Job("", "", seed if seeds is None else seeds[number], asked, graph.to_json()))
+            yield work.generated(work.Job("", "", seed, asked, graph.to_json()))
         except ValueError as error:
             raise ValueError(f"graph {number}: {error}") from None
 

@@ -213,11 +213,8 @@ def _head(raw: Any) -> dict[str, Any]:
 
 def _entry(raw: Any, number: int, sets: int) -> Entry:
     """A line of the plan, which anybody may have sent; raises ValueError for one that is not as we write it."""
-    if not isinstance(raw, dict):
-        raise ValueError(f"line {number + 2} is no room of a plan")
-    given = {**raw, "draw": tuple(raw["draw"]) if raw["draw"] else None}
     try:
-        entry = TypeAdapter(Entry).validate_python(given)
+        entry = TypeAdapter(Entry).validate_python(raw)
     except ValidationError as error:
         raise ValueError(f"line {number + 2}: {told(error)}") from None
     if entry.number != number:

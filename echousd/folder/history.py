@@ -67,17 +67,14 @@ def remembered(
     return [*old["history"], entry][-LONGEST:], {where: _archive({**replaced, manifest: told})}
 
 
-def undo(root: Path, *, wait: bool = False) -> tuple[str, ...]:
-    """Put a room back to what it was before its last edit, byte for byte, and say which steps were taken back.
-
-    Arguments:
-        root: the room's root layer. wait: for another process that writes the folder.
+def undo(root: Path) -> tuple[str, ...]:
+    """Put a room (root layer) back to what it was before its last edit, byte for byte; returns the steps taken back.
 
     Raises ValueError where there is no edit to take back, somebody changed a file of the room or put another in its
     place, or the archive is damaged; nothing is changed then.
     """
     folder = root.parent
-    with folders.held(folder, wait=wait, run="undo") as finished:
+    with folders.held(folder, run="undo") as finished:
         if finished == "undo":
             return told(root, "undo")
         manifest = folders.claim(folder, force=False, root=root.stem)
@@ -106,17 +103,14 @@ def undo(root: Path, *, wait: bool = False) -> tuple[str, ...]:
     return tuple(last["steps"])
 
 
-def redo(root: Path, *, wait: bool = False) -> tuple[str, ...]:
-    """Make the edit that was taken back last once more, byte for byte, and say which steps it were.
-
-    Arguments:
-        root: the room's root layer. wait: for another process that writes the folder.
+def redo(root: Path) -> tuple[str, ...]:
+    """Make once more the edit of a room (root layer) that was taken back last, byte for byte; returns its steps.
 
     Raises ValueError where none was taken back or the room is another since, somebody changed a file of the room or
     put another in its place, or the archive is damaged; nothing is changed then.
     """
     folder = root.parent
-    with folders.held(folder, wait=wait, run="redo") as finished:
+    with folders.held(folder, run="redo") as finished:
         if finished == "redo":
             return told(root, "redo")
         manifest = folders.claim(folder, force=False, root=root.stem)

@@ -124,7 +124,7 @@ def _write_looks(pen: Pen, name: str, style: str, slots: Mapping[str, Sequence[s
     used, chosen, scope = sorted(set(bindings.values())), palette_for(style), f"/{name}/{MTL}"
     shown = alternatives(chosen)
     plain = {harmony: {slot: replace(look(harmony, slot), pattern="") for slot in used} for harmony in shown}
-    write_looks(pen, plain[chosen], bindings, scope, tinted=True)
+    write_looks(pen, plain[chosen], bindings, scope)
     write_palettes(pen, chosen, plain, f"/{name}", scope)
 
 

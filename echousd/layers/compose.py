@@ -240,7 +240,7 @@ def materials_layer(
     """
     pen = _pen(room, "materials")
     pen.over("/Room")
-    materials.write_looks(pen, tables[harmony], bindings, also=tables[harmony], harmony=harmony, tinted=True)
+    materials.write_looks(pen, tables[harmony], bindings, also=tables[harmony], harmony=harmony)
     for asset in sorted({room.assets[name] for name in instanced(room)}):
         assets.as_class(pen.layer, asset)
     materials.write_palettes(pen, harmony, tables)

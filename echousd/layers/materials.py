@@ -39,11 +39,11 @@ def look_images(look: Look, harmony: str) -> dict[str, tuple[str, bytes]]:
     return {name: (f"textures/{path}.jpg", content) for name, (path, content) in found.items()}
 
 
-def define_material(pen: Pen, path: str, look: Look, harmony: str = "", *, tinted: bool = False) -> None:
+def define_material(pen: Pen, path: str, look: Look, harmony: str = "") -> None:
     """Author a UsdPreviewSurface material; a textured one reads `primvars:st`.
 
     `path`: where. `look`: what it looks like. `harmony`: whose colours its images have; "" = without images, for an
-    asset that stands for itself. `tinted`: leave colours to `tint_material`, which a variant calls.
+    asset that stands for itself. Colours are left to `tint_material`, which a variant calls.
     """
     found = look_images(look, harmony) if harmony else {}
     fallbacks = {"diffuseColor": look.color, "normal": (0.5, 0.5, 1.0), "roughness": (look.roughness,) * 3}
@@ -51,7 +51,7 @@ def define_material(pen: Pen, path: str, look: Look, harmony: str = "", *, tinte
         Image(IMAGES[name], f"../{file}", {name: "r" if name == "roughness" else "rgb"}, fallback=fallbacks[name])
         for name, (file, _) in found.items()
     ]
-    values: dict[str, Any] = {} if found else {"diffuseColor": None if tinted else look.color}
+    values: dict[str, Any] = {} if found else {"diffuseColor": None}
     if "roughness" not in found:
         values["roughness"] = look.roughness
     values["metallic"] = look.metallic
@@ -82,17 +82,17 @@ def tint_material(pen: Pen, path: str, base: Look, look: Look) -> None:
 
 def write_looks(
     pen: Pen, looks: Mapping[str, Look], bindings: Mapping[str, str], scope: str = LOOKS, also: Iterable[str] = (),
-    harmony: str = "", tinted: bool = False,
+    harmony: str = "",
 ) -> None:  # fmt: skip
     """Define every look that is bound, and bind it.
 
     `pen`: writes the opinions, as overs on whatever is bound. `looks`: material name -> look. `bindings`: prim path of
     a mesh or subset -> material name. `scope`: path of the prim that the materials stand below. `also`: names of looks
-    that are defined, too, though another layer binds them. `harmony`, `tinted`: see `define_material`.
+    that are defined, too, though another layer binds them. `harmony`: see `define_material`.
     """
     pen.define(scope, "Scope")
     for name in sorted({*bindings.values(), *also}):
-        define_material(pen, f"{scope}/{name}", looks[name], harmony, tinted=tinted)
+        define_material(pen, f"{scope}/{name}", looks[name], harmony)
     for path, name in bindings.items():
         pen.bind(path, f"{scope}/{name}")
 

@@ -372,7 +372,7 @@ def test_a_palette_turns_images_and_plain_colours_alike_in_both_kinds_of_network
     tables = {word: {slot: look(word, slot) for slot in slots} for word in ("oak", "walnut")}
     pen = Pen.blank("Room")
     for slot, one in tables["oak"].items():
-        define_material(pen, f"/Room/Looks/{slot}", one, "oak", tinted=True)
+        define_material(pen, f"/Room/Looks/{slot}", one, "oak")
     write_palettes(pen, "oak", tables)
     write_networks(pen, "oak", tables)
     stage = Usd.Stage.Open(pen.layer)
