@@ -14,9 +14,9 @@ from pxr import Sdf
 from echomodel.boxes2d import CORNERS, turned
 from echomodel.dressing import KINDS, usual_size
 from echomodel.dressing import thing as solids_of
+from echomodel.floors import AT_WALL
 from echomodel.openings import Opening, inward_normal
 from echomodel.rules import verdicts
-from echomodel.rules.placements import AT_WALL
 from echomodel.vocabulary import vocabulary
 from echousd.draw.sight import Furniture
 from echousd.dressing import floors, tabletops, upholstery, walls

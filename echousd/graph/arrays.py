@@ -9,9 +9,8 @@ from contextlib import contextmanager
 import numpy as np
 
 from echomodel.boxes import Boxes
-from echomodel.graph import GraphBatch
+from echomodel.graph import GraphBatch, Stated
 from echomodel.randomness import Noise
-from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 

@@ -6,15 +6,16 @@ import warnings
 
 import numpy as np
 
+from echomodel.late import Late
 from echomodel.objective.faults import ROUNDING
 from echomodel.rules import fronts, judged, margins
 from echomodel.rules.geometry import BoxesLike, Spread
-from echomodel.rules.placements import placement_margins
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import floor_centre, stated_placements, triplets_of
 from echousd.place.geometry import Collision, collisions, pair_indices
 from echousd.room import LayoutOutcome, RoomData, Verdict
 
+placement_margins = Late("echomodel.rules.placements:placement_margins")
 STATES = {1: "kept", 0: "broken", -1: "unmeasured"}
 
 
@@ -61,6 +62,8 @@ def unbroken(graph: SceneGraph, boxes: BoxesLike) -> set[int]:
 
 
 def _placement_verdicts(graph: SceneGraph, boxes: BoxesLike) -> tuple[Verdict, ...]:
+    if not graph.placements:
+        return ()
     categories = [node.category for node in graph.nodes]
     margin = placement_margins(Spread.of(boxes), stated_placements(graph), graph.room.corners, categories).tolist()
     return tuple(

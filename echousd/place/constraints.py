@@ -14,17 +14,17 @@ import numpy as np
 
 from echomodel.boxes2d import CORNERS, axes, hull
 from echomodel.floors import signed_distance
+from echomodel.graph import Stated
 from echomodel.late import Late
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, allowed_overlap
 from echomodel.rules import rule_set
-from echomodel.rules.geometry import PairGeometry
+from echomodel.rules.geometry import PairGeometry, Spread
 from echomodel.rules.margins import pair_margins
-from echomodel.rules.placements import Spread, Stated, margin_of
 from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import COLUMNS, PLAN, SIDES, parting
 from echousd.place.problem import Problem
 
-csr_array = Late("scipy.sparse:csr_array")
+csr_array, margin_of = Late("scipy.sparse:csr_array"), Late("echomodel.rules.placements:margin_of")
 KINDS = RELATION, PLACEMENT, COLLISION, FLOOR, OVERHANG, WALL, SUPPORT, CEILING = range(8)  # from `WALL` on equalities
 MANY = 60  # boxes beyond which gradients are sparse
 PART = 0.002  # metres that pairs are parted farther than they may overlap

@@ -14,10 +14,9 @@ import numpy as np
 
 from echomodel.arrays import norm
 from echomodel.boxes2d import footprints, seen
-from echomodel.floors import signed_distance
+from echomodel.floors import Walls, signed_distance
 from echomodel.objective.support import allowed_overlap
 from echomodel.openings import edge_lengths, signed_area
-from echomodel.rules.placements import Walls
 
 if TYPE_CHECKING:
     from echousd.place.problem import Problem

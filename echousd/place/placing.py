@@ -34,7 +34,7 @@ from echousd.place.search import Arranged, Search
 from echousd.place.solver import Conflict, PlaceConfig, conflicts, solve, unmet
 
 if TYPE_CHECKING:
-    from echomodel.rules.placements import Stated
+    from echomodel.graph import Stated
     from echousd.graph import SceneGraph
 
 FULL = 0.3  # share of a floor that is covered from which on smaller furniture is tried

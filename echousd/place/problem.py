@@ -18,7 +18,7 @@ from echousd.place.distances import BEHIND, kept_behind
 from echousd.place.geometry import Floor, pair_indices
 
 if TYPE_CHECKING:
-    from echomodel.rules.placements import Stated
+    from echomodel.graph import Stated
 
 WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it stands free
 WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's normal does not lean on it
@@ -163,7 +163,7 @@ def problem_of(
         The others as `echousd.place.place_boxes`.
     """
     from echomodel.rules import measured
-    from echomodel.rules.placements import Spread
+    from echomodel.rules.geometry import Spread
 
     words = tuple(vocabulary().category(word).name for word in categories)
     told = np.flatnonzero(np.isin(triplets[:, 1], sorted(measured(rules))))

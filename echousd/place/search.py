@@ -21,7 +21,7 @@ from echomodel.objective.copies import copies_of, looks_at
 from echomodel.objective.plan import Found, found, nobody
 from echomodel.objective.table import COST
 from echomodel.rules import margins
-from echomodel.rules.placements import Spread
+from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import beyond, depths
 from echousd.place.problem import Problem

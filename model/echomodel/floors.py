@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from echomodel.arrays import Array, at_least, at_most, dot, kit
+import numpy as np
+
+from echomodel.arrays import Array, at_least, at_most, cast, dot, kit
 from echomodel.boxes2d import outline
 
 SIDES = ((-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0))  # corners and middles of a footprint
+AT_WALL = 0.15  # metres between a wall and the side that stands against it
 
 
 def known(floor: Array) -> Array:
@@ -72,3 +75,32 @@ def footprint(size: Array, position: Array, yaw: Array) -> Array:
     Returns (N, 8, 2) float32, x and z, metres. Walls that enter between two of these points are not met.
     """
     return outline(size[:, ::2] / 2, yaw, SIDES) + position[:, None, ::2]
+
+
+class Walls:
+    """The walls of a floor: starts, directions and inward normals (E, 2), lengths (E,), how far the room turns at each
+    start, as a sine, below 0 at corners that point into it, and which are `inner` corners (E,).
+
+    Arguments:
+        floor: (E, 2) float, corners of the floor in either order, metres.
+    """
+
+    def __init__(self, floor: np.ndarray) -> None:
+        self.start = np.array(floor, float)
+        edge = np.concatenate([self.start[1:], self.start[:1]]) - self.start
+        self.length = np.maximum(np.hypot(edge[:, 0], edge[:, 1]), 1e-9)
+        self.along = edge / self.length[:, None]
+        sign = 1.0 if signed_area(self.start[None])[0] > 0 else -1.0
+        self.normal = sign * np.stack([-self.along[:, 1], self.along[:, 0]], 1)
+        before = np.concatenate([self.along[-1:], self.along[:-1]])
+        self.turn = sign * (before[:, 0] * self.along[:, 1] - before[:, 1] * self.along[:, 0])
+        self.inner = self.turn > 0.1
+
+    def away(self, points: Array) -> Array:
+        """(..., E) distance of points (..., 2) from the line of every wall, inwards positive."""
+        return dot(points[..., None, :] - cast(self.start, points), cast(self.normal, points))
+
+    def beside(self, points: Array) -> Array:
+        """(..., E) how far points (..., 2) lie from the nearer end of every wall, along it; negative: past it."""
+        at = dot(points[..., None, :] - cast(self.start, points), cast(self.along, points))
+        return kit(points).minimum(at, cast(self.length, points) - at)

@@ -18,6 +18,19 @@ if TYPE_CHECKING:
     from echomodel.roomboxes import RoomBoxes
 
 
+@dataclass(frozen=True)
+class Stated:
+    """A placement of one box.
+
+    Arguments:
+        placement: name of its row. subject: number of the box. others: numbers of the boxes that it names.
+    """
+
+    placement: str
+    subject: int
+    others: tuple[int, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class GraphBatch:
     """S scene graphs with N nodes and E triplets in all, packed as one disjoint graph.

@@ -9,12 +9,11 @@ import numpy as np
 
 from echomodel.arrays import Array, at_least, cast, device_of, full, kit, on_device
 from echomodel.boxes import Boxes
-from echomodel.graph import GraphBatch
+from echomodel.graph import GraphBatch, Stated
 from echomodel.objective import Plan
 from echomodel.objective.access import askew
 from echomodel.objective.support import ON_CEILING, ON_FLOOR
 from echomodel.openings import HINGES, STEP, Opening, inward_normal
-from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 
 ALMOST = np.radians(3.0)  # off a quarter turn to a wall: nobody turns furniture by so little

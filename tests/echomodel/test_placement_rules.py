@@ -7,7 +7,8 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.rules.placements import WAYS, Stated, placement_margins
+from echomodel.graph import Stated
+from echomodel.rules.placements import WAYS, placement_margins
 
 FLOOR = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
 NOTCHED = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 0.0), (0.0, 0.0), (0.0, 2.0), (-2.0, 2.0)])

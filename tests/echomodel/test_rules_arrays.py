@@ -9,10 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echomodel.boxes import Boxes
+from echomodel.floors import Walls
+from echomodel.graph import Stated
 from echomodel.rules import RULE_SETS, margins, rule_set, verdicts
-from echomodel.rules.geometry import pairs
+from echomodel.rules.geometry import Spread, pairs
 from echomodel.rules.margins import pair_margins
-from echomodel.rules.placements import RULES, Spread, Stated, Walls, margin_of, placement_margins
+from echomodel.rules.placements import RULES, margin_of, placement_margins
 from echomodel.vocabulary import vocabulary
 
 SEEDS, WORDS = st.integers(0, 10_000), vocabulary()

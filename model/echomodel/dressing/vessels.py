@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.plants import grown, species
 from echomodel.furniture.solids import Lathe, Solid, ball, rotation, tube
+from echomodel.late import Late
+
+grown, species = Late("echomodel.furniture.plants:grown"), Late("echomodel.furniture.plants:species")
 
 
 def vessel(outer: np.ndarray, wall: float, material: str, inside: float = 0.1) -> Lathe:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, both, box, of_role
-from echomodel.furniture.plants import grown, species
 from echomodel.furniture.solids import Solid, tube, turned
 from echomodel.furniture.style import Choices, Style
+from echomodel.late import Late
 
+grown, species = Late("echomodel.furniture.plants:grown"), Late("echomodel.furniture.plants:species")
 SMALL = 0.55  # metres: lower plants are those of tables
 PANEL = (16 / 9, 21 / 9)  # width over height of a screen with its bezel
 

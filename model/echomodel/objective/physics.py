@@ -8,13 +8,15 @@ from collections.abc import Callable
 import numpy as np
 
 from echomodel.arrays import Array, at_least, full, held, put
-from echomodel.floors import edges, footprint, signed_area
+from echomodel.floors import Walls, edges, footprint, signed_area
+from echomodel.late import Late
 from echomodel.objective.plan import FAR, Found, Plan, found, joined, nobody
 from echomodel.objective.support import ON_CEILING, ON_FLOOR
 from echomodel.rules import RULE_SETS, rule_set
-from echomodel.rules.placements import Spread, Walls, margin_of
+from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
 
+margin_of = Late("echomodel.rules.placements:margin_of")
 TOUCH = 0.01  # metres that two boxes, a box and a wall, a box and its carrier may be off
 
 

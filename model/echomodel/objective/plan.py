@@ -12,10 +12,10 @@ import numpy as np
 
 from echomodel.arrays import Array, at_least, cast, dot, full, held, kit, least_of, norm, on_device, pairs_in, rows
 from echomodel.floors import edges, known, signed_area, signed_distance
+from echomodel.graph import Stated
 from echomodel.objective.support import carriers, shared_fraction
 from echomodel.openings import Opening
 from echomodel.rules.geometry import BoxesLike, PairGeometry, pairs
-from echomodel.rules.placements import Stated
 from echomodel.rules.sets import rule_set
 from echomodel.vocabulary import Category, vocabulary
 

@@ -6,65 +6,25 @@ As relations beyond SG-FRONT they are measured, guided to, placed and checked; t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import reduce
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, cast, dot, kit, norm
+from echomodel.arrays import Array, at_least, cast, kit, norm
 from echomodel.boxes2d import along_sides, seen
-from echomodel.openings import signed_area
+from echomodel.floors import AT_WALL, Walls
 from echomodel.rules.geometry import BoxesLike, Spread
 from echomodel.rules.margins import floating
 from echomodel.vocabulary import Category, vocabulary
 
-AT_WALL = 0.15  # metres between a wall and the side that stands against it
+if TYPE_CHECKING:
+    from echomodel.graph import Stated
+
 AT_CORNER = 0.25  # metres between each wall of a corner and what stands in it
 WITHIN = 0.05  # metres by which a centre may leave the space between two others
 DETOUR = 0.5  # metres that the way from one to the other is longer by way of it, at most
 WAYS = np.stack([way(np.arange(48) * (np.pi / 24)) for way in (np.cos, np.sin)])  # from which that space is looked at
-
-
-@dataclass(frozen=True)
-class Stated:
-    """A placement of one box.
-
-    Arguments:
-        placement: name of its row. subject: number of the box. others: numbers of the boxes that it names.
-    """
-
-    placement: str
-    subject: int
-    others: tuple[int, ...] = ()
-
-
-class Walls:
-    """The walls of a floor: starts, directions and inward normals (E, 2), lengths (E,), how far the room turns at each
-    start, as a sine, below 0 at corners that point into it, and which are `inner` corners (E,).
-
-    Arguments:
-        floor: (E, 2) float, corners of the floor in either order, metres.
-    """
-
-    def __init__(self, floor: np.ndarray) -> None:
-        self.start = np.array(floor, float)
-        edge = np.concatenate([self.start[1:], self.start[:1]]) - self.start
-        self.length = np.maximum(np.hypot(edge[:, 0], edge[:, 1]), 1e-9)
-        self.along = edge / self.length[:, None]
-        sign = 1.0 if signed_area(floor) > 0 else -1.0
-        self.normal = sign * np.stack([-self.along[:, 1], self.along[:, 0]], 1)
-        before = np.concatenate([self.along[-1:], self.along[:-1]])
-        self.turn = sign * (before[:, 0] * self.along[:, 1] - before[:, 1] * self.along[:, 0])
-        self.inner = self.turn > 0.1
-
-    def away(self, points: Array) -> Array:
-        """(..., E) distance of points (..., 2) from the line of every wall, inwards positive."""
-        return dot(points[..., None, :] - cast(self.start, points), cast(self.normal, points))
-
-    def beside(self, points: Array) -> Array:
-        """(..., E) how far points (..., 2) lie from the nearer end of every wall, along it; negative: past it."""
-        at = dot(points[..., None, :] - cast(self.start, points), cast(self.along, points))
-        return kit(points).minimum(at, cast(self.length, points) - at)
 
 
 Measure = Callable[[Spread, Sequence[Spread], Walls, Category], Array]

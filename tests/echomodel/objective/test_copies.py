@@ -9,11 +9,11 @@ import pytest
 import torch
 from plans import tensors_of
 
+from echomodel.graph import Stated
 from echomodel.objective import TERMS, copies, plan_of
 from echomodel.objective.copies import copies_of
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
-from echomodel.rules.placements import Stated
 
 ROOMS = [
     room

@@ -10,8 +10,8 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
+from echomodel.graph import Stated
 from echomodel.objective import KINDS, TERMS, faults_of, missed, plan_of
-from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 
 DOCS = Path(__file__).parents[3] / "docs"

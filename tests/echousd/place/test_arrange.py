@@ -129,7 +129,7 @@ def test_a_stool_comes_to_the_desk_that_has_no_other_seat():
 
 
 def test_beds_that_share_a_nightstand_stand_beside_each_other():
-    from echomodel.rules.placements import Stated
+    from echomodel.graph import Stated
 
     words = ["single_bed", "single_bed", "nightstand"]
     size = [(0.9, 0.9, 2.0), (0.9, 0.9, 2.0), (0.45, 0.5, 0.4)]

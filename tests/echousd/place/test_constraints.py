@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
+from echomodel.graph import Stated
 from echomodel.rules import margins, measured
-from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place.constraints import KINDS, OVERHANG, PLACEMENT, RELATION, SLACK, Constraints, Linearised
 from echousd.place.geometry import COLUMNS

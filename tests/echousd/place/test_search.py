@@ -9,11 +9,11 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
+from echomodel.graph import Stated
 from echomodel.objective import TERMS, plan_of
 from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, margins
-from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place.placing import place_boxes
 from echousd.place.problem import problem_of
