@@ -102,15 +102,9 @@ def digests_of(jobs: Mapping[str, Job]) -> dict[str, str]:
 
 
 def write_rooms(
-    plan: Plan,
-    output: Path,
-    options: RoomOptions,
-    *,
-    outside: Sequence[str] = (),
-    force: bool = False,
-    workers: int | None = None,
-    tell: Callable[[int, int], None] = lambda done, total: None,
-) -> Made:
+    plan: Plan, output: Path, options: RoomOptions, *, outside: Sequence[str] = (), force: bool = False,
+    workers: int | None = None, tell: Callable[[int, int], None] = lambda done, total: None,
+) -> Made:  # fmt: skip
     """Make a home in a folder: rooms whose graph, place in the plan and options are as before keep their bytes.
 
     Arguments:

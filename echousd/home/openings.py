@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -103,23 +104,23 @@ def openings_of(
     """
     by_name = {floor.name: floor for floor in floors}
     wanted = [r for r in home.relations if r.row.passes and r not in done]
-    options = [_passage_options(home, by_name, *r.pair, r.predicate) for r in wanted]
+    options = [[*_passages(home, by_name, *r.pair, r.predicate)] for r in wanted]
     if not any(there.values()):
-        options.append(_front_doors(by_name[home.entered_by], floors))
+        options.append([*_front_doors(by_name[home.entered_by], floors)])
     order = sorted(range(len(options)), key=lambda number: len(options[number]))
-    fixed = [_Hole(((room, opening),), 0.0) for room, own in there.items() for opening in own]
+    fixed = [_Hole(((by_name[room], opening),), 0.0) for room, own in there.items() for opening in own]
     picked: dict[int, _Hole] = {}
     for _ in range(2):  # the second time, each knows where all the others are
         for number in order:
             others = [*fixed, *(hole for which, hole in picked.items() if which != number)]
-            costs = [hole.cost + sum(hole.meets(other, by_name) for other in others) for hole in options[number]]
+            costs = [hole.cost + sum(map(hole.meets, others)) for hole in options[number]]
             if costs:
                 picked[number] = options[number][int(np.argmin(costs))]
     found = {floor.name: list(there.get(floor.name, ())) for floor in floors}
     for number in sorted(picked):
-        for room, opening in picked[number].sides:
-            name = numbered(opening.kind, [one.name for one in found[room]])
-            found[room].append(replace(opening, name=name))
+        for floor, opening in picked[number].sides:
+            own = found[floor.name]
+            own.append(replace(opening, name=numbered(opening.kind, [one.name for one in own])))
     for floor in floors:
         found[floor.name] += () if there.get(floor.name) else _windows(home, floor, floors, found[floor.name])
     return {name: tuple(own) for name, own in found.items()}
@@ -129,20 +130,23 @@ def openings_of(
 class _Hole:
     """A hole in a wall as the one or two rooms have it, and what speaks against it."""
 
-    sides: tuple[tuple[str, Opening], ...]
+    sides: tuple[tuple[Floor, Opening], ...]
     cost: float
 
-    def meets(self, other: _Hole, floors: dict[str, Floor]) -> float:
+    @cached_property
+    def ways(self) -> list[shapely.Polygon]:
+        """What must stay free on each of its sides."""
+        return [shapely.Polygon(free_area(floor.corners, opening)) for floor, opening in self.sides]
+
+    def meets(self, other: _Hole) -> float:
         """What speaks against two holes together: swings that cross, holes in one place."""
         out = 0.0
-        for room, mine in self.sides:
-            for same, theirs in other.sides:
-                if room == same:
+        for number, (floor, mine) in enumerate(self.sides):
+            for side, (same, theirs) in enumerate(other.sides):
+                if floor is same:
                     if overlap(mine, theirs) > -2 * JAMB:
                         out += 100.0
-                    corners = floors[room].corners
-                    areas = [shapely.Polygon(free_area(corners, one)) for one in (mine, theirs)]
-                    out += 30.0 * areas[0].intersection(areas[1]).area
+                    out += 30.0 * self.ways[number].intersection(other.ways[side]).area
         return out
 
 
@@ -154,9 +158,8 @@ def _places(low: float, high: float, width: float) -> np.ndarray:
     return np.unique(np.round([*np.arange(first, last, STEP), last, (first + last) / 2], 3))
 
 
-def _passage_options(home: HomeGraph, floors: dict[str, Floor], one: str, other: str, predicate: str) -> list[_Hole]:
+def _passages(home: HomeGraph, floors: dict[str, Floor], one: str, other: str, predicate: str) -> Iterator[_Hole]:
     """All holes that a relation could be kept by."""
-    out: list[_Hole] = []
     for facing in facings(floors[one], floors[other]):
         if predicate == "open_to":
             span = facing.high - facing.low - 2 * JAMB
@@ -164,13 +167,12 @@ def _passage_options(home: HomeGraph, floors: dict[str, Floor], one: str, other:
             ends = (facing.low + JAMB, facing.high - JAMB - width)  # which leaves one whole wall beside it
             for offset in ends if width > 0.8 else ():
                 mine = Opening("passage", "passage", facing.edge, round(offset, 3), round(width, 3), PASSAGE[1])
-                out.append(_Hole(((one, mine), (other, facing.across(mine))), -width))
+                yield _Hole(((floors[one], mine), (floors[other], facing.across(mine))), -width)
             continue
         for into in facings(floors[one], floors[other]), facings(floors[other], floors[one]):
             for side in into:
                 if {side.edge, side.other_edge} == {facing.edge, facing.other_edge}:
-                    out += _leaves(home, floors, side)
-    return out
+                    yield from _leaves(home, floors, side)
 
 
 def _leaves(home: HomeGraph, floors: dict[str, Floor], side: Facing) -> Iterator[_Hole]:
@@ -181,15 +183,14 @@ def _leaves(home: HomeGraph, floors: dict[str, Floor], side: Facing) -> Iterator
     for mine, corner in _doors(floor, side, *DOOR):
         outside = shapely.Polygon(free_area(floor.corners, mine)).difference(room).area
         cost = 0.3 * hub + 0.25 * corner + 50.0 * outside
-        yield _Hole(((side.one, mine), (side.other, side.across(mine))), cost)
+        yield _Hole(((floor, mine), (floors[side.other], side.across(mine))), cost)
 
 
-def _front_doors(floor: Floor, floors: Sequence[Floor]) -> list[_Hole]:
-    out: list[_Hole] = []
+def _front_doors(floor: Floor, floors: Sequence[Floor]) -> Iterator[_Hole]:
     for side in outer_spans(floor, floors):
         length = float(edge_lengths(floor.corners)[side.edge])
-        out += [_Hole(((floor.name, d),), 0.1 * c + 0.05 * length) for d, c in _doors(floor, side, *FRONT_DOOR)]
-    return out
+        for door, corner in _doors(floor, side, *FRONT_DOOR):
+            yield _Hole(((floor, door),), 0.1 * corner + 0.05 * length)
 
 
 def _doors(floor: Floor, side: Facing, width: float, height: float) -> Iterator[tuple[Opening, float]]:

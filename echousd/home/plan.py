@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
@@ -19,7 +19,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError, SceneGraph
 from echousd.home.graph import HomeGraph, HomeRelation, HomeRoom
 from echousd.home.openings import Floor, counterpart, facings, openings_of
-from echousd.home.solve import CORNERS, FACADE, Cells, Problem, Wish, scaled, solved
+from echousd.home.solve import CORNERS, EFFORTS, FACADE, Cells, Problem, Wish, scaled, solved
 from echousd.shapes.walls import outline as offset
 
 INNER, OUTER = 0.12, 0.24  # metres, thickness of walls between rooms and of outer walls
@@ -104,14 +104,15 @@ class Plan:
 
     def broken(self) -> tuple[str, ...]:
         """Relations of the graph that the plan does not keep, measured on its floors and openings."""
-        return tuple(str(relation) for relation in self.home.relations if not self._keeps(relation))
+        joined = {(frozenset(pair), opening.kind) for pair, opening in ways(self)}
+        return tuple(str(relation) for relation in self.home.relations if not self._keeps(relation, joined))
 
-    def _keeps(self, relation: HomeRelation) -> bool:
-        row, (one, other) = relation.row, relation.pair
+    def _keeps(self, relation: HomeRelation, joined: Container[tuple[frozenset[str], str]]) -> bool:
+        row = relation.row
         a, b = (shapely.Polygon(self.cells[name]) for name in relation.pair)
         if row.passes:
             kinds = {"door", "passage"} if relation.predicate == "door" else {"passage"}
-            return any({*pair} == {one, other} and opening.kind in kinds for pair, opening in ways(self))
+            return any((frozenset(relation.pair), kind) in joined for kind in kinds)
         if row.wall:
             return bool(shapely.length(shapely.intersection(a, b)) >= row.wall - 1e-6)
         if row.symmetric:
@@ -171,12 +172,13 @@ def plan_home(home: HomeGraph, *, seed: int = 0, before: Plan | None = None) -> 
     if told:
         raise GraphError(told[0])
     first = _problem(home, seed, before)
-    for problem in _attempts(home, first):
-        state, lie = solved(problem)
+    for effort, problem in itertools.product(EFFORTS, _attempts(home, first)):
+        state, lie = solved(problem, effort)
         if state == "solved":
-            plan = _finished(home, lie)
+            plan = _walled(home, lie)
             if home.area and first.free and abs(plan.area / home.area - 1) > 0.02:
-                plan = _finished(home, scaled(problem, lie, home.area / plan.area))
+                plan = _walled(home, scaled(problem, lie, home.area / plan.area))
+            plan = with_openings(plan)
             if not plan.broken():
                 return plan
     raise GraphError(_unplannable(first))
@@ -408,15 +410,15 @@ def _unplannable(problem: Problem) -> str:
 # -- from cells to floors ----------------------------------------------------------------------------------------------
 
 
-def _finished(home: HomeGraph, lie: Cells) -> Plan:
-    """Floors between walls of real thickness, with doors and windows, about the middle of the home."""
+def _walled(home: HomeGraph, lie: Cells) -> Plan:
+    """Floors between walls of real thickness, without openings, about the middle of the home."""
     shapes = {name: shapely.union_all([shapely.box(*rect) for rect in own]) for name, own in lie.items()}
     whole = shapely.union_all([*shapes.values()])
     low, high = np.array(whole.bounds).reshape(2, 2)
     shift = -((low + high) / 2).round(2) if home.outline is None else np.array(home.outline).min(0)
     cells = {name: _corners(shape) + shift for name, shape in shapes.items()}
     walls = {name: _thickness(cells[name] - shift, whole) for name in cells}
-    return with_openings(Plan(home, cells, walls, {name: () for name in cells}, lie))
+    return Plan(home, cells, walls, {name: () for name in cells}, lie)
 
 
 def with_openings(plan: Plan, before: HomeGraph | None = None) -> Plan:

@@ -25,7 +25,9 @@ ELL = 1.4  # metres of either arm of an L
 MORE = 0.4  # square metres that a larger room has more, at least
 GAP = 0.1  # metres between rooms that share no wall, at least
 FINE = 0.05  # metres that wall lines are moved by
-EFFORT = 1.2  # of the solver's own clock, which counts work and is the same on every machine; about seconds
+# Of the solver's own clock, which counts work and is the same on every machine, about half a second each. What is not
+# found soon is found late or never: a milder problem is sooner solved than the same one longer sought.
+EFFORTS = (0.2, 1.2)
 
 
 @dataclass(frozen=True)
@@ -78,15 +80,15 @@ class Problem:
         return extents / np.maximum((extents / step).round(), 1)
 
 
-def solved(problem: Problem) -> tuple[str, Cells]:
-    """`solved`, `impossible` (proven) or `unknown` (not within its effort), and the cells."""
+def solved(problem: Problem, effort: float = EFFORTS[-1]) -> tuple[str, Cells]:
+    """`solved`, `impossible` (proven) or `unknown` (not within that effort), and the cells."""
     cp = extra("ortools.sat.python.cp_model", "plans need a constraint solver", "home", GraphError)
     model, parts = _model(cp, problem)
     solver = cp.CpSolver()
     solver.parameters.num_workers = 1
     solver.parameters.random_seed = problem.seed
     solver.parameters.linearization_level = 0  # plans of ten rooms four times as fast
-    solver.parameters.max_deterministic_time = EFFORT
+    solver.parameters.max_deterministic_time = effort
     status = solver.Solve(model)
     if status not in (cp.OPTIMAL, cp.FEASIBLE):
         return ("impossible" if status == cp.INFEASIBLE else "unknown"), {}

@@ -10,9 +10,11 @@ from hypothesis import assume, given, settings
 
 from echomodel.openings import segment, signed_area, swing_area
 from echousd.graph import GraphError
+from echousd.home import plan as planning
 from echousd.home.given import next_plan
 from echousd.home.graph import HomeGraph
 from echousd.home.plan import INNER, OUTER, conflicts, plan_home, plans, ways
+from echousd.home.solve import EFFORTS, solved
 from echousd.home.stages import home_layer
 
 FLAT = "kitchen open_to living, hall door living, hall door bedroom*2, hall door bathroom"
@@ -169,6 +171,16 @@ def test_what_no_plan_keeps_is_a_smallest_set(kept, more):
     for left_out in kept[::2]:
         rest = [one for one in kept if one != left_out]
         assert plan_home(HomeGraph.from_words(", ".join([*more, *rest]))).broken() == (), f"without {left_out}"
+
+
+def test_a_hall_of_nine_doors_is_planned_without_a_long_search(monkeypatch):
+    efforts = []
+    monkeypatch.setattr(planning, "solved", lambda problem, effort: efforts.append(effort) or solved(problem, effort))
+    rooms = ["kitchen", "living", "bathroom*2", "study", "bedroom*4"]
+    plan = plan_home(HomeGraph.from_words(", ".join(f"hall door {room}" for room in rooms), area=140))
+    assert plan.broken() == ()
+    assert len(efforts) > 1, "the first form of the problem was found at once: a hall of more doors"
+    assert {*efforts} == {EFFORTS[0]}
 
 
 def test_without_the_solver_it_says_what_to_install(monkeypatch):
