@@ -12,7 +12,7 @@ import shapely
 
 from echomodel.boxes2d import footprints, seen, turned
 from echomodel.dressing import KINDS
-from echomodel.openings import Opening, free_area
+from echomodel.openings import STEP, Opening, free_area, zone
 from echomodel.vocabulary import Category, RoomStyle, vocabulary
 from echousd.dressing.stories import TABLE, Story, story
 from echousd.shapes.geometry import Geometry
@@ -113,7 +113,8 @@ class Setting:
 
     def __post_init__(self) -> None:
         self.room = shapely.Polygon(self.floor)
-        self.wider = self.room.buffer(0.005)
+        french = [zone(self.floor, o, STEP) for o in self.openings if o.kind == "window" and not o.sill]
+        self.wider = self.room.buffer(0.005).difference(shapely.union_all([shapely.Polygon(way) for way in french]))
         self.ways = [(shapely.Polygon(free_area(self.floor, o)), o) for o in self.openings if o.kind != "window"]
 
     def rng(self, *words: str) -> np.random.Generator:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from echomodel.boxes2d import footprints
-from echomodel.openings import signed_area, sliding, swing_area
+from echomodel.openings import STEP, WINDOW_DEPTH, Opening, signed_area, sliding, swing_area, zone
 from echomodel.sizes import footprint
 from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError
@@ -14,6 +16,8 @@ from echousd.graph.scene import SceneGraph
 
 LARGEST = 10_000.0  # m² of the box around a floor; what is rasterized on it takes 0.1 MB for each
 SLIDING = 0.08  # share of rooms without a style whose door slides, where there is room for it
+FRENCH, TALL = 0.15, 0.15  # likewise, whose windows reach down to the floor, or nearly
+LOW = 0.3  # metres, sill of tall windows
 CROWDED = 0.62  # share of the floor, from which on a person is told
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -104,6 +108,33 @@ def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGr
     if not use and not len(boxes[0]) and _generator(seed, "sliding").random() < share:
         placed = tuple(one if one in graph.room.openings else sliding(corners, one, placed) for one in placed)
     return graph.with_room(openings=placed)
+
+
+def with_lowered_windows(graph: SceneGraph, stated: SceneGraph, boxes: Arrays, seed: int) -> SceneGraph:
+    """The graph with French or tall windows, by its style, instead of those that nobody stated and nothing is before.
+
+    Arguments:
+        stated: the graph as it was before openings were proposed.
+        boxes: size (n, 3), position (n, 3) of the bottom centre, metres, and yaw (n,), of all that stands there.
+    """
+    import shapely
+
+    corners, words, draw = graph.room.corners, vocabulary(), _generator(seed, "windows").random()
+    style = words.known_style(graph.room.style)
+    french, tall = (style.french, style.tall) if style else (FRENCH, TALL)
+    wanted = [(0.0, STEP)] * (draw < french) + [(LOW, WINDOW_DEPTH)] * (draw < french + tall)  # sills, and free before
+    if corners is None or not wanted or words.room_type(graph.room.type).use:
+        return graph
+    plans, (size, position, _) = shapely.polygons(footprints(*boxes)), boxes
+
+    def lowered(one: Opening) -> Opening:
+        for sill, deep in wanted if one.kind == "window" and one not in stated.room.openings else ():
+            before = shapely.intersects(plans, shapely.Polygon(zone(corners, one, deep)))
+            if sill < one.sill and not (before & (position[:, 1] + size[:, 1] > sill)).any():
+                return replace(one, sill=sill, height=one.height + one.sill - sill)
+        return one
+
+    return graph.with_room(openings=tuple(map(lowered, graph.room.openings)))
 
 
 def _fixed(graph: SceneGraph) -> Arrays:

@@ -18,7 +18,7 @@ from echousd.graph import SceneGraph, load_graph
 from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.consistency import faults_of
 from echousd.graph.files import STAGE_FORMS
-from echousd.graph.floors import check_doors, check_space, with_plan, with_wider_floor
+from echousd.graph.floors import check_doors, check_space, with_lowered_windows, with_plan, with_wider_floor
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
 from echousd.make.layouts import (
@@ -150,6 +150,7 @@ def generate(
         graph = with_wider_floor(graph, footprints(*plan).reshape(-1, 2))
     if not stated.room.openings:
         graph = with_free_openings(graph, layouts, seed)
+    graph = with_lowered_windows(graph, stated, plan, seed)
     made = mixed_shapes(replace(request, graph=graph, retrieved=models), shapes)
     floor = room_floor(graph, layouts)
     geometry = {name: made.geometry[owner] for name, owner in made.owners.items()}

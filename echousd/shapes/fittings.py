@@ -23,6 +23,7 @@ LINING = 0.03
 LEAF, OVER, TRACK = 0.04, 0.03, 0.07  # thickness of a leaf; what one that slides covers beside its hole; above it
 GAP = 0.004
 FRAME, BAR, PANE = 0.055, 0.022, 0.42  # width of a window's frame and of its glazing bars, and about what lies between
+FOOT = 0.22  # height of the rail at the foot of a French window
 PLATE, REACH = 0.085, 0.12  # side of a switch's plate, and how far beside a door's trim it is
 BAY = (0.35, 0.45)  # of a bay window: along the wall to where its front begins, and how far that is before it
 RAIL = (0.12, 0.09, 0.25)  # curtain rail: above the window, before the wall, beyond its sides
@@ -172,13 +173,13 @@ def door_track(opening: Opening, way: float) -> Mesh:
 
 
 def window_frame(opening: Opening, kind: str = "plain") -> Mesh:
-    """The frame in the middle of the wall, with the bars of its `kind` of `WINDOWS`."""
+    """The frame in the middle of the wall, with the bars of its `kind` of `WINDOWS`; a leaf's foot in French ones."""
     w = (0.05, 0.11)
     start, end, low, top = opening.offset, opening.end, opening.sill, opening.sill + opening.height
-    inner, height = (start + FRAME, end - FRAME), (low + FRAME, top - FRAME)
+    inner, height = (start + FRAME, end - FRAME), (low + (FRAME if low else FOOT), top - FRAME)
     boards = [
         board((start, start + FRAME), (low, top), w), board((end - FRAME, end), (low, top), w),
-        board(inner, (low, low + FRAME), w), board(inner, (top - FRAME, top), w),
+        board(inner, (low, height[0]), w), board(inner, (top - FRAME, top), w),
     ]  # fmt: skip
     across = {"sash": low + 0.5 * opening.height, "transom": low + 0.7 * opening.height}.get(kind)
     if across:
@@ -186,6 +187,8 @@ def window_frame(opening: Opening, kind: str = "plain") -> Mesh:
     if opening.width > 1.05:
         middle = (start + end) / 2
         boards.append(board((middle - FRAME / 2, middle + FRAME / 2), (height[0], across or height[1]), w))
+        if not low:
+            boards.append(board((middle - 0.012, middle + 0.012), (0.98, 1.1), (0.02, 0.05)))
     if kind == "bars":
         thin = (0.062, 0.1)
         for lines, upright in ((inner, True), (height, False)):

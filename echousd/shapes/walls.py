@@ -84,7 +84,7 @@ def walls(
 def _bay(polygon: np.ndarray, openings: Sequence[Opening]) -> Opening | None:
     """The widest window that can stand out before its wall."""
     around = shapely.Polygon(polygon).buffer(WALL, join_style="mitre")
-    windows = [one for one in openings if one.kind == "window" and one.width >= BROAD]
+    windows = [one for one in openings if one.kind == "window" and one.sill and one.width >= BROAD]
     free = [shapely.Polygon(zone(polygon, one, -WALL - BAY[1])).difference(around).area for one in windows]
     can = [one for one, area in zip(windows, free, strict=True) if area > 0.98 * one.width * BAY[1]]
     return max(can, key=lambda one: one.width, default=None)
@@ -205,7 +205,7 @@ def _filled(
             *made("board", "trim", board),
             *made("body", "wall", body),
             *(one for number, pane in enumerate(glass) for one in made(f"glass{number or ''}", "glass", pane)),
-            *made("sill", "trim", fittings.window_sill(opening)),
+            *made("sill", "trim", fittings.window_sill(opening) if opening.sill else None),
             *made("rail", look, fittings.curtain_rail(opening, length, height, boxed=millwork.boxed), solid=False),
         )
         return ShellPart(name, "window", pieces)

@@ -229,6 +229,7 @@ class RoomStyle:
         family: of furniture making. kinds: (part, kinds of it) where the style has others than its family.
         palettes: harmonies. windows, doors, cornices: of the millwork (metres of a cornice's height, 0 = none).
         boxed, sliding, bays: shares of rooms whose curtains hang from behind boards, whose door slides, with a bay.
+        french, tall: shares of those whose windows reach down to the floor, or nearly, where nothing is before them.
         covers: what a wall behind a bed or sofa has, "" = nothing. floors: slots of those of wood or the like.
         beams: slots of what lies below the ceiling, "" = nothing.
         radiators, curtains, shelves: small things that stand under windows, hang before them, and on walls.
@@ -250,6 +251,8 @@ class RoomStyle:
     boxed: float = 0.0
     bays: float = 0.0
     sliding: float = 0.0
+    french: float = 0.0
+    tall: float = 0.0
     radiators: tuple[str, ...] = ("panel_radiator",)
     shelves: tuple[str, ...] = ("wall_shelf", "ledge", "box_shelf")
     kinds: tuple[tuple[str, tuple[str, ...]], ...] = ()

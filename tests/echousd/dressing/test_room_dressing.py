@@ -138,6 +138,15 @@ def test_a_window_without_room_for_curtains_has_a_blind_and_no_rail():
         assert sum(name.endswith("rail") for name in pieces) == rails
 
 
+def test_nothing_small_stands_in_the_way_out_through_a_french_window():
+    def free(sill, z):
+        window = Opening("window", "window", 0, 1.1, 1.8, 2.2 - sill, sill)
+        setting = Setting({}, SQUARE, (window,), 2.7, True, False, 0)
+        return setting.clear(Thing("basket", np.array([0.3, 0.4, 0.3]), np.array([0.0, 0.0, z]), 0.0))
+
+    assert [free(sill, z) for sill in (0.3, 0.0) for z in (-1.8, -1.4, -1.2)] == [True, True, True, False, False, True]
+
+
 @pytest.mark.parametrize(("tall", "x", "kind"), [(2.37, 1.4, "blind"), (2.2, 1.4, "curtain"), (2.37, 1.7, "curtain")])
 def test_no_rail_runs_into_what_stands_beside_a_window(tall, x, kind):
     window = Opening("window", "window", 0, 1.1, 1.8, 1.3, 0.9)  # its rail reaches to 1.15 at 2.32

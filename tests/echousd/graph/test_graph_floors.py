@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 import shapely
 
-from echomodel.openings import USUAL, Opening, free_area, segment, swing_area
+from echomodel.openings import USUAL, Opening, free_area, inward_normal, segment, swing_area
 from echomodel.rooms.runs import WORKTOP
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.floors import (
     check_space,
     with_floor,
+    with_lowered_windows,
     with_placed_openings,
     with_plan,
     with_plan_of,
@@ -90,6 +93,40 @@ def test_doors_slide_by_the_style_of_the_room_where_the_wall_beside_is_free() ->
             assert free.intersection(shapely.LineString(segment(room.corners, other))).length < 1e-3
     stated = GRAPH.with_room(size=(4.0, 3.2), style="industrial", openings=(Opening("d", "door", 0, 1.5, 0.9, 2.0),))
     assert {with_plan(stated, seed).room.openings[0].swing for seed in range(20)} == {"in"}
+
+
+def test_windows_reach_down_by_the_style_of_the_room_where_nothing_stands_before_them() -> None:
+    def lowered(boxes, style="japandi", room="bedroom", openings=()):
+        asked = GRAPH.replaced(room=RoomSpec(room, size=(4.0, 3.2), style=style, openings=openings))
+        planned = [with_placed_openings(asked, NOTHING, seed) for seed in range(60)]
+        made = [with_lowered_windows(graph, asked, boxes(graph), seed) for seed, graph in enumerate(planned)]
+        for before, after in ((a, b) for p, m in zip(planned, made, strict=True)
+                              for a, b in zip(p.room.openings, m.room.openings, strict=True)):  # fmt: skip
+            assert after.sill + after.height == pytest.approx(before.sill + before.height)
+            assert after == before or after.kind == "window"
+        return Counter(one.sill for graph in made for one in graph.room.openings if one.kind == "window")
+
+    def before(high, off):
+        def box(graph):
+            window = next(one for one in graph.room.openings if one.kind == "window")
+            near, far = segment(graph.room.corners, window)
+            x, z = (near + far) / 2 + (off + 0.1) * inward_normal(graph.room.corners, window.edge)
+            return np.array([(0.2, high, 0.2)]), np.array([(x, 0.0, z)]), np.zeros(1)
+
+        return box
+
+    free = lowered(lambda graph: NOTHING)
+    assert set(free) == {0.0, 0.3, 0.9}
+    assert 15 < free[0.0] < 40
+    assert 5 < free[0.3] < 30
+    assert lowered(lambda graph: NOTHING, "industrial")[0.0] == 0
+    assert lowered(before(0.5, 0.65)) == free
+    assert set(lowered(before(0.5, 0.4))) == {0.3, 0.9}  # in nobody's light, but in the way out
+    assert set(lowered(before(0.5, 0.1))) == {0.9}
+    assert set(lowered(before(0.25, 0.1))) == {0.3, 0.9}
+    assert set(lowered(lambda graph: NOTHING, room="bathroom")) == {1.2}
+    window = Opening("w", "window", 0, 1.0, 1.2, 1.0, 1.1)
+    assert set(lowered(lambda graph: NOTHING, openings=(window,))) == {1.1}
 
 
 def test_floors_that_do_not_hold_their_furniture_grow() -> None:

@@ -18,7 +18,7 @@ from echousd.checks.mesh_rules import extents
 from echousd.checks.reading import Reading
 from echousd.graph import RoomSpec
 from echousd.options import RoomOptions
-from echousd.shapes.fittings import DOORS, NICHE, RAIL, WINDOWS, Millwork, millwork_of
+from echousd.shapes.fittings import DOORS, NICHE, RAIL, WINDOWS, Millwork, millwork_of, window_frame
 from echousd.shapes.walls import WALL, beams, outline, slab, walls
 
 NOTCHED = np.array([(0, 0), (1, 0), (1, 1), (4, 1), (4, 3), (0, 3)], float)
@@ -225,6 +225,20 @@ def test_the_widest_window_stands_out_before_its_wall_on_three_sides(turn, windo
     for name in ("Wall_1_mesh", "Wall_3_small_frame"):
         np.testing.assert_array_equal(made[name].vertices, flat[name].vertices)
     assert (made["Wall_1_window_body"].vertices[:, [0, 2]] - near) @ -inside == pytest.approx(WALL, abs=0.6)
+
+
+def test_french_windows_have_a_foot_and_a_handle_and_no_board_or_bay() -> None:
+    french = replace(WINDOW, sill=0.0, height=2.2)
+    made, usual = (
+        pieces(walls(rectangle(4.0, 3.0), 2.6, (one,), millwork=Millwork(bay=True))) for one in (french, WINDOW)
+    )
+    assert "Wall_1_window_sill" in usual
+    assert "Wall_1_window_sill" not in made
+    assert "Wall_1_window_body" not in made
+    frame = made["Wall_1_window_frame"]
+    assert frame.bounds[0, 1] == 0.0
+    assert window_frame(french).vertices[:, 2].min() < window_frame(WINDOW).vertices[:, 2].min() - 0.02  # a handle
+    assert not (np.abs(frame.vertices[:, 1] - 0.055) < 1e-6).any()
 
 
 def test_no_window_stands_out_that_is_narrow_or_before_another_wall_or_outdoors() -> None:
