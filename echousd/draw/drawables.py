@@ -19,11 +19,13 @@ from echousd.textures import TextureError, read_image
 
 @dataclass(frozen=True)
 class Texture:
-    """An image that a material reads: its resolved path, the prim of its shader, and the channel that counts."""
+    """An image that a material reads: its resolved path, the prim of its shader, the channel that counts, and what its
+    values are multiplied with."""
 
     path: str
     prim: str
     channel: str = "r"
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -231,20 +233,30 @@ def _surface(material: UsdShade.Material) -> Paint:
         image = UsdShade.Shader(connected[0].source.GetPrim())
         file = values.asset(image.GetInput("file").GetAttr()) if image and image.GetInput("file") else None
         if file and file.resolvedPath:
-            images[name] = image, Texture(str(file.resolvedPath), str(image.GetPath()), str(connected[0].sourceName))
+            where = str(file.resolvedPath), str(image.GetPath()), str(connected[0].sourceName)
+            images[name] = image, Texture(*where, _first(image, "scale") if name == "roughness" else 1.0)
     texture, tint, laid_out = Texture("", ""), (1.0, 1.0, 1.0), "st"
     if "diffuseColor" in images:
         image, texture = images["diffuseColor"]
         laid_out = _primvar_of(image)
         if image.GetInput("scale"):
             tint = rgb(values.given(image.GetInput("scale").GetAttr()), tint)
+    rough = values.number(found.get("roughness"), 0.5)
+    if "roughness" in images:  # ours fall back to their mean
+        rough = (_first(images["roughness"][0], "fallback", 0.0) or 0.5) * images["roughness"][1].scale
     return Paint(
         material.GetPrim().GetName(), rgb(values.given(found.get("diffuseColor")), (0.18, 0.18, 0.18)),
-        rgb(values.given(found.get("emissiveColor")), (0.0, 0.0, 0.0)), values.number(found.get("roughness"), 0.5),
+        rgb(values.given(found.get("emissiveColor")), (0.0, 0.0, 0.0)), rough,
         values.number(found.get("metallic"), 0.0), texture.path, texture.prim, tint,
         values.number(found.get("opacity"), 1.0), laid_out,
         *(images[name][1] if name in images else None for name in ("roughness", "normal")),
     )  # fmt: skip
+
+
+def _first(image: UsdShade.Shader, name: str, default: float = 1.0) -> float:
+    """The first number of an input of an image."""
+    told = image.GetInput(name)
+    return float(rgb(values.given(told.GetAttr()), (default,))[0]) if told else default
 
 
 def _primvar_of(image: UsdShade.Shader) -> str:

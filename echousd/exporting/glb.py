@@ -205,7 +205,7 @@ class _Tree:
         tint = paint.tint if paint.texture else paint.color
         color = [float(np.clip(c, 0.0, 1.0)) for c in (*tint, paint.opacity)]
         rough: dict[str, Any] = {"metallicFactor": float(np.clip(paint.metallic, 0.0, 1.0))}
-        rough["roughnessFactor"] = 1.0 if paint.rough else float(np.clip(paint.roughness, 0.0, 1.0))
+        rough["roughnessFactor"] = float(np.clip(paint.rough.scale if paint.rough else paint.roughness, 0.0, 1.0))
         if color != [1.0, 1.0, 1.0, 1.0]:
             rough["baseColorFactor"] = color
         entry: dict[str, Any] = {"name": paint.name, "pbrMetallicRoughness": rough}

@@ -30,7 +30,9 @@ def look_images(look: Look, harmony: str) -> dict[str, tuple[str, bytes]]:
     if not look.pattern:
         return {}
     tint = harmony if look.pattern in PRINTS else baking.hexadecimal(look.color)
-    found = {"diffuseColor": (f"{look.pattern}_{tint}", baking.color_image(look.pattern, look.color, harmony))}
+    worn = 0.0 if look.pattern in PRINTS else look.worn
+    image = baking.color_image(look.pattern, look.color, harmony, worn)
+    found = {"diffuseColor": (f"{look.pattern}_{tint}" + f"_worn{1000 * worn:.0f}" * (worn > 0), image)}
     normal, rough = baking.normal_image(look.pattern, look.metres), baking.rough_image(look.pattern, look.roughness)
     if normal is not None:
         found["normal"] = (f"{look.pattern}_{look.metres * 100:.0f}cm_normal", normal)
@@ -40,10 +42,10 @@ def look_images(look: Look, harmony: str) -> dict[str, tuple[str, bytes]]:
 
 
 def define_material(pen: Pen, path: str, look: Look, harmony: str = "") -> None:
-    """Author a UsdPreviewSurface material; a textured one reads `primvars:st`.
+    """Author a UsdPreviewSurface material; a textured one reads `primvars:st`. `tint_material` tells colour and gloss.
 
     `path`: where. `look`: what it looks like. `harmony`: whose colours its images have; "" = without images, for an
-    asset that stands for itself. Colours are left to `tint_material`, which a variant calls.
+    asset that stands for itself.
     """
     found = look_images(look, harmony) if harmony else {}
     fallbacks = {"diffuseColor": look.color, "normal": (0.5, 0.5, 1.0), "roughness": (look.roughness,) * 3}
@@ -51,9 +53,7 @@ def define_material(pen: Pen, path: str, look: Look, harmony: str = "") -> None:
         Image(IMAGES[name], f"../{file}", {name: "r" if name == "roughness" else "rgb"}, fallback=fallbacks[name])
         for name, (file, _) in found.items()
     ]
-    values: dict[str, Any] = {} if found else {"diffuseColor": None}
-    if "roughness" not in found:
-        values["roughness"] = look.roughness
+    values: dict[str, Any] = {name: None for name in ("diffuseColor", "roughness") if name not in found}
     values["metallic"] = look.metallic
     if look.opacity < 1:
         values["opacity"] = look.opacity
@@ -61,6 +61,11 @@ def define_material(pen: Pen, path: str, look: Look, harmony: str = "") -> None:
         values["emissiveColor"] = look.emissive
     preview_surface(pen, path, values, images)
     pen.label(path, material=material_of(path.rpartition("/")[2]))
+
+
+def uneven(look: Look) -> bool:
+    """Whether an image says how rough a look is, place by place."""
+    return bool(look.pattern) and baking.rough_image(look.pattern, look.roughness) is not None
 
 
 def tint_factor(base: Look, look: Look) -> list[float]:
@@ -71,13 +76,18 @@ def tint_factor(base: Look, look: Look) -> list[float]:
 
 
 def tint_material(pen: Pen, path: str, base: Look, look: Look) -> None:
-    """Author, for a variant, how a material comes from its images in the colours of `base` to those of `look`."""
-    if base.pattern.startswith("picture_"):
-        return
-    if base.pattern:
+    """Author, for a variant, how a material comes from its images in the colours of `base` to those of `look`, and its
+    gloss.
+    """
+    plain: dict[str, Any] = {} if base.pattern else {"color3f inputs:diffuseColor": look.color}
+    if base.pattern and not base.pattern.startswith("picture_"):
         pen.over(f"{path}/{IMAGES['diffuseColor']}", {"float4 inputs:scale": (*tint_factor(base, look), 1.0)})
-        return
-    pen.over(f"{path}/surface", {"color3f inputs:diffuseColor": look.color})
+    if not uneven(base):
+        plain["float inputs:roughness"] = look.rough
+    elif look.gloss != 1:
+        pen.over(f"{path}/{IMAGES['roughness']}", {"float4 inputs:scale": (*(look.gloss,) * 3, 1.0)})
+    if plain:
+        pen.over(f"{path}/surface", plain)
 
 
 def write_looks(
@@ -88,7 +98,7 @@ def write_looks(
 
     `pen`: writes the opinions, as overs on whatever is bound. `looks`: material name -> look. `bindings`: prim path of
     a mesh or subset -> material name. `scope`: path of the prim that the materials stand below. `also`: names of looks
-    that are defined, too, though another layer binds them. `harmony`: see `define_material`.
+    that are defined, too, though another layer binds them. `harmony`, `tinted`: see `define_material`.
     """
     pen.define(scope, "Scope")
     for name in sorted({*bindings.values(), *also}):

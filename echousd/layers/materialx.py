@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from echousd.layers.materials import LOOKS, look_images, tint_factor
+from echousd.layers.materials import LOOKS, look_images, tint_factor, uneven
 from echousd.shapes.looks import Look
 from echousd.stage.pen import Pen
 
@@ -35,7 +35,7 @@ def _network(pen: Pen, path: str, look: Look, harmony: str) -> None:
     values: dict[str, Any] = {
         "float inputs:metallic": look.metallic, "float inputs:opacity": look.opacity,
         "color3f inputs:emissiveColor": look.emissive, "color3f inputs:diffuseColor": None,
-        "float inputs:roughness": None if "roughness" in images else look.roughness,
+        "float inputs:roughness": None,
     }  # fmt: skip
     surface = _node(pen, f"{path}/mtlx_surface", "ND_UsdPreviewSurface_surfaceshader", "token", values)
     feeds: dict[str, str] = {}
@@ -47,7 +47,8 @@ def _network(pen: Pen, path: str, look: Look, harmony: str) -> None:
         feeds["color3f inputs:diffuseColor"] = _node(pen, f"{path}/mtlx_tint", "ND_multiply_color3", "color3f", tint)
     if "roughness" in images:
         rough = _image(pen, f"{path}/mtlx_roughness", "ND_image_float", "float", images["roughness"], at)
-        feeds["float inputs:roughness"] = rough
+        gloss = {"float inputs:in1.connect": rough}
+        feeds["float inputs:roughness"] = _node(pen, f"{path}/mtlx_gloss", "ND_multiply_float", "float", gloss)
     if "normal" in images:
         value = _image(pen, f"{path}/mtlx_normal", "ND_image_vector3", "float3", images["normal"], at)
         for step, kind, number in (("doubled", "multiply", 2.0), ("centred", "subtract", 1.0)):  # 0 .. 1 -> -1 .. 1
@@ -59,11 +60,16 @@ def _network(pen: Pen, path: str, look: Look, harmony: str) -> None:
 
 
 def _tint(pen: Pen, path: str, base: Look, look: Look) -> None:
-    """What a harmony makes of a material: the factor of its image, or its plain colour."""
+    """What a harmony makes of a material: factors of its images, or a plain colour and roughness."""
+    plain: dict[str, Any] = {} if base.pattern else {"color3f inputs:diffuseColor": look.color}
     if base.pattern:
         pen.over(f"{path}/mtlx_tint", {"color3f inputs:in2": tuple(tint_factor(base, look))})
+    if uneven(base):
+        pen.over(f"{path}/mtlx_gloss", {"float inputs:in2": look.gloss})
     else:
-        pen.over(f"{path}/mtlx_surface", {"color3f inputs:diffuseColor": look.color})
+        plain["float inputs:roughness"] = look.rough
+    if plain:
+        pen.over(f"{path}/mtlx_surface", plain)
 
 
 def _node(pen: Pen, path: str, identifier: str, kind: str, values: Mapping[str, Any]) -> str:

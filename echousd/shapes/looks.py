@@ -8,13 +8,16 @@ from dataclasses import dataclass
 from functools import cache
 
 from echomodel.vocabulary import vocabulary
-from echousd.shapes.finishes.slots import HARMONIES, SECOND, SLOTS, Color, linear, mixed
+from echousd.shapes.finishes.slots import HARMONIES, SECOND, SLOTS, Color, finish_of, linear, mixed
 from echousd.shapes.styles import ROOM_STYLE
 
 
 @dataclass(frozen=True)
 class Look:
-    """One UsdPreviewSurface: colours are linear RGB in [0, 1]; the pattern, if there is one, carries the colour."""
+    """One UsdPreviewSurface: colours are linear RGB in [0, 1]; the pattern, if there is one, carries the colour.
+
+    `gloss`: what its roughness, or the image of it, is multiplied with. `worn`: share by which wear changes its tone.
+    """
 
     color: Color
     roughness: float = 0.6
@@ -23,6 +26,13 @@ class Look:
     emissive: Color = (0.0, 0.0, 0.0)
     pattern: str = ""
     metres: float = 1.0
+    gloss: float = 1.0
+    worn: float = 0.0
+
+    @property
+    def rough(self) -> float:
+        """Its roughness in the mean."""
+        return round(min(self.gloss * self.roughness, 1.0), 4)
 
 
 SHOWN = 6  # harmonies among which a written room or asset lets one choose
@@ -40,7 +50,8 @@ def look(palette: str, slot: str, variant: int = 0) -> Look:
     word = SECOND.get(made.color, made.color) if variant % 2 else made.color
     color = mixed(getattr(harmony, word, word), made.mix, made.share)
     emissive = (GLOW[0], GLOW[1], GLOW[2]) if slot == "shade" else (0.0, 0.0, 0.0)
-    return Look(color, made.roughness, made.metallic, made.opacity, emissive, made.pattern, made.metres)
+    how = made.metallic, made.opacity, emissive, made.pattern, made.metres
+    return Look(color, made.roughness, *how, *finish_of(palette, slot))
 
 
 def second(seed: int, category: str) -> bool:

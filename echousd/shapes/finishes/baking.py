@@ -25,7 +25,8 @@ Bake = TypeVar("Bake", bound=Callable[..., "bytes | None"])
 
 # What draws them is not loaded where the cache has every image.
 PROGRAMS = "echousd.shapes.finishes.patterns"
-noise, printed = Late(f"{PROGRAMS}:noise"), Late("echousd.shapes.finishes.pictures:printed")
+aged, noise = (Late(f"{PROGRAMS}:{name}") for name in ("aged", "noise"))
+printed = Late("echousd.shapes.finishes.pictures:printed")
 QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
 
 
@@ -65,11 +66,11 @@ def hexadecimal(color: Color) -> str:
 
 
 @kept
-def color_image(pattern: str, color: Color, harmony: str) -> bytes:
-    """A pattern in a colour (linear RGB), or what is printed in those of a harmony, as JPEG."""
+def color_image(pattern: str, color: Color, harmony: str, worn: float = 0.0) -> bytes:
+    """A pattern in a colour (linear RGB), `aged` by a share, or what is printed in those of a harmony, as JPEG."""
     if pattern in PRINTS:
         return _jpeg(printed(pattern, harmony))
-    tone = relief(pattern).tone
+    tone = aged(relief(pattern).tone, worn) if worn else relief(pattern).tone
     tone = tone[..., None] if tone.ndim == 2 else tone
     return _jpeg(np.clip(tone * np.asarray(color), 0, 1))
 

@@ -42,6 +42,13 @@ def _grid() -> tuple[np.ndarray, np.ndarray]:
     return axis[None, :], axis[:, None]
 
 
+def aged(tone: np.ndarray, share: float) -> np.ndarray:
+    """A tone as years of use leave it: rubbed paler and darker in patches, by a share of it, its contrasts stronger."""
+    patch = noise(201, 4.0, 4.0, 2.5) + 0.5 * noise(202, 24.0, 24.0)
+    worn = (1 + 8 * share) * (tone - 1) + 1
+    return worn * (1 + share * (patch if tone.ndim == 2 else patch[..., None]))
+
+
 def wood(seed: int = 1, rings: int = 9, contrast: float = 0.75) -> Relief:
     """Sawn wood, its fibres along u: bands of early and late wood, streaks, pores."""
     _, v = _grid()

@@ -76,10 +76,19 @@ class Harmony(NamedTuple):
     metal2: str
 
 
+_TABLE = tables("harmonies.toml", __file__)
+FINISHED = {"wood": "wood", "metal": "metal", "plaster": "wall"} | dict.fromkeys(("fabric", "linen", "wool"), "cloth")
+FINISHES: Mapping[str, Mapping[str, tuple[float, float]]] = {name: row.pop("finish") for name, row in _TABLE.items()}
 HARMONIES: Mapping[str, Harmony] = {
     name: Harmony(**{word: color for shares in row.values() for word, color in shares.items()})
-    for name, row in tables("harmonies.toml", __file__).items()
+    for name, row in _TABLE.items()
 }
+
+
+def finish_of(harmony: str, slot: str) -> tuple[float, float]:
+    """What the roughness of a slot is multiplied with in a harmony, and by what share wear makes its tone uneven."""
+    factor, worn = FINISHES[harmony].get(FINISHED.get(material_of(slot), ""), (1.0, 0.0))
+    return factor, worn
 
 
 def linear(hexadecimal: str) -> Color:

@@ -231,6 +231,19 @@ def test_one_looks_through_the_glass_of_a_front(opacity, size, faces):
     assert len(read_scenery(stage).triangles) == faces + 2
 
 
+def test_surfaces_are_as_rough_as_their_image_is_in_the_mean_times_its_scale(root):
+    stage = Usd.Stage.Open(str(root))
+    (floor,) = (mesh for mesh in read_drawables(stage) if mesh.category == "floor")
+    image = UsdShade.Shader.Get(stage, "/Room/Looks/floor/roughness")
+    fallback, scale = (image.GetInput(name).Get()[0] for name in ("fallback", "scale"))
+    assert (fallback, scale) == pytest.approx((0.5, scale))
+    assert floor.paints[0][0].roughness == pytest.approx(fallback * scale)
+    stage.SetEditTarget(stage.GetSessionLayer())
+    image.GetInput("scale").Set((0.2, 0.2, 0.2, 1.0))
+    (polished,) = (mesh for mesh in read_drawables(stage) if mesh.category == "floor")
+    assert polished.paints[0][0].roughness == pytest.approx(0.1)
+
+
 def test_a_small_picture_is_quick(root):
     stage = Usd.Stage.Open(str(root))
     render_stage(stage, size=16)

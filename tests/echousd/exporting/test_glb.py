@@ -119,7 +119,9 @@ def test_maps_are_those_of_the_stage(root, tmp_path):
         image = UsdShade.Shader(shader.GetInput(name).GetConnectedSources()[0][0].source.GetPrim())
         file = image.GetInput("file").Get().resolvedPath
         assert gltf.image(texture) == Path(file).read_bytes(), name  # the file itself, not encoded again
-    assert floor["pbrMetallicRoughness"]["roughnessFactor"] == 1.0
+    gloss = stage.GetAttributeAtPath("/Room/Looks/floor/roughness.inputs:scale").Get()[0]
+    assert floor["pbrMetallicRoughness"]["roughnessFactor"] == pytest.approx(gloss)
+    assert gloss < 1
     glass = next(one for one in gltf.tree["materials"] if one["name"] == "glass")
     assert glass["alphaMode"] == "BLEND"
     assert glass["pbrMetallicRoughness"]["baseColorFactor"][3] == pytest.approx(0.06)

@@ -70,6 +70,21 @@ def test_no_cloth_of_furniture_is_nearly_as_bright_as_the_walls(harmony):
         assert bright @ linear(cloth) < 0.7 * bright @ linear(tones.wall)
 
 
+def test_harmonies_say_how_glossy_and_how_worn_their_materials_are():
+    slots = {"wood": "floor", "metal": "metal", "cloth": "fabric", "wall": "wall"}
+    told = {word: [look(harmony, slot) for harmony in HARMONIES] for word, slot in slots.items()}
+    for word, looks in told.items():
+        assert len({one.gloss for one in looks}) > 4, word
+        assert len({one.worn for one in looks}) > 4, word
+        assert all(0.1 < one.rough <= 1 and 0 <= one.worn < 0.1 for one in looks)
+    assert look("ink", "ceramic").rough == look("oak", "ceramic").rough
+    new, old = (np.asarray(Image.open(io.BytesIO(baking.color_image("planks", (0.3, 0.2, 0.1), "oak", worn))), float)
+                for worn in (0.0, 0.03))  # fmt: skip
+    assert np.abs(new.mean((0, 1)) - old.mean((0, 1))).max() < 2
+    patches = [image[..., 0].reshape(16, 32, 16, 32).mean((1, 3)).std() for image in (new, old)]
+    assert patches[1] > 1.2 * patches[0]
+
+
 def test_fibres_run_along_the_longer_side_of_a_board():
     boards = [
         Block(centre=np.array([0, 0.5, 0.0]), half=np.array([0.02, 0.5, 0.02])),
