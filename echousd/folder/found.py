@@ -86,11 +86,11 @@ def layer_over(place: Path) -> Path:
     """
     if not place.is_dir():
         return place
-    from pxr import Sdf
+    from echousd.stage.files import layer_there
 
     root = room_at(place)
     layers = sorted(path for path in root.parent.glob("*.usd*") if path.suffix in STAGE_FORMS and path != root)
-    opened = {path: Sdf.Layer.FindOrOpen(str(path)) for path in layers}
+    opened = {path: layer_there(path) for path in layers}
     over = [
         path
         for path, layer in opened.items()

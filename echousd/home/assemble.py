@@ -35,7 +35,7 @@ from echousd.options import MAX_SEED, RoomOptions
 from echousd.shapes.looks import palette_of_room
 from echousd.shapes.surface import surface
 from echousd.shapes.walls import THICKNESS
-from echousd.stage.files import layer_bytes, open_stage, write_all
+from echousd.stage.files import layer_bytes, layer_there, open_stage, write_all
 from echousd.stage.pen import Pen
 from echousd.stage.shading import preview_surface
 from echousd.stage.turning import rescale, turn_up
@@ -146,7 +146,7 @@ def wanted_jobs(
     jobs, root, layer = (
         jobs_of(plan, output, options, outside),
         earlier(output, options.seed),
-        _layer(output / ROOT_FILE),
+        layer_there(output / ROOT_FILE),
     )
     digests, marks = digests_of(jobs), dict(layer.customLayerData.get("rooms", {})) if layer else {}
     there = {name: find_manifest(output / FOLDER / name) for name in jobs}
@@ -167,15 +167,11 @@ def _opened(job: Job, manifest: Mapping[str, Any], plan: Plan) -> Job:
 
 def remembered(root: Path) -> tuple[HomeGraph, RoomOptions]:
     """What was asked of a home that was made: its graph and the options of its rooms."""
-    layer = _layer(root)
+    layer = layer_there(root)
     data = dict(layer.customLayerData) if layer else {}
     if "asked" not in data:
         raise ValueError(f"{root}: says nothing of what was asked of it, allowed: a home that echousd generate made")
     return home_of_plain(json.loads(data["asked"])), RoomOptions(**json.loads(data["options"]))
-
-
-def _layer(root: Path) -> Sdf.Layer | None:
-    return Sdf.Layer.FindOrOpen(str(root)) if root.is_file() else None
 
 
 def _run(jobs: Sequence[Job], workers: int | None) -> Iterator[tuple[str, Mapping[str, Any] | None, str]]:
@@ -201,7 +197,7 @@ def _run(jobs: Sequence[Job], workers: int | None) -> Iterator[tuple[str, Mappin
 def earlier(output: Path, seed: int) -> Path | None:
     """The home that is in a folder, None where there is none of this seed."""
     root = output / ROOT_FILE
-    layer = _layer(root)
+    layer = layer_there(root)
     return root if layer and layer.customLayerData.get("seed") == seed else None
 
 

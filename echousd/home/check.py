@@ -16,9 +16,8 @@ from echomodel.vocabulary import vocabulary
 from echousd.checks.report import CheckReport, check
 from echousd.home.given import plan_there
 from echousd.home.plan import Plan, doorways, overlapping
-from echousd.home.stages import Standing, furniture
+from echousd.home.stages import Standing, furniture, named_rooms
 from echousd.stage.files import open_stage
-from echousd.stage.read import find_rooms
 
 ROBOT = 0.15  # metres, radius of a robot that is 0.3 m wide
 SLACK = 0.02  # metres that it squeezes through
@@ -76,8 +75,8 @@ def check_home(path: Path, *, rules: str = "strict", layout: int | None = None, 
     ]
     told += [("ways", says) for says in _blocked(plan, ground)]
     rooms = {
-        prims.room.GetName(): check(_room_file(prims.room), rules=rules, layout=layout, settle=settle)
-        for prims in find_rooms(stage)
+        name: check(_room_file(prims.room), rules=rules, layout=layout, settle=settle)
+        for name, prims in named_rooms(stage).items()
     }
     return HomeReport(tuple(told), reached, len(plan.home.relations), rooms)
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from echomodel.openings import Opening, direction, edge_lengths, inward_normal, numbered
+from echomodel.openings import Opening, direction, numbered
 from echousd.graph import SceneGraph
 from echousd.graph.files import STAGE_FORMS
 from echousd.home.graph import HomeGraph, HomeRelation
-from echousd.home.openings import facings
+from echousd.home.openings import Floor, face_to_face, facings
 from echousd.home.plan import INNER, OUTER, Plan, overlapping, plan_home, rectangles, with_openings
 from echousd.shapes.walls import outline as offset
 
@@ -97,14 +97,15 @@ def walled(home: HomeGraph, rooms: Placed) -> Plan | None:
         floors, insets = corners, {name: np.zeros(len(floor)) for name, floor in corners.items()}
     else:
         insets, walls = {}, {}
-        for name, floor in corners.items():
-            gaps = [
-                _gap(floor, edge, [corners[other] for other in corners if other != name]) for edge in range(len(floor))
-            ]
-            insets[name] = np.array([INNER / 2 if gap is not None and gap < INNER / 2 else 0.0 for gap in gaps])
-            walls[name] = tuple(
-                OUTER if gap is None else INNER / 2 if gap < INNER / 2 else round(gap / 2, 4) for gap in gaps
-            )
+        sides = [Floor(name, floor, ()) for name, floor in corners.items()]
+        for one in sides:
+            gap = np.full(len(one.corners), np.inf)
+            for stretch in (each for other in sides if other is not one for each in face_to_face(one, other)):
+                if -0.02 < stretch.deep < THICKEST:
+                    gap[stretch.edge] = min(gap[stretch.edge], max(stretch.deep, 0.0))
+            meets, met = gap < INNER / 2, np.isfinite(gap)
+            insets[one.name] = np.where(meets, INNER / 2, 0.0)
+            walls[one.name] = tuple(np.select([meets, met], [INNER / 2, (gap / 2).round(4)], OUTER).tolist())
         floors = {name: offset(floor, -insets[name]).round(4) for name, floor in corners.items()}
     cells = {name: offset(floor, walls[name]).round(4) for name, floor in floors.items()}
     low = np.concatenate([*cells.values()]).min(0)
@@ -114,21 +115,6 @@ def walled(home: HomeGraph, rooms: Placed) -> Plan | None:
     }
     poses = {name: pose for name, (_, pose) in rooms.items()}
     return Plan(home, cells, walls, {name: () for name in cells}, lie, poses)
-
-
-def _gap(floor: np.ndarray, edge: int, others: list[np.ndarray]) -> float | None:
-    """Metres from an edge to the nearest floor that faces it, None where none does within a wall's thickness."""
-    outward, along = -inward_normal(floor, edge), direction(floor, edge)
-    length, found = float(edge_lengths(floor)[edge]), []
-    for other in others:
-        for behind in range(len(other)):
-            start = other[behind] - floor[edge]
-            if outward @ inward_normal(other, behind) < 0.999 or not -0.02 < start @ outward < THICKEST:
-                continue
-            ends = np.array([start, other[(behind + 1) % len(other)] - floor[edge]]) @ along
-            if min(ends.max(), length) - max(ends.min(), 0.0) > 0.05:
-                found.append(max(float(start @ outward), 0.0))
-    return min(found, default=None)
 
 
 def _moved(openings: tuple[Opening, ...], before: np.ndarray, after: np.ndarray) -> tuple[Opening, ...]:

@@ -292,7 +292,7 @@ def _room(name: str, entry: Any) -> HomeRoom:
     only_fields(fields, (*own, *spec, *inside, *RoomSpec.model_fields, *OF_ROOM, "objects", "relations", *LISTS), where)
     try:
         spec = spec if "type" in spec else {"type": _type_of(normalised(name)), **spec}
-        if inside.get("objects") or inside.get("nodes"):
+        if any(inside.values()):
             return HomeRoom(name, graph_from_plain(SceneGraph, {"room": spec, **inside}), **own)
         filled = starting_graph(spec["type"]).nodes[0]  # the walls' words need a graph to be read with
         bare = graph_from_plain(SceneGraph, {"room": spec, "objects": {filled.name: filled.category}})

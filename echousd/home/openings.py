@@ -61,23 +61,27 @@ class Facing:
         )  # fmt: skip
 
 
-def facings(one: Floor, other: Floor) -> Iterator[Facing]:
-    """The stretches of wall that two rooms share, however they are turned."""
+def face_to_face(one: Floor, other: Floor) -> Iterator[Facing]:
+    """The stretches of a floor's edges before which edges of another lie the other way, however far away."""
     for edge, length in enumerate(edge_lengths(one.corners)):
         along, outward = direction(one.corners, edge), -inward_normal(one.corners, edge)
         for other_edge, other_length in enumerate(edge_lengths(other.corners)):
             if outward @ inward_normal(other.corners, other_edge) < 0.999:
                 continue
             start = other.corners[other_edge] - one.corners[edge]
-            deep = float(start @ outward)
-            if abs(deep - one.walls[edge] - other.walls[other_edge]) > UNEVEN:
-                continue
             turned = float(direction(other.corners, other_edge) @ along)
             at = float(start @ along)
             low, high = sorted((at, at + turned * float(other_length)))
             low, high = max(low, 0.0), min(high, float(length))
             if high - low > 0.05:
-                yield Facing(one.name, edge, low, high, deep, other.name, other_edge, at)
+                yield Facing(one.name, edge, low, high, float(start @ outward), other.name, other_edge, at)
+
+
+def facings(one: Floor, other: Floor) -> Iterator[Facing]:
+    """The stretches of wall that two rooms share, however they are turned."""
+    for stretch in face_to_face(one, other):
+        if abs(stretch.deep - one.walls[stretch.edge] - other.walls[stretch.other_edge]) <= UNEVEN:
+            yield stretch
 
 
 def counterpart(floor: Floor, opening: Opening, floors: Iterable[Floor]) -> tuple[str, Opening] | None:

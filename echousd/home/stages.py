@@ -21,7 +21,7 @@ from echousd.stage.contents import read_contents
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage, save_layer, source
 from echousd.stage.pen import ops, relate, say
-from echousd.stage.read import faults, find_rooms, place, room_graph, stated_fields, value
+from echousd.stage.read import RoomPrims, faults, find_rooms, place, room_graph, stated_fields, value
 from echousd.stage.units import to_metres
 from echousd.stage.write import author, define, put
 
@@ -92,14 +92,14 @@ def read_home(stage: Usd.Stage) -> HomeGraph:
     What a plan says of a room (floor, walls, openings) is no part of what was asked of it.
     """
     with values.reading(stage):
-        found = find_rooms(stage)
+        found = named_rooms(stage)
         graph = next((prim for prim in stage.Traverse() if prim.GetTypeName() == usd.HOME_TYPE), None)
-        names = _names([prims.room.GetPath() for prims in found])
+        names = {prims.room.GetPath(): name for name, prims in found.items()}
         with faults(source(stage)):
-            rooms = []
-            for prims in found:
-                fields = stated_fields(prims.room, usd.HOME_ROOM_FIELDS)
-                rooms.append(HomeRoom(names[prims.room.GetPath()], asked(room_graph(prims)), **fields))
+            rooms = [
+                HomeRoom(name, asked(room_graph(prims)), **stated_fields(prims.room, usd.HOME_ROOM_FIELDS))
+                for name, prims in found.items()
+            ]
             if graph is None:
                 return HomeGraph(rooms)
             ways = [_relation(prim, names) for prim in graph.GetChildren() if prim.GetTypeName() == usd.RELATION_TYPE]
@@ -118,14 +118,12 @@ def read_poses(path: Path) -> dict[str, tuple[SceneGraph, np.ndarray]]:
     """Of every room of a stage its graph as it stands there, and (4, 4) float, its pose in metres, +Y up."""
     stage = open_stage(path)
     with values.reading(stage):
-        found = find_rooms(stage)
-        names = _names([prims.room.GetPath() for prims in found])
         cache, turn, out = UsdGeom.XformCache(values.NOW), to_metres(stage), {}
-        for prims in found:
+        for name, prims in named_rooms(stage).items():
             pose = turn @ values.matrix(cache.GetLocalToWorldTransform(prims.room), prims.room)
             lean = np.arctan2(pose[0, 2] - pose[2, 0], pose[0, 0] + pose[2, 2])
             pose[:3, :3] = upright(lean)  # the nearest: rooms are made upright and in metres
-            out[names[prims.room.GetPath()]] = (room_graph(prims), pose)
+            out[name] = (room_graph(prims), pose)
         return out
 
 
@@ -144,8 +142,8 @@ def furniture(plan: Plan, path: Path) -> list[Standing]:
     if path.suffix.lower() not in STAGE_FORMS:
         return found
     stage = open_stage(path)
-    for prims in find_rooms(stage):
-        pose = plan.pose(prims.room.GetName())
+    for name, prims in named_rooms(stage).items():
+        pose = plan.pose(name)
         for thing in read_contents(prims).objects:
             if vocabulary().category(thing.node.category).support == "ceiling":
                 continue
@@ -155,11 +153,13 @@ def furniture(plan: Plan, path: Path) -> list[Standing]:
     return found
 
 
-def _names(paths: list[Sdf.Path]) -> dict[Sdf.Path, str]:
-    """A name for every room: its prim's where it is the only one so called."""
-    often = [path.name for path in paths]
+def named_rooms(stage: Usd.Stage) -> dict[str, RoomPrims]:
+    """The rooms of a stage, each by the name of its prim where it is the only one so called, else by its path."""
+    found = {prims.room.GetPath(): prims for prims in find_rooms(stage)}
+    often = [path.name for path in found]
     return {
-        path: path.name if often.count(path.name) == 1 else str(path).strip("/").replace("/", "_") for path in paths
+        path.name if often.count(path.name) == 1 else str(path).strip("/").replace("/", "_"): prims
+        for path, prims in found.items()
     }
 
 

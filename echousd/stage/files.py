@@ -72,6 +72,14 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
     return stage
 
 
+def layer_there(path: Path) -> Sdf.Layer | None:
+    """The layer in a file, None where no file is there or none that can be read."""
+    try:
+        return Sdf.Layer.FindOrOpen(str(path)) if path.is_file() else None
+    except (Tf.ErrorException, UnicodeDecodeError):  # USD quotes the damaged layer
+        return None
+
+
 def regular_layers(path: Path) -> list[Sdf.Layer]:
     """All layers that a stage may compose, opened; raises StageError for one that is a pipe, which USD would wait for.
 

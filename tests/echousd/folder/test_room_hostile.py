@@ -183,6 +183,7 @@ def test_a_file_that_is_a_link_out_of_the_folder_is_none_of_its_files(tmp_path, 
 
 def test_of_the_layers_in_a_folder_the_one_over_its_room_is_found(folder):
     (folder / "other.usda").write_text("#usda 1.0\n")
+    (folder / "damaged.usda").write_text("#usda 1.0\ndef {")
     with pytest.raises(ValueError, match=r"layers over bedroom.usda in this folder: none"):
         layer_over(folder)
     (folder / "mine.usda").write_text("#usda 1.0\n(subLayers = [@./bedroom.usda@])\n")

@@ -135,6 +135,19 @@ def test_somebody_elses_file_stays(tmp_path, echousd_command):
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["home.usda"]
 
 
+def test_a_damaged_home_is_replaced_when_told_so(made, tmp_path, echousd_command):
+    root = made[0] / "home.usda"
+    root.write_bytes(root.read_bytes()[:-20])
+    command = ("generate", tmp_path / "flat.yaml", "-o", made[0], *QUICK)
+    done = echousd_command(*command, "--force")
+    assert done.code == 0, done.err
+    assert echousd_command("check", made[0]).code == 0
+    root.write_text("#usda 1.0\ndef {")
+    done = echousd_command(*command)
+    assert done.code == 2
+    assert "home.usda: exists and is no home of echousd; choose another place or use --force" in done.err
+
+
 @pytest.mark.parametrize("words", [("plan", "-o", "{tmp}/flat.png"), ("generate", "-o", "{tmp}/flat")])
 def test_what_cannot_be_planned_is_told_with_its_file(tmp_path, echousd_command, words):
     rooms = "{bed: {type: bedroom, area: 40}, bath: {type: bathroom, area: 30}}"
@@ -241,3 +254,17 @@ def test_a_plan_is_drawn_with_what_stands_in_it(made, tmp_path, echousd_command)
     assert place == pytest.approx(there.corners.mean(0), abs=0.02)
     assert echousd_command("plan", made[0], "-o", tmp_path / "flat.svg").code == 0
     assert (tmp_path / "flat.svg").read_text().count("<path") > 20
+
+
+def test_rooms_of_one_name_are_told_apart(made, tmp_path):
+    stage = Usd.Stage.CreateNew(str(tmp_path / "same.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    for above, room in (("A", "living"), ("B", "bedroom")):
+        prim = stage.DefinePrim(f"/World/{above}/room")
+        prim.GetReferences().AddReference(str(made[0] / "home.usda"), f"/House/Rooms/{room}")
+    stage.Save()
+    plan = plan_there(tmp_path / "same.usda")
+    assert [*plan.floors] == ["World_A_room", "World_B_room"]
+    there = {thing.node.name for thing in furniture(plan, tmp_path / "same.usda")}
+    assert there == {"sofa", "table", "bed"}
