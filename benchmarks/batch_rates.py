@@ -141,7 +141,7 @@ class Paper:
         key = (task.key, self._times[task.key])
         if key not in self._seen:
             began = time.process_time()
-            found = attempt(task.call, task.given)
+            found = attempt(task.call, task.argument)
             self._seen[key] = found, time.process_time() - began
         found, seconds = self._seen[key]
         heapq.heappush(self._busy, (self.now + seconds, sum(self._times.values()), task, found))

@@ -58,11 +58,11 @@ def judged(weights: str, way: str, tasks: list[Task]) -> tuple[np.ndarray, Count
         if way == "searched":
             with one_thread():
                 done = place_boxes(
-                    room.categories, room.size, room.position, room.yaw, task.told, floor_polygon=room.floor_polygon,
+                    room.categories, room.size, room.position, room.yaw, task.stated, floor_polygon=room.floor_polygon,
                     height=room.height, openings=room.openings, rules=task.rules,
                 )  # fmt: skip
             room, poses = replace(room, size=done.size, position=done.position, yaw=done.yaw), poses + done.judged
-        plan = plan_of(room, room.categories, room.floor_polygon, room.openings, task.told, height=room.height)
+        plan = plan_of(room, room.categories, room.floor_polygon, room.openings, task.stated, height=room.height)
         found = [fault.rule for fault in [*faults_of(plan, KINDS), *unreached(plan)]]
         kept, told = map(np.sum, kept_relations(task, room)["all"])
         scores.append([(kept, told), (len(found), len(room)), (not found, 1)])
@@ -83,7 +83,7 @@ def judged_by_default(weights: str, tasks: list[Task]) -> tuple[list[RoomBoxes],
     layouts.finished_boxes = counted
     for number, task in enumerate(tasks):
         room = task.room
-        graph = graph_of(replace(room, relations=task.told))
+        graph = graph_of(replace(room, relations=task.stated))
         nodes = tuple(node.replaced(size=None, position=None, yaw=None) for node in graph.nodes)
         graph = graph.replaced(nodes=nodes, room=graph.room.replaced(openings=room.openings))
         model = network or Another(OTHERS[weights], task)
@@ -136,7 +136,7 @@ def main() -> None:
     rooms = generate_rooms(options.count, SEED) if options.rooms is None else load_rooms(options.rooms)
     rooms = [room for room in with_known_words(rooms) if len(room) > 1]
     rooms = [rooms[number * len(rooms) // options.count] for number in range(min(options.count, len(rooms)))]
-    tasks = tasks_of(rooms, 0, told=1.0)
+    tasks = tasks_of(rooms, 0, stated=1.0)
     print(f"{len(tasks)} rooms, {sum(len(task.room) for task in tasks)} objects")
     usual = {"searched": search.BUDGET, "default": layouts.POSES}
     for way, poses in [(w, p) for w in options.ways for p in options.poses or [usual.get(w, 0)]]:

@@ -134,8 +134,8 @@ def main() -> None:
     every = generate_rooms(options.count, SEED) if options.rooms is None else load_rooms(options.rooms)
     rooms = [room for room in with_known_words(every) if len(room) > 1]
     rooms = [rooms[number * len(rooms) // options.count] for number in range(min(options.count, len(rooms)))]
-    tasks = tasks_of(rooms, 0, told=1.0)
-    told = [task.told for task in tasks]
+    tasks = tasks_of(rooms, 0, stated=1.0)
+    told = [task.stated for task in tasks]
     name = "generated" if options.rooms is None else options.rooms.stem
     drafts = drawn(tasks, options.cache / f"{name}_{options.count}.json")
     if options.each:

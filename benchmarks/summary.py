@@ -39,7 +39,7 @@ def areas(folder: Path) -> dict[str, Callable[[], object]]:
     from echousd.home.plan import plan_home
     from echousd.settle.settle import settle
 
-    task = tasks_of(generate_rooms(1, 770_000, room_type="living_room"), 0, told=1.0)[0]
+    task = tasks_of(generate_rooms(1, 770_000, room_type="living_room"), 0, stated=1.0)[0]
     load_model(None)
     held: dict[str, object] = {}
 

@@ -74,7 +74,7 @@ report = echousd.check("out/study/study.usda")
 for fault in (*report.collisions, *report.placement, *report.errors):
     print(fault)
 for one in report.relations:
-    print(one.said, one.state, one.margin)
+    print(one.sentence, one.state, one.margin)
 print(report.ok, report.good(strict=True), sorted(report.to_json()))
 """,
     "generate_home": r"""

@@ -88,8 +88,8 @@ def _weights() -> Iterator[Diagnosis]:
     files = sorted(entry.name for entry in entries if entry.name.endswith(".safetensors"))
     if files:
         sizes = (Path(str(folder.joinpath(name))).stat().st_size / 2**20 for name in files)
-        told = ", ".join(f"{name} ({size:.1f} MiB)" for name, size in zip(files, sizes, strict=True))
-        yield Diagnosis("weights", "ok", f"{told} in {folder}")
+        listed = ", ".join(f"{name} ({size:.1f} MiB)" for name, size in zip(files, sizes, strict=True))
+        yield Diagnosis("weights", "ok", f"{listed} in {folder}")
     else:
         yield Diagnosis("weights", "gap", f"no .safetensors file in {folder}", "reinstall echousd, or echousd train")
 

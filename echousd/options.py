@@ -170,7 +170,7 @@ class RoomOptions(PlainModel, Look):
 
     @classmethod
     def _explained(cls, fields: dict[str, Any], error: ValidationError) -> ValueError:
-        return ValueError(told(error, cls))
+        return ValueError(validation_message(error, cls))
 
 
 @lru_cache(maxsize=4)  # words are compared with those of all models once in a process
@@ -187,7 +187,7 @@ def _wishes(
     return wishes
 
 
-def told(error: ValidationError, model: type[BaseModel] = BaseModel) -> str:
+def validation_message(error: ValidationError, model: type[BaseModel] = BaseModel) -> str:
     """The first fault in one line: the field, what was found and what is allowed."""
     first = error.errors(include_url=False)[0]
     where = ".".join(str(part) for part in first["loc"]) or "the file"
@@ -247,7 +247,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def takes_options(names: Collection[str] = tuple(RoomOptions.model_fields)) -> Callable[[Function], Function]:
-    """Show rows of the table in place of a function's `**given` in its signature."""
+    """Show rows of the table in place of a function's `**changes` in its signature."""
 
     def shown(function: Function) -> Function:
         own = [one for one in signature(function).parameters.values() if one.kind is not Parameter.VAR_KEYWORD]

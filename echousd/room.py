@@ -35,10 +35,10 @@ class Verdict:
 
     def __str__(self) -> str:
         margin = "" if self.margin is None else f" (margin {self.margin:+.2f})"
-        return f"{self.said} is {self.state}{margin}"
+        return f"{self.sentence} is {self.state}{margin}"
 
     @property
-    def said(self) -> str:
+    def sentence(self) -> str:
         """The relation or placement as a sentence."""
         return " ".join(filter(None, (self.subject, self.predicate, self.object)))
 

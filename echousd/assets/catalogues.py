@@ -30,7 +30,7 @@ from echousd.assets.reference import MODELS
 from echousd.graph.files import LAYER_FORMS
 from echousd.stage.apart import fatal
 
-Told = Callable[[str], None]  # is told of what cannot be read, one line each
+Tell = Callable[[str], None]  # is told of what cannot be read, one line each
 Models = Iterator[tuple[Path | None, dict[str, Any]]]  # file, None where it is not there; fields of `Entry`
 
 
@@ -65,7 +65,7 @@ class Entry:
     tags: tuple[str, ...] = ()
 
 
-def entries_of(path: Path, tell: Told) -> list[Entry]:
+def entries_of(path: Path, tell: Tell) -> list[Entry]:
     """The models of the library, folder or model at a path; what cannot be read is told.
 
     Raises ValueError for a path that is none.
@@ -79,14 +79,14 @@ def entries_of(path: Path, tell: Told) -> list[Entry]:
     raise ValueError(f"{path}: neither a folder nor a model nor a library")
 
 
-def _entries(path: Path, table: Path, models: Models, tell: Told) -> list[Entry]:
+def _entries(path: Path, table: Path, models: Models, tell: Tell) -> list[Entry]:
     found: list[Entry] = []
     missing, top = 0, path if path.is_dir() else path.parent
     try:
-        for file, said in models:
+        for file, fields in models:
             missing += file is None
             if file is not None:
-                found.append(Entry(file=ModelFile(file, top, said.pop("member", "")), **said))
+                found.append(Entry(file=ModelFile(file, top, fields.pop("member", "")), **fields))
     except (ValueError, KeyError, OSError) as error:
         tell(str(error) if str(error).startswith(str(table)) else f"{table}: {error}")
     if missing:
@@ -105,10 +105,10 @@ def sweet_home(path: Path) -> list[Path]:
     return [p for p in (path, *sorted(path.rglob("*.sh3f"))) if p.suffix == ".sh3f" and p.is_file()]
 
 
-def sweet_home_models(path: Path, library: Path, tell: Told) -> Models:
+def sweet_home_models(path: Path, library: Path, tell: Tell) -> Models:
     """All models; those that were looked at for this project have the class that was found by eye."""
-    for said in read_library(library):
-        yield library, {"category": _sweet_home_class(**said), "decided": True, **said}
+    for fields in read_library(library):
+        yield library, {"category": _sweet_home_class(**fields), "decided": True, **fields}
 
 
 def read_library(path: Path) -> list[dict[str, Any]]:
@@ -130,7 +130,7 @@ def read_library(path: Path) -> list[dict[str, Any]]:
         notice = archive.read(NOTICE).decode("latin-1") if NOTICE in names else ""
     head, items = _properties(text)
     licence = _unescaped(head.get("license", "")) or _licence_in(notice)
-    return [told for item in items if (told := _sweet_home_model(item, path.stem, licence, head.get("provider", "")))]
+    return [model for item in items if (model := _sweet_home_model(item, path.stem, licence, head.get("provider", "")))]
 
 
 def _sweet_home_model(item: Mapping[str, str], library: str, licence: str, provider: str) -> dict[str, Any] | None:
@@ -211,7 +211,7 @@ def abo(folder: Path) -> list[Path]:
     return [p for p in sorted(folder.rglob("3dmodels.csv*")) if p.name in ("3dmodels.csv", "3dmodels.csv.gz")][:1]
 
 
-def abo_models(folder: Path, table: Path, tell: Told) -> Models:
+def abo_models(folder: Path, table: Path, tell: Tell) -> Models:
     """Models of the table, and what listings say of them."""
     listed: dict[str, Mapping[str, Any]] = {}
     for file in sorted(folder.rglob("listings_*.json*")):
@@ -241,26 +241,26 @@ def objaverse(folder: Path) -> list[Path]:
     return [p for p in (folder / "annotations.json", folder / "annotations.json.gz") if p.is_file()][:1]
 
 
-def objaverse_models(folder: Path, table: Path, tell: Told) -> Models:
+def objaverse_models(folder: Path, table: Path, tell: Tell) -> Models:
     """Annotated objects; pickled ones are never opened."""
     annotations = json_of(table)
     if not isinstance(annotations, dict):
         raise ValueError(f"{table}: found a {type(annotations).__name__}, allowed: uid -> annotation")
     files = {p.stem: p for p in sorted(folder.rglob("*")) if p.suffix.lower() in MODELS}
-    for uid, said in annotations.items():
-        if not isinstance(said, dict):
+    for uid, row in annotations.items():
+        if not isinstance(row, dict):
             continue
-        about = said.get("license_info")
+        about = row.get("license_info")
         about = about if isinstance(about, dict) else {}
-        turn, size, materials = _turned_to_view(said.get("frontView")), said.get("size"), said.get("materials")
+        turn, size, materials = _turned_to_view(row.get("frontView")), row.get("size"), row.get("materials")
         dims = np.array(size, float) / 100 if _is_size(size) else None
         yield files.get(uid), {
-            "key": uid, "name": text(said.get("category")) or uid, "words": texts(said, "category", "synset"),
+            "key": uid, "name": text(row.get("category")) or uid, "words": texts(row, "category", "synset"),
             "dims": dims if dims is None or turn is None else np.abs(turn @ dims), "turn": turn,
-            "licence": str(about.get("license") or said.get("license") or ""),
+            "licence": str(about.get("license") or row.get("license") or ""),
             "author": str(about.get("creator_display_name") or about.get("creator_username") or ""),
-            "placement": next((word for flag, word in RESTS if said.get(flag)), ""),
-            "tags": (*texts(said, "description", "style"), *map(str, materials if isinstance(materials, list) else ())),
+            "placement": next((word for flag, word in RESTS if row.get(flag)), ""),
+            "tags": (*texts(row, "description", "style"), *map(str, materials if isinstance(materials, list) else ())),
         }  # fmt: skip
 
 
@@ -293,7 +293,7 @@ def hssd(folder: Path) -> list[Path]:
     return []
 
 
-def hssd_models(folder: Path, table: Path, tell: Told) -> Models:
+def hssd_models(folder: Path, table: Path, tell: Tell) -> Models:
     """Models of the table; parts of decomposed models are left out."""
     files = {p.stem: p for p in sorted(folder.rglob("*.glb")) if "decomposed" not in p.parts}
     for row in rows_of(table):
@@ -309,7 +309,7 @@ def hssd_models(folder: Path, table: Path, tell: Told) -> Models:
 def _turned_to_axes(up: str, front: str) -> np.ndarray | None:
     """The rotation whose rows are the object's axes, from two vectors as texts `x,y,z`; None where they are none."""
     try:
-        axes = np.array([[float(v) for v in said.replace(",", " ").split()] for said in (up, front)])
+        axes = np.array([[float(v) for v in axis.replace(",", " ").split()] for axis in (up, front)])
     except ValueError:
         return None
     if axes.shape != (2, 3) or not np.isfinite(axes).all():
@@ -329,7 +329,7 @@ def future3d(folder: Path) -> list[Path]:
     return [p for p in (folder / "model_info.json", *sorted(folder.glob("*/model_info.json"))) if p.is_file()]
 
 
-def future3d_models(folder: Path, table: Path, tell: Told) -> Models:
+def future3d_models(folder: Path, table: Path, tell: Tell) -> Models:
     """Models of a table."""
     rows = json_of(table)
     for item in rows if isinstance(rows, list) else ():
@@ -356,7 +356,7 @@ def plain_folder(path: Path) -> list[Path]:
     return [path] if path.is_dir() or path.suffix.lower() in MODELS else []
 
 
-def folder_models(path: Path, folder: Path, tell: Told) -> Models:
+def folder_models(path: Path, folder: Path, tell: Tell) -> Models:
     """Every model file; parts that a USD model consists of are left to it."""
     if folder.is_file():
         yield folder, _of_folder(folder, folder.parent)
@@ -408,7 +408,7 @@ def parts_of_others(files: list[Path]) -> set[Path]:
 
 
 # The first that a path is one of counts; a plain folder is everything else.
-CATALOGUES: tuple[tuple[Callable[[Path], list[Path]], Callable[[Path, Path, Told], Models]], ...] = (
+CATALOGUES: tuple[tuple[Callable[[Path], list[Path]], Callable[[Path, Path, Tell], Models]], ...] = (
     (sweet_home, sweet_home_models),
     (abo, abo_models),
     (objaverse, objaverse_models),
@@ -481,13 +481,13 @@ def text(value: Any) -> str:
     return ""
 
 
-def texts(said: Mapping[str, Any], *names: str) -> tuple[str, ...]:
+def texts(row: Mapping[str, Any], *names: str) -> tuple[str, ...]:
     """What some fields of a catalogue say, those that say nothing left out."""
-    return tuple(filter(None, (text(said.get(name)) for name in names)))
+    return tuple(filter(None, (text(row.get(name)) for name in names)))
 
 
 def _there(folder: Path, place: str) -> Path | None:
     """The file at a place that a table names below a folder, None where there is none."""
-    said = Path(place)
-    inside = said.name and not said.is_absolute() and ".." not in said.parts
-    return folder / said if inside and (folder / said).is_file() else None
+    relative = Path(place)
+    inside = relative.name and not relative.is_absolute() and ".." not in relative.parts
+    return folder / relative if inside and (folder / relative).is_file() else None

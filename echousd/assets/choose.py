@@ -78,8 +78,8 @@ class AssetWishes:
 
         from echomodel.text import ClipTextEncoder
 
-        said = [" ".join((r.name, r.category.replace("_", " "), *r.tags, *r.materials)) for r in records]
-        vectors = ClipTextEncoder()([self.text, *said])
+        described = [" ".join((r.name, r.category.replace("_", " "), *r.tags, *r.materials)) for r in records]
+        vectors = ClipTextEncoder()([self.text, *described])
         vectors = torch.nn.functional.normalize(torch.as_tensor(vectors), dim=1)
         away = TEXT * (1.0 - vectors[1:] @ vectors[0])
         return dict(zip((record.id for record in records), away.tolist(), strict=True))

@@ -120,7 +120,7 @@ TONES = 0.05  # distance within which a colour is one of the room's
 DARKER = 0.5  # what lightness counts for, as light and dark woods go together
 LOUD = 9.0  # cost of a colour that is none of the room's, of its distance and its share
 SPOTS = 0.5  # power of a share: small spots of a loud colour are seen from afar
-TOLD = 4.0  # cost of another colour than the one that the graph tells
+STATED = 4.0  # cost of another colour than the one that the graph tells
 TOGETHER = 0.5  # cost of the distance of two models' main colours
 MAIN = 0.2  # share from which on a colour is one that people name a model by
 LIVELY = ("plant",)  # looks that may have any colour
@@ -164,7 +164,7 @@ def costs(colors: np.ndarray, category: str, palette: np.ndarray, wanted: np.nda
         out += LOUD * (share**SPOTS * np.minimum(grey, np.maximum(_away(lab, tones) - TONES, 0))).sum(1)
     if len(wanted):
         far = np.where(share >= MAIN, np.maximum(_away(lab, wanted) - TONES, 0), np.inf).min(1)
-        out += TOLD * np.where(np.isfinite(far), far, 0.0)
+        out += STATED * np.where(np.isfinite(far), far, 0.0)
     return out
 
 

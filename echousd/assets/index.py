@@ -72,12 +72,12 @@ def index(
     Raises ValueError where a folder is none, nothing is found, or the file is no index and cannot be replaced.
     """
     arrow()
-    said: list[str] = []
-    entries = list(_entries(folders, said.append))
+    unread: list[str] = []
+    entries = list(_entries(folders, unread.append))
     if not entries:
         where = ", ".join(map(str, folders))
         kinds = "usd, usda, usdc, usdz, glb, gltf, obj, and libraries"
-        why = f" ({said[0]})" if said else ""
+        why = f" ({unread[0]})" if unread else ""
         raise ValueError(f"{where}: holds no models; allowed: {kinds}{why}")
     wishes = read_corrections(table) if table is not None and table.exists() else {}
     before: Mapping[str, AssetRecord] = {}
@@ -106,7 +106,7 @@ def index(
             saved = time.monotonic()
     write_library(file, done.values())
     faults = [record.fault for record in done.values() if record.fault]
-    return Indexed(file, len(done), sum(r.usable for r in done.values()), len(fresh), (*said, *faults))
+    return Indexed(file, len(done), sum(r.usable for r in done.values()), len(fresh), (*unread, *faults))
 
 
 def _entries(folders: Sequence[Path], tell: Callable[[str], None]) -> Iterator[Entry]:
@@ -128,7 +128,7 @@ def _stays(old: AssetRecord, entry: Entry, file: Path, wishes: Corrections) -> b
     """Whether a row is still true: the file is the same one, and nobody corrects it otherwise than before."""
     unchanged = bool(old.stamp) and old.stamp == stamp(entry.file.path)
     place = old.uri.partition("!")[0] == relative(entry.file.path, file)
-    return unchanged and place and old.corrected == said_of(wishes.get(old.id, {}))
+    return unchanged and place and old.corrected == correction_of(wishes.get(old.id, {}))
 
 
 def _read(entries: list[Entry], file: Path, workers: int, descriptors: bool) -> Iterator[AssetRecord]:
@@ -162,20 +162,20 @@ LARGEST = 64 * 2**20  # bytes of a table
 Corrections = Mapping[str, Mapping[str, str]]
 
 
-def write_table(path: Path, records: Iterable[AssetRecord], said: Corrections | None = None) -> None:
+def write_table(path: Path, records: Iterable[AssetRecord], corrections: Corrections | None = None) -> None:
     """Write the table: what a person may say of each model, and beside it what was found.
 
     `use` 0 leaves a model out, `category` is of the vocabulary, `turn` is in degrees, counter-clockwise from above, and
     `metres` is the unit of the model's file. Empty where what was found is right.
 
     Arguments:
-        said: what was said already, which stays.
+        corrections: what was said already, which stays.
     """
     with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
         for r in records:
-            row = (said or {}).get(r.id, {})
+            row = (corrections or {}).get(r.id, {})
             wishes = [row.get(name, "") for name in COLUMNS[1:5]]
             size = [f"{length:.3f}" for length in r.dims]
             writer.writerow([r.id, *wishes, r.category, r.name, *size, r.licence, r.fault])
@@ -213,15 +213,15 @@ def _check(row: Mapping[str, str], where: str) -> None:
         raise ValueError(f"{where}: {error}") from None
 
 
-def said_of(row: Mapping[str, str]) -> str:
+def correction_of(row: Mapping[str, str]) -> str:
     """What a row corrects, as the index remembers it; "" for one that corrects nothing."""
-    said = [row.get("category", ""), row.get("turn", ""), row.get("metres", ""), "0" if row.get("use") == "0" else ""]
-    return "|".join(said) if any(said) else ""
+    cells = [row.get("category", ""), row.get("turn", ""), row.get("metres", ""), "0" if row.get("use") == "0" else ""]
+    return "|".join(cells) if any(cells) else ""
 
 
 def corrected(record: AssetRecord, row: Mapping[str, str]) -> AssetRecord:
     """The record as a person's row of the table wants it."""
-    record = replace(record, corrected=said_of(row))
+    record = replace(record, corrected=correction_of(row))
     category = vocabulary().category(row["category"]).name if row["category"] else record.category
     if category != record.category:
         place = PLACEMENT[vocabulary().category(category).support]

@@ -24,9 +24,9 @@ CLAUSES = (
 
 def spdx(text: str) -> str:
     """The SPDX identifier of what somebody calls a licence; the words themselves where they name no known one."""
-    said = " ".join(text.split())
-    low = said.lower().replace("_", "-")
-    if not said:
+    line = " ".join(text.split())
+    low = line.lower().replace("_", "-")
+    if not line:
         return UNKNOWN
     for pattern, name in PLAIN:
         if re.search(pattern, low):
@@ -36,7 +36,7 @@ def spdx(text: str) -> str:
         number = version[1] if version else ("3.0" if re.search(r"\b3\b", low) else "4.0")
         clauses = [word for pattern, word in CLAUSES if re.search(pattern, low)]
         return "-".join(["CC-BY", *clauses, number])
-    return said[:120]
+    return line[:120]
 
 
 def allowed(licence: str, wanted: Sequence[str]) -> bool:

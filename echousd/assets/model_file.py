@@ -91,15 +91,15 @@ class Beside(Resolver):
 
     def get(self, name: Any) -> bytes:
         """Content of a file that the model names; raises ValueError where there is none in reach."""
-        said = name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
-        said = said.replace("\\", "/").strip()
+        place = name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
+        place = place.replace("\\", "/").strip()
         try:
             with unpacking(self.model):
-                content = self._member(said) if self.model.member else self._file(said)
+                content = self._member(place) if self.model.member else self._file(place)
         except ValueError:
-            self.missing.append(said)
-            raise ValueError(f"{self.model}: names {said!r}, which is not there") from None
-        self.images[said] = content
+            self.missing.append(place)
+            raise ValueError(f"{self.model}: names {place!r}, which is not there") from None
+        self.images[place] = content
         return content
 
     def _file(self, name: str) -> bytes:

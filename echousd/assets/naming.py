@@ -130,8 +130,8 @@ def misfit(category: str, dims: Sequence[float] | np.ndarray) -> float:
     low, high = np.log(table.low / SLACK), np.log(table.high * SLACK)
     best = np.inf
     for order in ((0, 1, 2), (2, 1, 0)):
-        said = np.log(np.maximum(np.asarray(dims, float)[list(order)], 1e-9))
-        best = min(best, float(np.maximum(np.maximum(low - said, said - high), 0).sum()))
+        lengths = np.log(np.maximum(np.asarray(dims, float)[list(order)], 1e-9))
+        best = min(best, float(np.maximum(np.maximum(low - lengths, lengths - high), 0).sum()))
     return best
 
 

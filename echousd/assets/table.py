@@ -123,17 +123,17 @@ def _read(file: Path, changed: int) -> Library:
         raise
     except (pa.ArrowException, OSError, ValueError) as error:  # words that are no UTF-8, too
         reason = str(error).splitlines()[0]
-        told = reason if reason.startswith(f"{file}: ") else f"{file}: cannot be read as an index ({reason:.120})"
-        raise ValueError(told) from None
+        message = reason if reason.startswith(f"{file}: ") else f"{file}: cannot be read as an index ({reason:.120})"
+        raise ValueError(message) from None
 
 
 def _library(file: Path, table: Any) -> Library:
     about = json.loads((table.schema.metadata or {}).get(KEY, b"null"))
     version = about.get("version") if isinstance(about, dict) else None
     if version != VERSION:
-        told = f"version {'none' if version is None else version} of an index of assets, allowed: {VERSION}"
+        message = f"version {'none' if version is None else version} of an index of assets, allowed: {VERSION}"
         kind = OldIndex if isinstance(version, int) else ValueError
-        raise kind(f"{file}: {told}; index the folder again")
+        raise kind(f"{file}: {message}; index the folder again")
     wanted = list(_schema())
     wrong = [f.name for f in wanted if f.name not in table.schema.names or table.schema.field(f.name).type != f.type]
     if wrong:

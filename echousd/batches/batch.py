@@ -90,10 +90,10 @@ def batch(
 
     Raises ValueError for what is not allowed, a folder in use or with another plan, and says the difference.
     """
-    given = [sources] if isinstance(sources, str | Path) else sources
+    listed = [sources] if isinstance(sources, str | Path) else sources
     how = {field.name: options.pop(field.name) for field in fields(RunOptions) if field.name in options}
     raw = {
-        "sources": [Path(one).as_posix() for one in given], "sample": dict(sample or {}), "count": count, "seed": seed,
+        "sources": [Path(one).as_posix() for one in listed], "sample": dict(sample or {}), "count": count, "seed": seed,
         "options": options, "variations": {key: list(values) for key, values in (variations or {}).items()},
     }  # fmt: skip
     return run_batch(request_of(raw, "batch"), Path(out), RunOptions(**how))
@@ -186,9 +186,9 @@ def _agree_on(plan: RunPlan, out: Path, *, resume: bool) -> None:
         save_plan(plan, out)
         return
     old = load_plan(out)
-    told = difference(old, plan)
-    if told:
-        raise ValueError(f"{out}: holds a run with another plan ({told}); choose another folder")
+    unequal = difference(old, plan)
+    if unequal:
+        raise ValueError(f"{out}: holds a run with another plan ({unequal}); choose another folder")
     if not resume:
         raise ValueError(f"{out}: holds a run of {len(old.entries)} rooms; go on with it (--resume) or choose another")
 

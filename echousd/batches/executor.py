@@ -35,7 +35,7 @@ class Task:
 
     key: str
     call: Callable[[Any], Any]
-    given: Any
+    argument: Any
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class LocalWorkers:
         worker = next(worker for worker in self._workers if worker.task is None)
         worker.task, worker.since = task, time.monotonic()
         with contextlib.suppress(OSError):  # it is dead; `outcomes` will see that
-            worker.pipe.send((task.call, task.given))
+            worker.pipe.send((task.call, task.argument))
 
     def outcomes(self, seconds: float) -> list[Outcome]:
         """What has ended since, after waiting for at most so long; workers beyond a limit are killed."""
@@ -163,10 +163,10 @@ class LocalWorkers:
         return _Worker(process, mine, environment)
 
 
-def attempt(call: Callable[[Any], Any], given: Any) -> tuple[str, Any]:
+def attempt(call: Callable[[Any], Any], argument: Any) -> tuple[str, Any]:
     """`done` and the value, or `error` and one line."""
     try:
-        return "done", call(given)
+        return "done", call(argument)
     except ValueError as error:
         return "error", str(error)
     except MemoryError:
@@ -181,8 +181,8 @@ def _serve(pipe: Connection, parent: int) -> None:
     _die_with(parent)
     with contextlib.suppress(EOFError, OSError):
         while True:
-            call, given = pipe.recv()
-            pipe.send(attempt(call, given))
+            call, argument = pipe.recv()
+            pipe.send(attempt(call, argument))
 
 
 def _die_with(parent: int) -> None:
@@ -270,7 +270,7 @@ class RayCluster:
 
     def submit(self, task: Task) -> None:
         """Begin a task."""
-        reference = self._room.remote(task.call, task.given, self._memory, self._timeout)
+        reference = self._room.remote(task.call, task.argument, self._memory, self._timeout)
         self._begun[reference] = task, time.monotonic()
 
     def outcomes(self, seconds: float) -> list[Outcome]:
@@ -336,22 +336,22 @@ class RayCluster:
         return found
 
 
-def watched(call: Any, given: Any, memory: int | None, seconds: float | None = None) -> tuple[str, Any]:
+def watched(call: Any, argument: Any, memory: int | None, seconds: float | None = None) -> tuple[str, Any]:
     """`attempt`, given up as soon as the process holds more than so many MiB or takes longer than so many seconds."""
     began = time.monotonic()
     done = threading.Event()
     found: list[tuple[str, Any]] = []
 
     def work() -> None:
-        found.append(attempt(call, given))
+        found.append(attempt(call, argument))
         done.set()
 
     thread = threading.Thread(target=work, daemon=True)
     thread.start()
     while not done.wait(DYING):
-        if told := _beyond(os.getpid(), began, memory, seconds):
+        if limit := _beyond(os.getpid(), began, memory, seconds):
             threading.Timer(1.0, os._exit, (1,)).start()  # after this answer is on its way: the thread cannot be ended
-            return "limit", told
+            return "limit", limit
     return found[0]
 
 

@@ -12,7 +12,7 @@ from pydantic import ConfigDict, Field, ValidationError
 
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import PlainModel
-from echousd.options import FILES, MAX_SEED, ROOM, RoomOptions, row, told
+from echousd.options import FILES, MAX_SEED, ROOM, RoomOptions, row, validation_message
 
 
 class BatchOptions(RoomOptions):
@@ -44,7 +44,7 @@ class BatchRequest(PlainModel):
 
     @classmethod
     def _explained(cls, fields: dict[str, Any], error: ValidationError) -> ValueError:
-        return ValueError(told(error, cls))
+        return ValueError(validation_message(error, cls))
 
     def chosen(self, copy: int) -> BatchOptions:
         """The options of the room number `copy` of a graph."""

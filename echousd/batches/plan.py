@@ -23,7 +23,7 @@ from echousd.folder.within import check_links, inside
 from echousd.graph.fields import IDENTIFIER
 from echousd.graph.files import LAYER_FORMS
 from echousd.naming import as_identifier
-from echousd.options import told
+from echousd.options import validation_message
 from echousd.pending import STAGING
 from echousd.store import Store
 
@@ -188,11 +188,11 @@ def difference(old: RunPlan, new: RunPlan) -> str:
     """What the new plan says otherwise, in one line; "" where both are equal."""
     if old.digest == new.digest:
         return ""
-    told = [f"{key} was {a}, now {b}" for key, a, b in _unequal(old.head, new.head)]
-    if not told:
+    lines = [f"{key} was {a}, now {b}" for key, a, b in _unequal(old.head, new.head)]
+    if not lines:
         changed = [(a, b) for a, b in zip(old.entries, new.entries, strict=False) if a != b]
-        told = [f"{len(changed)} graphs changed, the first of {changed[0][0].origin}" if changed else "other rooms"]
-    return "; ".join(told[:4])
+        lines = [f"{len(changed)} graphs changed, the first of {changed[0][0].origin}" if changed else "other rooms"]
+    return "; ".join(lines[:4])
 
 
 def _unequal(old: Any, new: Any, where: str = "") -> Iterator[tuple[str, Any, Any]]:
@@ -216,7 +216,7 @@ def _entry(raw: Any, number: int, sets: int) -> Entry:
     try:
         entry = TypeAdapter(Entry).validate_python(raw)
     except ValidationError as error:
-        raise ValueError(f"line {number + 2}: {told(error)}") from None
+        raise ValueError(f"line {number + 2}: {validation_message(error)}") from None
     if entry.number != number:
         raise ValueError(f"line {number + 2}: number is {entry.number}, allowed: {number}")
     if entry.options >= sets:

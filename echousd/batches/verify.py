@@ -36,12 +36,12 @@ def write_sheet(folder: Path, rows: Iterable[dict[str, Any]], title: str) -> Pat
     """
     cards = []
     for row in rows:
-        picture, told = Path(row["root"]).with_suffix(".png") if row["root"] else None, _told(row)
+        picture, complaints = Path(row["root"]).with_suffix(".png") if row["root"] else None, _complaints(row)
         kept = f"{row['objects']} objects, {row['relations_kept']} of {row['relations_asked']} relations"
         shown = picture.as_posix() if picture and (folder / picture).is_file() else ""
-        worst = 1000 if row["state"] != "done" else 100 * (not row["check"]) + len(told)
+        worst = 1000 if row["state"] != "done" else 100 * (not row["check"]) + len(complaints)
         own = {name: row[name] for name in ("id", "root", "type", "seed")}
-        cards.append({**own, "kept": kept if row["root"] else "", "picture": shown, "told": told, "worst": worst})
+        cards.append({**own, "kept": kept if row["root"] else "", "picture": shown, "told": complaints, "worst": worst})
     cards.sort(key=lambda card: (-card["worst"], card["id"]))
     kinds = sorted({card["type"] for card in cards} - {""})
     page = template("echousd.batches", "sheet.html.j2")
@@ -50,14 +50,14 @@ def write_sheet(folder: Path, rows: Iterable[dict[str, Any]], title: str) -> Pat
     return folder / SHEET
 
 
-def _told(row: dict[str, Any]) -> list[str]:
+def _complaints(row: dict[str, Any]) -> list[str]:
     """What is wrong with a room, a few words each."""
     if row["state"] != "done":
         return [row["error"] or "not made yet"]
     missed = row["relations_asked"] - row["relations_kept"]
-    told = [f"relations not kept: {missed}"] * bool(missed)
-    told += [f"collisions: {row['collisions']}"] * bool(row["collisions"])
-    return [*told, *["fails echousd check"] * (not row["check"]), *row["check_errors"], *row["living_faults"]]
+    lines = [f"relations not kept: {missed}"] * bool(missed)
+    lines += [f"collisions: {row['collisions']}"] * bool(row["collisions"])
+    return [*lines, *["fails echousd check"] * (not row["check"]), *row["check_errors"], *row["living_faults"]]
 
 
 MANIFEST, TABLE, SUMMARY = "manifest.jsonl", "manifest.parquet", "summary.json"
@@ -75,8 +75,8 @@ def manifest_rows(plan: RunPlan, folder: Path) -> Iterator[dict[str, Any]]:
         if found:
             entry.folder(folder)  # no link on the way leads elsewhere
         root = f"{entry.path}/{found['root']}" if found.get("root") else ""
-        given = {"id": entry.id, "source": entry.origin, "seed": entry.seed, "version": plan.head["version"]}
-        yield {**row, **given, "root": root}
+        about = {"id": entry.id, "source": entry.origin, "seed": entry.seed, "version": plan.head["version"]}
+        yield {**row, **about, "root": root}
 
 
 def summary(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
@@ -206,8 +206,8 @@ def _fault(place: Path, row: dict[str, Any], stored: Collection[str], *, check: 
         return f"check: {error}"
     counts = (len(report.broken), len(report.collisions), len(report.placement), len(report.errors))
     restless = sum(len(found.restless) for found in report.settled or ())
-    told = "check: {} relations, {} collisions, {} misplaced, {} errors".format(*counts)
-    return "" if report.ok else told + f", {restless} restless" * bool(restless)
+    message = "check: {} relations, {} collisions, {} misplaced, {} errors".format(*counts)
+    return "" if report.ok else message + f", {restless} restless" * bool(restless)
 
 
 def finish(folder: Path, *, webdataset: bool = False) -> dict[str, Any]:
@@ -256,13 +256,13 @@ def write_webdataset(folder: Path, rows: Iterable[dict[str, Any]], rooms: int = 
 
 
 def _members(folder: Path, row: dict[str, Any]) -> Iterator[tuple[str, bytes]]:
-    told = {key: value for key, value in row.items() if key != "seconds"}  # the only thing that no seed decides
+    content = {key: value for key, value in row.items() if key != "seconds"}  # the only thing that no seed decides
     beside, picture = (
         inside(folder, str(PurePosixPath(row["root"]).with_suffix(ending)), f"{folder}: the manifest")
         for ending in (".json", ".png")
     )
-    told["room"] = read_json(beside, LARGEST)
-    yield f"{row['id']}.json", (json.dumps(told, sort_keys=True) + "\n").encode()
+    content["room"] = read_json(beside, LARGEST)
+    yield f"{row['id']}.json", (json.dumps(content, sort_keys=True) + "\n").encode()
     if picture.is_file():
         yield f"{row['id']}.png", read_bounded(picture, MAX_BYTES)
 

@@ -57,7 +57,7 @@ def room(job: Job) -> dict[str, Any]:
 
     started = time.perf_counter()
     folder = Path(job.folder)
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         made = generated(job)
         with held(folder, wait=True):
@@ -66,7 +66,7 @@ def room(job: Job) -> dict[str, Any]:
             if job.options.preview:
                 write_pictures(root, stage)
     facts = _facts(made, root, stage, settle=job.options.settle)
-    facts["notes"] = [*made.notes, *(str(warning.message) for warning in told)]
+    facts["notes"] = [*made.notes, *(str(warning.message) for warning in caught)]
     facts["seconds"] = round(time.perf_counter() - started, 3)
     return facts
 

@@ -14,7 +14,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 from echomodel.vocabulary import vocabulary
 from echousd.checks.reading import Finding, Reading, rule
 from echousd.exporting.packing import Reach
-from echousd.stage.files import said
+from echousd.stage.files import usd_error
 from echousd.stage.units import METRES, UP_AXIS, unit_faults, upwards
 from echousd.stage.values import LARGEST, UNREADABLE, asset, misfit, shown
 from echousd.textures import READABLE, TextureError, file_of, read_image
@@ -29,12 +29,12 @@ ABSOLUTE = re.compile(r"^(?:/|\\\\|[A-Za-z]:[\\/]|file:)")
 @rule("echo:RelativePaths")
 def relative_paths(reading: Reading) -> Iterator[Finding]:
     """Every asset path is relative and written with forward slashes."""
-    told = set()
+    seen = set()
     for layer, paths in reading.named_files.items():
         for holder, path in paths:
-            if (layer.identifier, path) in told or not (ABSOLUTE.match(path) or "\\" in path):
+            if (layer.identifier, path) in seen or not (ABSOLUTE.match(path) or "\\" in path):
                 continue
-            told.add((layer.identifier, path))
+            seen.add((layer.identifier, path))
             what = "absolute" if ABSOLUTE.match(path) else "written with backslashes"
             where = layer.GetDisplayName()
             yield Finding(holder, f"{where}: asset path {path!r} is {what}, allowed: ./relative/path")
@@ -46,14 +46,14 @@ def paths_inside(reading: Reading) -> Iterator[Finding]:
     if not reading.stage.GetRootLayer().realPath:
         return
     reach = Reach.of(reading.stage)
-    told = set()
+    seen = set()
     for layer, paths in reading.named_files.items():
         if layer.realPath and not reach.holds(layer.realPath):
             continue  # what a layer outside names is outside with it; the layer itself is told
         for holder, path in paths:
-            if (layer.identifier, path) in told or ABSOLUTE.match(path):
+            if (layer.identifier, path) in seen or ABSOLUTE.match(path):
                 continue
-            told.add((layer.identifier, path))
+            seen.add((layer.identifier, path))
             full = layer.ComputeAbsolutePath(path)
             if full and not reach.holds(full):
                 where = f"{layer.GetDisplayName()}: asset path {path!r} leads out of the room's folder"
@@ -105,9 +105,9 @@ def arcs(reading: Reading) -> Iterator[Finding]:
     stage = reading.stage
     mass = float(UsdPhysics.GetStageKilogramsPerUnit(stage))
     for layer in reading.named_files:
-        told = layer.pseudoRoot.GetInfo(KILOGRAMS) if layer.pseudoRoot.HasInfo(KILOGRAMS) else mass
-        if not math.isclose(told, mass, rel_tol=SAME):
-            where = f"{KILOGRAMS} is {told:g} in {layer.GetDisplayName()}"
+        authored = layer.pseudoRoot.GetInfo(KILOGRAMS) if layer.pseudoRoot.HasInfo(KILOGRAMS) else mass
+        if not math.isclose(authored, mass, rel_tol=SAME):
+            where = f"{KILOGRAMS} is {authored:g} in {layer.GetDisplayName()}"
             yield Finding(Sdf.Path.absoluteRootPath, f"{where}, {mass:g} in the stage, allowed: the same")
     up = upwards(stage)
     for prim in reading.distinct:
@@ -119,13 +119,13 @@ def arcs(reading: Reading) -> Iterator[Finding]:
             size = float(np.cbrt(abs(np.linalg.det(world)))) * reading.metres
             unit = layer.pseudoRoot.GetInfo(METRES) if layer.pseudoRoot.HasInfo(METRES) else None
             if unit is not None and size > 0 and abs(math.log(size / unit)) > UNLIKE:
-                told = f"{METRES} is {unit:g} in {layer.GetDisplayName()}, a unit of it is {size:.3g} m here"
-                yield Finding(prim.GetPath(), f"{told}, allowed: the same")
+                message = f"{METRES} is {unit:g} in {layer.GetDisplayName()}, a unit of it is {size:.3g} m here"
+                yield Finding(prim.GetPath(), f"{message}, allowed: the same")
             axis = layer.pseudoRoot.GetInfo(UP_AXIS) if layer.pseudoRoot.HasInfo(UP_AXIS) else None
             turned = world[:, 2 if axis == "Z" else 1]
             if axis is not None and turned @ up < LEVEL * np.linalg.norm(turned):
-                told = f"{UP_AXIS} is {axis} in {layer.GetDisplayName()}, but its {axis} does not point up here"
-                yield Finding(prim.GetPath(), told)
+                message = f"{UP_AXIS} is {axis} in {layer.GetDisplayName()}, but its {axis} does not point up here"
+                yield Finding(prim.GetPath(), message)
 
 
 def _referenced(prim: Usd.Prim) -> list[Sdf.Layer]:
@@ -151,7 +151,7 @@ def value_types(_reading: Reading, attribute: Usd.Attribute) -> Iterator[str]:
     try:
         found = attribute.Get()
     except Tf.ErrorException as error:
-        yield f"a value that cannot be read: {said(error)}"
+        yield f"a value that cannot be read: {usd_error(error)}"
         return
     if misfit(attribute.GetTypeName(), found):
         yield f"holds {shown(found)}, allowed: {attribute.GetTypeName()}"
@@ -175,8 +175,8 @@ def finite_values(_reading: Reading, attribute: Usd.Attribute) -> Iterator[str]:
     physical = attribute.GetNamespace().startswith("physics")
     bad = np.isnan(found) if physical else ~(np.abs(found) <= LARGEST)
     if bad.any():
-        told = f"{found[bad].flat[0]:g}" + (f" ({int(bad.sum())} of {bad.size} numbers)" if bad.size > 1 else "")
-        yield f"holds {told}, allowed: -{LARGEST:g} to {LARGEST:g}"
+        message = f"{found[bad].flat[0]:g}" + (f" ({int(bad.sum())} of {bad.size} numbers)" if bad.size > 1 else "")
+        yield f"holds {message}, allowed: -{LARGEST:g} to {LARGEST:g}"
 
 
 @rule("echo:TransformOps", "prims")

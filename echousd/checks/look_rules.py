@@ -220,8 +220,8 @@ def _findings(reading: Reading) -> list[tuple[str, Finding]]:
                 values = (numbers := _numbers(attribute))[numbers > -UNLIMITED]  # physics: as the engine likes
                 if not row.allows(values, reading.metres):
                     shown = ", ".join(f"{value:g}" for value in values[:4])
-                    told = f"is {shown}, allowed: {row.allowed} ({row.why})"
-                    found.append((row.rule, Finding(attribute.GetPath(), told)))
+                    message = f"is {shown}, allowed: {row.allowed} ({row.why})"
+                    found.append((row.rule, Finding(attribute.GetPath(), message)))
     return found
 
 

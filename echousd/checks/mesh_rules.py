@@ -43,8 +43,8 @@ def degenerate(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[Finding]:
     sides = ((corners - corners[:, [2, 0, 1]]) ** 2).sum(2).max(1, initial=0.0)  # squares
     flat = twice | ((normals**2).sum(1) <= (THIN * sides) ** 2)
     if flat.any():
-        told = f"{int(flat.sum())} of {len(flat)} triangles have no area"
-        yield Finding(mesh.GetPath(), told, warning=not twice.any() or of_others(mesh.GetPrim()))
+        message = f"{int(flat.sum())} of {len(flat)} triangles have no area"
+        yield Finding(mesh.GetPath(), message, warning=not twice.any() or of_others(mesh.GetPrim()))
 
 
 @rule("echo:Subdivision", "meshes")
@@ -195,13 +195,13 @@ class Laid:
         return cls.counted(values, primvar.GetInterpolation(), arrays, f"{name} has {len(values)} {word}")
 
     @classmethod
-    def counted(cls, values: np.ndarray, interpolation: str, arrays: MeshArrays, told: str) -> Laid:
-        """Values that must be as many as their interpolation asks for on a mesh; `told` says how many there are."""
+    def counted(cls, values: np.ndarray, interpolation: str, arrays: MeshArrays, problem: str) -> Laid:
+        """Values that must be as many as their interpolation asks for on a mesh; `problem` says how many there are."""
         tokens = UsdGeom.Tokens
         many = {
             tokens.constant: 1, tokens.uniform: len(arrays.counts), tokens.faceVarying: len(arrays.indices)
         }.get(interpolation, len(arrays.points))  # fmt: skip
-        fault = "" if len(values) == many else f"{told}, {interpolation} interpolation needs {many}"
+        fault = "" if len(values) == many else f"{problem}, {interpolation} interpolation needs {many}"
         return cls(values, interpolation, fault)
 
 
@@ -261,7 +261,7 @@ def of_others(prim: Usd.Prim) -> bool:
 @rule("echo:Scale")
 def scale(reading: Reading) -> Iterator[Finding]:
     """No scale is zero, and no node of a graph, body or collider is scaled differently along its axes."""
-    told: set[Sdf.Path] = set()
+    reported: set[Sdf.Path] = set()
     for prim in reading.prims:
         if not prim.IsA(UsdGeom.Xformable):
             continue
@@ -271,7 +271,7 @@ def scale(reading: Reading) -> Iterator[Finding]:
         except UNREADABLE:
             continue
         if local.min() < 1e-6:
-            told.add(prim.GetPath())
+            reported.add(prim.GetPath())
             yield Finding(prim.GetPath(), f"scale is {_listed(local)}, allowed: above 0")
             continue
         schemas = applied(prim)
@@ -281,8 +281,8 @@ def scale(reading: Reading) -> Iterator[Finding]:
         if world.min() < 1e-6 or world.max() / world.min() < 1 + EVEN:
             continue
         culprit = _unevenly_scaled(prim, reading.cache)
-        if culprit.GetPath() not in told:
-            told.add(culprit.GetPath())
+        if culprit.GetPath() not in reported:
+            reported.add(culprit.GetPath())
             what = "a body, collider or object of a scene graph"
             yield Finding(culprit.GetPath(), f"scale is {_listed(world)}, allowed on {what}: the same along all axes")
 

@@ -74,13 +74,13 @@ def stated_boxes(reading: Reading) -> Iterator[Finding]:
             if node.size is not None:
                 apart = np.abs(thing.size - node.size)
                 if (apart > np.maximum(SIZE[0], SIZE[1] * np.array(node.size))).any():
-                    told = f"{usd.SIZE} is {_shown(node.size)}, its geometry {_shown(thing.size)} metres"
-                    yield Finding(paths[node.name], told)
+                    message = f"{usd.SIZE} is {_shown(node.size)}, its geometry {_shown(thing.size)} metres"
+                    yield Finding(paths[node.name], message)
             if node.yaw is not None:
                 turn = (thing.yaw - node.yaw + np.pi) % (2 * np.pi) - np.pi
                 if abs(turn) > TURN:
-                    told = f"{usd.YAW} is {node.yaw:.3g}, it is turned by {thing.yaw:.3g} radians"
-                    yield Finding(paths[node.name], told)
+                    message = f"{usd.YAW} is {node.yaw:.3g}, it is turned by {thing.yaw:.3g} radians"
+                    yield Finding(paths[node.name], message)
 
 
 def _states(prim: Usd.Prim, names: tuple[str, ...]) -> bool:
@@ -188,8 +188,8 @@ def agreeing_labels(reading: Reading, prim: Usd.Prim) -> Iterator[Finding | str]
     other = meant in SHELL and not shared
     if other and not any(prim.GetPath().HasPrefix(node.GetPath()) for node in reading.nodes):
         known = is_structure(word) or known_category(word) is not None
-        told = f"{usd.LABELS} is {words[0]!r}, its name says {meant!r}"
-        yield Finding(prim.GetPath(), told, warning=not known)
+        message = f"{usd.LABELS} is {words[0]!r}, its name says {meant!r}"
+        yield Finding(prim.GetPath(), message, warning=not known)
     if len(classes) == 1:
         try:
             same = ade20k(word)
@@ -246,7 +246,7 @@ def consistent_graph(reading: Reading) -> Iterator[Finding]:
     if any(not found.warning for found in edge_targets(reading)):
         return
     for room in reading.rooms:
-        with warnings.catch_warnings(record=True) as told:
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", StatedTwice)
             try:
                 room_graph(room)
@@ -257,7 +257,7 @@ def consistent_graph(reading: Reading) -> Iterator[Finding]:
                 read_small(prim)
             except StageError as error:
                 yield Finding(prim.GetPath(), _without_place(str(error), prim))
-        for hint in told:
+        for hint in caught:
             message = str(hint.message)
             yield Finding(room.graph.GetPath(), message.split(": ", 1)[-1], warning=True)
 
@@ -277,13 +277,13 @@ def known_types(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
 @rule("echo:Semantics")
 def semantics(reading: Reading) -> Iterator[Finding]:
     """All visible geometry carries semantics labels, itself or through a prim above it."""
-    told: set = set()
+    reported: set = set()
     for prim in reading.prims:
         if not prim.IsA(UsdGeom.Gprim) or reading.is_guide(prim) or _labelled(prim):
             continue
         owner = next((above for above in lineage(prim) if _kind(above) == "component"), prim)
-        if owner.GetPath() not in told:
-            told.add(owner.GetPath())
+        if owner.GetPath() not in reported:
+            reported.add(owner.GetPath())
             yield Finding(
                 owner.GetPath(), "no semantics labels, allowed: SemanticsLabelsAPI on the geometry or above it"
             )

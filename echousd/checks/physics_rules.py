@@ -40,8 +40,8 @@ def dynamic_colliders(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     body = _body_above(prim) if prim.IsA(UsdGeom.Mesh) else None
     if not body or not moves(body):
         return
-    told = prim.HasAPI(UsdPhysics.MeshCollisionAPI)
-    kind = UsdPhysics.MeshCollisionAPI(prim).GetApproximationAttr().Get() if told else UsdPhysics.Tokens.none
+    approximated = prim.HasAPI(UsdPhysics.MeshCollisionAPI)
+    kind = UsdPhysics.MeshCollisionAPI(prim).GetApproximationAttr().Get() if approximated else UsdPhysics.Tokens.none
     if kind in CONCAVE:
         yield (
             f"physics:approximation is {kind!r} on a collider of the dynamic body <{body.GetPath()}>, "
@@ -123,8 +123,8 @@ def masses(reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """A body weighs no more than stone, its centre is within its geometry, its inertia that of something."""
     if prim.IsInstanceProxy():
         return
-    told = UsdPhysics.MassAPI(prim)
-    mass, centre = told.GetMassAttr().Get(), told.GetCenterOfMassAttr()
+    authored = UsdPhysics.MassAPI(prim)
+    mass, centre = authored.GetMassAttr().Get(), authored.GetCenterOfMassAttr()
     shapes = [found for found in below(prim) if found.IsA(UsdGeom.Gprim) and not reading.is_guide(found)]
     box = _bounds(shapes, reading)
     world = reading.world(prim)
@@ -141,11 +141,11 @@ def masses(reading: Reading, prim: Usd.Prim) -> Iterator[str]:
         off = float(np.maximum(box[0] - at, at - box[1]).max())
         if off > APART:
             yield f"its centre of mass lies {off:.2g} m outside its geometry"
-    yield from _inertia(told)
+    yield from _inertia(authored)
 
 
-def _inertia(told: UsdPhysics.MassAPI) -> Iterator[str]:
-    inertia, axes = told.GetDiagonalInertiaAttr().Get(), told.GetPrincipalAxesAttr()
+def _inertia(authored: UsdPhysics.MassAPI) -> Iterator[str]:
+    inertia, axes = authored.GetDiagonalInertiaAttr().Get(), authored.GetPrincipalAxesAttr()
     if inertia is not None and 2 * max(inertia) > sum(inertia) * (1 + SLACK):
         shown = ", ".join(f"{value:g}" for value in inertia)
         yield f"physics:diagonalInertia is {shown}, allowed: none larger than both others"

@@ -112,8 +112,8 @@ def _furniture(whole: Whole) -> Iterator[Misplacement]:
     """Objects that are outside the floor, float, sink into it, or have no geometry where others have."""
     room, floor = whole.room, whole.floor
     yield from (Misplacement(name, "empty") for name in room.missing)
-    told = HEIGHT if room.spec is None else room.spec.tall
-    height = max([told, *(float(thing.position[1] + thing.size[1]) for thing in room.objects)])
+    ceiling = HEIGHT if room.spec is None else room.spec.tall
+    height = max([ceiling, *(float(thing.position[1] + thing.size[1]) for thing in room.objects)])
     for thing in room.objects:
         beyond = -np.inf if floor is None else _beyond(thing, floor)
         if beyond > OUTSIDE:
@@ -156,7 +156,7 @@ def _dressing(whole: Whole) -> Iterator[Misplacement]:
     small, shell = ([one.shape for one in found if one.shape is not None] for found in (whole.small, whole.shell))
     carriers, windows = [*whole.room.objects, *small, *shell], _windows(whole)  # sills carry things, too
     for one in whole.small:
-        yield from (Misplacement(one.name, *told) for told in _small_faults(one, whole.floor, carriers, windows, shell))
+        yield from (Misplacement(one.name, *why) for why in _small_faults(one, whole.floor, carriers, windows, shell))
 
 
 def _small_faults(

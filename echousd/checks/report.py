@@ -27,7 +27,7 @@ from echousd.place.living import LivingFault, living_faults
 from echousd.room import Verdict
 from echousd.stage.contents import RoomContents
 from echousd.stage.encoding import StageError
-from echousd.stage.files import opened, said, source
+from echousd.stage.files import opened, source, usd_error
 from echousd.stage.foreign import UNTOLD
 from echousd.stage.layouts import ARTICULATED, ARTICULATION, each_layout, showing_variant
 from echousd.stage.read import RoomPrims, find_rooms
@@ -64,8 +64,8 @@ def safely(rule: StageRule, reading: Reading) -> list[Finding]:
     try:
         found.extend(rule.find(reading))
     except UNREADABLE as error:
-        told = f"cannot be read through: {said(error)}" if isinstance(error, Tf.ErrorException) else str(error)
-        found.append(Finding(Sdf.Path.absoluteRootPath, told))
+        why = f"cannot be read through: {usd_error(error)}" if isinstance(error, Tf.ErrorException) else str(error)
+        found.append(Finding(Sdf.Path.absoluteRootPath, why))
     return found
 
 
@@ -98,15 +98,15 @@ def _faults_of_usd(stage: Usd.Stage) -> tuple[set[Fault], set[Fault]]:
     context = UsdValidation.ValidationContext(known)
     silence = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what the report says as well
     try:
-        told = context.Validate(stage)
+        found_errors = context.Validate(stage)
     except Tf.ErrorException as stopped:  # a validator that cannot read the stage ends the whole run
-        return {Fault(ALONE, "/", f"OpenUSD's validators stopped: {said(stopped)}")}, set()
+        return {Fault(ALONE, "/", f"OpenUSD's validators stopped: {usd_error(stopped)}")}, set()
     finally:
         silence.TakeUncoalescedDiagnostics()
         del silence
     errors, warnings = set(), set()
     knows_materialx = bool(Plug.Registry().GetPluginWithName("usdMtlx"))  # usd-core comes without it
-    for error in told:
+    for error in found_errors:
         name = f"{error.GetValidator().GetMetadata().name}.{error.GetName()}"
         fault = Fault(name, _site(error), " ".join(error.GetMessage().split()))
         if not knows_materialx and fault.rule.endswith(UNKNOWN_NODE) and MATERIALX in fault.message:
@@ -235,8 +235,8 @@ class CheckReport:
         found = {"layouts": each} if several else self.layouts[0].to_json()
         rest = {} if self.settled is None else {"settle": [each.to_json() for each in self.settled]}
         usd = {"errors": self.errors, "warnings": self.warnings}
-        told = {word: [fault.to_json() for fault in faults] for word, faults in usd.items()}
-        return {"ok": self.ok, **found, "usd": told, **rest}
+        of_usd = {word: [fault.to_json() for fault in faults] for word, faults in usd.items()}
+        return {"ok": self.ok, **found, "usd": of_usd, **rest}
 
 
 def check(
@@ -332,20 +332,20 @@ def rewritten(stage: Usd.Stage, room: str, relations: Sequence[Verdict]) -> Iter
     if manifest is None or manifest["name"] != root.stem or any(digest_of(root.parent / n) != files[n] for n in layers):
         return
     measured = {(one.subject, one.predicate, one.object): one for one in relations}
-    told: dict[tuple[str, str, str], str] = {}
+    written: dict[tuple[str, str, str], str] = {}
     verdicts = manifest["verdicts"] if isinstance(manifest.get("verdicts"), list) else []
     for verdict in (each for each in verdicts if isinstance(each, dict)):
         triple = (str(verdict.get("subject")), str(verdict.get("predicate")), str(verdict.get("object")))
-        told[triple] = str(verdict.get("state"))
+        written[triple] = str(verdict.get("state"))
         found = measured.get(triple)
         if found is None or found.margin is None or abs(found.margin) < CLEAR:
             continue
-        if (found.state == "kept") != (told[triple] == "kept"):
-            said = f"'{found.said}' is {told[triple]}, it is {found.state} ({found.margin:+.3f})"
-            yield Fault(RULE, room, f"{root.stem}.json says that {said}")
+        if (found.state == "kept") != (written[triple] == "kept"):
+            message = f"'{found.sentence}' is {written[triple]}, it is {found.state} ({found.margin:+.3f})"
+            yield Fault(RULE, room, f"{root.stem}.json says that {message}")
     for triple, found in measured.items():
-        if found.margin is not None and triple not in told:
-            yield Fault(RULE, room, f"{root.stem}.json says nothing of '{found.said}'")
-    kept, counts = list(told.values()).count("kept"), manifest.get("relations")
+        if found.margin is not None and triple not in written:
+            yield Fault(RULE, room, f"{root.stem}.json says nothing of '{found.sentence}'")
+    kept, counts = list(written.values()).count("kept"), manifest.get("relations")
     if not isinstance(counts, dict) or counts.get("kept") != kept:
         yield Fault(RULE, room, f"{root.stem}.json counts {counts} relations, its verdicts say {kept} kept")

@@ -52,7 +52,7 @@ def run(
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="A JSON line for every room, on stdout.")] = False,
     outside: Outside = None,
-    **given: Any,
+    **changes: Any,
 ) -> None:
     """Make many rooms, each whole or not at all; end it, go on with --resume, on as many machines as there are."""
     from echousd.batches.batch import RunOptions, run_batch
@@ -68,9 +68,9 @@ def run(
     raw["sources"] = [*raw.get("sources", []), *(word for word in words if word not in files)]
     raw["sample"] = {**raw.get("sample", {}), **parse_sample(sample)}
     raw |= {key: value for key, value in (("count", count), ("seed", seed)) if value is not None}
-    if "assets" in given:
-        given["assets"] = str(Path(given["assets"]).absolute())
-    raw["options"] = {**raw.get("options", {}), **parse_options(more or []), **given}
+    if "assets" in changes:
+        changes["assets"] = str(Path(changes["assets"]).absolute())
+    raw["options"] = {**raw.get("options", {}), **parse_options(more or []), **changes}
     again = resume and raw == {"sources": [], "sample": {}, "options": {}}
     request = load_plan(output).request if again else request_of(raw, files[0] if files else "batch")
     with _shown(json) as tell:

@@ -41,12 +41,12 @@ def check(
     rule_set(rules)  # known, before each room tells that it is not
     found = [path for place in room for path in rooms_at(place)]
     reports = [_one(path, json, rules, layout, strict, settle, alone=len(found) == 1) for path in found]
-    unread = sum("error" in told for _, told in reports)
+    unread = sum("error" in report for _, report in reports)
     if json:
         say_json(
             reports[0][1]
             if len(found) == 1
-            else [{"room": str(p), **told} for p, (_, told) in zip(found, reports, strict=True)],
+            else [{"room": str(p), **report} for p, (_, report) in zip(found, reports, strict=True)],
             indent=2,
         )
     elif len(found) > 1:
@@ -73,7 +73,7 @@ def _one(
         stage = open_stage(room)
         if is_home(stage):  # what a single room does not need is not loaded to see that it is one
             from echousd.home.check import check_home
-            from echousd.home.given import plan_there
+            from echousd.home.existing import plan_there
 
             if plan_there(room) is not None:
                 home = check_home(room, rules=rules, layout=layout, settle=settle)
@@ -139,12 +139,12 @@ def _of_room(report: CheckReport, strict: bool) -> tuple[list[Row], list[Fault]]
             (_mark(not layout.placement), f"{which}placement", f"{len(layout.placement)} misplaced"),
             (doubt[0] if layout.living else "ok", f"{which}living", living),
         ]
-        said = [("broken", f"{one.said} (margin {one.margin:+.3f})") for one in layout.broken]
-        said += [("collision", f"{hit.first} and {hit.second}, {hit.depth:.3f} m deep") for hit in layout.collisions]
+        lines = [("broken", f"{one.sentence} (margin {one.margin:+.3f})") for one in layout.broken]
+        lines += [("collision", f"{hit.first} and {hit.second}, {hit.depth:.3f} m deep") for hit in layout.collisions]
         for wrong in layout.placement:
             far = "" if wrong.distance is None else f" by {wrong.distance:.3f} m"
-            said.append(("placement", f"{wrong.object} is {wrong.problem}{far}"))
-        faults += [(kind, where + text, "red") for kind, text in said]
+            lines.append(("placement", f"{wrong.object} is {wrong.problem}{far}"))
+        faults += [(kind, where + text, "red") for kind, text in lines]
         faults += [("living", f"{where}{seen.says} ({seen.rule})", doubt[1]) for seen in layout.living]
     usd = f"{counted(len(report.errors), 'error')}, {counted(len(report.warnings), 'warning')}"
     rows.append((_mark(not report.errors), "USD", usd))
@@ -152,11 +152,11 @@ def _of_room(report: CheckReport, strict: bool) -> tuple[list[Row], list[Fault]]
         faults += [(kind, f"{fault.rule} <{fault.prim}>: {fault.message}", colour) for fault in found]
     for rest in report.settled or ():
         still = len(rest.motions) - len(rest.restless)
-        told = f"{still} of {len(rest.motions)} pieces rest for {rest.seconds:g} s"
-        rows.append((_mark(rest.ok), f"{rest.layout} settle".strip(), told))
+        message = f"{still} of {len(rest.motions)} pieces rest for {rest.seconds:g} s"
+        rows.append((_mark(rest.ok), f"{rest.layout} settle".strip(), message))
         for motion in rest.restless:
-            told = f"{motion.name} moves {motion.shift:.3f} m and {motion.turn:.1f} degrees: {motion.why}"
-            faults.append(("restless", told, "red"))
+            message = f"{motion.name} moves {motion.shift:.3f} m and {motion.turn:.1f} degrees: {motion.why}"
+            faults.append(("restless", message, "red"))
     return rows, faults
 
 

@@ -33,7 +33,7 @@ def edit(
     wait: Wait = False,
     outside: Outside = None,
     json: Made = False,
-    **given: Any,
+    **changes: Any,
 ) -> None:
     """Change what a room holds; objects that the change does not touch stay byte for byte.
 
@@ -44,7 +44,7 @@ def edit(
     from echousd.make.wishes import wished
     from echousd.options import EditRequest
 
-    asked = {kind: given.pop(kind, None) for kind in EditRequest.__dataclass_fields__}
+    asked = {kind: changes.pop(kind, None) for kind in EditRequest.__dataclass_fields__}
     wishes = EditRequest(**{kind: words for kind, words in asked.items() if words})
     if not recover:
         if wishes == EditRequest(relate=wishes.relate, unrelate=wishes.unrelate) != EditRequest() and is_home(room):
@@ -63,11 +63,11 @@ def edit(
         else:
             _step(room, wait, json, "undo" if undo else "redo")
         return
-    given["outside"] = outside or ()
+    changes["outside"] = outside or ()
     nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
     _change(
-        f"edit {_name_of(wishes, given)}", lambda: (room, wished(read_room(room), wishes)), output or room.parent,
-        given, nothing, dry_run=dry_run, force=force, wait=wait, json=json,
+        f"edit {_name_of(wishes, changes)}", lambda: (room, wished(read_room(room), wishes)), output or room.parent,
+        changes, nothing, dry_run=dry_run, force=force, wait=wait, json=json,
     )  # fmt: skip
 
 
@@ -90,7 +90,7 @@ def update(
     wait: Wait = False,
     outside: Outside = None,
     json: Made = False,
-    **given: Any,
+    **changes: Any,
 ) -> None:
     """Bring a room up to date with what a stronger layer changes: its relations, objects and transforms.
 
@@ -108,10 +108,10 @@ def update(
             say(f"locked   {name}, where {layer.name} puts it")
         return own, graph
 
-    given["outside"] = outside or ()
+    changes["outside"] = outside or ()
     nothing = f"{layer}: changes nothing about the room"
-    run = f"update {_name_of(layer.name, layer.read_bytes(), given)}"
-    _change(run, wanted, layer.parent, given, nothing, dry_run=dry_run, force=False, wait=wait, json=json)
+    run = f"update {_name_of(layer.name, layer.read_bytes(), changes)}"
+    _change(run, wanted, layer.parent, changes, nothing, dry_run=dry_run, force=False, wait=wait, json=json)
 
 
 def _name_of(*asked: object) -> str:
@@ -130,7 +130,7 @@ def _step(room: Path, wait: bool, json: bool, run: str) -> None:
     step = {"undo": history.undo, "redo": history.redo}[run]
     with held(room.parent, wait=wait, run=run) as finished:
         shown = finished or room.with_suffix(".png").is_file()  # who wanted no picture gets none
-        steps = history.told(room, run) if finished == run else step(room)
+        steps = history.steps_of(room, run) if finished == run else step(room)
         pictures = write_pictures(room) if shown else []
     _say_steps(room, pictures, {"undo": "undone", "redo": "redone"}[run], steps, json)
 
@@ -146,7 +146,7 @@ def _recover(room: Path, wait: bool, json: bool) -> None:
         raise ValueError(f"{room}: no such folder")
     with held(folder, wait=wait) as finished:
         root = room_at(folder)
-        _say_finished(root, history.told(root, finished) if finished else (), json)
+        _say_finished(root, history.steps_of(root, finished) if finished else (), json)
 
 
 def _say_finished(room: Path, steps: Sequence[str], json: bool) -> None:
@@ -184,7 +184,7 @@ def _change(
     from echousd.cli.terminal import progress_bar
     from echousd.folder.folder import check_output, writing
     from echousd.folder.found import room_at
-    from echousd.folder.history import told
+    from echousd.folder.history import steps_of
     from echousd.make.edit import carried, touched
     from echousd.make.edit import edit as change
     from echousd.make.finished import write_room
@@ -194,7 +194,7 @@ def _change(
     check_output(folder, flat=False, force=force)
     with writing(folder, flat=False, force=force, wait=wait, run="" if dry_run else run) as finished:
         if finished:
-            _say_finished(room_at(folder), told(room_at(folder), run), json)
+            _say_finished(room_at(folder), steps_of(room_at(folder), run), json)
             return
         root, graph = wanted()
         room = read_room(root)
@@ -231,7 +231,7 @@ def adopt(
     wait: Wait = False,
     outside: Outside = None,
     json: Made = False,
-    **given: Any,
+    **changes: Any,
 ) -> None:
     """Complete a stage that others began: its furniture stays where and as it is, new pieces stand around it.
 
@@ -242,7 +242,7 @@ def adopt(
     from echousd.folder.folder import check_output, writing
     from echousd.options import RoomOptions
 
-    options = RoomOptions(**given)
+    options = RoomOptions(**changes)
     check_output(output, flat=False, force=force)
     with writing(output, flat=False, force=force, wait=wait), telling_faults(), progress_bar() as listen:
         from echousd.make.finished import write_room

@@ -65,8 +65,8 @@ def suite(
     command = f"echousd eval suite {' '.join(asked)} --against {against} --count {count} --seed {seed}"
     command += f" --relations {relations:g}" * (relations != 1.0) + f" --only {','.join(chosen)}" * bool(chosen)
     command += "".join(f" --{name} {path}" for name, path in named.items())
-    with progress_bar() as told_to:
-        found, run = evaluate(settings, told_to)
+    with progress_bar() as progress:
+        found, run = evaluate(settings, progress)
     written = write_report(found, run, out, command)
     say_done(json, written, map(str, written))
 
@@ -89,8 +89,8 @@ def study(
     from echousd.evaluation.suite import write_study
 
     check_free(out, force=force)
-    with progress_bar() as told_to:
-        path = write_study(systems, against, count, seed, out, told_to)
+    with progress_bar() as progress:
+        path = write_study(systems, against, count, seed, out, progress)
     say_done(json, [path], [str(path)])
 
 

@@ -28,7 +28,7 @@ def generate(
     force: Force = False,
     wait: Wait = False,
     outside: Outside = None,
-    **given: Any,
+    **values: Any,
 ) -> None:
     """Generate a room from a scene graph, as layers of USD; of a home, its plan, its rooms and what composes them.
 
@@ -40,7 +40,7 @@ def generate(
     from echousd.options import RoomOptions
 
     started = time.perf_counter()
-    options = RoomOptions(**given)
+    options = RoomOptions(**values)
     check_output(output, flat=flat, force=force)
     if flat and store:
         raise ValueError(f"--store is {store}, which a file of --flat does not use; leave one of them out")

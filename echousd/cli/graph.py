@@ -110,33 +110,33 @@ def new(
     from echousd.graph.nodes import Placed
     from echousd.graph.text import sentence, stating, with_openings
 
-    if sum(given is not None for given in (source, room, rooms)) != 1:
+    if sum(fields is not None for fields in (source, room, rooms)) != 1:
         raise GraphError("say where the graph comes from: either --from GRAPH, --room TYPE or --rooms ROOMS")
     if room is None and count:
         raise GraphError("--count goes with --room; edit the objects of a file in the file")
     check_free(out, force=force)
-    home = None if room else home_given(source, rooms, area, size, relate or ())
+    home = None if room else home_from(source, rooms, area, size, relate or ())
     if home is not None:
         if height or door or window:
             raise GraphError("--height, --door and --window are of one room; write those of a home's into its file")
         from echousd.home.files import save_home
 
         save_home(home, out)
-        told = f"wrote {out}: {_summary_of_home(home)}"
-        say_done(json, [out], [told], {"rooms": len(home.rooms), "relations": len(home.relations)})
+        line = f"wrote {out}: {_summary_of_home(home)}"
+        say_done(json, [out], [line], {"rooms": len(home.rooms), "relations": len(home.relations)})
         return
     if area is not None:
         raise GraphError("--area goes with --rooms; the floor of one room is --size")
-    given = {name: value for name, value in {"size": size, "height": height}.items() if value is not None}
+    fields = {name: value for name, value in {"size": size, "height": height}.items() if value is not None}
     if source is not None:
-        made = load_graph(source).with_room(**given)
+        made = load_graph(source).with_room(**fields)
         later = relate or ()
     else:
         assert room is not None
-        said = {text: sentence(text) for text in relate or ()}
-        stated = [one for one in said.values() if not isinstance(one, Placed)]
-        later = [text for text, one in said.items() if isinstance(one, Placed)]
-        made = starting_graph(RoomSpec(room, **given), dict(map(_counted, count or ())), stated)
+        sentences = {text: sentence(text) for text in relate or ()}
+        stated = [one for one in sentences.values() if not isinstance(one, Placed)]
+        later = [text for text, one in sentences.items() if isinstance(one, Placed)]
+        made = starting_graph(RoomSpec(room, **fields), dict(map(_counted, count or ())), stated)
     for text in later:
         made = stating(made, text)
     words = [("door", text) for text in door or ()] + [("window", text) for text in window or ()]
@@ -151,7 +151,7 @@ def new(
     say_done(json, [out], [f"wrote {out}: {_summary(made)}"], counts)
 
 
-def home_given(
+def home_from(
     source: Path | None, rooms: str | None, area: float | None, size: tuple[float, float] | None, relate: Sequence[str]
 ) -> HomeGraph | None:
     """The home that a command line describes, None where its file holds a single room."""

@@ -57,15 +57,15 @@ def add_room_command(
     asks: bool = False,
     batch: bool = False,
 ) -> None:
-    """Add a command that takes a room's options: in place of its `**given` those of the table that are used.
+    """Add a command that takes a room's options: in place of its `**changes` those of the table that are used.
 
     Arguments:
         edits: only what an edit may set. asks: and what it changes (`EditRequest`).
         batch: the table of a batch, whose seed is not among the rooms'.
     """
     hints = get_type_hints(command, include_extras=True)
-    given = [one for one in signature(command).parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
-    own = [one.replace(annotation=hints[one.name]) for one in given]
+    parameters = [one for one in signature(command).parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
+    own = [one.replace(annotation=hints[one.name]) for one in parameters]
     used: dict[str, Any] = {}
 
     class WithFlags(TyperCommand):
@@ -117,8 +117,8 @@ def _flags(*, edits: bool, asks: bool, batch: bool) -> list[Parameter]:
     ordered = sorted(chosen, key=lambda name: GROUPS.index(rows[name].json_schema_extra["group"]))
     wishes = []
     for one in fields(EditRequest) if asks else ():
-        told: Any = Annotated[list[str] | None, typer.Option(help=one.metadata["help"], show_default=False)]
-        wishes.append(Parameter(one.name, Parameter.KEYWORD_ONLY, default=None, annotation=told))
+        kind: Any = Annotated[list[str] | None, typer.Option(help=one.metadata["help"], show_default=False)]
+        wishes.append(Parameter(one.name, Parameter.KEYWORD_ONLY, default=None, annotation=kind))
     return [*wishes, *(_flag(name, rows[name]) for name in ordered)]
 
 
@@ -128,14 +128,14 @@ def _flag(name: str, row: Any) -> Parameter:
 
     kind = next(kind for kind in (bool, int, float, str) if _is(row.annotation, kind))
     words, extra = words_of(row), row.json_schema_extra
-    word, said = f"--{extra['flag'] or name.replace('_', '-')}", f"{row.description[0].upper()}{row.description[1:]}"
+    word, text = f"--{extra['flag'] or name.replace('_', '-')}", f"{row.description[0].upper()}{row.description[1:]}"
     if kind is bool and row.default:
         word += f"/--no-{name.replace('_', '-')}"
     if len(words) > LONG:
-        said, words = f"{said}: {words.replace('|', ', ')}", "word"
+        text, words = f"{text}: {words.replace('|', ', ')}", "word"
     default = f" ({row.default})" if row.default not in (None, "", True, False) else ""
     option = typer.Option(
-        word, help=f"{said}{default}.", metavar=words or None, show_default=False,
+        word, help=f"{text}{default}.", metavar=words or None, show_default=False,
         hidden=not extra["everyday"], rich_help_panel=None if extra["everyday"] else extra["group"],
     )  # fmt: skip
     return Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, option])

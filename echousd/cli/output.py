@@ -191,8 +191,8 @@ def say_written(files: Sequence[Path], faults: Sequence[str] = (), more: Mapping
         faults: a sentence each.
         more: further entries.
     """
-    told = {"ok": not faults, "written": [str(path) for path in files], "faults": list(faults)}
-    say_json({**told, "seconds": round(time.perf_counter() - _began.get(), 3), **(more or {})}, indent=2)
+    content = {"ok": not faults, "written": [str(path) for path in files], "faults": list(faults)}
+    say_json({**content, "seconds": round(time.perf_counter() - _began.get(), 3), **(more or {})}, indent=2)
 
 
 def say_done(json: bool, files: Sequence[Path], lines: Iterable[str], more: Mapping[str, Any] | None = None) -> None:
@@ -226,7 +226,7 @@ def tell_room(written: Written) -> None:
         kept = f"{counts['kept']} of {counts['kept'] + counts['broken']} measured relations kept"
         say(f"layout_{number} {kept}" if several else f"graph    {counted(len(room.names), 'object')}, {kept}")
         for verdict in found.broken:
-            say(f"broken   {verdict.said} (margin {verdict.margin:+.2f})")
+            say(f"broken   {verdict.sentence} (margin {verdict.margin:+.2f})")
         for hit in found.collisions:
             say(f"collide  {hit.first} and {hit.second} by {hit.depth:.2f} m")
         for sentence in found.restless:

@@ -76,8 +76,8 @@ def import_(
         draw_plans(
             [made.plan], picture, found.lines or [room.corners[[*range(len(room.corners)), 0]] for room in found.rooms]
         )
-    told = ", ".join(f"{count} {what}" for what, count in made.counts.items())
-    lines = [f"wrote {output}", f"format   {found.format}: {found.frame}", f"found    {told}, {made.plan.area:.1f} m²"]
+    many = ", ".join(f"{count} {what}" for what, count in made.counts.items())
+    lines = [f"wrote {output}", f"format   {found.format}: {found.frame}", f"found    {many}, {made.plan.area:.1f} m²"]
     lines += [f"ignored  {count} x {what}" for what, count in made.ignored.items()]
     facts = {"format": found.format, "frame": found.frame, "found": made.counts, "ignored": made.ignored}
     say_done(json, [output, *([picture] if picture else [])], lines, facts)
@@ -112,8 +112,8 @@ def export(
     from echousd.graph.files import LAYER_FORMS
     from echousd.graph.picture import PICTURES
     from echousd.home.draw import draw_plans, write_dxf, write_procthor
+    from echousd.home.existing import plan_there
     from echousd.home.files import load_home
-    from echousd.home.given import plan_there
     from echousd.home.plan import plans
     from echousd.home.stages import furniture, write_home
 
@@ -163,7 +163,7 @@ def generate_home(
     from echousd.folder.found import is_home
     from echousd.graph.consistency import faults_of
     from echousd.home.assemble import earlier, wanted_jobs, write_rooms
-    from echousd.home.given import next_plan, plan_there
+    from echousd.home.existing import next_plan, plan_there
 
     stated = None if is_home(graph) else plan_there(graph, home)
     before = graph if is_home(graph) else earlier(output, options.seed)

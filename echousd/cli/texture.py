@@ -48,9 +48,9 @@ def export(
         room, output, tool, prompt=prompt, dressing=dressing, resolution=resolution, layout=layout, shell=shell,
         force=force,
     )  # fmt: skip
-    told = {"objects": [thing.name for thing in job.objects], "prompt": job.prompt, "left_out": job.left_out}
+    content = {"objects": [thing.name for thing in job.objects], "prompt": job.prompt, "left_out": job.left_out}
     lines = [f"job      {output / 'job.json'}", f"objects  {len(job.objects)}, prompt {job.prompt!r}"]
-    say_done(json, [output / "job.json"], lines, told)
+    say_done(json, [output / "job.json"], lines, content)
     if not json:
         _tell(job)
 
@@ -79,8 +79,8 @@ def import_(
     for words, what in ((look.unpainted, "no result"), (look.skipped, "left out")):
         if words:
             lines.append(f"as it was: {', '.join(words)} ({what})")
-    told = {"look": look.name, "painted": list(look.painted), "no_result": list(look.unpainted)}
-    say_done(json, [look.layer], lines, {**told, "left_out": list(look.skipped)})
+    content = {"look": look.name, "painted": list(look.painted), "no_result": list(look.unpainted)}
+    say_done(json, [look.layer], lines, {**content, "left_out": list(look.skipped)})
 
 
 def _tell(job: Job) -> None:

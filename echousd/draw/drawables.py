@@ -89,7 +89,7 @@ def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
                 else f"{_component(form.above)}{form.path.partition('[')[2].partition(']')[0]}"
             )
             category = _category(prim) or (_category(form.above) if form.above else "")
-            double = bool(values.given(UsdGeom.Gprim(prim).GetDoubleSidedAttr()))
+            double = bool(values.value_of(UsdGeom.Gprim(prim).GetDoubleSidedAttr()))
             yield Drawable(
                 form.path, component, category, to_world @ form.world, triangles, normals, st, paints, double
             )
@@ -162,7 +162,7 @@ def _corner_values(
         found, interpolation, attribute = _flattened(primvar), primvar.GetInterpolation(), primvar.GetAttr()
     elif name == "normals" and mesh.GetNormalsAttr().HasAuthoredValue():
         attribute = mesh.GetNormalsAttr()
-        found, interpolation = values.given(attribute), mesh.GetNormalsInterpolation()
+        found, interpolation = values.value_of(attribute), mesh.GetNormalsInterpolation()
     else:
         return None
     table = values.numbers(found, width, attribute)
@@ -177,7 +177,7 @@ def _corner_values(
 
 def _flattened(primvar: UsdGeom.Primvar) -> Any:
     """Values of a primvar, one for each of its indices; raises StageError for indices out of range."""
-    found = values.given(primvar.GetAttr())
+    found = values.value_of(primvar.GetAttr())
     if not primvar.IsIndexed() or isinstance(found, str):  # a text is refused where numbers are read
         return found
     index = values.array(primvar.GetIndicesAttr(), whole=True)
@@ -207,8 +207,8 @@ def paints_of(prim: Usd.Prim, face: np.ndarray, known: dict[str, Paint]) -> list
 def _bound(prim: Usd.Prim, known: dict[str, Paint]) -> Paint:
     material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
     if not material:
-        told: Any = values.given(UsdGeom.Gprim(prim).GetDisplayColorAttr()) if prim.IsA(UsdGeom.Gprim) else None
-        color = rgb(next(iter(told), None) if hasattr(told, "__iter__") else None, None)
+        authored: Any = values.value_of(UsdGeom.Gprim(prim).GetDisplayColorAttr()) if prim.IsA(UsdGeom.Gprim) else None
+        color = rgb(next(iter(authored), None) if hasattr(authored, "__iter__") else None, None)
         return Paint("displayColor", color) if color else Paint()
     path = str(material.GetPath())
     if path not in known:
@@ -240,13 +240,13 @@ def _surface(material: UsdShade.Material) -> Paint:
         image, texture = images["diffuseColor"]
         laid_out = _primvar_of(image)
         if image.GetInput("scale"):
-            tint = rgb(values.given(image.GetInput("scale").GetAttr()), tint)
+            tint = rgb(values.value_of(image.GetInput("scale").GetAttr()), tint)
     rough = values.number(found.get("roughness"), 0.5)
     if "roughness" in images:  # ours fall back to their mean
         rough = (_first(images["roughness"][0], "fallback", 0.0) or 0.5) * images["roughness"][1].scale
     return Paint(
-        material.GetPrim().GetName(), rgb(values.given(found.get("diffuseColor")), (0.18, 0.18, 0.18)),
-        rgb(values.given(found.get("emissiveColor")), (0.0, 0.0, 0.0)), rough,
+        material.GetPrim().GetName(), rgb(values.value_of(found.get("diffuseColor")), (0.18, 0.18, 0.18)),
+        rgb(values.value_of(found.get("emissiveColor")), (0.0, 0.0, 0.0)), rough,
         values.number(found.get("metallic"), 0.0), texture.path, texture.prim, tint,
         values.number(found.get("opacity"), 1.0), laid_out,
         *(images[name][1] if name in images else None for name in ("roughness", "normal")),
@@ -255,8 +255,8 @@ def _surface(material: UsdShade.Material) -> Paint:
 
 def _first(image: UsdShade.Shader, name: str, default: float = 1.0) -> float:
     """The first number of an input of an image."""
-    told = image.GetInput(name)
-    return float(rgb(values.given(told.GetAttr()), (default,))[0]) if told else default
+    authored = image.GetInput(name)
+    return float(rgb(values.value_of(authored.GetAttr()), (default,))[0]) if authored else default
 
 
 def _primvar_of(image: UsdShade.Shader) -> str:

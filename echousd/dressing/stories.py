@@ -56,7 +56,7 @@ def guessed(room: str, furniture: Iterable[Category]) -> str:
     """Who seems to live in a room of some type with some furniture; "" where nothing tells."""
     words = {word for row in furniture for word in (row.name, row.role)}
     for resident in RESIDENTS:
-        told = TABLE[resident]
-        if room in told.get("rooms", ()) or any(words.issuperset(signs) for signs in told.get("signs", ())):
+        story = TABLE[resident]
+        if room in story.get("rooms", ()) or any(words.issuperset(signs) for signs in story.get("signs", ())):
             return resident
     return ""

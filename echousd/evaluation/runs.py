@@ -180,8 +180,8 @@ def run_systems(
                 if (base, draft) not in bases:
                     bases[base, draft] = _timed(drawn, system, tasks, settings.seed + 1000 * draft)
             drafts = [bases[key] for key in keys]
-            work, given = partial(_timed, finished, system), (tasks, zip(*(rooms for rooms, _ in drafts), strict=True))
-            done = list(pool.map(work, *given, chunksize=2) if pool else map(work, *given))
+            work, over = partial(_timed, finished, system), (tasks, zip(*(rooms for rooms, _ in drafts), strict=True))
+            done = list(pool.map(work, *over, chunksize=2) if pool else map(work, *over))
             made[system.name] = [room for room, _ in done]
             seconds[system.name] = sum(took for _, took in [*drafts, *done]) / len(tasks)
             if progress:
@@ -189,9 +189,9 @@ def run_systems(
     return made, seconds
 
 
-def _timed(work: Callable[..., Any], *given: Any) -> tuple[Any, float]:
+def _timed(work: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
     began = time.process_time()
-    return work(*given), time.process_time() - began
+    return work(*arguments), time.process_time() - began
 
 
 def rooms_of(system: System, settings: SuiteSettings) -> tuple[list[Task], list[str]]:
@@ -215,10 +215,10 @@ def rooms_of(system: System, settings: SuiteSettings) -> tuple[list[Task], list[
     return _spread(tasks, settings.count), notes
 
 
-def note(section: str, **told: Any) -> str:
+def note(section: str, **values: Any) -> str:
     """What a table measures, as notes.toml has it."""
     text = resources.files("echousd.evaluation").joinpath("notes.toml").read_text("utf-8")
-    return " ".join(tomllib.loads(text)[section].split()).format(**told)
+    return " ".join(tomllib.loads(text)[section].split()).format(**values)
 
 
 def figures(
@@ -319,8 +319,8 @@ def _model(name: str, file: Path) -> tuple[str, np.ndarray]:
     number = name.rpartition(".")[2]
     for top in (file.parent, *list(file.parents)[1:3]):
         for folder in (place for kind in ASSETS for place in sorted((top / kind).glob(f"*/{number}"))):
-            told = json.loads((folder / "data.json").read_text("utf-8"))["annotations"]
-            return str(told["category"]), np.asarray(trimesh.load_scene(folder / f"{number}.glb").bounds, float)
+            annotations = json.loads((folder / "data.json").read_text("utf-8"))["annotations"]
+            return str(annotations["category"]), np.asarray(trimesh.load_scene(folder / f"{number}.glb").bounds, float)
     wanted = f"_data/<data set>/{number}/{number}.glb"
     raise ValueError(f"{file}: model {name} is not there, wanted: {wanted} beside it or above")
 

@@ -33,9 +33,9 @@ from echomodel.metrics.layouts import (
     strata_of,
     tasks_of,
 )
-from echomodel.metrics.pictures import WEIGHTS, body_scores, features, picture, picture_figures, told_by_pictures
+from echomodel.metrics.pictures import WEIGHTS, body_scores, cnn_accuracy, features, picture, picture_figures
 from echomodel.metrics.pointsets import chamfer, set_scores, surface_points
-from echomodel.metrics.sets import AXES, layout_distance, set_figures, size_distances, size_scores, told_apart
+from echomodel.metrics.sets import AXES, forest_auc, layout_distance, set_figures, size_distances, size_scores
 from echomodel.metrics.statistics import Counts, Figure, figure, mean
 from echomodel.protocols import FurnitureModel, RoomModel, furnishes
 from echomodel.roomboxes import RoomBoxes
@@ -86,7 +86,7 @@ def faults(run: Run) -> list[Table]:
     first, seed = next(iter(scores)), run.settings.seed
     columns = ["told", "faults", "faults A", "faults B", "faultless", "physics"]
     rows = figures(scores, columns, seed, first)
-    tables = [Table("faults", "Faults an object", note("faults", told=run.settings.relations), rows)]
+    tables = [Table("faults", "Faults an object", note("faults", stated=run.settings.relations), rows)]
     for stratum in strata_of(run.tasks[0]):
         rows = {}
         for name, found in scores.items():
@@ -139,8 +139,8 @@ def realism(run: Run) -> list[Table]:
     for name, rooms in run.made.items():
         paired = run.of[name] is run.tasks and name != "real"
         rows[name] = {
-            "AUC, own rooms": told_apart(rooms, real, seed, paired=True) if paired else Figure(None),
-            "AUC, others": told_apart(rooms, run.reference, seed),
+            "AUC, own rooms": forest_auc(rooms, real, seed, paired=True) if paired else Figure(None),
+            "AUC, others": forest_auc(rooms, run.reference, seed),
             **set_figures(rooms, run.reference, seed),
             **{f"KS of {axis}": Figure(value) for axis, value in size_distances(rooms, run.reference).items()},
         }
@@ -173,7 +173,7 @@ def pictures(run: Run) -> list[Table]:
             run.missing.append(f"{' and '.join(names)} of pictures from above: --{kind} FILE, {WEIGHTS[kind]}")
     for name, made in run.made.items():
         real = "real" if run.of[name] is run.tasks and name != "real" else OTHERS
-        rows[name] = {"small CNN": told_by_pictures(shown[name], shown[real], seed)}
+        rows[name] = {"small CNN": cnn_accuracy(shown[name], shown[real], seed)}
         for word, kinds in ROOMS.items():
             of = [[k for k, r in enumerate(part) if not kinds or r.room_type in kinds] for part in (made, rooms[real])]
             for kind, found in seen.items():
@@ -269,7 +269,7 @@ def _judged(run: Run, made: Mapping[str, Sequence[RoomBoxes]], columns: Sequence
     """Columns of what rooms score that were made of the run's tasks, and whether they are told from real ones."""
     rows = figures(_scored(made, dict.fromkeys(made, run.tasks)), columns, run.settings.seed, next(iter(made)))
     for name, rooms in made.items():
-        rows[name]["real or generated, AUC"] = told_apart(rooms, run.reference, run.settings.seed)
+        rows[name]["real or generated, AUC"] = forest_auc(rooms, run.reference, run.settings.seed)
     return rows
 
 
@@ -316,8 +316,8 @@ def shapes(run: Run) -> list[Table]:
     for (name, distance), by_class in scored.items():
         for key, title in FIGURES.items():
             rows.setdefault(name, {})[f"{title}, {distance}"] = mean([row[key] for row in by_class.values()], seed)
-    told = note("shapes", count=count, against=run.settings.shapes or "pieces of the programs drawn anew")
-    tables = [Table("shapes", "Shapes", told, {name: rows[name] for name in made})]
+    text = note("shapes", count=count, against=run.settings.shapes or "pieces of the programs drawn anew")
+    tables = [Table("shapes", "Shapes", text, {name: rows[name] for name in made})]
     for key in ("mmd", "cov", "acc"):
         for distance in DISTANCES:
             by = {name: {word: Figure(row[key]) for word, row in scored[name, distance].items()} for name in made}
@@ -325,17 +325,17 @@ def shapes(run: Run) -> list[Table]:
     return [*tables, _consistency(models, sizes, seed)]
 
 
-def pieces(model: RoomModel, scenes: Sequence[Sequence[str]], sizes: np.ndarray, seed: int, told: str = "") -> Pieces:
+def pieces(model: RoomModel, scenes: Sequence[Sequence[str]], sizes: np.ndarray, seed: int, stated: str = "") -> Pieces:
     """The furniture of scenes that a model makes, with its scores where it is written in parts.
 
     Arguments:
         scenes: categories of each. sizes: (N, 3) metres. told: predicate that joins all of a scene, "" = none.
     """
-    predicate = vocabulary().predicate_id(told) if told else 0
+    predicate = vocabulary().predicate_id(stated) if stated else 0
     graph = GraphBatch.pack([
         GraphBatch.single(
             [vocabulary().category_id(word) for word in scene],
-            [(i, predicate, j) for i in range(len(scene)) for j in range(len(scene)) if told and i != j],
+            [(i, predicate, j) for i in range(len(scene)) for j in range(len(scene)) if stated and i != j],
         )
         for scene in scenes
     ])  # fmt: skip
@@ -374,12 +374,12 @@ def _consistency(models: Mapping[str, RoomModel], sizes: Mapping[str, np.ndarray
     """Table 3: Chamfer distances of pieces of one class that are told to be of one style."""
     rows: dict[str, dict[str, Figure]] = {}
     for name, model in {**models, "independent shapes": models["network"]}.items():
-        told = "same_style_as" if name in models else ""
-        rows[name] = _styles(model, bool(told), seed) if furnishes(model) else {}
+        stated = "same_style_as" if name in models else ""
+        rows[name] = _styles(model, bool(stated), seed) if furnishes(model) else {}
         for word in CONSISTENT:
             doubled = np.repeat(sizes[word][:PAIRS], 2, axis=0)
-            scenes = [[word] * 2] * (len(doubled) // 2) if told else [[word]] * len(doubled)
-            found = torch.from_numpy(clouds([mesh for mesh, _ in pieces(model, scenes, doubled, seed, told)]))
+            scenes = [[word] * 2] * (len(doubled) // 2) if stated else [[word]] * len(doubled)
+            found = torch.from_numpy(clouds([mesh for mesh, _ in pieces(model, scenes, doubled, seed, stated)]))
             apart = [1000 * float(chamfer(one, found[2 * k + 1 :][:1])) for k, one in enumerate(found[::2])]
             rows[name][f"{word} x 1000"] = mean(apart, seed)
     rows["random"] = {f"{word} x 1000": Figure(0.0) for word in CONSISTENT}

@@ -52,7 +52,7 @@ def evaluate(settings: SuiteSettings, progress: StageListener | None = None) -> 
     systems = list({system.name: system for system in systems}.values())
     theirs = {system.name: rooms_of(system, settings) for system in systems if system.foreign}
     rooms, others = rooms_against(settings)
-    tasks = tasks_of(rooms, settings.seed, told=settings.relations)
+    tasks = tasks_of(rooms, settings.seed, stated=settings.relations)
     chosen = [name for name in SECTIONS if name in (settings.only or SECTIONS)]
     able = [s for s in systems if not s.foreign and {*chosen} - OWN]
     asked, seconds = run_systems(able, tasks, settings, progress)
@@ -101,7 +101,7 @@ def write_study(
     if len(systems) < 2:
         raise ValueError(f"{len(systems)} systems that can be asked the same rooms, allowed: 2 or more")
     settings = SuiteSettings(tuple(names), against, count, seed)
-    tasks = tasks_of(rooms_against(settings)[0], seed, told=settings.relations)
+    tasks = tasks_of(rooms_against(settings)[0], seed, stated=settings.relations)
     made, _ = run_systems(systems, tasks, settings, progress)
     pictures = {
         f"{name}/{number}": sheet([replace(room, id="")], 1) for name, rooms in made.items()
@@ -131,9 +131,9 @@ def preferences(files: Sequence[Path]) -> dict[str, Any]:
     kept = alike = repeats = 0
     for file in files:
         try:
-            told = json.loads(file.read_text("utf-8"))["answers"]
-            again = [(a["choice"], a["first"]) for a in told if a.get("first") is not None]
-            rows = [(a["one"], a["other"], a["choice"]) for a in told if a.get("first") is None]
+            answers = json.loads(file.read_text("utf-8"))["answers"]
+            again = [(a["choice"], a["first"]) for a in answers if a.get("first") is not None]
+            rows = [(a["one"], a["other"], a["choice"]) for a in answers if a.get("first") is None]
         except (KeyError, TypeError, json.JSONDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{file}: no answers of a study ({type(error).__name__} {error})") from None
         same = sum(choice == first for choice, first in again)
@@ -180,8 +180,8 @@ def write_report(found: Mapping[str, Any], run: Run, out: Path, command: str) ->
     page = {**content, **_arranged(found["tables"]), "pictures": pictures(run)}
     md, plain, html, seconds = written = report_files(out)
     write_text(md, rendered("report.md.j2", page, escaped=False))
-    told = content | {"tables": [asdict(table) for table in found["tables"]]}
-    write_text(plain, json.dumps(told, indent=1, default=float) + "\n")
+    form = content | {"tables": [asdict(table) for table in found["tables"]]}
+    write_text(plain, json.dumps(form, indent=1, default=float) + "\n")
     write_text(html, rendered("report.html.j2", page))
     write_json(seconds, {"CPU seconds a room": {name: round(value, 3) for name, value in run.seconds.items()}})
     return written

@@ -93,8 +93,8 @@ def finished(system: System, task: Task, drafts: Sequence[RoomBoxes]) -> RoomBox
 
     def worth(room: RoomBoxes) -> tuple[float, ...]:
         scores = layout_scores(task, room)
-        kept, told = map(np.sum, scores["told"])
-        return float(told - kept), *(float(np.sum(scores[name][0])) for name in ("physics", "faults A"))
+        kept, stated = map(np.sum, scores["told"])
+        return float(stated - kept), *(float(np.sum(scores[name][0])) for name in ("physics", "faults A"))
 
     return min(made, key=worth) if len(made) > 1 else made[0]
 
@@ -103,7 +103,7 @@ def searched(task: Task, draft: RoomBoxes, config: PlaceConfig) -> RoomBoxes:
     """A draft placed until the room keeps what is told and the objective holds."""
     with one_thread():
         done = place_boxes(
-            draft.categories, draft.size, draft.position, draft.yaw, task.told,
+            draft.categories, draft.size, draft.position, draft.yaw, task.stated,
             floor_polygon=draft.floor_polygon if len(draft.floor_polygon) else None, height=draft.height,
             openings=draft.openings, rules=task.rules, config=config,
         )  # fmt: skip
@@ -139,7 +139,7 @@ def _edit(tasks: Sequence[Task]) -> GraphEdit | None:
     if len(before) < len(tasks):
         return None
     first = np.cumsum([0, *(len(task.room) for task in tasks)])
-    moved = [told + np.array([at, 0, at]) for told, at in zip(before, first, strict=False)]
+    moved = [place + np.array([at, 0, at]) for place, at in zip(before, first, strict=False)]
     added = np.concatenate([task.added for task in tasks if task.added is not None])
     return GraphEdit(torch.from_numpy(np.concatenate(moved)), torch.from_numpy(added))
 

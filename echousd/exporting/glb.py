@@ -63,8 +63,8 @@ def glb(stage: Usd.Stage, reach: Reach) -> bytes:
             tree.add_view_or_light(prim)
     for room in find_rooms(stage):
         names = node_names(room)
-        told = [{"subject": r.subject, "predicate": r.predicate, "object": r.object} for r in facts(room, names)]
-        extras = {"roomType": room_spec(room).type, "relations": told}
+        relations = [{"subject": r.subject, "predicate": r.predicate, "object": r.object} for r in facts(room, names)]
+        extras = {"roomType": room_spec(room).type, "relations": relations}
         tree.extras(
             tree.node(room.room), extras | ({"layout": selected_layout(stage)} if selected_layout(stage) else {})
         )
@@ -255,8 +255,8 @@ class _Tree:
         elif prim.HasAPI(UsdLux.LightAPI):
             light = _light(prim, abs(float(self.frame[0, 0])))
             if light:
-                told = {"KHR_lights_punctual": {"light": len(self.lights)}}
-                self.tables["nodes"][self.node(prim)]["extensions"] = told
+                extensions = {"KHR_lights_punctual": {"light": len(self.lights)}}
+                self.tables["nodes"][self.node(prim)]["extensions"] = extensions
                 self.lights.append({"name": prim.GetName(), **light})
                 self.extensions.add("KHR_lights_punctual")
 
@@ -274,10 +274,10 @@ class _Tree:
             tree["extensionsUsed"] = sorted(self.extensions)
         if self.lights:
             tree["extensions"] = {"KHR_lights_punctual": {"lights": self.lights}}
-        told = json.dumps(tree, separators=(",", ":"), allow_nan=False).encode()
-        told += b" " * (-len(told) % 4)
-        head = struct.pack("<4sII", b"glTF", 2, 28 + len(told) + len(self.binary))
-        chunks = struct.pack("<I4s", len(told), b"JSON") + told + struct.pack("<I4s", len(self.binary), b"BIN\0")
+        text = json.dumps(tree, separators=(",", ":"), allow_nan=False).encode()
+        text += b" " * (-len(text) % 4)
+        head = struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(self.binary))
+        chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(self.binary), b"BIN\0")
         return head + chunks + bytes(self.binary)
 
 

@@ -126,10 +126,10 @@ def sceneeval_files(stage: Usd.Stage, out: Path) -> dict[Path, bytes]:
     files = {out / "input" / "EchoUSD" / "scene_0.json": state}
     for path, name in node_names(prims).items():
         node, number = graph.node(name), model_name(name)
-        told = {"category": node.category.replace("_", " "), "description": f"a {node.category.replace('_', ' ')}"}
+        about = {"category": node.category.replace("_", " "), "description": f"a {node.category.replace('_', ' ')}"}
         folder = out / ASSETS / number
         files[folder / f"{number}.glb"] = object_glb(stage, prims.room.GetPath(), path)
-        files[folder / "data.json"] = json.dumps({"annotations": {**told, "materials": []}}).encode()
+        files[folder / "data.json"] = json.dumps({"annotations": {**about, "materials": []}}).encode()
     return files
 
 

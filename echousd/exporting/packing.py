@@ -108,8 +108,8 @@ class Package:
         inside = Ar.SplitPackageRelativePathInner(path)[1] or path
         ending = PurePosixPath(inside).suffix.lower()
         if ending not in PACKED:
-            told = f"{self.reach.room}: {where} names {path!r}, which is left out (packed: {', '.join(PACKED)})"
-            warnings.warn(told, LeftOut, stacklevel=2)
+            message = f"{self.reach.room}: {where} names {path!r}, which is left out (packed: {', '.join(PACKED)})"
+            warnings.warn(message, LeftOut, stacklevel=2)
             return ""
         try:
             content = texture_bytes(path)

@@ -24,7 +24,7 @@ from echousd.folder.manifest import LARGEST, Digest, find_manifest
 from echousd.folder.within import check_links, inside
 from echousd.graph.files import STAGE_FORMS
 from echousd.naming import free_name
-from echousd.options import told
+from echousd.options import validation_message
 from echousd.pending import JOURNAL, STAGING, half_written
 from echousd.stage.files import check_path
 
@@ -102,7 +102,7 @@ def read_journal(folder: Path, name: str = JOURNAL) -> Journal | None:
         journal = Journal.model_validate(json.loads(path.read_bytes()))
     except ValidationError as error:
         give_up = f"delete {folder / STAGING} to give the interrupted run up"
-        raise ValueError(f"{path}: {told(error, Journal)}; {give_up}") from None
+        raise ValueError(f"{path}: {validation_message(error, Journal)}; {give_up}") from None
     except (ValueError, RecursionError):  # emptied by a power cut, as some disks do
         warnings.warn(f"{path}: cannot be read; the interrupted run is given up, generate the room again", stacklevel=3)
         return None

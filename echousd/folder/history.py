@@ -20,7 +20,7 @@ from echousd.folder.within import inside
 
 FOLDER = "history"
 UNDONE = ".redo"  # folder of what was taken back, until something else is written
-TOLD = ".redo"  # entry of such an archive: which state it follows, what was edited, which files the edit removes
+NOTE = ".redo"  # entry of such an archive: which state it follows, what was edited, which files the edit removes
 LONGEST = 50  # steps that are kept
 LARGEST = 2**30  # bytes of one state that are read back
 WHEN = (1980, 1, 1, 0, 0, 0)  # of every file in an archive: equal states are equal bytes
@@ -51,8 +51,8 @@ def remembered(
         and files.get(path) != content
         and (path in files or (path not in owned and folders.digest(content) == old["files"][path]))
     }
-    told = ownership.read(folder, manifest)
-    if told is None or not (replaced or steps):
+    saved = ownership.read(folder, manifest)
+    if saved is None or not (replaced or steps):
         return list(old["history"]), {}
     number = 1 + max((entry["number"] for entry in old["history"]), default=0)
     number, where = _free(folder, FOLDER, number)
@@ -64,7 +64,7 @@ def remembered(
         "adds": sorted(path for path in leaves if before[path] is None),
         "leaves": {path: digest for path, digest in sorted(leaves.items()) if owned.get(path) != digest},
     }
-    return [*old["history"], entry][-LONGEST:], {where: _archive({**replaced, manifest: told})}
+    return [*old["history"], entry][-LONGEST:], {where: _archive({**replaced, manifest: saved})}
 
 
 def undo(root: Path) -> tuple[str, ...]:
@@ -76,7 +76,7 @@ def undo(root: Path) -> tuple[str, ...]:
     folder = root.parent
     with folders.held(folder, run="undo") as finished:
         if finished == "undo":
-            return told(root, "undo")
+            return steps_of(root, "undo")
         manifest = folders.claim(folder, force=False, root=root.stem)
         if not manifest.get("history"):
             raise ValueError(f"{root}: no edit to take back")
@@ -88,7 +88,7 @@ def undo(root: Path) -> tuple[str, ...]:
         earlier = read_manifest(folder / name, json.loads(files[name]))
         expected = {**manifest["files"], **last["leaves"]}
         gone = [path for path in (*last["adds"], last["restores"]) if path in expected and path not in files]
-        words = _Told(
+        words = _Note(
             after=folders.digest(files[name]),
             steps=last["steps"],
             removes=[path for path in files if path not in expected and ownership.read(folder, path) is None],
@@ -97,7 +97,7 @@ def undo(root: Path) -> tuple[str, ...]:
         again = _step(folder, last["restores"], files, gone, expected, earlier, "take the edit back")
         _, where = _free(folder, UNDONE, last["number"])
         order = [f"{manifest['name']}.usda", name]
-        undone = {where: _archive({**again, TOLD: words.model_dump_json().encode()})}
+        undone = {where: _archive({**again, NOTE: words.model_dump_json().encode()})}
         drawn = ownership.pictures(folder, manifest["name"])
         folders.write_together(folder, {**undone, **files}, last=order, remove=[*gone, *drawn])
     return tuple(last["steps"])
@@ -112,7 +112,7 @@ def redo(root: Path) -> tuple[str, ...]:
     folder = root.parent
     with folders.held(folder, run="redo") as finished:
         if finished == "redo":
-            return told(root, "redo")
+            return steps_of(root, "redo")
         manifest = folders.claim(folder, force=False, root=root.stem)
         name = f"{manifest.get('name', root.stem)}.json"
         now = ownership.read(folder, name) if manifest else None
@@ -120,7 +120,7 @@ def redo(root: Path) -> tuple[str, ...]:
         if archive is None:
             raise ValueError(f"{root}: no edit that was taken back can be made again")
         files = _read_archive(folder, archive)
-        words = _read_told(folder / archive, files.pop(TOLD, b""))
+        words = _read_note(folder / archive, files.pop(NOTE, b""))
         later = read_manifest(folder / name, json.loads(files.get(name, b"{}")))
         expected = {**manifest["files"], **words.leaves}
         _step(folder, archive, files, words.removes, expected, later, "make the edit again")
@@ -129,27 +129,27 @@ def redo(root: Path) -> tuple[str, ...]:
     return tuple(words.steps)
 
 
-def told(root: Path, run: str) -> tuple[str, ...]:
+def steps_of(root: Path, run: str) -> tuple[str, ...]:
     """What the last `undo` of a room took back, or else its last edit or `redo` did; empty where nothing says so."""
     manifest = find_manifest(root.parent, root.stem)
     now = ownership.read(root.parent, f"{manifest['name']}.json") if manifest else None
     if run != "undo" or now is None:
         return tuple(manifest["history"][-1]["steps"]) if manifest and manifest["history"] else ()
     archive = _following(root.parent, folders.digest(now))
-    return tuple(_read_told(Path(archive), _read_archive(root.parent, archive)[TOLD]).steps) if archive else ()
+    return tuple(_read_note(Path(archive), _read_archive(root.parent, archive)[NOTE]).steps) if archive else ()
 
 
 def undone(folder: Path) -> list[str]:
     """Paths of the archives of edits that were taken back, the earliest edit first; what others put there is none."""
-    return [archive for archive, told in _numbered(folder) if isinstance(told, _Told)]
+    return [archive for archive, note in _numbered(folder) if isinstance(note, _Note)]
 
 
-def _numbered(folder: Path) -> Iterator[tuple[str, _Told | ValueError]]:
+def _numbered(folder: Path) -> Iterator[tuple[str, _Note | ValueError]]:
     """Paths of the archives of edits that were taken back, by number, and what each says, or what is wrong with it."""
     found = [path for path in inside(folder, UNDONE, "a file of the room").glob("*.zip") if path.stem.isdecimal()]
     for archive in (f"{UNDONE}/{path.name}" for path in sorted(found, key=lambda path: int(path.stem))):
         try:
-            yield archive, _read_told(folder / archive, _read_archive(folder, archive, only=TOLD).get(TOLD, b""))
+            yield archive, _read_note(folder / archive, _read_archive(folder, archive, only=NOTE).get(NOTE, b""))
         except ValueError as error:
             yield archive, error
 
@@ -167,12 +167,12 @@ def _following(folder: Path, state: str) -> str | None:
     Raises ValueError where none does and an archive is damaged, so that it might have been that one.
     """
     found = list(_numbered(folder))
-    for archive, told in found:
-        if isinstance(told, _Told) and told.after == state:
+    for archive, note in found:
+        if isinstance(note, _Note) and note.after == state:
             return archive
-    for _, told in found:
-        if isinstance(told, ValueError):
-            raise told
+    for _, note in found:
+        if isinstance(note, ValueError):
+            raise note
     return None
 
 
@@ -227,7 +227,7 @@ def _step(
     return found
 
 
-class _Told(BaseModel):
+class _Note(BaseModel):
     """What an archive of an edit that was taken back says of it."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
@@ -238,9 +238,9 @@ class _Told(BaseModel):
     leaves: dict[str, str] = {}
 
 
-def _read_told(archive: Path, content: bytes) -> _Told:
+def _read_note(archive: Path, content: bytes) -> _Note:
     try:
-        return _Told.model_validate_json(content)
+        return _Note.model_validate_json(content)
     except ValidationError:
         raise ValueError(f"{archive}: is damaged (it does not say which edit it holds)") from None
 

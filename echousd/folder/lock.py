@@ -68,10 +68,10 @@ def owner_of(folder: Path) -> str:
     """`process 123 on host (since 09:41:07)` as the lock of the folder says, or `another process`."""
     try:
         with (folder / LOCK).open(encoding="ascii", errors="replace") as file:
-            told = file.read(SHORT)
+            words = file.read(SHORT)
     except OSError:
         return "another process"
-    return told if told.startswith("process ") and told.isascii() and told.isprintable() else "another process"
+    return words if words.startswith("process ") and words.isascii() and words.isprintable() else "another process"
 
 
 def _create(folder: Path) -> list[Path]:
@@ -96,7 +96,7 @@ def _take(folder: Path) -> FileLock | None:
         except (Timeout, FileNotFoundError):  # or the folder was removed in between
             return None
     if lock.lock_counter == 1 and not isinstance(lock, SoftFileLock):  # which writes its own owner
-        told = f"process {os.getpid()} on {socket.gethostname()[:40]} (since {time.strftime('%H:%M:%S')})"
+        words = f"process {os.getpid()} on {socket.gethostname()[:40]} (since {time.strftime('%H:%M:%S')})"
         with contextlib.suppress(OSError):  # of a full disk, which what comes next meets, too
-            path.write_text(told, encoding="ascii", errors="replace")
+            path.write_text(words, encoding="ascii", errors="replace")
     return lock

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from echousd.folder.within import check_links, inside
 from echousd.graph.fields import IDENTIFIER
-from echousd.options import MAX_SEED, Look, told
+from echousd.options import MAX_SEED, Look, validation_message
 
 MANIFEST_KEY = "echousd_room"
 LARGEST = 64 * 2**20  # bytes of a manifest or journal that are read
@@ -90,7 +90,7 @@ def read_manifest(path: Path, raw: dict[str, Any]) -> dict[str, Any]:
     try:
         manifest = Manifest.model_validate(raw)
     except ValidationError as error:
-        raise ValueError(f"{path}: {told(error, Manifest)}") from None
+        raise ValueError(f"{path}: {validation_message(error, Manifest)}") from None
     for name in manifest.files:
         inside(path.parent, name, f"{path}: files")
     for step in manifest.history:

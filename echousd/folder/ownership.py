@@ -99,9 +99,9 @@ def merged_root(path: Path, current: bytes, fresh: bytes) -> bytes:
     if not readable:
         raise ValueError(f"{path}: edited by hand and no longer readable as USD; repair it or delete it")
     for key in ("upAxis", "metersPerUnit", "defaultPrim"):
-        said, new = (layer.pseudoRoot.GetInfo(key) for layer in (theirs, ours))
-        if said != new:
-            raise ValueError(f"{path}: edited by hand, {key} {said}; a room with {new} needs another folder")
+        held, new = (layer.pseudoRoot.GetInfo(key) for layer in (theirs, ours))
+        if held != new:
+            raise ValueError(f"{path}: edited by hand, {key} {held}; a room with {new} needs another folder")
     present = [path for path in theirs.subLayerPaths if path in ours.subLayerPaths or not path.startswith("./layers/")]
     theirs.subLayerPaths = present + [layer for layer in ours.subLayerPaths if layer not in present]
     theirs.customLayerData = {**theirs.customLayerData, **ours.customLayerData}

@@ -17,7 +17,7 @@ from echousd.graph import SceneGraph
 LENGTH = 1e-4  # metres
 ANGLE = 0.01  # degrees
 DISTANCE = 1e-4  # of a signed distance on the normalised grid
-TOLD = 1e-4  # of a number that describes a piece of furniture
+DESCRIPTION = 1e-4  # of a number that describes a piece of furniture
 
 
 def triplets_of(graph: SceneGraph) -> np.ndarray:

@@ -36,9 +36,9 @@ def faults_of(file: str) -> Iterator[None]:
     except GraphError as error:
         if not file:
             raise
-        told = GraphError(f"{file}: {error}", error.about)
-        told.lines = tuple(f"{file}: {line}" for line in error.lines)
-        raise told from None
+        located = GraphError(f"{file}: {error}", error.about)
+        located.lines = tuple(f"{file}: {line}" for line in error.lines)
+        raise located from None
 
 
 def raise_all(wrong: Sequence[GraphError]) -> None:
@@ -93,12 +93,12 @@ def triple_faults(triples: Sequence[Triple], names: Iterable[str]) -> list[Graph
     for order, edges in ordered_edges(triple for triple in stated if triple[0] != triple[2]).items():
         cycle = find_cycle(edges)
         if cycle:
-            said = [f"'{' '.join(edges[pair])}'" for pair in cycle]
+            steps = [f"'{' '.join(edges[pair])}'" for pair in cycle]
             here = ("relations", max(stated[edges[pair]] for pair in cycle))
-            if len(said) == 2:
-                wrong.append(GraphError(f"{said[0]} contradicts {said[1]} ({order} order)", here))
+            if len(steps) == 2:
+                wrong.append(GraphError(f"{steps[0]} contradicts {steps[1]} ({order} order)", here))
                 continue
-            together = f"{', '.join(said[:-1])} and {said[-1]}"
+            together = f"{', '.join(steps[:-1])} and {steps[-1]}"
             wrong.append(GraphError(f"{together} contradict each other: a cycle in the {order} order", here))
     return wrong
 

@@ -63,13 +63,13 @@ class GraphDiff:
 
     def lines(self) -> list[str]:
         """One readable line a step: `+` new, `-` gone, `~` changed."""
-        said = _room_lines(*self.room) if self.room else []
-        said += [f"- object {node.name} ({node.category})" for node in self.removed]
-        said += [f"+ object {node.name} ({node.category})" for node in self.added]
-        said += [f"~ object {old.name}: {_fields(old, new)}" for old, new in self.changed]
-        said += [f"- relation {relation}" for relation in self.unrelated]
-        said += [f"+ relation {relation}" for relation in self.related]
-        return said + [f"~ relation {old}: {_fields(old, new)}" for old, new in self.reweighted]
+        out = _room_lines(*self.room) if self.room else []
+        out += [f"- object {node.name} ({node.category})" for node in self.removed]
+        out += [f"+ object {node.name} ({node.category})" for node in self.added]
+        out += [f"~ object {old.name}: {_fields(old, new)}" for old, new in self.changed]
+        out += [f"- relation {relation}" for relation in self.unrelated]
+        out += [f"+ relation {relation}" for relation in self.related]
+        return out + [f"~ relation {old}: {_fields(old, new)}" for old, new in self.reweighted]
 
 
 def same(one: Node, other: Node) -> bool:
@@ -80,12 +80,12 @@ def same(one: Node, other: Node) -> bool:
 
 def _room_lines(old: RoomSpec, new: RoomSpec) -> list[str]:
     fields = _fields(old, new, but=("openings",))
-    said = [f"~ room: {fields}"] if fields else []
+    lines = [f"~ room: {fields}"] if fields else []
     was, will = {o.name: o for o in old.openings}, {o.name: o for o in new.openings}
-    said += [f"- {sentence(o)}" for name, o in was.items() if name not in will]
-    said += [f"+ {sentence(o)}" for name, o in will.items() if name not in was]
-    said += [f"~ {sentence(was[n])} -> {sentence(o)}" for n, o in will.items() if n in was and was[n] != o]
-    return said or ["~ room: another order of the openings"]
+    lines += [f"- {sentence(o)}" for name, o in was.items() if name not in will]
+    lines += [f"+ {sentence(o)}" for name, o in will.items() if name not in was]
+    lines += [f"~ {sentence(was[n])} -> {sentence(o)}" for n, o in will.items() if n in was and was[n] != o]
+    return lines or ["~ room: another order of the openings"]
 
 
 def _fields(old: Any, new: Any, but: tuple[str, ...] = ()) -> str:

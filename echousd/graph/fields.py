@@ -96,7 +96,7 @@ ANGLE_TEXT = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(deg|degrees?|
 
 def angle(value: Any) -> float:
     """Radians from a number of radians or a text with its unit, such as `90 deg`; raises ValueError."""
-    told = value
+    degrees = value
     if isinstance(value, str):
         match = ANGLE_TEXT.fullmatch(value)
         try:
@@ -105,10 +105,10 @@ def angle(value: Any) -> float:
             value = math.nan
     number = _converted(value)
     if not math.isfinite(number):
-        raise ValueError(f"found {shown(told)}, allowed: radians, or degrees as in 90 deg")
+        raise ValueError(f"found {shown(degrees)}, allowed: radians, or degrees as in 90 deg")
     if abs(number) > 2 * math.pi + 1e-6:
-        hint = f"; {told:g} degrees are written {told:g} deg" if isinstance(told, int | float) else ""
-        raise ValueError(f"found {shown(told)}, allowed: -2 pi to 2 pi radians{hint}")
+        hint = f"; {degrees:g} degrees are written {degrees:g} deg" if isinstance(degrees, int | float) else ""
+        raise ValueError(f"found {shown(degrees)}, allowed: -2 pi to 2 pi radians{hint}")
     return number
 
 
@@ -146,9 +146,9 @@ def _corners(value: Any) -> tuple[Point, ...]:
     if flat and not reason.startswith("Self-intersection"):
         raise ValueError(f"{len(corners)} corners that enclose no area, allowed: at least three around the floor")
     if reason != "Valid Geometry":
-        said = re.sub(r"-?\d+(\.\d+)?", lambda number: f"{float(number[0]):.2f}", reason)
+        text = re.sub(r"-?\d+(\.\d+)?", lambda number: f"{float(number[0]):.2f}", reason)
         raise ValueError(
-            f"{said.replace('[', ' at (').replace(']', ')')}, allowed: an outline that does not cross itself"
+            f"{text.replace('[', ' at (').replace(']', ')')}, allowed: an outline that does not cross itself"
         )
     return corners
 

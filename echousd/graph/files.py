@@ -61,8 +61,8 @@ def read_file(path: Path, build: Callable[[str, Any, str], Any]) -> Any:
     except GraphError:
         raise
     except ValueError as error:  # of a word alone, or of memory
-        told = str(error)
-        raise GraphError(told if told.startswith(f"{path}: ") else f"{path}: {told}") from None
+        message = str(error)
+        raise GraphError(message if message.startswith(f"{path}: ") else f"{path}: {message}") from None
 
 
 def save_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:

@@ -40,9 +40,9 @@ def with_floor(graph: SceneGraph, seed: int) -> SceneGraph:
         return graph
     from echomodel.plans import floor_extents, floor_outline, longest_side
 
-    said = [relation.predicate for relation in graph.relations]
-    aside = sum(predicate in ("left", "right") for predicate in said)
-    ahead = sum(predicate in ("front", "behind") for predicate in said)
+    predicates = [relation.predicate for relation in graph.relations]
+    aside = sum(predicate in ("left", "right") for predicate in predicates)
+    ahead = sum(predicate in ("front", "behind") for predicate in predicates)
     furniture = [node.category for node in graph.nodes], [node.size for node in graph.nodes]
     extents = floor_extents(
         graph.room.type,
@@ -183,12 +183,12 @@ def check_space(graph: SceneGraph) -> tuple[str, ...]:
     check_extents(extents)
 
     area = abs(signed_area(corners))
-    said = f"the floor of {extents[0]:.2f} x {extents[1]:.2f} m ({area:.1f} m²)"
+    space = f"the floor of {extents[0]:.2f} x {extents[1]:.2f} m ({area:.1f} m²)"
     diagonal = float(np.hypot(*extents))
     for node in graph.nodes:
         if node.size and max(node.size[0], node.size[2]) > diagonal:
             raise GraphError(
-                f"{said} is too small for {node.name!r}, which is {max(node.size[0], node.size[2]):.2f} m long; "
+                f"{space} is too small for {node.name!r}, which is {max(node.size[0], node.size[2]):.2f} m long; "
                 f"allowed: up to {diagonal:.2f} m, corner to corner",
                 ("room",),
             )
@@ -196,13 +196,13 @@ def check_space(graph: SceneGraph) -> tuple[str, ...]:
     least = footprint(categories, sizes, least=True)
     if least > area:
         raise GraphError(
-            f"{said} is too small for its furniture, which covers at least {least:.1f} m²; allowed: a larger floor, "
+            f"{space} is too small for its furniture, which covers at least {least:.1f} m²; allowed: a larger floor, "
             "fewer or smaller objects",
             ("room",),
         )
     usual = footprint(categories, sizes)
     if usual > CROWDED * area:
-        return (f"{said} is small for furniture that covers about {usual:.1f} m²: expect tight ways",)
+        return (f"{space} is small for furniture that covers about {usual:.1f} m²: expect tight ways",)
     return ()
 
 

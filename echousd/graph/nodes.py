@@ -72,9 +72,9 @@ class PlainModel(BaseModel, metaclass=_Plain):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
-        told = signature(cls)  # whose annotations are a page of validators
-        plain = [one.replace(annotation=Parameter.empty) for one in told.parameters.values()]
-        cls.__signature__ = told.replace(parameters=plain, return_annotation=Signature.empty)
+        whole = signature(cls)  # whose annotations are a page of validators
+        plain = [one.replace(annotation=Parameter.empty) for one in whole.parameters.values()]
+        cls.__signature__ = whole.replace(parameters=plain, return_annotation=Signature.empty)
 
 
 class RoomSpec(PlainModel):
@@ -218,8 +218,8 @@ class Node(PlainModel):
     @property
     def placements(self) -> tuple[Placed, ...]:
         """What is said of its place in the room."""
-        told = [] if self.place is None else [Placed(self.name, self.place)]
-        return (*told, *([] if self.between is None else [Placed(self.name, "between", self.between)]))
+        alone = [] if self.place is None else [Placed(self.name, self.place)]
+        return (*alone, *([] if self.between is None else [Placed(self.name, "between", self.between)]))
 
     @classmethod
     def _title(cls, fields: dict[str, Any]) -> str:
@@ -246,8 +246,8 @@ class Relation(PlainModel):
 
     @classmethod
     def _title(cls, fields: dict[str, Any]) -> str:
-        said = " ".join(str(fields[part]) for part in ("subject", "predicate", "object"))
-        return f"relation {field.shown(said)}: "
+        sentence = " ".join(str(fields[part]) for part in ("subject", "predicate", "object"))
+        return f"relation {field.shown(sentence)}: "
 
     @property
     def triple(self) -> tuple[str, str, str]:

@@ -44,20 +44,20 @@ def opening_from_words(entry: Any, kind: str, room: RoomSpec, taken: Iterable[st
 
     Raises GraphError.
     """
-    said = _read(entry, kind)
-    name = said.get("name", None) or numbered(kind, taken)
+    fields = _read(entry, kind)
+    name = fields.get("name", None) or numbered(kind, taken)
     corners = room.corners
-    if "wall" not in said:
+    if "wall" not in fields:
         raise GraphError(f"{kind} {name!r}: wall is missing, allowed: {_walls_allowed(corners)}")
-    edge = _wall(said["wall"], corners, f"{kind} {name!r}")
+    edge = _wall(fields["wall"], corners, f"{kind} {name!r}")
     values: dict[str, Any] = {**USUAL[kind]}
     for key in ("width", "height", "sill"):
-        if key in said:
-            values[key] = _metres(said[key], f"{kind} {name!r}: {key}")
-    values["offset"] = _offset(said.get("offset"), kind, values["width"], edge, corners, f"{kind} {name!r}")
+        if key in fields:
+            values[key] = _metres(fields[key], f"{kind} {name!r}: {key}")
+    values["offset"] = _offset(fields.get("offset"), kind, values["width"], edge, corners, f"{kind} {name!r}")
     for key in ("hinge", "swing"):
-        if key in said:
-            word = str(said[key]).strip().lower()
+        if key in fields:
+            word = str(fields[key]).strip().lower()
             values[key] = SAME.get(word, word)
     try:
         return Opening(name, kind, edge, **values)
@@ -99,22 +99,22 @@ def _words(text: str, kind: str) -> dict[str, Any]:
     return found
 
 
-def _wall(value: Any, corners: np.ndarray | None, said: str) -> int:
+def _wall(value: Any, corners: np.ndarray | None, about: str) -> int:
     """The number of a wall that is named by its number or by where it lies."""
     count = 4 if corners is None else len(corners)
     if isinstance(value, int | str) and str(value).strip().isdecimal():
         number = int(value)
         if number >= count:
-            raise GraphError(f"{said}: wall {number}, allowed: {_walls_allowed(corners)}")
+            raise GraphError(f"{about}: wall {number}, allowed: {_walls_allowed(corners)}")
         return number
     way = WALLS.get(str(value).strip().lower().removesuffix(" wall"))
     if way is None:
-        raise GraphError(f"{said}: wall {value!r}, allowed: {_walls_allowed(corners)}")
+        raise GraphError(f"{about}: wall {value!r}, allowed: {_walls_allowed(corners)}")
     outline = rectangle(1.0, 1.0) if corners is None else corners
     facing = np.array([-inward_normal(outline, edge) @ way for edge in range(len(outline))])
     lengths = np.where(facing > math.cos(math.pi / 4), edge_lengths(outline), -1.0)
     if lengths.max() < 0:
-        raise GraphError(f"{said}: no wall lies {value}, allowed: {_walls_allowed(corners)}")
+        raise GraphError(f"{about}: no wall lies {value}, allowed: {_walls_allowed(corners)}")
     return int(lengths.argmax())
 
 
@@ -123,28 +123,28 @@ def _walls_allowed(corners: np.ndarray | None) -> str:
     return f"0 to {count - 1}, north (front), east (right), south (behind) or west (left)"
 
 
-def _offset(value: Any, kind: str, width: float, edge: int, corners: np.ndarray | None, said: str) -> float:
+def _offset(value: Any, kind: str, width: float, edge: int, corners: np.ndarray | None, about: str) -> float:
     if value is None and corners is None:
-        raise GraphError(f"{said}: offset is missing, allowed: metres along the wall, or say the size of the room")
+        raise GraphError(f"{about}: offset is missing, allowed: metres along the wall, or say the size of the room")
     usual = "start" if kind == "door" else "middle"
     place = usual if value is None else str(value).strip().lower()
     if place not in PLACES:
-        return _metres(value, f"{said}: offset")
+        return _metres(value, f"{about}: offset")
     if corners is None:
-        raise GraphError(f"{said}: offset {value!r} needs the size of the room, allowed: metres, or say the size")
+        raise GraphError(f"{about}: offset {value!r} needs the size of the room, allowed: metres, or say the size")
     free = max(float(edge_lengths(corners)[edge]) - width, 0.0)
     margin = min(FROM_WALL, free / 2)
     return round(margin + (free - 2 * margin) * PLACES[place], 4)
 
 
-def _metres(value: Any, said: str) -> float:
+def _metres(value: Any, about: str) -> float:
     if isinstance(value, str):
         try:
             value = float(value.strip().removesuffix("m"))
         except ValueError:
-            raise GraphError(f"{said} is {value!r}, allowed: a number, metres") from None
+            raise GraphError(f"{about} is {value!r}, allowed: a number, metres") from None
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise GraphError(f"{said} is {value!r}, allowed: a number, metres")
+        raise GraphError(f"{about} is {value!r}, allowed: a number, metres")
     return float(value)
 
 

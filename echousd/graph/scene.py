@@ -182,8 +182,8 @@ class SceneGraph(PlainModel):
             lines.append(f"  {flow(name)}: {flow(node['category'] if len(node) == 1 else node)}")
         if self.relations:
             lines.append("relations:")
-        for relation, said in zip(self.relations, form["relations"], strict=True):
-            lines.append(f"  - {relation if len(said) == 3 else flow(said)}")
+        for relation, entry in zip(self.relations, form["relations"], strict=True):
+            lines.append(f"  - {relation if len(entry) == 3 else flow(entry)}")
         return "\n".join(lines) + "\n"
 
 

@@ -53,10 +53,10 @@ def read_text(build: Callable[[Any], Read], text: str, form: Literal["json", "ya
         wrong += [error, *error.others]
     if not wrong:
         return built
-    said = [_with_source(source, _with_line(located, each)) for each in wrong[:MAX_ERRORS]]
-    told = GraphError("\n".join(said), wrong[0].about)
-    told.lines = tuple(said)
-    raise told from None
+    lines = [_with_source(source, _with_line(located, each)) for each in wrong[:MAX_ERRORS]]
+    whole = GraphError("\n".join(lines), wrong[0].about)
+    whole.lines = tuple(lines)
+    raise whole from None
 
 
 def _with_line(located: Located, error: GraphError) -> str:
@@ -104,18 +104,18 @@ def graph_from_plain(kind: type[SceneGraph], data: Any) -> SceneGraph:
         raise GraphError(
             f"relations: found {shown(stated)}, allowed: a list such as [bed left wardrobe]", ("relations",)
         )
-    said = [_tried(errors, _sentence, entry, ("relations", i), names) for i, entry in enumerate(stated or ())]
-    relations = [one if isinstance(one, Relation) else None for one in said]
+    read = [_tried(errors, _sentence, entry, ("relations", i), names) for i, entry in enumerate(stated or ())]
+    relations = [one if isinstance(one, Relation) else None for one in read]
     if errors:
         named = [(str(one["name"]), _others(one)) for one in objects if "name" in one]
         errors += name_faults(named) if len(named) == len(objects) else []
         errors += unknown_ends([None if r is None else r.triple for r in relations], dict(named))
         raise_all(errors)
-    for i, one in enumerate(said):
+    for i, one in enumerate(read):
         if isinstance(one, Placed):
             nodes = _tried(errors, _with_placement, nodes, one, ("relations", i)) or nodes
     raise_all(errors)
-    rows = [i for i, one in enumerate(said) if isinstance(one, Relation)]
+    rows = [i for i, one in enumerate(read) if isinstance(one, Relation)]
     try:
         return kind(room, tuple(nodes), tuple(one for one in relations if one is not None))
     except GraphError as error:
@@ -127,9 +127,9 @@ def _where_written(error: GraphError, rows: Sequence[int]) -> GraphError:
     about = error.about
     if about[:1] == ("relations",):
         about = ("relations", rows[int(about[1])], *about[2:])
-    told = GraphError(str(error), about)
-    told.others = tuple(_where_written(each, rows) for each in error.others)
-    return told
+    located = GraphError(str(error), about)
+    located.others = tuple(_where_written(each, rows) for each in error.others)
+    return located
 
 
 def _with_placement(nodes: list[Node], placed: Placed, about: Path) -> list[Node]:
@@ -142,8 +142,8 @@ def _with_placement(nodes: list[Node], placed: Placed, about: Path) -> list[Node
     held = {name: getattr(nodes[at], name) for name in fields}
     same = set if placed.others else str  # between a and b is between b and a
     if any(value is not None and same(value) != same(fields[name]) for name, value in held.items()):
-        told = next(one for one in nodes[at].placements if bool(one.others) == bool(placed.others))
-        raise GraphError(f"'{placed}': {told} is stated already, allowed: one of them", about)
+        placement = next(one for one in nodes[at].placements if bool(one.others) == bool(placed.others))
+        raise GraphError(f"'{placed}': {placement} is stated already, allowed: one of them", about)
     try:
         return [node.replaced(**fields) if i == at else node for i, node in enumerate(nodes)]
     except GraphError as error:
@@ -155,8 +155,8 @@ def _node(fields: dict[str, Any], about: Path) -> Node:
 
 
 def _sentence(entry: Any, about: Path, names: Mapping[str, str]) -> Relation | Placed:
-    said = fields_of_sentence(entry, about, names)
-    return said if isinstance(said, Placed) else _built(Relation, said, about)
+    fields = fields_of_sentence(entry, about, names)
+    return fields if isinstance(fields, Placed) else _built(Relation, fields, about)
 
 
 def _named(objects: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], dict[str, str]]:
@@ -284,10 +284,10 @@ def _in_radians(fields: dict[str, Any], about: Path) -> dict[str, Any]:
         return fields
     if "yaw" in fields:
         raise GraphError("both yaw and yaw_degrees are given, allowed: one of them", (*about, "yaw_degrees"))
-    said = fields["yaw_degrees"]
-    if isinstance(said, bool) or not isinstance(said, int | float) or not abs(said) <= 360:
-        raise GraphError(f"yaw_degrees: found {shown(said)}, allowed: -360 to 360", (*about, "yaw_degrees"))
-    return {**{key: value for key, value in fields.items() if key != "yaw_degrees"}, "yaw": f"{said} deg"}
+    degrees = fields["yaw_degrees"]
+    if isinstance(degrees, bool) or not isinstance(degrees, int | float) or not abs(degrees) <= 360:
+        raise GraphError(f"yaw_degrees: found {shown(degrees)}, allowed: -360 to 360", (*about, "yaw_degrees"))
+    return {**{key: value for key, value in fields.items() if key != "yaw_degrees"}, "yaw": f"{degrees} deg"}
 
 
 def _own_name(category: str) -> str:
@@ -337,8 +337,8 @@ def _placed(words: list[str], about: Path) -> Placed | None:
         return None
     others = tuple(word.strip(",") for word in pair[-2:])
     if len(pair) < 4:
-        said = " ".join(words)
-        raise GraphError(f"'{said}': found one other object, allowed: two, such as table {named} sofa and chair", about)
+        text = " ".join(words)
+        raise GraphError(f"'{text}': found one other object, allowed: two, such as table {named} sofa and chair", about)
     return Placed(words[0], named, others)
 
 
@@ -347,14 +347,14 @@ def _refuse_slip(words: list[str], about: Path) -> None:
     try:
         vocabulary().predicate(" ".join(words[1:-1]))
     except UnknownWord:
-        said = {word: row for row in vocabulary().placements for word in (row.name, *row.aliases)}
+        rows = {word: row for row in vocabulary().placements for word in (row.name, *row.aliases)}
         whole, first = normalised(" ".join(words[1:])), normalised(words[1])
-        alone = [word for word, row in said.items() if not row.others]
+        alone = [word for word, row in rows.items() if not row.others]
         near = difflib.get_close_matches(whole, alone, n=1, cutoff=TYPO)
         if "and" in words[2:]:
-            near = near or difflib.get_close_matches(first, [w for w in said if w not in alone], n=1, cutoff=TYPO)
+            near = near or difflib.get_close_matches(first, [w for w in rows if w not in alone], n=1, cutoff=TYPO)
         if near:
-            text = f"relation '{' '.join(words)}': did you mean {said[near[0]].name.replace('_', ' ')}?"
+            text = f"relation '{' '.join(words)}': did you mean {rows[near[0]].name.replace('_', ' ')}?"
             raise GraphError(text, about) from None
 
 
@@ -369,8 +369,8 @@ def _placement(words: str) -> str | None:
 
 def sentence(text: str, names: Mapping[str, str] | None = None) -> Relation | Placed:
     """What a sentence states; raises `GraphError`."""
-    said = fields_of_sentence(text, (), names)
-    return said if isinstance(said, Placed) else Relation(**said)
+    fields = fields_of_sentence(text, (), names)
+    return fields if isinstance(fields, Placed) else Relation(**fields)
 
 
 def placed_fields(placed: Placed) -> dict[str, Any]:
@@ -380,19 +380,19 @@ def placed_fields(placed: Placed) -> dict[str, Any]:
 
 def stating(graph: SceneGraph, text: str) -> SceneGraph:
     """The graph in which a sentence holds as well; raises `GraphError`."""
-    said = sentence(text, graph.titles)
-    if isinstance(said, Placed):
-        return graph.update_node(said.subject, **placed_fields(said))
-    return graph.relate(said.subject, said.predicate, said.object)
+    stated = sentence(text, graph.titles)
+    if isinstance(stated, Placed):
+        return graph.update_node(stated.subject, **placed_fields(stated))
+    return graph.relate(stated.subject, stated.predicate, stated.object)
 
 
 def without(graph: SceneGraph, text: str) -> SceneGraph:
     """The graph without what a sentence states; raises `GraphError` where it does not."""
-    said = sentence(text, graph.titles)
-    if isinstance(said, Relation):
-        return graph.unrelate(said.subject, said.predicate, said.object)
-    held = graph.node(said.subject).placements
-    if not any(one.placement == said.placement and set(one.others) == set(said.others) for one in held):
-        told = ", ".join(map(str, held)) or "nothing"
-        raise GraphError(f"'{said}' is not stated in this graph; of the place of {said.subject}: {told}")
-    return graph.update_node(said.subject, **dict.fromkeys(placed_fields(said)))
+    stated = sentence(text, graph.titles)
+    if isinstance(stated, Relation):
+        return graph.unrelate(stated.subject, stated.predicate, stated.object)
+    held = graph.node(stated.subject).placements
+    if not any(one.placement == stated.placement and set(one.others) == set(stated.others) for one in held):
+        listed = ", ".join(map(str, held)) or "nothing"
+        raise GraphError(f"'{stated}' is not stated in this graph; of the place of {stated.subject}: {listed}")
+    return graph.update_node(stated.subject, **dict.fromkeys(placed_fields(stated)))

@@ -24,7 +24,7 @@ from echousd.batches.work import Job, room
 from echousd.folder.found import is_home
 from echousd.folder.manifest import find_manifest
 from echousd.graph import SceneGraph
-from echousd.home.given import next_plan
+from echousd.home.existing import next_plan
 from echousd.home.graph import HomeGraph, home_of_plain
 from echousd.home.plan import Plan, doorways
 from echousd.home.stages import HOME, home_layer, room_path
@@ -96,8 +96,8 @@ def digests_of(jobs: Mapping[str, Job]) -> dict[str, str]:
     """Of all that decides each room's bytes."""
     found, weights = {}, cache(weights_hash)
     for name, job in jobs.items():
-        told = [job.text, job.seed, job.options.model_dump(), weights(job.options.weights), echousd.__version__]
-        found[name] = hashlib.sha256(json.dumps(told, default=str, sort_keys=True).encode()).hexdigest()[:16]
+        inputs = [job.text, job.seed, job.options.model_dump(), weights(job.options.weights), echousd.__version__]
+        found[name] = hashlib.sha256(json.dumps(inputs, default=str, sort_keys=True).encode()).hexdigest()[:16]
     return found
 
 

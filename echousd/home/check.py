@@ -14,7 +14,7 @@ from pxr import Usd
 from echomodel.openings import STEP, inward_normal, segment
 from echomodel.vocabulary import vocabulary
 from echousd.checks.report import CheckReport, check
-from echousd.home.given import plan_there
+from echousd.home.existing import plan_there
 from echousd.home.plan import Plan, doorways, overlapping
 from echousd.home.stages import Standing, furniture, named_rooms
 from echousd.stage.files import open_stage
@@ -64,21 +64,21 @@ def check_home(path: Path, *, rules: str = "strict", layout: int | None = None, 
     stage = open_stage(path)
     ground = open_ground(plan, furniture(plan, path))
     reached = walked(plan, ground)
-    told = [("broken", f"{relation}: the plan does not keep it") for relation in plan.broken()]
+    faults = [("broken", f"{relation}: the plan does not keep it") for relation in plan.broken()]
     for one, other, shared in overlapping(plan.floors, 0.01):
-        told.append(("walls", f"{one} and {other} share {shared:.2f} m² of floor, allowed: none"))
-    told += [("walls", says) for says in _openings(plan)]
-    told += [
+        faults.append(("walls", f"{one} and {other} share {shared:.2f} m² of floor, allowed: none"))
+    faults += [("walls", says) for says in _openings(plan)]
+    faults += [
         ("ways", f"{name}: a robot of 0.3 m from {plan.home.entered_by} gets to {share:.0%} of its free floor")
         for name, share in reached.items()
         if share < REACHED
     ]
-    told += [("ways", says) for says in _blocked(plan, ground)]
+    faults += [("ways", says) for says in _blocked(plan, ground)]
     rooms = {
         name: check(_room_file(prims.room), rules=rules, layout=layout, settle=settle)
         for name, prims in named_rooms(stage).items()
     }
-    return HomeReport(tuple(told), reached, len(plan.home.relations), rooms)
+    return HomeReport(tuple(faults), reached, len(plan.home.relations), rooms)
 
 
 def _room_file(prim: Usd.Prim) -> Path:

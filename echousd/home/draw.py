@@ -113,8 +113,8 @@ def draw_plans(
             axes.fill(*on_paper(floor).T, color=TINTS[row.use])
             middle = shapely.Polygon(on_paper(floor)).representative_point()
             sides = " x ".join(f"{side:.2f}" for side in np.ptp(on_paper(floor), 0))
-            told = f"{name.replace('_', ' ')}\n{abs(signed_area(floor)):.1f} m²\n{sides} m"
-            axes.text(middle.x, middle.y, told, ha="center", va="center", fontsize=7)
+            label = f"{name.replace('_', ' ')}\n{abs(signed_area(floor)):.1f} m²\n{sides} m"
+            axes.text(middle.x, middle.y, label, ha="center", va="center", fontsize=7)
         for line in lines_of(plan):
             points = np.vstack([line.points, line.points[:1]]) if line.closed else line.points
             if line.layer == "wall":
@@ -128,12 +128,12 @@ def draw_plans(
             word = thing.node.category.replace("_", "\n")
             x, y = corners.mean(0).tolist()
             axes.text(x, y, word, ha="center", va="center", fontsize=3.5, color="#5a5a5a")
-        for start, end, told in dimensions_of(plan):
+        for start, end, label in dimensions_of(plan):
             axes.annotate("", start, end, arrowprops={"arrowstyle": "<->", "linewidth": 0.6})
             middle = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
             upright = 90 if start[0] == end[0] else 0
             box = {"facecolor": "white", "linewidth": 0, "pad": 1}
-            axes.annotate(told, middle, fontsize=6, rotation=upright, ha="center", va="center", bbox=box)
+            axes.annotate(label, middle, fontsize=6, rotation=upright, ha="center", va="center", bbox=box)
         for points in over:
             axes.plot(*on_paper(points).T, color="#d02f2f", linewidth=0.5, alpha=0.8)
         axes.set_title(f"{plan.area:.1f} m²", fontsize=8)

@@ -115,8 +115,8 @@ class HomeGraph(PlainModel):
         for number, relation in enumerate(self.relations):
             for end in relation.pair:
                 if end not in names:
-                    told = f"'{relation}': {end!r} is no room of this home, allowed: {', '.join(names)}"
-                    raise GraphError(told, ("relations", number))
+                    message = f"'{relation}': {end!r} is no room of this home, allowed: {', '.join(names)}"
+                    raise GraphError(message, ("relations", number))
             if relation.subject == relation.object:
                 raise GraphError(f"'{relation}': a room and itself, allowed: two rooms", ("relations", number))
         if self.entrance is not None and self.entrance not in names:
@@ -163,8 +163,8 @@ class HomeGraph(PlainModel):
         """The room called `name`; raises `GraphError`."""
         found = next((room for room in self.rooms if room.name == name), None)
         if found is None:
-            told = ", ".join(room.name for room in self.rooms)
-            raise GraphError(f"no room {field.shown(name)} in this home, allowed: {told}")
+            listed = ", ".join(room.name for room in self.rooms)
+            raise GraphError(f"no room {field.shown(name)} in this home, allowed: {listed}")
         return found
 
     @property
@@ -213,8 +213,8 @@ class HomeGraph(PlainModel):
         """Without a relation; raises `GraphError` where it is not stated."""
         gone = relation_of(sentence)
         if gone not in self.relations:
-            told = ", ".join(f"'{relation}'" for relation in self.relations)
-            raise GraphError(f"no relation '{gone}' in this home, allowed: {told}")
+            listed = ", ".join(f"'{relation}'" for relation in self.relations)
+            raise GraphError(f"no relation '{gone}' in this home, allowed: {listed}")
         return self.replaced(relations=tuple(one for one in self.relations if one != gone))
 
     def to_json(self) -> str:
@@ -224,8 +224,8 @@ class HomeGraph(PlainModel):
             inside = plain(room.graph)
             del inside["room"]
             rooms[room.name] = {**_about_room(room), **inside}
-        told = {"home": self._about(), "rooms": rooms, "relations": [str(relation) for relation in self.relations]}
-        return json.dumps(told, ensure_ascii=False, indent=1) + "\n"
+        content = {"home": self._about(), "rooms": rooms, "relations": [str(relation) for relation in self.relations]}
+        return json.dumps(content, ensure_ascii=False, indent=1) + "\n"
 
     def to_yaml(self) -> str:
         """The short YAML form that a person would write, which `echousd.home.files.load_home` reads."""

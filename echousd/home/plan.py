@@ -168,9 +168,9 @@ def plan_home(home: HomeGraph, *, seed: int = 0, before: Plan | None = None) -> 
     Raises `GraphError` that names what contradicts itself, with a smallest set of relations that cannot hold together.
     """
     home = home.connected()
-    told = conflicts(home)
-    if told:
-        raise GraphError(told[0])
+    faults = conflicts(home)
+    if faults:
+        raise GraphError(faults[0])
     first = _problem(home, seed, before)
     for effort, problem in itertools.product(EFFORTS, _attempts(home, first)):
         state, lie = solved(problem, effort)
@@ -228,13 +228,13 @@ def _circles(home: HomeGraph) -> Iterator[str]:
             row, pair = relation.row, relation.pair
             if step is None:
                 if row.compares:
-                    order.add_edge(*pair, said=str(relation))
+                    order.add_edge(*pair, sentence=str(relation))
             elif row.step in (step, (-step[0], -step[1])):
-                order.add_edge(*(pair if row.step == step else pair[::-1]), said=str(relation))
+                order.add_edge(*(pair if row.step == step else pair[::-1]), sentence=str(relation))
         for circle in networkx.simple_cycles(order):
             ends = zip(circle, (*circle[1:], circle[0]), strict=True)
-            said = " and ".join(f"'{order.edges[pair]['said']}'" for pair in ends)
-            yield f"{said} cannot all hold"
+            sentences = " and ".join(f"'{order.edges[pair]['sentence']}'" for pair in ends)
+            yield f"{sentences} cannot all hold"
             break
 
 
@@ -248,8 +248,8 @@ def _areas(home: HomeGraph) -> Iterator[str]:
     least = sum(stated.get(room.name, _usual(room)[0]) for room in home.rooms)
     most = home.area or (None if home.outline is None else _inside(home.outline, len(home.rooms)))
     if most is not None and least > most * STATED[1]:
-        told = ", ".join(f"{room.name} {stated.get(room.name, _usual(room)[0]):.3g}" for room in home.rooms)
-        yield f"the rooms need {least:.3g} m² at least ({told}), the home has {most:.3g} m²"
+        listed = ", ".join(f"{room.name} {stated.get(room.name, _usual(room)[0]):.3g}" for room in home.rooms)
+        yield f"the rooms need {least:.3g} m² at least ({listed}), the home has {most:.3g} m²"
     if home.outline is not None and home.area is not None:
         room = _inside(home.outline, len(home.rooms))
         if not 0.8 < home.area / room < 1.2:
@@ -271,8 +271,8 @@ def _crossing(home: HomeGraph) -> Iterator[str]:
     flat, witness = networkx.check_planarity(shared, counterexample=True)
     if not flat:
         pairs = {frozenset(edge) for edge in witness.edges}
-        said = [f"'{r}'" for r in home.relations if r.row.wall and frozenset(r.pair) in pairs]
-        yield f"no flat plan has all of {', '.join(said)}: their ways would cross; leave one of them out"
+        sentences = [f"'{r}'" for r in home.relations if r.row.wall and frozenset(r.pair) in pairs]
+        yield f"no flat plan has all of {', '.join(sentences)}: their ways would cross; leave one of them out"
 
 
 # -- the problem -------------------------------------------------------------------------------------------------------

@@ -45,8 +45,8 @@ def home_layer(home: HomeGraph, plan: Plan | None = None, *, rooms: bool = True)
         for path, kind in ((HOME, "assembly"), (ROOMS, "group")):
             define(layer, Sdf.Path(path), "Xform").kind = kind
         graph = define(layer, Sdf.Path(GRAPH), usd.HOME_TYPE)
-        for name, told in usd.values_of(home, usd.HOME_FIELDS).items():
-            put(graph, name, told)
+        for name, value in usd.values_of(home, usd.HOME_FIELDS).items():
+            put(graph, name, value)
         if home.entrance is not None:
             relate(graph, usd.ENTRANCE, room_path(home.entrance))
         for relation in home.relations:
@@ -168,8 +168,8 @@ def _relation(prim: Usd.Prim, names: Mapping[Sdf.Path, str]) -> HomeRelation:
     for end in (usd.SUBJECT, usd.OBJECT):
         targets = values.targets(prim, end)
         if len(targets) != 1 or targets[0] not in names:
-            told = ", ".join(map(str, targets)) or "nothing"
-            raise StageError(f"{place(prim)}: {end} points to {told}, allowed: one room of the home")
+            listed = ", ".join(map(str, targets)) or "nothing"
+            raise StageError(f"{place(prim)}: {end} points to {listed}, allowed: one room of the home")
         ends.append(names[targets[0]])
     with faults(place(prim)):
         return HomeRelation(ends[0], str(value(prim, usd.PREDICATE)), ends[1])

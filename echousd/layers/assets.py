@@ -86,9 +86,9 @@ def write_mesh(pen: Pen, path: str, form: Surface, **about: str) -> None:
     for name in ("primvars:normals", "primvars:st"):
         spec.attributes[name].SetInfo("interpolation", "faceVarying")
     if len(form.groups) > 1:
-        told = {"uniform token elementType": "face", "uniform token familyName": "materialBind"}
+        family = {"uniform token elementType": "face", "uniform token familyName": "materialBind"}
         for name, faces in form.groups.items():
-            pen.define(f"{path}/{name}", "GeomSubset", {**told, "int[] indices": faces})
+            pen.define(f"{path}/{name}", "GeomSubset", {**family, "int[] indices": faces})
         say(spec, {"uniform token subsetFamily:materialBind:familyType": "partition"})
 
 
@@ -101,8 +101,8 @@ def geometry_layer(
     written. `data`: customLayerData. `style`: chooses the looks, which a room's materials layer overrides.
     """
     pen = Pen.blank(name, ".usdc", data)
-    told = {f"custom float[] {DESCRIPTION}": geometry.description} if geometry.description else {}
-    pen.define(f"/{name}", "Xform", told)
+    fields = {f"custom float[] {DESCRIPTION}": geometry.description} if geometry.description else {}
+    pen.define(f"/{name}", "Xform", fields)
     pen.define(f"/{name}/{GEO}", "Scope")
     for body in sorted({part.body for part in geometry.parts if part.body}):
         pen.define(piece_path(f"/{name}", name, body), "Xform")

@@ -60,8 +60,8 @@ def attribution_files(room: RoomData) -> dict[str, bytes]:
 
 def text(room: str, origins: dict[str, Origin]) -> str:
     """A table of the models, by licence and author."""
-    told = "Made by others, and placed and scaled here; a licence may ask that they are named."
-    lines = [f"# Models in {room}", "", told, ""]
+    notice = "Made by others, and placed and scaled here; a licence may ask that they are named."
+    lines = [f"# Models in {room}", "", notice, ""]
     lines += ["| asset | model | licence | author |", "|---|---|---|---|"]
     for name, origin in sorted(origins.items(), key=lambda entry: (entry[1].licence, entry[1].credit, entry[0])):
         row = (name, origin.asset, origin.licence, origin.credit or "unknown")
@@ -145,8 +145,8 @@ def layer_data(room: RoomData, name: str) -> dict[str, Any]:
 
 def simready_data(room: RoomData) -> dict[str, Any]:
     """What SimReady's profiles ask of a root layer besides; the date is the earliest there is, as in our archives."""
-    told = {"asset_type": "Scene", "source_file": room.provenance.source or "none", "usd_date_generated": "1980-01-01"}
-    return {**told, "SimReady_Metadata": dict(told)}
+    about = {"asset_type": "Scene", "source_file": room.provenance.source or "none", "usd_date_generated": "1980-01-01"}
+    return {**about, "SimReady_Metadata": dict(about)}
 
 
 def geometry_layer(room: RoomData) -> Sdf.Layer:

@@ -52,8 +52,8 @@ def _network(pen: Pen, path: str, look: Look, harmony: str) -> None:
     if "normal" in images:
         value = _image(pen, f"{path}/mtlx_normal", "ND_image_vector3", "float3", images["normal"], at)
         for step, kind, number in (("doubled", "multiply", 2.0), ("centred", "subtract", 1.0)):  # 0 .. 1 -> -1 .. 1
-            told = {"float3 inputs:in1.connect": value, "float inputs:in2": number}
-            value = _node(pen, f"{path}/mtlx_{step}", f"ND_{kind}_vector3FA", "float3", told)
+            inputs = {"float3 inputs:in1.connect": value, "float inputs:in2": number}
+            value = _node(pen, f"{path}/mtlx_{step}", f"ND_{kind}_vector3FA", "float3", inputs)
         feeds["float3 inputs:normal"] = value
     pen.over(f"{path}/mtlx_surface", {f"{words}.connect": output for words, output in feeds.items()})
     pen.over(path, {f"token outputs:{CONTEXT}:surface.connect": surface})

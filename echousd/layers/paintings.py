@@ -149,8 +149,8 @@ def brought(root: Path | None, folder: Path) -> dict[str, dict[str, bytes]]:
         taken = {path: folder / path for path in content if (folder / path).exists()}
         other = [path for path, it in taken.items() if not it.is_file() or it.read_bytes() != content[path]]
         if other:
-            told = f"{folder / other[0]}: is another look; that of {root.parent} is not taken along"
-            warnings.warn(told, stacklevel=5)
+            message = f"{folder / other[0]}: is another look; that of {root.parent} is not taken along"
+            warnings.warn(message, stacklevel=5)
             continue
         found[f"./{FOLDER}/{place.name}"] = content
     return found

@@ -73,4 +73,4 @@ def cleared(
     gaps = separation(size, position, yaw, pairs)
     apart = dict(zip(map(tuple, pairs.tolist()), gaps, strict=True))
     names = [(scene.names[i], scene.names[k], deep) for (i, k), deep in left if -apart.get((i, k), -np.inf) > TOUCH]
-    return boxes, tuple(Collision(*told) for told in names)
+    return boxes, tuple(Collision(*ends) for ends in names)

@@ -38,8 +38,8 @@ from echousd.progress import StageTimer
 from echousd.room import LayoutOutcome, Provenance
 from echousd.shapes.looks import palette_of_room
 from echousd.shapes.sources.mixing import check_sources, default_source, mixed_shapes
-from echousd.shapes.sources.named import anchored, check_files, source_of, with_given_sizes
-from echousd.shapes.sources.retrieval import given_pieces, retrieved
+from echousd.shapes.sources.named import anchored, check_files, source_of, with_model_sizes
+from echousd.shapes.sources.retrieval import named_pieces, retrieved
 from echousd.shapes.sources.source import Retrieved, ShapeRequest
 from echousd.shapes.styles import asset_names, stated_styles, style_groups
 
@@ -49,7 +49,7 @@ ROUNDS = 4  # times that boxes are placed: what is in the way of what was moved 
 @takes_options(OF_NEW)
 def edit(
     room: str | Path, graph: SceneGraph, *, model: RoomModel | None = None, outside: Sequence[str | Path] = (),
-    progress: StageListener | None = None, **given: Any,
+    progress: StageListener | None = None, **changes: Any,
 ) -> Room:  # fmt: skip
     """A room whose graph was changed; objects that the change does not touch keep box, mesh and files.
 
@@ -62,22 +62,22 @@ def edit(
         graph: what its graph (`read_room(room).graph`) shall become; a floor or openings that it leaves open stay
             those of the room.
         model, outside, progress: as for `generate`.
-        given: options of what is new (`RoomOptions`); `shapes` and `faces` are those of the room where none are given.
+        changes: options of what is new (`RoomOptions`); without them `shapes` and `faces` are those of the room.
 
     Raises ValueError as `generate` and `read_room` do, and for a room that other weights than those that ship made if
     neither `model` nor `weights` is given. Warns where the weights are not those that made the room, and of
     faults as `generate` does.
     """
-    if wrong := sorted(given.keys() - set(OF_NEW)):
+    if wrong := sorted(changes.keys() - set(OF_NEW)):
         raise ValueError(f"{wrong[0]} is no option of an edit, allowed: {', '.join(OF_NEW)}")
-    given = {name: value for name, value in given.items() if value is not None}
-    RoomOptions(**given)  # what is not allowed is told before the room is read
+    changes = {name: value for name, value in changes.items() if value is not None}
+    RoomOptions(**changes)  # what is not allowed is told before the room is read
     timer = StageTimer(progress)
     with timer.stage("read"):
         saved = read_room(room)
     manifest = saved.manifest
     look = {name: manifest[name] for name in Look.model_fields}
-    asked = RoomOptions(**{**look, **given})
+    asked = RoomOptions(**{**look, **changes})
     wishes, shapes = partial(asked.wishes, outside), asked.shapes
     check_objects(graph, str(room))
     beside = Path(room).parent
@@ -105,13 +105,13 @@ def edit(
     if shaped_anew or moving:
         with timer.stage("load"), one_thread():
             used = model_of(asked, model)
-            _compare(saved.manifest, used, given=bool(model or asked.weights), root=Path(room))
+            _compare(saved.manifest, used, chosen=bool(model or asked.weights), root=Path(room))
         if shaped_anew:
             made_of = saved.manifest["shapes"]
             again = made_of in ("parts", "sdf") or (made_of in ("library", "guided") and asked.assets is not None)
             shapes = shapes or (made_of if again else default_source(used))
             check_sources([shapes, *(source_of(graph.node(name), shapes) for name in shaped_anew)], used)
-            own = given_pieces(graph, wishes, fresh)
+            own = named_pieces(graph, wishes, fresh)
         search = LayoutSearch(
             used, asked.seed, timer, asked.steps, graph_edit(saved.graph, graph), place=asked.place,
             drafts=asked.drafts or most_drafts(used, len(graph.nodes)),
@@ -123,14 +123,14 @@ def edit(
         pins: list[SceneGraph] = []
         notes: tuple[str, ...] = ()
         for number, (before, _) in enumerate(begun):
-            pinned = with_given_sizes(_pinned(graph, saved.graph, before, fresh, moving), sizes)
+            pinned = with_model_sizes(_pinned(graph, saved.graph, before, fresh, moving), sizes)
             if layouts:  # one furniture in all layouts
                 pinned = with_sizes(pinned, layouts[0])
             pins.append(pinned)
-            found, told = (_boxes_of(pinned), ()) if search is None else search.best(pinned, number)
+            found, search_notes = (_boxes_of(pinned), ()) if search is None else search.best(pinned, number)
             layouts.append(found)
             if search is not None and number == 0:
-                notes = (*search.model.unlearned(graph_batch(pinned)), *told)
+                notes = (*search.model.unlearned(graph_batch(pinned)), *search_notes)
         return layouts, pins, notes
 
     geometry = {name: saved.geometry[name] for name in graph.names if name not in shaped_anew}
@@ -241,8 +241,8 @@ def in_the_way(
     new = broken(graph, room, outcome) - broken(saved.graph, was, layout_outcome(saved.graph, saved.boxes))
     out = set().union(*({*ends} for _, *ends in new if {*ends} & {*moving, *along})) & free
     if out <= {*moving}:
-        told = [{relation.subject, relation.object} for relation in graph.relations]
-        out = out.union(*(ends for ends in told if ends & out)) & free
+        related = [{relation.subject, relation.object} for relation in graph.relations]
+        out = out.union(*(ends for ends in related if ends & out)) & free
     pairs = [(graph.names[k], graph.names[i]) for k, i in attending(room)]
     for _ in pairs:
         out |= {name for name, at in pairs if at in out} & free
@@ -346,10 +346,10 @@ def _own_names(assets: Mapping[str, str], fresh: set[str]) -> dict[str, str]:
     return {name: renamed.get(asset, asset) if name in fresh else asset for name, asset in assets.items()}
 
 
-def _compare(manifest: Mapping[str, Any], echo: RoomModel, *, given: bool, root: Path) -> None:
+def _compare(manifest: Mapping[str, Any], echo: RoomModel, *, chosen: bool, root: Path) -> None:
     """Refuse the weights that ship where the room needs others; warn where the room was made with other weights."""
     preset, made_with = manifest["preset"], manifest["model"]
-    if not given and preset != echo.preset:
+    if not chosen and preset != echo.preset:
         raise ValueError(
             f"{root}: made with weights of the preset {preset!r} (hash {made_with or 'unknown'}), which do not ship; "
             "name their file (--weights FILE)"

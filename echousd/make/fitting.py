@@ -22,17 +22,17 @@ def with_space(graph: SceneGraph) -> tuple[SceneGraph, tuple[str, ...]]:
 
     Raises `GraphError` where nothing that may be left out is left.
     """
-    said: list[str] = []
+    notes: list[str] = []
     while True:
         try:
             check_space(graph)
-            return graph, tuple(said)
+            return graph, tuple(notes)
         except GraphError:
             out = _dispensable(graph, graph.names)
             if out is None:
                 raise
             graph = graph.remove_node(out)
-            said.append(f"left out: {out}, the floor is too small for all that was asked for")
+            notes.append(f"left out: {out}, the floor is too small for all that was asked for")
 
 
 def fitted(graph: SceneGraph, arranged: Callable[[SceneGraph], Layout]) -> tuple[SceneGraph, Layout, tuple[str, ...]]:
@@ -40,7 +40,7 @@ def fitted(graph: SceneGraph, arranged: Callable[[SceneGraph], Layout]) -> tuple
 
     `arranged`: makes the best layout of a graph.
     """
-    said: list[str] = []
+    notes: list[str] = []
     while True:
         layout = arranged(graph)
         hits = colliding(graph, layout[0])
@@ -51,9 +51,9 @@ def fitted(graph: SceneGraph, arranged: Callable[[SceneGraph], Layout]) -> tuple
         else:
             out, why = _in_a_way(graph, layout[0])
         if out is None:
-            return graph, layout, tuple(said)
+            return graph, layout, tuple(notes)
         graph = graph.remove_node(out)
-        said.append(f"left out: {out}, no place for it but {why}")
+        notes.append(f"left out: {out}, no place for it but {why}")
 
 
 def _in_a_way(graph: SceneGraph, boxes: Boxes) -> tuple[str | None, str]:

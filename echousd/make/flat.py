@@ -79,8 +79,8 @@ def _with_layouts(layouts: Mapping[str, Sdf.Layer]) -> Sdf.Layer:
 
 def _small_relations(layer: Sdf.Layer) -> list[Sdf.Path]:
     """Paths of the relations of small things that are nodes."""
-    told = layer.GetPrimAtPath(f"{ROOM}/{usd.GRAPH_NAME}").nameChildren
-    ends = {one.path: one.relationships[usd.SUBJECT].targetPathList for one in told if usd.SUBJECT in one.relationships}
+    prims = layer.GetPrimAtPath(f"{ROOM}/{usd.GRAPH_NAME}").nameChildren
+    ends = {p.path: p.relationships[usd.SUBJECT].targetPathList for p in prims if usd.SUBJECT in p.relationships}
     return [path for path, found in ends.items() if any(end.HasPrefix(DRESSING) for end in found.explicitItems)]
 
 

@@ -77,13 +77,13 @@ class LayoutSearch:
         """So many drafts at once from the layout branch, in the room's frame; what the graph fixes comes back."""
         centre, nodes = floor_centre(graph), graph.nodes
         batch = GraphBatch.pack([graph_batch(graph)] * count)
-        given = np.array([None not in (n.size, n.position, n.yaw) for n in nodes] * count)
+        known_nodes = np.array([None not in (n.size, n.position, n.yaw) for n in nodes] * count)
         known = Boxes.cat([Boxes(
             np.array([n.size or (1.0, 1.0, 1.0) for n in nodes], np.float32),
             np.array([n.position or (0.0, 0.0, 0.0) for n in nodes], np.float32) - centre,
             np.array([n.yaw or 0.0 for n in nodes], np.float32),
         )] * count)  # fmt: skip
-        extra: dict[str, Any] = {"known": known, "known_mask": given} if given.any() else {}
+        extra: dict[str, Any] = {"known": known, "known_mask": known_nodes} if known_nodes.any() else {}
         if self.steps is not None:
             extra["steps"] = self.steps
         if self.place and isinstance(self.model, EchoModel):
@@ -92,7 +92,7 @@ class LayoutSearch:
             extra["edit"] = repeated(self.change, len(nodes), count)
         generator = seeded(self.seed, "layout", number)
         with self.timer.stage("layout") as tell, one_thread():
-            drawn = not given.all()  # else nothing is left to draw
+            drawn = not known_nodes.all()  # else nothing is left to draw
             draw = self.model.sample_layout
             found = draw(batch, generator=generator, progress=tell, **extra).to(None) if drawn else known
         return [

@@ -117,8 +117,8 @@ def _with_partners(scene: Scene, graph: SceneGraph, group: list[int], broken: se
     `broken`: numbers of verdicts, those of the relations and after them those of the placements.
     """
     out = list(group)
-    told: tuple[Relation | Placed, ...] = (*graph.relations, *graph.placements)
-    for one in (told[row] for row in sorted(broken)):
+    stated: tuple[Relation | Placed, ...] = (*graph.relations, *graph.placements)
+    for one in (stated[row] for row in sorted(broken)):
         for name in (one.subject, one.object) if isinstance(one, Relation) else (one.subject, *one.others):
             number = graph.names.index(name)
             if number not in out and not scene.fixed[number]:

@@ -37,7 +37,7 @@ from echousd.place.living import unusual
 from echousd.progress import StageTimer
 from echousd.room import Provenance
 from echousd.shapes.sources.mixing import check_sources, default_source, mixed_shapes, shape_nearness, sources_of
-from echousd.shapes.sources.named import anchored, check_files, names_models, with_given_sizes
+from echousd.shapes.sources.named import anchored, check_files, names_models, with_model_sizes
 from echousd.shapes.sources.source import Retrieved, ShapeRequest
 from echousd.shapes.styles import asset_names, style_groups
 from echousd.stage.files import open_stage, opened
@@ -45,7 +45,7 @@ from echousd.stage.graphs import read_graph
 from echousd.stage.read import find_rooms
 from echousd.stage.units import conventions
 
-given_pieces, retrieved = (Late(f"echousd.shapes.sources.retrieval:{name}") for name in ("given_pieces", "retrieved"))
+named_pieces, retrieved = (Late(f"echousd.shapes.sources.retrieval:{name}") for name in ("named_pieces", "retrieved"))
 read_contents = Late("echousd.stage.contents:read_contents")  # of a stage where something is locked
 with_space, fitted = Late("echousd.make.fitting:with_space"), Late("echousd.make.fitting:fitted")
 
@@ -55,7 +55,7 @@ def generate(
     graph: SceneGraph | str | Path, *, room: str | None = None, options: RoomOptions | None = None,
     model: RoomModel | None = None, earlier: Path | None = None, outside: Sequence[str | Path] = (),
     boxes: Boxes | None = None, meshes: Mapping[str, str | Path] | None = None, progress: StageListener | None = None,
-    **given: Any,
+    **changes: Any,
 ) -> Room:  # fmt: skip
     """Make a room from a scene graph.
 
@@ -65,7 +65,7 @@ def generate(
     Arguments:
         graph: the graph, or a file that holds one (stage, YAML, JSON).
         room: prim path of one room where the file holds several.
-        options: how the room is made and written; `given`, the same by name, comes first. Equal options give equal
+        options: how the room is made and written; `changes`, the same by name, comes first. Equal options give equal
             rooms.
         model: a loaded model, or a sampler of your own (any object that keeps `echomodel.protocols.RoomModel`); None =
             the model of the option `weights`.
@@ -84,7 +84,7 @@ def generate(
     Warns (`RoomWarning`) of relations that are broken, of furniture that collides and of what `settle` finds restless;
     `Room.faults` lists them.
     """
-    asked = (options or RoomOptions()).replaced(**given)
+    asked = (options or RoomOptions()).replaced(**changes)
     timer = StageTimer(progress)
     file, beside, other = "", Path.cwd(), ""
     seed, wishes = asked.seed, partial(asked.wishes, outside)
@@ -116,7 +116,7 @@ def generate(
         shapes = asked.shapes or default_source(echo)
         check_sources([shapes, *sources_of(graph, shapes).values()], echo)
     theirs = names_models(graph, shapes)
-    pieces = given_pieces(graph, wishes, timer=timer) if theirs else Retrieved()
+    pieces = named_pieces(graph, wishes, timer=timer) if theirs else Retrieved()
     with faults_of(file):
         check_doors(graph)
         graph, left_out = with_space(graph) if asked.fit == "drop" else (graph, ())
@@ -128,7 +128,7 @@ def generate(
     )  # fmt: skip
 
     def arranged(graph: SceneGraph) -> tuple[Boxes, tuple[str, ...]]:
-        return search.best(with_given_sizes(graph, sizes))
+        return search.best(with_model_sizes(graph, sizes))
 
     models = pieces
     for drawn in (False, True):

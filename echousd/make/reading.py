@@ -130,8 +130,8 @@ def _geometry(root: Usd.Prim, asset: str | None, category: str, manifest: Mappin
             parts.append(Part(name, form, _slots(mesh, len(form.faces)), body=body))
     if not parts or not colliders:
         return None
-    told = manifest.get("meshes", {}).get(asset, {})
-    origin = Origin(told.get("shapes", manifest["shapes"]), told.get("licence", LICENCE), told.get("credit", ""))
+    entry = manifest.get("meshes", {}).get(asset, {})
+    origin = Origin(entry.get("shapes", manifest["shapes"]), entry.get("licence", LICENCE), entry.get("credit", ""))
     return Geometry(
         tuple(parts), tuple(colliders), origin, read_mass(root), read_joints(root, asset or ""),
         description=tuple(root.GetAttribute(DESCRIPTION).Get() or ()),
@@ -165,8 +165,8 @@ def _slots(mesh: UsdGeom.Mesh, faces: int) -> dict[str, np.ndarray]:
     if subsets:
         return {subset.GetPrim().GetName(): np.asarray(subset.GetIndicesAttr().Get()) for subset in subsets}
     # one slot is bound on the mesh itself: the asset, the weakest that speaks of it, calls its look by the slot
-    told = mesh.GetPrim().GetRelationship("material:binding").GetPropertyStack()
-    bound = told[-1].targetPathList.GetAddedOrExplicitItems() if told else ()
+    specs = mesh.GetPrim().GetRelationship("material:binding").GetPropertyStack()
+    bound = specs[-1].targetPathList.GetAddedOrExplicitItems() if specs else ()
     return {bound[0].name if bound else "wood": np.arange(faces)}
 
 
@@ -182,9 +182,9 @@ def read_original(root: Usd.Prim, asset: str | None, category: str, manifest: Ma
     if not len(faces):
         return None
     mesh = Mesh(points, faces)
-    told = manifest["meshes"][asset]
-    words = (told.get("shapes", ""), told.get("licence", LICENCE), told.get("credit", ""))
-    origin = Origin(*words, asset=told.get("asset", ""), sha256=told.get("sha256", ""))
+    entry = manifest["meshes"][asset]
+    words = (entry.get("shapes", ""), entry.get("licence", LICENCE), entry.get("credit", ""))
+    origin = Origin(*words, asset=entry.get("asset", ""), sha256=entry.get("sha256", ""))
     shape = collider_of(mesh, category)
     return Geometry((Part("mesh", mesh, {}),), (shape,), origin, read_mass(root), original=_original(root, asset))
 

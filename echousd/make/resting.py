@@ -38,8 +38,8 @@ def settled(room: Room) -> Room:
         notes = (*room.notes, *(f"{name} stands where it comes to rest" for name in moved))
         room = replace(room, layouts=found, outcomes=outcomes, notes=notes)
         reports = settle_layouts(_as_ours(room).stage)
-    told = [replace(report, layout="").sentences for report in reports]
-    outcomes = tuple(replace(one, restless=each) for one, each in zip(room.outcomes, told, strict=True))
+    sentences = [replace(report, layout="").sentences for report in reports]
+    outcomes = tuple(replace(one, restless=each) for one, each in zip(room.outcomes, sentences, strict=True))
     return replace(room, outcomes=outcomes)
 
 

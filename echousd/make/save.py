@@ -108,20 +108,20 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
         owned |= {path: recorded[path] for path in kept_steps & recorded.keys()}
         owned |= {path: folders.digest(content) for path, content in archive.items()}
     gone = [path for path in gone if path not in owned or path in needed]
-    told = (
+    fields = (
         manifest_of(room, owned)
         | {"history": history}
         | ({"store": shelf.at, "stored": dict(sorted(shelf.keys.items()))} if shelf else {})
     )
-    files[manifest] = (json.dumps(told, indent=1) + "\n").encode()
+    files[manifest] = (json.dumps(fields, indent=1) + "\n").encode()
     stale = [path for path in gone if path not in needed and _digest(folder, path) == recorded[path]]
     # What is referenced comes before what refers to it, so that a room opens between any two renames.
     layers = [layer_file(name, crate=room.options.crate) for name in reversed(LAYERS)]
     last = [*layers, UNFIT, root, manifest]
     drawn = ownership.pictures(folder, room.name)
     remove = [*stale, *(undone(folder) if old else ()), *drawn]
-    told_kept = {path: name for path, name in kept.items() if name}
-    changed = folders.write_together(folder, files, last=last, remove=remove, kept=told_kept)
+    named_kept = {path: name for path, name in kept.items() if name}
+    changed = folders.write_together(folder, files, last=last, remove=remove, kept=named_kept)
     for fault in unfit:
         warnings.warn(fault, stacklevel=3)
     for path in gone:

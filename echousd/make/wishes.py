@@ -32,8 +32,8 @@ def wished(saved: SavedRoom, wishes: EditRequest) -> SceneGraph:
     An object that is moved, turned or resized keeps the rest of its box as it is.
     """
     graph = saved.graph
-    for said in wishes.remove:
-        graph = graph.remove_node(_name(graph, said))
+    for asked in wishes.remove:
+        graph = graph.remove_node(_name(graph, asked))
     for text in wishes.unrelate:
         graph = without(graph, text)
     for text in wishes.relabel:
@@ -43,11 +43,11 @@ def wished(saved: SavedRoom, wishes: EditRequest) -> SceneGraph:
         graph = _added(graph, text)
     for text in wishes.relate:
         graph = stating(graph, text)
-    for said in wishes.lock:
-        name = _name(graph, said)
+    for asked in wishes.lock:
+        name = _name(graph, asked)
         graph = _placed(graph, saved, name).lock(name)
-    for said in wishes.unlock:
-        graph = graph.update_node(_name(graph, said), locked=False, position=None, yaw=None)
+    for asked in wishes.unlock:
+        graph = graph.update_node(_name(graph, asked), locked=False, position=None, yaw=None)
     for text in wishes.move:
         name, place = _named(graph, text)
         graph = _placed(graph, saved, name)
@@ -125,9 +125,9 @@ def _named(graph: SceneGraph, text: str) -> tuple[str, str]:
     return _name(graph, name), rest
 
 
-def _name(graph: SceneGraph, said: str) -> str:
+def _name(graph: SceneGraph, text: str) -> str:
     """The name of the object that a person calls by its name or by its title."""
-    return str(name_of(said.strip(), graph.titles))
+    return str(name_of(text.strip(), graph.titles))
 
 
 def _parts(text: str) -> tuple[str, str]:

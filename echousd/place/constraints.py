@@ -122,10 +122,10 @@ class Constraints:
         """
         state = np.concatenate([position, size], 1)
         apart, axis = self._apart(state, handicap)
-        rows = [*self._told(state), apart, *self._floor(state), self._walls(state), self._support(state)]
+        rows = [*self._relations(state), apart, *self._floor(state), self._walls(state), self._support(state)]
         return _linearised([*rows, self._overhang(state)], state, axis)
 
-    def _told(self, state: np.ndarray) -> list[Rows]:
+    def _relations(self, state: np.ndarray) -> list[Rows]:
         """Relations, and placements, for which furniture moves, but none grows or shrinks."""
         problem, triplets, found = self.problem, self.problem.triplets, []
         rules, ends = rule_set(problem.rules), triplets[:, [0, 2]]

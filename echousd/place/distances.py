@@ -56,8 +56,8 @@ MOST_UNDER = 0.45  # of its depth that a chair is pushed under its table
 
 def score(category: str, size: np.ndarray) -> float:
     """A standard score drawn for pieces of a category and size (3,), the same for equal ones, in any room."""
-    said = f"{category} {' '.join(str(round(side * 100)) for side in size.tolist())}"
-    return NormalDist().inv_cdf((zlib.crc32(said.encode()) + 0.5) / 2**32)
+    piece = f"{category} {' '.join(str(round(side * 100)) for side in size.tolist())}"
+    return NormalDist().inv_cdf((zlib.crc32(piece.encode()) + 0.5) / 2**32)
 
 
 def kept_behind(categories: Sequence[str], size: np.ndarray, drawn: np.ndarray) -> np.ndarray:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 GRAPHS, PLAIN = 20, 200  # of a shard: graphs that are searched, and rooms of the generator that are looked through
 OTHERS = 1_000_000  # seeds between the two
 HALLS = 0.12  # share of large rooms of several zones
-TOLD = (0.5, 2.0)  # relations an object, as people tell them
+STATED = (0.5, 2.0)  # relations an object, as people tell them
 NOTHING = np.zeros((0, 3), int)  # that is told
 COLUMNS = ("shard", "graphs", "kept", "from_generator", "faults_generator", "plain", "objects", "cpu_seconds")
 
@@ -115,20 +115,20 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
     drawn = generate_rooms(graphs, plan.seed, start=first, halls=HALLS)
     luck = np.random.Generator(np.random.PCG64([plan.seed, number, 5]))
     labels = label_rooms(drawn, rules="strict") if drawn else []
-    told = [
-        stated_of_room(relations, room, float(luck.uniform(*TOLD)), seed=int(luck.integers(2**31)))
+    stated = [
+        stated_of_room(relations, room, float(luck.uniform(*STATED)), seed=int(luck.integers(2**31)))
         for relations, room in zip(labels, drawn, strict=True)
     ]
     starts = [[Boxes.from_room(room)] for room in drawn]
     if plan.drafts and drawn:
-        for more, drafts in zip(starts, _drafts(plan, drawn, told, number), strict=True):
+        for more, drafts in zip(starts, _drafts(plan, drawn, stated, number), strict=True):
             more += drafts
     others = generate_rooms(PLAIN, plan.seed + OTHERS, start=number * PLAIN, halls=HALLS)
     plain = [_with(room, room.size, room.position, room.yaw) for room in others if not _missed(room, NOTHING)]
     kept: list[RoomBoxes] = []
     numbers: list[int] = []
     own = faults = 0
-    for k, (room, triplets, begun) in enumerate(zip(drawn, told, starts, strict=True)):
+    for k, (room, triplets, begun) in enumerate(zip(drawn, stated, starts, strict=True)):
         ends = [(*it, n) for n, start in enumerate(begun) if (it := _searched(room, triplets, start))]
         faults += len(_missed(room, triplets))
         if ends:
@@ -145,10 +145,10 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
     return dict(zip(COLUMNS, row, strict=True))
 
 
-def _drafts(plan: ExamplesPlan, rooms: list[RoomBoxes], told: list[np.ndarray], number: int) -> list[list[Boxes]]:
+def _drafts(plan: ExamplesPlan, rooms: list[RoomBoxes], stated: list[np.ndarray], number: int) -> list[list[Boxes]]:
     """Boxes that the network draws of some rooms from noise, `plan.drafts` of each."""
     model, counts = load_model(plan.weights), [len(room) for room in rooms]
-    labelled = [replace(room, relations=triplets) for room, triplets in zip(rooms, told, strict=True)]
+    labelled = [replace(room, relations=triplets) for room, triplets in zip(rooms, stated, strict=True)]
     graph = GraphBatch.pack([GraphBatch.from_room(room) for room in labelled])
     out: list[list[Boxes]] = [[] for _ in rooms]
     for draft in range(plan.drafts):

@@ -42,12 +42,12 @@ def fitted(at: Problem, rigid: np.ndarray) -> tuple[Problem, np.ndarray]:
 
     def missed(run: Run) -> float:
         _, boxes = built(run)
-        margin = margins(boxes.plan, told, rules=at.rules, center=at.centre, fronts=at.plan.fronts)
+        margin = margins(boxes.plan, stated, rules=at.rules, center=at.centre, fronts=at.plan.fronts)
         return MISSED * float((margin < 0).sum())
 
-    told = at.triplets[(mine | at.fixed)[at.triplets[:, [0, 2]]].all(1)]
+    stated = at.triplets[(mine | at.fixed)[at.triplets[:, [0, 2]]].all(1)]
     found = runs([kinds[i] for i in number], at.size[mine], ~rigid[mine], site, over=over, draft=at.position[mine],
-                 missed=missed if len(told) else None)  # fmt: skip
+                 missed=missed if len(stated) else None)  # fmt: skip
     best, least = (at, none), np.inf
     for run in found:
         who, placed = built(run)

@@ -27,8 +27,8 @@ class LivingFault:
 
     def to_json(self) -> dict:
         """The entry of reports and manifests."""
-        said = {"object": self.object, "rule": self.rule, "other": self.other}
-        return {**said, "margin": round(self.margin, 4), "says": self.says}
+        about = {"object": self.object, "rule": self.rule, "other": self.other}
+        return {**about, "margin": round(self.margin, 4), "says": self.says}
 
 
 def living_faults(
@@ -60,7 +60,7 @@ def plan_to_live_in(
         floor if corners is None else np.asarray(corners, float),  # openings count the edges of the stated floor
         graph.room.openings if corners is not None else (),
         triplets_of(graph),
-        given=np.array([bool(n.obstacle) or (n.position is not None and not all_blamed) for n in graph.nodes]),
+        fixed=np.array([bool(n.obstacle) or (n.position is not None and not all_blamed) for n in graph.nodes]),
     )
 
 
@@ -73,16 +73,16 @@ def unusual(graph: SceneGraph) -> tuple[str, ...]:
     """A sentence for each stated size that no such furniture has, and for each stated place beside the floor."""
     import shapely
 
-    told = []
+    lines = []
     for node in graph.nodes:
         if node.size is None or node.obstacle or node.asset:
             continue
         for word, side, low, high in zip(("wide", "high", "deep"), node.size, *size_range(node.category), strict=True):
             if not 0.999 * low <= side <= 1.001 * high:
-                told.append(f"{node.name} is {side:.3g} m {word} as stated; such furniture: {low:.3g} to {high:.3g} m")
+                lines.append(f"{node.name} is {side:.3g} m {word} as stated; such furniture: {low:.3g} to {high:.3g} m")
     if graph.room.corners is not None:
         floor = shapely.Polygon(graph.room.corners).buffer(1e-3)
         there = [(node.name, *node.position) for node in graph.nodes if node.position is not None]
         beside = [(name, x, z) for name, x, _, z in there if not floor.covers(shapely.Point(x, z))]
-        told += [f"{name} is stated to stand at ({x:.2f}, {z:.2f}) m, beside the floor" for name, x, z in beside]
-    return tuple(told)
+        lines += [f"{name} is stated to stand at ({x:.2f}, {z:.2f}) m, beside the floor" for name, x, z in beside]
+    return tuple(lines)

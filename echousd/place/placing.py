@@ -162,7 +162,7 @@ def place_boxes(
     known = {} if begun is None else begun
 
     sizes = [predicate.id for predicate in vocabulary().predicates if predicate.measures == "size"]
-    told = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
+    measured = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
     held: np.ndarray = fixed
 
     def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, kept: np.ndarray) -> Problem:
@@ -175,16 +175,16 @@ def place_boxes(
     if floor_polygon is not None and config.arrange:
         higher = [predicate.id for predicate in vocabulary().predicates if predicate.order == "height"]
         of_more = np.unique(triplets[np.isin(triplets[:, 1], list({*sizes} - {*higher}))][:, [0, 2]])
-        lenient = np.isin(np.arange(n), of_more)[:, None] | (np.isin(np.arange(n), told)[:, None] & UPRIGHT)
+        lenient = np.isin(np.arange(n), of_more)[:, None] | (np.isin(np.arange(n), measured)[:, None] & UPRIGHT)
         usual = usual_sizes(drawn.categories, drawn.size, lenient=lenient)
-        kept = rigid | (has_proportions(drawn.categories) & ~np.isin(np.arange(n), told))
+        kept = rigid | (has_proportions(drawn.categories) & ~np.isin(np.arange(n), measured))
         at = posed(np.where(rigid[:, None], size, usual), position, yaw, kept)
         at, planned = fitted(at, rigid) if any(kind.stands == "row" for kind in at.kinds) else (at, none)
         if planned.any():
             held, rigid, kept = fixed | planned, rigid | planned, kept | planned
             at = posed(at.size, at.position, at.yaw, kept)
         anchor, compared = at.anchor, triplets[np.isin(triplets[:, 1], sizes)]
-        free = ~rigid & ~np.isin(np.arange(n), told)
+        free = ~rigid & ~np.isin(np.arange(n), measured)
 
         def suited(to: Problem, size: np.ndarray) -> Problem:
             laid = laid_tables(to.categories, size, anchor, ~rigid)
@@ -256,9 +256,9 @@ def lamps_along(
         off = np.hypot(*(before[lit] - before[i])[:, [0, 2]].T)
         j = lit[int(off.argmin())]
         ends = triplets[(triplets[:, [0, 2]] == i).any(1)][:, [0, 2]].ravel().tolist()
-        told = [k for a, predicate, k in triplets.tolist() if a == i and predicate == above and k in lit]
-        if len(told) == 1:  # perhaps in a row with others
-            j = told[0]
+        below = [k for a, predicate, k in triplets.tolist() if a == i and predicate == above and k in lit]
+        if len(below) == 1:  # perhaps in a row with others
+            j = below[0]
         elif off.min() >= (BED_LIT.most if kinds[j].role == "bed" else OVER):
             continue
         if {*ends} <= {i, j}:

@@ -59,8 +59,8 @@ class Problem:
     def spread(self) -> Problem:
         """The problem whose pieces keep usual distances to walls where drawn ones are too alike, at those walls."""
         usual = kept_behind(self.categories, self.size, np.full(len(self.size), np.nan))
-        told = np.isin(np.arange(len(usual)), [one.subject for one in self.stated if not one.others])  # of walls
-        usual = np.where(told, np.minimum(usual, BEHIND[1]), usual)
+        walled = np.isin(np.arange(len(usual)), [one.subject for one in self.stated if not one.others])  # of walls
+        usual = np.where(walled, np.minimum(usual, BEHIND[1]), usual)
         behind = np.where(self.fixed, self.behind, usual)
         leaning = np.flatnonzero(~np.isnan(self.wall[:, 0, 0]) & ~self.fixed)
         position = self.position.copy()
@@ -75,7 +75,7 @@ class Problem:
     position = _of_plan("position")  # (n, 3) float, metres, of the middles of the bottoms
     yaw = _of_plan("yaw")  # (n,) float, radians
     triplets = _of_plan("triplets")  # (e, 3) int, [subject, predicate id, object], those that the rules measure
-    fixed = _of_plan("given")  # (n,) bool, boxes that must not move
+    fixed = _of_plan("fixed")  # (n,) bool, boxes that must not move
     anchor = _of_plan("anchor")  # (n,) int, whom each attends, -1 = nobody
     fronts = _of_plan("fronts")  # (n,) bool, which of the boxes have a front
     kinds = _of_plan("kinds")  # rows of the vocabulary
@@ -119,7 +119,7 @@ class Problem:
         """Whether a box stands on the floor itself."""
         return bool(self.carrier[i] == ON_FLOOR)
 
-    def told(self, i: int) -> np.ndarray:
+    def triplets_of(self, i: int) -> np.ndarray:
         """(r, 3) int, the triplets that name a box."""
         return np.asarray(self.triplets[(self.triplets[:, [0, 2]] == i).any(1)])
 
@@ -178,7 +178,7 @@ def problem_of(
         yaw[turn] = np.arctan2(wall[turn, 1, 0], wall[turn, 1, 1])
     behind = kept_behind(words, size, wall_gaps(wall, size, position, yaw))
     plan = plan_of(
-        Spread(size, position, yaw), words, floor_polygon, openings, triplets[told], given=fixed, height=height,
+        Spread(size, position, yaw), words, floor_polygon, openings, triplets[told], fixed=fixed, height=height,
         rules=rules, stated=stated,
     )  # fmt: skip
     return Problem(plan, told, rigid, turned, floor, carrier, wall, behind)
@@ -216,16 +216,16 @@ def stacked(
 
 def lean(
     categories: Sequence[str], size: np.ndarray, position: np.ndarray, yaw: np.ndarray, floor: Floor,
-    carrier: np.ndarray, told: Collection[int] = (),
+    carrier: np.ndarray, walled: Collection[int] = (),
 ) -> np.ndarray:  # fmt: skip
     """(n, 2, 2) float: point and inward normal of the wall that each piece of wall furniture leans on, NaN = none.
 
     Arguments:
-        told: boxes that the graph has against a wall, whatever they are.
+        walled: boxes that the graph has against a wall, whatever they are.
     """
     rows = [vocabulary().category(word) for word in categories]
     leaning = [
-        ((row.wall or i in told) and carrier[i] == ON_FLOOR) or row.support == "wall" for i, row in enumerate(rows)
+        ((row.wall or i in walled) and carrier[i] == ON_FLOOR) or row.support == "wall" for i, row in enumerate(rows)
     ]
     facing = axes(yaw)[1] @ floor.normal.T > np.cos(WALL_TURN)
     corner = footprints(size, position, yaw)

@@ -107,9 +107,9 @@ def out_of_habit(problem: Problem, i: int, position: np.ndarray, yaw: np.ndarray
 
 def _leans(problem: Problem, i: int) -> bool:
     """Whether a box belongs with its back to a wall, by its kind or because the graph has it there."""
-    told = any(one.subject == i and one.placement == "against_wall" for one in problem.stated)
+    stated = any(one.subject == i and one.placement == "against_wall" for one in problem.stated)
     kind = problem.kinds[i]
-    return told or kind.wall or (kind.role == "board" and kind.access > 0)
+    return stated or kind.wall or (kind.role == "board" and kind.access > 0)
 
 
 def slots_at(problem: Problem, i: int, anchor: int) -> list[tuple[float, float, float, float]]:
@@ -255,8 +255,8 @@ def along_walls(problem: Problem, i: int, more: float) -> list[Row]:
     """With the back to every wall that is long enough, from corner to corner and where the draft is nearest."""
     width, depth = float(problem.size[i, 0]), float(problem.size[i, 2])
     gap = 0.0 if problem.kinds[i].support == "wall" else float(problem.behind[i])
-    told = {(one.placement, one.subject) for one in problem.stated}
-    fills = problem.kinds[i].clear > 0 and ("in_corner", i) in told  # a tub does, other things stand near one
+    stated = {(one.placement, one.subject) for one in problem.stated}
+    fills = problem.kinds[i].clear > 0 and ("in_corner", i) in stated  # a tub does, other things stand near one
     rows = []
     for start, along, length, yaw in problem.walls:
         free = length - width
@@ -315,17 +315,17 @@ def _in_the_open(problem: Problem, i: int, more: float) -> list[Row]:
 def _overhead(problem: Problem, position: np.ndarray, yaw: np.ndarray, there: np.ndarray, i: int) -> list[Row]:
     """Over the middle of tables, beds and sofas' tables, and over the middle of the room."""
     above = vocabulary().predicate_id("above")
-    told = [b for a, word, b in problem.triplets.tolist() if a == i and word == above]
+    under = [b for a, word, b in problem.triplets.tolist() if a == i and word == above]
     low = problem.kinds[i].look == "pendant_lamp"  # it would meet heads
     rows: list[Row] = []
     for j, kind in enumerate(problem.kinds):
         lit = kind.role == "bed" or (kind.role == "board" and not kind.access)
-        if not there[j] or not (j in told or (lit and problem.standing(j))):
+        if not there[j] or not (j in under or (lit and problem.standing(j))):
             continue
         (x, _, z), heading = position[j].tolist(), float(yaw[j])
         long = heading if problem.size[j, 0] >= problem.size[j, 2] else heading - HALF_PI
         more = 0.3 * _lamps_over(problem, position, there, i, j) + 0.2 * (kind.stands == "beside") + LOOSE * (not low)
-        more = 0.0 if j in told else more
+        more = 0.0 if j in under else more
         for away in _row_over(problem, i, j):  # along its long side
             rows.append((x + math.cos(long) * away, z - math.sin(long) * away, heading, more))
     x, z = problem.centre.tolist()

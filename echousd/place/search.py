@@ -77,10 +77,10 @@ class Search:
         yields: frozenset[str] = frozenset(),
     ) -> None:  # fmt: skip
         self.problem, self.budget, self.judged, self.walked = problem, budget, 0, False
-        said, words = {int(number) for number in problem.triplets[:, 1]}, vocabulary().predicates
-        told = {row.name for row in words if row.id in said} | {"placed"}
+        numbers, words = {int(number) for number in problem.triplets[:, 1]}, vocabulary().predicates
+        stated = {row.name for row in words if row.id in numbers} | {"placed"}
         sizes = {row.name for row in words if row.measures == "size"} | {"scale"}  # which no pose changes
-        self.terms = tuple(t for t in terms if t.name not in sizes and (t.kind != "relations" or t.name in told))
+        self.terms = tuple(t for t in terms if t.name not in sizes and (t.kind != "relations" or t.name in stated))
         self.firm = np.array([term.name not in yields for term in self.terms])
         self.rooms: dict[bytes, Plan] = {}
         self.slots: dict[tuple[int, int], np.ndarray] = {}
@@ -92,11 +92,11 @@ class Search:
         self.children: list[list[int]] = [[] for _ in range(n)]
         self.screens: list[list[int]] = [[] for _ in range(n)]
         near, opposed, above = map(vocabulary().predicate_id, ("close_by", "opposite", "above"))
-        kinds, told = problem.kinds, problem.triplets.tolist()
-        beside = {one: other for one, word, other in told if word == near and kinds[one].role in ("decor", "light")}
-        either = [pair for one, word, other in told if word == opposed for pair in ((one, other), (other, one))]
+        kinds, stated = problem.kinds, problem.triplets.tolist()
+        beside = {one: other for one, word, other in stated if word == near and kinds[one].role in ("decor", "light")}
+        either = [pair for one, word, other in stated if word == opposed for pair in ((one, other), (other, one))]
         ahead = {k: i for k, i in either if kinds[k].role == "storage" and kinds[i].role in ("bed", "sofa")}
-        over = {one: other for one, word, other in told if word == above and problem.hanging[one]}
+        over = {one: other for one, word, other in stated if word == above and problem.hanging[one]}
         for k in range(n):
             parent = int(problem.carrier[k]) if problem.carrier[k] >= 0 else int(problem.anchor[k])
             parent = ahead.get(k, beside.get(k, over.get(k, -1))) if parent < 0 else parent
@@ -132,7 +132,7 @@ class Search:
         worst: dict[int, float] = {}
         room = problem.plan.at(state.position, state.yaw)
         if self.looks:
-            room = copies_of(problem.plan, room.position[None], room.yaw[None], np.ones_like(room.given))
+            room = copies_of(problem.plan, room.position[None], room.yaw[None], np.ones_like(room.fixed))
             every = [term.find(room) for term in self.terms]
         else:
             looked = [looks_at(room, term.find) for term in self.terms]
@@ -375,12 +375,13 @@ class Search:
 
     def _broken(self, state: State, there: np.ndarray, i: int, rows: np.ndarray, along: list[int]) -> np.ndarray:
         """(K,) float: what a box at K poses breaks of its relations to those who do not go along with it."""
-        told = self.problem.told(i)
-        told = told[there[told[:, ::2]].all(1) & ~np.isin(np.where(told[:, 0] == i, told[:, 2], told[:, 0]), along)]
-        if not len(told):
+        edges = self.problem.triplets_of(i)
+        other = np.where(edges[:, 0] == i, edges[:, 2], edges[:, 0])
+        edges = edges[there[edges[:, ::2]].all(1) & ~np.isin(other, along)]
+        if not len(edges):
             return np.zeros(len(rows))
         at = np.stack([rows[:, 0], np.full(len(rows), height_of(self.problem, state.position, i)), rows[:, 1]], 1)
-        margin = self.margins_at(state, i, at, rows[:, 2], told)
+        margin = self.margins_at(state, i, at, rows[:, 2], edges)
         return np.asarray(MISSED * (np.maximum(-margin, 0.0) + (margin < 0)).sum(1))
 
     def _hits(
@@ -400,14 +401,14 @@ class Search:
             cost += (HIT * (deep > 0.01) + DEEP * deep).sum(1) + HIT * (out > 0.01) + DEEP * out
         return cost
 
-    def margins_at(self, state: State, i: int, at: np.ndarray, turn: np.ndarray, told: np.ndarray) -> np.ndarray:
+    def margins_at(self, state: State, i: int, at: np.ndarray, turn: np.ndarray, stated: np.ndarray) -> np.ndarray:
         """(K, e) float: margins of relations (e, 3) of box i at poses (K, 3) and (K,), the others where they are."""
-        problem, ends, count = self.problem, told[:, [0, 2]], len(turn) * len(told)
+        problem, ends, count = self.problem, stated[:, [0, 2]], len(turn) * len(stated)
         own = (ends == i)[None]
         position = np.where(own[..., None], at[:, None, None], state.position[ends]).reshape(-1, 3)
         yaw = np.where(own, turn[:, None, None], state.yaw[ends]).ravel()
         size, fronts = (np.tile(of[ends], (len(turn), *[1] * of.ndim)) for of in (problem.size, problem.fronts))
-        asked = np.stack([2 * np.arange(count), np.tile(told[:, 1], len(turn)), 2 * np.arange(count) + 1], 1)
+        asked = np.stack([2 * np.arange(count), np.tile(stated[:, 1], len(turn)), 2 * np.arange(count) + 1], 1)
         found = margins(Spread(size.reshape(-1, 3), position, yaw), asked, rules=problem.rules, center=problem.centre,
                         fronts=fronts.ravel())  # fmt: skip
         return np.asarray(found.reshape(len(turn), -1))
@@ -538,7 +539,7 @@ def costs_of(rows_of: Sequence[tuple[Term, Found]], room: Plan) -> tuple[Found, 
     slack, broken, each, weight, always = repeat(room.numbers(row), xp.asarray(count)).T
     who, other, margin = (xp.concat([getattr(seen, name) for _, seen in every]) for name in ("who", "other", "margin"))
     missed = at_most(at_least(slack - margin, 0.0), 2.0)
-    blamed = ~room.given[who] | (always > 0)
+    blamed = ~room.fixed[who] | (always > 0)
     return found(who, margin, other=other), (broken * (margin < 0) + each * weight * missed) * blamed
 
 
@@ -556,8 +557,8 @@ def part_of(room: Plan, there: np.ndarray) -> Plan:
     def mapped(of: np.ndarray) -> np.ndarray:
         return np.where(of < 0, of, number[np.maximum(of, 0)])[keep]
 
-    told = room.triplets[there[room.triplets[:, ::2]].all(1)]
-    told = np.stack([number[told[:, 0]], told[:, 1], number[told[:, 2]]], 1)
+    triplets = room.triplets[there[room.triplets[:, ::2]].all(1)]
+    triplets = np.stack([number[triplets[:, 0]], triplets[:, 1], number[triplets[:, 2]]], 1)
     stated = tuple(
         replace(one, subject=int(number[one.subject]), others=tuple(int(number[k]) for k in one.others))
         for one in room.stated
@@ -565,7 +566,7 @@ def part_of(room: Plan, there: np.ndarray) -> Plan:
     )
     out = Plan(
         tuple(room.kinds[k] for k in keep.tolist()), room.size[keep], room.position[keep], room.yaw[keep],
-        room.scene[keep], room.floor, room.openings, told, room.given[keep], room.height, room.rules, stated,
+        room.scene[keep], room.floor, room.openings, triplets, room.fixed[keep], room.height, room.rules, stated,
     )  # fmt: skip
     vars(out).update(
         anchor=mapped(room.anchor), carrier=mapped(room.carrier), joins=mapped(room.joins),

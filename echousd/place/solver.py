@@ -258,9 +258,9 @@ def conflicts(
         groups = [*(group for group in groups if group not in touched), (joined, members)]
 
     def conflict(members: list[int]) -> Conflict:
-        told, pairs = ([at.number[r] for r in members if at.kind[r] == kind] for kind in (RELATION, COLLISION))
+        relations, pairs = ([at.number[r] for r in members if at.kind[r] == kind] for kind in (RELATION, COLLISION))
         beyond = {i for r in members if at.kind[r] == FLOOR for i in at.boxes_of(r)}
-        rows: list[int] = problem.rows[told].tolist()
+        rows: list[int] = problem.rows[relations].tolist()
         return Conflict(tuple(rows), tuple((i, j) for i, j in problem.pairs[pairs].tolist()), tuple(sorted(beyond)))
 
     relations, pairs, outside = failures

@@ -138,16 +138,16 @@ def convex_parts(mesh: trimesh.Trimesh) -> Iterator[np.ndarray]:
 
 def _friction(prim: Usd.Prim) -> float:
     material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")[0]
-    told = UsdPhysics.MaterialAPI(material).GetDynamicFrictionAttr().Get() if material else None
-    return FRICTION if told is None else float(told)
+    authored = UsdPhysics.MaterialAPI(material).GetDynamicFrictionAttr().Get() if material else None
+    return FRICTION if authored is None else float(authored)
 
 
 def _gravity(stage: Usd.Stage, metres: float) -> np.ndarray:
     down = -upwards(stage)
     for prim in stage.Traverse():
         if prim.GetTypeName() == "PhysicsScene":
-            told = prim.GetAttribute("physics:gravityDirection")
-            direction = array(told) if told.HasAuthoredValue() else down
+            authored = prim.GetAttribute("physics:gravityDirection")
+            direction = array(authored) if authored.HasAuthoredValue() else down
             length = float(np.linalg.norm(direction))
             strength = prim.GetAttribute("physics:gravityMagnitude").Get()
             strength = GRAVITY if strength is None or not 0 <= strength < np.inf else float(strength) * metres

@@ -39,11 +39,11 @@ def charts(
     if find_spec("xatlas") is None:
         raise ValueError('texture coordinates need xatlas: pip install "echousd[texture]"')
     boards = [board for meshes in pictures for board in meshes]
-    given = {"options": np.array([resolution, padding]), "counts": np.array([len(meshes) for meshes in pictures])}
+    arrays = {"options": np.array([resolution, padding]), "counts": np.array([len(meshes) for meshes in pictures])}
     for number, (points, faces) in enumerate(boards):
-        given |= {f"points{number}": points.astype(np.float32), f"faces{number}": faces.astype(np.uint32)}
+        arrays |= {f"points{number}": points.astype(np.float32), f"faces{number}": faces.astype(np.uint32)}
     sent = io.BytesIO()
-    np.savez(sent, allow_pickle=False, **given)
+    np.savez(sent, allow_pickle=False, **arrays)
     words, how = [sys.executable, "-P", str(HERE)], ""
     for _ in range(TRIES):
         try:

@@ -141,10 +141,10 @@ def write_mass(pen: Pen, path: str, mass: Mass) -> None:
 def read_mass(prim: Usd.Prim) -> Mass | None:
     """The mass that is authored on a body, None where it is not authored in full."""
     api = UsdPhysics.MassAPI(prim)
-    told = (api.GetMassAttr(), api.GetCenterOfMassAttr(), api.GetDiagonalInertiaAttr(), api.GetPrincipalAxesAttr())
-    if not prim.HasAPI(UsdPhysics.MassAPI) or not all(attribute.HasAuthoredValue() for attribute in told):
+    authored = (api.GetMassAttr(), api.GetCenterOfMassAttr(), api.GetDiagonalInertiaAttr(), api.GetPrincipalAxesAttr())
+    if not prim.HasAPI(UsdPhysics.MassAPI) or not all(attribute.HasAuthoredValue() for attribute in authored):
         return None
-    kilograms, centre, inertia, turn = (attribute.Get() for attribute in told)
+    kilograms, centre, inertia, turn = (attribute.Get() for attribute in authored)
     axes = np.array(Gf.Matrix3d(Gf.Rotation(Gf.Quatd(turn))), float).T  # USD's matrices act on rows
     return Mass(float(kilograms), np.array(centre, float), np.array(inertia, float), axes)
 

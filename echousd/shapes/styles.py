@@ -72,7 +72,7 @@ def _rows(graph: SceneGraph, group_of: Sequence[int]) -> list[tuple[int, int]]:
 
 def _sets(graph: SceneGraph, group_of: Sequence[int]) -> list[tuple[int, int]]:
     """Pairs of objects of one set that no style parts: those without a style join the others of their category."""
-    told = {name for relation in graph.relations for name in (relation.subject, relation.object)
+    related = {name for relation in graph.relations for name in (relation.subject, relation.object)
             if "style" in vocabulary().predicate(relation.predicate).unites}  # fmt: skip
     kinds: dict[str, list[int]] = {}
     styled: dict[str, set[int]] = {}
@@ -80,7 +80,7 @@ def _sets(graph: SceneGraph, group_of: Sequence[int]) -> list[tuple[int, int]]:
         row = vocabulary().category(node.category)
         if row.stands not in IN_SETS and row.role != "bed" and not (row.role == "board" and row.access):
             continue
-        if node.style or node.name in told:
+        if node.style or node.name in related:
             styled.setdefault(row.name, set()).add(group_of[number])
         kinds.setdefault(row.name, []).append(number)
     pairs = []
@@ -112,19 +112,19 @@ def equal_sizes(
         first = left[0]
         group: list[int] = []
         for i in left:
-            told = categories[i] == categories[first] and styles[names[i]] == styles[names[first]]
-            if told and not any((j, i) in apart for j in group):
+            alike = categories[i] == categories[first] and styles[names[i]] == styles[names[first]]
+            if alike and not any((j, i) in apart for j in group):
                 group.append(i)
         left = [i for i in left if i not in group]
-        given = [i for i in group if not free[i]]
-        if given:
-            for i in set(group) - set(given):
-                out[i] = size[given[int(np.abs(np.log(size[given] / size[i])).sum(1).argmin())]]
+        fixed = [i for i in group if not free[i]]
+        if fixed:
+            for i in set(group) - set(fixed):
+                out[i] = size[fixed[int(np.abs(np.log(size[fixed] / size[i])).sum(1).argmin())]]
         elif (size[group].max(0) / size[group].min(0) - 1).max() <= ALIKE:
             out[group] = size[group].min(0)  # fits wherever one of them does
         else:
             out[group] = size[group[int(size[group].prod(1).argmin())]]
-        if not given and vocabulary().category(categories[first]).support == "ceiling":
+        if not fixed and vocabulary().category(categories[first]).support == "ceiling":
             out[group, 1] = size[group, 1].max()  # the one that has to reach down furthest
     return out
 
@@ -133,8 +133,8 @@ def unequal_pairs(graph: SceneGraph) -> set[tuple[int, int]]:
     """Pairs (i, j), i < j, of objects that a relation of the graph tells to differ in size."""
     place = {node.name: number for number, node in enumerate(graph.nodes)}
     words = vocabulary()
-    told = (relation for relation in graph.relations if words.predicate(relation.predicate).measures == "size")
-    return {tuple(sorted((place[r.subject], place[r.object]))) for r in told}  # type: ignore[misc]
+    sized = (relation for relation in graph.relations if words.predicate(relation.predicate).measures == "size")
+    return {tuple(sorted((place[r.subject], place[r.object]))) for r in sized}  # type: ignore[misc]
 
 
 def shared_assets(

@@ -33,8 +33,8 @@ _read_here: set[tuple[str, int, int]] = set()  # the same of those that this pro
 
 def check_apart(path: str | os.PathLike[str]) -> None:
     """Raises StageError for a stage that ends the process that reads it, and names the file."""
-    for told in fatal([Path(path)]).values():
-        raise StageError(told)
+    for fault in fatal([Path(path)]).values():
+        raise StageError(fault)
 
 
 def check_harmless(path: Path, stage: Path | None = None) -> None:
@@ -108,23 +108,23 @@ def fatal(paths: Iterable[Path]) -> dict[Path, str]:
 def _read(paths: list[Path]) -> tuple[Path | None, str, list[Path]]:
     """The first of the files that the process did not survive, what became of it, and all files that it did survive."""
     words = [sys.executable, "-P", str(READER)]
-    given = json.dumps({"files": [str(path) for path in paths], "memory": [files.HELD, files.EACH]})
+    request = json.dumps({"files": [str(path) for path in paths], "memory": [files.HELD, files.EACH]})
     try:
         done = subprocess.run(
-            words, input=given, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,  # USD quotes a damaged layer there
+            words, input=request, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,  # USD quotes a damaged layer there
             text=True, timeout=PATIENCE, check=False,
         )  # fmt: skip
-        code, told = done.returncode, done.stdout
+        code, output = done.returncode, done.stdout
     except subprocess.TimeoutExpired as late:
-        code, told = None, (late.stdout or b"").decode() if isinstance(late.stdout, bytes) else late.stdout or ""
-    names = [json.loads(line) for line in told.splitlines() if line.endswith('"')]
+        code, output = None, (late.stdout or b"").decode() if isinstance(late.stdout, bytes) else late.stdout or ""
+    names = [json.loads(line) for line in output.splitlines() if line.endswith('"')]
     if code == 0 or not names:  # without a name it could not begin, and says nothing of any file
         return None, "", [Path(name) for name in names if Path(name).is_file()]
-    given_names = [str(path) for path in paths]
-    last = next((name for name in reversed(names) if name in given_names), given_names[0])
+    asked = [str(path) for path in paths]
+    last = next((name for name in reversed(names) if name in asked), asked[0])
     how = "does not come to an end" if code is None else f"ends the program ({f'signal {-code}' if code < 0 else code})"
-    told = f"{names[-1] if names else last}: reading it {how}; it is damaged, or made to do that"
-    return Path(last), told, []
+    output = f"{names[-1] if names else last}: reading it {how}; it is damaged, or made to do that"
+    return Path(last), output, []
 
 
 def _stamp(path: Path) -> tuple[str, int, int]:

@@ -162,14 +162,14 @@ def room_of(graph: SceneGraph, name: str) -> RoomBoxes:
     Raises:
         StageError: a node without a box.
     """
-    given = [node.style for node in graph.nodes]
-    ours = all(style is None or re.fullmatch(rf"{STYLE}\d+", style) for style in given)
+    words = [node.style for node in graph.nodes]
+    ours = all(style is None or re.fullmatch(rf"{STYLE}\d+", style) for style in words)
     room = room_boxes(graph)
     return replace(
         room,
         id=name,
         models=tuple(str(node.attributes.get("model", "")) for node in graph.nodes),
-        styles=tuple(int(s.removeprefix(STYLE)) if s else -1 for s in given) if ours else room.styles,
+        styles=tuple(int(s.removeprefix(STYLE)) if s else -1 for s in words) if ours else room.styles,
         relations=triplets_of(graph),
     )
 

@@ -103,10 +103,10 @@ class StageError(ValueError):
 
 def values_of(thing: object, fields: Mapping[str, str]) -> dict[str, Any]:
     """What a thing says of some fields, by property and in USD's types; what it leaves open is left out."""
-    given = {name: getattr(thing, field, None) for name, field in fields.items()}
-    said = {name: value for name, value in given.items() if value is not None and value is not False and value != ()}
-    kinds = {name: type(VALUE_TYPES[name].defaultValue) for name in said}
-    return {name: kinds[name](value) if isinstance(value, tuple) else value for name, value in said.items()}
+    every = {name: getattr(thing, field, None) for name, field in fields.items()}
+    held = {name: value for name, value in every.items() if value is not None and value is not False and value != ()}
+    kinds = {name: type(VALUE_TYPES[name].defaultValue) for name in held}
+    return {name: kinds[name](value) if isinstance(value, tuple) else value for name, value in held.items()}
 
 
 def room_values(room: RoomSpec) -> dict[str, Any]:

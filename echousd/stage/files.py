@@ -52,7 +52,7 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
     except UnicodeDecodeError as error:  # in the names of the layers that it refers to
         raise StageError(f"{path}: a layer that is no UTF-8 text ({error.reason})") from None
     except Tf.ErrorException as error:
-        raise StageError(f"{path}: not a USD file that can be read ({said(error)})") from None
+        raise StageError(f"{path}: not a USD file that can be read ({usd_error(error)})") from None
     finally:
         silence.TakeUncoalescedDiagnostics()
         del silence
@@ -178,7 +178,7 @@ def source(stage: Usd.Stage) -> str:
     return layer.realPath or layer.identifier
 
 
-def said(error: Tf.ErrorException) -> str:
+def usd_error(error: Tf.ErrorException) -> str:
     """The most specific thing that USD says about an error, in one line."""
     try:
         texts = [str(getattr(entry, "commentary", "")).strip() for entry in error.args]
@@ -209,9 +209,8 @@ def save_layer(layer: Sdf.Layer, path: str | os.PathLike[str]) -> None:
             if not layer.Export(str(beside)):
                 raise StageError(f"{path}: cannot be written")
     except (OSError, Tf.ErrorException) as error:
-        raise StageError(
-            f"{path}: cannot be written ({said(error) if isinstance(error, Tf.ErrorException) else error.strerror})"
-        ) from None
+        why = usd_error(error) if isinstance(error, Tf.ErrorException) else error.strerror
+        raise StageError(f"{path}: cannot be written ({why})") from None
     loaded = Sdf.Layer.Find(str(path.absolute()))
     if loaded:  # a stage of this process has the file open: let it follow
         loaded.Reload(force=True)

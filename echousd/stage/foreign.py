@@ -149,7 +149,7 @@ def _read(
     boxed = _boxes(to_metres(stage))
     nodes: list[tuple[Sdf.Path, Node]] = []
     floors: list[tuple[Sdf.Path, Box]] = []
-    said: list[str] = []
+    seen_words: list[str] = []
     taken: set[str] = set()
     skipped: Counter[str] = Counter()
     obstacles: Counter[str] = Counter()
@@ -163,8 +163,8 @@ def _read(
             skipped.update(["hidden"] if words else [])
             prims.PruneChildren()
             continue
-        said.extend((*words, prim.GetName()))
-        category, told = next(filter(None, map(known_category, words)), None), {}
+        seen_words.extend((*words, prim.GetName()))
+        category, about = next(filter(None, map(known_category, words)), None), {}
         if category is None and prim.IsA(UsdGeom.PointInstancer):  # prototypes stand nowhere by themselves
             skipped.update(["of an instancer"] if names or _holds_furniture(prim) else [])
             prims.PruneChildren()
@@ -180,7 +180,7 @@ def _read(
                 continue
             size = () if _holds_furniture(prim) or (box := boxed(prim)) is None else sorted(box.size)
             if size and size[0] > 0 and size[1] >= LARGE:
-                category, told = TAKEN_FOR, {OBSTACLE: words[0]}
+                category, about = TAKEN_FOR, {OBSTACLE: words[0]}
                 obstacles[repr(words[0])] += 1
             else:
                 skipped[f"unknown label {words[0]!r}"] += 1
@@ -194,8 +194,8 @@ def _read(
         name = free_name(Tf.MakeValidIdentifier(ascii_name), taken)
         taken.add(name)
         node = Node(
-            name, category, size=box.size, position=box.position, yaw=box.yaw, locked=bool(told), attributes=told,
-            shapes="boxes" if told else None,
+            name, category, size=box.size, position=box.position, yaw=box.yaw, locked=bool(about), attributes=about,
+            shapes="boxes" if about else None,
         )  # fmt: skip
         nodes.append((prim.GetPath(), node))
     _tell(stage, skipped, obstacles)
@@ -204,13 +204,13 @@ def _read(
             f"{source(stage)}: no scene graph (no EchoSceneGraph prim) and no prims with semantics labels and bounds "
             "to make one of" + ("" if names else "; --names takes the names of prims for labels")
         )
-    return nodes, floors, said
+    return nodes, floors, seen_words
 
 
 def _tell(stage: Usd.Stage, skipped: Counter[str], obstacles: Counter[str]) -> None:
-    told = (("labelled prims that became no node", skipped), ("unknown labels, fixed obstacles", obstacles))
-    if said := [f"{what}: {', '.join(f'{w} ({n})' for w, n in found.most_common(8))}" for what, found in told if found]:
-        warnings.warn(f"{source(stage)}: {'; '.join(said)}", SkippedPrims, stacklevel=4)
+    seen = (("labelled prims that became no node", skipped), ("unknown labels, fixed obstacles", obstacles))
+    if text := [f"{what}: {', '.join(f'{w} ({n})' for w, n in found.most_common(8))}" for what, found in seen if found]:
+        warnings.warn(f"{source(stage)}: {'; '.join(text)}", SkippedPrims, stacklevel=4)
 
 
 def _graph(
@@ -311,5 +311,5 @@ def _room_type(words: list[str], categories: list[str]) -> str:
     for known in filter(None, (vocabulary().known_room_type(word.rstrip("0123456789_")) for word in words)):
         return known.name
     has = {*categories, *(vocabulary().category(name).coarse for name in categories)}
-    told = [kind for kind in vocabulary().room_types if kind.signs and has.issuperset(kind.signs)]
-    return max(told, key=lambda kind: kind.certainty).name if told else UNTOLD
+    kinds = [kind for kind in vocabulary().room_types if kind.signs and has.issuperset(kind.signs)]
+    return max(kinds, key=lambda kind: kind.certainty).name if kinds else UNTOLD

@@ -81,8 +81,8 @@ def forms(
                 skipped[str(prim.GetTypeName())] += 1
                 first.setdefault(str(prim.GetTypeName()), str(prim.GetPath()))
     if skipped:
-        told = ", ".join(f"{count} {kind} (such as <{first[kind]}>)" for kind, count in skipped.items())
-        warnings.warn(f"left out, as they have no polygons: {told}", SkippedForms, stacklevel=2)
+        listed = ", ".join(f"{count} {kind} (such as <{first[kind]}>)" for kind, count in skipped.items())
+        warnings.warn(f"left out, as they have no polygons: {listed}", SkippedForms, stacklevel=2)
 
 
 def _instances(instancer: UsdGeom.PointInstancer, cache: UsdGeom.XformCache) -> Iterator[Form]:
@@ -152,7 +152,7 @@ def polygons(prim: Usd.Prim) -> Polygons:
 def is_subdivision(prim: Usd.Prim) -> bool:
     """Whether a mesh says that it is a subdivision surface (many that are none leave the scheme open)."""
     scheme = UsdGeom.Mesh(prim).GetSubdivisionSchemeAttr()
-    return scheme.HasAuthoredValue() and values.given(scheme) in ("catmullClark", "loop")
+    return scheme.HasAuthoredValue() and values.value_of(scheme) in ("catmullClark", "loop")
 
 
 def solid(prim: Usd.Prim) -> trimesh.Trimesh:
@@ -170,7 +170,7 @@ def solid(prim: Usd.Prim) -> trimesh.Trimesh:
         return trimesh.creation.box([length("size", 2.0)] * 3)
     if kind == "Sphere":
         return trimesh.creation.icosphere(3, radius)
-    axis = str(values.given(prim.GetAttribute("axis")) or "Z")
+    axis = str(values.value_of(prim.GetAttribute("axis")) or "Z")
     if kind == "Plane":  # its width runs along x, along z where x is its axis; a turn takes x to y, or to z
         x, y = (length(name, 2.0) / 2 for name in (("width", "length") if axis == "Z" else ("length", "width")))
         mesh = trimesh.Trimesh([(-x, -y, 0), (x, -y, 0), (x, y, 0), (-x, y, 0)], [(0, 1, 2), (0, 2, 3)], process=False)

@@ -21,13 +21,13 @@ def emitted(prim: Usd.Prim, metres: float) -> np.ndarray:
         return values.number(prim.GetAttribute(f"inputs:{name}"), 0.0)
 
     light = UsdLux.LightAPI(prim)
-    color = np.array(values.given(light.GetColorAttr()) or (1, 1, 1), float)
-    if values.given(light.GetEnableColorTemperatureAttr()):
+    color = np.array(values.value_of(light.GetColorAttr()) or (1, 1, 1), float)
+    if values.value_of(light.GetEnableColorTemperatureAttr()):
         color = color * UsdLux.BlackbodyTemperatureAsRgb(number("colorTemperature"))
     color = np.clip(color, 0.0, None) * number("intensity") * 2.0 ** np.clip(number("exposure"), -MAX_STOPS, MAX_STOPS)
     if prim.IsA(UsdLux.DomeLight):
         return color
-    whole = bool(values.given(light.GetNormalizeAttr()))
+    whole = bool(values.value_of(light.GetNormalizeAttr()))
     if prim.IsA(UsdLux.DistantLight):
         disc = np.pi * np.sin(np.radians(number("angle")) / 2) ** 2
         return color if whole or disc == 0 else color * disc

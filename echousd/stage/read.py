@@ -70,7 +70,7 @@ def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:
     for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()):
         kind = kinds.get(prim.GetTypeName())
         if kind is None and usd.NODE_API in prim.GetPrimTypeInfo().GetAppliedAPISchemas():
-            kind = "small" if values.given(prim.GetAttribute(usd.SHAPES)) == usd.DRESSING else "nodes"
+            kind = "small" if values.value_of(prim.GetAttribute(usd.SHAPES)) == usd.DRESSING else "nodes"
         if kind:
             found[kind].append(prim)
     graphs = found.pop("graphs")
@@ -145,12 +145,12 @@ def facts(prims: RoomPrims, names: dict[Sdf.Path, str]) -> Iterator[Relation]:
 
     Warns `StatedTwice`; raises StageError.
     """
-    for said in stated(prims, names).values():
-        strongest, relation = said[0]
-        if len(said) == 1:
+    for entries in stated(prims, names).values():
+        strongest, relation = entries[0]
+        if len(entries) == 1:
             yield relation
             continue
-        others = ", ".join(f"<{prim.GetPath()}>" for prim, _ in said[1:])
+        others = ", ".join(f"<{prim.GetPath()}>" for prim, _ in entries[1:])
         warnings.warn(
             f"{place(strongest)}: states '{relation}' as {others} does; one fact, confidence {relation.confidence:g}",
             StatedTwice,
@@ -161,15 +161,15 @@ def facts(prims: RoomPrims, names: dict[Sdf.Path, str]) -> Iterator[Relation]:
 
 def stated(prims: RoomPrims, names: dict[Sdf.Path, str]) -> dict[tuple[str, str, str], list[tuple[Usd.Prim, Relation]]]:
     """Triple to the prims that state it with the relation as each says it, those of stronger layers first."""
-    told: dict[tuple[str, str, str], list[tuple[Usd.Prim, Relation]]] = {}
+    found: dict[tuple[str, str, str], list[tuple[Usd.Prim, Relation]]] = {}
     for prim in prims.relations:
         relation = relation_of(prim, names)
         if relation:
-            told.setdefault(relation.triple, []).append((prim, relation))
-    for said in told.values():
-        if len(said) > 1:
-            said.sort(key=lambda entry: _strength(entry[0]))
-    return told
+            found.setdefault(relation.triple, []).append((prim, relation))
+    for entries in found.values():
+        if len(entries) > 1:
+            entries.sort(key=lambda entry: _strength(entry[0]))
+    return found
 
 
 def _strength(prim: Usd.Prim) -> int:
@@ -255,7 +255,7 @@ def _between(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> tuple[str, ...] | No
 
 def value(prim: Usd.Prim, name: str) -> Any:
     """The value of an attribute, None where there is none; raises StageError for a text that cannot be meant."""
-    found = values.given(prim.GetAttribute(name))
+    found = values.value_of(prim.GetAttribute(name))
     if found is None or isinstance(found, float | bool):
         return found
     found = usd.plain(found)

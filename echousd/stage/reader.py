@@ -82,9 +82,9 @@ def main() -> None:
     """Read the files that stdin names."""
     from pxr import Usd
 
-    given = json.load(sys.stdin)
-    for path in given["files"]:
-        if read(path, given["memory"], set()):
+    request = json.load(sys.stdin)
+    for path in request["files"]:
+        if read(path, request["memory"], set()):
             print(json.dumps(path), flush=True)  # noqa: T201
             try:
                 stage = Usd.Stage.Open(path)

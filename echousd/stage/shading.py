@@ -35,21 +35,21 @@ def preview_surface(
         pen.define(f"{path}/st", "Shader", {**reader, "float2 outputs:result": None})
     for image in images:
         colored = KINDS.get(next(iter(image.inputs))) == "color3f"
-        told: dict[str, Any] = {
+        fields: dict[str, Any] = {
             "uniform token info:id": "UsdUVTexture", "asset inputs:file": image.file,
             "token inputs:sourceColorSpace": "sRGB" if colored else "raw", "token inputs:wrapS": wrap,
             "token inputs:wrapT": wrap, "float2 inputs:st.connect": f"{path}/st.outputs:result",
         }  # fmt: skip
         if image.fallback:
-            told["float4 inputs:fallback"] = (*image.fallback, 1.0)
+            fields["float4 inputs:fallback"] = (*image.fallback, 1.0)
         if image.tint and tuple(image.tint) != (1.0, 1.0, 1.0):
-            told["float4 inputs:scale"] = (*image.tint, 1.0)
+            fields["float4 inputs:scale"] = (*image.tint, 1.0)
         if "normal" in image.inputs:
-            told |= {"float4 inputs:scale": (2, 2, 2, 1), "float4 inputs:bias": (-1, -1, -1, 0)}
+            fields |= {"float4 inputs:scale": (2, 2, 2, 1), "float4 inputs:bias": (-1, -1, -1, 0)}
         for name, channel in image.inputs.items():
-            told[f"{'float3' if channel == 'rgb' else 'float'} outputs:{channel}"] = None
+            fields[f"{'float3' if channel == 'rgb' else 'float'} outputs:{channel}"] = None
             say(surface, {f"{_words(name)}.connect": f"{path}/{image.name}.outputs:{channel}"})
-        pen.define(f"{path}/{image.name}", "Shader", told)
+        pen.define(f"{path}/{image.name}", "Shader", fields)
     say(surface, {**{_words(name): value for name, value in values.items()}, "token outputs:surface": None})
 
 

@@ -62,36 +62,36 @@ def conventions(stage: Usd.Stage, path: str | None = None) -> dict[str, float | 
     """
     from echousd.stage.read import find_rooms
 
-    said: dict[str, float | str] = {}
+    found: dict[str, float | str] = {}
     if _speaker(stage, METRES):
-        said["meters_per_unit"] = round(metres_per_unit(stage), 9)
+        found["meters_per_unit"] = round(metres_per_unit(stage), 9)
     if _speaker(stage, UP_AXIS):
-        said["up_axis"] = up_axis(stage)
+        found["up_axis"] = up_axis(stage)
     paths = [str(prims.room.GetPath()) for prims in find_rooms(stage)] if path is None else [path]
     if len(paths) > 1:
         file, named = stage.GetRootLayer().realPath, ", ".join(paths)
         raise ValueError(f"{file}: {len(paths)} rooms, name one (room_path): {named}")
-    return {**said, **({"room_path": paths[0]} if paths else {})}
+    return {**found, **({"room_path": paths[0]} if paths else {})}
 
 
 def unit_faults(stage: Usd.Stage) -> Iterator[tuple[str, bool]]:
     """A sentence for what other programs get wrong about a stage's units, and whether the stage itself is wrong."""
     root = stage.GetRootLayer()
     for key in (METRES, UP_AXIS):
-        said = root.pseudoRoot.GetInfo(key) if root.pseudoRoot.HasInfo(key) else None
+        held = root.pseudoRoot.GetInfo(key) if root.pseudoRoot.HasInfo(key) else None
         below = next((layer for layer in _layers(stage)[1:] if layer.pseudoRoot.HasInfo(key)), None)
         if below is None:
             continue
         meant = below.pseudoRoot.GetInfo(key)
         where = f"{key} is {_shown(meant)} in {below.GetDisplayName()}"
-        if said is None:
+        if held is None:
             yield (
                 f"{root.GetDisplayName()} sets no {key}, {where}; taken as {_shown(meant)} here, "
                 "other programs may not: set it",
                 False,
             )
-        elif said != meant:
-            yield f"{key} is {_shown(said)} in {root.GetDisplayName()}, but {where}, allowed: the same", True
+        elif held != meant:
+            yield f"{key} is {_shown(held)} in {root.GetDisplayName()}, but {where}, allowed: the same", True
 
 
 def _speaker(stage: Usd.Stage, key: str) -> Sdf.Layer | None:

@@ -136,7 +136,7 @@ class _Editor:
 
     def relation_edits(self, graph: SceneGraph) -> list[Edit]:
         facts = stated(self.prims, self.names)
-        held = {triple: said[0] for triple, said in facts.items()}
+        held = {triple: entries[0] for triple, entries in facts.items()}
         wanted = {relation.triple: relation for relation in graph.relations}
         gone = {triple: entry for triple, entry in held.items() if triple not in wanted}
         taken = {child.GetName() for child in self.prims.graph.GetAllChildren()}
@@ -154,7 +154,7 @@ class _Editor:
                 edits += self.other_predicate(*gone.pop(replaced), relation, taken)
             else:
                 edits.append(self.new_relation(relation, taken))
-        again = [prim for triple, said in facts.items() if triple not in wanted for prim, _ in said[1:]]
+        again = [prim for triple, entries in facts.items() if triple not in wanted for prim, _ in entries[1:]]
         return [*map(self.removal, [*(prim for prim, _ in gone.values()), *again]), *edits]
 
     def inactive_relations(self) -> dict[tuple[str, str, str], Usd.Prim]:

@@ -12,7 +12,7 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
 from echousd.graph import MAX_TEXT
 from echousd.stage.encoding import StageError
-from echousd.stage.files import said, source, specs
+from echousd.stage.files import source, specs, usd_error
 
 NOW = Usd.TimeCode.EarliestTime()  # what stages are read at: some tools write even what never moves as samples
 LARGEST = 1e9  # in the stage's unit; what is further away is a fault, and its square overflows single precision
@@ -40,19 +40,19 @@ def owner(attribute: Usd.Attribute | None) -> str:
     return f"{source(attribute.GetStage())}: <{attribute.GetPrimPath()}>: {attribute.GetName()}"
 
 
-def given(attribute: Usd.Attribute | None) -> Any:
+def value_of(attribute: Usd.Attribute | None) -> Any:
     """The value at `NOW`, None where there is none; raises StageError where OpenUSD cannot read it."""
     if not attribute:
         return None
     try:
         return attribute.Get(NOW)
     except Tf.ErrorException as error:
-        raise StageError(f"{owner(attribute)}: a value that cannot be read ({said(error)})") from None
+        raise StageError(f"{owner(attribute)}: a value that cannot be read ({usd_error(error)})") from None
 
 
 def number(attribute: Usd.Attribute | None, default: float = 0.0) -> float:
     """A finite number; raises StageError for anything else."""
-    found = given(attribute)
+    found = value_of(attribute)
     if found is None or attribute is None:
         return default
     if isinstance(found, bool) or not isinstance(found, int | float):
@@ -67,7 +67,7 @@ def array(attribute: Usd.Attribute | None, width: int = 1, *, whole: bool = Fals
 
     Raises StageError for other types, NaN, infinities and numbers beyond `LARGEST`.
     """
-    found = given(attribute)
+    found = value_of(attribute)
     return numbers([] if found is None else found, width, attribute, whole=whole)
 
 
@@ -92,7 +92,7 @@ def numbers(found: Any, width: int, attribute: Usd.Attribute | None, *, whole: b
 
 def texts(attribute: Usd.Attribute | None) -> tuple[str, ...]:
     """A list of words, a single one included; empty without a value; raises StageError for anything else."""
-    found = given(attribute)
+    found = value_of(attribute)
     if found is None or attribute is None:
         return ()
     words = (found,) if isinstance(found, str) else tuple(found) if hasattr(found, "__iter__") else (None,)
@@ -106,7 +106,7 @@ def texts(attribute: Usd.Attribute | None) -> tuple[str, ...]:
 
 def asset(attribute: Usd.Attribute | None) -> Sdf.AssetPath | None:
     """An asset path, None without one; raises StageError for anything else."""
-    found = given(attribute)
+    found = value_of(attribute)
     if found is None or isinstance(found, Sdf.AssetPath) or attribute is None:
         return found
     raise StageError(f"{owner(attribute)} is {shown(found)}, allowed: an asset path")
@@ -119,7 +119,7 @@ def targets(prim: Usd.Prim, name: str) -> list[Sdf.Path]:
         return list(relationship.GetTargets()) if relationship else []
     except Tf.ErrorException as error:
         where = f"{source(prim.GetStage())}: <{prim.GetPath()}>: {name}"
-        raise StageError(f"{where} is no relationship that can be read ({said(error)})") from None
+        raise StageError(f"{where} is no relationship that can be read ({usd_error(error)})") from None
 
 
 def matrix(found: Gf.Matrix4d, prim: Usd.Prim) -> np.ndarray:
@@ -219,6 +219,6 @@ def reading(stage: Usd.Stage) -> Iterator[None]:
     try:
         yield
     except Tf.ErrorException as error:
-        raise StageError(f"{source(stage)}: cannot be read ({said(error)})") from None
+        raise StageError(f"{source(stage)}: cannot be read ({usd_error(error)})") from None
     except UnicodeDecodeError as error:
         raise StageError(f"{source(stage)}: a text that is no UTF-8 ({error.reason})") from None

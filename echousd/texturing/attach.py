@@ -133,10 +133,10 @@ def _compare(job: Job, surfaces: Surfaces, skip: tuple[str, ...], folder: Path) 
         and thing.name not in skip
         and (now[thing.name].topology != thing.topology or now[thing.name].path != thing.path)
     ]
-    told = [f"{', '.join(words)} {what}" for words, what in ((gone, "is gone"), (changed, "has other meshes")) if words]
-    if told:
+    why = [f"{', '.join(words)} {what}" for words, what in ((gone, "is gone"), (changed, "has other meshes")) if words]
+    if why:
         raise ValueError(
-            f"{folder}: not the room that the job was made of: {' and '.join(told)}; export again, or leave out with "
+            f"{folder}: not the room that the job was made of: {' and '.join(why)}; export again, or leave out with "
             "--skip"
         )
 

@@ -247,10 +247,10 @@ def object_prompt(thing: Painted, surfaces: Surfaces) -> str:
 
 
 def _prompt(name: str, styles: list[str], palette: str) -> str:
-    kind, told = _words(name), list(dict.fromkeys(map(_words, styles)))
-    said = f"{'an' if kind[:1] in 'aeiou' else 'a'} {kind}"
-    said += f" in {' and '.join(told[:3])} style" if told else ""
-    return said + (f", {_words(palette)} colours" if palette else "")
+    kind, styled = _words(name), list(dict.fromkeys(map(_words, styles)))
+    prompt = f"{'an' if kind[:1] in 'aeiou' else 'a'} {kind}"
+    prompt += f" in {' and '.join(styled[:3])} style" if styled else ""
+    return prompt + (f", {_words(palette)} colours" if palette else "")
 
 
 def _words(name: str) -> str:

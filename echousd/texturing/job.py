@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from echomodel.files import read_bounded, telling
 from echousd.folder.within import inside
 from echousd.graph.fields import IDENTIFIER
-from echousd.options import told
+from echousd.options import validation_message
 from echousd.texturing.atlas import Unwrapped, layout_digest
 from echousd.texturing.obj import read_obj
 
@@ -99,7 +99,7 @@ def read_job(folder: Path) -> Job:
         with telling(path, "cannot be read", ", allowed: the folder of texture export"):
             job = Job.model_validate_json(read_bounded(path, LARGEST))
     except ValidationError as error:
-        raise ValueError(f"{path}: {told(error)}") from None
+        raise ValueError(f"{path}: {validation_message(error)}") from None
     for thing in job.objects:
         inside(folder, thing.mesh, f"{path}: objects.{thing.name}.mesh")
     twice, count = Counter(thing.name for thing in job.objects).most_common(1)[0]
@@ -108,10 +108,10 @@ def read_job(folder: Path) -> Job:
     return job
 
 
-def script_for(tool: str, said: Mapping[str, str] | None = None) -> bytes:
+def script_for(tool: str, words: Mapping[str, str] | None = None) -> bytes:
     """What runs a tool on a job: its file in `scripts/`, where `@WORD@` stands for a text that a shell has to read."""
     text = Path(__file__).with_name("scripts").joinpath(f"{tool}.sh").read_text("utf-8")
-    return re.sub("@([A-Z]+)@", lambda word: shlex.quote((said or {})[word[1]]), text).encode()
+    return re.sub("@([A-Z]+)@", lambda word: shlex.quote((words or {})[word[1]]), text).encode()
 
 
 def job_mesh(folder: Path, thing: JobObject) -> Unwrapped:
@@ -119,9 +119,9 @@ def job_mesh(folder: Path, thing: JobObject) -> Unwrapped:
     path = inside(folder, thing.mesh, f"{folder / JOB}: objects.{thing.name}.mesh")
     mesh = read_obj(path)
     if len(mesh.faces) != thing.triangles:
-        told = f"{len(mesh.faces)} triangles, {thing.triangles} were exported"
+        message = f"{len(mesh.faces)} triangles, {thing.triangles} were exported"
     elif layout_digest(mesh.corners) != thing.layout:
-        told = "other texture coordinates than were exported"
+        message = "other texture coordinates than were exported"
     else:
         return mesh
-    raise ValueError(f"object {thing.name!r}: {path} has {told}; put what a tool changed into {RESULTS}/")
+    raise ValueError(f"object {thing.name!r}: {path} has {message}; put what a tool changed into {RESULTS}/")

@@ -50,23 +50,23 @@ def _one_picture(folder: Path, job: Job) -> Results:
     name, content = image_of(texture_bytes(str(picture)) or b"", str(picture), SCENE)
     objects: dict[str, Result] = {}
     for number, thing in enumerate(job.objects):
-        given = job_mesh(folder, thing)
+        sent = job_mesh(folder, thing)
         own = picture.parent / "meshes" / thing.kind / f"{number}_{thing.name}.obj"
-        st = given.corners
+        st = sent.corners
         if own.is_file():
             check_links(folder, own, f"object {thing.name!r}")
             back = read_obj(own)
-            st = _aligned(given, back, thing)
+            st = _aligned(sent, back, thing)
         # Its pictures' first and last texels lie on the borders 0 and 1, and not half a texel inside.
         objects[thing.name] = (st * (job.resolution - 1) + 0.5) / job.resolution, {"color": name}
     return objects, {name: content}
 
 
-def _aligned(given: Unwrapped, back: Unwrapped, thing: JobObject) -> np.ndarray:
+def _aligned(sent: Unwrapped, back: Unwrapped, thing: JobObject) -> np.ndarray:
     """Texture coordinates of a mesh that came back, face by face where the order is the same."""
-    if len(given.faces) == len(back.faces) and np.abs(given.triangles - back.triangles).max() < 1e-4:
+    if len(sent.faces) == len(back.faces) and np.abs(sent.triangles - back.triangles).max() < 1e-4:
         return np.clip(back.corners, 0.0, 1.0)
-    return texture_coordinates(given, back, thing.name)
+    return texture_coordinates(sent, back, thing.name)
 
 
 def _many_pictures(folder: Path, job: Job) -> Results:
@@ -84,8 +84,8 @@ def _many_pictures(folder: Path, job: Job) -> Results:
             if picture is None:
                 continue
             own = _beside(folder, thing.name, (".obj",))
-            given = job_mesh(folder, thing)
-            st = given.corners if own is None else _aligned(given, read_obj(own), thing)
+            sent = job_mesh(folder, thing)
+            st = sent.corners if own is None else _aligned(sent, read_obj(own), thing)
             raw, source = {"color": texture_bytes(str(picture)) or b""}, str(picture)
             for slot in ("metal_rough", "normal"):
                 more = _beside(folder, f"{thing.name}_{slot}", IMAGES)
@@ -153,7 +153,7 @@ TURNS = tuple(  # about +Y, +X and back: what exporters do with "up" and "forwar
 )
 
 
-def texture_coordinates(given: Unwrapped, back: Unwrapped, name: str) -> np.ndarray:
+def texture_coordinates(sent: Unwrapped, back: Unwrapped, name: str) -> np.ndarray:
     """(t, 3, 2) float, for each corner of the mesh that was given out, where it lies in the picture that came back.
 
     Accepted: vertices split, joined and re-ordered, triangles re-ordered and begun at another corner, triangles without
@@ -161,11 +161,11 @@ def texture_coordinates(given: Unwrapped, back: Unwrapped, name: str) -> np.ndar
     with the object's name for other triangles (remeshed, decimated, mirrored), and for coordinates outside of [0, 1].
 
     Arguments:
-        given: what the job holds. back: what the tool made of it. name: of the object.
+        sent: what the job holds. back: what the tool made of it. name: of the object.
     """
-    best, st = len(given.faces), None
+    best, st = len(sent.faces), None
     for turn in TURNS:
-        found = _found(_fitted(back.triangles @ turn.T, given.triangles), given.triangles, back.corners)
+        found = _found(_fitted(back.triangles @ turn.T, sent.triangles), sent.triangles, back.corners)
         if isinstance(found, int):
             best = min(best, found)
         else:
@@ -173,7 +173,7 @@ def texture_coordinates(given: Unwrapped, back: Unwrapped, name: str) -> np.ndar
             break
     if st is None:
         raise ValueError(
-            f"object {name!r}: {len(back.faces)} triangles came back, and {best} of the {len(given.faces)} that were "
+            f"object {name!r}: {len(back.faces)} triangles came back, and {best} of the {len(sent.faces)} that were "
             "given are not among them; allowed: the same triangles in any order (no remeshing, no decimation): turn "
             f"that off in the tool, bake its colours onto meshes/{name}.obj, or leave the object out with --skip {name}"
         )

@@ -60,8 +60,8 @@ def scenetex_files(
     files[f"{scene}/meshes/scene_config.json"] = _json(config)
     files[f"{run}/scene_config.json"] = _json(seeded)
     files[f"{run}/scene.obj"] = obj_bytes(_joined(laid), "scene", material=False)
-    said = {"ROOM": room, "PROMPT": prompt, "SCENE": scene_id(room), "STAMP": STAMP, "OUTPUTS": OUTPUTS}
-    files["run.sh"] = script_for("scenetex", {**said, "ANCHORED": str(ANCHORED)})
+    values = {"ROOM": room, "PROMPT": prompt, "SCENE": scene_id(room), "STAMP": STAMP, "OUTPUTS": OUTPUTS}
+    files["run.sh"] = script_for("scenetex", {**values, "ANCHORED": str(ANCHORED)})
     return files
 
 

@@ -55,10 +55,10 @@ def without_slopes(function: Function) -> Function:
     """The function, run without keeping what gradients would need; torch is not loaded for it."""
 
     @wraps(function)
-    def run(*given: Any, **named: Any) -> Any:
+    def run(*arguments: Any, **named: Any) -> Any:
         torch = sys.modules.get("torch")
         with torch.no_grad() if torch else nullcontext():
-            return function(*given, **named)
+            return function(*arguments, **named)
 
     return run  # type: ignore[return-value]
 

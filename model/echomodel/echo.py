@@ -111,11 +111,10 @@ class EchoModel:
         pairs = pairs_of(graph, self.config.predicates)
         if edit is None:
             return self.model.latent(graph.category, pairs)
-        old = pairs_of(graph.with_triplets(on_device(edit.before, self.device)), self.config.predicates)
         added = on_device(edit.added, self.device)
-        return self.model.latent(
-            graph.category, pairs, before=old.without(~added, old.told), added=added, touched=touched_nodes(graph, edit)
-        )
+        old = pairs_of(graph.with_triplets(on_device(edit.before, self.device)), self.config.predicates)
+        old = old.without(~added, old.stated)
+        return self.model.latent(graph.category, pairs, before=old, added=added, touched=touched_nodes(graph, edit))
 
     def unlearned(self, graph: GraphBatch) -> tuple[str, ...]:
         """One sentence for every word of the graph that the weights do not know, and what becomes of it."""
@@ -151,9 +150,9 @@ class EchoModel:
             own.temperature * start[equal] if by.noise is None else start, by,
         )  # fmt: skip
 
-    def _how(self, graph: GraphBatch, told: dict[str, Any]) -> CompactSampling:
+    def _how(self, graph: GraphBatch, options: dict[str, Any]) -> CompactSampling:
         """What a caller asks for, with what is known checked and on the model's device."""
-        how = CompactSampling(**told)
+        how = CompactSampling(**options)
         known, mask = known_values(graph, how.known, how.known_mask, self.device)
         return replace(how, known=known, known_mask=mask)
 

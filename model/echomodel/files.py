@@ -121,8 +121,8 @@ def from_cache(kind: str, key: bytes, make: Callable[[], bytes]) -> bytes:
     with suppress(OSError, RuntimeError):  # of a user without a home
         file = cache_folder() / kind / digest(key)
         content = file.read_bytes()
-    told, found = content[:32], content[32:]
-    if told != digest(found).encode():
+    checksum, found = content[:32], content[32:]
+    if checksum != digest(found).encode():
         found = make()
         with suppress(OSError, ValueError):  # that of a path without a name
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -206,8 +206,8 @@ def within_memory(path: Path, name: str = "", *, size: int | None = None) -> Ite
         yield
     except MemoryError as error:
         traceback.clear_frames(error.__traceback__)  # what it had read by then
-        told = f"{name or path}: takes more memory to read than {most >> 20} MiB, allowed: that much for {size} bytes"
-        raise ValueError(told) from None
+        why = f"{name or path}: takes more memory to read than {most >> 20} MiB, allowed: that much for {size} bytes"
+        raise ValueError(why) from None
     finally:
         resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
 

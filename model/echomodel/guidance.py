@@ -31,14 +31,14 @@ def guided(predict: Predict, plan: Plan, scale: BoxScale, *, strength: float, ro
         if not rounds or bool((level > LATE).any()):
             return clean
         drawn = Boxes.decode(clean, scale)
-        there = mended(plan, drawn, strength=strength, rounds=rounds, given=level == 0).encode(scale)
+        there = mended(plan, drawn, strength=strength, rounds=rounds, fixed=level == 0).encode(scale)
         xp = kit(x)
         return xp.where((level > 0)[:, None], xp.concat([clean[:, :3], there[:, 3:]], 1), clean)
 
     return pulled
 
 
-def mended(plan: Plan, boxes: Boxes, *, strength: float, rounds: int, given: Array | None = None) -> Boxes:
+def mended(plan: Plan, boxes: Boxes, *, strength: float, rounds: int, fixed: Array | None = None) -> Boxes:
     """Boxes after so many steps of Adam (Kingma & Ba 2015) on their places and headings, down what all terms miss.
 
     Arguments:
@@ -46,9 +46,9 @@ def mended(plan: Plan, boxes: Boxes, *, strength: float, rounds: int, given: Arr
         boxes: N, where they are drawn.
         strength: of the first step, metres and radians; the steps become shorter and shorter.
         rounds: how many.
-        given: (N,) bool, boxes that stay; None = none.
+        fixed: (N,) bool, boxes that stay; None = none.
     """
-    start = standing(plan, boxes, given)
+    start = standing(plan, boxes, fixed)
     xp, height = kit(start.yaw), start.position[:, 1]
     place = xp.concat([start.position[:, ::2], start.yaw[:, None]], 1)
     mean, square = xp.zeros_like(place), xp.zeros_like(place)
@@ -61,5 +61,5 @@ def mended(plan: Plan, boxes: Boxes, *, strength: float, rounds: int, given: Arr
         square = MOMENTS[1] * square + (1 - MOMENTS[1]) * slope.square()
         step = mean / (1 - MOMENTS[0] ** (number + 1)) / ((square / (1 - MOMENTS[1] ** (number + 1))).sqrt() + 1e-8)
         rate = strength * (1 - (1 - LEAST) * number / rounds)
-        place = xp.where(start.given[:, None], place, place - rate * step)
+        place = xp.where(start.fixed[:, None], place, place - rate * step)
     return placed(boxes, xp.stack([place[:, 0], height, place[:, 1]], 1), place[:, 2])

@@ -18,8 +18,8 @@ class Late:
         module, name = self.place.split(":")
         return attrgetter(name)(import_module(module))
 
-    def __call__(self, *given: Any, **by_name: Any) -> Any:
-        return self.itself(*given, **by_name)
+    def __call__(self, *arguments: Any, **by_name: Any) -> Any:
+        return self.itself(*arguments, **by_name)
 
 
 def extra(module: str, need: str, name: str, error: type[Exception] = ValueError) -> Any:

@@ -122,33 +122,33 @@ def check_openings(openings: Sequence[Opening], polygon: Any = None, height: flo
     lengths = None if polygon is None else edge_lengths(polygon)
     seen: dict[str, Opening] = {}
     for opening in openings:
-        said = f"{opening.kind} {opening.name!r}"
+        about = f"{opening.kind} {opening.name!r}"
         if opening.name in seen:
             raise ValueError(f"two openings are called {opening.name!r}, allowed: a name of its own for each")
         if lengths is not None:
             if opening.edge >= len(lengths):
                 raise ValueError(
-                    f"{said}: wall {opening.edge} of a floor with {len(lengths)} walls, "
+                    f"{about}: wall {opening.edge} of a floor with {len(lengths)} walls, "
                     f"allowed: 0 to {len(lengths) - 1}"
                 )
             length = float(lengths[opening.edge])
             if opening.end > length + 1e-4:
                 raise ValueError(
-                    f"{said}: reaches from {opening.offset:.2f} to {opening.end:.2f} m along wall {opening.edge}, "
+                    f"{about}: reaches from {opening.offset:.2f} to {opening.end:.2f} m along wall {opening.edge}, "
                     f"which is {length:.2f} m long; allowed: offset and width within it"
                 )
         elif opening.end > PROPOSED:
             raise ValueError(
-                f"{said}: ends at {opening.end:.2f} m along wall {opening.edge} of a floor that nobody stated, "
+                f"{about}: ends at {opening.end:.2f} m along wall {opening.edge} of a floor that nobody stated, "
                 f"allowed: up to {PROPOSED:g} m, or say the size of the room"
             )
         top = opening.sill + opening.height
         if height is not None and top > height + 1e-6:
-            raise ValueError(f"{said}: its top is at {top:.2f} m, allowed: up to the room's height, {height:.2f} m")
+            raise ValueError(f"{about}: its top is at {top:.2f} m, allowed: up to the room's height, {height:.2f} m")
         for other in seen.values():
             if overlap(opening, other) > TOUCH:
                 raise ValueError(
-                    f"{said} and {other.kind} {other.name!r} overlap by {overlap(opening, other):.2f} m on wall "
+                    f"{about} and {other.kind} {other.name!r} overlap by {overlap(opening, other):.2f} m on wall "
                     f"{opening.edge}, allowed: side by side"
                 )
         seen[opening.name] = opening

@@ -64,8 +64,8 @@ class RoomBoxes:
     @classmethod
     def from_json(cls, raw: dict) -> RoomBoxes:
         """Read one entry of a rooms file; raises ValueError that names the field which is not as allowed."""
-        told = raw.get("objects") if isinstance(raw, dict) else None
-        if not isinstance(told, list) or not all(isinstance(one, dict) for one in told):
+        items = raw.get("objects") if isinstance(raw, dict) else None
+        if not isinstance(items, list) or not all(isinstance(one, dict) for one in items):
             raise ValueError("objects is no list of objects")
         floor, height = _numbers(raw, "floor_polygon", -1, 2), float(_numbers(raw, "height", least=0))
         if len(floor) in (1, 2):
@@ -73,16 +73,16 @@ class RoomBoxes:
         relations = None if raw.get("relations") is None else _numbers(raw, "relations", -1, 3).astype(int)
         known = {row.id for row in vocabulary().predicates}
         for s, p, o in () if relations is None else relations.tolist():
-            if s == o or not {s, o} <= {*range(len(told))} or p not in known:
-                raise ValueError(f"relation {[s, p, o]}, allowed: two of {len(told)} objects and a predicate's number")
+            if s == o or not {s, o} <= {*range(len(items))} or p not in known:
+                raise ValueError(f"relation {[s, p, o]}, allowed: two of {len(items)} objects and a predicate's number")
         return cls(
             id=_word(raw, "id"), room_type=_word(raw, "room_type"), floor_polygon=floor, height=height,
-            categories=tuple(_word(o, "category") for o in told),
-            size=np.array([_numbers(o, "size", 3, least=0) for o in told]).reshape(-1, 3),
-            position=np.array([_numbers(o, "position", 3) for o in told]).reshape(-1, 3),
-            yaw=np.array([_numbers(o, "yaw") for o in told]).reshape(-1),
-            models=tuple(_word({"model": "", **o}, "model") for o in told),
-            styles=tuple(int(_numbers({"style": -1, **o}, "style")) for o in told),
+            categories=tuple(_word(o, "category") for o in items),
+            size=np.array([_numbers(o, "size", 3, least=0) for o in items]).reshape(-1, 3),
+            position=np.array([_numbers(o, "position", 3) for o in items]).reshape(-1, 3),
+            yaw=np.array([_numbers(o, "yaw") for o in items]).reshape(-1),
+            models=tuple(_word({"model": "", **o}, "model") for o in items),
+            styles=tuple(int(_numbers({"style": -1, **o}, "style")) for o in items),
             relations=relations, openings=tuple(map(opening_from_json, raw.get("openings", ()))),
         )  # fmt: skip
 
@@ -124,15 +124,15 @@ def _word(raw: dict, key: str) -> str:
 
 def _numbers(raw: dict, key: str, *shape: int, least: float = -np.inf) -> np.ndarray:
     """The finite numbers of a field, of one shape; -1 = as many as there are."""
-    told = raw.get(key)
+    value = raw.get(key)
     try:
-        found = np.array(told if told != [] else np.zeros((0, *shape[1:])), float)
+        found = np.array(value if value != [] else np.zeros((0, *shape[1:])), float)
         fits = all(want in (-1, has) for want, has in zip(shape, found.shape, strict=True))
     except (TypeError, ValueError):
         fits = False
     if not fits or not (np.isfinite(found) & (found >= least)).all():
         what = f"{' x '.join(map(str, shape)).replace('-1', 'n')} finite numbers" if shape else "a finite number"
-        raise ValueError(f"{key} is {told!r}, allowed: {what}{' of 0 and more' * (least == 0)}")
+        raise ValueError(f"{key} is {value!r}, allowed: {what}{' of 0 and more' * (least == 0)}")
     return found
 
 

@@ -19,25 +19,25 @@ from echomodel.vocabulary import vocabulary
 ALMOST = np.radians(3.0)  # off a quarter turn to a wall: nobody turns furniture by so little
 
 
-def settled(plan: Plan, boxes: Boxes, given: Array | None = None) -> Boxes:
+def settled(plan: Plan, boxes: Boxes, fixed: Array | None = None) -> Boxes:
     """Boxes at the heights that their carriers give them and, where they almost are, square to a wall.
 
     Only the last step does so: down a slope that begins where terms have their kinks a hair's breadth decides.
 
     Arguments: as for `guidance.mended`, the plan in either library.
     """
-    start = standing(plan, boxes, given)
+    start = standing(plan, boxes, fixed)
     off = askew(start, start.kit.arange(len(start)))
-    return placed(boxes, start.position, start.yaw - start.kit.where((abs(off) < ALMOST) & ~start.given, off, 0.0))
+    return placed(boxes, start.position, start.yaw - start.kit.where((abs(off) < ALMOST) & ~start.fixed, off, 0.0))
 
 
-def standing(plan: Plan, boxes: Boxes, given: Array | None) -> Plan:
+def standing(plan: Plan, boxes: Boxes, fixed: Array | None) -> Plan:
     """The plan with boxes where they are drawn, at the heights of what carries them, but for those that stay."""
     xp, device = kit(plan.yaw), device_of(plan.yaw)
     drawn, like = boxes.to(device), xp.zeros(0, dtype=xp.float64)  # rounding would choose the side
     size, position, yaw = (cast(of, like) for of in (drawn.size, drawn.position, drawn.yaw))
-    stays = xp.zeros(len(boxes), dtype=xp.bool) if given is None else on_device(given, device)
-    start = replace(plan, size=size, position=position, yaw=yaw, given=stays, floor=cast(plan.floor, like))
+    stays = xp.zeros(len(boxes), dtype=xp.bool) if fixed is None else on_device(fixed, device)
+    start = replace(plan, size=size, position=position, yaw=yaw, fixed=stays, floor=cast(plan.floor, like))
     height = xp.where(stays, position[:, 1], heights(start))
     return start.at(xp.stack([position[:, 0], height, position[:, 2]], 1), yaw)
 

@@ -29,12 +29,12 @@ def centred(floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | No
     """
     if floor is None:
         return np.full((4, 2), np.nan, np.float32)
-    given = np.asarray(floor, np.float64)
-    if given.shape == (2,):
-        return rectangle(*given.tolist()).astype(np.float32)
-    if given.ndim != 2 or given.shape[1] != 2 or len(given) < 3:
-        raise ValueError(f"floor has shape {given.shape}, expected (2,) extents or (k, 2) corners, k >= 3")
-    return (given - (given.max(0) + given.min(0)) / 2).astype(np.float32)
+    corners = np.asarray(floor, np.float64)
+    if corners.shape == (2,):
+        return rectangle(*corners.tolist()).astype(np.float32)
+    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:
+        raise ValueError(f"floor has shape {corners.shape}, expected (2,) extents or (k, 2) corners, k >= 3")
+    return (corners - (corners.max(0) + corners.min(0)) / 2).astype(np.float32)
 
 
 def padded(rows: Sequence[Array]) -> Array:
@@ -138,8 +138,8 @@ def room_features(rows: Array) -> tuple[Array, Array]:
     xp, there = kit(rows), kit(rows).isfinite(rows[..., 0])
     rows = xp.where(there[..., None], rows, xp.zeros_like(rows))
     width = norm(rows[..., 2:4] - rows[..., :2])[..., None]
-    told = xp.concat([rows[..., :4] / 2, rows[..., 4:6], width, rows[..., 6:]], -1)
-    return told, cast(there, rows)
+    features = xp.concat([rows[..., :4] / 2, rows[..., 4:6], width, rows[..., 6:]], -1)
+    return features, cast(there, rows)
 
 
 def clearances(boxes: Boxes, rows: Array) -> Array:
@@ -159,9 +159,9 @@ def clearances(boxes: Boxes, rows: Array) -> Array:
         nearest = xp.where(mask, clear, xp.full_like(clear, AWAY * 10)).argmin(1)
         some = cast(mask.any(1), clear)[:, None]
         chosen = xp.stack([picked(gap, nearest) for gap in (*gaps[:2], clear)], 1)
-        told = [xp.tanh(chosen / scale) for scale in (AWAY, ROUND_ABOUT, NEAR)]
-        told += [xp.tanh(picked(gap, nearest)[:, None] / s) for gap in gaps[2:] for s in (ROUND_ABOUT, NEAR)]
-        out.append(xp.concat([xp.concat(told, 1) * some, some], 1))
+        features = [xp.tanh(chosen / scale) for scale in (AWAY, ROUND_ABOUT, NEAR)]
+        features += [xp.tanh(picked(gap, nearest)[:, None] / s) for gap in gaps[2:] for s in (ROUND_ABOUT, NEAR)]
+        out.append(xp.concat([xp.concat(features, 1) * some, some], 1))
     return xp.concat(out, 1)
 
 

@@ -276,5 +276,5 @@ def _shipped() -> Vocabulary:
         for name, kind in kinds.items()
     }
     words = {name: tuple(raw[name]) for name in ("structure", "coarse_categories", "unsupported")}
-    meant = {kind: {word: tuple(near) for word, near in said.items()} for kind, said in raw["meant"].items()}
+    meant = {kind: {word: tuple(near) for word, near in words_of.items()} for kind, words_of in raw["meant"].items()}
     return Vocabulary(**rows, **words, hints=raw["hints"], meant=meant)

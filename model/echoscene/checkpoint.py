@@ -156,8 +156,8 @@ def read_published(path: str | os.PathLike[str]) -> dict[str, Tensor]:
         # Mapped, not read: the optimiser's state in a published file is twice as large as the weights.
         raw = torch.load(path, map_location="cpu", weights_only=True, mmap=is_zipfile(path))
     except pickle.UnpicklingError as error:
-        told = str(error)
-        named = re.search(r"GLOBAL ([\w.]+)", told) or re.search(r"`?([\w.]+)`? (?:was not an allowed|is not)", told)
+        text = str(error)
+        named = re.search(r"GLOBAL ([\w.]+)", text) or re.search(r"`?([\w.]+)`? (?:was not an allowed|is not)", text)
         what = f"it refers to {named.group(1)}" if named else "it is not a plain pickle of tensors"
         raise CheckpointError(
             f"{path}: refused, {what}; only tensors, numbers and containers of them are read, nothing is executed"

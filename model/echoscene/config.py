@@ -162,16 +162,16 @@ def paper(classes: int = 14, settings: Mapping[str, Any] | None = None) -> Relea
     for name in settings or {}:
         if name not in known:
             raise ValueError(f"unknown field 'paper.{name}', allowed: {', '.join(sorted(known))}")
-    told = {
+    published = {
         part: {field: settings[name] for name, field in names.items() if settings and name in settings}
         for part, names in SETTINGS.items()
     }
-    encoder = from_dict(EncoderConfig, {"classes": classes, "separated": False, **told["encoder"]}, "paper")
+    encoder = from_dict(EncoderConfig, {"classes": classes, "separated": False, **published["encoder"]}, "paper")
     common = {"edge_features": encoder.text, "predicate": encoder.learned}
-    layout = from_dict(UNetConfig, {"objects": 2 * encoder.node, **common, **told["layout"]}, "paper")
+    layout = from_dict(UNetConfig, {"objects": 2 * encoder.node, **common, **published["layout"]}, "paper")
     # the condition of the shapes is as wide as what reaches the U-Net where no echo stands between them
-    volume = told["shape"].get("conditioning") == "concat" and not told["shape"].get("echo", True)
+    volume = published["shape"].get("conditioning") == "concat" and not published["shape"].get("echo", True)
     objects = layout.grid**3 if volume else layout.context
-    shape = from_dict(UNetConfig, {**SHAPE, "objects": objects, **common, **told["shape"]}, "paper")
-    vqvae = from_dict(VQConfig, {"resolution": 4 * layout.grid, **told["vqvae"]}, "paper")
+    shape = from_dict(UNetConfig, {**SHAPE, "objects": objects, **common, **published["shape"]}, "paper")
+    vqvae = from_dict(VQConfig, {"resolution": 4 * layout.grid, **published["vqvae"]}, "paper")
     return ReleasedConfig("paper", encoder, layout, shape, vqvae)

@@ -88,7 +88,7 @@ class ReleasedEcho:
         """
         by = Sampling(**how)
         assert not isinstance(by.generator, SceneGenerators)  # scenes of their own seeds are for compact weights
-        whole, change, objects = self._told(graph, by.edit)
+        whole, change, objects = self._asked(graph, by.edit)
         boxes = self.model.sample_layout(
             whole, generator=by.generator, steps=by.steps, change=change, progress=by.progress
         )[objects]
@@ -110,7 +110,7 @@ class ReleasedEcho:
         """
         by = Sampling(**how)
         assert not isinstance(by.generator, SceneGenerators)  # scenes of their own seeds are for compact weights
-        whole, change, objects = self._told(graph, by.edit)
+        whole, change, objects = self._asked(graph, by.edit)
         latents = self.model.sample_shapes(
             whole, generator=by.generator, steps=by.steps or 100, change=change, progress=by.progress
         )[objects]
@@ -143,14 +143,14 @@ class ReleasedEcho:
             raise ValueError(f"this model has no class for {', '.join(missing)}; allowed: {', '.join(sorted(known))}")
         return [found[number] for number in graph.category.tolist()]
 
-    def _told(self, graph: GraphBatch, edit: GraphEdit | None) -> tuple[SceneGraphTensors, GraphChange | None, Tensor]:
+    def _asked(self, graph: GraphBatch, edit: GraphEdit | None) -> tuple[SceneGraphTensors, GraphChange | None, Tensor]:
         """All scenes as the model takes them, the edit, and (M,) bool which nodes are objects; made on the CPU."""
         graph = in_published_words(graph.to("cpu"))
         scenes, objects = self._scenes(graph)
         change = None
         if edit is not None:
-            told = replace(edit, before=on_device(edit.before, "cpu"), added=on_device(edit.added, "cpu"))
-            change = self._change(graph, scenes, told)
+            there = replace(edit, before=on_device(edit.before, "cpu"), added=on_device(edit.added, "cpu"))
+            change = self._change(graph, scenes, there)
         return pack_scenes(scenes)[0], change, objects.to(self.model.device)
 
     def _scenes(self, graph: GraphBatch) -> tuple[list[SceneGraphTensors], Tensor]:

@@ -397,8 +397,8 @@ class ReleasedModel(GraphEncoder):
             t = torch.randint(count, (kept,), generator=generator).to(device)
             clean = latents[:kept].to(device)
             noise = normal(clean.shape, generator, device)
-            given, tables = shapes[:kept], self.shape_tables
-            losses["shape"] = shape_loss(self.shape_df, clean, given, triples, t, noise, tables, edge_attr)
+            context, tables = shapes[:kept], self.shape_tables
+            losses["shape"] = shape_loss(self.shape_df, clean, context, triples, t, noise, tables, edge_attr)
             losses["loss"] = losses["layout"] + losses["shape"]
         return losses
 

@@ -40,8 +40,8 @@ class PublishedRooms:
     """
 
     def __init__(self, folder: Path) -> None:
-        told = SGFront(folder).rooms()
-        pairs = zip(with_known_words(told), told, strict=True)
+        rooms = SGFront(folder).rooms()
+        pairs = zip(with_known_words(rooms), rooms, strict=True)
         self.rooms = [replace(new, relations=old.relations) for new, old in pairs if len(new) == len(old) > 0]
         if not self.rooms:
             raise ValueError(f"{folder}: no scan of trainval with objects that the vocabulary holds")
@@ -261,11 +261,11 @@ def paper_model(settings: Mapping[str, Any], start: tuple[str, ...] = ()) -> Pap
     classes = vocabulary().coarse_categories
     model = PaperModel(paper(len(classes), settings), classes=classes)
     for path in start:
-        given = load_released(path)
-        if getattr(given, "config", None) != model.config:
+        released = load_released(path)
+        if getattr(released, "config", None) != model.config:
             raise ValueError(f"{path}: was not trained with the sizes in the recipe's [paper]")
-        model.load_state_dict(given.state_dict())
-        model.statistics = getattr(given, "statistics", None)
+        model.load_state_dict(released.state_dict())
+        model.statistics = getattr(released, "statistics", None)
     return model
 
 

@@ -29,8 +29,8 @@ def main() -> None:
     began, recipe = time.monotonic(), read_recipe(options.recipe, options.set)
 
     def report(step: int, values: dict[str, float]) -> None:
-        told = (f"{name} {value:.4g}" for name, value in values.items())
-        print(f"{time.monotonic() - began:5.0f} s  step {step} of {recipe.steps}", *told, flush=True)
+        shown = (f"{name} {value:.4g}" for name, value in values.items())
+        print(f"{time.monotonic() - began:5.0f} s  step {step} of {recipe.steps}", *shown, flush=True)
 
     resume = (options.output / "checkpoint.safetensors").exists()
     trainer = open_run(recipe, options.output, resume=resume, report=report)

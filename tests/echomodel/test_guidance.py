@@ -65,7 +65,7 @@ def test_what_a_term_misses_is_mended_and_none_shrinks(things, more, wrong):
 
 def test_known_boxes_stay():
     plan, boxes = room(("wardrobe", (0.0, 0.1, 0.0), 0), ("desk", (0.6, 0.0, 0.2), 0))
-    after = mended(plan, boxes, strength=0.1, rounds=40, given=torch.tensor([True, False]))
+    after = mended(plan, boxes, strength=0.1, rounds=40, fixed=torch.tensor([True, False]))
     assert torch.equal(after.position[0], boxes.position[0])
     assert after.yaw[0] == boxes.yaw[0]
     assert "apart" not in faults(plan, after)

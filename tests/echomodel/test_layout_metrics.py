@@ -22,6 +22,7 @@ from echomodel.metrics.layouts import (
 from echomodel.metrics.pictures import bodies, body_scores, collisions, out_of_bounds
 from echomodel.metrics.sets import (
     category_divergence,
+    forest_auc,
     frechet_distance,
     kernel_distance,
     layout_distance,
@@ -29,7 +30,6 @@ from echomodel.metrics.sets import (
     object_features,
     set_figures,
     size_distances,
-    told_apart,
 )
 from echomodel.metrics.statistics import Counts, figure, paired_p
 from echomodel.openings import Opening
@@ -58,7 +58,7 @@ def share(pair):
 @pytest.mark.parametrize("rules", ["strict", "sgfront"])
 def test_true_boxes_keep_every_relation_and_mirrored_ones_lose_theirs(rooms, rules):
     tasks = tasks_of(rooms, 0, rules=rules)
-    assert sum(len(task.told) for task in tasks) > 1000
+    assert sum(len(task.stated) for task in tasks) > 1000
     mirrored = [replace(r, position=r.position * [1, 1, -1], yaw=-r.yaw) for r in rooms]
     for task, room, other in zip(tasks, rooms, mirrored, strict=True):
         assert share(kept_relations(task, room)["all"]) == 1.0
@@ -69,32 +69,32 @@ def test_true_boxes_keep_every_relation_and_mirrored_ones_lose_theirs(rooms, rul
 
 
 def test_people_tell_few_relations_of_near_pairs(rooms):
-    few = tasks_of(rooms, 0, told=1.0)
-    assert all(0 < len(task.told) <= len(task.room) for task in few)
-    assert [task.told.tolist() for task in tasks_of(rooms, 0, told=1.0)] == [task.told.tolist() for task in few]
+    few = tasks_of(rooms, 0, stated=1.0)
+    assert all(0 < len(task.stated) <= len(task.room) for task in few)
+    assert [task.stated.tolist() for task in tasks_of(rooms, 0, stated=1.0)] == [task.stated.tolist() for task in few]
 
 
 def test_edits_turn_one_relation_or_bring_one_object(rooms):
     rng = np.random.default_rng(3)
     for task in tasks_of(rooms, 0, rules="sgfront"):
         turned = changed(task, rng)
-        new = {tuple(t) for t in turned.told.tolist()} - {tuple(t) for t in task.told.tolist()}
+        new = {tuple(t) for t in turned.stated.tolist()} - {tuple(t) for t in task.stated.tolist()}
         assert len(new) <= 1
         assert all((s, OPPOSITE[p], o) in {tuple(t) for t in turned.before.tolist()} for s, p, o in new)
         broken = kept_relations(turned, task.room)
         assert broken["rest"][0] == broken["rest"][1]
-        assert broken["all"][1][0] - broken["all"][0][0] == (1 if len(new) else 0) or len(turned.told) < len(task.told)
+        assert broken["all"][1][0] - broken["all"][0][0] == bool(len(new)) or len(turned.stated) < len(task.stated)
         added = extended(task, rng)
         assert added.added.sum() == 1
         assert not added.added[added.before[:, [0, 2]]].any()
-        assert np.array_equal(added.told, task.told)
+        assert np.array_equal(added.stated, task.stated)
 
 
 def test_faults_are_counted_once_in_either_half(rooms):
     assert not HALVES[0] & HALVES[1]
     assert min(map(len, HALVES)) > 15
     total = 0.0
-    for task in tasks_of(rooms[:10], 0, told=1.0):
+    for task in tasks_of(rooms[:10], 0, stated=1.0):
         wild = replace(task.room, position=np.roll(task.room.position, 1, axis=0))
         scores = layout_scores(task, wild)
         parts = sum(pair[0] for name, pair in scores.items() if name.startswith("term "))
@@ -157,14 +157,14 @@ def test_sets_on_closed_forms():
 def test_a_forest_tells_what_differs_and_nothing_else(rooms, monkeypatch):
     monkeypatch.setattr("echomodel.metrics.sets.TREES", 50)
     wild = [replace(r, position=np.roll(r.position, 1, axis=0)) for r in rooms[:20]]
-    assert told_apart(wild, rooms[:20], 0, paired=True).value > 0.85
-    assert told_apart(wild[:3], rooms[:3], 0, paired=True).value is None
-    nothing = told_apart(rooms[:20], rooms[20:], 0)
+    assert forest_auc(wild, rooms[:20], 0, paired=True).value > 0.85
+    assert forest_auc(wild[:3], rooms[:3], 0, paired=True).value is None
+    nothing = forest_auc(rooms[:20], rooms[20:], 0)
     assert nothing.low < 0.5 < nothing.high
     digits = [replace(r, position=r.position + 1e-4, yaw=r.yaw + 1e-4) for r in rooms[:20]]
     features = [np.concatenate([object_features(r) for r in part]) for part in (digits, rooms[:20])]
     assert np.mean(features[0] != features[1]) < 0.02  # what differs are files, not rooms
-    assert told_apart(wild, rooms[:20], 0) == told_apart(wild, rooms[:20], 0)
+    assert forest_auc(wild, rooms[:20], 0) == forest_auc(wild, rooms[:20], 0)
 
 
 def test_set_figures_have_intervals_and_see_scrambled_rooms(rooms):

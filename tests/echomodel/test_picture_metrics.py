@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from echomodel.metrics.pictures import features, picture, picture_figures, told_by_pictures
+from echomodel.metrics.pictures import cnn_accuracy, features, picture, picture_figures
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_rooms
 
@@ -93,7 +93,7 @@ def test_their_distances_have_closed_forms():
 def test_a_small_network_tells_what_differs_and_nothing_else(monkeypatch):
     monkeypatch.setattr("echomodel.metrics.pictures.STEPS", 20)
     shown = np.stack([picture(room, 0) for room in generate_rooms(12, 4)])
-    assert told_by_pictures(shown, 255 - shown, 0).value > 0.95
-    same = told_by_pictures(shown, shown, 0)
+    assert cnn_accuracy(shown, 255 - shown, 0).value > 0.95
+    same = cnn_accuracy(shown, shown, 0)
     assert same.value == pytest.approx(0.5)
-    assert same == told_by_pictures(shown, shown, 0)
+    assert same == cnn_accuracy(shown, shown, 0)

@@ -30,7 +30,7 @@ class Inline:
             fate = forced.pop(0)
             self.done.append(Outcome(task, fate, error=f"forced: {fate}"))
             return
-        fate, value = attempt(task.call, task.given)
+        fate, value = attempt(task.call, task.argument)
         self.done.append(Outcome(task, fate, value) if fate == "done" else Outcome(task, fate, error=value))
 
     def outcomes(self, seconds):

@@ -64,9 +64,9 @@ def found_in(
     rooms = list(_rooms(kinds, [(text, axes @ where) for text, where in labels], axes))
     if not rooms:
         layers = Counter(stroke.layer or "0" for stroke in strokes)
-        told = ", ".join(f"{name} ({count})" for name, count in layers.most_common(6)) or "none"
+        listed = ", ".join(f"{name} ({count})" for name, count in layers.most_common(6)) or "none"
         raise GraphError(
-            f"no rooms; layers: {told}; allowed: closed lines on a layer such as 'room', or lines that "
+            f"no rooms; layers: {listed}; allowed: closed lines on a layer such as 'room', or lines that "
             "enclose rooms on one such as 'wall'"
         )
     holes = [
@@ -180,8 +180,8 @@ def read_dxf(path: Path, unit: float | None) -> Found:
             ignored[kind.lower()] += 1
         if len(strokes) > MOST:
             raise GraphError(f"more than {MOST} lines, allowed: that many")
-    told = f"{scale:g} m a unit ({'as told' if unit is not None else 'as the file says'}), x is east, y north"
-    return found_in(strokes, blocks, labels, MAP, told, ignored)
+    frame = f"{scale:g} m a unit ({'as told' if unit is not None else 'as the file says'}), x is east, y north"
+    return found_in(strokes, blocks, labels, MAP, frame, ignored)
 
 
 DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
@@ -230,8 +230,8 @@ def read_svg(content: bytes, unit: float | None) -> Found:
     walk(shown, "")
     if len(strokes) > MOST:
         raise GraphError(f"more than {MOST} lines, allowed: that many")
-    told = f"{unit:g} m a unit (as told), up of the picture is north"
-    return found_in(strokes, (), labels, SCREEN, told, Counter())
+    frame = f"{unit:g} m a unit (as told), up of the picture is north"
+    return found_in(strokes, (), labels, SCREEN, frame, Counter())
 
 
 INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}label"
@@ -328,8 +328,8 @@ def read_here(path: str, unit: float | None) -> Found:
     walls = [made[0][:, :2] for one in file.by_type("IfcWall") if (made := mesh(one)) is not None]
     lines = [np.array(shapely.MultiPoint(w @ MAP.T).minimum_rotated_rectangle.exterior.coords) for w in walls]
     storeys = sorted({room.storey for room in rooms}, key=lambda level: lows.get(level, 0.0))
-    told = f"{'its own units' if scale == 1 else f'{scale:g} m a unit (as told)'} in metres, z up, y is north"
-    return Found(told, rooms, holes, pieces, storeys, lines, ignored)
+    frame = f"{'its own units' if scale == 1 else f'{scale:g} m a unit (as told)'} in metres, z up, y is north"
+    return Found(frame, rooms, holes, pieces, storeys, lines, ignored)
 
 
 def _of_type(file: Any, name: str) -> list[Any]:

@@ -31,14 +31,14 @@ class Format:
     """A format: what it is called, how a file in it ends, whether it needs a unit to be told, and its reader.
 
     Arguments:
-        told: of JSON, whether this is the format of some data; None for others.
+        recognised: of JSON, whether this is the format of some data; None for others.
         read: of a path and a unit in metres (`None` = as the file says), or of the data.
     """
 
     name: str
     ending: str
     read: Callable[..., Found]
-    told: Callable[[Any], bool] | None = None
+    recognised: Callable[[Any], bool] | None = None
     metric: bool = True  # always in one unit, so that none can be told
 
 
@@ -114,16 +114,16 @@ def read_plan(path: Path, form: str | None = None, unit: float | None = None) ->
         if unit is not None and chosen.metric:
             raise GraphError(f"--unit: {chosen.name} is always in one unit, allowed: to leave it out")
         with within_memory(path):
-            return chosen.name, chosen.read(data) if chosen.told else chosen.read(path, unit)
+            return chosen.name, chosen.read(data) if chosen.recognised else chosen.read(path, unit)
     except GraphError as error:
-        told = str(error)
-        raise GraphError(told if told.startswith(str(path)) else f"{path}: {told}") from None
+        message = str(error)
+        raise GraphError(message if message.startswith(str(path)) else f"{path}: {message}") from None
     except OSError as error:
         raise GraphError(f"{path}: {(error.strerror or str(error)).lower()}") from None
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        told = str(error).removeprefix(f"{path}: ").removeprefix(f"{path.name}: ").partition("\n")[0]
-        said = f"{error} is missing" if isinstance(error, KeyError) else told
-        raise GraphError(f"{path}: not as {form or path.suffix.lstrip('.')} has it ({said})") from None
+        message = str(error).removeprefix(f"{path}: ").removeprefix(f"{path.name}: ").partition("\n")[0]
+        reason = f"{error} is missing" if isinstance(error, KeyError) else message
+        raise GraphError(f"{path}: not as {form or path.suffix.lstrip('.')} has it ({reason})") from None
 
 
 def _format_of(path: Path, form: str | None) -> tuple[Format, Any]:
@@ -134,15 +134,15 @@ def _format_of(path: Path, form: str | None) -> tuple[Format, Any]:
     fitting = [one for one in FORMATS if one.name == form or (form is None and one.ending == path.suffix.lower())]
     if not fitting:
         raise GraphError(f"extension {path.suffix!r}, allowed: {', '.join(dict.fromkeys(f.ending for f in FORMATS))}")
-    if fitting[0].told is None:
+    if fitting[0].recognised is None:
         if path.stat().st_size > MOST:
             raise GraphError(f"{path.stat().st_size} bytes, allowed: at most {MOST}")
         return fitting[0], None
     data = json.loads(read_bounded(path, MOST))
     if not isinstance(data, dict):
         raise GraphError("no plan that is known, allowed: an object with rooms")
-    known = [one for one in fitting if form or (one.told is not None and one.told(data))]
+    known = [one for one in fitting if form or (one.recognised is not None and one.recognised(data))]
     if not known:
-        names = ", ".join(one.name for one in FORMATS if one.told)
+        names = ", ".join(one.name for one in FORMATS if one.recognised)
         raise GraphError(f"no plan that is known, allowed: JSON of {names}")
     return known[0], data

@@ -16,7 +16,7 @@ from echomodel.vocabulary import normalised, vocabulary
 from echousd.assets.naming import category_of, known_word, plain
 from echousd.graph import GraphError, Node, RoomSpec, SceneGraph, starting_graph
 from echousd.graph.nodes import OBSTACLE
-from echousd.home.given import APART, walled
+from echousd.home.existing import APART, walled
 from echousd.home.graph import HomeGraph, HomeRelation, HomeRoom
 from echousd.home.importing.found import Found, Hole, Piece, Room, kind_of
 from echousd.home.openings import Facing, facings, outer_spans
@@ -99,9 +99,9 @@ def imported(found: Found, storey: str | None = None, *, lenient: bool = False) 
     plan = replace(plan, home=HomeGraph(graphs, relations))
     if not holes:
         plan = with_openings(replace(plan, home=plan.home.connected()))
-    told = {"rooms": len(named), **{f"{kind}s": counts[kind] for kind in ("door", "window", "passage")}}
+    counted = {"rooms": len(named), **{f"{kind}s": counts[kind] for kind in ("door", "window", "passage")}}
     return Imported(
-        plan, {**told, "fixed pieces": counts["fixed"]}, {what: n for what, n in ignored.items() if n}, found
+        plan, {**counted, "fixed pieces": counts["fixed"]}, {what: n for what, n in ignored.items() if n}, found
     )
 
 
@@ -114,8 +114,8 @@ def room_kind(words: Sequence[str]) -> str | None:
                 kind = vocabulary().known_room_type("_".join(parts[start : start + length]))
                 if kind is not None:
                     return kind.name
-        if told := kind_of("rooms", plain(text)):
-            return told
+        if word := kind_of("rooms", plain(text)):
+            return word
     return None
 
 
@@ -237,12 +237,12 @@ def _furnished(plan: Plan, pieces: Sequence[Piece]) -> tuple[dict[str, list[Node
         known = size if size is not None and np.isfinite(size).all() else None
         read = [known_word(word) or category_of((), word, "", known)[0] for word in piece.words]
         category = next(filter(None, read), "")
-        told = {}
+        attributes = {}
         if not category:
             if known is None or sorted(known)[1] < LARGE:
                 ignored[f"{piece.words[0]!r}, not known"] += 1
                 continue
-            category, told = TAKEN_FOR, {OBSTACLE: piece.words[0][:60] or "thing"}
+            category, attributes = TAKEN_FOR, {OBSTACLE: piece.words[0][:60] or "thing"}
         usual = size_statistics(category).median
         size = usual if size is None else np.where(np.isfinite(size), size, usual).clip(0.02)
         origin, at, front = plan.origin(room), piece.at.astype(float).copy(), piece.front
@@ -258,8 +258,8 @@ def _furnished(plan: Plan, pieces: Sequence[Piece]) -> tuple[dict[str, list[Node
         found[room].append(
             Node(
                 name, category, size=tuple(size.round(4).tolist()), position=tuple(round(float(v), 4) for v in away),
-                yaw=round(float(np.arctan2(front[0], front[1])), 6), locked=True, attributes=told,
-                shapes="boxes" if told else None,
+                yaw=round(float(np.arctan2(front[0], front[1])), 6), locked=True, attributes=attributes,
+                shapes="boxes" if attributes else None,
             )
         )  # fmt: skip
     return found, ignored

@@ -299,5 +299,5 @@ def read_sweethome(content: bytes, name: str) -> Found:
             at = np.array([middle[0], above, middle[1]])
             front = SCREEN @ [-math.sin(turn), math.cos(turn)]
             pieces.append(Piece(called, (called, one.get("catalogId", "")), at, front, size, storey=storey(one)))
-    told = "centimetres, up of the plan is our north"
-    return Found(told, rooms, holes, pieces, [*number.values()] or [""], [points for _, points in walls])
+    frame = "centimetres, up of the plan is our north"
+    return Found(frame, rooms, holes, pieces, [*number.values()] or [""], [points for _, points in walls])

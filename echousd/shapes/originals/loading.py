@@ -31,7 +31,7 @@ from echousd.shapes.colliders import collider_of
 from echousd.shapes.geometry import CONVERTED, Geometry, Origin, Original, Part
 from echousd.shapes.surface import box_projection, creased_normals
 from echousd.srgb import to_linear
-from echousd.stage.files import layer_bytes, said
+from echousd.stage.files import layer_bytes, usd_error
 from echousd.stage.pen import Pen
 from echousd.stage.shading import Image, preview_surface
 from echousd.textures import READABLE, encoded
@@ -107,7 +107,7 @@ def collected(model: ModelFile) -> tuple[str, Mapping[str, bytes]]:
     try:
         return _collected(model)
     except Tf.ErrorException as error:
-        raise ValueError(f"{model}: cannot be collected with the files that it depends on ({said(error)})") from None
+        raise ValueError(f"{model}: cannot be collected with all that it depends on ({usd_error(error)})") from None
     finally:
         silence.TakeUncoalescedDiagnostics()
         del silence
@@ -160,15 +160,15 @@ class Images:
 
     def named(self, image: Any) -> str:
         """The path of an image (PIL) of a material from the layer, "" where it cannot be packed."""
-        said = image.info.get("file_path", "") if hasattr(image, "info") else ""
-        content = self.beside.images.get(said, b"") if said else b""
+        file = image.info.get("file_path", "") if hasattr(image, "info") else ""
+        content = self.beside.images.get(file, b"") if file else b""
         found = checked_image(content) if content else None
         if found is None or not found[0]:
             mode = "RGBA" if "A" in image.getbands() or image.mode == "P" else "RGB"
             content, ending = encoded(image.convert(mode)), ".png"
         else:
             ending = found[0]
-        stem = re.sub(r"[^A-Za-z0-9_\-]+", "_", PurePosixPath(said.replace("\\", "/")).stem) or "image"
+        stem = re.sub(r"[^A-Za-z0-9_\-]+", "_", PurePosixPath(file.replace("\\", "/")).stem) or "image"
         name = f"{FOLDER}/{stem[:40]}_{hashlib.sha256(content).hexdigest()[:8]}{ending}"
         self.files[name] = content
         return f"./{name}"
@@ -208,8 +208,8 @@ def _parts(scene: trimesh.Scene) -> Iterator[_Part]:
         points = np.asarray(mesh.vertices) @ matrix[:3, :3].T + matrix[:3, 3]
         faces = np.asarray(mesh.faces)[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else np.asarray(mesh.faces)
         faces = outward(points, faces)
-        told = getattr(mesh.visual, "uv", None)
-        uv = None if told is None or len(told) != len(points) else np.asarray(told)
+        coordinates = getattr(mesh.visual, "uv", None)
+        uv = None if coordinates is None or len(coordinates) != len(points) else np.asarray(coordinates)
         if uv is not None:  # beyond a million repeats no digits are left for a place in the image: an exporter's slip
             uv = np.where(np.abs(uv) < 1e6, uv, 0.0) if np.isfinite(uv).all() else None
         yield Mesh(points, faces), uv, getattr(mesh.visual, "material", None)
@@ -227,8 +227,8 @@ def _layer(parts: list[_Part], images: Images) -> Sdf.Layer:
         if material is None:
             continue
         if id(material) not in looks:
-            said = str(getattr(material, "name", "") or "look")
-            name = Tf.MakeValidIdentifier(said.encode("ascii", "replace").decode())
+            label = str(getattr(material, "name", "") or "look")
+            name = Tf.MakeValidIdentifier(label.encode("ascii", "replace").decode())
             while name in taken:
                 name = f"{name}_{number}"
             taken.add(name)

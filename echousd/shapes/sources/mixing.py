@@ -15,7 +15,7 @@ from echomodel.late import Late
 from echomodel.protocols import RoomModel, furnishes
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
-from echousd.graph.arrays import TOLD, graph_batch, one_thread, rounded, seeded
+from echousd.graph.arrays import DESCRIPTION, graph_batch, one_thread, rounded, seeded
 from echousd.shapes.geometry import Geometry, Origin
 from echousd.shapes.joinery import assembled
 from echousd.shapes.sources.named import source_of
@@ -38,12 +38,12 @@ def furniture_of_parts(request: ShapeRequest) -> Shapes:
     named = stated_styles(request.graph)
 
     def make(row: int) -> Geometry:
-        told = tuple(round(float(v), 4) for v in described[row])
-        style, choices = piece_of(np.array(told), named[request.graph.nodes[row].name])
+        vector = tuple(round(float(v), 4) for v in described[row])
+        style, choices = piece_of(np.array(vector), named[request.graph.nodes[row].name])
         kind = vocabulary().category(request.graph.nodes[row].category)
         parts = solids(kind.name, style, choices, size[row])
         origin = Origin("parts")
-        return assembled(parts, size[row], faces=request.faces, origin=origin, description=told, round=kind.round)
+        return assembled(parts, size[row], faces=request.faces, origin=origin, description=vector, round=kind.round)
 
     return per_asset(request, make)
 
@@ -68,7 +68,7 @@ def descriptions(request: ShapeRequest) -> np.ndarray:
             graph_batch(graph), request.centred, generator=seeded(request.seed, "parts"), steps=request.steps,
             styles=styles, progress=tell, **extra,
         )  # fmt: skip
-    return rounded(on_device(found, None), TOLD).astype(np.float32)
+    return rounded(on_device(found, None), DESCRIPTION).astype(np.float32)
 
 
 @dataclass(frozen=True)

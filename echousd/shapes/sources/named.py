@@ -60,7 +60,7 @@ def _moved(graph: SceneGraph, change: Callable[[str], str]) -> SceneGraph:
     return graph if nodes == graph.nodes else graph.replaced(nodes=nodes)
 
 
-def with_given_sizes(graph: SceneGraph, sizes: Mapping[str, Vector]) -> SceneGraph:
+def with_model_sizes(graph: SceneGraph, sizes: Mapping[str, Vector]) -> SceneGraph:
     """The graph in which the sizes that are known of some objects are fixed, unless they state their own."""
     if not sizes:
         return graph

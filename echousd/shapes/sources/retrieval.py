@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 TOGETHER = ("at", "head", "beside")  # slot_roles of things that come in pairs and sets
 
 
-def given_pieces(
+def named_pieces(
     graph: SceneGraph, wishes: Wanted, among: Container[str] | None = None, timer: StageTimer | None = None
 ) -> Retrieved:
     """The models that the graph names itself, with their real sizes; raises ValueError that names object and file.
@@ -44,14 +44,14 @@ def given_pieces(
     with (timer or StageTimer()).stage("assets"):
         for node in named:
             try:
-                chosen[node.name], files[node.name] = _given(node, asked)
+                chosen[node.name], files[node.name] = _named(node, asked)
             except (ValueError, ImportError) as error:
                 raise ValueError(f"object {node.name!r}: {error}") from None
     sizes = {node.name: chosen[node.name].dims for node in named if node.size is None}
     return Retrieved(chosen, files, sizes, collect=asked.collect)
 
 
-def _given(node: Node, wishes: AssetWishes) -> tuple[AssetRecord, ModelFile]:
+def _named(node: Node, wishes: AssetWishes) -> tuple[AssetRecord, ModelFile]:
     from echousd.shapes.originals.loading import library_file, own_file, own_record
 
     assert node.asset is not None
@@ -67,18 +67,18 @@ def _given(node: Node, wishes: AssetWishes) -> tuple[AssetRecord, ModelFile]:
 
 
 def retrieved(
-    request: ShapeRequest, shapes: str, wishes: Wanted, given: Retrieved,
+    request: ShapeRequest, shapes: str, wishes: Wanted, named: Retrieved,
     nearness: Mapping[str, Mapping[str, float]] | None = None, palette: str = "",
 ) -> Retrieved:  # fmt: skip
     """The models of all objects that come from a library, and the sizes of those that their boxes do not fit.
 
-    `shapes`: the room's source. `given`: what `given_pieces` found. `nearness`: as for `choose`. `palette`: harmony of
+    `shapes`: the room's source. `named`: what `named_pieces` found. `nearness`: as for `choose`. `palette`: harmony of
     the room, whose colours models shall go with; "" = that which the seed chooses.
     """
     graph, seed = request.graph, request.seed
     wanted = [i for i in request.rows if source_of(graph.nodes[i], shapes) in RETRIEVED]
     if not wanted:
-        return given
+        return named
     from echousd.assets.choose import choose, fits
     from echousd.shapes.originals.loading import library_file
 
@@ -90,15 +90,15 @@ def retrieved(
             asked,
             _asked(graph, wanted, size, request.styles),
             seed,
-            kept=given.chosen,
+            kept=named.chosen,
             nearness=nearness,
             palette=tones,
         )
-        files, sizes = dict(given.files), dict(given.sizes)
+        files, sizes = dict(named.files), dict(named.sizes)
         for i in wanted:
             node = graph.nodes[i]
             record = chosen.get(node.name)
-            if record is None or node.name in given.chosen:
+            if record is None or node.name in named.chosen:
                 continue
             assert asked.library is not None
             files[node.name] = library_file(asked.library, record)

@@ -39,8 +39,8 @@ class Furniture(Layers):
     def clean(self, scores: Array) -> Array:
         """(..., D) that scores (..., D) stand for: each word's probability on [-1, 1], numbers cut."""
         ends = [0, *accumulate(self.settings.kinds)]
-        said = [2 * softmax(scores[..., start:end]) - 1 for start, end in pairwise(ends)]
-        return kit(scores).concat([*said, clipped(scores[..., ends[-1] :], -1.0, 1.0)], -1)
+        parts = [2 * softmax(scores[..., start:end]) - 1 for start, end in pairwise(ends)]
+        return kit(scores).concat([*parts, clipped(scores[..., ends[-1] :], -1.0, 1.0)], -1)
 
     def scores(self, x: Array, level: Array, context: FurnitureContext) -> Array:
         """Logarithms of the words' odds, and the numbers as they are: (N, D)."""
@@ -60,7 +60,7 @@ class Furniture(Layers):
         """
         xp = kit(x)
         clear = xp.log1p(2 * (1 - level) / (level + 0.05))  # 0 for pure noise, 3.7 for a known piece
-        weight = cast(1 / (1 + xp.exp(-self.trust(pairs.told))), x) * clear[pairs.sender, None]
+        weight = cast(1 / (1 + xp.exp(-self.trust(pairs.stated))), x) * clear[pairs.sender, None]
         total = sum_of(pairs.receiver, weight, len(x))
         out = []
         for voice in range(weight.shape[1]):

@@ -188,8 +188,8 @@ class Layout(Layers):
         walls, openings = wall_features(boxes, context.floor), clearances(boxes, context.openings)
         concat = kit(clean).concat
         features = concat([box_features(clean, self.settings.frequencies), walls, openings], 1)
-        told = concat([context.pairs.told, pair_features(boxes, context.pairs)], 1)
-        return features, replace(context.pairs, told=told)
+        stated = concat([context.pairs.stated, pair_features(boxes, context.pairs)], 1)
+        return features, replace(context.pairs, stated=stated)
 
 
 def exactly(x: Array) -> AbstractContextManager[None]:

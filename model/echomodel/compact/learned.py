@@ -47,7 +47,7 @@ def table_of(kind: str, names: Names) -> np.ndarray:
 
 def unlearned(graph: GraphBatch, config: CompactConfig) -> tuple[str, ...]:
     """One sentence for every word of the graph that the weights do not know, and what becomes of it."""
-    said = []
+    lines = []
     for kind, text, held in (
         ("categories", "category", graph.category),
         ("room_types", "room type", graph.room_type),
@@ -59,8 +59,8 @@ def unlearned(graph: GraphBatch, config: CompactConfig) -> tuple[str, ...]:
                 becomes = f"generated as {_nearest(kind, row.name, known)}"
                 if kind == "predicates":
                     becomes = "guided, placed and checked, not generated"
-                said.append(f"the weights do not know the {text} {row.name}: {becomes}")
-    return tuple(said)
+                lines.append(f"the weights do not know the {text} {row.name}: {becomes}")
+    return tuple(lines)
 
 
 def _nearest(kind: str, word: str, known: Collection[str]) -> str | None:

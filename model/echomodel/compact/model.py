@@ -83,11 +83,11 @@ class _Undrawn(TorchFunctionMode):
     """Leaves initial values undrawn: on the meta device torch would load its compiler for them, for seconds."""
 
     def __torch_function__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
-        given = kwargs or {}
+        named = kwargs or {}
         if func is torch.randn:
             return torch.empty(*args)
         drawn = func in (nn.init.normal_, torch.Tensor.mul, torch.Tensor.__mul__)
-        return (args[0] if args else given["tensor"]) if drawn else func(*args, **given)
+        return (args[0] if args else named["tensor"]) if drawn else func(*args, **named)
 
 
 def read_weights(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:

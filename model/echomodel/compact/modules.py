@@ -37,14 +37,14 @@ class EchoLayer(Echo, nn.Module):
 
     Arguments:
         width: channels of a node.
-        told: channels of `Pairs.told`.
+        stated: channels of `Pairs.stated`.
     """
 
-    def __init__(self, width: int, told: int) -> None:
+    def __init__(self, width: int, stated: int) -> None:
         super().__init__()
         self.norm = nn.LayerNorm(width)
         self.ends = nn.Linear(width, 2 * width)
-        self.told = nn.Linear(told, width, bias=False)
+        self.told = nn.Linear(stated, width, bias=False)
         self.message = nn.Linear(width, width)
         self.norm_mlp = nn.LayerNorm(width)
         self.mlp = nn.Sequential(nn.Linear(width, 2 * width), nn.SiLU(), nn.Linear(2 * width, width))
@@ -138,11 +138,11 @@ class FurnitureDenoiser(Furniture, nn.Module):
         self.own = nn.Linear(values, width)
         self.level = nn.Sequential(nn.Linear(64, 128), nn.SiLU())
         self.modulation = nn.Linear(128, 2 * width * own.layers)
-        told = 2 * len(config.predicates)
-        self.trust = nn.Sequential(nn.Linear(told, 32), nn.SiLU(), nn.Linear(32, own.voices)) if own.echo else None
+        stated = 2 * len(config.predicates)
+        self.trust = nn.Sequential(nn.Linear(stated, 32), nn.SiLU(), nn.Linear(32, own.voices)) if own.echo else None
         self.heard = nn.Linear(own.voices * (values + 1), width) if own.echo else None
         self.layers = nn.ModuleList(
-            (EchoLayer(width, told) if own.echo else Alone(width)) for _ in range(own.layers)
+            (EchoLayer(width, stated) if own.echo else Alone(width)) for _ in range(own.layers)
         )  # fmt: skip
         self.norm = nn.LayerNorm(width)
         self.head = nn.Linear(width, values)

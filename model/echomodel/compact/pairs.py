@@ -23,28 +23,28 @@ class Pairs:
     """All P ordered pairs of different nodes of one scene, sorted by receiver.
 
     Every object hears every other object of its room, as the published graph's `in` relations to the scene node make
-    possible; what a pair is told in the graph stands in `told`.
+    possible; what the graph states of a pair is in `stated`.
 
     Arguments:
         receiver, sender: (P,) int64, nodes.
-        told: (P, 2R) float32, predicates that hold from receiver to sender, then from sender to receiver; a branch may
-            put more channels behind them.
+        stated: (P, 2R) float32, predicates that hold from receiver to sender, then from sender to receiver; a branch
+            may put more channels behind them.
         scale: (N, 1) float32, 1 / sqrt(number of senders), the weight of a node's summed messages.
     """
 
     receiver: Array
     sender: Array
-    told: Array
+    stated: Array
     scale: Array
 
     def to(self, device: Any) -> Pairs:
         """The same pairs as tensors on a device, or with None as arrays of numpy."""
-        return Pairs(*(on_device(of, device) for of in (self.receiver, self.sender, self.told, self.scale)))
+        return Pairs(*(on_device(of, device) for of in (self.receiver, self.sender, self.stated, self.scale)))
 
-    def without(self, node_mask: Array, told: Array) -> Pairs:
-        """The pairs between the nodes where `node_mask` (N,) bool is true, with `told` (P, 2R) in place of the old."""
+    def without(self, node_mask: Array, stated: Array) -> Pairs:
+        """The pairs between the nodes where `node_mask` (N,) bool is true, with `stated` (P, 2R) instead of theirs."""
         keep = rows(node_mask[self.receiver] & node_mask[self.sender])
-        return Pairs(self.receiver[keep], self.sender[keep], told[keep], self.scale)
+        return Pairs(self.receiver[keep], self.sender[keep], stated[keep], self.scale)
 
 
 def ordered_pairs(counts: Array) -> tuple[Array, Array, Array]:
@@ -136,7 +136,7 @@ class Echo(Layers):
             scale, shift = parted(modulation, 2)
             normed = normed * (1 + scale) + shift
         here, there = parted(self.ends(normed), 2)
-        heard = pair_messages(here, there, self.told(pairs.told), pairs.receiver, pairs.sender)
+        heard = pair_messages(here, there, self.told(pairs.stated), pairs.receiver, pairs.sender)
         x = x + self.message(heard * pairs.scale)
         return x + self.mlp(self.norm_mlp(x))
 

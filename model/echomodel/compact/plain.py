@@ -52,9 +52,9 @@ class Net:
             self.transposed = np.ascontiguousarray(own["weight"][""].T)  # a few rows times it are twice as fast
         self.numbered = sorted(int(name) for name in own if name.isdigit())
 
-    def __call__(self, *given: Any, **named: Any) -> np.ndarray:
+    def __call__(self, *arguments: Any, **named: Any) -> np.ndarray:
         """What a network of its own kind does with these, else what `mapped` does."""
-        return getattr(self, "forward", self.mapped)(*given, **named)
+        return getattr(self, "forward", self.mapped)(*arguments, **named)
 
     def __getitem__(self, number: int) -> Net:
         return vars(self)[str(number)]

@@ -147,7 +147,7 @@ def sample_boxes(model: Model, latent: Latent, graph: GraphBatch, how: CompactSa
     """
     config = model.config.layout
     scale = box_scale(model, graph.category)
-    given = None if how.known is None else how.known.encode(scale)
+    known = None if how.known is None else how.known.encode(scale)
     if how.rules not in model.config.rules:
         raise ValueError(f"rules is {how.rules!r}, allowed: {', '.join(model.config.rules)}")
     rules = kit(graph.room_type).full_like(graph.room_type, model.config.rules.index(how.rules))
@@ -158,11 +158,11 @@ def sample_boxes(model: Model, latent: Latent, graph: GraphBatch, how: CompactSa
     if strength:
         predict = guided(predict, plan, scale, strength=strength, rounds=config.guidance_rounds)
     noise = how.start(graph.num_nodes, 8, model.device)
-    vectors = replace(how, known=given).denoised(predict, noise, config)
+    vectors = replace(how, known=known).denoised(predict, noise, config)
     boxes = Boxes.decode(vectors, scale)
     boxes = Boxes(clipped(boxes.size, 0.01, 20.0), boxes.position, boxes.yaw)
     if strength:
-        boxes = mended(plan, boxes, strength=strength, rounds=AFTER, given=how.known_mask)
+        boxes = mended(plan, boxes, strength=strength, rounds=AFTER, fixed=how.known_mask)
     boxes = settled(plan, boxes, how.known_mask)
     if how.known is None or how.known_mask is None:
         return boxes
@@ -177,8 +177,8 @@ def with_whole_styles(graph: GraphBatch, groups: Array) -> GraphBatch:
     alike = (groups[:, None] == groups) & (graph.scene[:, None] == graph.scene)
     subject, target = pairs_in(alike & beside(~np.eye(len(groups), dtype=bool), groups))
     same = kit(subject).full_like(subject, vocabulary().predicate_id("same_style_as"))
-    told = kit(subject).stack([subject, same, target], 1)
-    return graph.with_triplets(kit(told).concat([graph.triplets, told]))
+    same_style = kit(subject).stack([subject, same, target], 1)
+    return graph.with_triplets(kit(same_style).concat([graph.triplets, same_style]))
 
 
 @without_slopes

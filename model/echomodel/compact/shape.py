@@ -231,9 +231,9 @@ class ShapeDenoiser(nn.Module):
         condition = nn.functional.silu(nodes + self.level(sinusoids))
         heard = self._echo(x, sinusoids, context) if self.settings.echo else torch.zeros_like(nodes)
         h = torch.einsum("ntv,tvw->ntw", x.reshape(len(x), self.settings.tokens, -1), self.token) + self.place
-        told = torch.stack([heard, nodes, condition], dim=1)
+        sources = torch.stack([heard, nodes, condition], dim=1)
         for block in self.blocks:
-            h = block(h, condition, told)
+            h = block(h, condition, sources)
         scale, shift = self.scale_shift(condition)[:, None].chunk(2, dim=2)
         return torch.einsum("ntw,twv->ntv", self.norm(h) * (1 + scale) + shift, self.head).flatten(1)
 
@@ -263,13 +263,13 @@ class _Block(nn.Module):
         nn.init.zeros_(self.modulation.weight)
         nn.init.zeros_(self.modulation.bias)
 
-    def forward(self, h: Tensor, condition: Tensor, told: Tensor) -> Tensor:
+    def forward(self, h: Tensor, condition: Tensor, sources: Tensor) -> Tensor:
         scale_a, shift_a, gate_a, scale_m, shift_m, gate_m = self.modulation(condition)[:, None].chunk(6, dim=2)
         normed = self.norm(h) * (1 + scale_a) + shift_a
         q, k, v = (self._split(part) for part in self.qkv(normed).chunk(3, dim=2))
         attended = nn.functional.scaled_dot_product_attention(q, k, v)
         h = h + (1 + gate_a) * self.attended(attended.transpose(1, 2).flatten(2))
-        k, v = (self._split(part) for part in self.cross_kv(told).chunk(2, dim=2))
+        k, v = (self._split(part) for part in self.cross_kv(sources).chunk(2, dim=2))
         crossed = nn.functional.scaled_dot_product_attention(self._split(self.cross_q(self.norm(h))), k, v)
         h = h + self.cross_out(crossed.transpose(1, 2).flatten(2))
         return h + (1 + gate_m) * self.mlp(self.norm(h) * (1 + scale_m) + shift_m)
@@ -357,7 +357,7 @@ def sample_shapes(
         how: to sample; what is known is checked.
     """
     settings = model.config.shape
-    given = None if how.known is None else model.shape.codes(model.autoencoder.encode(how.known))
+    known = None if how.known is None else model.shape.codes(model.autoencoder.encode(how.known))
     tries = 1 if how.noise is not None else how.candidates or settings.candidates
     width = max(1, min(tries, TOGETHER // graph.num_nodes))
     rounds = [min(width, tries - start) for start in range(0, tries, width)]
@@ -366,8 +366,8 @@ def sample_shapes(
         starts = [how.start(graph.num_nodes, settings.components, model.device) for _ in range(count)]
         if how.noise is None:
             starts = [settings.temperature * x[equal] for x in starts]
-        masks, told = repeated(how.known_mask, count), part_of(how.progress, number, len(rounds))
-        here = replace(how, known=repeated(given, count), known_mask=masks, progress=told)
+        masks, progress = repeated(how.known_mask, count), part_of(how.progress, number, len(rounds))
+        here = replace(how, known=repeated(known, count), known_mask=masks, progress=progress)
         many, nodes = GraphBatch.pack([graph] * count), latent(graph, how.edit).repeat(count, 1)
         pairs = pairs_of(many, model.config.predicates)
         predict = shape_predictor(model, many, boxes.size.repeat(count, 1), pairs, nodes)

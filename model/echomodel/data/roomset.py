@@ -295,8 +295,8 @@ def read_note(path: Path, **kinds: type) -> dict:
         found = read_json(path, 2**24)
     wrong = [key for key, kind in kinds.items() if not isinstance(found, dict) or type(found.get(key)) is not kind]
     if wrong or not isinstance(found, dict):
-        told = ", ".join(f"{key} ({kinds[key].__name__})" for key in wrong) or "an object"
-        raise ValueError(f"{path}: not what a set of data says of itself, missing: {told}")
+        wanted = ", ".join(f"{key} ({kinds[key].__name__})" for key in wrong) or "an object"
+        raise ValueError(f"{path}: not what a set of data says of itself, missing: {wanted}")
     return found
 
 
@@ -321,5 +321,5 @@ def claim(folder: Path, plan: dict) -> None:
     found = read_note(note)
     wrong = [key for key in plan if found.get(key) != plan[key]]
     if wrong:
-        told = ", ".join(f"{key} {found.get(key)!r}" for key in wrong if key != "categories") or "other categories"
-        raise ValueError(f"{folder}: was begun with {told}; choose another folder or remove it")
+        listed = ", ".join(f"{key} {found.get(key)!r}" for key in wrong if key != "categories") or "other categories"
+        raise ValueError(f"{folder}: was begun with {listed}; choose another folder or remove it")

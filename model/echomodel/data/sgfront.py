@@ -113,8 +113,8 @@ class SGFront:
             if not isinstance(predicate, int) or not 1 <= predicate < len(self.predicates):
                 raise fault(graphs, f"relation {number} {relation}: id {predicate}, allowed are 1 to 15")
             if self.predicates[predicate] != word:
-                told = self.predicates[predicate]
-                raise fault(graphs, f"relation {number} {relation}: id {predicate} is {told!r} in relationships.txt")
+                words = self.predicates[predicate]
+                raise fault(graphs, f"relation {number} {relation}: id {predicate} is {words!r} in relationships.txt")
             triples.append((local[str(subject)], predicate, local[str(object_)]))
         values = np.array(params, float) - [0, 0, 0, *centre, 0]
         there = np.array([category != FLOOR for category in objects.values()])

@@ -200,8 +200,8 @@ def described(style: Style, choices: Choices) -> np.ndarray:
     return out
 
 
-def piece_of(vector: np.ndarray, told: RoomStyle | None = None) -> tuple[Style, Choices]:
-    """The style and the open choices that a vector (WIDTH,) describes: kinds that a family has, or the style `told`.
+def piece_of(vector: np.ndarray, room: RoomStyle | None = None) -> tuple[Style, Choices]:
+    """The style and the open choices that a vector (WIDTH,) describes: kinds of a family, or of the style `room`.
 
     Raises ValueError for a vector of another width or with numbers that are not finite.
     """
@@ -212,8 +212,8 @@ def piece_of(vector: np.ndarray, told: RoomStyle | None = None) -> tuple[Style, 
         name: dict(zip(words, vector[start : start + len(words)], strict=True))
         for start, (name, words) in zip(STARTS, WORDS.items(), strict=False)
     }
-    family = told.family if told else max(FAMILIES, key=scores["family"].__getitem__)
-    kinds = {part: tuple(odds) for part, odds in FAMILIES[family].items()} | dict(told.kinds if told else ())
+    family = room.family if room else max(FAMILIES, key=scores["family"].__getitem__)
+    kinds = {part: tuple(odds) for part, odds in FAMILIES[family].items()} | dict(room.kinds if room else ())
     words: dict[str, Any] = {part: max(allowed, key=scores[part].__getitem__) for part, allowed in kinds.items()}
     share = (vector[HOT:].clip(-1, 1) + 1) / 2
     numbers = _LOW + (_HIGH - _LOW) * share[: len(PROPORTIONS)]

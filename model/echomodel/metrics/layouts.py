@@ -46,7 +46,7 @@ class Task:
     """
 
     room: RoomBoxes
-    told: np.ndarray
+    stated: np.ndarray
     before: np.ndarray | None = None
     added: np.ndarray | None = None
     touched: np.ndarray | None = None
@@ -55,23 +55,23 @@ class Task:
     @property
     def graph(self) -> GraphBatch:
         """What a network is asked."""
-        return GraphBatch.from_room(self.room, triplets=torch.from_numpy(self.told))
+        return GraphBatch.from_room(self.room, triplets=torch.from_numpy(self.stated))
 
 
 def tasks_of(
-    rooms: Sequence[RoomBoxes], seed: int, *, rules: str = "strict", told: float | None = None, drop: float = 0.5
+    rooms: Sequence[RoomBoxes], seed: int, *, rules: str = "strict", stated: float | None = None, drop: float = 0.5
 ) -> list[Task]:
     """The rooms with what is told of them.
 
     Arguments:
         rooms: in the vocabulary's words (`with_known_words`). seed: of what is told.
-        told: relations an object, near pairs first, as people write; None = those that a room has, as published
+        stated: relations an object, near pairs first, as people write; None = those that a room has, as published
             graphs do, else all that the rules find but for `drop` of them.
     """
     rng = np.random.default_rng([seed, 11])
-    labels = label_rooms(rooms, rules=rules, drop=drop if told is None else 0.0, rng=rng)
-    if told is not None:
-        labels = [stated_of_room(edges, room, told, seed) for edges, room in zip(labels, rooms, strict=True)]
+    labels = label_rooms(rooms, rules=rules, drop=drop if stated is None else 0.0, rng=rng)
+    if stated is not None:
+        labels = [stated_of_room(edges, room, stated, seed) for edges, room in zip(labels, rooms, strict=True)]
     else:
         labels = [edges if r.relations is None else r.relations for edges, r in zip(labels, rooms, strict=True)]
     return [Task(room, np.asarray(edges, np.int64), rules=rules) for room, edges in zip(rooms, labels, strict=True)]
@@ -82,22 +82,22 @@ def changed(task: Task, rng: np.random.Generator) -> Task:
 
     A mirrored edge that says what no longer holds stays, as in the published evaluation.
     """
-    can = np.flatnonzero(np.isin(task.told[:, 1], list(OPPOSITE)))
+    can = np.flatnonzero(np.isin(task.stated[:, 1], list(OPPOSITE)))
     none = np.zeros(len(task.room), bool)
     if not len(can):
-        return replace(task, before=task.told, added=none, touched=none)
+        return replace(task, before=task.stated, added=none, touched=none)
     chosen = int(can[rng.integers(len(can))])
-    subject, predicate, other = task.told[chosen].tolist()
-    after = task.told.copy()
+    subject, predicate, other = task.stated[chosen].tolist()
+    after = task.stated.copy()
     after[chosen, 1] = OPPOSITE[predicate]
     touched = np.isin(np.arange(len(task.room)), [subject, other])
-    return replace(task, told=after, before=task.told, added=none, touched=touched)
+    return replace(task, stated=after, before=task.stated, added=none, touched=touched)
 
 
 def extended(task: Task, rng: np.random.Generator) -> Task:
     """The task in which one object came in, with all that is told of it."""
     added = np.arange(len(task.room)) == int(rng.integers(len(task.room)))
-    return replace(task, before=task.told[~added[task.told[:, [0, 2]]].any(1)], added=added, touched=added)
+    return replace(task, before=task.stated[~added[task.stated[:, [0, 2]]].any(1)], added=added, touched=added)
 
 
 def kept_relations(task: Task, room: RoomBoxes) -> dict[str, Pair]:
@@ -105,12 +105,12 @@ def kept_relations(task: Task, room: RoomBoxes) -> dict[str, Pair]:
 
     `room`: its boxes as a system made them.
     """
-    verdict = verdicts(Boxes.from_room(room), torch.from_numpy(task.told), rules=task.rules).numpy()
-    names = np.array([vocabulary().predicates[k].name for k in task.told[:, 1]], dtype=object)
+    verdict = verdicts(Boxes.from_room(room), torch.from_numpy(task.stated), rules=task.rules).numpy()
+    names = np.array([vocabulary().predicates[k].name for k in task.stated[:, 1]], dtype=object)
     chosen = {group: [names == word for word in words] for group, words in GROUPS.items()}
     chosen["all"] = [np.ones(len(verdict), bool)]
     if task.touched is not None:
-        edited = task.touched[task.told[:, [0, 2]]].any(1)
+        edited = task.touched[task.stated[:, [0, 2]]].any(1)
         chosen |= {"edited": [edited], "rest": [~edited]}
     return {
         name: ([float((verdict[at] == 1).sum()) for at in rows], [float((verdict[at] >= 0).sum()) for at in rows])
@@ -143,7 +143,7 @@ def layout_scores(task: Task, room: RoomBoxes) -> dict[str, Pair]:
     """
     objects = float(len(room))
     floor, openings = room.floor_polygon, room.openings
-    plan = plan_of(room, room.categories, floor, openings, task.told, height=room.height, rules=task.rules)
+    plan = plan_of(room, room.categories, floor, openings, task.stated, height=room.height, rules=task.rules)
     found = Counter(fault.rule for fault in [*faults_of(plan, KINDS), *unreached(plan)])
     scores: dict[str, Pair] = {
         name: (float(sum(found[term] for term in terms)), objects) for name, terms in COUNTED.items()
@@ -192,11 +192,11 @@ def fullness(room: RoomBoxes) -> Pair:
 
 def strata_of(task: Task) -> Mapping[str, str]:
     """How a room is counted: its type, how many objects, how much is told of each."""
-    objects, told = len(task.room), len(task.told) / max(len(task.room), 1)
+    objects, stated = len(task.room), len(task.stated) / max(len(task.room), 1)
     return {
         "room type": task.room.room_type,
         "objects": "1 to 6" if objects <= 6 else "7 to 10" if objects <= 10 else "over 10",
-        "told an object": "0 to 1" if told < 0.95 else "1 to 5" if told <= 5 else "over 5",
+        "told an object": "0 to 1" if stated < 0.95 else "1 to 5" if stated <= 5 else "over 5",
     }
 
 

@@ -218,7 +218,7 @@ def picture_figures(ours: np.ndarray, theirs: np.ndarray, names: Sequence[str], 
     return with_subsets(measured, len(ours), len(theirs), seed)
 
 
-def told_by_pictures(made: np.ndarray, real: np.ndarray, seed: int) -> Figure:
+def cnn_accuracy(made: np.ndarray, real: np.ndarray, seed: int) -> Figure:
     """Share of pictures that a small CNN, trained here on the other half, tells rightly as made or real; 0.5 = cannot.
 
     It is no published classifier. The n-th of both fall into the same half, so that no furniture is seen twice.
@@ -246,6 +246,6 @@ def told_by_pictures(made: np.ndarray, real: np.ndarray, seed: int) -> Figure:
                 loss.backward()
                 optimizer.step()
             with torch.inference_mode():
-                said = sum(net(torch.rot90(x[half == held], k, (2, 3)))[:, 0] for k in range(TURNS))
-        right[half == held] = ((said > 0) == (truth[half == held] > 0)).float()
+                votes = sum(net(torch.rot90(x[half == held], k, (2, 3)))[:, 0] for k in range(TURNS))
+        right[half == held] = ((votes > 0) == (truth[half == held] > 0)).float()
     return replace(mean(right.tolist(), seed), rooms=len(made))

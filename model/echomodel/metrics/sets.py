@@ -47,9 +47,9 @@ def object_features(room: RoomBoxes) -> np.ndarray:
     here, near = torch.arange(len(boxes)), apart.argmin(1)
     turn = (boxes.yaw[near] - boxes.yaw)[:, None]
     words = torch.tensor([vocabulary().category_id(word) for word in room.categories])
-    told = torch.from_numpy(np.array(sizes)).float().clamp(-SCORES, SCORES)
+    scores = torch.from_numpy(np.array(sizes)).float().clamp(-SCORES, SCORES)
     columns = [
-        wall_features(boxes, floor), told, lift, seen_from(boxes, here, near), turn.sin(), turn.cos(),
+        wall_features(boxes, floor), scores, lift, seen_from(boxes, here, near), turn.sin(), turn.cos(),
         words[:, None], words[near][:, None],
     ]  # fmt: skip
     return torch.cat([column.float() for column in columns], 1).numpy()
@@ -134,7 +134,7 @@ def category_divergence(rooms: Sequence[Sequence[str]], reference: Sequence[Sequ
     return float(entropy(*([count[word] + 0.5 for word in words] for count in (theirs, ours))))
 
 
-def told_apart(made: Sequence[RoomBoxes], real: Sequence[RoomBoxes], seed: int, *, paired: bool = False) -> Figure:
+def forest_auc(made: Sequence[RoomBoxes], real: Sequence[RoomBoxes], seed: int, *, paired: bool = False) -> Figure:
     """Area under the curve of a random forest that tells made rooms from real ones, by their objects; 0.5 = it cannot.
 
     It judges rooms that it was not trained on; a room's score is the mean over its objects. Fewer rooms than there are
@@ -154,8 +154,8 @@ def told_apart(made: Sequence[RoomBoxes], real: Sequence[RoomBoxes], seed: int, 
     group = np.where(truth, np.arange(len(rooms)), np.arange(len(rooms)) - (len(made) if paired else 0))[room]
     forest = RandomForestClassifier(TREES, min_samples_leaf=LEAF, class_weight="balanced", random_state=seed)
     folds = {"groups": group, "cv": GroupKFold(FOLDS), "method": "predict_proba"}
-    said = cross_val_predict(forest, x, truth[room], **folds)[:, 1]
-    score = np.bincount(room, said) / np.bincount(room)
+    odds = cross_val_predict(forest, x, truth[room], **folds)[:, 1]
+    score = np.bincount(room, odds) / np.bincount(room)
     higher = (1 + np.sign(score[truth] - score[~truth, None])) / 2  # (real, made); half where they are equal
     rng = np.random.default_rng([seed, 6])
     drawn = [np.ix_(*(rng.choice(count, count) for count in higher.shape)) for _ in range(200)]

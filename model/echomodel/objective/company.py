@@ -339,10 +339,10 @@ def at_its_side(plan: Plan) -> Found:
 def stated_of(plan: Plan, i: Array, j: Array, *words: str) -> Array:
     """(P,) bool: the graph says one of these words of i and j, or of j and i."""
     count = len(plan.first)
-    said = full(plan.given, (count, count), False)
-    for one, other in map(plan.first.told, words):
-        said[one, other] = said[other, one] = True
-    return said[i % count, j % count]
+    related = full(plan.fixed, (count, count), False)
+    for one, other in map(plan.first.ends_of, words):
+        related[one, other] = related[other, one] = True
+    return related[i % count, j % count]
 
 
 def not_alone(plan: Plan) -> Found:

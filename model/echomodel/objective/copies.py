@@ -49,7 +49,7 @@ class Watched(Plan):
 
 def looks_at(room: Plan, find: Callable[[Plan], Found]) -> tuple[Array, Found]:
     """(N,) bool, the boxes of a room whose poses decide what a term finds, whatever they are; and what it finds."""
-    plan = Watched(**{of.name: getattr(room, of.name) for of in fields(Plan)}, asked=room.kit.zeros_like(room.given))
+    plan = Watched(**{of.name: getattr(room, of.name) for of in fields(Plan)}, asked=room.kit.zeros_like(room.fixed))
     vars(plan).update({name: getattr(room, name) for name in (*OF_WORDS, "turn")})
     seen = find(plan)
     for whom in (room.anchor, room.group, room.carrier):
@@ -146,8 +146,8 @@ class Copies(Plan):
         i, j, allowed = i[differ], j[differ], allowed[differ]
         return self._tiled(i), self._tiled(j), self._again(allowed)
 
-    def told(self, predicate: str) -> tuple[Array, Array]:
-        one, other = self.template.told(predicate)
+    def ends_of(self, predicate: str) -> tuple[Array, Array]:
+        one, other = self.template.ends_of(predicate)
         return self._tiled(one), self._tiled(other)
 
     @cached_property
@@ -254,7 +254,7 @@ def copies_of(room: Plan, position: Array, yaw: Array, moved: Array) -> Copies:
     return Copies(
         room.kinds * count, xp.tile(room.size, (count, 1)), position.reshape(-1, 3), yaw.reshape(-1),
         repeat(xp.arange(count), len(room)), _spread(room.floor, count), room.openings * count, room.triplets[:0],
-        xp.tile(room.given, (count,)), None if room.height is None else _spread(room.height, count), room.rules,
+        xp.tile(room.fixed, (count,)), None if room.height is None else _spread(room.height, count), room.rules,
         room.stated, template=room, apart_in=moved,
     )  # fmt: skip
 

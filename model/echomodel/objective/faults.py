@@ -82,12 +82,12 @@ def faults_of(plan: Plan, kinds: Collection[str] = BY_EYE) -> list[Fault]:
         seen = term.find(plan)
         for row in rows(seen.margin < -ROUNDING).tolist():
             who, other = int(seen.who[row]), int(seen.other[row])
-            if bool(plan.given[who]):
+            if bool(plan.fixed[who]):
                 continue
             text = term.says[int(seen.words[row]) % len(term.says)]
-            said = text.replace("{a}", "\0").replace("{b}", "\1").format(x=float(seen.measure[row]))
-            said = said.replace("\0", "{a}").replace("\1", "{b}")
-            out.append(Fault(who, other, term.name, float(seen.margin[row]), said))
+            sentence = text.replace("{a}", "\0").replace("{b}", "\1").format(x=float(seen.measure[row]))
+            sentence = sentence.replace("\0", "{a}").replace("\1", "{b}")
+            out.append(Fault(who, other, term.name, float(seen.margin[row]), sentence))
     return out
 
 
@@ -99,7 +99,7 @@ def unreached(plan: Plan) -> list[Fault]:
     furniture = plan.standing & plan.of("seat", "sofa", "board", "bed", "storage")
     attends = np.asarray(plan.anchor)  # a nightstand is reached from its bed, a chair with its table
     reached = walked.reached | ((attends >= 0) & walked.reached[attends])
-    free = ~np.asarray(plan.given)
+    free = ~np.asarray(plan.fixed)
     lost = np.flatnonzero(np.asarray(furniture) & free & ~reached)
     out = [Fault(int(i), -1, REACHED, -1.0, "{a} cannot be walked to from the door") for i in lost]
     closing = np.flatnonzero(walked.closing & free)
@@ -153,6 +153,6 @@ def missed(plan: Plan, kinds: Collection[str] = BY_EYE, beyond: float = -math.in
             continue
         miss = (max(term.slack + beyond, 0.0) - seen.margin).clip(0.0, MOST)
         if term.kind in BY_EYE:
-            miss = miss * ~plan.given[seen.who]
+            miss = miss * ~plan.fixed[seen.who]
         total = total + COST[term.kind][1] * term.weight * miss.sum()
     return total

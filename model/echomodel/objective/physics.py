@@ -84,7 +84,7 @@ def in_height(plan: Plan) -> Found:
     return found(who, margin, measure=TOUCH - margin, words=1 * (high < low))
 
 
-def told(predicate: str) -> Callable[[Plan], Found]:
+def stated(predicate: str) -> Callable[[Plan], Found]:
     """The term of a relation: its margins wherever the graph states it, by the plan's own set of rules."""
 
     def find(plan: Plan) -> Found:

@@ -105,7 +105,7 @@ class Plan:
         floor: (S, K, 2) float, corners of the floors, padded with NaN, all NaN = unknown; in the frame of the boxes.
         openings: doors and windows of each room.
         triplets: (E, 3) int64, what the graphs state.
-        given: (N,) bool, boxes whose place and heading somebody stated: no term blames them.
+        fixed: (N,) bool, boxes whose place and heading somebody stated: no term blames them.
         height: (S,) float, of the ceilings, metres, NaN = unknown; None = all unknown.
         rules: the rule set that the triplets are meant in. stated: where single boxes of the first room must stand.
     """
@@ -118,7 +118,7 @@ class Plan:
     floor: Array
     openings: tuple[tuple[Opening, ...], ...]
     triplets: Array
-    given: Array
+    fixed: Array
     height: Array | None = None
     rules: str = "strict"
     stated: tuple[Stated, ...] = ()
@@ -220,7 +220,7 @@ class Plan:
         return {}
 
     def _mask(self, values: Sequence[bool]) -> Array:
-        return cast(values, self.given)
+        return cast(values, self.fixed)
 
     @cached_property
     def standing(self) -> Array:
@@ -237,8 +237,8 @@ class Plan:
             here = np.flatnonzero(scene == room)
             number = np.full(len(self), -1)
             number[here] = np.arange(len(here))
-            told = triplets[(scene[triplets[:, 0]] == room)] if len(triplets) else triplets
-            local = np.stack([number[told[:, 0]], told[:, 1], number[told[:, 2]]], 1) if len(told) else told
+            kept = triplets[(scene[triplets[:, 0]] == room)] if len(triplets) else triplets
+            local = np.stack([number[kept[:, 0]], kept[:, 1], number[kept[:, 2]]], 1) if len(kept) else kept
             found = carriers([self.kinds[k] for k in here], size[here], position[here], yaw[here], local)
             out[here] = np.where(found >= 0, here[found.clip(0)], found)
         return cast(out, self.scene)
@@ -262,7 +262,7 @@ class Plan:
     @property
     def moved(self) -> Array:
         """(N,) bool, boxes that do not stand alike in all rooms."""
-        return full(self.given, len(self), True)
+        return full(self.fixed, len(self), True)
 
     @cached_property
     def ceiling(self) -> Array:
@@ -279,7 +279,7 @@ class Plan:
         middle = cast(xp.nan_to_num((xp.amax(corners, 1) + xp.amin(corners, 1)) / 2), self.size)
         return xp.stack([middle[:, 0], xp.zeros_like(middle[:, 0]), middle[:, 1]], 1)[self.scene]
 
-    def told(self, predicate: str) -> tuple[Array, Array]:
+    def ends_of(self, predicate: str) -> tuple[Array, Array]:
         """Subjects (P,) and objects (P,) of the relations of one name that the graphs state."""
         (i, _, j), rows = self.stated_pairs, self.rows_of(predicate)
         return i[rows], j[rows]
@@ -525,7 +525,7 @@ class Plan:
 
 def plan_of(
     boxes: BoxesLike, categories: Sequence[str], floor: Any = None,
-    openings: Sequence[Opening] = (), relations: Any = None, *, given: np.ndarray | None = None,
+    openings: Sequence[Opening] = (), relations: Any = None, *, fixed: np.ndarray | None = None,
     height: float | None = None, rules: str = "strict", stated: Sequence[Stated] = (),
 ) -> Plan:  # fmt: skip
     """The plan of one room, float64; in numpy, or in torch where the boxes are tensors.
@@ -535,7 +535,7 @@ def plan_of(
             the way of others and obey no rule.
         floor: (k, 2) float, corners (x, z) in the frame of the boxes, None = unknown.
         openings: doors and windows in its edges. relations: (E, 3) int, [subject, predicate id, object].
-        given: (N,) bool, boxes that no term blames.
+        fixed: (N,) bool, boxes that no term blames.
         height: of the ceiling, metres. rules, stated: as in `Plan`.
     """
     xp = kit(boxes.size)
@@ -546,7 +546,7 @@ def plan_of(
     return Plan(
         kinds_of(categories, triplets), size, position, yaw, xp.zeros(len(size), dtype=xp.int64), xp.asarray(corners),
         (tuple(openings),), xp.asarray(triplets, dtype=xp.int64),
-        xp.asarray(none if given is None else np.asarray(given, bool)),
+        xp.asarray(none if fixed is None else np.asarray(fixed, bool)),
         None if height is None else xp.asarray([height], dtype=xp.float64), rules, tuple(stated),
     )  # fmt: skip
 
@@ -554,7 +554,7 @@ def plan_of(
 def plan_of_rooms(rooms: Sequence[RoomBoxes]) -> Plan:
     """The plan of many rooms at once, of what their relations state; float32, as sets of rooms are kept."""
     sizes = [len(room) for room in rooms]
-    told = [np.zeros((0, 3), int) if room.relations is None else room.relations for room in rooms]
+    stated = [np.zeros((0, 3), int) if room.relations is None else room.relations for room in rooms]
     shift = np.cumsum([0, *sizes[:-1]])
     columns = ((getattr(room, name) for room in rooms) for name in ("size", "position", "yaw"))
     size, position, yaw = (np.concatenate(list(of)).astype(np.float32) for of in columns)
@@ -563,9 +563,9 @@ def plan_of_rooms(rooms: Sequence[RoomBoxes]) -> Plan:
     for number, own in enumerate(corners):
         floor[number, : len(own)] = own
     return Plan(
-        tuple(kind for room, t in zip(rooms, told, strict=True) for kind in kinds_of(room.categories, t)),
+        tuple(kind for room, t in zip(rooms, stated, strict=True) for kind in kinds_of(room.categories, t)),
         size, position, yaw, np.arange(len(rooms)).repeat(sizes), floor, tuple(tuple(room.openings) for room in rooms),
-        np.concatenate([t + np.array([k, 0, k]) for t, k in zip(told, shift, strict=True)]),
+        np.concatenate([t + np.array([k, 0, k]) for t, k in zip(stated, shift, strict=True)]),
         np.zeros(sum(sizes), bool), np.array([room.height for room in rooms], np.float32),
     )  # fmt: skip
 
@@ -578,8 +578,8 @@ def kinds_of(categories: Sequence[str], triplets: Array) -> tuple[Category, ...]
     """
     rows = [kind_of(word) for word in categories]
     near = {vocabulary().predicate_id(word) for word in ("close_by", "facing")}
-    told = [(a, b) for a, predicate, b in np.asarray(triplets).reshape(-1, 3).tolist() if predicate in near]
-    pairs = [(a, b) for a, b in (*told, *((b, a) for a, b in told)) if rows[b].role == "board" and rows[b].access]
+    stated = [(a, b) for a, predicate, b in np.asarray(triplets).reshape(-1, 3).tolist() if predicate in near]
+    pairs = [(a, b) for a, b in (*stated, *((b, a) for a, b in stated)) if rows[b].role == "board" and rows[b].access]
     for seat, desk in pairs:
         others = any(b == desk and a != seat and rows[a].stands == "at" for a, b in pairs)
         if rows[seat].role == "seat" and rows[seat].stands == "company" and not others:

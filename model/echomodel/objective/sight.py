@@ -82,7 +82,7 @@ ASIDE = {"sofa": math.radians(25.0), "bed": math.radians(30.0), "seat": math.rad
 TURNED = math.radians(45.0)  # from a screen's own front to who watches it
 # Metres between the middles of a screen and its viewer: 99 of 100 real sofas and all real beds.
 WATCHED_FROM = {"sofa": (1.2, 5.2), "bed": (0.9, 4.2), "seat": (0.9, 5.2)}
-TOLD = ("facing", "opposite")  # predicates that say who watches
+WATCHING = ("facing", "opposite")  # predicates that say who watches
 ON_AXIS = 0.6  # metres beside the axis of its viewer
 STEPS = tuple(0.1 + 0.8 * step / 12 for step in range(13))  # shares of the line of sight where things may be in it
 HIGH = 0.65  # metres: one looks over what is lower
@@ -144,7 +144,7 @@ def _watched(plan: Plan) -> tuple[Found, Array, Array, Array]:
     if not len(i):
         return nobody(plan.size), i > 0, full(plan.size, 0, 0.0), i
     main = plan.of("sofa", "bed") & ~plan.stands("company")  # armchairs watch where there is neither
-    for better in (lambda plan, i, j: stated_of(plan, i, j, *TOLD), lambda _plan, _i, j: main[j]):
+    for better in (lambda plan, i, j: stated_of(plan, i, j, *WATCHING), lambda _plan, _i, j: main[j]):
         good = better(plan, i, j)
         keep = good | (xp.bincount(i[good], minlength=len(plan))[i] == 0)
         i, j = i[keep], j[keep]

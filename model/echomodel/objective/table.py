@@ -59,7 +59,7 @@ REAL = "real rooms (statistics of 896, 300 measured): "
 MODULES = {"access": access, "company": company, "composition": composition, "crowding": crowding, "fitted": fitted,
            "physics": physics, "sight": sight, "sizes": sizes}  # fmt: skip
 RELATIONS = (
-    *(Term(physics.told(name), (f"{{a}} is not {name} {{b}}",), "what the word means", "relations", unit)
+    *(Term(physics.stated(name), (f"{{a}} is not {name} {{b}}",), "what the word means", "relations", unit)
       for name, unit in physics.measured()),
     Term(physics.placed, tuple(f"{{a}} is not {row.name}" for row in vocabulary().placements), "what the words mean",
          "relations"),

@@ -56,11 +56,11 @@ def margins(
     out = full(own.size, len(triplets), 0.0)
     headed = None if fronts is None else beside(fronts, own.size)
     placed = replace(own, size=held(own.size)) if rigid else own
-    words, told, chosen = vocabulary().predicates, triplets[:, 1], rule_set(rules)
-    there = {words[number].name: words[number] for number in sorted(set(told.tolist())) if 0 <= number < len(words)}
+    words, kinds, chosen = vocabulary().predicates, triplets[:, 1], rule_set(rules)
+    there = {words[number].name: words[number] for number in sorted(set(kinds.tolist())) if 0 <= number < len(words)}
     for name, rule in chosen.rules.items():  # in their order, so that gradients add up in one
         if name in there and rule.margin is not None:
-            at = rows(told == there[name].id)
+            at = rows(kinds == there[name].id)
             of = own if there[name].measures == "size" else placed  # all others are of place
             pair = pairs(of, triplets[at, 0], triplets[at, 2], centre, oriented=chosen.oriented, fronts=headed)
             out = put(out, at, rule.margin(pair))

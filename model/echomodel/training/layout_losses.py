@@ -70,9 +70,9 @@ def physics_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor,
     """
     graph, pairs = batch.graph, batch.pairs
     free = measurable(Boxes(boxes.size.detach(), boxes.position, boxes.yaw))
-    told = torch.zeros(0, 3, dtype=torch.int64, device=level.device)
+    none = torch.zeros(0, 3, dtype=torch.int64, device=level.device)
     words, openings = (UNKNOWN,) * len(boxes), ((),) * graph.num_scenes
-    plan = Plan(words, free.size, free.position, free.yaw, graph.scene, graph.floor, openings, told, known)
+    plan = Plan(words, free.size, free.position, free.yaw, graph.scene, graph.floor, openings, none, known)
     once = ((pairs.receiver < pairs.sender) & torch.isfinite(batch.allowed)).nonzero()[:, 0]
     i, j = pairs.receiver[once], pairs.sender[once]
     vars(plan)["couples"] = i, j, batch.allowed[once]  # whom each may touch is not the network's to choose

@@ -59,7 +59,7 @@ class LayoutStage:
     def open(cls, start: Start) -> LayoutStage:
         """The stage of a recipe; new layouts are normalised by its rooms."""
         rooms, held = (start.rooms(held=held) for held in (False, True))
-        if "layout" not in start.given:
+        if "layout" not in start.loaded:
             names = start.model.config.categories
             rows = places("categories", names, rooms.category)
             start.model.statistics = BoxStatistics.from_boxes(rooms.boxes, rows, len(names))

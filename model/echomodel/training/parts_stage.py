@@ -41,8 +41,8 @@ def parts_loss(
     hot = sum(settings.kinds)
     parts, words = scores.split([*settings.kinds, settings.numbers], dim=1), clean[:, :hot].split(settings.kinds, dim=1)
     surprise = [
-        torch.nn.functional.cross_entropy(said, true.argmax(1), reduction="none")
-        for said, true in zip(parts[:-1], words, strict=True)
+        torch.nn.functional.cross_entropy(logits, true.argmax(1), reduction="none")
+        for logits, true in zip(parts[:-1], words, strict=True)
     ]
     off = (parts[-1] - clean[:, hot:]).square().mean(1)
     free = (~known).float()
@@ -84,9 +84,9 @@ class PartsStage:
         drawn = draw_batch(self.rooms, self.nodes, generator)
         scenes, categories = drawn.graph.num_scenes, len(self.sizes)
         silent = torch.rand(scenes, generator=generator) < SILENT
-        told = silenced(drawn.pairs, silent, drawn.graph)
+        stated = silenced(drawn.pairs, silent, drawn.graph)
         groups = drawn.graph.scene * (1 + int(drawn.style.max())) + drawn.style
-        return ShapeBatch(drawn.graph, told, groups * categories + drawn.graph.category), drawn.boxes.size
+        return ShapeBatch(drawn.graph, stated, groups * categories + drawn.graph.category), drawn.boxes.size
 
     def suites(self, count: int, generator: torch.Generator) -> tuple[ShapeBatch, Tensor]:
         """Suites without a room, which hold rare classes as often as others."""
@@ -125,10 +125,10 @@ class PartsStage:
 
 def silenced(pairs: Pairs, silent: Tensor, graph: GraphBatch) -> Pairs:
     """The pairs without what is said of style and material in the `silent` scenes (S,)."""
-    told = pairs.told.clone()
-    width = told.shape[1] // 2
+    stated = pairs.stated.clone()
+    width = stated.shape[1] // 2
     columns = [predicate + side for predicate in vocabulary().uniting("shape") for side in (0, width)]
     rows = silent[graph.scene[pairs.receiver]]
     for column in columns:
-        told[rows, column] = 0
-    return Pairs(pairs.receiver, pairs.sender, told, pairs.scale)
+        stated[rows, column] = 0
+    return Pairs(pairs.receiver, pairs.sender, stated, pairs.scale)

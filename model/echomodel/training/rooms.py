@@ -92,7 +92,7 @@ class PackedRooms:
 
 @dataclass(frozen=True, eq=False)
 class LayoutBatch:
-    """Scenes of one training step: `graph` without triplets, its `told` predicates as pairs, and the true boxes.
+    """Scenes of one training step: `graph` without triplets, its stated predicates as pairs, and the true boxes.
 
     Arguments:
         predicates: (P, 16) bool, what the graph says of each pair before inverses are filled in.
@@ -149,7 +149,7 @@ def make_batch(rooms: PackedRooms, picked: Tensor, generator: torch.Generator, *
         predicates = _thinned(holds, boxes, receiver, sender, pair_scene, counts, generator)
     else:
         predicates = holds & (torch.rand(holds.shape, generator=generator) < 0.5)
-    pairs = Pairs(receiver, sender, _told(predicates.float(), receiver, sender, counts), scale)
+    pairs = Pairs(receiver, sender, _stated(predicates.float(), receiver, sender, counts), scale)
     graph = GraphBatch(
         category=rooms.category[nodes], triplets=torch.zeros(0, 3, dtype=torch.int64), scene=scene,
         room_type=rooms.room_type[picked], floor=floor, openings=openings,
@@ -168,8 +168,8 @@ def _bits(graph: GraphBatch) -> Tensor:
     number = torch.full((graph.num_nodes, graph.num_nodes), -1)
     number[receiver, sender] = torch.arange(len(receiver))
     hot = torch.zeros(len(receiver), len(PREDICATES), dtype=torch.int32)
-    told = graph.triplets[graph.triplets[:, 1] < len(PREDICATES)]
-    hot[number[told[:, 0], told[:, 2]], told[:, 1]] = 1
+    kept = graph.triplets[graph.triplets[:, 1] < len(PREDICATES)]
+    hot[number[kept[:, 0], kept[:, 2]], kept[:, 1]] = 1
     return (hot << torch.arange(len(PREDICATES), dtype=torch.int32)).sum(1, dtype=torch.int32)
 
 
@@ -228,17 +228,17 @@ def _thinned(
     kept = holds & (torch.rand(holds.shape, generator=generator) < share[pair_scene, None])
     kind, amount = torch.rand(scenes, generator=generator), torch.rand(scenes, generator=generator)
     each = torch.where(kind < 0.1, 0.0, torch.where(kind < 0.75, 0.4 + 1.6 * amount, 2 + 2 * amount))
-    told = (each * counts).round().long() * ~dense
+    number = (each * counts).round().long() * ~dense
     ranked = near_first(holds & ~dense[pair_scene, None], boxes, receiver, sender, counts, generator)
     place = torch.arange(len(ranked))
     of = pair_scene[ranked[:, 0]]
     first = torch.full((scenes,), len(ranked)).scatter_reduce(0, of, place, "amin")
-    chosen = ranked[place - first[of] < told[of]]
+    chosen = ranked[place - first[of] < number[of]]
     kept[chosen[:, 0], chosen[:, 1]] = True
     return kept
 
 
-def _told(predicates: Tensor, receiver: Tensor, sender: Tensor, counts: Tensor) -> Tensor:
+def _stated(predicates: Tensor, receiver: Tensor, sender: Tensor, counts: Tensor) -> Tensor:
     """Fill in inverses: (P, 16) float -> (P, 32) as in `pairs_of`."""
     back = reverse_pairs(receiver, sender, counts)
     inverse = torch.from_numpy(inverse_predicates(PREDICATES))
@@ -273,8 +273,8 @@ def _pseudo_edit(
     back = reverse_pairs(pairs.receiver, pairs.sender, counts)
     pseudo[back[changed]] = 0
     pseudo[changed] = wrong
-    told = _told(pseudo, pairs.receiver, pairs.sender, counts)
-    return pairs.without(~added, told), added, touched
+    stated = _stated(pseudo, pairs.receiver, pairs.sender, counts)
+    return pairs.without(~added, stated), added, touched
 
 
 def draw_levels(count: int, generator: torch.Generator, device: torch.device | str = "cpu") -> Tensor:

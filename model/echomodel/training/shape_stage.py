@@ -61,10 +61,10 @@ def shape_loss(
     known, level, noisy = noised(batch, clean, objective, generator)
     latent = model.latent(batch.graph.category, batch.pairs)
     context = model.shape.context(batch.graph, size, batch.pairs, latent)
-    said, wanted = (output_from(of, noisy, level, objective, LOWEST)
+    output, wanted = (output_from(of, noisy, level, objective, LOWEST)
                     for of in (model.shape(noisy, level, context).float(), clean))  # fmt: skip
     free = (~known).float()
-    error = (said - wanted).square().flatten(1).mean(1)
+    error = (output - wanted).square().flatten(1).mean(1)
     loss = (error * free).sum() / free.sum().clamp_min(1)
     return loss, {"shape": loss}
 
@@ -111,10 +111,10 @@ def draw_suites(count: int, styles: Tensor, generator: torch.Generator) -> Shape
     style = two[scene, (torch.rand(nodes, generator=generator) < 0.3).long()]
     at, to = ((scene[:, None] == scene) & ~torch.eye(nodes, dtype=torch.bool)).nonzero(as_tuple=True)
     same_style, same_coarse = style[at] == style[to], coarse[category[at]] == coarse[category[to]]
-    told = torch.stack([same_style, same_coarse, same_style & same_coarse], dim=1)
+    stated = torch.stack([same_style, same_coarse, same_style & same_coarse], dim=1)
     keep = torch.rand(count, generator=generator)[scene[at]]
-    told &= torch.rand(told.shape, generator=generator) < keep[:, None]
-    edge, predicate = told.nonzero(as_tuple=True)
+    stated &= torch.rand(stated.shape, generator=generator) < keep[:, None]
+    edge, predicate = stated.nonzero(as_tuple=True)
     graph = GraphBatch(
         category=category, triplets=torch.stack([at[edge], predicate + 13, to[edge]], dim=1), scene=scene,
         room_type=torch.randint(len(words.room_types), (count,), generator=generator),
@@ -145,7 +145,7 @@ class ShapeStage:
         """The stage of a recipe, its shapes encoded; a new denoiser is fitted to them."""
         rooms = start.rooms(held=False)
         stage = cls(rooms, encoded_set(start.model.autoencoder, start.shapes()), start.recipe.shapes_per_batch)
-        if "shape" not in start.given and not start.resume:
+        if "shape" not in start.loaded and not start.resume:
             stage.initialise(start.model, start.generator)
         return stage
 
@@ -274,7 +274,7 @@ class AutoencoderStage:
     def open(cls, start: Start) -> AutoencoderStage:
         """The stage of a recipe; a new autoencoder starts from the shapes' PCA."""
         stage = cls(start.shapes(), start.recipe.shapes_per_batch, start.components)
-        if "autoencoder" not in start.given:
+        if "autoencoder" not in start.loaded:
             stage.initialise(start.model, start.generator)
         return stage
 

@@ -36,14 +36,14 @@ class Start:
     Arguments:
         recipe: what to train; its paths must exist.
         model: the stage's parts, with the tensors of earlier runs.
-        given: parts that the files of `start` and `warm` held.
+        loaded: parts that the files of `start` and `warm` held.
         resume: whether a checkpoint will replace the tensors.
         components: shape branch that a file of `start` held, None = none did.
     """
 
     recipe: Recipe
     model: CompactModel
-    given: tuple[str, ...] = ()
+    loaded: tuple[str, ...] = ()
     resume: bool = False
     components: ShapeDenoiser | None = None
 
@@ -120,13 +120,13 @@ def started(kind: type[CompactStage], recipe: Recipe, device: torch.device, *, r
     found: tuple[str, ...] = ()
     components = None
     for path in recipe.start:
-        given, _ = load_weights([Path(path)])
-        found += given.parts
-        components = given.shape.to(device) if "shape" in given.parts else components
-        for part in set(given.parts) & set(model.parts):
-            model.get_submodule(part).load_state_dict(given.get_submodule(part).state_dict())
-        if "layout" in given.parts:
-            model.statistics = given.statistics
+        loaded, _ = load_weights([Path(path)])
+        found += loaded.parts
+        components = loaded.shape.to(device) if "shape" in loaded.parts else components
+        for part in set(loaded.parts) & set(model.parts):
+            model.get_submodule(part).load_state_dict(loaded.get_submodule(part).state_dict())
+        if "layout" in loaded.parts:
+            model.statistics = loaded.statistics
     for path in recipe.warm:
         found += warm_start(model, Path(path))
     missing = [part for part in kind.needs if part not in found]
@@ -139,8 +139,8 @@ def _in_words(recipe: Recipe) -> CompactConfig:
     """The recipe's model in the words of the file that it begins with; to a warm one's come those it does not know."""
     config = recipe.model
     if recipe.start:
-        given = load_weights([Path(recipe.start[0])])[0].config
-        return replace(config, **{kind: getattr(given, kind) for kind in WORDS})
+        loaded = load_weights([Path(recipe.start[0])])[0].config
+        return replace(config, **{kind: getattr(loaded, kind) for kind in WORDS})
     if not recipe.warm:
         return config
     named = words_of(Path(recipe.warm[0]), read_header(Path(recipe.warm[0])))
@@ -154,8 +154,8 @@ def _in_words(recipe: Recipe) -> CompactConfig:
 def data_folder(recipe: Recipe, part: str) -> Path:
     """The folder of the recipe's data that holds `part`; raises ValueError where the recipe names none that exists."""
     if not recipe.data or not Path(recipe.data).exists():
-        told = f"names {recipe.data}, which does not exist" if recipe.data else "is empty"
-        raise ValueError(f"recipe field 'data' {told}; stage {recipe.stage!r} needs a folder of `echousd data build`")
+        fault = f"names {recipe.data}, which does not exist" if recipe.data else "is empty"
+        raise ValueError(f"recipe field 'data' {fault}; stage {recipe.stage!r} needs a folder of `echousd data build`")
     return Path(recipe.data) if part == "rooms" and Path(recipe.data).is_file() else Path(recipe.data) / part
 
 
@@ -167,9 +167,9 @@ def warm_start(model: CompactModel, path: Path) -> tuple[str, ...]:
 
     Raises ValueError where the file cannot be read, or a tensor of it is larger than the model's.
     """
-    header, given = read_weights(path)
+    header, tensors = read_weights(path)
     own = model.state_dict()
-    for key, value in given.items():
+    for key, value in tensors.items():
         if key not in own:
             continue
         wanted = own[key]

@@ -163,15 +163,15 @@ class Trainer:
             raise ValueError(f"{path}: not a checkpoint of a training ({error})") from None
         other = changed_fields(recipe, json.loads(to_json(self.recipe)))
         if other:
-            told = "; ".join(f"{name} was {was!r}, is {now!r}" for name, was, now in other)
-            raise ValueError(f"{path}: is a checkpoint of another recipe ({told})")
+            message = "; ".join(f"{name} was {was!r}, is {now!r}" for name, was, now in other)
+            raise ValueError(f"{path}: is a checkpoint of another recipe ({message})")
         try:
             state = {key[6:]: value for key, value in tensors.items() if key.startswith("model.")}
             self.model.load_state_dict(state)
             self._continue_from(tensors)
         except (RuntimeError, KeyError) as error:
-            told = str(error).splitlines()[:2][-1].strip()
-            raise ValueError(f"{path}: does not fit the recipe's model: {told}") from None
+            message = str(error).splitlines()[:2][-1].strip()
+            raise ValueError(f"{path}: does not fit the recipe's model: {message}") from None
         self.step = step
 
     def _continue_from(self, tensors: dict[str, torch.Tensor]) -> None:

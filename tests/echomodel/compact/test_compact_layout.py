@@ -64,13 +64,13 @@ def test_pairs_against_loops() -> None:
                     if inverse[p] >= 0:
                         told[int(inverse[p])] = 1.0
             expected.append((i, j, told))
-    assert list(zip(pairs.receiver.tolist(), pairs.sender.tolist(), pairs.told.tolist(), strict=True)) == expected
+    assert list(zip(pairs.receiver.tolist(), pairs.sender.tolist(), pairs.stated.tolist(), strict=True)) == expected
 
 
 def test_repeated_triplets_count_once() -> None:
     graph = random_graph(4, 6, 3)
     twice = graph.with_triplets(torch.cat([graph.triplets, graph.triplets]))
-    assert torch.equal(pairs_of(graph).told, pairs_of(twice).told)
+    assert torch.equal(pairs_of(graph).stated, pairs_of(twice).stated)
 
 
 def test_echo_layer_against_loops() -> None:
@@ -83,7 +83,7 @@ def test_echo_layer_against_loops() -> None:
         for p in range(len(pairs.sender)):
             if pairs.receiver[p] == i:
                 ends = layer.ends(normed[i])[:8] + layer.ends(normed[pairs.sender[p]])[8:]
-                total = total + torch.nn.functional.silu(ends + layer.told(pairs.told[p]))
+                total = total + torch.nn.functional.silu(ends + layer.told(pairs.stated[p]))
         rows.append(x[i] + layer.message(total / 2))
     expected = torch.stack(rows)
     expected = expected + layer.mlp(layer.norm_mlp(expected))
@@ -196,7 +196,7 @@ def test_an_edit_acts_through_the_latent_graph_alone() -> None:
 def test_added_nodes_enter_with_an_empty_latent() -> None:
     model, graph = small_model(), random_graph(4, 6, 8)
     pairs, added = pairs_of(graph), torch.tensor([False, True, False, False])
-    before = pairs.without(~added, pairs.told)
+    before = pairs.without(~added, pairs.stated)
     assert not (before.receiver == 1).any()
     assert not (before.sender == 1).any()
     plain = model.latent(graph.category, pairs)
@@ -206,7 +206,7 @@ def test_added_nodes_enter_with_an_empty_latent() -> None:
 
 def test_without_keeps_messages_of_others() -> None:
     pairs = pairs_of(random_graph(3, 4, 9))
-    kept: Pairs = pairs.without(torch.tensor([True, False, True]), pairs.told)
+    kept: Pairs = pairs.without(torch.tensor([True, False, True]), pairs.stated)
     assert kept.receiver.tolist() == [0, 2]
     assert kept.sender.tolist() == [2, 0]
 

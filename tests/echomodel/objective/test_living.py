@@ -456,7 +456,7 @@ def test_a_bench_counts_as_the_chairs_that_it_stands_for():
 def test_what_was_given_is_not_blamed():
     room = BEDROOM.moved("wardrobe", yaw=HALF + 0.4)
     given = np.array([name == "wardrobe" for name in room.things])
-    assert not [key for key in room.found(given=given) if key[0] == "wardrobe"]
+    assert not [key for key in room.found(fixed=given) if key[0] == "wardrobe"]
 
 
 def test_a_piece_behind_others_cannot_be_walked_to():

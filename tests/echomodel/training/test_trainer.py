@@ -93,7 +93,7 @@ def test_batches_keep_the_node_budget_and_merge_like_graphs(packed: PackedRooms)
     batch = draw_batch(packed, 100, torch.Generator().manual_seed(0))
     assert 80 < batch.graph.num_nodes <= 100
     triplets = stated_triplets(batch)
-    assert torch.equal(pairs_of(batch.graph.with_triplets(triplets)).told, batch.pairs.told)
+    assert torch.equal(pairs_of(batch.graph.with_triplets(triplets)).stated, batch.pairs.stated)
 
 
 def test_densities_range_from_hand_written_to_dense(packed: PackedRooms) -> None:

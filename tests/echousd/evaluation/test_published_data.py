@@ -47,7 +47,7 @@ def test_graphs_are_those_of_the_files(folder):
     rooms, others = rooms_against(SuiteSettings(against=str(folder), count=3))
     told = {room.id: room.relations for room in SGFront(folder, split="test").rooms()}
     for task in tasks_of([*rooms, *others], 0, rules="sgfront"):
-        assert np.array_equal(task.told, told[task.room.id])
+        assert np.array_equal(task.stated, told[task.room.id])
     trained, shapes = opened_data(read_recipe(ROOT / "model/recipes/paper.toml", [f"data={folder}"]))
     assert len(trained) == 22
     assert trained.held_out.sum() == 1

@@ -114,7 +114,7 @@ def test_what_there_is_not_is_named(arguments, text, rooms, tmp_path, capsys):
 
 
 def test_systems_keep_furniture_and_floor_and_draw_from_their_seed(rooms):
-    tasks = tasks_of(rooms, 0, told=1.0)
+    tasks = tasks_of(rooms, 0, stated=1.0)
     for name in ("random", "generator", "retrieval", "shuffled", "muted", "real"):
         one, again = (BASES[name][0](tasks, 3) for _ in range(2))
         for task, room, same in zip(tasks, one, again, strict=True):
@@ -132,7 +132,7 @@ def test_a_retrieved_room_is_itself(rooms):
 
 
 def test_half_chooses_by_one_half_of_the_terms_alone(rooms, monkeypatch):
-    task = tasks_of(rooms[:1], 0, told=1.0)[0]
+    task = tasks_of(rooms[:1], 0, stated=1.0)[0]
     drafts = [rooms[0], replace(rooms[0], id="better")]
     scores = {"room": (5.0, 0.0), "better": (1.0, 9.0)}
     seen = []
@@ -168,7 +168,7 @@ def test_small_things_are_told_apart_by_prints_and_shapes_not_by_colours():
 
 
 def test_workers_change_nothing(rooms):
-    tasks = tasks_of(rooms[:2], 0, told=1.0)
+    tasks = tasks_of(rooms[:2], 0, stated=1.0)
     asked = [System.parse("random+search")]
     alone, together = (run_systems(asked, tasks, SuiteSettings(workers=count))[0]["random+search"] for count in (1, 2))
     assert all(np.array_equal(a.position, b.position) for a, b in zip(alone, together, strict=True))

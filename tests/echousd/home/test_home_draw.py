@@ -8,8 +8,8 @@ import shapely
 
 from echomodel.vocabulary import vocabulary
 from echousd.home.draw import lines_of, write_dxf
+from echousd.home.existing import plan_there
 from echousd.home.files import load_home
-from echousd.home.given import plan_there
 from echousd.home.graph import HomeGraph
 from echousd.home.importing.formats import read_plan
 from echousd.home.importing.homes import room_kind

@@ -13,8 +13,8 @@ import echousd
 from echousd.batches.plan import room_digest
 from echousd.folder.found import room_at
 from echousd.folder.manifest import find_manifest
+from echousd.home.existing import plan_there
 from echousd.home.files import load_home
-from echousd.home.given import plan_there
 from echousd.home.stages import furniture
 from echousd.make.reading import read_room
 

@@ -11,8 +11,8 @@ import svgelements
 
 from echomodel.openings import segment
 from echousd.graph import GraphError
+from echousd.home.existing import plan_there
 from echousd.home.files import load_home
-from echousd.home.given import plan_there
 from echousd.home.importing.formats import read_plan
 from echousd.home.importing.found import Found, Hole, Room, rooms_between
 from echousd.home.importing.homes import imported, room_kind

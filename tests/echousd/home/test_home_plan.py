@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings
 from echomodel.openings import segment, signed_area, swing_area
 from echousd.graph import GraphError
 from echousd.home import plan as planning
-from echousd.home.given import next_plan
+from echousd.home.existing import next_plan
 from echousd.home.graph import HomeGraph
 from echousd.home.plan import INNER, OUTER, conflicts, plan_home, plans, ways
 from echousd.home.solve import EFFORTS, solved

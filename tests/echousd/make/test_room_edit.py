@@ -245,7 +245,7 @@ def test_furniture_of_ours_that_is_told_another_style_is_shaped_anew():
 def test_what_is_new_is_made_as_the_room_was_where_its_library_is_at_hand(root, monkeypatch, made, assets, shapes):
     asked = []
     monkeypatch.setattr(sys.modules["echousd.make.edit"], "check_sources", lambda words, model: asked.append(words[0]))
-    monkeypatch.setattr(sys.modules["echousd.make.edit"], "given_pieces", lambda *given: 1 / 0)  # no further
+    monkeypatch.setattr(sys.modules["echousd.make.edit"], "named_pieces", lambda *given: 1 / 0)  # no further
     manifest = root.with_suffix(".json")
     manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "shapes": made}))
     with pytest.raises(ZeroDivisionError):

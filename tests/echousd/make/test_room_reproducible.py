@@ -14,7 +14,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.compact.shape import _decoded
 from echomodel.echo import EchoModel
-from echousd.graph.arrays import DISTANCE, TOLD, one_thread, rounded, rounded_boxes
+from echousd.graph.arrays import DESCRIPTION, DISTANCE, one_thread, rounded, rounded_boxes
 
 CODE = textwrap.dedent("""
     import hashlib, os, sys
@@ -144,7 +144,7 @@ def test_grids_are_rounded_and_threads_come_back():
     grid = np.full((1, 2, 2, 2), 0.01234567, np.float32)
     assert (rounded(grid, DISTANCE) == rounded(grid + 1e-6, DISTANCE)).all()
     told = np.full((2, 3), 0.123456, np.float32)
-    assert (rounded(told, TOLD) == rounded(told + 2e-6, TOLD)).all()
+    assert (rounded(told, DESCRIPTION) == rounded(told + 2e-6, DESCRIPTION)).all()
     before = torch.get_num_threads()
     with one_thread():
         assert torch.get_num_threads() == 1

@@ -48,7 +48,7 @@ def test_verdicts_say_what_was_asked():
     graph = graph_of(plant={"place": "in_corner"}, table={"between": ("sofa", "armchair")})
     boxes = drawn(1)
     found = relation_verdicts(graph, boxes)
-    assert [verdict.said for verdict in found[1:]] == ["table between sofa and armchair", "plant in_corner"]
+    assert [verdict.sentence for verdict in found[1:]] == ["table between sofa and armchair", "plant in_corner"]
     assert {verdict.state for verdict in found[1:]} == {"broken"}
     nowhere = graph.replaced(room=RoomSpec("living_room"))
     assert [verdict.state for verdict in relation_verdicts(nowhere, boxes)][1:] == ["broken", "unmeasured"]
@@ -63,6 +63,6 @@ def test_check_measures_placements(tmp_path):
         placed = place(graph, boxes).boxes if good else boxes
         room = echousd.generate(graph, shapes="boxes", boxes=placed, place=False, walls=False, dress="none")
         root = room.save(tmp_path / str(good))
-        found = {each.said: each.state == "kept" for each in check(root).relations}
+        found = {each.sentence: each.state == "kept" for each in check(root).relations}
         assert found["plant in_corner"] is good
         assert found["table between sofa and armchair"] is good

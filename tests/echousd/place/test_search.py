@@ -89,7 +89,7 @@ def test_most_terms_are_broken_by_shaken_rooms(missed):
 def test_what_is_given_is_blamed_for_relations_and_collisions_alone(missed):
     for name in ("parallel", "apart"):
         seen, plan = missed[name]
-        given = replace(plan, given=np.ones(len(plan), bool))
+        given = replace(plan, fixed=np.ones(len(plan), bool))
         term = next(term for term in TERMS if term.name == name)
         assert (float(cost(term, seen, given).sum()) > 0) == (name == "apart")
 

@@ -207,7 +207,7 @@ def test_a_model_with_a_broken_clip_is_told_in_a_line(tmp_path, capfd):
     clips.SetClipPrimPath(str(stage.GetDefaultPrim().GetPath()))
     stage.Save()
     (tmp_path / "clip.usda").write_text('#usda 1.0\ndef "x" { garbage\n')
-    with pytest.raises(ValueError, match=r"^\S+chest.usda: cannot be collected with the files.*Expected }") as told:
+    with pytest.raises(ValueError, match=r"^\S+chest.usda: cannot be collected with all.*Expected }") as told:
         collected(ModelFile(path, tmp_path))
     assert "pxrInternal" not in str(told.value)
     assert capfd.readouterr() == ("", "")

@@ -9,8 +9,8 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echomodel.openings import Opening
 from echousd.graph import Node, SceneGraph
+from echousd.home.existing import plan_there
 from echousd.home.files import load_home
-from echousd.home.given import plan_there
 from echousd.home.plan import INNER, OUTER, plan_home, ways
 from echousd.stage.graphs import write_graph
 

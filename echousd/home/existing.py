@@ -50,15 +50,15 @@ def plan_there(path: Path, home: HomeGraph | None = None) -> Plan | None:
     if path.suffix.lower() not in STAGE_FORMS:
         if home is None or any(room.graph.room.floor_polygon is None for room in home.rooms):
             return None
-        return given_plan(home, {room.name: (room.graph, np.eye(4)) for room in home.rooms})  # corners as in the home
+        return placed_plan(home, {room.name: (room.graph, np.eye(4)) for room in home.rooms})  # corners as in the home
     from echousd.home.files import load_home
     from echousd.home.stages import read_poses
 
     home = home or load_home(path)
-    return None if home is None else given_plan(home, read_poses(path))
+    return None if home is None else placed_plan(home, read_poses(path))
 
 
-def given_plan(home: HomeGraph, rooms: Placed) -> Plan | None:
+def placed_plan(home: HomeGraph, rooms: Placed) -> Plan | None:
     """The plan that rooms with floors and poses make together, None where a floor is missing or stands in another's.
 
     A door in one of them is a hole in the other; where none is stated, there are those that the graph asks for.
@@ -81,7 +81,7 @@ def _placed(graph: SceneGraph, pose: np.ndarray) -> np.ndarray:
 
 
 def walled(home: HomeGraph, rooms: Placed) -> Plan | None:
-    """The floors of rooms and the walls between them, without openings; as `given_plan`.
+    """The floors of rooms and the walls between them, without openings; as `placed_plan`.
 
     Floors that meet are taken to end in the middle of their wall and lose half of it.
     """
