@@ -9,10 +9,10 @@ from functools import lru_cache
 from pathlib import PurePosixPath
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
 
 from echomodel.vocabulary import vocabulary
-from echousd.checks.reading import Finding, Reading, rule
+from echousd.checks.reading import Authored, Finding, Reading, rule
 from echousd.exporting.packing import Reach
 from echousd.stage.files import usd_error
 from echousd.stage.units import METRES, UP_AXIS, unit_faults, upwards
@@ -143,17 +143,16 @@ ENGINES = {"physics:approximation": ("sdf", "sphereFill", "convexMeshSimplificat
 SPOKEN = {"echo:predicate": "predicates", "echo:roomType": "room_types"}
 INVERTED = "!invert!"
 RESET = "!resetXformStack!"
+WITHOUT_NUMBERS = (str, Sdf.AssetPath, Vt.IntArray, Vt.TokenArray, type(None), Tf.ErrorException)  # most values
 
 
 @rule("echo:ValueTypes", "authored")
-def value_types(_reading: Reading, attribute: Usd.Attribute) -> Iterator[str]:
+def value_types(_reading: Reading, authored: Authored) -> Iterator[str]:
     """Every value can be read is of the type of its attribute and one of its words: clients read nothing, or crash."""
-    try:
-        found = attribute.Get()
-    except Tf.ErrorException as error:
-        yield f"a value that cannot be read: {usd_error(error)}"
-        return
-    if misfit(attribute.GetTypeName(), found):
+    attribute, found = authored.attribute, authored.value
+    if isinstance(found, Tf.ErrorException):
+        yield f"a value that cannot be read: {usd_error(found)}"
+    elif misfit(attribute.GetTypeName(), found):
         yield f"holds {shown(found)}, allowed: {attribute.GetTypeName()}"
     elif isinstance(found, str) and attribute.GetTypeName() == Sdf.ValueTypeNames.Token:
         words = attribute.GetMetadata("allowedTokens") or WORDS.get(attribute.GetName())
@@ -164,15 +163,17 @@ def value_types(_reading: Reading, attribute: Usd.Attribute) -> Iterator[str]:
 
 
 @rule("echo:FiniteValues", "authored")
-def finite_values(_reading: Reading, attribute: Usd.Attribute) -> Iterator[str]:
+def finite_values(_reading: Reading, authored: Authored) -> Iterator[str]:
     """No NaN, no infinity (but for physics' "unlimited"), nothing beyond a thousand million."""
+    if isinstance(authored.value, WITHOUT_NUMBERS):
+        return
     try:
-        found = np.asarray(attribute.Get())
+        found = np.asarray(authored.value)
     except (TypeError, ValueError):
         return
     if found.dtype.kind != "f":
         return
-    physical = attribute.GetNamespace().startswith("physics")
+    physical = authored.name.startswith("physics")
     bad = np.isnan(found) if physical else ~(np.abs(found) <= LARGEST)
     if bad.any():
         message = f"{found[bad].flat[0]:g}" + (f" ({int(bad.sum())} of {bad.size} numbers)" if bad.size > 1 else "")
@@ -190,17 +191,17 @@ def transform_ops(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
 
 
 @rule("echo:AtRest", "authored")
-def at_rest(_reading: Reading, attribute: Usd.Attribute) -> Iterator[str]:
+def at_rest(_reading: Reading, authored: Authored) -> Iterator[str]:
     """Nothing moves or changes shape over time: placement, collisions and relations are measured at rest."""
-    moves = attribute.GetName().startswith("xformOp") or attribute.GetName() in ("points", "visibility")
-    if moves and (count := attribute.GetNumTimeSamples()):
+    moves = authored.name.startswith("xformOp") or authored.name in ("points", "visibility")
+    if moves and (count := authored.attribute.GetNumTimeSamples()):
         yield f"has {count} time samples, allowed: one value, without time"
 
 
 @rule("echo:Variants", "prims")
 def variants(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """Every chosen variant exists."""
-    if prim.IsInstanceProxy():
+    if prim.IsInstanceProxy() or not prim.HasAuthoredMetadata("variantSelection"):
         return
     chosen = {key: word for spec in reversed(prim.GetPrimStack()) for key, word in spec.variantSelections.items()}
     sets = prim.GetVariantSets()

@@ -47,14 +47,15 @@ def _used(material: Usd.Prim, outputs: list[UsdShade.Output]) -> set[Sdf.Path]:
         prim = stage.GetPrimAtPath(path)
         if path not in used and prim:
             used.add(path)
-            queue += [source for attribute in prim.GetAuthoredAttributes() for source in attribute.GetConnections()]
+            connected = filter(Usd.Attribute.HasAuthoredConnections, prim.GetAuthoredAttributes())
+            queue += [source for attribute in connected for source in attribute.GetConnections()]
     return used
 
 
 def _loose_ends(node: Usd.Prim) -> Iterator[Finding]:
     """Connections of a node to what is not there."""
     for attribute in node.GetAuthoredAttributes():
-        for source in attribute.GetConnections():
+        for source in attribute.GetConnections() if attribute.HasAuthoredConnections() else ():
             other = node.GetStage().GetPrimAtPath(source.GetPrimPath())
             if not other or not (other.HasAttribute(source.name) or UsdShade.Shader(other).GetOutput(source.name[8:])):
                 yield Finding(attribute.GetPath(), f"connected to <{source}>, where nothing is")
@@ -212,9 +213,11 @@ def _findings(reading: Reading) -> list[tuple[str, Finding]]:
     """The findings of all rows, each with its rule's name."""
     found = []
     for prim in reading.distinct:
+        there = {*prim.GetAuthoredPropertyNames()}
         for owner, instance in _owners(prim):
             for row in BY_OWNER.get(owner, ()):
-                attribute = prim.GetAttribute(row.attribute.replace("*", instance))
+                name = row.attribute.replace("*", instance)
+                attribute = prim.GetAttribute(name) if name in there else None
                 if not attribute or not attribute.HasAuthoredValue():
                     continue
                 values = (numbers := _numbers(attribute))[numbers > -UNLIMITED]  # physics: as the engine likes

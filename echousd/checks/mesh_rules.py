@@ -316,7 +316,7 @@ def materials_inside(reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     default = reading.stage.GetDefaultPrim()
     if not default or not prim.GetPath().HasPrefix(default.GetPath()):
         return
-    for relationship in prim.GetRelationships():
+    for relationship in prim.GetAuthoredRelationships():
         if not relationship.GetName().startswith(str(UsdShade.Tokens.materialBinding)):
             continue
         for target in targets(prim, relationship.GetName()):

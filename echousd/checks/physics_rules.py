@@ -11,7 +11,7 @@ from echomodel.dressing import SMALL
 from echomodel.vocabulary import vocabulary
 from echousd.checks.reading import Finding, Reading, below, rule
 from echousd.graph.nodes import OBSTACLE
-from echousd.stage.contents import triangulated, words_of
+from echousd.stage.contents import words_of
 from echousd.stage.encoding import CATEGORY, FREE
 from echousd.stage.read import value
 from echousd.stage.units import up_axis, upwards
@@ -97,14 +97,8 @@ def _collides(prim: Usd.Prim) -> bool:
 
 def _bounds(gprims: list[Usd.Prim], reading: Reading) -> np.ndarray | None:
     """(2, 3) float: box around some prims in the world, None for none."""
-    corners = []
-    for prim in gprims:
-        points, _ = triangulated(prim)
-        if len(points):
-            world = reading.world(prim)
-            turned = points @ world[:3, :3].T + world[:3, 3]
-            corners += [turned.min(0), turned.max(0)]
-    return np.stack([np.min(corners, 0), np.max(corners, 0)]) if corners else None
+    boxes = [box for box in map(reading.box, gprims) if box is not None]
+    return np.stack([np.min(boxes, (0, 1)), np.max(boxes, (0, 1))]) if boxes else None
 
 
 @rule("echo:Gravity", "prims", UsdPhysics.Scene)

@@ -11,7 +11,7 @@ import numpy as np
 from echomodel.boxes2d import axes, footprints
 from echomodel.dressing import SMALL
 from echomodel.openings import SKIRTING, segment
-from echomodel.triangles import along, area_normals, connected_pieces, distances, spread
+from echomodel.triangles import along, area_normals, distances, spread
 from echomodel.vocabulary import vocabulary
 from echousd.checks.reading import Reading
 from echousd.graph.nodes import HEIGHT
@@ -246,13 +246,12 @@ def _air_below(thing: Shape, others: Sequence[Shape], *, draped: bool = False) -
 
 
 def _surface_gap(feet: np.ndarray, bottom: float, other: Shape) -> float:
-    plan = other.points[other.faces][:, :, [0, 2]]
-    low, high = plan.min(1), plan.max(1)
+    low, high = other.spans[:, :, [0, 2]]
     best = np.inf
     for foot in feet:
         above = ((low <= foot) & (foot <= high)).all(1)
         if above.any():
-            best = min(best, float(np.abs(other.points[other.faces[above]][:, :, 1] - bottom).min()))
+            best = min(best, float(np.abs(other.triangles[above, :, 1] - bottom).min()))
     return best
 
 
@@ -327,8 +326,7 @@ def _reach(surface: Shape, solid: Shape, deep: float) -> float:
     within = points[inside_solid(points, solid)] if len(points) else points
     if not len(within):
         return 0.0
-    triangles = solid.points[solid.faces]
-    low, high = triangles.min(1).T[:, None], triangles.max(1).T[:, None]
+    triangles, (low, high) = solid.triangles, solid.spans.transpose(0, 2, 1)[:, :, None]
     skin = np.concatenate((solid.points, _scatter(solid.points, solid.faces, 4000))).T
     deepest = 0.0
     # A sample of the skin is further away than the skin itself: deepest first, until no point can be deeper.
@@ -348,7 +346,7 @@ def _reach(surface: Shape, solid: Shape, deep: float) -> float:
 
 def surface_points(surface: Shape, solid: Shape) -> np.ndarray:
     """(s, 3) float: vertices and scattered points of a surface that lie in the other object's box."""
-    near = surface.faces[_touches(surface.points[surface.faces], solid)]
+    near = surface.faces[_touches(surface.triangles, solid)]
     if not len(near):
         return np.zeros((0, 3))
     points = np.concatenate((surface.points[near].reshape(-1, 3), _scatter(surface.points, near, 4 * SAMPLES)))
@@ -381,24 +379,15 @@ def inside_solid(points: np.ndarray, solid: Shape) -> np.ndarray:
 
     Around its closed pieces nothing turns but within their boxes, so that most points are compared with few triangles.
     """
-    faces, inside = solid.faces, ((points >= solid.points.min(0)) & (points <= solid.points.max(0))).all(1)
+    inside = ((points >= solid.points.min(0)) & (points <= solid.points.max(0))).all(1)
     if not inside.any():
         return np.asarray(inside)
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
-    count = len(solid.points)
-    piece = connected_pieces(faces, count)
-    _, where = np.unique(edges.min(1) * count + edges.max(1), return_inverse=True)
-    balance = np.bincount(where, np.where(edges[:, 0] < edges[:, 1], 1, -1))
-    open_pieces = np.unique(np.tile(piece, 3)[balance[where] != 0])
-    loose = np.isin(piece, open_pieces)
-    turns = winding_number(points, solid.points[faces[loose]]) if loose.any() else np.zeros(len(points))
-    order = np.argsort(piece[~loose], kind="stable")
-    closed = faces[~loose][order]
-    for part in np.split(closed, np.flatnonzero(np.diff(piece[~loose][order])) + 1) if len(closed) else ():
-        corners = solid.points[part]
-        near = ((points >= corners.min((0, 1))) & (points <= corners.max((0, 1)))).all(1)
-        if near.any():
-            turns[near] += winding_number(points[near], corners)
+    loose, closed = solid.pieces
+    turns = winding_number(points, loose) if len(loose) else np.zeros(len(points))
+    low, high = solid.closed_spans[:, :, None]
+    near = ((points >= low) & (points <= high)).all(-1)
+    for number in np.flatnonzero(near.any(1)).tolist():
+        turns[near[number]] += winding_number(points[near[number]], closed[number])
     return np.asarray(turns > 0.5)
 
 

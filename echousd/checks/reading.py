@@ -8,13 +8,14 @@ from functools import cached_property
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Tf, Usd, UsdGeom
 
 from echomodel.triangles import area_normals
 from echousd.exporting.packing import asset_paths
-from echousd.stage.contents import HIDDEN, RoomContents, components, read_contents
+from echousd.stage.contents import HIDDEN, RoomContents, components, read_contents, triangulated
 from echousd.stage.encoding import StageError
-from echousd.stage.files import prim_specs
+from echousd.stage.files import specs
+from echousd.stage.forms import is_subdivision
 from echousd.stage.read import RoomPrims, find_rooms
 from echousd.stage.units import metres_per_unit
 from echousd.stage.values import NOW, UNREADABLE, MeshArrays, fans, matrix, mesh_arrays
@@ -60,14 +61,14 @@ class Reading:
         return [UsdGeom.Mesh(prim) for prim in self.distinct if prim.IsA(UsdGeom.Mesh)]
 
     @cached_property
-    def authored(self) -> list[Usd.Attribute]:
+    def authored(self) -> list[Authored]:
         """All attributes of the distinct prims that somebody authored."""
-        return [attribute for prim in self.distinct for attribute in prim.GetAuthoredAttributes()]
+        return [Authored(attribute) for prim in self.distinct for attribute in prim.GetAuthoredAttributes()]
 
     @cached_property
     def primvars(self) -> set[str]:
         """Names of all primvars that somebody authored."""
-        return {attribute.GetName().partition(":")[2] for attribute in self.authored}
+        return {attribute.name.partition(":")[2] for attribute in self.authored}
 
     @cached_property
     def bound(self) -> set[Sdf.Path]:
@@ -131,12 +132,38 @@ class Reading:
         """Whether a prim is there for tools rather than for the eye (purpose guide or proxy)."""
         return self.once("guide", prim, lambda: UsdGeom.Imageable(prim).ComputePurpose() in HIDDEN)
 
+    def box(self, prim: Usd.Prim) -> np.ndarray | None:
+        """(2, 3) float: box around the form of a prim in the world, None of one without; raises as `world` does."""
+
+        def read() -> np.ndarray | None:
+            plain = prim.IsA(UsdGeom.Mesh) and not is_subdivision(prim)
+            points, world = self.mesh(UsdGeom.Mesh(prim)).points if plain else triangulated(prim)[0], self.world(prim)
+            turned = points @ world[:3, :3].T + world[:3, 3]
+            return np.stack([turned.min(0), turned.max(0)]) if len(points) else None
+
+        return self.once("box", prim, read)
+
     def once(self, what: str, prim: Usd.Prim, read: Callable[[], Found]) -> Found:
         """What is read of a prim, read at the first call."""
         key = what, prim.GetPath()
         if key not in self._kept:
             self._kept[key] = read()
         return self._kept[key]  # type: ignore[return-value]
+
+
+class Authored:
+    """An attribute that somebody authored, and what it holds, or what OpenUSD says where that cannot be read."""
+
+    def __init__(self, attribute: Usd.Attribute) -> None:
+        self.attribute, self.name = attribute, attribute.GetName()
+        try:
+            self.value = attribute.Get()
+        except Tf.ErrorException as error:
+            self.value = error
+
+    def GetPath(self) -> Sdf.Path:
+        """Where it is, as prims say it."""
+        return self.attribute.GetPath()
 
 
 def below(prim: Usd.Prim) -> list[Usd.Prim]:
@@ -147,8 +174,9 @@ def below(prim: Usd.Prim) -> list[Usd.Prim]:
 def _asset_paths(layer: Sdf.Layer) -> list[tuple[Sdf.Path, str]]:
     """All asset paths that a layer authors, in sublayers, references, payloads, values or metadata, and their prims."""
     found = [(Sdf.Path.absoluteRootPath, path) for path in layer.subLayerPaths]
-    found += [(path.GetPrimPath(), named) for path, named in asset_paths(layer)]
-    for spec in prim_specs(layer):
+    every = specs(layer)
+    found += [(path.GetPrimPath(), named) for path, named in asset_paths(every)]
+    for spec in (spec for spec in every if isinstance(spec, Sdf.PrimSpec)):
         arcs = (*spec.referenceList.GetAddedOrExplicitItems(), *spec.payloadList.GetAddedOrExplicitItems())
         found += [(spec.path, arc.assetPath) for arc in arcs if arc.assetPath]
         identifier = (spec.assetInfo or {}).get("identifier")

@@ -7,7 +7,7 @@ import os
 import struct
 import warnings
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
@@ -155,7 +155,7 @@ def take_assets(layer: Sdf.Layer, package: Package | None) -> Mapping[str, str]:
     Raises StageError that names the prim or property of a file out of reach.
     """
     renamed: dict[str, str] = {}
-    for where, path in asset_paths(layer):
+    for where, path in asset_paths(specs(layer)):
         renamed[path] = package.take(path, f"<{where}>") if package is not None else ""
     UsdUtils.ModifyAssetPaths(layer, lambda path: renamed.get(path, ""))
     return renamed
@@ -173,9 +173,16 @@ def without_clock(archive: bytes) -> bytes:
     return bytes(out)
 
 
-def asset_paths(layer: Sdf.Layer) -> Iterator[tuple[Sdf.Path, str]]:
-    """Every asset path in the values and metadata of a layer, behind the path of its prim or property."""
-    for spec in specs(layer):
-        for key in (key for key in spec.ListInfoKeys() if key != "subLayerOffsets"):  # which Python cannot hold
+# What specs say that never holds an asset path, most of it all; offsets are what Python cannot hold.
+PLAIN = {
+    "typeName", "custom", "variability", "specifier", "apiSchemas", "interpolation", "targetPaths", "connectionPaths",
+    "references", "payload", "inheritPaths", "variantSelection", "variantSetNames", "kind", "subLayerOffsets",
+}  # fmt: skip
+
+
+def asset_paths(found: Iterable[Sdf.Spec]) -> Iterator[tuple[Sdf.Path, str]]:
+    """Every asset path in the values and metadata of some specs, behind the path of its prim or property."""
+    for spec in found:
+        for key in (key for key in spec.ListInfoKeys() if key not in PLAIN):
             for path in assets_in(spec.GetInfo(key)):
                 yield spec.path, path

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from pxr import Kind, Sdf, Usd, UsdGeom
 
 from echomodel.boxes2d import upright_box
-from echomodel.triangles import Mesh, joined
+from echomodel.triangles import Mesh, connected_pieces, joined
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import LABELS
 from echousd.stage.forms import Polygons, forms, polygons
@@ -36,6 +36,36 @@ class Shape:
     size: np.ndarray
     position: np.ndarray
     yaw: float
+
+    @cached_property
+    def triangles(self) -> np.ndarray:
+        """(f, 3, 3) float, metres: the corners of its faces."""
+        return self.points[self.faces]
+
+    @cached_property
+    def spans(self) -> np.ndarray:
+        """(2, f, 3) float, metres: lower and upper corners of the boxes around its faces."""
+        return np.stack([self.triangles.min(1), self.triangles.max(1)])
+
+    @cached_property
+    def pieces(self) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Triangles (n, 3, 3) of its connected pieces that are open, all together, and of each closed one."""
+        edges = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]]).astype(np.int64)
+        count = len(self.points)
+        piece = connected_pieces(self.faces, count)
+        _, where = np.unique(edges.min(1) * count + edges.max(1), return_inverse=True)
+        balance = np.bincount(where, np.where(edges[:, 0] < edges[:, 1], 1, -1))
+        loose = np.isin(piece, np.tile(piece, 3)[balance[where] != 0])
+        order = np.argsort(piece[~loose], kind="stable")
+        closed = self.triangles[~loose][order]
+        parts = np.split(closed, np.flatnonzero(np.diff(piece[~loose][order])) + 1) if len(closed) else []
+        return self.triangles[loose], parts
+
+    @cached_property
+    def closed_spans(self) -> np.ndarray:
+        """(2, p, 3) float, metres: lower and upper corners of the boxes around its closed pieces."""
+        corners = [(part.min((0, 1)), part.max((0, 1))) for part in self.pieces[1]]
+        return np.moveaxis(np.array(corners).reshape(-1, 2, 3), 1, 0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,7 @@ from echousd.shapes.colliders import collider_of
 from echousd.shapes.geometry import CONVERTED, Geometry, Origin, Original, Part
 from echousd.shapes.surface import box_projection, creased_normals
 from echousd.srgb import to_linear
-from echousd.stage.files import layer_bytes, usd_error
+from echousd.stage.files import layer_bytes, specs, usd_error
 from echousd.stage.pen import Pen
 from echousd.stage.shading import Image, preview_surface
 from echousd.textures import READABLE, encoded
@@ -139,7 +139,7 @@ def _named_by(layers: Sequence[Sdf.Layer], path: str) -> str:
     """`<prim or property path> ` of who names a file, "" where no value does (a layer that is referred to)."""
     real = os.path.realpath(path)
     for layer in layers:
-        for where, name in asset_paths(layer):
+        for where, name in asset_paths(specs(layer)):
             if os.path.realpath(layer.ComputeAbsolutePath(name)) == real:
                 return f"<{where}> "
     return ""
