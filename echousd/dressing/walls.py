@@ -329,16 +329,15 @@ HUNG_OVER = {"coat_rack": "hung_coats", "towel_radiator": "towel"}  # a row's `t
 
 
 def hung_up(setting: Setting) -> None:
-    """Coats side by side on a rack, towels over the rungs of a radiator."""
+    """Coats side by side on a rack, towels over the rungs of a radiator; none in a block, which has neither."""
     for host in setting.of("storage"):
-        kind = HUNG_OVER.get(host.row.top, "")
-        if not kind:
+        kind, corners = HUNG_OVER.get(host.row.top, ""), host.geometry.mesh.vertices
+        if not kind or not (abs(corners[:, 1] / float(host.size[1]) - 0.5) < 0.49).any():
             continue
         rng = setting.rng(host.name, kind)
         size = usual_size(kind, rng)
         w, h, d = (float(side) for side in host.size)
         if kind == "hung_coats":
-            corners = host.geometry.mesh.vertices
             pegs = (corners[:, 1] > 0.6 * h) & (corners[:, 2] > 0.05 - d / 2) & (abs(corners[:, 0]) < w / 2 - 0.06)
             hooks = min([1.7, 0.9 * h, *corners[pegs, 1] - 0.005])
             seat = corners[corners[:, 1] < h / 2, 1].max()  # of a bench or a board for shoes

@@ -15,6 +15,8 @@ from echousd.dressing.setting import Setting, standing
 from echousd.dressing.stories import story
 from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
+from echousd.shapes.meshing import box_mesh
+from echousd.shapes.sources.whole import solid_geometry
 
 FLOOR = np.array([(-2.0, -1.5), (2.0, -1.5), (2.0, 1.5), (-2.0, 1.5)])
 WINDOW = Opening("window", "window", 0, 1.2, 1.4, 1.2, 0.9)
@@ -69,6 +71,15 @@ def test_coats_hang_on_racks_and_towels_on_rungs(word, kind, least):
                 assert not (inside & (abs(corners[:, 1] - thing.position[1] - half[1]) < half[1] - 1e-3)).any()
             assert thing.position[1] + thing.size[1] < host.top
             assert abs(thing.position[0]) + thing.size[0] / 2 < host.size[0] / 2 + 0.01
+
+
+@pytest.mark.parametrize("word", ["coat_rack", "towel_radiator"])
+def test_nothing_hangs_in_a_block(word):
+    room, size = setting(word), np.array(SIZES[word])
+    block = solid_geometry(box_mesh(size), word, Origin("boxes"))
+    room.objects[word] = standing(word, word, size, room.objects[word].position, 0.0, block)
+    walls.hung_up(room)
+    assert room.placed == []
 
 
 def test_coats_hang_near_the_wall_on_deep_racks_too(monkeypatch):
