@@ -14,7 +14,7 @@ import numpy as np
 
 from echomodel.arrays import Array, at_least, at_most, repeat, rows, sum_of
 from echomodel.boxes2d import axes
-from echomodel.late import Late
+from echomodel.late import linear_sum_assignment
 from echomodel.objective import TERMS, Plan, Term, unreached
 from echomodel.objective.access import to_wall
 from echomodel.objective.copies import copies_of, looks_at
@@ -28,7 +28,6 @@ from echousd.place.problem import Problem
 from echousd.place.proposals import Row, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
 from echousd.place.solver import PlaceConfig
 
-linear_sum_assignment = Late("scipy.optimize:linear_sum_assignment")  # which rooms without seats at tables do without
 JUDGED = 48  # poses that are judged at once
 SWEEPS = 3  # times that what misses something is looked at after the first time
 BUDGET = 4500  # poses that are judged in all; each is a whole room

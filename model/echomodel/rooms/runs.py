@@ -15,6 +15,7 @@ from itertools import combinations, pairwise, product
 import numpy as np
 
 from echomodel.boxes2d import footprints
+from echomodel.late import linear_sum_assignment
 from echomodel.openings import Opening, free_area, signed_area
 from echomodel.rooms.floor import Wall, walls_of
 from echomodel.sizes import AISLE, LANDING, TALL, TRIANGLE, usual_range
@@ -353,8 +354,6 @@ class _Planner:
         hoods: Sequence[tuple[int, int, Interval, float]],
     ) -> list[tuple[int, int, Interval, float]]:  # fmt: skip
         """Wall units in line over worktops: none over the hob, before a window, or through a high unit."""
-        from scipy.optimize import linear_sum_assignment
-
         units = [i for i in self.hung if _hangs(self.kinds[i])]
         if not units:
             return []
