@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from pxr import Usd, UsdLux
+from pxr import Usd, UsdGeom, UsdLux
 
 from echousd.stage import values
 
@@ -31,12 +31,14 @@ def emitted(prim: Usd.Prim, metres: float) -> np.ndarray:
     if prim.IsA(UsdLux.DistantLight):
         disc = np.pi * np.sin(np.radians(number("angle")) / 2) ** 2
         return color if whole or disc == 0 else color * disc
+    scale = np.array(UsdGeom.Imageable(prim).ComputeLocalToWorldTransform(values.NOW))[:3, :3]
+    level = float(np.linalg.norm(np.cross(scale[0], scale[1])))  # of what lies in its x and y
     if prim.IsA(UsdLux.SphereLight):
-        surface = 4 * np.pi * number("radius") ** 2
+        surface = 4 * np.pi * number("radius") ** 2 * float(abs(np.linalg.det(scale))) ** (2 / 3)
     elif prim.IsA(UsdLux.DiskLight):
-        surface = np.pi * number("radius") ** 2
+        surface = np.pi * number("radius") ** 2 * level
     elif prim.IsA(UsdLux.RectLight):
-        surface = number("width") * number("height")
+        surface = number("width") * number("height") * level
     else:
         return np.zeros(3)
     return color * metres**2 * (1.0 if whole else surface)  # whole, also of a point without any

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdLux
+from pxr import Usd, UsdGeom, UsdLux
 
 from echousd.stage.encoding import StageError
 from echousd.stage.lights import emitted
@@ -33,6 +33,20 @@ def test_a_lamp_gives_the_same_in_metres_and_in_centimetres(kind, size, surface,
         intensity = 1.0 / metres**2 if whole else 1.0 / surface
         found = given(kind, intensity, metres, normalize=whole, exposure=1.0, **told)
         np.testing.assert_allclose(found, 2.0, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("kind", "size", "surface"), SIZES)
+def test_a_lamp_that_is_scaled_has_more_surface(kind, size, surface):
+    for whole, gain in ((False, 4.0), (True, 1.0)):
+        stage = Usd.Stage.CreateInMemory()
+        UsdGeom.Xform.Define(stage, "/asset").AddScaleOp().Set((2.0, 2.0, 2.0))
+        made = kind.Define(stage, "/asset/light")
+        UsdGeom.Xformable(made).AddScaleOp().Set((1.0, 1.0, 1.0) if kind is UsdLux.SphereLight else (1.0, 1.0, 9.0))
+        UsdLux.LightAPI(made).CreateNormalizeAttr(whole)
+        for name, value in {"intensity": 3.0, **size}.items():
+            made.GetPrim().GetAttribute(f"inputs:{name}").Set(value)
+        expected = 3.0 * gain * (1.0 if whole else surface)
+        np.testing.assert_allclose(emitted(made.GetPrim(), 1.0), expected, rtol=1e-5)
 
 
 def test_a_sun_gives_its_disc_or_what_it_says():
