@@ -37,6 +37,7 @@ DRAFTS = 8  # of which the best is kept
 ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
 MARGIN = 0.35  # metres of floor around the furniture where nobody said how large the floor is
 POSES = 8_000  # that are judged for one room, over all its drafts; the search that is begun then comes to its end
+PIECE = 500  # the same in halls, for each piece
 SHARE = 0.375  # of these in passing
 ALIKE = 4  # drafts that end alike, after which no further one is drawn; fewer lost a clean room in 140
 CROWD = 160  # objects of all drafts together, unless somebody says how many drafts
@@ -111,7 +112,8 @@ class LayoutSearch:
         """
         best: tuple[Boxes, tuple[str, ...]] | None = None
         worth: tuple[float, ...] = ()
-        ways, judged, budget = [(graph, DEFAULTS)], 0, POSES * max(1.0, self.drafts / DRAFTS)
+        ways, judged = [(graph, DEFAULTS)], 0
+        budget = max(POSES, PIECE * len(graph.nodes)) * max(1.0, self.drafts / DRAFTS)
         # what a draft leaves to be wished for, its number, it, and the searches that were begun from it
         left: list[tuple[tuple[float, ...], int, Boxes, dict[bytes, Arranged]]] = []
         if self.proposed and graph.room.openings:  # which make way for the furniture of every other draft

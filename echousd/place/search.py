@@ -30,7 +30,7 @@ from echousd.place.solver import PlaceConfig
 
 JUDGED = 48  # poses that are judged at once
 SWEEPS = 3  # times that what misses something is looked at after the first time
-BUDGET = 4500  # poses that are judged in all; each is a whole room
+BUDGET, PIECE = 4500, 300  # poses that are judged in all, each a whole room; in halls so many for each piece
 GAIN = 1e-3  # by which a move must be better
 WORTH = 0.5  # that a sweep must gain for another one
 GRAIN = 1e4  # costs are compared to so many parts of one
@@ -71,11 +71,9 @@ class Arranged:
 class Search:
     """One search in a problem; for terms that yield it does not begin anew."""
 
-    def __init__(
-        self, problem: Problem, terms: tuple[Term, ...] = TERMS, budget: int = BUDGET,
-        yields: frozenset[str] = frozenset(),
-    ) -> None:  # fmt: skip
-        self.problem, self.budget, self.judged, self.walked = problem, budget, 0, False
+    def __init__(self, problem: Problem, terms: tuple[Term, ...] = TERMS, yields: frozenset[str] = frozenset()) -> None:
+        self.problem, self.judged, self.walked = problem, 0, False
+        self.budget = max(BUDGET, PIECE * len(problem.size))
         numbers, words = {int(number) for number in problem.triplets[:, 1]}, vocabulary().predicates
         stated = {row.name for row in words if row.id in numbers} | {"placed"}
         sizes = {row.name for row in words if row.measures == "size"} | {"scale"}  # which no pose changes
@@ -88,6 +86,8 @@ class Search:
         self.looks: list[np.ndarray] = []
         self.urgent: list[int] = []
         n = len(problem.size)
+        at = (np.array(problem.slot_roles) == "at") & (problem.anchor >= 0)
+        self.seated = at & (np.bincount(problem.anchor[at], minlength=n)[problem.anchor] > 1)  # together at a table
         self.children: list[list[int]] = [[] for _ in range(n)]
         self.screens: list[list[int]] = [[] for _ in range(n)]
         near, opposed, above = map(vocabulary().predicate_id, ("close_by", "opposite", "above"))
@@ -447,6 +447,8 @@ class Search:
         there[out] = False
         there |= self.problem.fixed
         for i in self.order([k for k in out if not there[k]]):
+            if there[i] and self.seated[i]:  # with its table
+                continue
             there[i] = True
             state = self._expecting(state, there, i)
             state = self.reseated(self.moved(state, there, i), there, i)
@@ -487,7 +489,8 @@ class Search:
         for _ in range(SWEEPS):
             if not wrong or self.judged >= self.budget:
                 break
-            after = self.swept(state, self.involved(wrong))
+            anchors = [k for k in self.problem.anchor[wrong].tolist() if k >= 0]
+            after = self.swept(state, list(dict.fromkeys([*wrong, *anchors])))
             before, (cost, still) = total, self.faults(after)
             if cost < before - GAIN:
                 state, total, wrong = after, cost, still
@@ -509,7 +512,7 @@ class Search:
             self.urgent = wrong if number else []  # the worst first
             built = self.rebuilt(state, out)
             self.urgent = []
-            after = self.swept(built, out)
+            after = self.swept(built, [i for i in out if not self.seated[i]])
             cost, still = self.faults(after)
             if cost < total - GAIN:
                 state, total, wrong = self.mended(after, cost, still)
@@ -520,11 +523,8 @@ class Search:
         problem, n = self.problem, len(self.problem.size)
         at = problem.position.copy(), problem.yaw.copy()
         state = State(*at, np.array([0.02 + 0.3 * out_of_habit(problem, i, *at) for i in range(n)]))
-        _, wrong = self.faults(state)
-        seat = np.array([slot_role == "at" for slot_role in problem.slot_roles], bool)
-        mates = np.array([((problem.anchor == a) & seat).sum() for a in problem.anchor])
-        seated = seat & (problem.anchor >= 0) & (mates > 1) & ~np.isin(np.arange(n), wrong)  # together with their table
-        state = self.swept(state, [i for i in range(n) if not seated[i]])
+        self.faults(state)
+        state = self.swept(state, [i for i in range(n) if not self.seated[i]])
         return self.mended(state, *self.faults(state))
 
 
