@@ -125,7 +125,8 @@ BEDSIDE = 0.3  # metres beside a bed
 INTO_BED, OF_LAMPS, OF_CHAIRS = 0.6, 0.6, 0.2  # metres between a plant and a bed's side, a floor lamp, a chair
 LEAF = 0.1  # share of storage's front at either end that a door may open before
 GRAZE = 0.01  # metres that furniture may reach into a door's way, as layouts are rounded
-WALKED = 0.6  # metres, the width of a way on which one walks in, straight ahead through an open door
+# Metres: the width of a way on which one walks in, straight ahead through an open door, and how far no armchair is.
+WALKED, ENTERED = 0.6, 1.2
 TALL, STORED = 0.3, 0.1  # metres over a window's sill: what is higher, and storage that is, takes its light
 HEADBOARD = 0.3  # metres: of a bed only the head is so high
 CLEARANCE = 1.9  # metres: what hangs higher is in nobody's way
@@ -192,7 +193,7 @@ def plant_aside(plan: Plan) -> Found:
 
 
 def door_free(plan: Plan) -> Found:
-    """Doors swing, and passages are passed, without meeting furniture."""
+    """Doors swing, and passages are passed, without meeting furniture; who walks in walks into no armchair."""
     low = (held(plan.position)[:, 1] < CLEARANCE) & (plan.kit.amax(held(plan.size), 1) > 0.3)
     hangs = ~plan.standing & low & plan.of("storage", "seat", "sofa", "board", "bed")
     return _before_openings(plan, plan.standing | hangs, window=False)
@@ -262,6 +263,7 @@ def _clearance(plan: Plan, who: Array, polygon: np.ndarray, opening: Opening, de
         x = at_least(abs((middle - hinge) @ closed) - reach(closed), 0.0)
         z = at_least(abs((middle - hinge) @ inward) - reach(inward), 0.0)
         out = xp.maximum(out, xp.sqrt(at_least(x * x + z * z, 1e-12)) - opening.width)
-        walked = xp.maximum(beside + max(opening.width - WALKED, 0.0) / 2, deep)
+        further = (ENTERED - opening.depth) * plan.stands("company")[who]
+        walked = xp.maximum(beside + max(opening.width - WALKED, 0.0) / 2, deep - further)
         out = out if depth is not None else xp.minimum(walked, out)
     return out + GRAZE

@@ -257,8 +257,10 @@ def places_of(size: Array) -> Array:
 
 
 def chairs_even(plan: Plan) -> Found:
-    """The chairs of a table stand evenly around it; a bench counts as the chairs that it stands for."""
-    i, j, xp = seats_at(plan).i, seats_at(plan).j, plan.kit
+    """The chairs of a table stand evenly around it, two also around a corner that the graph states; a bench counts as
+    its chairs."""
+    seats, xp = seats_at(plan), plan.kit
+    i, j = seats.i, seats.j
     places = places_of(held(plan.size)[i])
     count = sum_of(j, places, len(plan))
     who = rows(count > 1)
@@ -266,7 +268,12 @@ def chairs_even(plan: Plan) -> Found:
     shift = abs(xp.stack([sum_of(j, off * places, len(plan))[who] for off in plan.local(i, j)], -1) / n)
     margin = EVEN + n % 2 * (ODD * plan.size[who][:, ::2] + 0.3) / n - shift
     at = xp.arange(len(who)), margin.argmin(1)
-    return found(who, margin[at], measure=shift[at])
+    tables = [j[stated_of(plan, i, j, "left", "right", "front", "behind")]]  # each seat's that is told where to be
+    for one, other in (plan.ends_of("close_by"), plan.ends_of("close_by")[::-1]):
+        tables.append(plan.anchor[one][plan.stands("at")[one] & (plan.anchor[one] == plan.anchor[other])])
+    two = [xp.bincount(of[of >= 0], minlength=len(plan)) for of in (xp.concat(tables), j, j[seats.ahead])]
+    corner = ((two[0] > 1) & (two[1] == 2) & (two[2] == 1))[who]
+    return found(who, xp.where(corner, FAR, margin[at]), measure=shift[at])
 
 
 def chairs_opposite(plan: Plan) -> Found:

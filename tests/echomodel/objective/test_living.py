@@ -408,6 +408,15 @@ def test_one_walks_in_straight_ahead_beside_the_leaf(hinge, at):
         assert (("plant", "door_free") in room.found(openings=(door,))) == reached
 
 
+@pytest.mark.parametrize(
+    ("kind", "x", "met"), [("armchair", -0.95, True), ("armchair", -0.85, False), ("plant", -0.95, False)]
+)
+def test_who_walks_in_walks_into_no_armchair(kind, x, met):
+    door = Opening("door", "door", 3, 0.3, 0.9, 2.0)  # its leaf reaches to x = -1.6
+    thing = {"kind": kind, "size": (0.8, 0.9, 0.8), "at": (x, 1.25), "yaw": -HALF}
+    assert (("one", "door_free") in Room({"one": thing}).found(openings=(door,))) == met
+
+
 @pytest.mark.parametrize(("hinge", "met"), [("left", True), ("right", False)])
 def test_nothing_stands_before_the_wall_where_a_leaf_slides(hinge, met):
     door = Opening("door", "door", 3, 1.2, 0.8, 2.0, hinge=hinge, swing="slide")  # from z = 0 to 0.8 in the wall at -x
@@ -451,6 +460,17 @@ def test_a_bench_counts_as_the_chairs_that_it_stands_for():
     table = {"table": {**SET.things["table"], "kind": "table"}}
     assert ("table", "chairs_even") not in Room({**chairs, **table, "bench": bench}).found()
     assert ("table", "chairs_even") in Room({**chairs, **table}).found()
+
+
+def test_two_chairs_sit_around_a_corner_where_the_graph_says_so():
+    chair = {"kind": "dining_chair", "size": (0.45, 0.9, 0.45)}
+    table = {"kind": "dining_table", "size": (1.4, 0.75, 1.4), "at": (0.0, 0.0)}
+    room = Room({"table": table, "a": {**chair, "at": (0.75, 0.0), "yaw": -HALF}, "b": {**chair, "at": (0.0, -0.75)}})
+    assert ("table", "chairs_even") in room.found()
+    told = [(1, vocabulary().predicate_id("front"), 0), (2, vocabulary().predicate_id("left"), 0)]
+    assert ("table", "chairs_even") in room.found(relations=told[:1])
+    assert ("table", "chairs_even") not in room.found(relations=told)
+    assert ("table", "chairs_even") not in room.found(relations=[(1, vocabulary().predicate_id("close_by"), 2)])
 
 
 def test_what_was_given_is_not_blamed():
