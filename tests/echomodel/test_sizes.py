@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from shapely.geometry import MultiPoint
 from shapely.ops import unary_union
@@ -25,6 +25,7 @@ WITHIN = np.zeros((1, 3), bool)
 SIDE = st.floats(0.05, 4.0)
 
 
+@example("tv", (1.2, 1.1, 0.1))  # the one that has a proportion
 @given(st.sampled_from([row.name for row in vocabulary().categories]), st.tuples(SIDE, SIDE, SIDE))
 def test_usual_sizes_are_in_range_and_in_proportion(word, size):
     (found,) = usual_sizes([word], np.array([size]), lenient=WITHIN)

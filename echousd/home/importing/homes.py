@@ -86,8 +86,9 @@ def imported(found: Found, storey: str | None = None, *, lenient: bool = False) 
     ignored.update(dropped)
     counts = Counter(one.kind for own in openings.values() for one in own)
     plan = replace(plan, openings=openings)
-    inside = {frozenset(pair): way for pair, way in ways(plan)}
-    counts["passage"] -= len(inside)  # the other side of a door or passage
+    met = [*ways(plan)]
+    counts["passage"] -= len(met)  # the other side of a door or passage
+    inside = {frozenset(pair): way for pair, way in met}
     relations = [
         HomeRelation(one, "open_to" if way.kind == "passage" and way.width >= WIDE else "door", other)
         for (one, other), way in ((sorted(pair), way) for pair, way in inside.items())

@@ -337,6 +337,11 @@ def test_generate_many_makes_the_same_rooms(calm, tmp_path):
 
 
 def test_weights_are_known_by_their_bytes(tmp_path):
-    assert front.weights_hash("") == front.weights_hash("")
+    for name in ("one", "same", "other"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "weights.safetensors").write_bytes(b"changed" if name == "other" else b"bytes")
+    one, same, other = (front.weights_hash(str(tmp_path / name)) for name in ("one", "same", "other"))
+    assert one == same != other
+    (tmp_path / "none").mkdir()
     with pytest.raises(ValueError, match="no weights there"):
-        front.weights_hash(str(tmp_path))
+        front.weights_hash(str(tmp_path / "none"))

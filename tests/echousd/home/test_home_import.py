@@ -260,6 +260,13 @@ def ifc(path, units=True):
     file.write(str(path))
 
 
+def test_two_doors_between_two_rooms_are_no_passage():
+    rooms = [Room(name, (name,), np.array(corners, float)) for name, corners in ROOMS.items()]
+    holes = [Hole(f"d{n}", "door", np.array([[(4.0, at), (4.0, at + 0.8)]])) for n, at in enumerate((0.2, 1.8))]
+    counts = imported(Found("metres", rooms, holes)).counts
+    assert (counts["doors"], counts["passages"]) == (2, 0)
+
+
 PLANS = {
     "dxf": (dxf, "flat.dxf", None), "svg": (svg, "flat.svg", 0.01), "sweethome": (sh3d, "flat.sh3d", None),
     "procthor": (procthor, "flat.json", None), "holodeck": (lambda path: procthor(path, True), "flat.json", None),
