@@ -8,6 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+from shapely.errors import ShapelyError
+
 from echomodel.files import read_bounded, within_memory
 from echousd.graph import GraphError
 from echousd.home.importing.drawings import read_dxf, read_ifc, read_svg
@@ -120,8 +123,11 @@ def read_plan(path: Path, form: str | None = None, unit: float | None = None) ->
         raise GraphError(message if message.startswith(str(path)) else f"{path}: {message}") from None
     except OSError as error:
         raise GraphError(f"{path}: {(error.strerror or str(error)).lower()}") from None
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        message = str(error).removeprefix(f"{path}: ").removeprefix(f"{path.name}: ").partition("\n")[0]
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError, ShapelyError) as error:
+        message = str(error)
+        if isinstance(error, ValidationError):
+            message = "a {title} of {input!r:.60}: {msg}".format(title=error.title.lower(), **error.errors()[0])
+        message = message.removeprefix(f"{path}: ").removeprefix(f"{path.name}: ").partition("\n")[0]
         reason = f"{error} is missing" if isinstance(error, KeyError) else message
         raise GraphError(f"{path}: not as {form or path.suffix.lstrip('.')} has it ({reason})") from None
 

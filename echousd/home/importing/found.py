@@ -7,9 +7,12 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from typing import Annotated
 
 import numpy as np
 import shapely
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as checked
 
 from echomodel.files import tables
 
@@ -18,9 +21,10 @@ MAP = np.array([[0.0, 1.0], [1.0, 0.0]])  # x east, y north: maps, z-up; also x 
 SCREEN = np.array([[0.0, -1.0], [1.0, 0.0]])  # x right, y down
 SNAP = 0.02  # metres that ends of walls may be apart
 SMALLEST = 0.8  # square metres between walls that may be a room
+CHECKED = ConfigDict(arbitrary_types_allowed=True)  # what a reader takes from a file: other types are refused
 
 
-@dataclass(frozen=True, eq=False)
+@checked(frozen=True, eq=False, config=CHECKED)
 class Room:
     """A room: corners (k, 2) of its floor, and words for its kind, the surest first."""
 
@@ -31,7 +35,7 @@ class Room:
     storey: str = ""
 
 
-@dataclass(frozen=True, eq=False)
+@checked(frozen=True, eq=False, config=CHECKED)
 class Hole:
     """A door, window or passage.
 
@@ -42,7 +46,7 @@ class Hole:
     """
 
     name: str
-    kind: str
+    kind: Annotated[str, Field(pattern="^(door|window|passage)$")]
     ends: np.ndarray
     height: float | None = None
     sill: float | None = None
@@ -50,7 +54,7 @@ class Hole:
     tips: np.ndarray | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@checked(frozen=True, eq=False, config=CHECKED)
 class Piece:
     """A piece of furniture.
 

@@ -413,6 +413,12 @@ def archive(path, **files):
             packed.writestr(name.replace("_", "."), text)
 
 
+def altered(path, write, old, new):
+    write(path)
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+
+
 BAD = {
     "flat.dxf": {
         "states no unit ($INSUNITS), allowed: --unit m, cm, mm": lambda path: dxf(path, unit=0),
@@ -438,6 +444,15 @@ BAD = {
         ),
         "allowed: shapely.box, Polygon or LineString of numbers": lambda path: unclear(
             path, '{"rooms": {"a": {"shape": "exit(1)"}}}'
+        ),
+        "not as json has it (a hole of 'archway': String should match pattern": lambda path: altered(
+            path, scenesmith, '"opening_type": "window"', '"opening_type": "archway"'
+        ),
+        "not as json has it (a hole of [2.0]: Input should be a valid number)": lambda path: altered(
+            path, scenesmith, '"height": 2.0', '"height": [2.0]'
+        ),
+        "not as json has it (IllegalArgumentException": lambda path: altered(
+            path, procthor, '"floorPolygon": [{"x": 0', '"floorPolygon": [{"x": NaN'
         ),
         "malformed node": lambda path: unclear(path, '{"rooms": {"a": {"shape": "shapely.Polygon(exit(1))"}}}'),
     },
