@@ -51,14 +51,21 @@ class Format:
 
 def _usdz(stage: Usd.Stage, asked: Export) -> Mapping[Path, bytes]:
     package = Package(asked.reach)
-    layer = flat_layer(stage, package=package if asked.pictures else None, physics=asked.physics)
-    return {asked.out: usdz(_marked(layer, stage), package, arkit=asked.arkit)}
+    return {asked.out: usdz(_flattened(stage, asked, package), package, arkit=asked.arkit)}
 
 
 def _flat(stage: Usd.Stage, asked: Export) -> Mapping[Path, bytes]:
     package = Package(asked.reach, images_beside(asked.out))
+    layer = _flattened(stage, asked, package)
+    return {asked.out: layer_bytes(layer, asked.out.suffix), **package.files(asked.out.parent)}
+
+
+def _flattened(stage: Usd.Stage, asked: Export, package: Package) -> Sdf.Layer:
+    """The flat layer that is asked for, which says the stage's layout that it holds where there are several."""
     layer = flat_layer(stage, package=package if asked.pictures else None, physics=asked.physics)
-    return {asked.out: layer_bytes(_marked(layer, stage), asked.out.suffix), **package.files(asked.out.parent)}
+    if layout := selected_layout(stage):
+        layer.customLayerData = {**layer.customLayerData, "layout": layout}
+    return layer
 
 
 FORMATS: Mapping[str, Format] = {
@@ -122,14 +129,6 @@ def export(
         check_free(path, force=force or not reader)
     write_all(files)
     return next(iter(files))
-
-
-def _marked(layer: Sdf.Layer, stage: Usd.Stage) -> Sdf.Layer:
-    """The layer, which says the stage's layout that it holds where there are several."""
-    layout = selected_layout(stage)
-    if layout:
-        layer.customLayerData = {**layer.customLayerData, "layout": layout}
-    return layer
 
 
 OURS = "Echo"  # what the names of our types and schemas begin with

@@ -143,11 +143,8 @@ def wanted_jobs(
 
     Where nothing but a room's openings is to be another, its job is to edit what is there.
     """
-    jobs, root, layer = (
-        jobs_of(plan, output, options, outside),
-        earlier(output, options.seed),
-        layer_there(output / ROOT_FILE),
-    )
+    jobs = jobs_of(plan, output, options, outside)
+    root, layer = earlier(output, options.seed), layer_there(output / ROOT_FILE)
     digests, marks = digests_of(jobs), dict(layer.customLayerData.get("rooms", {})) if layer else {}
     there = {name: find_manifest(output / FOLDER / name) for name in jobs}
     again = [name for name in jobs if not there[name] or marks.get(name) != digests[name]]

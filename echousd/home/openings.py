@@ -87,12 +87,9 @@ def facings(one: Floor, other: Floor) -> Iterator[Facing]:
 def counterpart(floor: Floor, opening: Opening, floors: Iterable[Floor]) -> tuple[str, Opening] | None:
     """The room behind an opening and the hole that must be on its side; None for one that leads outside."""
     for other in floors:
-        for facing in facings(floor, other) if other is not floor and other.name != floor.name else ():
-            if (
-                facing.edge == opening.edge
-                and facing.low - 0.01 <= opening.offset
-                and opening.end <= facing.high + 0.01
-            ):
+        for facing in facings(floor, other) if other.name != floor.name else ():
+            within = facing.low - 0.01 <= opening.offset and opening.end <= facing.high + 0.01
+            if facing.edge == opening.edge and within:
                 return other.name, facing.across(opening)
     return None
 

@@ -16,9 +16,8 @@ from echomodel.vocabulary import vocabulary
 from echousd.place.distances import APART, MOST_UNDER, kept_apart, over_bed, seen_from, spread_at_walls
 from echousd.place.geometry import depth_inside
 from echousd.place.problem import Problem
-from echousd.place.slots import INNER, STANDS, sides
+from echousd.place.slots import HALF_PI, INNER, STANDS, sides
 
-HALF_PI = math.pi / 2
 STEP = 0.2  # metres between two places at a wall
 GRID, PLACES = 0.35, 1000  # metres between two places in the open; in a hall so many, farther apart
 SLIDES = (0.08, 0.2, 0.45, 0.8)  # metres by which a piece is moved along its width and its depth

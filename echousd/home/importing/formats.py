@@ -13,6 +13,7 @@ from shapely.errors import ShapelyError
 
 from echomodel.files import read_bounded, within_memory
 from echousd.graph import GraphError
+from echousd.graph.consistency import faults_of
 from echousd.home.importing.drawings import read_dxf, read_ifc, read_svg
 from echousd.home.importing.found import Found
 from echousd.home.importing.homes import Imported, imported
@@ -98,10 +99,8 @@ def import_plan(
     Raises `GraphError` that names the file.
     """  # fmt: skip
     name, found = read_plan(Path(path), format, unit_of(unit))
-    try:
+    with faults_of(str(path)):
         return imported(replace(found, format=name), storey, lenient=lenient)
-    except GraphError as error:
-        raise GraphError(f"{path}: {error}") from None
 
 
 def read_plan(path: Path, form: str | None = None, unit: float | None = None) -> tuple[str, Found]:

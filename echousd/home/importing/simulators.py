@@ -187,6 +187,7 @@ def read_roomplan(data: Any) -> Found:
         storey = str(scan.get("story", 0))
         labels = tuple(str(one.get("label", "")) for one in scan.get("sections") or ())
         heights = [wall["dimensions"][1] for wall in scan["walls"]]
+        ground = min(map(_low, scan["walls"]), default=0.0)
         outlines = [_points(one, one.get("polygonCorners")) for one in scan.get("floors") or ()]
         outlines = [points for points in outlines if len(points) > 2]
         if not outlines:
@@ -197,15 +198,13 @@ def read_roomplan(data: Any) -> Found:
         for key, kind in (("doors", "door"), ("openings", "passage"), ("windows", "window")):
             for one in scan.get(key) or ():
                 ends = _points(one, _across(one)) @ turn.T
-                low = _matrix(one)[1, 3] - one["dimensions"][1] / 2 - min((_low(w) for w in scan["walls"]), default=0.0)
-                sill = max(float(low), 0.0) if kind == "window" else None
-                holes.append(
-                    Hole(str(one.get("identifier", kind)), kind, ends[None], one["dimensions"][1], sill, storey)
-                )
+                sill = max(_low(one) - ground, 0.0) if kind == "window" else None
+                name, height = str(one.get("identifier", kind)), one["dimensions"][1]
+                holes.append(Hole(name, kind, ends[None], height, sill, storey))
         for one in scan.get("objects") or ():
             word = next(iter(one["category"])) if isinstance(one.get("category"), dict) else str(one.get("category"))
             matrix, size = _matrix(one), np.array(one["dimensions"], float)
-            at = matrix[:3, 3] - [0.0, size[1] / 2 + min((_low(w) for w in scan["walls"]), default=0.0), 0.0]
+            at = matrix[:3, 3] - [0.0, size[1] / 2 + ground, 0.0]
             at[[0, 2]] = turn @ at[[0, 2]]
             pieces.append(Piece(word, (word,), at, turn @ matrix[[0, 2], 2], size, storey=storey))
     angle = math.degrees(math.atan2(turn[0, 1], turn[0, 0]))
@@ -223,8 +222,8 @@ def _across(one: Any) -> list[tuple[float, float, float]]:
     return [(-half, 0.0, 0.0), (half, 0.0, 0.0)]
 
 
-def _low(wall: Any) -> float:
-    return float(_matrix(wall)[1, 3] - wall["dimensions"][1] / 2)
+def _low(one: Any) -> float:
+    return float(_matrix(one)[1, 3] - one["dimensions"][1] / 2)
 
 
 def _points(one: Any, corners: Any) -> np.ndarray:
