@@ -231,6 +231,19 @@ def test_chairs_are_seated_together():
     assert after < before - 1.9
 
 
+def test_chairs_go_with_their_table_and_one_alone_by_itself(monkeypatch):
+    words = ["dining_table", *["dining_chair"] * 4, "desk", "office_chair"]
+    size = [(1.6, 0.75, 0.9), *[(0.45, 0.9, 0.5)] * 4, (1.2, 0.75, 0.6), (0.6, 1.0, 0.6)]
+    chairs = [(0.3, 0, 0.7), (0.35, 0, -0.7), (-0.5, 0, 0.6), (1.2, 0, -0.1)]
+    at = [(0, 0, 0), *chairs, (-1.8, 0, -1.6), (-1.8, 0, -0.9)]
+    search, _ = searched(words, size, at, [0, np.pi, 0, np.pi, -1.2, 0, np.pi])
+    moved, one = [], Search.moved
+    monkeypatch.setattr(Search, "moved", lambda self, *of: moved.append(of[-1]) or one(self, *of))
+    assert search.run().wrong == ()
+    assert {0, 5, 6} <= {*moved}
+    assert not {1, 2, 3, 4} & {*moved}
+
+
 def test_chairs_are_seated_where_they_are_told_to_be():
     """Each stands in the other one's place, so that none gets to its own alone, nor without what hangs over it."""
     words, at = ["dining_table", *["dining_chair"] * 2, "pendant_lamp"], [(0, 0, -0.6), (0, 0, 0.6), (0, 2.0, -0.6)]
@@ -323,6 +336,11 @@ def test_no_more_poses_are_judged_than_were_allowed():
     assert search.faults(found.state)[0] == pytest.approx(found.cost)
     more = Search(search.problem).run(0, found)
     assert (more.cost, more.judged) == (pytest.approx(found.cost), 0)  # it goes on from there
+
+
+def test_more_poses_are_judged_in_a_hall():
+    few, many = (searched(["chair"] * n, np.full((n, 3), 0.5), np.zeros((n, 3)), np.zeros(n))[0] for n in (8, 32))
+    assert many.budget > 2 * few.budget
 
 
 def test_a_lamp_that_is_told_the_impossible_stays_in_the_room():
