@@ -1,6 +1,7 @@
 """Room sets on disk: equal bytes per seed, resumed builds, rooms and batches that equal what was written."""
 
 import pickle
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -72,7 +73,9 @@ def test_a_set_of_one_file(folder, tmp_path):
     far = replace(rooms[0], position=rooms[0].position + 40)
     with pytest.raises(ValueError, match=r"room room_3_000000: a set of rooms holds less than 32.768 m"):
         pack_rooms(path, [far], [False], {})
-    for content in (b"PK", pickle.dumps({})):
+    with zipfile.ZipFile(tmp_path / "header.npz", "w") as packed:
+        packed.writestr("note.npy", b"\x93NUMPY\x01\x00\x03\x00('\n")
+    for content in (b"PK", pickle.dumps({}), (tmp_path / "header.npz").read_bytes()):
         (tmp_path / "bad.npz").write_bytes(content)
         with pytest.raises(ValueError, match=r"bad.npz: not a packed set of rooms, allowed: what `echousd"):
             RoomSet(tmp_path / "bad.npz")

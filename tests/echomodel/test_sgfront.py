@@ -93,6 +93,8 @@ def first(raw):
         (BOXES, lambda r: first(r)["1"].update(param7=[1, -1, 1, 0, 0, 0, 0]), r"size \[1, -1, 1\] is negative"),
         (BOXES, lambda r: first(r).pop("scene_center"), r"scene_center is None, expected 3 numbers"),
         (BOXES, lambda r: r.pop(next(iter(r))), r"scan \w+-0: missing"),
+        (GRAPHS, lambda r: first(r).update(relationships=[7]), r"a scan not as SG-FRONT has it \(object of type 'int'"),
+        (BOXES, lambda r: first(r).update({"1": 0.5}), r"a scan not as SG-FRONT has it \('float' object has no"),
     ],
 )  # fmt: skip
 def test_malformed_files_name_file_and_scan(folder, file, change, text):

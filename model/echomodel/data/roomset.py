@@ -13,6 +13,7 @@ import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -123,7 +124,7 @@ def _unpacked(path: Path) -> tuple[dict, dict[str, np.ndarray]]:
                     into = table[field] if field else table
                     into[...] = column / STEPS.get(field, MILLIMETRES) if into.dtype.kind == "f" else column
         most = {kind: len(note[kind]) for kind in _words()}
-    except (OSError, KeyError, TypeError, ValueError, EOFError, zipfile.BadZipFile, zlib.error):
+    except (OSError, KeyError, TypeError, ValueError, EOFError, TokenError, zipfile.BadZipFile, zlib.error):
         raise ValueError(f"{path}: not a packed set of rooms, allowed: what `echousd data import` writes") from None
     rooms = tables["rooms"]
     wrong = [name for name in list(TABLES)[1:] if rooms[name].sum(dtype=np.uint64) != len(tables[name])]

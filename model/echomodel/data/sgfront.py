@@ -57,13 +57,16 @@ class SGFront:
         if not isinstance(raw, dict) or not isinstance(raw.get("scans"), list):
             raise ValueError(f"{self.folder / graphs}: no list `scans`")
         rooms: dict[str, RoomBoxes] = {}
-        for number, entry in enumerate(raw["scans"]):
-            name = entry.get("scan", f"number {number}")
-            if name in rooms:
-                raise ValueError(f"{self.folder / graphs}: scan {name}: appears twice")
-            if name not in boxed:
-                raise ValueError(f"{self.folder / boxes}: scan {name}: missing")
-            rooms[name] = self._room(name, entry, boxed[name], graphs, boxes)
+        try:
+            for number, entry in enumerate(raw["scans"]):
+                name = entry.get("scan", f"number {number}")
+                if name in rooms:
+                    raise ValueError(f"{self.folder / graphs}: scan {name}: appears twice")
+                if name not in boxed:
+                    raise ValueError(f"{self.folder / boxes}: scan {name}: missing")
+                rooms[name] = self._room(name, entry, boxed[name], graphs, boxes)
+        except (AttributeError, KeyError, TypeError) as error:
+            raise ValueError(f"{self.folder / graphs}, {boxes}: a scan not as SG-FRONT has it ({error})") from None
         return list(rooms.values())
 
     # -- files ---------------------------------------------------------------------------------------------------
@@ -96,8 +99,7 @@ class SGFront:
             if min(param7[:3]) < 0:
                 raise fault(boxes, f"object {key}: size {param7[:3]} is negative")
             params.append(param7)
-            path = box.get("model_path") or ""
-            models.append(Path(path).parent.name)
+            models.append(Path(box.get("model_path") or "").parent.name)
         centre = boxed.get("scene_center")
         if centre is None or len(centre) != 3:
             raise fault(boxes, f"scene_center is {centre}, expected 3 numbers")
@@ -212,13 +214,10 @@ def _boxes(room: RoomBoxes, shift: np.ndarray) -> tuple[dict, np.ndarray]:
     # The scan's centre is the middle of its floor, as in the published boxes.
     extent = [high[0] - low[0], 0.0, high[1] - low[1], middle[0] + shift[0], shift[1], middle[1] + shift[2], 0.0]
     params = np.concatenate([params, [extent]])
-    corners = footprints(room.size, room.position, room.yaw)
+    floor = [low, [high[0], low[1]], high, [low[0], high[1]]]
+    corners = np.concatenate([footprints(room.size, room.position, room.yaw), [floor]]) + shift[[0, 2]]
     out: dict = {}
-    for k, row in enumerate(params):
-        if k < len(room):
-            plan = corners[k] + shift[[0, 2]]
-        else:
-            plan = np.array([low, [high[0], low[1]], high, [low[0], high[1]]]) + shift[[0, 2]]
+    for k, (row, plan) in enumerate(zip(params, corners, strict=True)):
         heights = (row[4], row[4] + row[1])
         model = room.models[k] if k < len(room.models) else ""
         out[str(k + 1)] = {
