@@ -7,10 +7,10 @@ from functools import lru_cache
 import numpy as np
 import shapely
 
-from echomodel.boxes2d import upright
+from echomodel.boxes2d import hull, upright
 from echomodel.dressing import usual_size
 from echomodel.dressing.prints import names_of
-from echomodel.dressing.textiles import LIES
+from echomodel.dressing.textiles import LEAN, LIES
 from echomodel.triangles import area_normals
 from echousd.dressing.setting import Setting, Standing, Thing
 from echousd.shapes.nofit import forbidden_moves
@@ -27,6 +27,7 @@ RIDGE = 0.1  # metres that an arm is higher than the seat at least so that a thr
 RAISED = 0.04  # metres that a thing is raised, or let down, at most so that it lies on the solids of a seat
 # Shares of a cushion's extents that it stands on, and the part of that which must be level.
 BASE, STEADY = np.array([0.9, 1.0, 0.6]), 0.6
+HELD, TRIES = 0.5, 6  # share of what lies flat that is on what it lies on; places that are tried for it
 
 
 def cushions(setting: Setting) -> None:
@@ -65,7 +66,8 @@ def bed_cushions(setting: Setting) -> None:
         wide, (kind, size, variant) = float(host.size[0]), _designs(setting, rng)[int(rng.integers(2))]
         if seat is None:
             continue
-        for side in (-1.0, 1.0) if wide > WIDE_BED and size[0] < 1.3 * size[1] else (0.0,):
+        two, size = size[0] < 1.3 * size[1], size + np.array([0.0, 0.0, LEAN * size[1]])
+        for side in (-1.0, 1.0) if wide > WIDE_BED and two else (0.0,):
             turn = float(rng.uniform(-0.12, 0.12))
             spot = _lying(host, seat, seat.before_pillows(side * 0.21 * wide, size), turn, size)
             _put(setting, host, _let_down(host, spot, size), kind, size, turn, variant)
@@ -99,9 +101,11 @@ def _put(
 
 
 def _upon(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | None:
-    """The spot (3,) for a flat thing, raised onto the solids below it; None where one of them stands far out."""
-    top = max(float(spot[1]), float(_tops(host, spot, size).max()))
-    return np.array([spot[0], top, spot[2]]) if top - spot[1] < RAISED else None
+    """The spot (3,) for a thing, raised onto the solids below it; None where one stands far out, or few hold it."""
+    tops = _tops(host, spot, size)
+    top = max(float(spot[1]), float(tops.max()))
+    level = (tops > tops.max() - LEVEL).mean() > HELD
+    return np.array([spot[0], top, spot[2]]) if level and top - spot[1] < RAISED else None
 
 
 def _let_down(host: Standing, spot: np.ndarray | None, size: np.ndarray) -> np.ndarray | None:
@@ -149,18 +153,20 @@ def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -
 
 
 def _lying(host: Standing, seat: _Seat, spot: np.ndarray | None, turn: float, size: np.ndarray) -> np.ndarray | None:
-    """A place near a spot (3,) that is clear of the host and on what is below; None where there is none."""
+    """A place near a spot (3,), or before it, that is clear of the host and on what is below; None where none is."""
     if spot is None:
         return None
-    for _ in range(3):
+    wide, deep = 2 * hull(size[[0, 2]] / 2, np.array(turn))
+    base = np.array([wide, size[1], deep])
+    for _ in range(TRIES):
         down = seat.below(spot, size)
-        upon = None if down is None else _upon(host, np.array([spot[0], down, spot[2]]), size)
-        clear = None if upon is None else _clear_of(host, upon + np.array([0.0, 0.002, 0.0]), turn, size)
-        if upon is None or clear is None:
-            return None
-        if np.abs(clear - upon).max() < LEVEL:
-            return clear
-        spot = clear
+        upon = None if down is None else _upon(host, np.array([spot[0], down, spot[2]]), base)
+        if upon is None:
+            spot = spot + np.array([0.0, 0.0, 2 * STEP])
+            continue
+        spot = _clear_of(host, upon + np.array([0.0, 0.002, 0.0]), turn, size)
+        if spot is None or np.abs(spot - upon).max() < LEVEL:
+            return spot
     return None
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from echomodel.dressing.textiles import LEAN, cushion
 from echomodel.furniture import Choices, Style, solids
 from echomodel.furniture.cloth import Tufted, cover, pillow, seam
 from echomodel.furniture.sofas import BODIES, upholstered_arms
@@ -44,6 +45,23 @@ def test_a_cord_runs_along_the_seam_of_its_cushion():
     line = seam(0.25, 0.24)
     assert np.linalg.norm(line[1:] - line[:-1], axis=1).max() < 0.07
     assert np.abs(trimesh.proximity.signed_distance(cushion, line)).max() < 0.004
+
+
+def test_a_deep_cushion_leans_back_over_a_wider_foot():
+    wide, tall = 0.45, 0.42
+    upright, leaning = (
+        np.concatenate([one.mesh()[0] for one in cushion((wide, tall, deep), np.random.default_rng(3))])
+        for deep in (0.15, 0.15 + LEAN * tall)
+    )
+
+    def slice_of(points, share):
+        z = points[abs(points[:, 1] / tall - share) < 0.06, 2]
+        return (z.max() + z.min()) / 2, np.ptp(z)
+
+    assert abs(slice_of(upright, 0.9)[0] - slice_of(upright, 0.1)[0]) < 0.01
+    assert slice_of(leaning, 0.1)[0] - slice_of(leaning, 0.9)[0] == pytest.approx(LEAN * tall * 0.88, abs=0.02)
+    assert slice_of(leaning, 0.1)[1] > 1.4 * slice_of(upright, 0.1)[1]
+    np.testing.assert_allclose(np.ptp(leaning, axis=0), (wide, tall, 0.15 + LEAN * tall), atol=0.03)
 
 
 def test_a_cover_has_folds_and_two_covers_differ():

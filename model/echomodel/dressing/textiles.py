@@ -9,7 +9,7 @@ import numpy as np
 
 from echomodel.dressing.prints import any_of
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.cloth import Sheet, folds, pillow, seam
+from echomodel.furniture.cloth import Sheet, Slumped, folds, pillow, seam
 from echomodel.furniture.solids import Solid, ball, rotation, tube, turned
 
 LIES = (11, 16)  # cells in which a throw knows what it lies on
@@ -132,9 +132,13 @@ CLOTHS = ("accent_cloth", "accent_plain", "accent_striped", "accent_checked", "b
 TRIMS = ("", "", "cord", "cord", "button", "tassels")  # of cushions
 
 
+LEAN, UPRIGHT = 0.28, 0.185  # of its height that a top is behind its foot; metres, the deepest that is upright
+
+
 def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
-    """A cushion on one of its sides, full or slack, of one of some cloths or of a print, trimmed in some way."""
-    w, h, d = size
+    """A cushion on a side, full or slack, of one of some cloths or of a print, trimmed; a deep one leans back."""
+    (w, h, _), lean = size, LEAN * size[1] if size[2] > UPRIGHT else 0.0
+    d = size[2] - lean
     cloth, trim = str(rng.choice(CLOTHS)), str(rng.choice(TRIMS))
     cord = str(rng.choice(("linen", "ebony", "blanket", "accent_plain")))
     body = pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), shown or cloth)
@@ -143,7 +147,8 @@ def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid
         "button": [ball((0, h / 2, 0), (0.016, 0.016, 0.51 * d), cord)],
         "tassels": [ball((x * w, y * h, 0), (0.016, 0.022, 0.014), cord) for x in (-0.47, 0.47) for y in (0.03, 0.97)],
     }
-    return [replace(body, power=float(rng.choice((3.0, 4.0, 5.5)))), *trims.get(trim, [])]
+    made = [replace(body, power=float(rng.choice((3.0, 4.0, 5.5)))), *trims.get(trim, [])]
+    return [Slumped(material=one.material, of=one, tall=h, lean=lean) for one in made] if lean else made
 
 
 lumbar_cushion = cushion  # long and low, for the small of the back

@@ -10,6 +10,7 @@ from echomodel.furniture.solids import FINEST, IDENTITY, Array, Ball, Block, Sol
 
 PINCH = 0.09  # of half a pillow's side that its middle stands back behind the corners
 BUTTON = ((0.014, -0.003), (0.015, 0.003), (0.008, 0.008))  # half widths of a button at heights over the cloth, metres
+FOOT, SPREAD = 0.15, 0.8  # of a slumped cushion's height, below which it does not lean; by how much it is wider there
 SEAM = 0.04  # of half a pillow's thickness that is left at its seams
 
 
@@ -44,6 +45,22 @@ class Pillow(Ball):
 def pillow(centre: Vector, half: Vector, material: str, role: str = "", turn: Array = IDENTITY) -> Pillow:
     """A pillow about `centre` (3,) with half axes `half` (3,), metres."""
     return Pillow(np.array(centre, float), turn, material, role, half=np.array(half, float), power=4.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Slumped(Solid):
+    """Another solid that leans back (-z) above its foot, which spreads: `lean` metres at the height `tall`."""
+
+    of: Solid = field(default_factory=Solid)
+    tall: float = 1.0
+    lean: float = 0.0
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        vertices, faces = self.of.mesh(detail)
+        x, y, z = vertices.T
+        high = np.clip(y / self.tall, 0, 1)
+        back = self.lean * (np.clip(high - FOOT, 0, 1) / (1 - FOOT) - 0.5)
+        return np.stack([x, y, z * (1 + SPREAD * (1 - high) ** 2) - back], 1), faces
 
 
 def seam(wide: float, tall: float) -> Array:

@@ -512,6 +512,25 @@ def test_what_is_flat_lies_on_the_solids_of_its_seat():
     np.testing.assert_allclose(upholstery._upon(host, np.array([0.3, 0.385, 0.1]), size), (0.3, 0.4, 0.1), atol=1e-9)
     assert upholstery._upon(host, np.array([0.3, 0.4, -0.12]), size) is None  # its back edge is in the back
     assert upholstery._upon(host, np.array([0.3, 0.35, 0.1]), size) is None  # as high as no seat is above what one sees
+    ridge = trimesh.creation.box((1.6, 0.41, 0.04))
+    ridge.apply_translation((0, 0.205, 0.2))
+    host.geometry.colliders.append(SimpleNamespace(mesh=ridge))
+    assert upholstery._upon(host, np.array([0.3, 0.4, 0.1]), size) is None  # it would lie askew
+
+
+def test_what_lies_on_a_bed_is_put_before_a_fold_that_would_tilt_it():
+    bed, fold = trimesh.creation.box((1.6, 0.5, 2.0)), trimesh.creation.box((1.6, 0.52, 0.1))
+    bed.apply_translation((0, 0.25, 0))
+    fold.apply_translation((0, 0.26, -0.3))
+    host = SimpleNamespace(geometry=SimpleNamespace(colliders=[SimpleNamespace(mesh=bed), SimpleNamespace(mesh=fold)]))
+    line = np.arange(-1.0, 1.0, STEP) + STEP / 2
+    seat = _Seat(line, line, np.full((len(line), len(line)), 0.5), 0.5)
+    for turn in (0.0, -0.4, 0.4):
+        size = np.array([0.3, 0.02, 0.2])
+        spot = upholstery._lying(host, seat, np.array([0.0, 0.5, -0.25]), turn, size)
+        deep = 0.15 * abs(np.sin(turn)) + 0.1 * np.cos(turn)
+        assert -0.25 + deep <= spot[2] < -0.05 + deep
+        assert spot[1] == pytest.approx(0.5, abs=0.003)
 
 
 def test_rows_of_books_on_long_shelves_are_drawn_whole():
