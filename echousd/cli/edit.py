@@ -166,17 +166,9 @@ def _say_steps(room: Path, pictures: Sequence[Path], word: str, steps: Sequence[
 
 
 def _change(
-    run: str,
-    wanted: Callable[[], tuple[Path, SceneGraph]],
-    folder: Path,
-    options: dict[str, Any],
-    nothing: str,
-    *,
-    dry_run: bool,
-    force: bool,
-    wait: bool,
-    json: bool,
-) -> None:
+    run: str, wanted: Callable[[], tuple[Path, SceneGraph]], folder: Path, options: dict[str, Any], nothing: str, *,
+    dry_run: bool, force: bool, wait: bool, json: bool,
+) -> None:  # fmt: skip
     """Have the room in a folder become what `wanted` says (its root layer and the graph), or say what would happen.
 
     The `run` that did the same and was interrupted is finished instead.

@@ -143,16 +143,9 @@ def export(
 
 
 def generate_home(
-    graph: Path,
-    home: HomeGraph,
-    output: Path,
-    options: RoomOptions,
-    outside: Sequence[Path],
-    *,
-    force: bool,
-    json: bool,
-    dry_run: bool = False,
-) -> None:
+    graph: Path, home: HomeGraph, output: Path, options: RoomOptions, outside: Sequence[Path], *, force: bool,
+    json: bool, dry_run: bool = False,
+) -> None:  # fmt: skip
     """Plan a home, make its rooms side by side, and say what became of each; exit code 1 for faults.
 
     Arguments:

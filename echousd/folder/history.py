@@ -27,13 +27,9 @@ WHEN = (1980, 1, 1, 0, 0, 0)  # of every file in an archive: equal states are eq
 
 
 def remembered(
-    folder: Path,
-    old: Mapping[str, Any],
-    files: Mapping[str, bytes],
-    owned: Mapping[str, str],
-    copies: Collection[str],
-    steps: Sequence[str],
-) -> tuple[list[dict[str, Any]], dict[str, bytes]]:
+    folder: Path, old: Mapping[str, Any], files: Mapping[str, bytes], owned: Mapping[str, str],
+    copies: Collection[str], steps: Sequence[str],
+) -> tuple[list[dict[str, Any]], dict[str, bytes]]:  # fmt: skip
     """The history of a room after an edit, and the archive of what the edit replaces: path -> bytes.
 
     Arguments:
@@ -183,14 +179,9 @@ def _others(files: Mapping[str, bytes], manifest: Mapping[str, Any], name: str) 
 
 
 def _step(
-    folder: Path,
-    archive: str,
-    files: Mapping[str, bytes],
-    removes: Sequence[str],
-    expected: Mapping[str, str],
-    to: Mapping[str, Any],
-    then: str,
-) -> dict[str, bytes]:
+    folder: Path, archive: str, files: Mapping[str, bytes], removes: Sequence[str], expected: Mapping[str, str],
+    to: Mapping[str, Any], then: str,
+) -> dict[str, bytes]:  # fmt: skip
     """Make sure that a step costs nobody a byte, and return all that it replaces and removes: path -> content.
 
     Arguments:

@@ -34,17 +34,9 @@ SCRIPTS = ("hunyuan", "mvpainter")  # tools that paint objects by pictures of th
 
 
 def export_job(
-    room: str | Path,
-    out: str | Path,
-    tool: str,
-    *,
-    prompt: str = "",
-    dressing: str = "none",
-    resolution: int | None = None,
-    layout: int | None = None,
-    shell: bool | None = None,
-    force: bool = False,
-) -> Job:
+    room: str | Path, out: str | Path, tool: str, *, prompt: str = "", dressing: str = "none",
+    resolution: int | None = None, layout: int | None = None, shell: bool | None = None, force: bool = False,
+) -> Job:  # fmt: skip
     """Write a room as a job for a texturing tool: meshes with texture coordinates, cameras, prompts and `job.json`.
 
     Arguments:
