@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 LONGEST_WORD = 300  # characters: a path is shorter, a name of a million is a prank
 LONGEST_LINE = 4000
 ENDLESS = re.compile(r"(?<![\w./-])(-?\d)(\d{39,})(?:\.\d+)?(?![\w/-]|\.\w)")  # a number that is no part of a path
-MARK = b"echousd"
-HEAD = 2048  # bytes in which a picture of ours says so
 _began: ContextVar[float] = ContextVar("_began", default=0.0)  # when the command did
 quiet: ContextVar[bool] = ContextVar("quiet", default=False)  # whether errors, warnings and data alone are said
 
@@ -84,19 +82,10 @@ def plain_json(found: Any) -> Any:
 
 
 def check_picture(path: Path, *, force: bool) -> None:
-    """Refuse to replace a file that is no picture of ours; raises ValueError.
+    """Raises ValueError where a file is that is no picture of ours, unless it is replaced by `force`."""
+    from echousd.draw.pictures import is_ours
 
-    Arguments:
-        path: the picture to write; ours say `echousd` in their first bytes.
-        force: replace whatever is there.
-    """
-    if force or not path.exists():
-        return
-    try:
-        ours = path.is_file() and MARK in path.open("rb").read(HEAD)
-    except OSError:
-        ours = False
-    if not ours:
+    if not force and path.exists() and not is_ours(path):
         raise ValueError(f"{path}: exists and is no picture of echousd; choose another place or use --force")
 
 

@@ -216,9 +216,9 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
         words.append(mesh.category)
         if mesh.category not in (*SHELL, "rug"):
             (curtains if mesh.category in HUNG else boxes).append(_box(mesh))
-    _hang(parts, [*(n for n, word in enumerate(words) if word in HUNG), *_on_shelves(parts, words)], len(walls))
     if not parts:
         raise ValueError(f"{stage.GetRootLayer().identifier}: nothing to draw, found no visible mesh")
+    _hang(parts, [*(n for n, word in enumerate(words) if word in HUNG), *_on_shelves(parts, words)], len(walls))
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     furniture, at_walls = (
         Furniture(found[:, :3], found[:, 3:6], found[:, 6])
@@ -243,15 +243,11 @@ def _pane(mesh: Drawable) -> np.ndarray:
 
 def _on_shelves(parts: list[dict[str, np.ndarray]], words: list[str]) -> list[int]:
     """Numbers of the parts that stand on shelves that hang on a wall."""
-    corners = [part["triangles"].reshape(-1, 3) for part in parts]
-    bounds = [(points.min(0), points.max(0)) for points in corners]
-    out = []
+    bounds = np.array([np.stack([part["triangles"].min((0, 1)), part["triangles"].max((0, 1))]) for part in parts])
+    middle, out = bounds.mean(1), list[int]()
     for low, high in (bounds[n] for n, word in enumerate(words) if word == "wall_shelf"):
-        for number, (least, most) in enumerate(bounds):
-            middle = (least + most) / 2
-            inside = (middle[[0, 2]] > low[[0, 2]]).all() and (middle[[0, 2]] < high[[0, 2]]).all()
-            if inside and low[1] < least[1] < high[1] + 0.03:
-                out.append(number)
+        inside = ((middle > low) & (middle < high))[:, [0, 2]].all(1)
+        out += np.flatnonzero(inside & (bounds[:, 0, 1] > low[1]) & (bounds[:, 0, 1] < high[1] + 0.03)).tolist()
     return out
 
 

@@ -39,24 +39,30 @@ class Furniture:
         local = cube * self.size[:, None]
         return np.asarray(self.position[:, None] + np.einsum("nji,nkj->nki", self._turns(), local))
 
+    def of(self, rows: np.ndarray) -> Furniture:
+        """Some of these boxes."""
+        return Furniture(self.size[rows], self.position[rows], self.yaw[rows])
+
     def with_others(self, *others: Furniture | None) -> Furniture:
         """These boxes, then some others."""
         every = [self, *(other for other in others if other is not None)]
         return Furniture(*(np.concatenate([getattr(one, f.name) for one in every]) for f in fields(Furniture)))
 
-    def met(self, view: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
+    def met(self, view: np.ndarray, half: float, near: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """(169,) int which box is the nearest along each of `RAYS` through a picture from inside, and metres to it,
         inf where there is none.
 
-        `view`: (4, 4) float camera to world. `half`: half of the picture's width at distance 1.
+        `view`: (4, 4) float camera to world. `half`: half of the picture's width at distance 1. `near`: metres ahead
+        from where on things are seen.
         """
         ways = (RAYS * (half, half, 1.0)) @ view[:3, :3].T
-        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+        far = np.linalg.norm(ways, axis=1, keepdims=True)
+        ways, begin = ways / far, near * far[:, 0]
         turn = self._turns()
         start = np.einsum("nij,nj->ni", turn, view[:3, 3] - self.position - self.size * (0.0, 0.5, 0.0))
         way = (turn.reshape(-1, 3) @ ways.T).reshape(len(turn), 3, -1).transpose(0, 2, 1)
         enter, leave = _crossing(start[:, None], way, 0.5 * self.size[:, None])
-        away = np.where((enter < leave) & (leave > 0), np.maximum(enter, 0.0), np.inf)
+        away = np.where((enter < leave) & (leave > begin), np.maximum(enter, begin), np.inf)
         which = away.argmin(0)
         return which, away[which, np.arange(len(RAYS))]
 

@@ -137,7 +137,8 @@ def _rays(world: World, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.nd
     aside = u * axes[:3, 0] + v * axes[:3, 1]
     if view.orthographic:
         return axes[:3, 3] + aside, np.broadcast_to(-axes[:3, 2], aside.shape)
-    return np.broadcast_to(axes[:3, 3], aside.shape), _unit(aside - axes[:3, 2])
+    way = aside - axes[:3, 2]
+    return axes[:3, 3] + np.float32(view.near) * way, _unit(way)
 
 
 def _met(
@@ -471,18 +472,18 @@ def _direct(world: World, hits: Hits, spot: np.ndarray, turn: np.ndarray) -> tup
     if inside and len(scenery.panes):  # one place in one window for each ray
         pane = scenery.panes[np.minimum((turn[:, 0] * len(scenery.panes)).astype(int), len(scenery.panes) - 1)]
         place = pane[:, 0] + (2 * spot[:, :1] - 1) * pane[:, 1] + (2 * spot[:, 1:] - 1) * pane[:, 2]
-        way, away = _way(point, place)
+        way, away = way_to(point, place)
         area = np.cross(pane[:, 1], pane[:, 2])  # a quarter of it
         seen = np.clip(_dot(way, normal), 0, None) * 4 * np.abs(_dot(way, area)) / np.maximum(away, 0.2) ** 2
         seen *= np.clip(0.65 + 1.4 * way[:, 1], 0.3, 1)  # sky above, ground below
-        share = _free(scene, point, way, away, seen > 1e-4) * np.minimum(seen, 1.5)  # none a spark near a pane
+        share = free(scene, point, way, away, seen > 1e-4) * np.minimum(seen, 1.5)  # none a spark near a pane
         light += share[:, None] * (len(scenery.panes) * SKY * lights.sky / np.pi) * SKY_LIGHT * lights.tint
     if inside and len(lights.bulbs):  # one lamp for each ray
         which = np.minimum((turn[:, 1] * len(lights.bulbs)).astype(int), len(lights.bulbs) - 1)
-        way, away = _way(point, lights.bulbs[which, (spot[:, 0] * lights.bulbs.shape[1]).astype(int)])
+        way, away = way_to(point, lights.bulbs[which, (spot[:, 0] * lights.bulbs.shape[1]).astype(int)])
         facing = np.clip(_dot(normal, way), 0, None) * len(lights.bulbs) / (away**2 + OWN**2)
         own = np.maximum(OWN, np.ptp(lights.bulbs, axis=1).max(-1))[which]  # what is so near is its shade
-        lit = _free(scene, point, way, away - own, facing > 0) * facing
+        lit = free(scene, point, way, away - own, facing > 0) * facing
         light += lit[:, None] * lights.power.take(which, 0) / np.float32(np.pi)
     return light, _sunny(world, point, normal, spot)
 
@@ -495,7 +496,7 @@ def _sunny(world: World, point: np.ndarray, normal: np.ndarray, spot: np.ndarray
     towards, soft = (sun[0], np.float32(0.005)) if inside and sun is not None else (ABOVE, SUN_SPREAD)
     towards = _unit(towards + soft * _on_sphere(spot))
     facing = np.clip(_dot(normal, towards), 0, None)
-    return _free(world.scene, point, towards, np.full(len(point), 1e3, np.float32), facing > 0) * facing
+    return free(world.scene, point, towards, np.full(len(point), 1e3, np.float32), facing > 0) * facing
 
 
 def _gathered(world: World, hits: Hits, square: np.ndarray) -> np.ndarray:
@@ -506,11 +507,8 @@ def _gathered(world: World, hits: Hits, square: np.ndarray) -> np.ndarray:
     rows = world.thrown.rows(hits.point, way, np.minimum(other["tfar"], 100), axis)
     thrown, missed = world.thrown.radiance.take(rows, 0), np.flatnonzero(other["primID"] < 0)
     thrown[missed] = 0 if world.view.inside else (0.92 + 0.35 * way.take(missed, 0)[:, 1:2]) * SKY_LIGHT
-    free, pale = (
-        np.clip(other["tfar"] / CREVICE, 0, 1),
-        PALE * world.scenery.flat_colors.take(other["primID"], 0) @ LUMA,
-    )
-    return np.column_stack([thrown, free + (1 - free) * pale])
+    pale = PALE * world.scenery.flat_colors.take(other["primID"], 0) @ LUMA
+    return np.column_stack([thrown, pale + (1 - pale) * np.clip(other["tfar"] / CREVICE, 0, 1)])
 
 
 def _lit(world: World) -> World:
@@ -519,7 +517,7 @@ def _lit(world: World) -> World:
     Light is found at places that an eye in it and those places see, and thrown on `TURNS` times.
     """
     rng, normals = np.random.default_rng(0), world.scenery.normals[:, 0]
-    point, normal = world.view.matrix[None, :3, 3].astype(np.float32), np.zeros((1, 3), np.float32)
+    point, normal = world.view.start[None].astype(np.float32), np.zeros((1, 3), np.float32)
     met: list[tuple[np.ndarray, ...]] = []
     for count in PLACES:  # from the eye all around or, where it is outside, ahead, then from what it sees
         origin, square = np.resize(point, (count, 3)), rng.random((count, 2), np.float32)
@@ -531,14 +529,8 @@ def _lit(world: World) -> World:
         origin, way, face, far = origin[there], way[there], hit["primID"][there], hit["tfar"][there]
         normal = -np.sign(_dot(normals[face], way))[:, None] * normals[face]
         point = origin + far[:, None] * way + BEFORE * normal
-        met.append(
-            (
-                point,
-                normal,
-                world.thrown.rows(origin, way, far, world.scenery.axis[face]),
-                world.scenery.flat_colors[face],
-            )
-        )
+        rows = world.thrown.rows(origin, way, far, world.scenery.axis[face])
+        met.append((point, normal, rows, world.scenery.flat_colors[face]))
         if not len(there):
             return world  # with nothing in the picture
     point, normal, rows, albedo = (np.concatenate(values) for values in zip(*met, strict=True))
@@ -558,14 +550,14 @@ def _lit(world: World) -> World:
     return world._replace(glow=glow.astype(np.float32), white=white)
 
 
-def _way(point: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def way_to(point: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Directions (n, 3) from points to places, and how far they are, (n,) metres."""
     way = place - point
     away = np.sqrt(np.maximum(_dot(way, way), 1e-12))
     return way / away[:, None], away
 
 
-def _free(scene: Any, point: np.ndarray, way: np.ndarray, away: np.ndarray, asked: np.ndarray) -> np.ndarray:
+def free(scene: Any, point: np.ndarray, way: np.ndarray, away: np.ndarray, asked: np.ndarray) -> np.ndarray:
     """(n,) float32: 1 where nothing stands within `away` metres in a direction, 0 elsewhere and where not `asked`."""
     out, ask = np.zeros(len(point), np.float32), np.flatnonzero(asked & (away > 0.02))
     out[asked & (away <= 0.02)] = 1.0

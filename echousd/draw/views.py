@@ -12,7 +12,7 @@ import shapely
 from pxr import UsdGeom
 
 from echomodel.boxes2d import axes
-from echomodel.openings import inward_normal
+from echomodel.openings import direction, edge_lengths, inward_normal, rectangle
 from echomodel.triangles import cross
 from echousd.draw.scenery import Scenery
 from echousd.draw.sight import AHEAD, ASPECT, RAYS, Furniture, filled
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
 # mm of a camera inside: 74, 81, 90 and 97 degrees across; metres of depth that each costs: wide ones distort
-LENSES, DISTORTED = (24.0, 21.0, 18.0, 16.0), (0.0, 3.0, 10.0, 24.0)
-EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
+LENSES, DISTORTED = (24.0, 21.0, 18.0, 16.0), (0.0, 20.0, 50.0, 90.0)
+EYE = 0.5  # of the height of the walls: where a camera inside is
 SLOPES = (0.05, 0.13, 0.22, 0.32)  # metres that the middle of its picture is lower for a metre ahead
 PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
 WHOLE, CLEAR = 1000.0, 80.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
@@ -45,6 +45,8 @@ SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width ove
 UNSEEN, MANY = 6.0, 8.0  # metres of depth that each of so many pieces in the picture is worth
 SHOWN, FAR = 30.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
 STEPS = (0.2, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
+# Or so far behind a wall, which its near plane cuts away, and so much of the room with what hangs and stands there.
+BEYOND, THROUGH = (0.6, 1.2, 2.0), (0.3, 0.5, 0.7, 0.9)
 APART = 3.0  # metres from the middle that it keeps where it stands further from its corner
 ALONG, OFF = (0.2, 0.35, 0.5, 0.65, 0.8), 0.4  # or along a wall, as shares of its length, and metres from it
 BEFORE_IT, TURNS = 3.4, np.arange(8) * np.pi / 4  # or so many metres around the main piece, where the room is so large
@@ -54,12 +56,23 @@ WIDE = 7.0  # metres of a scene from which on it is seen from higher up: over th
 FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than their sides is worth
 
 
+class Eye(NamedTuple):
+    """Where a camera may stand, before the walls, or beyond one that it looks straight through."""
+
+    spot: np.ndarray  # (2,) x and z, metres
+    near: float = 0.0  # metres ahead from where on things are seen: beyond the wall and what hangs there
+    way: np.ndarray | None = None  # (2,) in which it must look
+    aside: float = np.inf  # metres to the nearer end of the wall
+
+
 class Shot(NamedTuple):
-    """A camera inside: what it costs at first sight, camera to world (4, 4), mm; and what `Furniture.blocked` says."""
+    """A camera inside: what it costs at first sight, camera to world (4, 4), mm, metres ahead from where on it sees;
+    and what `Furniture.blocked` says."""
 
     cost: float
     view: np.ndarray
     lens: float
+    near: float
     points: np.ndarray
     blocked: np.ndarray
 
@@ -118,12 +131,14 @@ def framed(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
 def inside_view(
     floor: np.ndarray, furniture: Furniture, height: float, hung: Furniture | None = None,
     windows: Furniture | None = None, main: int | None = None,
-) -> tuple[np.ndarray, float]:  # fmt: skip
-    """Camera to world (4, 4) float, `shifted`, and focal length in mm of a view inside a room, its main piece whole.
+) -> tuple[np.ndarray, float, float]:  # fmt: skip
+    """Camera to world (4, 4) float, `shifted`, focal length in mm, and metres ahead from where on things are seen, of a
+    view inside a room, its main piece whole.
 
     Of all eyes, headings and lenses those count that have the main piece whole in the picture; of these the one that
     hides and cuts off least of what stands and hangs, has most furniture and depth in its picture and little that is
-    near, the main piece in its middle third, and no bare wall over a third of it.
+    near, the main piece in its middle third, and no bare wall over a third of it. Where there is no room for a lens
+    that draws things as they are, the camera stands behind a wall and looks straight through it.
 
     Arguments:
         floor: (k, 2) float, x and z of the corners, metres.
@@ -144,15 +159,12 @@ def inside_view(
     row = np.arange(len(everything.size))
     reach = np.where((row < len(things.size)) & (row != main), BEFORE, WALLED)
     aim, front = furniture.position[main, [0, 2]], axes(furniture.yaw[main])[1]
-    around = 0.5 * aim + 0.5 * furniture.position[:, [0, 2]].mean(0)
     high, stands = things.position[:, 1] > HIGH, np.arange(len(things.size)) < count
-    fragile = [_shades(furniture, height), things.corners[high & ~stands], things.corners[stands & ~high]]
-    wider = room.buffer(0.05)
 
     def merit(shot: Shot) -> float:
         """Metres of depth that a view is worth."""
         eye, half = shot.view[:3, 3], APERTURE / 2 / shot.lens
-        which, away = everything.met(shot.view, half)
+        which, away = everything.met(shot.view, half, shot.near)
         seen = (~shot.blocked & (_aside(shot.points, shot.view) <= half)).mean(-1).sum()
         bare = barest_share(which, np.where(row[which] < len(row) - len(floor), np.inf, away), height, shot.view, half)
         return (
@@ -162,27 +174,37 @@ def inside_view(
         )  # fmt: skip
 
     eyes: list[list[Shot]] = []
-    for spot, level in product(_spots(room, middle, aim), EYES):
-        eye = np.array([spot[0], level * height, spot[1]])
-        points, blocked = furniture.blocked(eye, hung)
+    halves = APERTURE / 2 / np.array(LENSES)
+    for at in (*_spots(room, middle, aim), *_beyond(floor, things, main)):
+        spot, seen, wider, way = at.spot, np.full(len(things.size), True), room.buffer(0.05), aim - at.spot
+        if at.way is not None:
+            seen = ((things.corners[..., [0, 2]] - spot) @ at.way).max(1) > at.near
+            wider, way = wider.union(shapely.Point(spot).buffer(1.4 * at.near)), at.way
+        eye = np.array([spot[0], EYE * height, spot[1]])
+        points, blocked = furniture.blocked(eye, things.of(seen & ~stands))
         hidden = CLEAR * _hidden(wider, points[main], blocked[main], eye)
-        views = _turned(eye, np.stack([aim - spot, around - spot]))
-        halves = APERTURE / 2 / np.array(LENSES)
+        views = _turned(eye, way)
         cut = (_aside(furniture.corners[main], views)[..., None] > halves / MARGIN).mean(-2)
         aside, back = (np.abs(views[..., [0, 2], axis] @ (aim - spot)) for axis in (0, 2))
         off = MIDDLE * np.clip((aside / np.maximum(back, 1e-9))[..., None] / halves - ASIDE, 0.0, 1.0)
         far = max(float(np.linalg.norm(aim - spot)), 1e-9)
         behind = BEHIND * max(0.0, float((aim - spot) @ front)) / far + SMALL * max(0.0, far - LARGE)
+        fragile = [_shades(furniture, height), things.corners[high & ~stands & seen], things.corners[stands & ~high]]
         cost = WHOLE * cut + off + _shown(fragile, views, halves) + hidden + behind
-        cost = (cost + np.abs(PANS)[:, None, None] + DISTORTED).ravel()
+        cost = cost + np.abs(PANS)[:, None, None] + DISTORTED
+        if at.way is not None:  # upright to the wall, and within it where it begins to see
+            low, wide = EYE * height - np.array(SLOPES)[:, None] * at.near, halves * at.near
+            beside = (wide > at.aside) | (low < wide / ASPECT) | (low + wide / ASPECT > height)
+            cost = cost + WHOLE * (beside | (np.abs(PANS) > 0)[:, None, None] | (np.array(LENSES) < LENSES[0]))
+        cost = cost.ravel()
         eyes.append([
-            Shot(float(cost[n]), views.reshape(-1, 4, 4)[n // len(LENSES)], LENSES[n % len(LENSES)], points, blocked)
-            for n in np.argsort(cost, kind="stable")[:TRIED]
+            Shot(float(cost[n]), views.reshape(-1, 4, 4)[n // len(LENSES)], LENSES[n % len(LENSES)], at.near, points,
+                 blocked) for n in np.argsort(cost, kind="stable")[:TRIED]
         ])  # fmt: skip
     eyes = sorted(eyes, key=lambda shots: shots[0].cost)[:LOOKED]
     best = sorted(eyes, key=lambda shots: -merit(shots[0]))[:CHOSEN]  # of each eye by the view that costs least
     shot = max((shot for shots in best for shot in shots), key=merit)
-    return shot.view, shot.lens
+    return shot.view, shot.lens, shot.near
 
 
 def barest_share(which: np.ndarray, wall: np.ndarray, height: float, view: np.ndarray, half: float) -> float:
@@ -248,8 +270,24 @@ def _walls(floor: np.ndarray, height: float) -> Furniture:
     return Furniture(size, np.insert(middle, 1, 0.0, axis=1), np.arctan2(outwards[:, 0], outwards[:, 1]))
 
 
-def _spots(room: shapely.Polygon, middle: np.ndarray, aim: np.ndarray) -> list[np.ndarray]:
-    """Where a camera inside may stand, (2,) x and z each, metres: in corners, along the walls, around what it sees."""
+def _beyond(floor: np.ndarray, things: Furniture, main: int) -> Iterator[Eye]:
+    """Eyes behind the walls, which see from where on nothing in their picture is cut open, and the main thing whole."""
+    for edge in range(len(floor)):
+        inside, along, length = inward_normal(floor, edge), direction(floor, edge), float(edge_lengths(floor)[edge])
+        deep, wide = ((things.corners[..., [0, 2]] - floor[edge]) @ way for way in (inside, along))
+        for out, middle in product(BEYOND, dict.fromkeys((float(wide[main].mean()), length / 2))):
+            for through in THROUGH:
+                reach = (out + through) * APERTURE / 2 / LENSES[0]  # half of the picture's width there
+                at = min(max(middle, reach + DEEP), length - reach - DEEP)
+                met = np.abs(wide - at).min(1) < reach
+                if not (met & (deep.min(1) < through) & (deep.max(1) > through)).any():
+                    if 2 * (reach + DEEP) < length and deep[main].min() > through:
+                        yield Eye(floor[edge] + at * along - out * inside, out + through, inside, min(at, length - at))
+                    break
+
+
+def _spots(room: shapely.Polygon, middle: np.ndarray, aim: np.ndarray) -> list[Eye]:
+    """Where a camera inside may stand: in corners, along the walls, around what it sees."""
     floor, spots = np.array(room.exterior.coords)[:-1], []
     for corner in floor:
         away = max(float(np.linalg.norm(middle - corner)), 1e-9)
@@ -258,17 +296,16 @@ def _spots(room: shapely.Polygon, middle: np.ndarray, aim: np.ndarray) -> list[n
         start, end = floor[edge], floor[(edge + 1) % len(floor)]
         spots += [start + share * (end - start) + OFF * inward_normal(floor, edge) for share in ALONG]
     around = aim + BEFORE_IT * np.stack([np.cos(TURNS), np.sin(TURNS)], 1)
-    return [*spots, *around[shapely.contains_xy(room.buffer(-OFF), around)]]
+    return [Eye(spot) for spot in (*spots, *around[shapely.contains_xy(room.buffer(-OFF), around)])]
 
 
-def _turned(eye: np.ndarray, ways: np.ndarray) -> np.ndarray:
-    """(w, `PANS`, `SLOPES`, 4, 4) float camera to world of an eye that looks along ways (w, 2), turned, `shifted`."""
+def _turned(eye: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """(`PANS`, `SLOPES`, 4, 4) float camera to world of an eye that looks along a way (2,), turned, `shifted`."""
     cos, sin = np.cos(PANS), np.sin(PANS)
-    turned = np.einsum("pij,wj->wpi", np.array([[cos, -sin], [sin, cos]]).transpose(2, 0, 1), ways)
-    target = eye + turned[..., :1] * (1, 0, 0) + turned[..., 1:] * (0, 0, 1)  # `insert` takes ten times as long
-    level = view_matrix(np.broadcast_to(eye, target.shape), target)
-    shape = (*level.shape[:-2], len(SLOPES), 4, 4)
-    return shifted(np.broadcast_to(level[..., None, :, :], shape), np.broadcast_to(SLOPES, shape[:-2]))
+    ways = np.stack([cos * way[0] - sin * way[1], 0 * cos, sin * way[0] + cos * way[1]], 1)
+    views = view_matrix(np.broadcast_to(eye, ways.shape), eye + ways)
+    shape = (len(PANS), len(SLOPES), 4, 4)
+    return shifted(np.broadcast_to(views[:, None], shape), np.broadcast_to(SLOPES, shape[:-2]))
 
 
 WIDEST = 4.0  # width of a picture over its height, and the other way round
@@ -277,13 +314,20 @@ WIDEST = 4.0  # width of a picture over its height, and the other way round
 @dataclass(frozen=True)
 class View:
     """A camera: (4, 4) camera to world, sheared where its lens is shifted, and half the picture's width, in metres
-    (top) or as a tangent (perspective); its width over its height; whether it is inside a closed room."""
+    (top) or as a tangent (perspective); its width over its height; whether it is inside a closed room; metres ahead
+    from where on it sees."""
 
     matrix: np.ndarray
     half: float
     orthographic: bool
     aspect: float = 1.0
     inside: bool = False
+    near: float = 0.0
+
+    @property
+    def start(self) -> np.ndarray:
+        """(3,) float, the middle of where it begins to see."""
+        return np.asarray(self.matrix[:3, 3] - self.near * self.matrix[:3, 2])
 
 
 def stage_views(stage: Usd.Stage) -> dict[str, View]:
@@ -306,7 +350,9 @@ def stage_views(stage: Usd.Stage) -> dict[str, View]:
         matrix[:3, 3 if flat else 2] += shift if flat else -shift
         half = wide / 2 * of_film
         aspect = float(np.clip(wide / max(camera.verticalAperture, 1e-6), 1 / WIDEST, WIDEST))
-        views[free_name(prim.GetName(), views)] = View(matrix, float(half), flat, aspect)
+        told = UsdGeom.Camera(prim).GetClippingRangeAttr().HasAuthoredValue() and not flat
+        near = max(camera.clippingRange.min, 0.0) * unit if told else 0.0
+        views[free_name(prim.GetName(), views)] = View(matrix, float(half), flat, aspect, near=near)
     return views
 
 
@@ -325,12 +371,11 @@ def hero_view(stage: Usd.Stage, scenery: Scenery) -> View:
     where least is hidden, at the height of a standing person's eyes."""
     lower, upper = scenery.bounds
     for view in stage_views(stage).values() if scenery.closed else ():
-        if not view.orthographic and (lower < view.matrix[:3, 3]).all() and (view.matrix[:3, 3] < upper).all():
+        if not view.orthographic and (lower < view.start).all() and (view.start < upper).all():
             return replace(view, aspect=ASPECT, inside=True)
-    x, z = (lower[0] + 0.15, upper[0] - 0.15), (lower[2] + 0.15, upper[2] - 0.15)  # inside the walls
-    floor = np.array([(x[0], z[0]), (x[0], z[1]), (x[1], z[1]), (x[1], z[0])])
-    matrix, lens = inside_view(floor, scenery.furniture, float(upper[1] - lower[1]), scenery.hung)
-    return View(matrix, APERTURE / 2 / lens, False, ASPECT, scenery.closed)
+    floor = rectangle(*(upper - lower - 0.3)[[0, 2]]) + (lower + upper)[[0, 2]] / 2  # inside the walls
+    matrix, lens, near = inside_view(floor, scenery.furniture, float(upper[1] - lower[1]), scenery.hung)
+    return View(matrix, APERTURE / 2 / lens, False, ASPECT, scenery.closed, near)
 
 
 def corner_views(scenery: Scenery) -> Iterator[tuple[View, Scenery]]:

@@ -65,7 +65,7 @@ class Surface:
         if size[1] > self.air or not self.area.area > 0:
             return None
         middle, half = self.span
-        turned = np.abs(np.array([np.cos(turn), np.sin(turn)]) @ [[size[0], size[2]], [size[2], size[0]]])
+        turned = np.abs([np.cos(turn), np.sin(turn)]) @ [[size[0], size[2]], [size[2], size[0]]]
         room = np.maximum(half - turned / 2 - EDGE, 0.0)
         places = [middle + np.array(share) * room for share in at]
         if beside is not None:

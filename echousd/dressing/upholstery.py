@@ -237,16 +237,10 @@ class _Seat:
 def _heights(corners: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
     """(len(x), len(z)) float: height of the highest surface over each cell of a grid, -inf where there is none."""
     out = np.full((len(x), len(z)), -np.inf)
-    # Small triangles fill the cells that their corners and middles lie in; large ones are drawn cell by cell.
-    middles = (corners[:, :2] + corners[:, 1:]).reshape(-1, 3) / 2
-    points = np.concatenate([corners.reshape(-1, 3), corners.mean(1), middles])
-    i, k = ((points[:, axis] - line[0]) / STEP + 0.5 for axis, line in ((0, x), (2, z)))
-    inside = (i >= 0) & (i < len(x)) & (k >= 0) & (k < len(z))
-    np.maximum.at(out, (i[inside].astype(int), k[inside].astype(int)), points[inside, 1])
     flat = corners[:, :, [0, 2]]
     one, two = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-    large = np.flatnonzero((np.abs(area) > 1e-10) & (np.ptp(flat, 1).max(1) > 1.5 * STEP))
+    large = np.flatnonzero(np.abs(area) > 1e-10)
     ends = np.stack([flat.min(1), flat.max(1)])[:, large]
     (top, bottom), (left, right) = (np.searchsorted(line, ends[..., axis]) for axis, line in enumerate((x, z)))
     count = (bottom - top) * (right - left)  # of cells that its box covers

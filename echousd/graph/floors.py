@@ -113,9 +113,7 @@ def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGr
 def with_lowered_windows(graph: SceneGraph, stated: SceneGraph, boxes: Arrays, seed: int) -> SceneGraph:
     """The graph with French or tall windows, by its style, instead of those that nobody stated and nothing is before.
 
-    Arguments:
-        stated: the graph as it was before openings were proposed.
-        boxes: size (n, 3), position (n, 3) of the bottom centre, metres, and yaw (n,), of all that stands there.
+    `stated`: the graph before openings were proposed. `boxes`: of all that stands there, as of `with_placed_openings`.
     """
     import shapely
 

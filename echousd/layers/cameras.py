@@ -70,9 +70,9 @@ def write_cameras(
     }  # fmt: skip
     pen.define("/Room/Cameras/top", "Camera", top)
     if walled is not None:
-        matrix, lens = inside_view(walled, furniture, float(upper[1]), hung, windows, main)
+        matrix, lens, near = inside_view(walled, furniture, float(upper[1]), hung, windows, main)
     else:
-        matrix, lens = perspective_views(points, furniture)[0], FOCAL_LENGTH
+        matrix, lens, near = perspective_views(points, furniture)[0], FOCAL_LENGTH, 0.0
     slope = float(matrix[:3, 1] @ matrix[:3, 2])  # 0 of a camera that has no shift
     sharp = centre if main is None else furniture.corners[main].mean(0)
     camera = {
@@ -81,7 +81,7 @@ def write_cameras(
         "float horizontalAperture": APERTURE * TENTHS,
         "float verticalAperture": APERTURE * TENTHS / (1.0 if walled is None else ASPECT),
         "float focusDistance": float(np.linalg.norm(matrix[:3, 3] - sharp)),
-        "float2 clippingRange": (0.05, 4 * float(np.linalg.norm(matrix[:3, 3] - centre)) + 10.0),
+        "float2 clippingRange": (max(near, 0.05), 4 * float(np.linalg.norm(matrix[:3, 3] - centre)) + 10.0),
     }  # fmt: skip
     pen.define("/Room/Cameras/perspective", "Camera", camera)
 

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-from scipy.spatial import cKDTree
 
 from echomodel.triangles import area_normals
 from echousd.draw.surfaces import Painted, Surfaces
-from echousd.draw.tracing import RenderUnavailable, embree
+from echousd.draw.tracing import RenderUnavailable, embree, free, way_to
 from echousd.draw.views import view_matrix
 from echousd.texturing.atlas import Unwrapped, texel_faces
 from echousd.texturing.job import JobCamera
@@ -26,30 +25,21 @@ SAMPLES = 1500  # points of an object
 
 def free_point(surfaces: Surfaces) -> tuple[np.ndarray, float]:
     """(3,) float, the point at `HEIGHT` that is furthest from everything, and how far that is in plan, metres."""
-    points = [thing.triangles.reshape(-1, 3) for thing in surfaces.objects if thing.kind != "stuff"]
-    floor = [t.triangles.reshape(-1, 3) for t in surfaces.objects if t.category == "floor"]
-    plan = np.concatenate(floor or points or [t.triangles.reshape(-1, 3) for t in surfaces.objects])[:, [0, 2]]
-    shape = shapely.MultiPoint(plan).convex_hull
+    clouds = [(thing.category, thing.kind, thing.triangles.reshape(-1, 3)) for thing in surfaces.objects]
+    things = [points for _, kind, points in clouds if kind != "stuff"]
+    floor = [points for category, _, points in clouds if category == "floor"]
+    shape = shapely.MultiPoint(np.concatenate(floor or things or [each[2] for each in clouds])[:, [0, 2]]).convex_hull
     corners = surfaces.graph.room.corners
     if corners is not None and shapely.Polygon(corners).is_valid:
         shape = shapely.Polygon(corners)
+    tall = (points for points in things if points[:, 1].min() < HEIGHT + 0.5 and points[:, 1].max() > HEIGHT - 0.5)
+    empty = shape.difference(shapely.union_all([shapely.MultiPoint(points[:, [0, 2]]).convex_hull for points in tall]))
     low_x, low_z, high_x, high_z = shape.bounds
     grid = np.stack(np.meshgrid(np.linspace(low_x, high_x, 33), np.linspace(low_z, high_z, 33)), -1).reshape(-1, 2)
-    apart = shapely.distance(shapely.points(grid), shape.boundary)
-    apart[~shapely.contains_xy(shape, grid)] = -1.0
-    tall = np.concatenate([np.zeros((0, 2)), *(_between(cloud, HEIGHT - 0.5, HEIGHT + 0.5) for cloud in points)])
-    if len(tall):
-        apart = np.minimum(apart, cKDTree(tall).query(grid)[0])
+    apart = shapely.distance(shapely.points(grid), empty.boundary)
+    apart[~shapely.contains_xy(empty, grid)] = -1.0
     best = int(apart.argmax())
     return np.array([grid[best, 0], HEIGHT, grid[best, 1]]).round(4), float(max(apart[best], 0.05))
-
-
-def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Plan of points on triangles between two heights."""
-    a = corners.reshape(-1, 3, 3)
-    weights = np.array([[i, j, 6 - i - j] for i in range(7) for j in range(7 - i)]) / 6
-    points = np.einsum("kc,tcx->tkx", weights, a).reshape(-1, 3)
-    return points[(points[:, 1] > low) & (points[:, 1] < high)][:, [0, 2]]
 
 
 def sphere_cameras(at: np.ndarray, distance: float) -> list[JobCamera]:
@@ -84,17 +74,9 @@ def visible_shares(
             ask = np.flatnonzero(~seen & (local[:, 2] < -0.01) & (np.abs(local[:, :2]) < half[:, None]).all(1))
             if not len(ask):
                 continue
-            way = matrix[:3, 3] - points[ask]
+            way, away = way_to(points[ask], matrix[:3, 3])
             side = np.where((way * normals[ask]).sum(1, keepdims=True) < 0, -1.0, 1.0)
-            start = points[ask] + 1e-3 * side * normals[ask]
-            distance = np.linalg.norm(way, axis=1)
-            free = scene.run(
-                np.ascontiguousarray(start, np.float32),
-                np.ascontiguousarray(way / distance[:, None], np.float32),
-                np.ascontiguousarray(distance - 2e-3, np.float32),
-                query="OCCLUDED",
-            )
-            seen[ask[free != 0]] = True
+            seen[ask] = free(scene, points[ask] + 1e-3 * side * normals[ask], way, away, away > 0) > 0
         shares.append(float(seen.mean()) if len(seen) else 0.0)
     return shares
 

@@ -87,8 +87,7 @@ HARMONIES: Mapping[str, Harmony] = {
 
 def finish_of(harmony: str, slot: str) -> tuple[float, float]:
     """What the roughness of a slot is multiplied with in a harmony, and by what share wear makes its tone uneven."""
-    factor, worn = FINISHES[harmony].get(FINISHED.get(material_of(slot), ""), (1.0, 0.0))
-    return factor, worn
+    return FINISHES[harmony].get(FINISHED.get(material_of(slot), ""), (1.0, 0.0))
 
 
 def linear(hexadecimal: str) -> Color:

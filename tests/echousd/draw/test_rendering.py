@@ -15,8 +15,8 @@ from echousd.draw.drawables import read_drawables
 from echousd.draw.indoors import LUMA
 from echousd.draw.rendering import render, render_stage, render_turn
 from echousd.draw.scenery import class_color, read_scenery
-from echousd.draw.tracing import BACKGROUND, Hits, World, _light, _next_room, embree, outside, smooth_light
-from echousd.draw.views import stage_views, turning_views
+from echousd.draw.tracing import BACKGROUND, Hits, World, _light, _next_room, embree, outside, smooth_light, trace
+from echousd.draw.views import hero_view, stage_views, turning_views
 from echousd.options import RoomOptions
 
 
@@ -231,6 +231,27 @@ def test_one_looks_through_the_glass_of_a_front(opacity, size, faces):
     assert len(read_scenery(stage).triangles) == faces + 2
 
 
+def test_a_camera_behind_a_wall_sees_what_its_near_plane_leaves(tmp_path):
+    options = RoomOptions(walls=True, dress="none")
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, options=options)
+    stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
+    stage.SetEditTarget(stage.GetSessionLayer())
+    camera, (lower, upper) = UsdGeom.Camera.Get(stage, "/Room/Cameras/perspective"), read_scenery(stage).bounds
+    camera.ClearXformOpOrder()
+    eye = ((lower[0] + upper[0]) / 2, 1.3, upper[2] + 1.5)
+    camera.AddTranslateOp(opSuffix="behind").Set(Gf.Vec3d(*eye))
+    seen = []
+    for near, inside in ((0.05, False), (1.4, False), (2.0, True)):
+        camera.GetClippingRangeAttr().Set((near, 50.0))
+        view = hero_view(stage, read_scenery(stage))
+        assert np.allclose(view.matrix[:3, 3], eye) == inside
+        through = stage_views(stage)["perspective"]
+        assert (through.near, through.start[2]) == pytest.approx((near, eye[2] - near), abs=1e-5)
+        seen.append(pixels(Image.fromarray((trace(read_scenery(stage), through, 96, rays=1) * 255).astype("uint8"))))
+    assert np.abs(seen[0] - seen[1]).mean() < 0.02  # the wall from outside, whatever is cut away before it
+    assert np.abs(seen[0] - seen[2]).mean() > 0.1
+
+
 def test_surfaces_are_as_rough_as_their_image_is_in_the_mean_times_its_scale(root):
     stage = Usd.Stage.Open(str(root))
     (floor,) = (mesh for mesh in read_drawables(stage) if mesh.category == "floor")
@@ -287,9 +308,7 @@ def test_walls_in_front_of_the_camera_are_cut_away(tmp_path):
     image = pixels(render_stage(stage, view="dollhouse", size=64, colors="class"))
     colourful = np.abs(image - image.mean(-1, keepdims=True)).max(-1) > 0.08
     assert colourful.mean() > 0.05  # the furniture is in sight
-    inside = (
-        UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective")).GetCamera(0).transform.ExtractTranslation()
-    )
+    inside = stage_views(stage)["perspective"].start
     assert abs(inside[0]) < 2.0
     assert abs(inside[2]) < 1.7
     assert 0.5 < inside[1] < 2.8

@@ -8,7 +8,7 @@ from pxr import Gf, Usd, UsdGeom, UsdLux
 from small_room import small_graph, small_room
 
 from echousd.draw.sight import ASPECT, Furniture
-from echousd.draw.views import perspective_views, shifted, stage_views
+from echousd.draw.views import inside_view, perspective_views, shifted, stage_views
 from echousd.layers.cameras import main_piece, room_points, write_cameras
 from echousd.options import RoomOptions
 from echousd.shapes import walls
@@ -80,7 +80,7 @@ def test_a_camera_is_sharp_where_what_the_room_is_for_stands():
         camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective")).GetCamera(0)
         away = np.linalg.norm(np.array(camera.transform.ExtractTranslation()) - at)
         assert camera.focusDistance == pytest.approx(away, rel=1e-5)
-        assert camera.clippingRange.min < 0.1
+        assert camera.clippingRange.min == pytest.approx(max(inside_view(floor, furniture, 2.5, main=main)[2], 0.05))
         assert 10 < camera.clippingRange.max < 50
         assert camera.horizontalAperture / camera.verticalAperture == pytest.approx(ASPECT)
 
@@ -111,7 +111,7 @@ def test_the_volume_of_a_room_with_walls_reaches_to_their_outside(room, ceiling,
 def test_a_camera_inside_has_the_shift_of_its_view(monkeypatch):
     level = np.array([[1.0, 0, 0, 0], [0, 1, 0, 1.2], [0, 0, 1, 3], [0, 0, 0, 1]])
     view = shifted(level, 0.25)
-    monkeypatch.setattr("echousd.layers.cameras.inside_view", lambda *_: (view, 24.0))
+    monkeypatch.setattr("echousd.layers.cameras.inside_view", lambda *_: (view, 24.0, 0.0))
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageMetersPerUnit(stage, 1)
     UsdGeom.SetStageUpAxis(stage, "Y")
