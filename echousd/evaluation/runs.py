@@ -272,7 +272,7 @@ def _from_json(file: Path) -> list[RoomBoxes]:
                 return [RoomBoxes.from_json(raw)]
             case {"objects": dict()}:
                 return [_scenesmith(raw, file)]
-    except (KeyError, TypeError, IndexError, ValueError, RecursionError) as error:
+    except (AttributeError, KeyError, TypeError, IndexError, ValueError, RecursionError) as error:
         raise ValueError(f"{file}: not a room as it says ({type(error).__name__} {error})") from None
     return load_rooms(file) if isinstance(raw, dict) and isinstance(raw.get("rooms"), list) else []
 

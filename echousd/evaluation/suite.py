@@ -134,7 +134,7 @@ def preferences(files: Sequence[Path]) -> dict[str, Any]:
             answers = json.loads(file.read_text("utf-8"))["answers"]
             again = [(a["choice"], a["first"]) for a in answers if a.get("first") is not None]
             rows = [(a["one"], a["other"], a["choice"]) for a in answers if a.get("first") is None]
-        except (KeyError, TypeError, json.JSONDecodeError, UnicodeDecodeError) as error:
+        except (AttributeError, KeyError, TypeError, json.JSONDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{file}: no answers of a study ({type(error).__name__} {error})") from None
         same = sum(choice == first for choice, first in again)
         alike, repeats = alike + same, repeats + len(again)

@@ -120,6 +120,7 @@ def test_scenesmith_has_boxes_and_quaternions(tmp_path):
     ("name", "text", "told"),
     [
         ("a.json", '{"format": "sceneState", "scene": {}}', "a.json: not a room as it says (KeyError 'arch')"),
+        ("a.json", '{"rooms": [{"id": 1}], "objects": [5], "walls": []}', "a.json: not a room as it says (Attr"),
         ("b.json", "{", "b.json: not a room as it says (JSONDecodeError"),
         ("c.json", "{}", "no rooms, a state of SceneEval, Holodeck's or SceneSmith's JSON"),
     ],
