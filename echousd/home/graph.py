@@ -265,11 +265,11 @@ def home_of_plain(data: Any) -> HomeGraph:
     if not isinstance(data, Mapping) or not isinstance(data.get("rooms"), Mapping):
         raise GraphError("rooms: allowed: a mapping of names to room types or to type, area, objects ...", ("rooms",))
     only_fields(data, KEYS, ())
+    forms = {"home": (Mapping, "a mapping with area, outline, entrance"), "relations": (list, "a list of relations")}
+    for key, (kind, allowed) in forms.items():
+        if data.get(key) and not isinstance(data[key], kind):
+            raise GraphError(f"{key}: found {field.shown(data[key])}, allowed: {allowed}", (key,))
     about = data.get("home") or {}
-    if not isinstance(about, Mapping):
-        raise GraphError(
-            f"home: found {field.shown(about)}, allowed: a mapping with area, outline, entrance", ("home",)
-        )
     only_fields(about, ("area", "outline", "entrance"), ("home",))
     rooms = [_room(str(name), entry) for name, entry in data["rooms"].items()]
     relations = []
@@ -294,7 +294,7 @@ def _room(name: str, entry: Any) -> HomeRoom:
         spec = spec if "type" in spec else {"type": _type_of(normalised(name)), **spec}
         if any(inside.values()):
             return HomeRoom(name, graph_from_plain(SceneGraph, {"room": spec, **inside}), **own)
-        filled = starting_graph(spec["type"]).nodes[0]  # the walls' words need a graph to be read with
+        filled = starting_graph(RoomSpec(spec["type"])).nodes[0]  # the walls' words need a graph to be read with
         bare = graph_from_plain(SceneGraph, {"room": spec, "objects": {filled.name: filled.category}})
         return HomeRoom(name, starting_graph(bare.room, area=float(own.get("area") or 0.0)), **own)
     except ValueError as error:

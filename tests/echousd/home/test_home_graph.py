@@ -120,6 +120,12 @@ def test_another_way_replaces_the_one_before():
         ("rooms: {hall: hallway}\nhome: {outline: [[0, 0], [1, 1], [1, 0], [0, 1]]}\n", "does not cross itself"),
         ("rooms: {hall: {area: -3}}\n", "area: found -3, allowed: greater than 0.5"),
         ("rooms: {}\n", "0 rooms, allowed: 1 to 40"),
+        (
+            "rooms: {hall: hallway}\nrelations: hall door hall\n",
+            ":2: relations: found 'hall door hall', allowed: a",
+        ),
+        ("rooms: {hall: hallway}\nhome: 5\n", ":2: home: found 5, allowed: a mapping with area, outline, entrance"),
+        ("rooms: {hall: {type: 5}}\n", "room 'hall': "),
         ("rooms: {den: {type: bedroom, relations: [bed left of desk]}}\n", "room 'den': the graph is empty"),
         ("rooms: {hall: {objects: [bad]}}\n", "room 'hall': "),
     ],
