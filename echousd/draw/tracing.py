@@ -15,7 +15,7 @@ from echousd.draw.scenery import Scenery, between
 from echousd.draw.views import View
 
 FINE, QUICK = 3, 2  # squared: rays per pixel
-AROUND = 3  # per ray: rays to what stands around
+AROUND = 2  # per ray: rays to what stands around
 # Places at which a room's light is found, rays of each kind from each, and how often light is thrown on.
 PLACES, OFTEN, TURNS = (600, 1200), 3, 3
 # Metres from which on nothing makes a place darker, how dark what touches it does, and how much less if it is white.
