@@ -143,7 +143,7 @@ def main() -> None:
         first: np.ndarray | None = None
         for weights in options.weights:
             if way == "searched":
-                search.Search.__init__.__defaults__ = (search.TERMS, poses, *search.Search.__init__.__defaults__[2:])
+                search.BUDGET = poses
             layouts.POSES = poses
             found, missed, looked = judged(weights, way, tasks)
             total = found.sum(0)

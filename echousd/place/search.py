@@ -30,7 +30,7 @@ from echousd.place.solver import PlaceConfig
 
 JUDGED = 48  # poses that are judged at once
 SWEEPS = 3  # times that what misses something is looked at after the first time
-BUDGET, PIECE = 4500, 300  # poses that are judged in all, each a whole room; in halls so many for each piece
+BUDGET, PIECES = 4500, 15  # poses that are judged in all, each a whole room; more where there are more pieces
 GAIN = 1e-3  # by which a move must be better
 WORTH = 0.5  # that a sweep must gain for another one
 GRAIN = 1e4  # costs are compared to so many parts of one
@@ -73,7 +73,7 @@ class Search:
 
     def __init__(self, problem: Problem, terms: tuple[Term, ...] = TERMS, yields: frozenset[str] = frozenset()) -> None:
         self.problem, self.judged, self.walked = problem, 0, False
-        self.budget = max(BUDGET, PIECE * len(problem.size))
+        self.budget = round(BUDGET * max(1.0, len(problem.size) / PIECES))
         numbers, words = {int(number) for number in problem.triplets[:, 1]}, vocabulary().predicates
         stated = {row.name for row in words if row.id in numbers} | {"placed"}
         sizes = {row.name for row in words if row.measures == "size"} | {"scale"}  # which no pose changes
