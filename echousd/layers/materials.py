@@ -98,7 +98,7 @@ def write_looks(
 
     `pen`: writes the opinions, as overs on whatever is bound. `looks`: material name -> look. `bindings`: prim path of
     a mesh or subset -> material name. `scope`: path of the prim that the materials stand below. `also`: names of looks
-    that are defined, too, though another layer binds them. `harmony`, `tinted`: see `define_material`.
+    that are defined, too, though another layer binds them. `harmony`: see `define_material`.
     """
     pen.define(scope, "Scope")
     for name in sorted({*bindings.values(), *also}):

@@ -36,7 +36,7 @@ from echousd.shapes.styles import equal_sizes, style_groups, unequal_pairs
 DRAFTS = 8  # of which the best is kept
 ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
 MARGIN = 0.35  # metres of floor around the furniture where nobody said how large the floor is
-POSES = 8_000  # that are judged for one room, over all its drafts; the search that is begun then comes to its end
+POSES = 12_000  # that are judged for one room, over all its drafts; the search that is begun then comes to its end
 PIECE = 500  # the same in halls, for each piece
 SHARE = 0.375  # of these in passing
 ALIKE = 4  # drafts that end alike, after which no further one is drawn; fewer lost a clean room in 140

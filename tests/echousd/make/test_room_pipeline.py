@@ -371,6 +371,7 @@ def searches(monkeypatch, faults, *, poses=100, **options):
         asked.append((len(graph.room.openings), config.yields, config.anew, before))
         return (boxes, ()), poses
 
+    monkeypatch.setattr(layouts, "POSES", 8_000)
     monkeypatch.setattr(layouts, "finished_boxes", finished)
     monkeypatch.setattr(layouts, "_wishes", lambda *_: (faults[len(asked) - 1],))
     layouts.LayoutSearch(StandIn(), 1, StageTimer(), **options).best(graph)
