@@ -39,6 +39,7 @@ from echousd.stage.write import author_relation, put
 
 ORIGIN = Origin("dressing")
 TALL, SEEN = 0.7, 0.3  # metres: what is or hangs higher may stand in a camera's way if it is so large
+LOW = 0.2  # metres: the same of what stands on the floor, which a near plane might cut open
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,8 @@ class Dressing:
     def hung(self) -> Furniture:
         """Boxes of what a camera at a wall would have right before it, in the first layout."""
         every = next(iter(self.layouts), {}).values()
-        things = [t for t in every if max(t.size[1], t.position[1]) > TALL and t.size.max() > SEEN]
+        high = [max(t.size[1], t.position[1]) > (TALL if t.position[1] else LOW) for t in every]
+        things = [t for t, tall in zip(every, high, strict=True) if tall and t.size.max() > SEEN]
         rows = np.array([(*t.size, *t.position, t.yaw) for t in things]).reshape(-1, 7)
         return Furniture(rows[:, :3], rows[:, 3:6], rows[:, 6])
 
