@@ -36,8 +36,11 @@ def gif(pictures: Sequence[Image.Image]) -> bytes:
 
 def is_ours(path: Path) -> bool:
     """Whether a picture of any form says in its first bytes that it is ours; a PNG as its `Software`."""
+    if not path.is_file():  # nobody waits for a pipe
+        return False
     try:
-        head = path.open("rb").read(HEAD) if path.is_file() else b""
+        with path.open("rb") as file:
+            head = file.read(HEAD)
     except OSError:
         return False
     return ("\0".join(MARK) if head.startswith(b"\x89PNG") else MARK[1]).encode() in head

@@ -156,8 +156,7 @@ def _lying(host: Standing, seat: _Seat, spot: np.ndarray | None, turn: float, si
     """A place near a spot (3,), or before it, that is clear of the host and on what is below; None where none is."""
     if spot is None:
         return None
-    wide, deep = 2 * hull(size[[0, 2]] / 2, np.array(turn))
-    base = np.array([wide, size[1], deep])
+    base = np.insert(2 * hull(size[[0, 2]] / 2, np.array(turn)), 1, size[1])
     for _ in range(TRIES):
         down = seat.below(spot, size)
         upon = None if down is None else _upon(host, np.array([spot[0], down, spot[2]]), base)
