@@ -13,7 +13,7 @@ from inspect import Parameter, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationError, model_validator
 
 from echousd.assets.reference import STRETCH
 from echousd.graph.fields import IDENTIFIER, RESIDENTS, SHAPES
@@ -75,10 +75,8 @@ def _licences(text: str) -> str:
 File = Annotated[str, BeforeValidator(lambda value: str(value) if isinstance(value, Path) else value)]
 
 
-class Look(BaseModel):
+class Look(BaseModel, frozen=True, strict=True, allow_inf_nan=False):
     """How a room looks and is written: what its manifest keeps, so that an edit goes on with it."""
-
-    model_config = ConfigDict(frozen=True, strict=True, allow_inf_nan=False)
 
     walls: bool = row(True, LOOK, "walls, with doors and windows", everyday=True)
     ceiling: bool = row(False, LOOK, "add a ceiling", everyday=True)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import PlainModel
@@ -22,7 +22,7 @@ class BatchOptions(RoomOptions):
     self_contained: bool = row(False, FILES, "assets in every room's own folder, not once in the run's store")
 
 
-class BatchRequest(PlainModel):
+class BatchRequest(PlainModel, strict=True):
     """One run: what `batch.toml` holds, field by field.
 
     Arguments:
@@ -32,8 +32,6 @@ class BatchRequest(PlainModel):
         options: of every room, but for the seed. variations: option -> values; a graph's rooms take the combinations
             in turn.
     """
-
-    model_config = ConfigDict(strict=True)
 
     sources: list[str] = Field([])
     sample: dict[str, Annotated[int, Field(ge=1)]] = Field({})

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from echomodel.files import check_free, digest, flush, telling
 from echousd.folder.lock import LOCK, locked, run_of
@@ -31,10 +31,8 @@ from echousd.stage.files import check_path
 DONE = "done.json"  # the journal of a run that has more to do once its files are in place
 
 
-class Move(BaseModel):
+class Move(BaseModel, extra="forbid", strict=True):
     """A staged file that belongs at `to`; `over` is the digest of what it may replace there, "" for nothing."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
 
     staged: Annotated[str, Field(pattern=r"^[0-9]{1,9}$")]
     to: str
@@ -42,22 +40,18 @@ class Move(BaseModel):
     over: Digest = ""
 
 
-class Removal(BaseModel):
+class Removal(BaseModel, extra="forbid", strict=True):
     """A file that goes if it still has this digest."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
 
     path: str
     digest: Digest
 
 
-class Journal(BaseModel):
+class Journal(BaseModel, extra="forbid", strict=True):
     """All that is left to do once every file of a run is staged, in order.
 
     `run` is what it does, "" = nobody asks; `kept` are files that are not ours, and what each is called from then on.
     """
-
-    model_config = ConfigDict(extra="forbid", strict=True)
 
     echousd_journal: Literal[2] = 2
     run: Annotated[str, Field(max_length=200)] = ""
@@ -106,19 +100,15 @@ def read_journal(folder: Path, name: str = JOURNAL) -> Journal | None:
     except (ValueError, RecursionError):  # emptied by a power cut, as some disks do
         warnings.warn(f"{path}: cannot be read; the interrupted run is given up, generate the room again", stacklevel=3)
         return None
-    for number, entry in enumerate(journal.move):
-        place = inside(folder, entry.to, f"{path}: move[{number}]")
-        _check_place(folder, place, f"{path}: move[{number}]")
-        check_links(folder, folder / STAGING / entry.staged, f"{path}: move[{number}] takes {entry.staged}")
-    for number, removal in enumerate(journal.remove):
-        place = inside(folder, removal.path, f"{path}: remove[{number}]")
-        _check_place(folder, place, f"{path}: remove[{number}]")
+    named = [(f"{path}: move[{number}]", entry.to) for number, entry in enumerate(journal.move)]
+    named += [(f"{path}: remove[{number}]", removal.path) for number, removal in enumerate(journal.remove)]
+    for entry, name in named:
+        place = inside(folder, name, entry)
+        if place.relative_to(folder).parts[0] == STAGING:
+            raise ValueError(f"{entry} names {place}, where runs keep their own files; allowed: the room's files")
+    for number, move in enumerate(journal.move):
+        check_links(folder, folder / STAGING / move.staged, f"{path}: move[{number}] takes {move.staged}")
     return journal
-
-
-def _check_place(folder: Path, place: Path, entry: str) -> None:
-    if place.relative_to(folder).parts[0] == STAGING:
-        raise ValueError(f"{entry} names {place}, where runs keep their own files; allowed: the room's files")
 
 
 def claim(folder: Path, *, force: bool, root: str = "") -> dict[str, Any]:

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ValidationError
 
 from echomodel.files import unpacking, within_memory
 from echousd.folder import folder as folders
@@ -218,10 +218,8 @@ def _step(
     return found
 
 
-class _Note(BaseModel):
+class _Note(BaseModel, strict=True, extra="forbid"):
     """What an archive of an edit that was taken back says of it."""
-
-    model_config = ConfigDict(strict=True, extra="forbid")
 
     after: str
     steps: list[str]

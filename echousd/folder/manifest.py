@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from echousd.folder.within import check_links, inside
 from echousd.graph.fields import IDENTIFIER
@@ -19,13 +19,11 @@ Name = Annotated[str, Field(pattern=f"^{IDENTIFIER.pattern}$", max_length=255)]
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]*$", max_length=128)]
 
 
-class Step(BaseModel):
+class Step(BaseModel, strict=True):
     """One edit that can be taken back: what it said, the archive with what it replaced, and the files that it added.
 
     `leaves` are the digests of what it wrote of files that are not ours alone, such as a root layer that it merged.
     """
-
-    model_config = ConfigDict(strict=True)
 
     number: Annotated[int, Field(ge=1)]
     steps: list[str]
@@ -34,10 +32,8 @@ class Step(BaseModel):
     leaves: dict[str, Digest] = Field({})
 
 
-class Manifest(Look):
+class Manifest(Look, extra="allow", strict=True, frozen=True):
     """The fields that are read back; others are kept as they are. `echousd.make.save.manifest_of` writes them."""
-
-    model_config = ConfigDict(extra="allow", strict=True)
 
     echousd_room: Literal[1]
     name: Name

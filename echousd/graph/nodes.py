@@ -8,7 +8,7 @@ from inspect import Parameter, Signature, signature
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 
 from echomodel.openings import check_openings, rectangle
 from echousd.graph import fields as field
@@ -31,10 +31,8 @@ class _Plain(ModelMetaclass):
         return sorted({name for names in own for name in names if not name.startswith("_")} - {"model_config"})
 
 
-class PlainModel(BaseModel, metaclass=_Plain):
+class PlainModel(BaseModel, metaclass=_Plain, frozen=True, extra="forbid"):
     """Frozen, without unknown fields, and with errors of one line."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     def __init__(self, **fields: Any) -> None:
         fault = None

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from echomodel.files import read_bounded, telling
 from echousd.folder.within import inside
@@ -28,17 +28,15 @@ Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]
 Row = tuple[float, float, float, float]
 
 
-class JobCamera(BaseModel):
+class JobCamera(BaseModel, frozen=True):
     """A camera: name, camera to world as rows (it looks along its -Z, +Y up, metres), field of view in degrees."""
-
-    model_config = ConfigDict(frozen=True)
 
     name: str
     matrix: tuple[Row, Row, Row, Row]
     fov: float
 
 
-class JobObject(BaseModel):
+class JobObject(BaseModel, frozen=True):
     """One object of a job.
 
     Arguments:
@@ -48,8 +46,6 @@ class JobObject(BaseModel):
         texels: of its picture that it covers. visible: how many of them a camera sees, None = not counted.
         to_room: (4, 4) rows, the mesh's frame to the room's, metres.
     """
-
-    model_config = ConfigDict(frozen=True)
 
     name: Name
     path: str
@@ -67,7 +63,7 @@ class JobObject(BaseModel):
     to_room: tuple[Row, Row, Row, Row]
 
 
-class Job(BaseModel):
+class Job(BaseModel, frozen=True):
     """What `job.json` holds.
 
     Arguments:
@@ -76,8 +72,6 @@ class Job(BaseModel):
         dressing: what was asked for of the small things.
         cameras: in order. objects: stuff first, in order. left_out: name -> why it is not in the job.
     """
-
-    model_config = ConfigDict(frozen=True)
 
     echousd_texture_job: Literal[1] = 1
     tool: Literal["scenetex", "hunyuan", "mvpainter", "generic"]
