@@ -320,18 +320,23 @@ def _words_in(file: IO[bytes]) -> Iterator[str]:
 
 def _named_by(file: IO[bytes], path: Path | None) -> list[str]:
     """What a binary layer refers to; one without a name of its own is asked under another."""
-    from pxr import Tf, UsdUtils
-
     with ExitStack() as held:
         if path is None or path.suffix not in LAYERS:
             copy = held.enter_context(tempfile.NamedTemporaryFile(suffix=".usdc"))
             shutil.copyfileobj(file, copy)
             copy.flush()
             path = Path(copy.name)
-        try:
-            return [name for names in UsdUtils.ExtractExternalReferences(str(path)) for name in names]
-        except Tf.ErrorException:  # no layer that could refer to anything
-            return []
+        return references_of(path)
+
+
+def references_of(layer: Path) -> list[str]:
+    """What a layer refers to, by the names that it says; empty for a file that is none."""
+    from pxr import Tf, UsdUtils
+
+    try:
+        return [name for names in UsdUtils.ExtractExternalReferences(str(layer)) for name in names]
+    except Tf.ErrorException:
+        return []
 
 
 def _whole(place: Path, files: Mapping[str, bytes]) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
-from pxr import Sdf, Tf, UsdUtils
+from pxr import Sdf, Tf
 
 from echomodel.files import telling
 from echousd.draw.pictures import is_ours
@@ -17,6 +17,7 @@ from echousd.naming import free_name
 from echousd.pending import STAGING
 from echousd.stage.apart import check_harmless
 from echousd.stage.paths import coarse_file, component_file, payload_file
+from echousd.store import references_of
 
 if TYPE_CHECKING:
     from echousd.room import RoomData
@@ -82,7 +83,8 @@ def referenced(
         own = layer.relative_to(folder).as_posix() if layer.is_relative_to(folder) else ""
         if own in replaced or (own in recorded and digest_of(layer) == recorded[own]):
             continue
-        for dependency in _dependencies(layer):
+        check_harmless(layer)
+        for dependency in references_of(layer):
             target = (layer.parent / dependency).resolve()
             if target.is_relative_to(top):
                 needed.setdefault(_unit(target.relative_to(top).as_posix()), layer.name)
@@ -117,14 +119,6 @@ def loses_text(layer: bytes) -> bool:
     """Whether a text layer that USD can read holds more than USD would write of it: remarks, an order of lines."""
     read = Sdf.Layer.CreateAnonymous(".usda")
     return read.ImportFromString(layer.decode("utf-8")) and read.ExportToString().encode("utf-8") != layer
-
-
-def _dependencies(layer: Path) -> list[str]:
-    check_harmless(layer)
-    try:
-        return [word for words in UsdUtils.ExtractExternalReferences(str(layer)) for word in words]
-    except Tf.ErrorException:  # no layer that could refer to anything
-        return []
 
 
 def _unit(path: str) -> str:
