@@ -18,6 +18,7 @@ from pathlib import Path, PurePath
 import numpy as np
 
 from echomodel.files import read_bounded, whole_file, write_text
+from echomodel.late import Late
 from echomodel.vocabulary import vocabulary
 from echousd.assets.catalogues import Entry, entries_of
 from echousd.assets.colors import swatches
@@ -28,6 +29,7 @@ from echousd.graph.files import STAGE_FORMS
 from echousd.pages import template
 from echousd.stage.apart import fatal
 
+shipped = Late("echomodel.loading:load_model")
 PACK = 8  # models that a worker reads in one go
 SAVED = 20.0  # seconds after which what is done is written, for a run that goes on after this one was killed
 FEW = 24  # models that are read faster than workers start
@@ -133,9 +135,8 @@ def _stays(old: AssetRecord, entry: Entry, file: Path, wishes: Corrections) -> b
 
 def _read(entries: list[Entry], file: Path, workers: int, descriptors: bool) -> Iterator[AssetRecord]:
     if workers < 2 or len(entries) < FEW:
-        encoder = _encoder(descriptors)
         for entry in entries:
-            yield described(entry, file, encoder=encoder)
+            yield from _pack([entry], file, descriptors)
         return
     packs = [entries[start : start + PACK] for start in range(0, len(entries), PACK)]
     # spawned: USD and numpy hold threads that do not survive a fork
@@ -145,16 +146,8 @@ def _read(entries: list[Entry], file: Path, workers: int, descriptors: bool) -> 
 
 
 def _pack(entries: list[Entry], file: Path, descriptors: bool) -> list[AssetRecord]:
-    encoder = _encoder(descriptors)
+    encoder = shipped(None) if descriptors else None
     return [described(entry, file, encoder=encoder) for entry in entries]
-
-
-def _encoder(wanted: bool) -> object:
-    if not wanted:
-        return None
-    from echomodel.loading import load_model
-
-    return load_model(None)
 
 
 COLUMNS = ("id", "use", "category", "turn", "metres", "found", "name", "width", "height", "depth", "licence", "fault")

@@ -248,7 +248,9 @@ def write_webdataset(folder: Path, rows: Iterable[dict[str, Any]], rooms: int = 
         with whole_file(path) as beside, tarfile.open(beside, "w", format=tarfile.USTAR_FORMAT) as tar:
             for row in pack:
                 for name, content in _members(folder, row):
-                    _add(tar, name, content)
+                    entry = tarfile.TarInfo(name)  # its time is 1970 and its owner nobody
+                    entry.size = len(content)
+                    tar.addfile(entry, io.BytesIO(content))
         written.append(path)
     for left in set(place.glob("rooms-*.tar")) - set(written):  # of a run that had more
         left.unlink()
@@ -265,9 +267,3 @@ def _members(folder: Path, row: dict[str, Any]) -> Iterator[tuple[str, bytes]]:
     yield f"{row['id']}.json", (json.dumps(content, sort_keys=True) + "\n").encode()
     if picture.is_file():
         yield f"{row['id']}.png", read_bounded(picture, MAX_BYTES)
-
-
-def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
-    entry = tarfile.TarInfo(name)  # its time is 1970 and its owner nobody
-    entry.size = len(content)
-    tar.addfile(entry, io.BytesIO(content))

@@ -136,20 +136,19 @@ def render(
     say_done(json, list(files), map(str, files))
 
 
-SOURCE = typer.Argument(..., metavar="IN.pth", help="Published checkpoint, a file written by torch.save.")
-OUTPUT = typer.Option(..., "--output", "-o", metavar="OUT.safetensors", help="File to write.")
-BOUNDS = typer.Option(
-    None, "--bounds", metavar="TXT", help="centered_bounds_*_trainval.txt of the data set: box statistics to store."
-)
-CLASSES = typer.Option(None, "--classes", metavar="TXT", help="Class names in the order of their ids, one a line.")
-
-
 @app.command("convert")
 def convert(
-    source: Path = SOURCE,
-    output: Path = OUTPUT,
-    bounds: Path | None = BOUNDS,
-    classes: Path | None = CLASSES,
+    source: Annotated[
+        Path, typer.Argument(metavar="IN.pth", help="Published checkpoint, a file written by torch.save.")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.safetensors", help="File to write.")],
+    bounds: Annotated[
+        Path | None,
+        typer.Option(metavar="TXT", help="centered_bounds_*_trainval.txt of the data set: box statistics to store."),
+    ] = None,
+    classes: Annotated[
+        Path | None, typer.Option(metavar="TXT", help="Class names in the order of their ids, one a line.")
+    ] = None,
     force: Replace = False,
     json: AsJson = False,
 ) -> None:

@@ -122,7 +122,8 @@ def new(
         from echousd.home.files import save_home
 
         save_home(home, out)
-        line = f"wrote {out}: {_summary_of_home(home)}"
+        on = "" if home.area is None else f" on {home.area:g} m²"
+        line = f"wrote {out}: a home of {len(home.rooms)} rooms{on}, {len(home.relations)} relations between them"
         say_done(json, [out], [line], {"rooms": len(home.rooms), "relations": len(home.relations)})
         return
     if area is not None:
@@ -171,11 +172,6 @@ def home_from(
     for sentence in relate:
         home = home.relate(sentence)
     return home
-
-
-def _summary_of_home(home: HomeGraph) -> str:
-    area = "" if home.area is None else f" on {home.area:g} m²"
-    return f"a home of {len(home.rooms)} rooms{area}, {len(home.relations)} relations between them"
 
 
 def _counted(text: str) -> tuple[str, int]:

@@ -64,7 +64,8 @@ def home_layer(home: HomeGraph, plan: Plan | None = None, *, rooms: bool = True)
             if room.ratio != RATIO:
                 put(spec, usd.RATIO, room.ratio)
             if plan is not None:
-                _placed(spec, plan.pose(room.name))
+                pose = Gf.Matrix4d(*(np.round(plan.pose(room.name).T, 6) + 0.0).ravel().tolist())  # in metres
+                say(spec, ops(**{"transform:home": ("matrix4d", pose)}))
             if rooms:
                 author(layer, room.graph if plan is None else plan.graph(room.name), spec.path)
     return layer
@@ -73,12 +74,6 @@ def home_layer(home: HomeGraph, plan: Plan | None = None, *, rooms: bool = True)
 def room_path(name: str) -> Sdf.Path:
     """Prim path of a room of a home."""
     return Sdf.Path(ROOMS).AppendChild(name)
-
-
-def _placed(spec: Sdf.PrimSpec, pose: np.ndarray) -> None:
-    """Author a room's pose in the home, (4, 4) float, metres, column vectors."""
-    matrix = Gf.Matrix4d(*(np.round(pose.T, 6) + 0.0).ravel().tolist())
-    say(spec, ops(**{"transform:home": ("matrix4d", matrix)}))
 
 
 def write_home(home: HomeGraph, path: Path, plan: Plan | None = None) -> None:

@@ -122,7 +122,9 @@ def _geometry(root: Usd.Prim, asset: str | None, category: str, manifest: Mappin
     """Parts and colliders below an object's root; None where there is no mesh of ours."""
     parts, colliders = [], []
     for prim, name, body in _pieces(root, asset) if root and asset else ():
-        form, mesh = _mesh(UsdGeom.Mesh(prim)), UsdGeom.Mesh(prim)
+        mesh = UsdGeom.Mesh(prim)
+        points, faces = (np.asarray(one.Get()) for one in (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr()))
+        form = Mesh(points.astype(float), faces.reshape(-1, 3))
         if mesh.GetPurposeAttr().Get() == UsdGeom.Tokens.guide:
             kind = prim.GetAttribute("physics:approximation").Get() or approximation(category)
             colliders.append(Collider(name, form, kind, body))
@@ -152,11 +154,6 @@ def _pieces(root: Usd.Prim, asset: str) -> Iterator[tuple[Usd.Prim, str, str]]:
                 own = piece_of(asset, child.GetName())
                 if own is not None and child.IsA(UsdGeom.Mesh):
                     yield child, own, name
-
-
-def _mesh(mesh: UsdGeom.Mesh) -> Mesh:
-    points = np.asarray(mesh.GetPointsAttr().Get(), float)
-    return Mesh(points, np.asarray(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3))
 
 
 def _slots(mesh: UsdGeom.Mesh, faces: int) -> dict[str, np.ndarray]:

@@ -99,7 +99,9 @@ def _made(
     distance = min(SPHERE, max(space - 0.05, 0.05))
     around = sphere_cameras(at, distance)
     shares = visible_shares(objects, laid, around)
-    words, every = prompt or room_prompt(surfaces), [object_prompt(thing, surfaces) for thing in objects]
+    named = dict.fromkeys(node.style for node in surfaces.graph.nodes if node.style)  # the styles of the graph
+    words = prompt or _prompt(surfaces.graph.room.type or "room", list(named), surfaces.palette)
+    every = [_prompt(one.category or one.name, [one.style or ""], surfaces.palette) for one in objects]
     files: dict[str, bytes] = {}
     name = Path(stage.GetRootLayer().realPath or "room").stem
     if together:
@@ -227,19 +229,9 @@ def _write_folder(out: Path, files: dict[str, bytes]) -> None:
             shutil.rmtree(beside, ignore_errors=True)
 
 
-def room_prompt(surfaces: Surfaces) -> str:
-    """`a bedroom in oak style, coast colours`: the room, the styles that its graph names, and its palette."""
-    styles = dict.fromkeys(node.style for node in surfaces.graph.nodes if node.style)
-    return _prompt(surfaces.graph.room.type or "room", list(styles), surfaces.palette)
-
-
-def object_prompt(thing: Painted, surfaces: Surfaces) -> str:
-    """`a nightstand in oak style, coast colours`."""
-    return _prompt(thing.category or thing.name, [thing.style] if thing.style else [], surfaces.palette)
-
-
 def _prompt(name: str, styles: list[str], palette: str) -> str:
-    kind, styled = _words(name), list(dict.fromkeys(map(_words, styles)))
+    """`a bedroom in oak style, coast colours`: a room or an object, its styles and the room's palette."""
+    kind, styled = _words(name), list(dict.fromkeys(map(_words, filter(None, styles))))
     prompt = f"{'an' if kind[:1] in 'aeiou' else 'a'} {kind}"
     prompt += f" in {' and '.join(styled[:3])} style" if styled else ""
     return prompt + (f", {_words(palette)} colours" if palette else "")

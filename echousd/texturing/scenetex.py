@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import yaml
@@ -21,14 +21,9 @@ STAMP = "echousd"
 OUTPUTS = "outputs"
 
 
-def scene_id(room: str) -> str:
-    """Name of the scene below `data/scenes`."""
-    return f"{room}/room"
-
-
 def mesh_path(number: int, thing: Painted, room: str) -> str:
     """Path of an object's OBJ in the job, which is its path in SceneTex's folder too."""
-    return f"data/scenes/{scene_id(room)}/meshes/{thing.kind}/{number}_{thing.name}.obj"
+    return f"data/scenes/{room}/room/meshes/{thing.kind}/{number}_{thing.name}.obj"
 
 
 def run_folder(prompt: str) -> str:
@@ -46,7 +41,7 @@ def scenetex_files(
         room, prompt: of the job. prompts: of the objects. objects: stuff first. laid: them in one picture.
         at: (3,) float, the point that cameras look through. distance: of the cameras from it, metres.
     """
-    scene = f"data/scenes/{scene_id(room)}"
+    scene = f"data/scenes/{room}/room"
     config, seeded = {}, {}
     files: dict[str, bytes] = {f"{scene}/cameras/sphere.yaml": _sphere(at, distance)}
     run = f"{run_folder(prompt)}/meshes"
@@ -57,17 +52,14 @@ def scenetex_files(
         seeded[str(number)] = {**entry, "num_vertices": len(mesh.points)}
         files[path] = obj_bytes(mesh, thing.name)
         files[f"{run}/{thing.kind}/{number}_{thing.name}.obj"] = obj_bytes(mesh, thing.name, material=False)
-    files[f"{scene}/meshes/scene_config.json"] = _json(config)
-    files[f"{run}/scene_config.json"] = _json(seeded)
-    files[f"{run}/scene.obj"] = obj_bytes(_joined(laid), "scene", material=False)
-    values = {"ROOM": room, "PROMPT": prompt, "SCENE": scene_id(room), "STAMP": STAMP, "OUTPUTS": OUTPUTS}
+    for path, entries in ((f"{scene}/meshes", config), (run, seeded)):
+        files[f"{path}/scene_config.json"] = (json.dumps(entries, indent=4) + "\n").encode()
+    points, faces = append_faces([mesh.points for mesh in laid], [mesh.faces for mesh in laid])
+    whole = Unwrapped(points, np.concatenate([mesh.st for mesh in laid]), faces)
+    files[f"{run}/scene.obj"] = obj_bytes(whole, "scene", material=False)
+    values = {"ROOM": room, "PROMPT": prompt, "SCENE": f"{room}/room", "STAMP": STAMP, "OUTPUTS": OUTPUTS}
     files["run.sh"] = script_for("scenetex", {**values, "ANCHORED": str(ANCHORED)})
     return files
-
-
-def _joined(laid: Sequence[Unwrapped]) -> Unwrapped:
-    points, faces = append_faces([mesh.points for mesh in laid], [mesh.faces for mesh in laid])
-    return Unwrapped(points, np.concatenate([mesh.st for mesh in laid]), faces)
 
 
 def _sphere(at: np.ndarray, distance: float) -> bytes:
@@ -79,7 +71,3 @@ def _sphere(at: np.ndarray, distance: float) -> bytes:
         "at": [[float(v) for v in at]],
     }
     return yaml.safe_dump(space, sort_keys=False).encode()
-
-
-def _json(found: Mapping[str, object]) -> bytes:
-    return (json.dumps(found, indent=4) + "\n").encode()

@@ -192,6 +192,7 @@ DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
 def read_svg(content: bytes, unit: float | None) -> Found:
     """An SVG of which one unit is `unit` metres; x is east, y south. Raises `GraphError`."""
     svgelements = extra("svgelements", "SVG needs svgelements", "svg", GraphError)
+    curves = svgelements.Arc | svgelements.CubicBezier | svgelements.QuadraticBezier
     if unit is None:
         raise GraphError(
             "an SVG has no scale, allowed: --unit with the metres of one of its units, such as --unit 0.01"
@@ -219,9 +220,8 @@ def read_svg(content: bytes, unit: float | None) -> Found:
             elif isinstance(one, svgelements.Shape):
                 for part in svgelements.Path(one).as_subpaths():
                     line = svgelements.Path(part)
-                    dots = [line.point(t) for t in np.linspace(0, 1, 17)] if _curved(line, svgelements) else [
-                        segment.end for segment in line
-                    ]  # fmt: skip
+                    curved = any(isinstance(segment, curves) for segment in line)
+                    dots = [line.point(t) for t in np.linspace(0, 1, 17)] if curved else [part.end for part in line]
                     points = np.array([(p.x, p.y) for p in dots if p is not None], float) * unit
                     closed = any(isinstance(segment, svgelements.Close) for segment in line)
                     if len(points) > 1:
@@ -235,10 +235,6 @@ def read_svg(content: bytes, unit: float | None) -> Found:
 
 
 INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}label"
-
-
-def _curved(line: Any, svgelements: Any) -> bool:
-    return any(isinstance(s, svgelements.Arc | svgelements.CubicBezier | svgelements.QuadraticBezier) for s in line)
 
 
 FURNITURE = ("IfcFurnishingElement", "IfcSanitaryTerminal", "IfcElectricAppliance", "IfcFlowTerminal")

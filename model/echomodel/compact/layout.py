@@ -62,7 +62,8 @@ def wall_features(boxes: Boxes, floor: Array) -> Array:
     gaps = xp.concat([ahead, signed_distance(outline, floor)], 1) * there
     turn = boxes.yaw - nearest_wall(outline[:, BACK], floor)
     turned = xp.stack([xp.sin(turn), xp.cos(turn), xp.sin(4 * turn), xp.cos(4 * turn)], 1) * there
-    return xp.concat([_scales(gaps), there, turned], 1)
+    scales = [xp.tanh(gaps / length) for length in (3, ROUND_ABOUT, NEAR)]
+    return xp.concat([*scales, there, turned], 1)
 
 
 def pair_features(boxes: Boxes, pairs: Pairs) -> Array:
@@ -114,11 +115,6 @@ def seen_from(boxes: Boxes, i: Array, j: Array) -> Array:
 def _hull_of(boxes: Boxes) -> Array:
     """(N, 2) half extents of the boxes along the room's x and z, metres."""
     return hull(boxes.size[:, ::2] / 2, boxes.yaw)
-
-
-def _scales(gaps: Array) -> Array:
-    xp = kit(gaps)
-    return xp.concat([xp.tanh(gaps / 3), xp.tanh(gaps / ROUND_ABOUT), xp.tanh(gaps / NEAR)], 1)
 
 
 @dataclass(frozen=True, eq=False)

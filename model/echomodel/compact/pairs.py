@@ -69,7 +69,8 @@ def pairs_of(graph: GraphBatch, predicates: tuple[str, ...] | None = None) -> Pa
     receiver, sender, scale = ordered_pairs(counts)
     row = beside(table_of("predicates", predicates), graph.triplets)[graph.triplets[:, 1]]
     graph, predicate = graph.with_triplets(graph.triplets[row >= 0]), row[row >= 0]
-    index = pair_index(graph, counts)
+    ends = [(graph.triplets[:, 0], graph.triplets[:, 2]), (graph.triplets[:, 2], graph.triplets[:, 0])]
+    index = [_pair_number(*pair, graph.scene, counts) for pair in ends]
     # an inverse relation says the same the other way round: left(a, b) = right(b, a)
     forward = full(scale, (len(receiver), len(predicates)), 0.0)
     inverse = beside(inverse_predicates(predicates), row)[predicate]
@@ -77,12 +78,6 @@ def pairs_of(graph: GraphBatch, predicates: tuple[str, ...] | None = None) -> Pa
     forward[index[1][inverse >= 0], inverse[inverse >= 0]] = 1
     backward = forward[reverse_pairs(receiver, sender, counts)]
     return Pairs(receiver, sender, kit(forward).concat([forward, backward], 1), scale)
-
-
-def pair_index(graph: GraphBatch, counts: Array) -> tuple[Array, Array]:
-    """Numbers of the pairs (subject, object) and (object, subject) of every triplet, two (E,) int64 arrays."""
-    subject, target = graph.triplets[:, 0], graph.triplets[:, 2]
-    return _pair_number(subject, target, graph.scene, counts), _pair_number(target, subject, graph.scene, counts)
 
 
 def reverse_pairs(receiver: Array, sender: Array, counts: Array) -> Array:

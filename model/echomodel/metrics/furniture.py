@@ -36,7 +36,8 @@ def loose_solids(solids: Sequence[Solid]) -> list[int]:
 
 def group_of(solids: Sequence[Solid]) -> tuple[Array, int]:
     """Number (n,) of the body that each solid is part of, and which body is the largest; none may be a core."""
-    surfaces = [_surface_of(solid) for solid in solids]
+    meshes = [solid.mesh(2) for solid in solids]
+    surfaces = [np.concatenate([points, spread(points[faces], POINTS)[0]]) for points, faces in meshes]
     low = np.array([points.min(0) for points in surfaces]) - TOUCH
     high = np.array([points.max(0) for points in surfaces]) + TOUCH
     near = (low[:, None] <= high[None]).all(2) & (high[:, None] >= low[None]).all(2)
@@ -46,12 +47,6 @@ def group_of(solids: Sequence[Solid]) -> tuple[Array, int]:
             joined.append((i, j))
     group = linked(joined, len(solids))
     return group, int(np.bincount(group).argmax())
-
-
-def _surface_of(solid: Solid) -> Array:
-    """Vertices of a solid and points spread evenly over its faces, metres."""
-    vertices, faces = solid.mesh(2)
-    return np.concatenate([vertices, spread(vertices[faces], POINTS)[0]])
 
 
 def _touches(points: Array, solid: Solid) -> bool:
