@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from pxr import Sdf, Tf
 
 from echomodel.files import telling
+from echomodel.late import Late
 from echousd.draw.pictures import is_ours
 from echousd.folder.folder import backup_name, digest, digest_of
 from echousd.folder.within import inside
@@ -17,10 +18,11 @@ from echousd.naming import free_name
 from echousd.pending import STAGING
 from echousd.stage.apart import check_harmless
 from echousd.stage.paths import coarse_file, component_file, payload_file
-from echousd.store import references_of
 
 if TYPE_CHECKING:
     from echousd.room import RoomData
+
+references_of = Late("echousd.store:references_of")
 
 
 def free_assets(folder: Path, room: RoomData, recorded: Mapping[str, str]) -> dict[str, str]:
