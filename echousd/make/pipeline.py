@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -19,6 +18,7 @@ from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.consistency import faults_of
 from echousd.graph.files import STAGE_FORMS
 from echousd.graph.floors import check_doors, check_space, with_lowered_windows, with_plan, with_wider_floor
+from echousd.graph.text import graph_from_plain
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
 from echousd.make.layouts import (
@@ -244,7 +244,7 @@ def with_earlier_locks(graph: SceneGraph, earlier: Path | None) -> tuple[SceneGr
     if not manifest:
         return graph, ()
     try:
-        old = SceneGraph.from_json(json.dumps(manifest.get("graph")))
+        old = graph_from_plain(SceneGraph, manifest.get("graph"))
     except ValueError:  # no graph that can be read
         return graph, ()
     kept = [

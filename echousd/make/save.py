@@ -18,6 +18,7 @@ from echousd.folder import folder as folders
 from echousd.folder import ownership
 from echousd.folder.manifest import MANIFEST_KEY
 from echousd.graph import SceneGraph
+from echousd.graph.text import graph_from_plain
 from echousd.layers.compose import LAYERS, room_files
 from echousd.naming import as_identifier
 from echousd.options import Look
@@ -101,7 +102,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     owned |= {path: recorded[path] for path in needed}
     history: list[dict[str, Any]] = []
     if room.edited and old:
-        steps = SceneGraph.from_json(json.dumps(old["graph"])).diff(room.graph).lines() if "graph" in old else []
+        steps = graph_from_plain(SceneGraph, old["graph"]).diff(room.graph).lines() if "graph" in old else []
         history, archive = remembered(folder, old, files, owned, list(kept.values()), steps)
         files |= archive
         kept_steps = {entry["restores"] for entry in history}

@@ -6,13 +6,13 @@ Every pattern is the same in every run and on every machine; colour comes later,
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
-from echomodel.late import Late
+from echomodel.late import Compiled
 
-cKDTree = Late("scipy.spatial:cKDTree")
+cKDTree = Compiled("scipy.spatial._ckdtree:cKDTree")
 SIZE = 512  # pixels on each side
 
 
@@ -25,6 +25,7 @@ class Relief:
     rough: np.ndarray | None = None  # (SIZE, SIZE) float, added to the roughness, None where it is even
 
 
+@lru_cache(maxsize=8)  # those of wear and of piles are asked for again by image after image
 def noise(seed: int, along: float, across: float, power: float = 2.0) -> np.ndarray:
     """(SIZE, SIZE) periodic noise of deviation 1; features are about `SIZE / along` x `SIZE / across` pixels."""
     rng = np.random.default_rng(seed)

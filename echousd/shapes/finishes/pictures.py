@@ -29,7 +29,7 @@ class Sheet:
         self.row, self.tones = PRINTS[name], STOCK | HARMONIES[harmony]._asdict()
         self.aspect, self.seed = ASPECTS[self.row["form"]], crc32(name.encode()) % 9973
         axis = (np.arange(SIZE) + 0.5) / SIZE - 0.5
-        self.x, self.y = np.meshgrid(axis * self.aspect, axis)
+        self.x, self.y = axis[None] * self.aspect, axis[:, None]
         self.tall = round(FINE * SIZE / self.aspect**0.5)  # pixels
         size = (round(self.tall * self.aspect), self.tall)
         self.image = Image.new("RGB", size, self.color(self.row.get("on", "paper")))
@@ -116,7 +116,7 @@ def fade(sheet: Sheet, row: Row) -> None:
     tones = np.array([sheet.color(word) for word in words], float)
     rows = [np.interp(np.linspace(0, 1, SIZE), level, tone) for tone in tones.T]
     image = np.repeat(np.stack(rows, -1)[:, None], SIZE, 1).astype(np.uint8)
-    mask = ((sheet.y + 0.5 >= level[0]) * 255).astype(np.uint8)
+    mask = np.repeat((sheet.y + 0.5 >= level[0]) * 255, SIZE, 1).astype(np.uint8)
     big = [Image.fromarray(one).resize(sheet.image.size) for one in (image, mask)]
     sheet.image.paste(big[0], (0, 0), big[1])
 
@@ -149,8 +149,9 @@ def motif(sheet: Sheet, row: Row) -> None:
     measure is `round`, `square`, `lozenge`, a `bar` across or a `post`; in `steps`, with `petals`, `zig` and `rough`.
     """
     turn, (across, down) = np.radians(row.get("turn", 0)), row.get("repeat", (1, 1))
-    x = sheet.x * np.cos(turn) + sheet.y * np.sin(turn)
-    y = sheet.y * np.cos(turn) - sheet.x * np.sin(turn)
+    x, y = sheet.x, sheet.y  # a row and a column, as long as nothing mixes them
+    if turn:
+        x, y = x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)
     p, q = (x / sheet.aspect + 0.5) * across, (y + 0.5) * down
     if "zig" in row:
         deep, many = row["zig"]
@@ -158,13 +159,13 @@ def motif(sheet: Sheet, row: Row) -> None:
     if "rough" in row:
         q = q + row["rough"] * noise(sheet.seed + 1, 5.0, 5.0, 3.5)
         p = p + row["rough"] * noise(sheet.seed + 2, 5.0, 5.0, 3.5)
-    p = p + 0.5 * (np.floor(q) % 2) * bool(row.get("brick"))
-    a, b = 2 * (p % 1) - 1, 2 * (q % 1) - 1
+    if row.get("brick"):
+        p = p + 0.5 * (np.floor(q) % 2)
+    a, b = 2 * (p - np.floor(p)) - 1, 2 * (q - np.floor(q)) - 1
     if "steps" in row:
         a, b = (np.round(one * row["steps"]) / row["steps"] for one in (a, b))
-    a_, b_ = np.abs(a), np.abs(b)
-    far = {"round": np.hypot(a, b), "square": np.maximum(a_, b_), "lozenge": a_ + b_, "bar": b_, "post": a_}
-    measure = far[row["motif"]]
+    far = {"round": np.hypot, "square": np.maximum, "lozenge": np.add, "bar": lambda _, b: b, "post": lambda a, _: a}
+    measure = far[row["motif"]](np.abs(a), np.abs(b))
     if "petals" in row:
         deep, many = row["petals"]
         measure = measure * (1 + deep * np.cos(many * np.arctan2(b, a)))
@@ -197,6 +198,6 @@ def printed(name: str, harmony: str) -> np.ndarray:
     sheet = Sheet(name, harmony)
     for row in sheet.row["of"]:
         PROGRAMS[next(iter(row))](sheet, row)
-    drawn = np.asarray(sheet.image.resize((SIZE, SIZE), Image.Resampling.BOX), float) / 255
+    drawn = to_linear(np.arange(256) / 255)[np.asarray(sheet.image.resize((SIZE, SIZE), Image.Resampling.BOX))]
     grain = 1 + 0.02 * noise(101, 90.0, 90.0) if name.startswith("picture_") else carpet().tone
-    return np.clip(to_linear(drawn) * grain[..., None], 0, 1)
+    return np.clip(drawn * grain[..., None], 0, 1)
