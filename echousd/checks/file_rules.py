@@ -12,7 +12,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
 
 from echomodel.vocabulary import vocabulary
-from echousd.checks.reading import Authored, Finding, Reading, rule
+from echousd.checks.reading import Authored, Finding, Reading, holder, rule
 from echousd.exporting.packing import Reach
 from echousd.stage.files import usd_error
 from echousd.stage.units import METRES, UP_AXIS, unit_faults, upwards
@@ -29,15 +29,11 @@ ABSOLUTE = re.compile(r"^(?:/|\\\\|[A-Za-z]:[\\/]|file:)")
 @rule("echo:RelativePaths")
 def relative_paths(reading: Reading) -> Iterator[Finding]:
     """Every asset path is relative and written with forward slashes."""
-    seen = set()
     for layer, paths in reading.named_files.items():
-        for holder, path in paths:
-            if (layer.identifier, path) in seen or not (ABSOLUTE.match(path) or "\\" in path):
-                continue
-            seen.add((layer.identifier, path))
+        for path in (path for path in paths if ABSOLUTE.match(path) or "\\" in path):
             what = "absolute" if ABSOLUTE.match(path) else "written with backslashes"
-            where = layer.GetDisplayName()
-            yield Finding(holder, f"{where}: asset path {path!r} is {what}, allowed: ./relative/path")
+            where = f"{layer.GetDisplayName()}: asset path {path!r}"
+            yield Finding(holder(layer, path), f"{where} is {what}, allowed: ./relative/path")
 
 
 @rule("echo:PathsInside")
@@ -46,19 +42,15 @@ def paths_inside(reading: Reading) -> Iterator[Finding]:
     if not reading.stage.GetRootLayer().realPath:
         return
     reach = Reach.of(reading.stage)
-    seen = set()
     for layer, paths in reading.named_files.items():
         if layer.realPath and not reach.holds(layer.realPath):
             continue  # what a layer outside names is outside with it; the layer itself is told
-        for holder, path in paths:
-            if (layer.identifier, path) in seen or ABSOLUTE.match(path):
-                continue
-            seen.add((layer.identifier, path))
+        for path in (path for path in paths if not ABSOLUTE.match(path)):
             full = layer.ComputeAbsolutePath(path)
             if full and not reach.holds(full):
-                where = f"{layer.GetDisplayName()}: asset path {path!r} leads out of the room's folder"
-                is_layer = bool(Sdf.FileFormat.FindByExtension(full))
-                yield Finding(holder, f"{where} {reach.places[0]}, allowed: a file below it", warning=is_layer)
+                what = f"leads out of the room's folder {reach.places[0]}, allowed: a file below it"
+                message = f"{layer.GetDisplayName()}: asset path {path!r} {what}"
+                yield Finding(holder(layer, path), message, warning=bool(Sdf.FileFormat.FindByExtension(full)))
 
 
 @rule("echo:Images", "prims", UsdShade.Shader)

@@ -8,13 +8,13 @@ from functools import cached_property
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, UsdGeom
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 
 from echomodel.triangles import area_normals
 from echousd.exporting.packing import asset_paths
 from echousd.stage.contents import HIDDEN, RoomContents, components, read_contents, triangulated
 from echousd.stage.encoding import StageError
-from echousd.stage.files import specs
+from echousd.stage.files import prim_specs, specs
 from echousd.stage.forms import is_subdivision
 from echousd.stage.read import RoomPrims, find_rooms
 from echousd.stage.units import metres_per_unit
@@ -95,10 +95,10 @@ class Reading:
         return [*self.nodes, *(prim for room in self.rooms for prim in components(room))]
 
     @cached_property
-    def named_files(self) -> dict[Sdf.Layer, list[tuple[Sdf.Path, str]]]:
-        """The layers in use, but for the session's, and all asset paths that each authors with their prims."""
+    def named_files(self) -> dict[Sdf.Layer, set[str]]:
+        """The layers in use, but for the session's, and all asset paths that each authors, see `holder`."""
         session = self.stage.GetSessionLayer()
-        return {layer: _asset_paths(layer) for layer in self.stage.GetUsedLayers() if layer != session}
+        return {layer: _named_files(layer) for layer in self.stage.GetUsedLayers() if layer != session}
 
     @cached_property
     def metres(self) -> float:
@@ -171,16 +171,24 @@ def below(prim: Usd.Prim) -> list[Usd.Prim]:
     return list(Usd.PrimRange(prim, Usd.TraverseInstanceProxies()))
 
 
+def holder(layer: Sdf.Layer, named: str) -> Sdf.Path:
+    """The first prim of a layer that authors an asset path, the root for the layer itself."""
+    return next((prim for prim, path in _asset_paths(layer) if path == named), Sdf.Path.absoluteRootPath)
+
+
+def _named_files(layer: Sdf.Layer) -> set[str]:
+    if layer.anonymous:
+        return {path for _, path in _asset_paths(layer)}
+    return {path for kind in UsdUtils.ExtractExternalReferences(layer.identifier) for path in kind}
+
+
 def _asset_paths(layer: Sdf.Layer) -> list[tuple[Sdf.Path, str]]:
     """All asset paths that a layer authors, in sublayers, references, payloads, values or metadata, and their prims."""
     found = [(Sdf.Path.absoluteRootPath, path) for path in layer.subLayerPaths]
-    every = specs(layer)
-    found += [(path.GetPrimPath(), named) for path, named in asset_paths(every)]
-    for spec in (spec for spec in every if isinstance(spec, Sdf.PrimSpec)):
-        arcs = (*spec.referenceList.GetAddedOrExplicitItems(), *spec.payloadList.GetAddedOrExplicitItems())
-        found += [(spec.path, arc.assetPath) for arc in arcs if arc.assetPath]
-        identifier = (spec.assetInfo or {}).get("identifier")
-        found += [(spec.path, identifier)] if isinstance(identifier, str) and identifier else []
+    found += [(path.GetPrimPath(), named) for path, named in asset_paths(specs(layer))]
+    for prim in prim_specs(layer):
+        arcs = (*prim.referenceList.GetAddedOrExplicitItems(), *prim.payloadList.GetAddedOrExplicitItems())
+        found += [(prim.path.StripAllVariantSelections(), arc.assetPath) for arc in arcs if arc.assetPath]
     return found
 
 

@@ -78,7 +78,8 @@ def find_faults(reading: Reading) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]
     stage = reading.stage
     own = [(rule, found) for rule in RULES for found in safely(rule, reading)]
     with showing_variant(stage, ARTICULATION, ARTICULATED) as changed:  # doors and drawers are joined in it alone
-        own += [(rule, found) for rule in JOINED if changed for found in safely(rule, Reading(stage))]
+        joined = Reading(stage)
+        own += [(rule, found) for rule in JOINED if changed for found in safely(rule, joined)]
     errors, warnings = _faults_of_usd(stage)
     for rule, found in own:
         (warnings if found.warning else errors).add(Fault(rule.name, str(found.path), found.message))
