@@ -101,6 +101,22 @@ class Whole:
         return None if self.polygon is None else Floor(self.polygon)
 
 
+class Carriers(tuple[Shape, ...]):
+    """Things that others may stand on."""
+
+    @cached_property
+    def _boxes(self) -> tuple[np.ndarray, ...]:
+        """In plan, (n, 2) middles and halves, and (n, 2, 2) from the room's axes to their own."""
+        rows = np.array([(*one.position[[0, 2]], *one.size[[0, 2]] / 2, one.yaw) for one in self]).reshape(-1, 5)
+        return rows[:, :2], rows[:, 2:4], np.stack(axes(rows[:, 4]), -1)
+
+    def below(self, feet: np.ndarray) -> list[Shape]:
+        """Those whose boxes hold one of some points (k, 2) in plan."""
+        middle, half, turn = self._boxes
+        local = np.abs((feet - middle[:, None]) @ turn)
+        return [self[at] for at in np.flatnonzero((local <= half[:, None]).all(2).any(1))]
+
+
 def find_misplaced(whole: Whole) -> tuple[Misplacement, ...]:
     """All that stands, hangs or looks where it should not; nothing in a room without furniture."""
     if not whole.room.objects:
@@ -113,6 +129,7 @@ def _furniture(whole: Whole) -> Iterator[Misplacement]:
     room, floor = whole.room, whole.floor
     yield from (Misplacement(name, "empty") for name in room.missing)
     ceiling = HEIGHT if room.spec is None else room.spec.tall
+    carriers = Carriers(room.objects)
     height = max([ceiling, *(float(thing.position[1] + thing.size[1]) for thing in room.objects)])
     for thing in room.objects:
         beyond = -np.inf if floor is None else _beyond(thing, floor)
@@ -122,7 +139,7 @@ def _furniture(whole: Whole) -> Iterator[Misplacement]:
         if bottom < -FLOATING:
             yield Misplacement(thing.name, "sunk", -bottom)
         elif not thing.node.obstacle:  # such are held by what only their own stage knows
-            air = _air_below(thing, room.objects)
+            air = _air_below(thing, carriers)
             if air > FLOATING and not _held(thing, floor, height):
                 yield Misplacement(thing.name, "floating", air)
 
@@ -154,13 +171,13 @@ def _dressing(whole: Whole) -> Iterator[Misplacement]:
     if whole.floor is None:
         return
     small, shell = ([one.shape for one in found if one.shape is not None] for found in (whole.small, whole.shell))
-    carriers, windows = [*whole.room.objects, *small, *shell], _windows(whole)  # sills carry things, too
+    carriers, windows = Carriers([*whole.room.objects, *small, *shell]), _windows(whole)  # sills carry things, too
     for one in whole.small:
         yield from (Misplacement(one.name, *why) for why in _small_faults(one, whole.floor, carriers, windows, shell))
 
 
 def _small_faults(
-    one: Surrounding, floor: Floor, carriers: Sequence[Shape], windows: np.ndarray, shell: Sequence[Shape] = ()
+    one: Surrounding, floor: Floor, carriers: Carriers, windows: np.ndarray, shell: Sequence[Shape] = ()
 ) -> Iterator[tuple[str, float | None]]:
     kind, shape = SMALL[one.word], one.shape
     if shape is None:
@@ -225,7 +242,7 @@ def _footprint(thing: Shape) -> np.ndarray:
     return footprints(thing.size[None], thing.position[None], np.array([thing.yaw]))[0]
 
 
-def _air_below(thing: Shape, others: Sequence[Shape], *, draped: bool = False) -> float:
+def _air_below(thing: Shape, others: Carriers, *, draped: bool = False) -> float:
     """Height of the bottom over the floor or over the nearest surface below the middle or a corner of the object.
 
     `draped`: it hangs lower than it lies, and counts from where it lies there.
@@ -233,15 +250,11 @@ def _air_below(thing: Shape, others: Sequence[Shape], *, draped: bool = False) -
     feet = np.concatenate((thing.position[None, [0, 2]], 0.5 * (_footprint(thing) + thing.position[[0, 2]])))
     bottom = _surface_gap(feet, 0.0, thing) if draped and len(thing.points) else float(thing.position[1])
     air = abs(bottom)
-    for other in others:
-        if other is thing:
-            continue
-        local = np.abs((feet - other.position[[0, 2]]) @ np.stack(axes(other.yaw), 1))
-        if (local <= other.size[[0, 2]] / 2).all(1).any():
-            air = min(air, abs(bottom - float(other.position[1] + other.size[1])))
-            # Things stand on shelves and seats, below the top of the whole box.
-            if len(other.points):
-                air = min(air, _surface_gap(feet, bottom, other))
+    for other in (other for other in others.below(feet) if other is not thing):
+        air = min(air, abs(bottom - float(other.position[1] + other.size[1])))
+        # Things stand on shelves and seats, below the top of the whole box.
+        if len(other.points):
+            air = min(air, _surface_gap(feet, bottom, other))
     return air
 
 

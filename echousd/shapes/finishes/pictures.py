@@ -164,8 +164,8 @@ def motif(sheet: Sheet, row: Row) -> None:
     a, b = 2 * (p - np.floor(p)) - 1, 2 * (q - np.floor(q)) - 1
     if "steps" in row:
         a, b = (np.round(one * row["steps"]) / row["steps"] for one in (a, b))
-    far = {"round": np.hypot, "square": np.maximum, "lozenge": np.add, "bar": lambda _, b: b, "post": lambda a, _: a}
-    measure = far[row["motif"]](np.abs(a), np.abs(b))
+    far = {"round": np.hypot, "square": np.maximum, "lozenge": np.add}.get(row["motif"])  # a bar and a post are even
+    measure = far(np.abs(a), np.abs(b)) if far else np.abs(b if row["motif"] == "bar" else a)
     if "petals" in row:
         deep, many = row["petals"]
         measure = measure * (1 + deep * np.cos(many * np.arctan2(b, a)))

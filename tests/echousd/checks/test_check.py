@@ -12,7 +12,7 @@ from pxr import Gf, Usd, UsdGeom
 
 import echousd
 from echousd.checks import Collision, check
-from echousd.checks.placement import Whole, _small_faults, find_collisions, mesh_depth, winding_number
+from echousd.checks.placement import Carriers, Whole, _small_faults, find_collisions, mesh_depth, winding_number
 from echousd.checks.report import find_living
 from echousd.cli.main import run
 from echousd.graph import Node, RoomSpec, SceneGraph
@@ -278,5 +278,5 @@ def test_coats_hang_from_a_rack_that_stands_off_its_wall(rack: float, told: list
     coats = Surrounding(prim, "coats", shape)
     floor = Floor(np.array([(-1.0, -2.0), (1.0, -2.0), (1.0, 2.0), (-1.0, 2.0)]))
     carriers = [thing("rack", "coat_rack", box(0.4, rack, 1.0), (-0.7, 0.0, 0.0))] if rack else []
-    found = _small_faults(coats, floor, carriers, np.zeros((0, 2, 2)))
+    found = _small_faults(coats, floor, Carriers(carriers), np.zeros((0, 2, 2)))
     assert [word for word, _ in found] == told
