@@ -221,7 +221,7 @@ def test_no_two_prints_are_nearly_the_same(what, monkeypatch):
     names = [name for name in PRINTS if name.startswith(f"{what}_")]
     for module in ("pictures", "patterns"):  # an eighth of this is looked at
         monkeypatch.setattr(f"echousd.shapes.finishes.{module}.SIZE", SIZE // 4)
-        monkeypatch.setattr(f"echousd.shapes.finishes.{module}.noise", noise.__wrapped__)  # none of another size is kept
+        monkeypatch.setattr(f"echousd.shapes.finishes.{module}.noise", noise.__wrapped__)
     drawn = [printed(name, "clay")[::2, ::2] for name in names]
     apart = [float(np.abs(one - other).mean()) for k, one in enumerate(drawn) for other in drawn[:k]]
     assert min(apart) > 0.02
