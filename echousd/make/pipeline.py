@@ -18,7 +18,6 @@ from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.consistency import faults_of
 from echousd.graph.files import STAGE_FORMS
 from echousd.graph.floors import check_doors, check_space, with_lowered_windows, with_plan, with_wider_floor
-from echousd.graph.text import graph_from_plain
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
 from echousd.make.layouts import (
@@ -45,6 +44,7 @@ from echousd.stage.graphs import read_graph
 from echousd.stage.read import find_rooms
 from echousd.stage.units import conventions
 
+graph_from_plain = Late("echousd.graph.text:graph_from_plain")  # of a room that is there already
 named_pieces, retrieved = (Late(f"echousd.shapes.sources.retrieval:{name}") for name in ("named_pieces", "retrieved"))
 read_contents = Late("echousd.stage.contents:read_contents")  # of a stage where something is locked
 with_space, fitted = Late("echousd.make.fitting:with_space"), Late("echousd.make.fitting:fitted")

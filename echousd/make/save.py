@@ -18,7 +18,6 @@ from echousd.folder import folder as folders
 from echousd.folder import ownership
 from echousd.folder.manifest import MANIFEST_KEY
 from echousd.graph import SceneGraph
-from echousd.graph.text import graph_from_plain
 from echousd.layers.compose import LAYERS, room_files
 from echousd.naming import as_identifier
 from echousd.options import Look
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from echousd.folder.stored import Shelf
 
 # of rooms that are there already
+graph_from_plain = Late("echousd.graph.text:graph_from_plain")
 remembered, undone = Late("echousd.folder.history:remembered"), Late("echousd.folder.history:undone")
 
 
