@@ -16,7 +16,7 @@ from echomodel.dressing import KINDS
 from echomodel.late import Late
 from echousd.draw.pictures import thumbnails
 from echousd.draw.sight import Furniture
-from echousd.dressing.dress import Dressing, dress, write_nodes
+from echousd.dressing.dress import Dressing, dress
 from echousd.dressing.setting import Thing
 from echousd.layers import assets, cameras, lights, materials, physics, structure
 from echousd.layers.cameras import room_points
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from echousd.folder.stored import Shelf
 
 carried_files, placed_files = Late("echousd.layers.placed:carried_files"), Late("echousd.layers.placed:placed_files")
+write_nodes = Late("echousd.dressing.nodes:write_nodes")
 FILE = "ATTRIBUTION.md"
 
 
