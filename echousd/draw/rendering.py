@@ -46,7 +46,7 @@ def render(
 def _showing(path: str | Path, layout: int | str | None, light: str | None) -> Iterator[Usd.Stage]:
     """A stage that shows one of its layouts and lights within the block; raises ValueError for what there is not."""
     from echousd.stage.files import open_stage
-    from echousd.stage.layouts import showing_layout, showing_variant
+    from echousd.stage.showing import showing_layout, showing_variant
 
     stage = open_stage(path)
     if light is None:

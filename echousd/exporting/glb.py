@@ -18,9 +18,9 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 from echousd.draw.drawables import Drawable, Paint, Texture, image_of, own_category, read_drawables
 from echousd.exporting.packing import Reach
 from echousd.stage import values
-from echousd.stage.layouts import selected_layout
 from echousd.stage.lights import emitted
 from echousd.stage.read import facts, find_rooms, node_names, room_spec
+from echousd.stage.showing import selected_layout
 from echousd.stage.units import to_metres
 from echousd.textures import encoded, texture_bytes
 

@@ -26,7 +26,6 @@ from echousd.shapes.matter import read_mass
 from echousd.stage.contents import room_frame, surface_of
 from echousd.stage.files import open_stage
 from echousd.stage.graphs import read_graph
-from echousd.stage.layouts import each_layout
 from echousd.stage.paths import (
     DESCRIPTION,
     GEO,
@@ -37,6 +36,7 @@ from echousd.stage.paths import (
     piece_name,
     piece_of,
 )
+from echousd.stage.showing import each_layout
 from echousd.stage.units import Z_TO_Y, metres_per_unit
 from echousd.stage.values import NOW, matrix, reading
 

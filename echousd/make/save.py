@@ -27,7 +27,7 @@ from echousd.shapes.geometry import Geometry
 from echousd.shapes.sources.named import beside
 from echousd.stage.apart import check_harmless
 from echousd.stage.files import open_stage, write_all
-from echousd.stage.layouts import layout_names, showing_layout
+from echousd.stage.layouts import layout_names
 from echousd.stage.paths import UNFIT, layer_file
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 # of rooms that are there already
 graph_from_plain = Late("echousd.graph.text:graph_from_plain")
 remembered, undone = Late("echousd.folder.history:remembered"), Late("echousd.folder.history:undone")
+showing_layout = Late("echousd.stage.showing:showing_layout")
 
 
 def save_room(

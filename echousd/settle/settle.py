@@ -18,7 +18,7 @@ from echousd.shapes.matter import read_mass
 from echousd.stage.contents import triangulated
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
-from echousd.stage.layouts import each_layout
+from echousd.stage.showing import each_layout
 from echousd.stage.units import metres_per_unit, upwards
 from echousd.stage.values import NOW, array, lineage, matrix, moves
 

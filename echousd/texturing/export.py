@@ -18,8 +18,8 @@ from echomodel.files import telling
 from echousd.draw.surfaces import Painted, Surfaces, read_surfaces
 from echousd.stage.contents import room_frame
 from echousd.stage.files import open_stage
-from echousd.stage.layouts import showing_layout
 from echousd.stage.read import the_room
+from echousd.stage.showing import showing_layout
 from echousd.stage.values import NOW, reading
 from echousd.textures import encoded
 from echousd.texturing import scenetex
