@@ -17,13 +17,12 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from echomodel.boxes import BoxStatistics
 from echomodel.compact.model import CompactModel
 from echomodel.config import CompactConfig
 from echomodel.data.roomset import RoomSet, build_rooms
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_rooms
-from echomodel.training.layout_stage import LayoutStage
+from echomodel.training.layout_stage import LayoutStage, statistics_of
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import PackedRooms
 
@@ -60,7 +59,7 @@ def main() -> None:
         few = [stored.room(k) for k in range(SCENES)]
     packed = PackedRooms.build(few, 0)
     nodes = int(packed.count.sum())
-    statistics = BoxStatistics.from_boxes(packed.boxes, packed.category, len(CompactConfig().categories))
+    statistics = statistics_of(packed.boxes, packed.category, len(CompactConfig().categories))
     model = CompactModel(CompactConfig(), statistics, ("latent", "layout"))
     stage = LayoutStage(packed, packed, Recipe("layout", 1, nodes=nodes, relation_weight=1.0))
     generator = torch.Generator().manual_seed(0)

@@ -13,10 +13,10 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
 
 from echomodel.vocabulary import vocabulary
 from echousd.checks.reading import Authored, Finding, Reading, holder, rule
-from echousd.exporting.packing import Reach
+from echousd.exporting.packing import Reach, misfit
 from echousd.stage.files import usd_error
-from echousd.stage.units import METRES, UP_AXIS, unit_faults, upwards
-from echousd.stage.values import LARGEST, UNREADABLE, asset, misfit, shown
+from echousd.stage.units import METRES, UP_AXIS, upwards
+from echousd.stage.values import LARGEST, UNREADABLE, asset, shown
 from echousd.textures import READABLE, TextureError, file_of, read_image
 
 KILOGRAMS = "kilogramsPerUnit"
@@ -87,8 +87,20 @@ def _image_fault(path: str, _stamp: tuple[int, ...]) -> str:
 @rule("echo:Units")
 def units(reading: Reading) -> Iterator[Finding]:
     """The root layer says the unit and the up axis of the layers that it composes."""
-    for message, wrong in unit_faults(reading.stage):
-        yield Finding(Sdf.Path.absoluteRootPath, message, warning=not wrong)
+    root, *others = reading.stage.GetLayerStack(includeSessionLayers=False)
+    for key in (METRES, UP_AXIS):
+        held = root.pseudoRoot.GetInfo(key) if root.pseudoRoot.HasInfo(key) else None
+        below = next((layer for layer in others if layer.pseudoRoot.HasInfo(key)), None)
+        if below is None:
+            continue
+        meant, here = below.pseudoRoot.GetInfo(key), root.GetDisplayName()
+        told, there = (f"{value:g}" if isinstance(value, float) else str(value) for value in (held, meant))
+        where = f"{key} is {there} in {below.GetDisplayName()}"
+        if held is None:
+            message = f"{here} sets no {key}, {where}; taken as {there} here, other programs may not: set it"
+            yield Finding(Sdf.Path.absoluteRootPath, message, warning=True)
+        elif held != meant:
+            yield Finding(Sdf.Path.absoluteRootPath, f"{key} is {told} in {here}, but {where}, allowed: the same")
 
 
 @rule("echo:Arcs")

@@ -15,11 +15,11 @@ from echomodel.files import check_free
 from echousd.draw.drawables import rgb
 from echousd.exporting.glb import glb
 from echousd.exporting.habitat import habitat_files, sceneeval_files
-from echousd.exporting.packing import Package, Reach, images_beside, take_assets, without_clock
+from echousd.exporting.packing import Package, Reach, check_types, images_beside, take_assets, without_clock
 from echousd.stage.files import layer_bytes, open_stage, prim_specs, source, write_all
-from echousd.stage.layouts import selected_layout, showing_layout
+from echousd.stage.showing import selected_layout, showing_layout
 from echousd.stage.units import set_units
-from echousd.stage.values import check_types, reading, targets
+from echousd.stage.values import reading, targets
 from echousd.textures import file_of
 
 

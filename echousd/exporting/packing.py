@@ -1,4 +1,4 @@
-"""What a room may take along into an archive: its own images, and nothing else of this machine."""
+"""What a room may take along into an archive: its own images, nothing else of this machine, values that are written."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from pxr import Ar, Sdf, Usd, UsdUtils
 
 from echousd.naming import free_name
 from echousd.stage.encoding import StageError
 from echousd.stage.files import assets_in, specs
+from echousd.stage.values import shown
 from echousd.store import store_above
 from echousd.textures import TextureError, file_of, texture_bytes
 
@@ -186,3 +188,28 @@ def asset_paths(found: Iterable[Sdf.Spec]) -> Iterator[tuple[Sdf.Path, str]]:
         for key in (key for key in spec.ListInfoKeys() if key not in PLAIN):
             for path in assets_in(spec.GetInfo(key)):
                 yield spec.path, path
+
+
+def misfit(kind: Sdf.ValueTypeName, found: Any) -> bool:
+    """Whether a value is of another type than its attribute; OpenUSD reads such a value, but cannot write it."""
+    default = kind.defaultValue
+    if found is None or default is None or isinstance(found, Sdf.ValueBlock):
+        return False
+    if isinstance(default, float | Sdf.TimeCode):
+        return isinstance(found, bool) or not isinstance(found, int | float | Sdf.TimeCode)
+    if isinstance(default, int) and not isinstance(default, bool):
+        return isinstance(found, bool) or not isinstance(found, int)
+    return not isinstance(found, type(default))
+
+
+def check_types(layer: Sdf.Layer, where: str) -> None:
+    """Raises StageError for the first value of a layer that is of another type than its attribute.
+
+    Arguments:
+        where: the file that the error names.
+    """
+    for spec in (spec for spec in specs(layer) if isinstance(spec, Sdf.AttributeSpec)):
+        samples = layer.ListTimeSamplesForPath(spec.path) if spec.HasInfo("timeSamples") else ()
+        for found in (spec.default, *(layer.QueryTimeSample(spec.path, time) for time in samples)):
+            if misfit(spec.typeName, found):
+                raise StageError(f"{where}: <{spec.path}> is {shown(found)}, allowed: {spec.typeName}")

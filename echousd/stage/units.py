@@ -6,8 +6,6 @@ stronger layer without them shows a room of metres a hundred times too small.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom
 
@@ -74,37 +72,8 @@ def conventions(stage: Usd.Stage, path: str | None = None) -> dict[str, float | 
     return {**found, **({"room_path": paths[0]} if paths else {})}
 
 
-def unit_faults(stage: Usd.Stage) -> Iterator[tuple[str, bool]]:
-    """A sentence for what other programs get wrong about a stage's units, and whether the stage itself is wrong."""
-    root = stage.GetRootLayer()
-    for key in (METRES, UP_AXIS):
-        held = root.pseudoRoot.GetInfo(key) if root.pseudoRoot.HasInfo(key) else None
-        below = next((layer for layer in _layers(stage)[1:] if layer.pseudoRoot.HasInfo(key)), None)
-        if below is None:
-            continue
-        meant = below.pseudoRoot.GetInfo(key)
-        where = f"{key} is {_shown(meant)} in {below.GetDisplayName()}"
-        if held is None:
-            yield (
-                f"{root.GetDisplayName()} sets no {key}, {where}; taken as {_shown(meant)} here, "
-                "other programs may not: set it",
-                False,
-            )
-        elif held != meant:
-            yield f"{key} is {_shown(held)} in {root.GetDisplayName()}, but {where}, allowed: the same", True
-
-
 def _speaker(stage: Usd.Stage, key: str) -> Sdf.Layer | None:
     """The strongest layer that sets a stage's metadatum: of the layer stack, else of what defines the first prims."""
-    layers = _layers(stage)
+    layers = stage.GetLayerStack(includeSessionLayers=False)
     defining = [spec.layer for prim in stage.GetPseudoRoot().GetChildren() for spec in prim.GetPrimStack()]
     return next((layer for layer in (*layers, *defining) if layer.pseudoRoot.HasInfo(key)), None)
-
-
-def _layers(stage: Usd.Stage) -> list[Sdf.Layer]:
-    """The layers of a stage's root, strongest first."""
-    return stage.GetLayerStack(includeSessionLayers=False)
-
-
-def _shown(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)

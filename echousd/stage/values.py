@@ -12,7 +12,7 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
 from echousd.graph import MAX_TEXT
 from echousd.stage.encoding import StageError
-from echousd.stage.files import source, specs, usd_error
+from echousd.stage.files import source, usd_error
 
 NOW = Usd.TimeCode.EarliestTime()  # what stages are read at: some tools write even what never moves as samples
 LARGEST = 1e9  # in the stage's unit; what is further away is a fault, and its square overflows single precision
@@ -158,31 +158,6 @@ def fans(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     face = np.repeat(np.arange(len(counts)), triangles)
     start, step = first[face], np.arange(len(face)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
     return face, np.stack([start, start + step + 1, start + step + 2], 1)
-
-
-def misfit(kind: Sdf.ValueTypeName, found: Any) -> bool:
-    """Whether a value is of another type than its attribute; OpenUSD reads such a value, but cannot write it."""
-    default = kind.defaultValue
-    if found is None or default is None or isinstance(found, Sdf.ValueBlock):
-        return False
-    if isinstance(default, float | Sdf.TimeCode):
-        return isinstance(found, bool) or not isinstance(found, int | float | Sdf.TimeCode)
-    if isinstance(default, int) and not isinstance(default, bool):
-        return isinstance(found, bool) or not isinstance(found, int)
-    return not isinstance(found, type(default))
-
-
-def check_types(layer: Sdf.Layer, where: str) -> None:
-    """Raises StageError for the first value of a layer that is of another type than its attribute.
-
-    Arguments:
-        where: the file that the error names.
-    """
-    for spec in (spec for spec in specs(layer) if isinstance(spec, Sdf.AttributeSpec)):
-        samples = layer.ListTimeSamplesForPath(spec.path) if spec.HasInfo("timeSamples") else ()
-        for found in (spec.default, *(layer.QueryTimeSample(spec.path, time) for time in samples)):
-            if misfit(spec.typeName, found):
-                raise StageError(f"{where}: <{spec.path}> is {shown(found)}, allowed: {spec.typeName}")
 
 
 def moves(prim: Usd.Prim) -> bool:

@@ -14,9 +14,6 @@ from echomodel.arrays import Array, at_least, beside, cast, clipped, kit, on_dev
 if TYPE_CHECKING:
     from echomodel.roomboxes import RoomBoxes
 
-FEWEST = 50  # boxes that the statistics of a class need
-NARROWEST = 0.02  # log metres: sizes that hardly vary would turn noise into huge numbers
-Z95 = 1.6449  # standard score of the 95th percentile
 LARGEST = 10.0  # log metres, far beyond any furniture
 
 
@@ -153,30 +150,6 @@ class BoxStatistics:
         for number, row in enumerate(self.classes):
             if len(row) != 9 or min(row[3:]) <= 0 or not self.log_size:
                 raise ValueError(f"box statistics: class {number} is {row}, expected nine numbers of log sizes")
-
-    @classmethod
-    def from_boxes(cls, boxes: Boxes, category: Array, categories: int) -> BoxStatistics:
-        """Spreads of log size per class and of position; x and z share theirs (rooms turn).
-
-        Arguments:
-            boxes: N boxes. category: (N,) int64, their classes. categories: number of classes; one with fewer than
-                `FEWEST` boxes gets the spread of all.
-        """
-        boxes, category = boxes.to(None), np.asarray(category)
-        size, position = np.log(np.maximum(boxes.size.astype(float), 1e-3)), boxes.position.astype(float)
-        mean, std = size.mean(0), size.std(0, ddof=1)
-        centre = np.array([0.0, position[:, 1].mean(), 0.0])
-        plane = np.sqrt(np.square(position[:, ::2]).mean())
-        spread = np.array([plane, position[:, 1].std(ddof=1), plane])
-        numbers = [(mean - std), (mean + std), (centre - spread), (centre + spread)]
-        low, high, start, stop = (tuple(round(float(v), 5) for v in values) for values in numbers)
-        rows = []
-        for number in range(categories):
-            own = size[category == number]
-            few, middle, many = np.quantile(own if len(own) >= FEWEST else size, [0.05, 0.5, 0.95], axis=0)
-            steps = np.maximum(np.concatenate([middle - few, many - middle]) / Z95, NARROWEST)
-            rows.append(tuple(round(float(v), 4) for v in (*middle, *steps)))
-        return cls(low, high, start, stop, log_size=True, classes=tuple(rows))
 
     def scale(self, category: Array | None = None) -> BoxScale:
         """What the numbers of boxes stand for: of N boxes of `category` (N,) int64, or of all alike.

@@ -11,11 +11,6 @@ from echomodel.vocabulary import vocabulary
 
 Objective = Literal["noise", "velocity", "flow"]
 Sampler = Literal["ddim", "ancestral"]
-DEPTHS = frozenset({"layers", "echo_layers", "blocks", "drafts", "voices"})  # each of them costs tensors
-RANGES = {  # of what costs no tensors, but time
-    "steps": (1, 1000), "candidates": (1, 64), "guidance_rounds": (0, 64), "guidance": (0, 100),
-    "temperature": (0, 10), "heads": (1, 64), "frequencies": (0, 16), "patch": (1, 64),
-}  # fmt: skip
 C = TypeVar("C")
 
 
@@ -165,22 +160,6 @@ class CompactConfig:
 def to_json(config: Any) -> str:
     """A configuration as one line of JSON."""
     return json.dumps(asdict(config), sort_keys=True)
-
-
-def check_numbers(raw: dict[str, Any], tensors: int, where: str = "") -> None:
-    """Raises ValueError for numbers of a file's configuration that would cost more than its tensors: layers, steps.
-
-    Arguments:
-        raw: nested plain values of a configuration. tensors: how many the file holds.
-    """
-    for name, value in raw.items():
-        path = f"{where}.{name}" if where else name
-        if isinstance(value, dict):
-            check_numbers(value, tensors, path)
-        elif name in DEPTHS and isinstance(value, int) and not 0 <= value <= tensors:
-            raise ValueError(f"{path} is {value}, the file holds {tensors} tensors")
-        elif name in RANGES and not RANGES[name][0] <= value <= RANGES[name][1]:
-            raise ValueError(f"{path} is {value}, allowed: {RANGES[name][0]} to {RANGES[name][1]}")
 
 
 def from_dict(kind: type[C], raw: dict[str, Any], where: str = "") -> C:

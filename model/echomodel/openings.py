@@ -167,16 +167,6 @@ def rectangle(width: float, depth: float) -> np.ndarray:
     return np.array(CORNERS) * (width / 2, depth / 2)
 
 
-def cut_rectangle(half_x: float, half_z: float, cuts: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:
-    """The corners of such a floor that has a piece of this width and depth cut from each corner, (0, 0) = none."""
-    points: list[tuple[float, float]] = []
-    for (sx, sz), (width, depth) in zip(CORNERS, cuts, strict=True):
-        x, z, inner_x, inner_z = sx * half_x, sz * half_z, sx * (half_x - width), sz * (half_z - depth)
-        step = [(inner_x, z), (inner_x, inner_z), (x, inner_z)] if width else [(x, z)]
-        points += step if sx == -sz else step[::-1]
-    return tuple(points)
-
-
 def edge_lengths(polygon: Any) -> np.ndarray:
     """(k,) float, metres, length of the edge from each corner to the next one."""
     corners = np.asarray(polygon, float)

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.openings import Opening, cut_rectangle
+from echomodel.openings import Opening
+from echomodel.rooms.floor import cut_rectangle
 from echomodel.rooms.statistics import room_type_statistics
 from echomodel.sizes import filled_area, footprint, pieces, quantile
 from echomodel.vocabulary import Category, vocabulary

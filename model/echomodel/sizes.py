@@ -10,9 +10,9 @@ from importlib import resources
 
 import numpy as np
 
-from echomodel.boxes import Z95
 from echomodel.vocabulary import Category, vocabulary
 
+Z95 = 1.6449  # standard score of the 95th percentile
 AT_WALL = 0.2  # metres: a class with a larger median gap does not belong at a wall
 USUAL_GAPS = (0.0, 0.03, 0.06)  # metres between a back and its wall: quartiles of classes without figures
 _KNOTS = {5: (-1.645, -0.674, 0.0, 0.674, 1.645), 3: (-1.645, 0.0, 1.645)}

@@ -19,7 +19,8 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from echomodel.boxes import BoxStatistics
-from echomodel.config import check_numbers, from_dict
+from echomodel.compact.model import check_numbers
+from echomodel.config import from_dict
 from echomodel.files import whole_file
 from echomodel.vocabulary import vocabulary
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig

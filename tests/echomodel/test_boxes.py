@@ -10,6 +10,7 @@ import torch
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.roomboxes import RoomBoxes
+from echomodel.training.layout_stage import statistics_of
 
 
 def random_boxes(count: int = 50) -> Boxes:
@@ -37,7 +38,7 @@ def test_published_normalisation() -> None:
 def test_sizes_become_standard_scores_of_their_class_and_statistics_survive_json() -> None:
     boxes, category = random_boxes(4000), torch.arange(4000) % 4 // 2
     boxes = Boxes(torch.where(category[:, None] == 1, 5 * boxes.size.square(), boxes.size), boxes.position, boxes.yaw)
-    statistics = BoxStatistics.from_boxes(boxes, category, 3)
+    statistics = statistics_of(boxes, category, 3)
     vectors = boxes.encode(statistics.scale(category))
     for number in (0, 1):
         scores = vectors[category == number, :3].quantile(torch.tensor([0.05, 0.5, 0.95]), dim=0)

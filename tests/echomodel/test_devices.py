@@ -11,7 +11,7 @@ import pytest
 import torch
 from second_device import SECOND, second_device
 
-from echomodel.boxes import Boxes, BoxStatistics
+from echomodel.boxes import Boxes
 from echomodel.compact.model import CompactModel
 from echomodel.config import CompactConfig, from_dict
 from echomodel.echo import EchoModel
@@ -21,7 +21,7 @@ from echomodel.protocols import GraphEdit
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 from echomodel.training import parts_stage
-from echomodel.training.layout_stage import LayoutStage
+from echomodel.training.layout_stage import LayoutStage, statistics_of
 from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import OptimizerConfig, Recipe
 from echomodel.training.rooms import PackedRooms
@@ -62,7 +62,7 @@ def packed(rooms):
 @pytest.fixture
 def model(packed):
     torch.manual_seed(0)
-    made = CompactModel(CONFIG, BoxStatistics.from_boxes(packed.boxes, packed.category, len(CONFIG.categories)))
+    made = CompactModel(CONFIG, statistics_of(packed.boxes, packed.category, len(CONFIG.categories)))
     with torch.no_grad():
         for parameter in made.parameters():
             parameter.add_(0.02 * torch.randn_like(parameter))

@@ -25,7 +25,7 @@ Bake = TypeVar("Bake", bound=Callable[..., "bytes | None"])
 
 # What draws them is not loaded where the cache has every image.
 PROGRAMS = "echousd.shapes.finishes.patterns"
-aged, noise = (Late(f"{PROGRAMS}:{name}") for name in ("aged", "noise"))
+aged, sky = (Late(f"{PROGRAMS}:{name}") for name in ("aged", "sky"))
 printed = Late("echousd.shapes.finishes.pictures:printed")
 QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
 
@@ -99,7 +99,7 @@ def rough_image(pattern: str, roughness: float) -> bytes | None:
 @kept
 def sky_image(kind: str) -> bytes:
     """What lies around a room, a row of `SKIES`, for its dome light, as JPEG."""
-    return _jpeg(sky(kind))
+    return _jpeg(sky(SKIES[kind]))
 
 
 def _jpeg(value: np.ndarray) -> bytes:
@@ -113,37 +113,4 @@ def _encoded(value: np.ndarray, quality: int) -> bytes:
     return out.getvalue()
 
 
-SKY_SIZE = (512, 1024)  # pixels: a window some metres away shows about a hundred of them
 SKIES: Mapping[str, Any] = tables("skies.toml", __file__)
-SOFT = 0.5  # degrees that outlines take
-
-
-def sky(kind: str) -> np.ndarray:
-    """`SKY_SIZE` + (3,) linear RGB by latitude and longitude, the zenith first: clouds, and a row of `SKIES`."""
-    height, width = SKY_SIZE
-    elevation, around = 90 - (np.arange(height) + 0.5)[:, None] / height * 180, np.arange(width) / width * 360
-    level, *tones = np.array(SKIES[kind]["tones"]).T
-    out = np.stack([np.interp(elevation, level, tone) for tone in tones], -1) * np.ones((1, width, 1))
-    grain, puff = (np.tile(noise(141 + n, *scale), (1, 2)) for n, scale in enumerate(((60.0, 60.0), (3.0, 9.0))))
-    cloud = np.clip(0.55 * puff - 0.25, 0, 0.75) * np.clip((elevation - 5) / 12, 0, 1)
-    out += cloud[..., None] * (np.array([0.95, 0.96, 0.97]) - out)
-    out *= np.where(elevation < 0, 1 + 0.06 * grain, 1.0)[..., None]
-    ridge = noise(151, 14.0, 14.0).repeat(2, axis=1)  # smooth rows of noise, all around
-    rng = np.random.default_rng(7)
-    for row, form in enumerate(SKIES[kind]["forms"]):
-        wide, leaves = form.get("wide", 360), form.get("grain", 0)
-        own = rng.integers(len(form["colors"]), size=360 // wide), rng.uniform(-1, 1, 360 // wide)
-        hue, tall = (values[(around / wide).astype(int)] for values in own)
-        top = form["rise"] + form["uneven"] * (tall if "wide" in form else np.clip(ridge[row], -1.2, 1.5))
-        here = slice(*np.searchsorted(-elevation[:, 0], (-top.max() - 3 * leaves, -form.get("foot", -2.5))))
-        up, leaf = elevation[here], leaves * grain[here]
-        shade = 1 + 0.45 * np.clip(leaf, -2, 2) + 0.1 * tall
-        if "wide" in form:
-            pane, eaves = form["pane"], top - form["roof"]
-            top = top - form["roof"] * np.abs(2 * (around / wide % 1) - 1)
-            across, level = around / pane % 1, (eaves - up) / (1.4 * pane) % 1
-            panes = (np.abs(across - 0.5) < 0.2) & (np.abs(level - 0.55) < 0.25) & (up < eaves)
-            shade = np.where(panes, 0.35, np.where((up > eaves) & (form["roof"] > 0), 0.4, shade))
-        share = np.clip((top + leaf - up) / SOFT, 0, 1)[..., None]
-        out[here] += share * (np.array(form["colors"])[hue] * np.clip(shade, 0.1, 2)[..., None] - out[here])
-    return np.clip(out, 0, 1)

@@ -5,8 +5,10 @@ Every pattern is the same in every run and on every machine; colour comes later,
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -257,3 +259,38 @@ def leaf() -> Relief:
 def stone() -> Relief:
     """Glazed clay with specks."""
     return Relief(1 + 0.02 * noise(98, 6.0, 6.0) - 0.5 * np.clip(noise(97, 90.0, 90.0, 4.0) - 1.9, 0, 1))
+
+
+SKY_SIZE = (512, 1024)  # pixels: a window some metres away shows about a hundred of them
+SOFT = 0.5  # degrees that outlines take
+
+
+def sky(row: Mapping[str, Any]) -> np.ndarray:
+    """`SKY_SIZE` + (3,) linear RGB by latitude and longitude, the zenith first: clouds, and a row of `skies.toml`."""
+    height, width = SKY_SIZE
+    elevation, around = 90 - (np.arange(height) + 0.5)[:, None] / height * 180, np.arange(width) / width * 360
+    level, *tones = np.array(row["tones"]).T
+    out = np.stack([np.interp(elevation, level, tone) for tone in tones], -1) * np.ones((1, width, 1))
+    grain, puff = (np.tile(noise(141 + n, *scale), (1, 2)) for n, scale in enumerate(((60.0, 60.0), (3.0, 9.0))))
+    cloud = np.clip(0.55 * puff - 0.25, 0, 0.75) * np.clip((elevation - 5) / 12, 0, 1)
+    out += cloud[..., None] * (np.array([0.95, 0.96, 0.97]) - out)
+    out *= np.where(elevation < 0, 1 + 0.06 * grain, 1.0)[..., None]
+    ridge = noise(151, 14.0, 14.0).repeat(2, axis=1)  # smooth rows of noise, all around
+    rng = np.random.default_rng(7)
+    for line, form in enumerate(row["forms"]):
+        wide, leaves = form.get("wide", 360), form.get("grain", 0)
+        own = rng.integers(len(form["colors"]), size=360 // wide), rng.uniform(-1, 1, 360 // wide)
+        hue, tall = (values[(around / wide).astype(int)] for values in own)
+        top = form["rise"] + form["uneven"] * (tall if "wide" in form else np.clip(ridge[line], -1.2, 1.5))
+        here = slice(*np.searchsorted(-elevation[:, 0], (-top.max() - 3 * leaves, -form.get("foot", -2.5))))
+        up, leaf = elevation[here], leaves * grain[here]
+        shade = 1 + 0.45 * np.clip(leaf, -2, 2) + 0.1 * tall
+        if "wide" in form:
+            pane, eaves = form["pane"], top - form["roof"]
+            top = top - form["roof"] * np.abs(2 * (around / wide % 1) - 1)
+            across, level = around / pane % 1, (eaves - up) / (1.4 * pane) % 1
+            panes = (np.abs(across - 0.5) < 0.2) & (np.abs(level - 0.55) < 0.25) & (up < eaves)
+            shade = np.where(panes, 0.35, np.where((up > eaves) & (form["roof"] > 0), 0.4, shade))
+        share = np.clip((top + leaf - up) / SOFT, 0, 1)[..., None]
+        out[here] += share * (np.array(form["colors"])[hue] * np.clip(shade, 0.1, 2)[..., None] - out[here])
+    return np.clip(out, 0, 1)

@@ -21,7 +21,7 @@ from torch.overrides import TorchFunctionMode
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.modules import FurnitureDenoiser, LatentGraph, LayoutDenoiser
 from echomodel.compact.weights import FORMAT, PARTS, WeightsError, joined_config, own_statistics, read_header
-from echomodel.config import CompactConfig, check_numbers, to_json
+from echomodel.config import CompactConfig, to_json
 from echomodel.files import whole_file
 
 if TYPE_CHECKING:
@@ -29,6 +29,13 @@ if TYPE_CHECKING:
 
 ROUNDED = ("shape.basis",)  # nearly half of all weights; its rows are directions, which two digits tell well enough
 SCALES = ".scales"
+
+
+DEPTHS = frozenset({"layers", "echo_layers", "blocks", "drafts", "voices"})  # each of them costs tensors
+RANGES = {  # of what costs no tensors, but time
+    "steps": (1, 1000), "candidates": (1, 64), "guidance_rounds": (0, 64), "guidance": (0, 100),
+    "temperature": (0, 10), "heads": (1, 64), "frequencies": (0, 16), "patch": (1, 64),
+}  # fmt: skip
 
 
 class CompactModel(nn.Module):
@@ -77,6 +84,22 @@ class CompactModel(nn.Module):
         }
         with whole_file(path) as beside:
             save_file(rounded(tensors), beside, metadata=metadata)
+
+
+def check_numbers(raw: dict[str, Any], tensors: int, where: str = "") -> None:
+    """Raises ValueError for numbers of a file's configuration that would cost more than its tensors: layers, steps.
+
+    Arguments:
+        raw: nested plain values of a configuration. tensors: how many the file holds.
+    """
+    for name, value in raw.items():
+        path = f"{where}.{name}" if where else name
+        if isinstance(value, dict):
+            check_numbers(value, tensors, path)
+        elif name in DEPTHS and isinstance(value, int) and not 0 <= value <= tensors:
+            raise ValueError(f"{path} is {value}, the file holds {tensors} tensors")
+        elif name in RANGES and not RANGES[name][0] <= value <= RANGES[name][1]:
+            raise ValueError(f"{path} is {value}, allowed: {RANGES[name][0]} to {RANGES[name][1]}")
 
 
 class _Undrawn(TorchFunctionMode):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from echomodel.boxes2d import CORNERS
-from echomodel.openings import Opening, cut_rectangle, numbered, overlap, zone
+from echomodel.openings import Opening, numbered, overlap, zone
 from echomodel.rooms.statistics import RoomTypeStatistics
 from echomodel.sizes import quantile
 
@@ -100,6 +101,16 @@ class Floor:
             if 0.1 < distance < best and -1e-6 <= reach <= other.length + 1e-6:
                 best = distance
         return best
+
+
+def cut_rectangle(half_x: float, half_z: float, cuts: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:
+    """The corners of such a floor that has a piece of this width and depth cut from each corner, (0, 0) = none."""
+    points: list[tuple[float, float]] = []
+    for (sx, sz), (width, depth) in zip(CORNERS, cuts, strict=True):
+        x, z, inner_x, inner_z = sx * half_x, sz * half_z, sx * (half_x - width), sz * (half_z - depth)
+        step = [(inner_x, z), (inner_x, inner_z), (x, inner_z)] if width else [(x, z)]
+        points += step if sx == -sz else step[::-1]
+    return tuple(points)
 
 
 def sample_floor(statistics: RoomTypeStatistics, rng: np.random.Generator) -> Floor:

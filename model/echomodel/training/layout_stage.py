@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
+from echomodel.arrays import Array
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
@@ -23,6 +25,7 @@ from echomodel.objective.support import FREE, ON_CEILING, ON_FLOOR
 from echomodel.randomness import normal
 from echomodel.rules import verdicts
 from echomodel.samplers import sample
+from echomodel.sizes import Z95
 from echomodel.standing import heights
 from echomodel.training.layout_losses import (
     deep,
@@ -62,7 +65,7 @@ class LayoutStage:
         if "layout" not in start.loaded:
             names = start.model.config.categories
             rows = places("categories", names, rooms.category)
-            start.model.statistics = BoxStatistics.from_boxes(rooms.boxes, rows, len(names))
+            start.model.statistics = statistics_of(rooms.boxes, rows, len(names))
         return cls(rooms, held, start.recipe)
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
@@ -220,3 +223,31 @@ def _shortened(slope: Tensor) -> Tensor:
     slope = slope.nan_to_num(0.0, 0.0, 0.0)  # of two middles at one place, say
     most = LONGEST / len(slope)  # of a mean over all
     return slope * (most / slope.norm(dim=1, keepdim=True).clamp_min(1e-12)).clamp_max(1)
+
+
+FEWEST = 50  # boxes that the statistics of a class need
+NARROWEST = 0.02  # log metres: sizes that hardly vary would turn noise into huge numbers
+
+
+def statistics_of(boxes: Boxes, category: Array, categories: int) -> BoxStatistics:
+    """Spreads of log size per class and of position; x and z share theirs (rooms turn).
+
+    Arguments:
+        boxes: N boxes. category: (N,) int64, their classes. categories: number of classes; one with fewer than
+            `FEWEST` boxes gets the spread of all.
+    """
+    boxes, category = boxes.to(None), np.asarray(category)
+    size, position = np.log(np.maximum(boxes.size.astype(float), 1e-3)), boxes.position.astype(float)
+    mean, std = size.mean(0), size.std(0, ddof=1)
+    centre = np.array([0.0, position[:, 1].mean(), 0.0])
+    plane = np.sqrt(np.square(position[:, ::2]).mean())
+    spread = np.array([plane, position[:, 1].std(ddof=1), plane])
+    numbers = [(mean - std), (mean + std), (centre - spread), (centre + spread)]
+    low, high, start, stop = (tuple(round(float(v), 5) for v in values) for values in numbers)
+    rows = []
+    for number in range(categories):
+        own = size[category == number]
+        few, middle, many = np.quantile(own if len(own) >= FEWEST else size, [0.05, 0.5, 0.95], axis=0)
+        steps = np.maximum(np.concatenate([middle - few, many - middle]) / Z95, NARROWEST)
+        rows.append(tuple(round(float(v), 4) for v in (*middle, *steps)))
+    return BoxStatistics(low, high, start, stop, log_size=True, classes=tuple(rows))
