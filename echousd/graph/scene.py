@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from dataclasses import MISSING, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from pydantic import model_validator
 
 from echomodel.late import Late
-from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
 from echousd.graph import fields as field
 from echousd.graph.consistency import GraphError, listed, name_faults, raise_all, triple_faults
@@ -189,34 +187,15 @@ class SceneGraph(PlainModel):
 
 def plain(graph: SceneGraph) -> dict[str, Any]:
     """The canonical form as plain data: fields in a fixed order, those at their default left out."""
+
+    def stated(model: PlainModel) -> dict[str, Any]:
+        return model.model_dump(mode="json", exclude_defaults=True)
+
     return {
-        "room": _stated(graph.room),
-        "nodes": [_stated(node) for node in graph.nodes],
-        "relations": [_stated(relation) for relation in graph.relations],
+        "room": stated(graph.room),
+        "nodes": list(map(stated, graph.nodes)),
+        "relations": list(map(stated, graph.relations)),
     }
-
-
-def _stated(model: RoomSpec | Node | Relation) -> dict[str, Any]:
-    fields = type(model).model_fields
-    values = {name: getattr(model, name) for name in fields}
-    return {
-        name: _lists(value)
-        for name, value in values.items()
-        if value != fields[name].get_default(call_default_factory=True)
-    }
-
-
-def _lists(value: Any) -> Any:
-    if isinstance(value, Opening):
-        return _of_opening(value)
-    return [_lists(entry) for entry in value] if isinstance(value, tuple) else value
-
-
-def _of_opening(opening: Opening) -> dict[str, Any]:
-    """The fields of an opening as plain data, those at their default left out."""
-    known = {field.name: field.default for field in fields(Opening)}
-    values = opening.to_json()
-    return {key: value for key, value in values.items() if known[key] is MISSING or value != known[key]}
 
 
 def flow(value: Any) -> str:
