@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import import_module, metadata, resources, util
 from pathlib import Path
@@ -28,12 +28,8 @@ class Diagnosis:
 
 def diagnose() -> list[Diagnosis]:
     """Look at the USD provider, the schema plugin, torch, the weights and the optional extras."""
-    checks: tuple[Callable[[], Iterator[Diagnosis]], ...] = (_python, _usd, _plugin, _torch, _weights, _extras)
-    return [diagnosis for check in checks for diagnosis in check()]
-
-
-def _python() -> Iterator[Diagnosis]:
-    yield Diagnosis("python", "ok", f"{platform.python_version()} on {platform.system()} {platform.machine()}")
+    python = f"{platform.python_version()} on {platform.system()} {platform.machine()}"
+    return [Diagnosis("python", "ok", python), *_usd(), *_plugin(), *_torch(), *_weights(), *_extras()]
 
 
 def _usd() -> Iterator[Diagnosis]:
@@ -54,7 +50,6 @@ def _usd() -> Iterator[Diagnosis]:
 
 
 def _plugin() -> Iterator[Diagnosis]:
-
     folder = plugin.plugin_path()
     if util.find_spec("pxr") is None:
         yield Diagnosis("schema plugin", "gap", f"not active, {folder}", "install a pxr first")

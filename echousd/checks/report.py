@@ -6,7 +6,7 @@ import importlib
 import os
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,10 +53,6 @@ class Fault:
     rule: str
     prim: str
     message: str
-
-    def to_json(self) -> dict:
-        """The entry of the report."""
-        return {"rule": self.rule, "prim": self.prim, "message": self.message}
 
 
 def safely(rule: StageRule, reading: Reading) -> list[Finding]:
@@ -237,7 +233,7 @@ class CheckReport:
         found = {"layouts": each} if several else self.layouts[0].to_json()
         rest = {} if self.settled is None else {"settle": [each.to_json() for each in self.settled]}
         usd = {"errors": self.errors, "warnings": self.warnings}
-        of_usd = {word: [fault.to_json() for fault in faults] for word, faults in usd.items()}
+        of_usd = {word: [asdict(fault) for fault in faults] for word, faults in usd.items()}
         return {"ok": self.ok, **found, "usd": of_usd, **rest}
 
 

@@ -124,13 +124,11 @@ def verify(
     count = len(list(store.keys()))
     if json:
         say_json({"ok": not wrong, "count": count, "changed": list(map(str, wrong))}, indent=2)
-    else:
-        for changed in wrong:
-            say(f"changed  {changed}")
+    lines = [f"changed  {place}" for place in wrong] or [f"ok       {count} assets and images as they were stored"]
+    for line in lines if not json else ():
+        say(line)
     if wrong:
         raise typer.Exit(1)
-    if not json:
-        say(f"ok       {count} assets and images as they were stored")
 
 
 @store_app.command("gc", epilog="Example: echousd store gc out/night/store out/night --dry-run")

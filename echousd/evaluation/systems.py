@@ -33,6 +33,7 @@ from echousd.place.solver import PlaceConfig
 
 TOGETHER = 64  # scenes in one pass of a network
 POOL, POOL_SEED = 400, 910_000  # generated rooms from which `retrieval` takes
+pool = cache(generate_rooms)
 QUARTERS = np.pi / 2
 Layouts = Callable[[Sequence[Task], int], list[RoomBoxes]]
 FINISHES = {
@@ -221,12 +222,7 @@ def retrieved(room: RoomBoxes, rng: np.random.Generator) -> RoomBoxes:
         odd = sum((have - there).values()) + sum((there - have).values())
         return odd + float(np.abs(np.ptp(other.floor_polygon, axis=0) - extent).sum())
 
-    return borrowed(room, min(_pool(), key=apart), rng)
-
-
-@cache
-def _pool() -> tuple[RoomBoxes, ...]:
-    return tuple(generate_rooms(POOL, POOL_SEED))
+    return borrowed(room, min(pool(POOL, POOL_SEED), key=apart), rng)
 
 
 def borrowed(room: RoomBoxes, other: RoomBoxes, rng: np.random.Generator) -> RoomBoxes:

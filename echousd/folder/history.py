@@ -84,11 +84,12 @@ def undo(root: Path) -> tuple[str, ...]:
         earlier = read_manifest(folder / name, json.loads(files[name]))
         expected = {**manifest["files"], **last["leaves"]}
         gone = [path for path in (*last["adds"], last["restores"]) if path in expected and path not in files]
+        digests = {path: folders.digest(content) for path, content in files.items()}
         words = _Note(
-            after=folders.digest(files[name]),
+            after=digests[name],
             steps=last["steps"],
             removes=[path for path in files if path not in expected and ownership.read(folder, path) is None],
-            leaves=_others(files, earlier, name),
+            leaves={p: d for p, d in digests.items() if p != name and earlier["files"].get(p) != d},
         )
         again = _step(folder, last["restores"], files, gone, expected, earlier, "take the edit back")
         _, where = _free(folder, UNDONE, last["number"])
@@ -170,12 +171,6 @@ def _following(folder: Path, state: str) -> str | None:
         if isinstance(note, ValueError):
             raise note
     return None
-
-
-def _others(files: Mapping[str, bytes], manifest: Mapping[str, Any], name: str) -> dict[str, str]:
-    """Digests of those of a state's files that its manifest (in the file `name`) does not know as they are."""
-    digests = {path: folders.digest(content) for path, content in files.items() if path != name}
-    return {path: digest for path, digest in digests.items() if manifest["files"].get(path) != digest}
 
 
 def _step(

@@ -52,13 +52,6 @@ write_nodes = Late("echousd.dressing.nodes:write_nodes")
 FILE = "ATTRIBUTION.md"
 
 
-def attribution_files(room: RoomData) -> dict[str, bytes]:
-    """The text, where a room holds models of other people."""
-    origins = {name: room.geometry[user].origin for name, user in room.asset_users.items()}
-    theirs = {name: origin for name, origin in origins.items() if origin.asset}
-    return {FILE: text(room.name, theirs).encode()} if theirs else {}
-
-
 def text(room: str, origins: dict[str, Origin]) -> str:
     """A table of the models, by licence and author."""
     notice = "Made by others, and placed and scaled here; a licence may ask that they are named."
@@ -95,7 +88,9 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     for name, user in room.asset_users.items():
         made[name] = _asset(room, name, user, shelf, (folder or Path.cwd()) / "assets" / name)
         files.update(made[name].files)
-    files |= attribution_files(room)
+    origins = {name: room.geometry[user].origin for name, user in room.asset_users.items()}
+    if theirs := {name: origin for name, origin in origins.items() if origin.asset}:  # models of other people
+        files[FILE] = text(room.name, theirs).encode()
     dressing = dress(room)
     small = {
         name: _written(room, name, KINDS[dressing.kinds[name]].name, ROOM_STYLE, geometry)

@@ -166,10 +166,13 @@ def edit(
             break
         moving |= way
         layouts, pins, notes = laid_out(sizes)
+    made_by = Provenance(*(manifest[key] for key in ("seed", "preset", "model", "shapes", "source")))
+    if used is not None:
+        made_by = replace(made_by, preset=used.preset, model=used.hash or made_by.model)
     after = Room(
         name=manifest["name"], graph=graph, layouts=tuple(layouts), geometry=geometry, assets=names, floor=floor,
         outcomes=outcomes, notes=(*crowded, *models.notes, *notes, *odd),
-        provenance=_provenance(manifest, used), options=asked.replaced(seed=manifest["seed"]),
+        provenance=made_by, options=asked.replaced(seed=manifest["seed"]),
         timings=timer.seconds, edited=Path(room),
         carried={asset: saved.carried[asset] for name, asset in names.items() if name not in shaped_anew},
     )  # fmt: skip
@@ -360,10 +363,3 @@ def _compare(manifest: Mapping[str, Any], echo: RoomModel, *, chosen: bool, root
             "what the edit does not touch stays as it is",
             stacklevel=3,
         )
-
-
-def _provenance(manifest: Mapping[str, Any], echo: RoomModel | None) -> Provenance:
-    preset, model = manifest["preset"], manifest["model"]
-    if echo is not None:
-        preset, model = echo.preset, echo.hash or model
-    return Provenance(manifest["seed"], preset, model, manifest["shapes"], manifest["source"])
