@@ -25,11 +25,11 @@ from echomodel.files import write_text
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
+from echomodel.objective.table import cost_of
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_rooms
 from echomodel.rules.telling import stated_of_room
 from echousd.place.placing import place_boxes
-from echousd.place.search import cost_of
 
 if TYPE_CHECKING:
     from echomodel.roomboxes import RoomBoxes

@@ -53,7 +53,7 @@ def parting(axis: np.ndarray, pairs: np.ndarray) -> np.ndarray:
 def separation(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     """(p,) float: distance of each pair along its best axis in metres, negative = depth of penetration."""
     i, j = pairs.T
-    return _gaps(size[i], position[i], yaw[i], size[j], position[j], yaw[j])
+    return gaps(size[i], position[i], yaw[i], size[j], position[j], yaw[j])
 
 
 def depths(
@@ -69,11 +69,11 @@ def depths(
     x, z = (position[:, axis] - at[:, None, axis] for axis in (0, 2))
     k, j = np.nonzero(x * x + z * z < reach * reach)  # of the few that are near the depth is asked for
     out = np.zeros(x.shape)
-    out[k, j] = np.maximum(-_gaps(size, at[k], turn[k], others[j], position[j], yaw[j]), 0.0)
+    out[k, j] = np.maximum(-gaps(size, at[k], turn[k], others[j], position[j], yaw[j]), 0.0)
     return out
 
 
-def _gaps(
+def gaps(
     size: np.ndarray, at: np.ndarray, turn: np.ndarray, others: np.ndarray, position: np.ndarray, yaw: np.ndarray
 ) -> np.ndarray:
     """(...) float: metres between boxes (..., 3) and (...), and others, along the axis that parts them best."""

@@ -8,27 +8,38 @@ settings on any machine: costs are compared to a ten-thousandth, of equal ones t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, at_most, repeat, rows, sum_of
+from echomodel.arrays import rows, sum_of
 from echomodel.boxes2d import axes
 from echomodel.late import linear_sum_assignment
 from echomodel.objective import TERMS, Plan, Term, unreached
 from echomodel.objective.access import to_wall
-from echomodel.objective.copies import copies_of, looks_at
-from echomodel.objective.plan import Found, found, nobody
-from echomodel.objective.table import COST
+from echomodel.objective.copies import copies_of, looks_at, part_of
+from echomodel.objective.table import COST, costs_of
 from echomodel.rules import margins
 from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
-from echousd.place.geometry import beyond, depths
+from echousd.place.geometry import beyond, depths, gaps
 from echousd.place.problem import Problem
-from echousd.place.proposals import Row, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
+from echousd.place.proposals import (
+    Row,
+    along_walls,
+    aside,
+    height_of,
+    out_of,
+    out_of_habit,
+    proposals,
+    seatings,
+    slots_at,
+    twins,
+)
 from echousd.place.solver import PlaceConfig
 
 JUDGED = 48  # poses that are judged at once
+MANY = 12  # pieces from which on a room is built up, one piece after the other
 SWEEPS = 3  # times that what misses something is looked at after the first time
 BUDGET, PIECES = 4500, 15  # poses that are judged in all, each a whole room; more where there are more pieces
 GAIN = 1e-3  # by which a move must be better
@@ -43,6 +54,7 @@ WALKS = 6  # states of those judged at once that are walked through, where somet
 ASIDE = 0.1  # metres from its axis of a group within which nobody stands to one side
 ASTRAY = 1.0  # metres from its slots beyond which a box is no longer at what it attends
 LIKED = 0.05  # of what slots are liked less, where chairs are seated together
+NEXT = 8  # places at walls, next to whom storage is told near, of which the one where it is so is taken
 LIT = 0.35  # metres between the middles of a lamp and of what it hangs over
 
 
@@ -96,12 +108,32 @@ class Search:
         either = [pair for one, word, other in stated if word == opposed for pair in ((one, other), (other, one))]
         ahead = {k: i for k, i in either if kinds[k].role == "storage" and kinds[i].role in ("bed", "sofa")}
         over = {one: other for one, word, other in stated if word == above and problem.hanging[one]}
+        self.alongside = self._alongside()
         for k in range(n):
             parent = int(problem.carrier[k]) if problem.carrier[k] >= 0 else int(problem.anchor[k])
             parent = ahead.get(k, beside.get(k, over.get(k, -1))) if parent < 0 else parent
             if parent >= 0 and not problem.fixed[k] and problem.slot_roles[k] != "near":
                 looked_at = problem.slot_roles[k] == "opposite" or ahead.get(k) == parent
                 (self.screens if looked_at else self.children)[parent].append(k)
+
+    def _alongside(self) -> list[list[tuple[int, int]]]:
+        """For each table and piece of storage the storage of walls told near it, or near such, and near whom."""
+        problem, kinds = self.problem, self.problem.kinds
+        near, stated = vocabulary().predicate_id("close_by"), problem.triplets.tolist()
+        edges = [pair for one, word, other in stated if word == near for pair in ((one, other), (other, one))]
+        walled = {
+            k for k, kind in enumerate(kinds)
+            if kind.wall and kind.role == "storage" and problem.standing(k) and not problem.fixed[k]
+            and problem.slot_roles[k] != "opposite"
+        }  # fmt: skip
+        out: list[list[tuple[int, int]]] = [[] for _ in kinds]
+        for i, kind in enumerate(kinds):
+            met = [i] if i in walled or (kind.role == "board" and not kind.wall) else []
+            for one in met:
+                new = [k for a, k in edges if a == one and k in walled and k not in met]
+                met += new
+                out[i] += [(k, one) for k in new]
+        return out
 
     # -- what it costs -----------------------------------------------------------------------------------------------
 
@@ -203,6 +235,10 @@ class Search:
         if screens:  # it takes them along to the wall ahead
             states.append(self._carried(state, i, group, rows, screens))
             tastes.append(taste)
+        along = [(k, at) for k, at in self.alongside[i] if there[k] and k not in group]
+        if along:
+            states.append(self._along(state, there, i, group, rows, along))
+            tastes.append(taste)
         mirrored = self._mirrored(state, i, group)
         if mirrored is not None:  # who attends it changes sides
             here = np.array([[*state.position[i, ::2], state.yaw[i], 0.0]])
@@ -215,7 +251,7 @@ class Search:
             changed[stand] = True
         position, yaw = (np.concatenate(part) for part in zip(*states, strict=True))
         every = np.concatenate(tastes)
-        changed[[*group, *(k for loads in screens for k in loads)]] = True
+        changed[[*group, *(k for loads in screens for k in loads), *(k for k, _ in along)]] = True
         best = self._best(there, position, yaw, changed, every)
         if best == 0:
             return state
@@ -334,6 +370,31 @@ class Search:
             self._carry(position, yaw, state, k, [k, *others], at)
         return position, yaw
 
+    def _along(
+        self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray, along: list[tuple[int, int]]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As `_carried`, and storage `along` walls where it is near whom it is told to, and runs into the least."""
+        problem, met = self.problem, [m for m in group if self.problem.standing(m)]
+        position, yaw = self._carried(state, i, group, rows)
+        for k, at in along:
+            walls = np.array(along_walls(problem, k, 0.0)).reshape(-1, 4)
+            if not len(walls):  # it is longer than each
+                continue
+            cost = self._hits(state, there, k, [*group, *(other for other, _ in along)], walls, [k])
+            here = np.insert(walls[:, :2], 1, 0.0, 1)
+            for m in met:
+                gap = gaps(problem.size[m], position[:, None, m], yaw[:, None, m], problem.size[k], here, walls[:, 2])
+                cost = cost + HIT * (gap < -0.01) + DEEP * np.maximum(-gap, 0.0) + np.maximum(gap, 0.0) * (m == at)
+            next_to = np.argsort(np.round(cost * GRAIN), 1, kind="stable")[:, :NEXT]
+            count, where = next_to.shape[1], walls[next_to]
+            then = State(position.repeat(count, 0), yaw.repeat(count, 0), state.taste)
+            cost = np.take_along_axis(cost, next_to, 1)
+            cost += self._broken(then, there, k, where.reshape(-1, 4), []).reshape(cost.shape)
+            best = where[np.arange(len(where)), np.round(cost * GRAIN).argmin(1)]
+            position[:, k, ::2], yaw[:, k] = best[:, :2], best[:, 2]
+            met.append(k)
+        return position, yaw
+
     def _carry(
         self, position: np.ndarray, yaw: np.ndarray, state: State, i: int, group: list[int], rows: np.ndarray
     ) -> None:
@@ -369,7 +430,7 @@ class Search:
 
     def _unlikely(self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray) -> np.ndarray:
         """(K,) float: what a box with its group runs into, leaves of the floor and breaks of relations at K poses."""
-        along = [*group, *self.screens[i]]  # which may go to the wall ahead
+        along = [*group, *self.screens[i], *(k for k, _ in self.alongside[i])]  # which may go to walls
         return self._hits(state, there, i, group, rows, group) + self._broken(state, there, i, rows, along)
 
     def _broken(self, state: State, there: np.ndarray, i: int, rows: np.ndarray, along: list[int]) -> np.ndarray:
@@ -401,11 +462,12 @@ class Search:
         return cost
 
     def margins_at(self, state: State, i: int, at: np.ndarray, turn: np.ndarray, stated: np.ndarray) -> np.ndarray:
-        """(K, e) float: margins of relations (e, 3) of box i at poses (K, 3) and (K,), the others where they are."""
+        """(K, e) float: margins of relations (e, 3) of box i at poses (K, 3) and (K,), the others as in the state or in
+        K states at once."""
         problem, ends, count = self.problem, stated[:, [0, 2]], len(turn) * len(stated)
         own = (ends == i)[None]
-        position = np.where(own[..., None], at[:, None, None], state.position[ends]).reshape(-1, 3)
-        yaw = np.where(own, turn[:, None, None], state.yaw[ends]).ravel()
+        position = np.where(own[..., None], at[:, None, None], state.position[..., ends, :]).reshape(-1, 3)
+        yaw = np.where(own, turn[:, None, None], state.yaw[..., ends]).ravel()
         size, fronts = (np.tile(of[ends], (len(turn), *[1] * of.ndim)) for of in (problem.size, problem.fronts))
         asked = np.stack([2 * np.arange(count), np.tile(stated[:, 1], len(turn)), 2 * np.arange(count) + 1], 1)
         found = margins(Spread(size.reshape(-1, 3), position, yaw), asked, rules=problem.rules, center=problem.centre,
@@ -524,51 +586,8 @@ class Search:
         at = problem.position.copy(), problem.yaw.copy()
         state = State(*at, np.array([0.02 + 0.3 * out_of_habit(problem, i, *at) for i in range(n)]))
         self.faults(state)
-        state = self.swept(state, [i for i in range(n) if not self.seated[i]])
+        if n < MANY:
+            state = self.swept(state, [i for i in range(n) if not self.seated[i]])
+        else:  # drafts of so many pieces are too far from what is asked to begin from
+            state = self.rebuilt(state, list(range(n)))
         return self.mended(state, *self.faults(state))
-
-
-def costs_of(rows_of: Sequence[tuple[Term, Found]], room: Plan) -> tuple[Found, Array]:
-    """The rows (P,) of what terms found in a room or its copies, all together, and what each costs (P,) float."""
-    every = [(term, seen) for term, seen in rows_of if len(seen.who)]
-    if not every:
-        return nobody(room.size), room.size[:0, 0]
-    xp, count = room.kit, [len(seen.who) for _, seen in every]
-    row = [(term.slack, *COST[term.kind], term.weight, term.kind in ("relations", "physics")) for term, _ in every]
-    slack, broken, each, weight, always = repeat(room.numbers(row), xp.asarray(count)).T
-    who, other, margin = (xp.concat([getattr(seen, name) for _, seen in every]) for name in ("who", "other", "margin"))
-    missed = at_most(at_least(slack - margin, 0.0), 2.0)
-    blamed = ~room.fixed[who] | (always > 0)
-    return found(who, margin, other=other), (broken * (margin < 0) + each * weight * missed) * blamed
-
-
-def cost_of(room: Plan) -> float:
-    """What a plan of one room costs by all terms."""
-    return float(costs_of([(term, term.find(room)) for term in TERMS], room)[1].sum())
-
-
-def part_of(room: Plan, there: np.ndarray) -> Plan:
-    """The plan of some boxes of a room, who attend and stand on each other as in the whole."""
-    keep = np.flatnonzero(there)
-    number = np.full(len(there) + 3, -1)
-    number[keep] = np.arange(len(keep))
-
-    def mapped(of: np.ndarray) -> np.ndarray:
-        return np.where(of < 0, of, number[np.maximum(of, 0)])[keep]
-
-    triplets = room.triplets[there[room.triplets[:, ::2]].all(1)]
-    triplets = np.stack([number[triplets[:, 0]], triplets[:, 1], number[triplets[:, 2]]], 1)
-    stated = tuple(
-        replace(one, subject=int(number[one.subject]), others=tuple(int(number[k]) for k in one.others))
-        for one in room.stated
-        if there[[one.subject, *one.others]].all()
-    )
-    out = Plan(
-        tuple(room.kinds[k] for k in keep.tolist()), room.size[keep], room.position[keep], room.yaw[keep],
-        room.scene[keep], room.floor, room.openings, triplets, room.fixed[keep], room.height, room.rules, stated,
-    )  # fmt: skip
-    vars(out).update(
-        anchor=mapped(room.anchor), carrier=mapped(room.carrier), joins=mapped(room.joins),
-        slot_role=tuple(room.slot_role[k] for k in keep.tolist()),
-    )  # fmt: skip
-    return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -257,6 +257,33 @@ def copies_of(room: Plan, position: Array, yaw: Array, moved: Array) -> Copies:
         xp.tile(room.fixed, (count,)), None if room.height is None else _spread(room.height, count), room.rules,
         room.stated, template=room, apart_in=moved,
     )  # fmt: skip
+
+
+def part_of(room: Plan, there: np.ndarray) -> Plan:
+    """The plan of some boxes of a room, who attend and stand on each other as in the whole."""
+    keep = np.flatnonzero(there)
+    number = np.full(len(there) + 3, -1)
+    number[keep] = np.arange(len(keep))
+
+    def mapped(of: np.ndarray) -> np.ndarray:
+        return np.where(of < 0, of, number[np.maximum(of, 0)])[keep]
+
+    triplets = room.triplets[there[room.triplets[:, ::2]].all(1)]
+    triplets = np.stack([number[triplets[:, 0]], triplets[:, 1], number[triplets[:, 2]]], 1)
+    stated = tuple(
+        replace(one, subject=int(number[one.subject]), others=tuple(int(number[k]) for k in one.others))
+        for one in room.stated
+        if there[[one.subject, *one.others]].all()
+    )
+    out = Plan(
+        tuple(room.kinds[k] for k in keep.tolist()), room.size[keep], room.position[keep], room.yaw[keep],
+        room.scene[keep], room.floor, room.openings, triplets, room.fixed[keep], room.height, room.rules, stated,
+    )  # fmt: skip
+    vars(out).update(
+        anchor=mapped(room.anchor), carrier=mapped(room.carrier), joins=mapped(room.joins),
+        slot_role=tuple(room.slot_role[k] for k in keep.tolist()),
+    )  # fmt: skip
+    return out
 
 
 def _spread(one: Array, count: int) -> Array:

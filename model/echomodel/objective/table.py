@@ -9,12 +9,13 @@ explains a room asks this table and holds no distance of his own.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from echomodel.arrays import Array, at_least, at_most, repeat
 from echomodel.files import tables
 from echomodel.objective import access, company, composition, crowding, fitted, physics, sight, sizes
-from echomodel.objective.plan import Found, Plan
+from echomodel.objective.plan import Found, Plan, found, nobody
 from echomodel.vocabulary import vocabulary
 
 # What a broken term costs, and a unit that is missed of it, by its kind.
@@ -77,3 +78,22 @@ def _read() -> Iterator[Term]:
 
 
 TERMS = (*RELATIONS, *_read())
+
+
+def costs_of(rows_of: Sequence[tuple[Term, Found]], room: Plan) -> tuple[Found, Array]:
+    """The rows (P,) of what terms found in a room or its copies, all together, and what each costs (P,) float."""
+    every = [(term, seen) for term, seen in rows_of if len(seen.who)]
+    if not every:
+        return nobody(room.size), room.size[:0, 0]
+    xp, count = room.kit, [len(seen.who) for _, seen in every]
+    row = [(term.slack, *COST[term.kind], term.weight, term.kind in ("relations", "physics")) for term, _ in every]
+    slack, broken, each, weight, always = repeat(room.numbers(row), xp.asarray(count)).T
+    who, other, margin = (xp.concat([getattr(seen, name) for _, seen in every]) for name in ("who", "other", "margin"))
+    missed = at_most(at_least(slack - margin, 0.0), 2.0)
+    blamed = ~room.fixed[who] | (always > 0)
+    return found(who, margin, other=other), (broken * (margin < 0) + each * weight * missed) * blamed
+
+
+def cost_of(room: Plan) -> float:
+    """What a plan of one room costs by all terms."""
+    return float(costs_of([(term, term.find(room)) for term in TERMS], room)[1].sum())

@@ -11,6 +11,7 @@ import torch
 from echomodel.boxes import Boxes
 from echomodel.graph import Stated
 from echomodel.objective import TERMS, plan_of
+from echomodel.objective.table import COST, costs_of
 from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, margins
@@ -18,7 +19,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.place.placing import place_boxes
 from echousd.place.problem import problem_of
 from echousd.place.proposals import out_of_habit, proposals, slots_at
-from echousd.place.search import COST, Search, State, costs_of
+from echousd.place.search import MANY, Search, State
 
 ID = {row.name: row.id for row in vocabulary().predicates}
 FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
@@ -124,6 +125,38 @@ def test_a_sofa_turns_to_another_wall_though_its_screen_and_a_plant_beside_that_
     assert search.group(1, every, state) == [1, 2]
     position, _ = search._carried(state, 0, [0], there[1:], screens=[[1, 2]])
     assert np.hypot(*(position[0, 2] - position[0, 1])[[0, 2]]) == pytest.approx(1.1, abs=0.05)
+
+
+def test_a_table_and_the_sideboard_told_near_it_go_to_another_wall_together():
+    words, told = ["dining_table", "sideboard", "bookshelf"], [(1, "close_by", 0), (2, "close_by", 1)]
+    size = [(1.6, 0.75, 0.9), (1.2, 0.8, 0.4), (0.8, 1.9, 0.3)]
+    search, state = searched(
+        words, size, [(0.0, 0, 0.0), (-2.29, 0, -1.2), (2.34, 0, 1.4)], [0, np.pi / 2, -np.pi / 2], told
+    )
+    assert search.alongside == [[(1, 0), (2, 1)], [(2, 1)], [(1, 2)]]
+    rows = np.array([[0.0, 1.2, 0.0, 0.0], [1.6, -1.0, 0.0, 0.0]])
+    position, yaw = search._along(state, np.ones(3, bool), 0, [0], rows, search.alongside[0])
+    for number in range(len(rows)):
+        plan = search.problem.plan.at(position[number], yaw[number])
+        margins = {term.name: term.find(plan).margin for term in TERMS if term.name in ("close_by", "apart", "at_wall")}
+        assert all((margin >= 0).all() for margin in margins.values())
+    assert np.hypot(*(position[1] - position[0])[[1, 2], ::2].T).min() > 0.5  # each time at another wall
+
+
+def test_storage_that_is_longer_than_every_wall_stays():
+    words, told = ["dining_table", "sideboard"], [(1, "close_by", 0)]
+    search, state = searched(words, [(1.6, 0.75, 0.9), (5.5, 0.8, 0.4)], [(0, 0, 0), (0, 0, -1.8)], [0, 0], told)
+    position, _ = search._along(state, np.ones(2, bool), 0, [0], np.array([[0.0, 1.0, 0.0, 0.0]]), [(1, 0)])
+    assert position[0, 1].tolist() == state.position[1].tolist()
+
+
+@pytest.mark.parametrize("count", [MANY - 1, MANY])
+def test_a_room_of_many_pieces_is_built_up(monkeypatch, count):
+    begun = []
+    monkeypatch.setattr(Search, "rebuilt", lambda self, state, out: begun.append(out) or state)
+    search, _ = searched(["stool"] * count, [(0.3, 0.4, 0.3)] * count, [(0.0, 0, 0.0)] * count, [0.0] * count)
+    search.run(0)
+    assert begun == [list(range(count))] * (count == MANY)
 
 
 def test_a_second_sofa_is_tried_at_the_sides_of_the_table():
