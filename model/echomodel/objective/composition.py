@@ -21,7 +21,7 @@ AHEAD = 1.0  # metres before a sofa to other groups: 97 % of real ones have them
 COVERED = 0.25  # share of its width from which on something is before it
 CELL, POINTS = 0.25, 1000  # metres between two points of the floor that are looked at; in a hall so many, farther apart
 FEW, LARGE = 5, 0.4  # pieces: fewer fill no room; square metres of those that fill an end of it
-NEARBY = 0.5  # metres: a point nearer to a piece is neither bare nor far from everything
+NEARER = 0.1  # metres by which a point must be nearer to a piece than what is bare or serves nothing, not to count
 
 
 def bare_limit(area: float, count: int) -> float:
@@ -61,6 +61,16 @@ def floor_points(plan: Plan) -> list[tuple[Array, float, Array, Array]]:
 
 
 @once
+def on_floors(plan: Plan) -> list[Array]:
+    """(s, n) int64 for rooms (s,), one after the other, of one floor: the pieces that stand there, rugs apart."""
+    out = []
+    for scenes, *_ in plan.rooms:
+        here = (plan.scene >= int(scenes[0])) & (plan.scene <= int(scenes[-1]))
+        out.append(plan.those(here & plan.standing & (plan.size[:, 1] > CLEAR_HEIGHT)).reshape(len(scenes), -1))
+    return out
+
+
+@once
 def floor_gaps(plan: Plan) -> list[tuple[float, int, Array, Array, Array, Array]]:
     """How far the floor lies from the pieces, for rooms (s,), one after the other, of one floor.
 
@@ -68,24 +78,23 @@ def floor_gaps(plan: Plan) -> list[tuple[float, int, Array, Array, Array, Array]
     room not those near to what stands alike in all, (q,) metres to the walls, and (s, q) to the nearest piece.
     """
     out = []
-    for scenes, area, points, walls in floor_points(plan):
-        here = (plan.scene >= int(scenes[0])) & (plan.scene <= int(scenes[-1]))
-        there = plan.those(here & plan.standing & (plan.size[:, 1] > CLEAR_HEIGHT)).reshape(len(scenes), -1)
-        far, gap = _far_points(plan, there, points)
+    for (_, area, points, walls), there in zip(floor_points(plan), on_floors(plan), strict=True):
+        near = min(SERVED - SOFT, bare_limit(area, there.shape[1]) - NEARER)
+        far, gap = _far_points(plan, there, points, near)
         out.append((area, len(points), there, points[far], walls[far], gap))
     return out
 
 
-def _far_points(plan: Plan, there: Array, points: Array) -> tuple[Array, Array]:
+def _far_points(plan: Plan, there: Array, points: Array, near: float) -> tuple[Array, Array]:
     if there.shape[1] < 2:
         return there.reshape(-1)[:0], points[:0]
     moved, xp = plan.moved[there[0]], plan.kit
     still, moved = there[:1, ~moved], there[:, moved]
     squares = xp.amin(_squares(plan, still, points), 1) if still.shape[1] else full(points, (1, len(points)), math.inf)
-    far = rows(squares[0] > NEARBY**2)
+    far = rows(squares[0] > near**2)
     squares = squares[:, far]
-    if moved.shape[1]:
-        squares = xp.minimum(squares, xp.amin(_squares(plan, moved, points[far]), 1))
+    for k in range(moved.shape[1]):  # one after the other, which fits a cache
+        squares = xp.minimum(squares, _squares(plan, moved[:, k : k + 1], points[far])[:, 0])
     return far, xp.broadcast_to(xp.sqrt(at_least(squares, 1e-12)), (len(there), len(far)))
 
 
@@ -121,7 +130,7 @@ BARE_END, BARE_STRIP, SHORT, SPARE = 0.45, 0.4, 1.6, 2.5
 def ends_used(plan: Plan) -> Found:
     """No end of a room is bare, nor a strip right across it: its large pieces stand about all of it; one is told."""
     out, xp = nobody(plan.size), plan.kit
-    for (_, polygon, _), (_, _, there, *_) in zip(plan.rooms, floor_gaps(plan), strict=True):
+    for (_, polygon, _), there in zip(plan.rooms, on_floors(plan), strict=True):
         large = (plan.size[there[0], 0] * plan.size[there[0], 2] > LARGE) & ~plan.of("decor")[there[0]]
         if there.shape[1] - max(int(plan.stands("row")[there[0]].sum()) - 1, 0) < FEW or not bool(large.any()):
             continue  # a row of units is one piece
