@@ -41,7 +41,9 @@ def floor_used(plan: Plan) -> Found:
         radius = xp.minimum(gap[:, inner], walls[inner])
         at = held(radius).argmax(1)
         most = radius[xp.arange(len(at)), at]
-        out = joined(out, found(_nearest(plan, there, points[inner[at]]), limit - most, measure=2 * most))
+        near = rows(held(most) > limit - NEARER)  # of smaller circles nobody need hear
+        told = _nearest(plan, there[near], points[inner[at[near]]])
+        out = joined(out, found(told, limit - most[near], measure=2 * most[near]))
     return out
 
 
