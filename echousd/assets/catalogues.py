@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Tf
 
-from echomodel.files import read_bounded, unpacking, within_memory
+from echomodel.files import raising, read_bounded, unpacking, within_memory
 from echousd.assets.licences import licence_beside
 from echousd.assets.model_file import ModelFile
 from echousd.assets.naming import class_by_name, fitted
@@ -426,15 +426,12 @@ MAX_TEXT = 2**30  # bytes of one table, unpacked
 
 def text_of(path: Path) -> str:
     """The text of a file, unpacked where it ends in `.gz`; raises ValueError that names it."""
-    try:
-        with within_memory(path):
-            content = read_bounded(path, MAX_TEXT)
-            if path.suffix == ".gz":
-                with gzip.open(io.BytesIO(content)) as file:
-                    blocks = islice(iter(lambda: file.read(BLOCK), b""), MAX_TEXT // BLOCK + 1)
-                    content = b"".join(blocks)
-    except (OSError, EOFError, zlib.error) as error:
-        raise ValueError(f"{path}: cannot be read ({error})") from None
+    with raising(f"{path}: cannot be read", OSError, EOFError, zlib.error), within_memory(path):
+        content = read_bounded(path, MAX_TEXT)
+        if path.suffix == ".gz":
+            with gzip.open(io.BytesIO(content)) as file:
+                blocks = islice(iter(lambda: file.read(BLOCK), b""), MAX_TEXT // BLOCK + 1)
+                content = b"".join(blocks)
     if len(content) > MAX_TEXT:
         raise ValueError(f"{path}: more than {MAX_TEXT} bytes, allowed for a table: that many")
     return content.decode("utf-8-sig", "replace")
@@ -442,11 +439,8 @@ def text_of(path: Path) -> str:
 
 def json_of(path: Path) -> Any:
     """The plain data of a JSON file; raises ValueError that names it."""
-    try:
-        with within_memory(path):
-            return json.loads(text_of(path))
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise ValueError(f"{path}: cannot be read as JSON ({error})") from None
+    with raising(f"{path}: cannot be read as JSON", json.JSONDecodeError, RecursionError), within_memory(path):
+        return json.loads(text_of(path))
 
 
 def json_lines(path: Path) -> Iterator[Mapping[str, Any]]:
@@ -462,12 +456,9 @@ def json_lines(path: Path) -> Iterator[Mapping[str, Any]]:
 
 def rows_of(path: Path) -> list[dict[str, str]]:
     """The rows of a CSV table, its column names in lower case; raises ValueError that names it."""
-    try:
-        with within_memory(path):
-            reader = csv.DictReader(io.StringIO(text_of(path)))
-            return [{str(k).strip().lower(): v or "" for k, v in row.items() if isinstance(v, str)} for row in reader]
-    except csv.Error as error:
-        raise ValueError(f"{path}: cannot be read as a table ({error})") from None
+    with raising(f"{path}: cannot be read as a table", csv.Error), within_memory(path):
+        reader = csv.DictReader(io.StringIO(text_of(path)))
+        return [{str(k).strip().lower(): v or "" for k, v in row.items() if isinstance(v, str)} for row in reader]
 
 
 def text(value: Any) -> str:

@@ -17,7 +17,7 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
-from echomodel.files import read_bounded, whole_file, write_text
+from echomodel.files import raising, read_bounded, whole_file, write_text
 from echomodel.late import Late
 from echomodel.vocabulary import vocabulary
 from echousd.assets.catalogues import Entry, entries_of
@@ -177,18 +177,16 @@ def write_table(path: Path, records: Iterable[AssetRecord], corrections: Correct
 def read_corrections(path: Path) -> Corrections:
     """The table by id; raises ValueError naming the file, the line, what was found and what is allowed."""
     out: dict[str, Mapping[str, str]] = {}
-    try:
-        with io.StringIO(read_bounded(path, LARGEST).decode("utf-8"), newline="") as file:
-            reader = csv.DictReader(file)
-            missing = [name for name in COLUMNS[:5] if name not in (reader.fieldnames or ())]
-            if missing:
-                raise ValueError(f"{path}: misses the columns {', '.join(missing)}")
-            for row in reader:
-                plain = {name: (row.get(name) or "").strip() for name in COLUMNS}
-                _check(plain, f"{path}:{reader.line_num}")
-                out[plain["id"]] = plain
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"{path}: cannot be read as a table ({error})") from None
+    unreadable = raising(f"{path}: cannot be read as a table", OSError, UnicodeDecodeError, csv.Error)
+    with unreadable, io.StringIO(read_bounded(path, LARGEST).decode("utf-8"), newline="") as file:
+        reader = csv.DictReader(file)
+        missing = [name for name in COLUMNS[:5] if name not in (reader.fieldnames or ())]
+        if missing:
+            raise ValueError(f"{path}: misses the columns {', '.join(missing)}")
+        for row in reader:
+            plain = {name: (row.get(name) or "").strip() for name in COLUMNS}
+            _check(plain, f"{path}:{reader.line_num}")
+            out[plain["id"]] = plain
     return out
 
 
@@ -197,13 +195,11 @@ def _check(row: Mapping[str, str], where: str) -> None:
         raise ValueError(f"{where}: use is {row['use']!r}, allowed: 1 or 0")
     if row["turn"] not in ("", "0", "90", "180", "270", "-90"):
         raise ValueError(f"{where}: turn is {row['turn']!r}, allowed: 0, 90, 180, 270 degrees")
-    try:
+    with raising(f"{where}:"):
         if row["category"]:
             vocabulary().category(row["category"])
         if row["metres"] and not 0 < float(row["metres"]) < 1e6:
             raise ValueError(f"metres is {row['metres']!r}, allowed: a positive number")
-    except ValueError as error:
-        raise ValueError(f"{where}: {error}") from None
 
 
 def correction_of(row: Mapping[str, str]) -> str:

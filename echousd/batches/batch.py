@@ -13,6 +13,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from echomodel.files import raising
 from echousd.batches import work
 from echousd.batches.executor import Executor, LocalWorkers, Outcome, RayCluster, Task
 from echousd.batches.options import BatchRequest, request_of
@@ -135,10 +136,8 @@ def generate_many(graphs: Iterable[SceneGraph], *, seed: int = 0, **options: Any
     """
     asked = request_of({"sources": ["graphs"], "options": options}, "generate_many").options
     for number, graph in enumerate(graphs):
-        try:
+        with raising(f"graph {number}:"):
             yield work.generated(work.Job("", "", seed, asked, graph.to_json()))
-        except ValueError as error:
-            raise ValueError(f"graph {number}: {error}") from None
 
 
 def _executor(how: RunOptions, rooms: int, device: str) -> Executor:

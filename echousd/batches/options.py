@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, ValidationError
 
+from echomodel.files import raising
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import PlainModel
 from echousd.options import FILES, MAX_SEED, ROOM, RoomOptions, row, validation_message
@@ -53,7 +54,7 @@ class BatchRequest(PlainModel, strict=True):
 
 def request_of(raw: Mapping[str, Any], where: str) -> BatchRequest:
     """A checked request; raises ValueError that names `where`, the field, what was found and what is allowed."""
-    try:
+    with raising(f"{where}:"):
         request = BatchRequest(**{**raw, "options": _options(raw.get("options", {}))})
         if fixed := {"device", "seed"} & request.variations.keys():
             raise ValueError(f"variations: {fixed.pop()}, allowed: what a room shows; one device for all")
@@ -61,8 +62,6 @@ def request_of(raw: Mapping[str, Any], where: str) -> BatchRequest:
             raise ValueError("variations: an empty list, allowed: at least one value of each option")
         for copy in range(min(len(list(itertools.product(*request.variations.values()))), 1000)):
             request.chosen(copy)
-    except ValueError as error:
-        raise ValueError(f"{where}: {error}") from None
     if not request.sources and not request.sample:
         raise ValueError(f"{where}: neither sources nor a sample; name graph files, or --sample bedroom:20")
     return request
@@ -76,10 +75,8 @@ def _options(raw: Any) -> BatchOptions:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """The fields of a `batch.toml`; all its paths are relative to it. Raises ValueError naming the file."""
-    try:
+    with raising(f"{path}: cannot be read as TOML", OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
         raw = tomllib.loads(path.read_text("utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ValueError(f"{path}: cannot be read as TOML ({error})") from None
     for name, kind, allowed in (("sources", list, "a list of files, folders, globs"), ("sample", dict, "room types")):
         if not isinstance(raw.get(name, kind()), kind):
             raise ValueError(f"{path}: {name} is {raw[name]!r:.80}, allowed: {allowed}")

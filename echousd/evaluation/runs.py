@@ -22,6 +22,7 @@ import trimesh
 from echomodel.boxes2d import seen
 from echomodel.data.roomset import load_rooms, with_known_words
 from echomodel.data.sgfront import SGFront
+from echomodel.files import raising
 from echomodel.metrics.layouts import Task
 from echomodel.metrics.statistics import Counts, Figure, Pair, figure
 from echomodel.progress import StageListener
@@ -159,10 +160,8 @@ def _spread(found: Sequence[Any], count: int) -> list[Any]:
 
 def known_rooms(name: str, rooms: Sequence[RoomBoxes]) -> list[RoomBoxes]:
     """The rooms in the vocabulary's words; raises ValueError that names the source for a room type of another one."""
-    try:
+    with raising(f"{name}:", UnknownWord):
         return with_known_words(rooms)
-    except UnknownWord as error:
-        raise ValueError(f"{name}: {error}") from None
 
 
 def run_systems(

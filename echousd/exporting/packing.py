@@ -14,6 +14,7 @@ from typing import Any
 
 from pxr import Ar, Sdf, Usd, UsdUtils
 
+from echomodel.files import raising
 from echousd.naming import free_name
 from echousd.stage.encoding import StageError
 from echousd.stage.files import assets_in, specs
@@ -113,10 +114,8 @@ class Package:
             message = f"{self.reach.room}: {where} names {path!r}, which is left out (packed: {', '.join(PACKED)})"
             warnings.warn(message, LeftOut, stacklevel=2)
             return ""
-        try:
+        with raising(f"{self.reach.room}: {where}:", TextureError, kind=StageError):
             content = texture_bytes(path)
-        except TextureError as error:
-            raise StageError(f"{self.reach.room}: {where}: {error}") from None
         if content is None:
             return ""
         name = name or self._unused(PurePosixPath(inside.replace("\\", "/")).name)

@@ -10,6 +10,7 @@ from typing import Any
 
 from pxr import Sdf, UsdUtils
 
+from echomodel.files import raising
 from echousd.store import Store
 
 SHARED = ("assets", "textures")  # folders of a room whose entries are put into a store
@@ -92,10 +93,8 @@ def shelf_of(manifest: Mapping[str, Any], folder: Path) -> Shelf | None:
         return None
     if "\0" in at or "\\" in at or PurePosixPath(at).is_absolute() or PureWindowsPath(at).drive:
         raise ValueError(f"{folder}: its manifest names the store {at!r:.80}, allowed: a relative path")
-    try:
+    with raising(f"{folder}: its manifest names the store {at!r:.80}:"):
         store = Store.open(os.path.realpath(folder / at))
-    except ValueError as error:
-        raise ValueError(f"{folder}: its manifest names the store {at!r:.80}: {error}") from None
     return Shelf(store, folder, dict(manifest.get("stored") or {}))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import trimesh
 from pxr import Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
+from echomodel.files import raising
 from echomodel.late import extra
 from echousd.shapes.geometry import Mass
 from echousd.shapes.joints import GRAVITY
@@ -103,11 +104,9 @@ def body_root(prim: Usd.Prim) -> Usd.Prim | None:
 
 
 def _solids(prim: Usd.Prim, cache: UsdGeom.XformCache, metres: float, *, moves: bool) -> Iterator[Solid]:
-    try:
+    with raising(f"<{prim.GetPath()}>: its collider cannot be read", Tf.ErrorException, kind=StageError):
         points, faces = triangulated(prim)
         world = matrix(cache.GetLocalToWorldTransform(prim), prim)
-    except Tf.ErrorException as error:
-        raise StageError(f"<{prim.GetPath()}>: its collider cannot be read ({error})") from None
     points = (points @ world[:3, :3].T + world[:3, 3]) * metres
     if not len(faces):
         return

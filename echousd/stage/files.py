@@ -12,7 +12,7 @@ from pathlib import Path
 
 from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 
-from echomodel.files import whole_file
+from echomodel.files import raising, whole_file
 from echousd.graph.files import LAYER_FORMS, STAGE_FORMS
 from echousd.pending import check_written
 from echousd.stage.apart import check_harmless
@@ -30,10 +30,8 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
     """
     path = Path(path)
     check_written([path])
-    try:
+    with raising(f"{path}: cannot be opened", OSError, ValueError, kind=StageError):
         there = path.exists()
-    except (OSError, ValueError) as error:
-        raise StageError(f"{path}: cannot be opened ({error})") from None
     if not there:
         raise StageError(f"{path}: no such file")
     if path.is_dir():

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any
 
 from pxr import Sdf, Usd
 
+from echomodel.files import raising
 from echomodel.openings import Opening, opening_from_json
 from echomodel.vocabulary import vocabulary
 from echousd.graph import MAX_TEXT, GraphError, Node, Relation, RoomSpec, SceneGraph
@@ -118,13 +119,9 @@ def place(prim: Usd.Prim) -> str:
     return f"{source(prim.GetStage())}: <{prim.GetPath()}>"
 
 
-@contextmanager
-def faults(where: str) -> Iterator[None]:
+def faults(where: str) -> AbstractContextManager[None]:
     """What is not valid in the graph that is built meanwhile is a fault of the stage there."""
-    try:
-        yield
-    except GraphError as error:
-        raise StageError(f"{where}: {error}") from None
+    return raising(f"{where}:", GraphError, kind=StageError)
 
 
 def room_graph(prims: RoomPrims) -> SceneGraph:
@@ -200,10 +197,8 @@ def node_names(prims: RoomPrims, *, small: bool = False) -> dict[Sdf.Path, str]:
 
 def read_opening(prim: Usd.Prim) -> Opening:
     """The opening that an EchoOpening prim states, called like the prim; raises StageError."""
-    try:
+    with raising(f"{place(prim)}:", kind=StageError):
         return opening_from_json({"name": prim.GetName(), **stated_fields(prim, usd.OPENING_FIELDS)})
-    except ValueError as error:
-        raise StageError(f"{place(prim)}: {error}") from None
 
 
 def room_spec(prims: RoomPrims) -> RoomSpec:

@@ -181,6 +181,20 @@ def telling(path: str | os.PathLike[str], fails: str = "cannot be written", then
 
 
 @contextmanager
+def raising(what: str, *instead_of: type[Exception], kind: type[Exception] = ValueError) -> Iterator[None]:
+    """Raises an error of a kind instead of one of the block's, ValueErrors where none are named, with what it says.
+
+    Arguments:
+        what: cannot be done; the reason follows in brackets, or as it is where `what` ends with a colon.
+    """
+    kinds = instead_of or (ValueError,)
+    try:
+        yield
+    except kinds as error:
+        raise kind(f"{what} {error}" if what.endswith(":") else f"{what} ({error})") from None
+
+
+@contextmanager
 def within_memory(path: Path, name: str = "", *, size: int | None = None) -> Iterator[None]:
     """Keep the process from holding much more than a file of somebody's has bytes while the block reads it.
 
@@ -249,7 +263,5 @@ def bounded_lines(file: BinaryIO, most: int, name: str | os.PathLike[str]) -> It
 def read_json(path: str | os.PathLike[str], most: int) -> Any:
     """The plain data of a JSON file, read as `read_bounded` does; ValueError also where it is no JSON."""
     content = read_bounded(path, most)
-    try:
+    with raising(f"{path}: cannot be read as JSON", ValueError, RecursionError):
         return json.loads(content)
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"{path}: cannot be read as JSON ({error})") from None

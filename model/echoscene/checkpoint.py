@@ -21,7 +21,7 @@ from torch import Tensor, nn
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.model import check_numbers
 from echomodel.config import from_dict
-from echomodel.files import whole_file
+from echomodel.files import raising, whole_file
 from echomodel.vocabulary import vocabulary
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig
 from echoscene.model import ReleasedModel
@@ -221,10 +221,8 @@ def convert(
     Raises CheckpointError: as `read_published` and `build`, or the number of class names is wrong.
     """
     tensors = read_published(source)
-    try:
+    with raising(f"{source}:", kind=CheckpointError):
         config = infer_config({key: tuple(value.shape) for key, value in tensors.items()})
-    except ValueError as error:
-        raise CheckpointError(f"{source}: {error}") from None
     count = config.encoder.classes if config.encoder else 0
     names = class_names(count) if classes is None else tuple(classes)
     if classes is not None and len(classes) != count:
@@ -248,10 +246,8 @@ def statistics_from_bounds(bounds: Sequence[float]) -> BoxStatistics:
 
 def read_bounds(path: str | os.PathLike[str]) -> BoxStatistics:
     """Read a `centered_bounds_*_trainval.txt` file; raises ValueError naming the file."""
-    try:
+    with raising(f"{path}:", ValueError, UnicodeDecodeError):
         return statistics_from_bounds([float(word) for word in Path(path).read_text("utf-8").split()])
-    except (ValueError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 Shapes = Mapping[str, tuple[int, ...]]

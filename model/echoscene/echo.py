@@ -15,6 +15,7 @@ from torch import Tensor
 
 from echomodel.arrays import on_device
 from echomodel.boxes import Boxes
+from echomodel.files import raising
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit, Sampling, touched_nodes
 from echomodel.randomness import SceneGenerators
@@ -61,10 +62,8 @@ class ReleasedEcho:
         model = load_released(path)
         if not isinstance(model, ReleasedModel):
             raise ValueError(f"{path}: holds the autoencoder alone, rooms need the model with its graph encoder")
-        try:
+        with raising(f"{path}:"):
             return cls(model.to(device), text, hashlib.sha256(Path(path).read_bytes()).hexdigest()[:12])
-        except ValueError as error:
-            raise ValueError(f"{path}: {error}") from None
 
     @property
     def preset(self) -> str:

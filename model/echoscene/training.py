@@ -15,6 +15,7 @@ from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.data.roomset import RoomSet, kept_out, with_known_words
 from echomodel.data.sgfront import SGFront
 from echomodel.data.shapeset import ShapeSet
+from echomodel.files import raising
 from echomodel.late import extra
 from echomodel.roomboxes import RoomBoxes
 from echomodel.text import CachedTextEncoder, ClipTextEncoder, RandomTextEncoder, TextEncoder, edge_text
@@ -82,11 +83,10 @@ class PublishedShapes:
         h5py = extra("h5py", "3D-FUTURE-SDF is read with h5py", "sgfront")
         out = []
         for number in numbers:
-            try:
-                with h5py.File(self.files[int(number)]) as file:
-                    out.append(np.asarray(file[FIELD], np.float32).reshape(1, 64, 64, 64))
-            except (OSError, KeyError, ValueError) as error:
-                raise ValueError(f"{self.files[int(number)]}: no grid {FIELD!r} of 64 x 64 x 64 ({error})") from None
+            name = self.files[int(number)]
+            unfit = raising(f"{name}: no grid {FIELD!r} of 64 x 64 x 64", OSError, KeyError, ValueError)
+            with unfit, h5py.File(name) as file:
+                out.append(np.asarray(file[FIELD], np.float32).reshape(1, 64, 64, 64))
         grids = torch.from_numpy(np.stack(out)).clamp(-CLAMP, CLAMP)
         if side == grids.shape[-1]:
             return grids

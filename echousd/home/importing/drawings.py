@@ -16,6 +16,7 @@ from xml.etree.ElementTree import ParseError
 import numpy as np
 import shapely
 
+from echomodel.files import raising
 from echomodel.late import extra
 from echousd.graph import GraphError
 from echousd.home.importing.found import MAP, SCREEN, Found, Hole, Piece, Room, kind_of, long_sides, rooms_between, span
@@ -146,10 +147,8 @@ def read_dxf(path: Path, unit: float | None) -> Found:
     from ezdxf.enums import InsertUnits
     from ezdxf.units import conversion_factor
 
-    try:
+    with raising("cannot be read as DXF", ezdxf.DXFError, OSError, ValueError, kind=GraphError):
         document, _ = recover.readfile(path)
-    except (ezdxf.DXFError, OSError, ValueError) as error:
-        raise GraphError(f"cannot be read as DXF ({error})") from None
     stated = document.units
     if unit is None and stated == 0:
         raise GraphError("states no unit ($INSUNITS), allowed: --unit m, cm, mm, in, ft or metres of one unit")
@@ -199,10 +198,8 @@ def read_svg(content: bytes, unit: float | None) -> Found:
         )
     if b"<!ENTITY" in content:
         raise GraphError("defines entities, allowed: none")
-    try:
+    with raising("cannot be read as SVG", ParseError, ValueError, kind=GraphError):
         shown = svgelements.SVG.parse(io.BytesIO(content), ppi=96, reify=True)
-    except (ParseError, ValueError) as error:
-        raise GraphError(f"cannot be read as SVG ({error})") from None
     box = getattr(shown, "viewbox", None)
     # the size on paper is no scale
     unit = unit * (box.width / shown.width if box and box.width and shown.width else 1.0)

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 import shapely
 
-from echomodel.files import unpacking
+from echomodel.files import raising, unpacking
 from echousd.graph import GraphError
 from echousd.home.importing.found import MAP, SCREEN, Found, Hole, Piece, Room, long_sides, rooms_between, span
 
@@ -258,10 +258,8 @@ def read_sweethome(content: bytes, name: str) -> Found:
         text = archive.read("Home.xml")
     if b"<!ENTITY" in text:
         raise GraphError(f"{name}: Home.xml defines entities, allowed: none")
-    try:
+    with raising(f"{name}: Home.xml cannot be read as XML", ElementTree.ParseError, kind=GraphError):
         home = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise GraphError(f"{name}: Home.xml cannot be read as XML ({error})") from None
     levels = sorted(home.iter("level"), key=lambda one: float(one.get("elevation", 0)))
     number = {one.get("id", ""): str(place) for place, one in enumerate(levels)}
     high = float(home.get("wallHeight", 250)) / 100

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echomodel.files import raising
 from echomodel.vocabulary import vocabulary
 from echousd.assets.reference import is_file
 from echousd.graph import Node, SceneGraph
@@ -43,10 +44,8 @@ def named_pieces(
     asked = wishes()
     with (timer or StageTimer()).stage("assets"):
         for node in named:
-            try:
+            with raising(f"object {node.name!r}:", ValueError, ImportError):
                 chosen[node.name], files[node.name] = _named(node, asked)
-            except (ValueError, ImportError) as error:
-                raise ValueError(f"object {node.name!r}: {error}") from None
     sizes = {node.name: chosen[node.name].dims for node in named if node.size is None}
     return Retrieved(chosen, files, sizes, collect=asked.collect)
 

@@ -22,7 +22,7 @@ from echomodel.boxes import BoxStatistics
 from echomodel.compact.modules import FurnitureDenoiser, LatentGraph, LayoutDenoiser
 from echomodel.compact.weights import FORMAT, PARTS, WeightsError, joined_config, own_statistics, read_header
 from echomodel.config import CompactConfig, to_json
-from echomodel.files import whole_file
+from echomodel.files import raising, whole_file
 
 if TYPE_CHECKING:
     from echomodel.compact.shape import Autoencoder, ShapeDenoiser
@@ -115,11 +115,9 @@ class _Undrawn(TorchFunctionMode):
 
 def read_weights(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
     """Metadata and tensors of a safetensors file as they are; raises WeightsError where it cannot be read."""
-    try:
-        with safe_open(path, "pt") as handle:
-            return handle.metadata() or {}, {key: handle.get_tensor(key) for key in handle.keys()}  # noqa: SIM118
-    except (OSError, SafetensorError) as error:
-        raise WeightsError(f"{path}: not a readable safetensors file ({error})") from None
+    unreadable = raising(f"{path}: not a readable safetensors file", OSError, SafetensorError, kind=WeightsError)
+    with unreadable, safe_open(path, "pt") as handle:
+        return handle.metadata() or {}, {key: handle.get_tensor(key) for key in handle.keys()}  # noqa: SIM118
 
 
 def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> tuple[CompactModel, str]:

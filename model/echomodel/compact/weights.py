@@ -17,6 +17,7 @@ from safetensors import SafetensorError, safe_open
 
 from echomodel.boxes import BoxStatistics
 from echomodel.config import CompactConfig, FurnitureConfig, from_dict
+from echomodel.files import raising
 from echomodel.late import Late
 
 
@@ -62,11 +63,9 @@ class WeightsError(ValueError):
 
 def read_header(path: Path) -> dict[str, str]:
     """Metadata of a safetensors file; raises WeightsError where it cannot be read."""
-    try:
-        with safe_open(path, "np") as handle:
-            return handle.metadata() or {}
-    except (OSError, SafetensorError) as error:
-        raise WeightsError(f"{path}: not a readable safetensors file ({error})") from None
+    unreadable = raising(f"{path}: not a readable safetensors file", OSError, SafetensorError, kind=WeightsError)
+    with unreadable, safe_open(path, "np") as handle:
+        return handle.metadata() or {}
 
 
 def joined_config(metadata: Mapping[Path, dict[str, str]]) -> CompactConfig:

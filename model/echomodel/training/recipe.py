@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from echomodel.config import C, CompactConfig, from_dict, to_json
+from echomodel.files import raising
 
 Stage = Literal["vqvae", "layout", "shape", "parts", "paper_vqvae", "paper"]
 
@@ -138,10 +139,8 @@ def read_recipe(path: Path, settings: list[str] | None = None) -> Recipe:
     missing = [name for name in ("stage", "steps") if name not in raw]
     if missing:
         raise ValueError(f"{path}: field {missing[0]!r} is missing")
-    try:
+    with raising(f"{path}:"):
         return with_settings(from_dict(Recipe, raw), settings or [])
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def with_settings(config: C, settings: list[str]) -> C:

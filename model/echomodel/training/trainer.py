@@ -18,7 +18,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from echomodel.config import to_json
-from echomodel.files import whole_file
+from echomodel.files import raising, whole_file
 from echomodel.training.recipe import Recipe
 
 # Fields of a recipe that may change on the way: length, rates and weights, files, and what the machine offers.
@@ -234,11 +234,9 @@ def read_log(path: Path) -> list[tuple[int, str, float]]:
     """Rows (step, name, value) of a log file, none where there is no file; raises ValueError for other files."""
     if not path.exists():
         return []
-    try:
-        with path.open(encoding="utf-8", newline="") as handle:
-            return [(int(row["step"]), row["name"], float(row["value"])) for row in csv.DictReader(handle)]
-    except (OSError, KeyError, TypeError, ValueError, csv.Error) as error:
-        raise ValueError(f"{path}: not the log of a training ({error})") from None
+    with raising(f"{path}: not the log of a training", OSError, KeyError, TypeError, ValueError, csv.Error):
+        rows = csv.DictReader(path.read_text("utf-8").splitlines())
+        return [(int(row["step"]), row["name"], float(row["value"])) for row in rows]
 
 
 def plot_log(log: Path, out: Path) -> None:
