@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from echomodel.late import Late
 from echousd.cli.options import Force, Made, Outside, Wait, add_room_command
 from echousd.cli.output import report, say, say_done, telling_faults
 
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
     from echousd.graph import SceneGraph
     from echousd.options import EditRequest
 
+check_output, held, writing = (Late(f"echousd.folder.folder:{word}") for word in ("check_output", "held", "writing"))
+check_ours, room_at = (Late(f"echousd.folder.found:{word}") for word in ("check_ours", "room_at"))
+read_room, write_pictures = Late("echousd.make.reading:read_room"), Late("echousd.make.save:write_pictures")
+progress_bar, StageTimer = Late("echousd.cli.terminal:progress_bar"), Late("echousd.progress:StageTimer")
 app = typer.Typer()
 
 
@@ -39,8 +44,7 @@ def edit(
 
     Every option may be given several times.
     """
-    from echousd.folder.found import check_ours, is_home, refuse_house, room_at
-    from echousd.make.reading import read_room
+    from echousd.folder.found import is_home, refuse_house
     from echousd.make.wishes import wished
     from echousd.options import EditRequest
 
@@ -96,7 +100,7 @@ def update(
 
     What the layer moves is the artist's wish: it stays where it was put, locked, and the others make way.
     """
-    from echousd.folder.found import check_ours, layer_over
+    from echousd.folder.found import layer_over
     from echousd.make.wishes import artists_wishes
 
     layer = layer_over(layer)
@@ -124,8 +128,6 @@ def _name_of(*asked: object) -> str:
 def _step(room: Path, wait: bool, json: bool, run: str) -> None:
     """Take the last edit of a room back (`undo`), or make it again (`redo`), and say what it was."""
     from echousd.folder import history
-    from echousd.folder.folder import held
-    from echousd.make.save import write_pictures
 
     step = {"undo": history.undo, "redo": history.redo}[run]
     with held(room.parent, wait=wait, run=run) as finished:
@@ -138,8 +140,6 @@ def _step(room: Path, wait: bool, json: bool, run: str) -> None:
 def _recover(room: Path, wait: bool, json: bool) -> None:
     """Finish what an interrupted run has begun, and say what it was."""
     from echousd.folder import history
-    from echousd.folder.folder import held
-    from echousd.folder.found import room_at
 
     folder = room if room.is_dir() else room.parent
     if not folder.is_dir():
@@ -152,7 +152,6 @@ def _recover(room: Path, wait: bool, json: bool) -> None:
 def _say_finished(room: Path, steps: Sequence[str], json: bool) -> None:
     """Draw a room whose run was finished, and say what it did; exit code 1 where it has faults."""
     from echousd.folder.manifest import find_manifest
-    from echousd.make.save import write_pictures
 
     _say_steps(room, write_pictures(room), "finished", steps, json)
     layouts = (find_manifest(room.parent, room.stem) or {}).get("layouts", ())
@@ -173,15 +172,10 @@ def _change(
 
     The `run` that did the same and was interrupted is finished instead.
     """
-    from echousd.cli.terminal import progress_bar
-    from echousd.folder.folder import check_output, writing
-    from echousd.folder.found import room_at
     from echousd.folder.history import steps_of
     from echousd.make.edit import carried, touched
     from echousd.make.edit import edit as change
     from echousd.make.finished import write_room
-    from echousd.make.reading import read_room
-    from echousd.progress import StageTimer
 
     check_output(folder, flat=False, force=force)
     with writing(folder, flat=False, force=force, wait=wait, run="" if dry_run else run) as finished:
@@ -230,8 +224,6 @@ def adopt(
     The stage is not written; the room refers to the pieces in it, with --collect to copies. What a person would point
     at in their arrangement is told and left as it is.
     """
-    from echousd.cli.terminal import progress_bar
-    from echousd.folder.folder import check_output, writing
     from echousd.options import RoomOptions
 
     options = RoomOptions(**changes)
@@ -240,7 +232,6 @@ def adopt(
         from echousd.make.finished import write_room
         from echousd.make.pipeline import generate
         from echousd.make.wishes import adopted, seen_in_theirs
-        from echousd.progress import StageTimer
         from echousd.stage.apart import check_apart
 
         check_apart(stage)

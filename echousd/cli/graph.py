@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from echomodel.files import check_free
+from echomodel.late import Late
 from echousd.cli.options import AsJson, Replace, ReplacePicture
 from echousd.cli.output import check_picture, counted, say, say_done, say_json
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from echousd.graph import SceneGraph
     from echousd.home.graph import HomeGraph
 
+load_home, vocabulary = Late("echousd.home.files:load_home"), Late("echomodel.vocabulary:vocabulary")
 app = typer.Typer()
 
 NEW_EXAMPLES = """Examples:
@@ -47,14 +49,10 @@ GRAPH_EXAMPLES = """Examples:
 
 
 def _room_types(incomplete: str) -> list[str]:
-    from echomodel.vocabulary import vocabulary
-
     return [kind.name for kind in vocabulary().room_types if kind.name.startswith(incomplete)]
 
 
 def _counts(incomplete: str) -> list[str]:
-    from echomodel.vocabulary import vocabulary
-
     return [f"{entry.name}=" for entry in vocabulary().categories if entry.name.startswith(incomplete)]
 
 
@@ -156,7 +154,6 @@ def home_from(
     source: Path | None, rooms: str | None, area: float | None, size: tuple[float, float] | None, relate: Sequence[str]
 ) -> HomeGraph | None:
     """The home that a command line describes, None where its file holds a single room."""
-    from echousd.home.files import load_home
     from echousd.home.graph import HomeGraph as Home
 
     about: dict[str, Any] = {} if area is None else {"area": area}
@@ -210,7 +207,6 @@ def graph(
     from echousd.graph import GraphError, SceneGraph, load_graph
     from echousd.graph.files import STAGE_FORMS
     from echousd.graph.picture import PICTURES, draw_graph
-    from echousd.home.files import load_home
 
     if as_json and schema:
         raise GraphError("--json and --schema exclude each other")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from echomodel.files import check_free
+from echomodel.late import Late
 from echousd.cli.options import Force, Written, group_of
 from echousd.cli.output import say, say_done, say_written
 
@@ -34,6 +35,8 @@ IMPORT_EXAMPLES = """Examples:
 
 
 plan_app = typer.Typer(cls=group_of("export"), no_args_is_help=True, epilog=EXAMPLES)
+draw_plans, write_home = Late("echousd.home.draw:draw_plans"), Late("echousd.home.stages:write_home")
+faults_of, plan_there = Late("echousd.graph.consistency:faults_of"), Late("echousd.home.existing:plan_there")
 app = typer.Typer()
 app.add_typer(plan_app, name="plan", help="Plan a home, draw or write its plan; read somebody's floor plan.")
 
@@ -62,9 +65,7 @@ def import_(
     """
     from echousd.graph.files import LAYER_FORMS
     from echousd.graph.picture import PICTURES
-    from echousd.home.draw import draw_plans
     from echousd.home.importing.formats import import_plan
-    from echousd.home.stages import write_home
 
     _writable(output, LAYER_FORMS, force)
     if picture is not None:
@@ -108,14 +109,12 @@ def export(
     """Plan a home, or take the plan that it has with what stands in it, and draw it or write it down."""
     from echousd.folder.found import room_at
     from echousd.graph import GraphError
-    from echousd.graph.consistency import faults_of
     from echousd.graph.files import LAYER_FORMS
     from echousd.graph.picture import PICTURES
-    from echousd.home.draw import draw_plans, write_dxf, write_procthor
-    from echousd.home.existing import plan_there
+    from echousd.home.draw import write_dxf, write_procthor
     from echousd.home.files import load_home
     from echousd.home.plan import plans
-    from echousd.home.stages import furniture, write_home
+    from echousd.home.stages import furniture
 
     form = output.suffix.lower()
     _writable(output, (*PICTURES, ".dxf", ".json", *LAYER_FORMS), force)
@@ -154,9 +153,8 @@ def generate_home(
     """
     from echousd.cli.terminal import progress_bar
     from echousd.folder.found import is_home
-    from echousd.graph.consistency import faults_of
     from echousd.home.assemble import earlier, wanted_jobs, write_rooms
-    from echousd.home.existing import next_plan, plan_there
+    from echousd.home.existing import next_plan
 
     stated = None if is_home(graph) else plan_there(graph, home)
     before = graph if is_home(graph) else earlier(output, options.seed)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from echomodel.files import check_free
+from echomodel.late import Late
 from echousd.cli.options import Replace
 from echousd.cli.output import counted
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from echousd.assets.record import AssetRecord
 
 
+Terminal, progress_bar = (Late(f"echousd.cli.terminal:{name}") for name in ("Terminal", "progress_bar"))
+load_rooms, with_known_words = (Late(f"echomodel.data.roomset:{name}") for name in ("load_rooms", "with_known_words"))
 app = typer.Typer()
 
 
@@ -36,7 +39,6 @@ def train(
     """
     from echomodel.training.recipe import read_recipe
     from echomodel.training.start import open_run
-    from echousd.cli.terminal import Terminal
 
     console = Terminal(stderr=True)
     folder = out or Path("runs") / recipe.stem
@@ -70,7 +72,6 @@ def build(
     Example: echousd data build --recipe packed --seed 1 -o data/packed
     """
     from echomodel.data.build import build_data
-    from echousd.cli.terminal import Terminal, progress_bar
 
     with progress_bar() as listen:
         rooms, shapes = build_data(out, recipe, seed, listen)
@@ -106,9 +107,8 @@ def _check_one_file(out: Path, *, force: bool) -> None:
 
 def _write_one_file(out: Path, found: list[RoomBoxes], kind: str) -> None:
     """Rooms in a rooms file, or in a set to train on, which holds known words alone; says how many."""
-    from echomodel.data.roomset import kept_out, pack_rooms, with_known_words
+    from echomodel.data.roomset import kept_out, pack_rooms
     from echomodel.roomboxes import write_rooms
-    from echousd.cli.terminal import Terminal
 
     left = ""
     if out.suffix == ".json":
@@ -136,7 +136,6 @@ def search(
 
     Example: echousd data search --count 200 --seed 7 -o data/found
     """
-    from echousd.cli.terminal import Terminal
     from echousd.place.examples import GRAPHS, PLAIN, ExamplesPlan, search_examples
 
     console = Terminal(stderr=True)
@@ -163,7 +162,7 @@ def plot(
 
     Example: echousd data plot rooms.json -o rooms.png --limit 20 --room bedroom
     """
-    from echomodel.data.roomset import load_rooms, rooms_of_type
+    from echomodel.data.roomset import rooms_of_type
     from echomodel.data.sheet import plot_rooms
 
     check_free(out, force=force)
@@ -192,7 +191,6 @@ def meshes(
     from echomodel.data.shapeset import MeshModel, build_meshes
     from echousd.assets.measure import measure
     from echousd.assets.table import read_library
-    from echousd.cli.terminal import Terminal, progress_bar
     from echousd.shapes.originals.loading import library_file
 
     found, console = read_library(library), Terminal(stderr=True)
@@ -226,7 +224,6 @@ def to_usd(
 
     Example: echousd data to-usd rooms.json -o stages --limit 10
     """
-    from echomodel.data.roomset import load_rooms, with_known_words
     from echousd.stage.boxes import write_stages
 
     check_free(out, force=force)
@@ -283,7 +280,6 @@ def to_sgfront(
 
     Example: echousd data to-sgfront rooms.json -o sgfront
     """
-    from echomodel.data.roomset import load_rooms, with_known_words
     from echomodel.data.sgfront import write_sgfront
 
     check_free(out, force=force)
