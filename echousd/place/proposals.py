@@ -8,6 +8,7 @@ from itertools import groupby, product
 
 import numpy as np
 
+from echomodel.boxes2d import hull
 from echomodel.objective.access import DEEP, PASSAGE, WALKED_BEHIND, to_wall
 from echomodel.objective.company import places_of
 from echomodel.objective.sight import WATCHED_FROM
@@ -161,29 +162,31 @@ def seatings(problem: Problem, i: int, seats: Sequence[int]) -> tuple[list[int],
     """
     places = places_of(problem.size)
     seats = sorted((k for k in seats if _slot_role(problem, k, i) == "around"), key=lambda k: -places[k])
-    ways: list[list[tuple[Row, tuple[float, float]]]] = [[]] if len(seats) > 1 else []
+    ways: list[list[tuple[Row, np.ndarray]]] = [[]] if len(seats) > 1 else []
     for alike in (list(group) for _, group in groupby(seats, key=lambda k: places[k])):
         largest = max(alike, key=lambda k: float(problem.size[k, 0]))
         slots = sorted(slots_at(problem, largest, i), key=lambda slot: slot[3])
-        found = [(slot, _halves(problem.size[largest], slot[2])) for slot in slots]
-        first = found[:2] if places[largest] > 1 and len(alike) < len(seats) else found
+        table = np.array(slots).reshape(-1, 4)
+        room = np.concatenate([table[:, :2], hull(problem.size[largest, ::2][None] / 2, table[:, 2])], 1)
+        first = 2 if places[largest] > 1 and len(alike) < len(seats) else len(slots)
         after = []
-        for begun, start in product(ways, first):  # those that go with each slot, its likes first
-            chosen, count = [*begun], len(begun) + len(alike)
-            for one in (start, *(one for one in found if one[0][3] == start[0][3]), *found):
-                gaps = [max(abs(one[0][k] - at[k]) - one[1][k] - half[k] for k in (0, 1)) for at, half in chosen]
-                if len(chosen) < count and min(gaps, default=0.0) > -0.01:
-                    chosen.append(one)
-            after += [chosen] * (len(chosen) == count)
+        for begun, start in product(ways, range(min(first, len(slots)))):  # those that go with each, its likes first
+            chosen, free = [*begun], np.ones(len(slots), bool)
+            for _, taken in begun:
+                free &= _clear_of(room, taken)
+            for k in (start, *np.flatnonzero(table[:, 3] == table[start, 3]).tolist(), *range(len(slots))):
+                if free[k] and len(chosen) < len(begun) + len(alike):
+                    chosen.append((slots[k], room[k]))
+                    free &= _clear_of(room, room[k])
+            after += [chosen] * (len(chosen) == len(begun) + len(alike))
         ways = after
-    rows = [[slot for slot, _ in way] for way in ways]
-    return seats, [way for number, way in enumerate(rows) if not any({*way} == {*one} for one in rows[:number])]
+    found = [[slot for slot, _ in way] for way in ways]
+    return seats, [way for number, way in enumerate(found) if not any({*way} == {*one} for one in found[:number])]
 
 
-def _halves(size: np.ndarray, turn: float) -> tuple[float, float]:
-    """Half the extents of a turned piece along both axes."""
-    cos, sin = abs(math.cos(turn)), abs(math.sin(turn))
-    return float(cos * size[0] + sin * size[2]) / 2, float(sin * size[0] + cos * size[2]) / 2
+def _clear_of(room: np.ndarray, taken: np.ndarray) -> np.ndarray:
+    """(k,) bool: which rectangles (k, 4), middles and half extents, another one leaves free."""
+    return np.asarray((abs(room[:, :2] - taken[:2]) - room[:, 2:] - taken[2:]).max(1) > -0.01)
 
 
 def out_of(position: np.ndarray, yaw: float, slot: tuple[float, float, float, float]) -> Row:
