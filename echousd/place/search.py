@@ -191,8 +191,9 @@ class Search:
                 if there[k] and k not in out and not self._astray(state, k, out[at]):
                     out.append(k)
             at += 1
-        for k in np.flatnonzero(self.problem.hanging & there).tolist():
-            away = (state.position[out] - state.position[k])[:, ::2]
+        under = [k for k in out if not self.problem.hanging[k]]
+        for k in np.flatnonzero(self.problem.hanging & there).tolist() if under else ():
+            away = (state.position[under] - state.position[k])[:, ::2]
             if k not in out and np.hypot(*away.T).min() < LIT:
                 out.append(k)
         return out

@@ -242,6 +242,20 @@ def test_a_lamp_over_the_table_of_a_sofa_goes_with_the_sofa(away, goes):
     assert (2 in search.group(0, np.ones(3, bool), state)) == goes
 
 
+def test_a_lamp_leaves_the_one_beside_it_where_it_is():
+    words, size = (
+        ["dining_table", "coffee_table", *["pendant_lamp"] * 2],
+        [(1.6, 0.75, 0.9), (1.0, 0.4, 0.6), *[(0.4, 0.8, 0.4)] * 2],
+    )
+    at = [(-1.5, 0, 0), (1.5, 0, 0), (1.4, 1.9, 0.1), (1.5, 1.9, 0)]
+    search, state = searched(words, size, at, [0] * 4, [(2, "above", 0), (3, "above", 1)])
+    every = np.ones(4, bool)
+    assert search.group(2, every, state) == [2]
+    after = search.moved(state, every, 2)
+    assert after.position[2, ::2] == pytest.approx([-1.5, 0.0])
+    assert after.position[3, ::2] == pytest.approx([1.5, 0.0])
+
+
 def test_seats_stay_where_they_are_when_the_table_of_their_sofa_is_turned():
     words = ["multi_seat_sofa", "coffee_table", "armchair"]
     size = [(2.2, 0.8, 0.9), (1.2, 0.4, 0.6), (0.8, 0.8, 0.8)]
