@@ -38,7 +38,7 @@ def index(
     Models that did not change since the last run are not read again. What cannot be used is listed.
     """
     from echousd.assets.index import index as make
-    from echousd.cli.terminal import progress_bar
+    from echousd.cli.progress import progress_bar
 
     if table is not None and not table.is_file():
         raise ValueError(f"{table}: no such file, allowed: a table that `echousd assets review` wrote")

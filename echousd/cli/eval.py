@@ -51,7 +51,7 @@ def suite(
 
     Example: echousd eval suite default guided --against rooms.json -o report --only relations,faults
     """
-    from echousd.cli.terminal import progress_bar
+    from echousd.cli.progress import progress_bar
     from echousd.evaluation.runs import SYSTEMS, SuiteSettings
     from echousd.evaluation.suite import evaluate, report_files, write_report
 
@@ -85,7 +85,7 @@ def study(
 
     Example: echousd eval study default generator+search real -o study.html --count 12
     """
-    from echousd.cli.terminal import progress_bar
+    from echousd.cli.progress import progress_bar
     from echousd.evaluation.suite import write_study
 
     check_free(out, force=force)

@@ -35,7 +35,7 @@ def generate(
     Of a graph's numbers, lengths are metres in the room's frame (+Y up, the floor at 0), yaw is `90 deg` or radians
     about +Y: at 0 a front looks along +Z.
     """
-    from echousd.cli.terminal import progress_bar
+    from echousd.cli.progress import progress_bar
     from echousd.folder.folder import check_output, writing
     from echousd.options import RoomOptions
 

@@ -151,7 +151,7 @@ def generate_home(
         graph: the file that it comes from; a home that was made is planned anew, from the plan that it has.
         dry_run: say what would be made, and make nothing.
     """
-    from echousd.cli.terminal import progress_bar
+    from echousd.cli.progress import progress_bar
     from echousd.folder.found import is_home
     from echousd.home.assemble import earlier, wanted_jobs, write_rooms
     from echousd.home.existing import next_plan

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from echousd.assets.record import AssetRecord
 
 
-Terminal, progress_bar = (Late(f"echousd.cli.terminal:{name}") for name in ("Terminal", "progress_bar"))
+Terminal, progress_bar = Late("echousd.cli.terminal:Terminal"), Late("echousd.cli.progress:progress_bar")
 load_rooms, with_known_words = (Late(f"echomodel.data.roomset:{name}") for name in ("load_rooms", "with_known_words"))
 app = typer.Typer()
 
