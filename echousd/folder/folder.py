@@ -164,16 +164,16 @@ def write_together(
             then nothing was changed.
     """
     with held(folder):
-        changed = _stage(folder, files, list(last), list(remove), dict(kept or {}))
-        if changed:
-            finish(folder)
-    return changed
+        journal = _stage(folder, files, list(last), list(remove), dict(kept or {}))
+        if journal.move:
+            finish(folder, journal)
+    return [entry.to for entry in journal.move]
 
 
 def _stage(
     folder: Path, files: Mapping[str, bytes], last: list[str], remove: list[str], kept: dict[str, str]
-) -> list[str]:
-    """Write what differs and the journal into the staging folder, and return the paths that will change."""
+) -> Journal:
+    """Write what differs and the journal into the staging folder, and return the journal."""
     staging = folder / STAGING
     order = [path for path in files if path not in last] + [path for path in last if path in files]
     for path in (*order, *remove):
@@ -193,14 +193,15 @@ def _stage(
             for number, path in enumerate(changed)
         ]
         gone = [Removal(path=path, digest=digest_of(folder / path)) for path in remove if (folder / path).is_file()]
+        journal = Journal(run=run_of(folder), move=move, remove=gone, kept=kept)
         if changed:
-            write_journal(staging, Journal(run=run_of(folder), move=move, remove=gone, kept=kept))
+            write_journal(staging, journal)
         else:
             _discard(staging)
     except OSError as error:
         shutil.rmtree(staging, ignore_errors=True)
         raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); nothing was changed") from None
-    return changed
+    return journal
 
 
 @contextmanager
@@ -240,12 +241,15 @@ def recover(folder: Path) -> str:
     return run or ""
 
 
-def finish(folder: Path) -> str | None:
-    """Do what the journal of a run says, and return the run's name; None where there is nothing to finish."""
+def finish(folder: Path, written: Journal | None = None) -> str | None:
+    """Do what the journal of a run says, and return the run's name; None where there is nothing to finish.
+
+    `written`: the journal, where this process has just written it and all that it names.
+    """
     staging = folder / STAGING
     with telling(folder, then="; run again to finish"):
-        journal = read_journal(folder)
-        if journal is not None and _whole(folder, journal):
+        journal = written or read_journal(folder)
+        if journal is not None and (written or _whole(folder, journal)):
             _finish(folder, journal)
             (staging / JOURNAL).replace(staging / DONE)
         else:

@@ -20,7 +20,8 @@ def inside(folder: Path, name: object, entry: str) -> Path:
     if not isinstance(name, str) or not name or "\0" in name:
         raise ValueError(f"{entry} is {name!r:.80}, {allowed}")
     parts = PurePosixPath(name).parts
-    if PurePosixPath(name).is_absolute() or PureWindowsPath(name).drive or "\\" in name or ".." in parts or not parts:
+    drive = ":" in name and PureWindowsPath(name).drive
+    if name.startswith("/") or drive or "\\" in name or ".." in parts or not parts:
         raise ValueError(f"{entry} names {name!r:.200}, outside of {folder}; {allowed}")
     path = folder.joinpath(*parts)
     check_links(folder, path, f"{entry} names {name!r:.200}")
@@ -29,11 +30,11 @@ def inside(folder: Path, name: object, entry: str) -> Path:
 
 def check_links(folder: Path, path: Path, entry: str) -> None:
     """Raises ValueError if a link at or above `path` (which lies below `folder`) leads out of the folder."""
-    place = path
-    for _ in path.parts[len(folder.parts) :]:
-        if place.name == ".." or place.is_symlink():
+    names, place = path.parts[len(folder.parts) :], os.fspath(path)
+    for name in reversed(names):
+        if name == ".." or os.path.islink(place):  # noqa: PTH114  # a Path for each name of each file takes its time
             break
-        place = place.parent
+        place = os.path.dirname(place)  # noqa: PTH120
     else:
         return
     top = os.path.realpath(folder)

@@ -287,7 +287,7 @@ def test_what_an_interrupted_run_has_not_moved_yet_holds(tmp_path, monkeypatch, 
         root = made.save(tmp_path / "room", preview=False, store=tmp_path / "store")
         bigger = edit(root, two(Node("chair", "chair")), shapes="boxes", drafts=1, steps=2, place=False)
         with monkeypatch.context() as patch:
-            patch.setattr(folders, "finish", lambda folder: None)
+            patch.setattr(folders, "finish", lambda *_: None)
             bigger.save(root.parent, preview=False)
         assert echousd_command("store", "gc", tmp_path / "store", "--older", 0).out.startswith("removed  0 of ")
         assert read_room(root).graph.names == ("bed", "lamp", "chair")

@@ -192,7 +192,7 @@ def test_file_that_appears_while_a_run_is_interrupted_is_kept(tmp_path, told, mo
 
     write_together(tmp_path, {"a.usda": b"old"}, last=[], remove=[])
     with monkeypatch.context() as patch:
-        patch.setattr(folders, "finish", lambda folder: None)  # the run ends when its journal is written
+        patch.setattr(folders, "finish", lambda *_: None)  # the run ends when its journal is written
         write_together(tmp_path, {"a.usda": b"new", "b.usda": b"new"}, last=[], remove=[])
     (tmp_path / "a.usda").write_bytes(b"mine")
     (tmp_path / "b.usda").write_bytes(b"mine, too")
