@@ -16,13 +16,13 @@ from echousd.stage import values
 from echousd.stage.encoding import StageError
 
 if TYPE_CHECKING:
-    import trimesh
+    pass
 
 MAX_INSTANCES = 50_000  # of one instancer
 SOLIDS = ("Cube", "Sphere", "Cylinder", "Cone", "Capsule", "Plane")
-SIDES = 32  # corners of a circle
 refined = Late("echousd.stage.subdivision:refined")
 smooth_normals = Late("echousd.stage.subdivision:smooth_normals")
+solid = Late("echousd.stage.subdivision:solid")
 
 
 class SkippedForms(UserWarning):
@@ -153,35 +153,3 @@ def is_subdivision(prim: Usd.Prim) -> bool:
     """Whether a mesh says that it is a subdivision surface (many that are none leave the scheme open)."""
     scheme = UsdGeom.Mesh(prim).GetSubdivisionSchemeAttr()
     return scheme.HasAuthoredValue() and values.value_of(scheme) in ("catmullClark", "loop")
-
-
-def solid(prim: Usd.Prim) -> trimesh.Trimesh:
-    """One of `SOLIDS` as triangles, in the prim's own frame and unit."""
-    import trimesh  # with scipy half a second, which stages of meshes alone need not wait for
-
-    kind = prim.GetTypeName()
-
-    def length(name: str, default: float) -> float:
-        return max(values.number(prim.GetAttribute(name), default), 1e-9)
-
-    scale = 0.5 if kind == "Capsule" else 1.0  # of what USD takes where nothing is said
-    radius, height = length("radius", scale), length("height", 2 * scale)
-    if kind == "Cube":
-        return trimesh.creation.box([length("size", 2.0)] * 3)
-    if kind == "Sphere":
-        return trimesh.creation.icosphere(3, radius)
-    axis = str(values.value_of(prim.GetAttribute("axis")) or "Z")
-    if kind == "Plane":  # its width runs along x, along z where x is its axis; a turn takes x to y, or to z
-        x, y = (length(name, 2.0) / 2 for name in (("width", "length") if axis == "Z" else ("length", "width")))
-        mesh = trimesh.Trimesh([(-x, -y, 0), (x, -y, 0), (x, y, 0), (-x, y, 0)], [(0, 1, 2), (0, 2, 3)], process=False)
-    elif kind == "Cylinder":
-        mesh = trimesh.creation.cylinder(radius, height, sections=SIDES)
-    elif kind == "Cone":
-        mesh = trimesh.creation.cone(radius, height, sections=SIDES)
-    else:
-        mesh = trimesh.creation.capsule(height, radius, count=[SIDES, SIDES // 2])
-    mesh.apply_translation(-mesh.bounds.mean(0))  # USD's solids lie around their origin
-    turn = {"X": [[0, 0, 1], [1, 0, 0], [0, 1, 0]], "Y": [[0, 1, 0], [0, 0, 1], [1, 0, 0]]}.get(axis)
-    if turn is not None:
-        mesh.apply_transform(np.block([[np.array(turn, float), np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]]))
-    return mesh

@@ -8,9 +8,10 @@ import trimesh
 
 from echomodel.dressing.textiles import LEAN, cushion
 from echomodel.furniture import Choices, Style, solids
-from echomodel.furniture.cloth import Tufted, cover, pillow, seam
+from echomodel.furniture.cloth import cover, pillow, seam
 from echomodel.furniture.sofas import BODIES, upholstered_arms
 from echomodel.furniture.style import FAMILIES
+from echomodel.furniture.tufting import Tufted
 
 HALF = np.array([0.4, 0.1, 0.25])
 MADE = {

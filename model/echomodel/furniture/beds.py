@@ -8,10 +8,12 @@ from itertools import product
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, both, box, core, cushion, of_role
-from echomodel.furniture.cloth import Tufted, cover, pillow
+from echomodel.furniture.cloth import cover, pillow
 from echomodel.furniture.solids import Solid, ball, rotation, turned
 from echomodel.furniture.style import Choices, Style
+from echomodel.late import Late
 
+tufted = Late("echomodel.furniture.tufting:Tufted")
 COVERS = ("blanket", "blanket", "blanket_striped", "blanket_checked", "linen_striped")  # of beds
 SET_BACK = 0.006  # metres between two faces that would lie in one plane
 
@@ -19,7 +21,7 @@ SET_BACK = 0.006  # metres between two faces that would lie in one plane
 def _padded(low: tuple, high: tuple, apart: float, *, channels: bool = False) -> Solid:
     """A panel that is drawn in every `apart` metres, between two corners (3,)."""
     block = box(low, high)
-    return Tufted(block.centre, material="fabric", half=block.half, apart=apart, channels=channels)
+    return tufted(block.centre, material="fabric", half=block.half, apart=apart, channels=channels)
 
 
 def _headboard(style: Style, w: float, h: float, z: float) -> list[Solid]:

@@ -6,10 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from echomodel.furniture.solids import FINEST, IDENTITY, Array, Ball, Block, Solid, Vector, loft, superellipse
+from echomodel.furniture.solids import FINEST, IDENTITY, Array, Ball, Block, Solid, Vector, loft
 
 PINCH = 0.09  # of half a pillow's side that its middle stands back behind the corners
-BUTTON = ((0.014, -0.003), (0.015, 0.003), (0.008, 0.008))  # half widths of a button at heights over the cloth, metres
 FOOT, SPREAD = 0.15, 0.8  # of a slumped cushion's height, below which it does not lean; by how much it is wider there
 SEAM = 0.04  # of half a pillow's thickness that is left at its seams
 
@@ -119,7 +118,7 @@ class Cover(Block):
         y += hung * self.depth * (0.4 + 0.3 * np.sin(9 * line + phase[2]) + 0.3 * np.sin(23 * line + phase[1]))
         slack = self.depth * (0.5 + 0.5 * np.sin(6 * x + phase[1])) * np.clip(1 - (t + d) / 0.25, 0, 1)
         top = np.stack([x + out[0] * reach, y, z + out[1] * reach + slack], -1)
-        return _closed(top, *_grid(*s.shape), (0.0, -h, 0.0))
+        return closed(top, *grid(*s.shape), (0.0, -h, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,14 +129,14 @@ class Sheet(Solid):
     back: Array = field(default_factory=lambda: np.zeros((2, 2, 3)))
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        faces, border = _grid(*self.front.shape[:2])
+        faces, border = grid(*self.front.shape[:2])
         far, after = self.front.size // 3, np.roll(border, -1)
         strip = np.stack([after, border, border + far, after, border + far, after + far], 1).reshape(-1, 3)
         vertices = np.concatenate([self.front.reshape(-1, 3), self.back.reshape(-1, 3)])
         return vertices, _outward(vertices, np.concatenate([faces, faces[:, ::-1] + far, strip]))
 
 
-def _grid(n: int, m: int) -> tuple[Array, Array]:
+def grid(n: int, m: int) -> tuple[Array, Array]:
     """Triangles (f, 3) of a grid of n times m points, and the numbers of those at its border as it runs around them."""
     at = np.arange(n * m).reshape(n, m)
     a, b, c, d = (corner.ravel() for corner in (at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]))
@@ -156,57 +155,8 @@ def cover(
     return replace(made, phase=(first, second, third))
 
 
-@dataclass(frozen=True, eq=False)
-class Tufted(Block):
-    """A padded panel whose front (+z) is drawn in every `apart` metres: to buttons amid diamonds, or along channels."""
-
-    apart: float = 0.2
-    channels: bool = False
-
-    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        w, h, d = self.half
-        r, cells = min(0.04, 0.4 * self.apart, 0.45 * w, 0.45 * h, d), (2, 4, 4, 6)[detail]  # from a fold to the next
-        (x, i, e), (y, j, f) = (_rounded_line(*line) for line in (
-            (w, r, cells * max(1, round((2 + 2 * self.channels) * (w - r) / self.apart))),
-            (h, r, 1 if self.channels else cells * max(1, round(2 * (h - r) / self.apart)))))  # fmt: skip
-        i, edge = i[:, None], np.minimum(e[:, None], f)
-        if self.channels:
-            one = other = np.sqrt(np.abs(np.sin(np.pi * i / cells))) + 0 * j
-        else:
-            one, other = (np.abs(np.cos(np.pi * line / cells)) for line in (i + j, i - j))
-        drawn = (1 - one * other) ** 2 + 0.8 * (1 - np.maximum(one, other)) ** 2
-        z = d - r + r * np.sqrt(1 - (1 - edge) ** 2) - 0.44 * d * min(1.0, self.apart / 0.2) * drawn * edge
-        z[edge == 0] = -d
-        points = np.stack([*np.broadcast_arrays(x[:, None], y, z)], -1)
-        inner = (one + other < 1e-6) & (i > 0) & (i < i.max()) & (j > 0) & (j < j.max())
-        buttons = points[inner] if detail > 1 else points[:0, 0]
-        faces, border = _grid(*z.shape)
-        # of each quad, which folds where it is deeper, as its mirror image does
-        first, second = faces.reshape(2, -1, 3)
-        (a, b, c), e, z = first.T.copy(), second[:, 2].copy(), z.ravel()
-        gain = z[a] + z[c] - z[b] - z[e]
-        other = np.where(np.abs(gain) > 1e-6, gain > 0, (points.reshape(-1, 3)[[a, c], 0].sum(0) > 0))
-        first[other], second[other] = np.stack([a, b, e], 1)[other], np.stack([b, c, e], 1)[other]
-        vertices, faces = _closed(points, faces, border, (0.0, 0.0, -d))
-        knob, sides = loft([np.insert(superellipse(2.0, 6)[::-1] * wide, 2, high, axis=1) for wide, high in BUTTON])
-        more = (sides + len(knob) * np.arange(len(buttons))[:, None, None] + len(vertices)).reshape(-1, 3)
-        vertices = np.concatenate([vertices, (buttons[:, None] + knob).reshape(-1, 3)])
-        return vertices, np.concatenate([faces, more])
-
-
-def _rounded_line(half: float, r: float, cells: int) -> tuple[Array, Array, Array]:
-    """Places across a panel whose edges are round, as many cells between these; which cell each is at, and how far
-    in from the edge, in `r`.
-    """
-    near = np.array([0.0, 0.1, 0.4])
-    flat = np.linspace(r - half, half - r, cells + 1)
-    share = np.concatenate([near, np.ones(cells + 1), near[::-1]])
-    place = np.concatenate([r * near - half, flat, half - r * near[::-1]])
-    return place, np.concatenate([[0] * 3, np.arange(cells + 1), [cells] * 3]), share
-
-
-def _closed(points: Array, faces: Array, border: Array, end: tuple[float, float, float]) -> tuple[Array, Array]:
-    """The closed surface of a `_grid` of points (n, m, 3) whose border is joined to a point."""
+def closed(points: Array, faces: Array, border: Array, end: tuple[float, float, float]) -> tuple[Array, Array]:
+    """The closed surface of a `grid` of points (n, m, 3) whose border is joined to a point."""
     vertices = np.concatenate([points.reshape(-1, 3), [end]])
     fan = np.stack([np.roll(border, -1), border, np.full(len(border), len(vertices) - 1)], 1)
     return vertices, _outward(vertices, np.concatenate([faces, fan]))

@@ -12,10 +12,10 @@ import numpy as np
 
 from echomodel.files import tables
 from echomodel.furniture.carpentry import Size, base, both, box, cushion, of_role
-from echomodel.furniture.cloth import Tufted
 from echomodel.furniture.seating import chair_legs, leaning, slim_arms
 from echomodel.furniture.solids import Lathe, Pad, Solid, ball, bent, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
+from echomodel.furniture.tufting import Tufted
 
 BODIES: list[dict[str, Any]] = list(tables("bodies.toml", __file__).values())
 padded = partial(turned, material="fabric")

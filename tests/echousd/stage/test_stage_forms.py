@@ -10,10 +10,10 @@ import echousd
 from echousd.draw.drawables import read_drawables
 from echousd.stage.contents import read_contents, shape_of
 from echousd.stage.encoding import StageError
-from echousd.stage.forms import SkippedForms, polygons, solid
+from echousd.stage.forms import SkippedForms, polygons
 from echousd.stage.read import find_rooms
 from echousd.stage.showing import each_layout, showing_variant
-from echousd.stage.subdivision import refined
+from echousd.stage.subdivision import refined, solid
 
 
 def empty():
