@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import tempfile
 import weakref
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,16 +62,9 @@ class Room(RoomData):
 
         return render_stage(self.stage, view=view, size=size)
 
-    def _repr_png_(self) -> bytes | None:
+    def _repr_html_(self) -> str:
         from echousd.textures import encoded
 
-        try:
-            picture = self.image(size=360)
-        except ValueError:  # without embreex a notebook shows the table alone
-            return None
-        return encoded(picture)
-
-    def _repr_html_(self) -> str:
         kept = sum(v.state == "kept" for v in self.verdicts)
         measured = sum(v.state != "unmeasured" for v in self.verdicts)
         size = [" × ".join(f"{v:.2f}" for v in row) for row in self.boxes.size.tolist()]
@@ -79,8 +73,10 @@ class Room(RoomData):
         rows = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in cells)
         head = "".join(f"<th>{title}</th>" for title in ("object", "category", "size (m)", "position (m)"))
         count = f"{len(self.names)} objects, {kept} of {measured} measured relations kept"
-        png = self._repr_png_()
-        picture = f'<img width="360" src="data:image/png;base64,{base64.b64encode(png).decode()}">' if png else ""
+        picture = ""
+        with suppress(ValueError):  # without embreex a notebook shows the table alone
+            png = base64.b64encode(encoded(self.image(size=360))).decode()
+            picture = f'<img width="360" src="data:image/png;base64,{png}">'
         return f"<div><b>{self.name}</b>: {count}<br>{picture}<table><tr>{head}</tr>{rows}</table></div>"
 
     def __repr__(self) -> str:
