@@ -143,12 +143,16 @@ def joined(own: Size, anchor: Size, kind: Category, count: int, apart: float, ah
 
 
 def sides(own: Size, table: Size) -> list[Slot]:
-    """A second sofa again: at any side of the table that it shares, looking at it."""
+    """A second sofa again: at any side of the table that it shares, looking at it, or level with one end of that side,
+    where its corner is near the table's and there is room for knees."""
     out = []
-    for turn, half in zip((0.0, HALF_PI, math.pi, -HALF_PI), (table[2], table[0]) * 2, strict=True):
-        for gap, more in ((0.18, 0.0), (0.3, 0.1), (0.45, 0.1)):
-            away = half / 2 + own[2] / 2 + gap
-            out.append((math.sin(turn) * away, math.cos(turn) * away, turn + math.pi, more))
+    ways = ((0.18, 0, 0.0), (0.3, 0, 0.1), (0.45, 0, 0.1), (0.35, 1, 0.0), (0.35, -1, 0.0))
+    for quarter, turn in enumerate((0.0, HALF_PI, math.pi, -HALF_PI)):
+        deep, wide = table[[2, 0]] if quarter % 2 == 0 else table[[0, 2]]
+        for gap, end, more in ways:
+            away, level = deep / 2 + own[2] / 2 + gap, end * (own[0] - wide) / 2
+            at = math.sin(turn) * away + math.cos(turn) * level, math.cos(turn) * away - math.sin(turn) * level
+            out.append((*at, turn + math.pi, more))
     return out
 
 

@@ -20,6 +20,7 @@ from echousd.place.placing import place_boxes
 from echousd.place.problem import problem_of
 from echousd.place.proposals import out_of_habit, proposals, slots_at
 from echousd.place.search import MANY, Search, State
+from echousd.place.slots import sides
 
 ID = {row.name: row.id for row in vocabulary().predicates}
 FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
@@ -167,6 +168,18 @@ def test_a_second_sofa_is_tried_at_the_sides_of_the_table():
     near = np.hypot(rows[:, 0] - 1.2 / 2 - 0.45, rows[:, 1] + 2.2) < 0.5  # at its end
     looks = np.sin(rows[near, 2]) < -0.99
     assert (looks & (abs(rows[near, 1] + 2.2) < 0.01)).any()
+
+
+def test_a_second_sofa_level_with_an_end_of_the_table_is_near_it_and_leaves_room_for_knees():
+    words, size = ["sofa", "coffee_table"], [(2.2, 0.8, 0.9), (1.2, 0.4, 0.7)]
+    slots = sides(*np.array(size))
+    level = [slot for slot in slots if min(abs(slot[0]), abs(slot[1])) > 0.1]
+    for lateral, forward, turn, _ in level:
+        at = [(lateral, 0.0, forward), (0.0, 0.0, 0.0)]
+        search, _ = searched(words, size, at, [turn, 0.0], [(0, "close_by", 1)], floor=FLOOR * 2)
+        names = {term.name for term in search.terms if bool((term.find(search.problem.plan).margin < 0).any())}
+        assert not names & {"close_by", "knees_free", "apart"}, (lateral, forward)
+    assert len(level) == 8
 
 
 def test_an_ottoman_leaves_room_for_the_knees_before_its_sofa():
