@@ -6,10 +6,9 @@ import torch
 from torch import Tensor, nn
 
 from echomodel.compact.furniture import Furniture
-from echomodel.compact.latent import Latents
 from echomodel.compact.layout import BOX, PAIR_FEATURES, WALL_FEATURES, Layout
 from echomodel.compact.learned import Names, places
-from echomodel.compact.pairs import Echo, Pairs
+from echomodel.compact.pairs import Echo, Latents, Pairs
 from echomodel.config import CompactConfig
 from echomodel.surroundings import GRID, OPENING_FEATURES, PLAN
 

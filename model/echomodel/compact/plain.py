@@ -19,10 +19,9 @@ from safetensors.numpy import load
 from echomodel.arrays import silu
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.furniture import Furniture
-from echomodel.compact.latent import Latents
 from echomodel.compact.layout import Layout
 from echomodel.compact.learned import places
-from echomodel.compact.pairs import Echo
+from echomodel.compact.pairs import Echo, Latents
 from echomodel.compact.weights import joined_config, own_statistics, read_header
 from echomodel.config import CompactConfig
 
