@@ -22,11 +22,12 @@ AGAINST = 0.5  # share of the faces whose normals point the other way
 
 
 @rule("echo:MeshIndices", "meshes")
-def mesh_indices(_reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
+def mesh_indices(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     """Faces have three corners or more, as many in all as there are indices, and indices name points."""
-    points = array(mesh.GetPointsAttr(), 3)
-    counts = array(mesh.GetFaceVertexCountsAttr(), whole=True)
-    indices = array(mesh.GetFaceVertexIndicesAttr(), whole=True)
+    read = readable(lambda: reading.mesh(mesh), None)
+    points = array(mesh.GetPointsAttr(), 3) if read is None else read.points
+    counts = array(mesh.GetFaceVertexCountsAttr(), whole=True) if read is None else read.counts
+    indices = array(mesh.GetFaceVertexIndicesAttr(), whole=True) if read is None else read.indices
     if len(counts) and counts.min() < 3:
         yield f"a face has {counts.min()} corners, allowed: 3 or more"
     elif counts.sum() != len(indices):

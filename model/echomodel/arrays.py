@@ -180,7 +180,10 @@ def silu(values: Array) -> Array:
 
 def parted(values: Array, count: int) -> Any:
     """So many equal parts of the columns of values (n, c)."""
-    return np.split(values, count, 1) if isinstance(values, NUMPY) else values.chunk(count, 1)
+    if not isinstance(values, NUMPY):
+        return values.chunk(count, 1)
+    width = values.shape[1] // count
+    return [values[:, first : first + width] for first in range(0, count * width, width)]
 
 
 def softmax(values: Array) -> Array:

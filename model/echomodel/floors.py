@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, at_most, cast, dot, kit
+from echomodel.arrays import NUMPY, Array, at_least, at_most, cast, dot, kit
 from echomodel.boxes2d import outline
 
 SIDES = ((-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0))  # corners and middles of a footprint
@@ -29,9 +29,10 @@ def signed_area(floor: Array) -> Array:
 
 def edges(floor: Array) -> tuple[Array, Array]:
     """Start and end (S, K, 2) of the walls; padding repeats the first corner, which makes walls of no length."""
-    xp = kit(floor)
-    start = xp.nan_to_num(xp.where(xp.isfinite(floor), floor, floor[:, :1]))  # NaN would spoil gradients
-    return start, xp.roll(start, -1, 1)
+    xp, start = kit(floor), floor
+    if not isinstance(floor, NUMPY) or not np.isfinite(floor).all():
+        start = xp.nan_to_num(xp.where(xp.isfinite(floor), floor, floor[:, :1]))  # NaN would spoil gradients
+    return start, xp.concat([start[:, 1:], start[:, :1]], 1)
 
 
 def signed_distance(points: Array, floor: Array) -> Array:
