@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Literal, Self
 
@@ -175,8 +176,8 @@ class Turned(Solid):
             rims += [(self.height - r + r * np.sin(t), high - (r - r * np.cos(t))) for t in arc]
         else:
             rims = [(0.0, low), (self.height, high)]
-        rings = [np.insert(outline * np.maximum(half, 1e-4), 1, y, axis=1) for y, half in rims]
-        return loft(rings)
+        levels, halves = zip(*rims, strict=True)
+        return loft(at_levels(outline * np.maximum(halves, 1e-4)[:, None], np.array(levels)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,17 +273,27 @@ def superellipse(power: float, corners: int = 32) -> Array:
     return np.sign(points) * np.abs(points) ** (2 / power)
 
 
-def loft(rings: list[Array]) -> tuple[Array, Array]:
+def at_levels(outlines: Array, levels: Array) -> Array:
+    """Rings (n, k, 3) of outlines (n, k, 2) in plan, each at a height of its own (n,)."""
+    return np.stack([outlines[..., 0], levels[:, None] + 0 * outlines[..., 0], outlines[..., 1]], -1)
+
+
+def loft(rings: Sequence[Array] | Array) -> tuple[Array, Array]:
     """Closed surface through rings of equal length (k, 3): quads between neighbours, a fan over each end."""
-    k, n = len(rings[0]), len(rings)
     vertices = np.concatenate([*rings, rings[0].mean(0)[None], rings[-1].mean(0)[None]])
+    return vertices, _lofted(len(rings), len(rings[0]))
+
+
+@lru_cache(maxsize=256)
+def _lofted(n: int, k: int) -> Array:
+    """Faces (f, 3) of the surface through n rings of k corners, and the middles of both ends."""
     i = np.arange(k)
     j = (i + 1) % k
     faces = [np.stack([r * k + i, r * k + j, (r + 1) * k + j], 1) for r in range(n - 1)]
     faces += [np.stack([r * k + i, (r + 1) * k + j, (r + 1) * k + i], 1) for r in range(n - 1)]
     faces.append(np.stack([np.full(k, n * k), j, i], 1))
     faces.append(np.stack([np.full(k, n * k + 1), (n - 1) * k + i, (n - 1) * k + j], 1))
-    return vertices, np.concatenate(faces)
+    return np.concatenate(faces)
 
 
 _CUBES: dict[int, tuple[Array, Array]] = {}
@@ -356,7 +367,7 @@ class Lathe(Solid):
         largest = float(self.profile[:, 0].max())
         corners = ((8, 12, 20, 32) if largest > 0.05 else (6, 8, 10, 14))[detail]
         circle = superellipse(2.0, corners) * [1.0, self.squash]
-        rings = [np.insert(circle * max(r, 1e-4), 1, y, axis=1) for r, y in self.profile]
+        rings = at_levels(circle * np.maximum(self.profile[:, :1, None], 1e-4), self.profile[:, 1])
         if not self.hollow:
             return loft(rings)
         k, n = corners, len(rings)
@@ -365,7 +376,7 @@ class Lathe(Solid):
         for ring in range(n):
             low, high = ring * k, (ring + 1) % n * k
             faces += [np.stack([low + i, low + j, high + j], 1), np.stack([low + i, high + j, high + i], 1)]
-        return np.concatenate(rings), np.concatenate(faces)
+        return rings.reshape(-1, 3), np.concatenate(faces)
 
     def _outline(self) -> Array:
         if self.hollow:
