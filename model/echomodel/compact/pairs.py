@@ -142,13 +142,10 @@ class Echo(Layers):
         some = len(a) * CACHED // max(1, len(pairs.receiver)) + 1
         if some >= len(a) or not isinstance(a, NUMPY):
             return pair_messages(a, b, self.told(pairs.stated), pairs.receiver, pairs.sender)
-        first = range(0, len(a), some)
-        rows = [*pairs.receiver.searchsorted(first), len(pairs.receiver)]
-        parts = ((at, slice(*rows[k : k + 2])) for k, at in enumerate(first))
-        return np.concatenate([
-            pair_messages(a[at : at + some], b, self.told(pairs.stated[i]), pairs.receiver[i] - at, pairs.sender[i])
-            for at, i in parts
-        ])  # fmt: skip
+        cuts = pairs.receiver.searchsorted(range(some, len(a), some))
+        split = (np.split(of, cuts) for of in (pairs.receiver, pairs.sender, pairs.stated))
+        blocks = zip(range(0, len(a), some), *split, strict=True)
+        return np.concatenate([pair_messages(a[k : k + some], b, self.told(p), i - k, j) for k, i, j, p in blocks])
 
 
 class Latents(Layers):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import pairwise
 from typing import Any, Literal, Self
 
@@ -296,28 +296,24 @@ def _lofted(n: int, k: int) -> Array:
     return np.concatenate(faces)
 
 
-_CUBES: dict[int, tuple[Array, Array]] = {}
-
-
+@cache
 def cube_surface(cells: int) -> tuple[Array, Array]:
     """Surface of the cube [-1, 1]^3 as a grid of `cells` quads an edge, vertices shared."""
-    if cells not in _CUBES:
-        steps = np.linspace(-1, 1, cells + 1)
-        u, v = (g.ravel() for g in np.meshgrid(steps, steps, indexing="ij"))
-        index = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
-        a, b, c, d = index[:-1, :-1].ravel(), index[1:, :-1].ravel(), index[1:, 1:].ravel(), index[:-1, 1:].ravel()
-        quads = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-        points: list[Array] = []
-        faces: list[Array] = []
-        for axis in range(3):
-            for side in (-1.0, 1.0):
-                face = np.empty((len(u), 3))
-                face[:, axis], face[:, (axis + 1) % 3], face[:, (axis + 2) % 3] = side, u, v
-                faces.append((quads if side > 0 else quads[:, ::-1]) + len(u) * len(points))
-                points.append(face)
-        vertices, inverse = np.unique(np.round(np.concatenate(points), 9), axis=0, return_inverse=True)
-        _CUBES[cells] = vertices, inverse.reshape(-1)[np.concatenate(faces)]
-    return _CUBES[cells]
+    steps = np.linspace(-1, 1, cells + 1)
+    u, v = (g.ravel() for g in np.meshgrid(steps, steps, indexing="ij"))
+    index = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
+    a, b, c, d = index[:-1, :-1].ravel(), index[1:, :-1].ravel(), index[1:, 1:].ravel(), index[:-1, 1:].ravel()
+    quads = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    points: list[Array] = []
+    faces: list[Array] = []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            face = np.empty((len(u), 3))
+            face[:, axis], face[:, (axis + 1) % 3], face[:, (axis + 2) % 3] = side, u, v
+            faces.append((quads if side > 0 else quads[:, ::-1]) + len(u) * len(points))
+            points.append(face)
+    vertices, inverse = np.unique(np.round(np.concatenate(points), 9), axis=0, return_inverse=True)
+    return vertices, inverse.reshape(-1)[np.concatenate(faces)]
 
 
 Vector = Sequence[float] | Array  # (3,)
