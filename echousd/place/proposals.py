@@ -9,9 +9,9 @@ from itertools import groupby, product
 import numpy as np
 
 from echomodel.boxes2d import hull
-from echomodel.objective.access import DEEP, PASSAGE, WALKED_BEHIND, to_wall
+from echomodel.objective.access import DEEP, WALKED_BEHIND, to_wall
 from echomodel.objective.company import places_of
-from echomodel.objective.sight import WATCHED_FROM
+from echomodel.objective.sight import PASSAGE, WATCHED_FREE, WATCHED_FROM
 from echomodel.objective.support import ON_CEILING
 from echomodel.vocabulary import vocabulary
 from echousd.place.distances import APART, MOST_UNDER, kept_apart, over_bed, seen_from, spread_at_walls
@@ -296,8 +296,8 @@ def _in_view(problem: Problem, i: int, at_walls: Sequence[Row]) -> list[Row]:
     front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
     free = to_wall(problem.plan, np.zeros(len(rows), int), rows[:, :2], front)
     deep = free + float(problem.size[i, 2]) / 2 > DEEP
-    away = [free - AMID * far, np.full(len(rows), WALKED_BEHIND - 0.01 - problem.behind[i]), free - far]
-    keep = [free > max(far, AMID * far + PASSAGE), deep, deep & (free > far + WALKED_BEHIND)]
+    away = [free - AMID * far, np.full(len(rows), WALKED_BEHIND - 0.01 - problem.behind[i]), free - WATCHED_FREE]
+    keep = [free > max(far, AMID * far + PASSAGE), deep, deep & (free > WATCHED_FREE + WALKED_BEHIND)]
     out = [(rows + np.pad(off[:, None] * front, ((0, 0), (0, 2))))[at] for off, at in zip(away, keep, strict=True)]
     return [(x, z, yaw, more) for x, z, yaw, more in np.concatenate(out).tolist()]
 
@@ -319,6 +319,7 @@ def _overhead(problem: Problem, position: np.ndarray, yaw: np.ndarray, there: np
     above = vocabulary().predicate_id("above")
     under = [b for a, word, b in problem.triplets.tolist() if a == i and word == above]
     low = problem.kinds[i].look == "pendant_lamp"  # it would meet heads
+    others = there & np.array([kind.support == "ceiling" for kind in problem.kinds]) & (np.arange(len(there)) != i)
     rows: list[Row] = []
     for j, kind in enumerate(problem.kinds):
         lit = kind.role == "bed" or (kind.role == "board" and not kind.access)
@@ -326,7 +327,8 @@ def _overhead(problem: Problem, position: np.ndarray, yaw: np.ndarray, there: np
             continue
         (x, _, z), heading = position[j].tolist(), float(yaw[j])
         long = heading if problem.size[j, 0] >= problem.size[j, 2] else heading - HALF_PI
-        more = 0.3 * _lamps_over(problem, position, there, i, j) + 0.2 * (kind.stands == "beside") + LOOSE * (not low)
+        lamps = int((np.hypot(*(position[others] - position[j])[:, [0, 2]].T) < 0.5).sum())  # that hang there already
+        more = 0.3 * lamps + 0.2 * (kind.stands == "beside") + LOOSE * (not low)
         more = 0.0 if j in under else more
         for away in _row_over(problem, i, j):  # along its long side
             rows.append((x + math.cos(long) * away, z - math.sin(long) * away, heading, more))
@@ -343,13 +345,6 @@ def _row_over(problem: Problem, i: int, j: int) -> list[float]:
         return [over_bed(problem.size, problem.position, problem.yaw, i, j) if problem.kinds[j].role == "bed" else 0.0]
     length = float(problem.size[j, [0, 2]].max())
     return [((k + 0.5) / len(lamps) - 0.5) * length for k in range(len(lamps))]
-
-
-def _lamps_over(problem: Problem, position: np.ndarray, there: np.ndarray, i: int, j: int) -> int:
-    """How many other lamps hang over box j."""
-    lamps = there & np.array([kind.support == "ceiling" for kind in problem.kinds])
-    lamps[i] = False
-    return int((np.hypot(*(position[lamps] - position[j])[:, [0, 2]].T) < 0.5).sum())
 
 
 def height_of(problem: Problem, position: np.ndarray, i: int) -> float:

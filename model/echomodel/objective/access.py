@@ -9,18 +9,17 @@ import numpy as np
 from echomodel.arrays import Array, at_least, at_most, cast, dot, full, held, kit, least_of, picked, put
 from echomodel.objective.company import COMPANY
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, nobody, worst
-from echomodel.objective.sight import WATCHED_FROM, screens
+from echomodel.objective.sight import PASSAGE, WATCHED_FREE, screens
 from echomodel.openings import SLID, Opening, hinge_point, inward_normal, segment
 
 CROOKED = math.radians(1.0)  # 98 % of such furniture in real rooms is turned less
 TOUCHING = 0.3  # metres: 93 % of real beds, nightstands and tv stands have a smaller gap behind
 NEAR_WALL = 0.2  # metres between a wall and the front or back of a desk
 DINERS = 3  # chairs that make a dining table of a desk
-PASSAGE = 0.75  # metres: a sofa so far from the wall may stand in the room on purpose, one walks behind it
 DEEP = 6.0  # metres of the room along its axis from which on it does; or something of another group stands behind it
 # Metres behind it at most, if nothing stands there (two of 129 real sofas have more), and what of more counts; in a
 # hall so deep that from there no screen at the wall ahead is watched more, beside the depth of both halves.
-WALKED_BEHIND, BARE, IN_HALL, HALVES = 1.3, 0.02, 2.5, 0.4
+WALKED_BEHIND, BARE, IN_HALL, HALVES = 1.3, 0.02, 3.1, 0.4
 MET = 0.25  # share of its width from which on something is behind it
 # Metres to what an armchair looks at, to 45 degrees, and to a wall that it does not look at.
 SEEN, NEAR = 3.0, 2.0
@@ -62,7 +61,7 @@ def at_wall(plan: Plan) -> Found:
     free, margin, xp = free[who] & (gap >= PASSAGE), TOUCHING - gap, plan.kit
     if bool(free.any()):
         depth = gap + plan.size[who, 2] + wall_ahead(plan, who)
-        most = (depth - WATCHED_FROM["sofa"][1] - HALVES).clip(WALKED_BEHIND, IN_HALL)
+        most = (depth - WATCHED_FREE - HALVES).clip(WALKED_BEHIND, IN_HALL)
         bare = at_least(most - gap, -BARE)
         bare = xp.where(depth >= DEEP, bare, margin)
         bare = xp.where(_backed(plan, who, held(gap)), FAR, bare)
@@ -263,7 +262,7 @@ def _clearance(plan: Plan, who: Array, polygon: np.ndarray, opening: Opening, de
         x = at_least(abs((middle - hinge) @ closed) - reach(closed), 0.0)
         z = at_least(abs((middle - hinge) @ inward) - reach(inward), 0.0)
         out = xp.maximum(out, xp.sqrt(at_least(x * x + z * z, 1e-12)) - opening.width)
-        further = (ENTERED - opening.depth) * plan.stands("company")[who]
-        walked = xp.maximum(beside + max(opening.width - WALKED, 0.0) / 2, deep - further)
-        out = out if depth is not None else xp.minimum(walked, out)
+    if depth is None:
+        further = max(ENTERED - opening.depth, 0.0) * plan.stands("company")[who]
+        out = xp.minimum(out, xp.maximum(beside + max(opening.width - WALKED, 0.0) / 2, deep - further))
     return out + GRAZE

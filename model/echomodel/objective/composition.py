@@ -6,18 +6,20 @@ Distances were measured on 300 real rooms with their furniture, unless a standar
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from echomodel.arrays import Array, at_least, at_most, cast, full, held, least_of, norm, once, rows, sum_of
 from echomodel.floors import footprint, signed_area, signed_distance
+from echomodel.objective.access import WALKED
 from echomodel.objective.company import AROUND, BESIDE, first_of, seats_at
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
 from echomodel.sizes import REACH, filled_area
 
 # Radius of an empty circle, of the side of a square of each piece's share of the floor; more a square metre; at most.
 BARE = (0.48, 0.0116, 1.0)
-AHEAD = 1.0  # metres before a sofa to other groups: 97 % of real ones have them
+AHEAD, IN_VIEW = 1.0, 1.5  # metres before a sofa and a group's armchair to other groups: 97 % of real ones have them
 COVERED = 0.25  # share of its width from which on something is before it
 CELL, POINTS = 0.25, 1000  # metres between two points of the floor that are looked at; in a hall so many, farther apart
 FEW, LARGE = 5, 0.4  # pieces: fewer fill no room; square metres of those that fill an end of it
@@ -115,13 +117,22 @@ def _squares(plan: Plan, who: Array, points: Array) -> Array:
 
 
 def sofa_ahead(plan: Plan) -> Found:
-    """What lies right before a sofa belongs to its group: no dining table, chair or desk stands there."""
+    """What lies right before a sofa belongs to its group; an armchair looks at the back of no chair, one of a group at
+    no table of another; behind a sofa one passes between it and those."""
+    loungers, xp = plan.of("sofa") | (plan.stands("company") & plan.of("seat")), plan.kit
     sofas = plan.of("sofa") & plan.standing & ~plan.stands("company")
+    chairs, grouped = plan.stands("at") & plan.of("seat") & plan.standing, plan.anchor >= 0
     others = plan.of("board", "seat", "storage", "bed", "sofa") & plan.standing & ~plan.stands("opposite")
-    i, j = plan.pairs(sofas, others, least=True)
-    other = plan.group[i] != plan.group[j]
-    i, j = i[other], j[other]
-    return plan.nearest(i, j, plan.more_ahead(i, j, AHEAD, COVERED), AHEAD)
+    i, j = plan.pairs(loungers & plan.standing, others, least=True)
+    met = (plan.group[i] != plan.group[j]) & (sofas[i] | chairs[j] | (grouped[i] & plan.dining[j]))
+    i, j = i[met], j[met]
+    needed = cast(xp.where(sofas, AHEAD, IN_VIEW), plan.size)
+    towards = chairs[j] & ~sofas[i] & (xp.cos(plan.yaw[i] - plan.yaw[j]) < 0)
+    ahead = plan.nearest(i, j, xp.where(towards, FAR, plan.more_ahead(i, j, needed[i], COVERED)), 0.0)
+    ahead = replace(ahead, measure=at_least(ahead.margin + needed[ahead.who], 0.0))
+    met = sofas[i] & (plan.dining | chairs)[j]
+    behind = plan.nearest(i[met], j[met], plan.more_ahead(i[met], j[met], WALKED, COVERED, sign=-1.0), WALKED)
+    return joined(ahead, replace(behind, words=behind.words + 1))
 
 
 # Share of a room's length from a wall to the nearest large piece: 87 % of real rooms; from one such piece to the next:
@@ -260,13 +271,13 @@ def _free_sides(plan: Plan) -> tuple[Array, Array]:
 
 
 def _free_beside(plan: Plan, who: Array) -> Array:
-    """(P, 4): metres free left, right, behind and before of tables, to walls and to what is no seat."""
+    """(P, 4): metres free left, right, behind and before of tables, to walls and to what is neither seat nor lamp."""
     (right, front), xp = plan.axes(who), plan.kit
     out = xp.stack([-right, right, -front, front], 1)
     half = plan.size[who][:, [0, 0, 2, 2]] / 2
     edge = plan.position[who][:, None, ::2] + out * half[..., None]
     walls = plan.inside(edge + out * SEAT, who) + SEAT
-    row, k = plan.beside(who, plan.standing & ~plan.of("seat") & (plan.size[:, 1] > CLEAR_HEIGHT))
+    row, k = plan.beside(who, plan.standing & ~plan.of("seat", "light") & (plan.size[:, 1] > CLEAR_HEIGHT))
     j = who[row]
     keep = k != j
     row, k, j = row[keep], k[keep], j[keep]

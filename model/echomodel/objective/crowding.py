@@ -9,7 +9,7 @@ from echomodel.objective.plan import FAR, Found, Plan, found, joined
 # Metres between pieces of different groups, by role: the 2nd to 3rd percentile in real rooms.
 APART = {
     ("sofa", "board"): 0.2, ("sofa", "seat"): 0.12, ("board", "board"): 0.1, ("board", "seat"): 0.05,
-    ("seat", "seat"): 0.06, ("seat", "storage"): 0.12, ("bed", "seat"): 0.05, ("bed", "sofa"): 0.12,
+    ("seat", "seat"): 0.06, ("seat", "storage"): 0.12, ("bed", "seat"): 0.05, ("bed", "sofa"): 0.35,
     ("bed", "bed"): 0.15, ("bed", "board"): 0.25,
 }  # fmt: skip
 ROLES = sorted({role for pair in APART for role in pair})
@@ -55,8 +55,6 @@ def groups_apart(plan: Plan) -> Found:
 def _side_by_side(plan: Plan, i: Array, j: Array) -> Array:
     """(P,) bool: desks and the like in one row, looking the same way."""
     boards = plan.of("board")[i] & plan.of("board")[j]
-    if not bool(boards.any()):
-        return boards
     aside = abs(plan.local(i, j)[0]) - plan.reach(i, j)[0] - plan.size[j, 0] / 2
     return boards & (aside > -0.05) & (plan.kit.cos(plan.yaw[i] - plan.yaw[j]) > 0.97)
 

@@ -138,7 +138,9 @@ class Builder:
         return not any(overlaps(zone, other, 0.03) for other in self.items if other not in ignore)
 
     def add(self, item: Item, style: int) -> Item:
-        item.style, item.size = style, _of_its_kind(item)
+        table = size_statistics(item.category)  # no side is far beyond what such furniture comes in
+        x, y, z = np.clip(item.size, SMALLEST * table.low, LARGEST * table.high).tolist()
+        item.style, item.size = style, (x, y, z)
         item.__post_init__()
         self.items.append(item)
         zone = front_zone(item)
@@ -237,13 +239,6 @@ class Builder:
             if placed:
                 return placed
         return None
-
-
-def _of_its_kind(item: Item) -> Size:
-    """The size of an item, no side far beyond what such furniture comes in."""
-    table = size_statistics(item.category)
-    x, y, z = np.clip(item.size, SMALLEST * table.low, LARGEST * table.high).tolist()
-    return x, y, z
 
 
 def front_zone(item: Item) -> Item | None:

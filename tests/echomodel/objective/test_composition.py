@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.objective import composition, crowding
+from echomodel.objective import composition, crowding, sight
 from echomodel.objective.plan import plan_of
 
 HALF = np.pi / 2
@@ -50,6 +50,56 @@ def test_chairs_stand_no_fence(pitch, margin):
 def test_chairs_do_not_touch_across_the_corner_of_their_table(aside, margin):
     chairs = seated(((0.4, 0.65), np.pi), ((0.85, aside), -HALF))
     assert list(seen(crowding.seats_apart, chairs)[0].values()) == [pytest.approx(margin)]
+
+
+@pytest.mark.parametrize(("gap", "margin"), [(1.4, -0.1), (1.6, 0.1)])
+def test_an_armchair_of_a_group_looks_at_no_chair_of_another(gap, margin):
+    sofa = ("multi_seat_sofa", (2.0, 0.8, 0.9), (0.0, 0.0), 0.0)
+    armchair = ("armchair", (0.8, 0.8, 0.8), (1.8, 0.8), HALF)
+    back = ("dining_chair", (0.5, 0.9, 0.5), (2.2 + gap + 0.25, 0.8), HALF)
+    table = ("dining_table", (0.8, 0.75, 1.6), (2.2 + gap + 0.85, 0.8), 0.0)
+    found, seen_of, _ = seen(composition.sofa_ahead, [sofa, armchair, table, back], (9.0, 4.0))
+    assert found[1] == pytest.approx(margin)
+    assert dict(zip(seen_of.who.tolist(), seen_of.other.tolist(), strict=True))[1] == 3
+    assert seen_of.measure.tolist()[seen_of.who.tolist().index(1)] == pytest.approx(gap)
+    alone, *_ = seen(composition.sofa_ahead, [armchair, table, back], (9.0, 4.0))
+    assert alone == {0: pytest.approx(margin)}  # one of no group, too, but it may look at a table, and a face
+    assert seen(composition.sofa_ahead, [armchair, table], (9.0, 4.0))[0] == {}
+    assert seen(composition.sofa_ahead, [armchair, table, (*back[:3], -HALF)], (9.0, 4.0))[0] == {}
+
+
+@pytest.mark.parametrize(("gap", "aside", "margin"), [(0.5, 0.0, -0.1), (0.7, 0.0, 0.1), (0.5, 1.4, 0.4)])
+def test_one_passes_between_a_sofa_and_the_table_behind_it(gap, aside, margin):
+    sofa = ("multi_seat_sofa", (2.0, 0.8, 0.9), (0.0, 0.0), 0.0)
+    table = ("dining_table", (1.2, 0.75, 0.8), (aside, -0.45 - gap - 0.4), 0.0)
+    _, found, _ = seen(composition.sofa_ahead, [sofa, table])
+    assert found.margin.tolist()[-1] == pytest.approx(margin if not aside else 0.5 - (1.0 + 0.6 - aside))
+    assert found.words.tolist()[-1] == 1
+    desk = ("desk", (1.2, 0.75, 0.8), (aside, -0.45 - gap - 0.4), 0.0)  # which may stand there
+    assert min(seen(composition.sofa_ahead, [sofa, desk])[0].values(), default=1.0) >= 0
+
+
+@pytest.mark.parametrize(("gap", "margin"), [(0.3, -0.05), (0.4, 0.05)])
+def test_a_sofa_keeps_off_the_side_of_a_bed(gap, margin):
+    bed = ("double_bed", (1.8, 0.5, 2.0), (0.0, 0.0), 0.0)
+    sofa = ("multi_seat_sofa", (2.0, 0.8, 0.9), (0.9 + gap + 1.0, 0.0), 0.0)
+    assert list(seen(crowding.groups_apart, [bed, sofa])[0].values()) == [pytest.approx(margin)]
+
+
+@pytest.mark.parametrize(("beside", "margin"), [("side_table", 0.4), ("floor_lamp", -0.24)])
+def test_a_lamp_makes_no_nook_for_a_plant(beside, margin):
+    plant = ("plant", (0.4, 1.0, 0.4), (0.0, -1.8), 0.0)
+    found, *_ = seen(composition.plant_in_nook, [plant, (beside, (0.4, 1.2, 0.4), (0.6, -1.8), 0.0)], (4.4, 4.0))
+    assert found == {0: pytest.approx(margin, abs=1e-3)}
+
+
+@pytest.mark.parametrize(
+    ("behind", "away", "margin"), [(0.1, 5.1, 0.1), (0.1, 5.3, -0.1), (0.8, 4.3, 0.1), (0.8, 4.5, -0.1)]
+)
+def test_a_sofa_is_near_enough_to_its_screen_the_more_so_where_it_stands_free(behind, away, margin):
+    sofa = ("multi_seat_sofa", (2.0, 0.8, 0.9), (0.0, behind + 0.45 - 3.5), 0.0)
+    stand = ("tv_stand", (1.8, 0.5, 0.4), (0.0, behind + 0.45 + away - 3.5), np.pi)
+    assert seen(sight.screen_in_view, [sofa, stand], (5.0, 7.0))[0] == {1: pytest.approx(margin)}
 
 
 def test_seats_at_desks_and_single_chairs_need_no_elbow_room():
