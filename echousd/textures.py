@@ -54,16 +54,17 @@ def texture_bytes(path: str) -> bytes | None:
     return bytes(asset.GetBuffer())
 
 
-def read_image(path: str) -> np.ndarray:
+def read_image(path: str, halved: int = 0) -> np.ndarray:
     """(h, w, 3) uint8 sRGB of the image at a resolved path; one grey pixel where there is no file.
 
-    Raises TextureError for what `texture_bytes` refuses, what is no image, and more than `MAX_PIXELS` pixels.
+    `halved`: how often its sides are halved; of a JPEG, at most thrice, that makes reading it quicker. Raises
+    TextureError for what `texture_bytes` refuses, what is no image, and more than `MAX_PIXELS` pixels.
     """
     content = texture_bytes(path)
-    return np.full((1, 1, 3), GREY, np.uint8) if content is None else decoded(content, path)
+    return np.full((1, 1, 3), GREY, np.uint8) if content is None else decoded(content, path, halved)
 
 
-def decoded(content: bytes, path: str) -> np.ndarray:
+def decoded(content: bytes, path: str, halved: int = 0) -> np.ndarray:
     """(h, w, 3) uint8 sRGB of an encoded image; raises TextureError, which calls it `path`, as `read_image` does."""
     from PIL import Image
 
@@ -79,7 +80,9 @@ def decoded(content: bytes, path: str) -> np.ndarray:
                     raise TextureError(
                         f"{path}: an image of {width} x {height} pixels, allowed: {MAX_PIXELS} (8192 x 8192)"
                     )
-                return _rgb(image)
+                image.draft(None, (max(width >> halved, 1), max(height >> halved, 1)))
+                many = 2**halved * image.width // width  # that are left to be one
+                return _rgb(image) if many < 2 else np.asarray(Image.fromarray(_rgb(image)).reduce(many))
         except TextureError:
             raise
         except Image.DecompressionBombError:
@@ -101,6 +104,6 @@ def _rgb(image: Image) -> np.ndarray:
     image.load()
     out = np.empty((image.height, image.width, 3), np.uint8)
     for top in range(0, image.height, STRIP):
-        strip = image.crop((0, top, image.width, min(top + STRIP, image.height)))
-        out[top : top + STRIP] = np.asarray(strip.convert("RGB"))
+        strip = image if image.height <= STRIP else image.crop((0, top, image.width, min(top + STRIP, image.height)))
+        out[top : top + STRIP] = np.asarray(strip if strip.mode == "RGB" else strip.convert("RGB"))
     return out

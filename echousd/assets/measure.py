@@ -195,6 +195,7 @@ def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) ->
                 faces.append(triangles)
                 coats += _stage_coats(form, surface, known, covers) if painted else ()
     prims = [root, *Usd.PrimRange(root, Usd.TraverseInstanceProxies())]
+    _, _, unresolved = UsdUtils.ComputeAllDependencies(Sdf.AssetPath(str(path)))
     layer = stage.GetRootLayer()
     data = dict(layer.customLayerData)
     measures = any(used.pseudoRoot.HasInfo("metersPerUnit") for used in stage.GetUsedLayers())
@@ -218,7 +219,7 @@ def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) ->
         bodies=any(prim.HasAPI(UsdPhysics.RigidBodyAPI) for prim in prims),
         colliders=any(prim.HasAPI(UsdPhysics.CollisionAPI) for prim in prims),
         variants=variants,
-        missing=tuple(missing_files(path)),
+        missing=tuple(sorted({PurePosixPath(str(name).replace("\\", "/")).name for name in unresolved})),
         coats=tuple(coats),
     )
 
@@ -268,9 +269,3 @@ def named_prim(stage: Usd.Stage, path: Path, prim_path: str) -> Usd.Prim:
     if not prim:
         raise StageError(f"{path}: no prim <{prim_path}>, allowed: the path of a prim of the stage")
     return prim
-
-
-def missing_files(path: Path) -> list[str]:
-    """Files that a stage depends on and that are not there, as their names end."""
-    _, _, unresolved = UsdUtils.ComputeAllDependencies(Sdf.AssetPath(str(path)))
-    return sorted({PurePosixPath(str(name).replace("\\", "/")).name for name in unresolved})

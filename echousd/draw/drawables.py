@@ -75,6 +75,7 @@ def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
     to_world = to_metres(stage)
     cache = UsdGeom.XformCache(values.NOW)
     known: dict[str, Paint] = {}
+    owners: dict[Usd.Prim, tuple[str, str]] = {}
     shapes: dict[Usd.Prim, tuple | None] = {}  # of what an instancer places often
     for form in forms(stage.GetPseudoRoot(), cache):
         prim = form.prim
@@ -83,38 +84,40 @@ def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
             shapes[prim] = part
         if part is not None:
             triangles, normals, st, paints = part
-            component = (
-                _component(prim)
-                if form.above is None
-                else f"{_component(form.above)}{form.path.partition('[')[2].partition(']')[0]}"
-            )
-            category = _category(prim) or (_category(form.above) if form.above else "")
+            component, category = _owner(prim, owners)
+            component = component or prim.GetName()
+            if form.above is not None:
+                above, also = _owner(form.above, owners)
+                number = form.path.partition("[")[2].partition("]")[0]
+                component, category = f"{above or form.above.GetName()}{number}", category or also
             double = bool(values.value_of(UsdGeom.Gprim(prim).GetDoubleSidedAttr()))
             yield Drawable(
                 form.path, component, category, to_world @ form.world, triangles, normals, st, paints, double
             )
 
 
-def image_of(prim: str, file: str) -> np.ndarray:
-    """(h, w, 3) uint8 sRGB of the image that a prim names, by their paths; raises StageError naming both."""
+def image_of(prim: str, file: str, halved: int = 0) -> np.ndarray:
+    """(h, w, 3) uint8 sRGB of the image that a prim names, by paths, halved so often; raises StageError naming both."""
     try:
-        return read_image(file)
+        return read_image(file, halved)
     except TextureError as error:
         raise StageError(f"<{prim}>: {error}") from None
 
 
-def _category(prim: Usd.Prim) -> str:
-    return next(filter(None, map(own_category, values.lineage(prim))), "")
+def _owner(prim: Usd.Prim, known: dict[Usd.Prim, tuple[str, str]]) -> tuple[str, str]:
+    """Name of the nearest component at or above a prim, and the nearest category, "" without one; `known` grows."""
+    if prim.IsPseudoRoot():
+        return "", ""
+    if prim not in known:
+        component, category = _owner(prim.GetParent(), known)
+        whole = Usd.ModelAPI(prim).GetKind() == "component"
+        known[prim] = prim.GetName() if whole else component, own_category(prim) or category
+    return known[prim]
 
 
 def own_category(prim: Usd.Prim) -> str:
     """The category that a prim itself is labelled with, "" without one."""
     return next(iter(values.texts(prim.GetAttribute(LABELS))), "")
-
-
-def _component(prim: Usd.Prim) -> str:
-    above = (each for each in values.lineage(prim) if Usd.ModelAPI(each).GetKind() == "component")
-    return next(above, prim).GetName()
 
 
 def _part(
@@ -129,19 +132,17 @@ def _part(
     if UsdGeom.Gprim(prim).GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         corner = corner[:, ::-1]
     triangles = points[index[corner]]
-    cross = area_normals(triangles)
-    flat = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-12)
-    normals = np.repeat(flat[:, None], 3, axis=1)
     paints = tuple(paints_of(prim, surface.face[face], known))
     if surface.normals is not None:
         return triangles, surface.normals[index[corner]], None, paints
     if not prim.IsA(UsdGeom.Mesh):
-        return triangles, normals, None, paints
+        return triangles, _flat(triangles), None, paints
     mesh = UsdGeom.Mesh(prim)
     where = (index, len(points), face, corner)
     authored = _corner_values(mesh, "normals", 3, *where)
+    length = np.zeros(1) if authored is None else np.linalg.norm(authored, axis=-1, keepdims=True)
+    normals = _flat(triangles) if length.min(initial=1) <= 1e-9 else np.zeros(1)
     if authored is not None:
-        length = np.linalg.norm(authored, axis=-1, keepdims=True)
         normals = np.where(length > 1e-9, authored / np.maximum(length, 1e-9), normals)
     tables = {name: _corner_values(mesh, name, 2, *where) for name in {"st", *(paint.st for paint, _ in paints)}}
     st = tables["st"]
@@ -151,6 +152,12 @@ def _part(
             table = tables[paint.st] if tables[paint.st] is not None else tables["st"]
             st[faces] = 0.0 if table is None else table[faces]
     return triangles, normals, st, paints
+
+
+def _flat(triangles: np.ndarray) -> np.ndarray:
+    """(t, 3, 3) normals of triangles (t, 3, 3) at their corners."""
+    cross = area_normals(triangles)
+    return np.repeat((cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-12))[:, None], 3, axis=1)
 
 
 def _corner_values(

@@ -63,6 +63,8 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
 
     `shades`: of everything that glows its triangles (f, 3, 3) in the world, metres.
     """
+    from PIL import Image
+
     frame, cache = to_metres(stage), UsdGeom.XformCache(NOW)
     sky, suns, bulbs, power, tint = 0.0, [], [], [], np.ones(3, np.float32)
     domes, view, panels = 0, None, list[tuple[np.ndarray, np.ndarray]]()
@@ -75,7 +77,10 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
             strength = float(color.max())
             domes, sky, tint = domes + 1, sky + strength, color / max(strength, 1e-9)
             picture = UsdLux.DomeLight(prim).GetTextureFileAttr().Get(NOW)
-            view = view if picture is None else _out_of_focus(image_of(str(prim.GetPath()), picture.resolvedPath))
+            if picture is not None:  # behind a room that is in focus, what lies around is soft, and in a little haze
+                sharp = Image.fromarray(image_of(str(prim.GetPath()), picture.resolvedPath))
+                soft = sharp.reduce(max(1, round(2 * BLURRED * sharp.width / 360)))  # between its pixels it is
+                view = np.asarray(Image.blend(soft, Image.merge("RGB", [soft.convert("L")] * 3), HAZE))
         elif prim.IsA(UsdLux.DistantLight):
             towards = world[:3, 2] / max(float(np.linalg.norm(world[:3, 2])), 1e-9)
             suns.append(np.stack([towards, color]))
@@ -92,14 +97,6 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
         bulbs=np.array(bulbs, np.float32).reshape(-1, SPOTS, 3), power=np.array(power, np.float32).reshape(-1, 3),
         tint=tint, view=view,
     )  # fmt: skip
-
-
-def _out_of_focus(view: np.ndarray) -> np.ndarray:
-    """What lies around (h, w, 3), uint8, as it is behind a room that is in focus: soft, and in a little haze."""
-    from PIL import Image
-
-    soft = Image.fromarray(view).reduce(max(1, round(2 * BLURRED * view.shape[1] / 360)))  # between its pixels it is
-    return np.asarray(Image.blend(soft, Image.merge("RGB", [soft.convert("L")] * 3), HAZE))
 
 
 def _spots(bulb: np.ndarray, shades: Sequence[np.ndarray]) -> np.ndarray:
@@ -136,30 +133,30 @@ def with_ceiling(scenery: Scenery) -> Scenery:
 
 
 def evened(light: np.ndarray, white: np.ndarray) -> np.ndarray:
-    """(n, 1) what light (n, 3) is multiplied by: less than 1 where it is brighter than the mean, more where it is less,
+    """(n,) what light (3, n) is multiplied by: less than 1 where it is brighter than the mean, more where it is less,
     so that walls at lamps and windows keep their colour and corners are not black.
 
     `white`: (3,) the mean light in the room.
     """
-    level = light @ LUMA / max(float(white @ LUMA), 1e-6)
-    return np.asarray(np.maximum(level, np.float32(1e-3))[:, None] ** np.float32(-EVEN))
+    level = LUMA @ light / max(float(white @ LUMA), 1e-6)
+    return np.asarray(np.maximum(level, np.float32(1e-3)) ** np.float32(-EVEN))
 
 
 def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable[[np.ndarray], np.ndarray]:
-    """How a picture's linear colours (..., 3) come to [0, 1]: what is bright in the room comes to `BRIGHT`, with
+    """How a picture's linear colours (3, n) come to [0, 1]: what is bright in the room comes to `BRIGHT`, with
     contrast about it, and what is brighter is rolled off as film does.
 
-    `color`: (n, 3) linear radiance of the picture. `light`: (3,) that of the room, to whose colour the eye adapts in
+    `color`: (3, n) linear radiance of the picture. `light`: (3,) that of the room, to whose colour the eye adapts in
     part. `day`: 1 by day, 0 by night, see `Lights.day`.
     """
     adapted, bright = (float(np.interp(day, (0, 1), ends)) for ends in (ADAPTED, BRIGHT))  # floats keep float32
     white = (np.maximum(light, 1e-6) / max(float(light.mean()), 1e-6)) ** adapted
-    seen, most = np.maximum(np.percentile(color / white @ LUMA, (SHARE, WHITE)), 1e-4)
-    scale = (min(bright / seen, bright / BRIGHT[1] * PAPER / most, BRIGHTEST) / white).astype(np.float32)
+    seen, most = np.maximum(np.percentile((LUMA / white).astype("f4") @ color, (SHARE, WHITE)), 1e-4)
+    scale = (min(bright / seen, bright / BRIGHT[1] * PAPER / most, BRIGHTEST) / white).astype("f4")[:, None]
 
     def shown(color: np.ndarray) -> np.ndarray:
         color = color * scale
-        level = np.maximum(color @ LUMA, np.float32(1e-6))[..., None]
+        level = np.maximum(LUMA @ color, np.float32(1e-6))
         mapped = _filmic(level, bright)
         kept = HUE * np.sqrt(1 - mapped)
         return np.clip(kept * color * mapped / level + (1 - kept) * _filmic(color, bright), 0, 1)

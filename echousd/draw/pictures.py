@@ -24,7 +24,7 @@ def png(picture: Image.Image) -> bytes:
 
     mark = PngInfo()
     mark.add_text(*MARK)
-    return encoded(picture, pnginfo=mark)
+    return encoded(picture, pnginfo=mark, compress_level=2)  # in half the time of 4, for a tenth more bytes
 
 
 def gif(pictures: Sequence[Image.Image]) -> bytes:

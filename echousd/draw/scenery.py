@@ -5,15 +5,16 @@ from __future__ import annotations
 import colorsys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from pxr import Usd
 
 from echomodel.boxes2d import upright_box
 from echomodel.triangles import area_normals, box
-from echousd.draw.drawables import Drawable, Paint, image_of, read_drawables
-from echousd.draw.indoors import Lights, read_lights
+from echousd.draw.drawables import Paint, image_of, read_drawables
+from echousd.draw.indoors import LUMA, Lights, read_lights
 from echousd.draw.sight import Furniture
 
 GOLDEN = 0.61803398875
@@ -21,9 +22,12 @@ LINEAR = (np.arange(256, dtype=np.float32) / 255) ** 2.2  # of a byte of sRGB
 MIXED = np.array([0.3141, 0.2718, 0.1618], np.float32)  # so that no two colours of a room add up to the same
 SHELL = ("floor", "wall", "ceiling", "door", "window")
 SMALL = 0.35  # metres: what is no larger hides nothing that a picture is of
-SMALLEST = 6  # times that an image is halved at most
+LEVELS = 7  # sizes of an image, each half of the one before
 # Opacity of a pane below which one looks through it; twice the m² of upright glass from which on it glazes a front.
 SEEN_THROUGH, GLAZED = 0.5, 0.03
+NEXT, NEAR, FAR = 2.5, 1.2, 0.6  # metres from a passage to the wall beyond, and what light there is on the way to it
+SKY_LIGHT = np.array([0.90, 0.93, 0.97], np.float32)
+BACKGROUND = np.array([0.90, 0.905, 0.915], np.float32) ** 2.2
 HUNG = ("picture", "mirror", "curtain", "blind", "wall_shelf", "wall_clock", "coats", "radiator")  # goes with its wall
 
 
@@ -38,10 +42,10 @@ class Scenery:
     gloss: np.ndarray  # (f,) float32 in [0, 1]
     st: np.ndarray  # (f, 3, 2) float32 texture coordinates
     texture: np.ndarray  # (f,) int, which of `images` colours the face, -1 for none
-    # (h, w, 3) uint8 sRGB each, and (3,) float32, what its linear RGB is multiplied by
-    images: tuple[tuple[np.ndarray, np.ndarray], ...]
-    furniture: Furniture  # boxes of the objects
-    hung: Furniture  # boxes of what hangs on walls
+    # each as read with its sides halved so often, `image_of`; and (3,) float32, what its linear RGB is multiplied by
+    images: tuple[tuple[Callable[[int], np.ndarray], np.ndarray], ...]
+    # of each object whether it hangs on a wall, its lower and upper corner (3,) in its frame, and that, (4, 4)
+    things: tuple[tuple[bool, np.ndarray, np.ndarray, np.ndarray], ...]
     wall: np.ndarray  # (f,) int, which wall a face belongs to, -1 for none
     panes: np.ndarray  # (p, 3, 3) float32: middle, half of the width and half of the height of every window's pane
     pane_wall: np.ndarray  # (p,) int, the walls of the panes
@@ -53,6 +57,13 @@ class Scenery:
         """Lower and upper corner, (3,) float each."""
         corners = self.triangles.reshape(-1, 3).astype(float)
         return corners.min(0), corners.max(0)
+
+    def furniture(self, hung: bool = False) -> Furniture:
+        """Upright boxes, with their own headings, of the objects that are not small, or of what hangs on walls."""
+        things = [(box(*ends).vertices, frame) for hangs, *ends, frame in self.things if hangs == hung]
+        found = [np.hstack(upright_box(at @ frame[:3, :3].T + frame[:3, 3], frame[:3, :3])) for at, frame in things]
+        table = np.array([one for one in found if hung or one[:3].max() > SMALL]).reshape(-1, 7)
+        return Furniture(table[:, :3], table[:, 3:6], table[:, 6])
 
     @property
     def closed(self) -> bool:
@@ -86,63 +97,131 @@ class Scenery:
         return int(level.argmax()), int(upright.argmax())
 
     @cached_property
-    def axis(self) -> np.ndarray:
-        """(f,) int, along which axis each face looks most."""
-        return np.abs(self.normals[:, 0]).argmax(1)
-
-    @cached_property
-    def material(self) -> np.ndarray:
-        """(f,) float32, a number that differs where colour, glow or texture do."""
-        return (self.flat_colors @ MIXED + 3 * self.emissive @ MIXED + self.texture).astype(np.float32)
+    def planes(self) -> Planes:
+        """What rays that met faces ask of them."""
+        apart = (np.concatenate([each[:, :1], each[:, 1:] - each[:, :1]], 1) for each in (self.normals, self.st))
+        tables = (*(each.reshape(len(each), -1) for each in apart), self.flat_colors, self.flat_colors @ LUMA)
+        material = np.append(self.flat_colors @ MIXED + 3 * self.emissive @ MIXED + self.texture, -9)
+        planes = [np.ascontiguousarray(each.T, np.float32) for each in (*tables, material)]
+        return Planes._make([*planes, np.abs(self.normals[:, 0]).argmax(1), self.emissive.any(1)])
 
     @cached_property
     def texels(self) -> np.ndarray:
         """(f,) float32, pixels of its image that a metre of each face has."""
-        sizes = np.array([(i.shape[1], i.shape[0]) for i, _ in self.images] or [(1, 1)], np.float32)
+        sizes = 2 * np.array([read(1).shape[1::-1] for read, _ in self.images] or [(1, 1)], np.float32)
         flat = np.diff(self.st, axis=1) * sizes[self.texture][:, None]
         area = np.linalg.norm(area_normals(self.triangles), axis=1)
         pixels = np.abs(flat[:, 0, 0] * flat[:, 1, 1] - flat[:, 0, 1] * flat[:, 1, 0])
         return np.sqrt(pixels / np.maximum(area, 1e-9)).astype(np.float32)
 
-    def colors(self, face: np.ndarray, st: np.ndarray, breadth: np.ndarray) -> np.ndarray:
-        """(n, 3) colour of places `breadth` (n,) metres wide on faces (n,) at texture coordinates (n, 2).
+    def atlas(self, face: np.ndarray, breadth: np.ndarray) -> tuple[np.ndarray, ...]:
+        """The images of faces (n,) as they are seen where a pixel is `breadth` (n,) metres wide, and halved further.
+
+        In one row: (3, n) uint8 pixels; (3, images * `LEVELS`) int, the first of each, its width and height; and
+        (3, images) float32, what each's linear RGB is multiplied by.
+        """
+        from PIL import Image
+
+        drawn = np.flatnonzero(self.texture.take(face) >= 0)
+        place = self._halved(face.take(drawn), breadth.take(drawn))
+        asked = np.bincount(place, minlength=len(self.images) * LEVELS).reshape(-1, LEVELS) > 0
+        pixels, places, first = [np.zeros((0, 3), np.uint8)], list[tuple[int, int, int]](), 0
+        for (read, _), levels in zip(self.images, asked, strict=True):
+            finest = int(levels.argmax()) if levels.any() else LEVELS - 1
+            shown = Image.fromarray(read(min(finest, 1))).reduce(2 ** max(finest - 1, 0))
+            for level in range(LEVELS):
+                places.append((first, *shown.size))
+                if level >= finest:
+                    pixels.append(np.asarray(shown).reshape(-1, 3))
+                    first, shown = first + len(pixels[-1]), shown.reduce(2)
+        tints = np.array([tint for _, tint in self.images], np.float32)
+        tables = (each.reshape(-1, 3).T for each in (np.concatenate(pixels), np.array(places, int), tints))
+        return tuple(map(np.ascontiguousarray, tables))
+
+    def _halved(self, face: np.ndarray, breadth: np.ndarray) -> np.ndarray:
+        """(n,) int, the number of the image of each face and how often it is halved, as one."""
+        level = np.log2(np.maximum(breadth * self.texels.take(face), 1))
+        return self.texture.take(face) * LEVELS + np.minimum(level, LEVELS - 1).astype(np.intp)
+
+    def colors(
+        self, face: np.ndarray, bary: np.ndarray, breadth: np.ndarray, atlas: tuple[np.ndarray, ...]
+    ) -> np.ndarray:
+        """(3, n) colour of places `breadth` (n,) metres wide on faces (n,), at `bary` (2, n) between their corners.
 
         It is that of an image reduced until its pixels are so wide: finer ones would flicker ("mip map").
         """
-        out, texture = self.flat_colors.take(face, 0), self.texture.take(face)
-        level = np.clip(np.log2(np.maximum(breadth * self.texels.take(face), 1)), 0, SMALLEST).astype(np.int8)
-        for number, (_, tint) in enumerate(self.images):
-            own = np.flatnonzero(texture == number)
-            for halved in np.flatnonzero(np.bincount(level.take(own))).tolist():
-                here = own[level.take(own) == halved]
-                right, up = st.take(here, 0).T
-                out[here] = between(self.reduced(number, halved), right, 1 - up) * tint
+        out, drawn = self.planes.color.take(face, 1), np.flatnonzero(self.texture.take(face) >= 0)
+        face, (u, v) = face.take(drawn), bary.take(drawn, 1)
+        place, laid = self._halved(face, breadth.take(drawn)), self.planes.laid.take(face, 1)
+        right, up = laid[:2] + u * laid[2:4] + v * laid[4:]
+        pixels, places, tints = atlas
+        out[:, drawn] = between(pixels, right, 1 - up, *places.take(place, 1)) * tints.take(place // LEVELS, 1)
         return out
 
-    @cached_property
-    def reduced(self) -> Callable[[int, int], np.ndarray]:
-        """Number of an image, and how often its sides are halved -> (h, w, 3) uint8."""
-        from PIL import Image
 
-        return cache(lambda number, halved: np.asarray(Image.fromarray(self.images[number][0]).reduce(2**halved)))
+class Planes(NamedTuple):
+    """Of f faces, by plane (k, f) float32: normals and texture coordinates, at the first corner and how they differ at
+    the others; colours; and (f,): how bright these are, a number that differs where colour, glow or texture do (one
+    more at the end, of nothing), along which axis they look most, and whether they are of lamps."""
+
+    normal: np.ndarray
+    laid: np.ndarray
+    color: np.ndarray
+    luma: np.ndarray
+    material: np.ndarray
+    axis: np.ndarray
+    glows: np.ndarray
 
 
-def between(image: np.ndarray, right: np.ndarray, down: np.ndarray) -> np.ndarray:
-    """(n, 3) linear RGB of an image (h, w, 3), uint8, at shares (n,) of its width and height, between its pixels; it
-    goes on beyond its borders."""
-    height, width = image.shape[:2]
-    x, y = right * width - 0.5, down * height - 0.5
+def between(pixels: np.ndarray, right: np.ndarray, down: np.ndarray, first: Any, width: Any, height: Any) -> np.ndarray:
+    """(3, n) linear RGB of images at shares (n,) of their widths and heights, between their pixels; they go on beyond
+    their borders. `pixels`, `first`, `width`, `height`: as of an `atlas`."""
+    x, y = (right - np.floor(right)) * width - 0.5, (down - np.floor(down)) * height - 0.5
     column, row = np.floor(x), np.floor(y)
-    x, y, pixels = (x - column)[:, None], (y - row)[:, None], image.reshape(-1, 3)
-    left, right, above, below = (
-        (first + k).astype(np.int32) % n for first, n in ((column, width), (row, height)) for k in (0, 1)
+    x, y, column, row = (x - column).astype("f4"), (y - row).astype("f4"), column.astype(int), row.astype(int)
+    left, above = column + width * (column < 0), row + height * (row < 0)
+    column, row = column + 1, row + 1
+    beside, below = column * (column < width), row * (row < height)
+    upper, lower = (
+        (1 - x) * LINEAR.take(pixels.take(line + left, 1)) + x * LINEAR.take(pixels.take(line + beside, 1))
+        for line in (first + above * width, first + below * width)
     )
-    first, second = (
-        (1 - x) * LINEAR.take(pixels.take(line * width + left, 0))
-        + x * LINEAR.take(pixels.take(line * width + right, 0))
-        for line in (above, below)
-    )
-    return (1 - y) * first + y * second
+    return (1 - y) * upper + y * lower
+
+
+def outside(scenery: Scenery, origin: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(3, n) colour that rays which meet nothing see: through a window's pane what lies around, else the paper; and
+    which (n,) bool see through a pane."""
+    out: np.ndarray = np.broadcast_to(BACKGROUND[:, None], direction.shape).copy()
+    around, through = scenery.lights.view, np.zeros(out.shape[1], bool)
+    for middle, side, rise in scenery.panes:
+        normal = np.cross(side, rise)
+        along = normal @ direction
+        reach = (normal @ (middle[:, None] - origin)) / np.where(np.abs(along) < 1e-9, 1e-9, along)
+        point = origin + reach * direction - middle[:, None]
+        u, v = side @ point / (side @ side), rise @ point / (rise @ rise)
+        here = (reach > 0) & (np.abs(u) <= 1) & (np.abs(v) <= 1)
+        if around is None:
+            out[:, here] = SKY_LIGHT[:, None]
+        else:  # by latitude and longitude
+            x, y, z = direction[:, here]
+            across, down = 0.5 + np.arctan2(x, z) / (2 * np.pi), np.arccos(np.clip(y, -1, 1)) / np.pi
+            out[:, here] = between(around.reshape(-1, 3).T, across, down, 0, around.shape[1], around.shape[0])
+        through |= here
+    return out, through
+
+
+def next_room(scenery: Scenery, white: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(3, n) radiance that rays see which leave by a passage: a wall and a floor like those here, in less light than
+    `white` (3,), the mean in this room."""
+    low, high = (each[:, None] for each in scenery.bounds)
+    floor, wall = scenery.largest
+    way = np.where(np.abs(direction) < 1e-6, 1e-6, direction)
+    leaves = np.maximum((low - origin) / way, (high - origin) / way)[[0, 2]].min(0)
+    down = np.where(way[1] < 0, (scenery.triangles[floor, 0, 1] - origin[1]) / way[1], np.inf)
+    far = np.clip((down - leaves) * np.hypot(way[0], way[2]) / NEXT, 0, 1)
+    color = np.where(far < 1, scenery.flat_colors[floor, :, None], scenery.flat_colors[wall, :, None])
+    return np.asarray(white[:, None] * color * (NEAR + (FAR - NEAR) * far), np.float32)
 
 
 @cache
@@ -166,8 +245,8 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     `SemanticsLabelsAPI:category` instead of by material. Raises ValueError when there is no mesh to see.
     """
     parts: list[dict[str, np.ndarray]] = []
-    images: dict[tuple, tuple[int, tuple[np.ndarray, np.ndarray]]] = {}
-    boxes, curtains = list[np.ndarray](), list[np.ndarray]()
+    images: dict[tuple, tuple[Callable[[int], np.ndarray], np.ndarray]] = {}
+    things = list[tuple[bool, np.ndarray, np.ndarray, np.ndarray]]()
     shades: dict[str, list[np.ndarray]] = {}  # by component
     words: list[str] = []
     above = list[dict[str, np.ndarray]]()
@@ -176,16 +255,18 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     for mesh in read_drawables(stage):
         if mesh.category == "ceiling":  # pictures look in from above
             continue
+        points = mesh.triangles.reshape(-1, 3) @ mesh.world[:3, :3].T + mesh.world[:3, 3]
         if mesh.category == "window" and not by_class and all(p.opacity < SEEN_THROUGH for p, _ in mesh.paints):
-            panes.append((mesh.component, _pane(mesh)))
+            panes.append((mesh.component, _pane(points)))
             continue  # light goes through
         if mesh.category == "wall":
             walls.setdefault(mesh.component, len(walls))
         count = len(mesh.triangles)
-        turned = mesh.normals @ np.linalg.inv(mesh.world[:3, :3])  # inverse transpose, as rows
+        turned = mesh.normals.reshape(-1, 3) @ np.linalg.inv(mesh.world[:3, :3])  # inverse transpose, as rows
+        turned = turned / np.maximum(np.linalg.norm(turned, axis=-1, keepdims=True), 1e-12)
         part = {
-            "triangles": (mesh.triangles @ mesh.world[:3, :3].T + mesh.world[:3, 3]).astype(np.float32),
-            "normals": (turned / np.maximum(np.linalg.norm(turned, axis=-1, keepdims=True), 1e-12)).astype(np.float32),
+            "triangles": points.reshape(-1, 3, 3).astype(np.float32),
+            "normals": turned.reshape(-1, 3, 3).astype(np.float32),
             "st": np.zeros((count, 3, 2), np.float32) if mesh.st is None else mesh.st.astype(np.float32),
             "flat_colors": np.zeros((count, 3), np.float32), "emissive": np.zeros((count, 3), np.float32),
             "gloss": np.zeros(count, np.float32), "texture": np.full(count, -1),
@@ -197,12 +278,11 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             part["gloss"][faces] = min(1.0, 0.5 * (1 - paint.roughness) + 0.35 * paint.metallic)
             part["texture"][faces], clear[faces] = -1, paint.opacity < SEEN_THROUGH
             if paint.texture:
-                key = (paint.texture, paint.tint)
-                if key not in images:
-                    pixels = image_of(paint.image, paint.texture)
-                    images[key] = (len(images), (pixels, np.array(paint.tint, np.float32)))
-                part["texture"][faces], (pixels, tint) = images[key]
-                part["flat_colors"][faces] = LINEAR[pixels[::16, ::16]].mean((0, 1)) * tint
+                key, found = (paint.texture, paint.tint), cache(partial(image_of, paint.image, paint.texture))
+                read, tint = images.setdefault(key, (found, np.array(paint.tint, np.float32)))
+                part["texture"][faces] = [*images].index(key)
+                # most images are seen in half their size at most, in which a JPEG is read in half of the time
+                part["flat_colors"][faces] = LINEAR[read(1)[::8, ::8]].mean((0, 1)) * tint
         if mesh.category == "beam":
             above.append(part)
             continue
@@ -215,26 +295,22 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
         parts.append(part)
         words.append(mesh.category)
         if mesh.category not in (*SHELL, "rug"):
-            (curtains if mesh.category in HUNG else boxes).append(_box(mesh))
+            ends = mesh.triangles.min((0, 1)), mesh.triangles.max((0, 1))
+            things.append((mesh.category in HUNG, *ends, mesh.world))
     if not parts:
         raise ValueError(f"{stage.GetRootLayer().identifier}: nothing to draw, found no visible mesh")
     _hang(parts, [*(n for n, word in enumerate(words) if word in HUNG), *_on_shelves(parts, words)], len(walls))
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    furniture, at_walls = (
-        Furniture(found[:, :3], found[:, 3:6], found[:, 6])
-        for found in (np.array(each).reshape(-1, 7) for each in ([b for b in boxes if b[:3].max() > SMALL], curtains))
-    )
     return Scenery(
-        images=tuple(image for _, image in images.values()), furniture=furniture, hung=at_walls,
+        images=tuple(images.values()), things=tuple(things),
         panes=np.array([pane for _, pane in panes], np.float32).reshape(-1, 3, 3),
         pane_wall=np.array([walls.get(wall, -1) for wall, _ in panes], int),
         lights=read_lights(stage, [np.concatenate(each) for each in shades.values()]), above=tuple(above), **joined,
     )  # fmt: skip
 
 
-def _pane(mesh: Drawable) -> np.ndarray:
-    """(3, 3) float: middle, half of the width and half of the height of an upright pane, metres."""
-    points = mesh.triangles.reshape(-1, 3) @ mesh.world[:3, :3].T + mesh.world[:3, 3]
+def _pane(points: np.ndarray) -> np.ndarray:
+    """(3, 3) float: middle, half of the width and half of the height of an upright pane of corners (n, 3), metres."""
     low, high = points.min(0), points.max(0)
     middle, flat = (low + high) / 2, points[:, [0, 2]] - (low + high)[[0, 2]] / 2
     far = flat[int(np.argmax((flat**2).sum(1)))]
@@ -243,6 +319,8 @@ def _pane(mesh: Drawable) -> np.ndarray:
 
 def _on_shelves(parts: list[dict[str, np.ndarray]], words: list[str]) -> list[int]:
     """Numbers of the parts that stand on shelves that hang on a wall."""
+    if "wall_shelf" not in words:
+        return []
     bounds = np.array([np.stack([part["triangles"].min((0, 1)), part["triangles"].max((0, 1))]) for part in parts])
     middle, out = bounds.mean(1), list[int]()
     for low, high in (bounds[n] for n, word in enumerate(words) if word == "wall_shelf"):
@@ -261,10 +339,3 @@ def _hang(parts: list[dict[str, np.ndarray]], hung: list[int], count: int) -> No
         middle = parts[index]["triangles"].reshape(-1, 3).mean(0)
         apart = [np.linalg.norm(np.maximum(np.maximum(low - middle, middle - high), 0)) for low, high in bounds]
         parts[index]["wall"][:] = int(np.argmin(apart))
-
-
-def _box(mesh: Drawable) -> np.ndarray:
-    """(7,) float: size and bottom centre in metres and yaw of the upright box around a mesh, with its own heading."""
-    points, turn = mesh.triangles.reshape(-1, 3), mesh.world[:3, :3]
-    corners = box(points.min(0), points.max(0)).vertices
-    return np.hstack(upright_box(corners @ turn.T + mesh.world[:3, 3], turn))

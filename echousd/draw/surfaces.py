@@ -164,13 +164,8 @@ def _piece(stage: Usd.Stage, drawable: Drawable) -> SurfacePiece:
     if clear == shown:
         kept = [drawable.path]
     world = drawable.triangles @ drawable.world[:3, :3].T + drawable.world[:3, 3]
+    through = [p for p in lineage(prim) if p.IsInstance() or (p.IsInstanceProxy() and p.IsInstanceable())]
     return SurfacePiece(
         drawable.path, corners, arrays.indices[corners], int(arrays.counts.sum()), polygon, drawable.triangles, world,
-        tuple(kept), _instances(prim),
+        tuple(kept), tuple(str(each.GetPath()) for each in reversed(through)),
     )  # fmt: skip
-
-
-def _instances(prim: Usd.Prim) -> tuple[str, ...]:
-    """The instances that a prim is seen through."""
-    found = [p for p in lineage(prim) if p.IsInstance() or (p.IsInstanceProxy() and p.IsInstanceable())]
-    return tuple(str(each.GetPath()) for each in reversed(found))

@@ -155,7 +155,9 @@ def inside_view(
         furniture = Furniture(np.full((1, 3), 1e-3), np.insert(middle, 1, 0.0)[None], np.zeros(1))
     things = furniture.with_others(hung)
     everything = things.with_others(windows, _walls(floor, height))
-    main = _main(furniture) if main is None else main
+    if main is None:  # the largest piece that one looks over, of all where there is none
+        low = furniture.size[:, 1] + furniture.position[:, 1] < LOW
+        main = int((furniture.size[:, [0, 2]].prod(1) * (low | ~low.any())).argmax())
     row = np.arange(len(everything.size))
     reach = np.where((row < len(things.size)) & (row != main), BEFORE, WALLED)
     aim, front = furniture.position[main, [0, 2]], axes(furniture.yaw[main])[1]
@@ -182,7 +184,8 @@ def inside_view(
             wider, way = wider.union(shapely.Point(spot).buffer(1.4 * at.near)), at.way
         eye = np.array([spot[0], EYE * height, spot[1]])
         points, blocked = furniture.blocked(eye, things.of(seen & ~stands))
-        hidden = CLEAR * _hidden(wider, points[main], blocked[main], eye)
+        lines = shapely.linestrings(np.stack(np.broadcast_arrays(eye, points[main]), 1)[..., [0, 2]])
+        hidden = CLEAR * float((blocked[main] | ~shapely.covers(wider, lines)).mean())  # by pieces, or by a corner
         views = _turned(eye, way)
         cut = (_aside(furniture.corners[main], views)[..., None] > halves / MARGIN).mean(-2)
         aside, back = (np.abs(views[..., [0, 2], axis] @ (aim - spot)) for axis in (0, 2))
@@ -218,21 +221,6 @@ def barest_share(which: np.ndarray, wall: np.ndarray, height: float, view: np.nd
     with np.errstate(divide="ignore"):
         level = np.where(way < 0, -view[1, 3] / way, (height - view[1, 3]) / np.maximum(way, 1e-12))
     return float(np.bincount(which[wall < level - DEEP]).max(initial=0)) / len(RAYS)
-
-
-def _main(furniture: Furniture) -> int:
-    """The largest piece that one looks over, of all where there is none."""
-    low = furniture.size[:, 1] + furniture.position[:, 1] < LOW
-    area = furniture.size[:, [0, 2]].prod(1) * np.where(low | ~low.any(), 1.0, 0.0)
-    return int(area.argmax())
-
-
-def _hidden(wider: shapely.Polygon, points: np.ndarray, blocked: np.ndarray, eye: np.ndarray) -> float:
-    """Share of the points (p, 3) of a piece that furniture (`blocked`) or a corner of the room, made a little wider,
-    hides from an eye.
-    """
-    lines = shapely.linestrings(np.stack(np.broadcast_arrays(eye, points), 1)[..., [0, 2]])
-    return float((blocked | ~shapely.covers(wider, lines)).mean())
 
 
 def _aside(points: np.ndarray, view: np.ndarray) -> np.ndarray:
@@ -374,13 +362,14 @@ def hero_view(stage: Usd.Stage, scenery: Scenery) -> View:
         if not view.orthographic and (lower < view.start).all() and (view.start < upper).all():
             return replace(view, aspect=ASPECT, inside=True)
     floor = rectangle(*(upper - lower - 0.3)[[0, 2]]) + (lower + upper)[[0, 2]] / 2  # inside the walls
-    matrix, lens, near = inside_view(floor, scenery.furniture, float(upper[1] - lower[1]), scenery.hung)
+    room = floor, scenery.furniture(), float(upper[1] - lower[1]), scenery.furniture(hung=True)
+    matrix, lens, near = inside_view(*room)
     return View(matrix, APERTURE / 2 / lens, False, ASPECT, scenery.closed, near)
 
 
 def corner_views(scenery: Scenery) -> Iterator[tuple[View, Scenery]]:
     """From above each corner, the view where least is hidden first, and what it shows: near walls are left out."""
-    for matrix in perspective_views(_outermost(scenery), scenery.furniture):
+    for matrix in perspective_views(_outermost(scenery), scenery.furniture()):
         shown = scenery.without_near_walls(matrix[:3, 3])
         if shown is not scenery:
             matrix = framed(_outermost(shown), matrix[:3, 2])

@@ -225,7 +225,8 @@ def flat_layer(stage: Usd.Stage, *, package: Package | None = None, physics: boo
     _drop_unused_materials(stage)
     if package is None:
         _drop_materialx(stage)
-    images = [prim for prim in stage.TraverseAll() if _is_image(prim)]
+    shaders = [prim for prim in stage.TraverseAll() if prim.GetTypeName() == "Shader"]
+    images = [prim for prim in shaders if (file := prim.GetAttribute("inputs:file")) and file.HasAuthoredValue()]
     take_assets(layer, package)
     for image in images:
         file = image.GetAttribute("inputs:file").Get()
@@ -258,12 +259,6 @@ def _as_float(attribute: Usd.Attribute) -> None:
     for time, value in found.items():
         if value is not None:
             single.Set(Gf.Vec3f(value), time)
-
-
-def _is_image(prim: Usd.Prim) -> bool:
-    """Whether a prim is a shader that reads an image."""
-    file = prim.GetAttribute("inputs:file")
-    return prim.GetTypeName() == "Shader" and bool(file) and file.HasAuthoredValue()
 
 
 def _drop_materialx(stage: Usd.Stage) -> None:

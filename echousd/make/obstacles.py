@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,7 +16,6 @@ from echomodel.triangles import Mesh, connected_pieces
 from echousd.graph import SceneGraph
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.nofit import FLUSH, Solids, depth, forbidden_moves
-from echousd.shapes.walls import ShellPart
 from echousd.shapes.walls import walls as walls_of
 
 REACH = 0.5  # metres that a piece is moved at most in all
@@ -115,7 +114,9 @@ def scene_of(
     plan = floor if graph.room.corners is None else graph.room.corners
     height = graph.room.tall
     built = walls_of(plan, height, graph.room.openings, thickness=graph.room.walls) if walls else []
-    shell = list(shell_solids(built))
+    # what stands before the walls: sills, casings, leaves; walls themselves are the floor's edge
+    fitted = ((part.name, piece) for part in built for filled in part.inner for piece in filled.pieces)
+    shell = [(name, _boards(piece.mesh)) for name, piece in fitted if piece.solid]
     everything = [*solids, *(pieces for _, pieces in shell)]
     return Scene(
         everything, np.array([node.locked or node.position is not None for node in nodes] + [True] * len(shell)),
@@ -125,12 +126,6 @@ def scene_of(
         np.array([(np.concatenate(pieces).min(0), np.concatenate(pieces).max(0)) for pieces in everything]),
         [*graph.names, *(wall for wall, _ in shell)],
     )  # fmt: skip
-
-
-def shell_solids(parts: Sequence[ShellPart]) -> Iterator[tuple[str, Solids]]:
-    """Walls' names and convex pieces of what stands before them: sills, casings, leaves; walls are the floor's edge."""
-    pieces = ((part.name, piece) for part in parts for filled in part.inner for piece in filled.pieces)
-    return ((name, _boards(piece.mesh)) for name, piece in pieces if piece.solid)
 
 
 def _level(solids: Solids) -> BaseGeometry:

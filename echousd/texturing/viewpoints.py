@@ -74,9 +74,9 @@ def visible_shares(
             ask = np.flatnonzero(~seen & (local[:, 2] < -0.01) & (np.abs(local[:, :2]) < half[:, None]).all(1))
             if not len(ask):
                 continue
-            way, away = way_to(points[ask], matrix[:3, 3])
-            side = np.where((way * normals[ask]).sum(1, keepdims=True) < 0, -1.0, 1.0)
-            seen[ask] = free(scene, points[ask] + 1e-3 * side * normals[ask], way, away, away > 0) > 0
+            way, away = way_to(points[ask].T, matrix[:3, 3:])
+            side = np.where((way * normals[ask].T).sum(0) < 0, -1.0, 1.0)
+            seen[ask] = free(scene, points[ask].T + 1e-3 * side * normals[ask].T, way, away, away > 0) > 0
         shares.append(float(seen.mean()) if len(seen) else 0.0)
     return shares
 

@@ -58,15 +58,6 @@ def used_area(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]
     return area
 
 
-def wall_length(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]) -> float:
-    """Metres of wall that furniture stands at.
-
-    `categories`, `sizes`: as `footprint`.
-    """
-    there = pieces(categories, sizes)
-    return sum(p.width + HANDS for p in there if p.kind.wall or (p.kind.role == "board" and p.kind.access))
-
-
 def longest_side(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]) -> float:
     """Metres, the longest side of anything that stands on the floor.
 
@@ -103,7 +94,8 @@ def floor_extents(
     aspect = float(np.clip(row.aspect * np.exp(0.14 * rng.standard_normal()), 1.0, 2.2))
     short = max(float(np.sqrt(area / aspect)), least)
     long = max(area / short, short, longest + 0.1)
-    grown = wall_length(categories, sizes) / WALLED / (2 * (short + long))
+    walled = sum(p.width + HANDS for p in there if p.kind.wall or (p.kind.role == "board" and p.kind.access))
+    grown = walled / WALLED / (2 * (short + long))
     short, long = (round(side * max(grown, 1.0), 1) for side in (short, long))
     x, z = (long, short) if rng.random() < along_x else (short, long)
     x = max([x, *(o.end for o in openings if o.edge % 2 == 0)])

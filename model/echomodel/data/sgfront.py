@@ -148,12 +148,6 @@ def _outline(floors: np.ndarray, others: np.ndarray) -> np.ndarray:
     return np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
 
 
-def small_mapping() -> dict[str, str]:
-    """Fine class of SG-FRONT -> small class, for the classes that our vocabulary knows."""
-    fine = {entry.sgfront: entry.coarse for entry in vocabulary().categories if entry.name == entry.sgfront}
-    return {SCENE: SCENE, **dict(sorted(fine.items())), FLOOR: FLOOR}
-
-
 ON_FLOOR = 0.04  # metres
 
 
@@ -186,7 +180,8 @@ def write_sgfront(
         rows.append(params - np.concatenate([np.zeros(3), shift, [0.0]]))
     write_text(folder / f"relationships_all_{split}.json", json.dumps({"scans": scans}))
     write_text(folder / f"obj_boxes_all_{split}.json", json.dumps(boxes))
-    mapping = small_mapping()
+    fine = {entry.sgfront: entry.coarse for entry in vocabulary().categories if entry.name == entry.sgfront}
+    mapping = {SCENE: SCENE, **dict(sorted(fine.items())), FLOOR: FLOOR}  # of the classes that we know
     write_text(folder / "classes_all.txt", "".join(f"{name}\n" for name in sorted(mapping)))
     write_text(folder / "mapping.json", json.dumps(mapping, indent=1))
     spelled = vocabulary().sgfront_predicates

@@ -79,7 +79,8 @@ def noised(
     noise = normal(clean.shape, generator, clean.device)
     # equal furniture starts from equal noise when sampled, so most of the scenes train that way
     shared = (torch.rand(scenes, generator=generator) < 0.75).to(clean.device)[scene, None]
-    noise = torch.where(shared, noise[first_of_group(batch)], noise)
+    same = (batch.graph.scene[:, None] == batch.graph.scene) & (batch.shape[:, None] == batch.shape)
+    noise = torch.where(shared, noise[same.int().argmax(1)], noise)  # of the first of its scene with the same shape
     return known, level, torch.where(known[:, None], clean, add_noise(clean, noise, level, objective))
 
 
@@ -87,12 +88,6 @@ def shifted(level: Tensor) -> Tensor:
     """Uniform levels moved towards the middle, where there is most to learn (Esser et al. 2024)."""
     normal = 0.2 + math.sqrt(2) * 1.2 * torch.erfinv((2 * level - 1).clamp(-0.9999, 0.9999))
     return torch.sigmoid(normal).clamp(0.02, 1.0)
-
-
-def first_of_group(batch: ShapeBatch) -> Tensor:
-    """(N,) int64: for every object the first of its scene with the same shape."""
-    same = (batch.graph.scene[:, None] == batch.graph.scene) & (batch.shape[:, None] == batch.shape)
-    return same.int().argmax(1)
 
 
 def draw_suites(count: int, styles: Tensor, generator: torch.Generator) -> ShapeBatch:

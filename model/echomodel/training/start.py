@@ -183,7 +183,11 @@ def warm_start(model: CompactModel, path: Path) -> tuple[str, ...]:
     parts = tuple(part for part in json.loads(header.get("parts", "[]")) if part in model.parts)
     if "layout" in parts:
         statistics = BoxStatistics.from_json(json.loads(header["statistics"]))
-        model.statistics = replace(statistics, classes=_grown(statistics.classes, model, path, header))
+        if classes := statistics.classes:  # of categories that are new, those of what they are like
+            numbers = torch.tensor([vocabulary().category_id(name) for name in model.config.categories])
+            like = places("categories", words_of(path, header)["categories"], numbers)
+            statistics = replace(statistics, classes=tuple(classes[k] for k in like))
+        model.statistics = statistics
     return parts
 
 
@@ -196,12 +200,3 @@ def _speak_of_new_words(model: CompactModel, path: Path, header: dict[str, str])
         words = torch.tensor([number(name) for name in table.names[old:]], dtype=torch.int64)
         with torch.no_grad():
             table.weight[old:] = table.weight[places(table.kind, known[table.kind], words)]
-
-
-def _grown(
-    classes: tuple[tuple[float, ...], ...], model: CompactModel, path: Path, header: dict[str, str]
-) -> tuple[tuple[float, ...], ...]:
-    """Statistics of the model's categories from those of a file's; what is new has those of what it is like."""
-    names, words = model.config.categories, vocabulary()
-    numbers = torch.tensor([words.category_id(name) for name in names])
-    return classes and tuple(classes[k] for k in places("categories", words_of(path, header)["categories"], numbers))

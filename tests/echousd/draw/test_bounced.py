@@ -12,15 +12,16 @@ TABLE = Bounced.dark(np.zeros(3), np.array([4.0, 3.0, 2.0]))
 def rows(*ways: tuple[float, float, float], origin: tuple[float, float, float] = (2.0, 1.5, 1.0)) -> np.ndarray:
     """Rows of surfaces that rays from the middle meet head on after 0.9 m."""
     way = np.array(ways, float)
-    return TABLE.rows(np.array([origin] * len(way)), way, np.full(len(way), 0.9), np.abs(way).argmax(1))
+    return TABLE.rows(np.array([origin] * len(way)).T, way.T, np.full(len(way), 0.9), np.abs(way).argmax(1))
 
 
 def test_each_of_the_six_sides_of_a_place_has_a_row_of_its_own():
     axes = np.concatenate([s * np.eye(3) for s in (-1, 1)])
-    place = TABLE.rows(np.tile([1.1, 1.1, 1.1], (6, 1)) - 0.05 * axes, axes, np.full(6, 0.1), np.tile(range(3), 2))
+    place = TABLE.rows(np.full((3, 6), 1.1) - 0.05 * axes.T, axes.T, np.full(6, 0.1), np.tile(range(3), 2))
     assert len(set(place.tolist())) == 6
     assert len(set((place // 6).tolist())) == 1
-    above, below = TABLE.rows(np.full((2, 3), 1.2), np.array([(0, -1, 0), (0, 1, 0)]), np.full(2, 0.1), np.full(2, 1))
+    ways = np.array([(0, -1, 0), (0, 1, 0)]).T
+    above, below = TABLE.rows(np.full((3, 2), 1.2), ways, np.full(2, 0.1), np.full(2, 1))
     assert above != below  # of a sheet the side counts that the ray comes from
 
 
@@ -28,13 +29,13 @@ def test_a_place_is_as_bright_as_what_was_found_there_and_others_as_their_side()
     far = rows((1, 0, 0), (1, 0, 0), (1, 0, 0), (0, 1, 0))
     far[1] = rows((1, 0, 0), origin=(0.2, 1.5, 1.0))[0]
     light = np.array([(1.0, 0.5, 0.0), (0.2, 0.2, 0.2), (3.0, 0.5, 0.0), (9.0, 9.0, 9.0)])
-    lit = TABLE.lit(far, light)
-    np.testing.assert_allclose(lit.radiance[far[0]], THROWN * np.array([2.0, 0.5, 0.0]), rtol=1e-6)
-    np.testing.assert_allclose(lit.radiance[far[1]], THROWN * 0.2, rtol=1e-6)
+    lit = TABLE.lit(far, light.T).radiance.T
+    np.testing.assert_allclose(lit[far[0]], THROWN * np.array([2.0, 0.5, 0.0]), rtol=1e-6)
+    np.testing.assert_allclose(lit[far[1]], THROWN * 0.2, rtol=1e-6)
     unknown = rows((1, 0, 0), origin=(2.0, 0.2, 0.2))
     assert unknown[0] not in far
-    np.testing.assert_allclose(lit.radiance[unknown[0]], THROWN * light[:3].mean(0), rtol=1e-6)
+    np.testing.assert_allclose(lit[unknown[0]], THROWN * light[:3].mean(0), rtol=1e-6)
 
 
 def test_places_outside_of_a_room_are_those_at_its_border():
-    assert np.isfinite(TABLE.radiance[rows((1, 0, 0), origin=(50.0, -9.0, 3.0))]).all()
+    assert np.isfinite(TABLE.radiance[:, rows((1, 0, 0), origin=(50.0, -9.0, 3.0))]).all()

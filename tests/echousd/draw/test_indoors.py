@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
+from PIL import Image
 from pxr import Gf, Usd, UsdGeom, UsdLux
 from small_room import BARE, StandIn, small_graph
 
 import echousd
+from echousd.draw.drawables import image_of
 from echousd.draw.indoors import BRIGHT, SHARE, evened, exposure, read_lights, with_ceiling
 from echousd.draw.rendering import render, render_stage
 from echousd.draw.scenery import read_scenery
@@ -211,10 +214,11 @@ def level_sheet(x: float, z: float, y: float = 0.05) -> np.ndarray:
 LAMP = {"bulbs": np.array([[(0.0, 1.5, 0.0)]], np.float32), "power": np.ones((1, 3), np.float32)}
 
 
-def test_a_fine_pattern_is_an_even_tone_from_afar_and_seen_from_near():
+def test_a_fine_pattern_is_an_even_tone_from_afar_and_seen_from_near(tmp_path):
     scenery, down = box_room(sky=0.0, **LAMP)
     board = np.where(np.indices((256, 256)).sum(0) % 2, 255, 0).astype(np.uint8)
-    chess = (np.repeat(board[..., None], 3, 2), np.ones(3, np.float32))
+    Image.fromarray(np.repeat(board[..., None], 3, 2)).save(tmp_path / "chess.png")
+    chess = (partial(image_of, "/Chess", str(tmp_path / "chess.png")), np.ones(3, np.float32))
     spread = {}
     for side in (1.0, 100.0):
         sheet = with_sheet(scenery, level_sheet(side, side), texture=np.zeros(2))
@@ -331,14 +335,15 @@ def test_what_is_white_darkens_less_where_it_touches():
 
 
 def test_light_is_evened_about_its_mean():
-    light = np.array([0.1, 1.0, 10.0], np.float32)[:, None] * np.ones(3, np.float32)
-    even = (light * evened(light, np.ones(3, np.float32)))[:, 0]
+    light = np.array([0.1, 1.0, 10.0], np.float32) * np.ones((3, 1), np.float32)
+    even = (light * evened(light, np.ones(3, np.float32)))[0]
     assert even[1] == pytest.approx(1.0)
     assert 10 < even[2] / even[0] < 70  # of 100
 
 
 def exposed(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> np.ndarray:
-    return exposure(color.astype(np.float32), light, day)(color.astype(np.float32))
+    color = color.astype(np.float32).reshape(-1, 3).T
+    return exposure(color, light, day)(color).T.reshape(20, 20, 3)
 
 
 def test_exposure_brings_dark_and_bright_rooms_to_one_tone():
@@ -362,9 +367,9 @@ def test_exposure_brings_dark_and_bright_rooms_to_one_tone():
 
 
 def test_what_glares_is_bleached_and_what_does_not_keeps_its_hue():
-    room, white = np.full((10, 10, 3), 0.5), np.ones(3)
+    room, white = np.full((3, 100), 0.5), np.ones(3)
     shown = exposure(room.astype(np.float32), white)
-    colour = np.array([[0.4, 0.15, 0.1]], np.float32)
+    colour = np.array([[0.4, 0.15, 0.1]], np.float32).T
     dim, glare = shown(colour), shown(100 * colour)
     assert glare.min() > 0.9
     assert dim.max() / dim.min() > 3.5

@@ -14,8 +14,8 @@ from echousd.draw.bounced import Bounced
 from echousd.draw.drawables import read_drawables
 from echousd.draw.indoors import LUMA
 from echousd.draw.rendering import render, render_stage, render_turn
-from echousd.draw.scenery import class_color, read_scenery
-from echousd.draw.tracing import BACKGROUND, Hits, World, _light, _next_room, embree, outside, smooth_light, trace
+from echousd.draw.scenery import BACKGROUND, class_color, next_room, outside, read_scenery
+from echousd.draw.tracing import RINGS, Seen, World, _light, embree, smooth_light, trace
 from echousd.draw.views import hero_view, stage_views, turning_views
 from echousd.options import RoomOptions
 
@@ -60,7 +60,7 @@ def test_up_axis_and_units_are_taken_care_of(up, unit):
 def test_a_room_is_seen_from_the_same_corner_in_any_unit_and_axis(root, tmp_path, written):
     room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE, **written)
     path = room.save(tmp_path / "bedroom", preview=False)
-    one, other = (read_scenery(Usd.Stage.Open(str(of))).furniture for of in (root, path))
+    one, other = (read_scenery(Usd.Stage.Open(str(of))).furniture() for of in (root, path))
     for values in ("size", "position", "facing"):
         np.testing.assert_allclose(getattr(one, values), getattr(other, values), atol=1e-4)
     pictures = [pixels(render(of, view="dollhouse", size=48, colors="class", rays=1)) for of in (root, path)]
@@ -136,7 +136,8 @@ def test_light_is_smoothed_within_a_plane_only():
     normal[:, :10, 1], normal[:, 10:, 0] = 1, 1
     light[:, 10:] += 5
     point = np.zeros((20, 20, 3), np.float32)
-    smooth = smooth_light(light, normal, point)
+    planes = (each.transpose(2, 0, 1).copy() for each in (light, normal, point))
+    smooth = smooth_light(*planes, [(slice(None), RINGS)]).transpose(1, 2, 0)
     assert smooth[:, :10].std() < 0.4 * light[:, :10].std()
     assert abs(smooth[:, :10].mean() - 1) < 0.1
     assert abs(smooth[:, 10:].mean() - 6) < 0.1
@@ -173,14 +174,15 @@ def test_one_looks_out_of_windows_and_past_walls_that_are_away(tmp_path):
     around = scenery.lights.view
     for view in (around, None):
         plain = replace(scenery, panes=scenery.panes[:1], lights=replace(scenery.lights, view=view))
-        (sky, field, beside, behind), through = outside(plain, np.tile(eye, (4, 1)), aims - eye)
+        colors, through = outside(plain, np.tile(eye, (4, 1)).T, (aims - eye).T)
+        sky, field, beside, behind = colors.T
         assert through.tolist() == [True, True, False, False]
         assert sky[2] > sky[1] > sky[0]
         assert field[1] > field[2] if view is around else (field == sky).all()
         np.testing.assert_array_equal([beside, behind], [BACKGROUND] * 2)
-    world = World(None, scenery, None, 64, np.zeros(4), None, 0.0, white=np.full(3, 0.5, np.float32))
     side = scenery.bounds[1][0]
-    wall, floor = _next_room(world, np.tile(eye, (2, 1)), np.array([(side, 0.0, 0.0), (side + 0.3, -1.4, 0.0)]))
+    ways = np.array([(side, 0.0, 0.0), (side + 0.3, -1.4, 0.0)])
+    wall, floor = next_room(scenery, np.full(3, 0.5), np.tile(eye, (2, 1)).T, ways.T).T
     assert wall @ LUMA < 0.5  # of white paper in the room's light
     ground = scenery.flat_colors[np.flatnonzero(scenery.normals[:, 0, 1] > 0.9)]
     off = np.abs(ground / (floor / floor.max()) - (ground / (floor / floor.max()))[:, :1]).max(1)
@@ -201,11 +203,10 @@ def test_what_light_there_is_everywhere_has_the_colour_of_the_rooms():
     world = World(
         embree(scenery.triangles), scenery, view, 64, np.zeros(4), Bounced.dark(*scenery.bounds), 0.0, white=warm
     )
-    up = np.array([(0.0, 1.0, 0.0)], np.float32)
-    light = _light(
-        world, Hits(np.array([(1.0, 1.2, 0.0)], np.float32), up, up, np.zeros(1)), 0, np.zeros((1, 4), np.float32)
-    )
-    np.testing.assert_allclose(light[0, :3] / light[0, 0], warm, rtol=1e-4)
+    up, place = np.array([(0.0, 1.0, 0.0)], np.float32).T, np.array([(1.0, 1.2, 0.0)], np.float32).T
+    seen = Seen(np.zeros(1, int), place, up, np.zeros((2, 1)), np.zeros((3, 1)))
+    light = _light(world, seen, 0, np.zeros((4, 1), np.float32))
+    np.testing.assert_allclose(light[:3, 0] / light[0, 0], warm, rtol=1e-4)
 
 
 @pytest.mark.parametrize(("opacity", "size", "faces"), [(0.3, 1.0, 2), (0.3, 0.1, 4), (0.9, 1.0, 4)])
