@@ -51,7 +51,7 @@ class Reach:
     def holds(self, path: str) -> bool:
         """Whether a file, all links followed, lies in reach."""
         real = Path(os.path.realpath(file_of(path)))
-        return any(real == place or place in real.parents for place in self.places) or store_above(real) is not None
+        return any(map(real.is_relative_to, self.places)) or store_above(real) is not None
 
     def check(self, path: str, where: str) -> None:
         """Raises StageError that names `where` (a prim, a layer) for a file out of reach."""

@@ -25,7 +25,7 @@ from echousd.place.living import living_faults
 from echousd.room import LayoutOutcome, RoomData
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.sources.named import beside
-from echousd.stage.apart import check_harmless
+from echousd.stage.apart import check_harmless, just_written
 from echousd.stage.files import open_stage, write_all
 from echousd.stage.layouts import layout_names
 from echousd.stage.paths import UNFIT, layer_file
@@ -124,6 +124,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     remove = [*stale, *(undone(folder) if old else ()), *drawn]
     named_kept = {path: name for path, name in kept.items() if name}
     changed = folders.write_together(folder, files, last=last, remove=remove, kept=named_kept)
+    just_written(folder / path for path in changed if path in owned and path.endswith((".usda", ".usdc")))
     for fault in unfit:
         warnings.warn(fault, stacklevel=3)
     for path in gone:
