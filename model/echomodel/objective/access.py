@@ -19,7 +19,7 @@ DINERS = 3  # chairs that make a dining table of a desk
 DEEP = 6.0  # metres of the room along its axis from which on it does; or something of another group stands behind it
 # Metres behind it at most, if nothing stands there (two of 129 real sofas have more), and what of more counts; in a
 # hall so deep that from there no screen at the wall ahead is watched more, beside the depth of both halves.
-WALKED_BEHIND, BARE, IN_HALL, HALVES = 1.3, 0.02, 3.1, 0.4
+WALKED_BEHIND, BARE, IN_HALL, HALVES = 1.3, 0.02, 6.0, 0.4
 MET = 0.25  # share of its width from which on something is behind it
 # Metres to what an armchair looks at, to 45 degrees, and to a wall that it does not look at.
 SEEN, NEAR = 3.0, 2.0
