@@ -6,7 +6,6 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom
@@ -14,9 +13,6 @@ from pxr import Sdf, Usd, UsdGeom
 from echomodel.late import Late
 from echousd.stage import values
 from echousd.stage.encoding import StageError
-
-if TYPE_CHECKING:
-    pass
 
 MAX_INSTANCES = 50_000  # of one instancer
 SOLIDS = ("Cube", "Sphere", "Cylinder", "Cone", "Capsule", "Plane")

@@ -130,6 +130,26 @@ def wrapped(up: str, metres: float, turn: bool, tmp_path: Path) -> Usd.Stage:
     return stage
 
 
+def test_absolute_paths_in_variants_are_told(tmp_path: Path) -> None:
+    stage = Usd.Stage.CreateNew(str(tmp_path / "kinds.usda"))
+    world = UsdGeom.Xform.Define(stage, "/World").GetPrim()
+    stage.SetDefaultPrim(world)
+    kinds, named = world.GetVariantSets().AddVariantSet("kind"), [tmp_path / "one.usda", tmp_path / "other.usda"]
+    for kind in named:
+        part = Usd.Stage.CreateNew(str(kind))
+        part.SetDefaultPrim(UsdGeom.Xform.Define(part, "/Part").GetPrim())
+        part.Save()
+        kinds.AddVariant(kind.stem)
+        kinds.SetVariantSelection(kind.stem)
+        with kinds.GetVariantEditContext():
+            world.GetReferences().AddReference(str(kind))
+    stage.Save()
+    told = [fault for fault in check(tmp_path / "kinds.usda").errors if fault.rule == "echo:RelativePaths"]
+    assert {str(fault.prim) for fault in told} == {"/World"}
+    said = sorted(fault.message.partition("asset path ")[2] for fault in told)
+    assert said == [f"'{kind}' is absolute, allowed: ./relative/path" for kind in named]
+
+
 @pytest.mark.parametrize(("up", "metres", "turn"), [("Y", 0.01, False), ("Z", 1.0, True), ("Z", 0.01, True)])
 def test_axes_units_and_place_do_not_matter(up: str, metres: float, turn: bool, tmp_path: Path) -> None:
     report = check(wrapped(up, metres, turn, tmp_path))
