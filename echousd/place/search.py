@@ -1,8 +1,9 @@
 """Search: pieces and groups are moved to the poses that the objective finds cheapest, all candidates judged at once.
 
-First every piece, anchors before those who attend them; then what the terms that are still missed are about: single
-pieces and groups; then such pieces are taken out and put in anew, the worst first. The same for equal
-settings on any machine: costs are compared to a ten-thousandth, of equal ones the first counts.
+First every piece, anchors before those who attend them, in rooms of many pieces one put in after the other; then what
+the terms that are still missed are about: single pieces and groups; then such pieces are taken out and put in anew, the
+worst first. The same for equal settings on any machine: costs are compared to a ten-thousandth, of equal ones the first
+counts.
 """
 
 from __future__ import annotations
@@ -122,8 +123,8 @@ class Search:
         edges = [pair for one, word, other in stated if word == near for pair in ((one, other), (other, one))]
         walled = {
             k for k, kind in enumerate(kinds)
-            if kind.wall and kind.role == "storage" and problem.standing(k) and not problem.fixed[k]
-            and problem.slot_roles[k] != "opposite"
+            if kind.wall and kind.role == "storage" and problem.standing(k) and problem.slot_roles[k] != "opposite"
+            and not (problem.fixed[k] or problem.turned[k])
         }  # fmt: skip
         out: list[list[tuple[int, int]]] = [[] for _ in kinds]
         for i, kind in enumerate(kinds):

@@ -135,6 +135,8 @@ def test_a_table_and_the_sideboard_told_near_it_go_to_another_wall_together():
         words, size, [(0.0, 0, 0.0), (-2.29, 0, -1.2), (2.34, 0, 1.4)], [0, np.pi / 2, -np.pi / 2], told
     )
     assert search.alongside == [[(1, 0), (2, 1)], [(2, 1)], [(1, 2)]]
+    for still in ({"turned": [1]}, {"fixed": [1]}):  # who has a stated heading or place does not go along
+        assert searched(words, size, state.position, state.yaw, told, **still)[0].alongside == [[], [], []]
     rows = np.array([[0.0, 1.2, 0.0, 0.0], [1.6, -1.0, 0.0, 0.0]])
     position, yaw = search._along(state, np.ones(3, bool), 0, [0], rows, search.alongside[0])
     for number in range(len(rows)):
