@@ -10,7 +10,7 @@ from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, nobo
 
 OVER = 0.25  # metres by which a pendant's middle may lie beyond the edge of what it hangs over
 MIDDLE = 0.22  # share of the room's extent: so near to the middle a lamp lights the room
-CENTRED = 0.3  # metres that a pendant, or the middle of several, may hang off the middle of its table or bed
+CENTRED = 0.3  # metres that a pendant, the middle of n a share of it, may hang off the middle of its table or bed
 PILLOW = 0.3  # metres behind the middle of a bed from which on lamps light a bedside
 IN_ROW, SPACED = 0.15, 0.25  # metres that one of several may hang beside their line, and that they keep apart
 TOUCH = 0.04  # metres of air below a lamp on its table
@@ -50,7 +50,7 @@ def pendant_centred(plan: Plan) -> Found:
     cos, sin = plan.turn[0][j], plan.turn[1][j]
     aside = abs(cos * x - sin * z) * (sin * x + cos * z > -PILLOW)
     off = plan.kit.where(plan.of("bed")[j], aside, plan.kit.sqrt(x * x + z * z + 1e-12)) * over  # elsewhere, nothing
-    return found(i, CENTRED - off, other=j, measure=off)
+    return found(i, CENTRED / count[j] - off, other=j, measure=off)
 
 
 def pendants_in_row(plan: Plan) -> Found:

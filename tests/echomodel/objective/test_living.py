@@ -548,6 +548,12 @@ def test_a_pendant_that_is_told_to_hang_above_a_table_hangs_over_its_middle_even
     assert ("pendant", "pendant_centred") not in DINING.found(relations=above)
 
 
+@pytest.mark.parametrize(("one", "other", "kept"), [(-0.4, 0.5, True), (0.0, 0.6, False), (0.0, 0.2, True)])
+def test_of_two_pendants_none_hangs_over_the_middle_with_the_other_beside_it(one, other, kept):
+    found = PENDANTS.moved("pendant_-1", at=(one, 0.0)).moved("pendant_1", at=(other, 0.0)).found()
+    assert (("pendant_-1", "pendant_centred") not in found) == kept
+
+
 def test_pendants_that_are_told_to_hang_above_a_table_hang_in_a_row_even_beside_it():
     across = PENDANTS.moved("pendant_1", at=(0.1, 0.5)).moved("pendant_-1", at=(-0.1, -0.5))  # their middle is its
     table, *lamps = (list(across.things).index(name) for name in ("table", "pendant_-1", "pendant_1"))
