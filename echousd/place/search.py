@@ -54,7 +54,7 @@ WALKS = 6  # states of those judged at once that are walked through, where somet
 ASIDE = 0.1  # metres from its axis of a group within which nobody stands to one side
 ASTRAY = 1.0  # metres from its slots beyond which a box is no longer at what it attends
 LIKED = 0.05  # of what slots are liked less, where chairs are seated together
-NEXT = 8  # places at walls, next to whom storage is told near, of which the one where it is so is taken
+NEXT = 8  # places at walls, the nearest to whom storage is told near, at which that relation is looked at
 LIT = 0.35  # metres between the middles of a lamp and of what it hangs over
 
 
@@ -245,9 +245,8 @@ class Search:
             here = np.array([[*state.position[i, ::2], state.yaw[i], 0.0]])
             states.append(self._carried(mirrored, i, group, np.concatenate([here, rows])))
             tastes += [state.taste[i : i + 1], taste]
-        changed = np.zeros(len(state.yaw), bool)
         position, yaw = (np.concatenate(part) for part in zip(*states, strict=True))
-        every = np.concatenate(tastes)
+        every, changed = np.concatenate(tastes), np.zeros(len(state.yaw), bool)
         changed[[*group, *(k for loads in screens for k in loads), *(k for k, _ in along)]] = True
         best = self._best(there, position, yaw, changed, every)
         if best == 0:
