@@ -35,6 +35,7 @@ from echousd.place.proposals import (
     proposals,
     seatings,
     slots_at,
+    twins,
 )
 from echousd.place.solver import PlaceConfig
 
@@ -245,8 +246,13 @@ class Search:
             here = np.array([[*state.position[i, ::2], state.yaw[i], 0.0]])
             states.append(self._carried(mirrored, i, group, np.concatenate([here, rows])))
             tastes += [state.taste[i : i + 1], taste]
+        changed = np.zeros(len(state.yaw), bool)
+        for stand, beds in self._beside_twin(state, there, i):
+            states.append(beds)
+            tastes.append(np.zeros(len(beds[1])))
+            changed[stand] = True
         position, yaw = (np.concatenate(part) for part in zip(*states, strict=True))
-        every, changed = np.concatenate(tastes), np.zeros(len(state.yaw), bool)
+        every = np.concatenate(tastes)
         changed[[*group, *(k for loads in screens for k in loads), *(k for k, _ in along)]] = True
         best = self._best(there, position, yaw, changed, every)
         if best == 0:
@@ -266,6 +272,23 @@ class Search:
         position[others, ::2] = state.position[i, ::2] + 2 * (away @ front)[:, None] * front - away
         yaw[others] = 2 * state.yaw[i] - state.yaw[others]
         return State(position, yaw, state.taste)
+
+    def _beside_twin(self, state: State, there: np.ndarray, i: int) -> list[tuple[int, tuple[np.ndarray, np.ndarray]]]:
+        """For a bed that shares a nightstand: that one, and the states with it between both, side by side."""
+        problem, out = self.problem, []
+        rows = np.array(twins(problem, state.position, state.yaw, i)).reshape(-1, 4)
+        for one in problem.stated if len(rows) else ():
+            stand = one.subject
+            if i in one.others and there[[stand, *one.others]].all() and not problem.fixed[stand]:
+                other = next(k for k in one.others if k != i)
+                position, yaw = self._carried(state, i, [k for k in self.group(i, there, state) if k != stand], rows)
+                level = (problem.size[stand, 2] - problem.size[[i, other], 2].mean()) / 2
+                front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
+                middle = (rows[:, :2] + state.position[other, [0, 2]]) / 2
+                position[:, stand, 0], position[:, stand, 2] = (middle + level * front).T
+                yaw[:, stand] = rows[:, 2]
+                out.append((stand, (position, yaw)))
+        return out
 
     def _best(
         self, there: np.ndarray, position: np.ndarray, yaw: np.ndarray, moved: np.ndarray, taste: np.ndarray

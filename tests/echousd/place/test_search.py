@@ -317,6 +317,20 @@ def test_chairs_are_seated_where_they_are_told_to_be():
     assert search.faults(state)[0] - search.faults(after)[0] > 2 * COST["relations"][0]
 
 
+def test_a_bed_comes_beside_its_twin_with_the_nightstand_that_they_share_between():
+    words, size = ["single_bed", "single_bed", "nightstand"], [(1.0, 0.9, 2.0), (1.0, 0.9, 2.0), (0.5, 0.5, 0.4)]
+    at, none = np.array([(-1.2, 0, -0.98), (1.48, 0, 1.2), (-0.35, 0, -1.75)]), np.zeros(3, bool)
+    problem = problem_of(
+        words, np.array(size), at, np.array([0, -np.pi / 2, 0]), np.zeros((0, 3), int), floor_polygon=FLOOR,
+        height=2.7, stated=(Stated("between", 2, (0, 1)),), fixed=none, rigid=none, turned=none,
+    ).spread()  # fmt: skip
+    search, state = Search(problem), State(problem.position, problem.yaw, np.zeros(3))
+    ((stand, (position, yaw)),) = search._beside_twin(state, np.ones(3, bool), 1)
+    assert stand == 2
+    assert np.cos(yaw - problem.yaw[0]) == pytest.approx(1.0)
+    assert position[:, 2, 0] == pytest.approx(position[:, :2, 0].mean(1))
+
+
 def test_two_pieces_that_stand_in_each_others_place_are_put_right():
     words, size = ["wardrobe", "bookshelf"], [(2.4, 2.2, 0.6), (0.8, 2.0, 0.3)]
     search, state = searched(words, size, [(-1.2, 0, 1.7), (-1.2, 0, -1.8)], [np.pi, 0.0], [(0, "left", 1)])
