@@ -29,6 +29,7 @@ from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.metrics.layouts import Task, kept_relations, tasks_of
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
+from echomodel.progress import StageTimer
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_rooms
 from echousd.evaluation.systems import BASES, Layouts, muted_model, networks, shuffled_model
@@ -36,7 +37,6 @@ from echousd.graph.arrays import one_thread
 from echousd.make import layouts
 from echousd.place import search
 from echousd.place.placing import place_boxes
-from echousd.progress import StageTimer
 from echousd.stage.boxes import graph_of
 
 SEED = 770_000  # of the generated rooms, as in `placing.py`

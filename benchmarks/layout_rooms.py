@@ -72,10 +72,10 @@ def cold(text: str, seed: int) -> dict[str, float]:
     """CPU seconds by part of this process, which has done nothing yet, for one graph as JSON; and drafts placed."""
     out = {"start of Python": time.process_time()}
     from echomodel.loading import load_model
+    from echomodel.progress import StageTimer
     from echousd.graph import SceneGraph
     from echousd.graph.floors import with_plan
     from echousd.make.layouts import LayoutSearch, most_drafts
-    from echousd.progress import StageTimer
 
     out["imports"] = time.process_time() - sum(out.values())
     model = load_model(None)
@@ -139,10 +139,10 @@ def cold_runs(times: int, first: int, product: float) -> None:
 def batch(rooms: int, first: int, product: float) -> None:
     """Print what a room takes in one process that makes many."""
     from echomodel.loading import load_model
+    from echomodel.progress import StageTimer
     from echousd.batches.sources import sampled_graph
     from echousd.graph.floors import with_plan
     from echousd.make.layouts import LayoutSearch, most_drafts
-    from echousd.progress import StageTimer
 
     model = load_model(None)
     graphs = [sampled_graph(TYPES[n % len(TYPES)], first, n // len(TYPES), 1.0) for n in range(rooms)]
@@ -166,9 +166,9 @@ def batch(rooms: int, first: int, product: float) -> None:
 
 def best_of_one(model: Any, graph: Any, seed: int) -> float:
     """CPU seconds of one draft of a warm model, placed."""
+    from echomodel.progress import StageTimer
     from echousd.graph.floors import with_plan
     from echousd.make.layouts import LayoutSearch
-    from echousd.progress import StageTimer
 
     planned = with_plan(graph, seed)
     began = time.process_time()

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 
 from echomodel.furniture import solids
-from echomodel.furniture.assembly import pieces_of
+from echomodel.furniture.solids import pieces_of
 from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model

@@ -17,7 +17,7 @@ from echomodel.boxes import Boxes
 from echomodel.data.sheet import thumbnail
 from echomodel.echo import EchoModel
 from echomodel.furniture import mesh_of, sample_size, solids
-from echomodel.furniture.assembly import pieces_of
+from echomodel.furniture.solids import pieces_of
 from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.objective.sizes import size_range

@@ -11,7 +11,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 from echomodel.triangles import cross
 from echousd.checks.reading import Finding, Reading, applied, rule
 from echousd.stage.encoding import NODE_API
-from echousd.stage.layouts import ARTICULATION
+from echousd.stage.pen import ARTICULATION
 from echousd.stage.values import NOW, UNREADABLE, MeshArrays, array, lineage, matrix, readable, targets
 
 THIN = 1e-9  # area of a triangle in shares of the square of its longest side that is none

@@ -12,7 +12,7 @@ from echomodel.dressing import SMALL
 from echomodel.vocabulary import UnknownWord, normalised
 from echousd.checks.reading import Finding, Reading, applied, below, rule
 from echousd.graph.nodes import OBSTACLE
-from echousd.shapes.joints import FRICTION_API
+from echousd.layers.physics import FRICTION_API
 from echousd.stage import encoding as usd
 from echousd.stage.boxes import read_small
 from echousd.stage.contents import components, room_frame, words_of

@@ -29,7 +29,7 @@ from echousd.stage.contents import RoomContents
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source, usd_error
 from echousd.stage.foreign import UNTOLD
-from echousd.stage.layouts import ARTICULATED, ARTICULATION
+from echousd.stage.pen import ARTICULATED, ARTICULATION
 from echousd.stage.read import RoomPrims, find_rooms
 from echousd.stage.showing import each_layout, showing_variant
 from echousd.stage.values import UNREADABLE, readable

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 check_output, held, writing = (Late(f"echousd.folder.folder:{word}") for word in ("check_output", "held", "writing"))
 check_ours, room_at = (Late(f"echousd.folder.found:{word}") for word in ("check_ours", "room_at"))
 read_room, write_pictures = Late("echousd.make.reading:read_room"), Late("echousd.make.save:write_pictures")
-progress_bar, StageTimer = Late("echousd.cli.progress:progress_bar"), Late("echousd.progress:StageTimer")
+progress_bar, StageTimer = Late("echousd.cli.progress:progress_bar"), Late("echomodel.progress:StageTimer")
 app = typer.Typer()
 
 

@@ -53,9 +53,9 @@ def generate(
         generate_home(graph, home, output, options, outside or (), force=force, json=json)
         return
     with writing(output, flat=flat, force=force, wait=wait), telling_faults(), progress_bar() as listen:
+        from echomodel.progress import StageTimer
         from echousd.make.finished import write_room
         from echousd.make.pipeline import generate as make
-        from echousd.progress import StageTimer
 
         spent = {"imports": time.perf_counter() - started}
         earlier = None if flat else output

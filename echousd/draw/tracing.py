@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from echomodel.triangles import along
-from echousd.draw.bounced import Bounced
-from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, VIEW, evened, exposure, rolled
+from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, VIEW, Bounced, evened, exposure, rolled
 from echousd.draw.scenery import SKY_LIGHT, Scenery, next_room, outside
 from echousd.draw.views import View
 

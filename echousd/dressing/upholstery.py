@@ -13,7 +13,7 @@ from echomodel.dressing.prints import names_of
 from echomodel.dressing.textiles import LEAN, LIES
 from echomodel.triangles import area_normals
 from echousd.dressing.setting import Setting, Standing, Thing
-from echousd.shapes.nofit import forbidden_moves
+from echousd.shapes.hulls import forbidden_moves
 
 ASIDE = 0.15  # metres that a cushion moves at most so that it stands in nothing
 PILLOW = 3.2  # exponent of the outline of a cushion

@@ -12,10 +12,9 @@ from pxr import Sdf
 from echomodel.late import Late
 from echomodel.triangles import area_normals
 from echousd.layers.materials import write_looks, write_palettes
-from echousd.layers.physics import write_asset_physics
+from echousd.layers.physics import write_asset_physics, write_joints
 from echousd.options import Look
 from echousd.shapes.geometry import Geometry
-from echousd.shapes.joints import write_joints
 from echousd.shapes.looks import alternatives, look, palette_for
 from echousd.shapes.surface import CREASE, Surface, surfaces
 from echousd.stage.paths import (

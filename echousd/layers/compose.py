@@ -22,13 +22,12 @@ from echousd.layers import assets, cameras, lights, materials, physics, structur
 from echousd.layers.cameras import room_points
 from echousd.naming import free_name
 from echousd.room import RoomData
-from echousd.shapes import joints, looks
+from echousd.shapes import looks
 from echousd.shapes.geometry import LICENCE, Geometry, Origin, Part
 from echousd.shapes.styles import ROOM_STYLE
 from echousd.shapes.surface import Surface, surfaces
 from echousd.stage.encoding import relation_name
 from echousd.stage.files import layer_bytes
-from echousd.stage.layouts import layout_pens
 from echousd.stage.paths import (
     DRESSING,
     OBJECTS,
@@ -40,7 +39,7 @@ from echousd.stage.paths import (
     payload_file,
     piece_path,
 )
-from echousd.stage.pen import Pen, ops
+from echousd.stage.pen import Pen, layout_pens, ops
 from echousd.stage.taxonomy import ade20k, word_of
 from echousd.stage.write import graph_layer as write_graph_layer
 
@@ -191,7 +190,7 @@ def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.L
     physics.write_physics(pen, solid)
     for part in built:
         if part.joint and part.mass:
-            joints.write_hinge(pen, part.path, part.joint, part.mass)
+            physics.write_hinge(pen, part.path, part.joint, part.mass)
     return pen.layer
 
 

@@ -19,8 +19,7 @@ from echousd.draw.views import view_matrix
 from echousd.layers.structure import drawn
 from echousd.room import RoomData
 from echousd.shapes.finishes import baking
-from echousd.stage.layouts import layout_pens
-from echousd.stage.pen import Pen, ops
+from echousd.stage.pen import Pen, layout_pens, ops
 
 LIGHTS = "/Room/Lights"
 NITS = 30.0  # cd/m² of a surface that comes to 1 in the picture: a camera in a lit room

@@ -18,7 +18,7 @@ from echomodel.boxes import Boxes
 from echomodel.boxes2d import turned
 from echomodel.objective import Plan, faults_of
 from echomodel.objective.support import ON_CEILING
-from echomodel.progress import StageListener
+from echomodel.progress import StageListener, StageTimer
 from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.vocabulary import vocabulary
 from echousd.assets.reference import Vector
@@ -34,7 +34,6 @@ from echousd.naming import free_name
 from echousd.options import OF_NEW, Look, RoomOptions, takes_options
 from echousd.place.living import plan_to_live_in, unusual
 from echousd.place.search import LIT
-from echousd.progress import StageTimer
 from echousd.room import LayoutOutcome, Provenance
 from echousd.shapes.looks import palette_of_room
 from echousd.shapes.sources.mixing import check_sources, default_source, mixed_shapes

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from echousd.progress import StageTimer
+from echomodel.progress import StageTimer
 from echousd.room import RoomData
 
 if TYPE_CHECKING:

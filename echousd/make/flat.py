@@ -18,8 +18,8 @@ from echousd.make.save import save_layers
 from echousd.room import RoomData
 from echousd.stage import encoding as usd
 from echousd.stage.files import layer_bytes, open_stage, write_all
-from echousd.stage.layouts import VARIANTS, layout_names
 from echousd.stage.paths import DRESSING, OBJECTS, ROOM
+from echousd.stage.pen import VARIANTS, layout_names
 from echousd.stage.showing import showing_layout
 from echousd.stage.turning import move_room
 

@@ -19,6 +19,7 @@ from echomodel.loading import load_model
 from echomodel.objective.access import LEAF, NEEDED
 from echomodel.objective.physics import TOUCH
 from echomodel.openings import signed_area
+from echomodel.progress import StageTimer
 from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
@@ -30,7 +31,6 @@ from echousd.place.living import living_faults, severity
 from echousd.place.placing import Arranged, PlacedBoxes
 from echousd.place.placing import place as placed
 from echousd.place.solver import PlaceConfig, sentence
-from echousd.progress import StageTimer
 from echousd.shapes.styles import equal_sizes, style_groups, unequal_pairs
 
 DRAFTS = 8  # of which the best is kept

@@ -17,7 +17,7 @@ from echomodel.objective.support import ON_CEILING
 from echousd.graph import Placed, Relation, SceneGraph
 from echousd.make.obstacles import EDGE, REACH, Scene
 from echousd.make.verdicts import unbroken
-from echousd.shapes.nofit import depth
+from echousd.shapes.hulls import depth
 
 GAP = 0.001  # metres left between what was moved apart
 DIRECTIONS = 8

@@ -15,7 +15,7 @@ from echomodel.objective import Plan
 from echomodel.triangles import Mesh, connected_pieces
 from echousd.graph import SceneGraph
 from echousd.shapes.geometry import Geometry
-from echousd.shapes.nofit import FLUSH, Solids, depth, forbidden_moves
+from echousd.shapes.hulls import FLUSH, Solids, depth, forbidden_moves
 from echousd.shapes.walls import walls as walls_of
 
 REACH = 0.5  # metres that a piece is moved at most in all

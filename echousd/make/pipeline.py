@@ -11,7 +11,7 @@ from typing import Any
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import footprints
 from echomodel.late import Late
-from echomodel.progress import StageListener
+from echomodel.progress import StageListener, StageTimer
 from echomodel.protocols import RoomModel
 from echousd.graph import SceneGraph, load_graph
 from echousd.graph.arrays import graph_batch, one_thread
@@ -33,7 +33,6 @@ from echousd.make.layouts import (
 from echousd.make.verdicts import layout_outcome, warn_of_faults
 from echousd.options import RoomOptions, takes_options
 from echousd.place.living import unusual
-from echousd.progress import StageTimer
 from echousd.room import Provenance
 from echousd.shapes.sources.mixing import check_sources, default_source, mixed_shapes, shape_nearness, sources_of
 from echousd.shapes.sources.named import anchored, check_files, names_models, with_model_sizes

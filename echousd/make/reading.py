@@ -18,10 +18,10 @@ from echousd.folder.found import manifest_of
 from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.graph import SceneGraph
+from echousd.layers.physics import read_joints
 from echousd.layers.placed import MODEL, PLACES
 from echousd.shapes.colliders import approximation, collider_of
 from echousd.shapes.geometry import LICENCE, Collider, Geometry, Origin, Original, Part
-from echousd.shapes.joints import read_joints
 from echousd.shapes.matter import read_mass
 from echousd.stage.contents import room_frame, surface_of
 from echousd.stage.files import open_stage

@@ -27,8 +27,8 @@ from echousd.shapes.geometry import Geometry
 from echousd.shapes.sources.named import beside
 from echousd.stage.apart import check_harmless, just_written
 from echousd.stage.files import open_stage, write_all
-from echousd.stage.layouts import layout_names
 from echousd.stage.paths import UNFIT, layer_file
+from echousd.stage.pen import layout_names
 
 if TYPE_CHECKING:
     from echousd.folder.stored import Shelf

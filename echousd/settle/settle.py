@@ -13,8 +13,8 @@ from pxr import Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from echomodel.files import raising
 from echomodel.late import extra
+from echousd.layers.physics import GRAVITY
 from echousd.shapes.geometry import Mass
-from echousd.shapes.joints import GRAVITY
 from echousd.shapes.matter import read_mass
 from echousd.stage.contents import triangulated
 from echousd.stage.encoding import StageError

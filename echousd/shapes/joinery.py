@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.furniture.assembly import Piece, pieces_of
-from echomodel.furniture.solids import FINEST, Solid
+from echomodel.furniture.solids import FINEST, Piece, Solid, pieces_of
 from echomodel.triangles import Mesh, area_normals, joined
 from echousd.shapes.geometry import FRAME, Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.hulls import convex_hull, hull_of

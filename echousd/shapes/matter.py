@@ -12,7 +12,7 @@ from shapely.affinity import scale
 
 from echomodel.dressing.prints import PRINTS
 from echomodel.files import tables
-from echomodel.furniture.assembly import Piece
+from echomodel.furniture.solids import Piece
 from echomodel.late import Late
 from echomodel.triangles import cross
 from echomodel.vocabulary import vocabulary

@@ -1,7 +1,7 @@
 """Prims of a layer authored through Sdf alone: no stage composes what is being written.
 
 Properties are called as usda spells them: `uniform token purpose`, `rel material:binding`, `custom float[] mine`,
-`color3f inputs:diffuseColor.connect`.
+`color3f inputs:diffuseColor.connect`. The layouts of a room are variants of a set: written here, and listed.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from pxr import Sdf
+from pxr import Sdf, Usd
+
+from echousd.stage.paths import ROOM
 
 NOTHING: Mapping[str, Any] = {}
 UNIFORM = Sdf.VariabilityUniform
@@ -146,3 +148,34 @@ def relate(spec: Sdf.PrimSpec, name: str, *targets: Sdf.Path | str, custom: bool
     relationship = spec.properties.get(name) or Sdf.RelationshipSpec(spec, name, custom, UNIFORM)
     relationship.targetPathList.ClearEditsAndMakeExplicit()  # no target is an opinion as well
     relationship.targetPathList.explicitItems = [Sdf.Path(target) for target in targets]
+
+
+VARIANTS = "layout"
+ARTICULATION, ARTICULATED = "articulation", "articulated"  # variant set of what opens, and the variant with joints
+
+
+def layout_prims(stage: Usd.Stage) -> list[Usd.Prim]:
+    """The prims with a variant set `layout`, at whatever path; rooms of one layout have none."""
+    found, prims = [], iter(Usd.PrimRange.Stage(stage))
+    for prim in prims:
+        if VARIANTS in prim.GetVariantSets().GetNames():
+            found.append(prim)
+        if prim.IsComponent():  # no room
+            prims.PruneChildren()
+    return found
+
+
+def layout_names(stage: Usd.Stage) -> tuple[str, ...]:
+    """All layouts of a stage, `layout_0` first; empty where there is only one."""
+    names = {name for prim in layout_prims(stage) for name in prim.GetVariantSet(VARIANTS).GetVariantNames()}
+    return tuple(sorted(names, key=lambda name: (len(name), name)))
+
+
+def layout_pens(pen: Pen, count: int, chosen: str | None = None) -> list[Pen]:
+    """A pen for each layout of a room, in the variant of its number; one alone is no variant.
+
+    Arguments:
+        chosen: the variant that is seen, None = another layer says which.
+    """
+    names = [f"{VARIANTS}_{number}" for number in range(count)]
+    return [pen] if count == 1 else list(pen.variants(ROOM, VARIANTS, names, chosen).values())

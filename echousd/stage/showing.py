@@ -9,7 +9,7 @@ from pxr import Sdf, Usd
 
 from echousd.stage.encoding import StageError
 from echousd.stage.files import source
-from echousd.stage.layouts import VARIANTS, layout_names, layout_prims
+from echousd.stage.pen import VARIANTS, layout_names, layout_prims
 
 
 def selected_layout(stage: Usd.Stage) -> str:

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
-from echomodel.furniture.assembly import pieces_of
-from echomodel.furniture.solids import FINEST
+from echomodel.furniture.solids import FINEST, pieces_of
 from echomodel.furniture.style import FAMILIES, GROUPS, OPEN, STYLE, WIDTH, described, draw_styles, piece_of
 from echomodel.metrics.furniture import loose_solids
 from echomodel.vocabulary import vocabulary

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from echomodel.furniture import Choices, Style, solids
-from echomodel.furniture.assembly import pieces_of
 from echomodel.furniture.plants import SPECIES, grown, species
+from echomodel.furniture.solids import pieces_of
 
 BOXES = {"floor": (np.array([0.5, 1.1, 0.5]), 0.25, 0.15), "table": (np.array([0.24, 0.27, 0.24]), 0.09, 0.06)}
 

@@ -12,9 +12,8 @@ from shapely.geometry import MultiPoint
 from shapely.ops import unary_union
 
 from echomodel.furniture import Choices, solids
-from echomodel.furniture.assembly import pieces_of
-from echomodel.furniture.decor import PANEL
-from echomodel.furniture.solids import Ball
+from echomodel.furniture.household import PANEL
+from echomodel.furniture.solids import Ball, pieces_of
 from echomodel.furniture.style import Style
 from echomodel.objective.sizes import EDGE, FEET, fitting_loads, in_proportion, laid_tables, size_range, usual_sizes
 from echomodel.sizes import usual_range

@@ -6,7 +6,7 @@ import trimesh
 
 from echomodel.dressing import KINDS, thing, usual_size
 from echomodel.dressing.books import book_size
-from echomodel.furniture.assembly import pieces_of
+from echomodel.furniture.solids import pieces_of
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -13,7 +13,7 @@ from small_room import BARE
 
 import echousd
 from echomodel.boxes import Boxes
-from echomodel.furniture import PROGRAMS, decor
+from echomodel.furniture import PROGRAMS, household
 from echomodel.furniture.carpentry import box
 from echomodel.furniture.style import FAMILIES, KINDS
 from echomodel.rooms.generator import drawn_shares, generate_rooms
@@ -154,8 +154,8 @@ def test_made_of_parts_dressed_weighed_and_made_in_batches(music, tmp_path, monk
         sides = [box((x, 0, -d / 2), (x + 0.05, 0.5 * h, d / 2)) for x in (-w / 2, w / 2 - 0.05)]
         return [*sides, box((-w / 2, 0.5 * h, -d / 2), (w / 2, h, d / 2))]
 
-    monkeypatch.setattr(decor, "spinet", spinet, raising=False)
-    monkeypatch.setitem(PROGRAMS, "decor", (*PROGRAMS["decor"], "spinet"))
+    monkeypatch.setattr(household, "spinet", spinet, raising=False)
+    monkeypatch.setitem(PROGRAMS, "household", (*PROGRAMS["household"], "spinet"))
     graph = starting_graph("music room", {"spinet": 1})  # of no stated size: its floor is that of its like
     graph = graph.replaced(relations=(*graph.relations, Relation("stool", "in_line_with", "harp")))
     options = {"shapes": "parts", "dress": "full", "walls": True}

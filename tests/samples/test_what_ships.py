@@ -16,6 +16,7 @@ from echomodel.furniture import solids
 from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.metrics.furniture import piece_scores, sampled, style_scores
+from echomodel.progress import StageTimer
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 from echomodel.vocabulary import vocabulary
@@ -24,7 +25,6 @@ from echousd.graph.arrays import floor_centre, graph_batch
 from echousd.graph.floors import with_plan
 from echousd.make.layouts import finished_boxes
 from echousd.make.verdicts import layout_outcome
-from echousd.progress import StageTimer
 
 SAMPLES = sorted((Path(__file__).parents[2] / "samples").glob("*.usda"))
 SEEDS = (0, 1, 2)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echomodel.files import raising
+from echomodel.progress import StageTimer
 from echomodel.vocabulary import vocabulary
 from echousd.assets.reference import is_file
 from echousd.graph import Node, SceneGraph
-from echousd.progress import StageTimer
 from echousd.shapes.finishes.slots import HARMONIES, linear
 from echousd.shapes.looks import palette_of_room
 from echousd.shapes.sources.named import RETRIEVED, source_of

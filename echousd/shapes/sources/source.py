@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from echomodel.boxes import Boxes
+from echomodel.progress import StageTimer
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import floor_centre
-from echousd.progress import StageTimer
 from echousd.shapes.geometry import FACES, Geometry
 from echousd.shapes.styles import shared_assets
 

@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.furniture.assembly import mesh_of
-from echomodel.furniture.solids import Joint, Solid
+from echomodel.furniture.solids import Joint, Solid, mesh_of
 from echomodel.furniture.style import Choices, Style, sample_size
 from echomodel.late import Late
 from echomodel.vocabulary import vocabulary
@@ -29,12 +28,11 @@ PROGRAMS = {
     "shelving": ("bookshelf", "shelf", "wine_cabinet"),
     "beds": ("double_bed", "single_bed"), "kids_beds": ("kids_bed",),
     "lamps": ("pendant_lamp", "ceiling_lamp", "floor_lamp", "table_lamp", "wall_lamp"),
-    "decor": ("plant", "tv"),
     "kitchens": ("base_unit", "wall_unit", "tall_unit", "sink_unit", "hob_unit", "dishwasher", "fridge", "range_hood",
                  "kitchen_island"),
     "bathrooms": ("toilet", "washbasin", "shower", "bathtub", "mirror_cabinet", "towel_radiator", "washing_machine"),
     "household": ("coat_rack", "shoe_cabinet", "radiator", "fireplace", "piano", "cot", "toy_box", "garden_table",
-                  "garden_chair"),
+                  "garden_chair", "plant", "tv"),
 }  # fmt: skip
 UNSAID = ("", "board")
 BY_MATERIAL = {"fabric": "upholstery", "shade": "shade", "leaf": "leaf", "mirror": "mirror"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echousd.draw.bounced import THROWN, Bounced
+from echousd.draw.indoors import THROWN, Bounced
 
 TABLE = Bounced.dark(np.zeros(3), np.array([4.0, 3.0, 2.0]))
 

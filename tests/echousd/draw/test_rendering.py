@@ -10,9 +10,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 from small_room import BARE, StandIn, small_graph
 
 import echousd
-from echousd.draw.bounced import Bounced
 from echousd.draw.drawables import read_drawables
-from echousd.draw.indoors import LUMA
+from echousd.draw.indoors import LUMA, Bounced
 from echousd.draw.rendering import render, render_stage, render_turn
 from echousd.draw.scenery import BACKGROUND, class_color, next_room, outside, read_scenery
 from echousd.draw.tracing import RINGS, Seen, World, _light, embree, smooth_light, trace

@@ -17,7 +17,7 @@ from echomodel.boxes2d import turned
 from echomodel.dressing import KINDS, SMALL
 from echomodel.dressing import thing as solids_of
 from echomodel.dressing.prints import PRINTS, printed
-from echomodel.furniture.assembly import pieces_of
+from echomodel.furniture.solids import pieces_of
 from echomodel.openings import Opening
 from echomodel.triangles import Mesh, joined
 from echomodel.vocabulary import vocabulary

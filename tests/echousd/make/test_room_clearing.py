@@ -17,7 +17,7 @@ from echousd.make.clearing import cleared
 from echousd.make.verdicts import relation_verdicts
 from echousd.place.living import living_faults
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
-from echousd.shapes.nofit import depth, forbidden, forbidden_moves
+from echousd.shapes.hulls import depth, forbidden, forbidden_moves
 
 FLOOR = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
 

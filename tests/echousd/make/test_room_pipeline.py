@@ -9,12 +9,12 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echomodel.boxes import Boxes
 from echomodel.openings import Opening
+from echomodel.progress import StageTimer
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.arrays import graph_batch
 from echousd.make import layouts
 from echousd.make.pipeline import with_locked_places
 from echousd.make.verdicts import relation_verdicts
-from echousd.progress import StageTimer
 from echousd.shapes.styles import asset_names, equal_sizes, shared_assets, style_groups
 
 

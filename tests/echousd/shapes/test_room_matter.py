@@ -5,8 +5,7 @@ import pytest
 import trimesh
 
 from echomodel.furniture import sample_size, solids
-from echomodel.furniture.assembly import Piece, pieces_of
-from echomodel.furniture.solids import Solid
+from echomodel.furniture.solids import Piece, Solid, pieces_of
 from echomodel.furniture.style import WIDTH, piece_of
 from echomodel.vocabulary import vocabulary
 from echousd.shapes.matter import MATTER, PARTS, weighed
