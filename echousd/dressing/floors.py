@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from echomodel.dressing import KINDS, usual_size
-from echomodel.dressing.prints import names_of
+from echomodel.dressing import KINDS, names_of, usual_size
 from echomodel.openings import hinge_point, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, around, rectangle
 from echousd.dressing.stories import Wish

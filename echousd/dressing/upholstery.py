@@ -8,8 +8,7 @@ import numpy as np
 import shapely
 
 from echomodel.boxes2d import hull, upright
-from echomodel.dressing import usual_size
-from echomodel.dressing.prints import names_of
+from echomodel.dressing import names_of, usual_size
 from echomodel.dressing.textiles import LEAN, LIES
 from echomodel.triangles import area_normals
 from echousd.dressing.setting import Setting, Standing, Thing

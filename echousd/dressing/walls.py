@@ -9,9 +9,8 @@ from itertools import islice, product
 import numpy as np
 
 from echomodel.boxes2d import axes
-from echomodel.dressing import KINDS, usual_size
+from echomodel.dressing import KINDS, printed, usual_size
 from echomodel.dressing import thing as solids_of
-from echomodel.dressing.prints import printed
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, rectangle, standing
 from echousd.dressing.tabletops import stocked, surfaces

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from echomodel.dressing.prints import PRINTS
+from echomodel.dressing import PRINTS
 from echousd.shapes.finishes import baking
 from echousd.shapes.finishes.slots import material_of
 from echousd.shapes.looks import Look

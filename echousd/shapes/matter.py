@@ -10,7 +10,7 @@ import shapely
 from pxr import Gf, Usd, UsdPhysics
 from shapely.affinity import scale
 
-from echomodel.dressing.prints import PRINTS
+from echomodel.dressing import PRINTS
 from echomodel.files import tables
 from echomodel.furniture.solids import Piece
 from echomodel.late import Late

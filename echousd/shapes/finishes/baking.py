@@ -12,7 +12,7 @@ import numpy as np
 import PIL
 from PIL import Image
 
-from echomodel.dressing.prints import PRINTS, TABLE
+from echomodel.dressing import PRINTS, TABLE
 from echomodel.files import digest, from_cache, tables
 from echomodel.late import Late
 from echousd.shapes.finishes.slots import HERE, Color

@@ -12,7 +12,7 @@ from zlib import crc32
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from echomodel.dressing.prints import ASPECTS, PRINTS
+from echomodel.dressing import ASPECTS, PRINTS
 from echousd.shapes.finishes.patterns import SIZE, carpet, noise
 from echousd.shapes.finishes.slots import HARMONIES
 from echousd.srgb import to_linear

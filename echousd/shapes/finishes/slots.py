@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echomodel.dressing.prints import PRINTS
+from echomodel.dressing import PRINTS
 from echomodel.files import tables
 from echousd.srgb import of_hexadecimal
 

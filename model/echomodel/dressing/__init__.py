@@ -1,7 +1,7 @@
 """Small things that make a room look lived in: what there is, what it is called, and programs that build it of solids.
 
-One row per kind (`things.toml`); the words stand beside the furniture's vocabulary, because no graph and no weights
-know them.
+One row per kind (`things.toml`), and per print (`prints.toml`) by the name of its material; the words stand beside the
+furniture's vocabulary, because no graph and no weights know them.
 """
 
 from __future__ import annotations
@@ -9,19 +9,26 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from echomodel.dressing.prints import PRINTS
 from echomodel.files import tables
 from echomodel.furniture.carpentry import Size, both
 from echomodel.furniture.solids import Block, Lathe, Solid, ball, rotation, tube
 from echomodel.late import Late
+from echomodel.rows import RoomStyle
 
 Program = Callable[..., list[Solid]]  # of extents (3,) and a generator; `shown`, a row of `prints.toml`, by name
 Size3 = tuple[float, float, float]
 Row = Mapping[str, Any]  # as `things.toml` says
+# of sheets that show the rows of `prints.toml`: what is printed on pictures and cloths and woven into rugs
+ASPECTS = {
+    "tall": 0.74, "wide": 1.45, "rug": 1.5, "round": 1.0, "oval": 1.5, "runner": 3.0, "square": 1.0, "lumbar": 1.7,
+}  # fmt: skip
+TABLE = Path(__file__).with_name("prints.toml")
+PRINTS: Mapping[str, Row] = tables(TABLE.name, __file__)
 
 
 @dataclass(frozen=True)
@@ -120,3 +127,26 @@ def usual_size(kind: str, rng: np.random.Generator) -> np.ndarray:
 def thing(kind: str, size: np.ndarray, rng: np.random.Generator, **form: tuple[float, ...]) -> list[Solid]:
     """The solids of one small thing, about as large as `size` (3,), metres; +Y up, +Z its front, its bottom at 0."""
     return KINDS[kind].program(np.asarray(size, float), rng, **form)
+
+
+def printed(what: str, form: str, resident: str = "", style: RoomStyle | None = None) -> dict[str, list[str]]:
+    """Kind -> names of what is printed on sheets of a form, for somebody who has rows of their own, else for anyone.
+
+    `what`: the word that names begin with. `style`: of a room; its prints are taken alone where there are any.
+    """
+    fit = {name: row for name, row in PRINTS.items() if name.startswith(f"{what}_") and row["form"] == form}
+    own = [name for name, row in fit.items() if resident in row.get("for", ())]
+    found: dict[str, list[str]] = {}
+    for name in own or (name for name, row in fit.items() if "for" not in row):
+        found.setdefault(fit[name].get("kind", name), []).append(name)
+    return {kind: names for kind, names in found.items() if style and kind in style.prints} or found
+
+
+def names_of(what: str, form: str, resident: str = "", style: RoomStyle | None = None) -> list[str]:
+    """The names of all kinds that are `printed` so."""
+    return [name for names in printed(what, form, resident, style).values() for name in names]
+
+
+def any_of(what: str, form: str, rng: np.random.Generator) -> str:
+    """The name of a row that anybody has."""
+    return str(rng.choice(names_of(what, form)))

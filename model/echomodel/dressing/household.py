@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from echomodel.dressing.prints import any_of
+from echomodel.dressing import any_of
 from echomodel.furniture.carpentry import Size, box, framed
 from echomodel.furniture.solids import Block, Lathe, Solid, ball, rotation, tube, turned
 from echomodel.late import Late

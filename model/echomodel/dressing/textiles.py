@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from echomodel.dressing.prints import any_of
+from echomodel.dressing import any_of
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.cloth import Sheet, Slumped, folds, pillow, seam
 from echomodel.furniture.solids import Solid, ball, rotation, tube, turned

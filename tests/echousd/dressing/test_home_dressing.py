@@ -5,8 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from echomodel.dressing import KINDS
-from echomodel.dressing.prints import PRINTS
+from echomodel.dressing import KINDS, PRINTS
 from echomodel.furniture import Choices, Style, solids
 from echomodel.openings import Opening
 from echousd.dressing import floors, tabletops, upholstery, walls

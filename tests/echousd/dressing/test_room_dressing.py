@@ -14,9 +14,8 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import turned
-from echomodel.dressing import KINDS, SMALL
+from echomodel.dressing import KINDS, PRINTS, SMALL, printed
 from echomodel.dressing import thing as solids_of
-from echomodel.dressing.prints import PRINTS, printed
 from echomodel.furniture.solids import pieces_of
 from echomodel.openings import Opening
 from echomodel.triangles import Mesh, joined

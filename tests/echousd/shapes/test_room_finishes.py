@@ -12,7 +12,7 @@ from pxr import Usd, UsdShade
 from small_room import BARE, StandIn, small_graph
 
 import echousd
-from echomodel.dressing.prints import ASPECTS, PRINTS
+from echomodel.dressing import ASPECTS, PRINTS
 from echomodel.furniture.solids import Block
 from echomodel.triangles import Mesh
 from echousd.checks.reading import Reading
