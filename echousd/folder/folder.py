@@ -68,10 +68,14 @@ def digest_of(path: Path) -> str:
         return ""
 
 
+def _flush_all(places: Iterable[Path]) -> None:
+    with ThreadPoolExecutor() as pool:  # one after another a room's hundred files wait a third of a second
+        list(pool.map(flush, places))
+
+
 def write_journal(staging: Path, journal: Journal) -> None:
     """Put the journal beside its staged files: these are on the disk before, and it is there as a whole."""
-    with ThreadPoolExecutor() as pool:  # one after another a room's hundred files wait a third of a second
-        list(pool.map(flush, (staging / entry.staged for entry in journal.move)))
+    _flush_all(staging / entry.staged for entry in journal.move)
     (staging / "journal.new").write_text(journal.model_dump_json(), "utf-8")
     flush(staging / "journal.new")
     (staging / "journal.new").replace(staging / JOURNAL)
@@ -304,9 +308,7 @@ def _finish(folder: Path, journal: Journal) -> None:
         _remove_empty(place.parent, folder)
     for path, name in journal.kept.items():
         tell_kept(folder, path, name)
-    for place in touched:
-        if place.is_dir():
-            flush(place)
+    _flush_all(place for place in touched if place.is_dir())
 
 
 def _discard(staging: Path) -> None:

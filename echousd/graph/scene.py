@@ -46,6 +46,9 @@ class SceneGraph(PlainModel):
         raise_all([*wrong, *triple_faults([relation.triple for relation in self.relations], self.names)])
         return self
 
+    def __hash__(self) -> int:
+        return hash(self.names)  # equal graphs have equal ones
+
     @cached_property
     def _by_name(self) -> dict[str, Node]:
         return {node.name: node for node in self.nodes}

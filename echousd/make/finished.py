@@ -7,6 +7,7 @@ import tempfile
 import weakref
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,17 +45,14 @@ class Room(RoomData):
 
         return save_room(self, Path(folder), force=force, preview=preview, wait=wait, store=store)
 
-    @property
+    @cached_property
     def stage(self) -> Usd.Stage:
         """The room as a composed stage (written to a temporary folder that lives as long as the room)."""
-        if not hasattr(self, "_stage"):
-            from pxr import Usd
+        from pxr import Usd
 
-            folder = tempfile.TemporaryDirectory(prefix="echousd-")
-            root = self.save(Path(folder.name) / self.name, preview=False)
-            object.__setattr__(self, "_stage", Usd.Stage.Open(str(root)))
-            weakref.finalize(self, folder.cleanup)
-        return self._stage  # type: ignore[attr-defined]
+        folder = tempfile.TemporaryDirectory(prefix="echousd-")
+        weakref.finalize(self, folder.cleanup)
+        return Usd.Stage.Open(str(self.save(Path(folder.name) / self.name, preview=False)))
 
     def image(self, *, size: int = 512, view: str = "hero") -> Any:
         """A picture of the room (PIL image); needs the extra `render`."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,7 @@ TALL = 2.0  # metres by which a screen counts as higher where openings are place
 DEFAULTS = PlaceConfig()
 OF_OPENINGS = frozenset({"door_free", "leaf_aside", "window_free"})  # terms
 DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
+judged_faults = lru_cache(4 * DRAFTS)(living_faults)  # of boxes that nobody changes: openings that make way ask again
 
 
 def check_objects(graph: SceneGraph, file: str = "") -> None:
@@ -176,10 +177,10 @@ def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int |
     `seed`: where nobody stated the openings, that by which they make way; None = they stay.
     """
     boxes, conflicts = found
-    faults = living_faults(graph, boxes)
+    faults = judged_faults(graph, boxes)
     if seed is not None and any(fault.rule in OF_OPENINGS for fault in faults):
         graph = with_free_openings(graph, [boxes], seed)
-        faults = living_faults(graph, boxes)
+        faults = judged_faults(graph, boxes)
     late = [fault for fault in faults if seed is not None and fault.rule in OF_OPENINGS]
     now = [fault for fault in faults if fault not in late]
     return len(layout_outcome(graph, boxes).faults), len(conflicts), round(severity(now), 2), round(severity(late), 2)
@@ -236,8 +237,6 @@ def _on_cords(graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str]) -> Box
 
 def _with_homeless_unlocked(graph: SceneGraph) -> SceneGraph:
     """The graph in which what is locked without having a place may be placed."""
-    if not any(node.locked and node.position is None for node in graph.nodes):
-        return graph
     return graph.replaced(nodes=tuple(n.replaced(locked=n.locked and n.position is not None) for n in graph.nodes))
 
 
@@ -248,7 +247,7 @@ def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int) -
     """
 
     def faults(graph: SceneGraph) -> int:
-        return sum(len(living_faults(graph, boxes)) for boxes in layouts)
+        return sum(len(judged_faults(graph, boxes)) for boxes in layouts)
 
     bare = graph.with_room(openings=())
     before = faults(graph)

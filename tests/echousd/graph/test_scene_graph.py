@@ -323,3 +323,11 @@ def test_names_that_pydantic_brings_along_are_not_shown(bedroom):
         assert not [name for name in shown if name.startswith(("model_", "_", "parse_", "copy"))]
         assert set(type(thing).model_fields) <= set(shown)
     assert {"relate", "names", "nodes"} <= set(dir(bedroom))
+
+
+def test_equal_graphs_have_equal_hashes():
+    graph = SceneGraph("bedroom", (Node("bed", "double_bed"), Node("lamp", "table_lamp")))
+    again = graph.replaced(nodes=tuple(node.replaced() for node in graph.nodes))
+    assert again == graph
+    assert hash(again) == hash(graph)
+    assert len({graph, again, graph.update_node("bed", yaw=1.0)}) == 2

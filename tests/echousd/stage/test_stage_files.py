@@ -1,10 +1,13 @@
 """Files that appear together or not at all."""
 
+import tempfile
 from pathlib import Path
 
 import pytest
+from pxr import Sdf
 
-from echousd.stage.files import write_all
+from echousd.stage import files
+from echousd.stage.files import layer_bytes, write_all
 
 
 def test_a_folder_in_the_way_is_found_before_anything_is_written(tmp_path):
@@ -39,3 +42,14 @@ def test_a_name_that_is_refused_is_told_by_itself(tmp_path, monkeypatch):
     monkeypatch.setattr(Path, "replace", refuse)
     with pytest.raises(ValueError, match=r"first\.usda: cannot be written \(Permission denied\); others .* may"):
         write_all({tmp_path / name: b"new" for name in ("first.usda", "second.jpg")})
+
+
+def test_a_layer_has_the_same_bytes_where_files_are_not_kept_in_memory(tmp_path, monkeypatch):
+    layer = Sdf.Layer.CreateAnonymous(".usdc")
+    Sdf.CreatePrimInLayer(layer, "/Room/Table")
+    found = layer_bytes(layer, ".usdc")
+    monkeypatch.setattr(files, "MEMORY", tmp_path / "none")  # another system
+    assert layer_bytes(layer, ".usdc") == found
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    with pytest.raises(OSError, match="cannot write a layer to"):
+        layer_bytes(layer, ".usdc")
