@@ -23,7 +23,7 @@ from echousd.layers.cameras import room_points
 from echousd.naming import free_name
 from echousd.room import RoomData
 from echousd.shapes import looks
-from echousd.shapes.geometry import LICENCE, Geometry, Origin, Part
+from echousd.shapes.geometry import LICENCE, Geometry, Part
 from echousd.shapes.styles import ROOM_STYLE
 from echousd.shapes.surface import Surface, surfaces
 from echousd.stage.encoding import relation_name
@@ -46,23 +46,10 @@ from echousd.stage.write import graph_layer as write_graph_layer
 if TYPE_CHECKING:
     from echousd.folder.stored import Shelf
 
-carried_files, placed_files = Late("echousd.layers.placed:carried_files"), Late("echousd.layers.placed:placed_files")
+OF_OTHERS = ("attribution", "carried_files", "placed_files")  # of rooms with models of other people
+attribution, carried_files, placed_files = (Late(f"echousd.layers.placed:{name}") for name in OF_OTHERS)
 write_nodes = Late("echousd.dressing.nodes:write_nodes")
 FILE = "ATTRIBUTION.md"
-
-
-def text(room: str, origins: dict[str, Origin]) -> str:
-    """A table of the models, by licence and author."""
-    notice = "Made by others, and placed and scaled here; a licence may ask that they are named."
-    lines = [f"# Models in {room}", "", notice, ""]
-    lines += ["| asset | model | licence | author |", "|---|---|---|---|"]
-    for name, origin in sorted(origins.items(), key=lambda entry: (entry[1].licence, entry[1].credit, entry[0])):
-        row = (name, origin.asset, origin.licence, origin.credit or "unknown")
-        cells = (" ".join(words.split()).replace("|", "\\|")[:200] for words in row)
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
-
-
 OTHERS = "room_others"  # what the names of a room's second materials begin with
 LAYERS = ("dressing", "materials", "physics", "layout", "graph", "geometry", "shell")  # strongest first
 
@@ -89,7 +76,7 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
         files.update(made[name].files)
     origins = {name: room.geometry[user].origin for name, user in room.asset_users.items()}
     if theirs := {name: origin for name, origin in origins.items() if origin.asset}:  # models of other people
-        files[FILE] = text(room.name, theirs).encode()
+        files[FILE] = attribution(room.name, theirs).encode()
     dressing = dress(room)
     small = {
         name: _written(room, name, KINDS[dressing.kinds[name]].name, ROOM_STYLE, geometry)

@@ -1,4 +1,4 @@
-"""A model of somebody else's as a USD asset: a component that places it, and refers to it or holds it."""
+"""A model of somebody else's as a USD asset: a component that places it, refers to it or holds it; whose they are."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pxr import Gf, Kind, Sdf
 
 from echousd.layers.assets import as_asked, component_layer, geometry_layer
 from echousd.options import Look
-from echousd.shapes.geometry import Geometry, Original
+from echousd.shapes.geometry import Geometry, Origin, Original
 from echousd.stage.files import layer_bytes
 from echousd.stage.paths import component_file, original_file, payload_file, payload_name, piece_name
 from echousd.stage.pen import ops, say
@@ -78,3 +78,15 @@ def _place(layer: Sdf.Layer, name: str, original: Original, path: str) -> None:
         model = Sdf.PrimSpec(places, piece_name(name, MODEL), Sdf.SpecifierDef)
         model.kind = Kind.Tokens.subcomponent  # a component has none below it
         model.payloadList.prependedItems.append(Sdf.Payload(path, Sdf.Path(original.prim)))
+
+
+def attribution(room: str, origins: dict[str, Origin]) -> str:
+    """A table of the models, by licence and author."""
+    notice = "Made by others, and placed and scaled here; a licence may ask that they are named."
+    lines = [f"# Models in {room}", "", notice, ""]
+    lines += ["| asset | model | licence | author |", "|---|---|---|---|"]
+    for name, origin in sorted(origins.items(), key=lambda entry: (entry[1].licence, entry[1].credit, entry[0])):
+        row = (name, origin.asset, origin.licence, origin.credit or "unknown")
+        cells = (" ".join(words.split()).replace("|", "\\|")[:200] for words in row)
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"

@@ -38,14 +38,13 @@ from echousd.shapes.sources.mixing import check_sources, default_source, mixed_s
 from echousd.shapes.sources.named import anchored, check_files, names_models, with_model_sizes
 from echousd.shapes.sources.source import Retrieved, ShapeRequest
 from echousd.shapes.styles import asset_names, style_groups
-from echousd.stage.files import open_stage, opened
+from echousd.stage.files import open_stage
 from echousd.stage.graphs import read_graph
-from echousd.stage.read import find_rooms
 from echousd.stage.units import conventions
 
-graph_from_plain = Late("echousd.graph.text:graph_from_plain")  # of a room that is there already
+with_earlier_locks = Late("echousd.make.reading:with_earlier_locks")  # of a room that is there already
+with_locked_places = Late("echousd.make.reading:with_locked_places")
 named_pieces, retrieved = (Late(f"echousd.shapes.sources.retrieval:{name}") for name in ("named_pieces", "retrieved"))
-read_contents = Late("echousd.stage.contents:read_contents")  # of a stage where something is locked
 with_space, fitted = Late("echousd.make.fitting:with_space"), Late("echousd.make.fitting:fitted")
 
 
@@ -85,7 +84,8 @@ def generate(
     """
     asked = (options or RoomOptions()).replaced(**changes)
     timer = StageTimer(progress)
-    file, beside, other = "", Path.cwd(), ""
+    file, beside, other, read = "", Path.cwd(), "", None
+    held, homeless = (), ()
     seed, wishes = asked.seed, partial(asked.wishes, outside)
     if asked.assets:  # what is absent is told before any long work
         wishes()
@@ -95,14 +95,14 @@ def generate(
         require_engine()
     if not isinstance(graph, SceneGraph):
         file, beside = Path(graph).name, Path(graph).parent
+        read = None if room else Path(graph)
         with timer.stage("read"):
-            read = Path(graph)
-            graph, other = _read(read, room, asked)
-            graph, held = with_earlier_locks(graph, earlier)
-            graph, homeless = with_locked_places(graph, None if room else read, earlier)
-    else:
+            graph, other = _read(Path(graph), room, asked)
+    before = earlier if earlier is None or earlier.is_dir() else earlier.parent
+    if any(node.locked for node in graph.nodes) or (before and any(before.glob("*.json"))):
         graph, held = with_earlier_locks(graph, earlier)
-        graph, homeless = with_locked_places(graph, earlier)
+        graph, homeless = with_locked_places(graph, read, earlier)
+        assert isinstance(graph, SceneGraph)
     if asked.resident:
         graph = graph.with_room(resident=asked.resident)
     graph = anchored(graph.with_room(openings=()) if asked.openings == "drawn" else graph, beside)
@@ -189,7 +189,7 @@ def _read(file: Path, room: str | None, asked: RoomOptions) -> tuple[SceneGraph,
     return graph, f"{file.name} has {'; '.join(differs)} (like={file.name} keeps them)" if differs else ""
 
 
-# -- what is stated before anything is drawn: what is locked, what a caller brings along -------------------------------
+# -- what a caller brings along ----------------------------------------------------------------------------------------
 
 
 def with_own_boxes(graph: SceneGraph, boxes: Boxes | None) -> SceneGraph:
@@ -211,77 +211,3 @@ def with_own_pieces(graph: SceneGraph, meshes: Mapping[str, str | Path]) -> Scen
             raise ValueError(f"meshes: object {name!r}: {file}: no such file")
         graph = graph.update_node(name, asset=Path(file).absolute().as_posix(), shapes=None)
     return graph
-
-
-def with_locked_places(graph: SceneGraph, *files: Path | None) -> tuple[SceneGraph, tuple[str, ...]]:
-    """The graph with size, position and yaw of locked objects that lack one, and a sentence for each without a place.
-
-    Arguments:
-        files: stages or folders of rooms in which the objects may stand, the first that holds one counts.
-
-    Raises ValueError for a stage that cannot be read.
-    """
-    wanted = {node.name for node in graph.nodes if node.locked and None in (node.size, node.position, node.yaw)}
-    for file in files:
-        stage = None if file is None else _stage_of(file)
-        if wanted and stage is not None:
-            graph, found = _filled(graph, stage, wanted)
-            wanted -= found
-    lost = sorted(name for name in wanted if graph.node(name).position is None)
-    return graph, tuple(f"{name} is locked but stands nowhere yet: it gets a place like all others" for name in lost)
-
-
-def with_earlier_locks(graph: SceneGraph, earlier: Path | None) -> tuple[SceneGraph, tuple[str, ...]]:
-    """The graph in which what the last generation has locked stays so, where the graph says nothing of its place.
-
-    `earlier`: folder or root layer of that generation. Returns the graph, and a sentence for each object that stays.
-    """
-    from echousd.folder.manifest import find_manifest
-
-    folder = earlier if earlier is None or earlier.is_dir() else earlier.parent
-    manifest = find_manifest(folder, earlier.stem) if earlier and folder and folder.is_dir() else None
-    if not manifest:
-        return graph, ()
-    try:
-        old = graph_from_plain(SceneGraph, manifest.get("graph"))
-    except ValueError:  # no graph that can be read
-        return graph, ()
-    kept = [
-        node.replaced(locked=True, size=node.size or was.size, position=was.position, yaw=was.yaw)
-        for node in graph.nodes
-        if node.name in old.names and (node.locked, node.position, node.yaw) == (False, None, None)
-        for was in [old.node(node.name)]
-        if was.locked and was.category == node.category
-    ]
-    names = {node.name: node for node in kept}
-    graph = graph.replaced(nodes=tuple(names.get(node.name, node) for node in graph.nodes)) if kept else graph
-    return graph, tuple(
-        f"{name} stays locked as in the room that is there; echousd edit --unlock frees it" for name in names
-    )
-
-
-def _stage_of(file: Path) -> Path | None:
-    """The stage at a path: the file itself, or the root layer of a room's folder."""
-    if file.is_dir():
-        from echousd.folder.manifest import find_manifest
-
-        manifest = find_manifest(file, file.resolve().name)
-        file = file / f"{manifest['name']}.usda" if manifest else file
-    return file if file.is_file() and file.suffix in STAGE_FORMS else None
-
-
-def _filled(graph: SceneGraph, file: Path, wanted: set[str]) -> tuple[SceneGraph, set[str]]:
-    stage = opened(file)
-    things = {thing.node.name: thing for room in find_rooms(stage) for thing in read_contents(room).objects}
-    found = wanted & things.keys()
-    nodes = []
-    for node in graph.nodes:
-        if node.name in found:
-            thing = things[node.name]
-            node = node.replaced(
-                size=node.size or tuple(thing.size.round(4).tolist()),
-                position=node.position or tuple(thing.position.round(4).tolist()),
-                yaw=round(float(thing.yaw), 5) if node.yaw is None else node.yaw,
-            )
-        nodes.append(node)
-    return graph.replaced(nodes=tuple(nodes)), found

@@ -1,4 +1,4 @@
-"""A room of ours read back from its folder: graph, boxes, meshes, files; in metres, +Y up, whatever it is saved in."""
+"""A room read back from its folder: graph, boxes, meshes, files, what is locked; in metres, +Y up, however saved."""
 
 from __future__ import annotations
 
@@ -15,16 +15,19 @@ from echomodel.boxes import Boxes
 from echomodel.triangles import Mesh
 from echousd.folder.folder import recover
 from echousd.folder.found import manifest_of
+from echousd.folder.manifest import find_manifest
 from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.graph import SceneGraph
+from echousd.graph.files import STAGE_FORMS
+from echousd.graph.text import graph_from_plain
 from echousd.layers.physics import read_joints
 from echousd.layers.placed import MODEL, PLACES
 from echousd.shapes.colliders import approximation, collider_of
 from echousd.shapes.geometry import LICENCE, Collider, Geometry, Origin, Original, Part
 from echousd.shapes.matter import read_mass
-from echousd.stage.contents import room_frame, surface_of
-from echousd.stage.files import open_stage
+from echousd.stage.contents import read_contents, room_frame, surface_of
+from echousd.stage.files import open_stage, opened
 from echousd.stage.graphs import read_graph
 from echousd.stage.paths import (
     DESCRIPTION,
@@ -36,6 +39,7 @@ from echousd.stage.paths import (
     piece_name,
     piece_of,
 )
+from echousd.stage.read import find_rooms
 from echousd.stage.showing import each_layout
 from echousd.stage.units import Z_TO_Y, metres_per_unit
 from echousd.stage.values import NOW, matrix, reading
@@ -231,3 +235,73 @@ def in_our_frame(geometry: Geometry, metres: float, *, z_up: bool) -> Geometry:
 
 def _brought(mesh: Mesh, to_ours: np.ndarray) -> Mesh:
     return Mesh(mesh.vertices @ to_ours.T, mesh.faces)
+
+
+def with_locked_places(graph: SceneGraph, *files: Path | None) -> tuple[SceneGraph, tuple[str, ...]]:
+    """The graph with size, position and yaw of locked objects that lack one, and a sentence for each without a place.
+
+    Arguments:
+        files: stages or folders of rooms in which the objects may stand, the first that holds one counts.
+
+    Raises ValueError for a stage that cannot be read.
+    """
+    wanted = {node.name for node in graph.nodes if node.locked and None in (node.size, node.position, node.yaw)}
+    for file in files:
+        stage = None if file is None else _stage_of(file)
+        if wanted and stage is not None:
+            graph, found = _filled(graph, stage, wanted)
+            wanted -= found
+    lost = sorted(name for name in wanted if graph.node(name).position is None)
+    return graph, tuple(f"{name} is locked but stands nowhere yet: it gets a place like all others" for name in lost)
+
+
+def with_earlier_locks(graph: SceneGraph, earlier: Path | None) -> tuple[SceneGraph, tuple[str, ...]]:
+    """The graph in which what the last generation has locked stays so, where the graph says nothing of its place.
+
+    `earlier`: folder or root layer of that generation. Returns the graph, and a sentence for each object that stays.
+    """
+    folder = earlier if earlier is None or earlier.is_dir() else earlier.parent
+    manifest = find_manifest(folder, earlier.stem) if earlier and folder and folder.is_dir() else None
+    if not manifest:
+        return graph, ()
+    try:
+        old = graph_from_plain(SceneGraph, manifest.get("graph"))
+    except ValueError:  # no graph that can be read
+        return graph, ()
+    kept = [
+        node.replaced(locked=True, size=node.size or was.size, position=was.position, yaw=was.yaw)
+        for node in graph.nodes
+        if node.name in old.names and (node.locked, node.position, node.yaw) == (False, None, None)
+        for was in [old.node(node.name)]
+        if was.locked and was.category == node.category
+    ]
+    names = {node.name: node for node in kept}
+    graph = graph.replaced(nodes=tuple(names.get(node.name, node) for node in graph.nodes)) if kept else graph
+    return graph, tuple(
+        f"{name} stays locked as in the room that is there; echousd edit --unlock frees it" for name in names
+    )
+
+
+def _stage_of(file: Path) -> Path | None:
+    """The stage at a path: the file itself, or the root layer of a room's folder."""
+    if file.is_dir():
+        manifest = find_manifest(file, file.resolve().name)
+        file = file / f"{manifest['name']}.usda" if manifest else file
+    return file if file.is_file() and file.suffix in STAGE_FORMS else None
+
+
+def _filled(graph: SceneGraph, file: Path, wanted: set[str]) -> tuple[SceneGraph, set[str]]:
+    stage = opened(file)
+    things = {thing.node.name: thing for room in find_rooms(stage) for thing in read_contents(room).objects}
+    found = wanted & things.keys()
+    nodes = []
+    for node in graph.nodes:
+        if node.name in found:
+            thing = things[node.name]
+            node = node.replaced(
+                size=node.size or tuple(thing.size.round(4).tolist()),
+                position=node.position or tuple(thing.position.round(4).tolist()),
+                yaw=round(float(thing.yaw), 5) if node.yaw is None else node.yaw,
+            )
+        nodes.append(node)
+    return graph.replaced(nodes=tuple(nodes)), found

@@ -116,7 +116,8 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
         | ({"store": shelf.at, "stored": dict(sorted(shelf.keys.items()))} if shelf else {})
     )
     files[manifest] = (json.dumps(fields, indent=1) + "\n").encode()
-    stale = [path for path in gone if path not in needed and _digest(folder, path) == recorded[path]]
+    left = {path: ownership.read(folder, path) or b"" for path in gone if path not in needed}
+    stale = [path for path, content in left.items() if folders.digest(content) == recorded[path]]
     # What is referenced comes before what refers to it, so that a room opens between any two renames.
     layers = [layer_file(name, crate=room.options.crate) for name in reversed(LAYERS)]
     last = [*layers, UNFIT, root, manifest]
@@ -223,8 +224,3 @@ def _mesh_facts(geometry: Geometry) -> dict[str, Any]:
     facts = {"faces": geometry.faces, "watertight": geometry.watertight}
     asset = {"asset": origin.asset, "sha256": origin.sha256} if origin.asset else {}
     return {**facts, "shapes": origin.shapes, "licence": origin.licence, **credit, **asset}
-
-
-def _digest(folder: Path, path: str) -> str:
-    content = ownership.read(folder, path)
-    return "" if content is None else folders.digest(content)

@@ -13,10 +13,10 @@ from echousd.checks.physics_rules import gravity
 from echousd.checks.reading import Reading
 from echousd.dressing.dress import dress
 from echousd.layers.compose import _asset as made
-from echousd.layers.compose import room_files, simready_data, text
+from echousd.layers.compose import room_files, simready_data
 from echousd.layers.materials import define_material, look_images, tint_factor, write_palettes
 from echousd.layers.materialx import write_networks
-from echousd.layers.placed import MODEL, PLACES, carried_files
+from echousd.layers.placed import MODEL, PLACES, attribution, carried_files
 from echousd.options import RoomOptions
 from echousd.settle.settle import read_world
 from echousd.shapes.finishes.baking import hexadecimal
@@ -65,7 +65,7 @@ def test_assets_of_ours_name_nobody_and_those_of_others_their_author(stage, root
         assert data["asset_license"] == "Apache-2.0"
         assert "asset_credit" not in data
     origins = {"sofa": Origin("library", "CC-BY-4.0", "A Person", "sofa.glb"), "bed": Origin("library", "CC0-1.0")}
-    assert text("bedroom", origins).splitlines()[-2:] == [
+    assert attribution("bedroom", origins).splitlines()[-2:] == [
         "| sofa | sofa.glb | CC-BY-4.0 | A Person |",
         "| bed |  | CC0-1.0 | unknown |",
     ]

@@ -13,7 +13,7 @@ from echomodel.progress import StageTimer
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.arrays import graph_batch
 from echousd.make import layouts
-from echousd.make.pipeline import with_locked_places
+from echousd.make.reading import with_locked_places
 from echousd.make.verdicts import relation_verdicts
 from echousd.shapes.styles import asset_names, equal_sizes, shared_assets, style_groups
 
