@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 
-from echomodel.triangles import cross
+from echomodel.triangles import along, bounds_of, cross, lengths
 from echousd.checks.reading import Finding, Reading, applied, rule
 from echousd.stage.encoding import NODE_API
 from echousd.stage.pen import ARTICULATION
@@ -41,8 +41,9 @@ def degenerate(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[Finding]:
     """No face uses a point twice or has no area; models of others may, in few faces."""
     _, faces, corners, normals = reading.triangles(mesh)
     twice = (faces == faces[:, [2, 0, 1]]).any(1)
-    sides = ((corners - corners[:, [2, 0, 1]]) ** 2).sum(2).max(1, initial=0.0)  # squares
-    flat = twice | ((normals**2).sum(1) <= (THIN * sides) ** 2)
+    one, two, three = corners.transpose(1, 2, 0)
+    sides = np.max([along(side, side) for side in (one - two, two - three, three - one)], 0)  # squares
+    flat = twice | (along(normals.T, normals.T) <= (THIN * sides) ** 2)
     if flat.any():
         message = f"{int(flat.sum())} of {len(flat)} triangles have no area"
         yield Finding(mesh.GetPath(), message, warning=not twice.any() or of_others(mesh.GetPrim()))
@@ -73,7 +74,7 @@ def normals(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     if found.fault:
         yield found.fault
         return
-    length = np.linalg.norm(found.values, axis=1)
+    length = lengths(found.values)
     wrong = np.abs(length - 1) > UNIT
     if wrong.any():
         yield f"a normal has length {length[wrong][0]:.4g} ({int(wrong.sum())} of {len(length)}), allowed: 1"
@@ -91,7 +92,7 @@ def extents(reading: Reading) -> Iterator[Finding]:
             continue
         if extent is None or not len(arrays.points):
             continue
-        box = np.stack([arrays.points.min(0), arrays.points.max(0)])
+        box = bounds_of(arrays.points)
         slack = EXTENT * np.linalg.norm(box[1] - box[0]) + 1e-6
         if extent.shape != (2, 3) or np.abs(extent - box).max() > slack:
             yield Finding(mesh.GetPath(), f"extent is {_shown(extent)}, its points reach {_shown(box)}")
@@ -169,8 +170,8 @@ def winding(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     if found is None or found.interpolation != UsdGeom.Tokens.faceVarying or found.fault:
         return
     turned = sign * turned
-    against = (turned * found.values[corners].sum(1)).sum(1) < 0
-    area = np.linalg.norm(turned, axis=1)
+    against = along(turned.T, sum(found.values[corner] for corner in corners.T).T) < 0
+    area = lengths(turned)
     if area[against].sum() > AGAINST * area.sum() > 0:
         yield f"{area[against].sum() / area.sum():.0%} of its surface winds against its normals, allowed: outwards"
 

@@ -11,7 +11,7 @@ import numpy as np
 from echomodel.boxes2d import axes, footprints
 from echomodel.dressing import SMALL
 from echomodel.openings import SKIRTING, segment
-from echomodel.triangles import along, area_normals, distances, spread
+from echomodel.triangles import along, area_normals, bounds_of, distances, spread
 from echomodel.vocabulary import vocabulary
 from echousd.checks.reading import Reading
 from echousd.graph.nodes import HEIGHT
@@ -392,7 +392,8 @@ def inside_solid(points: np.ndarray, solid: Shape) -> np.ndarray:
 
     Around its closed pieces nothing turns but within their boxes, so that most points are compared with few triangles.
     """
-    inside = ((points >= solid.points.min(0)) & (points <= solid.points.max(0))).all(1)
+    low, high = bounds_of(solid.points)
+    inside = ((points >= low) & (points <= high)).all(1)
     if not inside.any():
         return np.asarray(inside)
     loose, closed = solid.pieces

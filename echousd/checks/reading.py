@@ -10,7 +10,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 
-from echomodel.triangles import area_normals
+from echomodel.triangles import area_normals, bounds_of
 from echousd.exporting.packing import asset_paths
 from echousd.stage.contents import HIDDEN, RoomContents, components, read_contents, triangulated
 from echousd.stage.encoding import StageError
@@ -139,7 +139,7 @@ class Reading:
             plain = prim.IsA(UsdGeom.Mesh) and not is_subdivision(prim)
             points, world = self.mesh(UsdGeom.Mesh(prim)).points if plain else triangulated(prim)[0], self.world(prim)
             turned = points @ world[:3, :3].T + world[:3, 3]
-            return np.stack([turned.min(0), turned.max(0)]) if len(points) else None
+            return bounds_of(turned) if len(points) else None
 
         return self.once("box", prim, read)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pxr import Usd, UsdGeom, UsdShade
 
-from echomodel.triangles import area_normals
+from echomodel.triangles import area_normals, lengths
 from echousd.stage import values
 from echousd.stage.encoding import LABELS, StageError
 from echousd.stage.forms import forms, polygons
@@ -140,7 +140,7 @@ def _part(
     mesh = UsdGeom.Mesh(prim)
     where = (index, len(points), face, corner)
     authored = _corner_values(mesh, "normals", 3, *where)
-    length = np.zeros(1) if authored is None else np.linalg.norm(authored, axis=-1, keepdims=True)
+    length = np.zeros(1) if authored is None else lengths(authored)[..., None]
     normals = _flat(triangles) if length.min(initial=1) <= 1e-9 else np.zeros(1)
     if authored is not None:
         normals = np.where(length > 1e-9, authored / np.maximum(length, 1e-9), normals)
@@ -157,7 +157,7 @@ def _part(
 def _flat(triangles: np.ndarray) -> np.ndarray:
     """(t, 3, 3) normals of triangles (t, 3, 3) at their corners."""
     cross = area_normals(triangles)
-    return np.repeat((cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-12))[:, None], 3, axis=1)
+    return np.repeat((cross / np.maximum(lengths(cross), 1e-12)[:, None])[:, None], 3, axis=1)
 
 
 def _corner_values(

@@ -12,7 +12,7 @@ import numpy as np
 from pxr import Usd
 
 from echomodel.boxes2d import upright_box
-from echomodel.triangles import area_normals, box
+from echomodel.triangles import area_normals, bounds_of, box, lengths
 from echousd.draw.drawables import Paint, image_of, read_drawables
 from echousd.draw.indoors import LUMA, Lights, read_lights
 from echousd.draw.sight import Furniture
@@ -55,8 +55,8 @@ class Scenery:
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper corner, (3,) float each."""
-        corners = self.triangles.reshape(-1, 3).astype(float)
-        return corners.min(0), corners.max(0)
+        low, high = bounds_of(self.triangles).astype(float)
+        return low, high
 
     def furniture(self, hung: bool = False) -> Furniture:
         """Upright boxes, with their own headings, of the objects that are not small, or of what hangs on walls."""
@@ -93,7 +93,7 @@ class Scenery:
         """Number of the largest face that looks up, and of the largest pale one of a wall."""
         area, pale = area_normals(self.triangles), self.flat_colors.mean(1) ** 2
         level = area[:, 1] * (self.normals[:, 0, 1] > 0)
-        upright = np.linalg.norm(area, axis=1) * (self.wall >= 0) * pale
+        upright = lengths(area) * (self.wall >= 0) * pale
         return int(level.argmax()), int(upright.argmax())
 
     @cached_property
@@ -110,7 +110,7 @@ class Scenery:
         """(f,) float32, pixels of its image that a metre of each face has."""
         sizes = 2 * np.array([read(1).shape[1::-1] for read, _ in self.images] or [(1, 1)], np.float32)
         flat = np.diff(self.st, axis=1) * sizes[self.texture][:, None]
-        area = np.linalg.norm(area_normals(self.triangles), axis=1)
+        area = lengths(area_normals(self.triangles))
         pixels = np.abs(flat[:, 0, 0] * flat[:, 1, 1] - flat[:, 0, 1] * flat[:, 1, 0])
         return np.sqrt(pixels / np.maximum(area, 1e-9)).astype(np.float32)
 
@@ -246,6 +246,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     """
     parts: list[dict[str, np.ndarray]] = []
     images: dict[tuple, tuple[Callable[[int], np.ndarray], np.ndarray]] = {}
+    means: dict[tuple, np.ndarray] = {}  # colours of these
     things = list[tuple[bool, np.ndarray, np.ndarray, np.ndarray]]()
     shades: dict[str, list[np.ndarray]] = {}  # by component
     words: list[str] = []
@@ -263,7 +264,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             walls.setdefault(mesh.component, len(walls))
         count = len(mesh.triangles)
         turned = mesh.normals.reshape(-1, 3) @ np.linalg.inv(mesh.world[:3, :3])  # inverse transpose, as rows
-        turned = turned / np.maximum(np.linalg.norm(turned, axis=-1, keepdims=True), 1e-12)
+        turned = turned / np.maximum(lengths(turned), 1e-12)[:, None]
         part = {
             "triangles": points.reshape(-1, 3, 3).astype(np.float32),
             "normals": turned.reshape(-1, 3, 3).astype(np.float32),
@@ -282,7 +283,9 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
                 read, tint = images.setdefault(key, (found, np.array(paint.tint, np.float32)))
                 part["texture"][faces] = [*images].index(key)
                 # most images are seen in half their size at most, in which a JPEG is read in half of the time
-                part["flat_colors"][faces] = LINEAR[read(1)[::8, ::8]].mean((0, 1)) * tint
+                if key not in means:
+                    means[key] = LINEAR[read(1)[::8, ::8]].mean((0, 1)) * tint
+                part["flat_colors"][faces] = means[key]
         if mesh.category == "beam":
             above.append(part)
             continue
@@ -295,8 +298,8 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
         parts.append(part)
         words.append(mesh.category)
         if mesh.category not in (*SHELL, "rug"):
-            ends = mesh.triangles.min((0, 1)), mesh.triangles.max((0, 1))
-            things.append((mesh.category in HUNG, *ends, mesh.world))
+            low, high = bounds_of(mesh.triangles)
+            things.append((mesh.category in HUNG, low, high, mesh.world))
     if not parts:
         raise ValueError(f"{stage.GetRootLayer().identifier}: nothing to draw, found no visible mesh")
     _hang(parts, [*(n for n, word in enumerate(words) if word in HUNG), *_on_shelves(parts, words)], len(walls))
@@ -321,7 +324,7 @@ def _on_shelves(parts: list[dict[str, np.ndarray]], words: list[str]) -> list[in
     """Numbers of the parts that stand on shelves that hang on a wall."""
     if "wall_shelf" not in words:
         return []
-    bounds = np.array([np.stack([part["triangles"].min((0, 1)), part["triangles"].max((0, 1))]) for part in parts])
+    bounds = np.array([bounds_of(part["triangles"]) for part in parts])
     middle, out = bounds.mean(1), list[int]()
     for low, high in (bounds[n] for n, word in enumerate(words) if word == "wall_shelf"):
         inside = ((middle > low) & (middle < high))[:, [0, 2]].all(1)
@@ -334,7 +337,7 @@ def _hang(parts: list[dict[str, np.ndarray]], hung: list[int], count: int) -> No
     bounds = []
     for number in range(count):
         corners = np.concatenate([p["triangles"][p["wall"] == number].reshape(-1, 3) for p in parts])
-        bounds.append((corners.min(0), corners.max(0)))
+        bounds.append(bounds_of(corners))
     for index in hung if bounds else ():
         middle = parts[index]["triangles"].reshape(-1, 3).mean(0)
         apart = [np.linalg.norm(np.maximum(np.maximum(low - middle, middle - high), 0)) for low, high in bounds]

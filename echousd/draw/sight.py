@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property, reduce
 
 import numpy as np
 
@@ -14,6 +15,9 @@ ASPECT = 1.6  # of a picture from inside: its width over its height
 SPREAD = np.arange(-6, 7) / 6
 RAYS = np.stack([*(g.ravel() for g in np.meshgrid(SPREAD, SPREAD / ASPECT)), np.full(169, -1.0)], 1)
 AHEAD = RAYS[:, 1] == 0
+# of a box whose size is 1: its corners, and the points that are looked for in it
+CUBE = np.stack(np.meshgrid((-0.5, 0.5), (0.0, 1.0), (-0.5, 0.5), indexing="ij"), -1).reshape(-1, 3)
+GRID = np.stack(np.meshgrid(*[(-0.45, 0.0, 0.45)] * 3, indexing="ij"), -1).reshape(-1, 3)
 WEIGHTS = np.where(np.abs(RAYS[:, :2] * (1, ASPECT)).max(1) > 0.8, CUT, 1.0)
 
 
@@ -32,12 +36,10 @@ class Furniture:
         front = (axes(self.yaw)[1] * weight[:, None]).sum(0)
         return front / max(float(weight.sum()), 1e-9)
 
-    @property
+    @cached_property
     def corners(self) -> np.ndarray:
         """(n, 8, 3) float, the corners of each box, metres."""
-        cube = np.stack(np.meshgrid((-0.5, 0.5), (0.0, 1.0), (-0.5, 0.5), indexing="ij"), -1).reshape(-1, 3)
-        local = cube * self.size[:, None]
-        return np.asarray(self.position[:, None] + np.einsum("nji,nkj->nki", self._turns(), local))
+        return np.asarray(self.position[:, None] + np.einsum("nji,nkj->nki", self._turns, CUBE * self.size[:, None]))
 
     def of(self, rows: np.ndarray) -> Furniture:
         """Some of these boxes."""
@@ -58,7 +60,7 @@ class Furniture:
         ways = (RAYS * (half, half, 1.0)) @ view[:3, :3].T
         far = np.linalg.norm(ways, axis=1, keepdims=True)
         ways, begin = ways / far, near * far[:, 0]
-        turn = self._turns()
+        turn = self._turns
         start = np.einsum("nij,nj->ni", turn, view[:3, 3] - self.position - self.size * (0.0, 0.5, 0.0))
         way = (turn.reshape(-1, 3) @ ways.T).reshape(len(turn), 3, -1).transpose(0, 2, 1)
         enter, leave = _crossing(start[:, None], way, 0.5 * self.size[:, None])
@@ -69,9 +71,8 @@ class Furniture:
     def blocked(self, eye: np.ndarray, others: Furniture | None = None) -> tuple[np.ndarray, np.ndarray]:
         """(n, 27, 3) points in each box, metres, and (n, 27) whether another or one of `others` hides them."""
         n, boxes = len(self.size), self.with_others(others)
-        turn, middle = boxes._turns(), boxes.position + boxes.size * (0.0, 0.5, 0.0)
-        grid = np.stack(np.meshgrid(*[(-0.45, 0.0, 0.45)] * 3, indexing="ij"), -1).reshape(-1, 3)
-        points = middle[:n, None] + np.einsum("nji,nkj->nki", turn[:n], grid * self.size[:, None])
+        turn, middle = boxes._turns, boxes.position + boxes.size * (0.0, 0.5, 0.0)
+        points = middle[:n, None] + np.einsum("nji,nkj->nki", turn[:n], GRID * self.size[:, None])
         far, wide = (middle - eye)[:, ::2], np.hypot(*boxes.size.T[::2]) / 2
         share = np.clip(far[:n] @ far.T / (far[:n] ** 2).sum(1)[:, None].clip(1e-12), 0.0, 1.0)[..., None]
         beside = np.linalg.norm(far - share * far[:n, None], axis=2) - wide - wide[:n, None]  # of b from lines to a
@@ -84,6 +85,7 @@ class Furniture:
         np.logical_or.at(hidden, a, (enter < leave) & (leave > 0) & (enter < 1))
         return points, hidden
 
+    @cached_property
     def _turns(self) -> np.ndarray:
         """(n, 3, 3) from the room's frame to each object's."""
         return upright(-self.yaw)
@@ -99,4 +101,5 @@ def _crossing(start: np.ndarray, way: np.ndarray, half: np.ndarray) -> tuple[np.
     """Where rays enter and leave boxes around 0 of these half sizes, in its lengths; later than that, they miss."""
     way = np.where(np.abs(way) < 1e-9, 1e-9, way)
     first, second = (-half - start) / way, (half - start) / way
-    return np.minimum(first, second).max(-1), np.maximum(first, second).min(-1)
+    enter, leave = (np.moveaxis(each, -1, 0) for each in (np.minimum(first, second), np.maximum(first, second)))
+    return reduce(np.maximum, enter), reduce(np.minimum, leave)  # of three each, which numpy is slow to go through

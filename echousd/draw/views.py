@@ -162,6 +162,7 @@ def inside_view(
     reach = np.where((row < len(things.size)) & (row != main), BEFORE, WALLED)
     aim, front = furniture.position[main, [0, 2]], axes(furniture.yaw[main])[1]
     high, stands = things.position[:, 1] > HIGH, np.arange(len(things.size)) < count
+    shades, lying = _shades(furniture, height), things.corners[stands & ~high]
 
     def merit(shot: Shot) -> float:
         """Metres of depth that a view is worth."""
@@ -192,7 +193,7 @@ def inside_view(
         off = MIDDLE * np.clip((aside / np.maximum(back, 1e-9))[..., None] / halves - ASIDE, 0.0, 1.0)
         far = max(float(np.linalg.norm(aim - spot)), 1e-9)
         behind = BEHIND * max(0.0, float((aim - spot) @ front)) / far + SMALL * max(0.0, far - LARGE)
-        fragile = [_shades(furniture, height), things.corners[high & ~stands & seen], things.corners[stands & ~high]]
+        fragile = [shades, things.corners[high & ~stands & seen], lying]
         cost = WHOLE * cut + off + _shown(fragile, views, halves) + hidden + behind
         cost = cost + np.abs(PANS)[:, None, None] + DISTORTED
         if at.way is not None:  # upright to the wall, and within it where it begins to see

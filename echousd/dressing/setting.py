@@ -13,6 +13,7 @@ import shapely
 from echomodel.boxes2d import footprints, seen, turned
 from echomodel.dressing import KINDS
 from echomodel.openings import STEP, Opening, free_area, zone
+from echomodel.triangles import bounds_of
 from echomodel.vocabulary import Category, RoomStyle, vocabulary
 from echousd.dressing.stories import TABLE, Story, story
 from echousd.shapes.geometry import Geometry
@@ -66,7 +67,7 @@ class Standing:
     @cached_property
     def spans(self) -> np.ndarray:
         """(p, 2, 3) lower and upper corner of each of its pieces, metres."""
-        return np.array([(piece.min((0, 1)), piece.max((0, 1))) for piece in self.pieces])
+        return np.array([bounds_of(piece) for piece in self.pieces])
 
     def in_plan(self, position: np.ndarray) -> np.ndarray:
         """(2,) a point of the room (3,) in the object's frame, x and z."""

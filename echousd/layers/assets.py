@@ -10,7 +10,7 @@ import numpy as np
 from pxr import Sdf
 
 from echomodel.late import Late
-from echomodel.triangles import area_normals
+from echomodel.triangles import area_normals, lengths
 from echousd.layers.materials import write_looks, write_palettes
 from echousd.layers.physics import write_asset_physics, write_joints
 from echousd.options import Look
@@ -178,7 +178,7 @@ def most_used(geometry: Geometry) -> list[str]:
     """Material slots of all parts, the one with most surface first."""
     area: dict[str, float] = {}
     for part in geometry.parts:
-        size = np.linalg.norm(area_normals(part.mesh.triangles), axis=1)
+        size = lengths(area_normals(part.mesh.triangles))
         for slot, faces in part.slots.items():
             area[slot] = area.get(slot, 0.0) + float(size[faces].sum())
     return sorted(area, key=lambda slot: (-area[slot], slot))

@@ -8,6 +8,7 @@ import numpy as np
 from pxr import Gf
 
 from echomodel.openings import inward_normal, segment
+from echomodel.triangles import bounds_of
 from echomodel.vocabulary import vocabulary
 from echousd.draw.sight import ASPECT, Furniture
 from echousd.draw.views import APERTURE, FOCAL_LENGTH, MARGIN, inside_view, perspective_views, shifted
@@ -57,7 +58,7 @@ def write_cameras(
     """
     pen.define("/Room/Cameras", "Scope")
     # from afar rather than orthographic, whose width Blender takes for ten times what it is
-    lower, upper = points.min(0), points.max(0)
+    lower, upper = bounds_of(points)
     centre = (lower + upper) / 2
     width = float((upper - lower)[[0, 2]].max()) * MARGIN
     height = float(upper[1]) + FAR * width

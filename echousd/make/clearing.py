@@ -14,7 +14,7 @@ from echomodel.boxes import Boxes
 from echomodel.boxes2d import footprints, upright
 from echomodel.late import Late
 from echomodel.objective import Plan
-from echomodel.triangles import Mesh, connected_pieces
+from echomodel.triangles import Mesh, bounds_of, connected_pieces
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import rounded_boxes
 from echousd.make.verdicts import relation_verdicts, unbroken
@@ -189,7 +189,7 @@ def scene_of(
         room.carrier, room.anchor, yaw, room.of("seat"), np.sqrt(size[:, 0] * size[:, 2]),
         [shapely.Polygon(corner) for corner in footprints(size, position, yaw)],
         [_level(pieces) for pieces in solids], shapely.Polygon(floor).buffer(EDGE, join_style="mitre"),
-        np.array([(np.concatenate(pieces).min(0), np.concatenate(pieces).max(0)) for pieces in everything]),
+        np.array([bounds_of(np.concatenate(pieces)) for pieces in everything]),
         [*graph.names, *(wall for wall, _ in shell)],
     )  # fmt: skip
 

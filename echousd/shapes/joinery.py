@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from echomodel.furniture.solids import FINEST, Piece, Solid, pieces_of
-from echomodel.triangles import Mesh, area_normals, joined
+from echomodel.triangles import Mesh, area_normals, bounds_of, joined, lengths
 from echousd.shapes.geometry import FRAME, Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.hulls import convex_hull, hull_of
 from echousd.shapes.matter import ballasted, weighed
@@ -121,7 +121,7 @@ def covering(plain: np.ndarray, shown: np.ndarray) -> np.ndarray:
     corners, taken = plain, np.zeros(0, int)
     while not np.array_equal(plain, shown) and (hull := hull_of(corners)):
         normal = area_normals(hull.triangles)
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        normal /= np.maximum(lengths(normal), 1e-12)[:, None]
         beyond = shown @ normal.T - (hull.triangles[:, 0] * normal).sum(1)
         far = beyond.max(0)
         # the one farthest beyond each face, of faces that lack most: one at a time takes a hull for each
@@ -152,7 +152,7 @@ def convex_pieces(points: Sequence[np.ndarray], box: float) -> list[Mesh]:
     no obstacle of its own.
     """
     groups = list(points)
-    low, high = np.array([p.min(0) for p in points]), np.array([p.max(0) for p in points])
+    low, high = np.array([bounds_of(p) for p in points]).reshape(-1, 2, 3).swapaxes(0, 1)
     while len(groups) > 1:
         volume = _volume(low, high)
         union = _volume(np.minimum(low[:, None], low), np.maximum(high[:, None], high))
@@ -164,7 +164,7 @@ def convex_pieces(points: Sequence[np.ndarray], box: float) -> list[Mesh]:
         if np.isinf(wasted[one, other]):
             break
         groups[one] = np.concatenate([groups[one], groups.pop(other)])
-        low[one], high[one] = groups[one].min(0), groups[one].max(0)
+        low[one], high[one] = bounds_of(groups[one])
         low, high = np.delete(low, other, axis=0), np.delete(high, other, axis=0)
     return [convex_hull(group) for group in groups]
 

@@ -14,7 +14,7 @@ from echomodel.dressing import PRINTS
 from echomodel.files import tables
 from echomodel.furniture.solids import Piece
 from echomodel.late import Late
-from echomodel.triangles import cross
+from echomodel.triangles import along, cross, lengths
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.geometry import Geometry, Mass
@@ -73,10 +73,10 @@ def _moments(vertices: np.ndarray, faces: np.ndarray) -> tuple[Moments, Moments]
     origin = vertices[0]
     corners = (vertices - origin)[faces]
     one, two, three = corners.transpose(1, 0, 2)
-    whole = corners.sum(1)
+    whole = one + two + three
     pairs = np.einsum("tki,tkj->tij", corners, corners) + whole[:, :, None] * whole[:, None, :]
-    six = (one * cross(two, three)).sum(1)
-    area = np.linalg.norm(cross(two - one, three - one), axis=1) / 2
+    six = along(one.T, cross(two, three).T)
+    area = lengths(cross(two - one, three - one)) / 2
     solid = (float(six.sum() / 6), six @ whole / 24, np.einsum("t,tij->ij", six, pairs) / 120)
     surface = (float(area.sum()), area @ whole / 3, np.einsum("t,tij->ij", area, pairs) / 12)
     return _moved(*solid, origin), _moved(*surface, origin)

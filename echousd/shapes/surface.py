@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.triangles import Mesh, along, area_normals, connected_pieces
+from echomodel.triangles import Mesh, along, area_normals, bounds_of, connected_pieces, lengths
 from echousd.shapes.finishes.slots import UPRIGHT, metres_of
 
 NUDGE = 4e-6  # metres between points of different boards at one place
@@ -32,7 +32,7 @@ class Surface:
     @property
     def extent(self) -> np.ndarray:
         """(2, 3) float32: lower and upper corner."""
-        return np.stack([self.points.min(0), self.points.max(0)]).astype(np.float32)
+        return bounds_of(self.points).astype(np.float32)
 
 
 def surface(mesh: Mesh, groups: Mapping[str, np.ndarray], *, atlas: bool = False, crease: float = CREASE) -> Surface:
@@ -89,7 +89,7 @@ def creased_normals(mesh: Mesh, crease: float = CREASE) -> tuple[np.ndarray, np.
 def _corner_normals(points: np.ndarray, faces: np.ndarray, sharpest: np.ndarray) -> np.ndarray:
     """(3 f, 3): normals of the corners, smooth where faces look the same way by a cosine of `sharpest` (f,) or more."""
     area_normal = area_normals(points[faces])
-    unit = area_normal / np.maximum(np.linalg.norm(area_normal, axis=1, keepdims=True), 1e-20)
+    unit = area_normal / np.maximum(lengths(area_normal), 1e-20)[:, None]
     corner_vertex = faces.ravel()
     corner_face = np.repeat(np.arange(len(faces)), 3)
     order = np.argsort(corner_vertex, kind="stable")
@@ -145,7 +145,7 @@ def _laid_out(
             st[members] /= metres
         elif len(members):
             shown = points[faces[members]]
-            first, last = shown.reshape(-1, 3).min(0), shown.reshape(-1, 3).max(0)
+            first, last = bounds_of(shown)
             upward = int(np.argmin(last - first) == 1)  # what lies shows its upper side, what hangs its front
             share = (shown - first) / np.maximum(last - first, 1e-9)
             st[members] = np.stack([share[..., 0], 1 - share[..., 2] if upward else share[..., 1]], -1)
@@ -191,9 +191,9 @@ def unshared(points: np.ndarray, faces: np.ndarray, owner: np.ndarray, piece: np
 def _corners(triangles: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lower and upper corners (p, 3) of the pieces that triangles (f, 3, 3) belong to, all from 0 on, (f,) int."""
     order = np.argsort(piece, kind="stable")
-    first = np.searchsorted(piece[order], np.arange(piece.max(initial=-1) + 1))
-    triangles = triangles[order]
-    return np.minimum.reduceat(triangles.min(1), first), np.maximum.reduceat(triangles.max(1), first)
+    first = 3 * np.searchsorted(piece[order], np.arange(piece.max(initial=-1) + 1))
+    planes = np.ascontiguousarray(triangles[order].reshape(-1, 3).T)
+    return np.minimum.reduceat(planes, first, 1).T, np.maximum.reduceat(planes, first, 1).T
 
 
 def facing_axis(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ import numpy as np
 from pxr import Kind, Sdf, Usd, UsdGeom
 
 from echomodel.boxes2d import upright_box
-from echomodel.triangles import Mesh, connected_pieces, joined
+from echomodel.triangles import Mesh, bounds_of, connected_pieces, joined
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import LABELS
 from echousd.stage.forms import Polygons, forms, polygons
@@ -64,7 +64,7 @@ class Shape:
     @cached_property
     def closed_spans(self) -> np.ndarray:
         """(2, p, 3) float, metres: lower and upper corners of the boxes around its closed pieces."""
-        corners = [(part.min((0, 1)), part.max((0, 1))) for part in self.pieces[1]]
+        corners = [bounds_of(part) for part in self.pieces[1]]
         return np.moveaxis(np.array(corners).reshape(-1, 2, 3), 1, 0)
 
 

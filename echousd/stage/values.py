@@ -83,8 +83,8 @@ def numbers(found: Any, width: int, attribute: Usd.Attribute | None, *, whole: b
         raise StageError(f"{owner(attribute)} is {shown(found)}, allowed: {allowed}")
     if not whole:
         table = table.astype(np.float64)
-        bad = ~(np.abs(table) <= LARGEST)
-        if bad.any():
+        if not (table.min(initial=0) >= -LARGEST and table.max(initial=0) <= LARGEST):  # NaN is neither
+            bad = ~(np.abs(table) <= LARGEST)
             raise StageError(f"{owner(attribute)} holds {table[bad][0]:g}, allowed: -{LARGEST:g} to {LARGEST:g}")
         return table
     return table.astype(np.int64)
@@ -154,6 +154,8 @@ def mesh_arrays(mesh: UsdGeom.Mesh) -> MeshArrays:
 
 def fans(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Faces of `counts` (f,) int corners as triangles: (t,) int face, and (t, 3) int positions among all corners."""
+    if (counts == 3).all():  # as of nearly all meshes
+        return np.arange(len(counts)), np.arange(3 * len(counts)).reshape(-1, 3)
     first, triangles = np.cumsum(counts) - counts, np.clip(counts - 2, 0, None)
     face = np.repeat(np.arange(len(counts)), triangles)
     start, step = first[face], np.arange(len(face)) - np.repeat(np.cumsum(triangles) - triangles, triangles)

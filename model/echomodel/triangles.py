@@ -28,7 +28,7 @@ class Mesh:
     @cached_property
     def bounds(self) -> np.ndarray:
         """(2, 3): lower and upper corner."""
-        return np.stack([self.vertices.min(0), self.vertices.max(0)])
+        return bounds_of(self.vertices)
 
     @property
     def triangles(self) -> np.ndarray:
@@ -83,6 +83,18 @@ def cross(one: np.ndarray, two: np.ndarray) -> np.ndarray:
 def along(one: Sequence[np.ndarray] | np.ndarray, other: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
     """(...): the scalar products of vectors whose components are planes, (3, ...) each."""
     return np.asarray(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
+
+
+def lengths(vectors: np.ndarray) -> np.ndarray:
+    """(...): the lengths of vectors (..., 3), bit for bit as `np.linalg.norm` has them row by row."""
+    planes = np.moveaxis(vectors, -1, 0)
+    return np.sqrt(along(planes, planes))
+
+
+def bounds_of(points: np.ndarray) -> np.ndarray:
+    """(2, 3): lower and upper corner of points (..., 3), for which numpy takes twenty times as long row by row."""
+    planes = np.ascontiguousarray(points.reshape(-1, points.shape[-1]).T)
+    return np.stack([planes.min(1), planes.max(1)])
 
 
 def area_normals(triangles: np.ndarray) -> np.ndarray:

@@ -6,7 +6,18 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from trimesh.triangles import closest_point
 
-from echomodel.triangles import Mesh, area_normals, box, connected_pieces, cross, distances, joined, spread
+from echomodel.triangles import (
+    Mesh,
+    area_normals,
+    bounds_of,
+    box,
+    connected_pieces,
+    cross,
+    distances,
+    joined,
+    lengths,
+    spread,
+)
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
@@ -16,6 +27,16 @@ def test_a_vector_product_is_numpy_s_bit_for_bit(shape, kind):
     found = cross(one, two)
     assert found.dtype == kind
     np.testing.assert_array_equal(found, np.cross(one, two))
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+@pytest.mark.parametrize("shape", [(1, 3), (700, 3), (2, 5, 3)])
+def test_lengths_and_bounds_are_numpy_s_bit_for_bit(shape, kind):
+    points = np.random.default_rng(4).normal(size=shape).astype(kind)
+    rows = points.reshape(-1, 3)
+    assert lengths(points).dtype == bounds_of(points).dtype == kind
+    np.testing.assert_array_equal(lengths(points), np.linalg.norm(points, axis=-1))
+    np.testing.assert_array_equal(bounds_of(points), [rows.min(0), rows.max(0)])
 
 
 def test_a_normal_is_twice_as_long_as_its_triangle_s_area():
