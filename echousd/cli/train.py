@@ -131,6 +131,7 @@ def search(
     workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
     minutes: Annotated[float | None, typer.Option(help="Begin nothing after so many minutes.")] = None,
     unsearched: Annotated[bool, typer.Option(help="The generator's rooms that miss no term, none searched.")] = False,
+    rooms: Annotated[str | None, typer.Option(help="A packed set whose rooms are searched on, not new ones.")] = None,
 ) -> None:
     """Search rooms without a fault to train on, from several starts each; OUT/rooms.npz is the set.
 
@@ -143,7 +144,8 @@ def search(
     def report(row: dict[str, float]) -> None:
         console.print("  ".join(f"{name} {value}" for name, value in row.items()))
 
-    plan, shards = ExamplesPlan(seed, drafts, weights, not unsearched), -(-count // (PLAIN if unsearched else GRAPHS))
+    plan = ExamplesPlan(seed, drafts, weights, not unsearched, rooms)
+    shards = -(-count // (PLAIN if unsearched else GRAPHS))
     found = search_examples(out, plan, shards=shards, workers=workers, minutes=minutes, report=report)
     console.print(f"{out}/rooms.npz: {len(found)} rooms, {int(found.counts.sum())} objects")
 

@@ -45,12 +45,14 @@ COLUMNS = ("shard", "graphs", "kept", "from_generator", "faults_generator", "pla
 @dataclass(frozen=True)
 class ExamplesPlan:
     """What a folder of examples is filled with: the world's seed, drafts of the network a room, and the weights that
-    draw them, None = those that ship; not `searched`: rooms of the generator alone are kept."""
+    draw them, None = those that ship; not `searched`: rooms of the generator alone are kept; `rooms`: a packed set
+    whose rooms are searched on in place of the generator's."""
 
     seed: int
     drafts: int = 2
     weights: str | None = None
     searched: bool = True
+    rooms: str | None = None
 
 
 def search_examples(
@@ -68,7 +70,7 @@ def search_examples(
     """
     folder.mkdir(parents=True, exist_ok=True)
     kind = "rooms found by search" if plan.searched else "rooms of the generator"
-    claim(folder, {"kind": kind, "seed": plan.seed, "drafts": plan.drafts})
+    claim(folder, {"kind": kind, "seed": plan.seed, "drafts": plan.drafts, "rooms": plan.rooms})
     left = [number for number in range(shards) if not _shard(folder, number).exists()]
     until = None if minutes is None else time.time() + 60 * minutes
     work = partial(_search_shard, folder, plan, until)
@@ -112,7 +114,11 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
     started = time.process_time()
     graphs = GRAPHS if plan.searched else 0
     first = number * graphs
-    drawn = generate_rooms(graphs, plan.seed, start=first, halls=HALLS)
+    if plan.rooms is None:
+        drawn = generate_rooms(graphs, plan.seed, start=first, halls=HALLS)
+    else:
+        given = RoomSet(plan.rooms)
+        drawn = [given.room(k) for k in range(first, min(first + graphs, len(given)))]
     luck = np.random.Generator(np.random.PCG64([plan.seed, number, 5]))
     labels = label_rooms(drawn, rules="strict") if drawn else []
     stated = [
@@ -123,7 +129,8 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
     if plan.drafts and drawn:
         for more, drafts in zip(starts, _drafts(plan, drawn, stated, number), strict=True):
             more += drafts
-    others = generate_rooms(PLAIN, plan.seed + OTHERS, start=number * PLAIN, halls=HALLS)
+    looked = 0 if plan.rooms else PLAIN
+    others = generate_rooms(looked, plan.seed + OTHERS, start=number * PLAIN, halls=HALLS)
     plain = [_with(room, room.size, room.position, room.yaw) for room in others if not _missed(room, NOTHING)]
     kept: list[RoomBoxes] = []
     numbers: list[int] = []
@@ -161,14 +168,16 @@ def _drafts(plan: ExamplesPlan, rooms: list[RoomBoxes], stated: list[np.ndarray]
 
 
 def _searched(room: RoomBoxes, triplets: np.ndarray, start: Boxes) -> tuple[float, RoomBoxes] | None:
-    """The room as placing leaves it from a start, and what it costs; None where anything is still missed."""
-    done = place_boxes(
-        room.categories, start.size.double().numpy(), start.position.double().numpy(), start.yaw.double().numpy(),
-        triplets, floor_polygon=room.floor_polygon, height=room.height, openings=room.openings,
-    )  # fmt: skip
-    made = _with(room, done.size, done.position, done.yaw)
-    if done.collisions or done.outside or (done.verdict == 0).any() or _missed(made, triplets):
-        return None
+    """The room as placing leaves it from a start that misses anything, and what it costs; None where it still does."""
+    made = _with(room, *(of.double().numpy() for of in (start.size, start.position, start.yaw)))
+    if _missed(made, triplets):
+        done = place_boxes(
+            room.categories, made.size, made.position, made.yaw, triplets, floor_polygon=room.floor_polygon,
+            height=room.height, openings=room.openings,
+        )  # fmt: skip
+        made = _with(room, done.size, done.position, done.yaw)
+        if done.collisions or done.outside or (done.verdict == 0).any() or _missed(made, triplets):
+            return None
     plan = plan_of(made, made.categories, made.floor_polygon, made.openings, triplets, height=made.height)
     return cost_of(plan), made
 

@@ -38,6 +38,7 @@ class BranchConfig:
         objective: what the network is trained to predict; `flow` is rectified flow.
         steps: default number of sampling steps.
         sampler: default sampler.
+        temperature: scale of the noise that the ancestral sampler adds; below one, fewer stray pieces and less variety.
     """
 
     width: int = 192
@@ -46,6 +47,7 @@ class BranchConfig:
     objective: Objective = "flow"
     steps: int = 20
     sampler: Sampler = "ancestral"
+    temperature: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,6 @@ class ShapeConfig(BranchConfig):
         tokens: tokens that share the components, the strongest first.
         echo_width: channels of a node in the shape echo.
         echo_layers: triplet-GCN layers of the shape echo.
-        temperature: scale of the starting noise; below one, fewer stray pieces and less variety.
         candidates: draws per object, of which the most whole is kept.
     """
 
@@ -106,7 +107,6 @@ class ShapeConfig(BranchConfig):
     tokens: int = 4
     echo_width: int = 128
     echo_layers: int = 2
-    temperature: float = 1.0
     candidates: int = 8
     steps: int = 10
     GONE: ClassVar = {"echo_time": True, "conditioning": "cross", "prediction": "sample"}
@@ -120,7 +120,6 @@ class FurnitureConfig(BranchConfig):
         kinds: words of every kind that a description tells, in order.
         numbers: its proportions and open choices.
         voices: weighted means of the others' descriptions that a node hears at every step.
-        temperature: scale of the starting noise.
     """
 
     kinds: tuple[int, ...] = (5, 9, 2, 7, 5, 7, 4, 4, 7)
@@ -128,7 +127,6 @@ class FurnitureConfig(BranchConfig):
     width: int = 160
     layers: int = 3
     voices: int = 4
-    temperature: float = 1.0
     steps: int = 16
 
 

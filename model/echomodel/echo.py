@@ -147,7 +147,7 @@ class EchoModel:
         graph = with_whole_styles(graph, joined(graph, by.styles))
         return sample_descriptions(
             self.model, graph, boxes.size, self.graph_latent(graph, by.edit), equal,
-            own.temperature * start[equal] if by.noise is None else start, by,
+            start[equal] if by.noise is None else start, by,
         )  # fmt: skip
 
     def _how(self, graph: GraphBatch, options: dict[str, Any]) -> CompactSampling:

@@ -76,14 +76,19 @@ Strengths = tuple[float, float]  # of signal and noise at a level
 Step = Callable[..., Array]
 
 
-def ddim(x: Array, clean: Array, start: Strengths, end: Strengths, generator: Randomness | None) -> Array:
+def ddim(
+    x: Array, clean: Array, start: Strengths, end: Strengths, generator: Randomness | None, temperature: float
+) -> Array:
     """Deterministic DDIM (Song et al. 2021, Eq. 12 with eta 0); with rectified flow this is the Euler method."""
     (a, s), (b, r) = start, end
     return b * clean + r * (x - a * clean) / s
 
 
-def ancestral(x: Array, clean: Array, start: Strengths, end: Strengths, generator: Randomness | None) -> Array:
-    """DDPM ancestral sampling from the posterior q(x_s | x_t, x0) (Ho et al. 2020, Eq. 7)."""
+def ancestral(
+    x: Array, clean: Array, start: Strengths, end: Strengths, generator: Randomness | None, temperature: float
+) -> Array:
+    """DDPM ancestral sampling from the posterior q(x_s | x_t, x0) (Ho et al. 2020, Eq. 7), its noise scaled: what a
+    network is unsure of is noise as well, and below one both together are no more than there should be."""
     (a, s), (b, r) = start, end
     ratio = a / b
     between = s * s - ratio * ratio * r * r
@@ -91,7 +96,7 @@ def ancestral(x: Array, clean: Array, start: Strengths, end: Strengths, generato
     if r == 0:
         return mean
     noise = cast(normal(x.shape, generator, device_of(x)), x)
-    return mean + math.sqrt(max(between, 0.0)) * r / s * noise
+    return mean + temperature * math.sqrt(max(between, 0.0)) * r / s * noise
 
 
 SAMPLERS: dict[Sampler, Step] = {"ddim": ddim, "ancestral": ancestral}
@@ -100,13 +105,14 @@ SAMPLERS: dict[Sampler, Step] = {"ddim": ddim, "ancestral": ancestral}
 def sample(
     sampler: Sampler, predict: Predict, x: Array, steps: int, objective: Objective, *, known: Array | None = None,
     known_mask: Array | None = None, generator: Randomness | None = None, progress: StepListener | None = None,
+    temperature: float = 1.0,
 ) -> Array:  # fmt: skip
     """Run a sampler by name.
 
     Arguments:
         x: (N, ...) start, standard normal noise.
         known, known_mask: (N, ...) values and (N,) bool, nodes that keep their values from first to last.
-        generator: source of the noise that `ancestral` adds.
+        generator: source of the noise that `ancestral` adds, `temperature` times.
         progress: called with (steps done, steps) after every step.
 
     Raises ValueError where the sampler is not known, or steps < 1.
@@ -123,7 +129,7 @@ def sample(
         x = kit(x).where(fixed, cast(known, x), x)
     for number, (start, end) in enumerate(pairwise(np.linspace(1, 0, steps + 1).tolist())):
         clean, before, after = predict(x, free * start), _strengths(start, objective), _strengths(end, objective)
-        moved = SAMPLERS[sampler](x, clean, before, after, generator)
+        moved = SAMPLERS[sampler](x, clean, before, after, generator, temperature)
         x = moved if fixed is None else kit(x).where(fixed, x, moved)
         if progress is not None:
             progress(number + 1, steps)

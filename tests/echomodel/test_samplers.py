@@ -76,6 +76,18 @@ def test_equal_seeds_give_equal_bits(sampler: Sampler, objective: Objective) -> 
 
 
 @pytest.mark.parametrize("objective", ["noise", "velocity", "flow"])
+def test_a_low_temperature_draws_nearer_to_the_middle(objective: Objective) -> None:
+    spreads, middles = [], []
+    for temperature in (1.0, 0.5, 0.0):
+        generator, predict = torch.Generator().manual_seed(1), gaussian_denoiser(objective)
+        out = sample("ancestral", predict, start(3000), 50, objective, generator=generator, temperature=temperature)
+        spreads.append(out.std().item())
+        middles.append(out.mean().item())
+    assert spreads[0] > 1.2 * spreads[1] > 1.4 * spreads[2]
+    assert middles == pytest.approx([MEAN] * 3, abs=0.03)
+
+
+@pytest.mark.parametrize("objective", ["noise", "velocity", "flow"])
 def test_targets_and_clean_samples_are_inverse(objective: Objective) -> None:
     generator = torch.Generator().manual_seed(2)
     clean, noise = torch.randn(2, 9, 3, generator=generator, dtype=torch.float64)

@@ -97,6 +97,12 @@ def pair_features(boxes: Boxes, pairs: Pairs) -> Array:
     )  # fmt: skip
 
 
+def measured(boxes: Boxes, floor: Array, openings: Array, pairs: Pairs) -> tuple[Array, Array, Array]:
+    """What is measured on N boxes: gaps to the walls (N, WALL_FEATURES), clearances of doors and windows
+    (N, OPENING_FEATURES), and how pairs stand to one another (P, PAIR_FEATURES)."""
+    return wall_features(boxes, floor), clearances(boxes, openings), pair_features(boxes, pairs)
+
+
 def _across(boxes: Boxes, i: Array, j: Array) -> Array:
     """(P, 2) metres to the side and to the front of i at which j stands."""
     return seen((boxes.position[j] - boxes.position[i])[:, ::2], boxes.yaw[i])
@@ -137,6 +143,7 @@ class Layout(Layers):
     """
 
     settings: LayoutConfig
+    measure = staticmethod(measured)  # or the same, compiled for a machine
 
     def context(self, graph: GraphBatch, pairs: Pairs, latent: Array, rules: Array, scale: BoxScale) -> LayoutContext:
         """Everything that does not depend on the step.
@@ -181,10 +188,10 @@ class Layout(Layers):
     def _measure(self, clean: Array, context: LayoutContext) -> tuple[Array, Pairs]:
         """What the nodes (N, F) and the pairs are told about a draft of the boxes."""
         boxes = measurable(Boxes.decode(clean, context.scale))
-        walls, openings = wall_features(boxes, context.floor), clearances(boxes, context.openings)
+        walls, openings, pairs = self.measure(boxes, context.floor, context.openings, context.pairs)
         concat = kit(clean).concat
         features = concat([box_features(clean, self.settings.frequencies), walls, openings], 1)
-        stated = concat([context.pairs.stated, pair_features(boxes, context.pairs)], 1)
+        stated = concat([context.pairs.stated, pairs], 1)
         return features, replace(context.pairs, stated=stated)
 
 

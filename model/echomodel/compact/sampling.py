@@ -76,7 +76,7 @@ class CompactSampling(Sampling):
         sampler: None = the branch's. rules: the rule set that the relations are meant in, `strict` or `sgfront`.
         relation_guidance: of the first step down what the terms of the objective miss, metres (`echomodel.guidance`),
             0 = off, None = the branch's.
-        noise: (N, K) starting noise in place of the generator's, taken as it is (no temperature, no candidates).
+        noise: (N, K) starting noise in place of the generator's, taken as it is (no candidates).
         candidates: draws of a shape, of which the most whole that bears what stands on it is kept (pieces of one class
             and style together); None = the branch's.
         styles: (N,) int64, nodes with one number of 0 or more are furniture of one style, beside those that relations
@@ -95,6 +95,7 @@ class CompactSampling(Sampling):
         return sample(
             self.sampler or settings.sampler, predict, noise, self.steps or settings.steps, settings.objective,
             known=self.known, known_mask=self.known_mask, generator=self.generator, progress=self.progress,
+            temperature=settings.temperature,
         )  # fmt: skip
 
     def start(self, nodes: int, width: int, device: Any) -> Array:

@@ -365,7 +365,7 @@ def sample_shapes(
     for number, count in enumerate(rounds):
         starts = [how.start(graph.num_nodes, settings.components, model.device) for _ in range(count)]
         if how.noise is None:
-            starts = [settings.temperature * x[equal] for x in starts]
+            starts = [x[equal] for x in starts]
         masks, progress = repeated(how.known_mask, count), part_of(how.progress, number, len(rounds))
         here = replace(how, known=repeated(known, count), known_mask=masks, progress=progress)
         many, nodes = GraphBatch.pack([graph] * count), latent(graph, how.edit).repeat(count, 1)

@@ -138,7 +138,7 @@ def _unpacked(path: Path) -> tuple[dict, dict[str, np.ndarray]]:
 def _tables_of(rooms: Sequence[RoomBoxes], held_out: Sequence[bool]) -> dict[str, np.ndarray]:
     """The tables of some rooms."""
     words = vocabulary()
-    tables: dict[str, list[np.ndarray]] = {name: [] for name in TABLES}
+    tables: dict[str, list[np.ndarray]] = {name: [np.zeros(0, dtype)] for name, dtype in TABLES.items()}
     for k, room in enumerate(rooms):
         n = len(room)
         kind, openings = words.room_type_id(room.room_type), [_entry(opening) for opening in room.openings]

@@ -5,11 +5,13 @@ Those are a hinge on the relations told, what true boxes measure, collisions and
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
-from echomodel.compact.layout import FARTHEST, measurable, pair_features, wall_features
+from echomodel.compact.layout import FARTHEST, measurable, measured
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import box_scale
 from echomodel.objective import Plan
@@ -18,7 +20,7 @@ from echomodel.objective.plan import UNKNOWN
 from echomodel.randomness import normal
 from echomodel.rules import margins
 from echomodel.samplers import add_noise, clean_from, target
-from echomodel.surroundings import clearances, kept_free, outside
+from echomodel.surroundings import kept_free, outside
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import LayoutBatch, draw_levels
 from echomodel.vocabulary import vocabulary
@@ -103,6 +105,7 @@ def deep(margin: Tensor) -> Tensor:
 
 
 DRAFT = 0.3  # weight of each draft's own denoising loss
+Measure = Callable[..., tuple[Tensor, Tensor, Tensor]]  # as `compact.layout.measured`
 OPENINGS = 0.5  # weight of the clearances of doors and windows beside the gaps to the walls
 
 
@@ -145,7 +148,7 @@ def layout_loss(
         parts["relations"] = relation_hinge(batch, predicted, level, known, model.config.rules)
         loss = loss + recipe.relation_weight * parts["relations"]
     if recipe.measure_weight:
-        parts["measures"] = measure_distance(batch, predicted, context.floor, level, free)
+        parts["measures"] = measure_distance(batch, predicted, context.floor, level, free, model.layout.measure)
         loss = loss + recipe.measure_weight * parts["measures"]
     if recipe.physics_weight:
         parts["physics"] = physics_loss(batch, predicted, level, known)
@@ -161,7 +164,9 @@ def as_carried(batch: LayoutBatch, boxes: Boxes) -> Boxes:
     return Boxes(boxes.size, torch.stack([boxes.position[:, 0], height, boxes.position[:, 2]], 1), boxes.yaw)
 
 
-def measure_distance(batch: LayoutBatch, boxes: Boxes, floor: Tensor, level: Tensor, free: Tensor) -> Tensor:
+def measure_distance(
+    batch: LayoutBatch, boxes: Boxes, floor: Tensor, level: Tensor, free: Tensor, measure: Measure = measured
+) -> Tensor:
     """Mean difference of what predicted and true boxes measure (`compact.layout`), weighted by (1 - level)^2.
 
     It asks for a back at the wall and a chair at the table to the centimetre, where the square of a normalised position
@@ -169,16 +174,17 @@ def measure_distance(batch: LayoutBatch, boxes: Boxes, floor: Tensor, level: Ten
 
     Arguments:
         boxes: N predicted boxes. floor: (N, K, 2). level: (N,). free: (N,) float, 0 for known boxes.
+        measure: how it is measured.
     """
     pairs = batch.pairs
     weight = (1 - level).square()
     own = weight * free
     boxes, truth = measurable(Boxes(boxes.size.detach(), boxes.position, boxes.yaw)), measurable(batch.boxes)
-    walls = (wall_features(boxes, floor) - wall_features(truth, floor)).abs().mean(1)
     openings = batch.graph.openings[batch.graph.scene]
-    walls = walls + OPENINGS * (clearances(boxes, openings) - clearances(truth, openings)).abs().mean(1)
+    found, true = (measure(these, floor, openings, pairs) for these in (boxes, truth))
+    walls, clear, between = ((one - other).abs().mean(1) for one, other in zip(found, true, strict=True))
+    walls = walls + OPENINGS * clear
     both = torch.minimum(weight[pairs.receiver], weight[pairs.sender]) * free[pairs.receiver]
-    between = (pair_features(boxes, pairs) - pair_features(truth, pairs)).abs().mean(1)
     return (walls * own).sum() / own.sum().clamp_min(1) + (between * both).sum() / both.sum().clamp_min(1)
 
 

@@ -17,6 +17,7 @@ from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from echomodel.arrays import Array
 from echomodel.boxes import Boxes, BoxStatistics
+from echomodel.compact.layout import measured
 from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import box_scale, layout_predictor
@@ -66,6 +67,8 @@ class LayoutStage:
             names = start.model.config.categories
             rows = places("categories", names, rooms.category)
             start.model.statistics = statistics_of(rooms.boxes, rows, len(names))
+        if start.recipe.compiled:
+            start.model.layout.measure = torch.compile(measured, dynamic=True)
         return cls(rooms, held, start.recipe)
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
@@ -139,7 +142,10 @@ def sample_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Gener
     latent = model.latent(batch.graph.category, batch.pairs)
     predict = layout_predictor(model, batch.graph, batch.pairs, latent, batch.rules)
     noise = normal((batch.graph.num_nodes, 8), generator, model.device)
-    vectors = sample(layout.sampler, predict, noise, layout.steps, layout.objective, generator=generator)
+    vectors = sample(
+        layout.sampler, predict, noise, layout.steps, layout.objective, generator=generator,
+        temperature=layout.temperature,
+    )  # fmt: skip
     return Boxes.decode(vectors, box_scale(model, batch.graph.category))
 
 
@@ -208,7 +214,9 @@ def drawn_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Genera
             return steadied(predict(x, level))
 
     noise = normal((batch.graph.num_nodes, 8), generator, batch.graph.category.device)
-    x = sample(layout.sampler, late, noise, steps, layout.objective, generator=generator)
+    x = sample(
+        layout.sampler, late, noise, steps, layout.objective, generator=generator, temperature=layout.temperature
+    )
     return Boxes.decode(x, box_scale(model, batch.graph.category))
 
 

@@ -21,8 +21,8 @@ from echomodel.surroundings import padded, trimmed
 from echomodel.vocabulary import vocabulary
 
 PREDICATES = names_of("predicates")  # that networks are told, by their ids from 0 on; rules may measure more
-DENSE = 0.4  # share of the training rooms whose graphs tell 30 to 100 % of all relations
-UNKNOWN_FLOOR, UNKNOWN_OPENINGS = 0.25, 0.2
+DENSE = 0.25  # share of the training rooms whose graphs tell 30 to 100 % of all relations
+UNKNOWN_FLOOR, UNKNOWN_OPENINGS = 0.1, 0.1
 TOGETHER = 50  # rooms that are looked at at a time: their terms take a sixth of what they take one by one
 
 

@@ -24,7 +24,7 @@ from echomodel.training.recipe import Recipe
 # Fields of a recipe that may change on the way: length, rates and weights, files, and what the machine offers.
 MAY_CHANGE = {
     "steps", "data", "start", "warm", "optimizer", "relation_weight", "measure_weight",
-    "physics_weight", "drawn_weight", "validate_every", "save_every", "log_every", "threads", "workers",
+    "physics_weight", "drawn_weight", "validate_every", "save_every", "log_every", "threads", "workers", "compiled",
     "precision", "nodes", "scenes", "shapes_per_batch",
 }  # fmt: skip
 Report = Callable[[int, dict[str, float]], None]

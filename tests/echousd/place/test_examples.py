@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from echomodel.boxes import Boxes
+from echomodel.data.roomset import pack_rooms
 from echomodel.objective import faults_of, plan_of
 from echomodel.rooms.generator import generate_rooms
 from echousd.place import examples
@@ -46,6 +47,17 @@ def test_rooms_of_the_generator_that_miss_nothing_are_kept_unsearched(tmp_path):
     assert (row["graphs"], row["kept"], int(row["plain"])) == ("0", "0", len(rooms))
     with pytest.raises(ValueError, match="was begun"):
         search_examples(tmp_path, ExamplesPlan(5), shards=1)
+
+
+def test_rooms_of_a_set_are_searched_on(tmp_path):
+    given = generate_rooms(9, 5)
+    pack_rooms(tmp_path / "given.npz", given, [False] * 9, {})
+    rooms = search_examples(tmp_path / "out", ExamplesPlan(3, drafts=0, rooms=str(tmp_path / "given.npz")), shards=5)
+    rows = list(csv.DictReader((tmp_path / "out/log.csv").open()))
+    assert {row["plain"] for row in rows} == {"0"}
+    assert sum(int(row["kept"]) for row in rows) == len(rooms) >= 5
+    floors = {room.floor_polygon.round(3).tobytes() for room in given}
+    assert {rooms.room(k).floor_polygon.round(3).tobytes() for k in range(len(rooms))} <= floors
 
 
 def test_drafts_are_the_networks():
