@@ -119,7 +119,8 @@ class LayoutBatch:
 
 def draw_batch(rooms: PackedRooms, node_budget: int, generator: torch.Generator) -> LayoutBatch:
     """Draw rooms until the node budget is reached, mirror them, thin their relations and make pseudo edits."""
-    picked = torch.randint(len(rooms), (node_budget,), generator=generator)
+    owner = torch.arange(len(rooms)).repeat_interleave(rooms.count)  # every object is drawn as often, not every room
+    picked = owner[torch.randint(len(owner), (node_budget,), generator=generator)]
     fits = rooms.count[picked].cumsum(0) <= node_budget
     fits[0] = True
     return make_batch(rooms, picked[fits], generator)
