@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from importlib import resources
 
 import numpy as np
@@ -200,6 +200,7 @@ def ranges() -> Iterator[Row]:
 
 
 TABLE = tuple(ranges())
+named_schema = cache(Usd.SchemaRegistry.GetTypeNameAndInstance)
 BY_OWNER = {at: [row for row in TABLE if at in row.at] for row in TABLE for at in row.at}
 
 
@@ -233,7 +234,7 @@ def _owners(prim: Usd.Prim) -> Iterator[tuple[str, str]]:
     yield "", ""
     yield str(prim.GetTypeName()), ""
     for schema in applied(prim):
-        yield Usd.SchemaRegistry.GetTypeNameAndInstance(schema)
+        yield named_schema(schema)
     if prim.GetTypeName() == "Shader":
         yield str(prim.GetAttribute("info:id").Get() or ""), ""
 

@@ -11,7 +11,7 @@ import numpy as np
 from echomodel.boxes2d import axes, footprints
 from echomodel.dressing import SMALL
 from echomodel.openings import SKIRTING, segment
-from echomodel.triangles import along, area_normals, bounds_of, distances, spread
+from echomodel.triangles import along, area_normals, bounds_of, distances, spans_of, spread
 from echomodel.vocabulary import vocabulary
 from echousd.checks.reading import Reading
 from echousd.graph.nodes import HEIGHT
@@ -383,8 +383,8 @@ def _local(points: np.ndarray, solid: Shape) -> np.ndarray:
 
 
 def _touches(triangles: np.ndarray, solid: Shape) -> np.ndarray:
-    local = _local(triangles, solid)
-    return ((local.min(1) <= solid.size / 2) & (local.max(1) >= -solid.size / 2)).all(-1)
+    low, high = spans_of(_local(triangles, solid))
+    return np.asarray(((low <= solid.size / 2) & (high >= -solid.size / 2)).all(-1))
 
 
 def inside_solid(points: np.ndarray, solid: Shape) -> np.ndarray:

@@ -13,7 +13,7 @@ import shapely
 from echomodel.boxes2d import footprints, seen, turned
 from echomodel.dressing import KINDS
 from echomodel.openings import STEP, Opening, free_area, zone
-from echomodel.triangles import bounds_of
+from echomodel.triangles import bounds_of, spans_of
 from echomodel.vocabulary import Category, RoomStyle, vocabulary
 from echousd.dressing.stories import TABLE, Story, story
 from echousd.shapes.geometry import Geometry
@@ -220,8 +220,8 @@ def meets(thing: Standing, low: float, high: float, plan: shapely.Geometry) -> b
 
 def _section(corners: np.ndarray, low: float, high: float) -> shapely.Geometry:
     """The hull in plan of triangles (n, 3, 3) between two heights."""
-    y = corners[..., 1]
-    corners = corners[(y.max(1) > low) & (y.min(1) < high)]
+    least, most = spans_of(corners[..., 1])
+    corners = corners[(most > low) & (least < high)]
     points = corners.reshape(-1, 3)
     found = [points[(points[:, 1] > low) & (points[:, 1] < high)]]
     start, end = corners.reshape(-1, 3), np.roll(corners, -1, axis=1).reshape(-1, 3)

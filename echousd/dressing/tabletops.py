@@ -11,7 +11,7 @@ import shapely
 from echomodel.boxes2d import turned
 from echomodel.dressing import KINDS, usual_size
 from echomodel.late import Late
-from echomodel.triangles import area_normals
+from echomodel.triangles import area_normals, spans_of
 from echousd.dressing.setting import APART, Setting, Standing, Thing, around, rectangle
 
 book_size, fitting_books = (Late(f"echomodel.dressing.books:{name}") for name in ("book_size", "fitting_books"))
@@ -117,8 +117,8 @@ def surfaces(host: Standing) -> list[Surface]:
 
 def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
     """The triangles between two heights in plan; those that stand upright as lines."""
-    y = corners[..., 1]
-    plan = corners[(y.max(1) > low) & (y.min(1) < high)][:, :, [0, 2]]
+    least, most = spans_of(corners[..., 1])
+    plan = corners[(most > low) & (least < high)][:, :, [0, 2]]
     if not len(plan):
         return np.array([], object)
     first, second = plan[:, 1] - plan[:, 0], plan[:, 2] - plan[:, 0]

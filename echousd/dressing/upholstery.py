@@ -10,7 +10,7 @@ import shapely
 from echomodel.boxes2d import hull, upright
 from echomodel.dressing import names_of, usual_size
 from echomodel.dressing.textiles import LEAN, LIES
-from echomodel.triangles import area_normals
+from echomodel.triangles import area_normals, spans_of
 from echousd.dressing.setting import Setting, Standing, Thing
 from echousd.shapes.hulls import forbidden_moves
 
@@ -239,7 +239,7 @@ def _heights(corners: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
     one, two = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
     large = np.flatnonzero(np.abs(area) > 1e-10)
-    ends = np.stack([flat.min(1), flat.max(1)])[:, large]
+    ends = spans_of(flat)[:, large]
     (top, bottom), (left, right) = (np.searchsorted(line, ends[..., axis]) for axis, line in enumerate((x, z)))
     count = (bottom - top) * (right - left)  # of cells that its box covers
     cell, n = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count), np.repeat(large, count)

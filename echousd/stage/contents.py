@@ -10,7 +10,7 @@ import numpy as np
 from pxr import Kind, Sdf, Usd, UsdGeom
 
 from echomodel.boxes2d import upright_box
-from echomodel.triangles import Mesh, bounds_of, connected_pieces, joined
+from echomodel.triangles import Mesh, bounds_of, connected_pieces, joined, spans_of
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import LABELS
 from echousd.stage.forms import Polygons, forms, polygons
@@ -45,7 +45,7 @@ class Shape:
     @cached_property
     def spans(self) -> np.ndarray:
         """(2, f, 3) float, metres: lower and upper corners of the boxes around its faces."""
-        return np.stack([self.triangles.min(1), self.triangles.max(1)])
+        return spans_of(self.triangles)
 
     @cached_property
     def pieces(self) -> tuple[np.ndarray, list[np.ndarray]]:

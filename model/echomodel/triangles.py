@@ -97,6 +97,12 @@ def bounds_of(points: np.ndarray) -> np.ndarray:
     return np.stack([planes.min(1), planes.max(1)])
 
 
+def spans_of(triangles: np.ndarray) -> np.ndarray:
+    """(2, f, ...): the least and the greatest of the three corners of triangles (f, 3, ...)."""
+    one, two, three = np.moveaxis(triangles, 1, 0)
+    return np.stack([np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)])
+
+
 def area_normals(triangles: np.ndarray) -> np.ndarray:
     """(f, 3): normals of the triangles (f, 3, 3), twice as long as their areas."""
     return cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])

@@ -16,6 +16,7 @@ from echomodel.triangles import (
     distances,
     joined,
     lengths,
+    spans_of,
     spread,
 )
 
@@ -37,6 +38,8 @@ def test_lengths_and_bounds_are_numpy_s_bit_for_bit(shape, kind):
     assert lengths(points).dtype == bounds_of(points).dtype == kind
     np.testing.assert_array_equal(lengths(points), np.linalg.norm(points, axis=-1))
     np.testing.assert_array_equal(bounds_of(points), [rows.min(0), rows.max(0)])
+    for triangles in (rows, np.stack([rows] * 3, 1) * rows[:, None]):
+        np.testing.assert_array_equal(spans_of(triangles), [triangles.min(1), triangles.max(1)])
 
 
 def test_a_normal_is_twice_as_long_as_its_triangle_s_area():
