@@ -26,7 +26,7 @@ APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
 # mm of a camera inside: 74, 81, 90 and 97 degrees across; metres of depth that each costs: wide ones distort
 LENSES, DISTORTED = (24.0, 21.0, 18.0, 16.0), (0.0, 20.0, 50.0, 90.0)
-EYE = 0.5  # of the height of the walls: where a camera inside is
+EYES, RAISED = (0.5, 0.62), 12  # of the height of the walls: where a camera inside is; so many eyes are raised, too
 SLOPES = (0.05, 0.13, 0.22, 0.32)  # metres that the middle of its picture is lower for a metre ahead
 PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
 WHOLE, CLEAR = 1000.0, 80.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
@@ -176,14 +176,15 @@ def inside_view(
             - FILLED * filled(away, reach[which]) - BARE * max(0.0, bare - BAREST) - shot.cost
         )  # fmt: skip
 
-    eyes: list[list[Shot]] = []
     halves = APERTURE / 2 / np.array(LENSES)
-    for at in (*_spots(room, middle, aim), *_beyond(floor, things, main)):
+
+    def shots(at: Eye, up: float) -> list[Shot]:
+        """The views that cost least of an eye at a height."""
         spot, seen, wider, way = at.spot, np.full(len(things.size), True), room.buffer(0.05), aim - at.spot
         if at.way is not None:
             seen = ((things.corners[..., [0, 2]] - spot) @ at.way).max(1) > at.near
             wider, way = wider.union(shapely.Point(spot).buffer(1.4 * at.near)), at.way
-        eye = np.array([spot[0], EYE * height, spot[1]])
+        eye = np.array([spot[0], up, spot[1]])
         points, blocked = furniture.blocked(eye, things.of(seen & ~stands))
         lines = shapely.linestrings(np.stack(np.broadcast_arrays(eye, points[main]), 1)[..., [0, 2]])
         hidden = CLEAR * float((blocked[main] | ~shapely.covers(wider, lines)).mean())  # by pieces, or by a corner
@@ -197,15 +198,19 @@ def inside_view(
         cost = WHOLE * cut + off + _shown(fragile, views, halves) + hidden + behind
         cost = cost + np.abs(PANS)[:, None, None] + DISTORTED
         if at.way is not None:  # upright to the wall, and within it where it begins to see
-            low, wide = EYE * height - np.array(SLOPES)[:, None] * at.near, halves * at.near
+            low, wide = up - np.array(SLOPES)[:, None] * at.near, halves * at.near
             beside = (wide > at.aside) | (low < wide / ASPECT) | (low + wide / ASPECT > height)
             cost = cost + WHOLE * (beside | (np.abs(PANS) > 0)[:, None, None] | (np.array(LENSES) < LENSES[0]))
         cost = cost.ravel()
-        eyes.append([
+        return [
             Shot(float(cost[n]), views.reshape(-1, 4, 4)[n // len(LENSES)], LENSES[n % len(LENSES)], at.near, points,
                  blocked) for n in np.argsort(cost, kind="stable")[:TRIED]
-        ])  # fmt: skip
-    eyes = sorted(eyes, key=lambda shots: shots[0].cost)[:LOOKED]
+        ]  # fmt: skip
+
+    every = [(shots(at, EYES[0] * height), at) for at in (*_spots(room, middle, aim), *_beyond(floor, things, main))]
+    every = sorted(every, key=lambda one: one[0][0].cost)[:LOOKED]
+    before_walls = [at for _, at in every if at.way is None]
+    eyes = [views for views, _ in every] + [shots(at, EYES[1] * height) for at in before_walls[:RAISED]]
     best = sorted(eyes, key=lambda shots: -merit(shots[0]))[:CHOSEN]  # of each eye by the view that costs least
     shot = max((shot for shots in best for shot in shots), key=merit)
     return shot.view, shot.lens, shot.near

@@ -124,6 +124,25 @@ def test_the_camera_comes_nearer_where_the_room_is_large() -> None:
     assert np.linalg.norm(eye - (3.0, 2.0)) < 6.0  # not where it sees most pieces
 
 
+def test_the_camera_looks_over_the_back_of_an_armchair() -> None:
+    floor = np.array([(-2.15, -2.9), (-2.15, 2.9), (2.15, 2.9), (2.15, -2.9)])
+    left, right, back = np.pi / 2, -np.pi / 2, np.pi
+    things = boxes(
+        (2.01, 0.91, 1.03, -1.55, 0.0, 0.0, left), (0.99, 0.42, 0.85, -0.15, 0.0, 0.08, left),  # sofa, its table
+        (2.15, 0.65, 0.52, 1.86, 0.0, -0.2, right), (0.96, 0.92, 1.0, -0.15, 0.0, 1.52, back),  # screen, armchair
+        (1.27, 0.78, 0.57, 0.79, 0.0, -2.57, 0.0), (0.52, 0.99, 0.53, 0.79, 0.0, -2.06, back),  # desk and chair
+        (0.45, 1.79, 0.23, -0.79, 0.0, -2.71, 0.0), (1.38, 2.04, 0.42, -1.45, 0.0, 2.69, back),
+        (0.45, 0.99, 0.45, -0.15, 1.81, 0.08, left),
+    )  # fmt: skip
+    hung = boxes(
+        (0.4, 2.31, 0.09, 1.1, 0.01, 2.81, back), (0.4, 2.31, 0.09, -0.48, 0.01, 2.81, back),
+        (0.43, 0.87, 0.43, 1.84, 0.0, 2.59, left), (0.39, 0.39, 0.39, -1.55, 0.0, -1.27, left),
+    )  # fmt: skip
+    view, lens, near = inside_view(floor, things, 2.8, hung, main=0)
+    assert fills(things.of(np.array([3])), view, APERTURE / 2 / lens, 2.6, near) < 0.01
+    assert 1.5 < view[1, 3] < 1.8  # as high as the eyes of who stands
+
+
 NOTCHED = np.array([(0.0, 0.0), (0.0, 4.6), (2.8, 4.6), (2.8, 2.6), (5.2, 2.6), (5.2, 0.0)])
 
 
