@@ -59,7 +59,8 @@ def assembled(
         hulls = convex_pieces(corners, float(np.prod(size)))
         words = [f"{prefix}collider", *(f"{prefix}collider_{n}" for n in range(2, len(hulls) + 1))]
         colliders += [Collider(word, hull, "convexHull", body) for word, hull in zip(words, hulls, strict=True)]
-        masses[body] = weighed(own)
+        if fixed:
+            masses[body] = weighed(own)
     joints = {piece.joint.body: piece.joint for piece in pieces if piece.joint}
     fewer = sum(len(piece.faces) for piece in low) < COARSE * sum(len(piece.faces) for piece in pieces)
     coarse: list[Part] = []
@@ -68,7 +69,7 @@ def assembled(
     whole = ballasted(weighed(plain), [piece.vertices for piece in plain])
     return Geometry(
         tuple(parts), tuple(colliders), origin, mass=whole, joints=tuple(joints.values()),
-        masses=masses if fixed else {}, coarse=tuple(coarse), description=description,
+        masses=masses, coarse=tuple(coarse), description=description,
     )  # fmt: skip
 
 
