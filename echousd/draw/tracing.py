@@ -243,7 +243,8 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     for here, times in ((asked & torn, often), (asked & ~torn, seldom)):
         found[:6, here.ravel()] = _asked(world, seen.of(number[here]), number[here], times)
     thin = np.flatnonzero(asked & near.reshape(shape)[coarse])
-    found[:5, thin] = _pooled(seen.of(number.ravel()[thin]), found[:5, thin])
+    raw, slim = found[:6, thin], number.ravel()[thin]
+    found[:5, thin] = _pooled(seen.of(slim), raw[:5])
     found[6] = found[5] > 0
     reach = ((np.s_[:3], RINGS), (np.s_[3:5], RINGS[:3]), (np.s_[5:6], () if inside else RINGS), (np.s_[6:], RINGS[:1]))
     found = found.reshape(7, *asked.shape)
@@ -264,7 +265,9 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
             many += fits
         light[here], weight[here] = lent / np.maximum(many, 1), many
     rest, flat = np.flatnonzero(met & (weight == 0)), light.reshape(6, -1)
-    flat[:, rest] = _pooled(seen.of(rest), _asked(world, seen.of(rest), rest, often // 2))
+    # with what was asked of slim things beside them: alone they would be lighter and darker dashes along a trim
+    more = np.concatenate([_asked(world, seen.of(rest), rest, often // 2), raw], 1)
+    flat[:, rest] = _pooled(seen.of(np.concatenate([rest, slim])), more)[:, : len(rest)]
     border = np.flatnonzero(met & mixed & inside)  # of the sun's light: sharper than two pixels
     facing, shift = seen.normal.take(border, 1), _shifts(world, border)[:2]
     there = seen.point.take(border, 1) + BEFORE * facing
