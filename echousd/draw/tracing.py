@@ -246,7 +246,11 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     raw, slim = found[:6, thin], number.ravel()[thin]
     found[:5, thin] = _pooled(seen.of(slim), raw[:5])
     found[6] = found[5] > 0
-    reach = ((np.s_[:3], RINGS), (np.s_[3:5], RINGS[:3]), (np.s_[5:6], () if inside else RINGS), (np.s_[6:], RINGS[:1]))
+    gloss = world.scenery.gloss.take(seen.face).reshape(shape)[coarse]
+    reach = (
+        (np.s_[:3], RINGS), (np.s_[3:4], RINGS, gloss), (np.s_[4:5], RINGS[:3]), (np.s_[5:6], () if inside else RINGS),
+        (np.s_[6:], RINGS[:1]),
+    )  # fmt: skip
     found = found.reshape(7, *asked.shape)
     found = smooth_light(found, known[0], known[1], reach)
     mixed = ((found[6] > 0.01) & (found[6] < 0.99)).repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
@@ -352,13 +356,14 @@ def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, reach
     """Mean of the light (c, h, w) over neighbours on the same flat piece of surface (joint bilateral filter).
 
     Far passes leave out what is much lighter or darker, so that shadows keep their edges. `normal`, `point`: (3, h, w)
-    of the surface. `reach`: layers of the light, a slice of them, and `RINGS` that these are smoothed over.
+    of the surface. `reach`: layers of the light, a slice of them, `RINGS` that these are smoothed over, and (h, w) what
+    must be equal there if anything: what steel mirrors is nothing that the pane in it does.
     """
     height, width = light.shape[1:]
-    for apart in sorted({ring for _, rings in reach for ring in rings}):
+    for apart in sorted({ring for _, rings, *_ in reach for ring in rings}):
         # passes with ever wider holes reach far with few neighbours ("a trous")
-        parts = [(layers, light[layers]) for layers, rings in reach if apart in rings]
-        sums = [(layers, own, own.mean(0), own.copy(), np.ones_like(own[0])) for layers, own in parts]
+        parts = [(layers, light[layers], *alike) for layers, rings, *alike in reach if apart in rings]
+        sums = [(layers, own, own.mean(0), own.copy(), np.ones_like(own[0]), *alike) for layers, own, *alike in parts]
         # what two share they give each other: half of all eight are met
         for down, across in ((0, apart), (apart, -apart), (apart, 0), (apart, apart)):
             for top in range(0, height - down, BAND):
@@ -369,13 +374,15 @@ def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, reach
                 for _ in range(5):  # to the power of 32
                     share *= share
                 share *= np.abs(along(normal[here], point[there] - point[here])) < FLAT
-                for (_, own, bright, total, weight), (one, other) in product(sums, ((here, there), (there, here))):
-                    part = share
+                for (_, own, bright, total, weight, *alike), (one, other) in product(
+                    sums, ((here, there), (there, here))
+                ):
+                    part = share * (alike[0][one] == alike[0][other]) if alike else share
                     if apart > CLOSE:
-                        part = share / (1 + np.square((bright[other] - bright[one]) / (EVEN * bright[one] + 1e-4)) ** 2)
+                        part = part / (1 + np.square((bright[other] - bright[one]) / (EVEN * bright[one] + 1e-4)) ** 2)
                     total[one] += part * own[other]
                     weight[one] += part
-        for layers, _, _, total, weight in sums:
+        for layers, _, _, total, weight, *_ in sums:
             light[layers] = total / weight
     return light
 

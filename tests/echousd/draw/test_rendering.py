@@ -142,6 +142,18 @@ def test_light_is_smoothed_within_a_plane_only():
     assert abs(smooth[:, 10:].mean() - 6) < 0.1
 
 
+def test_what_steel_mirrors_is_not_smoothed_into_the_pane_in_it():
+    gloss = np.full((20, 20), 0.6, np.float32)
+    gloss[5:15, 5:15] = 0.4
+    light = np.where(gloss > 0.5, np.float32(0.5), np.float32(0.02))[None]
+    normal, point = np.zeros((2, 3, 20, 20), np.float32)
+    normal[2] = 1
+    mixed = smooth_light(light.copy(), normal, point, [(slice(None), RINGS[:2])])
+    assert mixed[0, 5, 5] > 0.1  # one flat piece
+    apart = smooth_light(light.copy(), normal, point, [(slice(None), RINGS[:2], gloss)])
+    np.testing.assert_allclose(apart, light, atol=1e-6)
+
+
 def test_soft_shadows_from_above_have_no_grain():
     """The sun outside is a wide disc: half in shadow is a gradient, no pattern of dots."""
     stage = Usd.Stage.CreateInMemory()
