@@ -77,7 +77,7 @@ Step = Callable[..., Array]
 
 
 def ddim(
-    x: Array, clean: Array, start: Strengths, end: Strengths, generator: Randomness | None, temperature: float
+    x: Array, clean: Array, start: Strengths, end: Strengths, generator: Randomness | None, temperature: Array
 ) -> Array:
     """Deterministic DDIM (Song et al. 2021, Eq. 12 with eta 0); with rectified flow this is the Euler method."""
     (a, s), (b, r) = start, end
@@ -85,7 +85,7 @@ def ddim(
 
 
 def ancestral(
-    x: Array, clean: Array, start: Strengths, end: Strengths, generator: Randomness | None, temperature: float
+    x: Array, clean: Array, start: Strengths, end: Strengths, generator: Randomness | None, temperature: Array
 ) -> Array:
     """DDPM ancestral sampling from the posterior q(x_s | x_t, x0) (Ho et al. 2020, Eq. 7), its noise scaled: what a
     network is unsure of is noise as well, and below one both together are no more than there should be."""
@@ -105,14 +105,14 @@ SAMPLERS: dict[Sampler, Step] = {"ddim": ddim, "ancestral": ancestral}
 def sample(
     sampler: Sampler, predict: Predict, x: Array, steps: int, objective: Objective, *, known: Array | None = None,
     known_mask: Array | None = None, generator: Randomness | None = None, progress: StepListener | None = None,
-    temperature: float = 1.0,
+    temperature: Array = 1.0,
 ) -> Array:  # fmt: skip
     """Run a sampler by name.
 
     Arguments:
         x: (N, ...) start, standard normal noise.
         known, known_mask: (N, ...) values and (N,) bool, nodes that keep their values from first to last.
-        generator: source of the noise that `ancestral` adds, `temperature` times.
+        generator: source of the noise that `ancestral` adds, `temperature` times: one number, or one for each column.
         progress: called with (steps done, steps) after every step.
 
     Raises ValueError where the sampler is not known, or steps < 1.

@@ -195,6 +195,12 @@ class Layout(Layers):
         return features, replace(context.pairs, stated=stated)
 
 
+def temperatures(settings: LayoutConfig, like: Array) -> Array:
+    """(BOX,) scales of the noise that sampling adds: places and headings have the branch's temperature, sizes vary as
+    they do."""
+    return cast([1.0] * 3 + [settings.temperature] * (BOX - 3), like)
+
+
 def exactly(x: Array) -> AbstractContextManager[None]:
     """Numbers that stand for centimetres are not rounded where the rest is computed in bfloat16."""
     if isinstance(x, NUMPY):

@@ -10,6 +10,7 @@ import numpy as np
 
 from echomodel.arrays import Array, beside, clipped, full, kit, on_device, pairs_in, rows, sum_of, without_slopes
 from echomodel.boxes import Boxes, BoxScale
+from echomodel.compact.layout import temperatures
 from echomodel.compact.learned import places
 from echomodel.compact.pairs import Pairs, pairs_of
 from echomodel.config import BranchConfig, Sampler
@@ -90,12 +91,14 @@ class CompactSampling(Sampling):
     candidates: int | None = None
     styles: Array | None = None
 
-    def denoised(self, predict: Predict, noise: Array, settings: BranchConfig) -> Array:
-        """What becomes of `noise` (N, ...), by the branch's sampler and steps where none are asked for."""
+    def denoised(
+        self, predict: Predict, noise: Array, settings: BranchConfig, temperature: Array | None = None
+    ) -> Array:
+        """What becomes of `noise` (N, ...), by the branch's sampler, steps and temperature where none are asked for."""
         return sample(
             self.sampler or settings.sampler, predict, noise, self.steps or settings.steps, settings.objective,
             known=self.known, known_mask=self.known_mask, generator=self.generator, progress=self.progress,
-            temperature=settings.temperature,
+            temperature=settings.temperature if temperature is None else temperature,
         )  # fmt: skip
 
     def start(self, nodes: int, width: int, device: Any) -> Array:
@@ -159,7 +162,7 @@ def sample_boxes(model: Model, latent: Latent, graph: GraphBatch, how: CompactSa
     if strength:
         predict = guided(predict, plan, scale, strength=strength, rounds=config.guidance_rounds)
     noise = how.start(graph.num_nodes, 8, model.device)
-    vectors = replace(how, known=known).denoised(predict, noise, config)
+    vectors = replace(how, known=known).denoised(predict, noise, config, temperatures(config, noise))
     boxes = Boxes.decode(vectors, scale)
     boxes = Boxes(clipped(boxes.size, 0.01, 20.0), boxes.position, boxes.yaw)
     if strength:

@@ -17,7 +17,7 @@ from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from echomodel.arrays import Array
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.compact.layout import measured
+from echomodel.compact.layout import measured, temperatures
 from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import box_scale, layout_predictor
@@ -144,7 +144,7 @@ def sample_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Gener
     noise = normal((batch.graph.num_nodes, 8), generator, model.device)
     vectors = sample(
         layout.sampler, predict, noise, layout.steps, layout.objective, generator=generator,
-        temperature=layout.temperature,
+        temperature=temperatures(layout, noise),
     )  # fmt: skip
     return Boxes.decode(vectors, box_scale(model, batch.graph.category))
 
@@ -215,8 +215,9 @@ def drawn_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Genera
 
     noise = normal((batch.graph.num_nodes, 8), generator, batch.graph.category.device)
     x = sample(
-        layout.sampler, late, noise, steps, layout.objective, generator=generator, temperature=layout.temperature
-    )
+        layout.sampler, late, noise, steps, layout.objective, generator=generator,
+        temperature=temperatures(layout, noise),
+    )  # fmt: skip
     return Boxes.decode(x, box_scale(model, batch.graph.category))
 
 

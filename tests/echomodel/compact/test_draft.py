@@ -5,8 +5,9 @@ from __future__ import annotations
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.compact.layout import PAIR_FEATURES, WALL_FEATURES, pair_features, wall_features
+from echomodel.compact.layout import PAIR_FEATURES, WALL_FEATURES, pair_features, temperatures, wall_features
 from echomodel.compact.pairs import pairs_of
+from echomodel.config import LayoutConfig
 from echomodel.graph import GraphBatch
 from echomodel.surroundings import centred, padded
 
@@ -53,3 +54,8 @@ def test_gradients_are_finite_where_the_floor_is_unknown() -> None:
     assert torch.isfinite(position.grad).all()
     assert position.grad[0].any()
     assert not position.grad[1].any()
+
+
+def test_sizes_vary_whatever_the_temperature_of_places():
+    scales = temperatures(LayoutConfig(temperature=0.25), torch.zeros(1))
+    assert scales.tolist() == [1.0] * 3 + [0.25] * 5
