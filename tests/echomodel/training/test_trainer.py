@@ -89,6 +89,24 @@ def test_measures_of_true_boxes_are_met_and_pull_at_places_alone(packed: PackedR
     assert (position.grad.abs().sum(1) > 0).float().mean() > 0.9
 
 
+def test_a_recipe_may_compile_what_is_measured(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[int] = []
+
+    def compiled(function, *, dynamic):
+        def run(boxes, *rest):
+            seen.append(len(boxes))
+            return function(boxes, *rest)
+
+        return run if dynamic else function
+
+    monkeypatch.setattr(torch, "compile", compiled)
+    settings = "model.layout.layers=2", "model.layout.drafts=1", "nodes=40", "measure_weight=1.0"
+    for on, times in (("false", 0), ("true", 3)):  # one draft, the prediction and the true boxes
+        trainer = open_run(smoke("layout", data, *settings, f"compiled={on}"), tmp_path / on)
+        trainer.stage.loss(trainer.model, torch.Generator().manual_seed(0))
+        assert len(seen) == times
+
+
 def test_batches_keep_the_node_budget_and_merge_like_graphs(packed: PackedRooms) -> None:
     batch = draw_batch(packed, 100, torch.Generator().manual_seed(0))
     assert 80 < batch.graph.num_nodes <= 100
