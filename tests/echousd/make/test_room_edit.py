@@ -351,7 +351,7 @@ def test_who_is_in_the_way_of_a_new_door_makes_way_and_no_other(tmp_path, neares
     root, wardrobe = room.save(tmp_path / "r", preview=False), room.boxes.position[1, ::2]
 
     def away(door):
-        return float(np.linalg.norm(np.mean(segment(room.floor, door), 0) - wardrobe))
+        return float(np.linalg.norm(np.mean(segment(graph.room.corners, door), 0) - wardrobe))
 
     doors = [
         Opening("new", "door", wall, at, 0.9, 2.0) for wall in range(4) for at in np.arange(0.1, 3.4, 0.1).round(2)
