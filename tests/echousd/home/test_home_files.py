@@ -217,7 +217,9 @@ def test_furniture_stays_where_a_room_only_gets_other_openings(made, echousd_com
     assert done.code == 0, done.err
     after = read_room(room_at(room))
     assert after.graph.names == before.graph.names == ("bed", "chair")
-    np.testing.assert_allclose(after.boxes.position[0], before.boxes.position[0], atol=1e-4)
+    moved = after.boxes.position - before.boxes.position
+    np.testing.assert_allclose(moved[1], 0, atol=1e-4)
+    assert np.abs(moved[0]).max() < 0.5  # a bed before three metres of passage makes way for it, no more
     assert after.graph.room.openings != before.graph.room.openings
     assert echousd_command("check", folder).code == 0
     made_again = echousd_command("edit", folder, "--relate", "living open to bedroom", "--dry-run")
