@@ -114,10 +114,10 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
     started = time.process_time()
     graphs = GRAPHS if plan.searched else 0
     first = number * graphs
-    if plan.rooms is None:
+    given = None if plan.rooms is None else RoomSet(plan.rooms)
+    if given is None:
         drawn = generate_rooms(graphs, plan.seed, start=first, halls=HALLS)
     else:
-        given = RoomSet(plan.rooms)
         drawn = [given.room(k) for k in range(first, min(first + graphs, len(given)))]
     luck = np.random.Generator(np.random.PCG64([plan.seed, number, 5]))
     labels = label_rooms(drawn, rules="strict") if drawn else []
@@ -129,8 +129,7 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
     if plan.drafts and drawn:
         for more, drafts in zip(starts, _drafts(plan, drawn, stated, number), strict=True):
             more += drafts
-    looked = 0 if plan.rooms else PLAIN
-    others = generate_rooms(looked, plan.seed + OTHERS, start=number * PLAIN, halls=HALLS)
+    others = generate_rooms(PLAIN if given is None else 0, plan.seed + OTHERS, start=number * PLAIN, halls=HALLS)
     plain = [_with(room, room.size, room.position, room.yaw) for room in others if not _missed(room, NOTHING)]
     kept: list[RoomBoxes] = []
     numbers: list[int] = []
@@ -144,7 +143,7 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
             numbers.append(first + k)
             own += which == 0
     found = len(kept)
-    held = [kept_out(n) for n in (*numbers, *range(len(plain)))]
+    held = [kept_out(n) if given is None else bool(given.held_out[n]) for n in (*numbers, *range(len(plain)))]
     kept += plain
     pack_rooms(_shard(folder, number), kept, held, {"kind": "rooms found by search", "seed": plan.seed})
     seconds = round(time.process_time() - started, 1)

@@ -84,7 +84,7 @@ class Recipe:
         precision: `float32` or `bfloat16` (autocast).
         threads: CPU threads, 0 = as many as torch likes. workers: processes that draw batches of rooms ahead of a GPU,
             0 = none.
-        compiled: what is measured on boxes is compiled; of some 12,000 small operations of a step that leaves a third.
+        compiled: what is measured on boxes, two of five small operations of a step, is compiled for the machine.
         model: sizes of the compact model. paper: settings of the `paper` preset (`echoscene.config.SETTINGS`).
         optimizer: how to step.
     """

@@ -51,11 +51,12 @@ def test_rooms_of_the_generator_that_miss_nothing_are_kept_unsearched(tmp_path):
 
 def test_rooms_of_a_set_are_searched_on(tmp_path):
     given = generate_rooms(9, 5)
-    pack_rooms(tmp_path / "given.npz", given, [False] * 9, {})
+    pack_rooms(tmp_path / "given.npz", given, [True] * 9, {})
     rooms = search_examples(tmp_path / "out", ExamplesPlan(3, drafts=0, rooms=str(tmp_path / "given.npz")), shards=5)
     rows = list(csv.DictReader((tmp_path / "out/log.csv").open()))
     assert {row["plain"] for row in rows} == {"0"}
     assert sum(int(row["kept"]) for row in rows) == len(rooms) >= 5
+    assert rooms.held_out.all()  # what the set held out stays so
     floors = {room.floor_polygon.round(3).tobytes() for room in given}
     assert {rooms.room(k).floor_polygon.round(3).tobytes() for k in range(len(rooms))} <= floors
 
