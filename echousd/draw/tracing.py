@@ -206,7 +206,10 @@ def _seen(world: World, origin: np.ndarray, way: np.ndarray, hit: Sequence[np.nd
         glow[:, missed[past]] = next_room(scenery, world.white, begin.take(past, 1), towards.take(past, 1))
     lean = scenery.planes.normal.take(face, 1)
     normal = _unit(lean[:3] + u * lean[3:6] + v * lean[6:])
-    normal *= -np.copysign(np.float32(1), along(normal, way))
+    averted = np.flatnonzero(along(normal, way) > 0)  # seen from behind, or at a rim whose round normals look away
+    a, b, c = (scenery.triangles[face[averted], corner].T for corner in range(3))
+    flat = np.cross(b - a, c - a, axis=0)
+    normal[:, averted] *= -np.copysign(np.float32(1), along(flat, normal[:, averted]) * along(flat, way[:, averted]))
     return Seen(face, origin + far * way, normal, hit[2], glow)
 
 

@@ -261,6 +261,22 @@ def test_a_thin_slanting_trim_is_as_even_as_what_lights_it():
     assert np.std(pictures, axis=0).mean() < 0.0155  # 0.018 where each of its pixels is lit by what it asked alone
 
 
+def test_the_rim_of_what_is_round_is_lit_as_what_is_beside_it():
+    import trimesh
+
+    lamps = np.array([(x, 1.5, z) for x in (-1.5, 1.5) for z in (-1.5, 1.5)], np.float32)
+    scenery, down = box_room(sky=0.0, bulbs=lamps[:, None], power=np.ones((4, 3), np.float32))
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=0.6)  # so coarse that normals at its rim look away
+    form = {"triangles": ball.triangles + np.array((0, 0.8, 0)), "normals": ball.vertex_normals[ball.faces]}
+    flat = {name: np.zeros((80, *shape)) for name, shape in (("gloss", ()), ("st", (3, 2)), ("emissive", (3,)))}
+    flat |= {"texture": np.full(80, -1), "wall": np.full(80, -1), "flat_colors": np.full((80, 3), 0.9)}
+    white, glowing = (
+        trace(with_sheet(scenery, level_sheet(1, 1), **form, **look), down, 160, rays=2).mean(-1)
+        for look in (flat, flat | {"emissive": np.ones((80, 3))})
+    )
+    assert white[glowing > 0.6].min() > 0.55  # 0.48 where normals that look away are turned into the ball
+
+
 def test_a_shade_is_brightest_at_its_bulb():
     scenery, down = box_room(sky=0.0, **LAMP)
     white = replace(scenery, flat_colors=np.full_like(scenery.flat_colors, 0.8))
