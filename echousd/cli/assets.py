@@ -22,8 +22,8 @@ SHOWN = 20  # faults that are told; the table holds all
 
 @assets_app.command(epilog="Example: echousd assets index ~/models -o models.parquet")
 def index(
-    folders: Annotated[list[Path], typer.Argument(help="Folders of models, or libraries.", show_default=False)],
-    output: Annotated[Path, typer.Option("-o", "--output", help="The index (.parquet).", show_default=False)],
+    folders: Annotated[list[Path], typer.Argument(help="Folders of models, or libraries.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The index (.parquet).")],
     workers: Annotated[int, typer.Option(help="Processes; 0: one for each core.", min=0, max=256)] = 0,
     table: Annotated[
         Path | None, typer.Option(help="Table of corrections; default: beside the index, where there is one.")
@@ -60,7 +60,7 @@ def index(
 
 @assets_app.command(epilog="Example: echousd assets review models.parquet")
 def review(
-    library: Annotated[Path, typer.Argument(help="Index (.parquet).", show_default=False)],
+    library: Annotated[Path, typer.Argument(help="Index (.parquet).")],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="The page; default: INDEX.html.")] = None,
     json: AsJson = False,
 ) -> None:
@@ -87,8 +87,8 @@ def review(
 
 @assets_app.command(epilog="Example: echousd assets pack out/bedroom -o packages")
 def pack(
-    room: Annotated[Path, typer.Argument(help="Room, or its folder.", show_default=False)],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the packages.", show_default=False)],
+    room: Annotated[Path, typer.Argument(help="Room, or its folder.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the packages.")],
     asset: Annotated[list[str] | None, typer.Option(help="Name of an asset; may be repeated; default: all.")] = None,
     author: Annotated[str, typer.Option(help="Who is told as the author.")] = "EchoUSD",
     force: Annotated[bool, typer.Option("--force", help="Replace packages that are there.")] = False,
@@ -113,9 +113,7 @@ app.add_typer(store_app, name="store", help="A folder where many rooms keep thei
 
 
 @store_app.command("verify", epilog="Example: echousd store verify out/night/store")
-def verify(
-    folder: Annotated[Path, typer.Argument(help="Folder of the store.", show_default=False)], json: AsJson = False
-) -> None:
+def verify(folder: Annotated[Path, typer.Argument(help="Folder of the store.")], json: AsJson = False) -> None:
     """Compare every asset with the hash that it lies under. Exit code 1 where one is not what it was."""
     from echousd.store import Store
 
@@ -133,7 +131,7 @@ def verify(
 
 @store_app.command("gc", epilog="Example: echousd store gc out/night/store out/night --dry-run")
 def gc(
-    folder: Annotated[Path, typer.Argument(help="Folder of the store.", show_default=False)],
+    folder: Annotated[Path, typer.Argument(help="Folder of the store.")],
     rooms: Annotated[
         list[Path] | None, typer.Argument(help="Folders with all rooms that use it; default: where the store lies.")
     ] = None,

@@ -25,10 +25,7 @@ app.add_typer(batch_app, name="batch", help="Many rooms: a plan, workers, a jour
 
 def run(
     sources: Annotated[
-        list[str] | None,
-        typer.Argument(
-            help="Graph files, folders, globs, JSONL or Parquet of graphs, a batch.toml.", show_default=False
-        ),
+        list[str] | None, typer.Argument(help="Graph files, folders, globs, JSONL or Parquet of graphs, a batch.toml.")
     ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the run.")] = Path("batch"),
     sample: Annotated[str, typer.Option(help="Draw graphs, such as bedroom:500,living_room:300.")] = "",
@@ -95,7 +92,7 @@ add_room_command(batch_app, run, _EXAMPLE, batch=True)
 
 @batch_app.command("status", epilog="Example: echousd batch status out/night")
 def status(
-    folder: Annotated[Path, typer.Argument(help="Folder of the run.", show_default=False)],
+    folder: Annotated[Path, typer.Argument(help="Folder of the run.")],
     json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
 ) -> None:
     """How far a run is, of all its shards."""
@@ -113,7 +110,7 @@ def status(
 
 @batch_app.command("verify", epilog="Example: echousd batch verify out/night")
 def verify(
-    folder: Annotated[Path, typer.Argument(help="Folder of the run.", show_default=False)],
+    folder: Annotated[Path, typer.Argument(help="Folder of the run.")],
     check: Annotated[bool, typer.Option("--check", help="Also run echousd check on every room.")] = False,
     json: AsJson = False,
 ) -> None:

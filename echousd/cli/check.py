@@ -20,8 +20,7 @@ app = typer.Typer()
 @app.command(epilog="Example: echousd check out/bedroom/bedroom.usda  (exit code 0: good, 1: faults, 2: not a room)")
 def check(
     room: Annotated[
-        list[Path],
-        typer.Argument(help="Rooms (.usda, .usdc, .usd, .usdz), their folders, folders of these.", show_default=False),
+        list[Path], typer.Argument(help="Rooms (.usda, .usdc, .usd, .usdz), their folders, folders of these.")
     ],
     json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
     rules: Annotated[str, typer.Option("--rules", help="Rules of the relations: strict or sgfront.")] = "strict",

@@ -24,7 +24,7 @@ app = typer.Typer()
 
 
 def edit(
-    room: Annotated[Path, typer.Argument(help="Room that generate made: root layer or folder.", show_default=False)],
+    room: Annotated[Path, typer.Argument(help="Room that generate made: root layer or folder.")],
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would change and who would move; write nothing.")
     ] = False,
@@ -89,7 +89,7 @@ def edit_home(root: Path, wishes: EditRequest, output: Path | None, *, dry_run: 
 
 
 def update(
-    layer: Annotated[Path, typer.Argument(help="Your layer over a room, or its folder.", show_default=False)],
+    layer: Annotated[Path, typer.Argument(help="Your layer over a room, or its folder.")],
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would change; write nothing.")] = False,
     wait: Wait = False,
     outside: Outside = None,
@@ -204,8 +204,8 @@ def _change(
 
 
 def adopt(
-    stage: Annotated[Path, typer.Argument(help="Stage with labels and bounds.", show_default=False)],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the room.", show_default=False)],
+    stage: Annotated[Path, typer.Argument(help="Stage with labels and bounds.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the room.")],
     room: Annotated[str | None, typer.Option(help="Room type; default: as the stage looks.")] = None,
     add: Annotated[
         list[str] | None,

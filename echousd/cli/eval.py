@@ -28,8 +28,7 @@ def suite(
         list[str] | None,
         typer.Argument(
             help="default, network, guided, shuffled, muted, generator, random, retrieval, real, each also "
-            "with +search or +half; weights; rooms from elsewhere. None: default, network, guided.",
-            show_default=False,
+            "with +search or +half; weights; rooms from elsewhere. None: default, network, guided."
         ),
     ] = None,
     against: Against = "generated",

@@ -15,8 +15,8 @@ app = typer.Typer()
 
 
 def generate(
-    graph: Annotated[Path, typer.Argument(help="Scene graph: a stage, YAML or JSON.", show_default=False)],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the room.", show_default=False)],
+    graph: Annotated[Path, typer.Argument(help="Scene graph: a stage, YAML or JSON.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the room.")],
     room: Annotated[
         str | None, typer.Option(help="Prim path of one room of several; default: all of them.", hidden=True)
     ] = None,

@@ -12,7 +12,7 @@ from typing import Annotated, Any, get_type_hints
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-Room = Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz) or its folder.", show_default=False)]
+Room = Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz) or its folder.")]
 Layout = Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)]
 Written = Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")]
@@ -117,7 +117,7 @@ def _flags(*, edits: bool, asks: bool, batch: bool) -> list[Parameter]:
     ordered = sorted(chosen, key=lambda name: GROUPS.index(rows[name].json_schema_extra["group"]))
     wishes = []
     for one in fields(EditRequest) if asks else ():
-        kind: Any = Annotated[list[str] | None, typer.Option(help=one.metadata["help"], show_default=False)]
+        kind: Any = Annotated[list[str] | None, typer.Option(help=one.metadata["help"])]
         wishes.append(Parameter(one.name, Parameter.KEYWORD_ONLY, default=None, annotation=kind))
     return [*wishes, *(_flag(name, rows[name]) for name in ordered)]
 
@@ -135,7 +135,7 @@ def _flag(name: str, row: Any) -> Parameter:
         text, words = f"{text}: {words.replace('|', ', ')}", "word"
     default = f" ({row.default})" if row.default not in (None, "", True, False) else ""
     option = typer.Option(
-        word, help=f"{text}{default}.", metavar=words or None, show_default=False,
+        word, help=f"{text}{default}.", metavar=words or None,
         hidden=not extra["everyday"], rich_help_panel=None if extra["everyday"] else extra["group"],
     )  # fmt: skip
     return Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, option])

@@ -22,9 +22,9 @@ app.add_typer(texture_app, name="texture", help="To texturing tools (SceneTex, H
     "export", epilog="Example: echousd texture export out/bedroom/bedroom.usda -o out/job --for scenetex"
 )
 def export(
-    room: Annotated[Path, typer.Argument(help="Room: .usda, .usdc, .usd, .usdz or folder.", show_default=False)],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the job.", show_default=False)],
-    tool: Annotated[str, typer.Option("--for", help="scenetex, hunyuan, mvpainter or generic.", show_default=False)],
+    room: Annotated[Path, typer.Argument(help="Room: .usda, .usdc, .usd, .usdz or folder.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the job.")],
+    tool: Annotated[str, typer.Option("--for", help="scenetex, hunyuan, mvpainter or generic.")],
     prompt: Annotated[str, typer.Option(help="Words for the room; default: from its graph.")] = "",
     dressing: Annotated[str, typer.Option(help="Small things: none, grouped as one object, or each.")] = "none",
     resolution: Annotated[
@@ -57,8 +57,8 @@ def export(
 
 @texture_app.command("import", epilog="Example: echousd texture import out/bedroom/bedroom.usda out/job --name oil")
 def import_(
-    room: Annotated[Path, typer.Argument(help="Room that was exported: root layer or folder.", show_default=False)],
-    job: Annotated[Path, typer.Argument(help="Folder of the job, painted.", show_default=False)],
+    room: Annotated[Path, typer.Argument(help="Room that was exported: root layer or folder.")],
+    job: Annotated[Path, typer.Argument(help="Folder of the job, painted.")],
     name: Annotated[str, typer.Option(help="Of the look; default: the tool's.")] = "",
     skip: Annotated[list[str] | None, typer.Option(help="Object that keeps its look; may be repeated.")] = None,
     preview: Annotated[bool, typer.Option("--preview/--no-preview", help="Draw the room's picture anew.")] = True,
