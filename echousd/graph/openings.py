@@ -5,15 +5,13 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from echomodel.openings import USUAL, Opening, edge_lengths, inward_normal, numbered, rectangle
 from echousd.graph.consistency import GraphError
-
-if TYPE_CHECKING:
-    from echousd.graph.nodes import RoomSpec
+from echousd.graph.nodes import RoomSpec
 
 LISTS = {"doors": "door", "windows": "window", "passages": "passage"}  # key of a text -> kind
 FROM_WALL = 0.1  # metres from the corner to a door whose offset nobody says

@@ -9,13 +9,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from pxr import Usd
 
 from echomodel.progress import StageTimer
 from echousd.room import RoomData
-
-if TYPE_CHECKING:
-    from pxr import Usd
 
 
 class Room(RoomData):

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -26,13 +25,11 @@ from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
 from echomodel.objective.table import cost_of
+from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_rooms
 from echomodel.rules.telling import stated_of_room
 from echousd.place.placing import place_boxes
-
-if TYPE_CHECKING:
-    from echomodel.roomboxes import RoomBoxes
 
 GRAPHS, PLAIN = 20, 200  # of a shard: graphs that are searched, and rooms of the generator that are looked through
 OTHERS = 1_000_000  # seeds between the two

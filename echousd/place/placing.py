@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from echomodel.boxes import Boxes
+from echomodel.graph import Stated
 from echomodel.late import Late
 from echomodel.objective import TERMS
 from echomodel.objective.plan import kind_of
@@ -26,16 +26,13 @@ from echomodel.openings import Opening, signed_area
 from echomodel.rules import margins, verdicts
 from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
+from echousd.graph import SceneGraph
 from echousd.graph.arrays import stated_placements, triplets_of
 from echousd.place.distances import BED_LIT
 from echousd.place.geometry import collisions, outside
 from echousd.place.problem import Problem, problem_of, stacked
 from echousd.place.search import Arranged, Search
 from echousd.place.solver import Conflict, PlaceConfig, conflicts, solve, unmet
-
-if TYPE_CHECKING:
-    from echomodel.graph import Stated
-    from echousd.graph import SceneGraph
 
 FULL = 0.3  # share of a floor that is covered from which on smaller furniture is tried
 BAD = 1.5  # cost of a room in which something is broken

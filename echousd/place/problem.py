@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from echomodel.boxes2d import axes, footprints, seen
+from echomodel.graph import Stated
 from echomodel.objective import Plan, plan_of
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, carriers
 from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
 from echousd.place.distances import BEHIND, kept_behind
 from echousd.place.geometry import Floor, pair_indices
-
-if TYPE_CHECKING:
-    from echomodel.graph import Stated
 
 WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it stands free
 WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's normal does not lean on it

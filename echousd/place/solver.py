@@ -8,11 +8,11 @@ because the objective is piecewise quadratic. The weights rho are so large that 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from echomodel.late import Late
+from echousd.graph import SceneGraph
 from echousd.place.constraints import (
     CEILING,
     COLLISION,
@@ -27,9 +27,6 @@ from echousd.place.constraints import (
 )
 from echousd.place.geometry import COLUMNS
 from echousd.place.problem import Problem
-
-if TYPE_CHECKING:
-    from echousd.graph import SceneGraph
 
 diags_array, splu = Late("scipy.sparse:diags_array"), Late("scipy.sparse.linalg:splu")
 

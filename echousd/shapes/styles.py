@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from echomodel.triangles import linked
 from echomodel.vocabulary import RoomStyle, vocabulary
+from echousd.graph import SceneGraph
 from echousd.naming import free_name
-
-if TYPE_CHECKING:
-    from echousd.graph import SceneGraph
 
 ALIKE = 0.15  # largest relative difference of an extent that may be the same piece of furniture
 EQUAL = 1e-3  # largest relative difference of an extent within one asset

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pxr import Sdf, Vt
 
+from echomodel.openings import Opening
+from echousd.graph import Node, RoomSpec
+from echousd.graph.nodes import SmallNode
 from echousd.naming import free_name
-
-if TYPE_CHECKING:
-    from echomodel.openings import Opening
-    from echousd.graph import Node, RoomSpec
-    from echousd.graph.nodes import SmallNode
 
 GRAPH_TYPE = "EchoSceneGraph"
 RELATION_TYPE = "EchoRelation"

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pxr import Sdf
 
+from echomodel.openings import Opening
+from echousd.graph import Node, Relation, SceneGraph
 from echousd.stage import encoding as usd
 from echousd.stage.pen import UNIFORM, apply_apis, relate
-
-if TYPE_CHECKING:
-    from echomodel.openings import Opening
-    from echousd.graph import Node, Relation, SceneGraph
 
 LAYER_DOC = """Scene graph of a room: what it holds and how its objects relate.
 Directions are the room's: front is +X, behind -X, left -Z, right +Z, up +Y. Lengths are metres, angles radians.

@@ -63,21 +63,17 @@ class RoomModel(Protocol):
     @property
     def preset(self) -> str:
         """`compact`, `paper` or `released`."""
-        ...
 
     @property
     def hash(self) -> str:
         """Short hash of the weights, empty for weights without a file."""
-        ...
 
     @property
     def branches(self) -> frozenset[str]:
         """What can be sampled: `layout`, `shape` (`sample_shapes`), `furniture` (see `FurnitureModel`)."""
-        ...
 
     def unlearned(self, graph: GraphBatch) -> tuple[str, ...]:
         """One sentence for every word of the graph that the weights do not know, and what becomes of it."""
-        ...
 
     def sample_layout(self, graph: GraphBatch, **how: Any) -> Boxes:
         """Boxes of N objects in the frame of `Boxes`, the floor's middle at the origin (EchoScene 3.3).
@@ -85,14 +81,12 @@ class RoomModel(Protocol):
         Arguments:
             graph: S scenes, N nodes. how: fields of the model's `Sampling`.
         """
-        ...
 
     def sample_shapes(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Array:
         """(N, R, R, R) float32 signed distances on the box-normalised grid, negative inside (EchoScene 3.4).
 
         Arguments as for `sample_layout`. Raises ValueError for a model without a shape branch.
         """
-        ...
 
 
 class FurnitureModel(RoomModel, Protocol):
@@ -100,7 +94,6 @@ class FurnitureModel(RoomModel, Protocol):
 
     def sample_furniture(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Array:
         """Descriptions (N, D) float32 of N pieces of furniture; arguments as for `sample_layout`."""
-        ...
 
 
 def furnishes(model: RoomModel | None) -> TypeGuard[FurnitureModel]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from echomodel.files import raising
 from echomodel.progress import StageTimer
 from echomodel.vocabulary import vocabulary
+from echousd.assets.choose import Asked, AssetWishes
+from echousd.assets.model_file import ModelFile
+from echousd.assets.record import AssetRecord
 from echousd.assets.reference import is_file
 from echousd.graph import Node, SceneGraph
 from echousd.shapes.finishes.slots import HARMONIES, linear
@@ -18,12 +20,7 @@ from echousd.shapes.sources.named import RETRIEVED, source_of
 from echousd.shapes.sources.source import Retrieved, ShapeRequest
 from echousd.shapes.styles import ALIKE, ROOM_STYLE, first_alike
 
-if TYPE_CHECKING:
-    from echousd.assets.choose import Asked, AssetWishes
-    from echousd.assets.model_file import ModelFile
-    from echousd.assets.record import AssetRecord
-
-    Wanted = Callable[[], AssetWishes]  # what is asked of a library, made where it is needed
+Wanted = Callable[[], AssetWishes]  # what is asked of a library, made where it is needed
 
 TOGETHER = ("at", "head", "beside")  # slot_roles of things that come in pairs and sets
 

@@ -7,26 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from echomodel.arrays import Array, at_least, cast, kit, norm
 from echomodel.boxes2d import along_sides, seen
 from echomodel.floors import AT_WALL, Walls
+from echomodel.graph import Stated
 from echomodel.rules.geometry import BoxesLike, Spread
 from echomodel.rules.margins import floating
 from echomodel.vocabulary import Category, vocabulary
-
-if TYPE_CHECKING:
-    from echomodel.graph import Stated
 
 AT_CORNER = 0.25  # metres between each wall of a corner and what stands in it
 WITHIN = 0.05  # metres by which a centre may leave the space between two others
 DETOUR = 0.5  # metres that the way from one to the other is longer by way of it, at most
 WAYS = np.stack([way(np.arange(48) * (np.pi / 24)) for way in (np.cos, np.sin)])  # from which that space is looked at
-
-
 Measure = Callable[[Spread, Sequence[Spread], Walls, Category], Array]
 
 

@@ -75,7 +75,6 @@ class CompactStage(TrainingStage, Protocol):
 
         Raises ValueError for a field of the recipe that is missing or wrong.
         """
-        ...
 
 
 # the stages of the compact model, as recipes name them: a layout needs none of the libraries of shapes
