@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import echousd
-from echousd.draw.rendering import render
+from echousd.draw.from_files import render
 from echousd.draw.tracing import QUICK
 from echousd.options import RoomOptions
 

@@ -32,7 +32,7 @@ def areas(folder: Path) -> dict[str, Callable[[], object]]:
     from echomodel.metrics.layouts import layout_scores, tasks_of
     from echomodel.rooms.generator import generate_rooms
     from echousd.checks import check
-    from echousd.draw.rendering import render
+    from echousd.draw.from_files import render
     from echousd.evaluation.systems import BASES, System, finished
     from echousd.exporting.formats import export
     from echousd.home.graph import HomeGraph

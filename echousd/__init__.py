@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from echomodel.vocabulary import vocabulary
     from echousd.batches.batch import batch, generate_many
     from echousd.checks import check
-    from echousd.draw.rendering import render
+    from echousd.draw.from_files import render
     from echousd.exporting.formats import export
     from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
     from echousd.home.assemble import generate_home
@@ -41,7 +41,7 @@ _PUBLIC = {
     "echomodel.vocabulary": ("vocabulary",),
     "echousd.batches.batch": ("batch", "generate_many"),
     "echousd.checks": ("check",),
-    "echousd.draw.rendering": ("render",),
+    "echousd.draw.from_files": ("render",),
     "echousd.exporting.formats": ("export",),
     "echousd.graph": ("GraphError", "Node", "Relation", "RoomSpec", "SceneGraph"),
     "echousd.home.assemble": ("generate_home",),

@@ -1,10 +1,15 @@
-"""Names as USD takes them, and names that nobody has yet."""
+"""Names as USD takes them, names that nobody has yet, and by which ending of its name a file is read."""
 
 from __future__ import annotations
 
 import unicodedata
 from collections.abc import Callable, Container
+from typing import Literal
 
+TEXT_FORMS: dict[str, Literal["yaml", "json"]] = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
+LAYER_FORMS = (".usda", ".usdc", ".usd")
+STAGE_FORMS = (*LAYER_FORMS, ".usdz")
+CRATE = b"PXR-USDC"  # how a binary stage begins
 HOUSE = "echousd_house"  # in the metadata of a layer that composes rooms
 HOME = "home.usda"  # that layer
 

@@ -14,14 +14,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationError, model_validator
+from pydantic.fields import FieldInfo
 
-from echousd.assets.reference import STRETCH
+from echousd.assets import STRETCH
 from echousd.graph.fields import IDENTIFIER, RESIDENTS, SHAPES
 from echousd.graph.nodes import PlainModel
 
 if TYPE_CHECKING:
-    from pydantic.fields import FieldInfo
-
     from echousd.assets.choose import AssetWishes
 
 FACES = 5000  # budget of each mesh

@@ -24,7 +24,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from echomodel.files import flush, read_json, telling, write_json
-from echousd.graph.files import CRATE
+from echousd.naming import CRATE
 from echousd.pending import STAGING
 
 MARK = "echousd_store.json"

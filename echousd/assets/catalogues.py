@@ -27,7 +27,7 @@ from echousd.assets.licences import licence_beside
 from echousd.assets.model_file import ModelFile
 from echousd.assets.naming import class_by_name, fitted
 from echousd.assets.reference import MODELS
-from echousd.graph.files import LAYER_FORMS
+from echousd.naming import LAYER_FORMS
 from echousd.stage.apart import fatal
 
 Tell = Callable[[str], None]  # is told of what cannot be read, one line each

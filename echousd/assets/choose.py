@@ -13,12 +13,12 @@ import numpy as np
 
 from echomodel.sizes import size_statistics
 from echomodel.vocabulary import Category, vocabulary
+from echousd.assets import STRETCH
 from echousd.assets.colors import MOST, apart, oklab, stated_colors
 from echousd.assets.colors import costs as color_costs
 from echousd.assets.colors import table as color_table
 from echousd.assets.licences import allowed
 from echousd.assets.record import AssetRecord
-from echousd.assets.reference import STRETCH
 from echousd.assets.table import Library
 
 EQUALLY_GOOD = 0.12  # difference of costs among which the seed decides

@@ -25,7 +25,7 @@ from echousd.assets.colors import swatches
 from echousd.assets.describe import PLACEMENT, described, left_out, relative, stamp
 from echousd.assets.record import AssetRecord, vector
 from echousd.assets.table import OldIndex, arrow, read_library, write_library
-from echousd.graph.files import STAGE_FORMS
+from echousd.naming import STAGE_FORMS
 from echousd.pages import template
 from echousd.stage.apart import fatal
 

@@ -19,7 +19,7 @@ from echomodel.triangles import area_normals
 from echousd.assets.colors import Coat, flat, pixels, texels
 from echousd.assets.model_file import ModelFile
 from echousd.draw.drawables import Paint, paints_of
-from echousd.graph.files import STAGE_FORMS
+from echousd.naming import STAGE_FORMS
 from echousd.srgb import to_linear
 from echousd.stage.contents import NOTHING, triangles_of
 from echousd.stage.encoding import StageError

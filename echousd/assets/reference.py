@@ -6,10 +6,9 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from echousd.graph.files import STAGE_FORMS
+from echousd.naming import STAGE_FORMS
 
 MODELS = (*STAGE_FORMS, ".obj", ".glb", ".gltf")
-STRETCH = 1.15  # largest factor by which a model may be made longer or shorter along an axis
 Vector = tuple[float, float, float]
 
 

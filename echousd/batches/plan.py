@@ -21,8 +21,7 @@ from echousd.folder.lock import LOCK
 from echousd.folder.manifest import MAX_SEED, Name, find_manifest
 from echousd.folder.within import check_links, inside
 from echousd.graph.fields import IDENTIFIER
-from echousd.graph.files import LAYER_FORMS
-from echousd.naming import as_identifier
+from echousd.naming import LAYER_FORMS, as_identifier
 from echousd.options import validation_message
 from echousd.pending import STAGING
 from echousd.store import Store

@@ -15,7 +15,8 @@ from echomodel.late import extra
 from echomodel.vocabulary import vocabulary
 from echousd.assets.table import LARGEST, unpacked
 from echousd.graph import GraphError, Node, RoomSpec, SceneGraph
-from echousd.graph.files import MAX_BYTES, STAGE_FORMS, TEXT_FORMS, load_graph
+from echousd.graph.files import MAX_BYTES, load_graph
+from echousd.naming import STAGE_FORMS, TEXT_FORMS
 
 MANY = (".jsonl", ".parquet")
 AT_ONCE = 64  # graphs of a table that are held in memory

@@ -17,10 +17,7 @@ app = typer.Typer()
 @app.command(epilog="Example: echousd export out/bedroom/bedroom.usda -o bedroom.usdz")
 def export(
     room: Room,
-    output: Annotated[
-        Path,
-        typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc; a folder with --for.", show_default=False),
-    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc; a folder with --for.")],
     reader: Annotated[
         str | None,
         typer.Option(
@@ -70,12 +67,7 @@ def render(
     room: Room,
     output: Annotated[
         Path,
-        typer.Option(
-            "-o",
-            "--output",
-            help="Picture to write (.png; .gif of a turntable); with --cameras a folder.",
-            show_default=False,
-        ),
+        typer.Option("-o", "--output", help="Picture to write (.png; .gif of a turntable); with --cameras a folder."),
     ],
     view: Annotated[
         str,
@@ -97,9 +89,10 @@ def render(
     json: Written = False,
 ) -> None:
     """Draw a room from inside, from above, from a corner, from all around, or through each of its cameras."""
+    from echousd.draw.from_files import render as draw
+    from echousd.draw.from_files import render_cameras, render_turn
     from echousd.draw.pictures import gif, png
-    from echousd.draw.rendering import QUALITIES, VIEWS, render_cameras, render_turn
-    from echousd.draw.rendering import render as draw
+    from echousd.draw.rendering import QUALITIES, VIEWS
     from echousd.folder.found import room_at
     from echousd.stage.files import write_all
 

@@ -12,6 +12,7 @@ from echomodel.files import check_free
 from echomodel.late import Late
 from echousd.cli.options import AsJson, Replace, ReplacePicture
 from echousd.cli.output import check_picture, counted, say, say_done, say_json
+from echousd.naming import STAGE_FORMS
 
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
@@ -205,7 +206,6 @@ def graph(
     """Show the scene graph of a stage or a text file, as the text that a person writes."""
     from echousd.folder.found import room_at
     from echousd.graph import GraphError, SceneGraph, load_graph
-    from echousd.graph.files import STAGE_FORMS
     from echousd.graph.picture import PICTURES, draw_graph
 
     if as_json and schema:

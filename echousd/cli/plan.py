@@ -12,6 +12,7 @@ from echomodel.files import check_free
 from echomodel.late import Late
 from echousd.cli.options import Force, Written, group_of
 from echousd.cli.output import say, say_done, say_written
+from echousd.naming import LAYER_FORMS
 
 if TYPE_CHECKING:
     from echousd.home.graph import HomeGraph
@@ -43,19 +44,15 @@ app.add_typer(plan_app, name="plan", help="Plan a home, draw or write its plan; 
 
 @plan_app.command("import", epilog=IMPORT_EXAMPLES)
 def import_(
-    source: Annotated[
-        Path, typer.Argument(metavar="FILE", help=".dxf, .ifc, .svg, .sh3d or .json.", show_default=False)
-    ],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Stage (.usda) to write.", show_default=False)],
+    source: Annotated[Path, typer.Argument(metavar="FILE", help=".dxf, .ifc, .svg, .sh3d or .json.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Stage (.usda) to write.")],
     form: Annotated[str | None, typer.Option("--format", help="Format, where it is not to be found out.")] = None,
     unit: Annotated[
         str | None, typer.Option(help="Unit of a drawing that states none: m, cm, mm, in, ft, or metres of one.")
     ] = None,
     storey: Annotated[str | None, typer.Option(help="Storey of several; default: the lowest.")] = None,
     lenient: Annotated[bool, typer.Option("--lenient", help="Leave out doors and windows that meet no wall.")] = False,
-    picture: Annotated[
-        Path | None, typer.Option(help="Draw the plan over the source (.png, .svg, .pdf).", show_default=False)
-    ] = None,
+    picture: Annotated[Path | None, typer.Option(help="Draw the plan over the source (.png, .svg, .pdf).")] = None,
     force: Force = False,
     json: Written = False,
 ) -> None:
@@ -63,7 +60,6 @@ def import_(
 
     Rooms without furniture get what such rooms usually hold.
     """
-    from echousd.graph.files import LAYER_FORMS
     from echousd.graph.picture import PICTURES
     from echousd.home.importing.formats import import_plan
 
@@ -94,12 +90,9 @@ def _writable(path: Path, endings: tuple[str, ...], force: bool) -> None:
 
 @plan_app.command("export", epilog=EXAMPLES)
 def export(
-    source: Annotated[Path, typer.Argument(metavar="HOME", help="Home: YAML, JSON or stage.", show_default=False)],
+    source: Annotated[Path, typer.Argument(metavar="HOME", help="Home: YAML, JSON or stage.")],
     output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", help=".png, .svg, .pdf, .dxf, .json (ProcTHOR 1.0.0) or .usda.", show_default=False
-        ),
+        Path, typer.Option("-o", "--output", help=".png, .svg, .pdf, .dxf, .json (ProcTHOR 1.0.0) or .usda.")
     ],
     several: Annotated[int, typer.Option("--plans", help="Plans side by side in a picture.", min=1, max=12)] = 1,
     seed: Annotated[int, typer.Option(help="Seed of the plan.", min=0)] = 0,
@@ -109,7 +102,6 @@ def export(
     """Plan a home, or take the plan that it has with what stands in it, and draw it or write it down."""
     from echousd.folder.found import room_at
     from echousd.graph import GraphError
-    from echousd.graph.files import LAYER_FORMS
     from echousd.graph.picture import PICTURES
     from echousd.home.draw import write_dxf, write_procthor
     from echousd.home.files import load_home

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from PIL import Image
 from pxr import Usd, UsdGeom, UsdLux
 
 from echomodel.triangles import area_normals
@@ -63,8 +64,6 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
 
     `shades`: of everything that glows its triangles (f, 3, 3) in the world, metres.
     """
-    from PIL import Image
-
     frame, cache = to_metres(stage), UsdGeom.XformCache(NOW)
     sky, suns, bulbs, power, tint = 0.0, [], [], [], np.ones(3, np.float32)
     domes, view, panels = 0, None, list[tuple[np.ndarray, np.ndarray]]()

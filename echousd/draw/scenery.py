@@ -9,6 +9,7 @@ from functools import cache, cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from PIL import Image
 from pxr import Usd
 
 from echomodel.boxes2d import upright_box
@@ -120,8 +121,6 @@ class Scenery:
         In one row: (3, n) uint8 pixels; (3, images * `LEVELS`) int, the first of each, its width and height; and
         (3, images) float32, what each's linear RGB is multiplied by.
         """
-        from PIL import Image
-
         drawn = np.flatnonzero(self.texture.take(face) >= 0)
         place = self._halved(face.take(drawn), breadth.take(drawn))
         asked = np.bincount(place, minlength=len(self.images) * LEVELS).reshape(-1, LEVELS) > 0

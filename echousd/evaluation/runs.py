@@ -32,8 +32,8 @@ from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.assets.naming import category_of
 from echousd.evaluation.systems import System, drawn, finished
 from echousd.folder.found import stages_at
-from echousd.graph.files import STAGE_FORMS
 from echousd.graph.nodes import HEIGHT
+from echousd.naming import STAGE_FORMS
 from echousd.stage.boxes import read_stage
 
 HELD_OUT = 770_000  # seed of generated rooms that no training used

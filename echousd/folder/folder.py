@@ -22,8 +22,7 @@ from echomodel.files import check_free, digest, flush, telling
 from echousd.folder.lock import LOCK, locked, run_of
 from echousd.folder.manifest import LARGEST, Digest, find_manifest
 from echousd.folder.within import check_links, inside
-from echousd.graph.files import STAGE_FORMS
-from echousd.naming import free_name
+from echousd.naming import STAGE_FORMS, free_name
 from echousd.options import validation_message
 from echousd.pending import JOURNAL, STAGING, half_written
 from echousd.stage.files import check_path

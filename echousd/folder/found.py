@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from echousd.folder.manifest import find_manifest
-from echousd.graph.files import STAGE_FORMS
-from echousd.naming import HOME, HOUSE
+from echousd.naming import HOME, HOUSE, STAGE_FORMS
 from echousd.pending import half_written
 
 

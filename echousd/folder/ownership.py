@@ -13,10 +13,9 @@ from echomodel.late import Late
 from echousd.draw.pictures import is_ours
 from echousd.folder.folder import backup_name, digest, digest_of
 from echousd.folder.within import inside
-from echousd.graph.files import STAGE_FORMS
-from echousd.naming import free_name
+from echousd.naming import STAGE_FORMS, free_name
 from echousd.pending import STAGING
-from echousd.stage.apart import check_harmless
+from echousd.stage.harmless import check_harmless
 from echousd.stage.paths import coarse_file, component_file, payload_file
 
 if TYPE_CHECKING:

@@ -7,17 +7,14 @@ import os
 import stat
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from echomodel.files import whole_file, within_memory
 from echomodel.late import Late
 from echousd.graph.consistency import GraphError
 from echousd.graph.scene import SceneGraph, graph_from_text
+from echousd.naming import LAYER_FORMS, STAGE_FORMS, TEXT_FORMS
 
-TEXT_FORMS: dict[str, Literal["yaml", "json"]] = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
-LAYER_FORMS = (".usda", ".usdc", ".usd")
-STAGE_FORMS = (*LAYER_FORMS, ".usdz")
-CRATE = b"PXR-USDC"  # how a binary stage begins
 MAX_BYTES = 8 * 2**20
 # what builds on this package
 read_graph, write_graph = Late("echousd.stage.graphs:read_graph"), Late("echousd.stage.graphs:write_graph")

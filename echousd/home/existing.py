@@ -11,10 +11,10 @@ import shapely
 
 from echomodel.openings import Opening, direction, numbered
 from echousd.graph import SceneGraph
-from echousd.graph.files import STAGE_FORMS
 from echousd.home.graph import HomeGraph, HomeRelation
 from echousd.home.openings import Floor, face_to_face, facings
 from echousd.home.plan import INNER, OUTER, Plan, overlapping, plan_home, rectangles, with_openings
+from echousd.naming import STAGE_FORMS
 from echousd.shapes.walls import outline as offset
 
 THICKEST = 0.6  # metres between two floors that have one wall between them

@@ -6,10 +6,13 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from echousd.graph.files import STAGE_FORMS, TEXT_FORMS, read_file, write_text
+from echomodel.late import Late
+from echousd.naming import STAGE_FORMS, TEXT_FORMS
 
 if TYPE_CHECKING:  # what a single room does not need is not loaded to see that it is one
     from echousd.home.graph import HomeGraph
+
+read_file, write_text = Late("echousd.graph.files:read_file"), Late("echousd.graph.files:write_text")
 
 
 def load_home(path: str | Path) -> HomeGraph | None:

@@ -12,9 +12,9 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 from echomodel.boxes2d import footprints, upright
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, SceneGraph
-from echousd.graph.files import STAGE_FORMS
 from echousd.home.graph import RATIO, HomeGraph, HomeRelation, HomeRoom
 from echousd.home.plan import Plan
+from echousd.naming import STAGE_FORMS
 from echousd.stage import encoding as usd
 from echousd.stage import values
 from echousd.stage.contents import read_contents

@@ -7,15 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 from pxr import Gf
 
+from echomodel.late import Late
 from echomodel.openings import inward_normal, segment
 from echomodel.triangles import bounds_of
 from echomodel.vocabulary import vocabulary
 from echousd.draw.sight import ASPECT, Furniture
-from echousd.draw.views import APERTURE, FOCAL_LENGTH, MARGIN, inside_view, perspective_views, shifted
+from echousd.draw.views import APERTURE, FOCAL_LENGTH, MARGIN, inside_view, shifted
 from echousd.room import RoomData
 from echousd.shapes import walls
 from echousd.stage.pen import Pen, ops
 
+perspective_views = Late("echousd.draw.outside:perspective_views")
 FAR = 10.0  # widths of the room that the camera above is away: heights hardly show
 TENTHS = 0.01  # what a millimetre is in USD's lens unit, tenths of a scene unit, here of a metre
 MAIN = ("bed", "sofa", "board", "screen", "cook")  # roles, a task: what a picture is about, the first that is there

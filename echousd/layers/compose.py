@@ -14,7 +14,6 @@ from pxr import Sdf
 import echousd
 from echomodel.dressing import KINDS
 from echomodel.late import Late
-from echousd.draw.pictures import thumbnails
 from echousd.draw.sight import Furniture
 from echousd.dressing.dress import Dressing, dress
 from echousd.dressing.setting import Thing
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
 
 OF_OTHERS = ("attribution", "carried_files", "placed_files")  # of rooms with models of other people
 attribution, carried_files, placed_files = (Late(f"echousd.layers.placed:{name}") for name in OF_OTHERS)
-write_nodes = Late("echousd.dressing.nodes:write_nodes")
+write_nodes, thumbnails = Late("echousd.dressing.nodes:write_nodes"), Late("echousd.draw.from_files:thumbnails")
 FILE = "ATTRIBUTION.md"
 OTHERS = "room_others"  # what the names of a room's second materials begin with
 LAYERS = ("dressing", "materials", "physics", "layout", "graph", "geometry", "shell")  # strongest first

@@ -14,9 +14,9 @@ from pxr import Sdf, Tf, Usd, Vt
 
 from echousd.draw.surfaces import DRESSING, Surfaces, read_surfaces
 from echousd.folder.within import inside
-from echousd.stage.apart import check_harmless, just_written
 from echousd.stage.encoding import StageError
 from echousd.stage.files import layer_bytes, open_stage
+from echousd.stage.harmless import check_harmless, just_written
 from echousd.stage.paths import UNFIT
 
 FOLDER = "looks"

@@ -12,14 +12,14 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdUtils
 
 import echousd
 from echomodel.files import check_free
-from echousd.draw.pictures import picture
+from echousd.draw.from_files import picture
 from echousd.folder.found import manifest_of
 from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.pending import check_written
-from echousd.stage.apart import check_harmless, just_written
 from echousd.stage.encoding import LABELS
 from echousd.stage.files import layer_bytes, write_all
+from echousd.stage.harmless import check_harmless, just_written
 from echousd.stage.paths import coarse_file, coarse_name, component_file, payload_file, payload_name
 from echousd.stage.turning import rescale, turn_up
 

@@ -16,7 +16,6 @@ from echomodel.protocols import RoomModel
 from echousd.graph import SceneGraph, load_graph
 from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.consistency import faults_of
-from echousd.graph.files import STAGE_FORMS
 from echousd.graph.floors import check_doors, check_space, with_lowered_windows, with_plan, with_wider_floor
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
@@ -31,6 +30,7 @@ from echousd.make.layouts import (
     with_sizes,
 )
 from echousd.make.verdicts import layout_outcome, warn_of_faults
+from echousd.naming import STAGE_FORMS
 from echousd.options import RoomOptions, takes_options
 from echousd.place.living import unusual
 from echousd.room import Provenance

@@ -19,10 +19,10 @@ from echousd.folder.manifest import find_manifest
 from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.graph import SceneGraph
-from echousd.graph.files import STAGE_FORMS
 from echousd.graph.text import graph_from_plain
 from echousd.layers.physics import read_joints
 from echousd.layers.placed import MODEL, PLACES
+from echousd.naming import STAGE_FORMS
 from echousd.shapes.colliders import approximation, collider_of
 from echousd.shapes.geometry import LICENCE, Collider, Geometry, Origin, Original, Part
 from echousd.shapes.matter import read_mass

@@ -25,8 +25,8 @@ from echousd.place.living import living_faults
 from echousd.room import LayoutOutcome, RoomData
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.sources.named import beside
-from echousd.stage.apart import check_harmless, just_written
 from echousd.stage.files import open_stage, write_all
+from echousd.stage.harmless import check_harmless, just_written
 from echousd.stage.paths import UNFIT, layer_file
 from echousd.stage.pen import layout_names
 

@@ -9,6 +9,7 @@ from itertools import groupby, product
 import numpy as np
 
 from echomodel.boxes2d import hull
+from echomodel.late import Late
 from echomodel.objective.access import DEEP, WALKED_BEHIND, to_wall
 from echomodel.objective.company import places_of
 from echomodel.objective.sight import PASSAGE, WATCHED_FREE, WATCHED_FROM
@@ -17,8 +18,9 @@ from echomodel.vocabulary import vocabulary
 from echousd.place.distances import APART, MOST_UNDER, kept_apart, over_bed, seen_from, spread_at_walls
 from echousd.place.geometry import depth_inside
 from echousd.place.problem import Problem
-from echousd.place.slots import HALF_PI, INNER, STANDS, sides
+from echousd.place.slots import HALF_PI, INNER, SEATS, STANDS
 
+sides = Late(f"{SEATS}:sides")
 STEP = 0.2  # metres between two places at a wall
 GRID, PLACES = 0.35, 1000  # metres between two places in the open; in a hall so many, farther apart
 SLIDES = (0.08, 0.2, 0.45, 0.8)  # metres by which a piece is moved along its width and its depth

@@ -11,8 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from echomodel.objective.crowding import HAND
-from echomodel.objective.sizes import TUCKED
+from echomodel.late import Late
 from echomodel.vocabulary import Category, vocabulary
 
 Size = np.ndarray
@@ -22,7 +21,6 @@ HALF_PI = math.pi / 2
 LONG = 1.3  # times as long as deep
 INNER = 0.25  # metres that a coffee table reaches into the corner of a sofa
 NIGHTSTAND = 0.55  # metres that a nightstand takes beside a bed
-DEEPER = 0.27  # metres that a chair is pushed under its table where room is scarce
 
 
 def head(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
@@ -48,111 +46,6 @@ def before(own: Size, anchor: Size, kind: Category, count: int, apart: float, ah
             for lateral in (0.0, -0.08, 0.08, -0.2, 0.2, -0.35, 0.35):
                 if abs(lateral) < anchor[0] / 2:
                     out.append((lateral, anchor[2] / 2 + depth / 2 + gap, turn, more + away + 1.5 * abs(lateral)))
-    return out
-
-
-def around(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
-    """Chairs: along both long sides of a table and at its ends, looking at it; along the front of one at a wall."""
-    length, depth = float(anchor[0]), float(anchor[2])
-    if kind.wall:
-        return _along_front(own, length, depth, count, -apart)
-    if length >= depth:
-        return _around(own, length, depth, count, -apart)
-    # the long sides are the left and the right one: the same, turned by a quarter
-    quarter = _around(own, depth, length, count, -apart)
-    return [(forward, -lateral, turn + HALF_PI, cost) for lateral, forward, turn, cost in quarter]
-
-
-def _around(own: Size, length: float, depth: float, count: int, tuck: float) -> list[Slot]:
-    out = []
-    fits = max(int((length + 0.1) // (own[0] + 0.06)), 1)
-    wanted = max(1, min(fits, math.ceil(count / 2)))
-    free = length - 2 * TUCKED * (count > 2 * wanted)  # what sits at the ends keeps off the corners
-    for per_side in sorted({wanted, max(wanted - 1, 1), fits}):
-        spacing = max(min(free / per_side, 0.85), float(own[0]) + HAND + 0.01)
-        more = 0.0 if per_side == wanted else 0.25 if count % 2 else 0.9
-        for k in range(per_side):
-            lateral = (k - (per_side - 1) / 2) * spacing
-            for tucked, push in ((tuck, 0.0), (DEEPER, 0.5), (-0.1, 0.7)):
-                forward = depth / 2 + own[2] / 2 - tucked
-                cost = more + push
-                out.append((lateral, -forward, 0.0, cost))
-                out.append((lateral, forward, math.pi, cost))
-    at_ends = (0.9 if count <= 2 * wanted else 0.1) + (1.5 if own[0] > depth + 0.1 else 0.0)  # no bench across an end
-    for tucked, push in ((tuck, 0.0), (DEEPER, 0.5), (-0.1, 0.7)):
-        out.append((length / 2 + own[2] / 2 - tucked, 0.0, -HALF_PI, at_ends + push))
-        out.append((-length / 2 - own[2] / 2 + tucked, 0.0, HALF_PI, at_ends + push))
-    return out
-
-
-def _along_front(own: Size, length: float, depth: float, count: int, tuck: float) -> list[Slot]:
-    spacing = max(min(length / max(count, 1), 0.7), float(own[0]) + 0.05)
-    return [
-        ((k - (count - 1) / 2) * spacing, depth / 2 + own[2] / 2 - tuck + off, math.pi, cost)
-        for k in range(count)
-        for off, cost in ((0.0, 0.0), (-0.15, 0.3), (0.2, 0.3))
-    ]
-
-
-def at_front(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
-    """Chairs at desks and dressing tables: in the middle of the front, looking at it."""
-    out = []
-    for tucked, push in ((-apart, 0.0), (0.25, 0.1), (0.0, 0.2), (0.4, 0.4)):
-        for lateral in (0.0, -0.12, 0.12, -0.3, 0.3):
-            if abs(lateral) < anchor[0] / 2:
-                out.append((lateral, anchor[2] / 2 + own[2] / 2 - min(tucked, 0.6 * own[2]), math.pi,
-                            push + 2.0 * abs(lateral)))  # fmt: skip
-    return out
-
-
-def company(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
-    """Armchairs: beside the coffee table or before the sofa, turned into the group."""
-    out = []
-    if kind.role == "board":  # around the coffee table, but not on its long side towards the sofa
-        for side in (-1.0, 1.0):
-            for gap, more in ((0.45, 0.0), (0.6, 0.05), (0.8, 0.2), (0.35, 0.2)):
-                for forward in (0.0, 0.3, -0.3, 0.6, -0.6):
-                    lateral = side * (anchor[0] / 2 + own[2] / 2 + gap)
-                    out.append((lateral, forward, math.atan2(-lateral, -forward), more + 0.3 * abs(forward)))
-        for side in (-1.0, 1.0):
-            for lateral in (0.0, 0.5, -0.5):
-                forward = side * (anchor[2] / 2 + own[2] / 2 + 0.45)
-                out.append((lateral, forward, math.atan2(-lateral, -forward), 0.25))
-        return out
-    for side in (-1.0, 1.0):
-        for away in (0.3, 0.5, 0.8):
-            for forward in (1.1, 1.4, 0.8):
-                lateral = side * (anchor[0] / 2 + own[2] / 2 + away - 0.4)
-                at = anchor[2] / 2 + forward
-                out.append((lateral, at, math.atan2(-lateral, 0.6 - at), 0.2))
-        out.append((side * (anchor[0] / 2 + own[0] / 2 + 0.5), 0.0, -side * 0.5, 0.5))
-    return out
-
-
-def joined(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
-    """A second sofa: opposite the first across the coffee table, or at a right angle at one of its ends."""
-    out = []
-    for away, more in ((1.6, 0.0), (1.9, 0.1), (1.35, 0.3)):
-        out.append((0.0, anchor[2] / 2 + own[2] / 2 + away, math.pi, 0.3 + more))
-    for side in (-1.0, 1.0):
-        for gap, more in ((0.25, 0.0), (0.5, 0.1), (0.1, 0.2)):
-            lateral = side * (anchor[0] / 2 + own[2] / 2 + gap)
-            for forward in (0.3, 0.6, 0.0):
-                out.append((lateral, anchor[2] / 2 + forward + own[0] / 2 - 0.3, -side * HALF_PI, more + 0.2 * forward))
-    return out
-
-
-def sides(own: Size, table: Size) -> list[Slot]:
-    """A second sofa again: at any side of the table that it shares, looking at it, or level with one end of that side,
-    where its corner is near the table's and there is room for knees."""
-    out = []
-    ways = ((0.18, 0, 0.0), (0.3, 0, 0.1), (0.45, 0, 0.1), (0.35, 1, 0.0), (0.35, -1, 0.0))
-    for quarter, turn in enumerate((0.0, HALF_PI, math.pi, -HALF_PI)):
-        deep, wide = table[[2, 0]] if quarter % 2 == 0 else table[[0, 2]]
-        for gap, end, more in ways:
-            away, level = deep / 2 + own[2] / 2 + gap, end * (own[0] - wide) / 2
-            at = math.sin(turn) * away + math.cos(turn) * level, math.cos(turn) * away - math.sin(turn) * level
-            out.append((*at, turn + math.pi, more))
     return out
 
 
@@ -209,7 +102,8 @@ def over(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahea
     return [(0.0, (own[2] - anchor[2]) / 2, 0.0, 0.0)]
 
 
+SEATS = "echousd.place.seats"
 STANDS: dict[str, Slots] = {
-    "head": head, "before": before, "around": around, "at_front": at_front, "company": company, "beside": beside,
-    "foot": foot, "on_top": on_top, "with": joined, "over": over,
+    "head": head, "before": before, "beside": beside, "foot": foot, "on_top": on_top, "over": over,
+    "with": Late(f"{SEATS}:joined"), **{name: Late(f"{SEATS}:{name}") for name in ("around", "at_front", "company")},
 }  # fmt: skip

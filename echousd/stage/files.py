@@ -13,10 +13,10 @@ from tempfile import NamedTemporaryFile, gettempdir
 from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 
 from echomodel.files import raising, whole_file
-from echousd.graph.files import LAYER_FORMS, STAGE_FORMS
+from echousd.naming import LAYER_FORMS, STAGE_FORMS
 from echousd.pending import check_written
-from echousd.stage.apart import check_harmless
 from echousd.stage.encoding import StageError
+from echousd.stage.harmless import check_harmless
 
 MEMORY = "/dev/shm"  # where Linux keeps files in memory
 # a MaterialX document, not there or no plugin

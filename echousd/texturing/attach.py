@@ -17,10 +17,10 @@ from echousd.folder import folder as folders
 from echousd.folder import ownership
 from echousd.folder.manifest import find_manifest
 from echousd.graph.fields import IDENTIFIER
-from echousd.graph.files import LAYER_FORMS
 from echousd.layers import paintings
 from echousd.layers.paintings import FOLDER, MADE, RECORD, VARIANTS, primvar
 from echousd.make.save import write_preview
+from echousd.naming import LAYER_FORMS
 from echousd.stage.files import layer_bytes, open_stage, prim_specs
 from echousd.stage.paths import UNFIT
 from echousd.stage.pen import Pen

@@ -26,7 +26,7 @@ from echousd.assets.record import AssetRecord
 from echousd.assets.reference import Vector, check_reach, joined, split
 from echousd.assets.table import Library
 from echousd.exporting.packing import PACKED, LeftOut, asset_paths
-from echousd.graph.files import STAGE_FORMS
+from echousd.naming import STAGE_FORMS
 from echousd.shapes.colliders import collider_of
 from echousd.shapes.geometry import CONVERTED, Geometry, Origin, Original, Part
 from echousd.shapes.surface import box_projection, creased_normals

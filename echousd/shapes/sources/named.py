@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
 
-from echousd.assets.reference import Vector, check_reach, is_file, joined, relative, split
+from echomodel.late import Late
 from echousd.graph import Node, SceneGraph
 
+check_reach, is_file, joined, relative, split = (
+    Late(f"echousd.assets.reference:{name}") for name in ("check_reach", "is_file", "joined", "relative", "split")
+)
 RETRIEVED = ("library", "guided")
 
 
@@ -60,7 +63,7 @@ def _moved(graph: SceneGraph, change: Callable[[str], str]) -> SceneGraph:
     return graph if nodes == graph.nodes else graph.replaced(nodes=nodes)
 
 
-def with_model_sizes(graph: SceneGraph, sizes: Mapping[str, Vector]) -> SceneGraph:
+def with_model_sizes(graph: SceneGraph, sizes: Mapping[str, tuple[float, float, float]]) -> SceneGraph:
     """The graph in which the sizes that are known of some objects are fixed, unless they state their own."""
     if not sizes:
         return graph

@@ -1,16 +1,15 @@
-"""What storage is put together from: fronts that open, with drawers and handles, carcasses, shelves, columns."""
+"""What storage is put together from: fronts that open, with drawers and handles, carcasses, shelves."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, both, box, core, framed
 from echomodel.furniture.solids import Joint, Solid, ball, tube
-from echomodel.furniture.style import Choices, Style
+from echomodel.furniture.style import Style
 
 Point = tuple[float, float]
 PANEL, SHEET = 0.018, 0.01  # metres: thickness of a front, and of the boards of a drawer
@@ -226,38 +225,3 @@ def foot_height(style: Style, h: float, most: float = 0.3) -> float:
 def fronted(size: Size, style: Style, foot: float, rows: int, columns: int, kind: str) -> list[Solid]:
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot)
     return parts + front((x0, y0), (x1, y1), z, rows, columns, kind, style, depth_of(size[2], z))
-
-
-def pattern(choices: Choices, count: int, odds: dict[str, float], symmetry: float) -> list[str]:
-    """What fills each of `count` columns, the words of `odds`; the same from both sides with this probability."""
-    kinds = choices.stream("pattern").choice(list(odds), size=count, p=list(odds.values()))
-    alike = choices.chance("symmetry", symmetry)
-    return [str(kinds[min(i, count - 1 - i) if alike else i]) for i in range(count)]
-
-
-def columns(rect: tuple, d: float, kinds: list[str], style: Style, levels: Iterable[float], rows: int) -> list[Solid]:
-    """Columns side by side in an open case `d` deep: with shelves at `levels`, of rows of drawers, or behind a door."""
-    x0, y0, x1, y1, z = rect
-    xs, t = np.linspace(x0, x1, len(kinds) + 1), BOARD
-    parts: list[Solid] = []
-    for i, kind in enumerate(kinds):
-        low, high = (float(xs[i]), y0), (float(xs[i + 1]), y1)
-        if i:
-            parts.append(box((xs[i] - t / 2, y0, -d / 2), (xs[i] + t / 2, y1, z), role="side"))
-        if kind == "open":
-            parts += [box((low[0], y - t / 2, -d / 2), (high[0], y + t / 2, z), role="shelf") for y in levels]
-            continue
-        parts.append(core((*low, -d / 2), (*high, z)))
-        parts += front(low, high, z, rows if kind == "drawer" else 1, 1, kind, style, depth_of(d, z))
-    return parts
-
-
-def mixed(size: Size, style: Style, choices: Choices, foot: float, column_width: float) -> list[Solid]:
-    """Columns side by side, each doors, drawers or open cells; symmetrical more often than not."""
-    parts, rect = carcass(size, style, foot, solid=False)
-    x0, y0, x1, y1, _ = rect
-    count = int(np.clip(round((x1 - x0) / column_width), 1, 6))
-    door, drawer, free = [0.5, 0.3, 0.2] if style.fronts != "open" else [0.35, 0.25, 0.4]
-    kinds = pattern(choices, count, {"door": door, "drawer": drawer, "open": free}, 0.7)
-    cells, rows = (int(np.clip(round((y1 - y0) / each), 1, 8)) for each in (0.32, 0.22))
-    return parts + columns(rect, size[2], kinds, style, np.linspace(y0, y1, cells + 1)[1:-1], rows)

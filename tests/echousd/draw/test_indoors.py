@@ -13,8 +13,9 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.draw.drawables import image_of
+from echousd.draw.from_files import render
 from echousd.draw.indoors import BRIGHT, SHARE, evened, exposure, read_lights, with_ceiling
-from echousd.draw.rendering import render, render_stage
+from echousd.draw.rendering import render_stage
 from echousd.draw.scenery import read_scenery
 from echousd.draw.tracing import trace
 from echousd.draw.views import View, hero_view, view_matrix

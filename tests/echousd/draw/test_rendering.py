@@ -11,11 +11,13 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.draw.drawables import read_drawables
+from echousd.draw.from_files import render, render_turn
 from echousd.draw.indoors import LUMA, Bounced
-from echousd.draw.rendering import render, render_stage, render_turn
+from echousd.draw.outside import turning_views
+from echousd.draw.rendering import render_stage
 from echousd.draw.scenery import BACKGROUND, class_color, next_room, outside, read_scenery
 from echousd.draw.tracing import RINGS, Seen, World, _light, embree, smooth_light, trace
-from echousd.draw.views import hero_view, stage_views, turning_views
+from echousd.draw.views import hero_view, stage_views
 from echousd.options import RoomOptions
 
 

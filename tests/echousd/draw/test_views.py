@@ -10,6 +10,7 @@ import shapely
 
 from echomodel.boxes2d import seen
 from echomodel.openings import Opening
+from echousd.draw.outside import perspective_views
 from echousd.draw.sight import ASPECT, RAYS, Furniture, filled
 from echousd.draw.views import (
     APERTURE,
@@ -18,7 +19,6 @@ from echousd.draw.views import (
     _walls,
     barest_share,
     inside_view,
-    perspective_views,
     view_matrix,
 )
 from echousd.graph import Node, RoomSpec, SceneGraph

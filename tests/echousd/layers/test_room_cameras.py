@@ -7,8 +7,9 @@ import pytest
 from pxr import Gf, Usd, UsdGeom, UsdLux
 from small_room import small_graph, small_room
 
+from echousd.draw.outside import perspective_views
 from echousd.draw.sight import ASPECT, Furniture
-from echousd.draw.views import inside_view, perspective_views, shifted, stage_views
+from echousd.draw.views import inside_view, shifted, stage_views
 from echousd.layers.cameras import main_piece, room_points, write_cameras
 from echousd.options import RoomOptions
 from echousd.shapes import walls

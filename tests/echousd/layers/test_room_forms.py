@@ -84,7 +84,7 @@ def test_shared_assets_are_instances_that_look_and_collide_alike(tmp_path):
 
 def test_every_asset_has_a_picture(tmp_path, monkeypatch):
     pytest.importorskip("embreex")
-    monkeypatch.setattr("echousd.draw.rendering.QUICK", 1)
+    monkeypatch.setattr("echousd.draw.from_files.QUICK", 1)
     root = made(tmp_path / "room", ("lamp", "wardrobe", "pendant", "nightstand_right"), thumbnails=True)
     assert len(list((root.parent / "assets").glob("small_*"))) > 5
     for asset in (root.parent / "assets").iterdir():

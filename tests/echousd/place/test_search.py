@@ -20,7 +20,7 @@ from echousd.place.placing import place_boxes
 from echousd.place.problem import problem_of
 from echousd.place.proposals import out_of_habit, proposals, slots_at
 from echousd.place.search import MANY, Search, State
-from echousd.place.slots import sides
+from echousd.place.seats import sides
 
 ID = {row.name: row.id for row in vocabulary().predicates}
 FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])

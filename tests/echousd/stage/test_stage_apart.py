@@ -19,7 +19,7 @@ from echousd.assets.index import index
 from echousd.batches.plan import room_digest
 from echousd.batches.verify import verify
 from echousd.draw import rendering
-from echousd.stage import apart
+from echousd.stage import apart, harmless
 from echousd.stage.apart import check_apart, fatal
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage
@@ -40,11 +40,11 @@ def deadly(tmp_path):
 
 def test_openusd_ends_at_it_and_not_at_what_is_flatter(deadly):
     """The day on which this fails, the file is no example any more, or `NESTED` too many."""
-    code = "from echousd.stage import apart, files; apart._harmless = lambda path: True; files.open_stage({!r})"
+    code = "from echousd.stage import files, harmless; harmless._harmless = lambda path: True; files.open_stage({!r})"
     words = [sys.executable, "-c", code.format(str(deadly))]
     assert subprocess.run(words, capture_output=True, check=False).returncode < 0
     for begin, end in (('def "a" {\n', "}\n"), ('def "a" ( customData = {\n', "}) {}\n"), ("int[] a = [", "]")):
-        deadly.write_text("#usda 1.0\n" + begin * apart.NESTED + end * apart.NESTED)
+        deadly.write_text("#usda 1.0\n" + begin * harmless.NESTED + end * harmless.NESTED)
         assert subprocess.run(words, capture_output=True, check=False).returncode in (0, 1)
 
 

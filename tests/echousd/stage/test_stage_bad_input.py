@@ -10,7 +10,7 @@ import pytest
 from pxr import Sdf, Usd
 
 from echousd.graph import Node, Relation, SceneGraph
-from echousd.graph.files import STAGE_FORMS
+from echousd.naming import STAGE_FORMS
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage, save_layer
 from echousd.stage.graphs import read_graph, write_graph

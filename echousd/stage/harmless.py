@@ -1,0 +1,72 @@
+"""Files that this process may read itself: what a manifest or the key of a store vouches for, and shallow texts."""
+
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+
+from echomodel import files
+from echomodel.late import Late
+from echousd.naming import CRATE
+from echousd.pending import DEEP
+
+NESTED = 4_000  # brackets that a text may open: OpenUSD is at its end where some 10,000 stand within each other
+check_apart, stored = Late("echousd.stage.apart:check_apart"), Late("echousd.store:stored")
+LARGE = 64 * 2**20  # bytes of a file that is looked at here, before it is read
+read_here: set[tuple[str, int, int]] = set()  # path, size and time of those that this process may read
+
+
+def check_harmless(path: Path, stage: Path | None = None) -> None:
+    """Raises StageError for a file that ends the process that reads it, which another does where this may be.
+
+    Arguments:
+        stage: what the other process reads, None = the file.
+    """
+    if not _harmless(path):
+        check_apart(stage or path)
+
+
+def _harmless(path: Path) -> bool:
+    """Whether this process may read a file: it was read apart, or is ours, or a text that cannot be nested deeply."""
+    stamp = stamp_of(path)
+    if stamp in read_here:
+        return True
+    if stamp[1] > LARGE:
+        return False
+    try:
+        content = path.read_bytes()
+    except OSError:  # told by whoever opens it next
+        return True
+    packed = content.startswith((CRATE, b"PK"))
+    text = not packed and sum(content.count(mark) for mark in (b"{", b"[", b"(")) <= NESTED
+    if not (text or _listed(path, files.digest(content)) or stored(path)):
+        return False
+    read_here.add(stamp)
+    return True
+
+
+def _listed(path: Path, digest: str) -> bool:
+    """Whether the manifest of a room that a file may lie in says that the room was written with it."""
+    for folder in path.resolve().parents[:DEEP]:
+        for listing in (place for place in folder.glob("*.json") if place.with_suffix(".usda").is_file()):
+            with suppress(OSError, ValueError, TypeError, KeyError, AttributeError):
+                if digest in _digests(listing, listing.stat().st_mtime_ns):
+                    return True
+    return False
+
+
+@lru_cache(maxsize=16)
+def _digests(listing: Path, changed: int) -> frozenset[str]:
+    return frozenset(files.read_json(listing, LARGE)["files"].values())
+
+
+def just_written(paths: Iterable[Path]) -> None:
+    """Have files that this process has just written taken for harmless."""
+    read_here.update(map(stamp_of, paths))
+
+
+def stamp_of(path: Path) -> tuple[str, int, int]:
+    """What tells a file that changed from the same file: path, size and time."""
+    found = path.stat()
+    return os.path.realpath(path), found.st_size, found.st_mtime_ns
