@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from echomodel.arrays import Array, at_least, at_most, cast, dot, full, held, kit, least_of, picked, put
-from echomodel.objective.company import COMPANY
+from echomodel.objective.company import COMPANY, first_of
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, nobody, worst
 from echomodel.objective.sight import PASSAGE, WATCHED_FREE, screens
 from echomodel.openings import SLID, Opening, hinge_point, inward_normal, segment
@@ -121,6 +121,10 @@ def desk_at_wall(plan: Plan) -> Found:
 NEEDED = 0.45  # share of the vocabulary's access depth below which a front counts as blocked
 SHARE = 0.3  # share of a front's width that may be covered
 BEDSIDE = 0.3  # metres beside a bed
+# Width from which on two sleep in a bed, metres beside it then, and to spare at its other side if one leaves less.
+FOR_TWO, AT_TWO, SPARE = 1.35, 0.45, 0.6
+# Metres between a bed's side and the wall that it stands at, and from which on a child's stands free.
+SLIT, AMID = 0.1, 0.7
 INTO_BED, OF_LAMPS, OF_CHAIRS = 0.6, 0.6, 0.2  # metres between a plant and a bed's side, a floor lamp, a chair
 LEAF = 0.1  # share of storage's front at either end that a door may open before
 GRAZE = 0.01  # metres that furniture may reach into a door's way, as layouts are rounded
@@ -154,20 +158,25 @@ def before_fronts(plan: Plan, opens: Array, depth: Array) -> Found:
 
 
 def bed_side_free(plan: Plan) -> Found:
-    """At least one long side of a bed can be reached, below the nightstands."""
+    """At least one long side of a bed can be reached, below the nightstands, both of one for two where there is room;
+    the other is at the wall, not near it: that of a child's bed at least there, or at something."""
     beds = plan.of("bed") & plan.standing
-    who = plan.those(beds)
+    who, xp = plan.those(beds), plan.kit
     i, j = plan.pairs(beds, plan.standing & ~plan.stands("head") & ~plan.movable, least=True)
     lateral, aside, along = _at_side(plan, j, i)
-    out, xp = [], plan.kit
+    free, gaps = [], []
     for sign in (1.0, -1.0):
-        margin = xp.where(sign * lateral > 0, aside - BEDSIDE, FAR)
-        margin = xp.maximum(margin, 0.4 * plan.size[i, 2] - along)
-        least, _ = plan.worst(i, margin, j)
-        points = plan.position[who][:, ::2] + sign * plan.axes(who)[0] * (plan.size[who, 0] / 2 + BEDSIDE)[:, None]
-        out.append(xp.minimum(least[who], plan.inside(points[:, None], who)[:, 0]))
-    margin = xp.maximum(*out)
-    return found(who, margin, measure=margin + BEDSIDE)
+        beside = xp.maximum(xp.where(sign * lateral > 0, aside, FAR), 0.4 * plan.size[i, 2] - along)
+        way = sign * plan.axes(who)[0]
+        gaps.append(to_wall(plan, who, plan.position[who][:, ::2] + way * plan.size[who, :1] / 2, way))
+        free.append(xp.minimum(plan.worst(i, beside, j)[0][who], gaps[-1]))
+    most, least, wall = xp.maximum(*free), xp.minimum(*free), xp.minimum(*gaps)
+    child = plan.which(lambda kind: kind.sgfront == "kids_bed")[who]
+    two, near = (plan.size[who, 0] > FOR_TWO) & ~child, xp.where(child, least, wall)
+    both = xp.where(two, xp.maximum(least - BEDSIDE, SPARE + least - most), FAR)
+    slit = xp.maximum(near - xp.where(child, AMID, BEDSIDE), SLIT - near)
+    margins = [most - xp.where(two, AT_TWO, BEDSIDE), both, slit]
+    return first_of(who, xp.full_like(who, -1), margins, [most, least, near])
 
 
 def _at_side(plan: Plan, i: Array, j: Array) -> tuple[Array, Array, Array]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from echomodel.arrays import Array, at_least, full, held, kit, least_of, norm, once, pairs_in, put, rows, sum_of
+from echomodel.arrays import Array, at_least, full, held, kit, least_of, norm, once, pairs_in, put, rows
 from echomodel.boxes2d import turned
 from echomodel.floors import footprint
 from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, joined, nobody
@@ -162,9 +162,7 @@ def first_of(i: Array, j: Array, margins: list[Array], measures: list[Array]) ->
     return found(i, margin[at], other=j, measure=xp.stack(measures)[at], words=at[0])
 
 
-EVEN = 0.16  # metres between a table's middle and the middle of its chairs, one chair pulled out is less
 PLACE = 0.62  # metres at a table that one who sits there takes: two on a bench
-ODD = 0.6  # share of the table's half side that an odd chair may shift that middle, over the number of chairs
 STAGGERED = 0.12  # metres between a chair's middle and that of the one opposite, where both sides have as many
 SPACED = 0.16  # metres by which the distances of neighbours at one side of a table differ: 95 % of real sides
 LEVEL = 0.12  # metres by which chairs are pushed under their table unlike each other
@@ -254,26 +252,6 @@ def _seats_at(plan: Plan, boards: Array) -> Seats:
 def places_of(size: Array) -> Array:
     """(...,) how many sit on seats of sizes (..., 3)."""
     return at_least((size[..., 0] / PLACE).round(), 1.0)
-
-
-def chairs_even(plan: Plan) -> Found:
-    """The chairs of a table stand evenly around it, two also around a corner that the graph states; a bench counts as
-    its chairs."""
-    seats, xp = seats_at(plan), plan.kit
-    i, j = seats.i, seats.j
-    places = places_of(held(plan.size)[i])
-    count = sum_of(j, places, len(plan))
-    who = rows(count > 1)
-    n = count[who][:, None]
-    shift = abs(xp.stack([sum_of(j, off * places, len(plan))[who] for off in plan.local(i, j)], -1) / n)
-    margin = EVEN + n % 2 * (ODD * plan.size[who][:, ::2] + 0.3) / n - shift
-    at = xp.arange(len(who)), margin.argmin(1)
-    tables = [j[stated_of(plan, i, j, "left", "right", "front", "behind")]]  # each seat's that is told where to be
-    for one, other in (plan.ends_of("close_by"), plan.ends_of("close_by")[::-1]):
-        tables.append(plan.anchor[one][plan.stands("at")[one] & (plan.anchor[one] == plan.anchor[other])])
-    two = [xp.bincount(of[of >= 0], minlength=len(plan)) for of in (xp.concat(tables), j, j[seats.ahead])]
-    corner = ((two[0] > 1) & (two[1] == 2) & (two[2] == 1))[who]
-    return found(who, xp.where(corner, FAR, margin[at]), measure=shift[at])
 
 
 def chairs_opposite(plan: Plan) -> Found:

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, at_most, cast, full, held, least_of, norm, once, rows, sum_of
+from echomodel.arrays import Array, at_least, at_most, cast, full, held, least_of, once, rows, sum_of
 from echomodel.floors import footprint, signed_area, signed_distance
 from echomodel.objective.access import WALKED
 from echomodel.objective.company import AROUND, BESIDE, first_of, seats_at
@@ -138,24 +138,18 @@ def sofa_ahead(plan: Plan) -> Found:
 # Share of a room's length from a wall to the nearest large piece: 87 % of real rooms; from one such piece to the next:
 # 98 %; metres of each that are never bare.
 BARE_END, BARE_STRIP, SHORT, SPARE = 0.45, 0.4, 1.6, 2.5
+HALF, LONG = 0.3, 4.5  # of an even share of the large pieces that half of such a length has, metres
 
 
 def ends_used(plan: Plan) -> Found:
     """No end of a room is bare, nor a strip right across it: its large pieces stand about all of it; one is told."""
     out, xp = nobody(plan.size), plan.kit
-    for (_, polygon, _), there in zip(plan.rooms, on_floors(plan), strict=True):
-        large = (plan.size[there[0], 0] * plan.size[there[0], 2] > LARGE) & ~plan.of("decor")[there[0]]
-        if there.shape[1] - max(int(plan.stands("row")[there[0]].sum()) - 1, 0) < FEW or not bool(large.any()):
-            continue  # a row of units is one piece
-        there = there[:, large]
-        low, high = (plan.numbers(of(polygon, axis=0).tolist()) for of in (np.min, np.max))
-        who, row = there.reshape(-1), xp.arange(len(there))
-        at = (footprint(plan.size[who], plan.position[who], plan.yaw[who]) - low) / (high - low)
-        first, last = (of(at, 1).reshape(len(there), -1, 2) for of in (xp.amin, xp.amax))
+    for there, first, last, width, _ in _large(plan):
+        row = xp.arange(len(there))
         start = xp.concat([0.0 * last[:, :1], last], 1)  # of what may be bare: the wall, the far side of each piece
         beyond = held(last[:, None]) > held(start[:, :, None]) + 1e-6  # (s, n + 1, n, 2), what ends further on
         end = xp.amin(xp.where(beyond, first[:, None], 1.0), 2)
-        ends, width = (start <= 0.0) | (end >= 1.0), high - low
+        ends = (start <= 0.0) | (end >= 1.0)
         most = xp.where(ends, at_least(SHORT / width, BARE_END), at_least(SPARE / width, BARE_STRIP))
         margin = (most - end + start).reshape(len(there), -1)
         widest = held(margin).argmin(1)
@@ -163,6 +157,39 @@ def ends_used(plan: Plan) -> Found:
         piece = xp.where(widest < 2, nearest, widest // 2 - 1)
         share = (end - start).reshape(len(there), -1)[row, widest]
         out = joined(out, found(there[row, piece], margin[row, widest], measure=100.0 * share))
+    return out
+
+
+def halves_used(plan: Plan) -> Found:
+    """No half of a long room is nearly bare: it has its part of the large pieces; the largest in the other is told."""
+    out, xp = nobody(plan.size), plan.kit
+    for there, first, last, width, middle in _large(plan):
+        row, area = xp.arange(len(there)), plan.size[there, :1] * plan.size[there, 2:]
+        lower = area * ((middle - first) / at_least(last - first, 1e-6)).clip(0.0, 1.0)  # (s, n, 2)
+        has = xp.stack([lower.sum(1), (area - lower).sum(1)], 1) / area.sum(1)[:, None]  # (s, 2, 2)
+        margin = xp.where(width > LONG, 2.0 * has - HALF, 1.0).reshape(len(there), -1)
+        at = held(margin).argmin(1)
+        told = xp.stack([area - lower, lower], 1)[row, at // 2, :, at % 2].argmax(1)
+        share = 1.0 - has.reshape(len(there), -1)[row, at]
+        out = joined(out, found(there[row, told], margin[row, at], measure=100.0 * share))
+    return out
+
+
+@once
+def _large(plan: Plan) -> list[tuple[Array, Array, Array, Array, Array]]:
+    """Large pieces (s, n) of rooms (s,) of one floor that have enough, where they begin and end, (s, n, 2) shares of
+    its extents, these (2,), metres, and its middle (2,), as shares."""
+    out = []
+    for (_, polygon, _), (*_, points, _), there in zip(plan.rooms, floor_points(plan), on_floors(plan), strict=True):
+        large = (plan.size[there[0], 0] * plan.size[there[0], 2] > LARGE) & ~plan.of("decor")[there[0]]
+        if there.shape[1] - max(int(plan.stands("row")[there[0]].sum()) - 1, 0) < FEW or not bool(large.any()):
+            continue  # a row of units is one piece
+        there = there[:, large]
+        low, high = (plan.numbers(of(polygon, axis=0).tolist()) for of in (np.min, np.max))
+        who = there.reshape(-1)
+        at = (footprint(plan.size[who], plan.position[who], plan.yaw[who]) - low) / (high - low)
+        first, last = (of(at, 1).reshape(len(there), -1, 2) for of in (plan.kit.amin, plan.kit.amax))
+        out.append((there, first, last, high - low, (points.mean(0) - low) / (high - low)))
     return out
 
 
@@ -176,7 +203,6 @@ BEYOND, CORNER = 0.1, 0.1  # metres that a seat may reach beyond its side of a t
 # Who sits alone at a side of a table: share of it that the middle may be beside its own, metres from which on its ends.
 ALONE, OFF = 0.3, 0.05
 NOOK, AT_WALL = 0.66, 0.4  # metres between a plant and what is next to it along and across, and to the next wall
-WORKPLACE = 1.0  # metres between the middles of two who work
 # Metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it; before storage to a low table, a sofa.
 OPENS, LOW, PASSED = 0.55, 0.45, 0.8
 # Share of the width of storage from which on nightstands, and other pieces, are before it; of a screen's all.
@@ -298,16 +324,6 @@ def plant_in_nook(plan: Plan) -> Found:
     widest = xp.maximum(xp.minimum(free[:, 0], free[:, 1]), xp.minimum(free[:, 2], free[:, 3]))
     wall = xp.amin(plan.inside(footprint(plan.size[who], plan.position[who], plan.yaw[who]), who), 1)
     return first_of(who, xp.full_like(who, -1), [NOOK - widest, AT_WALL - wall], [widest, wall])
-
-
-def workers_apart(plan: Plan) -> Found:
-    """Two who work at desks of their own sit apart from each other."""
-    sits = plan.stands("at") & plan.of("seat") & (plan.anchor >= 0) & (plan.of("board") & plan.works)[plan.anchor]
-    i, k = plan.pairs(sits, sits)
-    keep = (i < k) & (plan.anchor[i] != plan.anchor[k])
-    i, k = i[keep], k[keep]
-    apart = norm((plan.position[i] - plan.position[k])[:, ::2])
-    return found(i, apart - WORKPLACE, other=k, measure=apart)
 
 
 def wardrobe_opens(plan: Plan) -> Found:

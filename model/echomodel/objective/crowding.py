@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from echomodel.arrays import Array, at_least, cast, rows
-from echomodel.objective.access import wall_ahead
+from echomodel.objective.access import FOR_TWO, wall_ahead
 from echomodel.objective.plan import FAR, Found, Plan, found, joined
 
 # Metres between pieces of different groups, by role: the 2nd to 3rd percentile in real rooms.
@@ -13,6 +13,7 @@ APART = {
     ("bed", "bed"): 0.15, ("bed", "board"): 0.25,
 }  # fmt: skip
 ROLES = sorted({role for pair in APART for role in pair})
+AT_BED = 0.12  # metres between a bed and who works at a desk: all ten real ones
 LOW = 0.2  # metres between a coffee table and tables and chairs at which people eat or work: 94 % of real ones
 PULL, PULL_WALL = 0.22, 0.2  # metres behind a chair at a table, before furniture and before a wall
 DESK, DESK_WALL = 0.33, 0.19  # the same at a desk, where one works
@@ -26,8 +27,7 @@ OF_ITS_OWN = 0.25  # metres between a side table and a coffee table, a seat and 
 # Metres between the foot of a bed and furniture: one passes sideways; share of the foot from which on something is so.
 FOOT, AT_FOOT = 0.35, 0.1
 # Metres before a front that lamps and plants keep free, before a nightstand's, before who sits (33 of 34 real ones).
-LAMP, AT_BED, AT_SEAT = 0.6, 0.35, 0.35
-IN_LINE, NEXT = 0.15, 0.5  # metres between the backs of desks in a row, and between them
+LAMP, AT_STAND, AT_SEAT = 0.6, 0.35, 0.35
 MET = 0.25  # share of a width from which on something is before it
 EDGE = 0.06  # the same for lamps and plants, which are narrow
 
@@ -42,8 +42,10 @@ def groups_apart(plan: Plan) -> Found:
     number = cast(plan.column(lambda kind: ROLES.index(kind.role) if kind.role in ROLES else 0), plan.scene)
     low, high = plan.stands("before"), plan.stands("at") | plan.dining
     wanted = plan.kit.where((low[i] & high[j]) | (low[j] & high[i]), LOW, table[number[i], number[j]])
-    works = plan.of("board") & ~plan.dining  # which stand beside beds
-    bedside = (works[i] & plan.of("bed")[j]) | (works[j] & plan.of("bed")[i])
+    bed, works = plan.of("bed"), plan.of("board") & ~plan.dining  # which stand beside beds
+    bedside = (works[i] & bed[j]) | (works[j] & bed[i])
+    sits = plan.stands("at") & plan.works[at_least(plan.anchor, 0)] & (plan.anchor >= 0)
+    wanted = plan.kit.where((sits[i] & bed[j]) | (sits[j] & bed[i]), AT_BED, wanted)
     keep = (wanted > 0) & ~_side_by_side(plan, i, j) & ~bedside
     i, j, wanted = i[keep], j[keep], wanted[keep]
     least, about = plan.worst(i, plan.apart(i, j) - wanted, j)
@@ -59,23 +61,12 @@ def _side_by_side(plan: Plan, i: Array, j: Array) -> Array:
     return boards & (aside > -0.05) & (plan.kit.cos(plan.yaw[i] - plan.yaw[j]) > 0.97)
 
 
-def desks_in_line(plan: Plan) -> Found:
-    """Desks side by side that look the same way have their backs in one line."""
-    desks = plan.of("board") & plan.works & plan.standing
-    i, j = plan.pairs(desks, desks)
-    lateral, forward = plan.local(i, j)
-    half_width, half_depth = plan.reach(i, j)
-    next_to = _side_by_side(plan, i, j) & (abs(lateral) - half_width - plan.size[j, 0] / 2 < NEXT) & (i < j)
-    off = abs(forward - half_depth + plan.size[j, 2] / 2)[next_to]
-    return found(i[next_to], IN_LINE - off, other=j[next_to], measure=off)
-
-
 def chair_pulls_out(plan: Plan) -> Found:
-    """A chair can be moved back from its table or desk."""
-    chairs = plan.stands("at") & (plan.anchor >= 0) & ~plan.solid
+    """A chair can be moved back from its table or desk, also to another's; a stool from where one works."""
     works, xp = plan.works[at_least(plan.anchor, 0)], plan.kit
+    chairs = plan.stands("at") & (plan.anchor >= 0) & (works | ~plan.solid)
     needed, wall = xp.where(works, DESK, PULL), xp.where(works, DESK_WALL, PULL_WALL)
-    massive = (plan.of("board", "bed", "storage", "sofa") | plan.stands("company")) & plan.standing
+    massive = (plan.of("board", "bed", "storage", "sofa") | plan.stands("company", "at")) & plan.standing
     seen = _clear(plan, chairs, massive, needed, wall, behind=True)
     return seen.take(plan.apart(seen.who, plan.anchor[seen.who]) < AT) if len(seen.who) else seen
 
@@ -91,16 +82,17 @@ def _loungers(plan: Plan) -> Array:
 
 
 def bed_foot_free(plan: Plan) -> Found:
-    """One passes between the foot of a bed and what stands opposite."""
+    """One passes between the foot of a bed and what stands opposite; where two sleep, also a wall."""
     others = plan.standing & plan.of("storage", "board", "sofa", "seat", "bed")
-    return _clear(plan, plan.of("bed") & plan.standing, others, FOOT, -FAR, share=AT_FOOT)
+    wall = plan.kit.where(plan.size[:, 0] > FOR_TWO, FOOT, -FAR)
+    return _clear(plan, plan.of("bed") & plan.standing, others, FOOT, wall, share=AT_FOOT)
 
 
 def lamp_aside(plan: Plan) -> Found:
     """Lamps and plants do not stand before shelves, cupboards and drawers, nor before who sits."""
     fronts = (plan.of("storage") & plan.standing & plan.works) | _loungers(plan)
     i, j = plan.pairs(plan.of("light", "decor") & plan.standing, fronts, least=True)
-    free = plan.kit.where(_loungers(plan), AT_SEAT, plan.kit.where(plan.stands("head"), AT_BED, LAMP))
+    free = plan.kit.where(_loungers(plan), AT_SEAT, plan.kit.where(plan.stands("head"), AT_STAND, LAMP))
     return plan.nearest(i, j, plan.more_ahead(j, i, cast(free, plan.size)[j], EDGE), cast(free, plan.size))
 
 

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.objective import composition, crowding, sight
+from echomodel.objective import access, composition, crowding, sight
 from echomodel.objective.plan import plan_of
 
 HALF = np.pi / 2
@@ -282,14 +282,14 @@ def test_a_side_at_a_wall_or_at_furniture_is_not_free():
         assert found.words.tolist() == [words]
 
 
-@pytest.mark.parametrize(("apart", "margin"), [(2.4, 0.2), (2.0, -0.2)])
+@pytest.mark.parametrize(("apart", "margin"), [(2.4, 0.37), (2.0, -0.03)])
 def test_who_works_back_to_back_sits_apart(apart, margin):
     things = []
     for side in (-1, 1):
         yaw = HALF * (side + 1)  # each desk at its wall, its front into the room
         things += [("desk", (1.2, 0.75, 0.6), (0.0, side * apart / 2), yaw),
                    ("office_chair", (0.5, 0.9, 0.5), (0.0, side * (apart / 2 - 0.6)), yaw + np.pi)]  # fmt: skip
-    assert seen(composition.workers_apart, things)[0] == {1: pytest.approx(margin)}
+    assert seen(crowding.chair_pulls_out, things)[0] == {1: pytest.approx(margin), 3: pytest.approx(margin)}
 
 
 def test_no_table_goes_without_a_chair_while_another_has_two():
@@ -328,12 +328,76 @@ def test_who_sits_alone_at_the_end_of_a_table_sits_before_its_middle(aside, marg
     assert rows.measure.tolist()[0] == pytest.approx(aside)
 
 
-@pytest.mark.parametrize(("back", "margin"), [(0.05, 0.1), (0.35, -0.2)])
-def test_desks_side_by_side_are_in_line(back, margin):
-    desks = [("desk", (1.2, 0.75, 0.6), (-0.65, -1.6), 0.0), ("desk", (1.2, 0.75, 0.8), (0.65, -1.5 + back), 0.0)]
-    assert seen(crowding.desks_in_line, desks)[0] == {0: pytest.approx(margin)}
-    opposite = [desks[0], ("desk", (1.2, 0.75, 0.8), (0.65, 1.5), np.pi)]
-    assert seen(crowding.desks_in_line, opposite)[0] == {}
+# at the wall though there is room at the other side, too near it, free of it, in the middle
+@pytest.mark.parametrize(("gap", "margin"), [(0.01, -0.29), (0.25, -0.05), (0.35, 0.05), (2.6, 2.15)])
+def test_a_bed_for_two_is_got_into_from_both_sides_where_there_is_room(gap, margin):
+    bed = ("double_bed", (1.8, 1.0, 2.1), (0.9 + gap - 3.5, -0.9), 0.0)
+    found, rows, _ = seen(access.bed_side_free, [bed], (7.0, 4.0))
+    assert found == {0: pytest.approx(margin)}
+    assert rows.measure.tolist() == [pytest.approx(gap)]
+    if gap < 0.1:  # no more than 0.6 m is to spare in so narrow a room, a slit of 0.01 m is none
+        assert seen(access.bed_side_free, [(*bed[:2], (0.91 - 1.2, -0.9), 0.0)], (2.4, 4.0))[0][0] > 0
+
+
+@pytest.mark.parametrize(("width", "words", "margin"), [(2.2, 0, -0.05), (2.3, 0, 0.05)])
+def test_who_sleeps_in_two_in_a_narrow_room_has_more_beside_the_bed(width, words, margin):
+    bed = ("double_bed", (1.8, 1.0, 2.1), (0.9 - width / 2, -0.9), 0.0)
+    found, rows, _ = seen(access.bed_side_free, [bed], (width, 4.0))
+    assert (found, rows.words.tolist()) == ({0: pytest.approx(margin)}, [words])
+
+
+@pytest.mark.parametrize(("gap", "margin"), [(0.05, 0.05), (0.15, -0.05), (0.25, -0.05), (0.35, 0.05)])
+def test_a_bed_leaves_no_slit_to_the_wall(gap, margin):
+    bed = ("single_bed", (1.0, 0.7, 2.0), (-2.0 + gap, -0.9), 0.0)
+    assert seen(access.bed_side_free, [bed])[0] == {0: pytest.approx(margin)}
+
+
+@pytest.mark.parametrize("word", ["kids_bed", "cot"])
+@pytest.mark.parametrize(("x", "margin"), [(-1.95, 0.05), (-1.5, -0.2), (-1.25, 0.05)])
+def test_a_childs_bed_lies_along_a_wall_or_free(word, x, margin):
+    bed, shelf = (word, (1.0, 0.8, 1.8), (x, -1.1), 0.0), ("bookshelf", (0.8, 1.5, 0.3), (x + 0.75, -1.0), HALF)
+    found, rows, _ = seen(access.bed_side_free, [bed])
+    assert found == {0: pytest.approx(margin)}
+    assert rows.words.tolist() == [2]
+    beside = seen(access.bed_side_free, [(*bed[:2], (0.0, -1.1), 0.0), (*shelf[:2], (0.7, -1.0), HALF)])[0]
+    assert beside == {0: pytest.approx(0.05)}  # along what stands there
+
+
+@pytest.mark.parametrize(("gap", "margin"), [(0.3, -0.05), (0.4, 0.05)])
+def test_two_get_past_the_foot_of_their_bed(gap, margin):
+    bed = ("double_bed", (1.8, 1.0, 2.1), (0.0, 2.0 - gap - 1.05), 0.0)
+    assert seen(crowding.bed_foot_free, [bed])[0] == {0: pytest.approx(margin)}
+    assert seen(crowding.bed_foot_free, [("single_bed", (1.0, 1.0, 2.1), *bed[2:])])[0][0] > 1.0
+
+
+@pytest.mark.parametrize(("gap", "margin"), [(0.08, -0.04), (0.16, 0.04)])
+def test_who_works_at_a_desk_sits_off_the_bed(gap, margin):
+    desk, chair = ("desk", (1.2, 0.75, 0.6), (0.0, -1.6), 0.0), ("chair", (0.5, 0.9, 0.5), (0.0, -1.05), np.pi)
+    bed = ("double_bed", (1.4, 1.0, 2.0), (0.95 + gap, -0.9), 0.0)
+    found = seen(crowding.groups_apart, [desk, chair, bed])[0]
+    assert pytest.approx(margin) in list(found.values())
+
+
+@pytest.mark.parametrize(("gap", "margin"), [(0.15, -0.18), (0.4, 0.07)])
+def test_a_stool_moves_back_from_where_one_works(gap, margin):
+    vanity = ("dressing_table", (1.0, 0.75, 0.5), (0.0, -1.7), 0.0)
+    stool = ("stool", (0.4, 0.45, 0.4), (0.0, -1.2), np.pi)
+    bed = ("double_bed", (2.1, 1.0, 1.8), (0.0, -0.1 + gap), 0.0)
+    assert seen(crowding.chair_pulls_out, [vanity, stool, bed])[0] == {1: pytest.approx(margin)}
+
+
+@pytest.mark.parametrize(("x", "margin"), [(-0.5, 1 / 30), (-0.3, -1 / 30)])
+def test_no_half_of_a_hall_is_bare(x, margin):
+    right = [("cabinet", (1.0, 1.0, 1.0), (k % 3 + 1.0, k // 3 - 0.5), 0.0) for k in range(5)]
+    right[4] = ("bookshelf", (1.25, 2.0, 0.8), (3.0, -1.6), 0.0)
+    hall = [*right, ("cabinet", (1.0, 1.0, 1.0), (x, 1.0), 0.0)]
+    found, rows, boxes = seen(composition.halves_used, hall, (8.0, 4.0))
+    assert list(found.values()) == [pytest.approx(margin)]
+    assert rows.measure.tolist() == [pytest.approx(100 - 50 * (margin + 0.3))]
+    rows.margin.sum().backward()
+    assert float(boxes.position.grad[5, 0]) == pytest.approx(-2 / 6)
+    assert seen(composition.halves_used, hall, (4.4, 4.0))[0][0] > 0.5  # no half of so short a room
+    assert seen(composition.halves_used, hall[2:], (8.0, 4.0))[0] == {}  # so few fill no hall
 
 
 @pytest.mark.parametrize(("gap", "margin"), [(0.3, -0.08), (0.75, -0.05), (0.85, 0.05)])

@@ -140,6 +140,20 @@ def test_beds_that_share_a_nightstand_stand_beside_each_other():
     assert np.linalg.norm(stand - (one + other) / 2) == pytest.approx(0.8, abs=0.1)  # at their heads
 
 
+@pytest.mark.parametrize("word", ["kids_bed", "cot"])
+def test_a_childs_bed_goes_to_the_end_of_a_wall(word):
+    size = [(0.9, 0.8, 1.8), (1.5, 2.2, 0.6)]
+    (bed, _), (yaw, _) = arranged([word, "wardrobe"], size, [(0.2, 0, -1.3), (0.0, 0, 2.1)], [0.0, np.pi])
+    side = bed[[0, 2]] @ [np.cos(yaw), -np.sin(yaw)]
+    assert 2.4 - abs(side) - 0.45 < 0.1
+
+
+def test_a_bed_for_two_leaves_its_wall_where_there_is_room():
+    size, position = [(1.7, 1.0, 2.1), (1.5, 2.2, 0.6)], [(-1.5, 0, -1.3), (0.0, 0, 2.1)]
+    (bed, _), (yaw, _) = arranged(["double_bed", "wardrobe"], size, position, [0.0, np.pi])
+    assert 2.4 - abs(bed[[0, 2]] @ [np.cos(yaw), -np.sin(yaw)]) - 0.85 > 0.3
+
+
 def test_chairs_are_not_squeezed_where_there_is_room_at_the_other_side():
     words = ["dining_table", *["dining_chair"] * 4]
     size = [(1.6, 0.75, 0.9), *[(0.5, 0.9, 0.5)] * 4]
