@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache, reduce
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
@@ -40,9 +41,9 @@ def mesh_indices(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
 def degenerate(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[Finding]:
     """No face uses a point twice or has no area; models of others may, in few faces."""
     _, faces, corners, normals = reading.triangles(mesh)
-    twice = (faces == faces[:, [2, 0, 1]]).any(1)
+    twice = (faces.T[[1, 2, 0]] == faces.T).any(0)
     one, two, three = corners.transpose(1, 2, 0)
-    sides = np.max([along(side, side) for side in (one - two, two - three, three - one)], 0)  # squares
+    sides = reduce(np.maximum, (along(side, side) for side in (one - two, two - three, three - one)))  # squares
     flat = twice | (along(normals.T, normals.T) <= (THIN * sides) ** 2)
     if flat.any():
         message = f"{int(flat.sum())} of {len(flat)} triangles have no area"
@@ -162,17 +163,15 @@ def winding(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
         return
     sign = -1.0 if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded else 1.0
     if _closed(faces):
-        a, b, c = np.moveaxis(triangles - triangles.mean((0, 1)), 1, 0)
+        a, b, c = (triangles - triangles.mean((0, 1))).transpose(1, 0, 2)
         if sign * float((a * cross(b, c)).sum()) < 0:
             yield "closed and turned inside out: its faces wind the wrong way round"
             return
     found = _normals(reading, mesh)
     if found is None or found.interpolation != UsdGeom.Tokens.faceVarying or found.fault:
         return
-    turned = sign * turned
-    against = along(turned.T, sum(found.values[corner] for corner in corners.T).T) < 0
-    area = lengths(turned)
-    if area[against].sum() > AGAINST * area.sum() > 0:
+    against = along(sign * turned.T, sum(found.values[corner] for corner in corners.T).T) < 0
+    if against.any() and (area := lengths(turned))[against].sum() > AGAINST * area.sum() > 0:
         yield f"{area[against].sum() / area.sum():.0%} of its surface winds against its normals, allowed: outwards"
 
 
@@ -224,10 +223,9 @@ def _normals(reading: Reading, mesh: UsdGeom.Mesh) -> Laid | None:
 
 def _closed(faces: np.ndarray) -> bool:
     """Whether every edge of some triangles (t, 3) is walked once in each direction."""
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
-    size = int(faces.max()) + 1
-    there, back = np.sort(edges[:, 0] * size + edges[:, 1]), np.sort(edges[:, 1] * size + edges[:, 0])
-    return bool((there == back).all())
+    ends, size = faces.T.astype(np.int64), int(faces.max()) + 1
+    after = ends[[1, 2, 0]]
+    return np.array_equal(np.sort((ends * size + after).ravel()), np.sort((after * size + ends).ravel()))
 
 
 def _shown(box: np.ndarray) -> str:
@@ -268,7 +266,7 @@ def scale(reading: Reading) -> Iterator[Finding]:
         if not prim.IsA(UsdGeom.Xformable):
             continue
         try:
-            local = _factors(matrix(reading.cache.GetLocalTransformation(prim)[0], prim))
+            local = _factors(matrix(reading.cache.GetLocalTransformation(prim)[0], prim).tobytes())
             whole = reading.world(prim)
         except UNREADABLE:
             continue
@@ -279,7 +277,7 @@ def scale(reading: Reading) -> Iterator[Finding]:
         schemas = applied(prim)
         if NODE_API not in schemas and not any(schema in schemas for schema in PHYSICAL):
             continue
-        world = _factors(whole)
+        world = _factors(whole.tobytes())
         if world.min() < 1e-6 or world.max() / world.min() < 1 + EVEN:
             continue
         culprit = _unevenly_scaled(prim, reading.cache)
@@ -298,14 +296,16 @@ def mirrored(reading: Reading, prim: Usd.Prim) -> Iterator[str]:
 
 def _unevenly_scaled(prim: Usd.Prim, cache: UsdGeom.XformCache) -> Usd.Prim:
     for above in lineage(prim):
-        factors = _factors(cache.GetLocalTransformation(above)[0])
+        factors = _factors(np.array(cache.GetLocalTransformation(above)[0]).tobytes())
         if factors.max() / max(factors.min(), 1e-9) > 1 + EVEN:
             return above
     return prim
 
 
-def _factors(matrix) -> np.ndarray:  # type: ignore[no-untyped-def]
-    return np.linalg.svd(np.array(matrix)[:3, :3], compute_uv=False)
+@lru_cache(maxsize=4096)  # most prims have one of a few
+def _factors(transform: bytes) -> np.ndarray:
+    """(3,) float, how a transform (4, 4) float scales along its axes."""
+    return np.linalg.svd(np.frombuffer(transform).reshape(4, 4)[:3, :3], compute_uv=False)
 
 
 def _listed(factors: np.ndarray) -> str:

@@ -124,7 +124,7 @@ class Reading:
         def read() -> tuple[np.ndarray, ...]:
             arrays = self.mesh(mesh)
             faces = arrays.indices[corners := fans(arrays.counts)[1]]
-            return corners, faces, arrays.points[faces], area_normals(arrays.points[faces])
+            return corners, faces, (triangles := arrays.points[faces]), area_normals(triangles)
 
         return self.once("triangles", mesh.GetPrim(), read)
 
