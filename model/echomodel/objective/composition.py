@@ -300,21 +300,22 @@ def _free_beside(plan: Plan, who: Array) -> Array:
     """(P, 4): metres free left, right, behind and before of tables, to walls and to what is neither seat nor lamp."""
     (right, front), xp = plan.axes(who), plan.kit
     out = xp.stack([-right, right, -front, front], 1)
-    half = plan.size[who][:, [0, 0, 2, 2]] / 2
-    edge = plan.position[who][:, None, ::2] + out * half[..., None]
+    half = plan.size[:, [0, 0, 2, 2]] / 2
+    edge = plan.position[who][:, None, ::2] + out * half[who][..., None]
     walls = plan.inside(edge + out * SEAT, who) + SEAT
-    row, k = plan.beside(who, plan.standing & ~plan.of("seat", "light") & (plan.size[:, 1] > CLEAR_HEIGHT))
-    j = who[row]
-    keep = k != j
-    row, k, j = row[keep], k[keep], j[keep]
+    asked = full(plan.fixed, len(plan.first), False)
+    asked[who % len(asked)] = True
+    others = plan.standing & ~plan.of("seat", "light") & (plan.size[:, 1] > CLEAR_HEIGHT)
+    j, k = plan.pairs(asked, others, least=True)
+    if not len(j):
+        return walls
     lateral, forward = plan.local(k, j)
     wide, deep = plan.reach(k, j)
     ahead, aside = abs(forward) - deep - plan.size[j, 2] / 2, abs(lateral) - wide - plan.size[j, 0] / 2
-    beyond = xp.stack([-lateral - wide, lateral - wide, -forward - deep, forward - deep], -1) - half[row]
-    meets = (xp.stack([ahead, ahead, aside, aside], -1) < 0) & (beyond > -half[row])
-    beyond = xp.where(meets, beyond, FAR).reshape(-1)
-    side = (4 * row[:, None] + xp.arange(4)).reshape(-1)
-    return xp.minimum(walls, least_of(side, beyond, 4 * len(who), math.inf).reshape(-1, 4))
+    beyond = xp.stack([-lateral - wide, lateral - wide, -forward - deep, forward - deep], -1) - half[j]
+    meets = (xp.stack([ahead, ahead, aside, aside], -1) < 0) & (beyond > -half[j])
+    beyond = xp.where(meets, beyond, FAR)
+    return xp.minimum(walls, xp.stack([plan.worst(j, side, k)[0] for side in beyond.T], 1)[who])
 
 
 def plant_in_nook(plan: Plan) -> Found:
