@@ -21,7 +21,7 @@ from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
 from echomodel.echo import EchoModel
-from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
+from echomodel.furniture import draw_choices, draw_style, mesh_of, sample_size, solids
 from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.metrics.pointsets import set_scores, surface_points
@@ -110,7 +110,7 @@ def pieces(model: EchoModel, classes: list[str], count: int, seed: int, *, sdf: 
             mesh_of(solids(name, *piece_of(v), size), size) for v, size in zip(told, sizes, strict=True)
         ]
         made["programs"][name] = [
-            mesh_of(solids(name, Style.draw(rng), Choices.draw(rng), size), size) for size in sizes
+            mesh_of(solids(name, draw_style(rng), draw_choices(rng), size), size) for size in sizes
         ]
         if sdf:
             grids = model.sample_shapes(graph, boxes, generator=generator).float().numpy()

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
+from PIL import Image
 
 from echomodel.files import tables
 from echomodel.vocabulary import vocabulary
@@ -50,8 +51,6 @@ def texels(content: bytes, tint: Sequence[float] | np.ndarray = (1.0, 1.0, 1.0))
     Arguments:
         content: of the file. tint: (3) linear, what the image is multiplied with.
     """
-    from PIL import Image
-
     if not 0 < len(content) <= MAX_BYTES:
         return None
     try:
@@ -65,8 +64,6 @@ def texels(content: bytes, tint: Sequence[float] | np.ndarray = (1.0, 1.0, 1.0))
 
 def pixels(image: object, tint: Sequence[float] | np.ndarray = (1.0, 1.0, 1.0)) -> np.ndarray | None:
     """The same of an image of Pillow's, which may still be undecoded."""
-    from PIL import Image
-
     assert isinstance(image, Image.Image)
     if image.format not in FORMATS or image.width * image.height > MAX_PIXELS:
         return None

@@ -13,6 +13,7 @@ from echousd.draw.indoors import with_ceiling
 from echousd.draw.scenery import Scenery, read_scenery
 from echousd.draw.tracing import FINE, QUICK, trace
 from echousd.draw.views import View, hero_view, stage_views
+from echousd.stage.values import reading
 
 EVERY, CONTACT = "every-camera", "sheet"
 HERO, DOLLHOUSE = "hero", "dollhouse"
@@ -76,8 +77,6 @@ def cameras_of(stage: Usd.Stage) -> dict[str, View]:
 
 def scenery_of(stage: Usd.Stage, size: int, colors: str) -> Scenery:
     """What there is to draw; raises ValueError for colours or a size that there is not."""
-    from echousd.stage.values import reading
-
     if colors not in COLORS:
         raise ValueError(f"colors is {colors!r}, allowed: {', '.join(COLORS)}")
     if not 16 <= size <= LARGEST:

@@ -14,6 +14,7 @@ from pxr import Usd
 
 from echomodel.boxes2d import upright_box
 from echomodel.triangles import area_normals, bounds_of, box, lengths
+from echomodel.vocabulary import vocabulary
 from echousd.draw.drawables import Paint, image_of, read_drawables
 from echousd.draw.indoors import LUMA, Lights, read_lights
 from echousd.draw.sight import Furniture
@@ -226,8 +227,6 @@ def next_room(scenery: Scenery, white: np.ndarray, origin: np.ndarray, direction
 @cache
 def class_color(category: str) -> tuple[float, float, float]:
     """One linear colour per word, spread around the colour circle, the same in every run."""
-    from echomodel.vocabulary import vocabulary
-
     if category in SHELL:
         return (0.72, 0.71, 0.69)
     names = [entry.name for entry in vocabulary().categories]

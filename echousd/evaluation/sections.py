@@ -18,7 +18,7 @@ from pxr import Usd
 from echomodel.boxes import Boxes
 from echomodel.data.shapeset import ShapeSet
 from echomodel.echo import EchoModel
-from echomodel.furniture import Choices, Style, mesh_of, solids
+from echomodel.furniture import draw_choices, draw_style, mesh_of, solids
 from echomodel.furniture.style import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
@@ -359,7 +359,7 @@ def programs(sizes: Mapping[str, np.ndarray], seed: Sequence[int]) -> dict[str, 
     """Pieces of the programs, drawn anew for every seed."""
     luck = np.random.default_rng(list(seed))
     return {
-        word: [mesh_of(solids(word, Style.draw(luck), Choices.draw(luck), size), size) for size in rows]
+        word: [mesh_of(solids(word, draw_style(luck), draw_choices(luck), size), size) for size in rows]
         for word, rows in sizes.items()
     }
 

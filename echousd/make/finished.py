@@ -47,8 +47,6 @@ class Room(RoomData):
     @cached_property
     def stage(self) -> Usd.Stage:
         """The room as a composed stage (written to a temporary folder that lives as long as the room)."""
-        from pxr import Usd
-
         folder = tempfile.TemporaryDirectory(prefix="echousd-")
         weakref.finalize(self, folder.cleanup)
         return Usd.Stage.Open(str(self.save(Path(folder.name) / self.name, preview=False)))

@@ -14,6 +14,8 @@ from echomodel.graph import Stated
 from echomodel.objective import Plan, plan_of
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, carriers
 from echomodel.openings import Opening
+from echomodel.rules import measured
+from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
 from echousd.place.distances import BEHIND, kept_behind
 from echousd.place.geometry import Floor, pair_indices
@@ -160,9 +162,6 @@ def problem_of(
         turned: (n,) bool, boxes that must keep their yaw.
         The others as `echousd.place.place_boxes`.
     """
-    from echomodel.rules import measured
-    from echomodel.rules.geometry import Spread
-
     words = tuple(vocabulary().category(word).name for word in categories)
     told = np.flatnonzero(np.isin(triplets[:, 1], sorted(measured(rules))))
     floor = None if floor_polygon is None else Floor(floor_polygon)

@@ -13,6 +13,7 @@ import numpy as np
 from pxr import Usd
 
 from echomodel.roomboxes import RoomBoxes
+from echomodel.rules import label_relations
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.arrays import triplets_of
@@ -38,8 +39,6 @@ def relations_from_boxes(graph: SceneGraph, *, rules: str = "strict", per_object
 
     Raises StageError for a node without a box.
     """
-    from echomodel.rules import label_relations
-
     boxes = room_boxes(graph)
     found = label_relations(boxes, rules=rules, headings=True)
     if per_object is not None:
@@ -124,8 +123,6 @@ def graph_of(room: RoomBoxes, rules: str | None = "strict") -> SceneGraph:
     Raises:
         UnknownWord: a category or room type that the vocabulary does not hold.
     """
-    from echomodel.rules import label_relations
-
     words, number = vocabulary(), Counter[str]()
     totals = Counter(words.category(word).name for word in room.categories)
     names = []

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from echomodel.dressing.textiles import LEAN, cushion
-from echomodel.furniture import Choices, Style, solids
+from echomodel.furniture import draw_choices, draw_style, solids
 from echomodel.furniture.cloth import cover, pillow, seam
 from echomodel.furniture.sofas import BODIES, upholstered_arms
 from echomodel.furniture.style import FAMILIES
@@ -90,7 +90,7 @@ def test_sofas_have_eight_bodies_and_each_family_builds_several():
         assert sum(row["odds"].get(family, 0) > 0 for row in BODIES) >= 4
     rng, size, made = np.random.default_rng(0), np.array([2.1, 0.82, 0.92]), set()
     for _ in range(40):
-        parts = solids("multi_seat_sofa", Style.draw(rng), Choices.draw(rng), size)
+        parts = solids("multi_seat_sofa", draw_style(rng), draw_choices(rng), size)
         made.add(tuple(sorted((type(part).__name__, part.role) for part in parts)))
     assert len(made) >= 12
 
@@ -116,7 +116,7 @@ def test_a_button_is_where_folds_meet():
 
 @pytest.mark.parametrize(("arms", "softness"), [("box", 0.7), ("box", 0.2), ("slim", 0.5), ("rolled", 0.5)])
 def test_arms_are_no_plain_boxes_and_stay_within_the_seat(arms, softness):
-    style = replace(Style.draw(np.random.default_rng(3)), arms=arms, softness=softness, piping=0.0)
+    style = replace(draw_style(np.random.default_rng(3)), arms=arms, softness=softness, piping=0.0)
     parts = upholstered_arms(2.0, 0.1, 0.6, 0.9, 0.16, style)
     points = np.concatenate([part.mesh()[0] for part in parts])
     assert np.abs(points[:, 0]).max() < 1.02
@@ -128,7 +128,7 @@ def test_arms_are_no_plain_boxes_and_stay_within_the_seat(arms, softness):
 def test_armchairs_are_made_like_sofas():
     rng, size, made = np.random.default_rng(1), np.array([0.85, 0.85, 0.85]), set()
     for _ in range(40):
-        parts = solids("armchair", Style.draw(rng), Choices.draw(rng), size)
+        parts = solids("armchair", draw_style(rng), draw_choices(rng), size)
         made.add(tuple(sorted((type(part).__name__, part.role) for part in parts)))
     assert any(("Tufted", "back") in one for one in made)
     assert len(made) >= 12

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
+from echomodel.furniture import Choices, draw_choices, draw_style, mesh_of, sample_size, solids
+from echomodel.furniture.bent import Bow, Shell
 from echomodel.furniture.chairs import BODIES
 from echomodel.furniture.seating import back_rest
-from echomodel.furniture.solids import Ball, Block, Bow, Lathe, Pad, Shell, Tube, Turned, rotation
+from echomodel.furniture.solids import Ball, Block, Lathe, Pad, Tube, Turned, rotation
 from echomodel.furniture.style import OPEN
 from echomodel.metrics.furniture import loose_solids
 from echomodel.sizes import size_score, size_statistics
@@ -30,7 +31,7 @@ SOLIDS = {
 
 def furniture(category, style, rng, size):
     """One piece of furniture as a mesh."""
-    return mesh_of(solids(category, style, Choices.draw(rng), size), size, round=vocabulary().category(category).round)
+    return mesh_of(solids(category, style, draw_choices(rng), size), size, round=vocabulary().category(category).round)
 
 
 @pytest.mark.parametrize("name", SOLIDS)
@@ -49,7 +50,7 @@ def test_the_distance_of_a_solid_agrees_with_its_mesh(name):
 def test_a_piece_is_watertight_fills_its_size_and_survives_the_grid(category):
     for seed in range(3):
         rng = np.random.default_rng([seed, 11])
-        style = Style.draw(rng)
+        style = draw_style(rng)
         size = sample_size(category, rng, style)
         mesh = furniture(category, style, rng, size)
         assert mesh.is_watertight
@@ -59,7 +60,7 @@ def test_a_piece_is_watertight_fills_its_size_and_survives_the_grid(category):
         fills = [max(share[[0, 2]]), share[1]] if vocabulary().category(category).round else share
         np.testing.assert_allclose(fills, 1.0, rtol=1e-6)
         assert abs(mesh.bounds[0, 1]) < 1e-9
-    back = mesh_from_tsdf(tsdf_of(solids(category, style, Choices.draw(np.random.default_rng(0)), size)))
+    back = mesh_from_tsdf(tsdf_of(solids(category, style, draw_choices(np.random.default_rng(0)), size)))
     assert back.is_watertight
     # Up to two voxels more for parts thickened at the edge of the box, two less for tips of thin parts.
     assert (back.extents < 1.06).all()
@@ -69,7 +70,7 @@ def test_a_piece_is_watertight_fills_its_size_and_survives_the_grid(category):
 def test_the_same_generator_makes_the_same_piece_and_another_style_another_one():
     size = np.array([0.48, 0.9, 0.52])
     first, again, other = (
-        furniture("dining_chair", Style.draw(np.random.default_rng(s)), np.random.default_rng(5), size)
+        furniture("dining_chair", draw_style(np.random.default_rng(s)), np.random.default_rng(5), size)
         for s in (1, 1, 2)
     )
     np.testing.assert_array_equal(first.vertices, again.vertices)
@@ -78,7 +79,7 @@ def test_the_same_generator_makes_the_same_piece_and_another_style_another_one()
 
 def test_pieces_of_one_style_are_closer_in_size_than_pieces_of_different_styles():
     rng = np.random.default_rng(0)
-    styles = [Style.draw(rng) for _ in range(300)]
+    styles = [draw_style(rng) for _ in range(300)]
     pairs = np.log([[sample_size("dining_chair", rng, style) for _ in range(2)] for style in styles])
     within = np.abs(pairs[:, 0] - pairs[:, 1]).mean()
     assert within < 0.8 * np.abs(pairs[:, 0] - np.roll(pairs[:, 1], 1, axis=0)).mean()
@@ -87,7 +88,7 @@ def test_pieces_of_one_style_are_closer_in_size_than_pieces_of_different_styles(
 @pytest.fixture(scope="module")
 def styles():
     rng = np.random.default_rng(3)
-    return [style for _ in range(750) for style in (None, Style.draw(rng))]
+    return [style for _ in range(750) for style in (None, draw_style(rng))]
 
 
 @pytest.mark.parametrize("category", CATEGORIES)
@@ -111,20 +112,20 @@ def test_scores_of_sizes_undo_the_draw_and_shifts_move_them():
 
 
 def test_bad_words_and_sizes_are_refused_in_one_line():
-    style, rng = Style.draw(np.random.default_rng(0)), np.random.default_rng(0)
+    style, rng = draw_style(np.random.default_rng(0)), np.random.default_rng(0)
     with pytest.raises(UnknownWord, match="unknown category 'sculpture'"):
         sample_size("sculpture", rng, style)
     with pytest.raises(UnknownWord, match="unknown category 'sculpture'"):
-        solids("sculpture", style, Choices.draw(rng), np.ones(3))
+        solids("sculpture", style, draw_choices(rng), np.ones(3))
     with pytest.raises(ValueError, match=r"size of chair is \[1.0, -1.0, 1.0\], need three positive numbers in metres"):
-        solids("chair", style, Choices.draw(rng), np.array([1.0, -1.0, 1.0]))
+        solids("chair", style, draw_choices(rng), np.array([1.0, -1.0, 1.0]))
 
 
 @pytest.mark.parametrize("size", [(0.25, 1.4, 0.86), (0.86, 1.4, 0.25), (0.3, 1.5, 0.45)])
 def test_no_shade_of_a_floor_lamp_is_a_long_oval(size):
     rng = np.random.default_rng(4)
     for _ in range(20):
-        parts = solids("floor_lamp", Style.draw(rng), Choices.draw(rng), np.array(size))
+        parts = solids("floor_lamp", draw_style(rng), draw_choices(rng), np.array(size))
         shades = [part for part in parts if part.role == "shade" and isinstance(part, Lathe)]
         assert all(1 / 1.7 < part.squash < 1.7 for part in shades)
         assert mesh_of(parts, np.array(size)).is_watertight
@@ -133,7 +134,7 @@ def test_no_shade_of_a_floor_lamp_is_a_long_oval(size):
 def drawn(number, **told):
     """A style and open choices, the style's fields as told."""
     rng = np.random.default_rng(number)
-    return replace(Style.draw(rng), **told), Choices.draw(rng)
+    return replace(draw_style(rng), **told), draw_choices(rng)
 
 
 def bounds(parts):
@@ -167,8 +168,8 @@ def test_only_a_high_cabinet_for_children_has_a_gable():
     for high, gabled in ((0.76, False), (1.5, True)):
         size, found = np.array([0.6, high, 0.32]), set()
         for style in range(12):
-            look = Style.draw(np.random.default_rng(style))
-            parts = solids("children_cabinet", look, Choices.draw(np.random.default_rng(style)), size)
+            look = draw_style(np.random.default_rng(style))
+            parts = solids("children_cabinet", look, draw_choices(np.random.default_rng(style)), size)
             found.add(any(part.role == "roof" for part in parts))
         assert found == {gabled, False}
 
@@ -215,18 +216,18 @@ def test_no_stile_shows_before_the_board_of_a_back():
 
 @pytest.mark.parametrize("softness", [0.2, 0.8])
 def test_no_two_faces_of_an_arched_headboard_lie_in_one_plane(softness):
-    style = replace(Style.draw(np.random.default_rng(1)), headboard="arched", softness=softness)
+    style = replace(draw_style(np.random.default_rng(1)), headboard="arched", softness=softness)
     size = np.array([1.7, 1.1, 2.1])
-    parts = [p.mesh()[0] for p in solids("double_bed", style, Choices.draw(np.random.default_rng(2)), size)
+    parts = [p.mesh()[0] for p in solids("double_bed", style, draw_choices(np.random.default_rng(2)), size)
              if p.role == "headboard"]  # fmt: skip
     fronts, rears = ([round(float(end(part[:, 2])), 4) for part in parts] for end in (np.max, np.min))
     assert len(set(fronts)) == len(set(rears)) == len(parts) == 2
 
 
 def test_office_chairs_have_a_net_in_a_frame_and_a_pad_for_the_head_or_a_padded_back():
-    size, choices = np.array([0.62, 1.15, 0.6]), Choices.draw(np.random.default_rng(0))
+    size, choices = np.array([0.62, 1.15, 0.6]), draw_choices(np.random.default_rng(0))
     for tufting, count in ((0.9, 4), (0.1, 1)):
-        style = replace(Style.draw(np.random.default_rng(1)), tufting=tufting, back="panel")
+        style = replace(draw_style(np.random.default_rng(1)), tufting=tufting, back="panel")
         parts = solids("office_chair", style, choices, size)
         assert sum(part.role == "back" for part in parts) == count
         assert not loose_solids(parts)

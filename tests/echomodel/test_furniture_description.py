@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
+from echomodel.furniture import Choices, draw_choices, draw_style, mesh_of, sample_size, solids
+from echomodel.furniture.drawn import draw_styles
 from echomodel.furniture.solids import FINEST, pieces_of
-from echomodel.furniture.style import FAMILIES, GROUPS, OPEN, STYLE, WIDTH, described, draw_styles, piece_of
+from echomodel.furniture.style import FAMILIES, GROUPS, OPEN, STYLE, WIDTH, described, piece_of
 from echomodel.metrics.furniture import loose_solids
 from echomodel.vocabulary import vocabulary
 
@@ -16,7 +17,7 @@ CATEGORIES = [category.name for category in vocabulary().categories]
 
 def drawn(category: str, seed: int):
     rng = np.random.default_rng([seed, CATEGORIES.index(category)])
-    style, choices = Style.draw(rng), Choices.draw(rng)
+    style, choices = draw_style(rng), draw_choices(rng)
     return style, choices, sample_size(category, rng)
 
 

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
+from echomodel.furniture import draw_choices, draw_style, mesh_of, sample_size, solids
 from echomodel.objective.sizes import usual_sizes
 from echomodel.vocabulary import vocabulary
 
@@ -34,10 +34,10 @@ ROUNDING = 2e-3
 def piece(category, seed):
     """A mesh of a kind, in a style and a size of their own, as a room would have it."""
     rng = np.random.default_rng([seed, 7])
-    style = Style.draw(rng)
+    style = draw_style(rng)
     drawn = sample_size(category, rng, style)[None]
     size = usual_sizes([category], drawn, lenient=np.zeros((1, 3), bool))[0]
-    made = solids(category, style, Choices.draw(rng), size)
+    made = solids(category, style, draw_choices(rng), size)
     return mesh_of(made, size, round=vocabulary().category(category).round)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from echomodel.furniture import Choices, Style, solids
+from echomodel.furniture import Choices, draw_style, solids
 from echomodel.furniture.style import described
 from echomodel.metrics.furniture import piece_scores, style_scores, usual_size
 from echomodel.objective.sizes import size_range
@@ -25,7 +25,7 @@ def test_style_scores_tell_suites_of_one_style_from_others():
         assert sizes.shape == (graph.num_nodes, 3)
         assert int(graph.category.max()) < 7
         style = graph.scene if len(graph.triplets) else torch.arange(graph.num_nodes)
-        drawn = [Style.draw(np.random.default_rng(int(number))) for number in style]
+        drawn = [draw_style(np.random.default_rng(int(number))) for number in style]
         return torch.from_numpy(np.stack([described(one, Choices(np.zeros(18))) for one in drawn]))
 
     scores = style_scores(by_suite, 7, 5, 2)
@@ -36,7 +36,7 @@ def test_style_scores_tell_suites_of_one_style_from_others():
 
 def test_a_piece_is_closed_whole_and_fills_its_box():
     size = np.array([0.5, 0.9, 0.5])
-    parts = solids("chair", Style.draw(np.random.default_rng(0)), Choices(np.zeros(18)), size)
+    parts = solids("chair", draw_style(np.random.default_rng(0)), Choices(np.zeros(18)), size)
     mesh, scores = piece_scores(parts, size)
     assert scores == {"closed": 1.0, "loose": 0.0, "box_error": pytest.approx(0, abs=1e-6)}
     assert mesh.extents == pytest.approx(size)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
+from echomodel.furniture import draw_choices, draw_style, mesh_of, sample_size, solids
 from echomodel.furniture.distances import distance
 from echomodel.furniture.fronts import front
 from echomodel.vocabulary import vocabulary
@@ -27,9 +27,9 @@ HAS = {
 
 def drawn(name, seed):
     rng = np.random.default_rng([seed, 7])
-    style = Style.draw(rng)
+    style = draw_style(rng)
     size = sample_size(name, rng, style)
-    return solids(name, style, Choices.draw(rng), size), size
+    return solids(name, style, draw_choices(rng), size), size
 
 
 @pytest.mark.parametrize("name", HOME)
@@ -49,7 +49,7 @@ def test_pieces_are_closed_and_as_large_as_they_say(name):
 
 def test_a_run_of_units_is_cut_to_its_length_and_level():
     rng = np.random.default_rng(0)
-    style, choices = Style.draw(rng), Choices.draw(rng)
+    style, choices = draw_style(rng), draw_choices(rng)
     for width in (0.6, 1.2, 2.4):
         parts = solids("base_unit", style, choices, np.array([width, 0.9, 0.6]))
         backs = [part for part in parts if part.role == "back"]
@@ -81,7 +81,7 @@ def test_what_hangs_says_how_high():
 
 
 def test_the_doors_of_a_wardrobe_have_a_grip_where_lower_fronts_have_none():
-    style = replace(Style.draw(np.random.default_rng(0)), handles="none", fronts="flat")
+    style = replace(draw_style(np.random.default_rng(0)), handles="none", fronts="flat")
     made = {h: front((0.0, 0.0), (0.5, h), 0.3, 1, 1, "door", style, 0.5) for h in (0.7, 2.0)}
     grips = {h: [part for part in parts if part.role == "handle"] for h, parts in made.items()}
     assert len(grips[0.7]) == 0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echomodel.furniture import Choices, Style, solids
+from echomodel.furniture import draw_choices, draw_style, solids
 from echomodel.furniture.plants import SPECIES, grown, species
 from echomodel.furniture.solids import pieces_of
 
@@ -30,7 +30,7 @@ def test_plants_of_the_furniture_are_of_many_species():
     size, seen = np.array([0.5, 1.1, 0.5]), set()
     for seed in range(60):
         rng = np.random.default_rng(seed)
-        parts = solids("plant", Style.draw(rng), Choices.draw(rng), size)
+        parts = solids("plant", draw_style(rng), draw_choices(rng), size)
         if seed < 20:  # the rest are looked at for their leaves
             pieces = pieces_of(parts, size)
             assert np.ptp(np.concatenate([piece.vertices for piece in pieces]), axis=0).max() < 1.2

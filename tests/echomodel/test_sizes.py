@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 from shapely.geometry import MultiPoint
 from shapely.ops import unary_union
 
-from echomodel.furniture import Choices, solids
+from echomodel.furniture import draw_choices, draw_style, solids
 from echomodel.furniture.household import PANEL
 from echomodel.furniture.solids import Ball, pieces_of
-from echomodel.furniture.style import Style
 from echomodel.objective.sizes import EDGE, FEET, fitting_loads, in_proportion, laid_tables, size_range, usual_sizes
 from echomodel.sizes import usual_range
 from echomodel.vocabulary import vocabulary
@@ -70,7 +69,7 @@ def test_what_carries_something_has_a_plane_top(word):
     assert (fitting_loads(words, size, np.array([-1, -1]), np.ones(2, bool)) == size).all()
     for style in range(20):
         rng = np.random.default_rng(style)
-        pieces = pieces_of(solids(word, Style.draw(rng), Choices.draw(rng), carrying), carrying, 0)
+        pieces = pieces_of(solids(word, draw_style(rng), draw_choices(rng), carrying), carrying, 0)
         tops = [piece.vertices[piece.vertices[:, 1] > carrying[1] - 0.03][:, [0, 2]] for piece in pieces]
         top = unary_union([MultiPoint(points).convex_hull.buffer(1e-4) for points in tops if len(points) > 2])
         assert top.area > 0.8 * carrying[0] * carrying[2], style
@@ -89,7 +88,7 @@ def test_a_screen_fits_its_stand_and_stays_a_screen():
 @given(st.integers(0, 300), st.floats(0.5, 1.7), st.floats(0.4, 1.2), st.floats(0.04, 0.25))
 def test_screens_are_16_to_9_or_wider_in_any_box(seed, w, h, d):
     rng = np.random.default_rng(seed)
-    parts = solids("tv", Style.draw(rng), Choices.draw(rng), np.array([w, h, d]))
+    parts = solids("tv", draw_style(rng), draw_choices(rng), np.array([w, h, d]))
     panel = np.concatenate([p.mesh()[0] for p in parts if p.role in ("housing", "screen")])
     wide, high, _ = np.ptp(panel, axis=0)
     assert PANEL[0] - 0.01 <= wide / high <= PANEL[1] + 0.01
@@ -103,7 +102,7 @@ def test_what_is_round_is_stretched_alike_in_plan(word):
     for _ in range(12):
         size = np.array([0.6, 0.9, 0.6]) * rng.uniform(0.7, 1.2)
         size[2] = size[0]
-        parts = solids(word, Style.draw(rng), Choices.draw(rng), size)
+        parts = solids(word, draw_style(rng), draw_choices(rng), size)
         seen = [part for part in parts if not part.core]
         for piece in pieces_of(parts, size, round=True):
             before = np.ptp(piece.solid.mesh()[0], axis=0)
@@ -119,8 +118,8 @@ def test_globes_are_spheres(word):
     for _ in range(60):
         low, high = np.array(size_range(word))
         (size,) = usual_sizes([word], rng.uniform(low, high)[None], lenient=WITHIN)
-        style = replace(Style.draw(rng), shade="sphere")
-        for piece in pieces_of(solids(word, style, Choices.draw(rng), size), size, round=True):
+        style = replace(draw_style(rng), shade="sphere")
+        for piece in pieces_of(solids(word, style, draw_choices(rng), size), size, round=True):
             if isinstance(piece.solid, Ball) and piece.solid.role == "shade":
                 globes += 1
                 extent = np.ptp(piece.vertices, axis=0)

@@ -9,13 +9,14 @@ import numpy as np
 from echomodel.files import raising
 from echomodel.progress import StageTimer
 from echomodel.vocabulary import vocabulary
-from echousd.assets.choose import Asked, AssetWishes
+from echousd.assets.choose import Asked, AssetWishes, choose, fits
 from echousd.assets.model_file import ModelFile
 from echousd.assets.record import AssetRecord
 from echousd.assets.reference import is_file
 from echousd.graph import Node, SceneGraph
 from echousd.shapes.finishes.slots import HARMONIES, linear
 from echousd.shapes.looks import palette_of_room
+from echousd.shapes.originals.loading import library_file, own_file, own_record
 from echousd.shapes.sources.named import RETRIEVED, source_of
 from echousd.shapes.sources.source import Retrieved, ShapeRequest
 from echousd.shapes.styles import ALIKE, ROOM_STYLE, first_alike
@@ -48,8 +49,6 @@ def named_pieces(
 
 
 def _named(node: Node, wishes: AssetWishes) -> tuple[AssetRecord, ModelFile]:
-    from echousd.shapes.originals.loading import library_file, own_file, own_record
-
     assert node.asset is not None
     if is_file(node.asset):
         return own_record(node.asset, node.category), own_file(node.asset)
@@ -75,9 +74,6 @@ def retrieved(
     wanted = [i for i in request.rows if source_of(graph.nodes[i], shapes) in RETRIEVED]
     if not wanted:
         return named
-    from echousd.assets.choose import choose, fits
-    from echousd.shapes.originals.loading import library_file
-
     asked = wishes()
     size = np.asarray(request.boxes.size, float)
     with request.timer.stage("assets"):
@@ -105,8 +101,6 @@ def retrieved(
 
 def _asked(graph: SceneGraph, rows: list[int], size: np.ndarray, styles: Mapping[str, str]) -> list[Asked]:
     """The objects with who shares a model with whom: those of one category and style group, and sets."""
-    from echousd.assets.choose import Asked
-
     nodes = graph.nodes
 
     def same(i: int, j: int) -> bool:

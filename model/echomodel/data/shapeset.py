@@ -21,7 +21,7 @@ import zstandard
 
 from echomodel.data.roomset import claim, kept_out, set_note
 from echomodel.files import whole_file, write_json, write_text
-from echomodel.furniture import Choices, Style, sample_size, solids
+from echomodel.furniture import Style, draw_choices, draw_style, sample_size, solids
 from echomodel.furniture.solids import Solid
 from echomodel.progress import StepListener
 from echomodel.tsdf import RESOLUTION, TRUNCATION, tsdf_from_mesh, tsdf_of
@@ -56,10 +56,10 @@ class ShapeRecord:
 def piece(seed: int, style: int, category: str) -> tuple[Style, np.ndarray, list[Solid]]:
     """The piece of `category` in style number `style` of the world with this seed: its style, size (3,) and solids."""
     position = vocabulary().category_id(category)
-    look = Style.draw(np.random.default_rng([seed, style]))
+    look = draw_style(np.random.default_rng([seed, style]))
     rng = np.random.default_rng([seed, style, position])
     size = sample_size(category, rng, look)
-    return look, size, solids(category, look, Choices.draw(rng), size)
+    return look, size, solids(category, look, draw_choices(rng), size)
 
 
 def quantised(tsdf: np.ndarray) -> np.ndarray:

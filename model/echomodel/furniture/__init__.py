@@ -9,12 +9,14 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.solids import Joint, Solid, mesh_of
-from echomodel.furniture.style import Choices, Style, sample_size
+from echomodel.furniture.style import Choices, Style
 from echomodel.late import Late
 from echomodel.vocabulary import vocabulary
 
-__all__ = ["Choices", "Style", "mesh_of", "sample_size", "solids"]
+__all__ = ["Choices", "Style", "draw_choices", "draw_style", "mesh_of", "sample_size", "solids"]
 
+draw_choices, draw_style = Late(f"{__name__}.drawn:draw_choices"), Late(f"{__name__}.drawn:draw_style")
+sample_size = Late(f"{__name__}.drawn:sample_size")
 Builder = Callable[[np.ndarray, Style, Choices], list[Solid]]
 # Module -> its programs, functions of these names; one is loaded when a category asks for it.
 PROGRAMS = {

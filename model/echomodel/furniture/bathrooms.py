@@ -11,10 +11,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from echomodel.furniture.bent import bent
 from echomodel.furniture.carpentry import Size, around, both, box, of_role, post
 from echomodel.furniture.fronts import front
 from echomodel.furniture.kitchens import spout
-from echomodel.furniture.solids import Solid, bent, rotation, tube, turned
+from echomodel.furniture.solids import Solid, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
 
 SEAT = 0.42  # metres

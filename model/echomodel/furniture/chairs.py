@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from echomodel.furniture.bent import bent
 from echomodel.furniture.carpentry import Size, base, both, box, cushion, four, leg, of_role, top, within
 from echomodel.furniture.cloth import seam
 from echomodel.furniture.seating import back_rest, chair_legs, leaning, seat_of, slim_arms
-from echomodel.furniture.solids import Block, Solid, ball, bent, rotation, superellipse, tube, turned
+from echomodel.furniture.solids import Block, Solid, ball, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
 
 

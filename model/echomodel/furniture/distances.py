@@ -11,19 +11,8 @@ from functools import singledispatch
 
 import numpy as np
 
-from echomodel.furniture.solids import (
-    IDENTITY,
-    Array,
-    Ball,
-    Blade,
-    Block,
-    Bow,
-    Lathe,
-    Shell,
-    Solid,
-    Tube,
-    Turned,
-)  # fmt: skip
+from echomodel.furniture.bent import Blade, Bow, Shell
+from echomodel.furniture.solids import IDENTITY, Array, Ball, Block, Lathe, Solid, Tube, Turned
 
 
 def distance(solid: Solid, x: Array, y: Array, z: Array, scale: Array) -> Array:

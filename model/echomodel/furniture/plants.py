@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from echomodel.files import tables
-from echomodel.furniture.solids import Blade, Solid, ball, rotation, tube
+from echomodel.furniture.bent import Blade
+from echomodel.furniture.solids import Solid, ball, rotation, tube
 
 SPECIES: dict[str, dict[str, Any]] = tables("plants.toml", __file__)
 GOLDEN = 2 * np.pi * 0.382  # radians from leaf to leaf

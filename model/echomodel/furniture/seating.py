@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from echomodel.furniture.bent import Bow
 from echomodel.furniture.carpentry import base, both, box, cushion, leg, of_role, top
-from echomodel.furniture.solids import IDENTITY, Block, Bow, Solid, ball, rotation
+from echomodel.furniture.solids import IDENTITY, Block, Solid, ball, rotation
 from echomodel.furniture.style import Style
 
 

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from echomodel.files import tables
+from echomodel.furniture.bent import bent
 from echomodel.furniture.carpentry import Size, base, both, box, cushion, of_role
 from echomodel.furniture.seating import chair_legs, leaning, slim_arms
-from echomodel.furniture.solids import Lathe, Pad, Solid, ball, bent, rotation, superellipse, tube, turned
+from echomodel.furniture.solids import Lathe, Pad, Solid, ball, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
 from echomodel.furniture.tufting import Tufted
 

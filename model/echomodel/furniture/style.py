@@ -1,5 +1,5 @@
-"""A style, what the pieces of one suite share, drawn from a family of furniture making; what it leaves open;
-both as one vector, a description, with the same places in every class.
+"""A style, what the pieces of one suite share, of a family of furniture making; what it leaves open; both as one
+vector, a description, with the same places in every class.
 
 A kind is told by one number per word, +1 for the one that holds; a proportion or an open choice by one number in
 [-1, 1]. Every vector is a description: of a kind the largest number counts, other numbers are cut at their ends.
@@ -17,7 +17,6 @@ import numpy as np
 
 from echomodel.files import tables
 from echomodel.rows import RoomStyle
-from echomodel.sizes import Z95, size_statistics
 
 _ROWS = tables("families.toml", __file__)
 BUILD: dict[str, tuple[float, float]] = {name: (row.pop("bulk"), row.pop("soft")) for name, row in _ROWS.items()}
@@ -34,7 +33,7 @@ DRAWN: dict[str, tuple[float, float]] = {
     "seat_depth": (0.0, 1.0),
 }  # fmt: skip
 DRAWN_LAST: dict[str, tuple[float, float]] = {"edge": (0.0, 1.0), "piping": (0.0, 1.0), "finish": (0.0, 1.0)}
-# Least and largest value of every proportion that `Style.draw` makes of them.
+# Least and largest value of every proportion that `drawn.draw_style` makes of them.
 PROPORTIONS = DRAWN | {
     "bulk": (0.85 * 0.85, 1.3 * 1.2), "splay": (math.radians(5), math.radians(13)),
     "rake": (math.radians(3), math.radians(16)), "softness": (0.05, 1.0),
@@ -77,55 +76,6 @@ class Style:
     finish: float
     size_shift: tuple[float, float, float]
 
-    @classmethod
-    def draw(cls, rng: np.random.Generator) -> Style:
-        """Draw a style: first a family, then its kinds and proportions."""
-        family = str(rng.choice(list(FAMILIES)))
-        kinds = {name: weighted(rng, odds) for name, odds in FAMILIES[family].items()}
-        slender, soft = BUILD[family]
-        numbers = {name: float(rng.uniform(*ends)) for name, ends in DRAWN.items()}
-        shift = tuple(rng.normal(0, 1, 3).tolist())
-        numbers |= {name: float(rng.uniform(*ends)) for name, ends in DRAWN_LAST.items()}
-        numbers["bulk"] *= slender
-        numbers["softness"] = float(np.clip(soft + numbers["softness"], 0.05, 1))
-        numbers["corner"] **= 1.5
-        numbers |= {name: float(np.radians(numbers[name])) for name in ("splay", "rake")}
-        drawn: dict[str, Any] = {**kinds, **numbers}
-        return cls(family=family, **drawn, size_shift=shift)
-
-
-def weighted(rng: np.random.Generator, odds: dict[str, float]) -> str:
-    """One key of `odds`, drawn with probability in proportion to its value."""
-    names = list(odds)
-    share = np.array([odds[name] for name in names], float)
-    return names[int(rng.choice(len(names), p=share / share.sum()))]
-
-
-STYLE_SHARE = 0.5  # share of the variance of a size that the pieces of one style have in common
-
-
-def sample_size(
-    category: str, rng: np.random.Generator, style: Style | None = None, shift: Sequence[float] = (0.0, 0.0, 0.0)
-) -> np.ndarray:
-    """Draw a size (3,) in metres: width x, height y, depth z.
-
-    Each axis passes through the class's 5th, 50th and 95th percentile (log-linear between and, cut at the 1st and 99th,
-    beyond). Pieces of one style share `STYLE_SHARE` of their deviation, without changing the distribution over styles.
-
-    Arguments:
-        category: word of the vocabulary. rng: source of every draw. style: of the suite that the piece belongs to.
-        shift: how many standard deviations each axis is moved by.
-
-    Raises UnknownWord where the vocabulary does not know the category.
-    """
-    statistics = size_statistics(category)
-    z = rng.standard_normal(3)
-    if style is not None:
-        z = np.sqrt(STYLE_SHARE) * np.asarray(style.size_shift) + np.sqrt(1 - STYLE_SHARE) * z
-    z = np.clip(np.linalg.cholesky(statistics.correlation) @ z + shift, -2.33, 2.33) / Z95
-    low, middle, high = np.log(statistics.low), np.log(statistics.median), np.log(statistics.high)
-    return np.exp(middle + np.where(z < 0, z * (middle - low), z * (high - middle)))
-
 
 T = TypeVar("T")
 
@@ -148,11 +98,6 @@ class Choices:
         if values.shape != (len(OPEN),) or not np.isfinite(values).all():
             raise ValueError(f"open choices are {np.shape(self.values)}, expected ({len(OPEN)},) finite numbers")
         object.__setattr__(self, "values", values.clip(0.0, 1.0 - 1e-9))
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator) -> Choices:
-        """All open choices at random."""
-        return cls(rng.random(len(OPEN)))
 
     def number(self, name: str) -> float:
         """The number in [0, 1) behind a name of `OPEN`."""
@@ -219,9 +164,3 @@ def piece_of(vector: np.ndarray, room: RoomStyle | None = None) -> tuple[Style, 
     numbers = _LOW + (_HIGH - _LOW) * share[: len(PROPORTIONS)]
     words |= dict(zip(PROPORTIONS, numbers.tolist(), strict=True))
     return Style(family, **words, size_shift=(0.0, 0.0, 0.0)), Choices(share[len(PROPORTIONS) :])
-
-
-def draw_styles(count: int, rng: np.random.Generator) -> np.ndarray:
-    """(count, STYLE) float32: the style's share of the vector of so many styles, drawn as `Style.draw` draws them."""
-    rest = Choices(np.zeros(len(OPEN)))
-    return np.stack([described(Style.draw(rng), rest)[:STYLE] for _ in range(count)])

@@ -22,7 +22,7 @@ import trimesh
 from PIL import Image
 from torch import nn
 
-from echomodel.furniture import Choices, Style, mesh_of, solids
+from echomodel.furniture import draw_choices, draw_style, mesh_of, solids
 from echomodel.late import extra
 from echomodel.metrics.sets import frechet_distance, kernel_distance, with_subsets
 from echomodel.metrics.statistics import Figure, Pair, mean
@@ -40,7 +40,7 @@ def bodies(room: RoomBoxes, seed: int) -> list[trimesh.Trimesh]:
     rng = np.random.default_rng([seed, zlib.crc32(room.id.encode())])
     out = []
     for k, word in enumerate(room.categories):
-        style, choices = Style.draw(rng), Choices.draw(rng)
+        style, choices = draw_style(rng), draw_choices(rng)
         size = np.maximum(room.size[k], 0.02)
         mesh = mesh_of(solids(word, style, choices, size), size)
         matrix = trimesh.transformations.rotation_matrix(float(room.yaw[k]), [0, 1, 0])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.furniture.style import sample_size
+from echomodel.furniture.drawn import sample_size
 from echomodel.objective.access import INTO_BED, OF_CHAIRS, OF_LAMPS
 from echomodel.rooms.floor import Floor, Wall
 from echomodel.rooms.statistics import QUARTILE, room_requests

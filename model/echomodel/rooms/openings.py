@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
+import shapely
 
 from echomodel.boxes2d import footprints
 from echomodel.openings import SWINGS, USUAL, Opening, edge_lengths, free_area, inward_normal, numbered, signed_area
@@ -53,8 +54,6 @@ def _best(
     boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None, use: str,
 ) -> Opening | None:  # fmt: skip
     """The place of least cost among a grid of places on all walls, None where no wall is long enough."""
-    import shapely
-
     lengths = edge_lengths(polygon)
     name = numbered(kind, [opening.name for opening in made])
     sill, tall, wide = WINDOWS[use] if kind == "window" else (0.0, USUAL[kind]["height"], USUAL[kind]["width"])
@@ -108,8 +107,6 @@ def _best(
 
 def _blocks(boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None, above: float) -> np.ndarray:
     """The footprints of the boxes that begin below a door's height and end above another one, metres."""
-    import shapely
-
     if boxes is None:
         return np.array([])
     size, position, yaw = map(np.asarray, boxes)

@@ -10,7 +10,8 @@ from torch import Tensor
 
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import Pairs
-from echomodel.furniture.style import OPEN, draw_styles, sample_size
+from echomodel.furniture.drawn import draw_styles, sample_size
+from echomodel.furniture.style import OPEN
 from echomodel.graph import GraphBatch
 from echomodel.training.rooms import PackedRooms, draw_batch
 from echomodel.training.shape_stage import ShapeBatch, draw_suites, noised

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from echomodel.dressing import KINDS, PRINTS
-from echomodel.furniture import Choices, Style, solids
+from echomodel.furniture import draw_choices, draw_style, solids
 from echomodel.openings import Opening
 from echousd.dressing import floors, tabletops, upholstery, walls
 from echousd.dressing.dress import RULES, bare_walls
@@ -29,7 +29,7 @@ SIZES = {
 
 def stood(word, seed, at, yaw=0.0, name=None):
     rng, size = np.random.default_rng(seed), np.array(SIZES[word])
-    parts = solids(word, Style.draw(rng), Choices.draw(rng), size)
+    parts = solids(word, draw_style(rng), draw_choices(rng), size)
     made = assembled(parts, size, faces=3000, origin=Origin("parts"))
     return standing(name or word, word, size, np.array(at), yaw, made)
 

@@ -285,14 +285,14 @@ def test_doors_stay_free(room):
 
 
 def test_levels_of_a_shelf_have_air_and_what_stands_there_is_left_alone():
-    from echomodel.furniture import Choices, Style, solids
+    from echomodel.furniture import draw_choices, draw_style, solids
     from echousd.dressing.setting import standing
     from echousd.shapes.geometry import Origin
     from echousd.shapes.joinery import assembled
 
     size = np.array([1.0, 1.9, 0.35])
     rng = np.random.default_rng(5)
-    parts = solids("bookshelf", Style.draw(rng), Choices.draw(rng), size)
+    parts = solids("bookshelf", draw_style(rng), draw_choices(rng), size)
     host = standing(
         "shelf", "bookshelf", size, np.zeros(3), 0.0, assembled(parts, size, faces=5000, origin=Origin("x"))
     )

@@ -12,8 +12,8 @@ from shapely.geometry import MultiPoint, Point
 
 from echomodel.data.shapeset import piece as styled
 from echomodel.furniture import solids
+from echomodel.furniture.bent import bent
 from echomodel.furniture.carpentry import box as solid_box
-from echomodel.furniture.solids import bent
 from echomodel.furniture.style import WIDTH, piece_of
 from echomodel.triangles import Mesh, box
 from echomodel.vocabulary import vocabulary

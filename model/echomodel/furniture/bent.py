@@ -1,0 +1,109 @@
+"""Solids that are bent: boards that give to a back, walls round one, leaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from echomodel.furniture.solids import FINEST, Array, Block, Solid, Vector, loft, superellipse
+
+
+@dataclass(frozen=True, eq=False)
+class Bow(Block):
+    """A board with round edges whose middle stands back (-z) by `bow` metres behind its ends at left and right."""
+
+    bow: float = 0.03
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        w, h, t = self.half
+        outline = superellipse(7.0, (4, 8, 12, 16)[detail]) * (t, h)
+        r, turn = max(min(self.radius, w / 2, h / 2), 0.002), np.linspace(0, np.pi / 2, (2, 3, 3, 4)[detail])
+        end, cut = 1 - r * (1 - np.sin(turn)) / w, 1 - r * (1 - np.cos(turn)) / h
+        across = np.concatenate([-end[::-1], np.linspace(-end[0], end[0], (3, 4, 5, 7)[detail])[1:-1], end])
+        tall = np.interp(np.abs(across), end, cut)
+        rings = [np.stack([0 * outline[:, 0] + w * u, outline[:, 1] * high, outline[:, 0] - self.bow * (1 - u * u)], 1)
+                 for u, high in zip(across, tall, strict=True)]  # fmt: skip
+        return loft(rings)
+
+
+@dataclass(frozen=True, eq=False)
+class Shell(Solid):
+    """A standing wall bent round the back: half a superellipse, `half` = half width and depth behind z = 0, metres.
+
+    It is `thickness` thick, rises from y = 0 to `back` in the middle and falls to `front` at its ends; `ease` above 1
+    keeps the back high for longer.
+    """
+
+    half: tuple[float, float] = (1.0, 1.0)
+    thickness: float = 0.1
+    back: float = 0.8
+    front: float = 0.6
+    power: float = 2.5
+    ease: float = 3.0
+    RINGS = (9, 13, 21, 33)  # by detail
+
+    def _top(self, angle: Array) -> Array:
+        return self.back + (self.front - self.back) * np.clip(np.abs(angle) / (np.pi / 2), 0, 1) ** self.ease
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        angle = np.linspace(-np.pi / 2, np.pi / 2, self.RINGS[detail])
+        s, c = np.sin(angle), np.cos(angle)
+        norm = (np.abs(s) ** self.power + np.abs(c) ** self.power) ** (1 / self.power)
+        top, rings = self._top(angle), []
+        turn = np.linspace(0, np.pi, (2, 4, 5, 6)[detail])  # over the wall's top, which is as round as it is thick
+        across, down = np.array([1, 0, *(1 - np.cos(turn)) / 2]), self.thickness / 2 * (1 - np.sin(turn)) * (detail > 0)
+        for sine, cosine, length, high in zip(s, c, norm, top, strict=True):
+            wall = (np.array(self.half) - across[:, None] * self.thickness) * (sine, -cosine) / length
+            rings.append(np.insert(wall, 1, [0, 0, *(high - down)], axis=1))
+        return loft(rings)
+
+    def runs(self, vertices: Array) -> list[Array]:
+        count = next(n for n in self.RINGS if (len(vertices) - 2) % n == 0)
+        rings, ends = vertices[:-2].reshape(count, -1, 3), np.linspace(0, count - 1, 7).round().astype(int)
+        return [rings[first : last + 1].reshape(-1, 3) for first, last in pairwise(ends)]
+
+
+def bent(centre: Vector, half: tuple[float, float], thickness: float, back: float, front: float, **form: Any) -> Shell:
+    """A wall round the back of `centre` (3,), see `Shell`: the upholstered back of a seat, unless said otherwise."""
+    form = {"material": "fabric", "role": "back", **form}
+    return Shell(np.array(centre, float), half=half, thickness=thickness, back=back, front=front, **form)
+
+
+@dataclass(frozen=True, eq=False)
+class Blade(Solid):
+    """A leaf from the origin along +z: pointed at both ends, folded along its middle, its tip bent down by `bend`.
+
+    Arguments:
+        length, width, thick: metres. bend: radians from root to tip. full: where along it is widest, 0 to 1.
+    """
+
+    length: float = 0.3
+    width: float = 0.1
+    thick: float = 0.006
+    bend: float = 0.6
+    full: float = 0.45
+
+    def _spine(self, count: int) -> tuple[Array, Array, Array]:
+        """Points (n, 3) along the middle, their upward normals and half widths."""
+        share = np.linspace(0, 1, count)
+        angle = -self.bend * share
+        step = self.length / (count - 1)
+        middle = (angle[1:] + angle[:-1]) / 2
+        z = np.concatenate([[0], np.cumsum(np.cos(middle) * step)])
+        y = np.concatenate([[0], np.cumsum(np.sin(middle) * step)])
+        normal = np.stack([0 * angle, np.cos(angle), -np.sin(angle)], 1)
+        warped = np.where(share < self.full, share / self.full / 2, 0.5 + (share - self.full) / (1 - self.full) / 2)
+        half = self.width / 2 * np.sin(np.pi * warped) ** 0.8
+        return np.stack([0 * z, y, z], 1), normal, half
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        points, normal, half = self._spine((3, 4, 5, 7)[detail])
+        side = np.array([1.0, 0.0, 0.0])
+        rings = []
+        for point, up, reach in zip(points, normal, np.maximum(half, 0.06 * self.width), strict=True):
+            out, fold, thick = reach * side, 0.25 * reach * up, self.thick / 2 * up
+            rings.append(np.array([point + out + fold, point + thick, point - out + fold, point - thick]))
+        return loft(rings)
