@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageFilter
 from pxr import Usd, UsdGeom, UsdLux
 
 from echomodel.triangles import area_normals
@@ -79,7 +79,8 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
             if picture is not None:  # behind a room that is in focus, what lies around is soft, and in a little haze
                 sharp = Image.fromarray(image_of(str(prim.GetPath()), picture.resolvedPath))
                 soft = sharp.reduce(max(1, round(2 * BLURRED * sharp.width / 360)))  # between its pixels it is
-                view = np.asarray(Image.blend(soft, Image.merge("RGB", [soft.convert("L")] * 3), HAZE))
+                hazy = Image.blend(soft, Image.merge("RGB", [soft.convert("L")] * 3), HAZE)
+                view = np.asarray(hazy.filter(ImageFilter.GaussianBlur(1)))  # else its pixels show as squares
         elif prim.IsA(UsdLux.DistantLight):
             towards = world[:3, 2] / max(float(np.linalg.norm(world[:3, 2])), 1e-9)
             suns.append(np.stack([towards, color]))

@@ -54,8 +54,8 @@ def cafe_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A thin curtain on a rod across a window, below eye level: thick cloth before the light would be a dark fence."""
     w, h, d = size
     rod = tube([(-w / 2, h - 0.012, 0), (w / 2, h - 0.012, 0)], 0.006, "metal")
-    cloth = _hung(np.array([0.97 * w, h - 0.02, d]), rng, FOLD, top=0.7, drift=0.3, narrow=0.0, material="sheer")
-    return [*cloth, *_rings(np.array([w, h, d]), 1.5 * FOLD), rod]
+    cloth = np.array([0.97 * w, h - 0.02, d]), rng, max(FOLD, w / 20)
+    return [*_hung(*cloth, top=0.7, drift=0.3, narrow=0.0, material="sheer"), *_rings(size, 1.5 * FOLD), rod]
 
 
 def _drape(rng: np.random.Generator) -> str:
@@ -89,7 +89,7 @@ def _hung(
     along = turn / (2 * np.pi * count) - 0.5
     uneven = 0.8 + 0.2 * np.sin(0.43 * turn + phase[1])
     rows = []
-    for share in np.linspace(0, 1, 7 if count < 5 or tied else 5):
+    for share in np.linspace(0, 1, 7 if count < 5 or tied else 5 if h > 1 else 3):
         slack = 1 - share
         waist = tied * np.exp(-(((share - 0.38) / 0.16) ** 2))
         wide = (1 - narrow * share) * (1 - waist) * w

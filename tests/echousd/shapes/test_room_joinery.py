@@ -10,6 +10,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 from shapely.geometry import MultiPoint, Point
 
+from echomodel import dressing
 from echomodel.data.shapeset import piece as styled
 from echomodel.furniture import solids
 from echomodel.furniture.bent import bent
@@ -69,6 +70,14 @@ def test_solids_that_the_budget_has_no_room_for_are_told_of():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         within_budget(parts, SIZE, 9000)
+
+
+@pytest.mark.parametrize("wide", [0.6, 2.4, 3.6])
+def test_a_wide_window_has_the_cloth_of_its_curtain(wide):
+    size, made = np.array([wide, 0.68, 0.026]), dressing.KINDS["cafe_curtain"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        within_budget(dressing.thing("cafe_curtain", size, np.random.default_rng(0)), size, made.faces)
 
 
 @pytest.mark.parametrize("category", [row.name for row in vocabulary().categories if row.support in ("floor", "table")])
