@@ -17,6 +17,7 @@ from echomodel.config import CompactConfig, from_dict
 from echomodel.echo import EchoModel
 from echomodel.furniture.style import WIDTH
 from echomodel.graph import GraphBatch
+from echomodel.metrics import pointsets
 from echomodel.protocols import GraphEdit
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
@@ -105,18 +106,21 @@ def test_samples_are_the_same_on_another_device(device, model, rooms):
 
 
 class Grids:
-    """A shape set of noise."""
+    """A shape set of balls: noise has a surface in every cell."""
 
     held_out = np.arange(6) >= 4
 
     def tsdf(self, numbers):
-        return np.stack([np.random.default_rng(n).uniform(-1, 1, (64, 64, 64)).astype(np.float32) for n in numbers])
+        away = np.linalg.norm(np.indices((64, 64, 64)) - 31.5, axis=0)
+        return np.stack([np.clip((away - 12 - n) / 4, -1, 1).astype(np.float32) for n in numbers])
 
 
 @pytest.fixture(autouse=True)
 def few_styles_and_steps(monkeypatch):
     monkeypatch.setattr(parts_stage, "STYLES", 20)
     monkeypatch.setattr(parts_stage, "HELD", 5)
+    monkeypatch.setattr(pointsets, "SAMPLES", 200)
+    monkeypatch.setattr(pointsets, "DENSE", 1000)
     monkeypatch.setattr("echomodel.compact.sampling.AFTER", 2)  # of forty equal steps
 
 
