@@ -11,10 +11,9 @@ from echomodel.boxes2d import axes, upright
 
 CUT = 3.0  # how much more what is cut off by a picture's border disturbs
 ASPECT = 1.6  # of a picture from inside: its width over its height
-# rays through such a picture whose half width at distance 1 is 1, which go level, and what each of these counts
+# rays through such a picture whose half width at distance 1 is 1, and what each of these counts
 SPREAD = np.arange(-6, 7) / 6
 RAYS = np.stack([*(g.ravel() for g in np.meshgrid(SPREAD, SPREAD / ASPECT)), np.full(169, -1.0)], 1)
-AHEAD = RAYS[:, 1] == 0
 # of a box whose size is 1: its corners, and the points that are looked for in it
 CUBE = np.stack(np.meshgrid((-0.5, 0.5), (0.0, 1.0), (-0.5, 0.5), indexing="ij"), -1).reshape(-1, 3)
 GRID = np.stack(np.meshgrid(*[(-0.45, 0.0, 0.45)] * 3, indexing="ij"), -1).reshape(-1, 3)
@@ -50,9 +49,9 @@ class Furniture:
         every = [self, *(other for other in others if other is not None)]
         return Furniture(*(np.concatenate([getattr(one, f.name) for one in every]) for f in fields(Furniture)))
 
-    def met(self, view: np.ndarray, half: float, near: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """(169,) int which box is the nearest along each of `RAYS` through a picture from inside, and metres to it,
-        inf where there is none.
+    def met(self, view: np.ndarray, half: float, near: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(169,) int which box is the nearest along each of `RAYS` through a picture from inside, metres to it, inf
+        where there is none, and how far the ray goes where the box looks, 1 = straight at its back.
 
         `view`: (4, 4) float camera to world. `half`: half of the picture's width at distance 1. `near`: metres ahead
         from where on things are seen.
@@ -65,8 +64,8 @@ class Furniture:
         way = (turn.reshape(-1, 3) @ ways.T).reshape(len(turn), 3, -1).transpose(0, 2, 1)
         enter, leave = _crossing(start[:, None], way, 0.5 * self.size[:, None])
         away = np.where((enter < leave) & (leave > begin), np.maximum(enter, begin), np.inf)
-        which = away.argmin(0)
-        return which, away[which, np.arange(len(RAYS))]
+        nearest = away.argmin(0), np.arange(len(RAYS))
+        return nearest[0], away[nearest], way[..., 2][nearest]
 
     def blocked(self, eye: np.ndarray, others: Furniture | None = None) -> tuple[np.ndarray, np.ndarray]:
         """(n, 27, 3) points in each box, metres, and (n, 27) whether another or one of `others` hides them."""

@@ -15,7 +15,7 @@ from echomodel.boxes2d import axes
 from echomodel.openings import direction, edge_lengths, inward_normal, rectangle
 from echomodel.triangles import cross
 from echousd.draw.scenery import Scenery
-from echousd.draw.sight import AHEAD, ASPECT, RAYS, Furniture, filled
+from echousd.draw.sight import ASPECT, RAYS, Furniture, filled
 from echousd.naming import free_name
 from echousd.stage.units import metres_per_unit, up_axis
 
@@ -40,7 +40,9 @@ FILLED, BEHIND = 650.0, 90.0  # metres of depth that a picture full of what is n
 CUTS, HIGH = ((90.0, 40.0), (25.0, 0.0), (25.0, 0.0)), 0.25
 SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width over which it is cord; metres
 UNSEEN, MANY = 6.0, 8.0  # metres of depth that each of so many pieces in the picture is worth
-SHOWN, FAR = 30.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
+# And a picture full of furniture; a metre towards where it looks, up to so many; of what each loses a picture full: of
+# backs, seen where the cosine is larger, and of ceiling. By choices of 40 pictures among eight each.
+SHOWN, FACED, AHEAD, BACKS, AVERTED, OVERHEAD = 30.0, 20.0, 1.0, 320.0, 0.25, 250.0
 STEPS = (0.2, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
 # Or so far behind a wall, which its near plane cuts away, and so much of the room with what hangs and stands there.
 BEYOND, THROUGH = (0.6, 1.2, 2.0), (0.3, 0.5, 0.7, 0.9)
@@ -103,9 +105,9 @@ def inside_view(
     view inside a room, its main piece whole.
 
     Of all eyes, headings and lenses those count that have the main piece whole in the picture; of these the one that
-    hides and cuts off least of what stands and hangs, has most furniture and depth in its picture and little that is
-    near, the main piece in its middle third, and no bare wall over a third of it. Where there is no room for a lens
-    that draws things as they are, the camera stands behind a wall and looks straight through it.
+    hides and cuts off least of what stands and hangs, has most furniture in its picture, not its backs, little ceiling
+    and little that is near, the main piece in its middle third, and no bare wall over a third of it. Where there is no
+    room for a lens that draws things as they are, the camera stands behind a wall and looks straight through it.
 
     Arguments:
         floor: (k, 2) float, x and z of the corners, metres.
@@ -134,12 +136,13 @@ def inside_view(
     def merit(shot: Shot) -> float:
         """Metres of depth that a view is worth."""
         eye, half = shot.view[:3, 3], APERTURE / 2 / shot.lens
-        which, away = everything.met(shot.view, half, shot.near)
+        which, away, along = everything.met(shot.view, half, shot.near)
+        shown, above = np.isfinite(away) & (which < count), RAYS[:, 1] * half > shot.view[1, 2]
         seen = (~shot.blocked & (_aside(shot.points, shot.view) <= half)).mean(-1).sum()
         bare = barest_share(which, np.where(row[which] < len(row) - len(floor), np.inf, away), height, shot.view, half)
         return (
-            float(np.minimum(away[AHEAD], FAR).mean() + (eye[[0, 2]] - middle) @ furniture.facing)
-            + UNSEEN * min(seen, MANY) + SHOWN * float((np.isfinite(away) & (which < count)).mean())
+            FACED * min(float((eye[[0, 2]] - middle) @ furniture.facing), AHEAD) + UNSEEN * min(seen, MANY)
+            + float((SHOWN * shown - BACKS * (shown & (along > AVERTED)) - OVERHEAD * (above & np.isinf(away))).mean())
             - FILLED * filled(away, reach[which]) - BARE * max(0.0, bare - BAREST) - shot.cost
         )  # fmt: skip
 

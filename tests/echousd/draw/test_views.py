@@ -37,7 +37,7 @@ def fills(things: Furniture, view: np.ndarray, half: float, reach: float, near: 
 
 
 def bare_walls(things: list[Furniture], view: np.ndarray, half: float, near: float = 0.0) -> float:
-    which, away = boxes().with_others(*things, _walls(FLOOR, 2.8)).met(view, half, near)
+    which, away, _ = boxes().with_others(*things, _walls(FLOOR, 2.8)).met(view, half, near)
     bare = np.where(which < sum(len(some.size) for some in things), np.inf, away)
     return barest_share(which, bare, 2.8, view, half)
 
@@ -149,6 +149,22 @@ NOTCHED = np.array([(0.0, 0.0), (0.0, 4.6), (2.8, 4.6), (2.8, 2.6), (5.2, 2.6), 
 FLOORS = [FLOOR, NOTCHED, NOTCHED[:, ::-1]]
 MAIN = [(1.8, 1.0, 2.1), (2.4, 0.85, 0.95), (1.6, 0.75, 0.9)]  # bed, sofa, table
 PLACES = [(1.3, 1.2), (1.4, 3.2), (3.8, 1.3)]
+
+
+def test_the_camera_sees_seats_from_before_rather_than_their_backs() -> None:
+    floor = np.array([(0.0, 5.4), (3.4, 5.4), (3.4, 3.0), (6.0, 3.0), (6.0, 0.0), (0.0, 0.0)])
+    right, back = np.pi / 2, np.pi
+    things = boxes(
+        (2.0, 0.82, 0.84, 0.42, 0.0, 3.79, right), (0.68, 0.48, 0.67, 1.63, 0.0, 3.59, right),
+        (1.74, 0.67, 0.41, 3.2, 0.0, 3.79, -right), (1.12, 0.78, 0.64, 4.63, 0.0, 2.62, back),
+        (0.57, 0.88, 0.54, 4.63, 0.0, 2.1, 0.0), (0.87, 1.03, 0.23, 0.16, 0.0, 1.36, right),
+        (0.96, 0.89, 0.85, 1.72, 0.0, 2.58, 0.0), (0.43, 1.49, 0.43, 3.72, 0.0, 2.62, back),
+    )  # fmt: skip
+    view, lens, near = inside_view(floor, things, 2.8, main=0)
+    which, away, along = things.with_others(_walls(floor, 2.8)).met(view, APERTURE / 2 / lens, near)
+    shown = np.isfinite(away) & (which < len(things.size))
+    assert shown.mean() > 0.3  # before backs counted: 0.25
+    assert (shown & (along > 0.25)).mean() < 0.02  # 0.05
 
 
 @pytest.mark.parametrize("number", range(9))  # every pair of floor, piece and place
