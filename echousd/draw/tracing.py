@@ -292,8 +292,9 @@ def _pooled(seen: Seen, light: np.ndarray) -> np.ndarray:
     cell = (1 << np.arange(48, 0, -8)) @ np.concatenate([low, np.rint(2 * seen.normal) + 2]).astype(np.int64)
     share = np.stack([1 + low - place, place - low])
     weight = np.stack([share[x, 0] * share[y, 1] * share[z, 2] for x, y, z in CORNERS])
-    _, corner = np.unique(cell + CORNERS @ (1 << np.array([48, 40, 32]))[:, None], return_inverse=True)
-    corner = corner.reshape(weight.shape)
+    cells, own = np.unique(cell, return_inverse=True)  # many places are in one
+    _, number = np.unique(cells + CORNERS @ (1 << np.array([48, 40, 32]))[:, None], return_inverse=True)
+    corner = np.asarray(number.reshape(len(CORNERS), -1).take(own, 1))
     held = np.stack([np.bincount(corner.ravel(), (weight * part).ravel()) for part in (np.ones(len(cell)), *light)])
     taken = (held.take(corner, 1) * weight).sum(1)
     return np.asarray(taken[1:] / np.maximum(taken[0], 1e-9), np.float32)

@@ -147,8 +147,9 @@ def ends_used(plan: Plan) -> Found:
     for there, first, last, width, _ in _large(plan):
         row = xp.arange(len(there))
         start = xp.concat([0.0 * last[:, :1], last], 1)  # of what may be bare: the wall, the far side of each piece
-        beyond = held(last[:, None]) > held(start[:, :, None]) + 1e-6  # (s, n + 1, n, 2), what ends further on
-        end = xp.amin(xp.where(beyond, first[:, None], 1.0), 2)
+        near, far, since = (xp.stack([of[..., 0], of[..., 1]], 1) for of in (first, last, start))  # (s, 2, n), in rows
+        beyond = held(far[:, :, None]) > held(since[..., None]) + 1e-6  # (s, 2, n + 1, n), what ends further on
+        end = xp.amin(xp.where(beyond, near[:, :, None], 1.0), 3).swapaxes(1, 2)
         ends = (start <= 0.0) | (end >= 1.0)
         most = xp.where(ends, at_least(SHORT / width, BARE_END), at_least(SPARE / width, BARE_STRIP))
         margin = (most - end + start).reshape(len(there), -1)
@@ -307,8 +308,6 @@ def _free_beside(plan: Plan, who: Array) -> Array:
     asked[who % len(asked)] = True
     others = plan.standing & ~plan.of("seat", "light") & (plan.size[:, 1] > CLEAR_HEIGHT)
     j, k = plan.pairs(asked, others, least=True)
-    if not len(j):
-        return walls
     lateral, forward = plan.local(k, j)
     wide, deep = plan.reach(k, j)
     ahead, aside = abs(forward) - deep - plan.size[j, 2] / 2, abs(lateral) - wide - plan.size[j, 0] / 2
