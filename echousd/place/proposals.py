@@ -225,8 +225,7 @@ def _as_stated(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int) 
 
 
 def twins(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int) -> list[Row]:
-    """For a bed that is told to share a nightstand: beside the other one, with room for it between; a child's goes to
-    the ends of walls, where another lies along it."""
+    """For a bed that is told to share a nightstand: beside the other one, with room for it between."""
     rows: list[Row] = []
     for one in problem.stated:
         if i in one.others and len(one.others) == 2 and problem.slot_roles[one.subject] == "head":
@@ -235,9 +234,6 @@ def twins(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int) -> li
             back = (problem.size[i, 2] - problem.size[other, 2]) / 2
             slots = [(side * apart, back, 0.0, 0.0) for side in (-1.0, 1.0)]
             rows += [out_of(position[other], float(yaw[other]), slot) for slot in slots]
-    if not rows and problem.kinds[i].sgfront == "kids_bed":
-        at = [list(wall) for _, wall in groupby(along_walls(problem, i, 0.0), key=lambda row: row[2])]
-        rows = [row for wall in at for row in (wall[0], wall[-1])]
     return rows
 
 

@@ -135,9 +135,9 @@ def sofa_ahead(plan: Plan) -> Found:
     return joined(ahead, replace(behind, words=behind.words + 1))
 
 
-# Share of a room's length from a wall to the nearest large piece: 87 % of real rooms; from one such piece to the next:
-# 98 %; metres of each that are never bare.
-BARE_END, BARE_STRIP, SHORT, SPARE = 0.45, 0.4, 1.6, 2.5
+# Share of a room's extent from a wall to the nearest large piece: 87 % of real rooms, of the longer one: 84 %; from one
+# such piece to the next: 98 %; metres of each that are never bare.
+BARE_END, BARE_LONG, BARE_STRIP, SHORT, SPARE = 0.45, 0.37, 0.4, 1.6, 2.5
 HALF, LONG = 0.3, 4.5  # of an even share of the large pieces that half of such a length has, metres
 
 
@@ -151,7 +151,8 @@ def ends_used(plan: Plan) -> Found:
         beyond = held(far[:, :, None]) > held(since[..., None]) + 1e-6  # (s, 2, n + 1, n), what ends further on
         end = xp.amin(xp.where(beyond, near[:, :, None], 1.0), 3).swapaxes(1, 2)
         ends = (start <= 0.0) | (end >= 1.0)
-        most = xp.where(ends, at_least(SHORT / width, BARE_END), at_least(SPARE / width, BARE_STRIP))
+        bare = xp.where(width > width[[1, 0]], BARE_LONG, BARE_END)
+        most = xp.where(ends, xp.maximum(SHORT / width, bare), at_least(SPARE / width, BARE_STRIP))
         margin = (most - end + start).reshape(len(there), -1)
         widest = held(margin).argmin(1)
         nearest = held(first)[row, :, widest % 2].argmin(1)
@@ -247,18 +248,18 @@ def elbow_room(plan: Plan) -> Found:
 
 
 def chairs_balanced(plan: Plan) -> Found:
-    """As many sit at one side of a table as opposite, but for one where their number is odd, or no room is there."""
+    """As many sit at one side of a table as opposite, but for an odd one, two at a corner or no room."""
     seats, xp = seats_at(plan), plan.kit
     who, free = _free_sides(plan)
     places = at_least((held(plan.size)[:, 0] / ELBOW).round(), 1.0)  # a bench counts for several chairs
     count = sum_of(seats.side, places[seats.i], 4 * len(plan)).reshape(-1, 2, 2)[who]
     one, other, free = count[..., 0], count[..., 1], free.reshape(-1, 2, 2)
     room = xp.where(other < one, free[..., 1], free[..., 0]) | (xp.minimum(one, other) > 0)
-    more = (abs(one - other) * room).sum(-1)
+    uneven, seated = abs(one - other) * room, count.sum((1, 2))
+    more = xp.where(seated > 2, uneven.sum(-1), 2 * at_least(xp.amax(uneven, 1) - 1, 0.0))
     i, j = plan.attended("at", "foot")  # who stands far off, too
     total = sum_of(j, places[i], len(plan))[who]
-    some = count.sum((1, 2)) > 2  # two may sit around a corner
-    return found(who[some], (total % 2 + 0.5 - more)[some], measure=more[some])
+    return found(who, total % 2 + 0.5 - more, measure=more)
 
 
 def bench_fits(plan: Plan) -> Found:

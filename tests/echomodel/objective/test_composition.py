@@ -169,16 +169,18 @@ def test_a_small_room_has_no_circle_so_bare_as_a_hall_may():
     assert composition.bare_limit(100.0, 25) == pytest.approx(1.0 * 2)
 
 
-@pytest.mark.parametrize(("middle", "margin"), [(-2.0, -0.175), (-0.2, 0.05)])
+@pytest.mark.parametrize(("middle", "margin"), [(-2.0, -0.205), (-0.2, 0.02)])
 def test_no_end_of_a_hall_is_bare(middle, margin):
-    group = [("sofa", (2.0, 0.85, 0.95), (middle, -1.6), 0.0), ("coffee_table", (1.2, 0.4, 0.6), (middle, -0.5), 0.0)]
+    group = [("sofa", (2.8, 0.85, 0.95), (middle, -1.6), 0.0), ("coffee_table", (1.2, 0.4, 0.6), (middle, -0.5), 0.0)]
     stand = ("tv_stand", (1.6, 0.5, 0.4), (middle, 2.0), np.pi)
     plants = [("plant", (0.7, 1.2, 0.7), (x, 2.0), 0.0) for x in (-3.6, 3.6)]  # no plant fills an end
     found, rows, boxes = seen(composition.ends_used, [*group, stand, *plants], (8.0, 5.0))
     assert found == {0: pytest.approx(margin)}  # from the sofa's end to the wall at the right
-    assert rows.measure.tolist() == [pytest.approx(100 * (0.45 - margin))]
+    assert rows.measure.tolist() == [pytest.approx(100 * (0.37 - margin))]
     rows.margin.sum().backward()
     assert float(boxes.position.grad[0, 0]) == pytest.approx(1 / 8)
+    square = seen(composition.ends_used, [*group, stand, *plants], (8.0, 8.0))[0]  # has no longer extent
+    assert square == {0: pytest.approx(margin + 0.08)}
     assert seen(composition.ends_used, group, (8.0, 5.0))[0] == {}  # so few fill no hall
     table = ("dining_table", (1.2, 0.75, 0.9), (-0.5, 0.0), 0.0)  # 1.5 m of 3.2 m are no bare end
     assert seen(composition.ends_used, [table, *plants, *plants], (3.2, 2.8))[0] == {
@@ -267,8 +269,11 @@ def test_as_many_sit_at_one_side_of_a_table_as_opposite(front, back, margin, mor
     assert rows.measure.tolist() == [pytest.approx(more)]
 
 
-def test_two_sit_as_they_like_and_nobody_is_missed_where_no_room_is():
-    assert seen(composition.chairs_balanced, sides(2, 0))[0] == {}
+def test_two_sit_opposite_or_around_a_corner_and_nobody_is_missed_where_no_room_is():
+    assert seen(composition.chairs_balanced, sides(2, 0))[0] == {0: pytest.approx(-1.5)}
+    assert seen(composition.chairs_balanced, sides(1, 1))[0] == {0: pytest.approx(0.5)}
+    corner = seated(((0.0, 0.65), np.pi), ((0.85, 0.0), -HALF))
+    assert seen(composition.chairs_balanced, corner)[0] == {0: pytest.approx(0.5)}
     shelf = [("bookshelf", (1.6, 2.0, 0.3), (0.0, -1.0), 0.0)]
     assert seen(composition.chairs_balanced, sides(3, 0) + shelf)[0] == {0: pytest.approx(1.5)}
 
