@@ -123,7 +123,7 @@ SHARE = 0.3  # share of a front's width that may be covered
 BEDSIDE = 0.3  # metres beside a bed
 # Width from which on two sleep in a bed, metres beside it then, and to spare at its other side if one leaves less.
 FOR_TWO, AT_TWO, SPARE = 1.35, 0.45, 0.6
-# Metres between a bed's side and the wall that it stands at, and from which on a child's stands free.
+# Metres between a bed's side and the wall that it stands at, and from which on a wide one of a child stands free.
 SLIT, AMID = 0.1, 0.7
 INTO_BED, OF_LAMPS, OF_CHAIRS = 0.6, 0.6, 0.2  # metres between a plant and a bed's side, a floor lamp, a chair
 LEAF = 0.1  # share of storage's front at either end that a door may open before
@@ -159,7 +159,7 @@ def before_fronts(plan: Plan, opens: Array, depth: Array) -> Found:
 
 def bed_side_free(plan: Plan) -> Found:
     """At least one long side of a bed can be reached, below the nightstands, both of one for two where there is room;
-    the other is at the wall, not near it: that of a child's bed at least there, or at something."""
+    the other is at the wall, not near it: that of a narrow child's bed always, or at something."""
     beds = plan.of("bed") & plan.standing
     who, xp = plan.those(beds), plan.kit
     i, j = plan.pairs(beds, plan.standing & ~plan.stands("head") & ~plan.movable, least=True)
@@ -172,9 +172,10 @@ def bed_side_free(plan: Plan) -> Found:
         free.append(xp.minimum(plan.worst(i, beside, j)[0][who], gaps[-1]))
     most, least, wall = xp.maximum(*free), xp.minimum(*free), xp.minimum(*gaps)
     child = plan.which(lambda kind: kind.sgfront == "kids_bed")[who]
-    two, near = (plan.size[who, 0] > FOR_TWO) & ~child, xp.where(child, least, wall)
+    wide, near = plan.size[who, 0] > FOR_TWO, xp.where(child, least, wall)
+    two, free_of = wide & ~child, xp.where(child, xp.where(wide, AMID, FAR), BEDSIDE)
     both = xp.where(two, xp.maximum(least - BEDSIDE, SPARE + least - most), FAR)
-    slit = xp.maximum(near - xp.where(child, AMID, BEDSIDE), SLIT - near)
+    slit = xp.maximum(near - free_of, SLIT - near)
     margins = [most - xp.where(two, AT_TWO, BEDSIDE), both, slit]
     return first_of(who, xp.full_like(who, -1), margins, [most, least, near])
 

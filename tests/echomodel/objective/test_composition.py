@@ -358,13 +358,16 @@ def test_a_bed_leaves_no_slit_to_the_wall(gap, margin):
 
 
 @pytest.mark.parametrize("word", ["kids_bed", "cot"])
-@pytest.mark.parametrize(("x", "margin"), [(-1.95, 0.05), (-1.5, -0.2), (-1.25, 0.05)])
-def test_a_childs_bed_lies_along_a_wall_or_free(word, x, margin):
-    bed, shelf = (word, (1.0, 0.8, 1.8), (x, -1.1), 0.0), ("bookshelf", (0.8, 1.5, 0.3), (x + 0.75, -1.0), HALF)
+@pytest.mark.parametrize(("width", "gap", "margin"), [
+    (1.0, 0.05, 0.05), (1.0, 0.3, -0.2), (1.0, 0.75, -0.65), (1.5, 0.05, 0.05), (1.5, 0.3, -0.2), (1.5, 0.75, 0.05),
+])  # fmt: skip
+def test_a_childs_bed_lies_along_a_wall_or_is_wide_and_free(word, width, gap, margin):
+    bed = (word, (width, 0.8, 1.8), (width / 2 + gap - 2.5, -1.1), 0.0)
     found, rows, _ = seen(access.bed_side_free, [bed])
     assert found == {0: pytest.approx(margin)}
     assert rows.words.tolist() == [2]
-    beside = seen(access.bed_side_free, [(*bed[:2], (0.0, -1.1), 0.0), (*shelf[:2], (0.7, -1.0), HALF)])[0]
+    shelf = ("bookshelf", (0.8, 1.5, 0.3), (width / 2 + 0.2, -1.0), HALF)
+    beside = seen(access.bed_side_free, [(word, bed[1], (0.0, -1.1), 0.0), shelf])[0]
     assert beside == {0: pytest.approx(0.05)}  # along what stands there
 
 
