@@ -10,7 +10,7 @@ from pathlib import Path
 from PIL import Image
 from pxr import Usd
 
-from echousd.draw.outside import turning_views
+from echousd.draw.outside import turning_views, without_near_walls
 from echousd.draw.rendering import HERO, as_image, cameras_of, render_stage, scenery_of
 from echousd.draw.tracing import FINE, QUICK, trace
 from echousd.stage.files import open_stage
@@ -77,7 +77,7 @@ def render_turn(
     with _showing(path, layout, light) as stage:
         scenery = scenery_of(stage, size, colors)
     return [
-        as_image(trace(scenery.without_near_walls(view.matrix[:3, 3]), view, size, rays=rays))
+        as_image(trace(without_near_walls(scenery, view.matrix[:3, 3]), view, size, rays=rays))
         for view in turning_views(scenery, frames)
     ]
 

@@ -1,6 +1,7 @@
 """Where a camera stands outside of what it shows: above, at a corner, or all around."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,25 @@ from echousd.draw.views import APERTURE, FOCAL_LENGTH, MARGIN, View, view_matrix
 RISE = 0.62  # of a camera outside over the room's middle, for a metre that it is away
 WIDE = 7.0  # metres of a scene from which on it is seen from higher up: over the walls of several rooms
 FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than their sides is worth
+
+
+def without_near_walls(scenery: Scenery, eye: np.ndarray) -> Scenery:
+    """The scene without the walls between the middle of the room and an eye outside, as in a doll's house."""
+    lower, upper = scenery.bounds
+    middle = (lower + upper) / 2
+    keep, seen = np.ones(len(scenery.triangles), bool), np.ones(len(scenery.panes), bool)
+    for number in range(int(scenery.wall.max(initial=-1)) + 1):
+        faces = scenery.wall == number
+        corners = scenery.triangles[faces].reshape(-1, 3)
+        away = (corners.min(0) + corners.max(0)) / 2 - middle
+        if (away * (eye - middle))[[0, 2]].sum() > 0:
+            keep &= ~faces
+            seen &= scenery.pane_wall != number
+    if keep.all() or not keep.any():
+        return scenery
+    names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "st", "texture", "wall")
+    fewer = {name: getattr(scenery, name)[keep] for name in names}
+    return replace(scenery, panes=scenery.panes[seen], pane_wall=scenery.pane_wall[seen], **fewer)
 
 
 def perspective_views(points: np.ndarray, furniture: Furniture) -> list[np.ndarray]:
@@ -53,7 +73,7 @@ def top_view(scenery: Scenery) -> View:
 def corner_views(scenery: Scenery) -> Iterator[tuple[View, Scenery]]:
     """From above each corner, the view where least is hidden first, and what it shows: near walls are left out."""
     for matrix in perspective_views(_outermost(scenery), scenery.furniture()):
-        shown = scenery.without_near_walls(matrix[:3, 3])
+        shown = without_near_walls(scenery, matrix[:3, 3])
         if shown is not scenery:
             matrix = framed(_outermost(shown), matrix[:3, 2])
         yield View(matrix, APERTURE / 2 / FOCAL_LENGTH, False), shown

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import colorsys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from typing import Any, NamedTuple
 
@@ -71,24 +71,6 @@ class Scenery:
     def closed(self) -> bool:
         """Whether there are walls around it."""
         return bool((self.wall >= 0).any())
-
-    def without_near_walls(self, eye: np.ndarray) -> Scenery:
-        """The scene without the walls between the middle of the room and an eye outside, as in a doll's house."""
-        lower, upper = self.bounds
-        middle = (lower + upper) / 2
-        keep, seen = np.ones(len(self.triangles), bool), np.ones(len(self.panes), bool)
-        for number in range(int(self.wall.max(initial=-1)) + 1):
-            faces = self.wall == number
-            corners = self.triangles[faces].reshape(-1, 3)
-            away = (corners.min(0) + corners.max(0)) / 2 - middle
-            if (away * (eye - middle))[[0, 2]].sum() > 0:
-                keep &= ~faces
-                seen &= self.pane_wall != number
-        if keep.all() or not keep.any():
-            return self
-        names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "st", "texture", "wall")
-        fewer = {name: getattr(self, name)[keep] for name in names}
-        return replace(self, panes=self.panes[seen], pane_wall=self.pane_wall[seen], **fewer)
 
     @cached_property
     def largest(self) -> tuple[int, int]:

@@ -18,7 +18,7 @@ from echousd.graph.nodes import Node, Placed, PlainModel, Relation, RoomSpec
 if TYPE_CHECKING:
     from echousd.graph.difference import GraphDiff
 
-graph_from_text = Late("echousd.graph.text:graph_from_text")
+graph_from_text, short_text = (Late(f"echousd.graph.text:{name}") for name in ("graph_from_text", "short_text"))
 steps_between = Late("echousd.graph.difference:GraphDiff.between")
 name_of = Late("echousd.graph.titles:name_of")
 
@@ -175,17 +175,7 @@ class SceneGraph(PlainModel):
 
     def to_yaml(self) -> str:
         """The short YAML form that a person would write."""
-        form = plain(self)
-        room = form["room"]
-        lines = [f"room: {flow(room['type'] if len(room) == 1 else room)}", "objects:"]
-        for node in form["nodes"]:
-            name = node.pop("name")
-            lines.append(f"  {flow(name)}: {flow(node['category'] if len(node) == 1 else node)}")
-        if self.relations:
-            lines.append("relations:")
-        for relation, entry in zip(self.relations, form["relations"], strict=True):
-            lines.append(f"  - {relation if len(entry) == 3 else flow(entry)}")
-        return "\n".join(lines) + "\n"
+        return str(short_text(self))
 
 
 def plain(graph: SceneGraph) -> dict[str, Any]:
@@ -199,13 +189,3 @@ def plain(graph: SceneGraph) -> dict[str, Any]:
         "nodes": list(map(stated, graph.nodes)),
         "relations": list(map(stated, graph.relations)),
     }
-
-
-def flow(value: Any) -> str:
-    """`value` on one line of YAML."""
-    import yaml
-
-    from echousd.graph.syntax import Dumper
-
-    text = yaml.dump(value, Dumper=Dumper, default_flow_style=True, width=10**9, sort_keys=False, allow_unicode=True)
-    return text.removesuffix("\n").removesuffix("\n...").strip()

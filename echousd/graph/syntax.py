@@ -166,3 +166,9 @@ def _scalar(node: yaml.Node) -> Any:
     except (KeyError, ValueError):
         raise GraphError(f"line {line}: {shown(text)} is no {kind}") from None
     raise GraphError(f"line {line}: YAML tag {node.tag!r} is not read here, allowed: plain values")
+
+
+def flow(value: Any) -> str:
+    """`value` on one line of YAML."""
+    text = yaml.dump(value, Dumper=Dumper, default_flow_style=True, width=10**9, sort_keys=False, allow_unicode=True)
+    return text.removesuffix("\n").removesuffix("\n...").strip()

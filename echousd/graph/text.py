@@ -20,15 +20,15 @@ from echousd.graph.consistency import MAX_ERRORS, GraphError, listed, name_fault
 from echousd.graph.fields import IDENTIFIER, shown
 from echousd.graph.nodes import Node, Placed, PlainModel, Relation, RoomSpec
 from echousd.graph.openings import LISTS, listed_words, opening_from_words
+from echousd.graph.scene import SceneGraph, plain
 from echousd.graph.titles import composed, identifier_of, is_title, name_of, with_names
 
 if TYPE_CHECKING:
-    from echousd.graph.scene import SceneGraph
     from echousd.graph.syntax import Located, Path
 
 Built = TypeVar("Built", bound=PlainModel)
 Read = TypeVar("Read")
-parse_json, parse_yaml = Late("echousd.graph.syntax:parse_json"), Late("echousd.graph.syntax:parse_yaml")
+flow, parse_json, parse_yaml = (Late(f"echousd.graph.syntax:{name}") for name in ("flow", "parse_json", "parse_yaml"))
 TOP_KEYS = ("room", "objects", "nodes", "relations", *LISTS)
 
 
@@ -396,3 +396,18 @@ def without(graph: SceneGraph, text: str) -> SceneGraph:
         listed = ", ".join(map(str, held)) or "nothing"
         raise GraphError(f"'{stated}' is not stated in this graph; of the place of {stated.subject}: {listed}")
     return graph.update_node(stated.subject, **dict.fromkeys(placed_fields(stated)))
+
+
+def short_text(graph: SceneGraph) -> str:
+    """The short YAML form of a graph, which a person would write."""
+    form = plain(graph)
+    room = form["room"]
+    lines = [f"room: {flow(room['type'] if len(room) == 1 else room)}", "objects:"]
+    for node in form["nodes"]:
+        name = node.pop("name")
+        lines.append(f"  {flow(name)}: {flow(node['category'] if len(node) == 1 else node)}")
+    if graph.relations:
+        lines.append("relations:")
+    for relation, entry in zip(graph.relations, form["relations"], strict=True):
+        lines.append(f"  - {relation if len(entry) == 3 else flow(entry)}")
+    return "\n".join(lines) + "\n"

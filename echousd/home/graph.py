@@ -22,7 +22,8 @@ from echousd.graph import GraphError, RoomSpec, SceneGraph, starting_graph
 from echousd.graph import fields as field
 from echousd.graph.nodes import PlainModel
 from echousd.graph.openings import LISTS
-from echousd.graph.scene import flow, plain
+from echousd.graph.scene import plain
+from echousd.graph.syntax import flow
 from echousd.graph.text import graph_from_plain, only_fields
 
 if TYPE_CHECKING:

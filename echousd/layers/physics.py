@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from pxr import Gf, Usd
+from pxr import Gf
 
 from echomodel.dressing import SMALL
 from echomodel.furniture.solids import Joint
@@ -14,7 +14,7 @@ from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.geometry import FRAME, Geometry, Mass
 from echousd.shapes.hulls import hull_volume
 from echousd.shapes.matter import mass_of, write_mass
-from echousd.stage.paths import GEO, MTL, SHELL, piece_name, piece_of, piece_path
+from echousd.stage.paths import MTL, SHELL, piece_name, piece_path
 from echousd.stage.pen import ARTICULATED, ARTICULATION, Pen
 
 SCENE = "/Room/PhysicsScene"
@@ -153,12 +153,3 @@ def _joint(pen: Pen, path: str, still: str, moving: str, joint: Joint, places: t
     }  # fmt: skip
     apis = [f"PhysicsDriveAPI:{drive.partition(':')[2]}", FRICTION_API]
     pen.define(path, "PhysicsPrismaticJoint" if slides else "PhysicsRevoluteJoint", values, apis)
-
-
-def read_joints(root: Usd.Prim, asset: str) -> tuple[Joint, ...]:
-    """Names of the bodies of an asset that move, as joints without places: its files are carried on as they are."""
-    geo = root.GetChild(GEO)
-    below = geo.GetChildren() if geo else ()
-    bodies = [piece_of(asset, prim.GetName()) for prim in below if prim.GetTypeName() == "Xform"]
-    moving = [body for body in bodies if body and body != FRAME]
-    return tuple(Joint(body, "prismatic", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 0.0) for body in sorted(moving))

@@ -12,6 +12,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom
 
 from echomodel.boxes import Boxes
+from echomodel.furniture.solids import Joint
 from echomodel.triangles import Mesh
 from echousd.folder.folder import recover
 from echousd.folder.found import manifest_of
@@ -20,11 +21,10 @@ from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.graph import SceneGraph
 from echousd.graph.text import graph_from_plain
-from echousd.layers.physics import read_joints
 from echousd.layers.placed import MODEL, PLACES
 from echousd.naming import STAGE_FORMS
 from echousd.shapes.colliders import approximation, collider_of
-from echousd.shapes.geometry import LICENCE, Collider, Geometry, Origin, Original, Part
+from echousd.shapes.geometry import FRAME, LICENCE, Collider, Geometry, Origin, Original, Part
 from echousd.shapes.matter import read_mass
 from echousd.stage.contents import read_contents, room_frame, surface_of
 from echousd.stage.files import open_stage, opened
@@ -305,3 +305,12 @@ def _filled(graph: SceneGraph, file: Path, wanted: set[str]) -> tuple[SceneGraph
             )
         nodes.append(node)
     return graph.replaced(nodes=tuple(nodes)), found
+
+
+def read_joints(root: Usd.Prim, asset: str) -> tuple[Joint, ...]:
+    """Names of the bodies of an asset that move, as joints without places: its files are carried on as they are."""
+    geo = root.GetChild(GEO)
+    below = geo.GetChildren() if geo else ()
+    bodies = [piece_of(asset, prim.GetName()) for prim in below if prim.GetTypeName() == "Xform"]
+    moving = [body for body in bodies if body and body != FRAME]
+    return tuple(Joint(body, "prismatic", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 0.0) for body in sorted(moving))

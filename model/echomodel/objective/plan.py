@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +18,6 @@ from echomodel.openings import Opening
 from echomodel.rules.geometry import BoxesLike, PairGeometry, pairs
 from echomodel.rules.sets import rule_set
 from echomodel.vocabulary import Category, vocabulary
-
-if TYPE_CHECKING:
-    from echomodel.roomboxes import RoomBoxes
 
 
 @dataclass(frozen=True, eq=False)
@@ -548,25 +545,6 @@ def plan_of(
         (tuple(openings),), xp.asarray(triplets, dtype=xp.int64),
         xp.asarray(none if fixed is None else np.asarray(fixed, bool)),
         None if height is None else xp.asarray([height], dtype=xp.float64), rules, tuple(stated),
-    )  # fmt: skip
-
-
-def plan_of_rooms(rooms: Sequence[RoomBoxes]) -> Plan:
-    """The plan of many rooms at once, of what their relations state; float32, as sets of rooms are kept."""
-    sizes = [len(room) for room in rooms]
-    stated = [np.zeros((0, 3), int) if room.relations is None else room.relations for room in rooms]
-    shift = np.cumsum([0, *sizes[:-1]])
-    columns = ((getattr(room, name) for room in rooms) for name in ("size", "position", "yaw"))
-    size, position, yaw = (np.concatenate(list(of)).astype(np.float32) for of in columns)
-    corners = [np.asarray(room.floor_polygon, np.float32).reshape(-1, 2) for room in rooms]
-    floor = np.full((len(rooms), max(map(len, corners)), 2), np.nan, np.float32)
-    for number, own in enumerate(corners):
-        floor[number, : len(own)] = own
-    return Plan(
-        tuple(kind for room, t in zip(rooms, stated, strict=True) for kind in kinds_of(room.categories, t)),
-        size, position, yaw, np.arange(len(rooms)).repeat(sizes), floor, tuple(tuple(room.openings) for room in rooms),
-        np.concatenate([t + np.array([k, 0, k]) for t, k in zip(stated, shift, strict=True)]),
-        np.zeros(sum(sizes), bool), np.array([room.height for room in rooms], np.float32),
     )  # fmt: skip
 
 

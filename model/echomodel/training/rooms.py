@@ -14,7 +14,7 @@ from echomodel.compact.pairs import Pairs, inverse_predicates, ordered_pairs, re
 from echomodel.config import names_of
 from echomodel.data.roomset import RoomSet
 from echomodel.graph import GraphBatch
-from echomodel.objective.plan import plan_of_rooms
+from echomodel.objective.plan import Plan, kinds_of
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.telling import near_first
 from echomodel.surroundings import padded, trimmed
@@ -283,3 +283,22 @@ def draw_levels(count: int, generator: torch.Generator, device: torch.device | s
     offset = torch.rand(1, generator=generator)
     level = (torch.arange(count) + offset) / count
     return level[torch.randperm(count, generator=generator)].clamp(1e-3, 1.0).to(device)
+
+
+def plan_of_rooms(rooms: Sequence[RoomBoxes]) -> Plan:
+    """The plan of many rooms at once, of what their relations state; float32, as sets of rooms are kept."""
+    sizes = [len(room) for room in rooms]
+    stated = [np.zeros((0, 3), int) if room.relations is None else room.relations for room in rooms]
+    shift = np.cumsum([0, *sizes[:-1]])
+    columns = ((getattr(room, name) for room in rooms) for name in ("size", "position", "yaw"))
+    size, position, yaw = (np.concatenate(list(of)).astype(np.float32) for of in columns)
+    corners = [np.asarray(room.floor_polygon, np.float32).reshape(-1, 2) for room in rooms]
+    floor = np.full((len(rooms), max(map(len, corners)), 2), np.nan, np.float32)
+    for number, own in enumerate(corners):
+        floor[number, : len(own)] = own
+    return Plan(
+        tuple(kind for room, t in zip(rooms, stated, strict=True) for kind in kinds_of(room.categories, t)),
+        size, position, yaw, np.arange(len(rooms)).repeat(sizes), floor, tuple(tuple(room.openings) for room in rooms),
+        np.concatenate([t + np.array([k, 0, k]) for t, k in zip(stated, shift, strict=True)]),
+        np.zeros(sum(sizes), bool), np.array([room.height for room in rooms], np.float32),
+    )  # fmt: skip

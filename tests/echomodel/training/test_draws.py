@@ -11,13 +11,12 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.compact.model import load_weights
-from echomodel.objective.plan import plan_of_rooms
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_rooms
 from echomodel.training import layout_stage as draws
 from echomodel.training.layout_losses import plan_of_batch
 from echomodel.training.layout_stage import carrier_of, drawn_boxes, drawn_loss, missed_terms, steadied
-from echomodel.training.rooms import PackedRooms, make_batch
+from echomodel.training.rooms import PackedRooms, make_batch, plan_of_rooms
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ import echousd
 from echousd.draw.drawables import read_drawables
 from echousd.draw.from_files import render, render_turn
 from echousd.draw.indoors import LUMA, Bounced
-from echousd.draw.outside import turning_views
+from echousd.draw.outside import turning_views, without_near_walls
 from echousd.draw.rendering import render_stage
 from echousd.draw.scenery import BACKGROUND, class_color, next_room, outside, read_scenery
 from echousd.draw.tracing import RINGS, Seen, World, _light, embree, smooth_light, trace
@@ -205,7 +205,7 @@ def test_one_looks_out_of_windows_and_past_walls_that_are_away(tmp_path):
     painted = replace(scenery, flat_colors=scenery.flat_colors * dark)
     assert painted.wall[painted.largest[1]] != accent  # beyond a passage no wall is like an accent wall
     outwards = middle + 5 * (middle - eye) * (1, 0, 1)
-    assert len(scenery.without_near_walls(outwards).panes) < len(scenery.panes)
+    assert len(without_near_walls(scenery, outwards).panes) < len(scenery.panes)
 
 
 def test_what_light_there_is_everywhere_has_the_colour_of_the_rooms():
@@ -314,7 +314,7 @@ def test_walls_in_front_of_the_camera_are_cut_away(tmp_path):
     stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
     scenery = read_scenery(stage)
     assert scenery.wall.max() == 3
-    outside = scenery.without_near_walls(np.array([9.0, 3.0, 8.0]))
+    outside = without_near_walls(scenery, np.array([9.0, 3.0, 8.0]))
     assert len(set(outside.wall[outside.wall >= 0])) == 2
     centre = outside.triangles[outside.wall >= 0].reshape(-1, 3).mean(0)
     assert centre[0] < 0
