@@ -132,6 +132,7 @@ GRAZE = 0.01  # metres that furniture may reach into a door's way, as layouts ar
 WALKED, ENTERED = 0.6, 1.2
 TALL, STORED = 0.3, 0.1  # metres over a window's sill: what is higher, and storage that is, takes its light
 HEADBOARD = 0.3  # metres: of a bed only the head is so high
+EDGE, BOARD = 0.15, 0.05  # metres of a window that may be covered; that its board is wider, before which no row fits
 CLEARANCE = 1.9  # metres: what hangs higher is in nobody's way
 
 
@@ -260,9 +261,10 @@ def _clearance(plan: Plan, who: Array, polygon: np.ndarray, opening: Opening, de
     beside = abs(at - opening.width / 2) - opening.width / 2 - reach(along)
     out = xp.maximum(beside, deep)
     if opening.kind == "window":
-        over = xp.where(plan.of("storage"), STORED, TALL + HEADBOARD * plan.of("bed"))[who]
+        row = plan.stands("row")[who]  # flush with the wall, from which a single piece can draw back
+        over = xp.where(row, GRAZE, xp.where(plan.of("storage"), STORED, TALL + HEADBOARD * plan.of("bed"))[who])
         low = opening.sill + over - (plan.position[who, 1] + plan.size[who, 1])
-        return xp.maximum(out + 0.15, xp.where(screens(plan)[who], -FAR, low))
+        return xp.maximum(out + xp.where(row, -BOARD, EDGE), xp.where(screens(plan)[who], -FAR, low))
     if opening.swing == "slide":  # to the side of what would be its hinges
         hinge, closed = map(plan.numbers, hinge_point(polygon, opening))
         aside = abs((middle - hinge) @ closed + opening.width / 2) - opening.width / 2 - reach(closed)

@@ -131,10 +131,15 @@ def test_one_stands_before_what_washes(word, needed):
         assert narrow[word] == pytest.approx(gap - needed)
 
 
-def test_cupboards_hang_at_walls_and_before_no_window():
+def test_cupboards_hang_at_walls_and_before_no_window_nor_does_a_fridge_stand_at_its_board():
     window = Opening("window", "window", 0, 2.0, 1.2, 1.2, 0.95)
     for x, kept in ((0.0, False), (1.2, True)):
         hung = ("wall_unit", x, -1.82, 0.0, 1.4)
         assert (seen(access.window_free, hung, openings=[window])["wall_unit"] >= 0) == kept
+    window = Opening("window", "window", 0, 2.4, 1.2, 1.2, 1.2)
+    beside = 0.6 + SIZES["fridge"][0] / 2 + access.BOARD
+    for word, x, kept in (("fridge", beside + 0.01, True), ("fridge", beside - 0.01, False), ("base_unit", 0.0, True)):
+        at = (word, x, SIZES[word][2] / 2 - 2.0)
+        assert (seen(access.window_free, at, openings=[window])[word] >= 0) == kept, (word, x)
     assert seen(access.at_wall, ("towel_radiator", 0.0, -1.95, 0.0, 0.3))["towel_radiator"] > 0
     assert seen(access.at_wall, ("towel_radiator", 0.0, 0.0, 0.0, 0.3))["towel_radiator"] < 0
