@@ -57,16 +57,17 @@ def fitted(graph: SceneGraph, arranged: Callable[[SceneGraph], Layout]) -> tuple
 
 
 def _in_a_way(graph: SceneGraph, boxes: Boxes) -> tuple[str | None, str]:
-    """A piece that stands in the way of a door or passage and may be left out, and how; what a room is for stays."""
+    """A piece that stands in the way of a door or passage and may be left out, and how; what a room is for stays, and
+    has the place of another one."""
     kind = vocabulary().room_type(graph.room.type)
     spared = {name for name, _ in kind.contents[:1]} if kind.use != "wet" else {name for name, _ in kind.contents}
     for fault in living_faults(graph, boxes) if graph.room.openings else ():
-        if (
-            fault.rule == "door_free"
-            and abs(fault.margin) > IN_THE_WAY
-            and graph.node(fault.object).category not in spared
-        ):
-            return _dispensable(graph, [fault.object]), "in the way of a door"
+        if fault.rule == "door_free" and abs(fault.margin) > IN_THE_WAY:
+            if graph.node(fault.object).category not in spared:
+                return _dispensable(graph, [fault.object]), "in the way of a door"
+            others = [node for node in graph.nodes if vocabulary().category(node.category).support == "floor"]
+            names = [node.name for node in others if node.category not in spared]
+            return _dispensable(graph, names), f"where {fault.object} must stand to leave a door free"
     return None, ""
 
 
@@ -75,6 +76,4 @@ def _dispensable(graph: SceneGraph, names: tuple[str, ...] | list[str]) -> str |
     free = [node for node in graph.nodes if node.name in names and not node.locked and node.position is None]
     if not free or len(graph.nodes) < 2:
         return None
-    order = {node.name: number for number, node in enumerate(graph.nodes)}
-    rank = {node.name: LEAST_FIRST.index(vocabulary().category(node.category).role) for node in free}
-    return min(free, key=lambda node: (rank[node.name], -order[node.name])).name
+    return min(reversed(free), key=lambda node: LEAST_FIRST.index(vocabulary().category(node.category).role)).name

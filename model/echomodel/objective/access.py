@@ -265,12 +265,11 @@ def _clearance(plan: Plan, who: Array, polygon: np.ndarray, opening: Opening, de
         over = xp.where(row, GRAZE, xp.where(plan.of("storage"), STORED, TALL + HEADBOARD * plan.of("bed"))[who])
         low = opening.sill + over - (plan.position[who, 1] + plan.size[who, 1])
         return xp.maximum(out + xp.where(row, -BOARD, EDGE), xp.where(screens(plan)[who], -FAR, low))
+    hinge, closed = map(plan.numbers, hinge_point(polygon, opening))
     if opening.swing == "slide":  # to the side of what would be its hinges
-        hinge, closed = map(plan.numbers, hinge_point(polygon, opening))
         aside = abs((middle - hinge) @ closed + opening.width / 2) - opening.width / 2 - reach(closed)
         out = xp.minimum(out, xp.maximum(aside, deep + opening.depth - SLID))
     if swings:  # of the corner of the square that the leaf does not sweep what one walks through
-        hinge, closed = map(plan.numbers, hinge_point(polygon, opening))
         x = at_least(abs((middle - hinge) @ closed) - reach(closed), 0.0)
         z = at_least(abs((middle - hinge) @ inward) - reach(inward), 0.0)
         out = xp.maximum(out, xp.sqrt(at_least(x * x + z * z, 1e-12)) - opening.width)
