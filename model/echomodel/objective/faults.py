@@ -32,12 +32,14 @@ class Ways:
     Arguments:
         reached: (n,) bool, boxes that the robot can touch.
         share: of the floor that is free for its middle, the share that it can get to; 1 where nothing is free.
-        closing: (n,) bool, boxes between that and the largest part of the rest.
+        closing: (n,) bool, boxes between that and a part that another door leads to, or the largest of the rest.
+        parted: whether it gets to no other door from there.
     """
 
     reached: np.ndarray
     share: float
     closing: np.ndarray
+    parted: bool = False
 
 
 REACHED = "reached"
@@ -103,24 +105,24 @@ def unreached(plan: Plan) -> list[Fault]:
     lost = np.flatnonzero(np.asarray(furniture) & free & ~reached)
     out = [Fault(int(i), -1, REACHED, -1.0, "{a} cannot be walked to from the door") for i in lost]
     closing = np.flatnonzero(walked.closing & free)
-    if walked.share < OPEN and len(closing):
+    if (walked.share < OPEN or walked.parted) and len(closing):
         smallest = int(closing[np.asarray(held(plan.size))[closing].prod(1).argmin()])
-        says = f"{{a}} closes the way to {100 * (1 - walked.share):.0f} % of the free floor"
-        out.append(Fault(smallest, -1, REACHED, walked.share - OPEN, says))
+        what = "another door" if walked.parted else f"{100 * (1 - walked.share):.0f} % of the free floor"
+        least = 1.0 if walked.parted else OPEN
+        out.append(Fault(smallest, -1, REACHED, walked.share - least, f"{{a}} closes the way to {what}"))
     return out
 
 
 def walk(plan: Plan) -> Ways | None:
-    """Where a robot gets to in a plan of one room from its doors and passages, or in its largest free part where there
-    are none; None where its floor is unknown."""
+    """Where a robot gets to in a plan of one room from the door or passage that leads to most of it, or in its largest
+    free part where there are none; chairs are pulled aside. None where its floor is unknown."""
     import shapely
 
-    polygon = np.asarray(plan.floor[0])
-    polygon = polygon[np.isfinite(polygon).all(1)]
-    if len(polygon) < 3:
+    if not plan.rooms:
         return None
+    _, polygon, openings = plan.rooms[0]
     size, position, yaw = (np.asarray(held(of)) for of in (plan.size, plan.position, plan.yaw))
-    obstacle = np.asarray(plan.standing & ~plan.movable) & (size[:, 1] > CLEAR_HEIGHT)
+    obstacle = np.asarray(plan.standing & ~(plan.movable & plan.stands("at"))) & (size[:, 1] > CLEAR_HEIGHT)
     boxes = shapely.polygons(footprints(size, position, yaw))
     taken = shapely.union_all(shapely.buffer(boxes[obstacle], ROBOT - SLACK, quad_segs=4))
     free = shapely.difference(shapely.buffer(shapely.Polygon(polygon), SLACK - ROBOT, join_style="mitre"), taken)
@@ -128,17 +130,17 @@ def walk(plan: Plan) -> Ways | None:
     parts = parts[shapely.area(parts) > LEAST]
     if not len(parts):
         return Ways(np.zeros(len(size), bool), 1.0, np.zeros(len(size), bool))
-    area, entered = shapely.area(parts), np.zeros(len(parts), bool)
-    for opening in plan.openings[0]:
+    area, led = shapely.area(parts), np.zeros(len(parts), bool)
+    for opening in openings:
         if opening.kind != "window" and opening.edge < len(polygon):
             inside = segment(polygon, opening).mean(0) + inward_normal(polygon, opening.edge) * (ROBOT + STEP)
             met = shapely.area(shapely.intersection(parts, shapely.Point(inside).buffer(BEFORE)))
-            entered[met.argmax()] |= met.max() > 0
-    if not entered.any():
-        entered[area.argmax()] = True
-    walked, rest = shapely.multipolygons(parts[entered]), parts[(area * ~entered).argmax()]
+            led[met.argmax()] |= met.max() > 0
+    order = np.argsort(-area - area.sum() * led)  # those at doors first, the larger before the others
+    walked, rest = parts[order[0]], parts[order[:2][-1]]
     closing = obstacle & shapely.dwithin(walked, boxes, ROBOT) & shapely.dwithin(rest, boxes, ROBOT)
-    return Ways(shapely.dwithin(walked, boxes, ROBOT + ARM), float(area[entered].sum() / area.sum()), closing)
+    share, parted = float(area[order[0]] / area.sum()), bool(led[order[1:]].any())
+    return Ways(shapely.dwithin(walked, boxes, ROBOT + ARM), share, closing, parted)
 
 
 def missed(plan: Plan, kinds: Collection[str] = BY_EYE, beyond: float = -math.inf) -> Array:

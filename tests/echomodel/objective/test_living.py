@@ -489,6 +489,15 @@ def test_what_closes_much_of_the_floor_off_is_seen():
     assert ("plant", "reached") not in room.moved("plant", size=(0.3, 1.2, 0.3)).found(openings=(door,))
 
 
+@pytest.mark.parametrize(("wide", "closed"), [(4.9, True), (4.0, False)])
+def test_one_walks_from_each_door_to_the_others(wide, closed):
+    bench = {"kind": "bench", "size": (wide, 0.45, 0.4), "at": (wide / 2 - 2.5, -1.2)}  # a fifth of the floor behind
+    doors = Opening("door", "door", 0, 2.0, 0.9, 2.0, swing="out"), Opening("passage", "passage", 2, 2.0, 0.9, 2.0)
+    found = Room({"bench": bench}).found(openings=doors)
+    assert (found.get(("bench", "reached")) == "bench closes the way to another door") == closed
+    assert ("bench", "reached") not in Room({"bench": bench}).found(openings=doors[1:])
+
+
 def test_stools_stand_along_the_whole_of_their_bar():
     bar = {"bar": {"kind": "console_table", "size": (1.5, 0.95, 0.4), "at": (0.0, -1.8)}}
     for aside, beside in ((0.55, False), (0.8, True)):
