@@ -90,9 +90,8 @@ def company(own: Size, anchor: Size, kind: Category, count: int, apart: float, a
 
 def joined(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
     """A second sofa: opposite the first across the coffee table, or at a right angle at one of its ends."""
-    out = []
-    for away, more in ((1.6, 0.0), (1.9, 0.1), (1.35, 0.3)):
-        out.append((0.0, anchor[2] / 2 + own[2] / 2 + away, math.pi, 0.3 + more))
+    middle = anchor[2] / 2 + own[2] / 2
+    out = [(0.0, middle + away, math.pi, cost) for away, cost in ((1.6, 0.3), (1.9, 0.4), (1.35, 0.6))]
     for side in (-1.0, 1.0):
         for gap, more in ((0.25, 0.0), (0.5, 0.1), (0.1, 0.2)):
             lateral = side * (anchor[0] / 2 + own[2] / 2 + gap)

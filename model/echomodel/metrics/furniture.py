@@ -41,10 +41,8 @@ def group_of(solids: Sequence[Solid]) -> tuple[Array, int]:
     low = np.array([points.min(0) for points in surfaces]) - TOUCH
     high = np.array([points.max(0) for points in surfaces]) + TOUCH
     near = (low[:, None] <= high[None]).all(2) & (high[:, None] >= low[None]).all(2)
-    joined = []
-    for i, j in zip(*np.nonzero(np.triu(near, 1)), strict=True):
-        if _touches(surfaces[i], solids[j]) or _touches(surfaces[j], solids[i]):
-            joined.append((i, j))
+    pairs = zip(*np.nonzero(np.triu(near, 1)), strict=True)
+    joined = [(i, j) for i, j in pairs if _touches(surfaces[i], solids[j]) or _touches(surfaces[j], solids[i])]
     group = linked(joined, len(solids))
     return group, int(np.bincount(group).argmax())
 
