@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import shapely
@@ -154,7 +154,7 @@ class Setting:
         if floor and not self.wider.contains(plan):
             return False
         low, high = float(thing.position[1]), float(thing.position[1] + thing.size[1])
-        around = plan.buffer(margin)
+        around = plan.buffer(margin) if margin else plan
         if any(way.intersects(around) for way, o in self.ways if low < o.height):
             return False
         for other in self.objects.values():
@@ -215,22 +215,21 @@ def meets(thing: Standing, low: float, high: float, plan: shapely.Geometry) -> b
     least, most = np.array(plan.bounds).reshape(2, 2)
     near = (thing.spans[:, 0, [0, 2]] <= most).all(1) & (thing.spans[:, 1, [0, 2]] >= least).all(1)
     near &= (thing.spans[:, 0, 1] < high) & (thing.spans[:, 1, 1] > low)
-    return any(_section(thing.pieces[n], low + SKIN, high - SKIN).intersects(plan) for n in np.flatnonzero(near))
+    return any(_section(thing, n, low + SKIN, high - SKIN).intersects(plan) for n in np.flatnonzero(near).tolist())
 
 
-def _section(corners: np.ndarray, low: float, high: float) -> shapely.Geometry:
-    """The hull in plan of triangles (n, 3, 3) between two heights."""
+@lru_cache(maxsize=64)  # along a wall each place asks for that of the same pieces
+def _section(thing: Standing, number: int, low: float, high: float) -> shapely.Geometry:
+    """The hull in plan of one of a thing's `pieces` between two heights."""
+    corners = thing.pieces[number]
     least, most = spans_of(corners[..., 1])
     corners = corners[(most > low) & (least < high)]
-    points = corners.reshape(-1, 3)
-    found = [points[(points[:, 1] > low) & (points[:, 1] < high)]]
     start, end = corners.reshape(-1, 3), np.roll(corners, -1, axis=1).reshape(-1, 3)
+    found = [start[(start[:, 1] > low) & (start[:, 1] < high)]]
     for level in (low, high):  # where the sides of long triangles pass through
         over = (start[:, 1] - level) * (end[:, 1] - level) < 0
         share = (level - start[over, 1]) / (end[over, 1] - start[over, 1])
         found.append(start[over] + share[:, None] * (end[over] - start[over]))
     inside = np.concatenate(found)[:, [0, 2]]
-    if not len(inside):
-        return shapely.Polygon()
     # a line has the hull of its points and is one object rather than thousands
     return shapely.convex_hull(shapely.linestrings(np.concatenate([inside, inside[:1]])))
