@@ -28,7 +28,7 @@ class Furniture:
     position: np.ndarray
     yaw: np.ndarray
 
-    @property
+    @cached_property
     def facing(self) -> np.ndarray:
         """(2,) float, x and z of the mean front, weighted by volume."""
         weight = self.size.prod(1)

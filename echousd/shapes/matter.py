@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -14,7 +15,7 @@ from echomodel.dressing import PRINTS
 from echomodel.files import tables
 from echomodel.furniture.solids import Piece
 from echomodel.late import Late
-from echomodel.triangles import along, cross, lengths
+from echomodel.triangles import Mesh, along, cross, lengths
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
 from echousd.shapes.geometry import Geometry, Mass
@@ -45,12 +46,11 @@ def weighed(pieces: Iterable[Piece]) -> Mass:
     total, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
     for piece in pieces:
         matter = PARTS.get((piece.solid.role, piece.solid.material)) or MATTER[piece.solid.material]
-        volume, area = _moments(piece.vertices, piece.faces)
+        volume, area = _moments(piece)
         inside, skin = max(volume[0], 1e-7), max(area[0], 1e-7)
         walls = min(inside, skin * matter.wall)
-        massive = walls >= inside
         for kilograms, (measure, one, two) in (
-            (matter.density * walls, volume if massive and volume[0] > 0 else area),
+            (matter.density * walls, volume if walls >= inside and volume[0] > 0 else area),
             (matter.core * (inside - walls), volume),
         ):
             if kilograms > 0:
@@ -68,10 +68,11 @@ def weighed(pieces: Iterable[Piece]) -> Mass:
 Moments = tuple[float, np.ndarray, np.ndarray]
 
 
-def _moments(vertices: np.ndarray, faces: np.ndarray) -> tuple[Moments, Moments]:
+@lru_cache(maxsize=512)  # of what opens each body is weighed, and all of it
+def _moments(mesh: Piece | Mesh) -> tuple[Moments, Moments]:
     """Of the volume and of the surface of a closed mesh: measure, first (3,) and second moment (3, 3) about 0."""
-    origin = vertices[0]
-    corners = (vertices - origin)[faces]
+    origin = mesh.vertices[0]
+    corners = (mesh.vertices - origin)[mesh.faces]
     one, two, three = corners.transpose(1, 0, 2)
     whole = one + two + three
     pairs = np.einsum("tki,tkj->tij", corners, corners) + whole[:, :, None] * whole[:, None, :]
@@ -120,7 +121,7 @@ def hull_moments(solids: Iterable[np.ndarray]) -> tuple[float, np.ndarray, np.nd
     `solids`: corners (n, 3) of each, metres.
     """
     hulls = [convex_hull(solid) for solid in solids]
-    moments = [_moments(hull.vertices, hull.faces)[0] for hull in hulls]
+    moments = [_moments(hull)[0] for hull in hulls]
     volume, first, second = (sum(part) for part in zip(*moments, strict=True))
     middle = first / volume
     square = second / volume - np.outer(middle, middle)
