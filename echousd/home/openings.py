@@ -216,11 +216,13 @@ def outer_spans(floor: Floor, floors: Sequence[Floor]) -> Iterator[Facing]:
 
 
 def _windows(home: HomeGraph, floor: Floor, floors: Sequence[Floor], there: Sequence[Opening]) -> Iterator[Opening]:
-    """A window, two in a large room, in the middle of the longest outer walls."""
+    """A window, two in a large room, in the middle of the longest outer walls, or at an end if a screen is watched."""
     row = vocabulary().room_type(home.room(floor.name).type)
     if row.use == "outdoor" or not (row.daylight or row.use == "wet"):
         return
     sill, tall, wide = WINDOWS[row.use]
+    kinds = [vocabulary().category(node.category) for node in home.room(floor.name).graph.nodes]
+    watched = any(kind.role == "screen" or kind.stands == "opposite" for kind in kinds)
     spans = []
     for side in outer_spans(floor, floors):
         low, high = side.low, side.high
@@ -234,6 +236,6 @@ def _windows(home: HomeGraph, floor: Floor, floors: Sequence[Floor], there: Sequ
         width = round(min(0.5 * span, wide), 1)
         if width < 0.5 or span - width < 2 * PIER or (count and abs(signed_area(floor.corners)) < 14.0):
             return
-        name = numbered("window", names)
-        names.append(name)
-        yield Opening(name, "window", edge, round((low + high - width) / 2, 3), width, tall, sill)
+        names.append(numbered("window", names))
+        start = round(low + PIER if watched else (low + high - width) / 2, 3)
+        yield Opening(names[-1], "window", edge, start, width, tall, sill)

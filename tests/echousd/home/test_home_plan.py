@@ -8,7 +8,7 @@ import shapely
 from homes import homes
 from hypothesis import assume, given, settings
 
-from echomodel.openings import segment, signed_area, swing_area
+from echomodel.openings import edge_lengths, segment, signed_area, swing_area
 from echousd.graph import GraphError
 from echousd.home import plan as planning
 from echousd.home.existing import next_plan
@@ -79,6 +79,13 @@ def test_windows_look_outside(flat):
         for window in windows:
             middle = shapely.Point(segment(flat.floors[name], window).mean(0))
             assert shapely.distance(outer, middle) == pytest.approx(OUTER, abs=1e-3)
+
+
+def test_windows_are_in_the_middle_but_where_a_screen_wants_the_wall(flat):
+    for name, shift in (("bedroom_1", False), ("living", True)):
+        window = next(opening for opening in flat.openings[name] if opening.kind == "window")
+        wall = edge_lengths(flat.floors[name])[window.edge]
+        assert (abs(window.offset + window.width / 2 - wall / 2) > 0.3) == shift, name
 
 
 def test_the_same_seed_gives_the_same_plan(flat):
