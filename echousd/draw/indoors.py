@@ -23,7 +23,7 @@ SKY = 4.0  # radiance of the sky in a window for a dome of intensity 1, whose li
 SUN = 7.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
 CEILING = np.array([0.87, 0.86, 0.84], np.float32)
 VIEW = 0.5  # of the sky's radiance, what is seen of it through a window: eyes adapt
-BLURRED, HAZE = 0.45, 0.25  # degrees that it is out of focus, and the share of its colour that haze takes
+BLURRED, HAZE = 0.3, 0.25  # degrees that it is out of focus, and the share of its colour that haze takes
 DIM = 0.02  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
