@@ -42,7 +42,7 @@ SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width ove
 UNSEEN, MANY = 6.0, 8.0  # metres of depth that each of so many pieces in the picture is worth
 # And a picture full of furniture; a metre towards where it looks, up to so many; of what each loses a picture full: of
 # backs, seen where the cosine is larger, and of ceiling. By choices of 40 pictures among eight each.
-SHOWN, FACED, AHEAD, BACKS, AVERTED, OVERHEAD = 30.0, 20.0, 1.0, 320.0, 0.25, 250.0
+SHOWN, FACED, AHEAD, BACKS, AVERTED, OVERHEAD = 30.0, 20.0, 1.0, 320.0, 0.25, 100.0
 STEPS = (0.2, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
 # Or so far behind a wall, which its near plane cuts away, and so much of the room with what hangs and stands there.
 BEYOND, THROUGH = (0.6, 1.2, 2.0), (0.3, 0.5, 0.7, 0.9)
