@@ -122,7 +122,7 @@ NEEDED = 0.45  # share of the vocabulary's access depth below which a front coun
 SHARE = 0.3  # share of a front's width that may be covered
 BEDSIDE = 0.3  # metres beside a bed
 # Width from which on two sleep in a bed, metres beside it then, and to spare at its other side if one leaves less.
-FOR_TWO, AT_TWO, SPARE = 1.35, 0.45, 0.6
+FOR_TWO, AT_TWO, SPARE = 1.35, 0.45, 0.75
 # Metres between a bed's side and the wall that it stands at, and from which on a wide one of a child stands free.
 SLIT, AMID = 0.1, 0.7
 INTO_BED, OF_LAMPS, OF_CHAIRS = 0.6, 0.6, 0.2  # metres between a plant and a bed's side, a floor lamp, a chair

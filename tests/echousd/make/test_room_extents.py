@@ -75,8 +75,8 @@ def test_a_door_that_nobody_stated_opens_before_no_drawers():
     door = Opening("door", "door", 1, 3.4, 0.9, 2.0)
     room = RoomSpec("bedroom", size=(2.4, 5.0), openings=(door,))
     boxes = Boxes(
-        torch.tensor([(1.85, 0.9, 2.0), (2.0, 2.2, 0.6), (1.1, 0.9, 0.5)]),
-        torch.tensor([(-0.275, 0.0, -1.48), (-0.88, 0.0, 1.1), (0.6, 0.0, 2.23)]),
+        torch.tensor([(1.7, 0.9, 2.0), (2.0, 2.2, 0.6), (1.1, 0.9, 0.5)]),
+        torch.tensor([(-0.35, 0.0, -1.48), (-0.88, 0.0, 1.1), (0.6, 0.0, 2.23)]),
         torch.tensor([0.0, np.pi / 2, np.pi]),
     )
     graph = SceneGraph(room, tuple(Node(word, word) for word in words))
