@@ -61,13 +61,13 @@ def _in_a_way(graph: SceneGraph, boxes: Boxes) -> tuple[str | None, str]:
     has the place of another one."""
     kind = vocabulary().room_type(graph.room.type)
     spared = {name for name, _ in kind.contents[:1]} if kind.use != "wet" else {name for name, _ in kind.contents}
+    others = [node for node in graph.nodes if vocabulary().category(node.category).support == "floor"]
+    names = [node.name for node in others if node.category not in spared]
     for fault in living_faults(graph, boxes) if graph.room.openings else ():
         if fault.rule == "door_free" and abs(fault.margin) > IN_THE_WAY:
-            if graph.node(fault.object).category not in spared:
-                return _dispensable(graph, [fault.object]), "in the way of a door"
-            others = [node for node in graph.nodes if vocabulary().category(node.category).support == "floor"]
-            names = [node.name for node in others if node.category not in spared]
-            return _dispensable(graph, names), f"where {fault.object} must stand to leave a door free"
+            stays = graph.node(fault.object).category in spared
+            if out := _dispensable(graph, names if stays else [fault.object]):
+                return out, f"where {fault.object} must stand to leave a door free" if stays else "in the way of a door"
     return None, ""
 
 

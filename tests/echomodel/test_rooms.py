@@ -178,11 +178,12 @@ def test_halls_hold_several_zones_and_stay_tidy():
     spacious |= {"screen_in_view", "sofa_ahead", "table_amid", "floor_used", "seats_apart"}
     spacious |= {"floor_served", "elbow_room", "wardrobe_opens", "each_served"}  # nor are a hall's distances a room's
     objects = int(count.sum())
-    # To the recipes: screens before windows, leaves, both sides of beds, halves and ends.
-    for unknown in ("screen_on_axis", "window_free", "leaf_aside", "bed_side_free", "halves_used", "ends_used"):
-        scores.pop(unknown)
+    # To the recipes: screens before windows, leaves, both sides of beds, halves and ends, ways from door to door.
+    unknown = {"screen_on_axis", "window_free", "leaf_aside", "bed_side_free", "halves_used", "ends_used", "reached"}
+    for name in unknown:
+        scores.pop(name)
     missed = sum(number for rule, number in scores.items() if rule not in spacious)
-    assert missed < 0.07 * objects  # .064
+    assert missed < 0.07 * objects  # .057
     assert scores.total() < 0.2 * objects  # a full hall's zones stand closer than the rules have them
     assert halls[3].to_json() == generate_rooms(1, 4, start=3, halls=1.0)[0].to_json()
 
