@@ -59,9 +59,12 @@ TURNED = {ast.Lt: ast.GtE, ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt, as
           ast.In: ast.NotIn, ast.NotIn: ast.In, ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.Add: ast.Sub,
           ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.And: ast.Or, ast.Or: ast.And}  # fmt: skip
 NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
+# No editable installation comes before the copy, as that of new setuptools does.
+COPY = "import sys; sys.meta_path[:] = [m for m in sys.meta_path if getattr(m, '__name__', '') != '_EditableFinder']"
 # A failing example of hypothesis need not be made small, and the next change shall not meet it.
-PROFILE = "from hypothesis import HealthCheck, Phase, settings; settings.register_profile('mutants', deadline=None, \
-suppress_health_check=[HealthCheck.too_slow], phases=(Phase.explicit, Phase.generate), database=None, derandomize=True)"
+PROFILE = f"{COPY}; from hypothesis import HealthCheck, Phase, settings; settings.register_profile('mutants', \
+deadline=None, suppress_health_check=[HealthCheck.too_slow], phases=(Phase.explicit, Phase.generate), database=None, \
+derandomize=True)"
 
 
 def changes(tree: ast.Module) -> Iterator[tuple[ast.AST, str, object]]:
@@ -192,6 +195,9 @@ class Loop:
             self.broken = "the tests fail without any change"
             return True
         self.record, found = None, json.loads(notes.read_text())
+        if not found["tests"]:
+            self.broken = "no test runs anything of these modules: another copy of them is imported"
+            return True
         took, apart = found["seconds"], set(found["apart"])
         for number, one in enumerate(self.mutants):
             target = self.copy / one.path.relative_to(TOP)
