@@ -11,7 +11,7 @@ from stopped_disk import stopped_disk
 
 from echousd.folder import folder
 from echousd.folder.folder import check_output, check_writable, claim, recover, write_together
-from echousd.folder.found import room_at
+from echousd.folder.found import room_at, rooms_at
 from echousd.folder.lock import LOCK
 from echousd.folder.manifest import Manifest
 from echousd.pending import JOURNAL, STAGING
@@ -191,3 +191,20 @@ def test_a_folder_of_several_rooms_names_the_first_eight(tmp_path, count, more):
     assert str(told.value).endswith(", ...") == more
     assert str(told.value).count(".usda") == min(count, 8)
     assert room_at(tmp_path / "home/room_1") == tmp_path / "home/room_1/room.usda"
+
+
+def test_a_pattern_finds_rooms_and_stages_each_once_or_says_what_it_matched(tmp_path):
+    for name in ("b", "a"):
+        files = manifest([]) | {"room.usda": b"#usda 1.0\n"}
+        (tmp_path / name).mkdir()
+        for path, content in files.items():
+            (tmp_path / name / path).write_bytes(content)
+    (tmp_path / "alone.usda").write_text("#usda 1.0\n")
+    rooms = [tmp_path / "a/room.usda", tmp_path / "alone.usda", tmp_path / "b/room.usda"]
+    assert rooms_at(tmp_path / "**") == rooms
+    assert rooms_at(tmp_path / "[ab]") == [rooms[0], rooms[2]]
+    (tmp_path / "notes.txt").write_text("no room")
+    with pytest.raises(ValueError, match=r"\*\.txt: matches no room$"):
+        rooms_at(tmp_path / "*.txt")
+    with pytest.raises(ValueError, match=r"\*\.abc: matches nothing$"):
+        rooms_at(tmp_path / "*.abc")
