@@ -13,7 +13,7 @@ import manifold3d
 import numpy as np
 import shapely
 
-from echomodel.openings import SKIRTING, SLID, Opening
+from echomodel.openings import BOARD, SKIRTING, SLID, Opening
 from echomodel.triangles import Mesh, box, joined
 from echomodel.vocabulary import vocabulary
 
@@ -225,7 +225,7 @@ def bay(opening: Opening, kind: str, wall: float = WALL) -> tuple[Mesh, list[Mes
 
 def window_sill(opening: Opening) -> Mesh:
     """The board below a window, a little into the room."""
-    return board((opening.offset - 0.05, opening.end + 0.05), (opening.sill - 0.03, opening.sill), (-0.04, 0.0))
+    return board((opening.offset - BOARD, opening.end + BOARD), (opening.sill - 0.03, opening.sill), (-0.04, 0.0))
 
 
 def curtain_rail(opening: Opening, length: float, height: float, *, boxed: bool = False) -> Mesh | None:

@@ -22,6 +22,7 @@ USUAL = {  # metres, where nobody says otherwise
 WINDOW_DEPTH = 0.35  # metres before a window where nothing tall stands
 STEP = 0.6  # metres before a door that a person needs to stand
 SLID = 0.08  # metres before a wall that a leaf takes which slides there, and its rail
+BOARD = 0.05  # metres that the board below a window is wider than it, at either end
 SKIRTING = 0.012  # metres, thickness of the boards along the foot of a wall
 HIGHEST = 100.0  # metres of an opening's height and sill: more than any room has
 LONGEST = 10_000.0  # metres of its offset and width: longer than any wall

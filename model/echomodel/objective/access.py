@@ -10,7 +10,7 @@ from echomodel.arrays import Array, at_least, at_most, cast, dot, full, held, ki
 from echomodel.objective.company import COMPANY, first_of
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, nobody, worst
 from echomodel.objective.sight import PASSAGE, WATCHED_FREE, screens
-from echomodel.openings import SLID, Opening, hinge_point, inward_normal, segment
+from echomodel.openings import BOARD, SLID, Opening, hinge_point, inward_normal, segment
 
 CROOKED = math.radians(1.0)  # 98 % of such furniture in real rooms is turned less
 TOUCHING = 0.3  # metres: 93 % of real beds, nightstands and tv stands have a smaller gap behind
@@ -132,7 +132,7 @@ GRAZE = 0.01  # metres that furniture may reach into a door's way, as layouts ar
 WALKED, ENTERED = 0.6, 1.2
 TALL, STORED = 0.3, 0.1  # metres over a window's sill: what is higher, and storage that is, takes its light
 HEADBOARD = 0.3  # metres: of a bed only the head is so high
-EDGE, BOARD = 0.15, 0.05  # metres of a window that may be covered; that its board is wider, before which no row fits
+EDGE = 0.15  # metres of a window that may be covered, but by no row, which does not fit before its board
 CLEARANCE = 1.9  # metres: what hangs higher is in nobody's way
 
 
@@ -176,8 +176,7 @@ def bed_side_free(plan: Plan) -> Found:
     wide, near = plan.size[who, 0] > FOR_TWO, xp.where(child, least, wall)
     two, free_of = wide & ~child, xp.where(child, xp.where(wide, AMID, FAR), BEDSIDE)
     both = xp.where(two, xp.maximum(least - BEDSIDE, SPARE + least - most), FAR)
-    slit = xp.maximum(near - free_of, SLIT - near)
-    margins = [most - xp.where(two, AT_TWO, BEDSIDE), both, slit]
+    margins = [most - xp.where(two, AT_TWO, BEDSIDE), both, xp.maximum(near - free_of, SLIT - near)]
     return first_of(who, xp.full_like(who, -1), margins, [most, least, near])
 
 

@@ -8,7 +8,7 @@ from echomodel.boxes import Boxes
 from echomodel.objective import access, fitted
 from echomodel.objective.copies import copies_of
 from echomodel.objective.plan import plan_of
-from echomodel.openings import Opening
+from echomodel.openings import BOARD, Opening
 
 HALF = np.pi / 2
 SIZES = {
@@ -137,7 +137,7 @@ def test_cupboards_hang_at_walls_and_before_no_window_nor_does_a_fridge_stand_at
         hung = ("wall_unit", x, -1.82, 0.0, 1.4)
         assert (seen(access.window_free, hung, openings=[window])["wall_unit"] >= 0) == kept
     window = Opening("window", "window", 0, 2.4, 1.2, 1.2, 1.2)
-    beside = 0.6 + SIZES["fridge"][0] / 2 + access.BOARD
+    beside = 0.6 + SIZES["fridge"][0] / 2 + BOARD
     for word, x, kept in (("fridge", beside + 0.01, True), ("fridge", beside - 0.01, False), ("base_unit", 0.0, True)):
         at = (word, x, SIZES[word][2] / 2 - 2.0)
         assert (seen(access.window_free, at, openings=[window])[word] >= 0) == kept, (word, x)
