@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 from functools import partial
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from echousd.cli.options import AsJson
+from echousd.cli.options import AsJson, told
 from echousd.cli.output import say, say_done, say_json
 
 assets_app = typer.Typer(
@@ -20,17 +19,13 @@ app.add_typer(assets_app, name="assets")
 SHOWN = 20  # faults that are told; the table holds all
 
 
-@assets_app.command(epilog="Example: echousd assets index ~/models -o models.parquet")
+@told(assets_app, "assets index")
 def index(
-    folders: Annotated[list[Path], typer.Argument(help="Folders of models, or libraries.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="The index (.parquet).")],
-    workers: Annotated[int, typer.Option(help="Processes; 0: one for each core.", min=0, max=256)] = 0,
-    table: Annotated[
-        Path | None, typer.Option(help="Table of corrections; default: beside the index, where there is one.")
-    ] = None,
-    descriptors: Annotated[
-        bool, typer.Option("--descriptors", help="Also say what each shape is like, for generate --shapes guided.")
-    ] = False,
+    folders: list[Path],
+    output: Path,
+    workers: int = 0,
+    table: Path | None = None,
+    descriptors: bool = False,
     json: AsJson = False,
 ) -> None:
     """Index a library: what its models are, how large, where their front is, and whose they are.
@@ -58,10 +53,10 @@ def index(
     say_done(json, [output], lines, {**counts, "left_out": list(map(str, done.faults))})
 
 
-@assets_app.command(epilog="Example: echousd assets review models.parquet")
+@told(assets_app, "assets review")
 def review(
-    library: Annotated[Path, typer.Argument(help="Index (.parquet).")],
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="The page; default: INDEX.html.")] = None,
+    library: Path,
+    output: Path | None = None,
     json: AsJson = False,
 ) -> None:
     """Write what there is to look at and to correct: a page with a picture of every model, and the table.
@@ -85,13 +80,13 @@ def review(
     say_done(json, [page, table], lines, {"models": len(records), "left_out": reasons})
 
 
-@assets_app.command(epilog="Example: echousd assets pack out/bedroom -o packages")
+@told(assets_app, "assets pack")
 def pack(
-    room: Annotated[Path, typer.Argument(help="Room, or its folder.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the packages.")],
-    asset: Annotated[list[str] | None, typer.Option(help="Name of an asset; may be repeated; default: all.")] = None,
-    author: Annotated[str, typer.Option(help="Who is told as the author.")] = "EchoUSD",
-    force: Annotated[bool, typer.Option("--force", help="Replace packages that are there.")] = False,
+    room: Path,
+    output: Path,
+    asset: list[str] | None = None,
+    author: str = "EchoUSD",
+    force: bool = False,
     json: AsJson = False,
 ) -> None:
     """Write a room's furniture as packages for SimReady hosts: Z up, payload folder, picture, provenance.
@@ -112,8 +107,8 @@ store_app = typer.Typer(no_args_is_help=True)
 app.add_typer(store_app, name="store", help="A folder where many rooms keep their assets and images once.")
 
 
-@store_app.command("verify", epilog="Example: echousd store verify out/night/store")
-def verify(folder: Annotated[Path, typer.Argument(help="Folder of the store.")], json: AsJson = False) -> None:
+@told(store_app, "store verify")
+def verify(folder: Path, json: AsJson = False) -> None:
     """Compare every asset with the hash that it lies under. Exit code 1 where one is not what it was."""
     from echousd.store import Store
 
@@ -129,14 +124,12 @@ def verify(folder: Annotated[Path, typer.Argument(help="Folder of the store.")],
         raise typer.Exit(1)
 
 
-@store_app.command("gc", epilog="Example: echousd store gc out/night/store out/night --dry-run")
+@told(store_app, "store gc")
 def gc(
-    folder: Annotated[Path, typer.Argument(help="Folder of the store.")],
-    rooms: Annotated[
-        list[Path] | None, typer.Argument(help="Folders with all rooms that use it; default: where the store lies.")
-    ] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would go.")] = False,
-    older: Annotated[float, typer.Option(help="Minutes since its last use for which an asset stays.", min=0)] = 60.0,
+    folder: Path,
+    rooms: list[Path] | None = None,
+    dry_run: bool = False,
+    older: float = 60.0,
     json: AsJson = False,
 ) -> None:
     """Remove assets and images that no room below the given folders names."""

@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from echousd.cli.options import AsJson, Outside, add_room_command, group_of
+from echousd.cli.options import AsJson, Outside, add_room_command, group_of, told
 from echousd.cli.output import one_line, say, say_error, say_json
 
 if TYPE_CHECKING:
@@ -24,30 +24,22 @@ app.add_typer(batch_app, name="batch", help="Many rooms: a plan, workers, a jour
 
 
 def run(
-    sources: Annotated[
-        list[str] | None, typer.Argument(help="Graph files, folders, globs, JSONL or Parquet of graphs, a batch.toml.")
-    ] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the run.")] = Path("batch"),
-    sample: Annotated[str, typer.Option(help="Draw graphs, such as bedroom:500,living_room:300.")] = "",
-    count: Annotated[int | None, typer.Option(help="Rooms of each graph; default 1.", min=1)] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of each graph's first room; default 0.", min=0)] = None,
-    workers: Annotated[int | None, typer.Option(help="Processes; default: one a core.", min=1)] = None,
-    shard: Annotated[str, typer.Option(help="Part i of n, for job arrays, such as 0/8.", hidden=True)] = "0/1",
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the folder's run, as it was asked.")] = False,
-    max_failures: Annotated[
-        int | None, typer.Option(help="Stop after more failed rooms than this.", hidden=True, min=0)
-    ] = None,
-    timeout: Annotated[float | None, typer.Option(help="Seconds a room may take.", hidden=True, min=0.1)] = None,
-    until: Annotated[str, typer.Option(help="Time to stop at, such as 06:30.", hidden=True)] = "",
-    memory: Annotated[int, typer.Option(help="MiB that a worker may hold.", hidden=True, min=256)] = 4096,
-    more: Annotated[
-        list[str] | None, typer.Option("--set", help="An option of the rooms by its name, such as ceiling=true.")
-    ] = None,
-    ray: Annotated[str, typer.Option(help="Run on Ray: auto, or the address of a cluster.", hidden=True)] = "",
-    webdataset: Annotated[
-        bool, typer.Option("--webdataset", help="Also tars of previews and JSON.", hidden=True)
-    ] = False,
-    json: Annotated[bool, typer.Option("--json", help="A JSON line for every room, on stdout.")] = False,
+    sources: list[str] | None = None,
+    output: Path = Path("batch"),
+    sample: str = "",
+    count: int | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    shard: str = "0/1",
+    resume: bool = False,
+    max_failures: int | None = None,
+    timeout: float | None = None,
+    until: str = "",
+    memory: int = 4096,
+    more: list[str] | None = None,
+    ray: str = "",
+    webdataset: bool = False,
+    json: bool = False,
     outside: Outside = None,
     **changes: Any,
 ) -> None:
@@ -86,14 +78,13 @@ def run(
         raise typer.Exit(1)
 
 
-_EXAMPLE = "echousd batch run samples/*.yaml -o out/night --workers 4 (`run` may be left out)"
-add_room_command(batch_app, run, _EXAMPLE, batch=True)
+add_room_command(batch_app, "batch run", run, batch=True)
 
 
-@batch_app.command("status", epilog="Example: echousd batch status out/night")
+@told(batch_app, "batch status")
 def status(
-    folder: Annotated[Path, typer.Argument(help="Folder of the run.")],
-    json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+    folder: Path,
+    json: bool = False,
 ) -> None:
     """How far a run is, of all its shards."""
     from echousd.batches.plan import load_plan
@@ -108,10 +99,10 @@ def status(
         say(f"failed   {times} x {one_line(error)}")
 
 
-@batch_app.command("verify", epilog="Example: echousd batch verify out/night")
+@told(batch_app, "batch verify")
 def verify(
-    folder: Annotated[Path, typer.Argument(help="Folder of the run.")],
-    check: Annotated[bool, typer.Option("--check", help="Also run echousd check on every room.")] = False,
+    folder: Path,
+    check: bool = False,
     json: AsJson = False,
 ) -> None:
     """Compare every room with the journal: there, whole, unchanged. Exit code 1 where one is not."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+from echousd.cli.options import told
 from echousd.cli.output import counted, one_line, safe, say, say_json
 
 if TYPE_CHECKING:
@@ -17,18 +18,14 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 
-@app.command(epilog="Example: echousd check out/bedroom/bedroom.usda  (exit code 0: good, 1: faults, 2: not a room)")
+@told(app, "check")
 def check(
-    room: Annotated[
-        list[Path], typer.Argument(help="Rooms (.usda, .usdc, .usd, .usdz), their folders, folders of these.")
-    ],
-    json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
-    rules: Annotated[str, typer.Option("--rules", help="Rules of the relations: strict or sgfront.")] = "strict",
-    layout: Annotated[int | None, typer.Option(help="Only this layout; default: all.", min=0)] = None,
-    strict: Annotated[bool, typer.Option("--strict", help="Broken living rules fail the check, too.")] = False,
-    settle: Annotated[
-        bool, typer.Option("--settle", help="Simulate two seconds as well: everything must rest (extra: sim).")
-    ] = False,
+    room: list[Path],
+    json: bool = False,
+    rules: str = "strict",
+    layout: int | None = None,
+    strict: bool = False,
+    settle: bool = False,
 ) -> None:
     """Check rooms: relations, collisions, placement, living rules in all their layouts, and their USD.
 

@@ -6,29 +6,24 @@ from dataclasses import asdict
 
 import typer
 
+from echousd.cli.options import told
 from echousd.cli.output import say_json
 from echousd.diagnosis import Diagnosis, diagnose
 
 app = typer.Typer()
 
 
-@app.command("plugin-path")
+@told(app, "plugin-path")
 def plugin_path() -> None:
-    """Print the folder of the USD schema plugin, for PXR_PLUGINPATH_NAME (does not load USD).
-
-    Example: PXR_PLUGINPATH_NAME=$(echousd plugin-path) usdview bedroom.usda
-    """
+    """Print the folder of the USD schema plugin, for PXR_PLUGINPATH_NAME (does not load USD)."""
     from echousd import plugin
 
     typer.echo(plugin.plugin_path())
 
 
-@app.command()
-def doctor(as_json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
-    """Report what EchoUSD finds on this machine and what to do about each gap; exit code 1 if there is one.
-
-    Example: echousd doctor --json
-    """
+@told(app, "doctor")
+def doctor(as_json: bool = False) -> None:
+    """Report what EchoUSD finds on this machine and what to do about each gap; exit code 1 if there is one."""
     findings = diagnose()
     healthy = all(diagnosis.state != "gap" for diagnosis in findings)
     if as_json:

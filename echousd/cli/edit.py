@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -24,16 +24,12 @@ app = typer.Typer()
 
 
 def edit(
-    room: Annotated[Path, typer.Argument(help="Room that generate made: root layer or folder.")],
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Say what would change and who would move; write nothing.")
-    ] = False,
-    undo: Annotated[bool, typer.Option("--undo", help="Take the last edit back, byte for byte; alone.")] = False,
-    redo: Annotated[bool, typer.Option("--redo", help="Make again what --undo took back last; alone.")] = False,
-    recover: Annotated[
-        bool, typer.Option("--recover", help="Finish what a run that was interrupted has begun to write; alone.")
-    ] = False,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
+    room: Path,
+    dry_run: bool = False,
+    undo: bool = False,
+    redo: bool = False,
+    recover: bool = False,
+    output: Path | None = None,
     force: Force = False,
     wait: Wait = False,
     outside: Outside = None,
@@ -89,8 +85,8 @@ def edit_home(root: Path, wishes: EditRequest, output: Path | None, *, dry_run: 
 
 
 def update(
-    layer: Annotated[Path, typer.Argument(help="Your layer over a room, or its folder.")],
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would change; write nothing.")] = False,
+    layer: Path,
+    dry_run: bool = False,
     wait: Wait = False,
     outside: Outside = None,
     json: Made = False,
@@ -204,15 +200,12 @@ def _change(
 
 
 def adopt(
-    stage: Annotated[Path, typer.Argument(help="Stage with labels and bounds.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the room.")],
-    room: Annotated[str | None, typer.Option(help="Room type; default: as the stage looks.")] = None,
-    add: Annotated[
-        list[str] | None,
-        typer.Option(help="Object to add, name:category; default: what such a room usually holds and this one lacks."),
-    ] = None,
-    relate: Annotated[list[str] | None, typer.Option(help='Relation to keep: "lamp close by sofa".')] = None,
-    names: Annotated[bool, typer.Option("--names", help="Names of prims count where labels are missing.")] = False,
+    stage: Path,
+    output: Path,
+    room: str | None = None,
+    add: list[str] | None = None,
+    relate: list[str] | None = None,
+    names: bool = False,
     force: Force = False,
     wait: Wait = False,
     outside: Outside = None,
@@ -248,7 +241,6 @@ def adopt(
     report([written], json=json, more=more)
 
 
-EXAMPLE = 'echousd edit out/bedroom/bedroom.usda --add stool:stool --relate "stool close by bed"'
-add_room_command(app, edit, EXAMPLE, edits=True, asks=True)
-add_room_command(app, update, "echousd update out/bedroom/mine.usda", edits=True)
-add_room_command(app, adopt, "echousd adopt loft.usd -o out/loft --room living_room")
+add_room_command(app, "edit", edit, edits=True, asks=True)
+add_room_command(app, "update", update, edits=True)
+add_room_command(app, "adopt", adopt)

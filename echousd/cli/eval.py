@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from echomodel.files import check_free
-from echousd.cli.options import Replace, Written
+from echousd.cli.options import Replace, Written, told
 from echousd.cli.output import say, say_done, say_json
 
 eval_app = typer.Typer(help="Scores of whoever lays out rooms, and studies with people.", no_args_is_help=True)
@@ -22,34 +22,23 @@ Count = Annotated[int, typer.Option(help="Rooms that every system lays out.", mi
 Seed = Annotated[int, typer.Option(help="Seed of every draw.")]
 
 
-@eval_app.command("suite")
+@told(eval_app, "eval suite")
 def suite(
-    systems: Annotated[
-        list[str] | None,
-        typer.Argument(
-            help="default, network, guided, shuffled, muted, generator, random, retrieval, real, each also "
-            "with +search or +half; weights; rooms from elsewhere. None: default, network, guided."
-        ),
-    ] = None,
+    systems: list[str] | None = None,
     against: Against = "generated",
-    out: Annotated[Path, typer.Option("-o", "--output", help="REPORT: gets .md, .json and .html.")] = Path("report"),
-    only: Annotated[str, typer.Option(help="Sections, with commas; default: all.")] = "",
+    out: Path = Path("report"),
+    only: str = "",
     count: Count = 24,
     seed: Seed = 0,
-    relations: Annotated[
-        float, typer.Option(help="Relations an object that are told, where people would tell them.")
-    ] = 1.0,
-    shapes: Annotated[Path | None, typer.Option(help="Set of shapes to compare with, real meshes for example.")] = None,
-    inception: Annotated[Path | None, typer.Option(help="Weights of FID and KID: inception-2015-12-05.pt.")] = None,
-    clip: Annotated[Path | None, typer.Option(help="Weights of FID-CLIP: OpenAI's ViT-B-32 (extra text).")] = None,
-    workers: Annotated[int, typer.Option(help="Processes that place rooms.", min=1)] = 2,
+    relations: float = 1.0,
+    shapes: Path | None = None,
+    inception: Path | None = None,
+    clip: Path | None = None,
+    workers: int = 2,
     force: Replace = False,
     json: Written = False,
 ) -> None:
-    """Ask systems the same rooms, score them beside chance and plain baselines, and write a report.
-
-    Example: echousd eval suite default guided --against rooms.json -o report --only relations,faults
-    """
+    """Ask systems the same rooms, score them beside chance and plain baselines, and write a report."""
     from echousd.cli.progress import progress_bar
     from echousd.evaluation.runs import SYSTEMS, SuiteSettings
     from echousd.evaluation.suite import evaluate, report_files, write_report
@@ -70,20 +59,17 @@ def suite(
     say_done(json, written, map(str, written))
 
 
-@eval_app.command("study")
+@told(eval_app, "eval study")
 def study(
-    systems: Annotated[list[str], typer.Argument(help="Two or more systems, as for suite.")],
-    out: Annotated[Path, typer.Option("-o", "--output", help="The page (.html).")] = Path("study.html"),
+    systems: list[str],
+    out: Path = Path("study.html"),
     against: Against = "generated",
     count: Count = 12,
     seed: Seed = 0,
     force: Replace = False,
     json: Written = False,
 ) -> None:
-    """Write a page that shows people pairs of rooms and records which they prefer, offline.
-
-    Example: echousd eval study default generator+search real -o study.html --count 12
-    """
+    """Write a page that shows people pairs of rooms and records which they prefer, offline."""
     from echousd.cli.progress import progress_bar
     from echousd.evaluation.suite import write_study
 
@@ -93,15 +79,12 @@ def study(
     say_done(json, [path], [str(path)])
 
 
-@eval_app.command("answers")
+@told(eval_app, "eval answers")
 def answers(
-    files: Annotated[list[Path], typer.Argument(help="What the pages of a study saved (.json).")],
-    json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+    files: list[Path],
+    json: bool = False,
 ) -> None:
-    """Say whom people preferred: shares with intervals, an exact test of each pair of systems, and agreement.
-
-    Example: echousd eval answers answers_*.json
-    """
+    """Say whom people preferred: shares with intervals, an exact test of each pair of systems, and agreement."""
     from echousd.evaluation.suite import preferences
 
     found = preferences(files)

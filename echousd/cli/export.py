@@ -3,44 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
 from echomodel.files import check_free
-from echousd.cli.options import AsJson, Layout, Replace, ReplacePicture, Room, Written
+from echousd.cli.options import AsJson, Layout, Replace, ReplacePicture, Room, Written, told
 from echousd.cli.output import check_picture, say_done
 
 app = typer.Typer()
 
 
-@app.command(epilog="Example: echousd export out/bedroom/bedroom.usda -o bedroom.usdz")
+@told(app, "export")
 def export(
     room: Room,
-    output: Annotated[Path, typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc; a folder with --for.")],
-    reader: Annotated[
-        str | None,
-        typer.Option(
-            "--for", help="sceneeval: its sceneState, a glb for every object; habitat: a data set of the room or home."
-        ),
-    ] = None,
-    arkit: Annotated[
-        bool, typer.Option("--arkit", help="usdz for Apple's viewers: a usdc inside, Y up, without lights and graph.")
-    ] = False,
-    search: Annotated[
-        list[Path] | None,
-        typer.Option(help="Folder besides the room's own whose files may be taken along; may be repeated."),
-    ] = None,
+    output: Path,
+    reader: str | None = None,
+    arkit: bool = False,
+    search: list[Path] | None = None,
     layout: Layout = None,
-    physics: Annotated[
-        bool | None,
-        typer.Option(
-            "--physics/--no-physics", help="Bodies, colliders and scene, or none of it; default: in flat USD alone."
-        ),
-    ] = None,
-    pictures: Annotated[
-        bool, typer.Option("--pictures/--no-pictures", help="Images, or plain colours alone (MuJoCo reads no JPEG).")
-    ] = True,
+    physics: bool | None = None,
+    pictures: bool = True,
     force: Replace = False,
     json: Written = False,
 ) -> None:
@@ -62,29 +45,18 @@ def export(
 TURN = "turntable"
 
 
-@app.command(epilog="Example: echousd render out/bedroom/bedroom.usda -o top.png --view top")
+@told(app, "render")
 def render(
     room: Room,
-    output: Annotated[
-        Path,
-        typer.Option("-o", "--output", help="Picture to write (.png; .gif of a turntable); with --cameras a folder."),
-    ],
-    view: Annotated[
-        str,
-        typer.Option(
-            help="hero (from inside), dollhouse (from above a corner), top, every-camera (those of --cameras side by "
-            "side), sheet (six views), turntable (a GIF)."
-        ),
-    ] = "hero",
-    cameras: Annotated[
-        bool, typer.Option("--cameras", help="A picture through each camera of the stage, named after it.")
-    ] = False,
-    quality: Annotated[str, typer.Option(help="fast, or fine: more rays, 1280 pixels across.")] = "fast",
-    size: Annotated[int | None, typer.Option(help="Pixels across a picture, else by --quality.")] = None,
-    frames: Annotated[int, typer.Option(help="Pictures of a turntable.", min=2, max=360)] = 24,
-    colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
+    output: Path,
+    view: str = "hero",
+    cameras: bool = False,
+    quality: str = "fast",
+    size: int | None = None,
+    frames: int = 24,
+    colors: str = "materials",
     layout: Layout = None,
-    light: Annotated[str | None, typer.Option(help="day, evening or night; else as the room shows.")] = None,
+    light: str | None = None,
     force: ReplacePicture = False,
     json: Written = False,
 ) -> None:
@@ -129,19 +101,12 @@ def render(
     say_done(json, list(files), map(str, files))
 
 
-@app.command("convert")
+@told(app, "convert")
 def convert(
-    source: Annotated[
-        Path, typer.Argument(metavar="IN.pth", help="Published checkpoint, a file written by torch.save.")
-    ],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.safetensors", help="File to write.")],
-    bounds: Annotated[
-        Path | None,
-        typer.Option(metavar="TXT", help="centered_bounds_*_trainval.txt of the data set: box statistics to store."),
-    ] = None,
-    classes: Annotated[
-        Path | None, typer.Option(metavar="TXT", help="Class names in the order of their ids, one a line.")
-    ] = None,
+    source: Path,
+    output: Path,
+    bounds: Path | None = None,
+    classes: Path | None = None,
     force: Replace = False,
     json: AsJson = False,
 ) -> None:
@@ -149,8 +114,6 @@ def convert(
 
     Sizes and switches are read off the parameter names. Nothing in the file is executed: it is refused if it holds
     anything but tensors and numbers. The result carries config, vocabulary and box statistics.
-
-    Example: echousd convert model2050.pth -o echoscene.safetensors --bounds centered_bounds_all_trainval.txt
     """
     if output.suffix != ".safetensors":
         raise ValueError(f"{output}: the output's name must end by .safetensors")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
@@ -15,16 +15,12 @@ app = typer.Typer()
 
 
 def generate(
-    graph: Annotated[Path, typer.Argument(help="Scene graph: a stage, YAML or JSON.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the room.")],
-    room: Annotated[
-        str | None, typer.Option(help="Prim path of one room of several; default: all of them.", hidden=True)
-    ] = None,
-    flat: Annotated[bool, typer.Option("--flat", help="One .usda or .usdc file instead.")] = False,
+    graph: Path,
+    output: Path,
+    room: str | None = None,
+    flat: bool = False,
     json: Made = False,
-    store: Annotated[
-        Path | None, typer.Option(help="Folder where many rooms keep their assets and images once.", hidden=True)
-    ] = None,
+    store: Path | None = None,
     force: Force = False,
     wait: Wait = False,
     outside: Outside = None,
@@ -70,4 +66,4 @@ def generate(
     report([written], json=json, more=more)
 
 
-add_room_command(app, generate, "echousd generate samples/bedroom.usda -o out/bedroom --seed 7")
+add_room_command(app, "generate", generate)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from echomodel.files import check_free
 from echomodel.late import Late
-from echousd.cli.options import AsJson, Replace, ReplacePicture
+from echousd.cli.options import AsJson, Replace, ReplacePicture, told
 from echousd.cli.output import check_picture, counted, say, say_done, say_json
 from echousd.naming import STAGE_FORMS
 
@@ -21,86 +21,20 @@ if TYPE_CHECKING:
 load_home, vocabulary = Late("echousd.home.files:load_home"), Late("echomodel.vocabulary:vocabulary")
 app = typer.Typer()
 
-NEW_EXAMPLES = """Examples:
 
-    echousd new bedroom.usda --from samples/bedroom.yaml
-
-    echousd new bedroom.usda --room bedroom --count nightstand=2 --count desk=1 --size 4 3.5
-
-    echousd new bedroom.usda --room bedroom --size 4 3.5 --door 'south 0.3' --window 'north 1.2 1.6'
-
-    echousd new bedroom.yaml --room bedroom     (a text to edit by hand)
-
-    echousd new flat.usda --rooms "kitchen open_to living, hall door bedroom*2, hall door bathroom" --area 75
-
-Frames: the room's front is +X, its right +Z, up +Y; lengths are metres, yaw is radians about +Y or, as in 90 deg,
-degrees; at yaw 0 the front of an object looks along +Z."""
-
-GRAPH_EXAMPLES = """Examples:
-
-    echousd graph bedroom.usda
-
-    echousd graph bedroom.usda -o bedroom.png
-
-    echousd graph house.usda --room /House/Bedroom --json > bedroom.json
-
-    echousd graph scan.usdc --names --relations 2 > room.yaml
-
-    echousd graph --schema > scenegraph.schema.json"""
-
-
-def _room_types(incomplete: str) -> list[str]:
-    return [kind.name for kind in vocabulary().room_types if kind.name.startswith(incomplete)]
-
-
-def _counts(incomplete: str) -> list[str]:
-    return [f"{entry.name}=" for entry in vocabulary().categories if entry.name.startswith(incomplete)]
-
-
-@app.command("new", epilog=NEW_EXAMPLES)
+@told(app, "new")
 def new(
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="File to write: .usda, .usdc, .usd, .yaml or .json.")],
-    source: Annotated[
-        Path | None, typer.Option("--from", metavar="GRAPH", help="YAML, JSON or stage to take the graph of.")
-    ] = None,
-    room: Annotated[
-        str | None,
-        typer.Option(
-            "--room", autocompletion=_room_types, help="Room type: begin with what such a room usually holds."
-        ),
-    ] = None,
-    count: Annotated[
-        list[str] | None,
-        typer.Option(metavar="CATEGORY=N", autocompletion=_counts, help="Objects of a category; 0 leaves it out."),
-    ] = None,
-    rooms: Annotated[
-        str | None,
-        typer.Option(
-            metavar="'A PREDICATE B, ...'",
-            help="A home: its rooms and how they lie (door, open_to, adjacent, north_of, larger_than ...).",
-        ),
-    ] = None,
-    area: Annotated[float | None, typer.Option(metavar="M2", help="Of a home: all its floors, square metres.")] = None,
-    relate: Annotated[
-        list[str] | None,
-        typer.Option(metavar="'A PREDICATE B'", help="One more relation, such as 'desk left of double_bed'."),
-    ] = None,
-    size: Annotated[
-        tuple[float, float] | None,
-        typer.Option(metavar="X Z", help="Extents of the floor, metres; of a home, of its outer walls."),
-    ] = None,
-    height: Annotated[float | None, typer.Option(metavar="M", help="Height of the room, metres.")] = None,
-    door: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="WALL ...",
-            help="A door: wall, metres from its first corner, width, hinge=, swing=, height=, name=.",
-        ),
-    ] = None,
-    window: Annotated[
-        list[str] | None,
-        typer.Option(metavar="WALL ...", help="A window: wall, metres from its first corner, width, sill=, height=."),
-    ] = None,
+    out: Path,
+    source: Path | None = None,
+    room: str | None = None,
+    count: list[str] | None = None,
+    rooms: str | None = None,
+    area: float | None = None,
+    relate: list[str] | None = None,
+    size: tuple[float, float] | None = None,
+    height: float | None = None,
+    door: list[str] | None = None,
+    window: list[str] | None = None,
     force: Replace = False,
     json: AsJson = False,
 ) -> None:
@@ -179,29 +113,16 @@ def _counted(text: str) -> tuple[str, int]:
     return word, int(number)
 
 
-@app.command("graph", epilog=GRAPH_EXAMPLES)
+@told(app, "graph")
 def graph(
-    source: Annotated[
-        Path | None, typer.Argument(metavar="GRAPH", help="Stage (.usda .usdc .usd .usdz), YAML, JSON, or a room.")
-    ] = None,
-    room: Annotated[str | None, typer.Option(metavar="PRIM", help="Prim path of one room of several.")] = None,
-    names: Annotated[
-        bool, typer.Option("--names", help="Of a stage without a graph: names of prims count where labels are missing.")
-    ] = False,
-    relations: Annotated[
-        float | None,
-        typer.Option(
-            metavar="N", help="Add N relations an object from the boxes, near and meaningful ones first.", min=0
-        ),
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the canonical JSON form.")] = False,
-    picture: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Draw a picture (.png, .svg, .pdf).")
-    ] = None,
+    source: Path | None = None,
+    room: str | None = None,
+    names: bool = False,
+    relations: float | None = None,
+    as_json: bool = False,
+    picture: Path | None = None,
     force: ReplacePicture = False,
-    schema: Annotated[
-        bool, typer.Option("--schema", help="Print the JSON schema of the canonical form; needs no GRAPH.")
-    ] = False,
+    schema: bool = False,
 ) -> None:
     """Show the scene graph of a stage or a text file, as the text that a person writes."""
     from echousd.folder.found import room_at

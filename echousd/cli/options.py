@@ -12,6 +12,10 @@ from typing import Annotated, Any, get_type_hints
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from echomodel.files import tables
+
+Command = Callable[..., Any]
+SAID = tables("words.toml", __file__)  # name of a command -> its row
 Room = Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz) or its folder.")]
 Layout = Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)]
 Written = Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")]
@@ -48,14 +52,42 @@ def group_of(usual: str) -> type[TyperGroup]:
 LONG = 8  # characters in place of a value; longer ones would leave no room for help
 
 
+def told(app: typer.Typer, name: str, **more: Any) -> Callable[[Command], Command]:
+    """Add a command, called by the last word of its name, with what `words.toml` says of it.
+
+    They are its examples, and of its arguments and options the help with flags, bounds and the like.
+    """
+
+    def add(command: Command) -> Command:
+        hints, row = get_type_hints(command, include_extras=True), SAID[name]
+        for kind, make in (("arguments", typer.Argument), ("options", typer.Option)):
+            for one, words in row.get(kind, {}).items():
+                said = dict(words) if isinstance(words, dict) else {"help": words}
+                if "completed" in said:
+                    said["autocompletion"] = _beginnings(*said.pop("completed"))
+                hints[one] = Annotated[hints[one], make(*said.pop("flags", ()), **said)]
+        own = [one for one in signature(command).parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
+        command.__signature__ = Signature([one.replace(annotation=hints[one.name]) for one in own])  # type: ignore[attr-defined]
+        command.__annotations__ = hints
+        app.command(name.split()[-1], epilog=row.get("examples"), **more)(command)
+        return command
+
+    return add
+
+
+def _beginnings(words: str, end: str) -> Callable[[str], list[str]]:
+    """What a shell completes: words of the vocabulary, with what comes after them."""
+
+    def found(incomplete: str) -> list[str]:
+        from echomodel.vocabulary import vocabulary
+
+        return [one.name + end for one in getattr(vocabulary(), words) if one.name.startswith(incomplete)]
+
+    return found
+
+
 def add_room_command(
-    app: typer.Typer,
-    command: Callable[..., Any],
-    example: str,
-    *,
-    edits: bool = False,
-    asks: bool = False,
-    batch: bool = False,
+    app: typer.Typer, name: str, command: Command, *, edits: bool = False, asks: bool = False, batch: bool = False
 ) -> None:
     """Add a command that takes a room's options: in place of its `**changes` those of the table that are used.
 
@@ -63,9 +95,7 @@ def add_room_command(
         edits: only what an edit may set. asks: and what it changes (`EditRequest`).
         batch: the table of a batch, whose seed is not among the rooms'.
     """
-    hints = get_type_hints(command, include_extras=True)
-    parameters = [one for one in signature(command).parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
-    own = [one.replace(annotation=hints[one.name]) for one in parameters]
+    own = [one for one in signature(command).parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
     used: dict[str, Any] = {}
 
     class WithFlags(TyperCommand):
@@ -85,13 +115,10 @@ def add_room_command(
             used.update({name: ctx.params.pop(name) for name in [*ctx.params] if name in self.flags})
             return super().invoke(ctx)
 
+    @told(app, name, cls=WithFlags)
     @wraps(command)
     def call(**values: Any) -> Any:
         return command(**values, **{name: value for name, value in used.items() if value is not None})
-
-    call.__signature__ = signature(command).replace(parameters=own)  # type: ignore[attr-defined]
-    call.__annotations__ = {one.name: one.annotation for one in own}
-    app.command(command.__name__, cls=WithFlags, epilog=f"Example: {example}")(call)
 
 
 def click_options(*flags: Parameter) -> list[Any]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from echomodel.files import check_free
 from echomodel.late import Late
-from echousd.cli.options import Force, Written, group_of
+from echousd.cli.options import SAID, Force, Written, group_of, told
 from echousd.cli.output import say, say_done, say_written
 from echousd.naming import LAYER_FORMS
 
@@ -18,41 +18,23 @@ if TYPE_CHECKING:
     from echousd.home.graph import HomeGraph
     from echousd.options import RoomOptions
 
-EXAMPLES = """Examples:
 
-    echousd plan export flat.yaml -o plans.png --plans 6        (export may be left out)
-
-    echousd plan flat.yaml -o planned.usda --seed 3        (echousd generate planned.usda -o flat furnishes this one)
-
-    echousd plan flat/home.usda -o flat.dxf"""
-
-IMPORT_EXAMPLES = """Examples:
-
-    echousd plan import flat.dxf -o flat.usda --unit mm --picture flat.png
-
-    echousd plan import house.ifc -o house.usda --storey 'Ground floor'
-
-    echousd plan import scan.json -o scan.usda        (RoomPlan, ProcTHOR, Holodeck, SceneSmith, SAGE or Infinigen)"""
-
-
-plan_app = typer.Typer(cls=group_of("export"), no_args_is_help=True, epilog=EXAMPLES)
+plan_app = typer.Typer(cls=group_of("export"), no_args_is_help=True, epilog=SAID["plan export"]["examples"])
 draw_plans, write_home = Late("echousd.home.draw:draw_plans"), Late("echousd.home.stages:write_home")
 faults_of, plan_there = Late("echousd.graph.consistency:faults_of"), Late("echousd.home.existing:plan_there")
 app = typer.Typer()
 app.add_typer(plan_app, name="plan", help="Plan a home, draw or write its plan; read somebody's floor plan.")
 
 
-@plan_app.command("import", epilog=IMPORT_EXAMPLES)
+@told(plan_app, "plan import")
 def import_(
-    source: Annotated[Path, typer.Argument(metavar="FILE", help=".dxf, .ifc, .svg, .sh3d or .json.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Stage (.usda) to write.")],
-    form: Annotated[str | None, typer.Option("--format", help="Format, where it is not to be found out.")] = None,
-    unit: Annotated[
-        str | None, typer.Option(help="Unit of a drawing that states none: m, cm, mm, in, ft, or metres of one.")
-    ] = None,
-    storey: Annotated[str | None, typer.Option(help="Storey of several; default: the lowest.")] = None,
-    lenient: Annotated[bool, typer.Option("--lenient", help="Leave out doors and windows that meet no wall.")] = False,
-    picture: Annotated[Path | None, typer.Option(help="Draw the plan over the source (.png, .svg, .pdf).")] = None,
+    source: Path,
+    output: Path,
+    form: str | None = None,
+    unit: str | None = None,
+    storey: str | None = None,
+    lenient: bool = False,
+    picture: Path | None = None,
     force: Force = False,
     json: Written = False,
 ) -> None:
@@ -88,14 +70,12 @@ def _writable(path: Path, endings: tuple[str, ...], force: bool) -> None:
     check_free(path, force=force)
 
 
-@plan_app.command("export", epilog=EXAMPLES)
+@told(plan_app, "plan export")
 def export(
-    source: Annotated[Path, typer.Argument(metavar="HOME", help="Home: YAML, JSON or stage.")],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help=".png, .svg, .pdf, .dxf, .json (ProcTHOR 1.0.0) or .usda.")
-    ],
-    several: Annotated[int, typer.Option("--plans", help="Plans side by side in a picture.", min=1, max=12)] = 1,
-    seed: Annotated[int, typer.Option(help="Seed of the plan.", min=0)] = 0,
+    source: Path,
+    output: Path,
+    several: int = 1,
+    seed: int = 0,
     force: Force = False,
     json: Written = False,
 ) -> None:

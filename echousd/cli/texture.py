@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from echousd.cli.options import AsJson, Layout, Wait
+from echousd.cli.options import AsJson, Layout, Wait, told
 from echousd.cli.output import say, say_done
 
 if TYPE_CHECKING:
@@ -18,25 +18,17 @@ app = typer.Typer()
 app.add_typer(texture_app, name="texture", help="To texturing tools (SceneTex, Hunyuan3D-Paint, MVPainter) and back.")
 
 
-@texture_app.command(
-    "export", epilog="Example: echousd texture export out/bedroom/bedroom.usda -o out/job --for scenetex"
-)
+@told(texture_app, "texture export")
 def export(
-    room: Annotated[Path, typer.Argument(help="Room: .usda, .usdc, .usd, .usdz or folder.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the job.")],
-    tool: Annotated[str, typer.Option("--for", help="scenetex, hunyuan, mvpainter or generic.")],
-    prompt: Annotated[str, typer.Option(help="Words for the room; default: from its graph.")] = "",
-    dressing: Annotated[str, typer.Option(help="Small things: none, grouped as one object, or each.")] = "none",
-    resolution: Annotated[
-        int | None,
-        typer.Option(help="Texels along an object's picture; default 2048 (SceneTex: 4096 for all).", min=64),
-    ] = None,
+    room: Path,
+    output: Path,
+    tool: str,
+    prompt: str = "",
+    dressing: str = "none",
+    resolution: int | None = None,
     layout: Layout = None,
-    shell: Annotated[
-        bool | None,
-        typer.Option("--shell/--no-shell", help="Floor and walls too; default: not for hunyuan and mvpainter."),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a job that lies there, its results too.")] = False,
+    shell: bool | None = None,
+    force: bool = False,
     json: AsJson = False,
 ) -> None:
     """Write meshes with texture coordinates, cameras, prompts, a script to run the tool, and job.json."""
@@ -55,14 +47,14 @@ def export(
         _tell(job)
 
 
-@texture_app.command("import", epilog="Example: echousd texture import out/bedroom/bedroom.usda out/job --name oil")
+@told(texture_app, "texture import")
 def import_(
-    room: Annotated[Path, typer.Argument(help="Room that was exported: root layer or folder.")],
-    job: Annotated[Path, typer.Argument(help="Folder of the job, painted.")],
-    name: Annotated[str, typer.Option(help="Of the look; default: the tool's.")] = "",
-    skip: Annotated[list[str] | None, typer.Option(help="Object that keeps its look; may be repeated.")] = None,
-    preview: Annotated[bool, typer.Option("--preview/--no-preview", help="Draw the room's picture anew.")] = True,
-    force: Annotated[bool, typer.Option("--force", help="Replace a look of that name.")] = False,
+    room: Path,
+    job: Path,
+    name: str = "",
+    skip: list[str] | None = None,
+    preview: bool = True,
+    force: bool = False,
     wait: Wait = False,
     json: AsJson = False,
 ) -> None:

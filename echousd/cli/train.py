@@ -10,7 +10,7 @@ import typer
 
 from echomodel.files import check_free
 from echomodel.late import Late
-from echousd.cli.options import Replace
+from echousd.cli.options import Replace, told
 from echousd.cli.output import counted
 
 if TYPE_CHECKING:
@@ -25,18 +25,15 @@ load_rooms, with_known_words = (Late(f"echomodel.data.roomset:{name}") for name 
 app = typer.Typer()
 
 
-@app.command("train")
+@told(app, "train")
 def train(
-    recipe: Annotated[Path, typer.Argument(help="Recipe file (TOML), see model/recipes.")],
-    settings: Annotated[list[str] | None, typer.Option("--set", help="Change a field: key.sub=value.")] = None,
-    out: Annotated[Path | None, typer.Option("-o", "--output", help="The run's folder; default: runs/RECIPE.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue from the folder's checkpoint.")] = False,
-    minutes: Annotated[float | None, typer.Option(help="Stop (with a checkpoint) after so many minutes.")] = None,
+    recipe: Path,
+    settings: list[str] | None = None,
+    out: Path | None = None,
+    resume: bool = False,
+    minutes: float | None = None,
 ) -> None:
-    """Train a part of the echo model; a run that was stopped continues bit for bit with --resume.
-
-    Example: echousd train model/recipes/layout.toml --set data=data/full --set steps=20000
-    """
+    """Train a part of the echo model; a run that was stopped continues bit for bit with --resume."""
     from echomodel.training.recipe import read_recipe
     from echomodel.training.start import open_run
 
@@ -61,16 +58,13 @@ Seed = Annotated[int, typer.Option(help="Seed of the world; equal seeds give equ
 Rooms = Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")]
 
 
-@data_app.command("build")
+@told(data_app, "data build")
 def build(
-    out: Annotated[Path, typer.Option("-o", "--output", help="Folder of the data set.")],
-    recipe: Annotated[str, typer.Option(help="smoke (seconds), packed (at most 40 MB) or full.")] = "smoke",
+    out: Path,
+    recipe: str = "smoke",
     seed: Seed = 0,
 ) -> None:
-    """Make rooms and shapes to train on; run again to continue a build that was stopped.
-
-    Example: echousd data build --recipe packed --seed 1 -o data/packed
-    """
+    """Make rooms and shapes to train on; run again to continue a build that was stopped."""
     from echomodel.data.build import build_data
 
     with progress_bar() as listen:
@@ -79,18 +73,15 @@ def build(
     Terminal(stderr=True).print(f"{out}: {len(rooms)} rooms, {len(shapes)} shapes, {size:.1f} MB")
 
 
-@data_app.command("rooms")
+@told(data_app, "data rooms")
 def rooms_command(
-    out: Annotated[Path, typer.Option("-o", "--output", help="A rooms file (.json), or a set to train on (.npz).")],
-    count: Annotated[int, typer.Option(help="Number of rooms.")] = 100,
+    out: Path,
+    count: int = 100,
     seed: Seed = 0,
-    room: Annotated[str | None, typer.Option(help="Room type; default a mixture.")] = None,
+    room: str | None = None,
     force: Replace = False,
 ) -> None:
-    """Generate rooms into a rooms file.
-
-    Example: echousd data rooms --count 50 --room bedroom -o bedrooms.json
-    """
+    """Generate rooms into a rooms file."""
     from echomodel.rooms.generator import generate_rooms
     from echomodel.vocabulary import vocabulary
 
@@ -121,22 +112,19 @@ def _write_one_file(out: Path, found: list[RoomBoxes], kind: str) -> None:
     Terminal(stderr=True).print(f"{out}: {counted(len(found), 'room')}{left}")
 
 
-@data_app.command("search")
+@told(data_app, "data search")
 def search(
-    out: Annotated[Path, typer.Option("-o", "--output", help="Folder of the rooms; run again to go on.")],
-    count: Annotated[int, typer.Option(help="Graphs to search rooms of, or rooms to look through.", min=1)] = 20_000,
+    out: Path,
+    count: int = 20_000,
     seed: Seed = 0,
-    drafts: Annotated[int, typer.Option(help="Drafts of the network a room, beside one arrangement.", min=0)] = 2,
-    weights: Annotated[str | None, typer.Option(help="Weights that draw them; default: those that ship.")] = None,
-    workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
-    minutes: Annotated[float | None, typer.Option(help="Begin nothing after so many minutes.")] = None,
-    unsearched: Annotated[bool, typer.Option(help="The generator's rooms that miss no term, none searched.")] = False,
-    rooms: Annotated[str | None, typer.Option(help="A packed set whose rooms are searched on, not new ones.")] = None,
+    drafts: int = 2,
+    weights: str | None = None,
+    workers: int = 1,
+    minutes: float | None = None,
+    unsearched: bool = False,
+    rooms: str | None = None,
 ) -> None:
-    """Search rooms without a fault to train on, from several starts each; OUT/rooms.npz is the set.
-
-    Example: echousd data search --count 200 --seed 7 -o data/found
-    """
+    """Search rooms without a fault to train on, from several starts each; OUT/rooms.npz is the set."""
     from echousd.place.examples import GRAPHS, PLAIN, ExamplesPlan, search_examples
 
     console = Terminal(stderr=True)
@@ -150,20 +138,17 @@ def search(
     console.print(f"{out}/rooms.npz: {len(found)} rooms, {int(found.counts.sum())} objects")
 
 
-@data_app.command("plot")
+@told(data_app, "data plot")
 def plot(
     rooms: Rooms,
-    out: Annotated[Path, typer.Option("-o", "--output", help="Picture file.")],
-    limit: Annotated[int, typer.Option(help="Number of rooms.")] = 50,
-    columns: Annotated[int, typer.Option(help="Rooms in a row.", min=1, max=1000)] = 10,
-    room: Annotated[str | None, typer.Option(help="Only rooms of this type.")] = None,
-    labels: Annotated[bool, typer.Option(help="Write the categories.")] = True,
+    out: Path,
+    limit: int = 50,
+    columns: int = 10,
+    room: str | None = None,
+    labels: bool = True,
     force: Replace = False,
 ) -> None:
-    """Draw rooms from above: rectangles coloured per class, a red line to each front.
-
-    Example: echousd data plot rooms.json -o rooms.png --limit 20 --room bedroom
-    """
+    """Draw rooms from above: rectangles coloured per class, a red line to each front."""
     from echomodel.data.roomset import rooms_of_type
     from echomodel.data.sheet import plot_rooms
 
@@ -174,17 +159,15 @@ def plot(
     plot_rooms(found[:limit], out, columns=columns, labels=labels)
 
 
-@data_app.command("meshes")
+@told(data_app, "data meshes")
 def meshes(
-    library: Annotated[Path, typer.Argument(help="Index of a library (.parquet), from echousd assets index.")],
-    out: Annotated[Path, typer.Option("-o", "--output", help="Folder of the set.")],
-    copies: Annotated[int, typer.Option(min=1, help="Stored shapes per training mesh: 1 as it is, 2 with mirror.")] = 2,
+    library: Path,
+    out: Path,
+    copies: int = 2,
 ) -> None:
     """Make a shape set from the usable models of a library: metric size, flood-filled distances, attribution.
 
     Classes and fronts are those of the index; `echousd assets review` tells how they are corrected.
-
-    Example: echousd data meshes models.parquet -o data/meshes
     """
     from functools import partial
 
@@ -213,19 +196,16 @@ def meshes(
     console.print(f"{out}: {len(shapes)} shapes, {int(shapes.held_out.sum())} held out")
 
 
-@data_app.command("to-usd")
+@told(data_app, "data to-usd")
 def to_usd(
     rooms: Rooms,
-    out: Annotated[Path, typer.Option("-o", "--output", help="Folder for the stages, one per room.")],
-    limit: Annotated[int | None, typer.Option(help="Only the first rooms.")] = None,
-    rules: Annotated[str, typer.Option(help="Label rooms without relations: strict, sgfront or none.")] = "strict",
-    known: Annotated[bool, typer.Option(help="Leave out objects that the vocabulary does not hold.")] = True,
+    out: Path,
+    limit: int | None = None,
+    rules: str = "strict",
+    known: bool = True,
     force: Replace = False,
 ) -> None:
-    """Write rooms of any source as USD stages with their scene graphs.
-
-    Example: echousd data to-usd rooms.json -o stages --limit 10
-    """
+    """Write rooms of any source as USD stages with their scene graphs."""
     from echousd.stage.boxes import write_stages
 
     check_free(out, force=force)
@@ -240,21 +220,17 @@ def to_usd(
     write_stages(found, out, None if rules == "none" else rules)
 
 
-@data_app.command("import")
+@told(data_app, "data import")
 def import_rooms(
-    sources: Annotated[
-        list[Path], typer.Argument(help="Rooms files, sets, stages, SG-FRONT, folders, what eval reads.")
-    ],
-    out: Annotated[Path, typer.Option("-o", "--output", help="A set to train on (.npz), or a rooms file (.json).")],
-    room: Annotated[str, typer.Option(help="Of SG-FRONT: bedroom, livingroom, diningroom, library or all.")] = "all",
-    split: Annotated[str, typer.Option(help="Of SG-FRONT: trainval or test.")] = "trainval",
+    sources: list[Path],
+    out: Path,
+    room: str = "all",
+    split: str = "trainval",
     force: Replace = False,
 ) -> None:
     """Bring rooms of any source into one file: for `echousd train --set data=FILE.npz`, or for eval.
 
     A set holds every twentieth room out and is labelled anew where it is read; a rooms file keeps what is told.
-
-    Example: echousd data import my_stages more_rooms.json -o mine.npz
     """
     from echomodel.data.sgfront import SGFront
     from echousd.evaluation.runs import rooms_from
@@ -269,19 +245,16 @@ def import_rooms(
     _write_one_file(out, found, "imported rooms")
 
 
-@data_app.command("to-sgfront")
+@told(data_app, "data to-sgfront")
 def to_sgfront(
     rooms: Rooms,
-    out: Annotated[Path, typer.Option("-o", "--output", help="Folder for the files.")],
-    split: Annotated[str, typer.Option(help="trainval or test.")] = "trainval",
-    drop: Annotated[float, typer.Option(help="Share of the relations that is left out.")] = 0.5,
-    seed: Annotated[int, typer.Option(help="Seed of the dropping.")] = 0,
+    out: Path,
+    split: str = "trainval",
+    drop: float = 0.5,
+    seed: int = 0,
     force: Replace = False,
 ) -> None:
-    """Write rooms in the files of SG-FRONT, labelled by its rules.
-
-    Example: echousd data to-sgfront rooms.json -o sgfront
-    """
+    """Write rooms in the files of SG-FRONT, labelled by its rules."""
     from echomodel.data.sgfront import write_sgfront
 
     check_free(out, force=force)

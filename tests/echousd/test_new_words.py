@@ -149,13 +149,13 @@ def test_outside_the_block_they_are_unknown():
 
 
 def test_made_of_parts_dressed_weighed_and_made_in_batches(music, tmp_path, monkeypatch):
-    def spinet(size, style, choices):  # a furniture program is a function of its name and a word of PROGRAMS
+    def spinet(size, style, choices):  # a furniture program is a function of its name and a word of programs.toml
         w, h, d = size
         sides = [box((x, 0, -d / 2), (x + 0.05, 0.5 * h, d / 2)) for x in (-w / 2, w / 2 - 0.05)]
         return [*sides, box((-w / 2, 0.5 * h, -d / 2), (w / 2, h, d / 2))]
 
     monkeypatch.setattr(household, "spinet", spinet, raising=False)
-    monkeypatch.setitem(PROGRAMS, "household", (*PROGRAMS["household"], "spinet"))
+    monkeypatch.setitem(PROGRAMS, "household", [*PROGRAMS["household"], "spinet"])
     graph = starting_graph("music room", {"spinet": 1})  # of no stated size: its floor is that of its like
     graph = graph.replaced(relations=(*graph.relations, Relation("stool", "in_line_with", "harp")))
     options = {"shapes": "parts", "dress": "full", "walls": True}

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from echomodel.files import tables
 from echomodel.furniture.solids import Joint, Solid, mesh_of
 from echomodel.furniture.style import Choices, Style
 from echomodel.late import Late
@@ -18,25 +19,7 @@ __all__ = ["Choices", "Style", "draw_choices", "draw_style", "mesh_of", "sample_
 draw_choices, draw_style = Late(f"{__name__}.drawn:draw_choices"), Late(f"{__name__}.drawn:draw_style")
 sample_size = Late(f"{__name__}.drawn:sample_size")
 Builder = Callable[[np.ndarray, Style, Choices], list[Solid]]
-# Module -> its programs, functions of these names; one is loaded when a category asks for it.
-PROGRAMS = {
-    "chairs": ("dining_chair", "chair", "chinese_chair", "dressing_chair", "bar_stool", "office_chair", "stool",
-               "bench", "ottoman"),
-    "sofas": ("armchair", "lounge_chair", "multi_seat_sofa", "loveseat_sofa", "sofa", "l_shaped_sofa",
-              "chaise_longue_sofa", "lazy_sofa"),
-    "tables": ("dining_table", "coffee_table", "side_table", "round_end_table", "corner_side_table", "console_table",
-               "desk", "dressing_table"),
-    "storage": ("nightstand", "wardrobe"), "floor_lamps": ("floor_lamp", "wall_lamp"),
-    "cabinets": ("dresser", "sideboard", "cabinet", "children_cabinet", "tv_stand"),
-    "shelving": ("bookshelf", "shelf", "wine_cabinet"),
-    "beds": ("double_bed", "single_bed"), "kids_beds": ("kids_bed",),
-    "lamps": ("pendant_lamp", "table_lamp"), "chandeliers": ("ceiling_lamp",),
-    "kitchens": ("base_unit", "wall_unit", "tall_unit", "sink_unit", "hob_unit", "dishwasher", "fridge", "range_hood",
-                 "kitchen_island"),
-    "bathrooms": ("toilet", "washbasin", "shower", "bathtub", "mirror_cabinet", "towel_radiator", "washing_machine"),
-    "household": ("coat_rack", "shoe_cabinet", "radiator", "fireplace", "piano", "cot", "toy_box", "garden_table",
-                  "garden_chair", "plant", "tv"),
-}  # fmt: skip
+PROGRAMS: dict[str, list[str]] = tables("programs.toml", __file__)
 UNSAID = ("", "board")
 BY_MATERIAL = {"fabric": "upholstery", "shade": "shade", "leaf": "leaf", "mirror": "mirror"}
 
