@@ -1,6 +1,7 @@
 """What the layout network draws, judged room by room: weights beside one another and beside the same ones shuffled.
 
-    python benchmarks/drafts.py [WEIGHTS ...] [--ways alone guided searched default] [--rooms ROOMS.json] [--count 40]
+    python benchmarks/drafts.py [WEIGHTS ...] [--ways alone guided searched default] [--count 40]
+                                [--rooms ROOMS.json | --types kitchen bathroom ...]
     python benchmarks/drafts.py ships muted shuffled random generator --ways searched --poses 250 1000 4500
     python benchmarks/drafts.py ships shuffled generator --ways default
 
@@ -134,17 +135,26 @@ def interval(mine: np.ndarray, first: np.ndarray) -> np.ndarray:
     return np.quantile(mine - first, [0.025, 0.975], axis=0)
 
 
+def generated(count: int, types: list[str] | None) -> list[RoomBoxes]:
+    """Rooms of the generator, of each type as many where types are named."""
+    if types is None:
+        return generate_rooms(count, SEED)
+    each = [generate_rooms(-(-count // len(types)), SEED, room_type=name) for name in types]
+    return [room for rooms in zip(*each, strict=True) for room in rooms]
+
+
 def main() -> None:
     """Print a line for each way and weights."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("weights", nargs="*", default=["ships"])
     parser.add_argument("--ways", nargs="+", default=["alone"], choices=["alone", "guided", "searched", "default"])
     parser.add_argument("--rooms", type=Path)
+    parser.add_argument("--types", nargs="+", help="room types to generate as many of each")
     parser.add_argument("--count", type=int, default=40)
     parser.add_argument("--poses", nargs="+", type=int)
     parser.add_argument("--draws", type=int, default=1)
     options = parser.parse_args()
-    rooms = generate_rooms(options.count, SEED) if options.rooms is None else load_rooms(options.rooms)
+    rooms = generated(options.count, options.types) if options.rooms is None else load_rooms(options.rooms)
     rooms = [room for room in with_known_words(rooms) if len(room) > 1]
     rooms = [rooms[number * len(rooms) // options.count] for number in range(min(options.count, len(rooms)))]
     tasks = tasks_of(rooms, 0, stated=1.0)

@@ -2,7 +2,8 @@
 
     python model/recipes/mean.py BEFORE.safetensors AFTER.safetensors -o MEAN.safetensors
 
-What the first file says of itself stays (Wortsman et al. 2022, model soups).
+What the first of the files that know the most words says of itself stays, and what a word means is the mean of those
+that know it (Wortsman et al. 2022, model soups).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from safetensors.torch import save_file
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from echomodel.compact.model import read_weights
+from echomodel.compact.weights import in_words, joined_config, words_of
 
 
 def main() -> None:
@@ -25,14 +27,21 @@ def main() -> None:
     parser.add_argument("files", nargs="+", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
-    files = [read_weights(path) for path in options.files]
-    form = {key: values.shape for key, values in files[0][1].items()}
-    for path, (_, tensors) in zip(options.files, files, strict=True):
-        if {key: values.shape for key, values in tensors.items()} != form:
+    files = {path: read_weights(path) for path in options.files}
+    config = joined_config({path: header for path, (header, _) in files.items()})
+    known = {path: words_of(path, header) for path, (header, _) in files.items()}
+    grown = [in_words(tensors, known[path], config) for path, (_, tensors) in files.items()]
+    for path, tensors in zip(files, grown, strict=True):
+        if {key: values.shape for key, values in tensors.items()} != {k: v.shape for k, v in grown[0].items()}:
             parser.error(f"{path}: holds other parts than {options.files[0]}, or of other sizes; nothing was written")
-    alike = {key: torch.stack([tensors[key] for _, tensors in files]) for key in files[0][1]}
-    mean = {key: values.float().mean(0).to(values.dtype) for key, values in alike.items()}
-    save_file(mean, options.output, files[0][0])
+    mean = {}
+    for key, first in grown[0].items():
+        each = torch.stack([tensors[key].float() for tensors in grown])
+        for row, (_, tensors) in enumerate(files.values()):
+            each[row, len(tensors[key]) :] = torch.nan  # words that this file does not know
+        mean[key] = each.nanmean(0).to(first.dtype)
+    most = max(files, key=lambda path: sum(map(len, known[path].values())))
+    save_file(mean, options.output, files[most][0])
 
 
 if __name__ == "__main__":

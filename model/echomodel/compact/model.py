@@ -20,7 +20,16 @@ from torch.overrides import TorchFunctionMode
 
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.modules import FurnitureDenoiser, LatentGraph, LayoutDenoiser
-from echomodel.compact.weights import FORMAT, PARTS, WeightsError, joined_config, own_statistics, read_header
+from echomodel.compact.weights import (
+    FORMAT,
+    PARTS,
+    WeightsError,
+    in_words,
+    joined_config,
+    own_statistics,
+    read_header,
+    words_of,
+)
 from echomodel.config import CompactConfig, to_json
 from echomodel.files import raising, whole_file
 
@@ -132,7 +141,7 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
     if not paths:
         raise WeightsError("no weights files found: install the package with its weights or name a file")
     metadata: dict[Path, dict[str, str]] = {}
-    tensors: dict[str, Tensor] = {}
+    held_by: dict[Path, dict[str, Tensor]] = {}
     digest = hashlib.sha256()
     for path in sorted(paths):
         header = read_header(path)
@@ -140,13 +149,16 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
         if header.get("format") != FORMAT:
             raise WeightsError(f"{path}: format is {header.get('format')!r}, expected {FORMAT!r}")
         metadata[path] = header
-        tensors.update(_numbers(path))
+        held_by[path] = _numbers(path)
     where = ", ".join(map(str, metadata))
     try:
         config = joined_config(metadata)
+        tensors: dict[str, Tensor] = {}
+        for path, header in metadata.items():
+            tensors |= in_words(held_by[path], words_of(path, header), config)
         held = {part for header in metadata.values() for part in json.loads(header["parts"])}
         parts = [part for part in PARTS if part in held]
-        statistics = own_statistics(metadata)
+        statistics = own_statistics(metadata, config)
         check_numbers(asdict(config), len(tensors))
         with torch.device("meta"), _Undrawn():  # sizes that a bent configuration asks for cost nothing there
             _check_fit(CompactModel(config, statistics, parts).state_dict(), tensors, where)

@@ -22,10 +22,9 @@ from echomodel.compact.furniture import Furniture
 from echomodel.compact.layout import Layout
 from echomodel.compact.learned import places
 from echomodel.compact.pairs import Echo, Latents
-from echomodel.compact.weights import joined_config, own_statistics, read_header
+from echomodel.compact.weights import TABLES, in_words, joined_config, own_statistics, read_header, words_of
 from echomodel.config import CompactConfig
 
-TABLES = {"category": "categories", "room_type": "room_types"}  # name of a table of vectors -> what its rows are of
 EPSILON = 1e-5  # of a norm's variance, as torch has it
 
 
@@ -129,11 +128,11 @@ def load_plain(paths: Sequence[Path]) -> tuple[PlainModel, str]:
     for path, header in metadata.items():
         digest.update(content := path.read_bytes())
         parts = json.loads(header["parts"])
-        held = load(content) if set(parts) & NETS.keys() else {}
+        held = in_words(load(content) if set(parts) & NETS.keys() else {}, words_of(path, header), config)
         for part in set(parts) & NETS.keys():
             own = {key[len(part) + 1 :]: value.astype(np.float32) for key, value in held.items()
                    if key.startswith(f"{part}.")}  # fmt: skip
             nets[part] = NETS[part](own, config)
             vars(nets[part])["settings"] = getattr(config, part)
     held_parts = tuple(part for header in metadata.values() for part in json.loads(header["parts"]))
-    return PlainModel(config, own_statistics(metadata), held_parts, **nets), digest.hexdigest()[:12]
+    return PlainModel(config, own_statistics(metadata, config), held_parts, **nets), digest.hexdigest()[:12]

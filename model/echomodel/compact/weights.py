@@ -13,12 +13,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from safetensors import SafetensorError, safe_open
 
 from echomodel.boxes import BoxStatistics
+from echomodel.compact.learned import Names, places
 from echomodel.config import CompactConfig, FurnitureConfig, from_dict
 from echomodel.files import raising
 from echomodel.late import Late
+from echomodel.vocabulary import vocabulary
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ def branches(parts: Iterable[str]) -> frozenset[str]:
 
 
 WORDS = ("categories", "predicates", "room_types")
-_SHARED = (*WORDS, "rules")
+TABLES = {"category": "categories", "room_type": "room_types"}  # name of a table of vectors -> what its rows are of
 FORMAT = "echousd-compact-1"
 
 
@@ -69,14 +72,17 @@ def read_header(path: Path) -> dict[str, str]:
 
 
 def joined_config(metadata: Mapping[Path, dict[str, str]]) -> CompactConfig:
-    """Each part's settings from the file that holds the part; what all parts share must be equal."""
+    """Each part's settings from the file that holds the part, and the words of the file that knows the most; what all
+    parts share must be equal, and words that a file knows be the first of those."""
     joined, first = None, None
     for path, header in metadata.items():
         own = from_dict(CompactConfig, {**json.loads(header["config"]), **words_of(path, header)})
         joined, first = joined or own, first or path
-        for shared in _SHARED:
-            if vars(own)[shared] != vars(joined)[shared]:
+        for shared in (*WORDS, "rules"):
+            few, more = sorted((vars(own)[shared], vars(joined)[shared]), key=len)
+            if few != (more[: len(few)] if shared in TABLES.values() else more):
                 raise WeightsError(f"{path}: {shared} differs from that of {first}, they are not one model")
+            joined = replace(joined, **{shared: more})
         parts, known = json.loads(header["parts"]), FurnitureConfig()
         if "furniture" in parts and (own.furniture.kinds, own.furniture.numbers) != (known.kinds, known.numbers):
             raise WeightsError(f"{path}: its furniture was described in other words; train it again")
@@ -85,11 +91,36 @@ def joined_config(metadata: Mapping[Path, dict[str, str]]) -> CompactConfig:
     return joined
 
 
-def own_statistics(metadata: Mapping[Path, Mapping[str, str]]) -> BoxStatistics:
-    """The box statistics of the file with the layout branch, which alone knows boxes, else of the first file."""
-    headers = list(metadata.values())
-    own = next((header for header in headers if "layout" in json.loads(header["parts"])), headers[0])
-    return BoxStatistics.from_json(json.loads(own["statistics"]))
+def in_words(tensors: Mapping[str, Any], known: Mapping[str, Names], config: CompactConfig) -> dict[str, Any]:
+    """Tensors by name, their tables in the words of `config`: one that a file does not know begins as what it is like.
+
+    Arguments:
+        known: words of the file, as `words_of` has them.
+    """
+    kinds = {key: TABLES.get(key.removesuffix(".weight").rpartition(".")[2], "") for key in tensors}
+    return {key: value[_rows(kinds[key], known, config)] if kinds[key] else value for key, value in tensors.items()}
+
+
+def _rows(kind: str, known: Mapping[str, Names], config: CompactConfig) -> np.ndarray | slice:
+    """Which rows of a file's table of words those are that `config` names."""
+    names, words = getattr(config, kind), vocabulary()
+    if names == known[kind]:
+        return slice(None)
+    number = {row.name: place for place, row in enumerate(getattr(words, kind))}
+    return places(kind, known[kind], np.array([number[words.name_of(kind, name)] for name in names]))
+
+
+def own_statistics(metadata: Mapping[Path, Mapping[str, str]], config: CompactConfig) -> BoxStatistics:
+    """The box statistics of the file with the layout branch, which alone knows boxes, else of the first file, of the
+    categories of `config`."""
+    first = next(iter(metadata))
+    path = next((path for path, header in metadata.items() if "layout" in json.loads(header["parts"])), first)
+    own = metadata[path]
+    statistics = BoxStatistics.from_json(json.loads(own["statistics"]))
+    if statistics.classes:
+        classes = np.array(statistics.classes)[_rows("categories", words_of(path, own), config)]
+        statistics = replace(statistics, classes=tuple(map(tuple, classes.tolist())))
+    return statistics
 
 
 def words_of(path: Path, header: Mapping[str, str]) -> dict[str, tuple[str, ...]]:

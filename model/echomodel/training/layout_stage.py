@@ -8,6 +8,7 @@ person who looks at a draw counts what is wrong in it.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -61,12 +62,14 @@ class LayoutStage:
 
     @classmethod
     def open(cls, start: Start) -> LayoutStage:
-        """The stage of a recipe; new layouts are normalised by its rooms."""
+        """The stage of a recipe; new layouts are normalised by its rooms, new categories by those of them."""
         rooms, held = (start.rooms(held=held) for held in (False, True))
-        if "layout" not in start.loaded:
-            names = start.model.config.categories
+        names, known = start.model.config.categories, start.model.statistics
+        old = start.known_categories if "layout" in start.loaded else 0
+        if old < len(names):
             rows = places("categories", names, rooms.category)
-            start.model.statistics = statistics_of(rooms.boxes, rows, len(names))
+            own = statistics_of(rooms.boxes, rows, len(names))
+            start.model.statistics = own if not old else replace(known, classes=known.classes[:old] + own.classes[old:])
         if start.recipe.compiled:
             start.model.layout.measure = torch.compile(measured, dynamic=True)
         return cls(rooms, held, start.recipe)

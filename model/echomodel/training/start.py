@@ -10,18 +10,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 import torch
 
 from echomodel.boxes import BoxStatistics
-from echomodel.compact.learned import places
-from echomodel.compact.model import CompactModel, load_weights, read_weights
-from echomodel.compact.modules import WordTable
+from echomodel.compact.model import CompactModel, load_weights, read_weights, restored
 from echomodel.compact.shape import ShapeDenoiser
-from echomodel.compact.weights import WORDS, read_header, words_of
+from echomodel.compact.weights import WORDS, in_words, own_statistics, read_header, words_of
 from echomodel.config import CompactConfig
 from echomodel.data.roomset import RoomSet
 from echomodel.late import Late
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import PackedRooms
 from echomodel.training.trainer import Report, Trainer, TrainingStage
-from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:
     from echomodel.data.shapeset import ShapeSet
@@ -51,6 +48,12 @@ class Start:
     def generator(self) -> torch.Generator:
         """The source of what is initialised from data, the same every time."""
         return torch.Generator().manual_seed(self.recipe.seed)
+
+    @property
+    def known_categories(self) -> int:
+        """How many of the model's categories, the first, the file that the recipe begins with knows."""
+        path = next((Path(name) for name in self.recipe.warm), None)
+        return len(words_of(path, read_header(path))["categories"] if path else self.model.config.categories)
 
     def rooms(self, *, held: bool) -> PackedRooms:
         """The recipe's rooms to train on, or those that are held out."""
@@ -169,7 +172,7 @@ def warm_start(model: CompactModel, path: Path) -> tuple[str, ...]:
     """
     header, tensors = read_weights(path)
     own = model.state_dict()
-    for key, value in tensors.items():
+    for key, value in in_words(restored(tensors), words_of(path, header), model.config).items():
         if key not in own:
             continue
         wanted = own[key]
@@ -179,24 +182,7 @@ def warm_start(model: CompactModel, path: Path) -> tuple[str, ...]:
             if value.shape != wanted.shape:
                 wanted.zero_()
             wanted[tuple(slice(0, size) for size in value.shape)] = value.to(wanted.dtype)
-    _speak_of_new_words(model, path, header)
     parts = tuple(part for part in json.loads(header.get("parts", "[]")) if part in model.parts)
     if "layout" in parts:
-        statistics = BoxStatistics.from_json(json.loads(header["statistics"]))
-        if classes := statistics.classes:  # of categories that are new, those of what they are like
-            numbers = torch.tensor([vocabulary().category_id(name) for name in model.config.categories])
-            like = places("categories", words_of(path, header)["categories"], numbers)
-            statistics = replace(statistics, classes=tuple(classes[k] for k in like))
-        model.statistics = statistics
+        model.statistics = own_statistics({path: header}, model.config)
     return parts
-
-
-def _speak_of_new_words(model: CompactModel, path: Path, header: dict[str, str]) -> None:
-    """Words that a file does not know begin as what they are like."""
-    known = words_of(path, header)
-    for table in (module for module in model.modules() if isinstance(module, WordTable)):
-        old = len(known[table.kind])
-        number = vocabulary().category_id if table.kind == "categories" else vocabulary().room_type_id
-        words = torch.tensor([number(name) for name in table.names[old:]], dtype=torch.int64)
-        with torch.no_grad():
-            table.weight[old:] = table.weight[places(table.kind, known[table.kind], words)]

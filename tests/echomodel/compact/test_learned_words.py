@@ -17,10 +17,11 @@ from echomodel.compact.model import CompactModel, load_weights
 from echomodel.compact.modules import WordTable
 from echomodel.compact.weights import WeightsError
 from echomodel.config import CompactConfig, from_dict
-from echomodel.data.roomset import RoomSet, build_rooms
+from echomodel.data.roomset import RoomSet, build_rooms, pack_rooms
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.rooms.generator import generate_rooms
+from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import Recipe
 from echomodel.training.start import started
@@ -149,6 +150,45 @@ def test_a_warm_start_adds_the_words_that_are_new(small):
         assert model.config.categories == (*given.config.categories, "a_harp")
         sofa = vocabulary().category_id("sofa")
         assert torch.equal(model.furniture.category(torch.tensor([sofa])), given.furniture.category.weight[[sofa - 1]])
+
+
+def test_files_that_know_more_and_fewer_words_are_one_model(small, tmp_path):
+    model, _ = load_weights([small])
+    names = model.config.categories
+    few = CompactModel(replace(model.config, categories=names[:46]), model.statistics, ("furniture",))
+    few.write(tmp_path / "few.safetensors", few.parts)
+    model.write(tmp_path / "latent.safetensors", ("latent",))
+    both, _ = load_weights([tmp_path / "few.safetensors", tmp_path / "latent.safetensors"])
+    assert both.config.categories == names
+    cot, bed = WORDS.category_id("cot"), WORDS.category_id("kids_bed")
+    rows = both.furniture.category(torch.tensor([cot, bed]))
+    assert torch.equal(rows[0], rows[1])
+    assert torch.equal(rows[1], few.furniture.category(torch.tensor([bed]))[0].half().float())
+    twisted = CompactModel(replace(model.config, categories=names[1::-1]), model.statistics, ("latent",))
+    twisted.write(tmp_path / "latent.safetensors", ("latent",))
+    with pytest.raises(WeightsError, match=r"latent\.safetensors: categories differs from that of .*few\.safetensors"):
+        load_weights([tmp_path / "few.safetensors", tmp_path / "latent.safetensors"])
+
+
+def test_a_new_category_of_furniture_is_as_large_as_that_of_its_rooms(tmp_path):
+    room_types = ("bedroom", "bathroom")
+    rooms = [room for name in room_types for room in generate_rooms(60, 5, room_type=name)]
+    pack_rooms(tmp_path / "rooms.npz", rooms, [k % 10 == 0 for k in range(len(rooms))], {})
+    sizes = {"latent": {"width": 8, "layers": 1}, "layout": {"width": 8, "layers": 1, "drafts": 0}}
+    config = replace(from_dict(CompactConfig, sizes), categories=CompactConfig().categories[:46])
+    classes = tuple((float(k), *[0.5] * 8) for k in range(46))
+    old = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3, log_size=True, classes=classes)
+    CompactModel(config, old, ("latent", "layout")).write(tmp_path / "old.safetensors", ("latent", "layout"))
+    recipe = Recipe(
+        "layout", 1, data=str(tmp_path / "rooms.npz"), warm=(str(tmp_path / "old.safetensors"),),
+        model=from_dict(CompactConfig, sizes),
+    )  # fmt: skip
+    start = started(LayoutStage, recipe, torch.device("cpu"), resume=False)
+    LayoutStage.open(start)
+    assert start.model.statistics.classes[:46] == classes
+    toilet = start.model.config.categories.index("toilet")
+    sizes = [room.size[k] for room in rooms for k, name in enumerate(room.categories) if name == "toilet"]
+    assert np.exp(start.model.statistics.classes[toilet][:3]) == pytest.approx(np.median(sizes, 0), rel=0.03)
 
 
 def from_small():
