@@ -13,6 +13,7 @@ from echomodel.objective import fitted
 from echomodel.objective.plan import plan_of
 from echomodel.openings import Opening, free_area, rectangle
 from echomodel.rooms.generator import generate_rooms
+from echomodel.rooms.openings import WINDOWS
 from echomodel.rooms.runs import Site, obstacles, runs
 from echomodel.vocabulary import vocabulary
 
@@ -118,3 +119,9 @@ def test_the_generator_has_rooms_of_a_home(room_type):
             assert {"sink_unit", "hob_unit", "fridge", "base_unit", "range_hood"} <= set(room.categories)
             plan = plan_of(room, list(room.categories), room.floor_polygon, room.openings)
             assert bool((fitted.row_flush(plan).margin >= 0).all()), room.id
+
+
+def test_windows_of_kitchens_begin_above_worktops():
+    rooms = [room for kind in ("kitchen", "bathroom") for room in generate_rooms(6, 4, room_type=kind)]
+    sills = {opening.sill for room in rooms for opening in room.openings if opening.kind == "window"}
+    assert sills == {WINDOWS["wet"][0]}

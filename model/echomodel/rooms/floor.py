@@ -10,8 +10,10 @@ import numpy as np
 
 from echomodel.boxes2d import CORNERS
 from echomodel.openings import Opening, numbered, overlap, zone
+from echomodel.rooms.openings import WINDOWS
 from echomodel.rooms.statistics import RoomTypeStatistics
 from echomodel.sizes import quantile
+from echomodel.vocabulary import vocabulary
 
 Rectangle = tuple[float, float, float, float]  # x0, z0, x1, z1
 SHARED_JAMB = 0.1  # metres of wall between two openings
@@ -137,7 +139,7 @@ def sample_floor(statistics: RoomTypeStatistics, rng: np.random.Generator) -> Fl
     for _ in range(1 + (area > 18) + (area > 30)):
         _open(openings, "passage" if openings and rng.random() < PASSAGES else "door", walls, height, rng)
     for _ in range(1 + (area > 25)):
-        _open(openings, "window", walls, height, rng)
+        _open(openings, "window", walls, height, rng, vocabulary().room_type(statistics.name).use)
     before = {o: zone(polygon, o, o.depth) for o in openings}
     free = {o: (*area.min(0).tolist(), *area.max(0).tolist()) for o, area in before.items()}
     return Floor(
@@ -208,13 +210,16 @@ def walls_of(polygon: tuple[tuple[float, float], ...]) -> tuple[Wall, ...]:
     return tuple(walls)
 
 
-def _open(openings: list[Opening], kind: str, walls: tuple[Wall, ...], height: float, rng: np.random.Generator) -> None:
+def _open(
+    openings: list[Opening], kind: str, walls: tuple[Wall, ...], height: float, rng: np.random.Generator, use: str = ""
+) -> None:
     """Add a door, passage or window at a random free place, or nothing where no wall is long enough."""
     width = {"door": rng.uniform(0.8, 1.0), "passage": rng.uniform(0.9, 1.6), "window": rng.uniform(1.0, 2.0)}[kind]
     sill, top = 0.0, 2.0 if kind == "door" else 2.1
     if kind == "window":
         top = rng.uniform(2.0, 2.3)
         sill = 0.0 if rng.random() < FRENCH else rng.uniform(0.8, 1.0)
+        sill = WINDOWS[use][0] if use == "wet" else sill
     width, sill, top = round(width, 2), round(sill, 2), round(min(top, height - 0.1), 2)
     hinge, swing = ("left", "right")[rng.integers(2)], "out" if rng.random() < OUTWARDS else "in"
     fits = [wall for wall in walls if wall.length > width + 0.1]
