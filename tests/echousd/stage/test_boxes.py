@@ -4,10 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pxr import Sdf, Usd
 
 from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import vocabulary
-from echousd.stage.boxes import graph_of, room_of
+from echousd.graph import Node, SceneGraph
+from echousd.stage.boxes import graph_of, read_dressing, room_of
+from echousd.stage.encoding import StageError
+from echousd.stage.write import graph_layer
 
 ROOM = RoomBoxes(
     "one", "bedroom", np.array([(-2, -2), (2, -2), (2, 2), (-2, 2.0)]), 2.6, ("double_bed", "nightstand", "nightstand"),
@@ -59,3 +63,17 @@ def test_names_styles_and_models_of_the_nodes():
     assert [node.attributes.get("model") for node in graph.nodes] == ["a", None, "b"]
     assert graph.room.floor_polygon == tuple(map(tuple, ROOM.floor_polygon.tolist()))
     assert graph_of(replace(ROOM, floor_polygon=np.zeros((0, 2))), None).room.floor_polygon is None
+
+
+def test_small_things_are_read_with_what_their_prims_state():
+    nodes = (Node("bed", "double_bed"), Node("mat", "wardrobe", size=(1.5, 0.02, 1.0)))
+    stage = Usd.Stage.Open(graph_layer(SceneGraph("bedroom", nodes)))
+    prim = next(prim for prim in stage.Traverse() if prim.GetName() == "mat")
+    prim.CreateAttribute("echo:shapes", Sdf.ValueTypeNames.Token).Set("dressing")
+    prim.GetAttribute("echo:category").Set("rug")
+    found = read_dressing(stage).nodes
+    assert [(node.name, node.category) for node in found] == [("mat", "rug")]
+    assert found[0].size == pytest.approx((1.5, 0.02, 1.0))
+    prim.GetAttribute("echo:category").Clear()
+    with pytest.raises(StageError, match="mat>: no category, allowed: echo:category, one of those of small things"):
+        read_dressing(stage)

@@ -51,6 +51,18 @@ def test_in_a_stronger_layer_and_back(first, second):
     assert base.ExportToString() == before
 
 
+def test_what_two_layers_state_is_taken_away_by_the_stronger():
+    base = graph_layer(GRAPH)
+    mine = Sdf.Layer.CreateAnonymous(".usda")
+    mine.subLayerPaths.append(base.identifier)
+    stage = Usd.Stage.Open(mine)
+    for fields in ({"style": "pine"}, {"style": None}, {"style": "ash"}, {"style": None}):
+        wanted = GRAPH.update_node("stand", **fields)
+        update_graph(stage, wanted)
+        assert read_graph(stage) == wanted
+    assert read_graph(Usd.Stage.Open(base)) == GRAPH
+
+
 @given(first=scene_graphs(), second=scene_graphs())
 @SOME
 def test_over_a_reference(first, second):

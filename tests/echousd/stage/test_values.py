@@ -123,6 +123,17 @@ def test_a_number_is_one_and_within_reach(kind, value, allowed):
     assert values.number(attribute(NAMES.Int, 3)) == 3.0
 
 
+def test_of_a_transform_the_number_out_of_reach_is_told():
+    prim = attribute(NAMES.Float, 1.0).GetPrim()
+    table = np.array([[2.0, 0, 0, 3], [0, 2, 0, 4], [0, 0, 2, 5], [0, 0, 0, 1]])
+    assert values.matrix(Gf.Matrix4d(table.T), prim).tolist() == table.tolist()
+    for worst in (-1e30, np.inf, np.nan):
+        table[1, 3] = worst
+        with pytest.raises(StageError) as found:
+            values.matrix(Gf.Matrix4d(table.T), prim)
+        assert f"</a>: its transform holds {worst:g}, allowed: -1e+09 to 1e+09" in str(found.value)
+
+
 def test_conventions_of_several_rooms_ask_for_one():
     stage = Usd.Stage.CreateInMemory()
     for name in ("/one", "/two"):
