@@ -7,24 +7,11 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from echomodel.files import tables
 from echomodel.progress import StageListener
 from echousd.cli.output import say
 
-TITLES = {
-    "read": "Reading the graph",
-    "load": "Loading the model",
-    "assets": "Choosing models",
-    "layout": "Drawing layouts",
-    "place": "Placing the furniture",
-    "shapes": "Shaping the furniture",
-    "meshes": "Cleaning the meshes",
-    "settle": "Simulating the room",
-    "write": "Writing the layers",
-    "preview": "Drawing the preview",
-    "rooms": "Making the rooms",
-    "models": "Reading the models",
-}
-
+TITLES = tables("stages.toml", __file__)
 LONG = 100  # steps of a stage of which a log hears every tenth part
 
 

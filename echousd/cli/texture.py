@@ -33,10 +33,10 @@ def export(
 ) -> None:
     """Write meshes with texture coordinates, cameras, prompts, a script to run the tool, and job.json."""
     from echousd.folder.found import room_at
-    from echousd.texturing import export_job
+    from echousd.texturing import export_texture_job
 
     room = room_at(room)
-    job = export_job(
+    job = export_texture_job(
         room, output, tool, prompt=prompt, dressing=dressing, resolution=resolution, layout=layout, shell=shell,
         force=force,
     )  # fmt: skip
@@ -60,10 +60,10 @@ def import_(
 ) -> None:
     """Bring what a tool painted back as a layer of your own over the room, and a variant of `looks`."""
     from echousd.folder.found import room_at
-    from echousd.texturing import import_job
+    from echousd.texturing import import_texture_job
 
     room = room_at(room)
-    look = import_job(room, job, name=name, skip=tuple(skip or ()), preview=preview, force=force, wait=wait)
+    look = import_texture_job(room, job, name=name, skip=tuple(skip or ()), preview=preview, force=force, wait=wait)
     lines = [
         f"look     {look.layer}",
         f"painted  {len(look.painted)} objects; variant {look.name!r} of `looks` on the room, `made` is without",

@@ -50,7 +50,7 @@ class ImportedLook:
     skipped: tuple[str, ...]
 
 
-def import_job(
+def import_texture_job(
     room: str | Path,
     job: str | Path,
     *,

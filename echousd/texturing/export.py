@@ -33,7 +33,7 @@ IMAGE = 512  # pixels of an object's picture
 SCRIPTS = ("hunyuan", "mvpainter")  # tools that paint objects by pictures of them, with a script to run them
 
 
-def export_job(
+def export_texture_job(
     room: str | Path, out: str | Path, tool: str, *, prompt: str = "", dressing: str = "none",
     resolution: int | None = None, layout: int | None = None, shell: bool | None = None, force: bool = False,
 ) -> Job:  # fmt: skip

@@ -10,6 +10,7 @@ import numpy as np
 from PIL import Image
 from scipy.spatial import cKDTree
 
+from echomodel.furniture.solids import rotation
 from echousd.folder.within import check_links
 from echousd.textures import TextureError, decoded, encoded, texture_bytes
 from echousd.texturing.atlas import Unwrapped
@@ -140,17 +141,10 @@ def _last_step(folder: Path) -> Path | None:
 
 
 TOLERANCE = 5e-5  # of the diagonal of the object
-TURNS = tuple(  # about +Y, +X and back: what exporters do with "up" and "forward"
-    np.array(turn, float)
-    for turn in (
-        [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-        [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
-        [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
-        [[-1, 0, 0], [0, 1, 0], [0, 0, -1]],
-        [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
-        [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
-    )
-)
+HALF = np.pi / 2
+TURNS = [  # about +Y, +X and back: what exporters do with "up" and "forward"
+    np.rint(rotation(x, y)) for x, y in ((0.0, 0.0), (-HALF, 0), (HALF, 0), (0, np.pi), (0, HALF), (0, -HALF))
+]
 
 
 def texture_coordinates(sent: Unwrapped, back: Unwrapped, name: str) -> np.ndarray:

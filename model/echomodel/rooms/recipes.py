@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from echomodel.files import tables
 from echomodel.rooms.builder import BODY, HALF_PI, Builder, Item, Size, overlaps
 from echomodel.rooms.floor import Wall
 from echomodel.rooms.groups import (
@@ -130,28 +131,10 @@ def _nightstands(room: Builder, bed: Item, size: Size, count: int, style: int) -
             return
 
 
-# Classes that the statistics do not show appear in place of a similar one with this probability.
-SUBSTITUTES = {
-    "double_bed": (("single_bed", 0.06),),
-    "multi_seat_sofa": (("sofa", 0.08), ("chaise_longue_sofa", 0.03)),
-    "loveseat_sofa": (("lazy_sofa", 0.2),),
-    "lounge_chair": (("lazy_sofa", 0.06),),
-    "side_table": (("corner_side_table", 0.1), ("round_end_table", 0.12)),
-    "sideboard": (("console_table", 0.12), ("wine_cabinet", 0.1)),
-    "cabinet": (("children_cabinet", 0.12), ("wine_cabinet", 0.1)),
-    "desk": (("table", 0.12),),
-    "dining_chair": (("chinese_chair", 0.04),),
-    "stool": (("dressing_chair", 0.3),),
-}
-# Seldom seen things that the default graphs still ask for.
-EXTRAS = {"table_lamp": 0.05, "tv": 0.04, "wall_lamp": 0.03, "bench": 0.04}
+TABLES = tables("recipes.toml", __file__)
 SOFA_KINDS = ("multi_seat_sofa", "l_shaped_sofa", "loveseat_sofa")
 # Of these a room mostly holds one kind.
 EXCLUSIVE = (BEDS, SOFA_KINDS, ("pendant_lamp", "ceiling_lamp"))
-STORAGE = (
-    "wardrobe", "cabinet", "bookshelf", "sideboard", "dresser", "shelf", "console_table", "wine_cabinet",
-    "children_cabinet",
-)  # fmt: skip
 Anchors = Callable[[], list[Item]]  # what lamps hang over once the room is furnished
 LOUNGERS = ("armchair", "lounge_chair")
 SMALL_TABLES = ("side_table", "corner_side_table", "round_end_table", "nightstand")
@@ -183,11 +166,11 @@ def wanted(statistics: RoomTypeStatistics, area: float, rng: np.random.Generator
             for category in held:
                 if category != chosen:
                     del want[category]
-    for category, others in SUBSTITUTES.items():
-        for other, share in others:
+    for category, others in TABLES["substitutes"].items():
+        for other, share in others.items():
             if category in want and rng.random() < share:
                 want[other] = want.get(other, 0) + want.pop(category)
-    for category, share in EXTRAS.items():
+    for category, share in TABLES["extras"].items():
         if rng.random() < share:
             want[category] = 1 + int(rng.random() < 0.4)
     return want
@@ -370,7 +353,7 @@ def _rest(room: Builder) -> None:
         else:
             television(room, sofa)
     table = next((item for item in room.items if item.category == "dining_table"), None)
-    for category in STORAGE:
+    for category in TABLES["storage"]["order"]:
         count = room.take(category)
         if count:
             size, style = room.size(category), room.style()

@@ -26,7 +26,9 @@ from echousd.folder.manifest import find_manifest
 from echousd.make.save import save_room
 from echousd.pending import STAGING
 from echousd.stage.files import open_stage
-from echousd.texturing import attach, export_job, import_job
+from echousd.texturing import attach
+from echousd.texturing import export_texture_job as export_job
+from echousd.texturing import import_texture_job as import_job
 
 OLD, NEW = ["bed", "lamp"], ["bed", "desk"]
 

@@ -20,7 +20,9 @@ from echousd.make.edit import edit
 from echousd.make.reading import read_room
 from echousd.stage.files import open_stage
 from echousd.stage.graphs import read_graph
-from echousd.texturing import atlas, export_job, import_job
+from echousd.texturing import atlas
+from echousd.texturing import export_texture_job as export_job
+from echousd.texturing import import_texture_job as import_job
 from echousd.texturing.atlas import Unwrapped
 from echousd.texturing.job import job_mesh
 from echousd.texturing.obj import glb_bytes

@@ -18,7 +18,9 @@ from echousd.layers.paintings import primvar
 from echousd.options import RoomOptions
 from echousd.stage.files import open_stage
 from echousd.texturing import export as texturing_export
-from echousd.texturing import export_job, import_job, scenetex
+from echousd.texturing import export_texture_job as export_job
+from echousd.texturing import import_texture_job as import_job
+from echousd.texturing import scenetex
 from echousd.texturing.atlas import Unwrapped, texel_faces
 from echousd.texturing.job import job_mesh
 from echousd.texturing.obj import glb_bytes
