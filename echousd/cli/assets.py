@@ -9,7 +9,7 @@ from pathlib import Path
 import typer
 
 from echousd.cli.options import AsJson, told
-from echousd.cli.output import say, say_done, say_json
+from echousd.cli.output import say_done, say_found
 
 assets_app = typer.Typer(
     help="Libraries of furniture: index them, look through them; a room's own as packages.", no_args_is_help=True
@@ -54,11 +54,7 @@ def index(
 
 
 @told(assets_app, "assets review")
-def review(
-    library: Path,
-    output: Path | None = None,
-    json: AsJson = False,
-) -> None:
+def review(library: Path, output: Path | None = None, json: AsJson = False) -> None:
     """Write what there is to look at and to correct: a page with a picture of every model, and the table.
 
     The table lies beside the index; what it says counts when the library is indexed again.
@@ -115,13 +111,8 @@ def verify(folder: Path, json: AsJson = False) -> None:
     store = Store.open(folder)
     wrong = [store.folder(key) for key in store.wrong()]
     count = len(list(store.keys()))
-    if json:
-        say_json({"ok": not wrong, "count": count, "changed": list(map(str, wrong))}, indent=2)
     lines = [f"changed  {place}" for place in wrong] or [f"ok       {count} assets and images as they were stored"]
-    for line in lines if not json else ():
-        say(line)
-    if wrong:
-        raise typer.Exit(1)
+    say_found(json, {"ok": not wrong, "count": count, "changed": list(map(str, wrong))}, lines, ok=not wrong)
 
 
 @told(store_app, "store gc")
@@ -142,7 +133,5 @@ def gc(
             raise ValueError(f"{place}: no such folder; allowed: folders with the rooms that use the store")
     before = len(list(store.keys()))
     gone = store.collect(places, grace=older * 60, dry=dry_run)
-    if json:
-        say_json({"ok": True, "count": before, "gone": list(map(str, gone)), "dry_run": dry_run}, indent=2)
-        return
-    say(f"{'unused' if dry_run else 'removed':<8} {len(gone)} of {before} assets and images")
+    line = f"{'unused' if dry_run else 'removed':<8} {len(gone)} of {before} assets and images"
+    say_found(json, {"ok": True, "count": before, "gone": list(map(str, gone)), "dry_run": dry_run}, [line])

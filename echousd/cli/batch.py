@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from echousd.cli.options import AsJson, Outside, add_room_command, group_of, told
-from echousd.cli.output import one_line, say, say_error, say_json
+from echousd.cli.output import one_line, say, say_error, say_found, say_json
 
 if TYPE_CHECKING:
     from echousd.batches.batch import BatchProgress
@@ -82,29 +82,18 @@ add_room_command(batch_app, "batch run", run, batch=True)
 
 
 @told(batch_app, "batch status")
-def status(
-    folder: Path,
-    json: bool = False,
-) -> None:
+def status(folder: Path, json: bool = False) -> None:
     """How far a run is, of all its shards."""
     from echousd.batches.plan import load_plan
     from echousd.batches.verify import manifest_rows, summary
 
     found = summary(manifest_rows(load_plan(folder), folder))
-    if json:
-        say_json(found, indent=1)
-        return
-    say(f"rooms    {found['done']} of {found['rooms']} done, {found['failed']} failed, {found['missing']} to go")
-    for error, times in found["errors"].items():
-        say(f"failed   {times} x {one_line(error)}")
+    line = f"rooms    {found['done']} of {found['rooms']} done, {found['failed']} failed, {found['missing']} to go"
+    say_found(json, found, [line, *(f"failed   {times} x {one_line(why)}" for why, times in found["errors"].items())])
 
 
 @told(batch_app, "batch verify")
-def verify(
-    folder: Path,
-    check: bool = False,
-    json: AsJson = False,
-) -> None:
+def verify(folder: Path, check: bool = False, json: AsJson = False) -> None:
     """Compare every room with the journal: there, whole, unchanged. Exit code 1 where one is not."""
     from echousd.batches.verify import verify as found_wrong
 
@@ -113,12 +102,8 @@ def verify(
         wrong.append({"room": room, "problem": problem})
         if not json:
             say(f"{room}: {one_line(problem)}")
-    if json:
-        say_json({"ok": not wrong, "wrong": wrong}, indent=2)
-    if wrong:
-        raise typer.Exit(1)
-    if not json:
-        say("every room is there and as it was made")
+    good = [] if wrong else ["every room is there and as it was made"]
+    say_found(json, {"ok": not wrong, "wrong": wrong}, good, ok=not wrong)
 
 
 def _shard(text: str) -> tuple[int, int]:

@@ -10,7 +10,7 @@ import typer
 
 from echomodel.files import check_free
 from echousd.cli.options import Replace, Written, told
-from echousd.cli.output import say, say_done, say_json
+from echousd.cli.output import say_done, say_found
 
 eval_app = typer.Typer(help="Scores of whoever lays out rooms, and studies with people.", no_args_is_help=True)
 app = typer.Typer()
@@ -80,20 +80,15 @@ def study(
 
 
 @told(eval_app, "eval answers")
-def answers(
-    files: list[Path],
-    json: bool = False,
-) -> None:
+def answers(files: list[Path], json: bool = False) -> None:
     """Say whom people preferred: shares with intervals, an exact test of each pair of systems, and agreement."""
     from echousd.evaluation.suite import preferences
 
     found = preferences(files)
-    if json:
-        say_json(found)
-        return
-    for row in found["pairs"]:
-        say(
-            f"{row['one']} over {row['other']}: {row['preferred']} of {row['asked']} "
-            f"({row['share']:.2f} [{row['low']:.2f}, {row['high']:.2f}], p {row['p']:.3f}), {row['ties']} undecided"
-        )
-    say(f"{found['people']} people, {found['kept']} kept; repeats answered alike: {found['repeats']}")
+    lines = [
+        f"{row['one']} over {row['other']}: {row['preferred']} of {row['asked']} "
+        f"({row['share']:.2f} [{row['low']:.2f}, {row['high']:.2f}], p {row['p']:.3f}), {row['ties']} undecided"
+        for row in found["pairs"]
+    ]
+    people = f"{found['people']} people, {found['kept']} kept; repeats answered alike: {found['repeats']}"
+    say_found(json, found, [*lines, people])

@@ -14,25 +14,12 @@ from typing import Any
 
 import typer
 
+from echomodel.files import tables
 from echousd.cli.output import one_line, prepare, quiet, safe
 
 # Module of a topic -> the commands that its `app` has. A module is imported when its command is called, or for the
 # help on all; it must not import torch or pxr at module level (start-up time).
-TOPICS = {
-    "graph": ("new", "graph"),
-    "plan": ("plan",),
-    "generate": ("generate",),
-    "batch": ("batch",),
-    "assets": ("store", "assets"),
-    "edit": ("edit", "update", "adopt"),
-    "export": ("render", "export", "convert"),
-    "texture": ("texture",),
-    "check": ("check",),
-    "train": ("train", "data"),
-    "doctor": ("plugin-path", "doctor"),
-    "eval": ("eval",),
-}
-
+TOPICS: dict[str, list[str]] = tables("topics.toml", __file__)
 BAD_INPUT, OWN_FAULT, INTERRUPTED, CLOSED_PIPE = 2, 70, 130, 141
 MOST_PARTS = 500
 GARBAGE = 200_000  # objects made between two looks for garbage: imports make a million and none of it

@@ -164,7 +164,7 @@ def report(made: Sequence[Written], *, json: bool = False, more: Mapping[str, An
     if json:
         files = [path for each in made for path in (each.root, each.preview)]
         rooms = {"rooms": [_room(each) for each in made]}
-        say_written([path for path in files if path], faults, {**rooms, **(more or {})})
+        say_json(_written([path for path in files if path], faults, {**rooms, **(more or {})}), indent=2)
     else:
         for each in made:
             tell_room(each)
@@ -172,25 +172,34 @@ def report(made: Sequence[Written], *, json: bool = False, more: Mapping[str, An
         raise typer.Exit(1)
 
 
-def say_written(files: Sequence[Path], faults: Sequence[str] = (), more: Mapping[str, Any] | None = None) -> None:
-    """Print as one JSON object which files were written, what is wrong with them, and how long it took.
+def _written(files: Sequence[Path], faults: Sequence[str], more: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Which files were written, previews too, not the layers below a room's root; what is wrong, and how long it took.
 
     Arguments:
-        files: what was written, previews too; not the layers below a room's root.
         faults: a sentence each.
         more: further entries.
     """
     content = {"ok": not faults, "written": [str(path) for path in files], "faults": list(faults)}
-    say_json({**content, "seconds": round(time.perf_counter() - _began.get(), 3), **(more or {})}, indent=2)
+    return {**content, "seconds": round(time.perf_counter() - _began.get(), 3), **(more or {})}
 
 
-def say_done(json: bool, files: Sequence[Path], lines: Iterable[str], more: Mapping[str, Any] | None = None) -> None:
-    """Say what a command has written: as one JSON object (`say_written`), or in lines."""
+def say_done(
+    json: bool, files: Sequence[Path], lines: Iterable[str], more: Mapping[str, Any] | None = None,
+    faults: Sequence[str] = (),
+) -> None:  # fmt: skip
+    """Say what a command has written: as one JSON object, or in lines; exit code 1 for faults."""
+    say_found(json, _written(files, faults, more), [*lines, *(f"fault    {fault}" for fault in faults)], ok=not faults)
+
+
+def say_found(json: bool, content: Mapping[str, Any], lines: Iterable[str], *, ok: bool = True) -> None:
+    """Say what a command has found: the content as one JSON object, or lines; exit code 1 where it is not good."""
     if json:
-        say_written(files, more=more)
+        say_json(content, indent=2)
     else:
         for line in lines:
             say(line)
+    if not ok:
+        raise typer.Exit(1)
 
 
 def _room(written: Written) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import typer
 from echomodel.files import check_free
 from echomodel.late import Late
 from echousd.cli.options import SAID, Force, Written, group_of, told
-from echousd.cli.output import say, say_done, say_written
+from echousd.cli.output import say_done
 from echousd.naming import LAYER_FORMS
 
 if TYPE_CHECKING:
@@ -154,11 +154,5 @@ def generate_home(
             kept = f"{row['relations_kept']} of {row['relations_asked']} measured relations kept"
             lines.append(f"room     {name}: {row['objects']} objects, {kept}")
             faults += [] if row["check"] else [f"{name}: {'; '.join(row['check_errors']) or 'see echousd check'}"]
-    if json:
-        rows = {name: dict(row) if row else None for name, row in made.rooms.items()}
-        say_written([made.root], faults, {"rooms": rows})
-    else:
-        for line in [*lines, *(f"fault    {fault}" for fault in faults)]:
-            say(line)
-    if faults:
-        raise typer.Exit(1)
+    rows = {name: dict(row) if row else None for name, row in made.rooms.items()}
+    say_done(json, [made.root], lines, {"rooms": rows}, faults)

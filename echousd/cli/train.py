@@ -59,11 +59,7 @@ Rooms = Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a ro
 
 
 @told(data_app, "data build")
-def build(
-    out: Path,
-    recipe: str = "smoke",
-    seed: Seed = 0,
-) -> None:
+def build(out: Path, recipe: str = "smoke", seed: Seed = 0) -> None:
     """Make rooms and shapes to train on; run again to continue a build that was stopped."""
     from echomodel.data.build import build_data
 
@@ -74,13 +70,7 @@ def build(
 
 
 @told(data_app, "data rooms")
-def rooms_command(
-    out: Path,
-    count: int = 100,
-    seed: Seed = 0,
-    room: str | None = None,
-    force: Replace = False,
-) -> None:
+def rooms_command(out: Path, count: int = 100, seed: Seed = 0, room: str | None = None, force: Replace = False) -> None:
     """Generate rooms into a rooms file."""
     from echomodel.rooms.generator import generate_rooms
     from echomodel.vocabulary import vocabulary
@@ -160,11 +150,7 @@ def plot(
 
 
 @told(data_app, "data meshes")
-def meshes(
-    library: Path,
-    out: Path,
-    copies: int = 2,
-) -> None:
+def meshes(library: Path, out: Path, copies: int = 2) -> None:
     """Make a shape set from the usable models of a library: metric size, flood-filled distances, attribution.
 
     Classes and fronts are those of the index; `echousd assets review` tells how they are corrected.

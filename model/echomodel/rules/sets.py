@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 from echomodel.arrays import Array, at_least, dot, kit
 from echomodel.boxes2d import axes, hull, seen
+from echomodel.files import tables
 from echomodel.rules.geometry import TINY, PairGeometry
 from echomodel.vocabulary import vocabulary
 
@@ -174,29 +175,13 @@ def _rules(
     }
 
 
-_BESIDE = f"{APART} m at least from centre to centre along {{}}, and {OVERLAP:.0%} of the smaller in the other at most"
-MEANS = {
-    "left": _BESIDE.format("-Z"),
-    "right": _BESIDE.format("+Z"),
-    "front": _BESIDE.format("+X"),
-    "behind": _BESIDE.format("-X"),
-    "close_by": f"a corner of one within {NEAR} m of a corner of the other, or their sides within {SIDES} m",
-    "above": f"over its footprint and higher than its top by {TOUCH} m at least",
-    "standing_on": f"the bottom within {TOUCH} m of its top, the centre over it",
-    "bigger_than": f"the volume larger by {VOLUME:.0%} of the larger one at least",
-    "smaller_than": f"the volume smaller by {VOLUME:.0%} of the larger one at least",
-    "taller_than": f"the top higher by {HEIGHT:.0%} of the higher one at least",
-    "shorter_than": f"the top lower by {HEIGHT:.0%} of the higher one at least",
-    "symmetrical_to": f"within {NEAR} m of its mirror image across the room's middle, and turned like that to "
-    "30 degrees where both have a front",
-}  # in the set `strict`
-
 CARRIED: dict[str, Margin] = {
     "above": lambda pair: pair.kit.minimum(pair.position_s[:, 1] - pair.top_o - TOUCH, pair.footprint_penetration),
     "standing_on": lambda pair: pair.kit.minimum(TOUCH - abs(pair.position_s[:, 1] - pair.top_o), pair.centre_inside),
 }
 STRICT = RuleSet("strict", True, _rules(APART, _larger, CARRIED, _symmetrical))
-STRICT.rules.update({name: replace(rule, means=MEANS[name]) for name, rule in STRICT.rules.items()})
+MEANS: dict[str, str] = tables("means.toml", __file__)  # names of numbers above in braces
+STRICT.rules.update({name: replace(rule, means=MEANS[name].format(**globals())) for name, rule in STRICT.rules.items()})
 
 PUBLISHED: dict[str, Margin] = {"standing_on": lambda pair: TOUCH - abs(pair.position_s[:, 1] - pair.position_o[:, 1])}
 OPEN = ("standing_on", "symmetrical_to")
