@@ -23,7 +23,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import IO
 
-from echomodel.files import flush, read_json, telling, write_json
+from echomodel.bounded import read_json
+from echomodel.files import flush, telling, write_json
 from echousd.naming import CRATE
 from echousd.pending import STAGING
 

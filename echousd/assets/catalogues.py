@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Tf
 
-from echomodel.files import raising, read_bounded, unpacking, within_memory
+from echomodel.bounded import read_bounded, unpacking
+from echomodel.files import raising, within_memory
 from echousd.assets.licences import licence_beside
 from echousd.assets.model_file import ModelFile
 from echousd.assets.naming import class_by_name, fitted

@@ -17,7 +17,8 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
-from echomodel.files import raising, read_bounded, whole_file, write_text
+from echomodel.bounded import read_bounded
+from echomodel.files import raising, whole_file, write_text
 from echomodel.late import Late
 from echomodel.vocabulary import vocabulary
 from echousd.assets.catalogues import Entry, entries_of

@@ -15,7 +15,7 @@ from typing import Any
 from PIL import Image
 from trimesh.resolvers import Resolver
 
-from echomodel.files import unpacking
+from echomodel.bounded import unpacking
 from echousd.textures import FORMATS, MAX_BYTES, MAX_PIXELS
 
 MAX_MODEL = 2 * 2**30  # bytes

@@ -14,7 +14,8 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, create_model
 
 import echousd
-from echomodel.files import bounded_lines, whole_file
+from echomodel.bounded import bounded_lines
+from echomodel.files import whole_file
 from echousd.batches.options import BatchOptions, BatchRequest
 from echousd.batches.sources import find_graphs
 from echousd.folder.lock import LOCK

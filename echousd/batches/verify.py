@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom
 
-from echomodel.files import read_bounded, read_json, whole_file, write_json
+from echomodel.bounded import read_bounded, read_json
+from echomodel.files import whole_file, write_json
 from echousd.batches.plan import COLUMNS, RunPlan, fault_of, load_plan, read_journals, whole_keys
 from echousd.folder.manifest import LARGEST
 from echousd.folder.within import inside

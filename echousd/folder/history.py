@@ -12,7 +12,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from echomodel.files import unpacking, within_memory
+from echomodel.bounded import unpacking
+from echomodel.files import within_memory
 from echousd.folder import folder as folders
 from echousd.folder import ownership
 from echousd.folder.manifest import find_manifest, read_manifest

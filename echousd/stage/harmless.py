@@ -13,6 +13,7 @@ from echousd.pending import DEEP
 
 NESTED = 4_000  # brackets that a text may open: OpenUSD is at its end where some 10,000 stand within each other
 check_apart, stored = Late("echousd.stage.apart:check_apart"), Late("echousd.store:stored")
+read_json = Late("echomodel.bounded:read_json")
 LARGE = 64 * 2**20  # bytes of a file that is looked at here, before it is read
 read_here: set[tuple[str, int, int]] = set()  # path, size and time of those that this process may read
 
@@ -58,7 +59,7 @@ def _listed(path: Path, digest: str) -> bool:
 
 @lru_cache(maxsize=16)
 def _digests(listing: Path, changed: int) -> frozenset[str]:
-    return frozenset(files.read_json(listing, LARGE)["files"].values())
+    return frozenset(read_json(listing, LARGE)["files"].values())
 
 
 def just_written(paths: Iterable[Path]) -> None:

@@ -11,7 +11,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field, ValidationError
 
-from echomodel.files import read_bounded, telling
+from echomodel.bounded import read_bounded
+from echomodel.files import telling
 from echousd.folder.within import inside
 from echousd.graph.fields import IDENTIFIER
 from echousd.options import validation_message

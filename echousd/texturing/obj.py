@@ -12,7 +12,8 @@ import numpy as np
 import trimesh
 from trimesh.util import append_faces
 
-from echomodel.files import read_bounded, telling
+from echomodel.bounded import read_bounded
+from echomodel.files import telling
 from echousd.texturing.atlas import DIGITS, Unwrapped
 
 LARGEST = 256 * 2**20  # bytes of a mesh that is read

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 HELD = 512 * 2**20  # bytes of memory that reading any file of somebody's may take
 EACH = 16  # and for each of its bytes: plain data takes more than its text
@@ -155,22 +155,6 @@ def flush(path: Path) -> None:
         os.close(file)
 
 
-def read_bounded(path: str | os.PathLike[str], most: int) -> bytes:
-    """The bytes of a file that anybody may have put there.
-
-    Raises ValueError that names it for what is no regular file (a pipe would wait for ever, a device never ends) or has
-    more than `most` bytes, and OSError as the system does.
-    """
-    file = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    with os.fdopen(file, "rb") as opened:
-        found = os.fstat(file)
-        if not stat.S_ISREG(found.st_mode):
-            raise ValueError(f"{path}: not a regular file, allowed: a file of at most {most} bytes")
-        if found.st_size > most:
-            raise ValueError(f"{path}: {found.st_size} bytes, allowed: at most {most}")
-        return opened.read(found.st_size + 1)[:most]  # a reader makes room for all that it is asked for
-
-
 @contextmanager
 def telling(path: str | os.PathLike[str], fails: str = "cannot be written", then: str = "") -> Iterator[None]:
     """Raises ValueError in place of an OSError of the block: the path, what fails, the system's reason, what then."""
@@ -224,44 +208,3 @@ def within_memory(path: Path, name: str = "", *, size: int | None = None) -> Ite
         raise ValueError(why) from None
     finally:
         resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
-
-
-@contextmanager
-def unpacking(name: object) -> Iterator[None]:
-    """Raises ValueError that names an archive where the block, which reads it, meets damage or a form unknown.
-
-    Python's module for archives raises what each of their ways of packing raises.
-    """
-    import lzma
-    import zipfile
-
-    try:
-        yield
-    except (
-        zipfile.BadZipFile,
-        zlib.error,
-        lzma.LZMAError,
-        EOFError,
-        OSError,
-        KeyError,
-        RuntimeError,
-        ValueError,
-    ) as error:
-        if isinstance(error, ValueError) and str(error).startswith(str(name)):
-            raise  # what the block itself has to say
-        raise ValueError(f"{name}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
-
-
-def bounded_lines(file: BinaryIO, most: int, name: str | os.PathLike[str]) -> Iterator[bytes]:
-    """Lines of an open file that anybody may have put there; raises ValueError for one of more than `most` bytes."""
-    for number, line in enumerate(iter(lambda: file.readline(most + 1), b""), 1):
-        if len(line) > most:
-            raise ValueError(f"{name}, line {number}: more than {most} bytes, allowed: that many")
-        yield line
-
-
-def read_json(path: str | os.PathLike[str], most: int) -> Any:
-    """The plain data of a JSON file, read as `read_bounded` does; ValueError also where it is no JSON."""
-    content = read_bounded(path, most)
-    with raising(f"{path}: cannot be read as JSON", ValueError, RecursionError):
-        return json.loads(content)

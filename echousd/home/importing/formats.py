@@ -11,7 +11,8 @@ from typing import Any
 from pydantic import ValidationError
 from shapely.errors import ShapelyError
 
-from echomodel.files import read_bounded, within_memory
+from echomodel.bounded import read_bounded
+from echomodel.files import within_memory
 from echousd.graph import GraphError
 from echousd.graph.consistency import faults_of
 from echousd.home.importing.drawings import read_dxf, read_ifc, read_svg

@@ -14,7 +14,8 @@ from xml.etree import ElementTree
 import numpy as np
 import shapely
 
-from echomodel.files import raising, unpacking
+from echomodel.bounded import unpacking
+from echomodel.files import raising
 from echousd.graph import GraphError
 from echousd.home.importing.found import MAP, SCREEN, Found, Hole, Piece, Room, long_sides, rooms_between, span
 

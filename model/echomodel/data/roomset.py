@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.files import read_json, telling, whole_file, write_json
+from echomodel.bounded import read_json
+from echomodel.files import telling, whole_file, write_json
 from echomodel.openings import HINGES, KINDS, SWINGS, Opening, numbered
 from echomodel.progress import StepListener
 from echomodel.roomboxes import RoomBoxes, read_rooms

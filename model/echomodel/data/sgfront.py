@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from echomodel.bounded import read_json
 from echomodel.boxes2d import footprints
-from echomodel.files import read_json, write_text
+from echomodel.files import write_text
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
