@@ -529,8 +529,9 @@ class Search:
                 continue
             rows = np.array([out_of(state.position[i], float(state.yaw[i]), slot) for slot in slots]).reshape(-1, 4)
             if len(rows):
-                at, turn = self._carried(state, k, self.group(k, there, state), rows)
-                others = [m for m in np.flatnonzero(there).tolist() if problem.anchor[m] == i or m == i]
+                group = self.group(k, there, state)
+                at, turn = self._carried(state, k, group, rows)
+                others = np.setdiff1d(np.flatnonzero(there), group)
                 deep = depths(problem.size[k], at[:, k], turn[:, k], problem.size[others], state.position[others],
                               state.yaw[others])  # fmt: skip
                 hit = np.maximum(deep - problem.shared[k, others], 0.0).max(1, initial=0.0)
@@ -545,7 +546,7 @@ class Search:
         for i in boxes:
             anchor = int(self.problem.anchor[i])
             out += [anchor] if anchor >= 0 else []
-            out += self.children[anchor if anchor >= 0 else i]
+            out += self.children[anchor if anchor >= 0 else i] + self.children[i]
         return [i for n, i in enumerate(out) if i not in out[:n]]
 
     def mended(self, state: State, total: float, wrong: list[int]) -> tuple[State, float, list[int]]:

@@ -375,6 +375,20 @@ def test_what_stands_on_a_nightstand_comes_with_it_to_its_bed():
     assert after.position[3, [0, 2]] == pytest.approx(after.position[1, [0, 2]], abs=0.01)
 
 
+def test_an_armchair_is_expected_where_no_second_sofa_stands_and_goes_out_with_its_table():
+    words, size = ["multi_seat_sofa", "coffee_table", "loveseat_sofa", "armchair"], [(2.2, 0.8, 0.9), (1.2, 0.4, 0.6)]
+    size += [(1.6, 0.8, 0.9), (0.8, 0.8, 0.8)]
+    at, told = [(0, 0, -1.5), (0, 0, -0.4), (4, 0, 3), (4, 0, -3)], [(3, "close_by", 1)]
+    search, _ = searched(words, size, at, np.zeros(4), told, floor=2 * FLOOR)
+    liked = min(slots_at(search.problem, 3, 1), key=lambda slot: slot[3])
+    at[2] = (liked[0], 0, at[1][2] + liked[1])
+    search, state = searched(words, size, at, [0.0, 0.0, liked[2], 0.0], told, floor=2 * FLOOR)
+    after = search._expecting(state, np.array([True, True, True, False]), 1)
+    assert float(search.problem.plan.at(after.position, after.yaw).apart(np.array([3]), np.array([2]))[0]) > -0.01
+    assert np.hypot(*(after.position[3] - after.position[1])[::2]) < 2.0
+    assert set(search.involved([1])) == {0, 1, 2, 3}
+
+
 def test_a_door_that_may_make_way_is_no_reason_to_begin_anew():
     none, door = np.zeros(1, bool), Opening("door", "door", 0, 0.75, 0.9, 2.0, 0.0)
     problem = problem_of(
