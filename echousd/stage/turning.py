@@ -103,6 +103,9 @@ def move_room(layer: Sdf.Layer, path: str) -> Sdf.Layer:
         spec = moved.GetPrimAtPath(above)
         spec.specifier, spec.typeName, spec.kind = Sdf.SpecifierDef, "Xform", "assembly"
     moved.defaultPrim = Sdf.Path(path).GetPrefixes()[0].name
+    for spec in prim_specs(moved):  # what was copied follows by itself; classes beside the room do not
+        for link in () if spec.path.HasPrefix(path) else spec.relationships:
+            link.targetPathList.ModifyItemEdits(lambda target: target.ReplacePrefix(ROOM, path))
     layer.TransferContent(moved)
     return layer
 

@@ -82,6 +82,17 @@ def test_shared_assets_are_instances_that_look_and_collide_alike(tmp_path):
     assert again.options.instances
 
 
+def test_instances_of_a_room_at_another_path_are_bound_to_its_own_looks(tmp_path):
+    root = made(tmp_path / "deep", instances=True, room_path="/World/Flat")
+    stage = Usd.Stage.Open(str(root))
+    classes = [prim for prim in stage.Traverse(Usd.PrimAllPrimsPredicate) if prim.IsAbstract()]
+    bound = [prim.GetRelationship("material:binding") for prim in classes]
+    paths = {str(target) for one in bound if one for target in one.GetTargets()}
+    assert paths
+    assert all(path.startswith("/World/Flat/Looks/") and stage.GetPrimAtPath(path) for path in paths)
+    assert not check(root).errors
+
+
 def test_every_asset_has_a_picture(tmp_path, monkeypatch):
     pytest.importorskip("embreex")
     monkeypatch.setattr("echousd.draw.from_files.QUICK", 1)
