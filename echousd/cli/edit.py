@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from echousd.options import EditRequest
 
 check_output, held, writing = (Late(f"echousd.folder.folder:{word}") for word in ("check_output", "held", "writing"))
-check_ours, room_at = (Late(f"echousd.folder.found:{word}") for word in ("check_ours", "room_at"))
+check_ours, own_root, room_at = (Late(f"echousd.folder.found:{word}") for word in ("check_ours", "own_root", "room_at"))
 read_room, write_pictures = Late("echousd.make.reading:read_room"), Late("echousd.make.save:write_pictures")
 progress_bar, StageTimer = Late("echousd.cli.progress:progress_bar"), Late("echomodel.progress:StageTimer")
 app = typer.Typer()
@@ -61,7 +61,7 @@ def edit(
         if recover:
             _recover(room, wait, json)
         else:
-            _step(room, wait, json, "undo" if undo else "redo")
+            _step(own_root(room), wait, json, "undo" if undo else "redo")
         return
     changes["outside"] = outside or ()
     nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
@@ -191,7 +191,7 @@ def _change(
             say_done(json, [], lines, plan)
             return
         with telling_faults(), progress_bar() as listen:
-            shown = root.with_suffix(".png").is_file()  # who wanted no picture gets none
+            shown = own_root(root).with_suffix(".png").is_file()  # who wanted no picture gets none
             made = change(root, graph, progress=listen, **options)
             written = write_room(made, folder, StageTimer(listen), force=force, preview=shown)
     for step in steps if not json else ():

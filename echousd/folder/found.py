@@ -58,6 +58,12 @@ def manifest_of(root: Path) -> dict[str, Any]:
     return manifest
 
 
+def own_root(root: Path) -> Path:
+    """The root layer of the room that `root` is, or is a layer over; `root` itself where there is no room of ours."""
+    manifest = find_manifest(root.parent, root.stem)
+    return root.with_name(f"{manifest['name']}.usda") if manifest else root
+
+
 def check_ours(root: Path) -> None:
     """Raises ValueError as `manifest_of` does, unless a run in the folder was interrupted, which is finished first."""
     if not half_written(root.parent):

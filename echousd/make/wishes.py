@@ -10,6 +10,7 @@ import numpy as np
 
 from echomodel.vocabulary import vocabulary
 from echousd.assets.reference import joined
+from echousd.folder.found import own_root
 from echousd.graph import GraphError, Node, SceneGraph
 from echousd.graph.starting import ONE_IS_ENOUGH
 from echousd.graph.text import stating, without
@@ -79,7 +80,7 @@ def artists_wishes(root: Path) -> tuple[Path, SceneGraph, tuple[str, ...]]:
     Raises ValueError where `root` is no layer over a room of ours.
     """
     theirs = read_room(root)
-    own = root.parent / f"{theirs.manifest['name']}.usda"
+    own = own_root(root)
     if own.resolve() == root.resolve():
         raise ValueError(f"{root}: the room's own root layer; name the stronger layer that changes it")
     ours = read_room(own)

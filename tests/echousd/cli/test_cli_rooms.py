@@ -141,3 +141,17 @@ def test_edits_draw_pictures_of_rooms_that_have_one(graph, tmp_path, echousd_com
         assert done.code == 0, done.err
         assert picture.is_file() == (not asked)
         assert asked or picture.read_bytes() != before
+
+
+def test_edits_through_a_stronger_layer_draw_the_picture_of_the_room(graph, tmp_path, echousd_command):
+    folder = tmp_path / "bedroom"
+    assert echousd_command("generate", graph, "-o", folder, "--shapes", "boxes", "--dress", "none").code == 0
+    mine = folder / "mine.usda"
+    mine.write_text('#usda 1.0\n(upAxis = "Y"\nmetersPerUnit = 1\nsubLayers = [@bedroom.usda@])\n')
+    seen = {(folder / "bedroom.png").read_bytes()}
+    for words in (("--remove", "wardrobe"), ("--undo",), ("--redo",)):
+        done = echousd_command("edit", mine, *words)
+        assert done.code == 0, done.err
+        seen.add((folder / "bedroom.png").read_bytes())
+    assert len(seen) == 2
+    assert not (folder / "mine.png").exists()
