@@ -9,11 +9,12 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import cycle, islice
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from echomodel.late import extra
@@ -152,7 +153,8 @@ class LocalWorkers:
         before = {name: os.environ.get(name) for name in own}
         os.environ.update(own)
         try:
-            process.start()
+            with without_script():
+                process.start()
         finally:
             for name, value in before.items():
                 if value is None:
@@ -161,6 +163,17 @@ class LocalWorkers:
                     os.environ[name] = value
         its.close()
         return _Worker(process, mine, environment)
+
+
+@contextlib.contextmanager
+def without_script() -> Iterator[None]:
+    """Have processes begin without the caller's script, which may be on no disk or start them without a guard."""
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 def attempt(call: Callable[[Any], Any], argument: Any) -> tuple[str, Any]:

@@ -18,6 +18,7 @@ import shapely
 
 from echomodel.files import raising
 from echomodel.late import extra
+from echousd.batches.executor import without_script
 from echousd.graph import GraphError
 from echousd.home.importing.found import MAP, SCREEN, Found, Hole, Piece, Room, kind_of, long_sides, rooms_between, span
 
@@ -240,7 +241,7 @@ FLAT = 0.5  # of a normal's upright part, from which a face belongs to a floor o
 
 def read_ifc(path: Path, unit: float | None) -> Found:
     """The building in an IFC file, z up, y north, in the unit that it states. Raises `GraphError`."""
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as apart:
+    with without_script(), ProcessPoolExecutor(1, mp_context=get_context("spawn")) as apart:
         try:
             return apart.submit(read_here, str(path), unit).result()
         except BrokenProcessPool:

@@ -45,6 +45,26 @@ def test_a_bad_task_costs_only_itself():
     assert not any(os.path.exists(f"/proc/{process}") for process in processes)  # noqa: PTH110
 
 
+SCRIPT = """
+from math import sqrt
+from echousd.batches.executor import LocalWorkers, Task
+pool = LocalWorkers(1)
+pool.submit(Task("root", sqrt, 49))
+print(pool.outcomes(60.0)[0])
+pool.close()
+"""
+
+
+@pytest.mark.parametrize("place", ["-", "script.py"])
+def test_a_script_without_a_guard_has_workers_wherever_it_comes_from(tmp_path, place):
+    (tmp_path / "script.py").write_text(SCRIPT)
+    done = subprocess.run(
+        [sys.executable, place], input=SCRIPT, cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert "fate='done', value=7.0" in done.stdout
+    assert done.stderr == ""
+
+
 def test_what_a_task_raises_is_one_line():
     assert attempt(square, 3) == ("done", 9)
     assert attempt(wrong, None) == ("error", "no such room")
