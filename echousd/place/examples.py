@@ -51,6 +51,12 @@ class ExamplesPlan:
     searched: bool = True
     rooms: str | None = None
 
+    def __post_init__(self) -> None:
+        if self.rooms is not None and not self.searched:
+            raise ValueError(
+                f"--unsearched keeps rooms of the generator, --rooms {self.rooms} is searched on: leave one"
+            )
+
 
 def search_examples(
     folder: Path, plan: ExamplesPlan, *, shards: int, workers: int = 1, minutes: float | None = None,

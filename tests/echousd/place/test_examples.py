@@ -49,6 +49,11 @@ def test_rooms_of_the_generator_that_miss_nothing_are_kept_unsearched(tmp_path):
         search_examples(tmp_path, ExamplesPlan(5), shards=1)
 
 
+def test_a_set_is_not_left_unsearched():
+    with pytest.raises(ValueError, match="--unsearched keeps rooms of the generator, --rooms mine"):
+        ExamplesPlan(5, searched=False, rooms="mine.npz")
+
+
 def test_rooms_of_a_set_are_searched_on(tmp_path):
     given = generate_rooms(9, 5)
     pack_rooms(tmp_path / "given.npz", given, [True] * 9, {})
