@@ -144,14 +144,22 @@ def read_infinigen(data: Any) -> Found:
         rooms.append(Room(name, (words.replace("-", " "),), _shape(name, entry), storey=level))
     levels = sorted({room.storey for room in rooms})
     holes = [
-        Hole(name, kind, _ends(name, entry))
+        Hole(name, kind, ends := _ends(name, entry), storey=_level(ends, rooms))
         for key, kind in (("doors", "door"), ("opens", "passage"), ("interiors", "passage"), ("windows", "window"))
         for name, entry in (data.get(key) or {}).items()
     ]
     entrance = data.get("entrance")
     if isinstance(entrance, dict) and ("shape" in entrance or "operation" in entrance):
-        holes.append(Hole("entrance", "door", _ends("entrance", entrance)))
+        ends = _ends("entrance", entrance)
+        holes.append(Hole("entrance", "door", ends, storey=_level(ends, rooms)))
     return Found(Z_UP, rooms, holes, storeys=levels)
+
+
+def _level(ends: np.ndarray, rooms: list[Room]) -> str:
+    """The storey in whose walls a hole lies, which is not stated; "" where several have one there."""
+    off = [max(map(shapely.Polygon(room.corners).exterior.distance, shapely.points(ends[0]))) for room in rooms]
+    near = {room.storey for room, far in zip(rooms, off, strict=True) if far < min(off) + 0.05}
+    return near.pop() if len(near) == 1 else ""
 
 
 def _ends(name: str, entry: Any) -> np.ndarray:

@@ -162,6 +162,22 @@ def infinigen(path):
     path.write_text(json.dumps(found))
 
 
+def test_holes_of_infinigen_are_of_the_storey_in_whose_walls_they_lie(tmp_path):
+    def shape(kind, *points):
+        return {"shape": f"shapely.{kind}({[*points]})"}
+
+    rooms = {"hallway_0/0": shape("Polygon", (0, 0), (4, 0), (4, 3), (0, 3))}
+    rooms |= {"bedroom_1/0": shape("Polygon", (0, 0), (2, 0), (2, 3), (0, 3))}
+    rooms |= {"study_1/0": shape("Polygon", (2, 0), (4, 0), (4, 3), (2, 3))}
+    doors = {"door": shape("LineString", (2, 1), (2, 1.9)), "door.001": shape("LineString", (1, 0), (1.9, 0))}
+    (tmp_path / "flat.json").write_text(json.dumps({"rooms": rooms, "doors": doors}))
+    _, found = read_plan(tmp_path / "flat.json")
+    assert [hole.storey for hole in found.holes] == ["1", ""]  # both have a wall at the second
+    assert imported(found).counts["doors"] == 1
+    upstairs = imported(found, "1")
+    assert [frozenset(pair) for pair, _ in ways(upstairs.plan)] == [frozenset(upstairs.plan.floors)]
+
+
 def roomplan(path):
     turn = np.radians(20)  # a scan begins however the phone is held
     cos, sin = np.cos(turn), np.sin(turn)
