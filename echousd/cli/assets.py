@@ -21,13 +21,9 @@ SHOWN = 20  # faults that are told; the table holds all
 
 @told(assets_app, "assets index")
 def index(
-    folders: list[Path],
-    output: Path,
-    workers: int = 0,
-    table: Path | None = None,
-    descriptors: bool = False,
+    folders: list[Path], output: Path, workers: int = 0, table: Path | None = None, descriptors: bool = False,
     json: AsJson = False,
-) -> None:
+) -> None:  # fmt: skip
     """Index a library: what its models are, how large, where their front is, and whose they are.
 
     Models that did not change since the last run are not read again. What cannot be used is listed.
@@ -78,13 +74,9 @@ def review(library: Path, output: Path | None = None, json: AsJson = False) -> N
 
 @told(assets_app, "assets pack")
 def pack(
-    room: Path,
-    output: Path,
-    asset: list[str] | None = None,
-    author: str = "EchoUSD",
-    force: bool = False,
+    room: Path, output: Path, asset: list[str] | None = None, author: str = "EchoUSD", force: bool = False,
     json: AsJson = False,
-) -> None:
+) -> None:  # fmt: skip
     """Write a room's furniture as packages for SimReady hosts: Z up, payload folder, picture, provenance.
 
     Needs the extra render.
@@ -117,12 +109,8 @@ def verify(folder: Path, json: AsJson = False) -> None:
 
 @told(store_app, "store gc")
 def gc(
-    folder: Path,
-    rooms: list[Path] | None = None,
-    dry_run: bool = False,
-    older: float = 60.0,
-    json: AsJson = False,
-) -> None:
+    folder: Path, rooms: list[Path] | None = None, dry_run: bool = False, older: float = 60.0, json: AsJson = False,
+) -> None:  # fmt: skip
     """Remove assets and images that no room below the given folders names."""
     from echousd.store import Store
 

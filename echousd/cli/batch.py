@@ -24,25 +24,12 @@ app.add_typer(batch_app, name="batch", help="Many rooms: a plan, workers, a jour
 
 
 def run(
-    sources: list[str] | None = None,
-    output: Path = Path("batch"),
-    sample: str = "",
-    count: int | None = None,
-    seed: int | None = None,
-    workers: int | None = None,
-    shard: str = "0/1",
-    resume: bool = False,
-    max_failures: int | None = None,
-    timeout: float | None = None,
-    until: str = "",
-    memory: int = 4096,
-    more: list[str] | None = None,
-    ray: str = "",
-    webdataset: bool = False,
-    json: bool = False,
-    outside: Outside = None,
-    **changes: Any,
-) -> None:
+    sources: list[str] | None = None, output: Path = Path("batch"), sample: str = "", count: int | None = None,
+    seed: int | None = None, workers: int | None = None, shard: str = "0/1", resume: bool = False,
+    max_failures: int | None = None, timeout: float | None = None, until: str = "", memory: int = 4096,
+    more: list[str] | None = None, ray: str = "", webdataset: bool = False, json: bool = False,
+    outside: Outside = None, **changes: Any,
+) -> None:  # fmt: skip
     """Make many rooms, each whole or not at all; end it, go on with --resume, on as many machines as there are."""
     from echousd.batches.batch import RunOptions, run_batch
     from echousd.batches.options import parse_options, parse_sample, read_toml, request_of

@@ -20,13 +20,9 @@ app = typer.Typer()
 
 @told(app, "check")
 def check(
-    room: list[Path],
-    json: bool = False,
-    rules: str = "strict",
-    layout: int | None = None,
-    strict: bool = False,
+    room: list[Path], json: bool = False, rules: str = "strict", layout: int | None = None, strict: bool = False,
     settle: bool = False,
-) -> None:
+) -> None:  # fmt: skip
     """Check rooms: relations, collisions, placement, living rules in all their layouts, and their USD.
 
     Of several rooms each gets a line, with --json an entry of one list, those that cannot be read as well.

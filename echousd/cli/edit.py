@@ -24,18 +24,10 @@ app = typer.Typer()
 
 
 def edit(
-    room: Path,
-    dry_run: bool = False,
-    undo: bool = False,
-    redo: bool = False,
-    recover: bool = False,
-    output: Path | None = None,
-    force: Force = False,
-    wait: Wait = False,
-    outside: Outside = None,
-    json: Made = False,
+    room: Path, dry_run: bool = False, undo: bool = False, redo: bool = False, recover: bool = False,
+    output: Path | None = None, force: Force = False, wait: Wait = False, outside: Outside = None, json: Made = False,
     **changes: Any,
-) -> None:
+) -> None:  # fmt: skip
     """Change what a room holds; objects that the change does not touch stay byte for byte.
 
     Every option may be given several times.
@@ -85,13 +77,9 @@ def edit_home(root: Path, wishes: EditRequest, output: Path | None, *, dry_run: 
 
 
 def update(
-    layer: Path,
-    dry_run: bool = False,
-    wait: Wait = False,
-    outside: Outside = None,
-    json: Made = False,
+    layer: Path, dry_run: bool = False, wait: Wait = False, outside: Outside = None, json: Made = False,
     **changes: Any,
-) -> None:
+) -> None:  # fmt: skip
     """Bring a room up to date with what a stronger layer changes: its relations, objects and transforms.
 
     What the layer moves is the artist's wish: it stays where it was put, locked, and the others make way.
@@ -200,18 +188,10 @@ def _change(
 
 
 def adopt(
-    stage: Path,
-    output: Path,
-    room: str | None = None,
-    add: list[str] | None = None,
-    relate: list[str] | None = None,
-    names: bool = False,
-    force: Force = False,
-    wait: Wait = False,
-    outside: Outside = None,
-    json: Made = False,
+    stage: Path, output: Path, room: str | None = None, add: list[str] | None = None, relate: list[str] | None = None,
+    names: bool = False, force: Force = False, wait: Wait = False, outside: Outside = None, json: Made = False,
     **changes: Any,
-) -> None:
+) -> None:  # fmt: skip
     """Complete a stage that others began: its furniture stays where and as it is, new pieces stand around it.
 
     The stage is not written; the room refers to the pieces in it, with --collect to copies. What a person would point

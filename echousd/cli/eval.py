@@ -24,20 +24,11 @@ Seed = Annotated[int, typer.Option(help="Seed of every draw.")]
 
 @told(eval_app, "eval suite")
 def suite(
-    systems: list[str] | None = None,
-    against: Against = "generated",
-    out: Path = Path("report"),
-    only: str = "",
-    count: Count = 24,
-    seed: Seed = 0,
-    relations: float = 1.0,
-    shapes: Path | None = None,
-    inception: Path | None = None,
-    clip: Path | None = None,
-    workers: int = 2,
-    force: Replace = False,
+    systems: list[str] | None = None, against: Against = "generated", out: Path = Path("report"), only: str = "",
+    count: Count = 24, seed: Seed = 0, relations: float = 1.0, shapes: Path | None = None,
+    inception: Path | None = None, clip: Path | None = None, workers: int = 2, force: Replace = False,
     json: Written = False,
-) -> None:
+) -> None:  # fmt: skip
     """Ask systems the same rooms, score them beside chance and plain baselines, and write a report."""
     from echousd.cli.progress import progress_bar
     from echousd.evaluation.runs import SYSTEMS, SuiteSettings
@@ -61,14 +52,9 @@ def suite(
 
 @told(eval_app, "eval study")
 def study(
-    systems: list[str],
-    out: Path = Path("study.html"),
-    against: Against = "generated",
-    count: Count = 12,
-    seed: Seed = 0,
-    force: Replace = False,
-    json: Written = False,
-) -> None:
+    systems: list[str], out: Path = Path("study.html"), against: Against = "generated", count: Count = 12,
+    seed: Seed = 0, force: Replace = False, json: Written = False,
+) -> None:  # fmt: skip
     """Write a page that shows people pairs of rooms and records which they prefer, offline."""
     from echousd.cli.progress import progress_bar
     from echousd.evaluation.suite import write_study

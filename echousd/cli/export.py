@@ -16,17 +16,10 @@ app = typer.Typer()
 
 @told(app, "export")
 def export(
-    room: Room,
-    output: Path,
-    reader: str | None = None,
-    arkit: bool = False,
-    search: list[Path] | None = None,
-    layout: Layout = None,
-    physics: bool | None = None,
-    pictures: bool = True,
-    force: Replace = False,
+    room: Room, output: Path, reader: str | None = None, arkit: bool = False, search: list[Path] | None = None,
+    layout: Layout = None, physics: bool | None = None, pictures: bool = True, force: Replace = False,
     json: Written = False,
-) -> None:
+) -> None:  # fmt: skip
     """Write a room as one file: usdz for the web or ARKit, glb, or flat USD.
 
     Readers that compose no layers, as three.js and tinyusdz, find nothing in a room's root layer: they need this file.
@@ -47,19 +40,10 @@ TURN = "turntable"
 
 @told(app, "render")
 def render(
-    room: Room,
-    output: Path,
-    view: str = "hero",
-    cameras: bool = False,
-    quality: str = "fast",
-    size: int | None = None,
-    frames: int = 24,
-    colors: str = "materials",
-    layout: Layout = None,
-    light: str | None = None,
-    force: ReplacePicture = False,
-    json: Written = False,
-) -> None:
+    room: Room, output: Path, view: str = "hero", cameras: bool = False, quality: str = "fast",
+    size: int | None = None, frames: int = 24, colors: str = "materials", layout: Layout = None,
+    light: str | None = None, force: ReplacePicture = False, json: Written = False,
+) -> None:  # fmt: skip
     """Draw a room from inside, from above, from a corner, from all around, or through each of its cameras."""
     from echousd.draw.from_files import render as draw
     from echousd.draw.from_files import render_cameras, render_turn
@@ -103,13 +87,9 @@ def render(
 
 @told(app, "convert")
 def convert(
-    source: Path,
-    output: Path,
-    bounds: Path | None = None,
-    classes: Path | None = None,
-    force: Replace = False,
+    source: Path, output: Path, bounds: Path | None = None, classes: Path | None = None, force: Replace = False,
     json: AsJson = False,
-) -> None:
+) -> None:  # fmt: skip
     """Convert a published EchoScene, EchoLayout or VQ-VAE checkpoint.
 
     Sizes and switches are read off the parameter names. Nothing in the file is executed: it is refused if it holds

@@ -15,17 +15,9 @@ app = typer.Typer()
 
 
 def generate(
-    graph: Path,
-    output: Path,
-    room: str | None = None,
-    flat: bool = False,
-    json: Made = False,
-    store: Path | None = None,
-    force: Force = False,
-    wait: Wait = False,
-    outside: Outside = None,
-    **values: Any,
-) -> None:
+    graph: Path, output: Path, room: str | None = None, flat: bool = False, json: Made = False,
+    store: Path | None = None, force: Force = False, wait: Wait = False, outside: Outside = None, **values: Any,
+) -> None:  # fmt: skip
     """Generate a room from a scene graph, as layers of USD; of a home, its plan, its rooms and what composes them.
 
     Of a graph's numbers, lengths are metres in the room's frame (+Y up, the floor at 0), yaw is `90 deg` or radians

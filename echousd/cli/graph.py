@@ -24,20 +24,11 @@ app = typer.Typer()
 
 @told(app, "new")
 def new(
-    out: Path,
-    source: Path | None = None,
-    room: str | None = None,
-    count: list[str] | None = None,
-    rooms: str | None = None,
-    area: float | None = None,
-    relate: list[str] | None = None,
-    size: tuple[float, float] | None = None,
-    height: float | None = None,
-    door: list[str] | None = None,
-    window: list[str] | None = None,
-    force: Replace = False,
-    json: AsJson = False,
-) -> None:
+    out: Path, source: Path | None = None, room: str | None = None, count: list[str] | None = None,
+    rooms: str | None = None, area: float | None = None, relate: list[str] | None = None,
+    size: tuple[float, float] | None = None, height: float | None = None, door: list[str] | None = None,
+    window: list[str] | None = None, force: Replace = False, json: AsJson = False,
+) -> None:  # fmt: skip
     """Author a scene graph, as a stage or as text, from a file or from a room type."""
     from echousd.graph import GraphError, RoomSpec, load_graph, save_graph, starting_graph
     from echousd.graph.nodes import Placed
@@ -115,15 +106,9 @@ def _counted(text: str) -> tuple[str, int]:
 
 @told(app, "graph")
 def graph(
-    source: Path | None = None,
-    room: str | None = None,
-    names: bool = False,
-    relations: float | None = None,
-    as_json: bool = False,
-    picture: Path | None = None,
-    force: ReplacePicture = False,
-    schema: bool = False,
-) -> None:
+    source: Path | None = None, room: str | None = None, names: bool = False, relations: float | None = None,
+    as_json: bool = False, picture: Path | None = None, force: ReplacePicture = False, schema: bool = False,
+) -> None:  # fmt: skip
     """Show the scene graph of a stage or a text file, as the text that a person writes."""
     from echousd.folder.found import room_at
     from echousd.graph import GraphError, SceneGraph, load_graph

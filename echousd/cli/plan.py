@@ -28,16 +28,9 @@ app.add_typer(plan_app, name="plan", help="Plan a home, draw or write its plan; 
 
 @told(plan_app, "plan import")
 def import_(
-    source: Path,
-    output: Path,
-    form: str | None = None,
-    unit: str | None = None,
-    storey: str | None = None,
-    lenient: bool = False,
-    picture: Path | None = None,
-    force: Force = False,
-    json: Written = False,
-) -> None:
+    source: Path, output: Path, form: str | None = None, unit: str | None = None, storey: str | None = None,
+    lenient: bool = False, picture: Path | None = None, force: Force = False, json: Written = False,
+) -> None:  # fmt: skip
     """Read a floor plan of another program: its rooms, doors and windows, and its furniture, which stays put.
 
     Rooms without furniture get what such rooms usually hold.
@@ -72,13 +65,8 @@ def _writable(path: Path, endings: tuple[str, ...], force: bool) -> None:
 
 @told(plan_app, "plan export")
 def export(
-    source: Path,
-    output: Path,
-    several: int = 1,
-    seed: int = 0,
-    force: Force = False,
-    json: Written = False,
-) -> None:
+    source: Path, output: Path, several: int = 1, seed: int = 0, force: Force = False, json: Written = False,
+) -> None:  # fmt: skip
     """Plan a home, or take the plan that it has with what stands in it, and draw it or write it down."""
     from echousd.folder.found import room_at
     from echousd.graph import GraphError

@@ -20,17 +20,9 @@ app.add_typer(texture_app, name="texture", help="To texturing tools (SceneTex, H
 
 @told(texture_app, "texture export")
 def export(
-    room: Path,
-    output: Path,
-    tool: str,
-    prompt: str = "",
-    dressing: str = "none",
-    resolution: int | None = None,
-    layout: Layout = None,
-    shell: bool | None = None,
-    force: bool = False,
-    json: AsJson = False,
-) -> None:
+    room: Path, output: Path, tool: str, prompt: str = "", dressing: str = "none", resolution: int | None = None,
+    layout: Layout = None, shell: bool | None = None, force: bool = False, json: AsJson = False,
+) -> None:  # fmt: skip
     """Write meshes with texture coordinates, cameras, prompts, a script to run the tool, and job.json."""
     from echousd.folder.found import room_at
     from echousd.texturing import export_texture_job
@@ -49,15 +41,9 @@ def export(
 
 @told(texture_app, "texture import")
 def import_(
-    room: Path,
-    job: Path,
-    name: str = "",
-    skip: list[str] | None = None,
-    preview: bool = True,
-    force: bool = False,
-    wait: Wait = False,
-    json: AsJson = False,
-) -> None:
+    room: Path, job: Path, name: str = "", skip: list[str] | None = None, preview: bool = True, force: bool = False,
+    wait: Wait = False, json: AsJson = False,
+) -> None:  # fmt: skip
     """Bring what a tool painted back as a layer of your own over the room, and a variant of `looks`."""
     from echousd.folder.found import room_at
     from echousd.texturing import import_texture_job

@@ -27,12 +27,9 @@ app = typer.Typer()
 
 @told(app, "train")
 def train(
-    recipe: Path,
-    settings: list[str] | None = None,
-    out: Path | None = None,
-    resume: bool = False,
+    recipe: Path, settings: list[str] | None = None, out: Path | None = None, resume: bool = False,
     minutes: float | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Train a part of the echo model; a run that was stopped continues bit for bit with --resume."""
     from echomodel.training.recipe import read_recipe
     from echomodel.training.start import open_run
@@ -104,16 +101,9 @@ def _write_one_file(out: Path, found: list[RoomBoxes], kind: str) -> None:
 
 @told(data_app, "data search")
 def search(
-    out: Path,
-    count: int = 20_000,
-    seed: Seed = 0,
-    drafts: int = 2,
-    weights: str | None = None,
-    workers: int = 1,
-    minutes: float | None = None,
-    unsearched: bool = False,
-    rooms: str | None = None,
-) -> None:
+    out: Path, count: int = 20_000, seed: Seed = 0, drafts: int = 2, weights: str | None = None, workers: int = 1,
+    minutes: float | None = None, unsearched: bool = False, rooms: str | None = None,
+) -> None:  # fmt: skip
     """Search rooms without a fault to train on, from several starts each; OUT/rooms.npz is the set."""
     from echousd.place.examples import GRAPHS, PLAIN, ExamplesPlan, search_examples
 
@@ -130,14 +120,9 @@ def search(
 
 @told(data_app, "data plot")
 def plot(
-    rooms: Rooms,
-    out: Path,
-    limit: int = 50,
-    columns: int = 10,
-    room: str | None = None,
-    labels: bool = True,
+    rooms: Rooms, out: Path, limit: int = 50, columns: int = 10, room: str | None = None, labels: bool = True,
     force: Replace = False,
-) -> None:
+) -> None:  # fmt: skip
     """Draw rooms from above: rectangles coloured per class, a red line to each front."""
     from echomodel.data.roomset import rooms_of_type
     from echomodel.data.sheet import plot_rooms
@@ -184,13 +169,9 @@ def meshes(library: Path, out: Path, copies: int = 2) -> None:
 
 @told(data_app, "data to-usd")
 def to_usd(
-    rooms: Rooms,
-    out: Path,
-    limit: int | None = None,
-    rules: str = "strict",
-    known: bool = True,
+    rooms: Rooms, out: Path, limit: int | None = None, rules: str = "strict", known: bool = True,
     force: Replace = False,
-) -> None:
+) -> None:  # fmt: skip
     """Write rooms of any source as USD stages with their scene graphs."""
     from echousd.stage.boxes import write_stages
 
@@ -208,12 +189,8 @@ def to_usd(
 
 @told(data_app, "data import")
 def import_rooms(
-    sources: list[Path],
-    out: Path,
-    room: str = "all",
-    split: str = "trainval",
-    force: Replace = False,
-) -> None:
+    sources: list[Path], out: Path, room: str = "all", split: str = "trainval", force: Replace = False,
+) -> None:  # fmt: skip
     """Bring rooms of any source into one file: for `echousd train --set data=FILE.npz`, or for eval.
 
     A set holds every twentieth room out and is labelled anew where it is read; a rooms file keeps what is told.
@@ -233,13 +210,8 @@ def import_rooms(
 
 @told(data_app, "data to-sgfront")
 def to_sgfront(
-    rooms: Rooms,
-    out: Path,
-    split: str = "trainval",
-    drop: float = 0.5,
-    seed: int = 0,
-    force: Replace = False,
-) -> None:
+    rooms: Rooms, out: Path, split: str = "trainval", drop: float = 0.5, seed: int = 0, force: Replace = False,
+) -> None:  # fmt: skip
     """Write rooms in the files of SG-FRONT, labelled by its rules."""
     from echomodel.data.sgfront import write_sgfront
 
