@@ -10,7 +10,7 @@ from echomodel.objective.plan import FAR, Found, Plan, found, joined
 APART = {
     ("sofa", "board"): 0.2, ("sofa", "seat"): 0.12, ("board", "board"): 0.1, ("board", "seat"): 0.05,
     ("seat", "seat"): 0.06, ("seat", "storage"): 0.12, ("bed", "seat"): 0.05, ("bed", "sofa"): 0.35,
-    ("bed", "bed"): 0.15, ("bed", "board"): 0.25,
+    ("bed", "bed"): 0.15, ("bed", "board"): 0.25, ("bed", "storage"): 0.2,
 }  # fmt: skip
 ROLES = sorted({role for pair in APART for role in pair})
 AT_BED = 0.12  # metres between a bed and who works at a desk: all ten real ones
@@ -42,8 +42,8 @@ def groups_apart(plan: Plan) -> Found:
     number = cast(plan.column(lambda kind: ROLES.index(kind.role) if kind.role in ROLES else 0), plan.scene)
     low, high = plan.stands("before"), plan.stands("at") | plan.dining
     wanted = plan.kit.where((low[i] & high[j]) | (low[j] & high[i]), LOW, table[number[i], number[j]])
-    bed, works = plan.of("bed"), plan.of("board") & ~plan.dining  # which stand beside beds
-    bedside = (works[i] & bed[j]) | (works[j] & bed[i])
+    bed, aside = plan.of("bed"), (plan.of("board") & ~plan.dining) | plan.stands("head")  # which stand beside beds
+    bedside = (aside[i] & bed[j]) | (aside[j] & bed[i])
     sits = plan.stands("at") & plan.works[at_least(plan.anchor, 0)] & (plan.anchor >= 0)
     wanted = plan.kit.where((sits[i] & bed[j]) | (sits[j] & bed[i]), AT_BED, wanted)
     keep = (wanted > 0) & ~_side_by_side(plan, i, j) & ~bedside

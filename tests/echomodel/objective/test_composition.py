@@ -86,6 +86,16 @@ def test_a_sofa_keeps_off_the_side_of_a_bed(gap, margin):
     assert list(seen(crowding.groups_apart, [bed, sofa])[0].values()) == [pytest.approx(margin)]
 
 
+@pytest.mark.parametrize(("gap", "margin"), [(0.1, -0.1), (0.25, 0.05)])
+def test_a_wardrobe_keeps_off_the_side_of_a_bed(gap, margin):
+    bed = ("kids_bed", (1.2, 0.9, 2.0), (0.0, 0.0), 0.0)
+    wardrobe = ("wardrobe", (1.6, 2.2, 0.6), (0.6 + gap + 0.3, 0.3), HALF)
+    assert list(seen(crowding.groups_apart, [bed, wardrobe])[0].values()) == [pytest.approx(margin)]
+    nightstands = [("nightstand", (0.4, 0.5, 0.4), (side, -0.8), 0.0) for side in (-0.82, 0.82)]
+    other = ("kids_bed", (1.2, 0.9, 2.0), (-1.65, 0.0), 0.0)  # whose bed shares one of them
+    assert min(seen(crowding.groups_apart, [bed, *nightstands, other])[0].values()) > 0
+
+
 @pytest.mark.parametrize(("beside", "margin"), [("side_table", 0.4), ("floor_lamp", -0.24)])
 def test_a_lamp_makes_no_nook_for_a_plant(beside, margin):
     plant = ("plant", (0.4, 1.0, 0.4), (0.0, -1.8), 0.0)
@@ -163,10 +173,48 @@ def test_an_emptier_room_may_leave_more_of_its_floor():
     assert composition.served_limit(100.0, one, one) == 1.0
 
 
-def test_a_small_room_has_no_circle_so_bare_as_a_hall_may():
-    assert composition.bare_limit(16.0, 4) == pytest.approx(0.6656 * 2)
-    assert composition.bare_limit(36.0, 9) == pytest.approx(0.8976 * 2)
-    assert composition.bare_limit(100.0, 25) == pytest.approx(1.0 * 2)
+@pytest.mark.parametrize(
+    ("at", "margin", "measure"),
+    [((0.0, 0.0), 1.7 - 10**0.5, 17.5), ((-2.0, 1.0), 1.7 - 3**0.5, 10.5), ((-2.2, 1.2), 1.7 - 1.8**0.5, 9.1)],
+)
+def test_no_corner_of_a_hall_is_bare(at, margin, measure):
+    corners = [("bookshelf", (1.0, 2.0, 1.0), place, 0.0) for place in ((-3.5, -2.5), (3.5, -2.5), (3.5, 2.5))]
+    corners += [("bookshelf", (1.0, 2.0, 1.0), (2.5, -2.5), 0.0)]
+    room = [("bookshelf", (1.0, 2.0, 1.0), at, HALF), *corners, ("carpet", (2.0, 0.02, 2.0), (-3.0, 2.0), 0.0)]
+    found, rows, boxes = seen(composition.corners_used, room, (8.0, 6.0))
+    assert found == {0: pytest.approx(margin)}  # of the one corner without a shelf; a rug fills none
+    assert rows.measure.tolist() == [pytest.approx(measure)]  # square metres
+    rows.margin.sum().backward()
+    assert float(boxes.position.grad[0, 0]) <= 0 <= float(boxes.position.grad[0, 2])  # drawn into the corner
+    assert float(abs(boxes.position.grad[0]).max()) > 0.5
+    units = [("base_unit", (0.6, 0.9, 0.6), (x, -1.7), 0.0) for x in np.arange(-2.0, 2.0, 0.6)]
+    for few in (room[:4], row_of(4, 0.4, 0.45), units):  # so few, chairs of a table and units of a row fill no room
+        assert seen(composition.corners_used, few, (8.0, 6.0))[0] == {}
+
+
+@pytest.mark.parametrize(("wide", "margin"), [(3.0, -0.08), (4.6, 0.072)])
+def test_a_hall_holds_enough_for_its_floor(wide, margin):
+    room = [("bookshelf", (wide, 2.0, 1.0), (x, 0.0), 0.0) for x in (-1.0, 1.0)]
+    carpet = ("carpet", (3.0, 0.02, 3.0), (0.0, 0.0), 0.0)
+    found, rows, _ = seen(
+        composition.floor_filled, [("desk", (1.5, 0.75, 1.0), (0.0, 2.0), 0.0), *room, carpet], (7.0, 6.0)
+    )
+    assert found == {1: pytest.approx((4 * (wide + 1) + 5) / 42 - 0.58)}
+    assert margin == pytest.approx(found[1], abs=0.02)
+    assert rows.measure.tolist() == [pytest.approx(100 * (0.58 + found[1]))]
+    assert seen(composition.floor_filled, room[:1], (5.0, 4.0))[0] == {}  # which may be sparse
+
+
+def test_a_corner_behind_a_wall_and_one_that_points_into_the_room_are_none():
+    outline = np.array([(-4.0, -3.0), (4.0, -3.0), (4.0, 0.0), (0.0, 0.0), (0.0, 3.0), (-4.0, 3.0)])
+    places = ((-3.5, -1.5), (-3.5, -2.5), (-0.5, 2.5), (-3.5, 2.5), (3.5, -0.5), (3.5, -2.5))
+    at = np.array([(x, 0.0, z) for x, z in places])
+    boxes = Boxes(np.full((6, 3), 1.0), at, np.zeros(6))
+    for turned in (outline, outline[::-1]):  # all five corners have a shelf
+        found = composition.corners_used(plan_of(boxes, ["bookshelf"] * 6, turned))
+        assert found.margin.tolist() == [pytest.approx(1.7 - 1e-3)]
+        without = plan_of(Boxes(boxes.size[:5], at[:5], np.zeros(5)), ["bookshelf"] * 5, turned)
+        assert composition.corners_used(without).margin.tolist() == [pytest.approx(1.7 - 6**0.5)]  # 7 m by 2 m
 
 
 @pytest.mark.parametrize(("middle", "margin"), [(-2.0, -0.205), (-0.2, 0.02)])

@@ -341,9 +341,9 @@ def test_a_hall_that_is_furnished_at_one_end_is_seen():
     plant = {"kind": "plant", "size": (0.5, 1.2, 0.5)}
     full = Room({**LIVING.things, **{f"plant_{n}": {**plant, "at": (-2.2 + 0.6 * n, 4.7)} for n in range(8)}})
     found = full.found(floor=hall)
-    assert [rule for _, rule in found].count("floor_used") == 1
-    assert any("a circle of 6.8 m of the floor is bare" in said for said in found.values())
-    assert not any(rule == "floor_used" for _, rule in LIVING.found(floor=None))
+    assert [rule for _, rule in found].count("corners_used") == 1
+    assert any("square metres of a corner lie bare beside" in said for said in found.values())
+    assert not any(rule == "corners_used" for _, rule in LIVING.found(floor=None))
 
 
 def test_desks_stand_in_a_row_and_what_belongs_together_touches():
@@ -360,6 +360,20 @@ def test_in_a_deep_hall_a_sofa_stands_where_it_sees_its_screen(deep, behind, kep
     stand = {"kind": "tv_stand", "size": (1.8, 0.5, 0.4), "at": (0.0, deep - 0.22), "yaw": np.pi}
     found = Room({"sofa": sofa, "stand": stand}).found(floor=floor)
     assert (("sofa", "at_wall") not in found) == kept
+
+
+@pytest.mark.parametrize(("away", "kept"), [(0.65, True), (0.8, False)])
+def test_an_armchair_is_near_its_group_or_has_something_of_its_own(away, kept):
+    floor = np.array([(-3.5, -2.0), (3.5, -2.0), (3.5, 2.5), (-3.5, 2.5)])
+    room = LIVING.moved("armchair", at=(0.55 + away + 0.4, -0.4)).moved("sofa", at=(-0.4, -1.53))
+    assert (("armchair", "not_alone") not in room.found(floor=floor)) == kept
+
+
+@pytest.mark.parametrize(("away", "kept"), [(0.55, True), (0.65, False)])
+def test_an_ottoman_stands_at_something(away, kept):
+    shelf = {"kind": "bookshelf", "size": (1.0, 1.8, 0.4), "at": (0.0, -1.8)}
+    pouf = {"kind": "ottoman", "size": (0.6, 0.4, 0.6), "at": (0.0, -1.6 + away + 0.3)}
+    assert (("pouf", "not_alone") not in Room({"shelf": shelf, "pouf": pouf}).found()) == kept
 
 
 def test_an_armchair_far_from_its_group_has_more_of_its_own_than_a_dining_table():
@@ -521,7 +535,7 @@ def test_margins_have_finite_slopes(term):
 def test_the_room_generator_rarely_breaks_them():
     rooms = generate_rooms(60, 3)
     found = [f for room in rooms for f in faults(plan_of(room, room.categories, room.floor_polygon))]
-    unknown = {"halves_used", "bed_side_free", "bed_foot_free"}  # to the recipes, which put beds where they fit
+    unknown = {"halves_used", "corners_used", "bed_side_free", "bed_foot_free"}  # to the recipes
     assert sum(fault.rule not in unknown for fault in found) < 0.28 * sum(len(room) for room in rooms)
 
 

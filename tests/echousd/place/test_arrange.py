@@ -231,7 +231,7 @@ def test_in_a_hall_the_sofa_comes_to_its_screen_and_its_table_with_it():
         [np.pi / 2, np.pi / 2, -np.pi / 2],
         [(1, "front", 0), (2, "opposite", 0)],
     )
-    assert not wrong  # it is told to look along nine metres: what is behind it is as much as that leaves
+    assert wrong == ["floor_filled"]  # it is told to look along nine metres: as much as that leaves is behind it
     assert (done.verdict == 1).all()
     assert np.linalg.norm(done.position[2] - done.position[0]) < 4.5
 
@@ -244,7 +244,7 @@ def test_an_armchair_does_not_turn_its_back_on_the_screen():
         [0.0, 0.0, np.pi, np.pi],
         [(1, "close_by", 0), (2, "opposite", 0), (3, "close_by", 1)],
     )
-    assert wrong == []
+    assert wrong == ["floor_filled"]  # so few pieces fill no hall
 
 
 def test_a_lamp_follows_the_table_that_is_moved_below_it():
