@@ -14,9 +14,9 @@ from echomodel.triangles import area_normals, lengths
 from echousd.layers.materials import write_looks, write_palettes
 from echousd.layers.physics import write_asset_physics, write_joints
 from echousd.options import Look
-from echousd.shapes.geometry import Geometry
+from echousd.shapes.geometry import CREASE, Geometry
 from echousd.shapes.looks import alternatives, look, palette_for
-from echousd.shapes.surface import CREASE, Surface, surfaces
+from echousd.shapes.surface import Surface, surfaces
 from echousd.stage.paths import (
     CLASSES,
     DESCRIPTION,

@@ -20,9 +20,9 @@ from echousd.dressing.walls import behind, walls_of
 from echousd.layers import assets
 from echousd.room import RoomData
 from echousd.shapes.fittings import PLAIN, Millwork, millwork_of
-from echousd.shapes.geometry import Mass
+from echousd.shapes.geometry import CREASE, Mass
 from echousd.shapes.matter import hull_moments
-from echousd.shapes.surface import CREASE, Surface, surfaces
+from echousd.shapes.surface import Surface, surfaces
 from echousd.shapes.walls import BEAM, COVED, THICKNESS, ShellPart, ShellPiece, beams, slab, wall_name, walls
 from echousd.stage import encoding
 from echousd.stage.paths import OPENINGS, SHELL, piece_name

@@ -10,9 +10,9 @@ import numpy as np
 
 from echomodel.triangles import Mesh, along, area_normals, bounds_of, connected_pieces, lengths
 from echousd.shapes.finishes.slots import UPRIGHT, metres_of
+from echousd.shapes.geometry import CREASE
 
 NUDGE = 4e-6  # metres between points of different boards at one place
-CREASE = np.radians(42.0)  # neighbours that fold more sharply than this keep a hard edge
 ATLAS = 1024, 2  # texels along a side and between charts, of pieces that are unwrapped without overlaps
 
 
