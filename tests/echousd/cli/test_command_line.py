@@ -14,6 +14,7 @@ import typer
 
 import echousd
 from echousd.cli import main
+from echousd.cli.options import SAID
 from echousd.cli.output import counted
 
 
@@ -35,19 +36,33 @@ def test_help_without_words(echousd_command):
     assert "graph" in outcome.out
 
 
+def commands(group, path=()):
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from commands(command, (*path, name))
+        else:
+            yield " ".join((*path, name)), command
+
+
 def test_every_command_has_help_with_an_example():
-    tree = main.command()
-
-    def commands(group, path):
-        for name, command in group.commands.items():
-            if hasattr(command, "commands"):
-                yield from commands(command, [*path, name])
-            else:
-                yield [*path, name], command
-
-    for path, command in commands(tree, []):
+    for name, command in commands(main.command()):
         text = f"{command.help}\n{command.epilog}"
-        assert f"echousd {' '.join(path)}" in text, f"{' '.join(path)} shows no example"
+        assert f"echousd {name}" in text, f"{name} shows no example"
+
+
+def test_every_argument_and_option_says_what_it_is():
+    found = dict(commands(main.command()))
+    assert found.keys() == SAID.keys()
+    silent = [f"{name} {one.name}" for name, command in found.items() for one in command.params if not one.help]
+    assert silent == []
+    sizes = next(one for one in found["new"].params if one.name == "size")
+    assert (sizes.opts, sizes.nargs, sizes.metavar) == (["--size"], 2, "X Z")
+    workers = next(one for one in found["assets index"].params if one.name == "workers")
+    assert workers.default == 0
+    with pytest.raises(Exception, match="should be less than or equal to 256"):
+        found["assets index"].make_context("index", ["models", "-o", "a.parquet", "--workers", "257"])
+    rooms = next(one for one in found["new"].params if one.name == "room")
+    assert [one.value for one in rooms.shell_complete(None, "bed")] == ["bedroom"]
 
 
 def test_help_says_units_and_frame(echousd_command):
