@@ -70,7 +70,7 @@ def size_score(category: str, size: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Piece:
+class OnFloor:
     """A piece on the floor: its row, width and depth in metres."""
 
     kind: Category
@@ -95,7 +95,7 @@ def filled_area(width: Sequence[float], depth: Sequence[float]) -> float:
     return sum((w + 2 * REACH) * (d + 2 * REACH) for w, d in zip(width, depth, strict=True))
 
 
-def pieces(categories: Sequence[str], sizes: Sequence[Sequence[float] | None], *, least: bool = False) -> list[Piece]:
+def pieces(categories: Sequence[str], sizes: Sequence[Sequence[float] | None], *, least: bool = False) -> list[OnFloor]:
     """What stands on the floor, in its usual size where none is stated."""
     out = []
     for category, size in zip(categories, sizes, strict=True):
@@ -104,7 +104,7 @@ def pieces(categories: Sequence[str], sizes: Sequence[Sequence[float] | None], *
             continue
         if size is None:
             size = _usual(row, least)
-        out.append(Piece(row, float(size[0]), float(size[2])))
+        out.append(OnFloor(row, float(size[0]), float(size[2])))
     return out
 
 
