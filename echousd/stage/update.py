@@ -140,7 +140,7 @@ class _Editor:
         wanted = {relation.triple: relation for relation in graph.relations}
         gone = {triple: entry for triple, entry in held.items() if triple not in wanted}
         taken = {child.GetName() for child in self.prims.graph.GetAllChildren()}
-        asleep = self.inactive_relations()
+        asleep = self.sleeping_relations()
         edits: list[Edit] = []
         for triple, relation in wanted.items():
             if triple in held:
@@ -157,12 +157,12 @@ class _Editor:
         again = [prim for triple, entries in facts.items() if triple not in wanted for prim, _ in entries[1:]]
         return [*map(self.removal, [*(prim for prim, _ in gone.values()), *again]), *edits]
 
-    def inactive_relations(self) -> dict[tuple[str, str, str], Usd.Prim]:
-        """Relations that somebody has deactivated, by triple: they come back by being activated."""
+    def sleeping_relations(self) -> dict[tuple[str, str, str], Usd.Prim]:
+        """Relations of which somebody has deactivated the prim or an end, by triple: they come back as they are."""
         found: dict[tuple[str, str, str], Usd.Prim] = {}
         ends = {path: name for name, path in self.paths.items()}
         for prim in self.prims.graph.GetAllChildren():
-            if prim.GetTypeName() == usd.RELATION_TYPE and not prim.IsActive():
+            if prim.GetTypeName() == usd.RELATION_TYPE:
                 subject, object_ = (self.target_of(prim, name) for name in (usd.SUBJECT, usd.OBJECT))
                 if subject in ends and object_ in ends:
                     found[ends[subject], value(prim, usd.PREDICATE), ends[object_]] = prim

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import pytest
 from graph_strategies import graphs as scene_graphs
 from hypothesis import given, settings
@@ -61,6 +63,23 @@ def test_what_two_layers_state_is_taken_away_by_the_stronger():
         update_graph(stage, wanted)
         assert read_graph(stage) == wanted
     assert read_graph(Usd.Stage.Open(base)) == GRAPH
+
+
+@pytest.mark.parametrize("layers", [(0,), (1,), (0, 1)])
+def test_an_object_that_layers_switched_off_is_switched_on_over_them(layers):
+    base = graph_layer(GRAPH)
+    mine = Sdf.Layer.CreateAnonymous(".usda")
+    mine.subLayerPaths.append(base.identifier)
+    stage = Usd.Stage.Open(mine)
+    closet = next(prim.GetPath() for prim in stage.Traverse() if prim.GetName() == "closet")
+    for number in layers:
+        Sdf.CreatePrimInLayer((base, mine)[number], closet).active = False
+    assert "closet" not in read_graph(stage).names
+    update_graph(stage, GRAPH)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # of a relation that is stated twice
+        assert read_graph(stage) == GRAPH
+    assert mine.GetPrimAtPath(closet).HasInfo("active") == (0 in layers)
 
 
 @given(first=scene_graphs(), second=scene_graphs())
