@@ -10,7 +10,7 @@ import shapely
 from manifold3d import Manifold
 from shapely.geometry.base import BaseGeometry
 
-from echomodel.triangles import Mesh, area_normals, box
+from echomodel.triangles import Mesh, box
 from echousd.shapes.geometry import Collider
 
 FACES = 120  # of the hull of what stands
@@ -24,11 +24,15 @@ PLANE = 1e-9  # share of the cube of their extent that the hull of points in one
 
 def hull_of(points: np.ndarray) -> Mesh | None:
     """The convex hull of points (n, 3) with exact corners, facing outwards; None of points in one plane."""
-    hull = Manifold.hull_points(points).simplify(FINE)
-    if hull.volume() <= PLANE * np.ptp(points, axis=0).max() ** 3:
+    if (hull := _hull(points)) is None:
         return None
-    mesh = hull.to_mesh64()
+    mesh = hull.simplify(FINE).to_mesh64()
     return Mesh(np.array(mesh.vert_properties), mesh.tri_verts.astype(int))  # views would be leaks in the end
+
+
+def _hull(points: np.ndarray) -> Manifold | None:
+    hull = Manifold.hull_points(points)
+    return None if hull.volume() <= PLANE * np.ptp(points, axis=0).max() ** 3 else hull
 
 
 def convex_hull(points: np.ndarray) -> Mesh:
@@ -45,8 +49,8 @@ def box_around(points: np.ndarray, least: float) -> Mesh:
 
 def hull_volume(points: np.ndarray) -> float:
     """Volume of the convex hull of points (n, 3), m³; 0 of points in one plane."""
-    hull = hull_of(points)
-    return 0.0 if hull is None else float(np.einsum("fx,fx->", hull.triangles[:, 0], area_normals(hull.triangles)) / 6)
+    hull = _hull(points)
+    return 0.0 if hull is None else hull.volume()
 
 
 def rounded_hull(points: np.ndarray) -> Mesh:
@@ -114,16 +118,8 @@ def forbidden(moving: np.ndarray, fixed: np.ndarray) -> BaseGeometry | None:
     low = max(moving[:, 1].min(), fixed[:, 1].min())
     if min(moving[:, 1].max(), fixed[:, 1].max()) - low <= FLUSH:
         return None
-    hull = hull_of((fixed[:, None] - moving[None]).reshape(-1, 3))
-    if hull is None:  # two parallel sheets
-        return None
-    start, end = hull.triangles.reshape(-1, 3), np.roll(hull.triangles, -1, axis=1).reshape(-1, 3)
-    start, end = start[start[:, 1] * end[:, 1] <= 0], end[start[:, 1] * end[:, 1] <= 0]
-    rise = end[:, 1] - start[:, 1]
-    share = np.where(np.abs(rise) > 1e-12, -start[:, 1] / np.where(np.abs(rise) > 1e-12, rise, 1.0), 0.0)
-    crossings = (start + share[:, None] * (end - start))[:, [0, 2]]
-    found = shapely.convex_hull(shapely.multipoints(crossings))
-    return found if isinstance(found, shapely.Polygon) else None
+    hull = _hull((fixed[:, None] - moving[None]).reshape(-1, 3)[:, [0, 2, 1]])  # cut across its third axis
+    return None if hull is None else shapely.Polygon(hull.slice(0.0).to_polygons()[0])  # None: parallel sheets
 
 
 def forbidden_moves(moving: Solids, fixed: Solids, reach: float) -> BaseGeometry:

@@ -88,22 +88,17 @@ class Blade(Solid):
 
     def _spine(self, count: int) -> tuple[Array, Array, Array]:
         """Points (n, 3) along the middle, their upward normals and half widths."""
-        share = np.linspace(0, 1, count)
-        angle = -self.bend * share
-        step = self.length / (count - 1)
-        middle = (angle[1:] + angle[:-1]) / 2
-        z = np.concatenate([[0], np.cumsum(np.cos(middle) * step)])
-        y = np.concatenate([[0], np.cumsum(np.sin(middle) * step)])
-        normal = np.stack([0 * angle, np.cos(angle), -np.sin(angle)], 1)
+        share = np.arange(count) * (1 / (count - 1))
+        angle, (points, normal) = -self.bend * share, np.zeros((2, count, 3))
+        middle, step = (angle[1:] + angle[:-1]) / 2, self.length / (count - 1)
+        points[1:, 1], points[1:, 2] = np.cumsum(np.sin(middle) * step), np.cumsum(np.cos(middle) * step)
+        normal[:, 1], normal[:, 2] = np.cos(angle), -np.sin(angle)
         warped = np.where(share < self.full, share / self.full / 2, 0.5 + (share - self.full) / (1 - self.full) / 2)
-        half = self.width / 2 * np.sin(np.pi * warped) ** 0.8
-        return np.stack([0 * z, y, z], 1), normal, half
+        return points, normal, self.width / 2 * np.sin(np.pi * warped) ** 0.8
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         points, normal, half = self._spine((3, 4, 5, 7)[detail])
-        side = np.array([1.0, 0.0, 0.0])
-        rings = []
-        for point, up, reach in zip(points, normal, np.maximum(half, 0.06 * self.width), strict=True):
-            out, fold, thick = reach * side, 0.25 * reach * up, self.thick / 2 * up
-            rings.append(np.array([point + out + fold, point + thick, point - out + fold, point - thick]))
+        reach = np.maximum(half, 0.06 * self.width)[:, None]
+        out, fold, thick = reach * [1.0, 0.0, 0.0], 0.25 * reach * normal, self.thick / 2 * normal
+        rings = np.stack([points + out + fold, points + thick, points - out + fold, points - thick], 1)
         return loft(rings)
