@@ -53,10 +53,8 @@ LONG = 8  # characters in place of a value; longer ones would leave no room for 
 
 
 def told(app: typer.Typer, name: str, **more: Any) -> Callable[[Command], Command]:
-    """Add a command, called by the last word of its name, with what `words.toml` says of it.
-
-    They are its examples, and of its arguments and options the help with flags, bounds and the like.
-    """
+    """Add a command, called by the last word of its name, with what `words.toml` says of it: examples, and of each
+    argument and option that no other command has the help, flags, bounds and the like."""
 
     def add(command: Command) -> Command:
         hints, row = get_type_hints(command, include_extras=True), SAID[name]
