@@ -6,7 +6,6 @@ says which files move where; from then on the run can be finished by whoever com
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import warnings
@@ -16,17 +15,18 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
 from echomodel.files import check_free, digest, flush, telling
+from echomodel.late import Late
 from echousd.folder.lock import LOCK, locked, run_of
-from echousd.folder.manifest import LARGEST, Digest, find_manifest
-from echousd.folder.within import check_links, inside
+from echousd.folder.manifest import Digest, find_manifest
+from echousd.folder.within import inside
 from echousd.naming import STAGE_FORMS, free_name
-from echousd.options import validation_message
 from echousd.pending import JOURNAL, STAGING, half_written
 from echousd.stage.files import check_path
 
+read_journal, whole = (Late(f"echousd.folder.interrupted:{name}") for name in ("read_journal", "whole"))
 DONE = "done.json"  # the journal of a run that has more to do once its files are in place
 
 
@@ -79,39 +79,6 @@ def write_journal(staging: Path, journal: Journal) -> None:
     flush(staging / "journal.new")
     (staging / "journal.new").replace(staging / JOURNAL)
     flush(staging)
-
-
-def read_journal(folder: Path, name: str = JOURNAL) -> Journal | None:
-    """The journal of an interrupted run in `folder`; None where it had not come so far, or cannot be read any more.
-
-    Arguments:
-        name: `JOURNAL`, or `DONE` for that of a run whose files are in place.
-
-    Raises ValueError for entries that name anything outside of the folder; nothing was changed then.
-    """
-    path = folder / STAGING / name
-    check_links(folder, path, f"{path} is read")
-    if not path.is_file():
-        return None
-    try:
-        if path.stat().st_size > LARGEST:
-            raise ValueError("it is too large")
-        journal = Journal.model_validate(json.loads(path.read_bytes()))
-    except ValidationError as error:
-        give_up = f"delete {folder / STAGING} to give the interrupted run up"
-        raise ValueError(f"{path}: {validation_message(error, Journal)}; {give_up}") from None
-    except (ValueError, RecursionError):  # emptied by a power cut, as some disks do
-        warnings.warn(f"{path}: cannot be read; the interrupted run is given up, generate the room again", stacklevel=3)
-        return None
-    named = [(f"{path}: move[{number}]", entry.to) for number, entry in enumerate(journal.move)]
-    named += [(f"{path}: remove[{number}]", removal.path) for number, removal in enumerate(journal.remove)]
-    for entry, name in named:
-        place = inside(folder, name, entry)
-        if place.relative_to(folder).parts[0] == STAGING:
-            raise ValueError(f"{entry} names {place}, where runs keep their own files; allowed: the room's files")
-    for number, move in enumerate(journal.move):
-        check_links(folder, folder / STAGING / move.staged, f"{path}: move[{number}] takes {move.staged}")
-    return journal
 
 
 def claim(folder: Path, *, force: bool, root: str = "") -> dict[str, Any]:
@@ -252,7 +219,7 @@ def finish(folder: Path, written: Journal | None = None) -> str | None:
     staging = folder / STAGING
     with telling(folder, then="; run again to finish"):
         journal = written or read_journal(folder)
-        if journal is not None and (written or _whole(folder, journal)):
+        if journal is not None and (written or whole(folder, journal)):
             _finish(folder, journal)
             (staging / JOURNAL).replace(staging / DONE)
         else:
@@ -275,16 +242,6 @@ def backup_name(folder: Path, path: str) -> str:
 def tell_kept(folder: Path, path: str, kept: str) -> None:
     """Warn that a file that is not ours, or was edited, is now called `kept`."""
     warnings.warn(f"{folder / path}: not as echousd wrote it; kept as {kept}", stacklevel=3)
-
-
-def _whole(folder: Path, journal: Journal) -> bool:
-    """Whether all that is still staged is what the journal says."""
-    for entry in journal.move:
-        staged = folder / STAGING / entry.staged
-        if staged.exists() and digest_of(staged) != entry.digest:
-            warnings.warn(f"{staged}: damaged; the interrupted run is given up, generate the room again", stacklevel=3)
-            return False
-    return True
 
 
 def _finish(folder: Path, journal: Journal) -> None:
