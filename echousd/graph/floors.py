@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.boxes2d import footprints
-from echomodel.openings import STEP, WINDOW_DEPTH, Opening, signed_area, sliding, swing_area, zone
+from echomodel.openings import STEP, WINDOW_DEPTH, WINDOWS, Opening, signed_area, sliding, swing_area, zone
 from echomodel.sizes import footprint
 from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError
@@ -92,7 +92,7 @@ def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGr
         boxes: size (n, 3), position (n, 3) of the bottom centre, metres, and yaw (n,), of all that stands already.
         seed: decides between places that are equally good.
     """
-    from echomodel.rooms.openings import WINDOWS, place_openings
+    from echomodel.rooms.openings import place_openings
 
     corners = graph.room.corners
     if corners is None or graph.room.walls or any(opening.kind == "window" for opening in graph.room.openings):

@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 
 from echomodel.openings import (
+    WINDOWS,
     Opening,
     direction,
     edge_lengths,
@@ -19,7 +20,7 @@ from echomodel.openings import (
     overlap,
     signed_area,
 )
-from echomodel.rooms.openings import PIER, WINDOWS
+from echomodel.rooms.openings import PIER
 from echomodel.vocabulary import vocabulary
 from echousd.home.graph import HomeGraph, HomeRelation
 

@@ -19,6 +19,10 @@ USUAL = {  # metres, where nobody says otherwise
     "window": {"width": 1.4, "height": 1.3, "sill": 0.9},
     "passage": {"width": 1.2, "height": 2.1, "sill": 0.0},
 }
+WINDOWS = {  # by use of a room: sill, height, width at most, metres; above worktops and basins where there are such
+    "": (USUAL["window"]["sill"], USUAL["window"]["height"], 2.0),
+    "wet": (1.2, 1.0, 1.2),
+}
 WINDOW_DEPTH = 0.35  # metres before a window where nothing tall stands
 STEP = 0.6  # metres before a door that a person needs to stand
 SLID = 0.08  # metres before a wall that a leaf takes which slides there, and its rail

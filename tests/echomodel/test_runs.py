@@ -11,9 +11,8 @@ from echomodel.boxes import Boxes
 from echomodel.boxes2d import footprints
 from echomodel.objective import fitted
 from echomodel.objective.plan import plan_of
-from echomodel.openings import Opening, free_area, rectangle
+from echomodel.openings import WINDOWS, Opening, free_area, rectangle
 from echomodel.rooms.generator import generate_rooms
-from echomodel.rooms.openings import WINDOWS
 from echomodel.rooms.runs import Site, obstacles, runs
 from echomodel.vocabulary import vocabulary
 

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from echomodel.boxes2d import CORNERS
-from echomodel.openings import Opening, numbered, overlap, zone
-from echomodel.rooms.openings import WINDOWS
+from echomodel.openings import WINDOWS, Opening, numbered, overlap, zone
 from echomodel.rooms.statistics import RoomTypeStatistics
 from echomodel.sizes import quantile
 from echomodel.vocabulary import vocabulary

@@ -9,17 +9,23 @@ import numpy as np
 import shapely
 
 from echomodel.boxes2d import footprints
-from echomodel.openings import SWINGS, USUAL, Opening, edge_lengths, free_area, inward_normal, numbered, signed_area
+from echomodel.openings import (
+    SWINGS,
+    USUAL,
+    WINDOWS,
+    Opening,
+    edge_lengths,
+    free_area,
+    inward_normal,
+    numbered,
+    signed_area,
+)
 
 GRID = 0.1  # metres between the places that are tried for an opening
 CORNER = 0.1  # metres from a corner to a door
 OUTWARDS = 0.7  # what a door that swings out of the room must save; rooms' doors open inwards
 PIER = 0.3  # metres of wall between a window and a corner or another opening
 SECOND_WINDOW, SECOND_DOOR = 16.0, 30.0  # square metres of floor
-WINDOWS = {  # by use of a room: sill, height, width at most, metres; above worktops and basins where there are such
-    "": (USUAL["window"]["sill"], USUAL["window"]["height"], 2.0),
-    "wet": (1.2, 1.0, 1.2),
-}
 
 
 def place_openings(
