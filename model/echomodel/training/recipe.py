@@ -73,6 +73,8 @@ class Recipe:
         warm: weights files, of an earlier version too, whose tensors are taken over as far as they reach: what has
             grown keeps what it had in its first rows and columns and begins with zeros in the others.
         frozen: parts that the stage would train but that stay as they are.
+        new_words: of the others too all stays but categories and room types that the file of `warm` does not know, so
+            that rooms without them are drawn as before.
         nodes: node budget of a batch of rooms. shapes_per_batch: objects per shape batch.
         scenes, text: `paper` alone: scenes per batch, and where text features come from: `clip` (downloaded once), a
             weights file of CLIP's, or `random` (vectors that only tell texts apart).
@@ -96,6 +98,7 @@ class Recipe:
     start: tuple[str, ...] = ()
     warm: tuple[str, ...] = ()
     frozen: tuple[str, ...] = ()
+    new_words: bool = False
     nodes: int = 512
     shapes_per_batch: int = 32
     scenes: int = 64

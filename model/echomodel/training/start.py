@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
@@ -11,6 +12,7 @@ import torch
 
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.model import CompactModel, load_weights, read_weights, restored
+from echomodel.compact.modules import WordTable
 from echomodel.compact.shape import ShapeDenoiser
 from echomodel.compact.weights import WORDS, in_words, own_statistics, read_header, words_of
 from echomodel.config import CompactConfig
@@ -111,6 +113,8 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
         return ELSEWHERE[recipe.stage](recipe, folder, device, resume=resume, report=report)
     kind: type[CompactStage] = STAGES[recipe.stage].itself
     start = started(kind, recipe, device, resume=resume)
+    if recipe.new_words:
+        _keep_known(start)
     return Trainer(recipe, start.model, kind.open(start), folder, resume=resume, report=report)
 
 
@@ -136,6 +140,21 @@ def started(kind: type[CompactStage], recipe: Recipe, device: torch.device, *, r
     if missing:
         raise ValueError(f"recipe field 'start': stage {recipe.stage!r} needs weights with {' and '.join(missing)}")
     return Start(recipe, model, found, resume, components)
+
+
+def _keep_known(start: Start) -> None:
+    """Of a model all but the words that its recipe's first file of `warm` does not know asks for no gradient."""
+    recipe, old = start.recipe, Path(next(iter(start.recipe.warm), ""))
+    known = words_of(old, read_header(old)) if recipe.warm else {}
+    if all(len(names) == len(getattr(start.model.config, kind)) for kind, names in known.items()):
+        what = f"{old} knows all words" if recipe.warm else "'warm' names no file whose words are known"
+        raise ValueError(f"recipe field 'new_words': {what}")
+    if recipe.optimizer.decay:
+        raise ValueError("recipe field 'new_words': optimizer.decay would change known words, allowed: 0")
+    start.model.requires_grad_(False)
+    for table in (module for module in start.model.modules() if isinstance(module, WordTable)):
+        new = torch.arange(len(table.names), device=table.weight.device)[:, None] >= len(known[table.kind])
+        table.weight.requires_grad_(True).register_hook(partial(torch.mul, new))
 
 
 def _in_words(recipe: Recipe) -> CompactConfig:

@@ -50,7 +50,7 @@ class Trainer:
 
     Arguments:
         recipe: what to do.
-        model: the model, initialised.
+        model: the model, initialised; what of it asks for no gradient stays as it is.
         stage: losses and validation.
         folder: where checkpoint.safetensors, weights.safetensors, log.csv and curves.png go.
         resume: continue from the folder's checkpoint.
@@ -68,7 +68,7 @@ class Trainer:
         self.report = report or (lambda step, values: None)
         for name in model.parts:
             for parameter in model.part_parameters(name):
-                parameter.requires_grad_(name in stage.trained)
+                parameter.requires_grad_(parameter.requires_grad and name in stage.trained)
         self.device = next(model.parameters()).device
         self.average = copy.deepcopy(model).requires_grad_(False).eval()
         self.trained = {name: p for name, p in model.named_parameters() if p.requires_grad}

@@ -23,8 +23,8 @@ from echomodel.graph import GraphBatch
 from echomodel.rooms.generator import generate_rooms
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.parts_stage import PartsStage
-from echomodel.training.recipe import Recipe
-from echomodel.training.start import started
+from echomodel.training.recipe import OptimizerConfig, Recipe
+from echomodel.training.start import open_run, started
 from echomodel.vocabulary import speaking, vocabulary
 
 WORDS = vocabulary()
@@ -170,25 +170,60 @@ def test_files_that_know_more_and_fewer_words_are_one_model(small, tmp_path):
         load_weights([tmp_path / "few.safetensors", tmp_path / "latent.safetensors"])
 
 
-def test_a_new_category_of_furniture_is_as_large_as_that_of_its_rooms(tmp_path):
-    room_types = ("bedroom", "bathroom")
-    rooms = [room for name in room_types for room in generate_rooms(60, 5, room_type=name)]
+@pytest.fixture
+def homes(tmp_path):
+    """A recipe for rooms of a home that begins with a small layout branch of 46 categories and five room types."""
+    rooms = [room for name in ("bedroom", "bathroom") for room in generate_rooms(60, 5, room_type=name)]
     pack_rooms(tmp_path / "rooms.npz", rooms, [k % 10 == 0 for k in range(len(rooms))], {})
     sizes = {"latent": {"width": 8, "layers": 1}, "layout": {"width": 8, "layers": 1, "drafts": 0}}
-    config = replace(from_dict(CompactConfig, sizes), categories=CompactConfig().categories[:46])
+    all_words = from_dict(CompactConfig, sizes)
+    few = replace(all_words, categories=all_words.categories[:46], room_types=all_words.room_types[:5])
     classes = tuple((float(k), *[0.5] * 8) for k in range(46))
-    old = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3, log_size=True, classes=classes)
-    CompactModel(config, old, ("latent", "layout")).write(tmp_path / "old.safetensors", ("latent", "layout"))
-    recipe = Recipe(
-        "layout", 1, data=str(tmp_path / "rooms.npz"), warm=(str(tmp_path / "old.safetensors"),),
-        model=from_dict(CompactConfig, sizes),
+    boxes = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3, log_size=True, classes=classes)
+    model = CompactModel(few, boxes, ("latent", "layout"))
+    for numbers in model.parameters():  # heads begin with zeros, which no slope goes through
+        torch.nn.init.normal_(numbers, 0.0, 0.2)
+    model.write(tmp_path / "old.safetensors", model.parts)
+    return Recipe(
+        "layout", 2, data=str(tmp_path / "rooms.npz"), warm=(str(tmp_path / "old.safetensors"),), model=all_words,
+        nodes=64, frozen=("latent",), optimizer=OptimizerConfig(rate=0.1, warmup=0, decay=0.0, average=0.0),
     )  # fmt: skip
-    start = started(LayoutStage, recipe, torch.device("cpu"), resume=False)
+
+
+def test_a_new_category_of_furniture_is_as_large_as_that_of_its_rooms(homes):
+    start = started(LayoutStage, homes, torch.device("cpu"), resume=False)
+    before = start.model.statistics
     LayoutStage.open(start)
-    assert start.model.statistics.classes[:46] == classes
-    toilet = start.model.config.categories.index("toilet")
-    sizes = [room.size[k] for room in rooms for k, name in enumerate(room.categories) if name == "toilet"]
-    assert np.exp(start.model.statistics.classes[toilet][:3]) == pytest.approx(np.median(sizes, 0), rel=0.03)
+    classes = start.model.statistics.classes
+    assert classes[:46] == before.classes[:46]
+    toilet, rooms = start.model.config.categories.index("toilet"), RoomSet(homes.data)
+    boxes = [rooms.room(k) for k in range(len(rooms)) if not rooms.held_out[k]]
+    sizes = [room.size[k] for room in boxes for k, name in enumerate(room.categories) if name == "toilet"]
+    assert np.exp(classes[toilet][:3]) == pytest.approx(np.median(sizes, 0), rel=0.03)
+
+
+def test_new_words_alone_are_learnt(homes, tmp_path):
+    open_run(replace(homes, new_words=True), tmp_path / "run").run()
+    old, new = (load_weights([tmp_path / path])[0] for path in ("old.safetensors", "run/weights.safetensors"))
+    begun = started(LayoutStage, homes, torch.device("cpu"), resume=False).model
+    for name, value in new.state_dict().items():
+        assert torch.equal(value[: len(old.state_dict()[name])], old.state_dict()[name]), name
+    toilet, harmless = (new.config.categories.index(name) for name in ("toilet", "garden_chair"))
+    first, after = begun.layout.category.weight.half(), new.layout.category.weight.half()
+    assert not torch.equal(after[toilet], first[toilet])
+    assert torch.equal(after[harmless], first[harmless])  # in none of the rooms
+
+
+def test_what_new_words_need_is_said(homes, tmp_path):
+    with pytest.raises(ValueError, match="recipe field 'new_words': 'warm' names no file whose words are known"):
+        open_run(replace(homes, new_words=True, warm=()), tmp_path / "run")
+    with pytest.raises(ValueError, match=r"'new_words': optimizer\.decay would change known words, allowed: 0"):
+        open_run(replace(homes, new_words=True, optimizer=OptimizerConfig()), tmp_path / "run")
+    model = started(LayoutStage, homes, torch.device("cpu"), resume=False).model
+    model.write(tmp_path / "all.safetensors", model.parts)
+    with pytest.raises(ValueError, match=r"'new_words': .*all\.safetensors knows all words"):
+        open_run(replace(homes, new_words=True, warm=(str(tmp_path / "all.safetensors"),)), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
 
 
 def from_small():
