@@ -6,6 +6,7 @@ import json
 import math
 import tomllib
 from dataclasses import dataclass, field
+from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
@@ -71,7 +72,8 @@ class Recipe:
         data: folder that `echousd data build` made, or a packed set of rooms; its held-out part is for validation.
         start: weights files to start from.
         warm: weights files, of an earlier version too, whose tensors are taken over as far as they reach: what has
-            grown keeps what it had in its first rows and columns and begins with zeros in the others.
+            grown keeps what it had in its first rows and columns and begins with zeros in the others; a name alone
+            that no file has, as layout.safetensors, is of those that ship.
         frozen: parts that the stage would train but that stay as they are.
         new_words: of the others too all stays but categories and room types that the file of `warm` does not know, so
             that rooms without them are drawn as before.
@@ -118,6 +120,14 @@ class Recipe:
     paper: dict = field(default_factory=dict)
     optimizer: OptimizerConfig = field(default_factory=OptimizerConfig)
 
+    @property
+    def warm_files(self) -> tuple[Path, ...]:
+        """Where the files of `warm` lie."""
+        ships = Path(str(resources.files("echomodel") / "weights"))
+        return tuple(
+            ships / one if Path(one).name == one and not Path(one).exists() else Path(one) for one in self.warm
+        )
+
     def __post_init__(self) -> None:
         for name, least, most in BOUNDS:
             found = getattr(self, name)
@@ -130,7 +140,7 @@ class Recipe:
 
 
 def read_recipe(path: Path, settings: list[str] | None = None) -> Recipe:
-    """Read a recipe file and apply `key=value` settings; paths in it are relative to its folder.
+    """Read a recipe file and apply `key=value` settings; paths in it are relative to the working folder.
 
     Raises ValueError where the file is not TOML, or a field is unknown or has a wrong type; the message names file and
     field.

@@ -54,7 +54,7 @@ class Start:
     @property
     def known_categories(self) -> int:
         """How many of the model's categories, the first, the file that the recipe begins with knows."""
-        path = next((Path(name) for name in self.recipe.warm), None)
+        path = next(iter(self.recipe.warm_files), None)
         return len(words_of(path, read_header(path))["categories"] if path else self.model.config.categories)
 
     def rooms(self, *, held: bool) -> PackedRooms:
@@ -134,8 +134,8 @@ def started(kind: type[CompactStage], recipe: Recipe, device: torch.device, *, r
             model.get_submodule(part).load_state_dict(loaded.get_submodule(part).state_dict())
         if "layout" in loaded.parts:
             model.statistics = loaded.statistics
-    for path in recipe.warm:
-        found += warm_start(model, Path(path))
+    for file in recipe.warm_files:
+        found += warm_start(model, file)
     missing = [part for part in kind.needs if part not in found]
     if missing:
         raise ValueError(f"recipe field 'start': stage {recipe.stage!r} needs weights with {' and '.join(missing)}")
@@ -165,10 +165,11 @@ def _in_words(recipe: Recipe) -> CompactConfig:
         return replace(config, **{kind: getattr(loaded, kind) for kind in WORDS})
     if not recipe.warm:
         return config
-    named = words_of(Path(recipe.warm[0]), read_header(Path(recipe.warm[0])))
+    file = recipe.warm_files[0]
+    named = words_of(file, read_header(file))
     new = {kind: tuple(name for name in getattr(config, kind) if name not in named[kind]) for kind in WORDS}
     if new["predicates"]:
-        raise ValueError(f"{recipe.warm[0]}: knows no relation {new['predicates'][0]!r}, which networks learn today")
+        raise ValueError(f"{file}: knows no relation {new['predicates'][0]!r}, which networks learn today")
     grown: dict[str, Any] = {kind: named[kind] + new[kind] for kind in WORDS}
     return replace(config, **grown)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -245,6 +246,16 @@ def test_recipes_name_what_is_wrong(tmp_path: Path) -> None:
         read_recipe(RECIPES / "layout.toml", ["stage=layouts"])
     with pytest.raises(ValueError, match="setting 'steps' has no '='"):
         read_recipe(RECIPES / "layout.toml", ["steps"])
+
+
+def test_a_recipe_begins_with_weights_that_ship_wherever_it_is_run(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    ships = Path(resources.files("echomodel") / "weights" / "layout.safetensors")
+    for name in ("tune", "layout_fine"):
+        assert read_recipe(RECIPES / f"{name}.toml").warm_files == (ships,)
+    (tmp_path / "layout.safetensors").write_bytes(b"")
+    assert read_recipe(RECIPES / "tune.toml").warm_files == (Path("layout.safetensors"),)
+    assert read_recipe(RECIPES / "tune.toml", ['warm=["a/layout.safetensors"]']).warm_files[0].parts[0] == "a"
 
 
 @pytest.mark.parametrize("path", sorted(RECIPES.glob("*.toml")), ids=lambda path: path.stem)
