@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -32,7 +33,7 @@ Results = tuple[dict[str, Result], dict[str, bytes]]
 def read_results(folder: Path, job: Job) -> Results:
     """What came back in a job's folder: object name -> result, and name of a picture (with its ending) -> image.
 
-    Objects without a result are left out.
+    Objects without a result are left out, and with a warning files that are named after no object.
     Raises ValueError that names the file or the object for results that cannot be used, and where there are none.
     """
     found = _one_picture(folder, job) if job.one_picture else _many_pictures(folder, job)
@@ -98,6 +99,10 @@ def _many_pictures(folder: Path, job: Job) -> Results:
             images[slot], encoded = image_of(content, f"{source} ({slot})", stem)
             pictures[images[slot]] = encoded
         objects[thing.name] = st, images
+    known = {f"{thing.name}{slot}" for thing in job.objects for slot in ("", "_metal_rough", "_normal")}
+    for path in sorted((folder / RESULTS).glob("*.*")):
+        if path.suffix.lower() in (*IMAGES, ".glb") and path.stem not in known:
+            warnings.warn(f"{path}: no object of the job is called {path.stem!r}; it is left out", stacklevel=4)
     return objects, pictures
 
 

@@ -8,6 +8,7 @@ import pytest
 import trimesh
 import yaml
 from painter import color_at, errors_in_texels, filled, in_room, paint, painted
+from PIL import Image
 from pxr import UsdShade, UsdValidation
 from small_room import small_room
 
@@ -24,6 +25,7 @@ from echousd.texturing import scenetex
 from echousd.texturing.atlas import Unwrapped, texel_faces
 from echousd.texturing.job import job_mesh
 from echousd.texturing.obj import glb_bytes
+from echousd.texturing.results import read_results
 
 SIDE = 768  # pixels of a picture for all
 
@@ -80,6 +82,16 @@ def test_every_point_gets_its_colour_back(room, generic, tool, tmp_path, small_p
     report = check(root)
     assert not report.errors
     assert not report.warnings
+
+
+def test_a_picture_of_no_object_is_named(generic, tmp_path):
+    job, made = generic
+    folder = shutil.copytree(made, tmp_path / "job")
+    for name in ("desk", "dekc", "desk_normal"):
+        Image.new("RGB", (4, 4)).save(folder / "results" / f"{name}.png")
+    with pytest.warns(UserWarning, match=r"dekc\.png: no object of the job is called 'dekc'; it is left out") as told:
+        assert read_results(folder, job)[0].keys() == {"desk"}
+    assert len(told) == 1
 
 
 def test_charts_are_unique_and_inside(generic):
