@@ -88,7 +88,8 @@ def read_room(root: str | Path) -> SavedRoom:
                 f"{root}: <{where}> holds what echousd did not write there ({reason}); generate the room again"
             ) from None
         if asset is None or found is None:
-            raise ValueError(f"{root}: object {node.name!r} has no mesh that echousd made; generate the room again")
+            remedy = f"take it out there and have `edit --add {node.name}:{node.category}` make it, or generate again"
+            raise ValueError(f"{root}: object {node.name!r} has no mesh that echousd made; {remedy}")
         if asset not in made:
             found = made[asset] = in_our_frame(found, metres, z_up=z_up)
             if shelf is not None and f"assets/{asset}" in shelf.keys:

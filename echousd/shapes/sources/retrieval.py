@@ -12,7 +12,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.assets.choose import Asked, AssetWishes, choose, fits
 from echousd.assets.model_file import ModelFile
 from echousd.assets.record import AssetRecord
-from echousd.assets.reference import is_file
+from echousd.assets.reference import MODELS, is_file
 from echousd.graph import Node, SceneGraph
 from echousd.shapes.finishes.slots import HARMONIES, linear
 from echousd.shapes.looks import palette_of_room
@@ -53,7 +53,8 @@ def _named(node: Node, wishes: AssetWishes) -> tuple[AssetRecord, ModelFile]:
     if is_file(node.asset):
         return own_record(node.asset, node.category), own_file(node.asset)
     if wishes.library is None:
-        raise ValueError(f"asset {node.asset!r} is in a library, but none is given; name one (--assets LIB)")
+        models = f"a file that ends in {', '.join(MODELS)}"
+        raise ValueError(f"asset {node.asset!r} is of a library, but none is given (--assets LIB), allowed: {models}")
     record = wishes.library.records.get(node.asset)
     if record is None or record.fault:
         why = "is not in it" if record is None else record.fault

@@ -185,6 +185,7 @@ def test_an_edit_follows_through(made, echousd_command):
     assert "no relation 'living door bedroom' in this home, allowed: 'living open_to bedroom'" in done.err
     done = echousd_command("edit", folder, "--add", "fern:plant")
     assert "home.usda: a home, which composes rooms; name one of them: rooms/bedroom/bedroom.usda" in done.err
+    assert "allowed for it are --relate and --unrelate alone, and no --undo of these" in done.err
 
 
 def test_edits_inside_a_room_are_not_lost_unsaid(made, tmp_path, echousd_command):

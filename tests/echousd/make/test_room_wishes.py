@@ -162,6 +162,17 @@ def test_a_stronger_layers_transform_is_the_artists_wish(root, echousd_command):
     assert "layers over bedroom.usda in this folder: none; name the one that changes it" in done.err
 
 
+def test_an_object_that_was_written_by_hand_is_named_with_the_remedy(root):
+    layer = Sdf.Layer.FindOrOpen(str(root.parent / "layers" / "graph.usda"))
+    stage = Usd.Stage.Open(layer)
+    prim = stage.DefinePrim("/Room/Objects/rocker", "Xform")
+    prim.AddAppliedSchema("EchoNodeAPI")
+    prim.CreateAttribute("echo:category", Sdf.ValueTypeNames.Token).Set("armchair")
+    layer.Save()
+    with pytest.raises(ValueError, match=r"'rocker' has no mesh that echousd made; .* `edit --add rocker:armchair`"):
+        read_room(root)
+
+
 def test_edits_are_taken_back_byte_for_byte(root, echousd_command):
     states = [files(root.parent)]
     assert echousd_command("edit", root, "--undo").err == f"error: {root}: no edit to take back\n"

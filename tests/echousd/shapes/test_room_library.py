@@ -108,6 +108,8 @@ def test_faults_name_the_object_and_the_file(library, tmp_path):
 
     with pytest.raises(ValueError, match=r"object 'lamp': .*nowhere.glb: no such file"):
         made(small_graph().update_node("lamp", asset="nowhere.glb"), shapes="boxes")
+    with pytest.raises(ValueError, match=r"asset 'ball.stl' is of a library, .* allowed: a file that ends in .*\.glb"):
+        made(small_graph().update_node("lamp", asset="ball.stl"), shapes="boxes")
     with pytest.raises(ValueError, match=r"object 'lamp': .*lib.parquet: asset 'moon' is not in it"):
         made(small_graph().update_node("lamp", asset="moon"), shapes="boxes", assets=library)
     with pytest.raises(ValueError, match="object 'lamp': shapes is 'own' without an asset"):
