@@ -59,12 +59,12 @@ def looks_at(room: Plan, find: Callable[[Plan], Found]) -> tuple[Array, Found]:
 
 def _repeated(name: str) -> cached_property[Array]:
     """A column of the room, the same in every copy."""
-    return cached_property(lambda copies: copies._again(getattr(copies.template, name)))
+    return cached_property(lambda copies: copies._prefix(name, lambda room: copies._again(getattr(room, name))))
 
 
 def _numbered(name: str) -> cached_property[Array]:
     """Numbers of boxes of the room, in every copy its own."""
-    return cached_property(lambda copies: copies._tiled(getattr(copies.template, name)))
+    return cached_property(lambda copies: copies._prefix(name, lambda room: copies._tiled(getattr(room, name))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class Copies(Plan):
     template: Plan = field(kw_only=True)
     apart_in: Array = field(kw_only=True)
 
-    @property
+    @cached_property
     def count(self) -> int:
         """How many copies there are."""
         return len(self.openings)
@@ -106,14 +106,23 @@ class Copies(Plan):
         """(K * P,) numbers of boxes of the room (P,), negative ones as they are, in every copy."""
         return self.kit.where(number[None] < 0, number[None], number[None] + self._shift).reshape(-1)
 
+    def _prefix(self, asked: object, spread: Callable[[Plan], Array]) -> Array:
+        """What is said of the words of the room in all copies: the first of as many as there ever were."""
+        kept = vars(self.template).setdefault("spread", {})
+        if len(kept.get(asked, ())) < len(self):
+            kept[asked] = spread(self.template)
+        return kept[asked][: len(self)]
+
     def _mask(self, values: Any) -> Array:
         raise NotImplementedError("masks of copies are those of their room")
 
     def of(self, *roles: str) -> Array:
-        return self._kept(("of", *roles), lambda: self._again(self.template.of(*roles)))
+        asked = ("of", *roles)
+        return self._kept(asked, lambda: self._prefix(asked, lambda room: self._again(room.of(*roles))))
 
     def stands(self, *slot_roles: str) -> Array:
-        return self._kept(("stands", *slot_roles), lambda: self._again(self.template.stands(*slot_roles)))
+        asked = ("stands", *slot_roles)
+        return self._kept(asked, lambda: self._prefix(asked, lambda room: self._again(room.stands(*slot_roles))))
 
     def which(self, asked: Callable[[Category], object]) -> Array:
         return self._again(self.template.which(asked))
@@ -192,6 +201,8 @@ class Copies(Plan):
     def worst(self, who: Array, margin: Array, other: Array) -> tuple[Array, Array]:
         least, about = super().worst(who, margin, other)
         alike = ~(self.moved[who] | self.moved[other])
+        if not bool(alike.any()):
+            return least, about
         rest, of = worst(who[alike], margin[alike], other[alike], len(self.template), FAR)
         rest = self._again(rest)
         return self.kit.minimum(least, rest), self.kit.where(rest < least, self._tiled(of), about)
@@ -225,8 +236,9 @@ class Copies(Plan):
 
     def _at(self, i: Array, j: Array) -> Array:
         n, (_, _, first, step) = len(self.template), self._listed
-        pair = i % n * n + j % n
-        return first[pair] + i // n * step[pair]
+        copy = i // n  # both are of one
+        pair = i * n + j - copy * (n * n + n)
+        return first[pair] + copy * step[pair]
 
     def local(self, i: Array, j: Array) -> tuple[Array, Array]:
         at = self._at(i, j)

@@ -46,9 +46,8 @@ def found(
     words: Array | None = None,
 ) -> Found:  # fmt: skip
     """A `Found` with what is left out filled in: nothing, the margin, the first sentence."""
-    xp = kit(who)
-    other = xp.full_like(who, -1) if other is None else other
-    words = xp.zeros_like(who) if words is None else words
+    other = full(who, len(who), -1) if other is None else other
+    words = full(who, len(who), 0) if words is None else words
     return Found(who, other, margin, margin if measure is None else measure, words)
 
 
@@ -337,7 +336,12 @@ class Plan:
 
     def axes(self, who: Array) -> tuple[Array, Array]:
         """(P, 2) each, x and z: unit vectors to the +x side and to the front of boxes (P,)."""
-        cos, sin = self.turn[0][who], self.turn[1][who]
+        side, front = self._axes
+        return side[who], front[who]
+
+    @cached_property
+    def _axes(self) -> tuple[Array, Array]:
+        cos, sin = self.turn
         return self.kit.stack([cos, -sin], -1), self.kit.stack([sin, cos], -1)
 
     def seen(self, who: Array, points: Array) -> tuple[Array, Array]:
