@@ -19,6 +19,7 @@ FLAT = 0.012  # metres: what is as near to the top or the bottom belongs to it
 APART = 0.015  # metres, a quarter of its extent at most, between corners of a base: engines take four of all of them
 THIN = 1e-4  # metres, least extent of the box of points in one plane
 FINE = 1e-6  # metres: a corner that is nearer than that to a line or plane between others is none
+EXACT = 9  # digits of metres: among corners that rounding alone keeps apart, a hull comes out with a dent
 PLANE = 1e-9  # share of the cube of their extent that the hull of points in one plane may have by rounding
 
 
@@ -31,7 +32,7 @@ def hull_of(points: np.ndarray) -> Mesh | None:
 
 
 def _hull(points: np.ndarray) -> Manifold | None:
-    hull = Manifold.hull_points(points)
+    hull = Manifold.hull_points(points.round(EXACT))
     return None if hull.volume() <= PLANE * np.ptp(points, axis=0).max() ** 3 else hull
 
 
