@@ -18,6 +18,7 @@ ASIDE = 0.15  # metres that a cushion moves at most so that it stands in nothing
 PILLOW = 3.2  # exponent of the outline of a cushion
 STEP = 0.02  # metres from place to place
 WIDE_BED = 1.3  # metres
+MORE = (1.9, 2.4)  # metres of a sofa with a third cushion in its middle, and with two
 LEVEL = 0.003  # metres: what is as high as that is one height
 DRAPED = {"sofa": 0.9, "seat": 0.4}  # shares of sofas and armchairs with a blanket over an arm
 # Metres between folds of a bed, and over its middle from where on it is a board; places behind pillows for cushions.
@@ -30,7 +31,7 @@ HELD, TRIES = 0.5, 6  # share of what lies flat that is on what it lies on; plac
 
 
 def cushions(setting: Setting) -> None:
-    """Cushions in the corners of sofas, a pair or two that differ, and an odd one beside them; one on an armchair."""
+    """Cushions in the corners of sofas, a pair or two that differ, on wide ones others between; one on an armchair."""
     for host in setting.inviting("cushions"):
         rng, seat = setting.rng(host.name, "cushion"), _Seat.of(host)
         if seat is None:
@@ -38,8 +39,9 @@ def cushions(setting: Setting) -> None:
         wide, pair, odd = float(host.size[0]), *_designs(setting, rng)
         narrow = min(pair, odd, key=lambda design: float(design[1][0]))
         ends = [(-1.0, pair), (1.0, pair if rng.random() < 0.6 else odd)]
-        if wide > 1.7 and (setting.full or rng.random() < 0.6):
-            ends.append((float(rng.choice((-0.62, 0.62))), odd))
+        more = setting.full or rng.random() < 0.75
+        apart = 0.28 / (wide / 2 - 0.25) if wide > MORE[1] else 0.0
+        ends += [(end, odd) for end in dict.fromkeys((-apart, apart)) if more and wide > MORE[0]]
         for end, (kind, size, variant) in ends if wide > 1.3 else [(float(rng.choice([-0.6, 0.6])), narrow)]:
             spot = seat.resting(end, size)
             turn = -0.12 * end * float(rng.uniform(0.3, 1.6))

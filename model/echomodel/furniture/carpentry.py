@@ -70,7 +70,8 @@ def cushion(
     """An upholstered body between two corners: its edges rounded as far as the style is soft, bulging at most."""
     a, b = np.asarray(low, float), np.asarray(high, float)
     half = np.maximum((b - a) / 2, 1e-3)
-    radius, crown = (float(half.min() * (low + more * style.softness)) for low, more in ((0.25, 0.55), (0.05, 0.2)))
+    fuller = ((0.42, 0.4), (0.05, 0.2) if role == "seat" else (0.14, 0.18))  # what stands on a seat wants it level
+    radius, crown = (float(half.min() * (low + more * style.softness)) for low, more in fuller)
     return Pad((a + b) / 2, turn, material, role, half=half, radius=radius, crown=crown)
 
 

@@ -23,10 +23,12 @@ def seat_of(style: Style, w: float, d: float, y: float, thick: float, z: float =
 
 
 def leaning(
-    low: tuple, high: tuple, rake: float, pivot_y: float, pivot_z: float, *, bow: float = 0.0, **look: Any
-) -> Block:
-    """A block that leans back by `rake` about the horizontal line through (pivot_y, pivot_z), bent by `bow` metres."""
-    block = box(low, high, role="back", **look)
+    low: tuple, high: tuple, rake: float, pivot_y: float, pivot_z: float, *, bow: float = 0.0,
+    padded: Style | None = None, **look: Any,
+) -> Block:  # fmt: skip
+    """A block that leans back by `rake` about the horizontal line through (pivot_y, pivot_z), bent by `bow` metres, or
+    `padded` as a style has it."""
+    block = cushion(low, high, padded, role="back") if padded else box(low, high, role="back", **look)
     if bow:
         block = Bow(block.centre, IDENTITY, block.material, "back", half=block.half, radius=block.radius, bow=bow)
     turn = rotation(x=-rake)

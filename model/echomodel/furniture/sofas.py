@@ -20,6 +20,7 @@ from echomodel.furniture.tufting import Tufted
 
 BODIES: list[dict[str, Any]] = list(tables("bodies.toml", __file__).values())
 padded = partial(turned, material="fabric")
+TOUCH = 0.006  # metres that cushions side by side press into one another
 FLARED = 0.4  # softness up to which arms have no pad and flare
 
 
@@ -41,7 +42,7 @@ def _framed(size: Size, style: Style, seat: float, rake: float) -> list[Solid]:
     parts.append(cushion(low, high, style, turn=rotation(x=-tilt)))
     z = -d * 0.36
     low, high = (-inner, seat - 0.08, z - 0.05), (inner, seat + (h - seat) / np.cos(rake), z + 0.05)
-    parts.append(leaning(low, high, rake, seat, z, material="fabric", radius=0.045))
+    parts.append(leaning(low, high, rake, seat, z, padded=style))
     x, y, t = w * 0.48, seat - deep, 0.04 * style.bulk
     parts += both(box((x - t, y - t, -d * 0.44), (x, y, d * 0.44), role="rail"))
     parts += [box((-x, y - t, z - t / 2), (x, y, z + t / 2), role="rail") for z in (-d * 0.3, d * 0.36)]
@@ -59,13 +60,15 @@ def upholstered_arms(w: float, foot: float, y: float, d: float, arm: float, styl
     if style.arms != "rolled":
         thick = 0.06 + 0.07 * style.softness
         pad = cushion((x0 - 0.01, y - thick, -d / 2 + 0.02), (x1, y, d / 2 - 0.005), firm)
-        side = box((x0, foot, -d / 2 + 0.03), (x1 - 0.016, y - 0.6 * thick, d / 2 - 0.03), "fabric", 0.03)
+        side = cushion(
+            (x0, foot, -d / 2 + 0.03), (x1 - 0.016, y - 0.6 * thick, d / 2 - 0.03), replace(style, softness=0.05)
+        )
         return of_role("arm", both(side, pad, *(_piping(pad) if style.piping > 0.55 else ())))
     r = arm * 0.6
     x = (x0 + x1) / 2 - (r - arm / 2) * 0.5
-    side = box((x0 + arm * 0.14, foot, -d / 2 + 0.03), (x1 - arm * 0.14, y - r, d / 2 - 0.02), "fabric", 0.03)
+    below = box((x0 + arm * 0.14, foot, -d / 2 + 0.03), (x1 - arm * 0.14, y - r, d / 2 - 0.02), "fabric", 0.03)
     roll = padded((x, y - r, -d / 2 + 0.03), r, d - 0.05, rounding=0.02, turn=rotation(x=np.pi / 2))
-    return of_role("arm", both(side, roll))
+    return of_role("arm", both(below, roll))
 
 
 def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -97,9 +100,8 @@ def _cushions(
     x0: float, x1: float, y0: float, y1: float, z0: float, z1: float, count: int, style: Style, **form: Any
 ) -> list[Solid]:
     """A row of cushions from x0 to x1."""
-    gap = 0.004
     edges = pairwise(np.linspace(x0, x1, count + 1))
-    pads = [cushion((a + gap, y0, z0), (b - gap, y1, z1), style, **form) for a, b in edges]
+    pads = [cushion((a - TOUCH, y0, z0), (b + TOUCH, y1, z1), style, **form) for a, b in edges]
     return [*pads, *(cord for pad in pads if pad.role == "seat" for cord in _piping(pad) if style.piping > 0.55)]
 
 
@@ -143,8 +145,7 @@ def _couch(
     parts.append(box(low, high, "fabric", 0.015 if body.get("skirt") else 0.045, "base"))
     tall = h - (0.06 if seats > 1 and style.contrast < 0.6 else 0.0)
     low, high = (-w / 2 + arm * 0.4, foot + 0.02, z0), (w / 2 - arm * 0.4, tall, z0 + frame)
-    soft = 0.02 + 0.05 * style.softness
-    parts.append(leaning(low, high, 0.5 * style.rake, seat, z0 + frame / 2, material="fabric", radius=soft))
+    parts.append(leaning(low, high, 0.5 * style.rake, seat, z0 + frame / 2, padded=style))
     if arm:
         parts += upholstered_arms(w, foot, y_arm, d, arm, style)
     inner = w / 2 - arm
@@ -241,7 +242,7 @@ def chaise_longue_sofa(size: Size, style: Style, choices: Choices) -> list[Solid
     parts.append(box(low, high, "fabric", 0.02, "base"))
     parts.append(cushion((-w / 2, seat - pad, -d / 2 + 0.1), (w / 2, seat, d / 2), style))
     low, high, pivot = (-w / 2, seat - pad, -d / 2), (w / 2, h, -d / 2 + 0.15), (seat - pad, -d / 2 + 0.08)
-    parts.append(leaning(low, high, 0.15 + style.rake, *pivot, material="fabric", radius=0.05))
+    parts.append(leaning(low, high, 0.15 + style.rake, *pivot, padded=style))
     if choices.chance("extra", 0.6):
         s = -1 if choices.chance("side", 0.5) else 1
         x0, x1 = sorted((s * w / 2, s * (w / 2 - 0.13)))

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 IDENTITY = np.eye(3)
+DENTED = 0.7  # of how far a cushion's middle stands out, by how much it is bent
 FINEST = 3  # levels of detail that a solid can be meshed in: 0 to 3
 
 
@@ -120,15 +121,23 @@ class Block(Solid):
 
 @dataclass(frozen=True, eq=False)
 class Pad(Block):
-    """A filled cushion: every side stands out in its middle by `crown` metres over its edges."""
+    """A filled cushion: every side stands out in its middle by `crown` metres over its edges; where one that is no seat
+    stands decides how it is dented, so that no two in a row are alike."""
 
     crown: float = 0.02
 
     def puffed(self, points: Array) -> Array:
         """Points (n, 3) of the block, as far drawn in as its filling lets them be."""
-        share = np.clip(1 - (points / self.half) ** 2, 0, 1)
+        place = points / self.half
+        share = np.clip(1 - place**2, 0, 1)
         flat = share[:, [1, 2, 0]] * share[:, [2, 0, 1]]  # 1 in the middle of the sides of each axis
-        return np.asarray(points * (1 - np.minimum(self.crown / self.half, 0.2) * (1 - flat)))
+        out = points * (1 - np.minimum(self.crown / self.half, 0.2) * (1 - flat))
+        thin, phase = int(np.argmin(self.half)), 9.0 * float(self.centre @ (1.0, 0.7, 1.3))
+        u, v = place[:, (thin + 1) % 3], place[:, (thin + 2) % 3]
+        out[:, thin] += (
+            DENTED * (self.role != "seat") * self.crown * np.sin(2.6 * u + phase) * np.cos(2.2 * v + 1.7 * phase)
+        )
+        return np.asarray(out)
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         steps, flat = ((0, 1), (1, 1), (1, 3), (2, 3))[detail]
