@@ -14,6 +14,8 @@ from echomodel.furniture.solids import Solid, ball, rotation, tube, turned
 
 LIES = (11, 16)  # cells in which a throw knows what it lies on
 FOLD = 0.125  # metres of curtain from one fold to the next
+FULL = (0.4, 1.0)  # of the fullest fold at a foot, the others
+BREAK = (0.05, 0.3)  # share of its height over its foot where a curtain breaks, and of a fold that is less deep there
 # where in a fold its cloth has points, radians from where it is foremost: it bends alike at each
 BENDS = np.array([0.5, np.pi / 2, np.pi - 0.5, np.pi, np.pi + 0.5, 1.5 * np.pi, 2 * np.pi - 0.5, 2 * np.pi])
 DRAPES = ("curtain", "curtain", "linen", "drape", "drape", "velvet", "drape_striped")  # what curtains are of
@@ -87,15 +89,18 @@ def _hung(
     phase, wander = rng.uniform(0, 2 * np.pi, 4), drift * rng.uniform(-1, 1, 3)
     turn = (np.arange(count)[:, None] * 2 * np.pi + BENDS).ravel()
     along = turn / (2 * np.pi * count) - 0.5
-    uneven = 0.8 + 0.2 * np.sin(0.43 * turn + phase[1])
+    full = rng.uniform(*FULL, count)  # how wide each fold comes to be below
+    ends = np.concatenate([[0.0], full.cumsum() / full.sum()]) - 0.5
+    below, uneven = np.interp(turn / (2 * np.pi), np.arange(count + 1), ends), full.repeat(len(BENDS)) / FULL[1]
     rows = []
-    for share in np.linspace(0, 1, 7 if count < 5 or tied else 5 if h > 1 else 3):
+    for share in np.concatenate([[0, BREAK[0]], np.linspace(0, 1, 6 if count < 5 or tied else 4 if h > 1 else 2)[1:]]):
         slack = 1 - share
         waist = tied * np.exp(-(((share - 0.38) / 0.16) ** 2))
         wide = (1 - narrow * share) * (1 - waist) * w
         aside = slack * (np.sin(6 * along + phase[2]) + wander[1] * slack * np.sin(11 * along + phase[3]))
-        x = wide * (along + 0.3 * wander[0] / count * aside)
-        z = (d - 0.012) / 2 * (1 - (1 - top) * share) * (1 - 0.3 * waist) * uneven * np.cos(turn)
+        x = wide * (along + slack * (below - along) + 0.6 * wander[0] / count * aside)
+        deep = (1 - (1 - top) * share) * (1 - 0.3 * waist) * (1 - (BREAK[1] if share == BREAK[0] else 0.0))
+        z = (d - 0.012) / 2 * deep * (1 + slack * (uneven - 1)) * np.cos(turn)
         rows.append(np.stack([x, np.full_like(x, share * (h - head)), z], 1))
     front, thick = np.stack(rows), np.array([0, 0, 0.004])
     return [Sheet(front=front + thick, back=front - thick, material=cloth)]
