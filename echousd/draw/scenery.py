@@ -30,7 +30,9 @@ SEEN_THROUGH, GLAZED = 0.5, 0.03
 NEXT, NEAR, FAR = 2.5, 1.2, 0.6  # metres from a passage to the wall beyond, and what light there is on the way to it
 SKY_LIGHT = np.array([0.90, 0.93, 0.97], np.float32)
 BACKGROUND = np.array([0.90, 0.905, 0.915], np.float32) ** 2.2
-HUNG = ("picture", "mirror", "curtain", "blind", "wall_shelf", "wall_clock", "coats", "radiator")  # goes with its wall
+HUNG = (  # goes with its wall
+    "picture", "mirror", "curtain", "blind", "wall_shelf", "wall_clock", "wall_decor", "coats", "radiator",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

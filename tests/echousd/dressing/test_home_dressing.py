@@ -1,15 +1,17 @@
 """What hangs, stands and lies in the rooms of a home: dishes on worktops, coats on racks, towels, toys, blinds."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from echomodel.dressing import KINDS, PRINTS
+from echomodel.dressing import thing as solids_of
 from echomodel.furniture import draw_choices, draw_style, solids
 from echomodel.openings import Opening
 from echousd.dressing import floors, tabletops, upholstery, walls
-from echousd.dressing.dress import RULES, bare_walls
+from echousd.dressing.dress import DECOR, RULES, bare_walls
 from echousd.dressing.setting import Setting, standing
 from echousd.dressing.stories import story
 from echousd.shapes.geometry import Origin
@@ -128,6 +130,7 @@ def test_windows_have_what_suits_the_room(use, kinds):
 
 @pytest.mark.parametrize("use", ["", "wet", "outdoor"])
 def test_pictures_and_shoes_stay_out_of_baths_and_off_balconies(use, monkeypatch):
+    monkeypatch.setattr("echousd.dressing.dress.OTHER", 0.0)
     monkeypatch.setattr(floors, "SHOES", 1.0)
     room = setting(use=use, openings=[Opening("door", "door", 1, 0.2, 0.9, 2.0)])
     floors.by_doors(room)
@@ -194,7 +197,8 @@ def test_curtains_end_at_the_sill_only_over_what_stands_under_the_window(word):
 
 
 @pytest.mark.parametrize("resident", ["", "child"])
-def test_pictures_of_one_wall_are_of_one_kind_and_a_childs_are_a_childs(resident):
+def test_pictures_of_one_wall_are_of_one_kind_and_a_childs_are_a_childs(resident, monkeypatch):
+    monkeypatch.setattr("echousd.dressing.dress.OTHER", 0.0)
     walls_seen = set()
     for seed in range(12):
         room = setting(seed=seed)
@@ -207,6 +211,42 @@ def test_pictures_of_one_wall_are_of_one_kind_and_a_childs_are_a_childs(resident
         walls_seen |= {PRINTS[name]["kind"] for name in names}
     assert (walls_seen == {"childs"}) == (resident == "child")
     assert resident or len(walls_seen) > 4
+
+
+def test_bare_walls_have_other_things_than_pictures_each_once():
+    met = set()
+    for seed in range(30):
+        room = setting(seed=seed)
+        bare_walls(room)
+        others = [thing for thing in room.placed if thing.kind in DECOR]
+        assert len({thing.kind for thing in others}) == len(others) < len(room.placed)
+        assert all(1.4 < thing.position[1] + thing.size[1] / 2 < 1.65 for thing in others)
+        met |= {thing.kind for thing in others}
+    assert met == set(DECOR)
+
+
+def test_a_hall_has_two_groups_on_a_wall_and_both_sides_of_a_door_something(monkeypatch):
+    monkeypatch.setattr("echousd.dressing.dress.OTHER", 0.0)
+    room = setting(openings=[Opening("door", "door", 2, 3.4, 0.9, 2.1)])
+    room = replace(room, floor=2.0 * FLOOR)
+    bare_walls(room)
+    beside = [thing for thing in room.placed if thing.position[2] > 2.9]  # the wall with the door
+    along = np.array([thing.position[0] for thing in beside])
+    assert (along < -0.6).any()
+    assert (along > 0.6).any()
+    whole = np.array([thing.position[0] for thing in room.placed if thing.position[2] < -2.9])
+    assert len(whole) == 6
+    assert np.diff(np.sort(whole))[2] > 1.3
+
+
+def test_curtains_fall_in_folds_that_are_even_at_the_head_and_uneven_at_the_foot():
+    size = np.array([0.5, 2.3, 0.085])
+    for kind in walls.CURTAINS:
+        cloth = max(solids_of(kind, size, np.random.default_rng(1)), key=lambda solid: len(solid.mesh()[0]))
+        head, foot = (np.ptp(np.diff(cloth.front[row, 7::8, 0])) for row in (-1, 0))
+        assert foot > 0.02 > head, kind
+        low, next_up = (np.ptp(cloth.front[row, :, 2]) for row in (0, 1))
+        assert next_up < 0.85 * low, kind  # it breaks over the floor
 
 
 def test_long_rugs_are_runners_and_rugs_of_one_room_differ():

@@ -350,7 +350,8 @@ def large_room(**options):
     return replace(made, options=RoomOptions(walls=True, dress="some", **options))
 
 
-def test_long_bare_walls_get_pictures_and_large_floors_plants():
+def test_long_bare_walls_get_pictures_and_large_floors_plants(monkeypatch):
+    monkeypatch.setattr("echousd.dressing.dress.OTHER", 0.0)
     room = large_room()
     setting = setting_of(room)
     things = dressed(room).placed
@@ -359,8 +360,8 @@ def test_long_bare_walls_get_pictures_and_large_floors_plants():
     assert len(yaws) == 4  # all walls
     for yaw in yaws:
         row = [thing for thing in alone if round(thing.yaw, 3) == yaw]
-        assert len(row) in (1, 3)
-        assert len({thing.size.tobytes() for thing in row}) == 1
+        assert 1 <= len(row) <= 6
+        assert len({thing.size.tobytes() for thing in row}) <= 2
         assert all(1.4 < thing.position[1] + thing.size[1] / 2 < 1.65 for thing in row)
     green = [thing for thing in things if thing.kind in ("floor_plant", "floor_vase")]
     assert 1 <= len(green) <= 3
