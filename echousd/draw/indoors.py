@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from echousd.draw.scenery import Scenery
 
 SKY = 4.0  # radiance of the sky in a window for a dome of intensity 1, whose light else comes from above as well
-SUN = 7.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
+SUN = 5.5  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
 CEILING = np.array([0.87, 0.86, 0.84], np.float32)
 VIEW = 0.5  # of the sky's radiance, what is seen of it through a window: eyes adapt
 BLURRED, HAZE = 0.3, 0.25  # degrees that it is out of focus, and the share of its colour that haze takes
@@ -28,10 +28,10 @@ DIM = 0.02  # radiance at every place of a room without lamps and windows, so th
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
 ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.6, 0.85), (0.38, 0.61), 70, 15.0
-EVEN = 0.18  # power of the light's brightness that eyes and those who photograph rooms take from it
+EVEN = 0.3  # power of the light's brightness that eyes and those who photograph rooms take from it
 WHITE, PAPER = 88, 0.95  # what so many of a hundred points are darker than comes to no more than that
-CONTRAST, KNEE = 1.4, 0.6  # power about what is bright, and from where on highlights are rolled off
-HUE = 0.6  # share of colours that keep their hue where they are bright; film bleaches them
+CONTRAST, KNEE = 1.55, 0.6  # power about what is bright, and from where on highlights are rolled off
+HUE = 0.8  # share of colours that keep their hue where they are bright; film bleaches them
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 DAY = 0.5  # radiance of the sky by day
 # The brightest shade over what white paper is on the average in the room, by night and by day, as eyes see it; the

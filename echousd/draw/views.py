@@ -43,6 +43,7 @@ UNSEEN, MANY = 6.0, 8.0  # metres of depth that each of so many pieces in the pi
 # And a picture full of furniture; a metre towards where it looks, up to so many; of what each loses a picture full: of
 # backs, seen where the cosine is larger, and of ceiling. By choices of 40 pictures among eight each.
 SHOWN, FACED, AHEAD, BACKS, AVERTED, OVERHEAD = 30.0, 20.0, 1.0, 320.0, 0.25, 100.0
+UNDER, FLOORED = 200.0, 0.32  # and a picture full of bare floor, and the share of it from which on that costs
 STEPS = (0.2, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
 # Or so far behind a wall, which its near plane cuts away, and so much of the room with what hangs and stands there.
 BEYOND, THROUGH = (0.6, 1.2, 2.0), (0.3, 0.5, 0.7, 0.9)
@@ -143,6 +144,7 @@ def inside_view(
         return (
             FACED * min(float((eye[[0, 2]] - middle) @ furniture.facing), AHEAD) + UNSEEN * min(seen, MANY)
             + float((SHOWN * shown - BACKS * (shown & (along > AVERTED)) - OVERHEAD * (above & np.isinf(away))).mean())
+            - UNDER * max(0.0, float((~above & np.isinf(away)).mean()) - FLOORED)
             - FILLED * filled(away, reach[which]) - BARE * max(0.0, bare - BAREST) - shot.cost
         )  # fmt: skip
 

@@ -199,6 +199,19 @@ def test_the_camera_shows_no_bare_wall_where_it_need_not():
     assert bare_walls([bed, walls], view, APERTURE / 2 / lens, near) < 1 / 3
 
 
+def test_the_camera_shows_less_bare_floor_where_it_is_asked_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    room, sofa = FLOOR * 1.8, (2.4, 0.85, 0.95, 4.5, 0.0, 6.5, np.pi)
+    things = boxes(sofa, (0.9, 0.9, 0.9, 2.6, 0.0, 4.6, 1.2), (1.2, 0.4, 0.7, 4.5, 0.0, 5.0, 0.0))
+    shares = []
+    for price in (0.0, 200.0):
+        monkeypatch.setattr("echousd.draw.views.UNDER", price)
+        view, lens, near = inside_view(room, things, 2.8)
+        half = APERTURE / 2 / lens
+        away = things.with_others(_walls(room, 2.8)).met(view, half, near)[1]
+        shares.append(float((np.isinf(away) & (RAYS[:, 1] * half < view[1, 2])).mean()))
+    assert shares[1] < shares[0] - 0.02
+
+
 def test_the_main_piece_is_in_the_middle_third_of_the_picture() -> None:
     floor = np.array([(0.0, 0.0), (0.0, 4.0), (9.0, 4.0), (9.0, 0.0)])
     sofa = boxes((2.2, 0.8, 0.9, 1.6, 0.0, 0.6, 0.0))  # and many things at the other end
