@@ -236,9 +236,8 @@ class Copies(Plan):
 
     def _at(self, i: Array, j: Array) -> Array:
         n, (_, _, first, step) = len(self.template), self._listed
-        copy = i // n  # both are of one
-        pair = i * n + j - copy * (n * n + n)
-        return first[pair] + copy * step[pair]
+        pair = i % n * n + j % n  # numbers below 0, of nobody, are told of whoever comes last
+        return first[pair] + i // n * step[pair]
 
     def local(self, i: Array, j: Array) -> tuple[Array, Array]:
         at = self._at(i, j)

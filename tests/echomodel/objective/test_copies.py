@@ -9,8 +9,9 @@ import pytest
 import torch
 from plans import tensors_of
 
+from echomodel.boxes import Boxes
 from echomodel.graph import Stated
-from echomodel.objective import TERMS, copies, plan_of
+from echomodel.objective import TERMS, access, copies, plan_of
 from echomodel.objective.copies import copies_of
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
@@ -70,6 +71,17 @@ def test_what_a_term_does_not_look_at_changes_nothing_that_it_finds(copied, term
     for one in found:
         assert torch.equal(one.who, found[0].who)
         assert torch.allclose(one.margin, found[0].margin)
+
+
+def test_who_attends_nobody_is_judged_in_any_number_of_copies():
+    size, at = np.full((3, 3), 0.8), np.array([(0.0, 0.0, 0.0), (1.5, 0.0, 0.0), (0.0, 0.0, 1.5)])
+    boxes = Boxes(size, at, np.zeros(3))
+    room = plan_of(boxes, ["armchair", "bookshelf", "plant"], np.array([(-2, -2), (4, -2), (4, 3), (-2, 3)], float))
+    assert room.anchor.tolist() == [-1, -1, -1]
+    many = copies_of(room, at[None].repeat(60, 0), np.zeros((60, 3)), np.array([True, False, False]))
+    none = np.full(60, -1)
+    assert np.array_equal(many.gap(np.arange(60) * 3, none), np.full(60, float(room.gap(np.array([0]), none[:1])[0])))
+    assert access.looks_in(many).margin.tolist() == access.looks_in(room).margin.tolist() * 60
 
 
 def test_terms_look_at_what_they_are_about(copied):
