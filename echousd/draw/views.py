@@ -44,6 +44,7 @@ UNSEEN, MANY = 6.0, 8.0  # metres of depth that each of so many pieces in the pi
 # backs, seen where the cosine is larger, and of ceiling. By choices of 40 pictures among eight each.
 SHOWN, FACED, AHEAD, BACKS, AVERTED, OVERHEAD = 30.0, 20.0, 1.0, 320.0, 0.25, 100.0
 UNDER, FLOORED = 200.0, 0.32  # and a picture full of bare floor, and the share of it from which on that costs
+MOST = SHOWN + FACED * AHEAD + UNSEEN * MANY + 1e-6  # that a view is worth which costs nothing
 STEPS = (0.2, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
 # Or so far behind a wall, which its near plane cuts away, and so much of the room with what hangs and stands there.
 BEYOND, THROUGH = (0.6, 1.2, 2.0), (0.3, 0.5, 0.7, 0.9)
@@ -183,9 +184,16 @@ def inside_view(
     every = sorted(every, key=lambda one: one[0][0].cost)[:LOOKED]
     before_walls = [at for _, at in every if at.way is None]
     eyes = [views for views, _ in every] + [shots(at, EYES[1] * height) for at in before_walls[:RAISED]]
-    best = sorted(eyes, key=lambda shots: -merit(shots[0]))[:CHOSEN]  # of each eye by the view that costs least
-    shot = max((shot for shots in best for shot in shots), key=merit)
-    return shot.view, shot.lens, shot.near
+    worth: dict[int, float] = {}  # of each eye by the view that costs least
+    for n in sorted(range(len(eyes)), key=lambda n: eyes[n][0].cost):
+        if len(worth) >= CHOSEN and MOST - eyes[n][0].cost < sorted(worth.values())[-CHOSEN]:
+            break  # neither this one nor any dearer one can be among the best
+        worth[n] = merit(eyes[n][0])
+    best, most = eyes[0][0], -np.inf
+    for shot in (shot for n in sorted(worth, key=lambda n: (-worth[n], n))[:CHOSEN] for shot in eyes[n]):
+        if MOST - shot.cost > most and (value := merit(shot)) > most:
+            best, most = shot, value
+    return best.view, best.lens, best.near
 
 
 def barest_share(which: np.ndarray, wall: np.ndarray, height: float, view: np.ndarray, half: float) -> float:

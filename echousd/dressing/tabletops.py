@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from echomodel.arrays import once
 from echomodel.boxes2d import turned
 from echomodel.dressing import KINDS, usual_size
 from echomodel.late import Late
 from echomodel.triangles import area_normals, spans_of
 from echousd.dressing.setting import APART, Setting, Standing, Thing, around, rectangle
+from echousd.shapes.geometry import Geometry
 
 book_size, fitting_books = (Late(f"echomodel.dressing.books:{name}") for name in ("book_size", "fitting_books"))
 
@@ -89,7 +91,13 @@ class Surface:
 
 def surfaces(host: Standing) -> list[Surface]:
     """The levels of an object, highest first."""
-    corners = host.geometry.mesh.triangles
+    return [Surface(host, *level) for level in _levels(host.geometry)]
+
+
+@once
+def _levels(geometry: Geometry) -> list[tuple[float, float, shapely.Geometry, shapely.STRtree]]:
+    """The levels of a piece, as a `Surface` has them."""
+    corners = geometry.mesh.triangles
     normal = area_normals(corners)
     double = np.linalg.norm(normal, axis=1)
     up = np.flatnonzero((normal[:, 1] > 0.97 * double) & (double > 1e-9))
@@ -99,19 +107,19 @@ def surfaces(host: Standing) -> list[Surface]:
     under = corners[normal[:, 1] < -0.97 * np.maximum(double, 1e-9), :, 1].mean(1)  # of boards, however thick
     order = np.argsort(height)
     groups = np.split(order, np.flatnonzero(np.diff(height[order]) > LEVEL) + 1)
-    found: list[Surface] = []
+    found: list[tuple[float, float, shapely.Geometry, shapely.STRtree]] = []
     for group in sorted(groups, key=lambda g: -float(height[g].max())):
         if area[group].sum() < LEAST:
             continue
         y = float(height[group].max())
         faces = up[group]
         level = shapely.union_all(shapely.polygons(corners[faces][:, :, [0, 2]]), grid_size=1e-4)
-        covered = [s.y - y - 0.04 for s in found if s.area.intersection(level).area > 0.3 * level.area]
+        covered = [top - y - 0.04 for top, _, other, _ in found if other.intersection(level).area > 0.3 * level.area]
         air = min([*covered, AIR])
         air = min([air, *(under[(under > y + air / 2) & (under < y + air)] - y - 0.004)])
         if air < 0.06:
             continue
-        found.append(Surface(host, y, air, level, shapely.STRtree(_between(corners, y + 0.004, y + air))))
+        found.append((y, air, level, shapely.STRtree(_between(corners, y + 0.004, y + air))))
     return found
 
 

@@ -125,7 +125,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     remove = [*stale, *(undone(folder) if old else ()), *drawn]
     named_kept = {path: name for path, name in kept.items() if name}
     changed = folders.write_together(folder, files, last=last, remove=remove, kept=named_kept)
-    just_written(folder / path for path in changed if path in owned and path.endswith((".usda", ".usdc")))
+    just_written(folder / path for path in files if path in owned and path.endswith((".usda", ".usdc")))
     for fault in unfit:
         warnings.warn(fault, stacklevel=3)
     for path in gone:
