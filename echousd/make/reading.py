@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -43,6 +44,8 @@ from echousd.stage.read import find_rooms
 from echousd.stage.showing import each_layout
 from echousd.stage.units import Z_TO_Y, metres_per_unit
 from echousd.stage.values import NOW, matrix, reading
+
+SCALED = 0.01  # what a prim may be scaled by, more or less, before it is said
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +119,12 @@ def _boxes(stage: Usd.Stage, objects: str, graph: SceneGraph, size: np.ndarray) 
         prim = stage.GetPrimAtPath(f"{objects}/{name}")
         with reading(stage):
             pose, _ = cache.ComputeRelativeTransform(prim, room)
-        matrix(pose, prim)
+        scale = np.linalg.norm(matrix(pose, prim)[:3, :3], axis=0)
+        if np.abs(scale - 1.0).max() > SCALED:
+            by = " x ".join(f"{v:.2f}" for v in scale)
+            warnings.warn(
+                f"<{prim.GetPath()}> is scaled by {by}: its box stays as made; --resize does it", stacklevel=3
+            )
         front, place = (np.array(v) @ turn.T for v in (pose.TransformDir(ahead), pose.ExtractTranslation()))
         position.append(place * metres_per_unit(stage))
         yaw.append(np.arctan2(front[0], front[2]))

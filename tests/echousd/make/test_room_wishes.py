@@ -162,6 +162,16 @@ def test_a_stronger_layers_transform_is_the_artists_wish(root, echousd_command):
     assert "layers over bedroom.usda in this folder: none; name the one that changes it" in done.err
 
 
+def test_a_scale_of_a_stronger_layer_is_said_for_boxes_do_not_follow(root):
+    layer = Sdf.Layer.CreateNew(str(root.with_name("larger.usda")))
+    layer.subLayerPaths = [f"./{root.name}"]
+    stage = Usd.Stage.Open(layer)
+    UsdGeom.Xformable(stage.GetPrimAtPath("/Room/Objects/wardrobe")).AddScaleOp().Set((1.3, 1.0, 1.0))
+    layer.Save()
+    with pytest.warns(UserWarning, match=r"</Room/Objects/wardrobe> is scaled by 1.30 x 1.00 x 1.00: .* --resize does"):
+        read_room(layer.realPath)
+
+
 def test_an_object_that_was_written_by_hand_is_named_with_the_remedy(root):
     layer = Sdf.Layer.FindOrOpen(str(root.parent / "layers" / "graph.usda"))
     stage = Usd.Stage.Open(layer)
