@@ -57,7 +57,8 @@ def imported(found: Found, storey: str | None = None, *, lenient: bool = False) 
     Raises `GraphError` for outlines that are open, cross or overlap, and for openings in no wall.
     """
     if storey is not None and storey not in found.storeys:
-        raise GraphError(f"no storey {storey!r}, allowed: {', '.join(map(repr, found.storeys))}")
+        allowed = ", ".join(map(repr, filter(None, found.storeys))) or "to leave it out, as the plan names none"
+        raise GraphError(f"no storey {storey!r}, allowed: {allowed}")
     level = storey if storey is not None else next(iter(found.storeys), "")
     ignored = Counter(found.ignored)
     ignored["rooms of other storeys"] += sum(one.storey not in ("", level) for one in found.rooms)

@@ -410,6 +410,8 @@ def test_what_does_not_fit_can_be_left_out_and_is_told():
     assert [room.name for room in imported(both, "1").plan.home.rooms] == ["study"]
     with pytest.raises(GraphError, match=r"no storey '2', allowed: '0', '1'"):
         imported(both, "2")
+    with pytest.raises(GraphError, match="no storey '2', allowed: to leave it out, as the plan names none"):
+        imported(Found("", [rectangle("hall", (0, 0), (3, 4))]), "2")
 
 
 def many_lines(path):
