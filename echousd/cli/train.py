@@ -37,8 +37,9 @@ def train(
     console = Terminal(stderr=True)
     folder = out or Path("runs") / recipe.stem
     plan = read_recipe(recipe, settings)
-    if not resume and (folder / "checkpoint.safetensors").exists():
-        raise ValueError(f"{folder}: holds a run already, continue it with --resume or choose another --output")
+    there = [name for name in ("checkpoint.safetensors", "weights.safetensors") if (folder / name).exists()]
+    if there and not resume:
+        raise ValueError(f"{folder}: holds {there[0]} already, continue it with --resume or choose another --output")
 
     def report(step: int, values: dict[str, float]) -> None:
         console.print(f"step {step}/{plan.steps}  " + "  ".join(f"{k} {v:.4g}" for k, v in values.items()))

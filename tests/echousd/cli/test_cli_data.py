@@ -333,3 +333,13 @@ def test_data_to_train_on_that_is_not_there_is_named(tmp_path, capsys):
     assert run([*recipe, "--set", "data=nowhere.npz"]) == 2
     assert "recipe field 'data' names nowhere.npz, which does not exist" in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("name", ["checkpoint.safetensors", "weights.safetensors"])
+def test_weights_of_a_run_are_not_written_over(tmp_path, capsys, name):
+    (tmp_path / name).write_bytes(b"a night's work")
+    recipe = str(Path(__file__).parents[3] / "model/recipes/smoke.toml")
+    assert run(["train", recipe, "-o", str(tmp_path)]) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert f"holds {name} already, continue it with --resume or choose another --output" in told
+    assert [path.name for path in tmp_path.iterdir()] == [name]
