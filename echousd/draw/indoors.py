@@ -28,7 +28,7 @@ DIM = 0.02  # radiance at every place of a room without lamps and windows, so th
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
 ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.6, 0.85), (0.38, 0.61), 70, 15.0
-EVEN = 0.3  # power of the light's brightness that eyes and those who photograph rooms take from it
+EVEN = (0.18, 0.3)  # power of the light's brightness that eyes take from it, and inside whoever photographs rooms
 WHITE, PAPER = 88, 0.95  # what so many of a hundred points are darker than comes to no more than that
 CONTRAST, KNEE = 1.55, 0.6  # power about what is bright, and from where on highlights are rolled off
 HUE = 0.8  # share of colours that keep their hue where they are bright; film bleaches them
@@ -132,14 +132,14 @@ def with_ceiling(scenery: Scenery) -> Scenery:
     return replace(scenery, above=(), **joined)
 
 
-def evened(light: np.ndarray, white: np.ndarray) -> np.ndarray:
+def evened(light: np.ndarray, white: np.ndarray, inside: bool = True) -> np.ndarray:
     """(n,) what light (3, n) is multiplied by: less than 1 where it is brighter than the mean, more where it is less,
     so that walls at lamps and windows keep their colour and corners are not black.
 
-    `white`: (3,) the mean light in the room.
+    `white`: (3,) the mean light in the room. `inside`: whether it is seen from there.
     """
     level = LUMA @ light / max(float(white @ LUMA), 1e-6)
-    return np.asarray(np.maximum(level, np.float32(1e-3)) ** np.float32(-EVEN))
+    return np.asarray(np.maximum(level, np.float32(1e-3)) ** np.float32(-EVEN[inside]))
 
 
 def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable[[np.ndarray], np.ndarray]:

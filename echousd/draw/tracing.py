@@ -327,7 +327,7 @@ def _colored(world: World, everything: Seen, falling: np.ndarray) -> np.ndarray:
         color = scenery.colors(seen.face, seen.bary, _breadth(world, seen), world.atlas)
         fallen = light[5] * sun
         fallen, whole = light[:3] * light[4] ** np.float32(DEPTH) + fallen, light[:3] + fallen
-        fallen *= evened(whole, world.white)
+        fallen *= evened(whole, world.white, world.view.inside)
         metal = scenery.gloss.take(seen.face) > METAL
         out[:, here] = color * fallen * np.where(metal, np.float32(MATT), 1) + light[3] * np.where(metal, color, 1)
         if len(shade := np.flatnonzero(scenery.planes.glows.take(seen.face))):  # less what they throw on themselves
