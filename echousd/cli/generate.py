@@ -25,10 +25,11 @@ def generate(
     """
     from echousd.cli.progress import progress_bar
     from echousd.folder.folder import check_output, writing
+    from echousd.folder.found import room_at
     from echousd.options import RoomOptions
 
     started = time.perf_counter()
-    options = RoomOptions(**values)
+    options, graph = RoomOptions(**values), room_at(graph)
     check_output(output, flat=flat, force=force)
     if flat and store:
         raise ValueError(f"--store is {store}, which a file of --flat does not use; leave one of them out")

@@ -155,3 +155,15 @@ def test_edits_through_a_stronger_layer_draw_the_picture_of_the_room(graph, tmp_
         seen.add((folder / "bedroom.png").read_bytes())
     assert len(seen) == 2
     assert not (folder / "mine.png").exists()
+
+
+def test_a_room_is_generated_again_from_its_folder(graph, tmp_path, echousd_command):
+    plain = ("--shapes", "boxes", "--dress", "none", "--no-preview")
+    assert echousd_command("generate", graph, "-o", tmp_path / "bedroom", *plain).code == 0
+    done = echousd_command("generate", tmp_path / "bedroom", "-o", tmp_path / "again", *plain)
+    assert done.code == 0, done.err
+    assert echousd.read_graph(tmp_path / "again/again.usda").names == small_graph().names
+    (tmp_path / "empty").mkdir()
+    done = echousd_command("generate", tmp_path / "empty", "-o", tmp_path / "none", *plain)
+    assert (done.code, "empty: no room in this folder" in done.err) == (2, True), done.err
+    assert not (tmp_path / "none").exists()
