@@ -73,7 +73,8 @@ def search_examples(
     """
     folder.mkdir(parents=True, exist_ok=True)
     kind = "rooms found by search" if plan.searched else "rooms of the generator"
-    claim(folder, {"kind": kind, "seed": plan.seed, "drafts": plan.drafts, "rooms": plan.rooms})
+    asked = {"seed": plan.seed, "drafts": plan.drafts, "rooms": plan.rooms, "weights": plan.weights}
+    claim(folder, {"kind": kind, **asked})
     left = [number for number in range(shards) if not _shard(folder, number).exists()]
     until = None if minutes is None else time.time() + 60 * minutes
     work = partial(_search_shard, folder, plan, until)

@@ -39,6 +39,8 @@ def test_found_rooms_miss_nothing_and_a_search_goes_on(tmp_path, monkeypatch):
         assert not faults_of(found, ("physics", "living", "composition"))
     with pytest.raises(ValueError, match="was begun with seed 5; choose another folder or remove it"):
         search_examples(tmp_path, ExamplesPlan(6, drafts=0), shards=1)
+    with pytest.raises(ValueError, match="was begun with weights None; choose another folder"):
+        search_examples(tmp_path, ExamplesPlan(5, drafts=0, weights="runs/mine"), shards=1)
 
 
 def test_rooms_of_the_generator_that_miss_nothing_are_kept_unsearched(tmp_path):
