@@ -212,6 +212,17 @@ def test_the_camera_shows_less_bare_floor_where_it_is_asked_to(monkeypatch: pyte
     assert shares[1] < shares[0] - 0.02
 
 
+def test_no_view_that_is_not_looked_at_closely_would_be_better(monkeypatch: pytest.MonkeyPatch) -> None:
+    others = boxes((0.5, 0.5, 0.4, 0.4, 0.0, 0.3, 0.0), (0.8, 2.0, 0.5, 4.5, 0.0, 2.0, -1.57))
+    rooms = [(FLOOR, BED.with_others(others)), (1.8 * FLOOR, BED.with_others(others)), (0.6 * FLOOR, BED)]
+    quick = [inside_view(floor, things, 2.8) for floor, things in rooms]
+    monkeypatch.setattr("echousd.draw.views.MOST", np.inf)
+    for found, (floor, things) in zip(quick, rooms, strict=True):
+        view, *others = inside_view(floor, things, 2.8)
+        assert np.array_equal(found[0], view)
+        assert list(found[1:]) == others
+
+
 def test_the_main_piece_is_in_the_middle_third_of_the_picture() -> None:
     floor = np.array([(0.0, 0.0), (0.0, 4.0), (9.0, 4.0), (9.0, 0.0)])
     sofa = boxes((2.2, 0.8, 0.9, 1.6, 0.0, 0.6, 0.0))  # and many things at the other end
