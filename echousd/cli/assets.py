@@ -8,7 +8,7 @@ from pathlib import Path
 
 import typer
 
-from echousd.cli.options import AsJson, told
+from echousd.cli.options import AsJson, documented_command
 from echousd.cli.output import say_done, say_found
 
 assets_app = typer.Typer(
@@ -19,7 +19,7 @@ app.add_typer(assets_app, name="assets")
 SHOWN = 20  # faults that are told; the table holds all
 
 
-@told(assets_app, "assets index")
+@documented_command(assets_app, "assets index")
 def index(
     folders: list[Path], output: Path, workers: int = 0, table: Path | None = None, descriptors: bool = False,
     json: AsJson = False,
@@ -49,7 +49,7 @@ def index(
     say_done(json, [output], lines, {**counts, "left_out": list(map(str, done.faults))})
 
 
-@told(assets_app, "assets review")
+@documented_command(assets_app, "assets review")
 def review(library: Path, output: Path | None = None, json: AsJson = False) -> None:
     """Write what there is to look at and to correct: a page with a picture of every model, and the table.
 
@@ -72,7 +72,7 @@ def review(library: Path, output: Path | None = None, json: AsJson = False) -> N
     say_done(json, [page, table], lines, {"models": len(records), "left_out": reasons})
 
 
-@told(assets_app, "assets pack")
+@documented_command(assets_app, "assets pack")
 def pack(
     room: Path, output: Path, asset: list[str] | None = None, author: str = "EchoUSD", force: bool = False,
     json: AsJson = False,
@@ -95,7 +95,7 @@ store_app = typer.Typer(no_args_is_help=True)
 app.add_typer(store_app, name="store", help="A folder where many rooms keep their assets and images once.")
 
 
-@told(store_app, "store verify")
+@documented_command(store_app, "store verify")
 def verify(folder: Path, json: AsJson = False) -> None:
     """Compare every asset with the hash that it lies under. Exit code 1 where one is not what it was."""
     from echousd.store import Store
@@ -107,7 +107,7 @@ def verify(folder: Path, json: AsJson = False) -> None:
     say_found(json, {"ok": not wrong, "count": count, "changed": list(map(str, wrong))}, lines, ok=not wrong)
 
 
-@told(store_app, "store gc")
+@documented_command(store_app, "store gc")
 def gc(
     folder: Path, rooms: list[Path] | None = None, dry_run: bool = False, older: float = 60.0, json: AsJson = False,
 ) -> None:  # fmt: skip

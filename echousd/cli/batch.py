@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from echousd.cli.options import AsJson, Outside, add_room_command, group_of, told
+from echousd.cli.options import AsJson, Outside, add_room_command, documented_command, group_of
 from echousd.cli.output import one_line, say, say_error, say_found, say_json
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def run(
 add_room_command(batch_app, "batch run", run, batch=True)
 
 
-@told(batch_app, "batch status")
+@documented_command(batch_app, "batch status")
 def status(folder: Path, json: bool = False) -> None:
     """How far a run is, of all its shards."""
     from echousd.batches.plan import load_plan
@@ -79,7 +79,7 @@ def status(folder: Path, json: bool = False) -> None:
     say_found(json, found, [line, *(f"failed   {times} x {one_line(why)}" for why, times in found["errors"].items())])
 
 
-@told(batch_app, "batch verify")
+@documented_command(batch_app, "batch verify")
 def verify(folder: Path, check: bool = False, json: AsJson = False) -> None:
     """Compare every room with the journal: there, whole, unchanged. Exit code 1 where one is not."""
     from echousd.batches.verify import verify as found_wrong

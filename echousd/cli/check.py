@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from echousd.cli.options import told
+from echousd.cli.options import documented_command
 from echousd.cli.output import counted, one_line, safe, say, say_json
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 
-@told(app, "check")
+@documented_command(app, "check")
 def check(
     room: list[Path], json: bool = False, rules: str = "strict", layout: int | None = None, strict: bool = False,
     settle: bool = False,

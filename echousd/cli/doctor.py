@@ -6,14 +6,14 @@ from dataclasses import asdict
 
 import typer
 
-from echousd.cli.options import told
+from echousd.cli.options import documented_command
 from echousd.cli.output import say_json
 from echousd.diagnosis import Diagnosis, diagnose
 
 app = typer.Typer()
 
 
-@told(app, "plugin-path")
+@documented_command(app, "plugin-path")
 def plugin_path() -> None:
     """Print the folder of the USD schema plugin, for PXR_PLUGINPATH_NAME (does not load USD)."""
     from echousd import plugin
@@ -21,7 +21,7 @@ def plugin_path() -> None:
     typer.echo(plugin.plugin_path())
 
 
-@told(app, "doctor")
+@documented_command(app, "doctor")
 def doctor(as_json: bool = False) -> None:
     """Report what EchoUSD finds on this machine and what to do about each gap; exit code 1 if there is one."""
     findings = diagnose()

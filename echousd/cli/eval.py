@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from echomodel.files import check_free
-from echousd.cli.options import Replace, Written, told
+from echousd.cli.options import Replace, Written, documented_command
 from echousd.cli.output import say_done, say_found
 
 eval_app = typer.Typer(help="Scores of whoever lays out rooms, and studies with people.", no_args_is_help=True)
@@ -22,7 +22,7 @@ Count = Annotated[int, typer.Option(help="Rooms that every system lays out.", mi
 Seed = Annotated[int, typer.Option(help="Seed of every draw.")]
 
 
-@told(eval_app, "eval suite")
+@documented_command(eval_app, "eval suite")
 def suite(
     systems: list[str] | None = None, against: Against = "generated", out: Path = Path("report"), only: str = "",
     count: Count = 24, seed: Seed = 0, relations: float = 1.0, shapes: Path | None = None,
@@ -50,7 +50,7 @@ def suite(
     say_done(json, written, map(str, written))
 
 
-@told(eval_app, "eval study")
+@documented_command(eval_app, "eval study")
 def study(
     systems: list[str], out: Path = Path("study.html"), against: Against = "generated", count: Count = 12,
     seed: Seed = 0, force: Replace = False, json: Written = False,
@@ -65,7 +65,7 @@ def study(
     say_done(json, [path], [str(path)])
 
 
-@told(eval_app, "eval answers")
+@documented_command(eval_app, "eval answers")
 def answers(files: list[Path], json: bool = False) -> None:
     """Say whom people preferred: shares with intervals, an exact test of each pair of systems, and agreement."""
     from echousd.evaluation.suite import preferences

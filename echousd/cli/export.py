@@ -8,13 +8,13 @@ from typing import Any
 import typer
 
 from echomodel.files import check_free
-from echousd.cli.options import AsJson, Layout, Replace, ReplacePicture, Room, Written, told
+from echousd.cli.options import AsJson, Layout, Replace, ReplacePicture, Room, Written, documented_command
 from echousd.cli.output import check_picture, say_done
 
 app = typer.Typer()
 
 
-@told(app, "export")
+@documented_command(app, "export")
 def export(
     room: Room, output: Path, reader: str | None = None, arkit: bool = False, search: list[Path] | None = None,
     layout: Layout = None, physics: bool | None = None, pictures: bool = True, force: Replace = False,
@@ -38,7 +38,7 @@ def export(
 TURN = "turntable"
 
 
-@told(app, "render")
+@documented_command(app, "render")
 def render(
     room: Room, output: Path, view: str = "hero", cameras: bool = False, quality: str = "fast",
     size: int | None = None, frames: int = 24, colors: str = "materials", layout: Layout = None,
@@ -85,7 +85,7 @@ def render(
     say_done(json, list(files), map(str, files))
 
 
-@told(app, "convert")
+@documented_command(app, "convert")
 def convert(
     source: Path, output: Path, bounds: Path | None = None, classes: Path | None = None, force: Replace = False,
     json: AsJson = False,

@@ -10,7 +10,7 @@ import typer
 
 from echomodel.files import check_free
 from echomodel.late import Late
-from echousd.cli.options import AsJson, Replace, ReplacePicture, told
+from echousd.cli.options import AsJson, Replace, ReplacePicture, documented_command
 from echousd.cli.output import check_picture, counted, say, say_done, say_json
 from echousd.naming import STAGE_FORMS
 
@@ -22,7 +22,7 @@ load_home, vocabulary = Late("echousd.home.files:load_home"), Late("echomodel.vo
 app = typer.Typer()
 
 
-@told(app, "new")
+@documented_command(app, "new")
 def new(
     out: Path, source: Path | None = None, room: str | None = None, count: list[str] | None = None,
     rooms: str | None = None, area: float | None = None, relate: list[str] | None = None,
@@ -104,7 +104,7 @@ def _counted(text: str) -> tuple[str, int]:
     return word, int(number)
 
 
-@told(app, "graph")
+@documented_command(app, "graph")
 def graph(
     source: Path | None = None, room: str | None = None, names: bool = False, relations: float | None = None,
     as_json: bool = False, picture: Path | None = None, force: ReplacePicture = False, schema: bool = False,

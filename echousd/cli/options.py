@@ -52,7 +52,7 @@ def group_of(usual: str) -> type[TyperGroup]:
 LONG = 8  # characters in place of a value; longer ones would leave no room for help
 
 
-def told(app: typer.Typer, name: str, **more: Any) -> Callable[[Command], Command]:
+def documented_command(app: typer.Typer, name: str, **more: Any) -> Callable[[Command], Command]:
     """Add a command, called by the last word of its name, with what `words.toml` says of it: examples, and of each
     argument and option that no other command has the help, flags, bounds and the like."""
 
@@ -113,7 +113,7 @@ def add_room_command(
             used.update({name: ctx.params.pop(name) for name in [*ctx.params] if name in self.flags})
             return super().invoke(ctx)
 
-    @told(app, name, cls=WithFlags)
+    @documented_command(app, name, cls=WithFlags)
     @wraps(command)
     def call(**values: Any) -> Any:
         return command(**values, **{name: value for name, value in used.items() if value is not None})

@@ -10,7 +10,7 @@ import typer
 
 from echomodel.files import check_free
 from echomodel.late import Late
-from echousd.cli.options import SAID, Force, Written, group_of, told
+from echousd.cli.options import SAID, Force, Written, documented_command, group_of
 from echousd.cli.output import say_done
 from echousd.naming import LAYER_FORMS
 
@@ -26,7 +26,7 @@ app = typer.Typer()
 app.add_typer(plan_app, name="plan", help="Plan a home, draw or write its plan; read somebody's floor plan.")
 
 
-@told(plan_app, "plan import")
+@documented_command(plan_app, "plan import")
 def import_(
     source: Path, output: Path, form: str | None = None, unit: str | None = None, storey: str | None = None,
     lenient: bool = False, picture: Path | None = None, force: Force = False, json: Written = False,
@@ -63,7 +63,7 @@ def _writable(path: Path, endings: tuple[str, ...], force: bool) -> None:
     check_free(path, force=force)
 
 
-@told(plan_app, "plan export")
+@documented_command(plan_app, "plan export")
 def export(
     source: Path, output: Path, several: int = 1, seed: int = 0, force: Force = False, json: Written = False,
 ) -> None:  # fmt: skip

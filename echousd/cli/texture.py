@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from echousd.cli.options import AsJson, Layout, Wait, told
+from echousd.cli.options import AsJson, Layout, Wait, documented_command
 from echousd.cli.output import say, say_done
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ app = typer.Typer()
 app.add_typer(texture_app, name="texture", help="To texturing tools (SceneTex, Hunyuan3D-Paint, MVPainter) and back.")
 
 
-@told(texture_app, "texture export")
+@documented_command(texture_app, "texture export")
 def export(
     room: Path, output: Path, tool: str, prompt: str = "", dressing: str = "none", resolution: int | None = None,
     layout: Layout = None, shell: bool | None = None, force: bool = False, json: AsJson = False,
@@ -39,7 +39,7 @@ def export(
         _tell(job)
 
 
-@told(texture_app, "texture import")
+@documented_command(texture_app, "texture import")
 def import_(
     room: Path, job: Path, name: str = "", skip: list[str] | None = None, preview: bool = True, force: bool = False,
     wait: Wait = False, json: AsJson = False,

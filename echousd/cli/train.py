@@ -10,7 +10,7 @@ import typer
 
 from echomodel.files import check_free
 from echomodel.late import Late
-from echousd.cli.options import Replace, told
+from echousd.cli.options import Replace, documented_command
 from echousd.cli.output import counted
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ load_rooms, with_known_words = (Late(f"echomodel.data.roomset:{name}") for name 
 app = typer.Typer()
 
 
-@told(app, "train")
+@documented_command(app, "train")
 def train(
     recipe: Path, settings: list[str] | None = None, out: Path | None = None, resume: bool = False,
     minutes: float | None = None,
@@ -56,7 +56,7 @@ Seed = Annotated[int, typer.Option(help="Seed of the world; equal seeds give equ
 Rooms = Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")]
 
 
-@told(data_app, "data build")
+@documented_command(data_app, "data build")
 def build(out: Path, recipe: str = "smoke", seed: Seed = 0) -> None:
     """Make rooms and shapes to train on; run again to continue a build that was stopped."""
     from echomodel.data.build import build_data
@@ -67,7 +67,7 @@ def build(out: Path, recipe: str = "smoke", seed: Seed = 0) -> None:
     Terminal(stderr=True).print(f"{out}: {len(rooms)} rooms, {len(shapes)} shapes, {size:.1f} MB")
 
 
-@told(data_app, "data rooms")
+@documented_command(data_app, "data rooms")
 def rooms_command(out: Path, count: int = 100, seed: Seed = 0, room: str | None = None, force: Replace = False) -> None:
     """Generate rooms into a rooms file."""
     from echomodel.rooms.generator import generate_rooms
@@ -100,7 +100,7 @@ def _write_one_file(out: Path, found: list[RoomBoxes], kind: str) -> None:
     Terminal(stderr=True).print(f"{out}: {counted(len(found), 'room')}{left}")
 
 
-@told(data_app, "data search")
+@documented_command(data_app, "data search")
 def search(
     out: Path, count: int = 20_000, seed: Seed = 0, drafts: int = 2, weights: str | None = None, workers: int = 1,
     minutes: float | None = None, unsearched: bool = False, rooms: str | None = None,
@@ -119,7 +119,7 @@ def search(
     console.print(f"{out}/rooms.npz: {len(found)} rooms, {int(found.counts.sum())} objects")
 
 
-@told(data_app, "data plot")
+@documented_command(data_app, "data plot")
 def plot(
     rooms: Rooms, out: Path, limit: int = 50, columns: int = 10, room: str | None = None, labels: bool = True,
     force: Replace = False,
@@ -135,7 +135,7 @@ def plot(
     plot_rooms(found[:limit], out, columns=columns, labels=labels)
 
 
-@told(data_app, "data meshes")
+@documented_command(data_app, "data meshes")
 def meshes(library: Path, out: Path, copies: int = 2) -> None:
     """Make a shape set from the usable models of a library: metric size, flood-filled distances, attribution.
 
@@ -168,7 +168,7 @@ def meshes(library: Path, out: Path, copies: int = 2) -> None:
     console.print(f"{out}: {len(shapes)} shapes, {int(shapes.held_out.sum())} held out")
 
 
-@told(data_app, "data to-usd")
+@documented_command(data_app, "data to-usd")
 def to_usd(
     rooms: Rooms, out: Path, limit: int | None = None, rules: str = "strict", known: bool = True,
     force: Replace = False,
@@ -188,7 +188,7 @@ def to_usd(
     write_stages(found, out, None if rules == "none" else rules)
 
 
-@told(data_app, "data import")
+@documented_command(data_app, "data import")
 def import_rooms(
     sources: list[Path], out: Path, room: str = "all", split: str = "trainval", force: Replace = False,
 ) -> None:  # fmt: skip
@@ -209,7 +209,7 @@ def import_rooms(
     _write_one_file(out, found, "imported rooms")
 
 
-@told(data_app, "data to-sgfront")
+@documented_command(data_app, "data to-sgfront")
 def to_sgfront(
     rooms: Rooms, out: Path, split: str = "trainval", drop: float = 0.5, seed: int = 0, force: Replace = False,
 ) -> None:  # fmt: skip
