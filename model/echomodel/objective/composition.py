@@ -17,14 +17,40 @@ from echomodel.objective.company import AROUND, BESIDE, first_of, seats_at
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
 from echomodel.sizes import REACH, filled_area
 
+# Radius of an empty circle, of the side of a square of each piece's share of the floor; more a square metre; at most.
+BARE = (0.48, 0.0116, 1.0)
 # Metres of a way along what is bare; side of a square that the rest of the largest such rectangle in a corner is: 90 %
 # of real rooms have a smaller one; sine of two walls that meet in one; share of a floor that 95 % of real rooms fill.
-WAY, BARE, SQUARE, THIN = 1.0, 1.7, 0.9, 0.58
+WAY, LEFT_BARE, SQUARE, THIN = 1.0, 1.7, 0.9, 0.58
 HALL = 24.0  # square metres of a room that a few pieces do not fill
 AHEAD, IN_VIEW = 1.0, 1.5  # metres before a sofa and a group's armchair to other groups: 97 % of real ones have them
 COVERED = 0.25  # share of its width from which on something is before it
 CELL, POINTS = 0.25, 1000  # metres between two points of the floor that are looked at; in a hall so many, farther apart
 FEW, LARGE = 5, 0.4  # pieces: fewer fill no room; square metres of those that fill an end of it
+NEARER = 0.1  # metres by which a point must be nearer to a piece than what is bare or serves nothing, not to count
+
+
+def bare_limit(area: float, count: int) -> float:
+    """Radius in metres from which on an empty circle is bare, in a floor of an area (square metres), so many pieces."""
+    return min(BARE[0] + BARE[1] * area, BARE[2]) * math.sqrt(area / max(count, 1))
+
+
+def floor_used(plan: Plan) -> Found:
+    """No large part of the floor is bare while the pieces stand close elsewhere; the nearest one is told."""
+    out, xp = nobody(plan.size), plan.kit
+    for area, _, there, points, walls, gap in floor_gaps(plan):
+        row = int(plan.stands("row")[there[0]].sum())  # a row of units is one piece
+        limit = bare_limit(area, there.shape[1] - max(row - 1, 0))
+        inner = rows(walls > limit)
+        if not len(inner):  # no circle of that size fits in
+            continue
+        radius = xp.minimum(gap[:, inner], walls[inner])
+        at = held(radius).argmax(1)
+        most = radius[xp.arange(len(at)), at]
+        near = rows(held(most) > limit - NEARER)  # of smaller circles nobody need hear
+        told = _nearest(plan, there[near], points[inner[at[near]]])
+        out = joined(out, found(told, limit - most[near], measure=2 * most[near]))
+    return out
 
 
 def corners_used(plan: Plan) -> Found:
@@ -51,7 +77,7 @@ def corners_used(plan: Plan) -> Found:
         row, k = xp.arange(len(there)), most % len(corner)
         wide, deep = (of.reshape(len(there), -1)[row, most] for of in (ends, deep))
         middle = start[k] + (wide[:, None] * ways[0][k] + deep[:, None] * ways[1][k]) / 2
-        margin = BARE - xp.sqrt(at_least(bare[row, most], 1e-6))
+        margin = LEFT_BARE - xp.sqrt(at_least(bare[row, most], 1e-6))
         out = joined(out, found(_nearest(plan, there, middle), margin, measure=wide * deep))
     return out
 
@@ -59,7 +85,7 @@ def corners_used(plan: Plan) -> Found:
 def floor_filled(plan: Plan) -> Found:
     """A hall holds enough for its floor, whatever its places; the largest piece is told."""
     out = nobody(plan.size)
-    for (_, area, _), there in zip(floor_points(plan), on_floors(plan), strict=True):
+    for (_, area, *_), there in zip(floor_points(plan), on_floors(plan), strict=True):
         if area >= HALL and there.shape[1]:
             wide, deep = (held(plan.size)[there, k] for k in (0, 2))
             share = ((wide + 2 * REACH) * (deep + 2 * REACH)).sum(1) / area
@@ -68,9 +94,9 @@ def floor_filled(plan: Plan) -> Found:
     return out
 
 
-def floor_points(plan: Plan) -> list[tuple[Array, float, Array]]:
-    """For rooms of one floor: their numbers (s,), its area, and points (P, 2) on it."""
-    kept: list[tuple[float, Array]] = vars(plan.first).setdefault("floor_points", [])
+def floor_points(plan: Plan) -> list[tuple[Array, float, Array, Array]]:
+    """For rooms of one floor: their numbers (s,), its area, points (P, 2) on it, and their distance to walls (P,)."""
+    kept: list[tuple[float, Array, Array]] = vars(plan.first).setdefault("floor_points", [])
     if not kept:
         for _, polygon, _ in plan.first.rooms:
             area = abs(float(signed_area(polygon[None])[0]))
@@ -79,7 +105,7 @@ def floor_points(plan: Plan) -> list[tuple[Array, float, Array]]:
             xs, zs = (np.arange(a + cell / 2, b, cell) for a, b in zip(low, high, strict=True))
             points = plan.numbers(np.stack(np.meshgrid(xs, zs), -1).reshape(-1, 2).tolist())
             walls = signed_distance(points[None], plan.numbers(polygon.tolist())[None])[0]
-            kept.append((area, points[walls > 0]))
+            kept.append((area, points[walls > 0], walls[walls > 0]))
     return [(scenes, *of) for (scenes, _, _), of in zip(plan.rooms, kept, strict=True)]
 
 
@@ -94,16 +120,17 @@ def on_floors(plan: Plan) -> list[Array]:
 
 
 @once
-def floor_gaps(plan: Plan) -> list[tuple[float, int, Array, Array, Array]]:
+def floor_gaps(plan: Plan) -> list[tuple[float, int, Array, Array, Array, Array]]:
     """How far the floor lies from the pieces, for rooms (s,), one after the other, of one floor.
 
     Returns its area, how many points it has, (s, n) int64, the pieces, (q, 2) the points that count: in copies of one
-    room not those near to what stands alike in all, and (s, q) metres to the nearest piece.
+    room not those near to what stands alike in all, (q,) metres to the walls, and (s, q) to the nearest piece.
     """
     out = []
-    for (_, area, points), there in zip(floor_points(plan), on_floors(plan), strict=True):
-        far, gap = _far_points(plan, there, points, SERVED - SOFT)
-        out.append((area, len(points), there, points[far], gap))
+    for (_, area, points, walls), there in zip(floor_points(plan), on_floors(plan), strict=True):
+        near = min(SERVED - SOFT, bare_limit(area, there.shape[1]) - NEARER)
+        far, gap = _far_points(plan, there, points, near)
+        out.append((area, len(points), there, points[far], walls[far], gap))
     return out
 
 
@@ -200,7 +227,7 @@ def _large(plan: Plan) -> list[tuple[Array, Array, Array, Array, Array]]:
     """Large pieces (s, n) of rooms (s,) of one floor that have enough, where they begin and end, (s, n, 2) shares of
     its extents, these (2,), metres, and its middle (2,), as shares."""
     out = []
-    for (_, polygon, _), (*_, points), there in zip(plan.rooms, floor_points(plan), on_floors(plan), strict=True):
+    for (_, polygon, _), (*_, points, _), there in zip(plan.rooms, floor_points(plan), on_floors(plan), strict=True):
         large = (plan.size[there[0], 0] * plan.size[there[0], 2] > LARGE) & ~plan.of("decor")[there[0]]
         if there.shape[1] - max(int(plan.stands("row")[there[0]].sum()) - 1, 0) < FEW or not bool(large.any()):
             continue  # a row of units is one piece
@@ -241,7 +268,7 @@ def served_limit(area: float, width: Array, depth: Array) -> float:
 def floor_served(plan: Plan) -> Found:
     """Furniture serves the whole floor: no more of it lies far from everything than so much furniture must leave."""
     out = nobody(plan.size)
-    for area, count, there, points, gap in floor_gaps(plan):
+    for area, count, there, points, _, gap in floor_gaps(plan):
         if not len(points):
             continue
         size = held(plan.size[there[0]])

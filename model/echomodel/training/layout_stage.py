@@ -159,8 +159,8 @@ PHYSICS = 3.0  # weight of what runs into something
 RELATIONS = 30.0  # weight of a metre by which something told is missed, as steep as a term is
 # Sizes are learnt as they are, openings are looked at with walls, what is bare is looked at room by room.
 OTHERWISE = (
-    "scale", "door_free", "leaf_aside", "window_free", "corners_used", "floor_served", "floor_filled", "ends_used",
-    "hung_over",
+    "scale", "door_free", "leaf_aside", "window_free", "floor_used", "corners_used", "floor_served", "floor_filled",
+    "ends_used", "hung_over",
 )  # fmt: skip
 
 

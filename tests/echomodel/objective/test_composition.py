@@ -166,6 +166,12 @@ def test_furniture_huddled_at_one_end_leaves_the_floor_unserved():
     assert float(boxes.position.grad[:, 0].max()) > 0  # drawn into the bare half
 
 
+def test_a_small_room_has_no_circle_so_bare_as_a_hall_may():
+    assert composition.bare_limit(16.0, 4) == pytest.approx(0.6656 * 2)
+    assert composition.bare_limit(36.0, 9) == pytest.approx(0.8976 * 2)
+    assert composition.bare_limit(100.0, 25) == pytest.approx(1.0 * 2)
+
+
 def test_an_emptier_room_may_leave_more_of_its_floor():
     one = torch.ones(1, dtype=torch.float64)
     assert composition.served_limit(8.0, one, one) == pytest.approx(np.exp(0.8 - 2 * 4 / 8))
