@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
-MOST = 26_400  # lines of modules
+MOST = 26_600  # lines of modules
 CODE = """
 import sys
 from echousd.cli.main import run
