@@ -45,6 +45,7 @@ MAX_OBJECTS = 200  # of one room: up to here time grows no faster than their num
 TALL = 2.0  # metres by which a screen counts as higher where openings are placed: it wants no window behind it
 DEFAULTS = PlaceConfig()
 OF_OPENINGS = frozenset({"door_free", "leaf_aside", "window_free"})  # terms
+OF_GRAPHS = frozenset({"floor_filled"})  # terms that only more furniture meets, no other draft
 DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
 judged_faults = lru_cache(4 * DRAFTS)(living_faults)  # of boxes that nobody changes: openings that make way ask again
 
@@ -172,7 +173,8 @@ def draft_rounds(drafts: int) -> list[tuple[int, int]]:
 
 
 def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int | None) -> tuple[float, ...]:
-    """What a layout leaves to be wished for, the worse first: what is broken or collides, conflicts, rounded faults.
+    """What a layout leaves to be wished for, the worse first: what is broken or collides, conflicts, rounded faults
+    that another layout may not have.
 
     `seed`: where nobody stated the openings, that by which they make way; None = they stay.
     """
@@ -182,7 +184,7 @@ def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int |
         graph = with_free_openings(graph, [boxes], seed)
         faults = judged_faults(graph, boxes)
     late = [fault for fault in faults if seed is not None and fault.rule in OF_OPENINGS]
-    now = [fault for fault in faults if fault not in late]
+    now = [fault for fault in faults if fault not in late and fault.rule not in OF_GRAPHS]
     return len(layout_outcome(graph, boxes).faults), len(conflicts), round(severity(now), 2), round(severity(late), 2)
 
 

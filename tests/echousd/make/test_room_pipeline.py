@@ -15,6 +15,7 @@ from echousd.graph.arrays import graph_batch
 from echousd.make import layouts
 from echousd.make.reading import with_locked_places
 from echousd.make.verdicts import relation_verdicts
+from echousd.place.living import living_faults, severity
 from echousd.shapes.styles import asset_names, equal_sizes, shared_assets, style_groups
 
 
@@ -407,6 +408,16 @@ def test_openings_that_nobody_stated_make_way_for_furniture(monkeypatch, propose
 def test_a_room_has_so_many_poses_for_all_its_searches(monkeypatch, poses, faults, anew):
     asked = searches(monkeypatch, faults, poses=poses, drafts=3)
     assert [search[2] for search in asked] == anew
+
+
+def test_a_hall_that_holds_too_little_wishes_for_no_other_draft():
+    graph = SceneGraph(RoomSpec("living_room", size=(8.0, 6.5)), (Node("plant", "plant"),))
+    boxes = Boxes(*(np.array(of, np.float32) for of in ([(0.4, 1.0, 0.4)], [(0.0, 0.0, 0.0)], [0.0])))
+    faults = {fault.rule for fault in living_faults(graph, boxes)}
+    assert "floor_filled" in faults
+    wishes = layouts._wishes(graph, (boxes, ()), None)
+    rest = [fault for fault in living_faults(graph, boxes) if fault.rule != "floor_filled"]
+    assert wishes == (0, 0, round(severity(rest), 2), 0.0)
 
 
 def test_drafts_that_end_alike_are_searched_once_in_earnest(monkeypatch):
