@@ -30,6 +30,7 @@ from echousd.options import RoomOptions
 from echousd.place.living import living_faults, severity
 from echousd.place.placing import Arranged, PlacedBoxes
 from echousd.place.placing import place as placed
+from echousd.place.search import OF_GRAPHS
 from echousd.place.solver import PlaceConfig, sentence
 from echousd.shapes.styles import equal_sizes, style_groups, unequal_pairs
 
@@ -45,7 +46,6 @@ MAX_OBJECTS = 200  # of one room: up to here time grows no faster than their num
 TALL = 2.0  # metres by which a screen counts as higher where openings are placed: it wants no window behind it
 DEFAULTS = PlaceConfig()
 OF_OPENINGS = frozenset({"door_free", "leaf_aside", "window_free"})  # terms
-OF_GRAPHS = frozenset({"floor_filled"})  # terms that only more furniture meets, no other draft
 DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
 judged_faults = lru_cache(4 * DRAFTS)(living_faults)  # of boxes that nobody changes: openings that make way ask again
 

@@ -48,6 +48,7 @@ WORTH = 0.5  # that a sweep must gain for another one
 GRAIN = 1e4  # costs are compared to so many parts of one
 PULL, FARTHEST, TURN = 0.08, 4.0, 0.1  # for a metre from the draft, up to so many, and for looking the other way
 ATTENDING = 0.25  # share of that for pieces that attend another
+OF_GRAPHS = frozenset({"floor_filled"})  # terms that only more furniture meets, no other place
 WHOLE = ("floor_used", "corners_used", "floor_served", "each_served")  # terms that ask for all pieces of a room
 FIRST = {"bed": 0.0, "sofa": 1.0, "board": 3.0, "storage": 4.0, "seat": 6.0, "screen": 7.0, "decor": 8.5, "light": 8.0}
 HIT, DEEP, MISSED = 1.0, 4.0, 3.0  # before anything is judged: for running into something, per metre, and relations
@@ -89,7 +90,7 @@ class Search:
         self.budget = round(BUDGET * max(1.0, len(problem.size) / PIECES))
         numbers, words = {int(number) for number in problem.triplets[:, 1]}, vocabulary().predicates
         stated = {row.name for row in words if row.id in numbers} | {"placed"}
-        sizes = {row.name for row in words if row.measures == "size"} | {"scale", "floor_filled"}  # of no pose
+        sizes = {row.name for row in words if row.measures == "size"} | {"scale"} | OF_GRAPHS  # of no pose
         self.terms = tuple(t for t in terms if t.name not in sizes and (t.kind != "relations" or t.name in stated))
         self.firm = np.array([term.name not in yields for term in self.terms])
         self.rooms: dict[bytes, Plan] = {}

@@ -18,7 +18,7 @@ from safetensors.torch import save_file
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from echomodel.compact.model import read_weights
-from echomodel.compact.weights import in_words, joined_config, words_of
+from echomodel.compact.weights import grown_tables, joined_config, words_of
 
 
 def main() -> None:
@@ -30,9 +30,10 @@ def main() -> None:
     files = {path: read_weights(path) for path in options.files}
     config = joined_config({path: header for path, (header, _) in files.items()})
     known = {path: words_of(path, header) for path, (header, _) in files.items()}
-    grown = [in_words(tensors, known[path], config) for path, (_, tensors) in files.items()]
+    grown = [grown_tables(tensors, known[path], config) for path, (_, tensors) in files.items()]
+    form = {key: values.shape for key, values in grown[0].items()}
     for path, tensors in zip(files, grown, strict=True):
-        if {key: values.shape for key, values in tensors.items()} != {k: v.shape for k, v in grown[0].items()}:
+        if {key: values.shape for key, values in tensors.items()} != form:
             parser.error(f"{path}: holds other parts than {options.files[0]}, or of other sizes; nothing was written")
     mean = {}
     for key, first in grown[0].items():

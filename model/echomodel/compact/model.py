@@ -24,7 +24,7 @@ from echomodel.compact.weights import (
     FORMAT,
     PARTS,
     WeightsError,
-    in_words,
+    grown_tables,
     joined_config,
     own_statistics,
     read_header,
@@ -155,7 +155,7 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
         config = joined_config(metadata)
         tensors: dict[str, Tensor] = {}
         for path, header in metadata.items():
-            tensors |= in_words(held_by[path], words_of(path, header), config)
+            tensors |= grown_tables(held_by[path], words_of(path, header), config)
         held = {part for header in metadata.values() for part in json.loads(header["parts"])}
         parts = [part for part in PARTS if part in held]
         statistics = own_statistics(metadata, config)

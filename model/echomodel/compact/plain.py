@@ -22,7 +22,7 @@ from echomodel.compact.furniture import Furniture
 from echomodel.compact.layout import Layout
 from echomodel.compact.learned import places
 from echomodel.compact.pairs import Echo, Latents
-from echomodel.compact.weights import TABLES, in_words, joined_config, own_statistics, read_header, words_of
+from echomodel.compact.weights import TABLES, grown_tables, joined_config, own_statistics, read_header, words_of
 from echomodel.config import CompactConfig
 
 EPSILON = 1e-5  # of a norm's variance, as torch has it
@@ -128,7 +128,7 @@ def load_plain(paths: Sequence[Path]) -> tuple[PlainModel, str]:
     for path, header in metadata.items():
         digest.update(content := path.read_bytes())
         parts = json.loads(header["parts"])
-        held = in_words(load(content) if set(parts) & NETS.keys() else {}, words_of(path, header), config)
+        held = grown_tables(load(content) if set(parts) & NETS.keys() else {}, words_of(path, header), config)
         for part in set(parts) & NETS.keys():
             own = {key[len(part) + 1 :]: value.astype(np.float32) for key, value in held.items()
                    if key.startswith(f"{part}.")}  # fmt: skip

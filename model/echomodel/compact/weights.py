@@ -91,7 +91,7 @@ def joined_config(metadata: Mapping[Path, dict[str, str]]) -> CompactConfig:
     return joined
 
 
-def in_words(tensors: Mapping[str, Any], known: Mapping[str, Names], config: CompactConfig) -> dict[str, Any]:
+def grown_tables(tensors: Mapping[str, Any], known: Mapping[str, Names], config: CompactConfig) -> dict[str, Any]:
     """Tensors by name, their tables in the words of `config`: one that a file does not know begins as what it is like.
 
     Arguments:
@@ -113,9 +113,7 @@ def _rows(kind: str, known: Mapping[str, Names], config: CompactConfig) -> np.nd
 def own_statistics(metadata: Mapping[Path, Mapping[str, str]], config: CompactConfig) -> BoxStatistics:
     """The box statistics of the file with the layout branch, which alone knows boxes, else of the first file, of the
     categories of `config`."""
-    first = next(iter(metadata))
-    path = next((path for path, header in metadata.items() if "layout" in json.loads(header["parts"])), first)
-    own = metadata[path]
+    path, own = max(metadata.items(), key=lambda of: "layout" in json.loads(of[1]["parts"]))
     statistics = BoxStatistics.from_json(json.loads(own["statistics"]))
     if statistics.classes:
         classes = np.array(statistics.classes)[_rows("categories", words_of(path, own), config)]

@@ -180,8 +180,9 @@ CARRIED: dict[str, Margin] = {
     "standing_on": lambda pair: pair.kit.minimum(TOUCH - abs(pair.position_s[:, 1] - pair.top_o), pair.centre_inside),
 }
 STRICT = RuleSet("strict", True, _rules(APART, _larger, CARRIED, _symmetrical))
-MEANS: dict[str, str] = tables("means.toml", __file__)  # names of numbers above in braces
-STRICT.rules.update({name: replace(rule, means=MEANS[name].format(**globals())) for name, rule in STRICT.rules.items()})
+MEANS: dict[str, str] = tables("means.toml", __file__)
+NUMBERS = dict(APART=APART, OVERLAP=OVERLAP, NEAR=NEAR, SIDES=SIDES, TOUCH=TOUCH, VOLUME=VOLUME, HEIGHT=HEIGHT)
+STRICT.rules.update({name: replace(rule, means=MEANS[name].format(**NUMBERS)) for name, rule in STRICT.rules.items()})
 
 PUBLISHED: dict[str, Margin] = {"standing_on": lambda pair: TOUCH - abs(pair.position_s[:, 1] - pair.position_o[:, 1])}
 OPEN = ("standing_on", "symmetrical_to")

@@ -14,7 +14,7 @@ from echomodel.boxes import BoxStatistics
 from echomodel.compact.model import CompactModel, load_weights, read_weights, restored
 from echomodel.compact.modules import WordTable
 from echomodel.compact.shape import ShapeDenoiser
-from echomodel.compact.weights import WORDS, in_words, own_statistics, read_header, words_of
+from echomodel.compact.weights import WORDS, grown_tables, own_statistics, read_header, words_of
 from echomodel.config import CompactConfig
 from echomodel.data.roomset import RoomSet
 from echomodel.late import Late
@@ -54,8 +54,7 @@ class Start:
     @property
     def known_categories(self) -> int:
         """How many of the model's categories, the first, the file that the recipe begins with knows."""
-        path = next(iter(self.recipe.warm_files), None)
-        return len(words_of(path, read_header(path))["categories"] if path else self.model.config.categories)
+        return len(_known_words(self.recipe).get("categories", self.model.config.categories))
 
     def rooms(self, *, held: bool) -> PackedRooms:
         """The recipe's rooms to train on, or those that are held out."""
@@ -144,10 +143,9 @@ def started(kind: type[CompactStage], recipe: Recipe, device: torch.device, *, r
 
 def _keep_known(start: Start) -> None:
     """Of a model all but the words that its recipe's first file of `warm` does not know asks for no gradient."""
-    recipe, old = start.recipe, Path(next(iter(start.recipe.warm), ""))
-    known = words_of(old, read_header(old)) if recipe.warm else {}
+    recipe, known = start.recipe, _known_words(start.recipe)
     if all(len(names) == len(getattr(start.model.config, kind)) for kind, names in known.items()):
-        what = f"{old} knows all words" if recipe.warm else "'warm' names no file whose words are known"
+        what = f"{recipe.warm[0]} knows all words" if known else "'warm' names no file whose words are known"
         raise ValueError(f"recipe field 'new_words': {what}")
     if recipe.optimizer.decay:
         raise ValueError("recipe field 'new_words': optimizer.decay would change known words, allowed: 0")
@@ -155,6 +153,11 @@ def _keep_known(start: Start) -> None:
     for table in (module for module in start.model.modules() if isinstance(module, WordTable)):
         new = torch.arange(len(table.names), device=table.weight.device)[:, None] >= len(known[table.kind])
         table.weight.requires_grad_(True).register_hook(partial(torch.mul, new))
+
+
+def _known_words(recipe: Recipe) -> dict[str, tuple[str, ...]]:
+    """Words of every kind that the first file of `warm` knows; none where there is no such file."""
+    return next((words_of(file, read_header(file)) for file in recipe.warm_files), {})
 
 
 def _in_words(recipe: Recipe) -> CompactConfig:
@@ -165,11 +168,11 @@ def _in_words(recipe: Recipe) -> CompactConfig:
         return replace(config, **{kind: getattr(loaded, kind) for kind in WORDS})
     if not recipe.warm:
         return config
-    file = recipe.warm_files[0]
-    named = words_of(file, read_header(file))
+    named = _known_words(recipe)
     new = {kind: tuple(name for name in getattr(config, kind) if name not in named[kind]) for kind in WORDS}
     if new["predicates"]:
-        raise ValueError(f"{file}: knows no relation {new['predicates'][0]!r}, which networks learn today")
+        name, file = new["predicates"][0], recipe.warm_files[0]
+        raise ValueError(f"{file}: knows no relation {name!r}, which networks learn today")
     grown: dict[str, Any] = {kind: named[kind] + new[kind] for kind in WORDS}
     return replace(config, **grown)
 
@@ -192,7 +195,7 @@ def warm_start(model: CompactModel, path: Path) -> tuple[str, ...]:
     """
     header, tensors = read_weights(path)
     own = model.state_dict()
-    for key, value in in_words(restored(tensors), words_of(path, header), model.config).items():
+    for key, value in grown_tables(restored(tensors), words_of(path, header), model.config).items():
         if key not in own:
             continue
         wanted = own[key]

@@ -219,6 +219,9 @@ def test_what_new_words_need_is_said(homes, tmp_path):
         open_run(replace(homes, new_words=True, warm=()), tmp_path / "run")
     with pytest.raises(ValueError, match=r"'new_words': optimizer\.decay would change known words, allowed: 0"):
         open_run(replace(homes, new_words=True, optimizer=OptimizerConfig()), tmp_path / "run")
+    ships = replace(homes, model=CompactConfig(), warm=("layout.safetensors",))  # a name alone is of those that ship
+    with pytest.raises(ValueError, match=r"'new_words': layout\.safetensors knows all words"):
+        open_run(replace(ships, new_words=True), tmp_path / "run")
     model = started(LayoutStage, homes, torch.device("cpu"), resume=False).model
     model.write(tmp_path / "all.safetensors", model.parts)
     with pytest.raises(ValueError, match=r"'new_words': .*all\.safetensors knows all words"):
