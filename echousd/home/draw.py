@@ -17,6 +17,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError
 from echousd.graph.picture import save_figure
 from echousd.home.importing.homes import room_kind
+from echousd.home.importing.simulators import procthor_type
 from echousd.home.plan import Plan, ways
 from echousd.home.stages import Standing
 from echousd.naming import free_name
@@ -170,7 +171,6 @@ def write_dxf(plan: Plan, path: Path, things: Sequence[Standing] = ()) -> None:
         drawing.saveas(beside)
 
 
-KINDS = {"kitchen": "Kitchen", "bathroom": "Bathroom", "bedroom": "Bedroom", "childrens_room": "Bedroom"}
 LOOK = {"name": "PureWhite"}
 ASSETS = {"door": "Doorway_1", "passage": "Doorframe_1", "window": "Window_Slider_48x36"}
 
@@ -178,14 +178,16 @@ ASSETS = {"door": "Doorway_1", "passage": "Doorframe_1", "window": "Window_Slide
 def write_procthor(plan: Plan, path: Path) -> None:
     """Write the rooms, walls, doors and windows of a plan; furniture stays out, whose models AI2-THOR does not have.
 
-    Walls of ProcTHOR have no thickness: rooms end in the middle of the walls between them.
+    Walls of ProcTHOR have no thickness: rooms end in the middle of the walls between them. What it has no words for
+    stands in `metadata`, from where `read_procthor` takes it.
     """
     number = {name: index + 2 for index, name in enumerate(plan.cells)}  # 1 is outside
-    rooms, walls = [], []
+    rooms, walls, ours = [], [], {"rooms": dict[str, Any](), "doors": dict[str, Any]()}
     for name, cell in plan.cells.items():
         spec = plan.home.room(name).graph.room
-        corners = [{"x": z, "y": 0, "z": x} for x, z in cell.round(4).tolist()]  # Unity's x is our east
-        about = {"roomType": KINDS.get(spec.type, "LivingRoom"), "floorPolygon": corners, "floorMaterial": LOOK}
+        corners = _in_unity(cell)
+        ours["rooms"][f"room|{number[name]}"] = {"name": name, "type": spec.type, "walls": [*plan.walls[name]]}
+        about = {"roomType": procthor_type(spec.type), "floorPolygon": corners, "floorMaterial": LOOK}
         rooms.append({"id": f"room|{number[name]}", **about, "ceilings": [], "children": []})
         for edge, ends in enumerate(zip(corners, [*corners[1:], corners[0]], strict=True)):
             polygon = [*ends, *({**corner, "y": spec.tall} for corner in ends)]
@@ -209,6 +211,14 @@ def write_procthor(plan: Plan, path: Path) -> None:
         middle = {"x": float(at.mean()), "y": opening.sill + opening.height / 2, "z": 0}
         hole = [{"x": float(np.round(x, 4)), **y, "z": 0} for x, y in zip(at, (low, high), strict=True)]
         found[f"{kind}s"].append({**one, "holePolygon": hole, "assetPosition": middle})
+        if len(swing := swing_area(plan.floors[name], opening)):
+            leaf = _in_unity(np.array([hinge_point(plan.floors[name], opening)[0], swing[-1]]))
+            ours["doors"][one["id"]] = dict(zip(("hinge", "tip"), leaf, strict=True))
     found["proceduralParameters"] = {"ceilingMaterial": LOOK, "floorColliderThickness": 1.0, "lights": []}
-    found["metadata"] = {"schema": "1.0.0", "generator": "echousd"}
+    found["metadata"] = {"schema": "1.0.0", "generator": "echousd", "echousd": ours}
     write_json(path, found)
+
+
+def _in_unity(points: np.ndarray) -> list[dict[str, float]]:
+    """Points (x, z) of the home as Unity has them: its x is our east."""
+    return [{"x": z, "y": 0, "z": x} for x, z in points.round(4).tolist()]

@@ -10,7 +10,17 @@ from itertools import combinations
 import numpy as np
 import shapely
 
-from echomodel.openings import USUAL, Opening, direction, inward_normal, numbered, overlap, segment, signed_area
+from echomodel.openings import (
+    USUAL,
+    WINDOWS,
+    Opening,
+    direction,
+    inward_normal,
+    numbered,
+    overlap,
+    segment,
+    signed_area,
+)
 from echomodel.sizes import size_statistics
 from echomodel.vocabulary import normalised, vocabulary
 from echousd.assets.naming import category_of, known_word, plain
@@ -26,7 +36,7 @@ from echousd.stage.foreign import LARGE, TAKEN_FOR
 
 LEAST = 0.5  # square metres of a room
 TIDY = 0.01  # metres: corners that stand out less are none
-WIDE = 1.5  # metres from which a way without a leaf is open
+WIDE = 1.0  # metres from which a way without a leaf is open: wider than a door
 NARROW = 0.4  # metres of what may be a way
 REACH = 0.3  # metres from a wall to what is a hole in it
 STRAIGHT = 0.97  # cosine between a hole and its wall
@@ -160,9 +170,12 @@ def _fit(plan: Plan, side: Facing, hole: Hole, ends: np.ndarray) -> tuple[float,
     away = abs(off - side.deep / 2)
     if away > side.deep / 2 + REACH or np.ptp(at) < STRAIGHT * width or end - start < max(NARROW, 0.6 * width):
         return None
-    usual = USUAL[hole.kind]
-    sill = (usual["sill"] if hole.sill is None else hole.sill) if hole.kind == "window" else 0.0
-    tall = min(hole.height or usual["height"], (height or np.inf) - sill - 0.01)
+    usual_sill, usual_tall = 0.0, USUAL[hole.kind]["height"]
+    if hole.kind == "window":
+        use = vocabulary().room_type(plan.home.room(side.one).type).use
+        usual_sill, usual_tall, _ = WINDOWS.get(use, WINDOWS[""])
+    sill = hole.sill if hole.kind == "window" and hole.sill is not None else usual_sill
+    tall = min(hole.height or usual_tall, (height or np.inf) - sill - 0.01)
     sides = (round(float(start), 4), round(float(end - start), 4), round(float(tall), 4))
     return away + width - (end - start), Opening(hole.kind, hole.kind, side.edge, *sides, round(float(sill), 4))
 

@@ -18,6 +18,7 @@ from echomodel.bounded import unpacking
 from echomodel.files import raising
 from echousd.graph import GraphError
 from echousd.home.importing.found import MAP, SCREEN, Found, Hole, Piece, Room, long_sides, rooms_between, span
+from echousd.shapes.walls import outline as offset
 
 UNITY = "metres, left-handed with +Y up as Unity has it; its +z is our north"
 Z_UP = "metres, z up; its +y is our north"
@@ -25,12 +26,19 @@ SHAPE = re.compile(r"\s*(?:shapely\.)?(box|Polygon|LineString)\s*\((.*)\)\s*", r
 LONGEST = 20_000  # characters of one shape
 
 
+def procthor_type(kind: str) -> str:
+    """The one of ProcTHOR's four types that a room type is nearest to."""
+    near = {"kitchen": "Kitchen", "bathroom": "Bathroom", "bedroom": "Bedroom", "childrens_room": "Bedroom"}
+    return near.get(kind, "LivingRoom")
+
+
 def read_procthor(data: Any) -> Found:
-    """ProcTHOR 1.0.0 and Holodeck: walls without a surface are passages, holes count along their first wall."""
-    rooms = [
-        Room(str(one["id"]), (str(one["roomType"]),), _flat(one["floorPolygon"]), _ceiling(one, data))
-        for one in data["rooms"]
-    ]
+    """ProcTHOR 1.0.0 and Holodeck: walls without a surface are passages, holes count along their first wall.
+
+    What only our own plans have (names and types of rooms, thickness of walls, leaves) stands in `metadata`.
+    """
+    ours = (data.get("metadata") or {}).get("echousd") or {"rooms": {}, "doors": {}}
+    rooms = [_procthor_room(one, ours["rooms"].get(str(one["id"])), data) for one in data["rooms"]]
     walls = {str(wall["id"]): _flat(wall["polygon"]) for wall in data.get("walls", ()) if wall.get("polygon")}
     holes = []
     for kind in ("door", "window"):
@@ -46,7 +54,11 @@ def read_procthor(data: Any) -> Found:
             passage = str(one.get("assetId", "")).startswith("Doorframe")  # without a leaf
             height = abs(high["y"] - low["y"])
             sill = min(low["y"], high["y"]) if kind == "window" else None
-            holes.append(Hole(str(one["id"]), "passage" if passage else kind, ends[None], height, sill))
+            tips = None
+            if leaf := ours["doors"].get(str(one["id"])):
+                hinge, tip = _flat([leaf["hinge"], leaf["tip"]])
+                ends, tips = ends[np.linalg.norm(ends - hinge, axis=1).argsort()], tip[None]
+            holes.append(Hole(str(one["id"]), "passage" if passage else kind, ends[None], height, sill, tips=tips))
     holes += [Hole(str(wall["id"]), "passage", walls[str(wall["id"])][None, :2]) for wall in _open_walls(data)]
     by_name = {room.name: shapely.Polygon(room.corners) for room in rooms}
     for pair in data.get("open_room_pairs", ()):
@@ -63,6 +75,17 @@ def read_procthor(data: Any) -> Found:
         front = np.array([math.cos(turn), math.sin(turn)])
         pieces.append(Piece(word, (word, str(one.get("assetId", ""))), at, front))
     return Found(UNITY, rooms, holes, pieces, ignored=ignored)
+
+
+def _procthor_room(one: Any, ours: Any, data: Any) -> Room:
+    """A room; of a plan of ours, if nobody changed its type or corners since, its floor between the walls."""
+    corners, name = _flat(one["floorPolygon"]), str(one["id"])
+    words: tuple[str, ...] = (str(one["roomType"]),)
+    if ours and procthor_type(ours["type"]) == one["roomType"]:
+        name, words = str(ours["name"]), (str(ours["type"]), *words)
+    if ours and len(ours["walls"]) == len(corners):
+        corners = offset(corners, [-float(thick) for thick in ours["walls"]])
+    return Room(name, words, corners, _ceiling(one, data))
 
 
 def _flat(corners: Any) -> np.ndarray:
