@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import groupby, product
 
 import numpy as np
 
-from echomodel.boxes2d import hull
 from echomodel.late import Late
-from echomodel.objective.access import DEEP, WALKED_BEHIND, to_wall
-from echomodel.objective.company import places_of
-from echomodel.objective.sight import PASSAGE, WATCHED_FREE, WATCHED_FROM
+from echomodel.objective.sizes import places_of
 from echomodel.objective.support import ON_CEILING
 from echomodel.vocabulary import vocabulary
 from echousd.place.distances import APART, MOST_UNDER, kept_apart, over_bed, seen_from, spread_at_walls
@@ -20,11 +16,10 @@ from echousd.place.geometry import depth_inside
 from echousd.place.problem import Problem
 from echousd.place.slots import HALF_PI, INNER, SEATS, STANDS
 
-sides = Late(f"{SEATS}:sides")
+in_view, seatings, sides = (Late(f"{SEATS}:{name}") for name in ("in_view", "seatings", "sides"))
 STEP = 0.2  # metres between two places at a wall
 GRID, PLACES = 0.35, 1000  # metres between two places in the open; in a hall so many, farther apart
 SLIDES = (0.08, 0.2, 0.45, 0.8)  # metres by which a piece is moved along its width and its depth
-AMID = 0.7  # share of the farthest watching distance at which a sofa stands in the room
 Row = tuple[float, float, float, float]  # x, z, yaw, and how much others are preferred
 
 
@@ -58,7 +53,7 @@ def proposals(problem: Problem, position: np.ndarray, yaw: np.ndarray, there: np
         if kind.stands == "company":
             rows += _corners(problem, i, loose, across=True)
         if kind.role == "sofa":
-            rows += _in_view(problem, i, walls)
+            rows += in_view(problem, i, walls)
         if not at_wall and kind.role not in ("decor", "light", "storage"):
             rows += _in_the_open(problem, i, loose)
         rows += _as_stated(problem, position, yaw, i)
@@ -116,7 +111,7 @@ def _leans(problem: Problem, i: int) -> bool:
 
 def slots_at(problem: Problem, i: int, anchor: int) -> list[tuple[float, float, float, float]]:
     """Where box i may stand in the frame of its anchor; empty where its row does not say."""
-    stands = _slot_role(problem, i, anchor)
+    stands = slot_role(problem, i, anchor)
     if stands not in STANDS:
         return []
     seats = np.array([kind.role == "seat" for kind in problem.kinds]) & (problem.anchor == anchor)
@@ -142,10 +137,10 @@ def _apart(problem: Problem, i: int, anchor: int, stands: str) -> tuple[float, f
 
 def _mates(problem: Problem, stands: str, anchor: int) -> list[int]:
     """All who stand so to a box."""
-    return [j for j in np.flatnonzero(problem.anchor == anchor).tolist() if _slot_role(problem, j, anchor) == stands]
+    return [j for j in np.flatnonzero(problem.anchor == anchor).tolist() if slot_role(problem, j, anchor) == stands]
 
 
-def _slot_role(problem: Problem, i: int, anchor: int) -> str:
+def slot_role(problem: Problem, i: int, anchor: int) -> str:
     """How box i stands to what it attends: the name of its slots, or of the row's own word where it has none."""
     kind, to = problem.kinds[i], problem.kinds[anchor]
     if problem.carrier[i] == anchor:
@@ -155,40 +150,6 @@ def _slot_role(problem: Problem, i: int, anchor: int) -> str:
     if kind.stands in ("at", "foot") and to.role == "board":
         return "at_front" if to.access else "around"
     return problem.slot_roles[i]
-
-
-def seatings(problem: Problem, i: int, seats: Sequence[int]) -> tuple[list[int], list[list[Row]]]:
-    """Who of some boxes stands around box i, wide ones first, and ways to do so: a slot for each, the best ways first.
-
-    Benches take the middle of a long side, chairs what is left.
-    """
-    places = places_of(problem.size)
-    seats = sorted((k for k in seats if _slot_role(problem, k, i) == "around"), key=lambda k: -places[k])
-    ways: list[list[tuple[Row, np.ndarray]]] = [[]] if len(seats) > 1 else []
-    for alike in (list(group) for _, group in groupby(seats, key=lambda k: places[k])):
-        largest = max(alike, key=lambda k: float(problem.size[k, 0]))
-        slots = sorted(slots_at(problem, largest, i), key=lambda slot: slot[3])
-        table = np.array(slots).reshape(-1, 4)
-        room = np.concatenate([table[:, :2], hull(problem.size[largest, ::2][None] / 2, table[:, 2])], 1)
-        first = 2 if places[largest] > 1 and len(alike) < len(seats) else len(slots)
-        after = []
-        for begun, start in product(ways, range(min(first, len(slots)))):  # those that go with each, its likes first
-            chosen, free = [*begun], np.ones(len(slots), bool)
-            for _, taken in begun:
-                free &= _clear_of(room, taken)
-            for k in (start, *np.flatnonzero(table[:, 3] == table[start, 3]).tolist(), *range(len(slots))):
-                if free[k] and len(chosen) < len(begun) + len(alike):
-                    chosen.append((slots[k], room[k]))
-                    free &= _clear_of(room, room[k])
-            after += [chosen] * (len(chosen) == len(begun) + len(alike))
-        ways = after
-    found = [[slot for slot, _ in way] for way in ways]
-    return seats, [way for number, way in enumerate(found) if not any({*way} == {*one} for one in found[:number])]
-
-
-def _clear_of(room: np.ndarray, taken: np.ndarray) -> np.ndarray:
-    """(k,) bool: which rectangles (k, 4), middles and half extents, another one leaves free."""
-    return np.asarray((abs(room[:, :2] - taken[:2]) - room[:, 2:] - taken[2:]).max(1) > -0.01)
 
 
 def out_of(position: np.ndarray, yaw: float, slot: tuple[float, float, float, float]) -> Row:
@@ -288,20 +249,6 @@ def _corners(problem: Problem, i: int, more: float, *, across: bool = False) -> 
         turn = math.atan2(*(one + two).tolist()) if across else problem.walls[k][3]
         rows.append((float(corner[0] + at[0]), float(corner[1] + at[1]), turn, more))
     return rows
-
-
-def _in_view(problem: Problem, i: int, at_walls: Sequence[Row]) -> list[Row]:
-    """In the room before a screen at the far wall, where a sofa at its own wall would be too far from it."""
-    if not any(role == "opposite" and a == i for role, a in zip(problem.slot_roles, problem.anchor, strict=True)):
-        return []
-    far, rows = WATCHED_FROM["sofa"][1], np.array(at_walls).reshape(-1, 4)
-    front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
-    free = to_wall(problem.plan, np.zeros(len(rows), int), rows[:, :2], front)
-    deep = free + float(problem.size[i, 2]) / 2 > DEEP
-    away = [free - AMID * far, np.full(len(rows), WALKED_BEHIND - 0.01 - problem.behind[i]), free - WATCHED_FREE]
-    keep = [free > max(far, AMID * far + PASSAGE), deep, deep & (free > WATCHED_FREE + WALKED_BEHIND)]
-    out = [(rows + np.pad(off[:, None] * front, ((0, 0), (0, 2))))[at] for off, at in zip(away, keep, strict=True)]
-    return [(x, z, yaw, more) for x, z, yaw, more in np.concatenate(out).tolist()]
 
 
 def _in_the_open(problem: Problem, i: int, more: float) -> list[Row]:

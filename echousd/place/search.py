@@ -317,6 +317,8 @@ class Search:
         """The state with those who stand around box i at one of the ways in which as many sit there."""
         problem = self.problem
         seats = [k for k in self.children[i] if there[k] and not problem.turned[k]]
+        if len(seats) < 2 or problem.kinds[i].role != "board":
+            return state
         if (i, *seats) not in self.ways:
             self.ways[i, *seats] = seatings(problem, i, seats)
         around, ways = self.ways[i, *seats]

@@ -1,13 +1,25 @@
-"""Slots of seats, as slots.py gives them: chairs at tables, armchairs and second sofas in a group."""
+"""Slots of seats, as slots.py gives them: chairs at tables, sofas, their tables and armchairs in a group."""
+
+from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import groupby, product
 
+import numpy as np
+
+from echomodel.boxes2d import hull
+from echomodel.objective.access import DEEP, PASSAGE, WALKED_BEHIND, WATCHED_FREE, to_wall
 from echomodel.objective.crowding import HAND
-from echomodel.objective.sizes import TUCKED
-from echomodel.vocabulary import Category
-from echousd.place.slots import HALF_PI, Size, Slot
+from echomodel.objective.sight import WATCHED_FROM
+from echomodel.objective.sizes import TUCKED, places_of
+from echomodel.vocabulary import Category, vocabulary
+from echousd.place.problem import Problem
+from echousd.place.proposals import Row, slot_role, slots_at
+from echousd.place.slots import HALF_PI, INNER, Size, Slot
 
 DEEPER = 0.27  # metres that a chair is pushed under its table where room is scarce
+AMID = 0.7  # share of the farthest watching distance at which a sofa stands in the room
 
 
 def around(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
@@ -112,3 +124,67 @@ def sides(own: Size, table: Size) -> list[Slot]:
             at = math.sin(turn) * away + math.cos(turn) * level, math.cos(turn) * away - math.sin(turn) * level
             out.append((*at, turn + math.pi, more))
     return out
+
+
+def before(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
+    """Coffee tables: before the sofa, in reach, the long side along it."""
+    inner = kind.name in vocabulary().cornered
+    out = []
+    for turn, more in ((0.0, 0.0), (math.pi, 0.02), (HALF_PI, 0.8)):
+        depth, width = (own[2], own[0]) if turn != HALF_PI else (own[0], own[2])
+        if width < depth * 0.95:
+            more += 0.3
+        for gap, away in ((apart, 0.0), (0.32, 0.05), (0.46, 0.05), (0.25, 0.3), (0.6, 0.3)):
+            gap = gap - INNER if inner else gap
+            for lateral in (0.0, -0.08, 0.08, -0.2, 0.2, -0.35, 0.35):
+                if abs(lateral) < anchor[0] / 2:
+                    out.append((lateral, anchor[2] / 2 + depth / 2 + gap, turn, more + away + 1.5 * abs(lateral)))
+    return out
+
+
+def in_view(problem: Problem, i: int, at_walls: Sequence[Row]) -> list[Row]:
+    """In the room before a screen at the far wall, where a sofa at its own wall would be too far from it."""
+    if not any(role == "opposite" and a == i for role, a in zip(problem.slot_roles, problem.anchor, strict=True)):
+        return []
+    far, rows = WATCHED_FROM["sofa"][1], np.array(at_walls).reshape(-1, 4)
+    front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
+    free = to_wall(problem.plan, np.zeros(len(rows), int), rows[:, :2], front)
+    deep = free + float(problem.size[i, 2]) / 2 > DEEP
+    away = [free - AMID * far, np.full(len(rows), WALKED_BEHIND - 0.01 - problem.behind[i]), free - WATCHED_FREE]
+    keep = [free > max(far, AMID * far + PASSAGE), deep, deep & (free > WATCHED_FREE + WALKED_BEHIND)]
+    out = [(rows + np.pad(off[:, None] * front, ((0, 0), (0, 2))))[at] for off, at in zip(away, keep, strict=True)]
+    return [(x, z, yaw, more) for x, z, yaw, more in np.concatenate(out).tolist()]
+
+
+def seatings(problem: Problem, i: int, seats: Sequence[int]) -> tuple[list[int], list[list[Row]]]:
+    """Who of some boxes stands around box i, wide ones first, and ways to do so: a slot for each, the best ways first.
+
+    Benches take the middle of a long side, chairs what is left.
+    """
+    places = places_of(problem.size)
+    seats = sorted((k for k in seats if slot_role(problem, k, i) == "around"), key=lambda k: -places[k])
+    ways: list[list[tuple[Row, np.ndarray]]] = [[]] if len(seats) > 1 else []
+    for alike in (list(group) for _, group in groupby(seats, key=lambda k: places[k])):
+        largest = max(alike, key=lambda k: float(problem.size[k, 0]))
+        slots = sorted(slots_at(problem, largest, i), key=lambda slot: slot[3])
+        table = np.array(slots).reshape(-1, 4)
+        room = np.concatenate([table[:, :2], hull(problem.size[largest, ::2][None] / 2, table[:, 2])], 1)
+        first = 2 if places[largest] > 1 and len(alike) < len(seats) else len(slots)
+        after = []
+        for begun, start in product(ways, range(min(first, len(slots)))):  # those that go with each, its likes first
+            chosen, free = [*begun], np.ones(len(slots), bool)
+            for _, taken in begun:
+                free &= _clear_of(room, taken)
+            for k in (start, *np.flatnonzero(table[:, 3] == table[start, 3]).tolist(), *range(len(slots))):
+                if free[k] and len(chosen) < len(begun) + len(alike):
+                    chosen.append((slots[k], room[k]))
+                    free &= _clear_of(room, room[k])
+            after += [chosen] * (len(chosen) == len(begun) + len(alike))
+        ways = after
+    found = [[slot for slot, _ in way] for way in ways]
+    return seats, [way for number, way in enumerate(found) if not any({*way} == {*one} for one in found[:number])]
+
+
+def _clear_of(room: np.ndarray, taken: np.ndarray) -> np.ndarray:
+    """(k,) bool: which rectangles (k, 4), middles and half extents, another one leaves free."""
+    return np.asarray((abs(room[:, :2] - taken[:2]) - room[:, 2:] - taken[2:]).max(1) > -0.01)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from echomodel.late import Late
-from echomodel.vocabulary import Category, vocabulary
+from echomodel.vocabulary import Category
 
 Size = np.ndarray
 Slot = tuple[float, float, float, float]
@@ -30,22 +30,6 @@ def head(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahea
         for gap, more in ((apart, 0.0), (apart + 0.09, 0.2), (apart + 0.22, 0.5)):
             lateral = side * (anchor[0] / 2 + own[0] / 2 + gap)
             out.append((lateral, -anchor[2] / 2 + own[2] / 2, 0.0, more))
-    return out
-
-
-def before(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
-    """Coffee tables: before the sofa, in reach, the long side along it."""
-    inner = kind.name in vocabulary().cornered
-    out = []
-    for turn, more in ((0.0, 0.0), (math.pi, 0.02), (HALF_PI, 0.8)):
-        depth, width = (own[2], own[0]) if turn != HALF_PI else (own[0], own[2])
-        if width < depth * 0.95:
-            more += 0.3
-        for gap, away in ((apart, 0.0), (0.32, 0.05), (0.46, 0.05), (0.25, 0.3), (0.6, 0.3)):
-            gap = gap - INNER if inner else gap
-            for lateral in (0.0, -0.08, 0.08, -0.2, 0.2, -0.35, 0.35):
-                if abs(lateral) < anchor[0] / 2:
-                    out.append((lateral, anchor[2] / 2 + depth / 2 + gap, turn, more + away + 1.5 * abs(lateral)))
     return out
 
 
@@ -104,6 +88,6 @@ def over(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahea
 
 SEATS = "echousd.place.seats"
 STANDS: dict[str, Slots] = {
-    "head": head, "before": before, "beside": beside, "foot": foot, "on_top": on_top, "over": over,
-    "with": Late(f"{SEATS}:joined"), **{name: Late(f"{SEATS}:{name}") for name in ("around", "at_front", "company")},
+    "head": head, "beside": beside, "foot": foot, "on_top": on_top, "over": over, "with": Late(f"{SEATS}:joined"),
+    **{name: Late(f"{SEATS}:{name}") for name in ("around", "at_front", "before", "company")},
 }  # fmt: skip

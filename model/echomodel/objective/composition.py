@@ -6,14 +6,12 @@ Distances were measured on 300 real rooms with their furniture, unless a standar
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, at_most, cast, dot, full, held, least_of, once, rows, sum_of
+from echomodel.arrays import Array, at_least, cast, dot, full, held, once, rows
 from echomodel.floors import Walls, footprint, signed_area, signed_distance
-from echomodel.objective.access import WALKED
-from echomodel.objective.company import AROUND, BESIDE, first_of, seats_at
+from echomodel.objective.company import AROUND, BESIDE, first_of
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
 from echomodel.sizes import REACH, filled_area
 
@@ -23,8 +21,6 @@ BARE = (0.48, 0.0116, 1.0)
 # of real rooms have a smaller one; sine of two walls that meet in one; share of a floor that 95 % of real rooms fill.
 WAY, LEFT_BARE, SQUARE, THIN = 1.0, 1.7, 0.9, 0.58
 HALL = 24.0  # square metres of a room that a few pieces do not fill
-AHEAD, IN_VIEW = 1.0, 1.5  # metres before a sofa and a group's armchair to other groups: 97 % of real ones have them
-COVERED = 0.25  # share of its width from which on something is before it
 CELL, POINTS = 0.25, 1000  # metres between two points of the floor that are looked at; in a hall so many, farther apart
 FEW, LARGE = 5, 0.4  # pieces: fewer fill no room; square metres of those that fill an end of it
 NEARER = 0.1  # metres by which a point must be nearer to a piece than what is bare or serves nothing, not to count
@@ -161,25 +157,6 @@ def _squares(plan: Plan, who: Array, points: Array) -> Array:
     return lateral * lateral + forward * forward
 
 
-def sofa_ahead(plan: Plan) -> Found:
-    """What lies right before a sofa belongs to its group; an armchair looks at the back of no chair, one of a group at
-    no table of another; behind a sofa one passes between it and those."""
-    loungers, xp = plan.of("sofa") | (plan.stands("company") & plan.of("seat")), plan.kit
-    sofas = plan.of("sofa") & plan.standing & ~plan.stands("company")
-    chairs, grouped = plan.stands("at") & plan.of("seat") & plan.standing, plan.anchor >= 0
-    others = plan.of("board", "seat", "storage", "bed", "sofa") & plan.standing & ~plan.stands("opposite")
-    i, j = plan.pairs(loungers & plan.standing, others, least=True)
-    met = (plan.group[i] != plan.group[j]) & (sofas[i] | chairs[j] | (grouped[i] & plan.dining[j]))
-    i, j = i[met], j[met]
-    needed = cast(xp.where(sofas, AHEAD, IN_VIEW), plan.size)
-    towards = chairs[j] & ~sofas[i] & (xp.cos(plan.yaw[i] - plan.yaw[j]) < 0)
-    ahead = plan.nearest(i, j, xp.where(towards, FAR, plan.more_ahead(i, j, needed[i], COVERED)), 0.0)
-    ahead = replace(ahead, measure=at_least(ahead.margin + needed[ahead.who], 0.0))
-    met = sofas[i] & (plan.dining | chairs)[j]
-    behind = plan.nearest(i[met], j[met], plan.more_ahead(i[met], j[met], WALKED, COVERED, sign=-1.0), WALKED)
-    return joined(ahead, replace(behind, words=behind.words + 1))
-
-
 # Share of a room's extent from a wall to the nearest large piece: 87 % of real rooms, of the longer one: 84 %; from one
 # such piece to the next: 98 %; metres of each that are never bare.
 BARE_END, BARE_LONG, BARE_STRIP, SHORT, SPARE = 0.45, 0.37, 0.4, 1.6, 2.5
@@ -242,13 +219,7 @@ def _large(plan: Plan) -> list[tuple[Array, Array, Array, Array, Array]]:
 
 SERVED = 1.0  # metres: floor further from all furniture serves nothing
 SOFT = 0.2  # metres on both sides of it over which a point of the floor counts in part
-ELBOW = 0.55  # metres of a table's edge a seat: 96 % of real sides with two seats or more (0.6 m in DIN 68880)
-EASY = 0.6  # metres of edge a seat that are enough for anybody: DIN 68880
 SEAT = 0.7  # metres that a side needs before it to seat somebody
-SQUEEZED, ROOMY = 0.17, 0.6  # metres behind chairs of one side, and how much more behind those opposite is to spare
-BEYOND, CORNER = 0.1, 0.1  # metres that a seat may reach beyond its side of a table, and more beyond one end of it
-# Who sits alone at a side of a table: share of it that the middle may be beside its own, metres from which on its ends.
-ALONE, OFF = 0.3, 0.05
 NOOK, AT_WALL = 0.66, 0.4  # metres between a plant and what is next to it along and across, and to the next wall
 # Metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it; before storage to a low table, a sofa.
 OPENS, LOW, PASSED = 0.55, 0.45, 0.8
@@ -279,71 +250,7 @@ def floor_served(plan: Plan) -> Found:
     return out
 
 
-def elbow_room(plan: Plan) -> Found:
-    """Chairs share the sides of their table: who sits beside others has room for the elbows, or no side is free."""
-    seats, xp = seats_at(plan), plan.kit
-    who, free = _free_sides(plan)
-    count = xp.bincount(seats.side, minlength=4 * len(plan)).reshape(-1, 4)[who]
-    edge = plan.size[who][:, [2, 2, 0, 0]]
-    best = at_most(xp.amax(xp.where(free, edge / (count + 1), 0.0), 1), EASY)
-    least = xp.amin(xp.where(count > 1, edge / at_least(count, 1), FAR), 1)
-    beside = least < FAR
-    who, best, least = who[beside], best[beside], least[beside]
-    return first_of(who, xp.full_like(who, -1), [least - ELBOW, least - best], [least, least])
-
-
-def chairs_balanced(plan: Plan) -> Found:
-    """As many sit at one side of a table as opposite, but for an odd one, two at a corner or no room."""
-    seats, xp = seats_at(plan), plan.kit
-    who, free = _free_sides(plan)
-    places = at_least((held(plan.size)[:, 0] / ELBOW).round(), 1.0)  # a bench counts for several chairs
-    count = sum_of(seats.side, places[seats.i], 4 * len(plan)).reshape(-1, 2, 2)[who]
-    one, other, free = count[..., 0], count[..., 1], free.reshape(-1, 2, 2)
-    room = xp.where(other < one, free[..., 1], free[..., 0]) | (xp.minimum(one, other) > 0)
-    uneven, seated = abs(one - other) * room, count.sum((1, 2))
-    more = xp.where(seated > 2, uneven.sum(-1), 2 * at_least(xp.amax(uneven, 1) - 1, 0.0))
-    i, j = plan.attended("at", "foot")  # who stands far off, too
-    total = sum_of(j, places[i], len(plan))[who]
-    return found(who, total % 2 + 0.5 - more, measure=more)
-
-
-def bench_fits(plan: Plan) -> Found:
-    """A seat stands within its side of a table, before its middle if alone; a bench along one that is as long as it."""
-    seats, xp = seats_at(plan), plan.kit
-    half_width, half_depth = plan.reach(seats.i, seats.j)
-    own = 2 * xp.where(seats.ahead, half_width, half_depth)
-    side = xp.where(seats.ahead, plan.size[seats.j, 0], plan.size[seats.j, 2])
-    aside = abs(seats.along) * ~plan.solid[seats.i]  # a stool stands anywhere
-    spare = (side - own) / 2
-    most = xp.where(seats.count == 1, xp.minimum(ALONE * side, at_least(spare, 0.0) + OFF), spare + BEYOND + CORNER)
-    measures = [own - side, plan.size[seats.i, 0] - own, aside]
-    margins = [BEYOND - measures[0], BEYOND - measures[1], most - aside]
-    return first_of(seats.i, seats.j, margins, measures)
-
-
-def table_amid(plan: Plan) -> Found:
-    """A table is not shoved to one side: chairs are not squeezed where those opposite have room to spare."""
-    seats, xp = seats_at(plan), plan.kit
-    half_width, half_depth = plan.reach(seats.i, seats.j)
-    edge = xp.where(seats.ahead, plan.size[seats.j, 2], plan.size[seats.j, 0]) / 2
-    out = abs(seats.across) + xp.where(seats.ahead, half_depth, half_width) - edge
-    who, _ = _free_sides(plan)
-    most = -least_of(seats.side, -out, 4 * len(plan), FAR).reshape(-1, 4)[who]
-    behind = (_free_beside(plan, who) - most).reshape(-1, 2, 2)
-    least, both = xp.amin(behind, 2), (most > -FAR).reshape(-1, 2, 2).all(2)
-    margin = xp.where(both, xp.maximum(least - SQUEEZED, ROOMY - xp.amax(behind, 2) + least), FAR)
-    at = xp.arange(len(who)), held(margin).argmin(1)
-    return found(who, margin[at], measure=at_least(least[at], 0.0)).take(rows(both.any(1) & plan.walled[who]))
-
-
-@once
-def _free_sides(plan: Plan) -> tuple[Array, Array]:
-    """(P,) int64, the tables with seats, and (P, 4) bool, whether one could sit left, right, behind and before them."""
-    who = rows(plan.kit.bincount(seats_at(plan).j, minlength=len(plan)) > 0)
-    return who, _free_beside(plan, who) > SEAT
-
-
-def _free_beside(plan: Plan, who: Array) -> Array:
+def free_beside(plan: Plan, who: Array) -> Array:
     """(P, 4): metres free left, right, behind and before of tables, to walls and to what is neither seat nor lamp."""
     (right, front), xp = plan.axes(who), plan.kit
     out = xp.stack([-right, right, -front, front], 1)
@@ -366,7 +273,7 @@ def _free_beside(plan: Plan, who: Array) -> Array:
 def plant_in_nook(plan: Plan) -> Found:
     """A plant fills a corner, or the end of what stands at a wall; it stands amid no bare wall and no floor."""
     who, xp = plan.those(plan.of("decor") & plan.standing & plan.walled), plan.kit
-    free = _free_beside(plan, who)
+    free = free_beside(plan, who)
     widest = xp.maximum(xp.minimum(free[:, 0], free[:, 1]), xp.minimum(free[:, 2], free[:, 3]))
     wall = xp.amin(plan.inside(footprint(plan.size[who], plan.position[who], plan.yaw[who]), who), 1)
     return first_of(who, xp.full_like(who, -1), [NOOK - widest, AT_WALL - wall], [widest, wall])

@@ -175,6 +175,10 @@ class Plan:
         words, mine = self._words
         return self._mask([bool(asked(kind)) for kind in words])[mine]
 
+    def has(self, asked: Callable[[Category], object]) -> bool:
+        """Whether the row of any box answers a question with yes."""
+        return any(asked(kind) for kind in self.first._words[0])
+
     def column(self, asked: Callable[[Category], Any]) -> Array:
         """(N, ...) float, what the rows of the boxes answer."""
         words, mine = self._words

@@ -7,10 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from echomodel.arrays import at_least, rows
+from echomodel.arrays import Array, at_least, rows
 from echomodel.boxes2d import seen
-from echomodel.objective.company import PLACE, places_of
-from echomodel.objective.composition import ELBOW
 from echomodel.objective.plan import Found, Plan, found, kind_of, nobody
 from echomodel.sizes import size_statistics, usual_range
 from echomodel.vocabulary import Category
@@ -20,6 +18,8 @@ SHORTER = 0.85  # times the least usual side, where the row of a category names 
 LARGER = 1.3  # times the largest one, for what is told to be larger or smaller than something
 USUAL = 0.6  # power of the ratio of the 5th and 95th percentile to the median
 
+PLACE = 0.62  # metres at a table that one who sits there takes: two on a bench
+ELBOW = 0.55  # metres of a table's edge a seat: 96 % of real sides with two seats or more (0.6 m in DIN 68880)
 ELBOWS = 0.14  # metres of a table's side for each chair beyond its width: 80 % of real sides have more
 TUCKED = 0.15  # metres by which chairs at the ends of a table keep off those at its sides
 LEAST_DEPTH, MOST_DEPTH = 0.75, 1.05  # metres of a table at which people sit opposite each other
@@ -28,6 +28,11 @@ SPARE = 0.8  # and in all beside that, at most
 EDGE = 0.02  # metres of a top that stay free around what stands on it
 FEET = 0.18  # metres, depth of the feet on which a screen stands
 SHRUNK = 0.85  # of its width and depth: what a piece becomes at the least where the room is too full for it
+
+
+def places_of(size: Array) -> Array:
+    """(...,) how many sit on seats of sizes (..., 3)."""
+    return at_least((size[..., 0] / PLACE).round(), 1.0)
 
 
 @cache

@@ -11,16 +11,37 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from echomodel.arrays import Array, at_least, at_most, repeat
 from echomodel.files import tables
-from echomodel.objective import access, company, composition, crowding, fitted, physics, sight, sizes
+from echomodel.late import Late
+from echomodel.objective import access, company, composition, crowding, lamps, physics, sizes
 from echomodel.objective.plan import Found, Plan, found, nobody
-from echomodel.vocabulary import vocabulary
+from echomodel.vocabulary import Category, vocabulary
 
 # What a broken term costs, and a unit that is missed of it, by its kind.
 COST = {"relations": (6.0, 4.0), "physics": (3.0, 10.0), "living": (2.0, 1.0), "composition": (1.5, 1.0)}
 KINDS = tuple(COST)
+
+
+@dataclass(frozen=True)
+class OfKind(Late):
+    """The function of a term at `place`, imported and asked where a room has boxes of a kind."""
+
+    kind: Callable[[Category], object]
+
+    @cached_property
+    def itself(self) -> Callable[[Plan], Found]:
+        """The function."""
+        return Late(self.place).itself
+
+    @property
+    def __name__(self) -> str:
+        return self.place.partition(":")[2]
+
+    def __call__(self, plan: Plan) -> Found:
+        return self.itself(plan) if plan.has(self.kind) else nobody(plan.size)
 
 
 @dataclass(frozen=True)
@@ -53,12 +74,20 @@ class Term:
     @property
     def means(self) -> str:
         """What is expected, one sentence."""
-        return (inspect.getdoc(self.find) or "").partition("\n\n")[0].replace("\n", " ")
+        told = self.find.itself if isinstance(self.find, OfKind) else self.find
+        return (inspect.getdoc(told) or "").partition("\n\n")[0].replace("\n", " ")
 
 
 REAL = "real rooms (statistics of 896, 300 measured): "
-MODULES = {"access": access, "company": company, "composition": composition, "crowding": crowding, "fitted": fitted,
-           "physics": physics, "sight": sight, "sizes": sizes}  # fmt: skip
+MODULES = {"access": access, "company": company, "composition": composition, "crowding": crowding, "lamps": lamps,
+           "physics": physics, "sizes": sizes}  # fmt: skip
+# Modules of which every term looks at boxes of some kind, alone or beside others: asked of rooms that have one.
+OF_KINDS: dict[str, Callable[[Category], object]] = {
+    "seating": lambda kind: kind.role == "board" or kind.stands == "at",
+    "lounging": lambda kind: kind.role == "sofa" or kind.stands in ("company", "before"),
+    "sight": lambda kind: kind.role == "screen" or kind.stands == "opposite",
+    "fitted": lambda kind: kind.task or kind.clear or kind.stands in ("row", "over"),
+}
 RELATIONS = (
     *(Term(physics.stated(name), (f"{{a}} is not {name} {{b}}",), "what the word means", "relations", unit)
       for name, unit in physics.measured()),
@@ -74,7 +103,9 @@ def _read() -> Iterator[Term]:
         for row in rows.get(kind, ()):
             module, _, name = row.pop("find").partition(".")
             source = row.pop("source", None) or REAL + row.pop("real")
-            yield Term(getattr(MODULES[module], name), tuple(row.pop("says")), source, kind, **row)
+            place = f"echomodel.objective.{module}:{name}"
+            find = OfKind(place, OF_KINDS[module]) if module in OF_KINDS else getattr(MODULES[module], name)
+            yield Term(find, tuple(row.pop("says")), source, kind, **row)
 
 
 TERMS = (*RELATIONS, *_read())

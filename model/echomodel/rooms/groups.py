@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from echomodel.objective.composition import BEYOND, CORNER
+from echomodel.objective.seating import BEYOND, CORNER
 from echomodel.rooms.builder import HALF_PI, Builder, Item, Size
 from echomodel.rooms.runs import Site, runs
 from echomodel.vocabulary import vocabulary

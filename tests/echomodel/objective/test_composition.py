@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.objective import access, composition, crowding, sight
+from echomodel.objective import access, composition, crowding, lounging, seating, sight
 from echomodel.objective.plan import plan_of
 
 HALF = np.pi / 2
@@ -32,8 +32,8 @@ def row_of(count, width, pitch):
 
 
 def test_every_seat_has_room_for_the_elbows():
-    assert seen(composition.elbow_room, row_of(2, 0.45, 0.6))[0][0] == pytest.approx(0.8 - 0.6)
-    margin, found, _ = seen(composition.elbow_room, row_of(3, 0.45, 0.53))
+    assert seen(seating.elbow_room, row_of(2, 0.45, 0.6))[0][0] == pytest.approx(0.8 - 0.6)
+    margin, found, _ = seen(seating.elbow_room, row_of(3, 0.45, 0.53))
     assert margin == {0: pytest.approx(1.6 / 3 - 0.6)}
     assert found.measure.tolist() == [pytest.approx(1.6 / 3)]
 
@@ -58,25 +58,25 @@ def test_an_armchair_of_a_group_looks_at_no_chair_of_another(gap, margin):
     armchair = ("armchair", (0.8, 0.8, 0.8), (1.8, 0.8), HALF)
     back = ("dining_chair", (0.5, 0.9, 0.5), (2.2 + gap + 0.25, 0.8), HALF)
     table = ("dining_table", (0.8, 0.75, 1.6), (2.2 + gap + 0.85, 0.8), 0.0)
-    found, seen_of, _ = seen(composition.sofa_ahead, [sofa, armchair, table, back], (9.0, 4.0))
+    found, seen_of, _ = seen(lounging.sofa_ahead, [sofa, armchair, table, back], (9.0, 4.0))
     assert found[1] == pytest.approx(margin)
     assert dict(zip(seen_of.who.tolist(), seen_of.other.tolist(), strict=True))[1] == 3
     assert seen_of.measure.tolist()[seen_of.who.tolist().index(1)] == pytest.approx(gap)
-    alone, *_ = seen(composition.sofa_ahead, [armchair, table, back], (9.0, 4.0))
+    alone, *_ = seen(lounging.sofa_ahead, [armchair, table, back], (9.0, 4.0))
     assert alone == {0: pytest.approx(margin)}  # one of no group, too, but it may look at a table, and a face
-    assert seen(composition.sofa_ahead, [armchair, table], (9.0, 4.0))[0] == {}
-    assert seen(composition.sofa_ahead, [armchair, table, (*back[:3], -HALF)], (9.0, 4.0))[0] == {}
+    assert seen(lounging.sofa_ahead, [armchair, table], (9.0, 4.0))[0] == {}
+    assert seen(lounging.sofa_ahead, [armchair, table, (*back[:3], -HALF)], (9.0, 4.0))[0] == {}
 
 
 @pytest.mark.parametrize(("gap", "aside", "margin"), [(0.5, 0.0, -0.1), (0.7, 0.0, 0.1), (0.5, 1.4, 0.4)])
 def test_one_passes_between_a_sofa_and_the_table_behind_it(gap, aside, margin):
     sofa = ("multi_seat_sofa", (2.0, 0.8, 0.9), (0.0, 0.0), 0.0)
     table = ("dining_table", (1.2, 0.75, 0.8), (aside, -0.45 - gap - 0.4), 0.0)
-    _, found, _ = seen(composition.sofa_ahead, [sofa, table])
+    _, found, _ = seen(lounging.sofa_ahead, [sofa, table])
     assert found.margin.tolist()[-1] == pytest.approx(margin if not aside else 0.5 - (1.0 + 0.6 - aside))
     assert found.words.tolist()[-1] == 1
     desk = ("desk", (1.2, 0.75, 0.8), (aside, -0.45 - gap - 0.4), 0.0)  # which may stand there
-    assert min(seen(composition.sofa_ahead, [sofa, desk])[0].values(), default=1.0) >= 0
+    assert min(seen(lounging.sofa_ahead, [sofa, desk])[0].values(), default=1.0) >= 0
 
 
 @pytest.mark.parametrize(("gap", "margin"), [(0.3, -0.05), (0.4, 0.05)])
@@ -113,9 +113,9 @@ def test_a_sofa_is_near_enough_to_its_screen_the_more_so_where_it_stands_free(be
 
 
 def test_seats_at_desks_and_single_chairs_need_no_elbow_room():
-    assert seen(composition.elbow_room, row_of(1, 0.6, 1.0))[0] == {}
+    assert seen(seating.elbow_room, row_of(1, 0.6, 1.0))[0] == {}
     desk = [("desk", (1.0, 0.75, 0.6), (0.0, 0.0), 0.0), *row_of(2, 0.6, 0.6)[1:]]
-    assert seen(composition.elbow_room, desk)[0] == {}
+    assert seen(seating.elbow_room, desk)[0] == {}
 
 
 @pytest.mark.parametrize(
@@ -253,7 +253,7 @@ def test_no_strip_between_two_islands_is_bare(right, margin):
 @pytest.mark.parametrize(("aside", "margin"), [(0.05, 0.05), (0.2, -0.1)])
 def test_a_bench_alone_at_its_side_lies_before_the_middle(aside, margin):
     bench = ("bench", (1.2, 0.45, 0.4), (aside, 0.75), np.pi)
-    assert seen(composition.bench_fits, [*seated(), bench])[0] == {1: pytest.approx(margin)}
+    assert seen(seating.bench_fits, [*seated(), bench])[0] == {1: pytest.approx(margin)}
 
 
 @pytest.mark.parametrize(("gap", "margin"), [(0.3, -0.02), (0.6, 0.05)])
@@ -296,13 +296,13 @@ CROWDED = [((side * 0.85, z), -side * HALF) for side in (-1, 1) for z in (-0.22,
 
 
 def test_chairs_do_not_crowd_a_short_side_while_the_long_ones_are_free():
-    margin, found, _ = seen(composition.elbow_room, seated(*CROWDED))
+    margin, found, _ = seen(seating.elbow_room, seated(*CROWDED))
     assert margin == {0: pytest.approx(0.45 - 0.6)}
     assert found.measure.tolist() == [pytest.approx(0.45)]
     around = [((0.33 * x, 0.65 * z), np.pi * (z > 0)) for x in (-1, 1) for z in (-1, 1)]
-    assert seen(composition.elbow_room, seated(*around))[0] == {0: pytest.approx(0.65 - 0.6)}
+    assert seen(seating.elbow_room, seated(*around))[0] == {0: pytest.approx(0.65 - 0.6)}
     turned = [(word, size, (at[1], -at[0]), yaw + HALF) for word, size, at, yaw in seated(*CROWDED)]
-    assert seen(composition.elbow_room, turned, (4.0, 5.0))[0] == {0: pytest.approx(0.45 - 0.6)}
+    assert seen(seating.elbow_room, turned, (4.0, 5.0))[0] == {0: pytest.approx(0.45 - 0.6)}
 
 
 def sides(front, back):
@@ -318,25 +318,25 @@ def sides(front, back):
     [(2, 2, 0.5, 0.0), (2, 1, 0.5, 1.0), (3, 1, -1.5, 2.0), (1, 3, -1.5, 2.0), (3, 0, -1.5, 3.0)],
 )
 def test_as_many_sit_at_one_side_of_a_table_as_opposite(front, back, margin, more):
-    found, rows, _ = seen(composition.chairs_balanced, sides(front, back))
+    found, rows, _ = seen(seating.chairs_balanced, sides(front, back))
     assert found == {0: pytest.approx(margin)}
     assert rows.measure.tolist() == [pytest.approx(more)]
 
 
 def test_two_sit_opposite_or_around_a_corner_and_nobody_is_missed_where_no_room_is():
-    assert seen(composition.chairs_balanced, sides(2, 0))[0] == {0: pytest.approx(-1.5)}
-    assert seen(composition.chairs_balanced, sides(1, 1))[0] == {0: pytest.approx(0.5)}
+    assert seen(seating.chairs_balanced, sides(2, 0))[0] == {0: pytest.approx(-1.5)}
+    assert seen(seating.chairs_balanced, sides(1, 1))[0] == {0: pytest.approx(0.5)}
     corner = seated(((0.0, 0.65), np.pi), ((0.85, 0.0), -HALF))
-    assert seen(composition.chairs_balanced, corner)[0] == {0: pytest.approx(0.5)}
+    assert seen(seating.chairs_balanced, corner)[0] == {0: pytest.approx(0.5)}
     shelf = [("bookshelf", (1.6, 2.0, 0.3), (0.0, -1.0), 0.0)]
-    assert seen(composition.chairs_balanced, sides(3, 0) + shelf)[0] == {0: pytest.approx(1.5)}
+    assert seen(seating.chairs_balanced, sides(3, 0) + shelf)[0] == {0: pytest.approx(1.5)}
 
 
 def test_a_side_at_a_wall_or_at_furniture_is_not_free():
     shelves = [("bookshelf", (1.6, 2.0, 0.3), (0.0, z), 0.0) for z in (-1.0, 1.0)]
     both, narrow = (seated(*CROWDED) + shelves, (5.0, 4.0)), (seated(*CROWDED), (5.0, 2.0))
     for room, words in ((both, 0), (narrow, 0), ((seated(*CROWDED) + shelves[:1], (5.0, 4.0)), 1)):
-        margin, found, _ = seen(composition.elbow_room, *room)
+        margin, found, _ = seen(seating.elbow_room, *room)
         assert margin == {0: pytest.approx(0.45 - (0.6 if words else 0.55))}
         assert found.words.tolist() == [words]
 
@@ -348,7 +348,7 @@ def test_who_works_back_to_back_sits_apart(apart, margin):
         yaw = HALF * (side + 1)  # each desk at its wall, its front into the room
         things += [("desk", (1.2, 0.75, 0.6), (0.0, side * apart / 2), yaw),
                    ("office_chair", (0.5, 0.9, 0.5), (0.0, side * (apart / 2 - 0.6)), yaw + np.pi)]  # fmt: skip
-    assert seen(crowding.chair_pulls_out, things)[0] == {1: pytest.approx(margin), 3: pytest.approx(margin)}
+    assert seen(seating.chair_pulls_out, things)[0] == {1: pytest.approx(margin), 3: pytest.approx(margin)}
 
 
 def test_no_table_goes_without_a_chair_while_another_has_two():
@@ -364,25 +364,25 @@ def test_no_table_goes_without_a_chair_while_another_has_two():
 @pytest.mark.parametrize(("length", "margin"), [(0.8, 0.1), (1.2, -0.2)])
 def test_no_bench_lies_across_the_end_of_its_table(length, margin):
     bench = ("bench", (length, 0.45, 0.4), (0.95, 0.0), -HALF)
-    assert seen(composition.bench_fits, [*seated(), bench])[0] == {1: pytest.approx(margin)}
+    assert seen(seating.bench_fits, [*seated(), bench])[0] == {1: pytest.approx(margin)}
     along = ("bench", (length, 0.45, 0.4), (0.0, 0.75), np.pi)
-    assert seen(composition.bench_fits, [*seated(), along])[0][1] > 0
+    assert seen(seating.bench_fits, [*seated(), along])[0][1] > 0
     end_on = ("bench", (length, 0.45, 0.4), (0.0, 0.45 + length / 2), HALF)
-    assert seen(composition.bench_fits, [*seated(), end_on])[0] == {1: pytest.approx(0.5 - length)}
+    assert seen(seating.bench_fits, [*seated(), end_on])[0] == {1: pytest.approx(0.5 - length)}
 
 
 @pytest.mark.parametrize(("along", "margin"), [(0.6, 0.04), (0.68, -0.04)])  # 0.16 and 0.24 m beyond the corner
 def test_nobody_sits_at_the_corner_of_a_table(along, margin):
-    found = seen(composition.bench_fits, seated(((along, 0.65), np.pi), ((-0.4, 0.65), np.pi)))
+    found = seen(seating.bench_fits, seated(((along, 0.65), np.pi), ((-0.4, 0.65), np.pi)))
     assert found[0][1] == pytest.approx(margin)
     assert found[1].measure.tolist()[0] == pytest.approx(along)
     stool = ("stool", (0.4, 0.45, 0.4), (0.8, 0.6), 0.0)
-    assert seen(composition.bench_fits, [*seated(), stool])[0][1] > 0  # which has no front
+    assert seen(seating.bench_fits, [*seated(), stool])[0][1] > 0  # which has no front
 
 
 @pytest.mark.parametrize(("aside", "margin"), [(0.2, 0.07), (0.36, -0.09)])
 def test_who_sits_alone_at_the_end_of_a_table_sits_before_its_middle(aside, margin):
-    found, rows, _ = seen(composition.bench_fits, seated(((0.85, aside), -HALF), ((-0.85, 0.0), HALF)))
+    found, rows, _ = seen(seating.bench_fits, seated(((0.85, aside), -HALF), ((-0.85, 0.0), HALF)))
     assert found[1] == pytest.approx(margin)
     assert rows.measure.tolist()[0] == pytest.approx(aside)
 
@@ -447,7 +447,7 @@ def test_a_stool_moves_back_from_where_one_works(gap, margin):
     vanity = ("dressing_table", (1.0, 0.75, 0.5), (0.0, -1.7), 0.0)
     stool = ("stool", (0.4, 0.45, 0.4), (0.0, -1.2), np.pi)
     bed = ("double_bed", (2.1, 1.0, 1.8), (0.0, -0.1 + gap), 0.0)
-    assert seen(crowding.chair_pulls_out, [vanity, stool, bed])[0] == {1: pytest.approx(margin)}
+    assert seen(seating.chair_pulls_out, [vanity, stool, bed])[0] == {1: pytest.approx(margin)}
 
 
 @pytest.mark.parametrize(("x", "margin"), [(-0.5, 1 / 30), (-0.3, -1 / 30)])

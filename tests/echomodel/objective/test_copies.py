@@ -11,7 +11,7 @@ from plans import tensors_of
 
 from echomodel.boxes import Boxes
 from echomodel.graph import Stated
-from echomodel.objective import TERMS, access, copies, plan_of
+from echomodel.objective import TERMS, copies, lounging, plan_of
 from echomodel.objective.copies import copies_of
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
@@ -81,7 +81,7 @@ def test_who_attends_nobody_is_judged_in_any_number_of_copies():
     many = copies_of(room, at[None].repeat(60, 0), np.zeros((60, 3)), np.array([True, False, False]))
     none = np.full(60, -1)
     assert np.array_equal(many.gap(np.arange(60) * 3, none), np.full(60, float(room.gap(np.array([0]), none[:1])[0])))
-    assert access.looks_in(many).margin.tolist() == access.looks_in(room).margin.tolist() * 60
+    assert lounging.looks_in(many).margin.tolist() == lounging.looks_in(room).margin.tolist() * 60
 
 
 def test_terms_look_at_what_they_are_about(copied):

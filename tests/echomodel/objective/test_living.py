@@ -11,8 +11,8 @@ from lived_in import BAR, BEDROOM, BENCH, DINING, HALF, LIVING, PENDANTS, SET, S
 from plans import tensors_of
 
 from echomodel.objective import TERMS, faults, plan_of
-from echomodel.objective.company import STAGGERED
 from echomodel.objective.plan import kinds_of
+from echomodel.objective.seating import STAGGERED
 from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
 from echomodel.vocabulary import vocabulary

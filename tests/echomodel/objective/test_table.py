@@ -12,6 +12,7 @@ import torch
 from echomodel.boxes import Boxes
 from echomodel.graph import Stated
 from echomodel.objective import KINDS, TERMS, faults_of, missed, plan_of
+from echomodel.objective.table import OfKind
 from echomodel.vocabulary import vocabulary
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -47,6 +48,16 @@ def test_names_are_there_once_and_every_term_explains_itself():
         assert all((term.means, term.source, term.says)), term.name
         assert all("{a}" in sentence for sentence in term.says), term.name
     assert [KINDS.index(term.kind) for term in TERMS] == sorted(KINDS.index(term.kind) for term in TERMS)
+
+
+@pytest.mark.parametrize("term", [term for term in TERMS if isinstance(term.find, OfKind)], ids=lambda term: term.name)
+def test_terms_that_wait_for_a_kind_find_nothing_in_rooms_without(term):
+    others = [row for row in vocabulary().categories if not term.find.kind(row)]
+    size = np.array([(1.5, 0.8, 0.6)] * len(others))
+    place = np.array([(0.4 * (k % 8), 0.0, 0.4 * (k // 8)) for k in range(len(others))])
+    room = plan_of(Boxes(size, place, np.arange(len(others)) * np.pi / 2), [row.name for row in others], 4 * FLOOR)
+    assert len(others) > 20
+    assert not len(term.find.itself(room).who)
 
 
 def test_the_page_is_up_to_date():

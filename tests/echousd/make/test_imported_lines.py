@@ -28,7 +28,9 @@ unused = ("echousd.checks", "echousd.texturing", "echousd.batches", "echousd.exp
           "echomodel.furniture.tufting", "echomodel.rules.placements", "echomodel.furniture.plants",
           "echomodel.furniture.cabinets", "echomodel.furniture.bent",
           "echomodel.furniture.drawn", "echomodel.dressing.greenery",
-          "echousd.place.seats", "echousd.stage.apart", "echousd.draw.outside", "echousd.draw.from_files",
+          "echomodel.objective.fitted", "echomodel.objective.lounging", "echomodel.objective.seating",
+          "echomodel.objective.sight", "echousd.place.seats", "echousd.stage.apart", "echousd.draw.outside",
+          "echousd.draw.from_files",
           "echoscene", "torch", "trimesh", "networkx", "sklearn", "scipy")
 print(sum(lines.values()), [name for name in unused if name in sys.modules])
 """
