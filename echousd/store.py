@@ -24,7 +24,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from echomodel.bounded import read_json
-from echomodel.files import flush, telling, write_json
+from echomodel.files import check_ours, flush, telling, write_json
 from echousd.naming import CRATE
 from echousd.pending import STAGING
 
@@ -60,11 +60,9 @@ class Store:
             raise ValueError(f"{root}: is a file, a store must be a folder")
         if (root / MARK).is_file():
             return cls.open(root)
-        others = sorted(path.name for path in root.iterdir()) if root.is_dir() else []
-        if others and any(not name.startswith(f".{MARK}") for name in others):  # another process begins it, too
-            if (root / MARK).is_file():
-                return cls.open(root)
-            raise ValueError(f"{root}: holds {', '.join(others[:3])} and no store; choose another folder")
+        check_ours(root, "store", MARK)  # which another process may have begun just now
+        if (root / MARK).is_file():
+            return cls.open(root)
         with telling(root):
             root.mkdir(parents=True, exist_ok=True)
             write_json(root / MARK, {"echousd_store": VERSION})

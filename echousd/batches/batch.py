@@ -13,7 +13,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from echomodel.files import raising
+from echomodel.files import check_ours, raising
 from echousd.batches import work
 from echousd.batches.executor import Executor, LocalWorkers, Outcome, RayCluster, Task
 from echousd.batches.options import BatchRequest, request_of
@@ -179,9 +179,7 @@ def _with_libraries(plan: RunPlan, outside: tuple[str, ...]) -> RunPlan:
 def _agree_on(plan: RunPlan, out: Path, *, resume: bool) -> None:
     """Write the plan, or make sure that the one that lies there is the same."""
     if not (out / STATE / "plan.jsonl").is_file():
-        others = sorted(entry.name for entry in out.iterdir() if entry.name != STATE)
-        if others:
-            raise ValueError(f"{out}: holds {', '.join(others[:3])} and no run of echousd batch; choose another folder")
+        check_ours(out, "run of echousd batch", besides=(STATE,))
         save_plan(plan, out)
         return
     old = load_plan(out)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdShade, UsdUtils
 
-from echomodel.files import check_free
+from echomodel.files import check_free, check_ours
 from echousd.draw.drawables import rgb
 from echousd.exporting.glb import glb
 from echousd.exporting.habitat import habitat_files, sceneeval_files
@@ -116,6 +116,8 @@ def export(
             raise ValueError(f"{out}: {word} says nothing to a {reader or out.suffix}, allowed: {allowed}")
     if not reader:
         check_free(out, force=force)
+    elif reader == "habitat":
+        check_ours(out, "data set of Habitat", "*.scene_dataset_config.json", force=force)
     stage = open_stage(room)
     reach = Reach.of(stage, search)
     reach.check_layers(stage)

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from echomodel.files import check_free, digest, flush, telling
+from echomodel.files import check_free, check_ours, digest, flush, telling
 from echomodel.late import Late
 from echousd.folder.lock import LOCK, locked, run_of
 from echousd.folder.manifest import Digest, find_manifest
@@ -93,10 +93,7 @@ def claim(folder: Path, *, force: bool, root: str = "") -> dict[str, Any]:
     manifest = find_manifest(folder, root)
     if manifest is not None:
         return manifest
-    others = sorted(entry.name for entry in folder.iterdir() if entry.name not in (STAGING, LOCK))
-    if others and not force:
-        shown = ", ".join(others[:3]) + (" ..." if len(others) > 3 else "")
-        raise ValueError(f"{folder}: holds {shown} and no room of EchoUSD; choose another folder or use --force")
+    check_ours(folder, "room of EchoUSD", force=force, besides=(STAGING, LOCK))
     return {}
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from pxr import Sdf
 
 import echousd
+from echomodel.files import check_ours
 from echomodel.openings import numbered
 from echomodel.triangles import box
 from echousd.batches.batch import MEMORY, cores, weights_hash
@@ -113,8 +114,8 @@ def write_rooms(
     Raises ValueError for a folder that holds something else, and where edits of a room would be lost.
     """
     root = output / ROOT_FILE
-    if root.exists() and not force and not is_home(root):
-        raise ValueError(f"{root}: exists and is no home of echousd; choose another place or use --force")
+    if not is_home(root):
+        check_ours(output, "home of echousd", force=force, besides=(FOLDER,))
     wanted, digests = wanted_jobs(plan, output, options, outside)
     edited = [job.id for job in wanted if not job.begin and (find_manifest(Path(job.folder)) or {}).get("history")]
     if edited and not force:

@@ -11,7 +11,7 @@ import stat
 import sys
 import traceback
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -103,6 +103,21 @@ def check_free(path: Path, *, force: bool, other: str = "place") -> None:
     """
     if path.exists() and not force and not (path.is_dir() and not any(path.iterdir())):
         raise ValueError(f"{path}: exists; choose another {other} or use --force")
+
+
+def check_ours(folder: Path, what: str, *marks: str, force: bool | None = None, besides: Iterable[str] = ()) -> None:
+    """Refuse a folder that holds other things than what is written there, unless `force`; raises ValueError.
+
+    Arguments:
+        what: is written there. marks: patterns of files of which one is there where it was written or begun before.
+        force: None where that is no choice. besides: names that say nothing.
+    """
+    names = {path.name for path in folder.iterdir()} - {*besides} if folder.is_dir() else set()
+    others = sorted(name for name in names if not PARTIAL.fullmatch(name))
+    if others and not force and not any(any(folder.glob(mark)) for mark in marks):
+        shown = ", ".join(others[:3]) + (" ..." if len(others) > 3 else "")
+        more = " or use --force" if force is not None else ""
+        raise ValueError(f"{folder}: holds {shown} and no {what}; choose another folder{more}")
 
 
 def digest(content: bytes) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from echomodel.data.roomset import RoomSet, build_rooms
 from echomodel.data.shapeset import ShapeSet, build_shapes
-from echomodel.files import write_json
+from echomodel.files import check_ours, write_json
 from echomodel.progress import StageListener, StepListener
 from echomodel.rooms.generator import STYLES
 
@@ -31,6 +31,8 @@ def build_data(
     if recipe not in RECIPES:
         raise ValueError(f"unknown recipe {recipe!r}: allowed are {', '.join(RECIPES)}")
     (count, styles, halls), folder = RECIPES[recipe], Path(directory)
+
+    check_ours(folder, "data set", "data.json", "rooms/plan.json")
 
     def report(part: str) -> StepListener | None:
         return None if progress is None else lambda done, total: progress(part, done, total)

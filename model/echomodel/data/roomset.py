@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from echomodel.bounded import read_json
-from echomodel.files import telling, whole_file, write_json
+from echomodel.files import check_ours, telling, whole_file, write_json
 from echomodel.openings import HINGES, KINDS, SWINGS, Opening, numbered
 from echomodel.progress import StepListener
 from echomodel.roomboxes import RoomBoxes, read_rooms
@@ -318,6 +318,7 @@ def claim(folder: Path, plan: dict) -> None:
     """
     note = folder / "plan.json"
     if not note.exists():
+        check_ours(folder, "data set")
         write_json(note, plan)
         return
     found = read_note(note)

@@ -20,7 +20,7 @@ import trimesh
 import zstandard
 
 from echomodel.data.roomset import claim, kept_out, set_note
-from echomodel.files import whole_file, write_json, write_text
+from echomodel.files import check_ours, whole_file, write_json, write_text
 from echomodel.furniture import Style, draw_choices, draw_style, sample_size, solids
 from echomodel.furniture.solids import Solid
 from echomodel.progress import StepListener
@@ -247,6 +247,7 @@ def build_meshes(
     folder = Path(directory)
     if not models:
         raise ValueError(f"{folder}: no model to learn from, allowed: a library with usable models")
+    check_ours(folder, "data set", "parts")
     (folder / "parts").mkdir(parents=True, exist_ok=True)
     records, names, kept, held = [], [], [], held_out(models)
     for done, model in enumerate(models, 1):

@@ -17,6 +17,7 @@ from echomodel.compact.shape import ShapeDenoiser
 from echomodel.compact.weights import WORDS, grown_tables, own_statistics, read_header, words_of
 from echomodel.config import CompactConfig
 from echomodel.data.roomset import RoomSet
+from echomodel.files import check_ours
 from echomodel.late import Late
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import PackedRooms
@@ -103,6 +104,7 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
 
     Raises ValueError for a file that the stage needs is not named or does not exist, or the checkpoint does not fit.
     """
+    check_ours(folder, "run of echousd train", "log.csv", "checkpoint.safetensors")
     if recipe.threads:
         torch.set_num_threads(recipe.threads)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")

@@ -343,3 +343,21 @@ def test_weights_of_a_run_are_not_written_over(tmp_path, capsys, name):
     told = " ".join(capsys.readouterr().err.split())
     assert f"holds {name} already, continue it with --resume or choose another --output" in told
     assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+RECIPE = str(Path(__file__).parents[3] / "model/recipes/smoke.toml")
+
+
+@pytest.mark.parametrize(
+    ("words", "what"),
+    [
+        (("train", RECIPE), "run of echousd train"),
+        (("data", "build"), "data set"),
+        (("data", "search", "--count", "1"), "data set"),
+    ],
+)
+def test_a_folder_that_holds_other_things_stays_as_it_is(tmp_path, capsys, words, what):
+    (tmp_path / "thesis.tex").write_text("mine")
+    assert run([*words, "-o", str(tmp_path)]) == 2
+    assert f"holds thesis.tex and no {what}; choose another folder" in " ".join(capsys.readouterr().err.split())
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]

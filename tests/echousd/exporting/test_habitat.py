@@ -63,6 +63,10 @@ def test_a_room_stands_as_in_usd(tmp_path, axis, metres):
     (region,) = json.loads((out / "bedroom.semantic_config.json").read_text("utf-8"))["region_annotations"]
     assert (region["label"], region["floor_height"]) == ("bedroom", 0.0)
     assert np.ptp(np.array(region["poly_loop"]), axis=0) == pytest.approx([4.0, 0.0, 3.6], abs=1e-3)
+    with pytest.raises(
+        ValueError, match=r"bedroom: holds assets, .* and no data set of Habitat; choose another folder"
+    ):
+        export(root, root.parent, reader="habitat")
 
 
 def test_a_stage_without_a_graph_is_named(tmp_path):

@@ -131,8 +131,11 @@ def test_somebody_elses_file_stays(tmp_path, echousd_command):
     (tmp_path / "out" / "home.usda").write_text("#usda 1.0\n")
     done = echousd_command("generate", tmp_path / "flat.yaml", "-o", tmp_path / "out", *QUICK)
     assert done.code == 2
-    assert "home.usda: exists and is no home of echousd; choose another place or use --force" in done.err
+    assert "out: holds home.usda and no home of echousd; choose another folder or use --force" in done.err
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["home.usda"]
+    (tmp_path / "out" / "home.usda").rename(tmp_path / "out" / "mine.usda")
+    done = echousd_command("generate", tmp_path / "flat.yaml", "-o", tmp_path / "out", *QUICK)
+    assert "out: holds mine.usda and no home of echousd; choose another folder or use --force" in done.err
 
 
 def test_a_damaged_home_is_replaced_when_told_so(made, tmp_path, echousd_command):
@@ -145,7 +148,7 @@ def test_a_damaged_home_is_replaced_when_told_so(made, tmp_path, echousd_command
     root.write_text("#usda 1.0\ndef {")
     done = echousd_command(*command)
     assert done.code == 2
-    assert "home.usda: exists and is no home of echousd; choose another place or use --force" in done.err
+    assert "out: holds home.usda, plan.usda and no home of echousd; choose another folder or use" in done.err
 
 
 @pytest.mark.parametrize("words", [("plan", "-o", "{tmp}/flat.png"), ("generate", "-o", "{tmp}/flat")])
