@@ -8,10 +8,12 @@ from typing import Any
 
 import typer
 
+from echomodel.late import Late
 from echousd.cli.options import Force, Made, Outside, Wait, add_room_command
 from echousd.cli.output import report, telling_faults
 
 app = typer.Typer()
+room_at = Late("echousd.folder.found:room_at")
 
 
 def generate(
@@ -25,11 +27,10 @@ def generate(
     """
     from echousd.cli.progress import progress_bar
     from echousd.folder.folder import check_output, writing
-    from echousd.folder.found import room_at
     from echousd.options import RoomOptions
 
     started = time.perf_counter()
-    options, graph = RoomOptions(**values), room_at(graph)
+    options, graph = RoomOptions(**values), room_at(graph) if graph.is_dir() else graph
     check_output(output, flat=flat, force=force)
     if flat and store:
         raise ValueError(f"--store is {store}, which a file of --flat does not use; leave one of them out")

@@ -15,6 +15,7 @@ from echomodel.boxes import Boxes
 from echomodel.boxes2d import footprints
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
+from echomodel.late import Late
 from echomodel.loading import load_model
 from echomodel.objective.access import LEAF, NEEDED
 from echomodel.objective.physics import TOUCH
@@ -31,9 +32,10 @@ from echousd.place.living import living_faults, severity
 from echousd.place.placing import Arranged, PlacedBoxes
 from echousd.place.placing import place as placed
 from echousd.place.search import OF_GRAPHS
-from echousd.place.solver import PlaceConfig, sentence
+from echousd.place.solver import PlaceConfig
 from echousd.shapes.styles import equal_sizes, style_groups, unequal_pairs
 
+sentence = Late("echousd.place.conflicts:sentence")
 DRAFTS = 8  # of which the best is kept
 ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
 MARGIN = 0.35  # metres of floor around the furniture where nobody said how large the floor is

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,7 +33,10 @@ from echousd.place.distances import BED_LIT
 from echousd.place.geometry import collisions, outside
 from echousd.place.problem import Problem, problem_of, stacked
 from echousd.place.search import Arranged, Search
-from echousd.place.solver import Conflict, PlaceConfig, conflicts, solve, unmet
+from echousd.place.solver import PlaceConfig, solve, unmet
+
+if TYPE_CHECKING:
+    from echousd.place.conflicts import Conflict
 
 FULL = 0.3  # share of a floor that is covered from which on smaller furniture is tried
 BAD = 1.5  # cost of a room in which something is broken
@@ -41,6 +45,7 @@ UPRIGHT = np.array([False, True, False])  # the side that taller and shorter are
 OVER = 0.15  # metres between the middles of a lamp and of the table that it hangs over
 SMALLEST = 0.02  # metres: no side of a sampled box is shorter
 fitted = Late("echousd.place.fitted:fitted")  # a kitchen's units
+conflicts = Late("echousd.place.conflicts:conflicts")  # where something is not met
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +229,7 @@ def place_boxes(
     beyond = outside(at, size_end, end, turn)
     broken = set(np.flatnonzero(verdict == 0).tolist())
     failures = broken, {pair for pair, _ in hit}, {number for number, _ in beyond}
-    against, judged = conflicts(at, found, failures), sum(one.judged for one in tried)
+    against, judged = conflicts(at, found, failures) if any(failures) else (), sum(one.judged for one in tried)
     return PlacedBoxes(size_end, end, turn, verdict, against, hit, beyond, judged)
 
 

@@ -1,4 +1,4 @@
-"""Shades, and the lamps of one shade that hang or stand on tables."""
+"""Shades, the lamps of one shade that hang or stand on tables, and chandeliers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from echomodel.furniture.solids import Lathe, Solid, Turned, ball, rotation, tub
 from echomodel.furniture.style import Choices, Style
 from echomodel.late import Late
 
-row, chandelier, rings = (Late(f"echomodel.furniture.chandeliers:{name}") for name in ("row", "chandelier", "rings"))
+row, rings = (Late(f"echomodel.furniture.ceiling_lamps:{name}") for name in ("row", "rings"))
 
 
 def disc(
@@ -120,4 +120,24 @@ def table_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
         parts.append(disc(0, 0, 0, a * 0.5, b * 0.5, max(0.012, stem * 0.06)))
         parts.append(disc(0, 0, 0, a * 0.12, b * 0.12, stem))
     parts.append(tube([[0, stem * 0.7, 0], [0, stem + tall * 0.5, 0]], 0.012, "metal"))
+    return parts
+
+
+def chandelier(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Curved arms round a stem, a candle or a small shade on each."""
+    w, h, d = size
+    body = min(h * 0.55, w * 0.6)
+    arms = choices.pick("count", [5, 6, 8])
+    r = max(0.008, 0.012 * w)
+    parts: list[Solid] = [tube([[0, body * 0.1, 0], [0, h, 0]], r, "metal")]
+    parts.append(ball((0, body * 0.22, 0), (w * 0.07, body * 0.14, d * 0.07), "metal"))
+    cup = min(0.07, w * 0.11)
+    for angle in np.arange(arms) * 2 * np.pi / arms + np.pi / arms:
+        c, s = np.cos(angle) * (w / 2 - cup), np.sin(angle) * (d / 2 - cup)
+        heights = (0, 0.3), (0.45, 0.06), (0.85, 0.14), (1, 0.68 if style.taper > 0.55 else 0.42)
+        parts.append(tube([[c * out, body * up, s * out] for out, up in heights], r * 0.9, "metal"))
+        if style.taper > 0.55:
+            parts += shade("cone", c, body * 0.5, s, cup, cup, body * 0.4, style)
+        else:
+            parts.append(ball((c, body * 0.55, s), (cup * 0.85, cup, cup * 0.85), "shade"))
     return parts

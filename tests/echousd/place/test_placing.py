@@ -12,9 +12,10 @@ from echomodel.objective.support import allowed_overlap
 from echomodel.rules import margins, verdicts
 from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+from echousd.place.conflicts import sentence
 from echousd.place.geometry import Floor, depth_inside, separation
 from echousd.place.placing import PlacedBoxes, place, place_boxes
-from echousd.place.solver import PlaceConfig, sentence
+from echousd.place.solver import PlaceConfig
 
 FLOOR = np.array([(-2.0, -1.8), (2.0, -1.8), (2.0, 1.8), (-2.0, 1.8)])
 

@@ -1,4 +1,4 @@
-"""Lamps of many parts at the ceiling: rows of shades, rings, chandeliers, and what is flush with it."""
+"""Lamps of many parts at the ceiling: rows of shades, rings, and what is flush with it."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from echomodel.furniture.carpentry import Size, both, box
 from echomodel.furniture.lamps import disc, kind_of, one_shade, shade
-from echomodel.furniture.solids import Solid, Tube, ball, rotation, tube, turned
+from echomodel.furniture.solids import Solid, Tube, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
 
 DOWN = rotation(x=np.pi)
@@ -30,26 +30,6 @@ def row(size: Size, style: Style, choices: Choices) -> list[Solid]:
         kind, high = one_shade(style, 2 * each, tall, 0.7 * h)
         parts += shade(kind, x, y, 0, each, each, high, style)
         parts.append(tube([[x, y + high * 0.9, 0], [x, h - 0.01, 0]], 0.006, "metal"))
-    return parts
-
-
-def chandelier(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """Curved arms round a stem, a candle or a small shade on each."""
-    w, h, d = size
-    body = min(h * 0.55, w * 0.6)
-    arms = choices.pick("count", [5, 6, 8])
-    r = max(0.008, 0.012 * w)
-    parts: list[Solid] = [tube([[0, body * 0.1, 0], [0, h, 0]], r, "metal")]
-    parts.append(ball((0, body * 0.22, 0), (w * 0.07, body * 0.14, d * 0.07), "metal"))
-    cup = min(0.07, w * 0.11)
-    for angle in np.arange(arms) * 2 * np.pi / arms + np.pi / arms:
-        c, s = np.cos(angle) * (w / 2 - cup), np.sin(angle) * (d / 2 - cup)
-        heights = (0, 0.3), (0.45, 0.06), (0.85, 0.14), (1, 0.68 if style.taper > 0.55 else 0.42)
-        parts.append(tube([[c * out, body * up, s * out] for out, up in heights], r * 0.9, "metal"))
-        if style.taper > 0.55:
-            parts += shade("cone", c, body * 0.5, s, cup, cup, body * 0.4, style)
-        else:
-            parts.append(ball((c, body * 0.55, s), (cup * 0.85, cup, cup * 0.85), "shade"))
     return parts
 
 
