@@ -155,6 +155,11 @@ def least_of(who: Array, values: Array, count: int, nothing: float) -> Array:
     return out
 
 
+def least_so_far(values: Array) -> Array:
+    """Of rows (n, k, ...) each and those before it the least: (n, k, ...)."""
+    return np.minimum.accumulate(values, 1) if isinstance(values, NUMPY) else values.cummin(1).values
+
+
 def sum_of(who: Array, values: Array, count: int) -> Array:
     """(count, ...): the sum of the values (k, ...) of each of `who` (k,) int64."""
     if not isinstance(values, NUMPY):

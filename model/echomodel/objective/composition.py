@@ -6,10 +6,12 @@ Distances were measured on 300 real rooms with their furniture, unless a standar
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, cast, dot, full, held, once, rows
+from echomodel.arrays import Array, at_least, cast, dot, full, held, least_so_far, once, rows
+from echomodel.boxes2d import footprints
 from echomodel.floors import Walls, footprint, signed_area, signed_distance
 from echomodel.objective.company import AROUND, BESIDE, first_of
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
@@ -57,17 +59,22 @@ def corners_used(plan: Plan) -> Found:
         corner = np.flatnonzero(walls.turn > SQUARE)
         start, *ways = map(plan.numbers, (walls.start[corner], walls.along[corner], -walls.along[corner - 1]))
         length = plan.numbers(np.stack([walls.length[corner], walls.length[corner - 1]]))
-        who, room, first = there.reshape(-1), (len(there), -1, len(corner)), length[:1]
-        count = int((~(plan.stands("row") | plan.movable))[who].sum())  # chairs and units of a row fill no room
+        first = length[:1]
+        count = int((~(plan.stands("row") | plan.movable))[there.reshape(-1)].sum())  # these fill no room
         if count < FEW * max(len(there), 1) or not len(corner):
             continue
-        at = footprint(plan.size[who], plan.position[who], plan.yaw[who])[:, ::2, None] - start
-        away = [dot(at, way) for way in ways]  # (s * n, 4, c) metres along both walls of each corner
-        met = (xp.amax(held(away[0]), 1) > 0) & (xp.amax(held(away[1]), 1) > 0)  # and not behind one
-        wide, deep = (xp.where(met, at_least(xp.amin(of, 1), 0.0), FAR).reshape(room) for of in away)
+        moved = plan.moved[there[0]]
+        still, moving = (_from_corners(plan, of, start, ways) for of in (there[:1, ~moved], there[:, moved]))
+        alike = (xp.broadcast_to(of, (len(there), *of.shape[1:])) for of in still)  # in all copies
+        wide, deep = (xp.concat([*of], 1) for of in zip(alike, moving, strict=True))
         ends = xp.concat([xp.minimum(wide, first), 0.0 * wide[:, :1] + first], 1)  # of rectangles, at pieces or walls
-        within = held(wide)[:, None] < held(ends)[:, :, None] - 1e-6
-        deep = xp.minimum(xp.amin(xp.where(within, deep[:, None], FAR), 2), length[1])
+        none = 0.0 * deep[:, :1] + FAR
+        order = xp.argsort(held(ends), 1)
+        ends, deep = (
+            of[xp.arange(len(there))[:, None, None], order, xp.arange(len(corner))]
+            for of in (ends, xp.concat([deep, none], 1))
+        )
+        deep = xp.minimum(least_so_far(xp.concat([none, deep], 1))[:, :-1], length[1])  # of those that begin before
         bare = (at_least(ends - WAY, 0.0) * at_least(deep - WAY, 0.0)).reshape(len(there), -1)
         most = held(bare).argmax(1)
         row, k = xp.arange(len(there)), most % len(corner)
@@ -76,6 +83,16 @@ def corners_used(plan: Plan) -> Found:
         margin = LEFT_BARE - xp.sqrt(at_least(bare[row, most], 1e-6))
         out = joined(out, found(_nearest(plan, there, middle), margin, measure=wide * deep))
     return out
+
+
+def _from_corners(plan: Plan, there: Array, start: Array, ways: Sequence[Array]) -> tuple[Array, Array]:
+    """(s, n, c) each: metres to pieces (s, n) along both walls of corners at (c, 2); `FAR` for what is behind one."""
+    who, xp = there.reshape(-1), plan.kit
+    at = footprints(plan.size[who], plan.position[who], plan.yaw[who])[:, :, None] - start
+    away = [dot(at, way) for way in ways]
+    met = (xp.amax(held(away[0]), 1) > 0) & (xp.amax(held(away[1]), 1) > 0)
+    wide, deep = (xp.where(met, at_least(xp.amin(of, 1), 0.0), FAR).reshape(*there.shape, len(start)) for of in away)
+    return wide, deep
 
 
 def floor_filled(plan: Plan) -> Found:

@@ -6,6 +6,7 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.objective import access, composition, crowding, lounging, seating, sight
+from echomodel.objective.copies import copies_of
 from echomodel.objective.plan import plan_of
 
 HALF = np.pi / 2
@@ -221,6 +222,32 @@ def test_a_corner_behind_a_wall_and_one_that_points_into_the_room_are_none():
         assert found.margin.tolist() == [pytest.approx(1.7 - 1e-3)]
         without = plan_of(Boxes(boxes.size[:5], at[:5], np.zeros(5)), ["bookshelf"] * 5, turned)
         assert composition.corners_used(without).margin.tolist() == [pytest.approx(1.7 - 6**0.5)]  # 7 m by 2 m
+
+
+def bare_in_corners(size, position, low, high):
+    """Side of a square of the largest bare rectangle in a corner less a way, one after the other; yaws of none."""
+    most = 0.0
+    for side in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        away = np.where(side, high - position, position - low)
+        near = [np.maximum(of - half / 2, 0.0) for of, half in zip(away, size, strict=True)]
+        for end in [*(of[0] for of in near), high[0] - low[0]]:
+            deep = min([*(of[1] for of in near if of[0] < end - 1e-6), high[1] - low[1]])
+            most = max(most, max(end - 1.0, 0.0) * max(deep - 1.0, 0.0))
+    return most**0.5
+
+
+def test_the_largest_bare_rectangle_in_a_corner_is_found_in_rooms_and_in_copies_of_them():
+    rng, half = np.random.default_rng(3), np.array([4.0, 3.0])
+    for count in rng.integers(5, 12, 40).tolist():
+        size = np.round(rng.uniform(0.4, 1.6, (count, 3)), 1)  # so that ends meet
+        at = np.round(rng.uniform(-0.8, 0.8, (3, count, 3)) * [4.0, 0.0, 3.0], 1)
+        at[1:, 2:] = at[0, 2:]  # copies differ by two
+        floor = np.array([(-4.0, -3.0), (4.0, -3.0), (4.0, 3.0), (-4.0, 3.0)])
+        plan = plan_of(Boxes(size, at[0], np.zeros(count)), ["bookshelf"] * count, floor)
+        copies = copies_of(plan, at, np.zeros((3, count)), np.arange(count) < 2)
+        slow = [1.7 - max(bare_in_corners(size[:, ::2], p[:, ::2], -half, half), 1e-3) for p in at]
+        assert composition.corners_used(copies).margin.tolist() == pytest.approx(slow)
+        assert composition.corners_used(plan).margin.tolist() == pytest.approx(slow[:1])
 
 
 @pytest.mark.parametrize(("middle", "margin"), [(-2.0, -0.205), (-0.2, 0.02)])
