@@ -100,18 +100,20 @@ def batch(
     return run_batch(request_of(raw, "batch"), Path(out), RunOptions(**how))
 
 
-def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
-    """`batch` for a checked request."""
+def run_batch(request: BatchRequest, out: Path, how: RunOptions, there: RunPlan | None = None) -> BatchResult:
+    """`batch` for a checked request, or for the plan that is there, whose sources nobody asks again."""
     check_writable(out)
     if "://" in str(out) or re.match(r"[A-Za-z][A-Za-z0-9+.-]+:/", out.as_posix()):  # `Path` makes one slash of two
         raise ValueError(f"{out}: allowed: a folder on a disk; its rooms are whole and may be copied as they appear")
     device = request.options.device
     if not how.ray:
         work.devices(device)
-    plan = _with_libraries(make_plan(request, weights_hash(request.options.weights), how.outside), how.outside)
+    weights = weights_hash(request.options.weights)
+    plan = there.by(weights) if there else make_plan(request, weights, how.outside)
+    plan = _with_libraries(plan, how.outside)
     place = shard_folder(out, how.shard)
     with locked(place):
-        _agree_on(plan, out, resume=how.resume or how.shard[1] > 1)
+        plan = _agree_on(plan, out, resume=how.resume or how.shard[1] > 1)
         valid = _valid(plan, out, how.shard)
         journal = Journal(place)
         pool = _executor(how, len(plan.entries), device)
@@ -176,18 +178,19 @@ def _with_libraries(plan: RunPlan, outside: tuple[str, ...]) -> RunPlan:
     return replace(plan, head={**plan.head, "libraries": found}) if found else plan
 
 
-def _agree_on(plan: RunPlan, out: Path, *, resume: bool) -> None:
-    """Write the plan, or make sure that the one that lies there is the same."""
+def _agree_on(plan: RunPlan, out: Path, *, resume: bool) -> RunPlan:
+    """Write the plan, or make sure that the one that lies there says the same; it counts."""
     if not (out / STATE / "plan.jsonl").is_file():
         check_ours(out, "run of echousd batch", besides=(STATE,))
         save_plan(plan, out)
-        return
+        return plan
     old = load_plan(out)
     unequal = difference(old, plan)
     if unequal:
         raise ValueError(f"{out}: holds a run with another plan ({unequal}); choose another folder")
     if not resume:
         raise ValueError(f"{out}: holds a run of {len(old.entries)} rooms; go on with it (--resume) or choose another")
+    return old
 
 
 def _valid(plan: RunPlan, out: Path, shard: tuple[int, int]) -> frozenset[str]:

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any
@@ -21,6 +21,7 @@ from echousd.batches.sources import find_graphs
 from echousd.folder.lock import LOCK
 from echousd.folder.manifest import MAX_SEED, Name, find_manifest
 from echousd.folder.within import check_links, inside
+from echousd.graph import SceneGraph
 from echousd.graph.fields import IDENTIFIER
 from echousd.naming import LAYER_FORMS, as_identifier
 from echousd.options import validation_message
@@ -103,6 +104,10 @@ class RunPlan:
         yield json.dumps(head, sort_keys=True) + "\n"
         for entry in self.entries:
             yield json.dumps(asdict(entry)) + "\n"
+
+    def by(self, weights: str) -> RunPlan:
+        """The same rooms by this version and these weights (their hash)."""
+        return replace(self, head={**self.head, "version": echousd.__version__, "weights": weights})
 
     def part(self, shard: tuple[int, int]) -> tuple[Entry, ...]:
         """The rooms of shard i of n: every n-th from number i on."""
@@ -190,9 +195,18 @@ def difference(old: RunPlan, new: RunPlan) -> str:
         return ""
     lines = [f"{key} was {a}, now {b}" for key, a, b in _unequal(old.head, new.head)]
     if not lines:
-        changed = [(a, b) for a, b in zip(old.entries, new.entries, strict=False) if a != b]
-        lines = [f"{len(changed)} graphs changed, the first of {changed[0][0].origin}" if changed else "other rooms"]
+        pairs = list(zip(old.entries, new.entries, strict=False))
+        changed = [a for a, b in pairs if a.graph != b.graph and not _alike(old.graphs, a.graph, new.graphs, b.graph)]
+        if any(replace(a, graph=b.graph) != b for a, b in pairs) or old.options != new.options:
+            lines = ["other rooms"]
+        if changed:
+            lines = [f"{len(changed)} graphs changed, the first of {changed[0].origin}"]
     return "; ".join(lines[:4])
+
+
+def _alike(old: dict[str, str], a: str, new: dict[str, str], b: str) -> bool:
+    """Whether two texts are of one graph, which another version writes otherwise."""
+    return a in old and b in new and SceneGraph.from_json(old[a]) == SceneGraph.from_json(new[b])
 
 
 def _unequal(old: Any, new: Any, where: str = "") -> Iterator[tuple[str, Any, Any]]:

@@ -48,13 +48,14 @@ def run(
         changes["assets"] = str(Path(changes["assets"]).absolute())
     raw["options"] = {**raw.get("options", {}), **parse_options(more or []), **changes}
     again = resume and raw == {"sources": [], "sample": {}, "options": {}}
-    request = load_plan(output).request if again else request_of(raw, files[0] if files else "batch")
+    there = load_plan(output) if again else None
+    request = there.request if there else request_of(raw, files[0] if files else "batch")
     with _shown(json) as tell:
         how = RunOptions(
             workers=workers, shard=_shard(shard), resume=resume, max_failures=max_failures, timeout=timeout,
             until=_clock(until), memory=memory, ray=ray, progress=tell, outside=tuple(map(str, outside or ())),
         )  # fmt: skip
-        result = run_batch(request, output, how)
+        result = run_batch(request, output, how, there)
     found = finish(output, webdataset=webdataset)
     say(f"rooms    {result.done} of {result.rooms}, {result.failed} failed, in {result.seconds:.0f} s", err=json)
     sheet = output / "index.html"

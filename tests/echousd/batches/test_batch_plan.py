@@ -46,6 +46,17 @@ def test_a_difference_is_told():
     assert plans.difference(old, changed) == "1 graphs changed, the first of sample:bedroom:0"
 
 
+def test_a_graph_that_is_written_otherwise_is_the_same_graph():
+    new = plan_of(sources=[str(SAMPLES / "bedroom.yaml")])
+    (digest, text), *_ = new.graphs.items()
+    entries = tuple(replace(entry, graph="beef") for entry in new.entries)
+    old = replace(new, entries=entries, graphs={"beef": json.dumps(json.loads(text), indent=4)})
+    assert old.digest != new.digest
+    assert plans.difference(old, new) == ""
+    other = replace(old, graphs={"beef": text.replace("wardrobe", "desk")})
+    assert plans.difference(other, new).startswith("1 graphs changed, the first of ")
+
+
 def test_variations_are_taken_in_turn():
     plan = plan_of(sample={"bedroom": 4}, variations={"walls": [True, False], "ceiling": [True, False]})
     chosen = [plan.options[entry.options] for entry in plan.entries]

@@ -88,6 +88,21 @@ def test_ctrl_c_ends_a_run_within_seconds(tmp_path):
     assert said.splitlines()[-1] == "error: interrupted"
 
 
+def test_a_run_goes_on_without_its_sources(echousd_command, tmp_path, monkeypatch):
+    (tmp_path / "graphs").mkdir()
+    (tmp_path / "graphs" / "a.yaml").write_text("room: bedroom\nobjects: {bed: double_bed}\n")
+    monkeypatch.chdir(tmp_path)
+    quick = ("--shapes", "boxes", "--dress", "none", "--no-preview", "--workers", "1")
+    assert echousd_command("batch", "graphs", "--count", "2", *quick, "-o", "run").code == 0
+    made = sorted((tmp_path / "run/rooms/0000").iterdir())
+    (made[1] / f"{made[1].name}.usda").unlink()
+    (tmp_path / "graphs" / "a.yaml").unlink()
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    outcome = echousd_command("batch", "-o", "../run", "--resume", "--workers", "1")
+    assert (outcome.code, "2 of 2" in outcome.out) == (0, True), outcome.err
+
+
 def test_a_run_goes_on_as_it_was_asked(echousd_command, tmp_path):
     asked = ("--sample", "bedroom:2", "--shapes", "boxes", "--dress", "none", "--no-preview", "--workers", "1")
     assert echousd_command("batch", *asked, "--seed", "5", "-o", tmp_path / "run").code == 0
