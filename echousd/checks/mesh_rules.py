@@ -266,13 +266,14 @@ def scale(reading: Reading) -> Iterator[Finding]:
         if not prim.IsA(UsdGeom.Xformable):
             continue
         try:
-            local = _factors(matrix(reading.cache.GetLocalTransformation(prim)[0], prim).tobytes())
+            own = matrix(reading.cache.GetLocalTransformation(prim)[0], prim)
+            local = _factors(own.tobytes())
             whole = reading.world(prim)
         except UNREADABLE:
             continue
         if local.min() < 1e-6:
             reported.add(prim.GetPath())
-            yield Finding(prim.GetPath(), f"scale is {_listed(local)}, allowed: above 0")
+            yield Finding(prim.GetPath(), f"scale is {_listed(own)}, allowed: above 0")
             continue
         schemas = applied(prim)
         if NODE_API not in schemas and not any(schema in schemas for schema in PHYSICAL):
@@ -284,7 +285,7 @@ def scale(reading: Reading) -> Iterator[Finding]:
         if culprit.GetPath() not in reported:
             reported.add(culprit.GetPath())
             what = "a body, collider or object of a scene graph"
-            yield Finding(culprit.GetPath(), f"scale is {_listed(world)}, allowed on {what}: the same along all axes")
+            yield Finding(culprit.GetPath(), f"scale is {_listed(whole)}, allowed on {what}: the same along all axes")
 
 
 @rule("echo:Mirrored", "prims", UsdGeom.Xformable)
@@ -308,8 +309,11 @@ def _factors(transform: bytes) -> np.ndarray:
     return np.linalg.svd(np.frombuffer(transform).reshape(4, 4)[:3, :3], compute_uv=False)
 
 
-def _listed(factors: np.ndarray) -> str:
-    return "(" + ", ".join(f"{factor:.4g}" for factor in sorted(factors)) + ")"
+def _listed(transform: np.ndarray) -> str:
+    """How a transform scales along x, y and z; of one that shears, along its own axes, the least first."""
+    along, factors = np.linalg.norm(transform[:3, :3], axis=1), _factors(transform.tobytes())[::-1]
+    shown = along if np.allclose(np.sort(along), factors, rtol=EVEN, atol=1e-6) else factors
+    return "(" + ", ".join(f"{factor:.4g}" for factor in shown) + ")"
 
 
 @rule("echo:MaterialsInside", "prims")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from echousd.cli.options import AsJson, Layout, Wait, documented_command
-from echousd.cli.output import say, say_done
+from echousd.cli.output import counted, say, say_done
 
 if TYPE_CHECKING:
     from echousd.texturing import Job
@@ -52,7 +52,7 @@ def import_(
     look = import_texture_job(room, job, name=name, skip=tuple(skip or ()), preview=preview, force=force, wait=wait)
     lines = [
         f"look     {look.layer}",
-        f"painted  {len(look.painted)} objects; variant {look.name!r} of `looks` on the room, `made` is without",
+        f"painted  {counted(len(look.painted), 'object')}; variant {look.name!r} of `looks` on the room",
     ]
     for words, what in ((look.unpainted, "no result"), (look.skipped, "left out")):
         if words:

@@ -260,8 +260,9 @@ def rooms_from(path: Path, *, held_out: bool = False) -> list[RoomBoxes]:
 
 
 def _from_json(file: Path) -> list[RoomBoxes]:
+    with raising(f"{file}: neither a stage ({', '.join(STAGE_FORMS)}), a set (.npz) nor JSON", ValueError, OSError):
+        raw = json.loads(file.read_bytes())
     try:
-        raw = json.loads(file.read_text("utf-8"))
         match raw:
             case {"format": "sceneState"}:
                 return [_sceneeval(raw["scene"], file)]

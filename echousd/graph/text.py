@@ -86,7 +86,8 @@ def _written(located: Located, about: Path) -> Path:
 def graph_from_plain(kind: type[SceneGraph], data: Any) -> SceneGraph:
     """The graph in plain data (mappings, lists, texts, numbers) of either form; raises `GraphError`."""
     if not isinstance(data, Mapping):
-        raise GraphError(f"found {shown(data)}, allowed: a mapping with {', '.join(TOP_KEYS)}")
+        found = "nothing" if data is None else shown(data)
+        raise GraphError(f"found {found}, allowed: a mapping with {', '.join(TOP_KEYS)}")
     only_fields(data, TOP_KEYS, ())
     if "objects" in data and "nodes" in data:
         raise GraphError("both objects and nodes are given, allowed: one of them", ("nodes",))

@@ -69,7 +69,8 @@ def generate(
             the model of the option `weights`.
         earlier: folder or root layer of the last generation, where locked objects without a place are looked for.
         outside: folders besides those of the graph's file and of the library's index in which models may lie.
-        boxes: layout of your own, n boxes in the order of the graph's nodes, metres and radians in the room's frame;
+        boxes: layout of your own, n boxes in the order of the graph's nodes, such as `echomodel.boxes.Boxes`: size and
+            position (n, 3) float, of the bottoms' centres, metres, yaw (n) float, radians, in the room's frame;
             every object stands where its box is.
         meshes: object name -> file of a piece of your own (USD, glTF, OBJ), which keeps its materials; relative to the
             working folder.
@@ -196,6 +197,8 @@ def with_own_boxes(graph: SceneGraph, boxes: Boxes | None) -> SceneGraph:
     """The graph whose objects state size, place and heading of `boxes` (n, in its order); raises ValueError."""
     if boxes is None:
         return graph
+    if not all(hasattr(boxes, field) for field in ("size", "position", "yaw")):
+        raise ValueError(f"boxes: found {boxes!r:.60}, allowed: size, position and yaw of n boxes")
     if len(boxes) != len(graph.nodes):
         raise ValueError(f"boxes: {len(boxes)} for a graph of {len(graph.nodes)} objects: need one box per object")
     rows = zip(graph.nodes, boxes.size.tolist(), boxes.position.tolist(), boxes.yaw.tolist(), strict=True)

@@ -87,7 +87,7 @@ def faults_of(plan: Plan, kinds: Collection[str] = BY_EYE) -> list[Fault]:
             if bool(plan.fixed[who]):
                 continue
             text = term.says[int(seen.words[row]) % len(term.says)]
-            sentence = text.replace("{a}", "\0").replace("{b}", "\1").format(x=float(seen.measure[row]))
+            sentence = text.replace("{a}", "\0").replace("{b}", "\1").format(x=max(float(seen.measure[row]), 0.0))
             sentence = sentence.replace("\0", "{a}").replace("\1", "{b}")
             out.append(Fault(who, other, term.name, float(seen.margin[row]), sentence))
     return out

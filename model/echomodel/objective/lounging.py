@@ -63,6 +63,7 @@ def table_before_sofa(plan: Plan) -> Found:
     alone = xp.bincount(plan.joins[plan.joins >= 0], minlength=len(plan))[j] == 0
     lies = xp.where(alone, lies_along(plan, i, j), FAR)
     out = first_of(i, j, [gap - least, BEFORE_SOFA[1] - gap, within - off, lies], [gap, gap, off, gap])
+    out = replace(out, words=xp.where((out.words == 0) & (gap < 0), 4, out.words))
     return out.take(held(-out.margin) <= least_of(j, held(-out.margin), len(plan), math.inf)[j])
 
 

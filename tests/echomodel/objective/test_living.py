@@ -145,6 +145,7 @@ MORE = [
     (LIVING.moved("armchair", at=(1.0, -0.3)), ("armchair", "seat_room"), "armchair: 0.05 m before it stands coffee"),
     (LIVING.moved("coffee", at=(-0.5, -0.4)), ("coffee", "table_before_sofa"), "0.50 m beside the middle of sofa"),
     (LIVING.moved("coffee", at=(0.0, 0.1)), ("coffee", "table_before_sofa"), "coffee lies 0.88 m before sofa"),
+    (LIVING.moved("coffee", at=(0.0, -1.4)), ("coffee", "table_before_sofa"), "coffee lies behind the front of sofa"),
     (LIVING.moved("armchair", at=(2.0, -1.53)), ("armchair", "seat_room"), "armchair looks at the end of sofa, 0.50 m"),
     (with_one(LIVING, "table", kind="dining_table", size=(1.4, 0.75, 0.8), at=(0.0, 0.8)), ("stand", "view_free"),
      "table stands between stand and who watches it"),

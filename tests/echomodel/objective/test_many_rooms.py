@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -37,6 +39,17 @@ def test_another_rooms_wardrobe_hides_no_screen():
     said = {fault.rule for fault in faults_of(packed_plan(plans))}
     assert said == {fault.rule for plan in plans for fault in faults_of(plan)}
     assert "view_free" not in said
+
+
+def test_no_sentence_names_less_than_nothing():
+    rng = np.random.default_rng(0)
+    for room in generate_rooms(12, 3):
+        place, low, high = room.position.copy(), *(f(room.floor_polygon, 0) for f in (np.min, np.max))
+        moved = np.flatnonzero(rng.random(len(room)) < 0.5)
+        place[moved[:, None], [0, 2]] = rng.uniform(low, high, (len(moved), 2))
+        shaken = replace(room, position=place)
+        for fault in faults_of(plan_of(shaken, shaken.categories, shaken.floor_polygon)):
+            assert not re.search(r"-\d|nan|inf\b", fault.says), fault
 
 
 def test_several_rooms_at_once_are_judged_as_one_by_one():

@@ -106,7 +106,7 @@ def test_messages_name_what_was_found_and_what_is_allowed() -> None:
         return f"{fault.prim} {fault.message}"
 
     assert message("short_uvs").endswith("primvars:st has 20 texture coordinates, faceVarying interpolation needs 24")
-    assert message("zero_scale") == "/Room/Objects/wardrobe/handle scale is (0, 1, 1), allowed: above 0"
+    assert message("zero_scale") == "/Room/Objects/wardrobe/handle scale is (1, 0, 1), allowed: above 0"
     assert "'wardrobe in nightstand'" in message("contradiction")
     assert "bound to </Looks/wood>" in message("material_outside")
     assert "'/home/artist/rooms/room.usda' is absolute" in message("absolute_path")

@@ -121,7 +121,8 @@ def test_scenesmith_has_boxes_and_quaternions(tmp_path):
     [
         ("a.json", '{"format": "sceneState", "scene": {}}', "a.json: not a room as it says (KeyError 'arch')"),
         ("a.json", '{"rooms": [{"id": 1}], "objects": [5], "walls": []}', "a.json: not a room as it says (Attr"),
-        ("b.json", "{", "b.json: not a room as it says (JSONDecodeError"),
+        ("b.json", "{", "b.json: neither a stage (.usda, .usdc, .usd, .usdz), a set (.npz) nor JSON (Expecting"),
+        ("bad.txt", "hello", "bad.txt: neither a stage (.usda, .usdc, .usd, .usdz), a set (.npz) nor JSON (Expecting"),
         ("c.json", "{}", "no rooms, a state of SceneEval, Holodeck's or SceneSmith's JSON"),
     ],
 )

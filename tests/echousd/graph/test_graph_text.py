@@ -113,7 +113,7 @@ GOOD = "room: bedroom\nobjects:\n  a: bed\n  b: lamp\n"
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "x.yaml: found None, allowed: a mapping with room, objects, nodes, relations"),
+        ("", "x.yaml: found nothing, allowed: a mapping with room, objects, nodes, relations"),
         ("bedroom", "x.yaml: found 'bedroom', allowed: a mapping with room"),
         ("room: bedroom", "x.yaml: the graph is empty, allowed: at least one object"),
         ("objects: {a: bed}", "x.yaml: room is missing, allowed: one of bedroom, living_room,"),

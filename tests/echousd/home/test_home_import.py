@@ -591,3 +591,17 @@ def test_a_house_of_procthor_that_others_changed_is_as_they_have_it(tmp_path, ec
         "room_4",
         "room_5",
     ]
+
+
+def test_a_picture_of_ours_is_no_plan_and_a_path_of_nothing_no_fault(tmp_path, echousd_command):
+    svg(tmp_path / "flat.svg")
+    text = (tmp_path / "flat.svg").read_text()
+    (tmp_path / "flat.svg").write_text(text.replace("</svg>", '<path class="wall"/></svg>'))
+    assert len(import_plan(tmp_path / "flat.svg", unit="cm").plan.floors) == 2
+    done = echousd_command("plan", tmp_path / "flat.svg", "-o", tmp_path / "flat.usda")
+    assert done.code == 2
+    words = ("new", tmp_path / "flat.yaml", "--rooms", "hall door bedroom")
+    assert echousd_command(*words).code == 0
+    assert echousd_command("plan", tmp_path / "flat.yaml", "-o", tmp_path / "drawn.svg").code == 0
+    done = echousd_command("plan", "import", tmp_path / "drawn.svg", "-o", tmp_path / "back.usda", "--unit", "1")
+    assert "a picture that echousd drew, which has no layers, allowed: the plan as .dxf, .json or .usda" in done.err

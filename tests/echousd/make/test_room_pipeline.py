@@ -215,6 +215,8 @@ def test_where_every_box_is_given_none_is_drawn() -> None:
     room = echousd.generate(small_graph(), model=Silent(), boxes=given, shapes="boxes", **BARE)
     assert np.array_equal(room.boxes.position, given.position)
     assert np.array_equal(room.boxes.size, given.size)
+    with pytest.raises(ValueError, match=r"boxes: found 3, allowed: size, position and yaw of n boxes"):
+        echousd.generate(small_graph(), boxes=3)
 
 
 def test_what_cannot_fit_is_said_or_left_out() -> None:
