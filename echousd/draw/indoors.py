@@ -20,14 +20,16 @@ if TYPE_CHECKING:
     from echousd.draw.scenery import Scenery
 
 SKY = 4.0  # radiance of the sky in a window for a dome of intensity 1, whose light else comes from above as well
-SUN = 5.5  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
+SUN = 4.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
 CEILING = np.array([0.87, 0.86, 0.84], np.float32)
-VIEW = 0.5  # of the sky's radiance, what is seen of it through a window: eyes adapt
-BLURRED, HAZE = 0.3, 0.25  # degrees that it is out of focus, and the share of its colour that haze takes
+# Of the sky's radiance, what is seen of it through a window: eyes adapt; and the power of the room's hue that they do
+# not adapt to there.
+VIEW, THERE = 0.65, 0.5
+BLURRED, HAZE = 0.15, 0.35  # degrees that it is out of focus, and the share of its colour that haze takes
 DIM = 0.02  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
-ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.6, 0.85), (0.38, 0.61), 70, 15.0
+ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.6, 0.75), (0.38, 0.61), 70, 15.0
 EVEN = (0.18, 0.3)  # power of the light's brightness that eyes take from it, and inside whoever photographs rooms
 WHITE, PAPER = 88, 0.95  # what so many of a hundred points are darker than comes to no more than that
 CONTRAST, KNEE = 1.55, 0.6  # power about what is bright, and from where on highlights are rolled off
@@ -80,7 +82,7 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
                 sharp = Image.fromarray(image_of(str(prim.GetPath()), picture.resolvedPath))
                 soft = sharp.reduce(max(1, round(2 * BLURRED * sharp.width / 360)))  # between its pixels it is
                 hazy = Image.blend(soft, Image.merge("RGB", [soft.convert("L")] * 3), HAZE)
-                view = np.asarray(hazy.filter(ImageFilter.GaussianBlur(1)))  # else its pixels show as squares
+                view = np.asarray(hazy.filter(ImageFilter.GaussianBlur(1.5)))  # else its pixels show as squares
         elif prim.IsA(UsdLux.DistantLight):
             towards = world[:3, 2] / max(float(np.linalg.norm(world[:3, 2])), 1e-9)
             suns.append(np.stack([towards, color]))
@@ -124,7 +126,8 @@ def with_ceiling(scenery: Scenery) -> Scenery:
         "triangles": corners[[[0, 1, 2], [0, 2, 3]]],
         "normals": np.broadcast_to(np.array([0, -1, 0], np.float32), (2, 3, 3)),
         "flat_colors": np.broadcast_to(CEILING, (2, 3)), "emissive": np.zeros((2, 3), np.float32),
-        "gloss": np.zeros(2, np.float32), "st": np.zeros((2, 3, 2), np.float32), "texture": np.full(2, -1),
+        "gloss": np.zeros(2, np.float32), "thin": np.zeros(2, np.float32), "st": np.zeros((2, 3, 2), np.float32),
+        "texture": np.full(2, -1),
         "wall": np.full(2, -1),
     }  # fmt: skip
     parts = [{key: getattr(scenery, key) for key in added}, *scenery.above, added]

@@ -28,7 +28,7 @@ def without_near_walls(scenery: Scenery, eye: np.ndarray) -> Scenery:
             seen &= scenery.pane_wall != number
     if keep.all() or not keep.any():
         return scenery
-    names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "st", "texture", "wall")
+    names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "thin", "st", "texture", "wall")
     fewer = {name: getattr(scenery, name)[keep] for name in names}
     return replace(scenery, panes=scenery.panes[seen], pane_wall=scenery.pane_wall[seen], **fewer)
 

@@ -28,6 +28,7 @@ LEVELS = 7  # sizes of an image, each half of the one before
 # Opacity of a pane below which one looks through it; twice the m² of upright glass from which on it glazes a front.
 SEEN_THROUGH, GLAZED = 0.5, 0.03
 NEXT, NEAR, FAR = 2.5, 1.2, 0.6  # metres from a passage to the wall beyond, and what light there is on the way to it
+HANGING, CLOTH, SHEER = ("curtain", "blind"), 0.22, 1.4  # the share of light that comes through cloth, thin cloth more
 SKY_LIGHT = np.array([0.90, 0.93, 0.97], np.float32)
 BACKGROUND = np.array([0.90, 0.905, 0.915], np.float32) ** 2.2
 HUNG = (  # goes with its wall
@@ -43,7 +44,8 @@ class Scenery:
     normals: np.ndarray
     flat_colors: np.ndarray  # flat_colors, emissive: (f, 3) float32 linear RGB
     emissive: np.ndarray
-    gloss: np.ndarray  # (f,) float32 in [0, 1]
+    gloss: np.ndarray  # gloss, thin: (f,) float32 in [0, 1]; the latter what comes through it of light from behind
+    thin: np.ndarray
     st: np.ndarray  # (f, 3, 2) float32 texture coordinates
     texture: np.ndarray  # (f,) int, which of `images` colours the face, -1 for none
     # each as read with its sides halved so often, `image_of`; and (3,) float32, what its linear RGB is multiplied by
@@ -252,14 +254,15 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             "normals": turned.reshape(-1, 3, 3).astype(np.float32),
             "st": np.zeros((count, 3, 2), np.float32) if mesh.st is None else mesh.st.astype(np.float32),
             "flat_colors": np.zeros((count, 3), np.float32), "emissive": np.zeros((count, 3), np.float32),
-            "gloss": np.zeros(count, np.float32), "texture": np.full(count, -1),
-            "wall": np.full(count, walls.get(mesh.component, -1)),
+            "gloss": np.zeros(count, np.float32), "thin": np.full(count, CLOTH * (mesh.category in HANGING), "f4"),
+            "texture": np.full(count, -1), "wall": np.full(count, walls.get(mesh.component, -1)),
         }  # fmt: skip
         plain, clear = Paint(color=class_color(mesh.category), roughness=1.0), np.zeros(count, bool)
         for paint, faces in ((plain, np.arange(count)),) if by_class else mesh.paints:
             part["flat_colors"][faces], part["emissive"][faces] = paint.color, paint.emissive
             part["gloss"][faces] = min(1.0, 0.5 * (1 - paint.roughness) + 0.35 * paint.metallic)
             part["texture"][faces], clear[faces] = -1, paint.opacity < SEEN_THROUGH
+            part["thin"][faces] *= SHEER if paint.opacity < 1 else 1
             if paint.texture:
                 key, found = (paint.texture, paint.tint), cache(partial(image_of, paint.image, paint.texture))
                 read, tint = images.setdefault(key, (found, np.array(paint.tint, np.float32)))

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from echomodel.triangles import along
-from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, VIEW, Bounced, evened, exposure, rolled
+from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, THERE, VIEW, Bounced, evened, exposure, rolled
 from echousd.draw.scenery import SKY_LIGHT, Scenery, next_room, outside
 from echousd.draw.views import View
 
@@ -81,7 +81,8 @@ BESIDE = np.array(sorted(product(range(-2, 3), repeat=2), key=lambda at: at[0] *
 POOL, CORNERS = 0.15, np.array(list(product((0, 1), repeat=3)))  # metres; of a cell of these
 CLOSE, EVEN = 2, 0.4  # from which ring on it matters how bright neighbours are, and the share that they may differ by
 ALIKE, FLAT = 0.97, 0.02  # cosine and metres within which two points lie on one flat piece of surface
-BEFORE = np.float32(2e-3)  # metres before a surface, from where on it is no more in the way of its own light
+# metres before a surface, from where on it is no more in the way of its own light; and of what cloth is thick
+BEFORE, THICK = np.float32(2e-3), np.float32(0.016)
 MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
 
 
@@ -201,7 +202,8 @@ def _seen(world: World, origin: np.ndarray, way: np.ndarray, hit: Sequence[np.nd
     begin, towards = origin.take(missed, 1), way.take(missed, 1)
     glow[:, missed], through = outside(scenery, begin, towards)
     if world.view.inside:
-        glow *= np.float32(VIEW * scenery.lights.sky) * scenery.lights.tint[:, None]
+        hue = (world.white / world.white.mean()) ** THERE  # which the picture will take from it
+        glow *= np.float32(VIEW * scenery.lights.sky) * (scenery.lights.tint * hue)[:, None]
         past = np.flatnonzero(~through)
         glow[:, missed[past]] = next_room(scenery, world.white, begin.take(past, 1), towards.take(past, 1))
     lean = scenery.planes.normal.take(face, 1)
@@ -414,7 +416,13 @@ def embree(triangles: np.ndarray) -> Any:
 def _light(world: World, seen: Seen, sample: int, shift: np.ndarray) -> np.ndarray:
     """(6, n) what falls on points by one sample of the sun, a window and a lamp, and what is around, see `_asked`."""
     out, at = np.zeros((6, len(seen.face)), np.float32), (seen.point, seen.normal)
-    out[:3], out[5] = _direct(world, *at, *(_even(sample, part) for part in (shift[:2], shift[2:])))
+    spots = [_even(sample, part) for part in (shift[:2], shift[2:])]
+    out[:3], out[5] = _direct(world, *at, *spots)
+    share = world.scenery.thin.take(seen.face)
+    if len(cloth := np.flatnonzero(share)):  # which light comes through
+        point, normal, *spots = (each.take(cloth, 1) for each in (*at, *spots))
+        some, sun = _direct(world, point - THICK * normal, -normal, *spots)
+        out[:3, cloth] += share.take(cloth) * (some + sun * world.sun[:, None])
     dim = np.float32(DIM * max(world.scenery.lights.sky, 0.1)) * world.white / max(float(world.white @ LUMA), 1e-6)
     out[:3], out[3] = out[:3] + dim[:, None], _mirrored(world, seen, _even(sample, shift[:2]))
     for ray in range(AROUND):

@@ -131,7 +131,7 @@ def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: 
 
 # Metres of bare wall that ask for a picture, a wide one, three, for two groups; and for one beside a longer stretch.
 STRETCH, UPRIGHT, LONG, HALL, SECOND = 1.0, 2.0, 3.0, 4.4, 1.7
-DECOR, OTHER = ("macrame", "wall_baskets", "wall_plates", "sunburst_mirror", "slats"), 0.3  # share of stretches with it
+DECOR, OTHER = ("macrame", "wall_baskets", "wall_plates", "sunburst_mirror"), 0.3  # share of stretches with it
 STEP = 0.1  # metres from spot to spot along a wall
 PROBE = np.array([0.3, 0.8, 0.03])  # a picture that tells whether a spot is bare
 EMPTY = 0.65  # metres around a corner where nothing stands

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from echomodel.furniture.cloth import Sheet
 from echomodel.furniture.solids import FINEST, Piece, Solid, pieces_of
 from echomodel.triangles import Mesh, area_normals, bounds_of, joined, lengths
-from echousd.shapes.geometry import FRAME, Collider, Geometry, Mass, Origin, Part
+from echousd.shapes.geometry import DRAPED, FRAME, Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.hulls import convex_hull, hull_of
 from echousd.shapes.matter import ballasted, weighed
 
@@ -112,7 +113,8 @@ def part_of(name: str, pieces: Sequence[Piece], body: str = "") -> Part:
     mesh = joined([Mesh(piece.vertices, piece.faces) for piece in pieces])
     words = [SLOTS.get(piece.solid.material, piece.solid.material) for piece in pieces]
     slot = np.repeat(words, [len(piece.faces) for piece in pieces])
-    return Part(name, mesh, {word: np.flatnonzero(slot == word) for word in sorted(set(words))}, CREASE, body)
+    crease = DRAPED if any(isinstance(piece.solid, Sheet) for piece in pieces) else CREASE
+    return Part(name, mesh, {word: np.flatnonzero(slot == word) for word in sorted(set(words))}, crease, body)
 
 
 def covering(plain: np.ndarray, shown: np.ndarray) -> np.ndarray:

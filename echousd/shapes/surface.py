@@ -10,7 +10,7 @@ import numpy as np
 
 from echomodel.triangles import Mesh, along, area_normals, bounds_of, connected_pieces, lengths
 from echousd.shapes.finishes.slots import UPRIGHT, metres_of
-from echousd.shapes.geometry import CREASE
+from echousd.shapes.geometry import CREASE, DRAPED
 
 NUDGE = 4e-6  # metres between points of different boards at one place
 ATLAS = 1024, 2  # texels along a side and between charts, of pieces that are unwrapped without overlaps
@@ -63,7 +63,9 @@ def surfaces(forms: Sequence[tuple[Mesh, Mapping[str, np.ndarray], float]], *, a
         st = [(places.astype(np.float32), index.astype(np.int32).ravel()) for _, index, places in laid]
     else:
         groups = [(slot, start[n] + members) for n, (_, own, _) in enumerate(forms) for slot, members in own.items()]
-        st = _indexed(_laid_out(points, faces, groups, owner, board), 5, np.repeat(owner, 3))
+        st = _indexed(
+            _laid_out(points, faces, groups, owner, board, sharpest <= np.cos(DRAPED)), 5, np.repeat(owner, 3)
+        )
     apart = unshared(points.astype(np.float32), faces, np.repeat(np.arange(len(forms)), np.diff(first)), board)
     return [
         Surface(
@@ -114,7 +116,7 @@ def _corner_normals(points: np.ndarray, faces: np.ndarray, sharpest: np.ndarray)
 
 def _laid_out(
     points: np.ndarray, faces: np.ndarray, groups: Sequence[tuple[str, np.ndarray]], owner: np.ndarray,
-    board: np.ndarray,
+    board: np.ndarray, draped: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """(3 f, 2): texture coordinates of the corners for the patterns of our material slots.
 
@@ -123,12 +125,14 @@ def _laid_out(
     places of the picture. Slots whose picture is of the whole thing get all of it on the side that they show.
 
     `groups`: slots and the faces of each, of one mesh. `owner`, `board`: (f,) int, the numbers of each face's mesh and
-    connected piece.
+    connected piece. `draped`: (f,) bool, whether it is cloth, which where it hangs has its picture from its front.
     """
     axis, way = facing_axis(points[faces])
-    st = _projected(points[faces], axis, way)
     low, high = _corners(points[faces], board)
     extent = (high - low)[board]
+    hangs = draped & ((thin := extent.argmin(1)) != 1)
+    axis[hangs], way[hangs] = thin[hangs], 1.0
+    st = _projected(points[faces], axis, way)
     rows = np.arange(len(faces))
     across, along = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
     turned = extent[rows, along] > 1.05 * extent[rows, across]

@@ -13,11 +13,10 @@ from echomodel.furniture.cloth import Sheet, Slumped, folds, pillow, seam
 from echomodel.furniture.solids import Solid, ball, rotation, tube, turned
 
 LIES = (11, 16)  # cells in which a throw knows what it lies on
-FOLD = 0.125  # metres of curtain from one fold to the next
+FOLD = 0.14  # metres of curtain from one fold to the next
 FULL = (0.4, 1.0)  # of the fullest fold at a foot, the others
 BREAK = (0.05, 0.3)  # share of its height over its foot where a curtain breaks, and of a fold that is less deep there
-# where in a fold its cloth has points, radians from where it is foremost: it bends alike at each
-BENDS = np.array([0.5, np.pi / 2, np.pi - 0.5, np.pi, np.pi + 0.5, 1.5 * np.pi, 2 * np.pi - 0.5, 2 * np.pi])
+BENDS, ROUND = (np.arange(10) + 0.5) * np.pi / 5, 0.075  # where in a fold, radians, points are; wider than a wave there
 DRAPES = ("curtain", "curtain", "linen", "drape", "drape", "velvet", "drape_striped")  # what curtains are of
 THROWS = ("accent_cloth", "accent_cloth", "accent_striped", "accent_checked")
 
@@ -88,7 +87,7 @@ def _hung(
     count = max(2, round(w / fold))
     phase, wander = rng.uniform(0, 2 * np.pi, 4), drift * rng.uniform(-1, 1, 3)
     turn = (np.arange(count)[:, None] * 2 * np.pi + BENDS).ravel()
-    along = turn / (2 * np.pi * count) - 0.5
+    along = (turn / (2 * np.pi) + ROUND * np.sin(2 * turn)) / count - 0.5
     full = rng.uniform(*FULL, count)  # how wide each fold comes to be below
     ends = np.concatenate([[0.0], full.cumsum() / full.sum()]) - 0.5
     below, uneven = np.interp(turn / (2 * np.pi), np.arange(count + 1), ends), full.repeat(len(BENDS)) / FULL[1]

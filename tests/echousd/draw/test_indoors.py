@@ -185,7 +185,7 @@ def test_a_lamp_shines_from_its_shade_and_throws_no_shadow_of_its_own_on_the_cei
     added = {
         "triangles": dark, "normals": np.zeros_like(dark) + np.float32((0, -1, 0)), "st": np.zeros((len(dark), 3, 2)),
         "flat_colors": np.zeros((len(dark), 3)), "emissive": np.zeros((len(dark), 3)), "gloss": np.zeros(len(dark)),
-        "texture": np.full(len(dark), -1), "wall": np.full(len(dark), -1),
+        "thin": np.zeros(len(dark)), "texture": np.full(len(dark), -1), "wall": np.full(len(dark), -1),
     }  # fmt: skip
     joined = {key: np.concatenate([getattr(scenery, key), more]).astype(more.dtype) for key, more in added.items()}
     picture = trace(replace(scenery, **joined), up, 96, rays=2).mean(-1)
@@ -199,7 +199,7 @@ def with_sheet(scenery, corners: np.ndarray, **values):
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     added = {
         "triangles": triangles, "normals": np.broadcast_to(normal / np.linalg.norm(normal), (2, 3, 3)),
-        "flat_colors": np.full((2, 3), 0.5), "emissive": np.zeros((2, 3)), "gloss": np.zeros(2),
+        "flat_colors": np.full((2, 3), 0.5), "emissive": np.zeros((2, 3)), "gloss": np.zeros(2), "thin": np.zeros(2),
         "st": np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)[[[0, 1, 2], [0, 2, 3]]], "texture": np.full(2, -1),
         "wall": np.full(2, -1), **values,
     }  # fmt: skip
@@ -269,13 +269,25 @@ def test_the_rim_of_what_is_round_is_lit_as_what_is_beside_it():
     scenery, down = box_room(sky=0.0, bulbs=lamps[:, None], power=np.ones((4, 3), np.float32))
     ball = trimesh.creation.icosphere(subdivisions=1, radius=0.6)  # so coarse that normals at its rim look away
     form = {"triangles": ball.triangles + np.array((0, 0.8, 0)), "normals": ball.vertex_normals[ball.faces]}
-    flat = {name: np.zeros((80, *shape)) for name, shape in (("gloss", ()), ("st", (3, 2)), ("emissive", (3,)))}
+    flat = {
+        name: np.zeros((80, *shape))
+        for name, shape in (("gloss", ()), ("thin", ()), ("st", (3, 2)), ("emissive", (3,)))
+    }
     flat |= {"texture": np.full(80, -1), "wall": np.full(80, -1), "flat_colors": np.full((80, 3), 0.9)}
     white, glowing = (
         trace(with_sheet(scenery, level_sheet(1, 1), **form, **look), down, 160, rays=2).mean(-1)
         for look in (flat, flat | {"emissive": np.ones((80, 3))})
     )
     assert white[glowing > 0.6].min() > 0.55  # 0.48 where normals that look away are turned into the ball
+
+
+def test_light_comes_through_a_curtain_and_not_through_a_board():
+    scenery, down = box_room(sky=0.0, **LAMP)
+    curtain, board = (
+        trace(with_sheet(scenery, level_sheet(1.0, 1.0, y=2.0), thin=np.full(2, thin)), down, 32, rays=2).mean(-1)
+        for thin in (0.3, 0.0)
+    )
+    assert curtain[14:18, 14:18].mean() > board[14:18, 14:18].mean() + 0.1
 
 
 def test_a_shade_is_brightest_at_its_bulb():
@@ -325,7 +337,7 @@ def test_a_glossy_floor_mirrors_the_window_and_more_so_aslant():
 def test_a_patch_of_sun_has_a_straight_border():
     """The border of a board's shadow, slightly aslant, in the picture's rows: soft by its sun's width alone."""
     pane = np.array([[(1.99, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.8, 0.0)]], np.float32)
-    scenery, down = box_room(sky=0.1, sun=np.array([(0.1, 0.99, 0.1), (1.0, 1.0, 1.0)], np.float32))
+    scenery, down = box_room(sky=0.1, sun=np.array([(0.1, 0.99, 0.1), (1.4, 1.4, 1.4)], np.float32))
     above = (scenery.triangles[..., 1] > 2.9).all(1)
     names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "st", "texture", "wall")
     scenery = replace(scenery, panes=pane, **{name: getattr(scenery, name)[~above] for name in names})
