@@ -141,7 +141,7 @@ LEAN, UPRIGHT = 0.28, 0.185  # of its height that a top is behind its foot; metr
 
 def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
     """A cushion on a side, full or slack, of one of some cloths or of a print, trimmed; a deep one leans back."""
-    (w, h, _), lean = size, LEAN * size[1] if size[2] > UPRIGHT else 0.0
+    (w, h, _), lean, low = size, LEAN * size[1] if size[2] > UPRIGHT else 0.0, 0.022
     d = size[2] - lean
     cloth, trim = str(rng.choice(CLOTHS)), str(rng.choice(TRIMS))
     cord = str(rng.choice(("linen", "ebony", "blanket", "accent_plain")))
@@ -149,7 +149,7 @@ def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid
     trims: dict[str, list[Solid]] = {
         "cord": [tube(seam(w / 2, h / 2) + np.array([0, h / 2, 0]), 0.004, cord)],
         "button": [ball((0, h / 2, 0), (0.016, 0.016, 0.51 * d), cord)],
-        "tassels": [ball((x * w, y * h, 0), (0.016, 0.022, 0.014), cord) for x in (-0.47, 0.47) for y in (0.03, 0.97)],
+        "tassels": [ball((x * w, y, 0), (0.016, low, 0.014), cord) for x in (-0.47, 0.47) for y in (low, h - low)],
     }
     made = [replace(body, power=float(rng.choice((3.0, 4.0, 5.5)))), *trims.get(trim, [])]
     return [Slumped(material=one.material, of=one, tall=h, lean=lean) for one in made] if lean else made

@@ -14,15 +14,16 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import turned
-from echomodel.dressing import KINDS, PRINTS, SMALL, printed
+from echomodel.dressing import KINDS, PRINTS, SMALL, printed, usual_size
 from echomodel.dressing import thing as solids_of
+from echomodel.dressing.textiles import LEAN
 from echomodel.furniture.solids import pieces_of
 from echomodel.openings import Opening
 from echomodel.triangles import Mesh, joined
 from echomodel.vocabulary import vocabulary
 from echousd.checks import check
 from echousd.dressing import tabletops, upholstery
-from echousd.dressing.dress import ORIGIN, RULES, TALL, Dressing, dress, dressed, setting_of
+from echousd.dressing.dress import ORIGIN, RULES, TALL, Dressing, dress, dressed, geometry_of, setting_of
 from echousd.dressing.setting import Setting, Thing, meets, standing
 from echousd.dressing.tabletops import surfaces
 from echousd.dressing.upholstery import STEP, _let_down, _Seat
@@ -423,6 +424,17 @@ def test_cushions_lie_on_their_seat_not_on_the_foot_of_its_back():
     spot = seat.resting(0.0, size)
     assert spot[2] < -0.25  # against the back
     assert spot[1] == pytest.approx(0.44)
+
+
+@pytest.mark.parametrize("variant", [228333841, *range(30)])  # the first has tassels, which were its lowest
+def test_a_cushion_that_leans_stands_on_its_foot(variant):
+    size = usual_size("cushion", np.random.default_rng(variant))
+    if variant > 30:
+        size = np.array([0.5137, 0.4937, 0.1778])
+    made = geometry_of("cushion", tuple(np.add(size, (0, 0, LEAN * size[1])).tolist()), variant)
+    corners = np.concatenate([collider.mesh.vertices for collider in made.colliders])
+    foot = corners[corners[:, 1] < corners[:, 1].min() + 0.005]
+    assert foot[:, 2].min() + 0.005 < made.mass.centre[2] < foot[:, 2].max() - 0.005
 
 
 def test_cushions_lie_before_the_pillows_of_wide_beds():
