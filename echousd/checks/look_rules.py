@@ -138,7 +138,7 @@ def viewpoints(reading: Reading) -> Iterator[Finding]:
                 yield Finding(prim.GetPath(), f"{-at[1]:.2g} m below the floor of its room, allowed: above it")
             elif prim.IsA(UsdGeom.Camera):
                 solids = reading.contents(room).objects if solids is None else solids
-                within = [one.name for one in solids if len(one.faces) and inside_solid(at[None], one)[0]]
+                within = [one.name for one in solids if len(one.faces) and inside_solid(at[None], one)[0][0]]
                 if within:
                     yield Finding(prim.GetPath(), f"stands inside {within[0]}, allowed: in the open")
 

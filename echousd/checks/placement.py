@@ -216,7 +216,7 @@ def _small_faults(
 def _recessed(shape: Shape, beyond: float, shell: Sequence[Shape]) -> bool:
     """Whether a thing that reaches beyond the floor stands in a recess: no deeper than walls, and inside none."""
     within = 0.98 * shape.points + 0.02 * shape.points.mean(0)
-    return beyond < LEANING and bool(shell) and not any(inside_solid(within, wall).any() for wall in shell)
+    return beyond < LEANING and bool(shell) and not any(inside_solid(within, wall)[0].any() for wall in shell)
 
 
 def _windows(whole: Whole) -> np.ndarray:
@@ -336,23 +336,24 @@ def mesh_depth(first: Shape, second: Shape, deep: float = SOLID) -> float:
 
 def _reach(surface: Shape, solid: Shape, deep: float) -> float:
     points = surface_points(surface, solid)
-    within = points[inside_solid(points, solid)] if len(points) else points
-    if not len(within):
+    within, at_most = inside_solid(points, solid, deep)
+    points, at_most = points[within & (at_most > deep)], at_most[within & (at_most > deep)]
+    if not len(points):
         return 0.0
     triangles, (low, high) = solid.triangles, solid.spans.transpose(0, 2, 1)[:, :, None]
     skin = np.concatenate((solid.points, _scatter(solid.points, solid.faces, 4000))).T
     deepest = 0.0
     # A sample of the skin is further away than the skin itself: deepest first, until no point can be deeper.
-    ways = (skin - point[:, None] for point in within)
-    at_most = np.sqrt([along(way, way).min() for way in ways])
+    ways = (skin - point[:, None] for point in points)
+    at_most = np.minimum(at_most, np.sqrt([along(way, way).min() for way in ways]))
     order, step = np.argsort(-at_most), max(1, PAIRS // len(triangles))
     for some in (order[start : start + step] for start in range(0, len(order), step)):
         if at_most[some[0]] <= max(deepest, deep):
             break
-        point, away = within[some].T[..., None], at_most[some]
+        point, away = points[some].T[..., None], at_most[some]
         way = np.maximum(np.maximum(low - point, point - high), 0.0)  # to the boxes around the triangles
         number, face = np.nonzero(along(way, way) <= (away[:, None] + 1e-9) ** 2)
-        np.minimum.at(away, number, distances(within[some[number], None], triangles[face]))
+        np.minimum.at(away, number, distances(points[some[number], None], triangles[face]))
         deepest = max(deepest, float(away.max()))
     return deepest
 
@@ -387,22 +388,27 @@ def _touches(triangles: np.ndarray, solid: Shape) -> np.ndarray:
     return np.asarray(((low <= solid.size / 2) & (high >= -solid.size / 2)).all(-1))
 
 
-def inside_solid(points: np.ndarray, solid: Shape) -> np.ndarray:
-    """(s,) bool: whether points (s, 3) are inside a solid.
+def inside_solid(points: np.ndarray, solid: Shape, deep: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """(s,) bool: whether points (s, 3) are inside a solid, of those that may be deeper; (s,) float: how deep at most.
 
-    Around its closed pieces nothing turns but within their boxes, so that most points are compared with few triangles.
+    Around its closed pieces nothing turns but within their boxes, so that most points are compared with few triangles;
+    from within a piece the way out of its box meets its surface.
     """
     low, high = bounds_of(solid.points)
+    at_most = np.full(len(points), np.inf)
     inside = ((points >= low) & (points <= high)).all(1)
     if not inside.any():
-        return np.asarray(inside)
+        return inside, at_most
     loose, closed = solid.pieces
     turns = winding_number(points, loose) if len(loose) else np.zeros(len(points))
-    low, high = solid.closed_spans[:, :, None]
-    near = ((points >= low) & (points <= high)).all(-1)
-    for number in np.flatnonzero(near.any(1)).tolist():
-        turns[near[number]] += winding_number(points[near[number]], closed[number])
-    return np.asarray(turns > 0.5)
+    (low, high), planes = solid.closed_spans.transpose(0, 2, 1)[..., None], points.T[:, None].copy()
+    out = np.minimum(planes - low, high - planes).min(0)  # (k, s) of the boxes around the pieces
+    for number in np.flatnonzero((out >= deep).any(1)).tolist():
+        some = np.flatnonzero(out[number] >= deep)
+        turn = winding_number(points[some], closed[number])
+        turns[some] += turn
+        at_most[some] = np.minimum(at_most[some], np.where(turn > 0.5, out[number, some], np.inf))
+    return turns > 0.5, at_most
 
 
 def winding_number(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

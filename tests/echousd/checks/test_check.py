@@ -11,8 +11,17 @@ import trimesh
 from pxr import Gf, Usd, UsdGeom
 
 import echousd
+from echomodel.triangles import distances
 from echousd.checks import Collision, check
-from echousd.checks.placement import Carriers, Whole, _small_faults, find_collisions, mesh_depth, winding_number
+from echousd.checks.placement import (
+    Carriers,
+    Whole,
+    _small_faults,
+    find_collisions,
+    mesh_depth,
+    surface_points,
+    winding_number,
+)
 from echousd.checks.report import find_living
 from echousd.cli.main import run
 from echousd.graph import Node, RoomSpec, SceneGraph
@@ -212,6 +221,26 @@ def test_depth_of_two_boxes() -> None:
     second = thing("b", "cabinet", box(1, 1, 1), (0.8, 0, 0))
     assert mesh_depth(first, second) == pytest.approx(0.2, abs=0.04)
     assert mesh_depth(first, thing("c", "cabinet", box(1, 1, 1), (1.001, 0, 0))) == 0.0
+
+
+def test_depth_of_boards_that_overlap_is_that_of_a_slow_look() -> None:
+    rng, seen = np.random.default_rng(5), []
+    for _ in range(60):
+        boards = []
+        for size, at in zip(rng.uniform(0.02, 0.5, (6, 3)) ** 1.5, rng.uniform(-0.2, 0.2, (6, 3)), strict=True):
+            boards.append(trimesh.creation.box(size).apply_translation(at))
+        boards[5].update_faces(np.arange(12) > 1)  # an open one
+        one, other = (trimesh.util.concatenate(some) for some in (boards[:3], boards[3:]))
+        first, second = thing("a", "cabinet", one, (0, 0, 0)), thing("b", "cabinet", other, (0, 0, 0))
+        slow = 0.0
+        for surface, solid in ((first, second), (second, first)):
+            points = surface_points(surface, solid)
+            within = points[winding_number(points, solid.triangles) > 0.5] if len(points) else points
+            slow = max([slow, *(float(distances(point, solid.triangles).min()) for point in within)])
+        depth = mesh_depth(first, second, 0.03)
+        seen.append(slow > 0.03)
+        assert depth == pytest.approx(slow, abs=1e-6) if seen[-1] else depth <= 0.03
+    assert 5 < sum(seen) < 55
 
 
 def test_large_faces_that_touch_by_millimetres_are_no_collision() -> None:
