@@ -21,7 +21,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.layers import assets
 from echousd.shapes.geometry import Geometry, Origin
 from echousd.shapes.joinery import assembled
-from echousd.shapes.surface import surface
+from echousd.shapes.surface import surfaces
 from echousd.stage.files import layer_bytes
 from echousd.stage.paths import piece_path
 
@@ -45,7 +45,8 @@ def on_disk(geometry: Geometry, word: str) -> int:
     """Bytes of the three files of an asset."""
     total = 0
     for parts, write in ((geometry.parts, assets.geometry_layer), (geometry.coarse, assets.coarse_layer)):
-        forms = {piece_path("", "one", p.name, p.body): surface(p.mesh, p.slots, crease=p.crease) for p in parts}
+        made = surfaces([(p.mesh, p.slots, p.crease) for p in parts]) if parts else []
+        forms = {piece_path("", "one", p.name, p.body): form for p, form in zip(parts, made, strict=True)}
         if write is assets.geometry_layer:
             extents = np.stack([form.extent for form in forms.values()])
             extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])

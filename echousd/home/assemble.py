@@ -33,8 +33,9 @@ from echousd.layers.assets import write_mesh
 from echousd.naming import HOME as ROOT_FILE
 from echousd.naming import HOUSE as MARK
 from echousd.options import MAX_SEED, RoomOptions
+from echousd.shapes.geometry import CREASE
 from echousd.shapes.looks import palette_of_room
-from echousd.shapes.surface import surface
+from echousd.shapes.surface import surfaces
 from echousd.shapes.walls import THICKNESS
 from echousd.stage.files import layer_bytes, layer_there, open_stage, write_all
 from echousd.stage.pen import Pen
@@ -244,6 +245,6 @@ def _thresholds(layer: Sdf.Layer, plan: Plan) -> None:
         pen.label(f"{above}/{name}", category="floor")
         slab = box((low_x, -THICKNESS, low_z), (high_x, 0.0, high_z))
         mesh = f"{above}/{name}/{name}_mesh"
-        write_mesh(pen, mesh, surface(slab, {"threshold": np.arange(len(slab.faces))}))
+        write_mesh(pen, mesh, surfaces([(slab, {"threshold": np.arange(len(slab.faces))}, CREASE)])[0])
         pen.over(mesh, apis=["PhysicsCollisionAPI"])
         pen.bind(mesh, f"{above}/Looks/threshold")

@@ -35,18 +35,13 @@ class Surface:
         return bounds_of(self.points).astype(np.float32)
 
 
-def surface(mesh: Mesh, groups: Mapping[str, np.ndarray], *, atlas: bool = False, crease: float = CREASE) -> Surface:
-    """A mesh with normals and texture coordinates.
-
-    `mesh`: triangles in metres. `groups`: material group -> face numbers. `atlas`: unwrap without overlaps into the
-    unit square (xatlas, extra `texture`) instead of projecting along the axes, see `_laid_out`. `crease`: neighbours
-    that fold more sharply than this keep a hard edge, radians.
-    """
-    return surfaces([(mesh, groups, crease)], atlas=atlas)[0]
-
-
 def surfaces(forms: Sequence[tuple[Mesh, Mapping[str, np.ndarray], float]], *, atlas: bool = False) -> list[Surface]:
-    """Meshes, groups and creases as for `surface`, all at once: of boards each alone takes several times as long."""
+    """Meshes with normals and texture coordinates, all at once: of boards each alone takes several times as long.
+
+    `forms`: triangles in metres; material group -> face numbers; neighbours that fold more sharply than this keep a
+    hard edge, radians. `atlas`: unwrap without overlaps into the unit square (xatlas, extra `texture`) instead of
+    projecting along the axes, see `_laid_out`.
+    """
     meshes = [(np.asarray(mesh.vertices), np.asarray(mesh.faces)) for mesh, _, _ in forms]
     first = np.cumsum([0, *(len(points) for points, _ in meshes)])
     start = np.cumsum([0, *(len(faces) for _, faces in meshes)])

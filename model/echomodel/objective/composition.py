@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, cast, dot, full, held, least_so_far, once, rows
+from echomodel.arrays import Array, at_least, at_most, cast, dot, full, held, least_so_far, once, rows
 from echomodel.boxes2d import footprints
 from echomodel.floors import Walls, footprint, signed_area, signed_distance
 from echomodel.objective.company import AROUND, BESIDE, first_of
@@ -59,22 +59,18 @@ def corners_used(plan: Plan) -> Found:
         corner = np.flatnonzero(walls.turn > SQUARE)
         start, *ways = map(plan.numbers, (walls.start[corner], walls.along[corner], -walls.along[corner - 1]))
         length = plan.numbers(np.stack([walls.length[corner], walls.length[corner - 1]]))
-        first = length[:1]
         count = int((~(plan.stands("row") | plan.movable))[there.reshape(-1)].sum())  # these fill no room
         if count < FEW * max(len(there), 1) or not len(corner):
             continue
         moved = plan.moved[there[0]]
         still, moving = (_from_corners(plan, of, start, ways) for of in (there[:1, ~moved], there[:, moved]))
+        none = full(plan.size, (len(there), 1, len(corner)), math.inf)
         alike = (xp.broadcast_to(of, (len(there), *of.shape[1:])) for of in still)  # in all copies
-        wide, deep = (xp.concat([*of], 1) for of in zip(alike, moving, strict=True))
-        ends = xp.concat([xp.minimum(wide, first), 0.0 * wide[:, :1] + first], 1)  # of rectangles, at pieces or walls
-        none = 0.0 * deep[:, :1] + FAR
-        order = xp.argsort(held(ends), 1)
-        ends, deep = (
-            of[xp.arange(len(there))[:, None, None], order, xp.arange(len(corner))]
-            for of in (ends, xp.concat([deep, none], 1))
-        )
-        deep = xp.minimum(least_so_far(xp.concat([none, deep], 1))[:, :-1], length[1])  # of those that begin before
+        wide, deep = (xp.concat([*of, none], 1) for of in zip(alike, moving, strict=True))
+        ends = xp.minimum(wide, length[:1])  # of rectangles, at pieces or walls
+        each = xp.arange(len(there))[:, None, None], xp.argsort(held(ends), 1), xp.arange(len(corner))
+        ends, before = ends[each], least_so_far(xp.concat([at_most(none, FAR), deep[each]], 1))[:, :-1]
+        deep = xp.minimum(before, length[1])
         bare = (at_least(ends - WAY, 0.0) * at_least(deep - WAY, 0.0)).reshape(len(there), -1)
         most = held(bare).argmax(1)
         row, k = xp.arange(len(there)), most % len(corner)

@@ -24,10 +24,10 @@ from echousd.shapes.finishes.baking import relief
 from echousd.shapes.finishes.patterns import SIZE, noise
 from echousd.shapes.finishes.pictures import PROGRAMS, STOCK, printed
 from echousd.shapes.finishes.slots import HARMONIES, SLOTS, linear, material_of
-from echousd.shapes.geometry import Origin
+from echousd.shapes.geometry import CREASE, Origin
 from echousd.shapes.joinery import assembled
 from echousd.shapes.looks import SHOWN, alternatives, look
-from echousd.shapes.surface import surface
+from echousd.shapes.surface import surfaces
 
 
 @pytest.mark.parametrize("name", sorted({row.pattern for row in SLOTS.values()} - {"", *PRINTS}))
@@ -91,7 +91,7 @@ def test_fibres_run_along_the_longer_side_of_a_board():
         Block(centre=np.array([0.5, 0.02, 0.0]), half=np.array([0.48, 0.02, 0.05])),
     ]
     made = assembled(boards, np.array([1.0, 1.0, 0.1]), faces=500, origin=Origin("parts"))
-    form = surface(made.parts[0].mesh, made.parts[0].slots)
+    form = surfaces([(made.parts[0].mesh, made.parts[0].slots, CREASE)])[0]
     corners, st = form.points[form.faces], form.st[form.st_index].reshape(-1, 3, 2)
     extent, spread = np.ptp(corners, axis=1), np.ptp(st, axis=1) * SLOTS["wood"].metres
     long = extent.max(1) > 0.8
@@ -102,7 +102,7 @@ def test_fibres_run_along_the_longer_side_of_a_board():
 @pytest.mark.parametrize(("slot", "along"), [("brick", 0), ("wallpaper", 0), ("wood", 1)])
 def test_bricks_lie_on_a_wall_that_is_higher_than_long(slot, along):
     mesh = Mesh(np.array([(0, 0, 0), (1, 0, 0), (1, 2.6, 0), (0, 2.6, 0)], float), np.array([(0, 1, 2), (0, 2, 3)]))
-    form = surface(mesh, {slot: np.arange(2)})
+    form = surfaces([(mesh, {slot: np.arange(2)}, CREASE)])[0]
     assert np.ptp(form.st, axis=0)[along] == pytest.approx(1.0 / SLOTS[slot].metres, abs=1e-4)
 
 

@@ -11,8 +11,12 @@ from echousd.shapes.geometry import CREASE, DRAPED
 from echousd.shapes.looks import SHOWN, alternatives, look, palette_for
 from echousd.shapes.meshing import box_mesh
 from echousd.shapes.sources.whole import BANDS, cut, material_groups
-from echousd.shapes.surface import creased_normals, surface, surfaces, unshared
+from echousd.shapes.surface import creased_normals, surfaces, unshared
 from echousd.stage.taxonomy import ade20k
+
+
+def surface(mesh, groups, *, atlas=False, crease=CREASE):
+    return surfaces([(mesh, groups, crease)], atlas=atlas)[0]
 
 
 def slow_creased_normals(mesh, crease):
