@@ -310,7 +310,7 @@ def _filled(graph: SceneGraph, file: Path, wanted: set[str]) -> tuple[SceneGraph
             node = node.replaced(
                 size=node.size or tuple(thing.size.round(4).tolist()),
                 position=node.position or tuple(thing.position.round(4).tolist()),
-                yaw=round(float(thing.yaw), 5) if node.yaw is None else node.yaw,
+                yaw=round(float(thing.yaw), 7) if node.yaw is None else node.yaw,
             )
         nodes.append(node)
     return graph.replaced(nodes=tuple(nodes)), found

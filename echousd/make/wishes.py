@@ -105,7 +105,7 @@ def _placed(graph: SceneGraph, saved: SavedRoom, name: str, *, anew: bool = Fals
     row = saved.graph.names.index(name)
     fields = {
         "position": tuple(round(float(v), 4) for v in saved.boxes.position[row]),
-        "yaw": round(float(saved.boxes.yaw[row]), 5),
+        "yaw": round(float(saved.boxes.yaw[row]), 7),
     }
     return graph.update_node(name, **{k: v for k, v in fields.items() if anew or getattr(node, k) is None})
 

@@ -97,6 +97,18 @@ def test_wishes_that_cannot_be_read(root, echousd_command, words, said):
     assert said in done.err
 
 
+def test_what_is_locked_turns_by_no_bit(root):
+    saved = read_room(root)
+    row = saved.graph.names.index("bed")
+    for degrees in (-180.0, 180.0, 90.0, -33.33, 179.99, 0.01):
+        yaw = saved.boxes.yaw.copy()
+        yaw[row] = np.deg2rad(degrees)
+        free = saved.graph.update_node("bed", position=None, yaw=None)
+        there = replace(saved, graph=free, boxes=replace(saved.boxes, yaw=yaw))
+        stated = wished(there, EditRequest(lock=("bed",))).node("bed").yaw
+        assert round(float(np.degrees(np.float32(stated))), 4) == degrees
+
+
 def test_unlocked_things_may_move_again(root):
     saved = read_room(root)
     locked = wished(saved, EditRequest(lock=("bed",)))
