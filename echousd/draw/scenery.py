@@ -28,7 +28,7 @@ LEVELS = 7  # sizes of an image, each half of the one before
 # Opacity of a pane below which one looks through it; twice the m² of upright glass from which on it glazes a front.
 SEEN_THROUGH, GLAZED = 0.5, 0.03
 NEXT, NEAR, FAR = 2.5, 1.2, 0.6  # metres from a passage to the wall beyond, and what light there is on the way to it
-HANGING, CLOTH, SHEER = ("curtain", "blind"), 0.22, 1.4  # the share of light that comes through cloth, thin cloth more
+HANGING, CLOTH, SHEER = ("curtain", "blind"), 0.22, 1.25  # the share of light that comes through cloth, thin cloth more
 SKY_LIGHT = np.array([0.90, 0.93, 0.97], np.float32)
 BACKGROUND = np.array([0.90, 0.905, 0.915], np.float32) ** 2.2
 HUNG = (  # goes with its wall
