@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 from pxr import Sdf, Usd
 
-from echousd.graph import SceneGraph
+from echousd.graph import SceneGraph, load_graph
+from echousd.naming import TEXT_FORMS
 from echousd.stage import values
 from echousd.stage.files import opened, save_layer
 from echousd.stage.read import find_rooms, room_graph, the_room
@@ -16,9 +18,12 @@ from echousd.stage.write import author, graph_layer, prim_path
 def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = None) -> SceneGraph:
     """The scene graph on a stage or in a file; `room` is the prim path of the room, needed where there are several.
 
-    A stage without a scene graph becomes one all the same if its prims carry semantics labels and bounds
-    (`foreign_graph`). Raises StageError, and GraphError's text with the file's name, for what is not valid.
+    A YAML or JSON file is read as `echousd new --from` reads it. A stage without a scene graph becomes one all the
+    same if its prims carry semantics labels and bounds (`foreign_graph`). Raises StageError for a stage, GraphError for
+    a text, that is not valid, with the file's name.
     """
+    if not isinstance(stage, Usd.Stage) and Path(stage).suffix.lower() in TEXT_FORMS:
+        return load_graph(stage)
     stage = opened(stage)
     with values.reading(stage):
         rooms = find_rooms(stage)

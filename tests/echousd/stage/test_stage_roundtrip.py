@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pxr import Sdf, Usd, UsdGeom
 
-from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.stage.files import save_layer
 from echousd.stage.graphs import read_graph, write_graph
 from echousd.stage.read import read_rooms
@@ -288,3 +288,14 @@ def test_an_edit_target_behind_a_reference():
     write_graph(BEDROOM, stage, room="/House/Bedroom")
     assert read_rooms(stage) == {"/House/Bedroom": BEDROOM}
     assert read_rooms(Usd.Stage.Open(source)) == {"/Asset": BEDROOM}
+
+
+def test_a_text_is_read_where_a_stage_is(tmp_path):
+    text = tmp_path / "room.yaml"
+    text.write_text("room: study\nobjects: {desk: desk, chair: chair}\nrelations: [chair close by desk]\n")
+    write_graph(read_graph(text), tmp_path / "room.usda")
+    assert read_graph(tmp_path / "room.usda") == read_graph(str(text))
+    assert len(read_graph(text).relations) == 1
+    text.write_text("room: study\nobjects: {desk: dusk}\n")
+    with pytest.raises(GraphError, match=r"room\.yaml:2: .*'dusk'"):
+        read_graph(text)
