@@ -204,7 +204,8 @@ def finished_boxes(
     def wrong(one: PlacedBoxes) -> tuple[float, ...]:
         return int((one.verdict == 0).sum()), len(one.collisions), severity(living_faults(graph, one.boxes))
 
-    graph = _with_homeless_unlocked(graph)
+    # what is locked without having a place may be placed
+    graph = graph.replaced(nodes=tuple(n.replaced(locked=n.locked and n.position is not None) for n in graph.nodes))
     with timer.stage("place"), one_thread():
         found = placed(graph, boxes, config=config, begun=begun)
         judged = found.judged
@@ -237,11 +238,6 @@ def _on_cords(graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str]) -> Box
     longer = Boxes(size, position, boxes.yaw)
     worse = len(layout_outcome(graph, longer).faults) > len(layout_outcome(graph, boxes).faults)
     return boxes if worse else longer
-
-
-def _with_homeless_unlocked(graph: SceneGraph) -> SceneGraph:
-    """The graph in which what is locked without having a place may be placed."""
-    return graph.replaced(nodes=tuple(n.replaced(locked=n.locked and n.position is not None) for n in graph.nodes))
 
 
 def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int) -> SceneGraph:
