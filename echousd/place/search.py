@@ -45,6 +45,7 @@ SWEEPS = 3  # times that what misses something is looked at after the first time
 BUDGET, PIECES = 4500, 15  # poses that are judged in all, each a whole room; more where there are more pieces
 GAIN = 1e-3  # by which a move must be better
 WORTH = 0.5  # that a sweep must gain for another one
+WRONG, UNEASY = 0.5, 0.1  # what a term costs that is broken, or kept so barely that it shows
 GRAIN = 1e4  # costs are compared to so many parts of one
 PULL, FARTHEST, TURN = 0.08, 4.0, 0.1  # for a metre from the draft, up to so many, and for looking the other way
 ATTENDING = 0.25  # share of that for pieces that attend another
@@ -159,8 +160,8 @@ class Search:
             self.rooms[key] = self.problem.plan if there.all() else part_of(self.problem.plan, there)
         return self.rooms[key]
 
-    def faults(self, state: State) -> tuple[float, list[int]]:
-        """What a room costs in all, and the boxes that its broken terms are about, the worst first."""
+    def faults(self, state: State, least: float = WRONG) -> tuple[float, list[int]]:
+        """What a room costs in all, and the boxes that terms of at least such a cost are about, the worst first."""
         problem = self.problem
         worst: dict[int, float] = {}
         room = problem.plan.at(state.position, state.yaw)
@@ -173,7 +174,7 @@ class Search:
         seen, cost = costs_of(list(zip(self.terms, every, strict=True)), room)
         total = float(cost.sum())
         firm = self.firm.repeat([len(found.who) for found in every])
-        for row in rows(firm & (cost > 0.5)).tolist():
+        for row in rows(firm & (cost > least)).tolist():
             for box in {int(seen.who[row]), int(seen.other[row])} - {-1}:
                 worst[box] = worst.get(box, 0.0) + float(cost[row])
         lost = self._unreached(state.position, state.yaw)
@@ -584,6 +585,10 @@ class Search:
             cost, still = self.faults(after)
             if cost < total - GAIN:
                 state, total, wrong = self.mended(after, cost, still)
+        if not wrong and (uneasy := self.faults(state, UNEASY)[1]):
+            after = self.swept(state, uneasy)
+            cost, still = self.faults(after)
+            state, total = (after, cost) if not still and cost < total - GAIN else (state, total)
         return Arranged(state, total, self.judged, tuple(wrong))
 
     def _first(self) -> tuple[State, float, list[int]]:

@@ -19,7 +19,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.place.placing import place_boxes
 from echousd.place.problem import problem_of
 from echousd.place.proposals import out_of_habit, proposals, slots_at
-from echousd.place.search import MANY, Search, State
+from echousd.place.search import MANY, UNEASY, Search, State
 from echousd.place.seats import sides
 
 ID = {row.name: row.id for row in vocabulary().predicates}
@@ -470,6 +470,18 @@ def test_margins_of_many_poses_are_those_of_one_after_the_other():
             fronts=torch.from_numpy(problem.fronts),
         )  # fmt: skip
         np.testing.assert_allclose(found[k], alone.numpy(), atol=1e-9)
+
+
+def test_what_is_barely_as_it_shall_be_is_moved_where_nothing_is_wrong(monkeypatch):
+    desk, chair = (1.6, 0.75, 0.7), (0.5, 0.9, 0.5)
+    search, state = searched(("desk", "chair"), (desk, chair), ((0.0, 0.0, -1.65), (0.4, 0.0, -1.1)), (0.0, np.pi))
+    monkeypatch.setattr(search, "_first", lambda: (state, *search.faults(state)))
+    assert not search.faults(state)[1]
+    assert search.faults(state, UNEASY)[1]
+    found = search.run()
+    assert not found.wrong
+    assert found.cost < search.faults(state)[0] - 0.2
+    assert abs(found.state.position[1, 0] - found.state.position[0, 0]) < 0.05
 
 
 def test_what_stands_at_a_leafs_edge_is_moved_a_hand_away_from_it():
