@@ -335,6 +335,8 @@ class Run:
             self.stopped = f"{progress.failed} rooms failed, allowed: {most}"
         elif until is not None and time.time() >= until:
             self.stopped = "the time is over"
+        elif not (self.folder / STATE / "plan.jsonl").is_file():
+            raise ValueError(f"{self.folder}: was moved or removed meanwhile; go on with --resume where it is")
 
     def _begin(self, executor: Executor, task: Task, entry: Entry) -> None:
         self._begun[task.key] = entry

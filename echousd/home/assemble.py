@@ -16,7 +16,7 @@ from pxr import Sdf
 
 import echousd
 from echomodel.files import check_ours
-from echomodel.openings import numbered
+from echomodel.openings import KINDS, numbered
 from echomodel.triangles import box
 from echousd.batches.batch import MEMORY, cores, weights_hash
 from echousd.batches.executor import LocalWorkers, Task
@@ -118,7 +118,7 @@ def write_rooms(
     if not is_home(root):
         check_ours(output, "home of echousd", force=force, besides=(FOLDER,))
     wanted, digests = wanted_jobs(plan, output, options, outside)
-    edited = [job.id for job in wanted if not job.begin and (find_manifest(Path(job.folder)) or {}).get("history")]
+    edited = [job.id for job in wanted if not job.begin and _edited(Path(job.folder))]
     if edited and not force:
         raise ValueError(
             f"{output}: {', '.join(edited)} would be made anew, which gives up what was edited in it since; allowed: "
@@ -136,6 +136,12 @@ def write_rooms(
         marks = {name: digests[name] for name in made}
         write_all(home_files(plan, output, made, marks, options))
     return Made(root, done, failed)
+
+
+def _edited(folder: Path) -> bool:
+    """Whether a room was edited but for its openings, which are the plan's."""
+    steps = [step for edit in (find_manifest(folder) or {}).get("history", ()) for step in edit["steps"]]
+    return not all(step.lstrip("+-~ ").startswith(KINDS) for step in steps)
 
 
 def wanted_jobs(

@@ -17,7 +17,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError
 from echousd.graph.picture import save_figure
 from echousd.home.importing.homes import room_kind
-from echousd.home.importing.simulators import procthor_type
+from echousd.home.importing.simulators import THOR
 from echousd.home.plan import Plan, ways
 from echousd.home.stages import Standing
 from echousd.naming import free_name
@@ -187,7 +187,7 @@ def write_procthor(plan: Plan, path: Path) -> None:
         spec = plan.home.room(name).graph.room
         corners = _in_unity(cell)
         ours["rooms"][f"room|{number[name]}"] = {"name": name, "type": spec.type, "walls": [*plan.walls[name]]}
-        about = {"roomType": procthor_type(spec.type), "floorPolygon": corners, "floorMaterial": LOOK}
+        about = {"roomType": THOR.get(spec.type, "LivingRoom"), "floorPolygon": corners, "floorMaterial": LOOK}
         rooms.append({"id": f"room|{number[name]}", **about, "ceilings": [], "children": []})
         for edge, ends in enumerate(zip(corners, [*corners[1:], corners[0]], strict=True)):
             polygon = [*ends, *({**corner, "y": spec.tall} for corner in ends)]

@@ -170,12 +170,10 @@ def _fit(plan: Plan, side: Facing, hole: Hole, ends: np.ndarray) -> tuple[float,
     away = abs(off - side.deep / 2)
     if away > side.deep / 2 + REACH or np.ptp(at) < STRAIGHT * width or end - start < max(NARROW, 0.6 * width):
         return None
-    usual_sill, usual_tall = 0.0, USUAL[hole.kind]["height"]
-    if hole.kind == "window":
-        use = vocabulary().room_type(plan.home.room(side.one).type).use
-        usual_sill, usual_tall, _ = WINDOWS.get(use, WINDOWS[""])
-    sill = hole.sill if hole.kind == "window" and hole.sill is not None else usual_sill
-    tall = min(hole.height or usual_tall, (height or np.inf) - sill - 0.01)
+    use, window = vocabulary().room_type(plan.home.room(side.one).type).use, hole.kind == "window"
+    low, usual, _ = WINDOWS.get(use, WINDOWS[""]) if window else (0.0, USUAL[hole.kind]["height"], 0.0)
+    sill = low if hole.sill is None or not window else hole.sill
+    tall = min(hole.height or usual, (height or np.inf) - sill - 0.01)
     sides = (round(float(start), 4), round(float(end - start), 4), round(float(tall), 4))
     return away + width - (end - start), Opening(hole.kind, hole.kind, side.edge, *sides, round(float(sill), 4))
 

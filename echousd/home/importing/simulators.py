@@ -24,12 +24,8 @@ UNITY = "metres, left-handed with +Y up as Unity has it; its +z is our north"
 Z_UP = "metres, z up; its +y is our north"
 SHAPE = re.compile(r"\s*(?:shapely\.)?(box|Polygon|LineString)\s*\((.*)\)\s*", re.DOTALL)
 LONGEST = 20_000  # characters of one shape
-
-
-def procthor_type(kind: str) -> str:
-    """The one of ProcTHOR's four types that a room type is nearest to."""
-    near = {"kitchen": "Kitchen", "bathroom": "Bathroom", "bedroom": "Bedroom", "childrens_room": "Bedroom"}
-    return near.get(kind, "LivingRoom")
+# ProcTHOR's types of rooms by ours: others are living rooms.
+THOR = {"kitchen": "Kitchen", "bathroom": "Bathroom", "bedroom": "Bedroom", "childrens_room": "Bedroom"}
 
 
 def read_procthor(data: Any) -> Found:
@@ -81,7 +77,7 @@ def _procthor_room(one: Any, ours: Any, data: Any) -> Room:
     """A room; of a plan of ours, if nobody changed its type or corners since, its floor between the walls."""
     corners, name = _flat(one["floorPolygon"]), str(one["id"])
     words: tuple[str, ...] = (str(one["roomType"]),)
-    if ours and procthor_type(ours["type"]) == one["roomType"]:
+    if ours and THOR.get(ours["type"], "LivingRoom") == one["roomType"]:
         name, words = str(ours["name"]), (str(ours["type"]), *words)
     if ours and len(ours["walls"]) == len(corners):
         corners = offset(corners, [-float(thick) for thick in ours["walls"]])

@@ -289,6 +289,21 @@ def test_a_full_disk_stops_the_run(calm, tmp_path, monkeypatch):
     assert digests(out) == digests(folder)
 
 
+def test_a_run_whose_folder_is_moved_stops_and_goes_on_there(calm, tmp_path):
+    source, folder, _ = calm
+    out, moved = tmp_path / "run", tmp_path / "moved"
+
+    def move(progress):
+        if out.is_dir() and not moved.exists():
+            out.rename(moved)
+
+    with pytest.raises(ValueError, match=r"run: was moved or removed meanwhile; go on with --resume where it is"):
+        batch(source, out, executor=Inline(), workers=1, progress=move, **QUICK)
+    assert not (out / "rooms").exists()
+    assert batch(source, moved, executor=Inline(), workers=1, resume=True, **QUICK).done == 2
+    assert digests(moved) == digests(folder)
+
+
 def test_another_plan_and_another_run_are_refused(calm, tmp_path):
     source, folder, _ = calm
     with pytest.raises(ValueError, match=r"another plan \(seed was 0, now 4\)"):

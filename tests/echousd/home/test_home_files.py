@@ -232,6 +232,15 @@ def test_furniture_stays_where_a_room_only_gets_other_openings(made, echousd_com
     assert "gives up what was edited in it since" in options.err  # in other colours all is another
 
 
+def test_a_home_is_edited_after_it_was_edited(made, echousd_command):
+    folder, _ = made
+    assert echousd_command("edit", folder, "--relate", "living open to bedroom").code == 0
+    assert find_manifest(folder / "rooms" / "bedroom")["history"]  # of its openings alone
+    done = echousd_command("edit", folder, "--relate", "bedroom larger than living")
+    assert done.code == 0, done.err
+    assert echousd_command("check", folder).code == 0
+
+
 def test_rooms_of_another_version_are_made_anew(made, monkeypatch, echousd_command):
     folder, _ = made
     ways = (("door", []), ("open to", ["bedroom", "living"]))
