@@ -13,6 +13,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import echousd
 from echomodel.files import check_ours, raising
 from echousd.batches import work
 from echousd.batches.executor import Executor, LocalWorkers, Outcome, RayCluster, Task
@@ -109,7 +110,8 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions, there: RunPlan 
     if not how.ray:
         work.devices(device)
     weights = weights_hash(request.options.weights)
-    plan = there.by(weights) if there else make_plan(request, weights, how.outside)
+    ours = {"version": echousd.__version__, "weights": weights}
+    plan = replace(there, head=there.head | ours) if there else make_plan(request, weights, how.outside)
     plan = _with_libraries(plan, how.outside)
     place = shard_folder(out, how.shard)
     with locked(place):

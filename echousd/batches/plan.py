@@ -105,10 +105,6 @@ class RunPlan:
         for entry in self.entries:
             yield json.dumps(asdict(entry)) + "\n"
 
-    def by(self, weights: str) -> RunPlan:
-        """The same rooms by this version and these weights (their hash)."""
-        return replace(self, head={**self.head, "version": echousd.__version__, "weights": weights})
-
     def part(self, shard: tuple[int, int]) -> tuple[Entry, ...]:
         """The rooms of shard i of n: every n-th from number i on."""
         return self.entries[shard[0] :: shard[1]]
@@ -197,10 +193,9 @@ def difference(old: RunPlan, new: RunPlan) -> str:
     if not lines:
         pairs = list(zip(old.entries, new.entries, strict=False))
         changed = [a for a, b in pairs if a.graph != b.graph and not _alike(old.graphs, a.graph, new.graphs, b.graph)]
-        if any(replace(a, graph=b.graph) != b for a, b in pairs) or old.options != new.options:
-            lines = ["other rooms"]
-        if changed:
-            lines = [f"{len(changed)} graphs changed, the first of {changed[0].origin}"]
+        other = old.options != new.options or any(replace(a, graph=b.graph) != b for a, b in pairs)
+        lines = ["other rooms"] if other else []
+        lines = [f"{len(changed)} graphs changed, the first of {changed[0].origin}"] if changed else lines
     return "; ".join(lines[:4])
 
 

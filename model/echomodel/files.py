@@ -115,8 +115,7 @@ def check_ours(folder: Path, what: str, *marks: str, force: bool | None = None, 
     names = {path.name for path in folder.iterdir()} - {*besides} if folder.is_dir() else set()
     others = sorted(name for name in names if not PARTIAL.fullmatch(name))
     if others and not force and not any(any(folder.glob(mark)) for mark in marks):
-        shown = ", ".join(others[:3]) + (" ..." if len(others) > 3 else "")
-        more = " or use --force" if force is not None else ""
+        shown, more = ", ".join(others[:3]) + " ..." * (len(others) > 3), " or use --force" * (force is not None)
         raise ValueError(f"{folder}: holds {shown} and no {what}; choose another folder{more}")
 
 

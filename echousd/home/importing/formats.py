@@ -119,7 +119,7 @@ def read_plan(path: Path, form: str | None = None, unit: float | None = None) ->
         with within_memory(path):
             return chosen.name, chosen.read(data) if chosen.recognised else chosen.read(path, unit)
     except GraphError as error:
-        message = str(error)
+        message = str(error).removeprefix(f"{path.name}: ")
         raise GraphError(message if message.startswith(str(path)) else f"{path}: {message}") from None
     except OSError as error:
         raise GraphError(f"{path}: {(error.strerror or str(error)).lower()}") from None
@@ -127,6 +127,7 @@ def read_plan(path: Path, form: str | None = None, unit: float | None = None) ->
         message = str(error)
         if isinstance(error, ValidationError):
             message = "a {title} of {input!r:.60}: {msg}".format(title=error.title.lower(), **error.errors()[0])
+            message = " ".join(message.replace("Value error, ", "").split())
         message = message.removeprefix(f"{path}: ").removeprefix(f"{path.name}: ").partition("\n")[0]
         reason = f"{error} is missing" if isinstance(error, KeyError) else message
         raise GraphError(f"{path}: not as {form or path.suffix.lstrip('.')} has it ({reason})") from None

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import numpy as np
 import shapely
-from pydantic import ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field
 from pydantic.dataclasses import dataclass as checked
 
 from echomodel.files import tables
@@ -35,6 +35,12 @@ class Room:
     storey: str = ""
 
 
+def _two_ends(ends: np.ndarray) -> np.ndarray:
+    if ends.ndim != 3 or ends.shape[1:] != (2, 2) or not np.isfinite(ends).all():
+        raise ValueError("found no two ends, allowed: x and z of both, finite numbers")
+    return ends
+
+
 @checked(frozen=True, eq=False, config=CHECKED)
 class Hole:
     """A door, window or passage.
@@ -47,7 +53,7 @@ class Hole:
 
     name: str
     kind: Annotated[str, Field(pattern="^(door|window|passage)$")]
-    ends: np.ndarray
+    ends: Annotated[np.ndarray, AfterValidator(_two_ends)]
     height: float | None = None
     sill: float | None = None
     storey: str = ""

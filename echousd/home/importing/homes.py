@@ -10,17 +10,8 @@ from itertools import combinations
 import numpy as np
 import shapely
 
-from echomodel.openings import (
-    USUAL,
-    WINDOWS,
-    Opening,
-    direction,
-    inward_normal,
-    numbered,
-    overlap,
-    segment,
-    signed_area,
-)
+from echomodel import openings as usual_openings
+from echomodel.openings import USUAL, Opening, direction, inward_normal, numbered, overlap, segment, signed_area
 from echomodel.sizes import size_statistics
 from echomodel.vocabulary import normalised, vocabulary
 from echousd.assets.naming import category_of, known_word, plain
@@ -154,7 +145,8 @@ def _outline(room: Room) -> np.ndarray:
     found: np.ndarray = np.array(ring.exterior.coords)[:-1]
     before, after = found - np.roll(found, 1, 0), np.roll(found, -1, 0) - found  # of the first corner, straight or not
     cross = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
-    return found[cross > 1e-3 * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)].round(4)
+    bends = cross > 1e-3 * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    return found[bends if bends.sum() > 2 else slice(None)].round(4)
 
 
 # -- doors and windows -------------------------------------------------------------------------------------------------
@@ -170,10 +162,12 @@ def _fit(plan: Plan, side: Facing, hole: Hole, ends: np.ndarray) -> tuple[float,
     away = abs(off - side.deep / 2)
     if away > side.deep / 2 + REACH or np.ptp(at) < STRAIGHT * width or end - start < max(NARROW, 0.6 * width):
         return None
-    use, window = vocabulary().room_type(plan.home.room(side.one).type).use, hole.kind == "window"
-    low, usual, _ = WINDOWS.get(use, WINDOWS[""]) if window else (0.0, USUAL[hole.kind]["height"], 0.0)
-    sill = low if hole.sill is None or not window else hole.sill
-    tall = min(hole.height or usual, (height or np.inf) - sill - 0.01)
+    use, high = vocabulary().room_type(plan.home.room(side.one).type).use, height or usual_openings.HIGHEST
+    windows, sill, usual = usual_openings.WINDOWS, 0.0, USUAL[hole.kind]["height"]
+    if hole.kind == "window":
+        low, usual, _ = windows.get(use, windows[""])
+        sill = hole.sill if hole.sill is not None and 0 <= hole.sill < high else low  # as usual where it is none
+    tall = min(hole.height if hole.height is not None and 0.1 <= hole.height <= high else usual, high - sill - 0.01)
     sides = (round(float(start), 4), round(float(end - start), 4), round(float(tall), 4))
     return away + width - (end - start), Opening(hole.kind, hole.kind, side.edge, *sides, round(float(sill), 4))
 

@@ -593,6 +593,36 @@ def test_a_house_of_procthor_that_others_changed_is_as_they_have_it(tmp_path, ec
     ]
 
 
+@pytest.mark.parametrize(
+    ("form", "old", "new", "told"),
+    [
+        ("scenesmith", '"height": 2.0', '"height": 0.001', ""),  # as tall as doors are
+        ("scenesmith", '"sill_height": 0.9', '"sill_height": NaN', ""),
+        ("procthor", '"y": 2.0', '"y": NaN', ""),
+        ("holodeck", "[[4, 1], [4, 1.9]]", "[[4, 1]]", "found no two ends, allowed: x and z of both, finite numbers"),
+        ("holodeck", "[[4, 1], [4, 1.9]]", "[[4, 1], [4, NaN]]", "found no two ends"),
+        (
+            "procthor",
+            '{"x": 6, "y": 0, "z": 3}, {"x": 4, "y": 0, "z": 3}',
+            '{"x": 4, "y": 0, "z": 3000}',
+            "",
+        ),
+    ],
+)
+def test_what_a_plan_says_in_vain_is_as_usual_or_told(tmp_path, form, old, new, told):
+    write, name, _ = PLANS[form]
+    write(tmp_path / name)
+    text = (tmp_path / name).read_text()
+    assert old in text
+    (tmp_path / name).write_text(text.replace(old, new))
+    if told:
+        with pytest.raises(GraphError, match=rf"{name}: not as json has it \(a hole of array.*\): {told}"):
+            import_plan(tmp_path / name)
+        return
+    plan = import_plan(tmp_path / name).plan
+    assert {one.height for own in plan.openings.values() for one in own} <= {2.0, 2.1, 1.3}
+
+
 def test_a_picture_of_ours_is_no_plan_and_a_path_of_nothing_no_fault(tmp_path, echousd_command):
     svg(tmp_path / "flat.svg")
     text = (tmp_path / "flat.svg").read_text()
