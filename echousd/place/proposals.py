@@ -9,7 +9,7 @@ import numpy as np
 
 from echomodel.late import Late
 from echomodel.objective.sizes import places_of
-from echomodel.objective.support import ON_CEILING
+from echomodel.objective.support import FREE, ON_CEILING
 from echomodel.vocabulary import vocabulary
 from echousd.place.distances import APART, MOST_UNDER, kept_apart, over_bed, seen_from, spread_at_walls
 from echousd.place.geometry import depth_inside
@@ -219,7 +219,7 @@ def _squared(problem: Problem, i: int) -> float:
 def along_walls(problem: Problem, i: int, more: float) -> list[Row]:
     """With the back to every wall that is long enough, from corner to corner and where the draft is nearest."""
     width, depth = float(problem.size[i, 0]), float(problem.size[i, 2])
-    gap = 0.0 if problem.kinds[i].support == "wall" else float(problem.behind[i])
+    gap = 0.0 if problem.carrier[i] == FREE else float(problem.behind[i])
     stated = {(one.placement, one.subject) for one in problem.stated}
     fills = problem.kinds[i].clear > 0 and ("in_corner", i) in stated  # a tub does, other things stand near one
     rows = []

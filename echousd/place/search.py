@@ -572,12 +572,11 @@ class Search:
 
         `begun`: what the same search found before, from where it goes on.
         """
-        n = len(self.problem.size)
         state, total, wrong = self._first() if begun is None else (begun.state, *self.faults(begun.state))
         for number in range(anew):
             if not wrong or self.judged >= self.budget:
                 break
-            out = list(range(n)) if number else self.involved(wrong)
+            out = list(range(len(state.yaw))) if number else self.involved(wrong)
             self.urgent = wrong if number else []  # the worst first
             built = self.rebuilt(state, out)
             self.urgent = []

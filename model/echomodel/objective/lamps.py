@@ -11,7 +11,7 @@ MIDDLE = 0.22  # share of the room's extent: so near to the middle a lamp lights
 CENTRED = 0.3  # metres that a pendant, the middle of n a share of it, may hang off the middle of its table or bed
 PILLOW = 0.3  # metres behind the middle of a bed from which on lamps light a bedside
 IN_ROW, SPACED = 0.15, 0.25  # metres that one of several may hang beside their line, and that they keep apart
-TOUCH = 0.04  # metres of air below a lamp on its table
+TOUCH, HUNG = 0.04, 0.1  # metres of air below a lamp on its table, and behind what hangs at a wall
 
 
 def pendant_over(plan: Plan) -> Found:
@@ -29,9 +29,8 @@ def pendant_over(plan: Plan) -> Found:
 
 def _hung(plan: Plan) -> tuple[Array, Array]:
     """Pairs (P,), (P,) of pendants and of the beds, and tables at which nobody works, of their room."""
-    lamps = plan.which(lambda kind: kind.look == "pendant_lamp")
     lit = plan.which(lambda kind: kind.role == "bed" or (kind.role == "board" and not kind.access))
-    return plan.pairs(lamps, lit & plan.standing)
+    return plan.pairs(plan.which(lambda kind: kind.look == "pendant_lamp"), lit & plan.standing)
 
 
 def _over(plan: Plan, i: Array, j: Array) -> Array:
@@ -65,11 +64,13 @@ def pendants_in_row(plan: Plan) -> Found:
 
 
 def lamp_on_surface(plan: Plan) -> Found:
-    """A table lamp or television stands on something that can carry it."""
-    small = plan.which(lambda kind: kind.support == "table" and not kind.hangs)
+    """A table lamp or television stands on something that can carry it; a television may hang at a wall."""
+    small = plan.which(lambda kind: kind.support == "table")
     i, j = plan.pairs(small, plan.which(lambda kind: kind.carries))
     who, xp = plan.those(small), plan.kit
     lateral, forward = plan.local(i, j)
     inside = xp.minimum(plan.size[j, 0] / 2 - abs(lateral), plan.size[j, 2] / 2 - abs(forward))
     air = abs(plan.position[i, 1] - plan.position[j, 1] - plan.size[j, 1])
-    return found(who, -least_of(i, -xp.minimum(inside, TOUCH - air), len(plan), 1.0)[who])
+    margin, behind = -least_of(i, -xp.minimum(inside, TOUCH - air), len(plan), 1.0)[who], plan.back_gaps(who)
+    hung = plan.which(lambda kind: kind.hangs)[who]
+    return found(who, xp.where(hung, xp.maximum(margin, HUNG - behind * plan.walled[who]), margin))

@@ -50,6 +50,13 @@ FAULTS = [
         ("tv", "screen_on_axis"),
         "tv stands 0.65 m beside the axis of sofa",
     ),
+    (
+        Room(
+            {**BEDROOM.things, "tv": {"kind": "tv", "size": (1.0, 0.6, 0.1), "at": (0.0, 1.5), "up": 1.0, "yaw": np.pi}}
+        ),
+        ("tv", "lamp_on_surface"),
+        "tv stands on nothing",
+    ),
     (LIVING.moved("armchair", yaw=HALF), ("armchair", "lounger_faces"), "armchair turns its back on sofa"),
     (DINING.moved("chair", yaw=0.0), ("chair", "seat_faces"), "chair looks 180 degrees past table"),
     (DINING.moved("chair", at=(0.5, 0.4), yaw=-HALF), ("chair", "seat_faces"), "chair looks 90 degrees past table"),

@@ -472,6 +472,15 @@ def test_margins_of_many_poses_are_those_of_one_after_the_other():
         np.testing.assert_allclose(found[k], alone.numpy(), atol=1e-9)
 
 
+def test_a_television_that_nothing_carries_hangs_at_a_wall():
+    size = ((1.6, 0.9, 2.0), (1.2, 0.7, 0.1))
+    search, _ = searched(("double_bed", "tv"), size, ((0.0, 0.0, -0.99), (1.0, 1.0, 0.3)), (0.0, 0.0))
+    found = search.run()
+    assert not found.wrong
+    wall = np.abs(FLOOR).max(0) - np.abs(found.state.position[1, ::2])
+    assert min(wall) < 0.1
+
+
 def test_what_is_barely_as_it_shall_be_is_moved_where_nothing_is_wrong(monkeypatch):
     desk, chair = (1.6, 0.75, 0.7), (0.5, 0.9, 0.5)
     search, state = searched(("desk", "chair"), (desk, chair), ((0.0, 0.0, -1.65), (0.4, 0.0, -1.1)), (0.0, np.pi))
