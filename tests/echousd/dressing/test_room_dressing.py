@@ -1,6 +1,5 @@
 """Small things: where they stand, that they stay out of the way, and that the room is the same without them."""
 
-import itertools
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -14,19 +13,18 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import turned
-from echomodel.dressing import KINDS, PRINTS, SMALL, printed, usual_size
+from echomodel.dressing import KINDS, PRINTS, SMALL, printed
 from echomodel.dressing import thing as solids_of
-from echomodel.dressing.textiles import LEAN
 from echomodel.furniture.solids import pieces_of
 from echomodel.openings import Opening
-from echomodel.triangles import Mesh, joined
+from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.checks import check
 from echousd.dressing import tabletops, upholstery
-from echousd.dressing.dress import ORIGIN, RULES, TALL, Dressing, dress, dressed, geometry_of, setting_of
+from echousd.dressing.dress import RULES, TALL, Dressing, dress, dressed, setting_of
 from echousd.dressing.setting import Setting, Thing, meets, standing
 from echousd.dressing.tabletops import surfaces
-from echousd.dressing.upholstery import STEP, _let_down, _Seat
+from echousd.dressing.upholstery import STEP, _Seat
 from echousd.dressing.walls import BLINDS, CURTAINS, RADIATORS, curtains, radiators, sockets
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.compose import room_files
@@ -34,7 +32,6 @@ from echousd.options import RoomOptions
 from echousd.room import Provenance
 from echousd.shapes.fittings import SKIRTING
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
-from echousd.shapes.hulls import convex_hull
 from echousd.shapes.sources.whole import material_groups, solid_geometry
 from echousd.shapes.walls import walls
 from echousd.stage.graphs import read_graph
@@ -395,46 +392,6 @@ def test_armchairs_around_a_table_share_a_rug():
     ]
     assert [rug.on for rug in rugs] == ["table"]
     assert rugs[0].size[0] > 1.6  # under the chairs' feet, too
-
-
-def seat_of(*solids):
-    """An armchair that collides by hulls of points (n, 3)."""
-    hulls = tuple(Collider(f"collider_{n}", convex_hull(points), "convexHull") for n, points in enumerate(solids))
-    part = Part("mesh", joined([hull.mesh for hull in hulls]), {})
-    return standing("seat", "armchair", np.array([0.8, 0.8, 0.8]), np.zeros(3), 0.0, Geometry((part,), hulls, ORIGIN))
-
-
-def test_a_cushion_stands_on_what_of_its_seat_is_level():
-    corners = np.array(list(itertools.product((-0.4, 0.4), (0.0, 0.42), (-0.4, 0.4))))
-    size = np.array([0.45, 0.42, 0.15])
-    assert _let_down(seat_of(corners), np.array([0.1, 0.435, 0.0]), size) == pytest.approx([0.1, 0.42, 0.0])
-    assert _let_down(seat_of(corners), np.array([0.1, 0.5, 0.0]), size) is None  # far above it
-    assert _let_down(seat_of(corners), np.array([0.5, 0.42, 0.0]), size) is None  # half beside it
-    raked = corners.copy()
-    raked[:, 1] += np.where(corners[:, 1] > 0.2, 0.2 * corners[:, 2], 0.0)
-    assert _let_down(seat_of(raked), np.array([0.1, 0.43, 0.0]), size) is None
-
-
-def test_cushions_lie_on_their_seat_not_on_the_foot_of_its_back():
-    """Where seat and back meet, heights pass through all between them; the cushion's edge touches the back there."""
-    line = np.arange(-0.5, 0.5, STEP) + STEP / 2
-    height, size = np.full((len(line), len(line)), 0.42), np.array([0.5, 0.48, 0.18])
-    height[:, :5], height[:, 5] = 0.8, 0.485
-    seat = _Seat(line, line, height, 0.42)
-    spot = seat.resting(0.0, size)
-    assert spot[2] < -0.25  # against the back
-    assert spot[1] == pytest.approx(0.44)
-
-
-@pytest.mark.parametrize("variant", [228333841, *range(30)])  # the first has tassels, which were its lowest
-def test_a_cushion_that_leans_stands_on_its_foot(variant):
-    size = usual_size("cushion", np.random.default_rng(variant))
-    if variant > 30:
-        size = np.array([0.5137, 0.4937, 0.1778])
-    made = geometry_of("cushion", tuple(np.add(size, (0, 0, LEAN * size[1])).tolist()), variant)
-    corners = np.concatenate([collider.mesh.vertices for collider in made.colliders])
-    foot = corners[corners[:, 1] < corners[:, 1].min() + 0.005]
-    assert foot[:, 2].min() + 0.005 < made.mass.centre[2] < foot[:, 2].max() - 0.005
 
 
 def test_cushions_lie_before_the_pillows_of_wide_beds():

@@ -1,0 +1,55 @@
+"""Cushions stand and lean on what of their seat is level."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from echomodel.dressing import usual_size
+from echomodel.dressing.textiles import LEAN
+from echomodel.triangles import joined
+from echousd.dressing.dress import ORIGIN, geometry_of
+from echousd.dressing.setting import standing
+from echousd.dressing.upholstery import STEP, _let_down, _Seat
+from echousd.shapes.geometry import Collider, Geometry, Part
+from echousd.shapes.hulls import convex_hull
+
+
+def seat_of(*solids):
+    """An armchair that collides by hulls of points (n, 3)."""
+    hulls = tuple(Collider(f"collider_{n}", convex_hull(points), "convexHull") for n, points in enumerate(solids))
+    part = Part("mesh", joined([hull.mesh for hull in hulls]), {})
+    return standing("seat", "armchair", np.array([0.8, 0.8, 0.8]), np.zeros(3), 0.0, Geometry((part,), hulls, ORIGIN))
+
+
+def test_a_cushion_stands_on_what_of_its_seat_is_level():
+    corners = np.array(list(itertools.product((-0.4, 0.4), (0.0, 0.42), (-0.4, 0.4))))
+    size = np.array([0.45, 0.42, 0.15])
+    assert _let_down(seat_of(corners), np.array([0.1, 0.435, 0.0]), size) == pytest.approx([0.1, 0.42, 0.0])
+    assert _let_down(seat_of(corners), np.array([0.1, 0.5, 0.0]), size) is None  # far above it
+    assert _let_down(seat_of(corners), np.array([0.5, 0.42, 0.0]), size) is None  # half beside it
+    raked = corners.copy()
+    raked[:, 1] += np.where(corners[:, 1] > 0.2, 0.2 * corners[:, 2], 0.0)
+    assert _let_down(seat_of(raked), np.array([0.1, 0.43, 0.0]), size) is None
+
+
+def test_cushions_lie_on_their_seat_not_on_the_foot_of_its_back():
+    """Where seat and back meet, heights pass through all between them; the cushion's edge touches the back there."""
+    line = np.arange(-0.5, 0.5, STEP) + STEP / 2
+    height, size = np.full((len(line), len(line)), 0.42), np.array([0.5, 0.48, 0.18])
+    height[:, :5], height[:, 5] = 0.8, 0.485
+    seat = _Seat(line, line, height, 0.42)
+    spot = seat.resting(0.0, size)
+    assert spot[2] < -0.25  # against the back
+    assert spot[1] == pytest.approx(0.44)
+
+
+@pytest.mark.parametrize("variant", [228333841, *range(30)])  # the first has tassels, which were its lowest
+def test_a_cushion_that_leans_stands_on_its_foot(variant):
+    size = usual_size("cushion", np.random.default_rng(variant))
+    if variant > 30:
+        size = np.array([0.5137, 0.4937, 0.1778])
+    made = geometry_of("cushion", tuple(np.add(size, (0, 0, LEAN * size[1])).tolist()), variant)
+    corners = np.concatenate([collider.mesh.vertices for collider in made.colliders])
+    foot = corners[corners[:, 1] < corners[:, 1].min() + 0.005]
+    assert foot[:, 2].min() + 0.005 < made.mass.centre[2] < foot[:, 2].max() - 0.005
