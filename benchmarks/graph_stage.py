@@ -23,8 +23,8 @@ from pxr import Gf, Sdf, Usd, Vt
 
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
-from echousd.stage.files import save_layer
-from echousd.stage.graphs import read_graph
+from echousd.stage.graphs import save_layer
+from echousd.stage.read import read_graph
 from echousd.stage.write import graph_layer
 
 WORDS = vocabulary()

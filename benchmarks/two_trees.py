@@ -30,8 +30,8 @@ def measure(tree: Path) -> None:
 
     import echousd
     from echousd.graph import load_graph
-    from echousd.stage.files import save_layer
-    from echousd.stage.graphs import read_graph
+    from echousd.stage.graphs import save_layer
+    from echousd.stage.read import read_graph
     from echousd.stage.write import graph_layer
 
     warnings.simplefilter("ignore")

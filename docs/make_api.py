@@ -20,8 +20,9 @@ from echousd.graph.nodes import PlainModel
 from echousd.home.assemble import Made
 from echousd.home.graph import HomeRelation, HomeRoom
 from echousd.home.importing.homes import Imported
-from echousd.home.plan import Plan
-from echousd.options import GROUPS, OF_NEW, RoomOptions, limits_of, words_of
+from echousd.home.plan import HomePlan
+from echousd.invalid import limits_of
+from echousd.options import GROUPS, OF_NEW, RoomOptions, words_of
 from echousd.place.living import LivingFault
 from echousd.room import LayoutOutcome, Provenance, Verdict
 from echousd.settle.settle import Motion, SettleReport
@@ -35,7 +36,7 @@ GIVES = {
     "SceneGraph": (GraphDiff,),
     "Room": (LayoutOutcome, Verdict, Provenance),
     "HomeGraph": (HomeRoom, HomeRelation),
-    "plan_home": (Plan,),
+    "plan_home": (HomePlan,),
     "generate_home": (Made,),
     "import_plan": (Imported,),
     "check": (

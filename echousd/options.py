@@ -5,10 +5,8 @@ Flags of commands, `batch.toml`, `--set`, the manifest and the signatures of Pyt
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from inspect import Parameter, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
@@ -16,12 +14,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
+from echomodel.late import Late
 from echousd.assets import STRETCH
 from echousd.graph.fields import IDENTIFIER, RESIDENTS, SHAPES
 from echousd.graph.nodes import PlainModel
 
 if TYPE_CHECKING:
     from echousd.assets.choose import AssetWishes
+
+wishes_of = Late("echousd.assets.choose:wishes_of")
+validation_message = Late("echousd.invalid:validation_message")
 
 FACES = 5000  # budget of each mesh
 MAX_SEED = 2**63 - 1  # what a layer stores as a whole number
@@ -163,53 +165,13 @@ class RoomOptions(PlainModel, Look):
         index = Path(self.assets or "")
         changed = index.stat().st_mtime_ns if self.assets and index.is_file() else 0
         beyond = tuple(map(str, outside))
-        return _wishes(self.assets, changed, self.stretch, self.licenses or "", self.text, self.collect, beyond)
+        asked = self.stretch, self.licenses or "", self.text, self.collect, beyond
+        wishes: AssetWishes = wishes_of(self.assets, changed, *asked)
+        return wishes
 
     @classmethod
     def _explained(cls, fields: dict[str, Any], error: ValidationError) -> ValueError:
         return ValueError(validation_message(error, cls))
-
-
-@lru_cache(maxsize=4)  # words are compared with those of all models once in a process
-def _wishes(
-    assets: str | None, changed: int, stretch: float, licenses: str, text: str, collect: bool, outside: tuple[str, ...]
-) -> AssetWishes:
-    from echousd.assets.choose import AssetWishes
-    from echousd.assets.table import read_library
-
-    words = tuple(word.strip() for word in licenses.split(",") if word.strip())
-    library = None if assets is None else read_library(assets)
-    wishes = AssetWishes(library, stretch, words, text, collect, outside=tuple(map(Path, outside)))
-    _ = wishes.unlikeness  # what is absent is told before any long work
-    return wishes
-
-
-def validation_message(error: ValidationError, model: type[BaseModel] = BaseModel) -> str:
-    """The first fault in one line: the field, what was found and what is allowed."""
-    first = error.errors(include_url=False)[0]
-    where = ".".join(str(part) for part in first["loc"]) or "the file"
-    if first["type"] == "value_error":
-        return str(first["ctx"]["error"])
-    if first["type"] == "string_pattern_mismatch":
-        pattern = first["ctx"]["pattern"]
-        what = "a name of letters, digits and _" if "A-Z" in pattern else "a hexadecimal digest"
-        what = "a path of names of letters, digits and _, such as /World/Room" if "/" in pattern else what
-        return f"{where} is {first['input']!r:.100}, allowed: {what}"
-    if first["type"] == "extra_forbidden":
-        return f"{where} is no option, allowed: {', '.join(sorted(model.model_fields))}"
-    field = model.model_fields.get(str(first["loc"][0])) if first["loc"] else None
-    limits = (
-        limits_of(field) if field is not None and first["type"] in ("greater_than_equal", "less_than_equal") else ""
-    )
-    words = re.sub("^Input should be ", "", first["msg"]).replace("'", "")
-    return f"{where} is {first['input']!r:.100}, allowed: {limits or words}"
-
-
-def limits_of(field: FieldInfo) -> str:
-    """The numbers that a field may hold, `1 to 64` or `1 or more`; "" where all are allowed."""
-    low = next((one.ge for one in field.metadata if hasattr(one, "ge")), None)
-    high = next((one.le for one in field.metadata if hasattr(one, "le")), None)
-    return "" if low is None else f"{low} or more" if high is None else f"{low} to {high}"
 
 
 def words_of(field: FieldInfo) -> str:

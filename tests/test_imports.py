@@ -30,7 +30,7 @@ LAYERS = (
     ("stage",),
     ("store",),
     ("graph",),
-    ("naming", "pages", "pending", "plugin", "srgb", "textures"),
+    ("invalid", "naming", "pages", "pending", "plugin", "srgb", "textures"),
 )
 # package -> what else it must not import, in a function or above it (imports for type hints alone are none)
 FORBIDDEN = {

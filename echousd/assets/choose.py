@@ -19,7 +19,7 @@ from echousd.assets.colors import costs as color_costs
 from echousd.assets.colors import table as color_table
 from echousd.assets.licences import allowed
 from echousd.assets.record import AssetRecord
-from echousd.assets.table import Library
+from echousd.assets.table import Library, read_library
 
 EQUALLY_GOOD = 0.12  # difference of costs among which the seed decides
 OTHER_WORD, OTHER_FAMILY = 0.35, 0.8  # cost of a model of a related category
@@ -264,3 +264,15 @@ def _words(record: AssetRecord) -> frozenset[str]:
 def _split(texts: tuple[str, ...]) -> frozenset[str]:
     words = " ".join(texts).lower().replace("_", " ").split()
     return frozenset(word for word in words if len(word) > 2 and word.isalpha())
+
+
+@lru_cache(maxsize=4)  # words are compared with those of all models once in a process
+def wishes_of(
+    assets: str | None, changed: int, stretch: float, licenses: str, text: str, collect: bool, outside: tuple[str, ...]
+) -> AssetWishes:
+    """What options wish of models; `changed`: when the index was written, licences with commas between."""
+    words = tuple(word.strip() for word in licenses.split(",") if word.strip())
+    library = None if assets is None else read_library(assets)
+    wishes = AssetWishes(library, stretch, words, text, collect, outside=tuple(map(Path, outside)))
+    _ = wishes.unlikeness  # what is absent is told before any long work
+    return wishes

@@ -48,16 +48,10 @@ def described(entry: Entry, library: Path, *, full: bool = True, encoder: object
 def left_out(entry: Entry, library: Path, fault: str) -> AssetRecord:
     """The row of a model that is not opened, and why."""
     return AssetRecord(
-        id=entry.key,
-        uri=relative(entry.file.path, library) + (f"!{entry.file.member}" if entry.file.member else ""),
-        root=relative(entry.file.top, library),
-        stamp=stamp(entry.file.path),
-        name=entry.name,
-        licence=spdx(entry.licence),
-        author=entry.author,
-        tags=entry.tags,
-        fault=fault,
-    )
+        id=entry.key, uri=relative(entry.file.path, library) + (f"!{entry.file.member}" if entry.file.member else ""),
+        root=relative(entry.file.top, library), stamp=stamp(entry.file.path), name=entry.name,
+        licence=spdx(entry.licence), author=entry.author, tags=entry.tags, fault=fault,
+    )  # fmt: skip
 
 
 def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool, encoder: object) -> AssetRecord:
@@ -78,19 +72,12 @@ def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool, encode
         if metres is not None and category:
             category, confidence = category_of((*entry.words, *found.labels), entry.name, entry.group, extents * metres)
     record = replace(
-        record,
-        category=category,
-        confidence=round(confidence, 3),
-        turn=tuple(turn.ravel().tolist()),
-        joints=found.joints,
-        rigid=found.bodies or found.colliders or found.joints > 0,
-        prim=found.prim,
-        materials=found.materials,
-        variants=found.variants,
-        missing=found.missing,
+        record, category=category, confidence=round(confidence, 3), turn=tuple(turn.ravel().tolist()),
+        joints=found.joints, rigid=found.bodies or found.colliders or found.joints > 0, prim=found.prim,
+        materials=found.materials, variants=found.variants, missing=found.missing,
         licence=record.licence if record.licence != UNKNOWN else spdx(found.licence),
         author=record.author or found.author,
-    )
+    )  # fmt: skip
     fault = "" if category else f"{entry.file}: {entry.name!r} is of no known category; set `category` in the table"
     if metres is None and entry.dims is None and category:
         return replace(record, fault=f"{entry.file}: says no unit, and its size tells none; set `metres` in the table")

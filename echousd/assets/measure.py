@@ -205,23 +205,18 @@ def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) ->
         f"{name}={root.GetVariantSet(name).GetVariantSelection()}" for name in root.GetVariantSets().GetNames()
     )
     return Measured(
-        *append_faces(points, faces),
-        metres=metres_per_unit(stage) if measures else None,
-        z_up=up_axis(stage) == UsdGeom.Tokens.z,
-        prim=str(root.GetPath()),
-        above=np.array(cache.GetParentToWorldTransform(root)).T,
-        yaw=0.0 if box is None else box.yaw,
+        *append_faces(points, faces), metres=metres_per_unit(stage) if measures else None,
+        z_up=up_axis(stage) == UsdGeom.Tokens.z, prim=str(root.GetPath()),
+        above=np.array(cache.GetParentToWorldTransform(root)).T, yaw=0.0 if box is None else box.yaw,
         labels=tuple(dict.fromkeys(word for prim in prims[:50] for word in labels(prim))),
         materials=tuple(dict.fromkeys(p.GetName() for p in prims if p.IsA(UsdShade.Material))),
         licence=words.get("asset_license") or words.get("license") or words.get("licence") or "",
-        author=words.get("asset_credit") or words.get("author") or "",
-        joints=joints,
+        author=words.get("asset_credit") or words.get("author") or "", joints=joints,
         bodies=any(prim.HasAPI(UsdPhysics.RigidBodyAPI) for prim in prims),
-        colliders=any(prim.HasAPI(UsdPhysics.CollisionAPI) for prim in prims),
-        variants=variants,
+        colliders=any(prim.HasAPI(UsdPhysics.CollisionAPI) for prim in prims), variants=variants,
         missing=tuple(sorted({PurePosixPath(str(name).replace("\\", "/")).name for name in unresolved})),
         coats=tuple(coats),
-    )
+    )  # fmt: skip
 
 
 def _stage_coats(

@@ -38,7 +38,7 @@ def category_of(
     size = np.ones(3) if dims is None else dims
     for text, confidence in ((name, CALLED), (group, SHELVED)):
         bare = re.sub(r"[_\-]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z0-9])", " ", text))
-        found = known_word(bare) or _abroad(bare, group, size)
+        found = known_word(bare) or _translated(bare, group, size)
         found = found or _within(bare, 2) or class_by_name(bare, group, size) or _within(bare)
         if found and fitted(found, text, group):
             return "", 0.0
@@ -73,9 +73,9 @@ def class_by_name(name: str, group: str, size: Sequence[float] | np.ndarray) -> 
     return choice.get(word, word)
 
 
-def _abroad(text: str, group: str, size: Sequence[float] | np.ndarray) -> str:
+def _translated(text: str, group: str, size: Sequence[float] | np.ndarray) -> str:
     """The category of a name that is no English one, "" where it is one or means nothing of ours."""
-    word = english(text) if ABROAD.search(text) or not _within(text) else ""
+    word = english(text) if FOREIGN.search(text) or not _within(text) else ""
     return (known_word(word) or class_by_name(word, group, size)) if word else ""
 
 
@@ -142,7 +142,7 @@ def likely_unit(category: str, extents: Sequence[float] | np.ndarray) -> float |
     return UNITS[place] if best < 0.5 else None
 
 
-ABROAD = re.compile(
+FOREIGN = re.compile(
     r"[^\x00-\x7f]|\b(de|da|del|della|di|du|des|d|la|le|il|para|con|mit|fur|aus|van|met|voor|tv.?mobel|meuble|mueble"
     r"|mobile|movel|meubel)\b",
     re.IGNORECASE,

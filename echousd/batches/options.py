@@ -13,7 +13,8 @@ from pydantic import Field, ValidationError
 from echomodel.files import raising
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import PlainModel
-from echousd.options import FILES, MAX_SEED, ROOM, RoomOptions, row, validation_message
+from echousd.invalid import validation_message
+from echousd.options import FILES, MAX_SEED, ROOM, RoomOptions, row
 
 
 class BatchOptions(RoomOptions):

@@ -15,15 +15,7 @@ from echomodel.triangles import along, area_normals, bounds_of, distances, spans
 from echomodel.vocabulary import vocabulary
 from echousd.checks.reading import Reading
 from echousd.graph.nodes import HEIGHT
-from echousd.place.geometry import (
-    SOLID,
-    TOUCH,
-    Collision,
-    Floor,
-    depth_inside,
-    pair_indices,
-    separation,
-)
+from echousd.place.geometry import SOLID, TOUCH, Collision, Floor, depth_inside, pair_indices, separation
 from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding, surroundings
 from echousd.stage.labels import known_category
 from echousd.stage.read import RoomPrims

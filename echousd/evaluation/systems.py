@@ -14,7 +14,6 @@ import torch
 from scipy.optimize import linear_sum_assignment
 from torch import nn
 
-from echomodel.boxes import Boxes
 from echomodel.compact.modules import EchoLayer
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
@@ -129,7 +128,10 @@ def networks(load: Callable[[], RoomModel], guidance: float | None = 0.0, steps:
             with one_thread():
                 found = model.sample_layout(graph, generator=each, edit=_edit(part), steps=steps, **extra).to("cpu")
             for task, one in zip(part, torch.arange(sum(rows)).split(rows), strict=True):
-                out.append(_with_boxes(task.room, found[one]))
+                boxes = found[one]  # which lie about the middle of the floor
+                size, position, yaw = (np.asarray(of, float) for of in (boxes.size, boxes.position, boxes.yaw))
+                position = position + task.room.centre
+                out.append(replace(task.room, size=size, position=position, yaw=yaw, relations=None))
         return out
 
     return layouts
@@ -143,12 +145,6 @@ def _edit(tasks: Sequence[Task]) -> GraphEdit | None:
     moved = [place + np.array([at, 0, at]) for place, at in zip(before, first, strict=False)]
     added = np.concatenate([task.added for task in tasks if task.added is not None])
     return GraphEdit(torch.from_numpy(np.concatenate(moved)), torch.from_numpy(added))
-
-
-def _with_boxes(room: RoomBoxes, boxes: Boxes) -> RoomBoxes:
-    """The room with other boxes, which lie about the middle of its floor."""
-    size, position, yaw = (np.asarray(value, float) for value in (boxes.size, boxes.position, boxes.yaw))
-    return replace(room, size=size, position=position + room.centre, yaw=yaw, relations=None)
 
 
 @cache

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from echousd.folder.folder import Journal, digest_of
 from echousd.folder.manifest import LARGEST
 from echousd.folder.within import check_links, inside
-from echousd.options import validation_message
+from echousd.invalid import validation_message
 from echousd.pending import JOURNAL, STAGING
 
 

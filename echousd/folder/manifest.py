@@ -8,9 +8,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError
 
+from echomodel.late import Late
 from echousd.folder.within import check_links, inside
 from echousd.graph.fields import IDENTIFIER
-from echousd.options import MAX_SEED, Look, validation_message
+from echousd.options import MAX_SEED, Look
+
+validation_message = Late("echousd.invalid:validation_message")
 
 MANIFEST_KEY = "echousd_room"
 LARGEST = 64 * 2**20  # bytes of a manifest or journal that are read

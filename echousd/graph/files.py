@@ -17,7 +17,7 @@ from echousd.naming import LAYER_FORMS, STAGE_FORMS, TEXT_FORMS
 
 MAX_BYTES = 8 * 2**20
 # what builds on this package
-read_graph, write_graph = Late("echousd.stage.graphs:read_graph"), Late("echousd.stage.graphs:write_graph")
+read_graph, write_graph = Late("echousd.stage.read:read_graph"), Late("echousd.stage.graphs:write_graph")
 
 
 def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGraph:

@@ -59,29 +59,6 @@ def with_floor(graph: SceneGraph, seed: int) -> SceneGraph:
     return graph.with_room(floor_polygon=tuple(map(tuple, cut.tolist())))
 
 
-def with_wider_floor(graph: SceneGraph, corners: np.ndarray) -> SceneGraph:
-    """The graph with its proposed floor made large enough for corners (n, 2) of furniture, x and z in metres.
-
-    An L-shaped floor that does not hold them becomes the rectangle around it, and its openings are placed anew.
-    """
-    import shapely
-
-    room = graph.room
-    if room.extents is None or not len(corners):
-        return graph
-    size = room.extents
-    if room.floor_polygon:
-        outline = shapely.Polygon(room.floor_polygon).buffer(1e-3)
-        if outline.covers(shapely.MultiPoint(corners)):
-            return graph
-        room = room.replaced(floor_polygon=None, size=size, openings=())
-    needed = 2 * np.abs(corners).max(0)
-    if (needed > np.array(size) + 1e-3).any():
-        x, z = (float(v) for v in np.maximum(size, np.ceil(needed * 10) / 10))
-        room = room.replaced(size=(x, z))
-    return graph if room is graph.room else graph.replaced(room=room)
-
-
 def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGraph:
     """The graph with a door where it states no opening, and windows where it states none, placed where nothing stands.
 
@@ -143,17 +120,6 @@ def _fixed(graph: SceneGraph) -> Arrays:
         np.array([node.position for node in nodes], float).reshape(-1, 3),
         np.array([node.yaw for node in nodes], float),
     )
-
-
-def with_plan_of(graph: SceneGraph, before: SceneGraph) -> SceneGraph:
-    """The graph with floor and openings of an earlier one where it states none of its own."""
-    room, old = graph.room, before.room
-    if room.extents is None and old.extents is not None:
-        room = room.replaced(floor_polygon=old.floor_polygon, size=old.size)
-    same = room.corners is not None and old.corners is not None and np.array_equal(room.corners, old.corners)
-    if not room.openings and same:
-        room = room.replaced(openings=old.openings)
-    return graph if room is graph.room else graph.replaced(room=room)
 
 
 def check_extents(extents: tuple[float, float] | None) -> None:

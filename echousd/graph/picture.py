@@ -179,14 +179,9 @@ def _draw_legend(figure: Any, used: set[str], tall: float) -> None:
     lines = [Line2D([], [], color=kind.colour, linestyle=kind.line, linewidth=1.6) for kind in keys]
     if lines:
         figure.legend(
-            lines,
-            [kind.name for kind in keys],
-            loc="lower center",
-            bbox_to_anchor=(0.5, 0.04 / tall),
-            ncols=len(keys),
-            frameon=False,
-            fontsize=8.5,
-        )
+            lines, [kind.name for kind in keys], loc="lower center", bbox_to_anchor=(0.5, 0.04 / tall), ncols=len(keys),
+            frameon=False, fontsize=8.5,
+        )  # fmt: skip
 
 
 WIDTH, HEIGHT = 1.9, 0.62  # of a box, inches

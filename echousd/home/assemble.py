@@ -27,7 +27,7 @@ from echousd.folder.manifest import find_manifest
 from echousd.graph import SceneGraph
 from echousd.home.existing import next_plan
 from echousd.home.graph import HomeGraph, home_of_plain
-from echousd.home.plan import Plan, doorways
+from echousd.home.plan import HomePlan, doorways
 from echousd.home.stages import HOME, home_layer, room_path
 from echousd.layers.assets import write_mesh
 from echousd.naming import HOME as ROOT_FILE
@@ -63,7 +63,7 @@ class Made:
 
 
 def generate_home(
-    home: HomeGraph | Plan, output: str | Path, *, force: bool = False, workers: int | None = None, **options: Any
+    home: HomeGraph | HomePlan, output: str | Path, *, force: bool = False, workers: int | None = None, **options: Any
 ) -> Made:
     """Plan a home, furnish its rooms side by side and write them to a folder, from whose plan a new one begins.
 
@@ -79,7 +79,7 @@ def generate_home(
     return write_rooms(home, folder, asked, force=force, workers=workers)
 
 
-def jobs_of(plan: Plan, output: Path, options: RoomOptions, outside: Sequence[str] = ()) -> dict[str, Job]:
+def jobs_of(plan: HomePlan, output: Path, options: RoomOptions, outside: Sequence[str] = ()) -> dict[str, Job]:
     """What workers need to make each room: its graph in the plan, a seed of its own, one palette for all."""
     fields = options.model_dump(exclude={"like", "room_path"}) | {
         "palette": options.palette or palette_of_room(options.seed),
@@ -104,7 +104,7 @@ def digests_of(jobs: Mapping[str, Job]) -> dict[str, str]:
 
 
 def write_rooms(
-    plan: Plan, output: Path, options: RoomOptions, *, outside: Sequence[str] = (), force: bool = False,
+    plan: HomePlan, output: Path, options: RoomOptions, *, outside: Sequence[str] = (), force: bool = False,
     workers: int | None = None, tell: Callable[[int, int], None] = lambda done, total: None,
 ) -> Made:  # fmt: skip
     """Make a home in a folder: rooms whose graph, place in the plan and options are as before keep their bytes.
@@ -145,7 +145,7 @@ def _edited(folder: Path) -> bool:
 
 
 def wanted_jobs(
-    plan: Plan, output: Path, options: RoomOptions, outside: Sequence[str] = ()
+    plan: HomePlan, output: Path, options: RoomOptions, outside: Sequence[str] = ()
 ) -> tuple[list[Job], dict[str, str]]:
     """The jobs of the rooms that a folder does not hold as they would be made, and the digest of every room.
 
@@ -162,7 +162,7 @@ def wanted_jobs(
     return [_opened(jobs[name], same[name], plan) if name in same else jobs[name] for name in again], digests
 
 
-def _opened(job: Job, manifest: Mapping[str, Any], plan: Plan) -> Job:
+def _opened(job: Job, manifest: Mapping[str, Any], plan: HomePlan) -> Job:
     spec, there = plan.graph(job.id).room, SceneGraph.from_json(json.dumps(manifest["graph"]))
     if not there.room.replaced(openings=spec.openings) == spec != there.room:
         return job
@@ -207,7 +207,7 @@ def earlier(output: Path, seed: int) -> Path | None:
 
 
 def home_files(
-    plan: Plan, output: Path, names: Sequence[str], digests: Mapping[str, str], options: RoomOptions
+    plan: HomePlan, output: Path, names: Sequence[str], digests: Mapping[str, str], options: RoomOptions
 ) -> dict[Path, bytes]:
     """The root layer, which has the rooms as payloads, and below it the layer of the graph and the plan."""
     below = home_layer(plan.home, plan, rooms=False)
@@ -237,7 +237,7 @@ def home_files(
     return {output / ROOT_FILE: layer_bytes(root, ".usda"), output / PLAN: layer_bytes(below, ".usda")}
 
 
-def _thresholds(layer: Sdf.Layer, plan: Plan) -> None:
+def _thresholds(layer: Sdf.Layer, plan: HomePlan) -> None:
     """Author floors in the doorways, where those of the rooms end: /House/Plan, one for each way through."""
     pen, above = Pen(layer), f"{HOME}/Plan"
     pen.define(above, "Xform", kind="group")

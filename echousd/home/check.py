@@ -15,7 +15,7 @@ from echomodel.openings import STEP, inward_normal, segment
 from echomodel.vocabulary import vocabulary
 from echousd.checks.report import CheckReport, check
 from echousd.home.existing import plan_there
-from echousd.home.plan import Plan, doorways, overlapping
+from echousd.home.plan import HomePlan, doorways, overlapping
 from echousd.home.stages import Standing, furniture, named_rooms
 from echousd.stage.files import open_stage
 
@@ -91,7 +91,7 @@ def _room_file(prim: Usd.Prim) -> Path:
     )
 
 
-def _openings(plan: Plan) -> Iterator[str]:
+def _openings(plan: HomePlan) -> Iterator[str]:
     """Doors that lead into a wall, are there twice, or have no leaf or two."""
     for name, openings in plan.openings.items():
         for opening in openings:
@@ -108,7 +108,7 @@ def _openings(plan: Plan) -> Iterator[str]:
                 yield f"{name} and {other}: two leaves in one door, allowed: one"
 
 
-def open_ground(plan: Plan, things: Sequence[Standing]) -> shapely.Geometry:
+def open_ground(plan: HomePlan, things: Sequence[Standing]) -> shapely.Geometry:
     """Where the middle of a robot may be on a home's floors and in its doorways, with what stands in its way there."""
     floors = [shapely.Polygon(floor) for floor in plan.floors.values()]
     floors += [shapely.box(*corners.ravel()).buffer(0.02) for *_, corners in doorways(plan)]
@@ -120,7 +120,7 @@ def open_ground(plan: Plan, things: Sequence[Standing]) -> shapely.Geometry:
     return shapely.union_all(floors).difference(shapely.union_all(solid)).buffer(SLACK - ROBOT)
 
 
-def walked(plan: Plan, ground: shapely.Geometry) -> dict[str, float]:
+def walked(plan: HomePlan, ground: shapely.Geometry) -> dict[str, float]:
     """Of every room the share of its free floor that a robot gets to which enters the home by its front door."""
     door = shapely.Point(_start(plan)).buffer(AT_DOOR)
     near = [part for part in shapely.get_parts(ground) if part.intersects(door)]
@@ -132,7 +132,7 @@ def walked(plan: Plan, ground: shapely.Geometry) -> dict[str, float]:
     return out
 
 
-def _blocked(plan: Plan, ground: shapely.Geometry) -> Iterator[str]:
+def _blocked(plan: HomePlan, ground: shapely.Geometry) -> Iterator[str]:
     """Doors and passages that furniture stands in, on either side."""
     for (one, other), opening, corners in doorways(plan):
         near, inward = segment(plan.floors[one], opening), inward_normal(plan.floors[one], opening.edge)
@@ -146,7 +146,7 @@ def _blocked(plan: Plan, ground: shapely.Geometry) -> Iterator[str]:
             )
 
 
-def _start(plan: Plan) -> np.ndarray:
+def _start(plan: HomePlan) -> np.ndarray:
     """(2,) float: behind the front door, or in the middle of the room that one enters by."""
     name = plan.home.entered_by
     floor = plan.floors[name]

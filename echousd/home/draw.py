@@ -18,7 +18,7 @@ from echousd.graph import GraphError
 from echousd.graph.picture import save_figure
 from echousd.home.importing.homes import room_kind
 from echousd.home.importing.simulators import THOR
-from echousd.home.plan import Plan, ways
+from echousd.home.plan import HomePlan, ways
 from echousd.home.stages import Standing
 from echousd.naming import free_name
 
@@ -48,7 +48,7 @@ def on_paper(points: np.ndarray) -> np.ndarray:
     return np.asarray(points, float)[..., ::-1]
 
 
-def lines_of(plan: Plan) -> Iterator[Line]:
+def lines_of(plan: HomePlan) -> Iterator[Line]:
     """What a plan consists of: pieces of wall, leaves with their swings, panes, floors."""
     holes = []
     for name, floor in plan.floors.items():
@@ -81,7 +81,7 @@ def _filled(floor: np.ndarray, opening: Opening, near: np.ndarray, out: np.ndarr
         yield Line("door", on_paper(swing[1:]))
 
 
-def dimensions_of(plan: Plan) -> Iterator[tuple[Place, Place, str]]:
+def dimensions_of(plan: HomePlan) -> Iterator[tuple[Place, Place, str]]:
     """Ends on paper and text of the lengths that a plan has outside: from wall to wall, below and left."""
     corners = on_paper(np.concatenate([*plan.cells.values()]))
     low, high = corners.min(0), corners.max(0)
@@ -93,7 +93,7 @@ def dimensions_of(plan: Plan) -> Iterator[tuple[Place, Place, str]]:
 
 
 def draw_plans(
-    plans: Sequence[Plan], path: Path, over: Sequence[np.ndarray] = (), things: Sequence[Standing] = ()
+    plans: Sequence[HomePlan], path: Path, over: Sequence[np.ndarray] = (), things: Sequence[Standing] = ()
 ) -> None:
     """Write a picture of plans side by side; the extension (.png, .svg, .pdf) chooses its form. Raises OSError.
 
@@ -141,7 +141,7 @@ def draw_plans(
     save_figure(figure, path)
 
 
-def write_dxf(plan: Plan, path: Path, things: Sequence[Standing] = ()) -> None:
+def write_dxf(plan: HomePlan, path: Path, things: Sequence[Standing] = ()) -> None:
     """Write a plan as DXF in metres with what stands in it, a layer each; raises `GraphError` without ezdxf."""
     ezdxf = extra("ezdxf", "DXF needs ezdxf", "dxf", GraphError)
     drawing = ezdxf.new(units=6)  # metres
@@ -175,7 +175,7 @@ LOOK = {"name": "PureWhite"}
 ASSETS = {"door": "Doorway_1", "passage": "Doorframe_1", "window": "Window_Slider_48x36"}
 
 
-def write_procthor(plan: Plan, path: Path) -> None:
+def write_procthor(plan: HomePlan, path: Path) -> None:
     """Write the rooms, walls, doors and windows of a plan; furniture stays out, whose models AI2-THOR does not have.
 
     Walls of ProcTHOR have no thickness: rooms end in the middle of the walls between them. What it has no words for

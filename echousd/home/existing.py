@@ -13,7 +13,7 @@ from echomodel.openings import Opening, direction, numbered
 from echousd.graph import SceneGraph
 from echousd.home.graph import HomeGraph, HomeRelation
 from echousd.home.openings import Floor, face_to_face, facings
-from echousd.home.plan import INNER, OUTER, Plan, overlapping, plan_home, rectangles, with_openings
+from echousd.home.plan import INNER, OUTER, HomePlan, overlapping, plan_home, rectangles, with_openings
 from echousd.naming import STAGE_FORMS
 from echousd.shapes.walls import outline as offset
 
@@ -22,7 +22,7 @@ APART = 0.05  # square metres that floors of different rooms may share by roundi
 Placed = Mapping[str, tuple[SceneGraph, np.ndarray]]  # graph of every room, and its pose in the home
 
 
-def next_plan(home: HomeGraph, *, seed: int = 0, before: Path | None = None) -> Plan:
+def next_plan(home: HomeGraph, *, seed: int = 0, before: Path | None = None) -> HomePlan:
     """The plan of a home of which one may be there already; raises `GraphError`.
 
     Arguments:
@@ -45,7 +45,7 @@ def _asks(home: HomeGraph) -> tuple[object, ...]:
     return rooms, home.area, home.outline, home.entrance
 
 
-def plan_there(path: Path, home: HomeGraph | None = None) -> Plan | None:
+def plan_there(path: Path, home: HomeGraph | None = None) -> HomePlan | None:
     """The plan on a stage, None where its rooms state no floors or floors in one place."""
     if path.suffix.lower() not in STAGE_FORMS:
         if home is None or any(room.graph.room.floor_polygon is None for room in home.rooms):
@@ -58,7 +58,7 @@ def plan_there(path: Path, home: HomeGraph | None = None) -> Plan | None:
     return None if home is None else placed_plan(home, read_poses(path))
 
 
-def placed_plan(home: HomeGraph, rooms: Placed) -> Plan | None:
+def placed_plan(home: HomeGraph, rooms: Placed) -> HomePlan | None:
     """The plan that rooms with floors and poses make together, None where a floor is missing or stands in another's.
 
     A door in one of them is a hole in the other; where none is stated, there are those that the graph asks for.
@@ -80,7 +80,7 @@ def _placed(graph: SceneGraph, pose: np.ndarray) -> np.ndarray:
     return graph.room.corners @ pose[[0, 2]][:, [0, 2]].T + pose[[0, 2], 3]
 
 
-def walled(home: HomeGraph, rooms: Placed) -> Plan | None:
+def walled(home: HomeGraph, rooms: Placed) -> HomePlan | None:
     """The floors of rooms and the walls between them, without openings; as `placed_plan`.
 
     Floors that meet are taken to end in the middle of their wall and lose half of it.
@@ -114,7 +114,7 @@ def walled(home: HomeGraph, rooms: Placed) -> Plan | None:
         for name, cell in cells.items()
     }
     poses = {name: pose for name, (_, pose) in rooms.items()}
-    return Plan(home, cells, walls, {name: () for name in cells}, lie, poses)
+    return HomePlan(home, cells, walls, {name: () for name in cells}, lie, poses)
 
 
 def _moved(openings: tuple[Opening, ...], before: np.ndarray, after: np.ndarray) -> tuple[Opening, ...]:
@@ -127,7 +127,7 @@ def _moved(openings: tuple[Opening, ...], before: np.ndarray, after: np.ndarray)
     return tuple(replace(one, offset=offset_of(one)) for one in openings)
 
 
-def _shared(plan: Plan, stated: Mapping[str, tuple[Opening, ...]]) -> dict[str, tuple[Opening, ...]]:
+def _shared(plan: HomePlan, stated: Mapping[str, tuple[Opening, ...]]) -> dict[str, tuple[Opening, ...]]:
     """The openings of all rooms with both sides of each: the leaf in the room that states the door first."""
     found = {name: list(openings) for name, openings in stated.items()}
     for name in list(found):
@@ -149,7 +149,7 @@ def _shared(plan: Plan, stated: Mapping[str, tuple[Opening, ...]]) -> dict[str, 
     return {name: tuple(openings) for name, openings in found.items()}
 
 
-def _reached(plan: Plan) -> HomeGraph:
+def _reached(plan: HomePlan) -> HomeGraph:
     """The graph with doors to rooms that share a wall with those one gets to, where it leads nowhere."""
     home, floors = plan.home, plan.sides
     order = sorted(floors, key=home.serves, reverse=True)

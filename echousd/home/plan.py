@@ -39,7 +39,7 @@ Key = TypeVar("Key")
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class HomePlan:
     """Where the rooms of a home lie, and their doors and windows.
 
     Arguments:
@@ -124,7 +124,7 @@ class Plan:
         return bool(a.area > b.area)
 
 
-def ways(plan: Plan) -> Iterator[tuple[tuple[str, str], Opening]]:
+def ways(plan: HomePlan) -> Iterator[tuple[tuple[str, str], Opening]]:
     """The pairs of rooms that one gets through between, and by what; a door is told by the room that has its leaf."""
     for name, openings in plan.openings.items():
         for opening in openings:
@@ -134,7 +134,7 @@ def ways(plan: Plan) -> Iterator[tuple[tuple[str, str], Opening]]:
                 yield (name, other[0]), opening
 
 
-def doorways(plan: Plan) -> Iterator[tuple[tuple[str, str], Opening, np.ndarray]]:
+def doorways(plan: HomePlan) -> Iterator[tuple[tuple[str, str], Opening, np.ndarray]]:
     """The `ways`, and (2, 2) float lower and upper corner (x, z), metres, of the floor in each."""
     floors = plan.sides
     for (one, other), opening in ways(plan):
@@ -159,7 +159,7 @@ def overlapping(floors: Mapping[Key, np.ndarray], most: float) -> Iterator[tuple
             yield one, other, shared
 
 
-def plan_home(home: HomeGraph, *, seed: int = 0, before: Plan | None = None) -> Plan:
+def plan_home(home: HomeGraph, *, seed: int = 0, before: HomePlan | None = None) -> HomePlan:
     """The plan of a home; the same graph and seed give the same plan.
 
     Arguments:
@@ -184,11 +184,11 @@ def plan_home(home: HomeGraph, *, seed: int = 0, before: Plan | None = None) -> 
     raise GraphError(_unplannable(first))
 
 
-def plans(home: HomeGraph, count: int, seed: int = 0) -> list[Plan]:
+def plans(home: HomeGraph, count: int, seed: int = 0) -> list[HomePlan]:
     """Several plans that differ, the first that of `plan_home`; fewer where no more are found."""
     if not 1 <= count <= MOST_PLANS:
         raise GraphError(f"plans is {count}, allowed: 1 to {MOST_PLANS}")
-    found: list[Plan] = []
+    found: list[HomePlan] = []
     for number in range(3 * count):
         made = plan_home(home, seed=seed + number)
         if not any(_alike(made, other) for other in found):
@@ -198,7 +198,7 @@ def plans(home: HomeGraph, count: int, seed: int = 0) -> list[Plan]:
     return found
 
 
-def _alike(one: Plan, other: Plan) -> bool:
+def _alike(one: HomePlan, other: HomePlan) -> bool:
     shared = sum(
         shapely.intersection(shapely.Polygon(one.cells[name]), shapely.Polygon(other.cells[name])).area
         for name in one.cells
@@ -286,7 +286,7 @@ def _usual(room: HomeRoom) -> tuple[float, float, float]:
     return float(statistics.area[0]), extents[0] * extents[1], min(NARROW * min(extents), statistics.short[2])
 
 
-def _problem(home: HomeGraph, seed: int, before: Plan | None) -> Problem:
+def _problem(home: HomeGraph, seed: int, before: HomePlan | None) -> Problem:
     """What the solver is asked at first: areas as stated or usual, in proportion to the whole."""
     floors, stated = _wanted(home)
     gross = {name: (np.sqrt(area) + WALLED) ** 2 for name, area in floors.items()}
@@ -410,7 +410,7 @@ def _unplannable(problem: Problem) -> str:
 # -- from cells to floors ----------------------------------------------------------------------------------------------
 
 
-def _walled(home: HomeGraph, lie: Cells) -> Plan:
+def _walled(home: HomeGraph, lie: Cells) -> HomePlan:
     """Floors between walls of real thickness, without openings, about the middle of the home."""
     shapes = {name: shapely.union_all([shapely.box(*rect) for rect in own]) for name, own in lie.items()}
     whole = shapely.union_all([*shapes.values()])
@@ -418,10 +418,10 @@ def _walled(home: HomeGraph, lie: Cells) -> Plan:
     shift = -((low + high) / 2).round(2) if home.outline is None else np.array(home.outline).min(0)
     cells = {name: _corners(shape) + shift for name, shape in shapes.items()}
     walls = {name: _thickness(cells[name] - shift, whole) for name in cells}
-    return Plan(home, cells, walls, {name: () for name in cells}, lie)
+    return HomePlan(home, cells, walls, {name: () for name in cells}, lie)
 
 
-def with_openings(plan: Plan, before: HomeGraph | None = None) -> Plan:
+def with_openings(plan: HomePlan, before: HomeGraph | None = None) -> HomePlan:
     """The plan with the doors, passages and windows that its graph asks for.
 
     Arguments:

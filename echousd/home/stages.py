@@ -13,13 +13,14 @@ from echomodel.boxes2d import footprints, upright
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, SceneGraph
 from echousd.home.graph import RATIO, HomeGraph, HomeRelation, HomeRoom
-from echousd.home.plan import Plan
+from echousd.home.plan import HomePlan
 from echousd.naming import STAGE_FORMS
 from echousd.stage import encoding as usd
 from echousd.stage import values
 from echousd.stage.contents import read_contents
 from echousd.stage.encoding import StageError
-from echousd.stage.files import open_stage, save_layer, source
+from echousd.stage.files import open_stage, source
+from echousd.stage.graphs import save_layer
 from echousd.stage.pen import ops, relate, say
 from echousd.stage.read import RoomPrims, faults, find_rooms, place, room_graph, stated_fields, value
 from echousd.stage.units import to_metres
@@ -30,7 +31,7 @@ DOC = """A home: /House/Graph says how its rooms lie to each other, each room's 
 North is +X, east +Z, up +Y. Lengths are metres in the graphs."""
 
 
-def home_layer(home: HomeGraph, plan: Plan | None = None, *, rooms: bool = True) -> Sdf.Layer:
+def home_layer(home: HomeGraph, plan: HomePlan | None = None, *, rooms: bool = True) -> Sdf.Layer:
     """A new anonymous layer with a home's graph, and where there is a plan, with the rooms in their places.
 
     Arguments:
@@ -76,7 +77,7 @@ def room_path(name: str) -> Sdf.Path:
     return Sdf.Path(ROOMS).AppendChild(name)
 
 
-def write_home(home: HomeGraph, path: Path, plan: Plan | None = None) -> None:
+def write_home(home: HomeGraph, path: Path, plan: HomePlan | None = None) -> None:
     """Write a home's stage, with its plan where there is one; raises StageError."""
     save_layer(home_layer(home, plan), path)
 
@@ -131,7 +132,7 @@ class Standing:
     low: float
 
 
-def furniture(plan: Plan, path: Path) -> list[Standing]:
+def furniture(plan: HomePlan, path: Path) -> list[Standing]:
     """What stands or hangs on walls in the rooms of a home on a stage, where it has a place."""
     found: list[Standing] = []
     if path.suffix.lower() not in STAGE_FORMS:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pxr import Sdf
 
-from echomodel.late import Late
+from echomodel.late import lates
 from echomodel.triangles import area_normals, lengths
 from echousd.layers.materials import write_looks, write_palettes
 from echousd.layers.physics import write_asset_physics, write_joints
@@ -17,23 +17,12 @@ from echousd.options import Look
 from echousd.shapes.geometry import CREASE, Geometry
 from echousd.shapes.looks import alternatives, look, palette_for
 from echousd.shapes.surface import Surface, surfaces
-from echousd.stage.paths import (
-    CLASSES,
-    DESCRIPTION,
-    GEO,
-    MTL,
-    ROOM,
-    class_path,
-    coarse_name,
-    payload_name,
-    piece_path,
-)
+from echousd.stage.paths import CLASSES, DESCRIPTION, GEO, MTL, ROOM, class_path, coarse_name, payload_name, piece_path
 from echousd.stage.pen import Pen, ops, say
 from echousd.stage.taxonomy import ade20k
 from echousd.stage.units import METRES
 
-rescale, turn_up = Late("echousd.stage.turning:rescale"), Late("echousd.stage.turning:turn_up")
-move_room = Late("echousd.stage.turning:move_room")
+move_room, rescale, turn_up = lates("echousd.stage.turning", "move_room", "rescale", "turn_up")
 LOD, HIGH, LOW, PROXY = "LOD", "high", "low", "proxy"  # a variant set and its variants, the default first
 
 

@@ -13,6 +13,7 @@ from pxr import Kind, Sdf
 
 from echomodel.boxes2d import footprints
 from echomodel.furniture.solids import Joint
+from echomodel.late import Late
 from echomodel.openings import Opening, edge_lengths
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import Category, vocabulary
@@ -23,11 +24,13 @@ from echousd.shapes.fittings import PLAIN, Millwork, millwork_of
 from echousd.shapes.geometry import CREASE, Mass
 from echousd.shapes.matter import hull_moments
 from echousd.shapes.surface import Surface, surfaces
-from echousd.shapes.walls import BEAM, COVED, THICKNESS, ShellPart, ShellPiece, beams, slab, wall_name, walls
+from echousd.shapes.walls import BEAM, COVED, THICKNESS, ShellPart, ShellPiece, slab, wall_name, walls
 from echousd.stage import encoding
 from echousd.stage.paths import OPENINGS, SHELL, piece_name
 from echousd.stage.pen import Pen, ops
 from echousd.stage.taxonomy import ade20k
+
+beams = Late("echousd.shapes.bays:beams")
 
 THIRD = 3  # one room in so many has the flooring of its type
 # Slots of the floorings that come in several kinds, equally often; wood where nothing else is.

@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import footprints, upright
-from echomodel.late import Late
+from echomodel.late import lates
 from echomodel.objective import Plan
 from echomodel.triangles import Mesh, bounds_of, connected_pieces
 from echousd.graph import SceneGraph
@@ -25,8 +25,7 @@ from echousd.shapes.geometry import Geometry
 from echousd.shapes.hulls import FLUSH, Solids, depth, forbidden_moves
 from echousd.shapes.walls import walls as walls_of
 
-moved_apart, moved_by = Late("echousd.make.moving:moved_apart"), Late("echousd.make.moving:moved_by")
-moved_onto_top = Late("echousd.make.moving:moved_onto_top")
+moved_apart, moved_by, moved_onto_top = lates("echousd.make.moving", "moved_apart", "moved_by", "moved_onto_top")
 DEEP = 0.001  # metres that solids may reach into one another
 ROUNDS = 4  # moves a piece
 

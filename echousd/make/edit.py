@@ -24,7 +24,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.assets.reference import Vector
 from echousd.graph import Node, SceneGraph, consistency
 from echousd.graph.arrays import graph_batch, one_thread
-from echousd.graph.floors import check_space, with_plan_of
+from echousd.graph.floors import check_space
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
 from echousd.make.layouts import LayoutSearch, check_objects, model_of, most_drafts, room_floor, with_sizes
@@ -362,3 +362,14 @@ def _compare(manifest: Mapping[str, Any], echo: RoomModel, *, chosen: bool, root
             "what the edit does not touch stays as it is",
             stacklevel=3,
         )
+
+
+def with_plan_of(graph: SceneGraph, before: SceneGraph) -> SceneGraph:
+    """The graph with floor and openings of an earlier one where it states none of its own."""
+    room, old = graph.room, before.room
+    if room.extents is None and old.extents is not None:
+        room = room.replaced(floor_polygon=old.floor_polygon, size=old.size)
+    same = room.corners is not None and old.corners is not None and np.array_equal(room.corners, old.corners)
+    if not room.openings and same:
+        room = room.replaced(openings=old.openings)
+    return graph if room is graph.room else graph.replaced(room=room)

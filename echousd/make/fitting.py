@@ -1,8 +1,10 @@
-"""What has no place in a room left out (`fit="drop"`): by the floor's area, then by what collides or blocks a door."""
+"""Floor and furniture brought together: a proposed floor made wider; what has no place left out (`fit="drop"`)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+
+import numpy as np
 
 from echomodel.boxes import Boxes
 from echomodel.vocabulary import vocabulary
@@ -77,3 +79,26 @@ def _dispensable(graph: SceneGraph, names: tuple[str, ...] | list[str]) -> str |
     if not free or len(graph.nodes) < 2:
         return None
     return min(reversed(free), key=lambda node: LEAST_FIRST.index(vocabulary().category(node.category).role)).name
+
+
+def with_wider_floor(graph: SceneGraph, corners: np.ndarray) -> SceneGraph:
+    """The graph with its proposed floor made large enough for corners (n, 2) of furniture, x and z in metres.
+
+    An L-shaped floor that does not hold them becomes the rectangle around it, and its openings are placed anew.
+    """
+    import shapely
+
+    room = graph.room
+    if room.extents is None or not len(corners):
+        return graph
+    size = room.extents
+    if room.floor_polygon:
+        outline = shapely.Polygon(room.floor_polygon).buffer(1e-3)
+        if outline.covers(shapely.MultiPoint(corners)):
+            return graph
+        room = room.replaced(floor_polygon=None, size=size, openings=())
+    needed = 2 * np.abs(corners).max(0)
+    if (needed > np.array(size) + 1e-3).any():
+        x, z = (float(v) for v in np.maximum(size, np.ceil(needed * 10) / 10))
+        room = room.replaced(size=(x, z))
+    return graph if room is graph.room else graph.replaced(room=room)

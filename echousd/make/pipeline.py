@@ -10,13 +10,13 @@ from typing import Any
 
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import footprints
-from echomodel.late import Late
+from echomodel.late import Late, lates
 from echomodel.progress import StageListener, StageTimer
 from echomodel.protocols import RoomModel
 from echousd.graph import SceneGraph, load_graph
 from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.consistency import faults_of
-from echousd.graph.floors import check_doors, check_space, with_lowered_windows, with_plan, with_wider_floor
+from echousd.graph.floors import check_doors, check_space, with_lowered_windows, with_plan
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
 from echousd.make.layouts import (
@@ -39,13 +39,13 @@ from echousd.shapes.sources.named import anchored, check_files, names_models, wi
 from echousd.shapes.sources.source import Retrieved, ShapeRequest
 from echousd.shapes.styles import asset_names, style_groups
 from echousd.stage.files import open_stage
-from echousd.stage.graphs import read_graph
+from echousd.stage.read import read_graph
 from echousd.stage.units import conventions
 
-with_earlier_locks = Late("echousd.make.reading:with_earlier_locks")  # of a room that is there already
-with_locked_places = Late("echousd.make.reading:with_locked_places")
+# of a room that is there already
+with_earlier_locks, with_locked_places = lates("echousd.make.reading", "with_earlier_locks", "with_locked_places")
 named_pieces, retrieved = (Late(f"echousd.shapes.sources.retrieval:{name}") for name in ("named_pieces", "retrieved"))
-with_space, fitted = Late("echousd.make.fitting:with_space"), Late("echousd.make.fitting:fitted")
+fitted, with_space, with_wider_floor = lates("echousd.make.fitting", "fitted", "with_space", "with_wider_floor")
 
 
 @takes_options()
@@ -148,6 +148,7 @@ def generate(
     plan = plan_boxes(layouts)
     if stated.room.extents is None:  # unplaced, or by weights that know of no floor, furniture may stand beyond
         graph = with_wider_floor(graph, footprints(*plan).reshape(-1, 2))
+        assert isinstance(graph, SceneGraph)
     if not stated.room.openings:
         graph = with_free_openings(graph, layouts, seed)
     graph = with_lowered_windows(graph, stated, plan, seed)

@@ -29,7 +29,6 @@ from echousd.shapes.geometry import FRAME, LICENCE, Collider, Geometry, Origin, 
 from echousd.shapes.matter import read_mass
 from echousd.stage.contents import read_contents, room_frame, surface_of
 from echousd.stage.files import open_stage, opened
-from echousd.stage.graphs import read_graph
 from echousd.stage.paths import (
     DESCRIPTION,
     GEO,
@@ -40,7 +39,7 @@ from echousd.stage.paths import (
     piece_name,
     piece_of,
 )
-from echousd.stage.read import find_rooms
+from echousd.stage.read import find_rooms, read_graph
 from echousd.stage.showing import each_layout
 from echousd.stage.units import Z_TO_Y, metres_per_unit
 from echousd.stage.values import NOW, matrix, reading

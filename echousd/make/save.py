@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pxr import Sdf, Usd
 
 import echousd
-from echomodel.late import Late
+from echomodel.late import Late, lates
 from echousd.draw.pictures import is_ours, png
 from echousd.folder import folder as folders
 from echousd.folder import ownership
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 # of rooms that are there already
 graph_from_plain = Late("echousd.graph.text:graph_from_plain")
 remembered, undone = Late("echousd.folder.history:remembered"), Late("echousd.folder.history:undone")
+loses_text, merged_root, referenced = lates("echousd.folder.merging", "loses_text", "merged_root", "referenced")
 showing_layout = Late("echousd.stage.showing:showing_layout")
 
 
@@ -89,8 +90,8 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     owned = {path: folders.digest(content) for path, content in files.items()}
     remarks = []
     if current is not None and root in recorded and folders.digest(current) not in (recorded[root], owned[root]):
-        files[root] = ownership.merged_root(folder / root, current, files[root])  # not ours alone: `owned` says so
-        remarks = [root] if ownership.loses_text(current) else []
+        files[root] = merged_root(folder / root, current, files[root])  # not ours alone: `owned` says so
+        remarks = [root] if loses_text(current) else []
     for path in (path for files_of in room.carried.values() for path in files_of):
         if path in files and path in recorded and path in owned and ownership.read(folder, path) == files[path]:
             owned[path] = recorded[path]  # if it was edited, it is taken along as it is and still not ours
@@ -99,7 +100,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     files |= painted  # the user's own: not among what the manifest knows as ours
     files |= {name: ownership.read(folder, path) or b"" for path, name in kept.items() if name}
     gone = [path for path in recorded if path not in owned]
-    needed = ownership.referenced(folder, recorded, gone, replaced)
+    needed = referenced(folder, recorded, gone, replaced) if gone else {}
     owned |= {path: recorded[path] for path in needed}
     history: list[dict[str, Any]] = []
     if room.edited and old:

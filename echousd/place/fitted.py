@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.objective.copies import part_of
 from echomodel.objective.table import cost_of
 from echomodel.rooms.runs import Run, Site, obstacles, runs
 from echomodel.rules import margins
 from echomodel.vocabulary import vocabulary
+from echousd.place.building import part_of
 from echousd.place.problem import Problem
 
 MISSED = 3.0  # what a relation costs that a plan breaks

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from echomodel.arrays import norm
-from echomodel.boxes2d import footprints, seen
+from echomodel.boxes2d import footprints, seen, to_frame
 from echomodel.floors import Walls, signed_distance
 from echomodel.objective.support import allowed_overlap
 from echomodel.openings import edge_lengths, signed_area
@@ -81,10 +81,11 @@ def gaps(
     x, z = position[..., 0] - at[..., 0], position[..., 2] - at[..., 2]
     like, across = np.abs(cos * c + sin * s), np.abs(sin * c - cos * s)  # of the axes of both
     width, deep, reach, length = size[..., 0] / 2, size[..., 2] / 2, others[..., 0] / 2, others[..., 2] / 2
-    gap: np.ndarray = np.abs(cos * x - sin * z) - (width + like * reach + across * length)
-    np.maximum(gap, np.abs(sin * x + cos * z) - (deep + across * reach + like * length), out=gap)
-    np.maximum(gap, np.abs(c * x - s * z) - (reach + like * width + across * deep), out=gap)
-    np.maximum(gap, np.abs(s * x + c * z) - (length + across * width + like * deep), out=gap)
+    (lateral, forward), (aside, ahead) = to_frame(x, z, cos, sin), to_frame(x, z, c, s)
+    gap: np.ndarray = np.abs(lateral) - (width + like * reach + across * length)
+    np.maximum(gap, np.abs(forward) - (deep + across * reach + like * length), out=gap)
+    np.maximum(gap, np.abs(aside) - (reach + like * width + across * deep), out=gap)
+    np.maximum(gap, np.abs(ahead) - (length + across * width + like * deep), out=gap)
     np.maximum(gap, position[..., 1] - at[..., 1] - size[..., 1], out=gap)
     np.maximum(gap, at[..., 1] - position[..., 1] - others[..., 1], out=gap)
     return gap

@@ -15,7 +15,6 @@ from echomodel.objective import TERMS
 from echomodel.objective.plan import kind_of
 from echomodel.objective.sizes import (
     fitting_loads,
-    has_proportions,
     hung_lamps,
     in_proportion,
     laid_tables,
@@ -95,22 +94,14 @@ def place(
     if len(boxes) != len(nodes):
         raise ValueError(f"{len(boxes)} boxes for a graph of {len(nodes)} objects: need one box per object")
     return place_boxes(
-        [node.category for node in nodes],
-        np.asarray(boxes.size, float),
-        np.asarray(boxes.position, float),
-        np.asarray(boxes.yaw, float),
-        triplets_of(graph),
-        floor_polygon=graph.room.corners,
-        height=graph.room.tall,
-        openings=graph.room.openings,
-        stated=stated_placements(graph),
+        [node.category for node in nodes], np.asarray(boxes.size, float), np.asarray(boxes.position, float),
+        np.asarray(boxes.yaw, float), triplets_of(graph), floor_polygon=graph.room.corners, height=graph.room.tall,
+        openings=graph.room.openings, stated=stated_placements(graph),
         fixed=np.array([node.locked or node.position is not None for node in nodes]),
         rigid=np.array([node.locked or node.size is not None for node in nodes]),
-        turned=np.array([node.locked or node.yaw is not None for node in nodes]),
-        rules=rules,
-        config=config,
+        turned=np.array([node.locked or node.yaw is not None for node in nodes]), rules=rules, config=config,
         begun=begun,
-    )
+    )  # fmt: skip
 
 
 def place_boxes(
@@ -179,7 +170,8 @@ def place_boxes(
         of_more = np.unique(triplets[np.isin(triplets[:, 1], list({*sizes} - {*higher}))][:, [0, 2]])
         lenient = np.isin(np.arange(n), of_more)[:, None] | (np.isin(np.arange(n), measured)[:, None] & UPRIGHT)
         usual = usual_sizes(drawn.categories, drawn.size, lenient=lenient)
-        kept = rigid | (has_proportions(drawn.categories) & ~np.isin(np.arange(n), measured))
+        sides = np.array([kind.round or bool(kind.aspect) for kind in drawn.kinds], bool)  # that go together
+        kept = rigid | (sides & ~np.isin(np.arange(n), measured))
         at = posed(np.where(rigid[:, None], size, usual), position, yaw, kept)
         at, planned = fitted(at, rigid) if any(kind.stands == "row" for kind in at.kinds) else (at, none)
         if planned.any():

@@ -163,7 +163,7 @@ def problem_of(
         The others as `echousd.place.place_boxes`.
     """
     words = tuple(vocabulary().category(word).name for word in categories)
-    told = np.flatnonzero(np.isin(triplets[:, 1], sorted(measured(rules))))
+    rows = np.flatnonzero(np.isin(triplets[:, 1], sorted(measured(rules))))
     floor = None if floor_polygon is None else Floor(floor_polygon)
     carrier = carriers([vocabulary().category(word) for word in words], size, position, yaw, triplets)
     position, yaw = stacked(size, position, carrier, height, fixed), yaw.copy()
@@ -175,10 +175,10 @@ def problem_of(
         yaw[turn] = np.arctan2(wall[turn, 1, 0], wall[turn, 1, 1])
     behind = kept_behind(words, size, wall_gaps(wall, size, position, yaw))
     plan = plan_of(
-        Spread(size, position, yaw), words, floor_polygon, openings, triplets[told], fixed=fixed, height=height,
+        Spread(size, position, yaw), words, floor_polygon, openings, triplets[rows], fixed=fixed, height=height,
         rules=rules, stated=stated,
     )  # fmt: skip
-    return Problem(plan, told, rigid, turned, floor, carrier, wall, behind)
+    return Problem(plan, rows, rigid, turned, floor, carrier, wall, behind)
 
 
 def wall_gaps(wall: np.ndarray, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from echousd.place.geometry import depth_inside
 from echousd.place.problem import Problem
 from echousd.place.slots import HALF_PI, INNER, SEATS, STANDS
 
-in_view, seatings, sides = (Late(f"{SEATS}:{name}") for name in ("in_view", "seatings", "sides"))
+in_view, sides = Late(f"{SEATS}:in_view"), Late(f"{SEATS}:sides")
 STEP = 0.2  # metres between two places at a wall
 GRID, PLACES = 0.35, 1000  # metres between two places in the open; in a hall so many, farther apart
 SLIDES = (0.08, 0.2, 0.45, 0.8)  # metres by which a piece is moved along its width and its depth

@@ -15,29 +15,20 @@ import numpy as np
 
 from echomodel.arrays import rows, sum_of
 from echomodel.boxes2d import axes
-from echomodel.late import linear_sum_assignment
+from echomodel.late import lates
 from echomodel.objective import TERMS, Plan, Term, unreached
 from echomodel.objective.access import to_wall
-from echomodel.objective.copies import copies_of, looks_at, part_of
+from echomodel.objective.copies import copies_of, looks_at
 from echomodel.objective.table import COST, costs_of
 from echomodel.rules import margins
 from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import beyond, depths, gaps
 from echousd.place.problem import Problem
-from echousd.place.proposals import (
-    Row,
-    along_walls,
-    aside,
-    height_of,
-    out_of,
-    out_of_habit,
-    proposals,
-    seatings,
-    slots_at,
-    twins,
-)
+from echousd.place.proposals import Row, along_walls, aside, height_of, out_of, out_of_habit, proposals, slots_at, twins
 from echousd.place.solver import PlaceConfig
+
+involved, part_of, rebuilt, reseated = lates("echousd.place.building", "involved", "part_of", "rebuilt", "reseated")
 
 JUDGED = 48  # poses that are judged at once
 MANY = 12  # pieces from which on a room is built up, one piece after the other
@@ -233,11 +224,11 @@ class Search:
         rows = np.concatenate([rows, near])
         keep = self._promising(state, there, i, group, rows, taste)
         rows, taste = rows[keep], taste[keep]
-        states = [(state.position[None], state.yaw[None]), self._carried(state, i, group, rows)]
+        states = [(state.position[None], state.yaw[None]), self.carried(state, i, group, rows)]
         tastes = [state.taste[i : i + 1], taste]
         screens = [self.group(k, there, state) for k in self.screens[i] if there[k]]
         if screens:  # it takes them along to the wall ahead
-            states.append(self._carried(state, i, group, rows, screens))
+            states.append(self.carried(state, i, group, rows, screens))
             tastes.append(taste)
         along = [(k, at) for k, at in self.alongside[i] if there[k] and k not in group]
         if along:
@@ -246,7 +237,7 @@ class Search:
         mirrored = self._mirrored(state, i, group)
         if mirrored is not None:  # who attends it changes sides
             here = np.array([[*state.position[i, ::2], state.yaw[i], 0.0]])
-            states.append(self._carried(mirrored, i, group, np.concatenate([here, rows])))
+            states.append(self.carried(mirrored, i, group, np.concatenate([here, rows])))
             tastes += [state.taste[i : i + 1], taste]
         changed = np.zeros(len(state.yaw), bool)
         for stand, beds in self._beside_twin(state, there, i):
@@ -256,7 +247,7 @@ class Search:
         position, yaw = (np.concatenate(part) for part in zip(*states, strict=True))
         every = np.concatenate(tastes)
         changed[[*group, *(k for loads in screens for k in loads), *(k for k, _ in along)]] = True
-        best = self._best(there, position, yaw, changed, every)
+        best = self.cheapest(there, position, yaw, changed, every)
         if best == 0:
             return state
         own = state.taste.copy()
@@ -283,16 +274,16 @@ class Search:
             stand = one.subject
             if i in one.others and there[[stand, *one.others]].all() and not problem.fixed[stand]:
                 other = next(k for k in one.others if k != i)
-                position, yaw = self._carried(state, i, [k for k in self.group(i, there, state) if k != stand], rows)
+                position, yaw = self.carried(state, i, [k for k in self.group(i, there, state) if k != stand], rows)
                 level = (problem.size[stand, 2] - problem.size[[i, other], 2].mean()) / 2
-                front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
+                front = axes(rows[:, 2])[1]
                 middle = (rows[:, :2] + state.position[other, [0, 2]]) / 2
                 position[:, stand, 0], position[:, stand, 2] = (middle + level * front).T
                 yaw[:, stand] = rows[:, 2]
                 out.append((stand, (position, yaw)))
         return out
 
-    def _best(
+    def cheapest(
         self, there: np.ndarray, position: np.ndarray, yaw: np.ndarray, moved: np.ndarray, taste: np.ndarray
     ) -> int:
         """Number of the cheapest of K states, the first one where none is better by enough."""
@@ -316,36 +307,10 @@ class Search:
 
     def reseated(self, state: State, there: np.ndarray, i: int) -> State:
         """The state with those who stand around box i at one of the ways in which as many sit there."""
-        problem = self.problem
-        seats = [k for k in self.children[i] if there[k] and not problem.turned[k]]
-        if len(seats) < 2 or problem.kinds[i].role != "board":
+        seats = [k for k in self.children[i] if there[k] and not self.problem.turned[k]]
+        if len(seats) < 2 or self.problem.kinds[i].role != "board":
             return state
-        if (i, *seats) not in self.ways:
-            self.ways[i, *seats] = seatings(problem, i, seats)
-        around, ways = self.ways[i, *seats]
-        if not ways:
-            return state
-        position, yaw = np.repeat(state.position[None], len(ways) + 1, 0), np.repeat(state.yaw[None], len(ways) + 1, 0)
-        wide = problem.size[around, 0]
-        rows = np.array([[out_of(state.position[i], float(state.yaw[i]), slot) for slot in way] for way in ways])
-        far = np.linalg.norm(state.position[around][:, None, ::2] - rows[:, None, :, :2], axis=-1)
-        far += FARTHEST * abs(wide[:, None] - wide)  # no chair goes to the slot of a bench, nor where it shall not be
-        loads = [[lamp for lamp in self.children[k] if there[lamp]] for k in around]  # which are told to be over it
-        for at, k in enumerate(around):
-            broken = self._broken(state, there, k, rows.reshape(-1, 4), [*around, *loads[at]])
-            far[:, at] += broken.reshape(len(ways), -1)
-        for number, slots in enumerate(rows, 1):
-            _, other = linear_sum_assignment(np.round(far[number - 1], 6))
-            position[number, around, ::2], yaw[number, around] = slots[other, :2], slots[other, 2]
-            for k, load in zip(around, loads, strict=True):
-                position[number, load] += position[number, k] - state.position[k]
-        changed = np.isin(np.arange(len(state.yaw)), [*around, *(lamp for load in loads for lamp in load)])
-        likes = [LIKED * sum(slot[3] for slot in slots) + 0.001 * number for number, slots in enumerate(ways)]
-        taste = np.array([state.taste[around].sum(), *likes])
-        best = self._best(there, position, yaw, changed, taste)
-        own = state.taste.copy()
-        own[around] = 0.0
-        return State(position[best], yaw[best], own) if best else state
+        return reseated(self, state, there, i, seats)
 
     def _taste(self, i: int, rows: np.ndarray) -> np.ndarray:
         """(K,) float: how much others are liked better than these poses of a box."""
@@ -356,7 +321,7 @@ class Search:
         share = ATTENDING if problem.anchor[i] >= 0 or hangs else 1.0
         return np.asarray(share * (PULL * off + TURN * turned * ~hangs) + 0.3 * rows[:, 3])
 
-    def _carried(
+    def carried(
         self, state: State, i: int, group: list[int], rows: np.ndarray, screens: Sequence[list[int]] = ()
     ) -> tuple[np.ndarray, np.ndarray]:
         """(K, n, 3) and (K, n): the boxes with one at each of K poses, and its group with it as one.
@@ -369,7 +334,7 @@ class Search:
         self._carry(position, yaw, state, i, group, rows)
         position[:, i, 1] = height_of(problem, state.position, i)
         for k, *others in screens:
-            front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
+            front = axes(rows[:, 2])[1]
             free = to_wall(problem.plan, np.zeros(len(rows), int), rows[:, :2], front)
             free = free - problem.size[k, 2] / 2 - problem.behind[k]
             at = np.concatenate([rows[:, :2] + free[:, None] * front, rows[:, 2:3] + np.pi], 1)
@@ -379,9 +344,9 @@ class Search:
     def _along(
         self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray, along: list[tuple[int, int]]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As `_carried`, and storage `along` walls where it is near whom it is told to, and runs into the least."""
+        """As `carried`, and storage `along` walls where it is near whom it is told to, and runs into the least."""
         problem, met = self.problem, [m for m in group if self.problem.standing(m)]
-        position, yaw = self._carried(state, i, group, rows)
+        position, yaw = self.carried(state, i, group, rows)
         for k, at in along:
             walls = np.array(along_walls(problem, k, 0.0)).reshape(-1, 4)
             if not len(walls):  # it is longer than each
@@ -395,7 +360,7 @@ class Search:
             count, where = next_to.shape[1], walls[next_to]
             then = State(position.repeat(count, 0), yaw.repeat(count, 0), state.taste)
             cost = np.take_along_axis(cost, next_to, 1)
-            cost += self._broken(then, there, k, where.reshape(-1, 4), []).reshape(cost.shape)
+            cost += self.broken(then, there, k, where.reshape(-1, 4), []).reshape(cost.shape)
             best = where[np.arange(len(where)), np.round(cost * GRAIN).argmin(1)]
             position[:, k, ::2], yaw[:, k] = best[:, :2], best[:, 2]
             met.append(k)
@@ -437,9 +402,9 @@ class Search:
     def _unlikely(self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray) -> np.ndarray:
         """(K,) float: what a box with its group runs into, leaves of the floor and breaks of relations at K poses."""
         along = [*group, *self.screens[i], *(k for k, _ in self.alongside[i])]  # which may go to walls
-        return self._hits(state, there, i, group, rows, group) + self._broken(state, there, i, rows, along)
+        return self._hits(state, there, i, group, rows, group) + self.broken(state, there, i, rows, along)
 
-    def _broken(self, state: State, there: np.ndarray, i: int, rows: np.ndarray, along: list[int]) -> np.ndarray:
+    def broken(self, state: State, there: np.ndarray, i: int, rows: np.ndarray, along: list[int]) -> np.ndarray:
         """(K,) float: what a box at K poses breaks of its relations to those who do not go along with it."""
         edges = self.problem.triplets_of(i)
         other = np.where(edges[:, 0] == i, edges[:, 2], edges[:, 0])
@@ -455,7 +420,7 @@ class Search:
     ) -> np.ndarray:
         """(K,) float: what some boxes of a group run into and leave of the floor where one of it is at K poses."""
         problem = self.problem
-        position, yaw = self._carried(state, i, which, rows)
+        position, yaw = self.carried(state, i, which, rows)
         apart = there.copy()
         apart[group] = False
         others, cost = np.flatnonzero(apart), np.zeros(len(rows))
@@ -506,53 +471,6 @@ class Search:
                 state = self.reseated(self.moved(state, every, i), every, i)
         return state
 
-    def rebuilt(self, state: State, out: list[int]) -> State:
-        """The state with some boxes taken out and put in again, one after the other.
-
-        With each come those who attend it, at the first of their slots, so that room is found for them, too.
-        """
-        there = np.ones(len(state.yaw), bool)
-        there[out] = False
-        there |= self.problem.fixed
-        for i in self.order([k for k in out if not there[k]]):
-            if there[i] and self.seated[i]:  # with its table
-                continue
-            there[i] = True
-            state = self._expecting(state, there, i)
-            state = self.reseated(self.moved(state, there, i), there, i)
-        return state
-
-    def _expecting(self, state: State, there: np.ndarray, i: int) -> State:
-        """The state with those who attend box i, and are not there, at their slots; they are there then."""
-        problem = self.problem
-        for k in [*self.children[i], *self.screens[i]]:
-            if there[k]:
-                continue
-            slots = sorted(slots_at(problem, k, i), key=lambda slot: slot[3])
-            if not slots and k not in self.screens[i]:
-                continue
-            rows = np.array([out_of(state.position[i], float(state.yaw[i]), slot) for slot in slots]).reshape(-1, 4)
-            if len(rows):
-                group = self.group(k, there, state)
-                at, turn = self._carried(state, k, group, rows)
-                others = np.setdiff1d(np.flatnonzero(there), group)
-                deep = depths(problem.size[k], at[:, k], turn[:, k], problem.size[others], state.position[others],
-                              state.yaw[others])  # fmt: skip
-                hit = np.maximum(deep - problem.shared[k, others], 0.0).max(1, initial=0.0)
-                best = int(np.round(hit * 100).argmin())
-                state = State(at[best], turn[best], state.taste)
-            there[k] = True
-        return state
-
-    def involved(self, boxes: list[int]) -> list[int]:
-        """Boxes, whom they attend, and who attends these."""
-        out = list(boxes)
-        for i in boxes:
-            anchor = int(self.problem.anchor[i])
-            out += [anchor] if anchor >= 0 else []
-            out += self.children[anchor if anchor >= 0 else i] + self.children[i]
-        return [i for n, i in enumerate(out) if i not in out[:n]]
-
     def mended(self, state: State, total: float, wrong: list[int]) -> tuple[State, float, list[int]]:
         """A state after what its broken terms are about was moved, what it costs, and what still is broken."""
         for _ in range(SWEEPS):
@@ -576,9 +494,9 @@ class Search:
         for number in range(anew):
             if not wrong or self.judged >= self.budget:
                 break
-            out = list(range(len(state.yaw))) if number else self.involved(wrong)
+            out = list(range(len(state.yaw))) if number else involved(self, wrong)
             self.urgent = wrong if number else []  # the worst first
-            built = self.rebuilt(state, out)
+            built = rebuilt(self, state, out)
             self.urgent = []
             after = self.swept(built, [i for i in out if not self.seated[i]])
             cost, still = self.faults(after)
@@ -599,5 +517,5 @@ class Search:
         if n < MANY:
             state = self.swept(state, [i for i in range(n) if not self.seated[i]])
         else:  # drafts of so many pieces are too far from what is asked to begin from
-            state = self.rebuilt(state, list(range(n)))
+            state = rebuilt(self, state, list(range(n)))
         return self.mended(state, *self.faults(state))

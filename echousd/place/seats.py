@@ -8,7 +8,7 @@ from itertools import groupby, product
 
 import numpy as np
 
-from echomodel.boxes2d import hull
+from echomodel.boxes2d import axes, hull
 from echomodel.objective.access import DEEP, PASSAGE, WALKED_BEHIND, WATCHED_FREE, to_wall
 from echomodel.objective.crowding import HAND
 from echomodel.objective.sight import WATCHED_FROM
@@ -149,7 +149,7 @@ def in_view(problem: Problem, i: int, at_walls: Sequence[Row]) -> list[Row]:
     if not any(role == "opposite" and a == i for role, a in zip(problem.slot_roles, problem.anchor, strict=True)):
         return []
     far, rows = WATCHED_FROM["sofa"][1], np.array(at_walls).reshape(-1, 4)
-    front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
+    front = axes(rows[:, 2])[1]
     free = to_wall(problem.plan, np.zeros(len(rows), int), rows[:, :2], front)
     deep = free + float(problem.size[i, 2]) / 2 > DEEP
     away = [free - AMID * far, np.full(len(rows), WALKED_BEHIND - 0.01 - problem.behind[i]), free - WATCHED_FREE]

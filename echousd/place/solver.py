@@ -12,16 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echomodel.late import Late
-from echousd.place.constraints import (
-    CEILING,
-    COLLISION,
-    KINDS,
-    OVERHANG,
-    WALL,
-    Constraints,
-    Linearised,
-    Matrix,
-)
+from echousd.place.constraints import CEILING, COLLISION, KINDS, OVERHANG, WALL, Constraints, Linearised, Matrix
 from echousd.place.geometry import COLUMNS
 from echousd.place.problem import Problem
 

@@ -6,7 +6,7 @@ All in a wall's own frame: u along the wall from its first corner, v up, w outwa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import manifold3d
@@ -25,7 +25,6 @@ GAP = 0.004
 FRAME, BAR, PANE = 0.055, 0.022, 0.42  # width of a window's frame and of its glazing bars, and about what lies between
 FOOT = 0.22  # height of the rail at the foot of a French window
 PLATE, REACH = 0.085, 0.12  # side of a switch's plate, and how far beside a door's trim it is
-BAY = (0.35, 0.45)  # of a bay window: along the wall to where its front begins, and how far that is before it
 RAIL = (0.12, 0.09, 0.25)  # curtain rail: above the window, before the wall, beyond its sides
 
 WINDOWS = {"plain": 3, "sash": 2, "bars": 2, "transom": 2}
@@ -203,24 +202,6 @@ def window_glass(opening: Opening) -> Mesh:
     """One pane behind the frame."""
     u = (opening.offset + FRAME / 2, opening.end - FRAME / 2)
     return board(u, (opening.sill + FRAME / 2, opening.sill + opening.height - FRAME / 2), (0.078, 0.084))
-
-
-def bay(opening: Opening, kind: str, wall: float = WALL) -> tuple[Mesh, list[Mesh], Mesh, Mesh]:
-    """Frame, panes, board, and what is below and above, of a window on three sides before a wall of some thickness."""
-    lean, out = min(BAY[0], opening.width / 4), wall + BAY[1]
-    start, end, low, top = opening.offset, opening.end, opening.sill, opening.sill + opening.height
-    corners = np.array([(start, wall), (start + lean, out), (end - lean, out), (end, wall)])
-    frames, panes = list[Mesh](), list[Mesh]()
-    for corner, side in zip(corners, np.diff(corners, axis=0), strict=False):
-        width = float(np.linalg.norm(side))
-        (x, z), one = side / width, replace(opening, offset=0.0, width=width)
-        turn, middle = np.array([(x, 0, z), (0, 1, 0), (-z, 0, x)]), np.array([0.0, 0.0, 0.08])
-        for mesh, made in ((window_frame(one, kind), frames), (window_glass(one), panes)):
-            made.append(Mesh((mesh.vertices - middle) @ turn + (corner[0], 0.0, corner[1]), mesh.faces))
-    over = corners + np.array([(-0.05, 0.0), (-0.05, 0.05), (0.05, 0.05), (0.05, 0.0)])
-    below = [upright(over, -0.1, low), upright(over, top, top + 0.12)]
-    within = upright(np.array([(start, 0.0), *corners, (end, 0.0)]), low, low + 0.02)
-    return joined(frames), panes, within, joined(below)
 
 
 def window_sill(opening: Opening) -> Mesh:

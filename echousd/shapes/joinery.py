@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from echomodel.furniture.cloth import Sheet
-from echomodel.furniture.solids import FINEST, Piece, Solid, pieces_of
+from echomodel.furniture.solids import FINEST, MeshedSolid, Solid, pieces_of
 from echomodel.triangles import Mesh, area_normals, bounds_of, joined, lengths
 from echousd.shapes.geometry import DRAPED, FRAME, Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.hulls import convex_hull, hull_of
@@ -74,25 +74,25 @@ def assembled(
     )  # fmt: skip
 
 
-def _bodies(pieces: Sequence[Piece], fixed: str) -> dict[str, list[Piece]]:
+def _bodies(pieces: Sequence[MeshedSolid], fixed: str) -> dict[str, list[MeshedSolid]]:
     """Body -> its solids, what is fixed first."""
-    out: dict[str, list[Piece]] = {fixed: []}
+    out: dict[str, list[MeshedSolid]] = {fixed: []}
     for piece in pieces:
         out.setdefault(piece.joint.body if piece.joint else fixed, []).append(piece)
     return {body: members for body, members in out.items() if members}
 
 
-def _parts(prefix: str, pieces: Sequence[Piece], body: str) -> list[Part]:
+def _parts(prefix: str, pieces: Sequence[MeshedSolid], body: str) -> list[Part]:
     """A part for each role among the solids of a body; what is the body itself, a drawer or a door, is its `mesh`."""
     kind = body.rsplit("_", 1)[0]
-    groups: dict[str, list[Piece]] = {}
+    groups: dict[str, list[MeshedSolid]] = {}
     for piece in pieces:
         role = piece.solid.role
         groups.setdefault("mesh" if role == kind else GROUPS.get(role, role), []).append(piece)
     return [part_of(f"{prefix}{role}", members, body) for role, members in groups.items()]
 
 
-def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int, *, round: bool = False) -> list[Piece]:
+def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int, *, round: bool = False) -> list[MeshedSolid]:
     """The solids as fine as `faces` triangles allow; of too many boxes the smallest are left out and it warns."""
     for detail in range(FINEST, -1, -1):
         pieces = pieces_of(solids, size, detail, round=round)
@@ -108,7 +108,7 @@ def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int, *, roun
     return pieces_of([pieces[number].solid for number in sorted(kept)], size, 0, round=round)
 
 
-def part_of(name: str, pieces: Sequence[Piece], body: str = "") -> Part:
+def part_of(name: str, pieces: Sequence[MeshedSolid], body: str = "") -> Part:
     """Some meshed solids as one part with a slot per material."""
     mesh = joined([Mesh(piece.vertices, piece.faces) for piece in pieces])
     words = [SLOTS.get(piece.solid.material, piece.solid.material) for piece in pieces]

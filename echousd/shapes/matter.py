@@ -13,7 +13,7 @@ from shapely.affinity import scale
 
 from echomodel.dressing import PRINTS
 from echomodel.files import tables
-from echomodel.furniture.solids import Piece
+from echomodel.furniture.solids import MeshedSolid
 from echomodel.late import Late
 from echomodel.triangles import Mesh, along, cross, lengths
 from echomodel.vocabulary import vocabulary
@@ -41,7 +41,7 @@ MATTER = _ROWS["materials"] | {name: _ROWS["materials"][name.partition("_")[0]] 
 PARTS = {tuple(words.split()): matter for words, matter in _ROWS["parts"].items()}
 
 
-def weighed(pieces: Iterable[Piece]) -> Mass:
+def weighed(pieces: Iterable[MeshedSolid]) -> Mass:
     """Mass, centre and moments of inertia of meshed solids; overlaps count twice."""
     total, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
     for piece in pieces:
@@ -69,7 +69,7 @@ Moments = tuple[float, np.ndarray, np.ndarray]
 
 
 @lru_cache(maxsize=512)  # of what opens each body is weighed, and all of it
-def _moments(mesh: Piece | Mesh) -> tuple[Moments, Moments]:
+def _moments(mesh: MeshedSolid | Mesh) -> tuple[Moments, Moments]:
     """Of the volume and of the surface of a closed mesh: measure, first (3,) and second moment (3, 3) about 0."""
     origin = mesh.vertices[0]
     corners = (mesh.vertices - origin)[mesh.faces]

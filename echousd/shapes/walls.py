@@ -9,16 +9,18 @@ import numpy as np
 import shapely
 
 from echomodel.furniture.solids import Joint
-from echomodel.openings import Opening, direction, edge_lengths, inward_normal, signed_area, zone
+from echomodel.late import Late
+from echomodel.openings import Opening, direction, edge_lengths, inward_normal, signed_area
 from echomodel.triangles import Mesh, joined
 from echousd.shapes import fittings
-from echousd.shapes.fittings import BAY, NICHE, PLAIN, WALL, Millwork
+from echousd.shapes.fittings import NICHE, PLAIN, WALL, Millwork
 from echousd.stage.paths import piece_name
 
+bay_window, stands_out = (Late(f"echousd.shapes.bays:{name}") for name in ("bay_window", "stands_out"))
+
 THICKNESS = 0.1  # metres, of floor and ceiling
-COVED = 2.5  # metres, height of rooms from which on there may be a cornice
 BEAM, BETWEEN = (0.13, 0.15), 1.0  # metres, width and depth of beams, and from one to the next
-BROAD = 1.3  # metres, width of windows from which on one may stand out before its wall
+COVED = 2.5  # metres, height of rooms from which on there may be a cornice
 PARAPET = 1.05  # metres, height of a wall outdoors that nothing opens
 
 
@@ -58,7 +60,7 @@ def walls(
         millwork: how doors, windows and mouldings are made. cuts: `NICHE` deep into these walls.
     """
     deep = np.array(thickness or [WALL] * len(polygon))
-    bay, parts = _bay(polygon, openings) if millwork.bay and not outdoor else None, []
+    bay, parts = stands_out(polygon, openings) if millwork.bay and not outdoor else None, []
     for edge, length in enumerate(edge_lengths(polygon).tolist()):
         if length < 1e-3:
             continue
@@ -81,37 +83,9 @@ def walls(
     return parts
 
 
-def _bay(polygon: np.ndarray, openings: Sequence[Opening]) -> Opening | None:
-    """The widest window that can stand out before its wall."""
-    around = shapely.Polygon(polygon).buffer(WALL, join_style="mitre")
-    windows = [one for one in openings if one.kind == "window" and one.sill and one.width >= BROAD]
-    free = [shapely.Polygon(zone(polygon, one, -WALL - BAY[1])).difference(around).area for one in windows]
-    can = [one for one, area in zip(windows, free, strict=True) if area > 0.98 * one.width * BAY[1]]
-    return max(can, key=lambda one: one.width, default=None)
-
-
 def wall_name(edge: int) -> str:
     """Name of the prim of the wall along an edge of the floor."""
     return f"Wall_{edge + 1}"
-
-
-def beams(polygon: np.ndarray, height: float, look: str, below: shapely.Geometry) -> list[ShellPart]:
-    """Beams of a material along the shorter side of a room, where nothing is `below` that reaches up to them."""
-    room, (low, high) = shapely.Polygon(polygon), (polygon.min(0), polygon.max(0))
-    long, (wide, deep) = int(np.ptp(polygon, axis=0).argmax()), BEAM
-    usual, free = max(round(float((high - low)[long]) / BETWEEN), 2), list[shapely.Geometry]()
-    for count in (usual, usual + 1, usual - 1):
-        strips = list[shapely.Geometry]()
-        for middle in low[long] + (np.arange(count) + 0.5) / count * (high - low)[long]:
-            ends = np.array([low, high])
-            ends[:, long] = middle - wide / 2, middle + wide / 2
-            cut = room.intersection(shapely.box(*ends.ravel()))
-            strips += [one for one in getattr(cut, "geoms", [cut]) if one.area > 0]
-        free = [one for one in strips if not one.intersects(below)]
-        if len(free) == len(strips):
-            break
-    bars = [fittings.upright(np.array(one.exterior.coords)[:-1], height - deep, height) for one in free]
-    return [ShellPart("Beams", "beam", (ShellPiece(piece_name("Beams", "mesh"), look, joined(bars)),))] if bars else []
 
 
 def slab(name: str, polygon: np.ndarray, bottom: float) -> ShellPart:
@@ -199,7 +173,7 @@ def _filled(
         look, glass = "trim" if millwork.boxed else "rail", [fittings.window_glass(opening)]
         panes, board, body = fittings.window_frame(opening, millwork.window), None, None
         if millwork.bay:
-            panes, glass, board, body = fittings.bay(opening, millwork.window, deep)
+            panes, glass, board, body = bay_window(opening, millwork.window, deep)
         pieces = (
             *made("frame", "trim", panes),
             *made("board", "trim", board),

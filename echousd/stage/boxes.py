@@ -22,8 +22,9 @@ from echousd.naming import free_name
 from echousd.stage import encoding as usd
 from echousd.stage import values
 from echousd.stage.encoding import StageError
-from echousd.stage.files import open_stage, opened, save_layer
+from echousd.stage.files import open_stage, opened
 from echousd.stage.foreign import boxed_graph, foreign_rooms
+from echousd.stage.graphs import save_layer
 from echousd.stage.read import faults, find_rooms, node_names, place, relation_of, stated_fields, the_room
 from echousd.stage.write import graph_layer
 
@@ -67,18 +68,13 @@ def room_boxes(graph: SceneGraph) -> RoomBoxes:
     if corners is None:
         corners = np.array(((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])))
     return RoomBoxes(
-        id="stage",
-        room_type=graph.room.type,
-        floor_polygon=np.asarray(corners, float),
+        id="stage", room_type=graph.room.type, floor_polygon=np.asarray(corners, float),
         height=graph.room.height or float((position[:, 1] + size[:, 1]).max()),
-        categories=tuple(node.category for node in graph.nodes),
-        size=size,
-        position=position,
-        yaw=np.array([node.yaw for node in graph.nodes], float),
-        models=("",) * len(graph.nodes),
+        categories=tuple(node.category for node in graph.nodes), size=size, position=position,
+        yaw=np.array([node.yaw for node in graph.nodes], float), models=("",) * len(graph.nodes),
         styles=tuple(styles.get(node.style, -1) if node.style else -1 for node in graph.nodes),
         openings=graph.room.openings,
-    )
+    )  # fmt: skip
 
 
 def read_dressing(stage: Usd.Stage | str | os.PathLike[str], room: str | None = None) -> DressingGraph:

@@ -13,7 +13,7 @@ from tempfile import NamedTemporaryFile, gettempdir
 from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 
 from echomodel.files import raising, whole_file
-from echousd.naming import LAYER_FORMS, STAGE_FORMS
+from echousd.naming import STAGE_FORMS
 from echousd.pending import check_written
 from echousd.stage.encoding import StageError
 from echousd.stage.harmless import check_harmless
@@ -191,28 +191,6 @@ def one_line(text: str, most: int = 200) -> str:
     """The first line of `text`, cut to `most` characters."""
     line = text.strip().splitlines()[0]
     return line if len(line) <= most else line[: most - 3] + "..."
-
-
-def save_layer(layer: Sdf.Layer, path: str | os.PathLike[str]) -> None:
-    """Write a layer to `path` (.usd, .usda or .usdc) by a temporary file beside it and a rename.
-
-    A layer of this process that was loaded from `path` is reloaded. Raises StageError, `path` left as it was.
-    """
-    path = Path(path)
-    if path.suffix not in LAYER_FORMS:
-        raise StageError(f"{path}: extension {path.suffix!r}, allowed: {', '.join(LAYER_FORMS)}")
-    if not path.parent.is_dir():
-        raise StageError(f"{path}: the folder {path.parent} does not exist")
-    try:
-        with whole_file(path, path.suffix) as beside:
-            if not layer.Export(str(beside)):
-                raise StageError(f"{path}: cannot be written")
-    except (OSError, Tf.ErrorException) as error:
-        why = usd_error(error) if isinstance(error, Tf.ErrorException) else error.strerror
-        raise StageError(f"{path}: cannot be written ({why})") from None
-    loaded = Sdf.Layer.Find(str(path.absolute()))
-    if loaded:  # a stage of this process has the file open: let it follow
-        loaded.Reload(force=True)
 
 
 def layer_bytes(layer: Sdf.Layer, suffix: str) -> bytes:

@@ -20,15 +20,7 @@ from echousd.naming import free_name
 from echousd.stage.contents import room_frame
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
-from echousd.stage.labels import (
-    STRUCTURE,
-    category_of_name,
-    is_floor,
-    is_structure,
-    known_category,
-    labels,
-    spaced,
-)
+from echousd.stage.labels import STRUCTURE, category_of_name, is_floor, is_structure, known_category, labels, spaced
 from echousd.stage.read import RoomPrims, faults, node_names, room_graph, value
 from echousd.stage.units import Z_TO_Y, to_metres
 from echousd.stage.values import NOW, lineage

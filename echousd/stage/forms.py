@@ -10,15 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom
 
-from echomodel.late import Late
+from echomodel.late import lates
 from echousd.stage import values
 from echousd.stage.encoding import StageError
 
 MAX_INSTANCES = 50_000  # of one instancer
 SOLIDS = ("Cube", "Sphere", "Cylinder", "Cone", "Capsule", "Plane")
-refined = Late("echousd.stage.subdivision:refined")
-smooth_normals = Late("echousd.stage.subdivision:smooth_normals")
-solid = Late("echousd.stage.subdivision:solid")
+refined, smooth_normals, solid = lates("echousd.stage.subdivision", "refined", "smooth_normals", "solid")
 
 
 class SkippedForms(UserWarning):

@@ -1,41 +1,19 @@
-"""Graphs in and out of any stage: ours or somebody else's to read, empty or with a graph already to write."""
+"""Graphs written to any stage, empty or with a graph already, and layers to files."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
-from pxr import Sdf, Usd
+from pxr import Sdf, Tf, Usd
 
-from echousd.graph import SceneGraph, load_graph
-from echousd.naming import TEXT_FORMS
-from echousd.stage import values
-from echousd.stage.files import opened, save_layer
-from echousd.stage.read import find_rooms, room_graph, the_room
+from echomodel.files import whole_file
+from echousd.graph import SceneGraph
+from echousd.naming import LAYER_FORMS
+from echousd.stage.encoding import StageError
+from echousd.stage.files import usd_error
+from echousd.stage.read import find_rooms
 from echousd.stage.write import author, graph_layer, prim_path
-
-
-def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = None) -> SceneGraph:
-    """The scene graph on a stage or in a file; `room` is the prim path of the room, needed where there are several.
-
-    A YAML or JSON file is read as `echousd new --from` reads it. A stage without a scene graph becomes one all the
-    same if its prims carry semantics labels and bounds (`foreign_graph`). Raises StageError for a stage, GraphError for
-    a text, that is not valid, with the file's name.
-    """
-    if not isinstance(stage, Usd.Stage) and Path(stage).suffix.lower() in TEXT_FORMS:
-        return load_graph(stage)
-    stage = opened(stage)
-    with values.reading(stage):
-        rooms = find_rooms(stage)
-        if not rooms:
-            from echousd.stage.foreign import foreign_graph, foreign_rooms
-
-            if room is None:
-                return foreign_graph(stage)
-            found = foreign_rooms(stage)
-            if room in found:
-                return found[room]
-        return room_graph(the_room(stage, room, rooms))
 
 
 def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage | str | os.PathLike[str], room: str = "/Room") -> None:
@@ -59,3 +37,25 @@ def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage | str | os.Path
         author(edit_target.GetLayer(), graph, edit_target.MapToSpecPath(path))
     else:
         author(target, graph, path)
+
+
+def save_layer(layer: Sdf.Layer, path: str | os.PathLike[str]) -> None:
+    """Write a layer to `path` (.usd, .usda or .usdc) by a temporary file beside it and a rename.
+
+    A layer of this process that was loaded from `path` is reloaded. Raises StageError, `path` left as it was.
+    """
+    path = Path(path)
+    if path.suffix not in LAYER_FORMS:
+        raise StageError(f"{path}: extension {path.suffix!r}, allowed: {', '.join(LAYER_FORMS)}")
+    if not path.parent.is_dir():
+        raise StageError(f"{path}: the folder {path.parent} does not exist")
+    try:
+        with whole_file(path, path.suffix) as beside:
+            if not layer.Export(str(beside)):
+                raise StageError(f"{path}: cannot be written")
+    except (OSError, Tf.ErrorException) as error:
+        why = usd_error(error) if isinstance(error, Tf.ErrorException) else error.strerror
+        raise StageError(f"{path}: cannot be written ({why})") from None
+    loaded = Sdf.Layer.Find(str(path.absolute()))
+    if loaded:  # a stage of this process has the file open: let it follow
+        loaded.Reload(force=True)

@@ -7,19 +7,24 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from pxr import Sdf, Usd
 
 from echomodel.files import raising
+from echomodel.late import Late
 from echomodel.openings import Opening, opening_from_json
 from echomodel.vocabulary import vocabulary
-from echousd.graph import MAX_TEXT, GraphError, Node, Relation, RoomSpec, SceneGraph
+from echousd.graph import MAX_TEXT, GraphError, Node, Relation, RoomSpec, SceneGraph, load_graph
 from echousd.graph.fields import title
+from echousd.naming import TEXT_FORMS
 from echousd.stage import encoding as usd
 from echousd.stage import values
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
+
+foreign_graph, foreign_rooms = (Late(f"echousd.stage.foreign:{name}") for name in ("foreign_graph", "foreign_rooms"))
 
 
 @dataclass
@@ -309,3 +314,24 @@ def _deactivated(stage: Usd.Stage, path: Sdf.Path) -> bool:
             return not prim.IsActive()
         path = path.GetParentPath()
     return False
+
+
+def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = None) -> SceneGraph:
+    """The scene graph on a stage or in a file; `room` is the prim path of the room, needed where there are several.
+
+    A YAML or JSON file is read as `echousd new --from` reads it. A stage without a scene graph becomes one all the
+    same if its prims carry semantics labels and bounds (`foreign_graph`). Raises StageError for a stage, GraphError for
+    a text, that is not valid, with the file's name.
+    """
+    if not isinstance(stage, Usd.Stage) and Path(stage).suffix.lower() in TEXT_FORMS:
+        return load_graph(stage)
+    stage = opened(stage)
+    with values.reading(stage):
+        rooms = find_rooms(stage)
+        if not rooms:
+            if room is None:
+                return foreign_graph(stage)
+            found = foreign_rooms(stage)
+            if room in found:
+                return found[room]
+        return room_graph(the_room(stage, room, rooms))

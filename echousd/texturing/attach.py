@@ -16,6 +16,7 @@ from echousd.draw.surfaces import Painted, Surfaces, read_surfaces
 from echousd.folder import folder as folders
 from echousd.folder import ownership
 from echousd.folder.manifest import find_manifest
+from echousd.folder.merging import loses_text
 from echousd.graph.fields import IDENTIFIER
 from echousd.layers import paintings
 from echousd.layers.paintings import FOLDER, MADE, RECORD, VARIANTS, primvar
@@ -157,7 +158,7 @@ def _attached(room: Path, layer: str, shared: set[str]) -> dict[str, bytes]:
     out[room.name] = fresh
     manifest = find_manifest(top, room.stem)
     recorded = dict(manifest["files"]) if manifest else {}
-    if current and not binary and recorded.get(room.name) != folders.digest(current) and ownership.loses_text(current):
+    if current and not binary and recorded.get(room.name) != folders.digest(current) and loses_text(current):
         kept = folders.backup_name(top, room.name)
         folders.tell_kept(top, room.name, kept)
         out[kept] = current

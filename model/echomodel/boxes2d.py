@@ -19,6 +19,16 @@ def axes(yaw: Array) -> tuple[Array, Array]:
     return xp.stack([cos, -sin], -1), xp.stack([sin, cos], -1)
 
 
+def to_frame(x: Array, z: Array, cos: Array, sin: Array) -> tuple[Array, Array]:
+    """How far x and z lie to the side and ahead of what is turned by an angle of that cosine and sine."""
+    return cos * x - sin * z, sin * x + cos * z
+
+
+def reach(width: Array, depth: Array, cos: Array, sin: Array) -> tuple[Array, Array]:
+    """Half extents along x and z of what has half a width and a depth, turned by an angle of these, both >= 0."""
+    return cos * width + sin * depth, sin * width + cos * depth
+
+
 def turned(points: Array, yaw: Array) -> Array:
     """Points (..., 2) of a frame, seen from outside of it: x' = cos x + sin z, z' = cos z - sin x."""
     xp = kit(points)
@@ -29,8 +39,7 @@ def turned(points: Array, yaw: Array) -> Array:
 def seen(points: Array, yaw: Array) -> Array:
     """Points (..., 2) in the frame: how far to its side and how far ahead of it they lie; the inverse of `turned`."""
     xp = kit(points)
-    cos, sin, x, z = xp.cos(yaw), xp.sin(yaw), points[..., 0], points[..., 1]
-    return xp.stack([cos * x - sin * z, sin * x + cos * z], -1)
+    return xp.stack(to_frame(points[..., 0], points[..., 1], xp.cos(yaw), xp.sin(yaw)), -1)
 
 
 def upright(yaw: Array) -> np.ndarray:
@@ -71,9 +80,7 @@ def footprints(size: Array, position: Array, yaw: Array) -> Array:
 def hull(half: Array, yaw: Array) -> Array:
     """(..., 2) half extents along x and z of what has half extents (..., 2) in its own frame."""
     xp = kit(half)
-    cos, sin = abs(xp.cos(yaw)), abs(xp.sin(yaw))
-    width, depth = half[..., 0], half[..., 1]
-    return xp.stack([cos * width + sin * depth, sin * width + cos * depth], -1)
+    return xp.stack(reach(half[..., 0], half[..., 1], abs(xp.cos(yaw)), abs(xp.sin(yaw))), -1)
 
 
 def along_sides(away: Array, half: Array, yaw: Array, other_half: Array, other_yaw: Array) -> tuple[Array, Array]:

@@ -22,8 +22,17 @@ class Late:
         module, name = self.place.split(":")
         return attrgetter(name)(import_module(module))
 
+    @property
+    def __name__(self) -> str:
+        return self.place.partition(":")[2]
+
     def __call__(self, *arguments: Any, **by_name: Any) -> Any:
         return self.itself(*arguments, **by_name)
+
+
+def lates(module: str, *names: str) -> list[Late]:
+    """Several of one module."""
+    return [Late(f"{module}:{name}") for name in names]
 
 
 @dataclass(frozen=True)

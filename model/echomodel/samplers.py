@@ -1,4 +1,4 @@
-"""What a denoiser is trained to predict, and samplers: from noise to a sample, any subset of nodes fixed at level 0.
+"""Samplers: from noise to a sample, any subset of nodes fixed at level 0.
 
 A sampler makes one step: it takes x (N, ...) from the strengths of one level to those of another, given the clean
 sample that the denoiser sees in it, which `predict(x, level)` returns for a noise level per node (N,).
@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, cast, device_of, full, kit
+from echomodel.arrays import Array, cast, device_of, full, kit
 from echomodel.config import Objective, Sampler
 from echomodel.progress import StepListener
 from echomodel.randomness import Randomness, normal
@@ -35,22 +35,6 @@ def expand(level: Array, like: Array) -> Array:
     return level.reshape(-1, *[1] * (like.ndim - 1))
 
 
-def add_noise(clean: Array, noise: Array, level: Array, objective: Objective) -> Array:
-    """Noisy samples at a level per node: clean, noise (N, ...), level (N,) -> (N, ...)."""
-    alpha, sigma = alpha_sigma(expand(level, clean), objective)
-    return alpha * clean + sigma * noise
-
-
-def target(clean: Array, noise: Array, level: Array, objective: Objective) -> Array:
-    """The training target: the noise (DDPM), alpha noise - sigma clean (v), or noise - clean (rectified flow)."""
-    if objective == "noise":
-        return noise
-    if objective == "flow":
-        return noise - clean
-    alpha, sigma = alpha_sigma(expand(level, clean), objective)
-    return alpha * noise - sigma * clean
-
-
 def clean_from(output: Array, noisy: Array, level: Array, objective: Objective) -> Array:
     """The clean sample that a prediction of the target stands for."""
     if objective == "flow":
@@ -59,16 +43,6 @@ def clean_from(output: Array, noisy: Array, level: Array, objective: Objective) 
     if objective == "velocity":
         return alpha * noisy - sigma * output
     return (noisy - sigma * output) / alpha
-
-
-def output_from(clean: Array, noisy: Array, level: Array, objective: Objective, floor: float = 0.05) -> Array:
-    """The prediction that a clean sample stands for; levels below `floor` are treated as `floor` (1 / sigma grows)."""
-    level = at_least(level, floor)
-    if objective == "flow":
-        return (noisy - clean) / expand(level, noisy)
-    alpha, sigma = alpha_sigma(expand(level, noisy), objective)
-    noise = (noisy - alpha * clean) / sigma
-    return noise if objective == "noise" else alpha * noise - sigma * clean
 
 
 Predict = Callable[[Array, Array], Array]

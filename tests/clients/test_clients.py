@@ -18,7 +18,7 @@ import echousd
 from echousd.exporting.formats import export
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.simready import pack
-from echousd.stage.graphs import read_graph
+from echousd.stage.read import read_graph
 
 pytestmark = pytest.mark.clients
 HERE = Path(__file__).parent

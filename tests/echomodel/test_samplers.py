@@ -7,17 +7,8 @@ import torch
 from torch import Tensor
 
 from echomodel.config import Objective, Sampler
-from echomodel.samplers import (
-    SAMPLERS,
-    Predict,
-    add_noise,
-    alpha_sigma,
-    clean_from,
-    expand,
-    output_from,
-    sample,
-    target,
-)
+from echomodel.samplers import SAMPLERS, Predict, alpha_sigma, clean_from, expand, sample
+from echomodel.training.targets import add_noise, output_from, target
 
 MEAN, SPREAD = 0.7, 0.4
 SWEEP = [(s, o) for s in SAMPLERS for o in ("noise", "velocity", "flow")]

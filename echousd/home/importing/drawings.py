@@ -21,7 +21,7 @@ from echomodel.files import raising
 from echomodel.late import extra
 from echousd.batches.executor import without_script
 from echousd.graph import GraphError
-from echousd.home.importing.found import MAP, SCREEN, Found, Hole, Piece, Room, kind_of, long_sides, rooms_between, span
+from echousd.home.importing.found import MAP, SCREEN, Drawn, Hole, Piece, Room, kind_of, long_sides, rooms_between, span
 
 MOST = 200_000  # strokes of a drawing
 
@@ -53,7 +53,7 @@ def meaning(*words: str) -> str:
 def found_in(
     strokes: Sequence[Stroke], blocks: Sequence[Block], labels: Sequence[tuple[str, np.ndarray]], axes: np.ndarray,
     frame: str, ignored: Counter[str],
-) -> Found:  # fmt: skip
+) -> Drawn:  # fmt: skip
     """What a drawing shows by its lines, symbols and labels (text and (2,) where).
 
     Raises `GraphError` where it has neither outlines of rooms nor walls that enclose any.
@@ -85,7 +85,7 @@ def found_in(
             at, size = np.array([middle[0], 0.0, middle[1]]), np.array([width, np.nan, deep])
             pieces.append(Piece(block.name, (block.name,), at, np.array([-along[1], along[0]]), size, sides=4))
     lines = [stroke.points @ axes.T for stroke in strokes]
-    return Found(frame, rooms, holes, pieces, lines=lines, ignored=ignored)
+    return Drawn(frame, rooms, holes, pieces, lines=lines, ignored=ignored)
 
 
 def _rooms(
@@ -141,7 +141,7 @@ def _arc(points: np.ndarray) -> np.ndarray | None:
 # -- DXF ---------------------------------------------------------------------------------------------------------------
 
 
-def read_dxf(path: Path, unit: float | None) -> Found:
+def read_dxf(path: Path, unit: float | None) -> Drawn:
     """A DXF in the unit that it states, or in `unit` metres; x is east, y north. Raises `GraphError`."""
     ezdxf = extra("ezdxf", "DXF needs ezdxf", "dxf", GraphError)
     from ezdxf import path as paths
@@ -190,7 +190,7 @@ DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
 # -- SVG ---------------------------------------------------------------------------------------------------------------
 
 
-def read_svg(content: bytes, unit: float | None) -> Found:
+def read_svg(content: bytes, unit: float | None) -> Drawn:
     """An SVG of which one unit is `unit` metres; x is east, y south. Raises `GraphError`."""
     svgelements = extra("svgelements", "SVG needs svgelements", "svg", GraphError)
     curves = svgelements.Arc | svgelements.CubicBezier | svgelements.QuadraticBezier
@@ -243,7 +243,7 @@ FURNITURE = ("IfcFurnishingElement", "IfcSanitaryTerminal", "IfcElectricApplianc
 FLAT = 0.5  # of a normal's upright part, from which a face belongs to a floor or ceiling
 
 
-def read_ifc(path: Path, unit: float | None) -> Found:
+def read_ifc(path: Path, unit: float | None) -> Drawn:
     """The building in an IFC file, z up, y north, in the unit that it states. Raises `GraphError`."""
     with without_script(), ProcessPoolExecutor(1, mp_context=get_context("spawn")) as apart:
         try:
@@ -252,7 +252,7 @@ def read_ifc(path: Path, unit: float | None) -> Found:
             raise GraphError("ends the program that reads it, allowed: a file that IfcOpenShell reads") from None
 
 
-def read_here(path: str, unit: float | None) -> Found:
+def read_here(path: str, unit: float | None) -> Drawn:
     """As `read_ifc`, in this process."""
     ifcopenshell = extra("ifcopenshell", "IFC needs ifcopenshell", "ifc", GraphError)
     from ifcopenshell import geom
@@ -327,7 +327,7 @@ def read_here(path: str, unit: float | None) -> Found:
     lines = [np.array(shapely.MultiPoint(w @ MAP.T).minimum_rotated_rectangle.exterior.coords) for w in walls]
     storeys = sorted({room.storey for room in rooms}, key=lambda level: lows.get(level, 0.0))
     frame = f"{'its own units' if scale == 1 else f'{scale:g} m a unit (as told)'} in metres, z up, y is north"
-    return Found(frame, rooms, holes, pieces, storeys, lines, ignored)
+    return Drawn(frame, rooms, holes, pieces, storeys, lines, ignored)
 
 
 def _of_type(file: Any, name: str) -> list[Any]:

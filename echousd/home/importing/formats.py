@@ -16,7 +16,7 @@ from echomodel.files import within_memory
 from echousd.graph import GraphError
 from echousd.graph.consistency import faults_of
 from echousd.home.importing.drawings import read_dxf, read_ifc, read_svg
-from echousd.home.importing.found import Found
+from echousd.home.importing.found import Drawn
 from echousd.home.importing.homes import Imported, imported
 from echousd.home.importing.simulators import (
     read_infinigen,
@@ -42,7 +42,7 @@ class Format:
 
     name: str
     ending: str
-    read: Callable[..., Found]
+    read: Callable[..., Drawn]
     recognised: Callable[[Any], bool] | None = None
     metric: bool = True  # always in one unit, so that none can be told
 
@@ -104,7 +104,7 @@ def import_plan(
         return imported(replace(found, format=name), storey, lenient=lenient)
 
 
-def read_plan(path: Path, form: str | None = None, unit: float | None = None) -> tuple[str, Found]:
+def read_plan(path: Path, form: str | None = None, unit: float | None = None) -> tuple[str, Drawn]:
     """The name of the format of somebody's floor plan, and what is in it.
 
     Arguments:

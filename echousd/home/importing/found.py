@@ -81,7 +81,7 @@ class Piece:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Drawn:
     """What was read.
 
     Arguments:

@@ -19,9 +19,9 @@ from echousd.graph import GraphError, Node, RoomSpec, SceneGraph, starting_graph
 from echousd.graph.nodes import OBSTACLE
 from echousd.home.existing import APART, walled
 from echousd.home.graph import HomeGraph, HomeRelation, HomeRoom
-from echousd.home.importing.found import Found, Hole, Piece, Room, kind_of
+from echousd.home.importing.found import Drawn, Hole, Piece, Room, kind_of
 from echousd.home.openings import Facing, facings, outer_spans
-from echousd.home.plan import Plan, overlapping, ways, with_openings
+from echousd.home.plan import HomePlan, overlapping, ways, with_openings
 from echousd.naming import free_name
 from echousd.stage.foreign import LARGE, TAKEN_FOR
 
@@ -42,13 +42,13 @@ class Imported:
         counts: what was understood, by kind. ignored: what was not, and how often. found: all that was read.
     """
 
-    plan: Plan
+    plan: HomePlan
     counts: dict[str, int]
     ignored: dict[str, int]
-    found: Found
+    found: Drawn
 
 
-def imported(found: Found, storey: str | None = None, *, lenient: bool = False) -> Imported:
+def imported(found: Drawn, storey: str | None = None, *, lenient: bool = False) -> Imported:
     """The home that a plan describes.
 
     Arguments:
@@ -152,7 +152,7 @@ def _outline(room: Room) -> np.ndarray:
 # -- doors and windows -------------------------------------------------------------------------------------------------
 
 
-def _fit(plan: Plan, side: Facing, hole: Hole, ends: np.ndarray) -> tuple[float, Opening] | None:
+def _fit(plan: HomePlan, side: Facing, hole: Hole, ends: np.ndarray) -> tuple[float, Opening] | None:
     """How far (metres) a hole is from fitting into a stretch of wall, and the opening that it is there, if it fits."""
     corners, height = plan.floors[side.one], plan.home.room(side.one).graph.room.height
     along, outward = direction(corners, side.edge), -inward_normal(corners, side.edge)
@@ -172,7 +172,9 @@ def _fit(plan: Plan, side: Facing, hole: Hole, ends: np.ndarray) -> tuple[float,
     return away + width - (end - start), Opening(hole.kind, hole.kind, side.edge, *sides, round(float(sill), 4))
 
 
-def _opened(plan: Plan, holes: Sequence[Hole], *, lenient: bool) -> tuple[dict[str, tuple[Opening, ...]], Counter[str]]:
+def _opened(
+    plan: HomePlan, holes: Sequence[Hole], *, lenient: bool
+) -> tuple[dict[str, tuple[Opening, ...]], Counter[str]]:
     """The openings of every room, those between two on both sides; what was left out."""
     floors, ignored = [*plan.sides.values()], Counter[str]()
     walls = [side for one, other in combinations(floors, 2) for side in facings(one, other)]
@@ -207,7 +209,7 @@ def _opened(plan: Plan, holes: Sequence[Hole], *, lenient: bool) -> tuple[dict[s
 
 
 def _leaf(
-    plan: Plan, sides: list[tuple[str, Opening]], hinge: np.ndarray, tip: np.ndarray | None
+    plan: HomePlan, sides: list[tuple[str, Opening]], hinge: np.ndarray, tip: np.ndarray | None
 ) -> list[tuple[str, Opening]]:
     """The sides of a door with its leaf where the source has it, else in the room that fewer go through."""
     hubs = [vocabulary().room_type(plan.home.room(name).type).hub for name, _ in sides]
@@ -230,7 +232,7 @@ def _leaf(
 # -- furniture ---------------------------------------------------------------------------------------------------------
 
 
-def _furnished(plan: Plan, pieces: Sequence[Piece]) -> tuple[dict[str, list[Node]], Counter[str]]:
+def _furnished(plan: HomePlan, pieces: Sequence[Piece]) -> tuple[dict[str, list[Node]], Counter[str]]:
     """The pieces of every room, in its own frame, where they stand; what was left out."""
     shapes = {name: shapely.Polygon(floor) for name, floor in plan.floors.items()}
     found: dict[str, list[Node]] = {name: [] for name in shapes}

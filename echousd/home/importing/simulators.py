@@ -17,7 +17,7 @@ import shapely
 from echomodel.bounded import unpacking
 from echomodel.files import raising
 from echousd.graph import GraphError
-from echousd.home.importing.found import MAP, SCREEN, Found, Hole, Piece, Room, long_sides, rooms_between, span
+from echousd.home.importing.found import MAP, SCREEN, Drawn, Hole, Piece, Room, long_sides, rooms_between, span
 from echousd.shapes.walls import outline as offset
 
 UNITY = "metres, left-handed with +Y up as Unity has it; its +z is our north"
@@ -28,7 +28,7 @@ LONGEST = 20_000  # characters of one shape
 THOR = {"kitchen": "Kitchen", "bathroom": "Bathroom", "bedroom": "Bedroom", "childrens_room": "Bedroom"}
 
 
-def read_procthor(data: Any) -> Found:
+def read_procthor(data: Any) -> Drawn:
     """ProcTHOR 1.0.0 and Holodeck: walls without a surface are passages, holes count along their first wall.
 
     What only our own plans have (names and types of rooms, thickness of walls, leaves) stands in `metadata`.
@@ -70,7 +70,7 @@ def read_procthor(data: Any) -> Found:
         word = str(one.get("object_name") or one["id"]).split("|")[0].split("-")[0]
         front = np.array([math.cos(turn), math.sin(turn)])
         pieces.append(Piece(word, (word, str(one.get("assetId", ""))), at, front))
-    return Found(UNITY, rooms, holes, pieces, ignored=ignored)
+    return Drawn(UNITY, rooms, holes, pieces, ignored=ignored)
 
 
 def _procthor_room(one: Any, ours: Any, data: Any) -> Room:
@@ -102,7 +102,7 @@ def _open_walls(data: Any) -> list[Any]:
     return list(found.values())
 
 
-def read_scenesmith(data: Any) -> Found:
+def read_scenesmith(data: Any) -> Drawn:
     """SceneSmith's house layout: rectangles with walls and what opens in them, from a wall's start to its near side."""
     kinds = {str(room["id"]): str(room.get("type", "")) for room in data.get("rooms", ())}
     rooms: list[Room] = []
@@ -122,10 +122,10 @@ def read_scenesmith(data: Any) -> Found:
                 ends = start + unit * np.array([[along], [along + one["width"]]])
                 key = str(one["opening_id"])
                 holes.setdefault(key, Hole(key, kind, ends[None], one.get("height"), one.get("sill_height")))
-    return Found(Z_UP, rooms, [*holes.values()])
+    return Drawn(Z_UP, rooms, [*holes.values()])
 
 
-def read_sage(data: Any) -> Found:
+def read_sage(data: Any) -> Drawn:
     """SAGE's layout: rooms with walls, doors and windows at a share of their wall, objects as boxes."""
     rooms, holes, pieces = [], [], []
     for room in data["rooms"]:
@@ -147,14 +147,14 @@ def read_sage(data: Any) -> Found:
             front = np.array([math.cos(turn), -math.sin(turn)])  # +y of the source, turned about its z
             extents = np.array([size["width"], size["height"], size["length"]], float)
             pieces.append(Piece(str(one["type"]), (str(one["type"]),), at, front, extents, sides=2))
-    return Found(Z_UP, rooms, holes, pieces)
+    return Drawn(Z_UP, rooms, holes, pieces)
 
 
 def _xy(point: Any) -> tuple[float, float]:
     return (point["x"], point["y"]) if isinstance(point, dict) else (point[0], point[1])
 
 
-def read_infinigen(data: Any) -> Found:
+def read_infinigen(data: Any) -> Drawn:
     """Infinigen's plans: shapes by name, stated as a call of shapely's or as its name and arguments; none is called."""
     rooms = []
     for name, entry in data["rooms"].items():
@@ -171,7 +171,7 @@ def read_infinigen(data: Any) -> Found:
     if isinstance(entrance, dict) and ("shape" in entrance or "operation" in entrance):
         ends = _ends("entrance", entrance)
         holes.append(Hole("entrance", "door", ends, storey=_level(ends, rooms)))
-    return Found(Z_UP, rooms, holes, storeys=levels)
+    return Drawn(Z_UP, rooms, holes, storeys=levels)
 
 
 def _level(ends: np.ndarray, rooms: list[Room]) -> str:
@@ -205,7 +205,7 @@ def _shape(name: str, entry: Any) -> np.ndarray:
 UNPACKED = 64 * 2**20  # bytes of a Home.xml
 
 
-def read_roomplan(data: Any) -> Found:
+def read_roomplan(data: Any) -> Drawn:
     """A scan of a room, or of a structure of several; it is turned until its walls lie along the axes."""
     scans = data.get("rooms") or [data]
     turn = _straight(scans)
@@ -238,7 +238,7 @@ def read_roomplan(data: Any) -> Found:
     angle = math.degrees(math.atan2(turn[0, 1], turn[0, 0]))
     frame = f"metres, +Y up; turned by {angle:.1f} degrees until walls lie along the axes"
     storeys = sorted({room.storey for room in rooms}, key=lambda text: (len(text), text))
-    return Found(frame, rooms, holes, pieces, storeys, ignored=ignored)
+    return Drawn(frame, rooms, holes, pieces, storeys, ignored=ignored)
 
 
 def _matrix(one: Any) -> np.ndarray:
@@ -272,7 +272,7 @@ def _straight(scans: Any) -> np.ndarray:
     return np.array([[cos, -sin], [sin, cos]])
 
 
-def read_sweethome(content: bytes, name: str) -> Found:
+def read_sweethome(content: bytes, name: str) -> Drawn:
     """The Home.xml in a file of Sweet Home 3D 5.3 or later; centimetres, y down, angles clockwise."""
 
     with unpacking(name), zipfile.ZipFile(io.BytesIO(content)) as archive:
@@ -325,4 +325,4 @@ def read_sweethome(content: bytes, name: str) -> Found:
             front = SCREEN @ [-math.sin(turn), math.cos(turn)]
             pieces.append(Piece(called, (called, one.get("catalogId", "")), at, front, size, storey=storey(one)))
     frame = "centimetres, up of the plan is our north"
-    return Found(frame, rooms, holes, pieces, [*number.values()] or [""], [points for _, points in walls])
+    return Drawn(frame, rooms, holes, pieces, [*number.values()] or [""], [points for _, points in walls])

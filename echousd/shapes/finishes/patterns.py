@@ -1,21 +1,29 @@
-"""Patterns of surfaces as tileable arrays: how light or dark, how high and how rough each point is; numpy alone.
+"""Patterns of surfaces as tileable arrays: how light or dark, how high and how rough each point is; and as images.
 
 Every pattern is the same in every run and on every machine; colour comes later, as one tint for the whole picture.
 """
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import lru_cache, partial
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache, partial
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
-from echomodel.late import Compiled
+from echomodel.dressing import PRINTS
+from echomodel.late import Compiled, Late
+from echousd.shapes.finishes.baking import SKIES
+from echousd.shapes.finishes.slots import Color
+from echousd.srgb import from_linear
 
 cKDTree = Compiled("scipy.spatial._ckdtree:cKDTree")
+printed = Late("echousd.shapes.finishes.pictures:printed")
 SIZE = 512  # pixels on each side
+QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,3 +302,54 @@ def sky(row: Mapping[str, Any]) -> np.ndarray:
         share = np.clip((top + leaf - up) / SOFT, 0, 1)[..., None]
         out[here] += share * (np.array(form["colors"])[hue] * np.clip(shade, 0.1, 2)[..., None] - out[here])
     return np.clip(out, 0, 1)
+
+
+@cache
+def relief(name: str) -> Relief:
+    """The pattern that the function of that name there draws, its tone 1 in the mean."""
+    drawn = globals()[name]()
+    return replace(drawn, tone=drawn.tone / drawn.tone.mean((0, 1)))
+
+
+def color_image(pattern: str, color: Color, harmony: str, worn: float = 0.0) -> bytes:
+    """A pattern in a colour (linear RGB), `aged` by a share, or what is printed in those of a harmony, as JPEG."""
+    if pattern in PRINTS:
+        return _jpeg(printed(pattern, harmony))
+    tone = aged(relief(pattern).tone, worn) if worn else relief(pattern).tone
+    tone = tone[..., None] if tone.ndim == 2 else tone
+    return _jpeg(np.clip(tone * np.asarray(color), 0, 1))
+
+
+def normal_image(pattern: str, metres: float) -> bytes | None:
+    """Tangent-space normals of a pattern that covers `metres`, +Y up as UsdPreviewSurface takes it; None if flat."""
+    height = None if pattern in PRINTS else relief(pattern).height
+    if height is None:
+        return None
+    step = 2 * max(metres, 0.4) / len(height)
+    across = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) / step
+    down = (np.roll(height, -1, 0) - np.roll(height, 1, 0)) / step
+    normal = np.stack([-across, down, np.ones_like(across)], -1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    return _encoded(normal / 2 + 0.5, 78)
+
+
+def rough_image(pattern: str, roughness: float) -> bytes | None:
+    """Roughness about a mean, grey; None where it is even."""
+    rough = None if pattern in PRINTS else relief(pattern).rough
+    return None if rough is None else _encoded(np.clip(roughness + rough, 0.05, 1), 70)
+
+
+def sky_image(kind: str) -> bytes:
+    """What lies around a room, a row of `SKIES`, for its dome light, as JPEG."""
+    return _jpeg(sky(SKIES[kind]))
+
+
+def _jpeg(value: np.ndarray) -> bytes:
+    return _encoded(from_linear(value), QUALITY)
+
+
+def _encoded(value: np.ndarray, quality: int) -> bytes:
+    out = io.BytesIO()
+    pixels = (np.clip(value, 0, 1) * 255 + 0.5).astype(np.uint8)
+    Image.fromarray(pixels).save(out, "JPEG", quality=quality, subsampling=0)
+    return out.getvalue()

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
 
-from echomodel.late import Late
+from echomodel.late import lates
 from echousd.graph import Node, SceneGraph
 
-check_reach, is_file, joined, relative, split = (
-    Late(f"echousd.assets.reference:{name}") for name in ("check_reach", "is_file", "joined", "relative", "split")
+check_reach, is_file, joined, relative, split = lates(
+    "echousd.assets.reference", "check_reach", "is_file", "joined", "relative", "split"
 )
 RETRIEVED = ("library", "guided")
 

@@ -11,13 +11,12 @@ import numpy as np
 from echomodel.files import tables
 from echomodel.furniture.solids import Joint, Solid, mesh_of
 from echomodel.furniture.style import Choices, Style
-from echomodel.late import Late
+from echomodel.late import Late, lates
 from echomodel.vocabulary import vocabulary
 
 __all__ = ["Choices", "Style", "draw_choices", "draw_style", "mesh_of", "sample_size", "solids"]
 
-draw_choices, draw_style = Late(f"{__name__}.drawn:draw_choices"), Late(f"{__name__}.drawn:draw_style")
-sample_size = Late(f"{__name__}.drawn:sample_size")
+draw_choices, draw_style, sample_size = lates(f"{__name__}.drawn", "draw_choices", "draw_style", "sample_size")
 Builder = Callable[[np.ndarray, Style, Choices], list[Solid]]
 PROGRAMS: dict[str, list[str]] = tables("programs.toml", __file__)
 UNSAID = ("", "board")

@@ -340,7 +340,7 @@ def wall(profile: list[tuple[float, float]], thick: float) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class MeshedSolid:
     """One solid as a closed mesh in its place: vertices (n, 3) in metres, faces (m, 3), and its joint there."""
 
     solid: Solid
@@ -351,7 +351,7 @@ class Piece:
 
 def pieces_of(
     solids: Sequence[Solid], size: np.ndarray | None = None, detail: int = FINEST, *, round: bool = False
-) -> list[Piece]:
+) -> list[MeshedSolid]:
     """Every solid meshed, all of them stretched together to fill `size`, standing on y = 0, centred in x and z.
 
     Arguments:
@@ -369,7 +369,7 @@ def pieces_of(
         stretch[[0, 2]] = stretch[[0, 2]].min()
     origin = np.array([(lower[0] + upper[0]) / 2, lower[1], (lower[2] + upper[2]) / 2])
     return [
-        Piece(solid, (vertices - origin) * stretch, faces, _stretched(solid.joint, origin, stretch))
+        MeshedSolid(solid, (vertices - origin) * stretch, faces, _stretched(solid.joint, origin, stretch))
         for solid, (vertices, faces) in zip(seen, meshes, strict=True)
     ]
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from echomodel.arrays import Array, at_least, at_most, cast, dot, full, held, least_so_far, once, rows
-from echomodel.boxes2d import footprints
+from echomodel.boxes2d import footprints, to_frame
 from echomodel.floors import Walls, footprint, signed_area, signed_distance
 from echomodel.objective.company import AROUND, BESIDE, first_of
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, joined, nobody, worst
@@ -165,8 +165,8 @@ def _squares(plan: Plan, who: Array, points: Array) -> Array:
     """(s, n, P): square of the metres between pieces (s, n) and points (..., P, 2)."""
     size, position, cos, sin = (of[who][..., None] for of in (plan.size, plan.position, *plan.turn))
     x, z = points[..., 0] - position[:, :, 0], points[..., 1] - position[:, :, 2]
-    lateral = at_least(abs(cos * x - sin * z) - size[:, :, 0] / 2, 0.0)
-    forward = at_least(abs(sin * x + cos * z) - size[:, :, 2] / 2, 0.0)
+    lateral, forward = to_frame(x, z, cos, sin)
+    lateral, forward = (at_least(abs(away) - size[:, :, k] / 2, 0.0) for away, k in ((lateral, 0), (forward, 2)))
     return lateral * lateral + forward * forward
 
 

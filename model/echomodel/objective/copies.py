@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from echomodel.arrays import Array, at_least, kit, norm, pairs_in, repeat, rows
+from echomodel.boxes2d import reach, to_frame
 from echomodel.objective.plan import FAR, OF_WORDS, Found, Plan, worst
 from echomodel.openings import Opening
 from echomodel.vocabulary import Category
@@ -226,9 +227,9 @@ class Copies(Plan):
         x, z = (self.position[i, axis] - self.position[j, axis] for axis in (0, 2))
         (cos, other_cos), (sin, other_sin) = ((turn[j], turn[i]) for turn in self.turn)
         along, across = abs(other_cos * cos + other_sin * sin), abs(other_sin * cos - other_cos * sin)
-        lateral, forward = cos * x - sin * z, sin * x + cos * z
+        lateral, forward = to_frame(x, z, cos, sin)
         width, depth = self.size[i, 0] / 2, self.size[i, 2] / 2
-        half_width, half_depth = along * width + across * depth, across * width + along * depth
+        half_width, half_depth = reach(width, depth, along, across)
         gap = xp.maximum(
             abs(lateral) - half_width - self.size[j, 0] / 2, abs(forward) - half_depth - self.size[j, 2] / 2
         )
@@ -268,33 +269,6 @@ def copies_of(room: Plan, position: Array, yaw: Array, moved: Array) -> Copies:
         xp.tile(room.fixed, (count,)), None if room.height is None else _spread(room.height, count), room.rules,
         room.stated, template=room, apart_in=moved,
     )  # fmt: skip
-
-
-def part_of(room: Plan, there: np.ndarray) -> Plan:
-    """The plan of some boxes of a room, who attend and stand on each other as in the whole."""
-    keep = np.flatnonzero(there)
-    number = np.full(len(there) + 3, -1)
-    number[keep] = np.arange(len(keep))
-
-    def mapped(of: np.ndarray) -> np.ndarray:
-        return np.where(of < 0, of, number[np.maximum(of, 0)])[keep]
-
-    triplets = room.triplets[there[room.triplets[:, ::2]].all(1)]
-    triplets = np.stack([number[triplets[:, 0]], triplets[:, 1], number[triplets[:, 2]]], 1)
-    stated = tuple(
-        replace(one, subject=int(number[one.subject]), others=tuple(int(number[k]) for k in one.others))
-        for one in room.stated
-        if there[[one.subject, *one.others]].all()
-    )
-    out = Plan(
-        tuple(room.kinds[k] for k in keep.tolist()), room.size[keep], room.position[keep], room.yaw[keep],
-        room.scene[keep], room.floor, room.openings, triplets, room.fixed[keep], room.height, room.rules, stated,
-    )  # fmt: skip
-    vars(out).update(
-        anchor=mapped(room.anchor), carrier=mapped(room.carrier), joins=mapped(room.joins),
-        slot_role=tuple(room.slot_role[k] for k in keep.tolist()),
-    )  # fmt: skip
-    return out
 
 
 def _spread(one: Array, count: int) -> Array:

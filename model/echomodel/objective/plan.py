@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from echomodel.arrays import Array, at_least, cast, dot, full, held, kit, least_of, norm, on_device, pairs_in, rows
+from echomodel.boxes2d import reach, to_frame
 from echomodel.floors import edges, known, signed_area, signed_distance
 from echomodel.graph import Stated
 from echomodel.objective.support import carriers, shared_fraction
@@ -330,8 +331,7 @@ class Plan:
     def local(self, i: Array, j: Array) -> tuple[Array, Array]:
         """(P,) and (P,): how far i's centre lies to j's +x side and before j's centre, metres."""
         dx, dz = self.position[i, 0] - self.position[j, 0], self.position[i, 2] - self.position[j, 2]
-        cos, sin = self.turn[0][j], self.turn[1][j]
-        return cos * dx - sin * dz, sin * dx + cos * dz
+        return to_frame(dx, dz, self.turn[0][j], self.turn[1][j])
 
     @cached_property
     def turn(self) -> tuple[Array, Array]:
@@ -351,15 +351,12 @@ class Plan:
     def seen(self, who: Array, points: Array) -> tuple[Array, Array]:
         """(...,) and (...,): how far points (..., 2) lie to the +x side of boxes (...,) and before them, metres."""
         off = points - self.position[who][..., ::2]
-        cos, sin = self.turn[0][who], self.turn[1][who]
-        return cos * off[..., 0] - sin * off[..., 1], sin * off[..., 0] + cos * off[..., 1]
+        return to_frame(off[..., 0], off[..., 1], self.turn[0][who], self.turn[1][who])
 
     def reach(self, i: Array, j: Array) -> tuple[Array, Array]:
         """(P,) and (P,): half extents of i along j's width and along j's front, metres."""
         turn = self.yaw[i] - self.yaw[j]
-        cos, sin = abs(self.kit.cos(turn)), abs(self.kit.sin(turn))
-        width, depth = self.size[i, 0] / 2, self.size[i, 2] / 2
-        return cos * width + sin * depth, sin * width + cos * depth
+        return reach(self.size[i, 0] / 2, self.size[i, 2] / 2, abs(self.kit.cos(turn)), abs(self.kit.sin(turn)))
 
     def nearest_point(self, i: Array, j: Array) -> tuple[Array, Array]:
         """(P,) and (P,): lateral and forward, in j's frame, from i's centre to the nearest point of j's footprint."""

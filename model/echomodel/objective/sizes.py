@@ -85,12 +85,6 @@ def in_proportion(categories: Sequence[str], size: np.ndarray, free: np.ndarray)
     return out
 
 
-def has_proportions(categories: Sequence[str]) -> np.ndarray:
-    """(n,) bool: kinds whose sides go together (`in_proportion`)."""
-    kinds = [kind_of(word) for word in categories]
-    return np.array([kind.round or bool(kind.aspect) for kind in kinds], bool)
-
-
 def smaller_sizes(categories: Sequence[str], size: np.ndarray, free: np.ndarray) -> np.ndarray:
     """(n, 3) float: sizes of what a person would choose for a room that is too full: less wide and deep, yet usual.
 

@@ -16,7 +16,7 @@ from functools import cached_property
 from echomodel.arrays import Array, at_least, at_most, repeat
 from echomodel.files import tables
 from echomodel.late import Late
-from echomodel.objective import access, company, composition, crowding, lamps, physics, sizes
+from echomodel.objective import access, company, composition, crowding, physics, sizes
 from echomodel.objective.plan import Found, Plan, found, nobody
 from echomodel.vocabulary import Category, vocabulary
 
@@ -35,10 +35,6 @@ class OfKind(Late):
     def itself(self) -> Callable[[Plan], Found]:
         """The function."""
         return Late(self.place).itself
-
-    @property
-    def __name__(self) -> str:
-        return self.place.partition(":")[2]
 
     def __call__(self, plan: Plan) -> Found:
         return self.itself(plan) if plan.has(self.kind) else nobody(plan.size)
@@ -79,7 +75,7 @@ class Term:
 
 
 REAL = "real rooms (statistics of 896, 300 measured): "
-MODULES = {"access": access, "company": company, "composition": composition, "crowding": crowding, "lamps": lamps,
+MODULES = {"access": access, "company": company, "composition": composition, "crowding": crowding,
            "physics": physics, "sizes": sizes}  # fmt: skip
 # Modules of which every term looks at boxes of some kind, alone or beside others: asked of rooms that have one.
 OF_KINDS: dict[str, Callable[[Category], object]] = {

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echomodel.boxes2d import reach, to_frame
 from echomodel.furniture.drawn import sample_size
 from echomodel.objective.access import INTO_BED, OF_CHAIRS, OF_LAMPS
 from echomodel.rooms.floor import Floor, Wall
@@ -37,8 +38,7 @@ class Item:
 
     def __post_init__(self) -> None:
         c, s = abs(math.cos(self.yaw)), abs(math.sin(self.yaw))
-        self.hull_x = (c * self.size[0] + s * self.size[2]) / 2
-        self.hull_z = (s * self.size[0] + c * self.size[2]) / 2
+        self.hull_x, self.hull_z = reach(self.size[0] / 2, self.size[2] / 2, c, s)
 
     @property
     def turned(self) -> bool:
@@ -52,8 +52,7 @@ class Item:
 
     def seen(self, x: float, z: float) -> tuple[float, float]:
         """How far to its +x side and how far before it a point lies; the inverse of `local`."""
-        c, s, dx, dz = math.cos(self.yaw), math.sin(self.yaw), x - self.x, z - self.z
-        return c * dx - s * dz, s * dx + c * dz
+        return to_frame(x - self.x, z - self.z, math.cos(self.yaw), math.sin(self.yaw))
 
 
 class Builder:

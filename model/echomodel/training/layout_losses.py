@@ -19,10 +19,11 @@ from echomodel.objective.physics import apart
 from echomodel.objective.plan import UNKNOWN
 from echomodel.randomness import normal
 from echomodel.rules import margins
-from echomodel.samplers import add_noise, clean_from, target
+from echomodel.samplers import clean_from
 from echomodel.surroundings import kept_free, outside
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import LayoutBatch, draw_levels
+from echomodel.training.targets import add_noise, target
 from echomodel.vocabulary import vocabulary
 
 STATED_SLACK = 0.02  # the hinge asks for this much more than the rule does (metres or ratio)
@@ -107,12 +108,6 @@ def deep(margin: Tensor) -> Tensor:
 DRAFT = 0.3  # weight of each draft's own denoising loss
 Measure = Callable[..., tuple[Tensor, Tensor, Tensor]]  # as `compact.layout.measured`
 OPENINGS = 0.5  # weight of the clearances of doors and windows beside the gaps to the walls
-
-
-def edited_latent(model: CompactModel, batch: LayoutBatch) -> Tensor:
-    """The latent graph by the inverse strategy: pseudo graph into the encoder, true graph out of the manipulator."""
-    edit = {"before": batch.before, "added": batch.added, "touched": batch.touched}
-    return model.latent(batch.graph.category, batch.pairs, **edit)
 
 
 def layout_loss(

@@ -31,7 +31,6 @@ from echomodel.sizes import Z95
 from echomodel.standing import heights
 from echomodel.training.layout_losses import (
     deep,
-    edited_latent,
     layout_loss,
     physics_loss,
     plan_of_batch,
@@ -77,7 +76,10 @@ class LayoutStage:
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch, whose graph passes encoder and manipulator, and of draws, and their parts."""
         batch, recipe = self._drawn(generator).to(model.device), self.recipe
-        loss, parts = layout_loss(model, batch, edited_latent(model, batch), generator, recipe)
+        # by the inverse strategy: pseudo graph into the encoder, true graph out of the manipulator
+        edit = {"before": batch.before, "added": batch.added, "touched": batch.touched}
+        latent = model.latent(batch.graph.category, batch.pairs, **edit)
+        loss, parts = layout_loss(model, batch, latent, generator, recipe)
         if recipe.drawn_weight:
             drawn, of_draws = drawn_loss(model, batch, generator)
             loss, parts = loss + recipe.drawn_weight * drawn, parts | of_draws

@@ -34,7 +34,7 @@ from echousd.shapes.fittings import SKIRTING
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
 from echousd.shapes.sources.whole import material_groups, solid_geometry
 from echousd.shapes.walls import walls
-from echousd.stage.graphs import read_graph
+from echousd.stage.read import read_graph
 
 SQUARE = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
 

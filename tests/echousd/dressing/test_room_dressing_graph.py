@@ -16,7 +16,7 @@ from echousd.layers.compose import room_files
 from echousd.make.flat import save_flat
 from echousd.options import RoomOptions
 from echousd.stage.encoding import StageError
-from echousd.stage.graphs import read_graph
+from echousd.stage.read import read_graph
 
 DRESSED = RoomOptions(walls=True, dress="full", dress_graph=True)
 

@@ -17,7 +17,7 @@ from echousd.graph.fields import RESIDENTS
 from echousd.options import RoomOptions
 from echousd.shapes.colliders import standing_hull
 from echousd.shapes.geometry import Geometry, Origin, Part
-from echousd.stage.graphs import read_graph
+from echousd.stage.read import read_graph
 
 STUDY = """
 room: {type: bedroom, size: [4.2, 3.6]}

@@ -12,7 +12,7 @@ import echousd
 from echousd.folder.folder import claim, recover
 from echousd.folder.found import layer_over, manifest_of
 from echousd.folder.manifest import find_manifest
-from echousd.folder.ownership import loses_text
+from echousd.folder.merging import loses_text
 from echousd.folder.stored import unit_of
 from echousd.folder.within import check_links, inside
 from echousd.make.reading import read_room

@@ -13,7 +13,7 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echousd.folder.folder import recover, write_together
 from echousd.folder.manifest import MAX_SEED, find_manifest
-from echousd.folder.ownership import merged_root
+from echousd.folder.merging import merged_root
 from echousd.make.edit import edit
 from echousd.make.save import save_room, write_preview
 from echousd.pending import STAGING

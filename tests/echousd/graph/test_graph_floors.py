@@ -17,9 +17,9 @@ from echousd.graph.floors import (
     with_lowered_windows,
     with_placed_openings,
     with_plan,
-    with_plan_of,
-    with_wider_floor,
 )
+from echousd.make.edit import with_plan_of
+from echousd.make.fitting import with_wider_floor
 from echousd.shapes.fittings import window_sill
 
 GRAPH = SceneGraph(

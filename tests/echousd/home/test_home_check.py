@@ -6,11 +6,11 @@ import shapely
 
 from echousd.home.check import ROBOT, _blocked, walked
 from echousd.home.graph import HomeGraph
-from echousd.home.plan import Plan, doorways, plan_home
+from echousd.home.plan import HomePlan, doorways, plan_home
 
 
 @pytest.fixture(scope="module", params=["door", "open_to"])
-def plan(request) -> Plan:
+def plan(request) -> HomePlan:
     return plan_home(HomeGraph.from_words(f"living {request.param} kitchen", area=40))
 
 

@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from itertools import pairwise
 
 import ezdxf
 import numpy as np
@@ -12,7 +13,7 @@ from echousd.graph import GraphError
 from echousd.home.existing import plan_there
 from echousd.home.files import load_home
 from echousd.home.importing.formats import import_plan, read_plan
-from echousd.home.importing.found import Found, Hole, Room, rooms_between
+from echousd.home.importing.found import Drawn, Hole, Room, rooms_between
 from echousd.home.importing.homes import imported, room_kind
 from echousd.home.plan import ways
 
@@ -277,7 +278,7 @@ def ifc(path, units=True):
 def test_two_doors_between_two_rooms_are_no_passage():
     rooms = [Room(name, (name,), np.array(corners, float)) for name, corners in ROOMS.items()]
     holes = [Hole(f"d{n}", "door", np.array([[(4.0, at), (4.0, at + 0.8)]])) for n, at in enumerate((0.2, 1.8))]
-    counts = imported(Found("metres", rooms, holes)).counts
+    counts = imported(Drawn("metres", rooms, holes)).counts
     assert (counts["doors"], counts["passages"]) == (2, 0)
 
 
@@ -332,15 +333,9 @@ def test_one_flat_in_every_format(form, tmp_path):
 def test_walls_alone_enclose_rooms(tmp_path):
     drawing = ezdxf.new(units=6)
     space = drawing.modelspace()
-    for ends in (
-        ((0, 0), (6, 0)),
-        ((6, 0), (6, 3)),
-        ((6, 3), (0, 3)),
-        ((0, 3), (0, 0)),
-        ((4, 0), (4, 1)),
-        ((4, 1.9), (4, 3)),
-    ):
-        space.add_line(*ends, dxfattribs={"layer": "Wand"})
+    corners = (0, 0), (6, 0), (6, 3), (0, 3), (0, 0)
+    for start, end in (*pairwise(corners), ((4, 0), (4, 1)), ((4, 1.9), (4, 3))):
+        space.add_line(start, end, dxfattribs={"layer": "Wand"})
     space.add_line(*DOOR, dxfattribs={"layer": "Tür"})
     space.add_text("Flur", dxfattribs={"layer": "Text"}).set_placement((5, 1.5))
     space.add_text("Schlafzimmer 1", dxfattribs={"layer": "Text"}).set_placement((2, 1.5))
@@ -352,10 +347,8 @@ def test_walls_alone_enclose_rooms(tmp_path):
 
 
 def test_thick_walls_are_no_rooms():
-    outer, inner = (
-        [(0, 0), (6, 0), (6, 4), (0, 4), (0, 0)],
-        [(0.2, 0.2), (5.8, 0.2), (5.8, 3.8), (0.2, 3.8), (0.2, 0.2)],
-    )
+    outer = [(0, 0), (6, 0), (6, 4), (0, 4), (0, 0)]
+    inner = [(0.2, 0.2), (5.8, 0.2), (5.8, 3.8), (0.2, 3.8), (0.2, 0.2)]
     (room,) = rooms_between([np.array(outer, float), np.array(inner, float)])
     assert np.ptp(room, 0) == pytest.approx((5.6, 3.6), abs=0.02)
 
@@ -381,14 +374,14 @@ ASTRAY = Hole("door_1", "door", np.array([[(1.0, 9.0), (1.9, 9.0)]]))
 @pytest.mark.parametrize(
     ("found", "said"),
     [
-        (Found("", [SOUND, rectangle("hall", (2, 0), (5, 4))]), "rooms 'bedroom' and 'hall' overlap by 4.00 m²"),
-        (Found("", [Room("hall", (), np.array([(0.0, 0.0), (1.0, 1.0)]))]), "'hall': an open outline of 2 corners"),
-        (Found("", [Room("hall", (), np.array([(0.0, 0), (2, 2), (2, 0), (0, 2)]))]), "outline crosses itself"),
-        (Found("", [rectangle("hall", (0, 0), (0.3, 0.4))]), "room 'hall': 0.12 m² of floor, allowed: at least 0.5"),
-        (Found("", [rectangle("hall", (0, 0), (300, 400))]), "120000 m² of floor, allowed: at most 5000 (see --unit)"),
-        (Found("", [Room("hall", (), np.array([(0, 0), (np.nan, 0), (2, 2.0)]))]), "an open outline of 3 corners"),
-        (Found("", [SOUND], [ASTRAY]), "door 'door_1' at 1.45 m north, 9.00 m east meets no wall of a room"),
-        (Found("", []), "no rooms, allowed: at least one"),
+        (Drawn("", [SOUND, rectangle("hall", (2, 0), (5, 4))]), "rooms 'bedroom' and 'hall' overlap by 4.00 m²"),
+        (Drawn("", [Room("hall", (), np.array([(0.0, 0.0), (1.0, 1.0)]))]), "'hall': an open outline of 2 corners"),
+        (Drawn("", [Room("hall", (), np.array([(0.0, 0), (2, 2), (2, 0), (0, 2)]))]), "outline crosses itself"),
+        (Drawn("", [rectangle("hall", (0, 0), (0.3, 0.4))]), "room 'hall': 0.12 m² of floor, allowed: at least 0.5"),
+        (Drawn("", [rectangle("hall", (0, 0), (300, 400))]), "120000 m² of floor, allowed: at most 5000 (see --unit)"),
+        (Drawn("", [Room("hall", (), np.array([(0, 0), (np.nan, 0), (2, 2.0)]))]), "an open outline of 3 corners"),
+        (Drawn("", [SOUND], [ASTRAY]), "door 'door_1' at 1.45 m north, 9.00 m east meets no wall of a room"),
+        (Drawn("", []), "no rooms, allowed: at least one"),
     ],
 )  # fmt: skip
 def test_a_plan_that_cannot_be_one_is_a_line(found, said):
@@ -399,17 +392,17 @@ def test_a_plan_that_cannot_be_one_is_a_line(found, said):
 
 
 def test_what_does_not_fit_can_be_left_out_and_is_told():
-    made = imported(Found("", [SOUND], [ASTRAY, ASTRAY]), lenient=True)
+    made = imported(Drawn("", [SOUND], [ASTRAY, ASTRAY]), lenient=True)
     assert made.ignored == {"doors that meet no wall": 2}
     upper = rectangle("study", (0, 0), (3, 4), storey="1")
-    both = Found("", [rectangle("hall", (0, 0), (3, 4), storey="0"), upper], storeys=("0", "1"))
+    both = Drawn("", [rectangle("hall", (0, 0), (3, 4), storey="0"), upper], storeys=("0", "1"))
     assert [room.name for room in imported(both).plan.home.rooms] == ["hall"]
     assert imported(both).ignored == {"rooms of other storeys": 1}
     assert [room.name for room in imported(both, "1").plan.home.rooms] == ["study"]
     with pytest.raises(GraphError, match=r"no storey '2', allowed: '0', '1'"):
         imported(both, "2")
     with pytest.raises(GraphError, match="no storey '2', allowed: to leave it out, as the plan names none"):
-        imported(Found("", [rectangle("hall", (0, 0), (3, 4))]), "2")
+        imported(Drawn("", [rectangle("hall", (0, 0), (3, 4))]), "2")
 
 
 def many_lines(path):

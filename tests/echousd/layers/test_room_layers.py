@@ -24,10 +24,10 @@ from echousd.shapes.geometry import Origin, Original
 from echousd.shapes.hulls import hull_volume
 from echousd.shapes.looks import Look, look
 from echousd.stage.boxes import read_dressing
-from echousd.stage.graphs import read_graph
 from echousd.stage.labels import labels
 from echousd.stage.paths import component_file, piece_name
 from echousd.stage.pen import Pen
+from echousd.stage.read import read_graph
 
 SPECIAL = {"inputs:opacity", "inputs:emissiveColor"}
 SEEN = {"wood": set(), "glass": {"inputs:opacity"}, "shade": {"inputs:emissiveColor"}}

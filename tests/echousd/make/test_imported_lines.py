@@ -30,7 +30,8 @@ unused = ("echousd.checks", "echousd.texturing", "echousd.batches", "echousd.exp
           "echomodel.furniture.drawn", "echomodel.dressing.greenery",
           "echomodel.objective.fitted", "echomodel.objective.lounging", "echomodel.objective.seating",
           "echomodel.objective.sight", "echousd.place.seats", "echousd.stage.apart", "echousd.draw.outside",
-          "echousd.draw.from_files", "echousd.place.conflicts", "echousd.folder.found",
+          "echousd.draw.from_files", "echousd.place.conflicts", "echousd.folder.found", "echousd.stage.graphs",
+          "echousd.shapes.bays", "echousd.place.building", "echousd.folder.merging", "echousd.invalid",
           "echoscene", "torch", "trimesh", "networkx", "sklearn", "scipy")
 print(sum(lines.values()), [name for name in unused if name in sys.modules])
 """

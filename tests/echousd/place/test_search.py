@@ -16,6 +16,7 @@ from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, margins
 from echomodel.vocabulary import vocabulary
+from echousd.place.building import expecting, involved
 from echousd.place.placing import place_boxes
 from echousd.place.problem import problem_of
 from echousd.place.proposals import out_of_habit, proposals, slots_at
@@ -100,7 +101,7 @@ def test_a_screen_goes_along_to_the_wall_ahead():
     words = ["multi_seat_sofa", "tv_stand"]
     search, state = searched(words, [(2.0, 0.8, 0.9), (1.6, 0.5, 0.4)], [(0, 0, -1.5), (1.0, 0, 1.8)], [0, np.pi])
     row = np.array([[-2.0, 0.3, np.pi / 2, 0.0]])
-    position, yaw = search._carried(state, 0, [0], row, screens=[[1]])
+    position, yaw = search.carried(state, 0, [0], row, screens=[[1]])
     assert position[0, 1, [0, 2]] == pytest.approx([2.5 - 0.2 - search.problem.behind[1], 0.3], abs=1e-6)
     assert np.cos(yaw[0, 1] + np.pi / 2) == pytest.approx(1.0)
 
@@ -124,7 +125,7 @@ def test_a_sofa_turns_to_another_wall_though_its_screen_and_a_plant_beside_that_
     there = np.array([[0.0, -1.5, 0.0, 0.0], [-2.0, 0.0, np.pi / 2, 0.0]])
     assert search._unlikely(state, every, 0, [0], there).tolist() == [0.0, 0.0]
     assert search.group(1, every, state) == [1, 2]
-    position, _ = search._carried(state, 0, [0], there[1:], screens=[[1, 2]])
+    position, _ = search.carried(state, 0, [0], there[1:], screens=[[1, 2]])
     assert np.hypot(*(position[0, 2] - position[0, 1])[[0, 2]]) == pytest.approx(1.1, abs=0.05)
 
 
@@ -156,7 +157,7 @@ def test_storage_that_is_longer_than_every_wall_stays():
 @pytest.mark.parametrize("count", [MANY - 1, MANY])
 def test_a_room_of_many_pieces_is_built_up(monkeypatch, count):
     begun = []
-    monkeypatch.setattr(Search, "rebuilt", lambda self, state, out: begun.append(out) or state)
+    monkeypatch.setattr("echousd.place.search.rebuilt", lambda search, state, out: begun.append(out) or state)
     search, _ = searched(["stool"] * count, [(0.3, 0.4, 0.3)] * count, [(0.0, 0, 0.0)] * count, [0.0] * count)
     search.run(0)
     assert begun == [list(range(count))] * (count == MANY)
@@ -242,7 +243,7 @@ def test_a_group_goes_as_one():
     search, state = searched(words, size, [(0, 0, -1.0), (1.1, 0, -1.8)], [0.0, 0.3], turned=[1])
     search.problem.turned[1] = False  # it was drawn askew
     row = np.array([[1.5, 0.0, -np.pi / 2, 0.0]])
-    position, yaw = search._carried(state, 0, [0, 1], row)
+    position, yaw = search.carried(state, 0, [0, 1], row)
     x, z = position[0, 1, [0, 2]] - row[0, :2]
     lateral = np.cos(-np.pi / 2) * x - np.sin(-np.pi / 2) * z
     assert lateral == pytest.approx(1.1, abs=0.1)
@@ -277,7 +278,7 @@ def test_seats_stay_where_they_are_when_the_table_of_their_sofa_is_turned():
     places, turns = [(0, 0, -1.5), (0, 0, -0.4), (1.5, 0, -0.4)], [0.0, np.pi / 2, -np.pi / 2]
     search, state = searched(words, size, places, turns, [(2, "close_by", 1)])
     group = search.group(1, np.ones(3, bool), state)
-    position, yaw = search._carried(state, 1, group, np.array([(0.2, -0.3, 0.0, 0.0)]))
+    position, yaw = search.carried(state, 1, group, np.array([(0.2, -0.3, 0.0, 0.0)]))
     assert set(group) == {1, 2}
     np.testing.assert_allclose(position[0, 1:, ::2], [(0.2, -0.3), (1.7, -0.3)])
     np.testing.assert_allclose(yaw[0], [0.0, 0.0, -np.pi / 2])
@@ -369,7 +370,7 @@ def test_what_stands_on_a_nightstand_comes_with_it_to_its_bed():
     at = [(0.0, 0, -0.9), (2.0, 0, 1.0), (-2.0, 0, 1.0), (2.0, 0.55, 1.0)]
     search, state = searched(*BED, at, np.zeros(4), [(3, "standing_on", 1)])
     there = np.array([True, False, False, True])
-    after = search._expecting(state, there, 0)
+    after = expecting(search, state, there, 0)
     assert there.all()
     assert abs(after.position[1, 0]) == pytest.approx(1.2, abs=0.2)
     assert after.position[3, [0, 2]] == pytest.approx(after.position[1, [0, 2]], abs=0.01)
@@ -383,10 +384,10 @@ def test_an_armchair_is_expected_where_no_second_sofa_stands_and_goes_out_with_i
     liked = min(slots_at(search.problem, 3, 1), key=lambda slot: slot[3])
     at[2] = (liked[0], 0, at[1][2] + liked[1])
     search, state = searched(words, size, at, [0.0, 0.0, liked[2], 0.0], told, floor=2 * FLOOR)
-    after = search._expecting(state, np.array([True, True, True, False]), 1)
+    after = expecting(search, state, np.array([True, True, True, False]), 1)
     assert float(search.problem.plan.at(after.position, after.yaw).apart(np.array([3]), np.array([2]))[0]) > -0.01
     assert np.hypot(*(after.position[3] - after.position[1])[::2]) < 2.0
-    assert set(search.involved([1])) == {0, 1, 2, 3}
+    assert set(involved(search, [1])) == {0, 1, 2, 3}
 
 
 def test_a_door_that_may_make_way_is_no_reason_to_begin_anew():

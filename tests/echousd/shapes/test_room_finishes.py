@@ -20,8 +20,7 @@ from echousd.checks.report import find_faults
 from echousd.exporting.formats import export
 from echousd.options import RoomOptions
 from echousd.shapes.finishes import baking
-from echousd.shapes.finishes.baking import relief
-from echousd.shapes.finishes.patterns import SIZE, noise
+from echousd.shapes.finishes.patterns import SIZE, noise, relief
 from echousd.shapes.finishes.pictures import PROGRAMS, STOCK, printed
 from echousd.shapes.finishes.slots import HARMONIES, SLOTS, linear, material_of
 from echousd.shapes.geometry import CREASE, Origin

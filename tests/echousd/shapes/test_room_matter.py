@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from echomodel.furniture import sample_size, solids
-from echomodel.furniture.solids import Piece, Solid, pieces_of
+from echomodel.furniture.solids import MeshedSolid, Solid, pieces_of
 from echomodel.furniture.style import WIDTH, piece_of
 from echomodel.vocabulary import vocabulary
 from echousd.shapes.matter import MATTER, PARTS, weighed
@@ -14,8 +14,8 @@ ROWS = vocabulary().categories
 PIECES = 12  # of each category; some of those draws are larger than anything that placing leaves in a room
 
 
-def piece(mesh: trimesh.Trimesh, material: str = "wood", role: str = "") -> Piece:
-    return Piece(Solid(material=material, role=role), np.asarray(mesh.vertices), np.asarray(mesh.faces), None)
+def piece(mesh: trimesh.Trimesh, material: str = "wood", role: str = "") -> MeshedSolid:
+    return MeshedSolid(Solid(material=material, role=role), np.asarray(mesh.vertices), np.asarray(mesh.faces), None)
 
 
 def tensor(mass):

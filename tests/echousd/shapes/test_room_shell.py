@@ -18,8 +18,9 @@ from echousd.checks.mesh_rules import extents
 from echousd.checks.reading import Reading
 from echousd.graph import RoomSpec
 from echousd.options import RoomOptions
+from echousd.shapes.bays import beams
 from echousd.shapes.fittings import DOORS, NICHE, RAIL, WINDOWS, Millwork, millwork_of, window_frame
-from echousd.shapes.walls import WALL, beams, outline, slab, walls
+from echousd.shapes.walls import WALL, outline, slab, walls
 
 NOTCHED = np.array([(0, 0), (1, 0), (1, 1), (4, 1), (4, 3), (0, 3)], float)
 DOOR = Opening("door", "door", 2, 0.4, 0.9, 2.0, hinge="right")

@@ -12,9 +12,9 @@ from pxr import Sdf, Usd
 from echousd.graph import Node, Relation, SceneGraph
 from echousd.naming import STAGE_FORMS
 from echousd.stage.encoding import StageError
-from echousd.stage.files import open_stage, save_layer
-from echousd.stage.graphs import read_graph, write_graph
-from echousd.stage.read import read_rooms
+from echousd.stage.files import open_stage
+from echousd.stage.graphs import save_layer, write_graph
+from echousd.stage.read import read_graph, read_rooms
 from echousd.stage.write import graph_layer
 
 GRAPH = SceneGraph(

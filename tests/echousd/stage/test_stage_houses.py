@@ -14,8 +14,8 @@ from echousd.stage.boxes import relations_from_boxes
 from echousd.stage.encoding import StageError
 from echousd.stage.files import MissingMaterials, open_stage
 from echousd.stage.foreign import Box, SkippedPrims, foreign_graph, foreign_rooms
-from echousd.stage.graphs import read_graph
 from echousd.stage.labels import spaced
+from echousd.stage.read import read_graph
 
 
 def house(path, *, labelled=True, rooms=("Bedroom", "LivingRoom_01")):

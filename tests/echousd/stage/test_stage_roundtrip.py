@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 from pxr import Sdf, Usd, UsdGeom
 
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
-from echousd.stage.files import save_layer
-from echousd.stage.graphs import read_graph, write_graph
-from echousd.stage.read import read_rooms
+from echousd.stage.graphs import save_layer, write_graph
+from echousd.stage.read import read_graph, read_rooms
 from echousd.stage.write import graph_layer
 
 FEW = settings(max_examples=15, deadline=None)

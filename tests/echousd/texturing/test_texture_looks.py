@@ -19,7 +19,7 @@ from echousd.folder.history import redo, undo
 from echousd.make.edit import edit
 from echousd.make.reading import read_room
 from echousd.stage.files import open_stage
-from echousd.stage.graphs import read_graph
+from echousd.stage.read import read_graph
 from echousd.texturing import atlas
 from echousd.texturing import export_texture_job as export_job
 from echousd.texturing import import_texture_job as import_job

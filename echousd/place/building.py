@@ -1,0 +1,122 @@
+"""A room built up again: pieces taken out and put in one after the other, seats at their tables anew."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from echomodel.late import linear_sum_assignment
+from echomodel.objective import Plan
+from echousd.place.geometry import depths
+from echousd.place.proposals import out_of, slots_at
+from echousd.place.search import FARTHEST, LIKED, Search, State
+from echousd.place.seats import seatings
+
+
+def rebuilt(search: Search, state: State, out: list[int]) -> State:
+    """The state with some boxes taken out and put in again, one after the other.
+
+    With each come those who attend it, at the first of their slots, so that room is found for them, too.
+    """
+    there = np.ones(len(state.yaw), bool)
+    there[out] = False
+    there |= search.problem.fixed
+    for i in search.order([k for k in out if not there[k]]):
+        if there[i] and search.seated[i]:  # with its table
+            continue
+        there[i] = True
+        state = expecting(search, state, there, i)
+        state = search.reseated(search.moved(state, there, i), there, i)
+    return state
+
+
+def expecting(search: Search, state: State, there: np.ndarray, i: int) -> State:
+    """The state with those who attend box i, and are not there, at their slots; they are there then."""
+    problem = search.problem
+    for k in [*search.children[i], *search.screens[i]]:
+        if there[k]:
+            continue
+        slots = sorted(slots_at(problem, k, i), key=lambda slot: slot[3])
+        if not slots and k not in search.screens[i]:
+            continue
+        rows = np.array([out_of(state.position[i], float(state.yaw[i]), slot) for slot in slots]).reshape(-1, 4)
+        if len(rows):
+            group = search.group(k, there, state)
+            at, turn = search.carried(state, k, group, rows)
+            others = np.setdiff1d(np.flatnonzero(there), group)
+            deep = depths(problem.size[k], at[:, k], turn[:, k], problem.size[others], state.position[others],
+                          state.yaw[others])  # fmt: skip
+            hit = np.maximum(deep - problem.shared[k, others], 0.0).max(1, initial=0.0)
+            best = int(np.round(hit * 100).argmin())
+            state = State(at[best], turn[best], state.taste)
+        there[k] = True
+    return state
+
+
+def involved(search: Search, boxes: list[int]) -> list[int]:
+    """Boxes, whom they attend, and who attends these."""
+    out = list(boxes)
+    for i in boxes:
+        anchor = int(search.problem.anchor[i])
+        out += [anchor] if anchor >= 0 else []
+        out += search.children[anchor if anchor >= 0 else i] + search.children[i]
+    return [i for n, i in enumerate(out) if i not in out[:n]]
+
+
+def reseated(search: Search, state: State, there: np.ndarray, i: int, seats: list[int]) -> State:
+    """The state with those of `seats` who stand around box i at one of the ways in which as many sit there."""
+    problem = search.problem
+    if (i, *seats) not in search.ways:
+        search.ways[i, *seats] = seatings(problem, i, seats)
+    around, ways = search.ways[i, *seats]
+    if not ways:
+        return state
+    position, yaw = np.repeat(state.position[None], len(ways) + 1, 0), np.repeat(state.yaw[None], len(ways) + 1, 0)
+    wide = problem.size[around, 0]
+    rows = np.array([[out_of(state.position[i], float(state.yaw[i]), slot) for slot in way] for way in ways])
+    far = np.linalg.norm(state.position[around][:, None, ::2] - rows[:, None, :, :2], axis=-1)
+    far += FARTHEST * abs(wide[:, None] - wide)  # no chair goes to the slot of a bench, nor where it shall not be
+    loads = [[lamp for lamp in search.children[k] if there[lamp]] for k in around]  # which are told to be over it
+    for at, k in enumerate(around):
+        broken = search.broken(state, there, k, rows.reshape(-1, 4), [*around, *loads[at]])
+        far[:, at] += broken.reshape(len(ways), -1)
+    for number, slots in enumerate(rows, 1):
+        _, other = linear_sum_assignment(np.round(far[number - 1], 6))
+        position[number, around, ::2], yaw[number, around] = slots[other, :2], slots[other, 2]
+        for k, load in zip(around, loads, strict=True):
+            position[number, load] += position[number, k] - state.position[k]
+    changed = np.isin(np.arange(len(state.yaw)), [*around, *(lamp for load in loads for lamp in load)])
+    likes = [LIKED * sum(slot[3] for slot in slots) + 0.001 * number for number, slots in enumerate(ways)]
+    taste = np.array([state.taste[around].sum(), *likes])
+    best = search.cheapest(there, position, yaw, changed, taste)
+    own = state.taste.copy()
+    own[around] = 0.0
+    return State(position[best], yaw[best], own) if best else state
+
+
+def part_of(room: Plan, there: np.ndarray) -> Plan:
+    """The plan of some boxes of a room, who attend and stand on each other as in the whole."""
+    keep = np.flatnonzero(there)
+    number = np.full(len(there) + 3, -1)
+    number[keep] = np.arange(len(keep))
+
+    def mapped(of: np.ndarray) -> np.ndarray:
+        return np.where(of < 0, of, number[np.maximum(of, 0)])[keep]
+
+    triplets = room.triplets[there[room.triplets[:, ::2]].all(1)]
+    triplets = np.stack([number[triplets[:, 0]], triplets[:, 1], number[triplets[:, 2]]], 1)
+    stated = tuple(
+        replace(one, subject=int(number[one.subject]), others=tuple(int(number[k]) for k in one.others))
+        for one in room.stated
+        if there[[one.subject, *one.others]].all()
+    )
+    out = Plan(
+        tuple(room.kinds[k] for k in keep.tolist()), room.size[keep], room.position[keep], room.yaw[keep],
+        room.scene[keep], room.floor, room.openings, triplets, room.fixed[keep], room.height, room.rules, stated,
+    )  # fmt: skip
+    vars(out).update(
+        anchor=mapped(room.anchor), carrier=mapped(room.carrier), joins=mapped(room.joins),
+        slot_role=tuple(room.slot_role[k] for k in keep.tolist()),
+    )  # fmt: skip
+    return out
