@@ -80,8 +80,8 @@ def references_of(shapes: ShapeSet, categories: list[int], count: int = 24) -> d
 def graphs_of(rooms: list[RoomBoxes]) -> tuple[GraphBatch, Boxes]:
     """Rooms as graphs with half of their relations, and their true boxes."""
     relations = label_rooms(rooms, rules=RULES, drop=0.5, rng=np.random.default_rng(0))
-    graphs = [GraphBatch.from_room(room, triplets=rows) for room, rows in zip(rooms, relations, strict=True)]
-    return GraphBatch.pack(graphs), Boxes.cat([Boxes.from_room(room) for room in rooms])
+    graphs = [room.graph(triplets=rows) for room, rows in zip(rooms, relations, strict=True)]
+    return GraphBatch.pack(graphs), Boxes.cat([room.boxes() for room in rooms])
 
 
 def main() -> None:

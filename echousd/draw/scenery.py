@@ -12,12 +12,14 @@ import numpy as np
 from PIL import Image
 from pxr import Usd
 
-from echomodel.boxes2d import upright_box
+from echomodel.late import Late
 from echomodel.triangles import area_normals, bounds_of, box, lengths
 from echomodel.vocabulary import vocabulary
 from echousd.draw.drawables import Paint, image_of, read_drawables
 from echousd.draw.indoors import LUMA, Lights, read_lights
 from echousd.draw.sight import Furniture
+
+upright_box = Late("echousd.stage.contents:upright_box")
 
 GOLDEN = 0.61803398875
 LINEAR = (np.arange(256, dtype=np.float32) / 255) ** 2.2  # of a byte of sRGB

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 import shapely
-from pxr import Sdf
+from pxr import Sdf, Vt
 
 from echomodel.boxes2d import CORNERS, turned
 from echomodel.dressing import KINDS
@@ -46,7 +46,8 @@ def write_nodes(layer: Sdf.Layer, graph: DressingGraph, room: Sdf.Path, taken: I
     for node in graph.nodes:
         spec = layer.GetPrimAtPath(above.AppendChild(node.name))
         apply_apis(spec, *usd.NODE_APIS)
-        for attribute, value in usd.small_values(node).items():
+        own = {usd.CATEGORY: node.category, usd.LABELS: Vt.TokenArray([node.category]), usd.SHAPES: usd.DRESSING}
+        for attribute, value in (own | usd.values_of(node, usd.NODE_FIELDS)).items():
             put(spec, attribute, value)
     if not graph.relations:
         return

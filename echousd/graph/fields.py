@@ -11,7 +11,8 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema
 
-from echomodel.openings import Opening, opening_from_json, signed_area
+from echomodel.late import lates
+from echomodel.openings import Opening, opening_from_json
 from echomodel.vocabulary import vocabulary
 
 MAX_TEXT = 65_536  # characters in one string: what an attribute may hold before it is taken for a mistake
@@ -22,6 +23,9 @@ SHAPES = ("parts", "sdf", "boxes", "library", "guided", "own")  # of the geometr
 # what `echousd.dressing` has stories of
 RESIDENTS = ("child", "teen", "couple", "senior", "student", "office", "guest")
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+angle, attributes, corners, place, two_names = lates(
+    "echousd.graph.stated", "angle", "attributes", "corners", "place", "two_names"
+)
 
 Point: TypeAlias = tuple[float, float]
 Vector: TypeAlias = tuple[float, float, float]
@@ -40,7 +44,7 @@ def checked_identifier(value: Any) -> str:
 def _text(value: Any) -> str:
     if not isinstance(value, str) or not value.strip():
         raise ValueError(f"found {shown(value)}, allowed: a non-empty text")
-    return _storable(value)
+    return storable(value)
 
 
 def title(value: Any) -> str:
@@ -61,7 +65,8 @@ def _one_of(words: tuple[str, ...]) -> tuple[BeforeValidator, WithJsonSchema]:
     return _optional(check), WithJsonSchema({"anyOf": [{"enum": list(words)}, {"type": "null"}]})
 
 
-def _storable(value: str) -> str:
+def storable(value: str) -> str:
+    """A text that a USD file can hold; raises ValueError."""
     if len(value) > MAX_TEXT:
         raise ValueError(f"a text of {len(value)} characters, allowed: {MAX_TEXT}")
     if "\0" in value or any("\ud800" <= character <= "\udfff" for character in value):
@@ -69,7 +74,8 @@ def _storable(value: str) -> str:
     return value
 
 
-def _converted(value: Any) -> float:
+def converted(value: Any) -> float:
+    """A number, not a number where the value is none."""
     try:
         return math.nan if isinstance(value, bool) or not isinstance(value, Real) else float(value)
     except OverflowError:
@@ -78,7 +84,7 @@ def _converted(value: Any) -> float:
 
 def _real(allowed: str, test: Callable[[float], bool] = math.isfinite) -> Callable[[Any], float]:
     def check(value: Any) -> float:
-        number = value if type(value) is float else _converted(value)
+        number = value if type(value) is float else converted(value)
         if not (math.isfinite(number) and test(number)):
             raise ValueError(f"found {shown(value)}, allowed: {allowed}")
         return number
@@ -86,36 +92,17 @@ def _real(allowed: str, test: Callable[[float], bool] = math.isfinite) -> Callab
     return check
 
 
-_number = _real("a finite number")
+finite = _real("a finite number")
 _positive = _real("a positive number, metres", lambda number: number > 0)
 _share = _real("a number from 0 to 1", lambda number: 0 <= number <= 1)
 
 
-ANGLE_TEXT = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(deg|degrees?|°|rad|radians?)\s*")
+def numbers_of(count: int, each: Callable[[Any], float], allowed: str) -> Callable[[Any], tuple[float, ...]]:
+    """A check for so many numbers, `allowed` in words."""
 
-
-def angle(value: Any) -> float:
-    """Radians from a number of radians or a text with its unit, such as `90 deg`; raises ValueError."""
-    degrees = value
-    if isinstance(value, str):
-        match = ANGLE_TEXT.fullmatch(value)
-        try:
-            value = float(match[1]) * (1.0 if match[2].startswith("rad") else math.pi / 180) if match else math.nan
-        except ValueError:
-            value = math.nan
-    number = _converted(value)
-    if not math.isfinite(number):
-        raise ValueError(f"found {shown(degrees)}, allowed: radians, or degrees as in 90 deg")
-    if abs(number) > 2 * math.pi + 1e-6:
-        hint = f"; {degrees:g} degrees are written {degrees:g} deg" if isinstance(degrees, int | float) else ""
-        raise ValueError(f"found {shown(degrees)}, allowed: -2 pi to 2 pi radians{hint}")
-    return number
-
-
-def _numbers(count: int, each: Callable[[Any], float], allowed: str) -> Callable[[Any], tuple[float, ...]]:
     def check(value: Any) -> tuple[float, ...]:
         try:
-            numbers = tuple(each(number) for number in _items(value))
+            numbers = tuple(each(number) for number in items(value))
         except ValueError:
             numbers = ()
         if len(numbers) != count:
@@ -125,77 +112,22 @@ def _numbers(count: int, each: Callable[[Any], float], allowed: str) -> Callable
     return check
 
 
-def _items(value: Any) -> Iterable[Any]:
+def items(value: Any) -> Iterable[Any]:
+    """What a list holds; raises ValueError for anything else."""
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
         raise ValueError(f"found {shown(value)}, allowed: a list")
     return value
 
 
-_corner = _numbers(2, _number, "corners [x, z], metres")
-
-
-def _corners(value: Any) -> tuple[Point, ...]:
-    entries = tuple(_items(value))
-    if len(entries) > MAX_CORNERS:
-        raise ValueError(f"{len(entries)} corners, allowed: {MAX_CORNERS}")
-    corners = tuple((x, z) for x, z in (_corner(corner) for corner in entries))
-    from shapely import Polygon, is_valid_reason
-
-    reason = is_valid_reason(Polygon(corners)) if len(corners) > 3 else "Valid Geometry"
-    flat = len(corners) < 3 or abs(signed_area(corners)) < 1e-6
-    if flat and not reason.startswith("Self-intersection"):
-        raise ValueError(f"{len(corners)} corners that enclose no area, allowed: at least three around the floor")
-    if reason != "Valid Geometry":
-        text = re.sub(r"-?\d+(\.\d+)?", lambda number: f"{float(number[0]):.2f}", reason)
-        raise ValueError(
-            f"{text.replace('[', ' at (').replace(']', ')')}, allowed: an outline that does not cross itself"
-        )
-    return corners
-
-
 def _openings(value: Any) -> tuple[Opening, ...]:
     found = []
-    for entry in _items(value):
+    for entry in items(value):
         if not isinstance(entry, Opening | Mapping):
             raise ValueError(f"found {shown(entry)}, allowed: an opening with name, kind, edge, offset, width, height")
         opening = entry if isinstance(entry, Opening) else opening_from_json(entry)
         checked_identifier(opening.name)
         found.append(opening)
     return tuple(found)
-
-
-def _attributes(value: Any) -> dict[str, Any]:
-    if not isinstance(value, Mapping):
-        raise ValueError(f"found {shown(value)}, allowed: names with a text, a number or true/false each")
-    return {checked_identifier(key): _scalar(key, entry) for key, entry in value.items()}
-
-
-def _scalar(key: str, value: Any) -> bool | int | float | str:
-    if isinstance(value, str):
-        try:
-            return _storable(value)
-        except ValueError as error:
-            raise ValueError(f"{key} is {error}") from None
-    if isinstance(value, int) and -(2**63) <= value < 2**63:  # bool is an int and stays one
-        return value
-    if isinstance(value, float) and math.isfinite(value):
-        return value
-    raise ValueError(f"{key} is {shown(value)}, allowed: a text, true, false or a finite number, integers below 2^63")
-
-
-def _place(value: Any) -> str:
-    single = [row.name for row in vocabulary().placements if not row.others]
-    word = vocabulary().placement(value).name if isinstance(value, str) else ""
-    if word not in single:
-        raise ValueError(f"found {shown(value)}, allowed: {', '.join(single)}")
-    return word
-
-
-def _two_names(value: Any) -> tuple[str, ...]:
-    names = tuple(_items(value))
-    if len(names) != 2 or names[0] == names[1]:
-        raise ValueError(f"found {shown(value)}, allowed: the names of two other objects")
-    return tuple(map(checked_identifier, names))
 
 
 def _flag(value: Any) -> bool:
@@ -235,34 +167,26 @@ RoomStyleWord: TypeAlias = Annotated[str | None, _optional(_style[0]), _style[1]
 _shapes, _resident = map(_one_of, (SHAPES, RESIDENTS))
 Shapes: TypeAlias = Annotated[str | None, _shapes[0], _shapes[1]]
 Resident: TypeAlias = Annotated[str | None, _resident[0], _resident[1]]
-Place: TypeAlias = Annotated[
-    str | None,
-    _optional(_place),
-    WithJsonSchema(
-        {"anyOf": [{"enum": [row.name for row in vocabulary().placements if not row.others]}, {"type": "null"}]}
-    ),
-]
-Two: TypeAlias = Annotated[tuple[str, str] | None, _optional(_two_names)]
+_places = {"enum": [row.name for row in vocabulary().placements if not row.others]}
+Place: TypeAlias = Annotated[str | None, _optional(place), WithJsonSchema({"anyOf": [_places, {"type": "null"}]})]
+Two: TypeAlias = Annotated[tuple[str, str] | None, _optional(two_names)]
 Title: TypeAlias = Annotated[str | None, _optional(title)]
 AssetName: TypeAlias = Annotated[str | None, _optional(_text)]
 Size: TypeAlias = Annotated[
-    Vector | None, _optional(_numbers(3, _positive, "three positive numbers [x, y, z], metres"))
+    Vector | None, _optional(numbers_of(3, _positive, "three positive numbers [x, y, z], metres"))
 ]
-Position: TypeAlias = Annotated[Vector | None, _optional(_numbers(3, _number, "three numbers [x, y, z], metres"))]
-Angle: TypeAlias = Annotated[
-    float | None,
-    _optional(angle),
-    WithJsonSchema(
-        {"anyOf": [{"type": "number"}, {"type": "string", "description": "such as 90 deg"}, {"type": "null"}]}
-    ),
-]
+Position: TypeAlias = Annotated[Vector | None, _optional(numbers_of(3, finite, "three numbers [x, y, z], metres"))]
+_angles = [{"type": "number"}, {"type": "string", "description": "such as 90 deg"}, {"type": "null"}]
+Angle: TypeAlias = Annotated[float | None, _optional(angle), WithJsonSchema({"anyOf": _angles})]
 Confidence: TypeAlias = Annotated[float, BeforeValidator(_share), Field(ge=0, le=1)]
-Attributes: TypeAlias = Annotated[dict[str, Scalar], BeforeValidator(_attributes)]
+Attributes: TypeAlias = Annotated[
+    dict[str, Scalar], BeforeValidator(lambda value: {} if value == {} else attributes(value))
+]
 Flag: TypeAlias = Annotated[bool, BeforeValidator(_flag)]
-Extents: TypeAlias = Annotated[Point | None, _optional(_numbers(2, _positive, "two positive numbers [x, z], metres"))]
-Corners: TypeAlias = Annotated[tuple[Point, ...] | None, _optional(_corners)]
+Extents: TypeAlias = Annotated[Point | None, _optional(numbers_of(2, _positive, "two positive numbers [x, z], metres"))]
+Corners: TypeAlias = Annotated[tuple[Point, ...] | None, _optional(corners)]
 Thicknesses: TypeAlias = Annotated[
-    tuple[float, ...], BeforeValidator(lambda value: tuple(_positive(each) for each in _items(value)))
+    tuple[float, ...], BeforeValidator(lambda value: tuple(_positive(each) for each in items(value)))
 ]
 Openings: TypeAlias = Annotated[tuple[Opening, ...], BeforeValidator(_openings)]
 Height: TypeAlias = Annotated[float | None, _optional(_positive)]

@@ -44,13 +44,8 @@ def with_floor(graph: SceneGraph, seed: int) -> SceneGraph:
     aside = sum(predicate in ("left", "right") for predicate in predicates)
     ahead = sum(predicate in ("front", "behind") for predicate in predicates)
     furniture = [node.category for node in graph.nodes], [node.size for node in graph.nodes]
-    extents = floor_extents(
-        graph.room.type,
-        *furniture,
-        _generator(seed, "floor"),
-        along_x=(1 + ahead) / (2 + ahead + aside),
-        openings=graph.room.openings,
-    )
+    share, rng = (1 + ahead) / (2 + ahead + aside), _generator(seed, "floor")
+    extents = floor_extents(graph.room.type, *furniture, rng, along_x=share, openings=graph.room.openings)
     cut = None
     if not graph.room.openings:
         cut = floor_outline(graph.room.type, extents, longest_side(*furniture), _generator(seed, "outline"))

@@ -1,4 +1,4 @@
-"""A room built up again: pieces taken out and put in one after the other, seats at their tables anew."""
+"""A room built up again: pieces taken out and put in one after the other, seats anew, storage along its walls."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 
 from echomodel.late import linear_sum_assignment
 from echomodel.objective import Plan
-from echousd.place.geometry import depths
-from echousd.place.proposals import out_of, slots_at
-from echousd.place.search import FARTHEST, LIKED, Search, State
+from echousd.place.geometry import depths, gaps
+from echousd.place.proposals import along_walls, out_of, slots_at
+from echousd.place.search import DEEP, FARTHEST, GRAIN, HIT, LIKED, NEXT, Search, State
 from echousd.place.seats import seatings
 
 
@@ -120,3 +120,35 @@ def part_of(room: Plan, there: np.ndarray) -> Plan:
         slot_role=tuple(room.slot_role[k] for k in keep.tolist()),
     )  # fmt: skip
     return out
+
+
+def with_along(
+    search: Search,
+    state: State,
+    there: np.ndarray,
+    i: int,
+    group: list[int],
+    rows: np.ndarray,
+    along: list[tuple[int, int]],
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """As `carried`, and storage `along` walls where it is near whom it is told to, and runs into the least."""
+    problem, met = search.problem, [m for m in group if search.problem.standing(m)]
+    position, yaw = search.carried(state, i, group, rows)
+    for k, at in along:
+        walls = np.array(along_walls(problem, k, 0.0)).reshape(-1, 4)
+        if not len(walls):  # it is longer than each
+            continue
+        cost = search.hits(state, there, k, [*group, *(other for other, _ in along)], walls, [k])
+        here = np.insert(walls[:, :2], 1, 0.0, 1)
+        for m in met:
+            gap = gaps(problem.size[m], position[:, None, m], yaw[:, None, m], problem.size[k], here, walls[:, 2])
+            cost = cost + HIT * (gap < -0.01) + DEEP * np.maximum(-gap, 0.0) + np.maximum(gap, 0.0) * (m == at)
+        next_to = np.argsort(np.round(cost * GRAIN), 1, kind="stable")[:, :NEXT]
+        count, where = next_to.shape[1], walls[next_to]
+        then = State(position.repeat(count, 0), yaw.repeat(count, 0), state.taste)
+        cost = np.take_along_axis(cost, next_to, 1)
+        cost += search.broken(then, there, k, where.reshape(-1, 4), []).reshape(cost.shape)
+        best = where[np.arange(len(where)), np.round(cost * GRAIN).argmin(1)]
+        position[:, k, ::2], yaw[:, k] = best[:, :2], best[:, 2]
+        met.append(k)
+    return position, yaw

@@ -129,7 +129,7 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
         stated_of_room(relations, room, float(luck.uniform(*STATED)), seed=int(luck.integers(2**31)))
         for relations, room in zip(labels, drawn, strict=True)
     ]
-    starts = [[Boxes.from_room(room)] for room in drawn]
+    starts = [[room.boxes()] for room in drawn]
     if plan.drafts and drawn:
         for more, drafts in zip(starts, _drafts(plan, drawn, stated, number), strict=True):
             more += drafts
@@ -159,7 +159,7 @@ def _drafts(plan: ExamplesPlan, rooms: list[RoomBoxes], stated: list[np.ndarray]
     """Boxes that the network draws of some rooms from noise, `plan.drafts` of each."""
     model, counts = load_model(plan.weights), [len(room) for room in rooms]
     labelled = [replace(room, relations=triplets) for room, triplets in zip(rooms, stated, strict=True)]
-    graph = GraphBatch.pack([GraphBatch.from_room(room) for room in labelled])
+    graph = GraphBatch.pack([room.graph() for room in labelled])
     out: list[list[Boxes]] = [[] for _ in rooms]
     for draft in range(plan.drafts):
         generator = torch.Generator().manual_seed(plan.seed * 1_000_003 + number * 101 + draft)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.late import Late
+from echomodel.late import lates
 from echomodel.objective.sizes import places_of
 from echomodel.objective.support import FREE, ON_CEILING
 from echomodel.vocabulary import vocabulary
@@ -16,7 +15,7 @@ from echousd.place.geometry import depth_inside
 from echousd.place.problem import Problem
 from echousd.place.slots import HALF_PI, INNER, SEATS, STANDS
 
-in_view, sides = Late(f"{SEATS}:in_view"), Late(f"{SEATS}:sides")
+in_view, midway, sides = lates(SEATS, "in_view", "midway", "sides")
 STEP = 0.2  # metres between two places at a wall
 GRID, PLACES = 0.35, 1000  # metres between two places in the open; in a hall so many, farther apart
 SLIDES = (0.08, 0.2, 0.45, 0.8)  # metres by which a piece is moved along its width and its depth
@@ -181,7 +180,7 @@ def _as_stated(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int) 
             rows += along_walls(problem, i, 0.0) + _corners(problem, i, 0.0)
             rows += _corners(problem, i, 0.0, across=True) if problem.kinds[i].front else []
         elif one.subject == i:
-            rows += _in_the_open(problem, i, 0.2) + _midway(position, yaw, one.others)
+            rows += _in_the_open(problem, i, 0.2) + midway(position, yaw, one.others)
     return rows
 
 
@@ -196,19 +195,6 @@ def twins(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int) -> li
             slots = [(side * apart, back, 0.0, 0.0) for side in (-1.0, 1.0)]
             rows += [out_of(position[other], float(yaw[other]), slot) for slot in slots]
     return rows
-
-
-def _midway(position: np.ndarray, yaw: np.ndarray, others: Sequence[int]) -> list[Row]:
-    """On the line between the centres of two others and a little beside it, turned as either of them."""
-    at, turn = position[list(others)][:, [0, 2]], yaw[list(others)]
-    way = at[1] - at[0]
-    aside = np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-9)
-    return [
-        (*(at[0] + share * way + lateral * aside).tolist(), float(heading), 0.05 + 0.2 * abs(lateral))
-        for share in (0.3, 0.4, 0.5, 0.6, 0.7)
-        for lateral in (0.0, -0.3, 0.3, -0.6, 0.6)
-        for heading in turn
-    ]
 
 
 def _squared(problem: Problem, i: int) -> float:

@@ -23,12 +23,14 @@ from echomodel.objective.table import COST, costs_of
 from echomodel.rules import margins
 from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
-from echousd.place.geometry import beyond, depths, gaps
+from echousd.place.geometry import beyond, depths
 from echousd.place.problem import Problem
-from echousd.place.proposals import Row, along_walls, aside, height_of, out_of, out_of_habit, proposals, slots_at, twins
+from echousd.place.proposals import Row, aside, height_of, out_of, out_of_habit, proposals, slots_at, twins
 from echousd.place.solver import PlaceConfig
 
-involved, part_of, rebuilt, reseated = lates("echousd.place.building", "involved", "part_of", "rebuilt", "reseated")
+involved, part_of, rebuilt, reseated, with_along = lates(
+    "echousd.place.building", "involved", "part_of", "rebuilt", "reseated", "with_along"
+)
 
 JUDGED = 48  # poses that are judged at once
 MANY = 12  # pieces from which on a room is built up, one piece after the other
@@ -232,7 +234,7 @@ class Search:
             tastes.append(taste)
         along = [(k, at) for k, at in self.alongside[i] if there[k] and k not in group]
         if along:
-            states.append(self._along(state, there, i, group, rows, along))
+            states.append(with_along(self, state, there, i, group, rows, along))
             tastes.append(taste)
         mirrored = self._mirrored(state, i, group)
         if mirrored is not None:  # who attends it changes sides
@@ -341,31 +343,6 @@ class Search:
             self._carry(position, yaw, state, k, [k, *others], at)
         return position, yaw
 
-    def _along(
-        self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray, along: list[tuple[int, int]]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """As `carried`, and storage `along` walls where it is near whom it is told to, and runs into the least."""
-        problem, met = self.problem, [m for m in group if self.problem.standing(m)]
-        position, yaw = self.carried(state, i, group, rows)
-        for k, at in along:
-            walls = np.array(along_walls(problem, k, 0.0)).reshape(-1, 4)
-            if not len(walls):  # it is longer than each
-                continue
-            cost = self._hits(state, there, k, [*group, *(other for other, _ in along)], walls, [k])
-            here = np.insert(walls[:, :2], 1, 0.0, 1)
-            for m in met:
-                gap = gaps(problem.size[m], position[:, None, m], yaw[:, None, m], problem.size[k], here, walls[:, 2])
-                cost = cost + HIT * (gap < -0.01) + DEEP * np.maximum(-gap, 0.0) + np.maximum(gap, 0.0) * (m == at)
-            next_to = np.argsort(np.round(cost * GRAIN), 1, kind="stable")[:, :NEXT]
-            count, where = next_to.shape[1], walls[next_to]
-            then = State(position.repeat(count, 0), yaw.repeat(count, 0), state.taste)
-            cost = np.take_along_axis(cost, next_to, 1)
-            cost += self.broken(then, there, k, where.reshape(-1, 4), []).reshape(cost.shape)
-            best = where[np.arange(len(where)), np.round(cost * GRAIN).argmin(1)]
-            position[:, k, ::2], yaw[:, k] = best[:, :2], best[:, 2]
-            met.append(k)
-        return position, yaw
-
     def _carry(
         self, position: np.ndarray, yaw: np.ndarray, state: State, i: int, group: list[int], rows: np.ndarray
     ) -> None:
@@ -385,7 +362,7 @@ class Search:
         """(k,) int: the poses that run into the least, leave the floor least and break the fewest relations."""
         keep, half = np.arange(len(rows)), JUDGED // 2
         if len(rows) > 2 * JUDGED:  # what is lost for where the box itself stands is not looked at with its group
-            alone = self._hits(state, there, i, group, rows, [i])
+            alone = self.hits(state, there, i, group, rows, [i])
             first = np.argsort(alone + taste, kind="stable")[:JUDGED]
             most = np.sort(self._unlikely(state, there, i, group, rows[first]) + taste[first])[half - 1]
             keep = np.flatnonzero((alone < HIT) | (alone + taste <= most + 1 / GRAIN))
@@ -402,7 +379,7 @@ class Search:
     def _unlikely(self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray) -> np.ndarray:
         """(K,) float: what a box with its group runs into, leaves of the floor and breaks of relations at K poses."""
         along = [*group, *self.screens[i], *(k for k, _ in self.alongside[i])]  # which may go to walls
-        return self._hits(state, there, i, group, rows, group) + self.broken(state, there, i, rows, along)
+        return self.hits(state, there, i, group, rows, group) + self.broken(state, there, i, rows, along)
 
     def broken(self, state: State, there: np.ndarray, i: int, rows: np.ndarray, along: list[int]) -> np.ndarray:
         """(K,) float: what a box at K poses breaks of its relations to those who do not go along with it."""
@@ -415,7 +392,7 @@ class Search:
         margin = self.margins_at(state, i, at, rows[:, 2], edges)
         return np.asarray(MISSED * (np.maximum(-margin, 0.0) + (margin < 0)).sum(1))
 
-    def _hits(
+    def hits(
         self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray, which: list[int]
     ) -> np.ndarray:
         """(K,) float: what some boxes of a group run into and leave of the floor where one of it is at K poses."""

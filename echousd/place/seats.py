@@ -228,3 +228,16 @@ def foot(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahea
         for side in (-1.0, 1.0):
             out.append((side * (anchor[0] / 2 + own[2] / 2 + 0.3), anchor[2] / 2 + 0.6, -side * HALF_PI, 0.4))
     return out
+
+
+def midway(position: np.ndarray, yaw: np.ndarray, others: Sequence[int]) -> list[Row]:
+    """On the line between the centres of two others and a little beside it, turned as either of them."""
+    at, turn = position[list(others)][:, [0, 2]], yaw[list(others)]
+    way = at[1] - at[0]
+    aside = np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-9)
+    return [
+        (*(at[0] + share * way + lateral * aside).tolist(), float(heading), 0.05 + 0.2 * abs(lateral))
+        for share in (0.3, 0.4, 0.5, 0.6, 0.7)
+        for lateral in (0.0, -0.3, 0.3, -0.6, 0.6)
+        for heading in turn
+    ]

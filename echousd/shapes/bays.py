@@ -1,4 +1,4 @@
-"""What the shell of few rooms has: beams below the ceiling, and a window that stands out before its wall."""
+"""What the shell of few rooms has: beams below the ceiling, a window that stands out, doors of glass or that slide."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from echomodel.openings import Opening, zone
+from echomodel.openings import SLID, Opening, zone
 from echomodel.triangles import Mesh, joined
-from echousd.shapes.fittings import WALL, upright, window_frame, window_glass
+from echousd.shapes.fittings import TRACK, WALL, board, leaf_of, lights_of, upright, window_frame, window_glass
 from echousd.shapes.walls import BEAM, BETWEEN, ShellPart, ShellPiece
 from echousd.stage.paths import piece_name
 
@@ -62,3 +62,15 @@ def bay_window(opening: Opening, kind: str, wall: float = WALL) -> tuple[Mesh, l
     below = [upright(over, -0.1, low), upright(over, top, top + 0.12)]
     within = upright(np.array([(start, 0.0), *corners, (end, 0.0)]), low, low + 0.02)
     return joined(frames), panes, within, joined(below)
+
+
+def door_glass(opening: Opening, wall: float = WALL) -> Mesh:
+    """The pane of a glazed leaf."""
+    start, end, low, top, (near, far) = leaf_of(opening, wall)
+    return board(*lights_of(start, end, low, top), ((near + far) / 2 - 0.003, (near + far) / 2 + 0.003))
+
+
+def door_track(opening: Opening, way: float) -> Mesh:
+    """What a leaf slides below, as long as its `way` (`slid`)."""
+    start, end, _, top, _ = leaf_of(opening, WALL)
+    return board((start + min(way, 0.0), end + max(way, 0.0)), (top + 0.02, top + TRACK), (0.005 - SLID, 0.0))

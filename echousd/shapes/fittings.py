@@ -82,9 +82,9 @@ def door_frame(opening: Opening, wall: float = WALL, *, both: bool = True) -> Me
 
 def door_leaf(opening: Opening, wall: float = WALL, kind: str = "panelled") -> Mesh:
     """The closed leaf, flush with the side that it opens to or sliding before the wall; `kind` of `DOORS`."""
-    start, end, low, top, w = _leaf(opening, wall)
+    start, end, low, top, w = leaf_of(opening, wall)
     if kind == "glazed":
-        (left, right), (bottom, above) = _lights(start, end, low, top)
+        (left, right), (bottom, above) = lights_of(start, end, low, top)
         sides = [board((start, left), (low, top), w), board((right, end), (low, top), w)]
         return joined([*sides, board((left, right), (low, bottom), w), board((left, right), (above, top), w)])
     boards = [board((start, end), (low, top), w)]
@@ -103,13 +103,7 @@ def door_leaf(opening: Opening, wall: float = WALL, kind: str = "panelled") -> M
     return joined(boards)
 
 
-def door_glass(opening: Opening, wall: float = WALL) -> Mesh:
-    """The pane of a glazed leaf."""
-    start, end, low, top, (near, far) = _leaf(opening, wall)
-    return board(*_lights(start, end, low, top), ((near + far) / 2 - 0.003, (near + far) / 2 + 0.003))
-
-
-def _leaf(opening: Opening, wall: float) -> tuple[float, float, float, float, tuple[float, float]]:
+def leaf_of(opening: Opening, wall: float) -> tuple[float, float, float, float, tuple[float, float]]:
     """Where a leaf begins and ends along the wall, above the floor, and through the wall."""
     if opening.swing == "slide":
         return opening.offset - OVER, opening.end + OVER, 0.008, opening.height + OVER, (-SLID, LEAF - SLID)
@@ -118,7 +112,7 @@ def _leaf(opening: Opening, wall: float) -> tuple[float, float, float, float, tu
     return start, end, 0.008, opening.height - LINING - GAP, (w, w + LEAF)
 
 
-def _lights(start: float, end: float, low: float, top: float) -> tuple[tuple[float, float], tuple[float, float]]:
+def lights_of(start: float, end: float, low: float, top: float) -> tuple[tuple[float, float], tuple[float, float]]:
     """Where the glass of a leaf is, along the wall and upwards."""
     return (start + 0.11, end - 0.11), (low + 0.38 * (top - low), top - 0.12)
 
@@ -141,7 +135,7 @@ def door_handle(opening: Opening, hinge_first: bool, wall: float = WALL) -> Mesh
     metres.
     """
     if opening.swing == "slide":
-        start, end, _, top, (w, _) = _leaf(opening, wall)
+        start, end, _, top, (w, _) = leaf_of(opening, wall)
         hung = [(x, (top - 0.2, top + TRACK)) for x in (start + 0.15, end - 0.15)]
         every = [*hung, (end - 0.07 if hinge_first else start + 0.07, (0.9, 1.2))]
         return joined([board((x - 0.02, x + 0.02), v, (w - 0.008, w)) for x, v in every])
@@ -163,12 +157,6 @@ def slid(opening: Opening, hinge_first: bool, length: float) -> float:
         return 0.0
     beside = opening.offset if hinge_first else length - opening.end
     return max(min(opening.width, beside - OVER), 0.01) * (-1.0 if hinge_first else 1.0)
-
-
-def door_track(opening: Opening, way: float) -> Mesh:
-    """What a leaf slides below, as long as its `way` (`slid`)."""
-    start, end, _, top, _ = _leaf(opening, WALL)
-    return board((start + min(way, 0.0), end + max(way, 0.0)), (top + 0.02, top + TRACK), (0.005 - SLID, 0.0))
 
 
 def window_frame(opening: Opening, kind: str = "plain") -> Mesh:

@@ -9,14 +9,16 @@ import numpy as np
 import shapely
 
 from echomodel.furniture.solids import Joint
-from echomodel.late import Late
+from echomodel.late import lates
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal, signed_area
 from echomodel.triangles import Mesh, joined
 from echousd.shapes import fittings
 from echousd.shapes.fittings import NICHE, PLAIN, WALL, Millwork
 from echousd.stage.paths import piece_name
 
-bay_window, stands_out = (Late(f"echousd.shapes.bays:{name}") for name in ("bay_window", "stands_out"))
+bay_window, door_glass, door_track, stands_out = lates(
+    "echousd.shapes.bays", "bay_window", "door_glass", "door_track", "stands_out"
+)
 
 THICKNESS = 0.1  # metres, of floor and ceiling
 BEAM, BETWEEN = (0.13, 0.15), 1.0  # metres, width and depth of beams, and from one to the next
@@ -189,13 +191,13 @@ def _filled(
     way = fittings.slid(opening, hinge_first, length)
     leaf = made("leaf", "door_leaf", fittings.door_leaf(opening, deep, millwork.door))
     if millwork.door == "glazed":
-        leaf += made("pane", "glass", fittings.door_glass(opening, deep), solid=False)
+        leaf += made("pane", "glass", door_glass(opening, deep), solid=False)
     handle = made("handle", "rail", fittings.door_handle(opening, hinge_first, deep), solid=False)
     joint = _joint(opening, frame, hinge_first, deep, way)
     hinge = ShellPart(piece_name(name, "hinge"), "", (*leaf, *handle), joint=joint)
     frames = made("frame", "trim", fittings.door_frame(opening, deep, both=both))
     switch = made("switch", "trim", fittings.light_switch(opening, hinge_first, length), solid=False)
-    track = made("track", "rail", fittings.door_track(opening, way) if way else None)
+    track = made("track", "rail", door_track(opening, way) if way else None)
     return ShellPart(name, "door", (*frames, *switch, *track), (hinge,))
 
 

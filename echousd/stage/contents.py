@@ -9,7 +9,7 @@ from functools import cached_property, partial
 import numpy as np
 from pxr import Kind, Sdf, Usd, UsdGeom
 
-from echomodel.boxes2d import upright_box
+from echomodel.boxes2d import seen, turned
 from echomodel.triangles import Mesh, bounds_of, connected_pieces, joined, spans_of
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import LABELS
@@ -246,3 +246,20 @@ def surface_of(
             pieces.append(Mesh(vertices @ world[:3, :3].T + world[:3, 3], triangles))
     whole = joined(pieces)
     return whole.vertices, whole.faces
+
+
+def upright_box(points: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Size (3,), bottom centre (3,) and yaw of the box that stands around points (n, 3), +Y up, as their own axes head.
+
+    `own`: (3, 3) float, column vectors, turns these axes.
+    """
+    front, width = own[:, 2], own[:, 0]
+    # The front is horizontal in our rooms; in a frame whose up is +Z it is not, then the width tells the heading.
+    level = np.hypot(front[0], front[2]) > np.hypot(width[0], width[2]) * 1e-3
+    yaw = float(np.arctan2(front[0], front[2])) if level else float(np.arctan2(-width[2], width[0]))
+    ahead = points.copy()
+    ahead[:, [0, 2]] = seen(points[:, [0, 2]], yaw)
+    low, high = ahead.min(0), ahead.max(0)
+    position = low.copy()
+    position[[0, 2]] = turned((low + high)[[0, 2]] / 2, yaw)
+    return high - low, position, yaw

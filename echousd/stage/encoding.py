@@ -9,7 +9,6 @@ from pxr import Sdf, Vt
 
 from echomodel.openings import Opening
 from echousd.graph import Node, RoomSpec
-from echousd.graph.nodes import SmallNode
 from echousd.naming import free_name
 
 GRAPH_TYPE = "EchoSceneGraph"
@@ -123,12 +122,6 @@ def node_values(node: Node) -> dict[str, Any]:
     values: dict[str, Any] = {CATEGORY: node.category, LABELS: Vt.TokenArray([node.obstacle or node.category])}
     free = {FREE + key: value for key, value in node.attributes.items()}
     return values | values_of(node, NODE_FIELDS) | free
-
-
-def small_values(node: SmallNode) -> dict[str, Any]:
-    """The authored properties of a small thing that is a node, in USD's types."""
-    values: dict[str, Any] = {CATEGORY: node.category, LABELS: Vt.TokenArray([node.category]), SHAPES: DRESSING}
-    return values | values_of(node, NODE_FIELDS)
 
 
 def value_type(name: str, value: Any) -> Sdf.ValueTypeName:

@@ -12,11 +12,12 @@ from pxr import Sdf, Usd, UsdGeom
 
 from echomodel.late import lates
 from echousd.stage import values
-from echousd.stage.encoding import StageError
 
 MAX_INSTANCES = 50_000  # of one instancer
 SOLIDS = ("Cube", "Sphere", "Cylinder", "Cone", "Capsule", "Plane")
-refined, smooth_normals, solid = lates("echousd.stage.subdivision", "refined", "smooth_normals", "solid")
+instances, refined, smooth_normals, solid = lates(
+    "echousd.stage.subdivision", "instances", "refined", "smooth_normals", "solid"
+)
 
 
 class SkippedForms(UserWarning):
@@ -67,7 +68,7 @@ def forms(
         elif prim.IsA(UsdGeom.PointInstancer):
             prims.PruneChildren()  # prototypes are seen where they are placed
             if shown(prim):
-                yield from _instances(UsdGeom.PointInstancer(prim), cache)
+                yield from instances(UsdGeom.PointInstancer(prim), cache)
         elif prim.IsA(UsdGeom.Boundable) and prim.IsA(UsdGeom.Gprim) and shown(prim):
             if prim.IsA(UsdGeom.Mesh) or prim.GetTypeName() in SOLIDS:
                 yield Form(prim, str(prim.GetPath()), values.matrix(cache.GetLocalToWorldTransform(prim), prim))
@@ -77,34 +78,6 @@ def forms(
     if skipped:
         listed = ", ".join(f"{count} {kind} (such as <{first[kind]}>)" for kind, count in skipped.items())
         warnings.warn(f"left out, as they have no polygons: {listed}", SkippedForms, stacklevel=2)
-
-
-def _instances(instancer: UsdGeom.PointInstancer, cache: UsdGeom.XformCache) -> Iterator[Form]:
-    prim = instancer.GetPrim()
-    which = values.array(instancer.GetProtoIndicesAttr(), whole=True)
-    if len(which) > MAX_INSTANCES:
-        raise StageError(f"<{prim.GetPath()}> places {len(which)} instances, allowed: {MAX_INSTANCES}")
-    prototypes = [prim.GetStage().GetPrimAtPath(path) for path in instancer.GetPrototypesRel().GetForwardedTargets()]
-    if len(which) and (which.min() < 0 or which.max() >= len(prototypes)):
-        raise StageError(
-            f"<{prim.GetPath()}>: protoIndices reach from {which.min()} to {which.max()}, "
-            f"allowed: 0 to {len(prototypes) - 1}"
-        )
-    how = UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
-    places = instancer.ComputeInstanceTransformsAtTime(values.NOW, values.NOW, *how) or []
-    seen = instancer.ComputeMaskAtTime(values.NOW) or [True] * len(places)
-    own = values.matrix(cache.GetLocalToWorldTransform(prim), prim)
-    known: dict[int, list[tuple[Form, np.ndarray]]] = {}
-    for number, place in enumerate(places):
-        kind = int(which[number])
-        if not seen[number] or not prototypes[kind]:
-            continue
-        if kind not in known:  # below the prototype, relative to it
-            base = np.linalg.inv(values.matrix(cache.GetLocalToWorldTransform(prototypes[kind]), prototypes[kind]))
-            known[kind] = [(form, base @ form.world) for form in forms(prototypes[kind], cache)]
-        for form, local in known[kind]:
-            world = own @ values.matrix(place, prim) @ local
-            yield Form(form.prim, f"{prim.GetPath()}[{number}]{form.path}", world, prim)
 
 
 @dataclass(frozen=True, eq=False)

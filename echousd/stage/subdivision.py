@@ -1,13 +1,16 @@
-"""Polygons of what has none of its own: subdivision surfaces, by Catmull and Clark's rules, and USD's solids."""
+"""Polygons of what has none of its own: subdivision surfaces, by Catmull and Clark's rules, USD's solids, instances."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pxr import Usd
+from pxr import Usd, UsdGeom
 
 from echousd.stage import values
+from echousd.stage.encoding import StageError
+from echousd.stage.forms import MAX_INSTANCES, Form, forms
 
 if TYPE_CHECKING:
     import trimesh
@@ -121,3 +124,32 @@ def solid(prim: Usd.Prim) -> trimesh.Trimesh:
     if turn is not None:
         mesh.apply_transform(np.block([[np.array(turn, float), np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]]))
     return mesh
+
+
+def instances(instancer: UsdGeom.PointInstancer, cache: UsdGeom.XformCache) -> Iterator[Form]:
+    """The forms below the prototypes of an instancer, wherever it places them; raises StageError."""
+    prim = instancer.GetPrim()
+    which = values.array(instancer.GetProtoIndicesAttr(), whole=True)
+    if len(which) > MAX_INSTANCES:
+        raise StageError(f"<{prim.GetPath()}> places {len(which)} instances, allowed: {MAX_INSTANCES}")
+    prototypes = [prim.GetStage().GetPrimAtPath(path) for path in instancer.GetPrototypesRel().GetForwardedTargets()]
+    if len(which) and (which.min() < 0 or which.max() >= len(prototypes)):
+        raise StageError(
+            f"<{prim.GetPath()}>: protoIndices reach from {which.min()} to {which.max()}, "
+            f"allowed: 0 to {len(prototypes) - 1}"
+        )
+    how = UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
+    places = instancer.ComputeInstanceTransformsAtTime(values.NOW, values.NOW, *how) or []
+    seen = instancer.ComputeMaskAtTime(values.NOW) or [True] * len(places)
+    own = values.matrix(cache.GetLocalToWorldTransform(prim), prim)
+    known: dict[int, list[tuple[Form, np.ndarray]]] = {}
+    for number, place in enumerate(places):
+        kind = int(which[number])
+        if not seen[number] or not prototypes[kind]:
+            continue
+        if kind not in known:  # below the prototype, relative to it
+            base = np.linalg.inv(values.matrix(cache.GetLocalToWorldTransform(prototypes[kind]), prototypes[kind]))
+            known[kind] = [(form, base @ form.world) for form in forms(prototypes[kind], cache)]
+        for form, local in known[kind]:
+            world = own @ values.matrix(place, prim) @ local
+            yield Form(form.prim, f"{prim.GetPath()}[{number}]{form.path}", world, prim)

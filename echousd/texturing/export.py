@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from pxr import Usd, UsdGeom
 
-from echomodel.boxes2d import upright, upright_box
+from echomodel.boxes2d import upright
 from echomodel.files import telling
 from echousd.draw.surfaces import Painted, Surfaces, read_surfaces
-from echousd.stage.contents import room_frame
+from echousd.stage.contents import room_frame, upright_box
 from echousd.stage.files import open_stage
 from echousd.stage.read import the_room
 from echousd.stage.showing import showing_layout

@@ -5,14 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from echomodel.arrays import Array, at_least, beside, cast, clipped, kit, on_device
-
-if TYPE_CHECKING:
-    from echomodel.roomboxes import RoomBoxes
 
 LARGEST = 10.0  # log metres, far beyond any furniture
 
@@ -53,13 +50,6 @@ class Boxes:
         """Boxes behind one another."""
         parts = ([getattr(each, name) for each in boxes] for name in ("size", "position", "yaw"))
         return cls(*(kit(part[0]).concat(part) for part in parts))
-
-    @classmethod
-    def from_room(cls, room: RoomBoxes) -> Boxes:
-        """The boxes of a room as tensors, moved so that the centre of its floor's bounding box is the origin."""
-        position = np.asarray(room.position, np.float32).reshape(-1, 3) - room.centre.astype(np.float32)
-        size, yaw = np.asarray(room.size, np.float32).reshape(-1, 3), np.asarray(room.yaw, np.float32).reshape(-1)
-        return cls(size, position, yaw).to("cpu")
 
     def to(self, device: Any) -> Boxes:
         """The same boxes as tensors on a device, or with None as arrays of numpy."""

@@ -55,23 +55,6 @@ def outline(half: Array, yaw: Array, places: Array = CORNERS) -> Array:
     return turned(half[..., None, :] * cast(places, half), yaw[..., None])
 
 
-def upright_box(points: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Size (3,), bottom centre (3,) and yaw of the box that stands around points (n, 3), +Y up, as their own axes head.
-
-    `own`: (3, 3) float, column vectors, turns these axes.
-    """
-    front, width = own[:, 2], own[:, 0]
-    # The front is horizontal in our rooms; in a frame whose up is +Z it is not, then the width tells the heading.
-    level = np.hypot(front[0], front[2]) > np.hypot(width[0], width[2]) * 1e-3
-    yaw = float(np.arctan2(front[0], front[2])) if level else float(np.arctan2(-width[2], width[0]))
-    ahead = points.copy()
-    ahead[:, [0, 2]] = seen(points[:, [0, 2]], yaw)
-    low, high = ahead.min(0), ahead.max(0)
-    position = low.copy()
-    position[[0, 2]] = turned((low + high)[[0, 2]] / 2, yaw)
-    return high - low, position, yaw
-
-
 def footprints(size: Array, position: Array, yaw: Array) -> Array:
     """(n, 4, 2): x and z of the corners of boxes in plan, in order around each; size, position (n, 3), metres."""
     return outline(size[:, ::2] / 2, yaw) + position[:, None, ::2]

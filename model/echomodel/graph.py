@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from echomodel.arrays import Array, cast, full, kit, on_device
 from echomodel.floors import area
 from echomodel.openings import Opening
-from echomodel.surroundings import ROW, centred, extents, opening_rows, padded, trimmed
+from echomodel.surroundings import ROW, centred, extents, opening_rows, padded
 from echomodel.vocabulary import vocabulary
-
-if TYPE_CHECKING:
-    from echomodel.roomboxes import RoomBoxes
 
 
 @dataclass(frozen=True)
@@ -113,19 +110,6 @@ class GraphBatch:
         ).to(device)  # fmt: skip
 
     @classmethod
-    def from_room(cls, room: RoomBoxes, *, triplets: Sequence[Sequence[int]] | Array | None = None) -> GraphBatch:
-        """The graph of a labelled room (`triplets` overrides its relations); raises `UnknownWord`."""
-        words = vocabulary()
-        relations = room.relations if triplets is None else triplets
-        return cls.single(
-            [words.category_id(word) for word in room.categories],
-            [] if relations is None else relations,
-            room_type=words.room_type_id(room.room_type),
-            floor=room.floor_polygon if len(room.floor_polygon) else None,
-            openings=room.openings, height=room.height,
-        )  # fmt: skip
-
-    @classmethod
     def pack(cls, graphs: Iterable[GraphBatch]) -> GraphBatch:
         """Put graphs behind one another as one disjoint graph; names survive when every graph has them."""
         graphs = list(graphs)
@@ -134,7 +118,7 @@ class GraphBatch:
         triplets, placements, scenes, nodes, count = [], [], [], 0, 0
         for graph in graphs:
             triplets.append(graph.triplets + cast([nodes, 0, nodes], graph.triplets))
-            placements.append(_shifted(graph.placements, nodes))
+            placements.append(shifted(graph.placements, nodes))
             scenes.append(graph.scene + count)
             nodes += graph.num_nodes
             count += graph.num_scenes
@@ -147,23 +131,6 @@ class GraphBatch:
             openings=padded([graph.openings for graph in graphs]), placements=xp.concat(placements),
             height=xp.concat([graph.height for graph in graphs]),
         )  # fmt: skip
-
-    def unpack(self) -> list[GraphBatch]:
-        """One graph per scene, the inverse of `pack`."""
-        owner, placed = self.scene[self.triplets[:, 0]], self.scene[self.placements[:, 0]]
-        out, start = [], 0
-        for number, count in enumerate(self.node_counts.tolist()):
-            nodes, room = slice(start, start + count), slice(number, number + 1)
-            triplets = self.triplets[owner == number] - cast([start, 0, start], self.triplets)
-            names = None if self.names is None else self.names[nodes]
-            graph = GraphBatch(
-                self.category[nodes], triplets, self.scene[nodes] * 0, self.room_type[room],
-                trimmed(self.floor[room]), names, _there(self.openings[room]),
-                _shifted(self.placements[placed == number], -start), self.height[room],
-            )  # fmt: skip
-            out.append(graph)
-            start += count
-        return out
 
     @property
     def num_nodes(self) -> int:
@@ -230,15 +197,10 @@ class GraphBatch:
                 raise ValueError(f"floor of scene {at} has its middle at {middle.tolist()} m, expected [0.0, 0.0]")
 
 
-def _shifted(placements: Array, nodes: int) -> Array:
+def shifted(placements: Array, nodes: int) -> Array:
     """Placements whose nodes are counted from elsewhere."""
     moved = placements + cast([nodes, 0, nodes, nodes], placements)
     return kit(moved).where(placements < 0, placements, moved)
-
-
-def _there(rows: Array) -> Array:
-    """The rows (1, O, ROW) of one scene without padding."""
-    return rows[:, : int(kit(rows).isfinite(rows[0, :, 0]).sum())]
 
 
 def within(what: str, values: Array, size: int) -> None:

@@ -6,9 +6,14 @@ asked to grow or shrink, each stands at the height of what carries it, and what 
 
 from __future__ import annotations
 
-from echomodel.arrays import Array, kit
+import math
+from collections.abc import Collection
+
+from echomodel.arrays import Array, full, kit
 from echomodel.boxes import Boxes, BoxScale
-from echomodel.objective import KINDS, Plan, missed
+from echomodel.objective import BY_EYE, KINDS, TERMS, Plan
+from echomodel.objective.faults import MOST
+from echomodel.objective.table import COST
 from echomodel.samplers import Predict
 from echomodel.standing import placed, standing
 
@@ -63,3 +68,20 @@ def mended(plan: Plan, boxes: Boxes, *, strength: float, rounds: int, fixed: Arr
         rate = strength * (1 - (1 - LEAST) * number / rounds)
         place = xp.where(start.fixed[:, None], place, place - rate * step)
     return placed(boxes, xp.stack([place[:, 0], height, place[:, 1]], 1), place[:, 2])
+
+
+def missed(plan: Plan, kinds: Collection[str] = BY_EYE, beyond: float = -math.inf) -> Array:
+    """() float, what the missed margins of the terms of some kinds cost, differentiable.
+
+    `beyond`: what is asked for beyond the slack of each term, in its unit; by default nothing, not even that.
+    """
+    total = full(plan.size, (), 0.0)
+    for term in TERMS:
+        seen = term.find(plan) if term.kind in kinds else None
+        if seen is None or not len(seen.who):
+            continue
+        miss = (max(term.slack + beyond, 0.0) - seen.margin).clip(0.0, MOST)
+        if term.kind in BY_EYE:
+            miss = miss * ~plan.fixed[seen.who]
+        total = total + COST[term.kind][1] * term.weight * miss.sum()
+    return total

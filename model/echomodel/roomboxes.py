@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from echomodel.arrays import Array
+from echomodel.boxes import Boxes
 from echomodel.files import write_text
+from echomodel.graph import GraphBatch
 from echomodel.openings import Opening, opening_from_json
 from echomodel.vocabulary import vocabulary
 
@@ -60,6 +63,24 @@ class RoomBoxes:
         """(3,) float, the middle of the bounding box of its floor, the origin without one."""
         corners = self.floor_polygon if len(self.floor_polygon) else np.zeros((1, 2))
         return np.insert((corners.max(0) + corners.min(0)) / 2, 1, 0.0)
+
+    def boxes(self) -> Boxes:
+        """The boxes as tensors, moved so that the centre of the floor's bounding box is the origin."""
+        position = np.asarray(self.position, np.float32).reshape(-1, 3) - self.centre.astype(np.float32)
+        size, yaw = np.asarray(self.size, np.float32).reshape(-1, 3), np.asarray(self.yaw, np.float32).reshape(-1)
+        return Boxes(size, position, yaw).to("cpu")
+
+    def graph(self, *, triplets: Sequence[Sequence[int]] | Array | None = None) -> GraphBatch:
+        """The graph of the labelled room (`triplets` overrides its relations); raises `UnknownWord`."""
+        words = vocabulary()
+        relations = self.relations if triplets is None else triplets
+        return GraphBatch.single(
+            [words.category_id(word) for word in self.categories],
+            [] if relations is None else relations,
+            room_type=words.room_type_id(self.room_type),
+            floor=self.floor_polygon if len(self.floor_polygon) else None,
+            openings=self.openings, height=self.height,
+        )  # fmt: skip
 
     @classmethod
     def from_json(cls, raw: dict) -> RoomBoxes:

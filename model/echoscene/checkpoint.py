@@ -355,16 +355,9 @@ def _unet(shapes: Shapes, prefix: str, gcn: str, code: str, time: str, condition
     else:
         context = _get(shapes, token, 2)[1]
         fields = {"context": context, "objects": context}
-    return UNetConfig(
-        channels=channels,
-        width=width,
-        mult=tuple(mult),
-        blocks=counts[0],
-        attention=tuple(sorted(attention, reverse=True)),
-        echo=echo,
-        conditioning=conditioning,
-        **fields,  # type: ignore[arg-type]
-    )
+    own = {"channels": channels, "width": width, "mult": tuple(mult), "blocks": counts[0], **fields}
+    attended = tuple(sorted(attention, reverse=True))
+    return UNetConfig(**own, attention=attended, echo=echo, conditioning=conditioning)  # type: ignore[arg-type]
 
 
 def _vqvae(shapes: Shapes) -> VQConfig:

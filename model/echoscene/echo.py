@@ -13,12 +13,13 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from echomodel.arrays import on_device
+from echomodel.arrays import Array, cast, kit, on_device
 from echomodel.boxes import Boxes
 from echomodel.files import raising
-from echomodel.graph import GraphBatch
+from echomodel.graph import GraphBatch, shifted
 from echomodel.protocols import GraphEdit, Sampling, touched_nodes
 from echomodel.randomness import SceneGenerators
+from echomodel.surroundings import trimmed
 from echomodel.text import TextEncoder, edge_text, encoder_named, node_text
 from echomodel.vocabulary import vocabulary
 from echoscene.checkpoint import load_released
@@ -154,7 +155,7 @@ class ReleasedEcho:
 
     def _scenes(self, graph: GraphBatch) -> tuple[list[SceneGraphTensors], Tensor]:
         """Each scene with its floor and `_scene_` nodes, and which nodes of all of them are objects, (M,) bool."""
-        labels, parts = self.labels(graph), graph.unpack()
+        labels, parts = self.labels(graph), unpacked(graph)
         scenes, start = [], 0
         for part in parts:
             scenes.append(self._scene(labels[start : start + part.num_nodes], part.category, part.triplets))
@@ -171,7 +172,7 @@ class ReleasedEcho:
     def _change(self, graph: GraphBatch, scenes: Sequence[SceneGraphTensors], edit: GraphEdit) -> GraphChange:
         """The edit in the model's own form: the graph before without the nodes that were added."""
         changes, start = [], 0
-        befores = in_published_words(replace(graph, triplets=edit.before)).unpack()
+        befores = unpacked(in_published_words(replace(graph, triplets=edit.before)))
         touched = touched_nodes(graph, edit) & ~edit.added
         labels = self.labels(graph)
         for before in befores:
@@ -344,3 +345,26 @@ def pack_changes(graphs: Sequence[SceneGraphTensors], changes: Sequence[GraphCha
         added=tuple(start + node for start, change in zip(old, changes, strict=False) for node in change.added),
         touched=tuple(start + node for start, change in zip(new, changes, strict=False) for node in change.touched),
     )
+
+
+def unpacked(packed: GraphBatch) -> list[GraphBatch]:
+    """One graph per scene, the inverse of `GraphBatch.pack`."""
+    owner, placed = packed.scene[packed.triplets[:, 0]], packed.scene[packed.placements[:, 0]]
+    out, start = [], 0
+    for number, count in enumerate(packed.node_counts.tolist()):
+        nodes, room = slice(start, start + count), slice(number, number + 1)
+        triplets = packed.triplets[owner == number] - cast([start, 0, start], packed.triplets)
+        names = None if packed.names is None else packed.names[nodes]
+        graph = GraphBatch(
+            packed.category[nodes], triplets, packed.scene[nodes] * 0, packed.room_type[room],
+            trimmed(packed.floor[room]), names, _there(packed.openings[room]),
+            shifted(packed.placements[placed == number], -start), packed.height[room],
+        )  # fmt: skip
+        out.append(graph)
+        start += count
+    return out
+
+
+def _there(rows: Array) -> Array:
+    """The rows (1, O, ROW) of one scene without padding."""
+    return rows[:, : int(kit(rows).isfinite(rows[0, :, 0]).sum())]

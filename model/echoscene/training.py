@@ -234,7 +234,7 @@ def _with_floor(room: RoomBoxes) -> Boxes:
     """A room's objects and its floor, a box without a height."""
     x, z = torch.as_tensor(room.floor_polygon.max(0) - room.floor_polygon.min(0), dtype=torch.float32).tolist()
     floor = Boxes(torch.tensor([[x, 0.0, z]]), torch.zeros(1, 3), torch.zeros(1))
-    return Boxes.cat([Boxes.from_room(room), floor])
+    return Boxes.cat([room.boxes(), floor])
 
 
 def opened_data(recipe: Recipe) -> tuple[RoomSet | PublishedRooms, ShapeSet | PublishedShapes]:

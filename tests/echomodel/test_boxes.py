@@ -60,7 +60,7 @@ def test_room_is_centred_on_its_floor() -> None:
         "r", "bedroom", np.array([[1, 2], [5, 2], [5, 8], [1, 8.0]]), 2.6, ("stool",),
         np.ones((1, 3)), np.array([[3.0, 0.5, 5.0]]), np.zeros(1),
     )  # fmt: skip
-    assert Boxes.from_room(room).position.tolist() == [[0.0, 0.5, 0.0]]
+    assert room.boxes().position.tolist() == [[0.0, 0.5, 0.0]]
 
 
 def test_bad_input_is_named() -> None:

@@ -11,12 +11,10 @@ import pytest
 import torch
 from second_device import SECOND, second_device
 
-from echomodel.boxes import Boxes
 from echomodel.compact.model import CompactModel
 from echomodel.config import CompactConfig, from_dict
 from echomodel.echo import EchoModel
 from echomodel.furniture.style import WIDTH
-from echomodel.graph import GraphBatch
 from echomodel.metrics import pointsets
 from echomodel.protocols import GraphEdit
 from echomodel.rooms.generator import generate_rooms
@@ -79,13 +77,13 @@ def on(device):
 def sampled(model: CompactModel, rooms, device) -> list[torch.Tensor]:
     """Boxes, shapes and descriptions of a room of which a piece is known, edited by one relation and one piece."""
     echo = EchoModel(copy.deepcopy(model).to(device))
-    graph = GraphBatch.from_room(rooms[0])
+    graph = rooms[0].graph()
     known = torch.arange(graph.num_nodes) == 1
     edit = GraphEdit(graph.triplets[1:], torch.arange(graph.num_nodes) == 2)
     edit = GraphEdit(edit.before[(edit.before[:, [0, 2]] != 2).all(1)], edit.added)
     told = {"edit": edit}
     boxes = echo.sample_layout(
-        graph, generator=torch.Generator().manual_seed(1), known=Boxes.from_room(rooms[0]), known_mask=known, **told
+        graph, generator=torch.Generator().manual_seed(1), known=rooms[0].boxes(), known_mask=known, **told
     )
     free = echo.sample_layout(graph, generator=torch.Generator().manual_seed(2))
     grids = echo.sample_shapes(graph, boxes, generator=torch.Generator().manual_seed(3), **told)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from echomodel.graph import GraphBatch
 from echomodel.roomboxes import RoomBoxes
+from echoscene.echo import unpacked
 
 
 @st.composite
@@ -44,8 +45,8 @@ def test_pack_unpack_is_lossless(singles: list[GraphBatch]) -> None:
     packed.check()
     assert packed.num_scenes == len(singles)
     assert packed.node_counts.tolist() == [g.num_nodes for g in singles]
-    assert all(equal(a, b) for a, b in zip(packed.unpack(), singles, strict=True))
-    assert equal(GraphBatch.pack(packed.unpack()), packed)
+    assert all(equal(a, b) for a, b in zip(unpacked(packed), singles, strict=True))
+    assert equal(GraphBatch.pack(unpacked(packed)), packed)
 
 
 def test_pack_of_packed_graphs_and_missing_names() -> None:
@@ -64,13 +65,13 @@ def test_room_becomes_a_graph() -> None:
         relations=np.array([[0, 1, 1]]),
     )  # fmt: skip
     with pytest.raises(ValueError, match="unknown category 'sofa_3x'"):
-        GraphBatch.from_room(RoomBoxes(**{**room.__dict__, "categories": ("sofa_3x", "bookcase")}))
+        RoomBoxes(**{**room.__dict__, "categories": ("sofa_3x", "bookcase")}).graph()
     room = RoomBoxes(**{**room.__dict__, "categories": ("couch", "bookcase")})
-    graph = GraphBatch.from_room(room)
+    graph = room.graph()
     assert graph.floor.tolist() == [[[-2.5, -1.5], [2.5, -1.5], [2.5, 1.5], [-2.5, 1.5]]]
     assert graph.room_type.tolist() == [1]
     assert graph.triplets.tolist() == [[0, 1, 1]]
-    assert GraphBatch.from_room(room, triplets=[]).triplets.shape == (0, 3)
+    assert room.graph(triplets=[]).triplets.shape == (0, 3)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from echomodel.data.sgfront import SGFront, write_sgfront
-from echomodel.graph import GraphBatch
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts
 from echomodel.vocabulary import vocabulary
@@ -44,7 +43,7 @@ def test_rooms_come_back(folder, rooms):
             told = {tuple(t) for t in room.relations.tolist()}
             assert told <= labels
             shares.append((len(told), len(labels)))
-            assert GraphBatch.from_room(room).num_nodes == len(room)
+            assert room.graph().num_nodes == len(room)
         kept, labelled = np.sum(shares, axis=0)
         assert 0.4 < kept / labelled < 0.6
 

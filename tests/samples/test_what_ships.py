@@ -77,8 +77,8 @@ def room_pieces(model, rooms, seed):
     words, out = [category.name for category in vocabulary().categories], []
     for room in rooms:
         relations = label_relations(room, rules="strict", drop=0.5, rng=rng)
-        graph = GraphBatch.from_room(room, triplets=torch.from_numpy(relations))
-        found = model.sample_furniture(graph, Boxes.from_room(room), generator=generator).float().cpu().numpy()
+        graph = room.graph(triplets=torch.from_numpy(relations))
+        found = model.sample_furniture(graph, room.boxes(), generator=generator).float().cpu().numpy()
         for number, vector, size in zip(graph.category.tolist(), found, room.size, strict=True):
             out.append(piece_scores(solids(words[number], *piece_of(vector), np.asarray(size)), np.asarray(size))[1])
     return out

@@ -79,14 +79,8 @@ def retrieved(
     size = np.asarray(request.boxes.size, float)
     with request.timer.stage("assets"):
         tones = np.array([linear(color) for color in HARMONIES[palette or palette_of_room(seed, graph.room.style)]])
-        chosen, missing = choose(
-            asked,
-            _asked(graph, wanted, size, request.styles),
-            seed,
-            kept=named.chosen,
-            nearness=nearness,
-            palette=tones,
-        )
+        pieces = _asked(graph, wanted, size, request.styles)
+        chosen, missing = choose(asked, pieces, seed, kept=named.chosen, nearness=nearness, palette=tones)
         files, sizes = dict(named.files), dict(named.sizes)
         for i in wanted:
             node = graph.nodes[i]

@@ -12,7 +12,6 @@ import numpy as np
 import shapely
 import torch
 
-from echomodel.boxes import Boxes
 from echomodel.boxes2d import footprints
 from echomodel.graph import GraphBatch
 from echomodel.metrics.statistics import Pair
@@ -55,7 +54,7 @@ class Task:
     @property
     def graph(self) -> GraphBatch:
         """What a network is asked."""
-        return GraphBatch.from_room(self.room, triplets=torch.from_numpy(self.stated))
+        return self.room.graph(triplets=torch.from_numpy(self.stated))
 
 
 def tasks_of(
@@ -105,7 +104,7 @@ def kept_relations(task: Task, room: RoomBoxes) -> dict[str, Pair]:
 
     `room`: its boxes as a system made them.
     """
-    verdict = verdicts(Boxes.from_room(room), torch.from_numpy(task.stated), rules=task.rules).numpy()
+    verdict = verdicts(room.boxes(), torch.from_numpy(task.stated), rules=task.rules).numpy()
     names = np.array([vocabulary().predicates[k].name for k in task.stated[:, 1]], dtype=object)
     chosen = {group: [names == word for word in words] for group, words in GROUPS.items()}
     chosen["all"] = [np.ones(len(verdict), bool)]

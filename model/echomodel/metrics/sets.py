@@ -13,7 +13,6 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import pdist, squareform
 from scipy.stats import entropy, ks_2samp
 
-from echomodel.boxes import Boxes
 from echomodel.compact.layout import measurable, seen_from, wall_features
 from echomodel.metrics.pointsets import compared
 from echomodel.metrics.statistics import Figure, spread
@@ -39,7 +38,7 @@ def object_features(room: RoomBoxes) -> np.ndarray:
         room, size=np.maximum(np.round(room.size, 2), 0.01), position=np.round(room.position, 2),
         yaw=np.radians(np.round(np.degrees(room.yaw)) % 360),
     )  # fmt: skip
-    boxes = measurable(Boxes.from_room(room))
+    boxes = measurable(room.boxes())
     floor = torch.from_numpy(centred(room.floor_polygon if len(room.floor_polygon) else None)).expand(len(room), -1, -1)
     sizes = [size_score(word, room.size[k : k + 1])[0] for k, word in enumerate(room.categories)]
     lift = torch.tanh(5 * boxes.position[:, 1:2])

@@ -5,16 +5,15 @@ From the door a robot of 0.2 m radius finds its way to every piece (as SceneEval
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from echomodel.arrays import Array, full, held, rows
+from echomodel.arrays import held, rows
 from echomodel.boxes2d import footprints
 from echomodel.objective.plan import CLEAR_HEIGHT, Plan
-from echomodel.objective.table import COST, TERMS
+from echomodel.objective.table import TERMS
 from echomodel.openings import inward_normal, segment
 
 ROBOT, SLACK = 0.2, 0.025  # metres, its radius, and how much narrower a way it squeezes through
@@ -141,20 +140,3 @@ def walk(plan: Plan) -> Ways | None:
     closing = obstacle & shapely.dwithin(walked, boxes, ROBOT) & shapely.dwithin(rest, boxes, ROBOT)
     share, parted = float(area[order[0]] / area.sum()), bool(led[order[1:]].any())
     return Ways(shapely.dwithin(walked, boxes, ROBOT + ARM), share, closing, parted)
-
-
-def missed(plan: Plan, kinds: Collection[str] = BY_EYE, beyond: float = -math.inf) -> Array:
-    """() float, what the missed margins of the terms of some kinds cost, differentiable.
-
-    `beyond`: what is asked for beyond the slack of each term, in its unit; by default nothing, not even that.
-    """
-    total = full(plan.size, (), 0.0)
-    for term in TERMS:
-        seen = term.find(plan) if term.kind in kinds else None
-        if seen is None or not len(seen.who):
-            continue
-        miss = (max(term.slack + beyond, 0.0) - seen.margin).clip(0.0, MOST)
-        if term.kind in BY_EYE:
-            miss = miss * ~plan.fixed[seen.who]
-        total = total + COST[term.kind][1] * term.weight * miss.sum()
-    return total

@@ -6,7 +6,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from echomodel.boxes import Boxes
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.geometry import BoxesLike
 from echomodel.vocabulary import vocabulary
@@ -71,4 +70,4 @@ def stated_relations(relations: Tensor, boxes: BoxesLike, per_object: float, gen
 def stated_of_room(relations: np.ndarray | Tensor, room: RoomBoxes, per_object: float, seed: int = 0) -> np.ndarray:
     """`stated_relations` of a room's boxes as (e, 3) int64 numpy; `seed` of the draws."""
     luck = torch.Generator().manual_seed(seed)
-    return np.asarray(stated_relations(torch.as_tensor(relations), Boxes.from_room(room), per_object, luck))
+    return np.asarray(stated_relations(torch.as_tensor(relations), room.boxes(), per_object, luck))

@@ -59,8 +59,8 @@ class PackedRooms:
     @classmethod
     def build(cls, rooms: Sequence[RoomBoxes], rules: int) -> PackedRooms:
         """Pack rooms whose `relations` are filled in; `rules` says by which rule set they were labelled."""
-        graphs = [GraphBatch.from_room(room) for room in rooms]
-        boxes = Boxes.cat([Boxes.from_room(room) for room in rooms])
+        graphs = [room.graph() for room in rooms]
+        boxes = Boxes.cat([room.boxes() for room in rooms])
         return cls(
             category=torch.cat([g.category for g in graphs]), size=boxes.size, position=boxes.position, yaw=boxes.yaw,
             style=torch.tensor([s for room in rooms for s in (room.styles or (-1,) * len(room))]),

@@ -40,7 +40,7 @@ def shuffled(seed=3):
 
 def rooms_of(model, rooms):
     """Boxes and descriptions of rooms, by the words that are spoken."""
-    graph = GraphBatch.pack([GraphBatch.from_room(room) for room in rooms])
+    graph = GraphBatch.pack([room.graph() for room in rooms])
     boxes = model.sample_layout(graph, generator=torch.Generator().manual_seed(1), steps=3)
     found = model.sample_furniture(graph, boxes, generator=torch.Generator().manual_seed(2), steps=3)
     return boxes.size, boxes.position, boxes.yaw, found
@@ -241,7 +241,7 @@ def test_a_room_set_names_its_words(tmp_path):
         for old, new in zip(before, (after.room(k) for k in range(4)), strict=True):
             assert (old.categories, old.room_type) == (new.categories, new.room_type)
             assert np.array_equal(old.relations, new.relations)
-        graph = GraphBatch.from_room(after.room(0))
+        graph = after.room(0).graph()
         assert [vocabulary().categories[k].name for k in graph.category.tolist()] == list(before[0].categories)
         assert vocabulary().room_types[int(graph.room_type[0])].name == before[0].room_type
 

@@ -11,7 +11,8 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.objective import faults_of, missed, plan_of
+from echomodel.guidance import missed
+from echomodel.objective import faults_of, plan_of
 from echomodel.rooms.generator import generate_rooms
 
 

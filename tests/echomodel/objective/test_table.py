@@ -11,7 +11,8 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.graph import Stated
-from echomodel.objective import KINDS, TERMS, faults_of, missed, plan_of
+from echomodel.guidance import missed
+from echomodel.objective import KINDS, TERMS, faults_of, plan_of
 from echomodel.objective.table import OfKind
 from echomodel.vocabulary import vocabulary
 

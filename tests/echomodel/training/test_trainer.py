@@ -284,7 +284,7 @@ def test_steps_and_seeds_draw_differently() -> None:
 def test_boxes_of_a_room_set_survive_packing(data: Path, packed: PackedRooms) -> None:
     rooms = RoomSet(data / "rooms")
     first = int((~rooms.held_out).nonzero()[0][0])
-    boxes = Boxes.from_room(rooms.room(first))
+    boxes = rooms.room(first).boxes()
     torch.testing.assert_close(packed.position[: len(boxes)], boxes.position)
 
 

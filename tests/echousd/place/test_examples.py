@@ -7,7 +7,6 @@ import csv
 import numpy as np
 import pytest
 
-from echomodel.boxes import Boxes
 from echomodel.data.roomset import pack_rooms
 from echomodel.objective import faults_of, plan_of
 from echomodel.rooms.generator import generate_rooms
@@ -78,7 +77,7 @@ def test_drafts_are_the_networks():
 
 def test_a_room_that_misses_something_is_left_out():
     room = generate_rooms(1, 5)[0]
-    start = Boxes.from_room(room)
+    start = room.boxes()
     assert examples._searched(room, np.zeros((0, 3), int), start) is not None
     contradiction = np.array([[0, 1, 1], [1, 1, 0]])  # each to the left of the other
     assert examples._searched(room, contradiction, start) is None

@@ -16,7 +16,7 @@ from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, margins
 from echomodel.vocabulary import vocabulary
-from echousd.place.building import expecting, involved
+from echousd.place.building import expecting, involved, with_along
 from echousd.place.placing import place_boxes
 from echousd.place.problem import problem_of
 from echousd.place.proposals import out_of_habit, proposals, slots_at
@@ -139,7 +139,7 @@ def test_a_table_and_the_sideboard_told_near_it_go_to_another_wall_together():
     for still in ({"turned": [1]}, {"fixed": [1]}):  # who has a stated heading or place does not go along
         assert searched(words, size, state.position, state.yaw, told, **still)[0].alongside == [[], [], []]
     rows = np.array([[0.0, 1.2, 0.0, 0.0], [1.6, -1.0, 0.0, 0.0]])
-    position, yaw = search._along(state, np.ones(3, bool), 0, [0], rows, search.alongside[0])
+    position, yaw = with_along(search, state, np.ones(3, bool), 0, [0], rows, search.alongside[0])
     for number in range(len(rows)):
         plan = search.problem.plan.at(position[number], yaw[number])
         margins = {term.name: term.find(plan).margin for term in TERMS if term.name in ("close_by", "apart", "at_wall")}
@@ -150,7 +150,7 @@ def test_a_table_and_the_sideboard_told_near_it_go_to_another_wall_together():
 def test_storage_that_is_longer_than_every_wall_stays():
     words, told = ["dining_table", "sideboard"], [(1, "close_by", 0)]
     search, state = searched(words, [(1.6, 0.75, 0.9), (5.5, 0.8, 0.4)], [(0, 0, 0), (0, 0, -1.8)], [0, 0], told)
-    position, _ = search._along(state, np.ones(2, bool), 0, [0], np.array([[0.0, 1.0, 0.0, 0.0]]), [(1, 0)])
+    position, _ = with_along(search, state, np.ones(2, bool), 0, [0], np.array([[0.0, 1.0, 0.0, 0.0]]), [(1, 0)])
     assert position[0, 1].tolist() == state.position[1].tolist()
 
 
