@@ -202,7 +202,8 @@ def _seen(world: World, origin: np.ndarray, way: np.ndarray, hit: Sequence[np.nd
     begin, towards = origin.take(missed, 1), way.take(missed, 1)
     glow[:, missed], through = outside(scenery, begin, towards)
     if world.view.inside:
-        hue = (world.white / world.white.mean()) ** THERE  # which the picture will take from it
+        light = world.white if world.white.any() else np.ones_like(world.white)  # where no lamp and no sky is
+        hue = (light / light.mean()) ** THERE  # which the picture will take from it
         glow *= np.float32(VIEW * scenery.lights.sky) * (scenery.lights.tint * hue)[:, None]
         past = np.flatnonzero(~through)
         glow[:, missed[past]] = next_room(scenery, world.white, begin.take(past, 1), towards.take(past, 1))

@@ -79,9 +79,11 @@ def test_a_third_branch_is_built_trained_saved_and_loaded(colours, tmp_path):
     settings = {"steps": 2, "save_every": 1, "validate_every": 1, "log_every": 1, "model": CONFIG}
     with pytest.raises(ValueError, match="stage 'colours' needs weights with latent"):
         open_run(Recipe(stage="colours", **settings), tmp_path / "run")
-    trainer = open_run(Recipe(stage="colours", start=(str(tmp_path / "latent.safetensors"),), **settings), tmp_path)
+    trainer = open_run(
+        Recipe(stage="colours", start=(str(tmp_path / "latent.safetensors"),), **settings), tmp_path / "out"
+    )
     assert trainer.run() == 2
-    model, _ = load_weights([tmp_path / "latent.safetensors", tmp_path / "weights.safetensors"])
+    model, _ = load_weights([tmp_path / "latent.safetensors", tmp_path / "out" / "weights.safetensors"])
     assert model.parts == ("latent", "colours")
     assert EchoModel(model).branches == {"colours"}
     assert torch.isfinite(model.colours(model.latent(GRAPH.category, pairs_of(GRAPH)))).all()
