@@ -123,12 +123,7 @@ def part_of(room: Plan, there: np.ndarray) -> Plan:
 
 
 def with_along(
-    search: Search,
-    state: State,
-    there: np.ndarray,
-    i: int,
-    group: list[int],
-    rows: np.ndarray,
+    search: Search, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray,
     along: list[tuple[int, int]],
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """As `carried`, and storage `along` walls where it is near whom it is told to, and runs into the least."""

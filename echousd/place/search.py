@@ -482,7 +482,8 @@ class Search:
         if not wrong and (uneasy := self.faults(state, UNEASY)[1]):
             after = self.swept(state, uneasy)
             cost, still = self.faults(after)
-            state, total = (after, cost) if not still and cost < total - GAIN else (state, total)
+            if not still and cost < total - GAIN:
+                state, total = after, cost
         return Arranged(state, total, self.judged, tuple(wrong))
 
     def _first(self) -> tuple[State, float, list[int]]:

@@ -83,11 +83,11 @@ def sofas_in_circle(plan: Plan) -> Found:
 def sofa_ahead(plan: Plan) -> Found:
     """What lies right before a sofa belongs to its group; an armchair looks at the back of no chair, one of a group at
     no table of another; behind a sofa one passes between it and those."""
-    loungers, xp = plan.of("sofa") | (plan.stands("company") & plan.of("seat")), plan.kit
+    seats, xp = plan.of("sofa") | (plan.stands("company") & plan.of("seat")), plan.kit
     sofas = plan.of("sofa") & plan.standing & ~plan.stands("company")
     chairs, grouped = plan.stands("at") & plan.of("seat") & plan.standing, plan.anchor >= 0
     others = plan.of("board", "seat", "storage", "bed", "sofa") & plan.standing & ~plan.stands("opposite")
-    i, j = plan.pairs(loungers & plan.standing, others, least=True)
+    i, j = plan.pairs(seats & plan.standing, others, least=True)
     met = (plan.group[i] != plan.group[j]) & (sofas[i] | chairs[j] | (grouped[i] & plan.dining[j]))
     i, j = i[met], j[met]
     needed = cast(xp.where(sofas, AHEAD, IN_VIEW), plan.size)
