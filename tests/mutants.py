@@ -46,7 +46,8 @@ GROUPS = {  # modules, and what tests them
                                         "echomodel/test_placement_rules.py", "echomodel/test_turned_relations.py"]),
     "graph": ("echousd/graph", ["echousd/graph"]),
     "stage": ("echousd/stage", ["echousd/stage"]),
-    "edit": ("echousd/make/edit.py", ["echousd/make/test_room_edit.py", "echousd/make/test_following.py"]),
+    "edit": ("echousd/make/edit.py echousd/make/furnishing.py",
+             ["echousd/make/test_room_edit.py", "echousd/make/test_following.py"]),
     "folder": ("echousd/folder", ["echousd/folder"]),
     "layers": ("echousd/layers", ["echousd/layers"]),
 }  # fmt: skip
@@ -345,7 +346,7 @@ def main() -> None:
     options = parser.parse_args()
     where, tests = GROUPS[options.group]
     tests = [f"tests/{test}" for test in options.tests or tests]
-    modules = [TOP / where] if where.endswith(".py") else sorted((TOP / where).glob("*.py"))
+    modules = [TOP / file for file in where.split()] if ".py" in where else sorted((TOP / where).glob("*.py"))
     places = [(path, n) for path in modules for n in range(len(list(changes(ast.parse(path.read_text())))))]
     chosen = random.Random(options.seed).sample(places, min(options.count, len(places)))
     if options.only:

@@ -57,8 +57,7 @@ def pictures_are_small() -> Iterator[None]:
 def rooms_are_made_of_few_drafts() -> Iterator[None]:
     """One draft a room, and its cameras are looked for at a dozen places."""
     with (
-        patch("echousd.make.pipeline.most_drafts", lambda model, objects: 1),
-        patch("echousd.make.edit.most_drafts", lambda model, objects: 1),
+        patch("echousd.make.furnishing.most_drafts", lambda model, objects: 1),
         patch.multiple("echousd.draw.views", **FEW),
     ):
         yield

@@ -6,9 +6,10 @@ What attends, stands on or hangs over what is put elsewhere goes along, and what
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -21,28 +22,21 @@ from echomodel.objective.support import ON_CEILING
 from echomodel.progress import StageListener, StageTimer
 from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.vocabulary import vocabulary
-from echousd.assets.reference import Vector
-from echousd.graph import Node, SceneGraph, consistency
+from echousd.graph import SceneGraph, consistency
 from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.floors import check_space
-from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
-from echousd.make.layouts import LayoutSearch, check_objects, model_of, most_drafts, room_floor, with_sizes
+from echousd.make.furnishing import Brief, box_fields, boxes_of, furnished, with_boxes
+from echousd.make.layouts import check_objects, model_of
 from echousd.make.reading import SavedRoom, read_room
 from echousd.make.verdicts import layout_outcome, warn_of_faults
-from echousd.naming import free_name
 from echousd.options import OF_NEW, Look, RoomOptions, takes_options
 from echousd.place.living import plan_to_live_in, unusual
 from echousd.place.search import LIT
 from echousd.room import LayoutOutcome, Provenance
-from echousd.shapes.looks import palette_of_room
-from echousd.shapes.sources.mixing import check_sources, default_source, mixed_shapes
-from echousd.shapes.sources.named import anchored, check_files, source_of, with_model_sizes
-from echousd.shapes.sources.retrieval import named_pieces, retrieved
-from echousd.shapes.sources.source import Retrieved, ShapeRequest
-from echousd.shapes.styles import asset_names, stated_styles, style_groups
-
-ROUNDS = 4  # times that boxes are placed: what is in the way of what was moved makes way, and what is in its way
+from echousd.shapes.sources.mixing import default_source
+from echousd.shapes.sources.named import anchored, check_files
+from echousd.shapes.styles import stated_styles
 
 
 @takes_options(OF_NEW)
@@ -74,111 +68,53 @@ def edit(
     timer = StageTimer(progress)
     with timer.stage("read"):
         saved = read_room(room)
-    manifest = saved.manifest
-    look = {name: manifest[name] for name in Look.model_fields}
-    asked = RoomOptions(**{**look, **changes})
-    wishes, shapes = partial(asked.wishes, outside), asked.shapes
+    manifest, beside = saved.manifest, Path(room).parent
+    asked = RoomOptions(**{name: manifest[name] for name in Look.model_fields} | changes)
+    wishes = partial(asked.wishes, outside)
     check_objects(graph, str(room))
-    beside = Path(room).parent
     graph = with_plan_of(anchored(graph, beside), saved.graph)
     fresh, moving = touched(anchored(saved.graph, beside), graph, saved.boxes)
     with consistency.faults_of(str(room)):
         crowded = check_space(graph) if fresh else ()
-    before = unusual(saved.graph)
-    odd = tuple(sentence for sentence in unusual(graph) if sentence not in before)
+    odd = [sentence for sentence in unusual(graph) if sentence not in unusual(saved.graph)]
     begun = [carried(saved.graph, graph, boxes) for boxes in saved.layouts]
+    there = tuple(box_fields(saved.graph.names, boxes, fresh) for boxes, _ in begun)
     rebuilt = graph.room.replaced(style=saved.graph.room.style) != saved.graph.room
     along = (movable(graph) if rebuilt else begun[0][1]) - moving
-    stated = _pinned(graph, saved.graph, begun[0][0], fresh, moving)
-    whole = all(None not in (node.size, node.position, node.yaw) for node in stated.nodes)
+    stated = with_boxes(graph, there[0], moving)
     put = fresh | _put_elsewhere(stated, saved) - along  # who went along may be in the way where it came
+    whole = all(None not in (node.size, node.position, node.yaw) for node in stated.nodes)
+
+    def way(boxes: Boxes, outcome: LayoutOutcome, moved: Collection[str]) -> set[str]:
+        return in_the_way(saved, graph, boxes, outcome, along, {*moved, *put})
+
     if asked.place and whole and (rebuilt or moving | put):
-        there = _boxes_of(stated)  # before anything is searched in vain
-        moving |= in_the_way(saved, graph, there, layout_outcome(graph, there), along, moving | put)
-    shaped_anew = fresh | restyled(saved, graph, fresh)
+        boxes = boxes_of(stated)  # before anything is searched in vain
+        moving |= way(boxes, layout_outcome(graph, boxes), moving)
+    shaped = fresh | restyled(saved, graph, fresh)
     check_files(graph, beside, outside, str(room), fresh)
-    styles = style_groups(graph)
-    used: RoomModel | None = None
-    search: LayoutSearch | None = None
-    own = Retrieved()
-    if shaped_anew or moving:
+    used, shapes = None, asked.shapes or manifest["shapes"]
+    made_by = Provenance(*(manifest[key] for key in ("seed", "preset", "model", "shapes", "source")))
+    if shaped or moving:
         with timer.stage("load"), one_thread():
             used = model_of(asked, model)
-            _compare(saved.manifest, used, chosen=bool(model or asked.weights), root=Path(room))
-        if shaped_anew:
-            made_of = saved.manifest["shapes"]
-            again = made_of in ("parts", "sdf") or (made_of in ("library", "guided") and asked.assets is not None)
-            shapes = shapes or (made_of if again else default_source(used))
-            check_sources([shapes, *(source_of(graph.node(name), shapes) for name in shaped_anew)], used)
-            own = named_pieces(graph, wishes, fresh)
-        search = LayoutSearch(
-            used, asked.seed, timer, asked.steps, graph_edit(saved.graph, graph), place=asked.place,
-            drafts=asked.drafts or most_drafts(used, len(graph.nodes)),
-        )  # fmt: skip
-
-    def laid_out(sizes: Mapping[str, Vector]) -> tuple[list[Boxes], list[SceneGraph], tuple[str, ...]]:
-        """The boxes of all layouts, the graphs that they are of, and what is to be told of the first."""
-        layouts: list[Boxes] = []
-        pins: list[SceneGraph] = []
-        notes: tuple[str, ...] = ()
-        for number, (before, _) in enumerate(begun):
-            pinned = with_model_sizes(_pinned(graph, saved.graph, before, fresh, moving), sizes)
-            if layouts:  # one furniture in all layouts
-                pinned = with_sizes(pinned, layouts[0])
-            pins.append(pinned)
-            found, search_notes = (_boxes_of(pinned), ()) if search is None else search.best(pinned, number)
-            layouts.append(found)
-            if search is not None and number == 0:
-                notes = (*search.model.unlearned(graph_batch(pinned)), *search_notes)
-        return layouts, pins, notes
-
-    geometry = {name: saved.geometry[name] for name in graph.names if name not in shaped_anew}
-    names = {name: saved.assets[name] for name in geometry}
-    wanted = tuple(name for name in graph.names if name in shaped_anew)
-    models = own
-    for drawn in (False, True):
-        sizes = models.sizes
-        layouts, pins, notes = laid_out(sizes)
-        request = ShapeRequest(
-            graph, layouts[0], styles, asked.seed, used, asked.steps, asked.faces, wanted, dict(geometry),
-            search.change if search else None, timer,
-        )  # fmt: skip
-        if wanted and shapes is not None and not drawn:
-            palette = asked.palette or palette_of_room(manifest["seed"], graph.room.style)
-            models = retrieved(request, shapes, wishes, own, palette=palette)
-        if models.sizes == sizes:  # else real ones shape the layout
-            break
-    if wanted and shapes is not None:
-        made = mixed_shapes(replace(request, retrieved=models), shapes)
-        geometry |= {name: made.geometry[owner] for name, owner in made.owners.items()}
-        names |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
-    names = _own_names({name: names[name] for name in graph.names}, shaped_anew)
-    geometry = {name: geometry[name] for name in graph.names}
-    floor, outcomes = room_floor(graph, layouts), tuple(layout_outcome(graph, found) for found in layouts)
-    for number in range(ROUNDS if asked.place else 0):
-        with timer.stage("place"), one_thread():
-            layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=asked.walls)
-        if search is None or number == ROUNDS - 1:
-            break
-        way = in_the_way(saved, graph, layouts[0], outcomes[0], along, moving | put)
-        if not way:
-            break
-        moving |= way
-        layouts, pins, notes = laid_out(sizes)
-    made_by = Provenance(*(manifest[key] for key in ("seed", "preset", "model", "shapes", "source")))
-    if used is not None:
+        _compare(manifest, used, chosen=bool(model or asked.weights), root=Path(room))
         made_by = replace(made_by, preset=used.preset, model=used.hash or made_by.model)
-    after = Room(
-        name=manifest["name"], graph=graph, layouts=tuple(layouts), geometry=geometry, assets=names, floor=floor,
-        outcomes=outcomes, notes=(*crowded, *models.notes, *notes, *odd),
-        provenance=made_by, options=asked.replaced(seed=manifest["seed"]),
-        timings=timer.seconds, edited=Path(room),
-        carried={asset: saved.carried[asset] for name, asset in names.items() if name not in shaped_anew},
-    )  # fmt: skip
+        again = shapes in ("parts", "sdf") or (shapes in ("library", "guided") and asked.assets is not None)
+        shapes = asked.shapes or (shapes if again else default_source(used))
+    names = {name: saved.assets[name] for name in graph.names if name not in shaped}
+    geometry = {name: saved.geometry[name] for name in names}
+    files = {asset: saved.carried[asset] for asset in names.values()}
+    after = furnished(Brief(
+        graph, graph, manifest["name"], asked, shapes, made_by, wishes, used, timer, there, geometry, names, files,
+        edited=Path(room), moving=moving, change=graph_edit(saved.graph, graph), in_the_way=way, notes=(*crowded, *odd),
+    ))  # fmt: skip
     warn_of_faults(after)
     return after
 
 
+made_of = attrgetter("category", "size", "shapes", "asset")
+placed_at = attrgetter("position", "yaw", "place", "between")
 STILL = 1e-3  # metres or radians: less is no other place
 
 
@@ -271,9 +207,9 @@ def touched(before: SceneGraph, after: SceneGraph, boxes: Boxes | None = None) -
     """
     diff = before.diff(after)
     fresh = {node.name for node in diff.added}
-    fresh |= {new.name for old, new in diff.changed if _made_of(old) != _made_of(new)}
+    fresh |= {new.name for old, new in diff.changed if made_of(old) != made_of(new)}
     moving = {relation.subject for relation in diff.related}
-    moving |= {new.name for old, new in diff.changed if _placed_at(old) != _placed_at(new)}
+    moving |= {new.name for old, new in diff.changed if placed_at(old) != placed_at(new)}
     on = [(r.subject, r.object) for r in after.relations if vocabulary().predicate(r.predicate).follows]
     pairs = [] if boxes is None else attending(plan_to_live_in(before, boxes))
     by = [(before.names[k], before.names[i]) for k, i in pairs]
@@ -282,14 +218,6 @@ def touched(before: SceneGraph, after: SceneGraph, boxes: Boxes | None = None) -
         moving |= {subject for subject, carrier in on if carrier in fresh | moving & free} & free
         moving |= {guest for guest, host in by if host in moving & free} & free
     return fresh, {name for name in moving - fresh if not after.node(name).locked}
-
-
-def _placed_at(node: Node) -> tuple[object, ...]:
-    return node.position, node.yaw, node.place, node.between
-
-
-def _made_of(node: Node) -> tuple[object, ...]:
-    return node.category, node.size, node.shapes, node.asset
 
 
 def graph_edit(before: SceneGraph, after: SceneGraph) -> GraphEdit:
@@ -304,23 +232,6 @@ def graph_edit(before: SceneGraph, after: SceneGraph) -> GraphEdit:
     return GraphEdit(graph_batch(after.replaced(relations=relations)).triplets, added)
 
 
-def _pinned(
-    graph: SceneGraph, old: SceneGraph, boxes: Boxes, fresh: Iterable[str], moving: Iterable[str]
-) -> SceneGraph:
-    """The graph with the boxes of everything that stays written into its nodes."""
-    row = {name: i for i, name in enumerate(old.names)}
-    nodes = []
-    for node in graph.nodes:
-        if node.name not in fresh:
-            size, position, yaw = (v[row[node.name]].tolist() for v in (boxes.size, boxes.position, boxes.yaw))
-            fields: dict[str, Any] = {"size": node.size or tuple(size)}
-            if node.name not in moving:
-                fields |= {"position": node.position or tuple(position), "yaw": yaw if node.yaw is None else node.yaw}
-            node = node.replaced(**fields)
-        nodes.append(node)
-    return graph.replaced(nodes=tuple(nodes))
-
-
 def _put_elsewhere(stated: SceneGraph, saved: SavedRoom) -> set[str]:
     """Names of what stands elsewhere than in the saved room, locked or not."""
     was = dict(zip(saved.graph.names, zip(saved.boxes.position, saved.boxes.yaw, strict=True), strict=True))
@@ -329,23 +240,6 @@ def _put_elsewhere(stated: SceneGraph, saved: SavedRoom) -> set[str]:
         name for name, position, yaw in there if position and yaw is not None
         and max(np.abs(was[name][0] - position).max(), abs(was[name][1] - yaw)) > STILL
     }  # fmt: skip
-
-
-def _boxes_of(graph: SceneGraph) -> Boxes:
-    return Boxes(
-        *(np.array([getattr(node, name) for node in graph.nodes], np.float32) for name in ("size", "position", "yaw"))
-    )
-
-
-def _own_names(assets: Mapping[str, str], fresh: set[str]) -> dict[str, str]:
-    """A new asset whose name an asset that stays has already gets another name."""
-    kept = {asset for name, asset in assets.items() if name not in fresh}
-    renamed: dict[str, str] = {}
-    for name in sorted(fresh):
-        asset = assets[name]
-        if asset in kept and asset not in renamed:
-            renamed[asset] = free_name(asset, kept | set(assets.values()) | set(renamed.values()))
-    return {name: renamed.get(asset, asset) if name in fresh else asset for name, asset in assets.items()}
 
 
 def _compare(manifest: Mapping[str, Any], echo: RoomModel, *, chosen: bool, root: Path) -> None:

@@ -16,7 +16,7 @@ from echousd.place.living import living_faults
 
 LEAST_FIRST = ("decor", "light", "seat", "screen", "storage", "board", "sofa", "bed")  # what a room misses least
 IN_THE_WAY = 0.1  # metres into the swing of a door or the way through a passage
-Layout = tuple[Boxes, tuple[str, ...]]
+Found = tuple[list[Boxes], tuple[str, ...]]
 
 
 def with_space(graph: SceneGraph) -> tuple[SceneGraph, tuple[str, ...]]:
@@ -37,23 +37,24 @@ def with_space(graph: SceneGraph) -> tuple[SceneGraph, tuple[str, ...]]:
             notes.append(f"left out: {out}, the floor is too small for all that was asked for")
 
 
-def fitted(graph: SceneGraph, arranged: Callable[[SceneGraph], Layout]) -> tuple[SceneGraph, Layout, tuple[str, ...]]:
-    """The graph and its layout without the pieces that collide or stand in a door, and a sentence for each of them.
+def fitted(graph: SceneGraph, laid_out: Callable[[SceneGraph], Found]) -> tuple[SceneGraph, Found, tuple[str, ...]]:
+    """The graph and its layouts without the pieces that collide or stand in a door, and a sentence for each of them.
 
-    `arranged`: makes the best layout of a graph.
+    `laid_out`: makes the best layouts of a graph; the first is looked at.
     """
     notes: list[str] = []
     while True:
-        layout = arranged(graph)
-        hits = colliding(graph, layout[0])
+        found = laid_out(graph)
+        boxes = found[0][0]
+        hits = colliding(graph, boxes)
         out = _dispensable(graph, [name for hit in hits[:1] for name in (hit.first, hit.second)])
         if out is not None:
             other = hits[0].second if out == hits[0].first else hits[0].first
             why = f"{hits[0].depth:.2f} m deep in {other}"
         else:
-            out, why = _in_a_way(graph, layout[0])
+            out, why = _in_a_way(graph, boxes)
         if out is None:
-            return graph, layout, tuple(notes)
+            return graph, found, tuple(notes)
         graph = graph.remove_node(out)
         notes.append(f"left out: {out}, no place for it but {why}")
 

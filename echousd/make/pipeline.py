@@ -1,51 +1,37 @@
-"""From a graph to a room: sample boxes, place them, get shapes from a source, decide what shares an asset."""
+"""From a graph to a room: the graph read, its locks, floor and openings found; then furnished as a new room."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from echomodel.boxes import Boxes
-from echomodel.boxes2d import footprints
 from echomodel.late import Late, lates
 from echomodel.progress import StageListener, StageTimer
 from echomodel.protocols import RoomModel
 from echousd.graph import SceneGraph, load_graph
-from echousd.graph.arrays import graph_batch, one_thread
+from echousd.graph.arrays import one_thread
 from echousd.graph.consistency import faults_of
-from echousd.graph.floors import check_doors, check_space, with_lowered_windows, with_plan
-from echousd.make.clearing import cleared_layouts
+from echousd.graph.floors import check_doors, check_space, with_plan
 from echousd.make.finished import Room
-from echousd.make.layouts import (
-    LayoutSearch,
-    check_objects,
-    model_of,
-    most_drafts,
-    plan_boxes,
-    room_floor,
-    with_free_openings,
-    with_sizes,
-)
-from echousd.make.verdicts import layout_outcome, warn_of_faults
+from echousd.make.furnishing import Brief, box_fields, furnished
+from echousd.make.layouts import check_objects, model_of
+from echousd.make.verdicts import warn_of_faults
 from echousd.naming import STAGE_FORMS
 from echousd.options import RoomOptions, takes_options
 from echousd.place.living import unusual
 from echousd.room import Provenance
-from echousd.shapes.sources.mixing import check_sources, default_source, mixed_shapes, shape_nearness, sources_of
-from echousd.shapes.sources.named import anchored, check_files, names_models, with_model_sizes
-from echousd.shapes.sources.source import Retrieved, ShapeRequest
-from echousd.shapes.styles import asset_names, style_groups
+from echousd.shapes.sources.mixing import check_sources, default_source
+from echousd.shapes.sources.named import anchored, check_files
 from echousd.stage.files import open_stage
 from echousd.stage.read import read_graph
 from echousd.stage.units import conventions
 
 # of a room that is there already
 with_earlier_locks, with_locked_places = lates("echousd.make.reading", "with_earlier_locks", "with_locked_places")
-named_pieces, retrieved = (Late(f"echousd.shapes.sources.retrieval:{name}") for name in ("named_pieces", "retrieved"))
-fitted, with_space, with_wider_floor = lates("echousd.make.fitting", "fitted", "with_space", "with_wider_floor")
+with_space = Late("echousd.make.fitting:with_space")
 
 
 @takes_options()
@@ -87,7 +73,7 @@ def generate(
     timer = StageTimer(progress)
     file, beside, other, read = "", Path.cwd(), "", None
     held, homeless = (), ()
-    seed, wishes = asked.seed, partial(asked.wishes, outside)
+    wishes = partial(asked.wishes, outside)
     if asked.assets:  # what is absent is told before any long work
         wishes()
     if asked.settle:
@@ -113,66 +99,24 @@ def generate(
     check_objects(graph, file)
     with timer.stage("load"), one_thread():
         echo = model_of(asked, model)
-        shapes = asked.shapes or default_source(echo)
-        check_sources([shapes, *sources_of(graph, shapes).values()], echo)
-    theirs = names_models(graph, shapes)
-    pieces = named_pieces(graph, wishes, timer=timer) if theirs else Retrieved()
+    shapes = asked.shapes or default_source(echo)
+    check_sources([shapes], echo)
     with faults_of(file):
         check_doors(graph)
         graph, left_out = with_space(graph) if asked.fit == "drop" else (graph, ())
         crowded = check_space(graph)
-    stated, graph = graph, with_plan(graph, seed)
-    search = LayoutSearch(
-        echo, seed, timer, asked.steps, drafts=asked.drafts or most_drafts(echo, len(graph.nodes)), place=asked.place,
-        proposed=not stated.room.openings,
-    )  # fmt: skip
-
-    def arranged(graph: SceneGraph) -> tuple[Boxes, tuple[str, ...]]:
-        return search.best(with_model_sizes(graph, sizes))
-
-    models = pieces
-    for drawn in (False, True):
-        sizes = models.sizes
-        graph, (first, notes), more = fitted(graph, arranged) if asked.fit == "drop" else (graph, arranged(graph), ())
-        left_out = (*left_out, *more)
-        request = ShapeRequest(graph, first, style_groups(graph), seed, echo, asked.steps, asked.faces, timer=timer)
-        if theirs and not drawn:
-            guided = "guided" in sources_of(graph, shapes).values()
-            near = shape_nearness(request, shapes, wishes()) if guided else None
-            models = retrieved(request, shapes, wishes, pieces, near, asked.palette)
-        if models.sizes == sizes:  # else real ones shape the layout
-            break
-    notes = (*left_out, *models.notes, *echo.unlearned(graph_batch(graph)), *notes)
-    sized = with_sizes(graph, first)
-    layouts = [first, *(search.best(sized, number)[0] for number in range(1, asked.layouts))]
-    plan = plan_boxes(layouts)
-    if stated.room.extents is None:  # unplaced, or by weights that know of no floor, furniture may stand beyond
-        graph = with_wider_floor(graph, footprints(*plan).reshape(-1, 2))
-        assert isinstance(graph, SceneGraph)
-    if not stated.room.openings:
-        graph = with_free_openings(graph, layouts, seed)
-    graph = with_lowered_windows(graph, stated, plan, seed)
-    made = mixed_shapes(replace(request, graph=graph, retrieved=models), shapes)
-    floor = room_floor(graph, layouts)
-    geometry = {name: made.geometry[owner] for name, owner in made.owners.items()}
-    outcomes = tuple(layout_outcome(graph, found) for found in layouts)
-    if asked.place:
-        with timer.stage("place"), one_thread():
-            layouts, outcomes = cleared_layouts([graph] * asked.layouts, layouts, geometry, floor, walls=asked.walls)
-    made_room = Room(
-        name=graph.room.type, graph=graph, layouts=tuple(layouts), geometry=geometry,
-        assets=asset_names(made.owners, {node.name: node.category for node in graph.nodes}), floor=floor,
-        outcomes=outcomes,
-        notes=(*filter(None, [other]), *crowded, *held, *homeless, *notes, *unusual(stated)),
-        provenance=Provenance(seed, echo.preset, echo.hash, shapes, file), options=asked, timings=timer.seconds,
-    )  # fmt: skip
+    made = furnished(Brief(
+        with_plan(graph, asked.seed), graph, graph.room.type, asked, shapes,
+        Provenance(asked.seed, echo.preset, echo.hash, shapes, file), wishes, echo, timer, [{}] * asked.layouts,
+        notes=(*filter(None, [other]), *crowded, *held, *homeless, *left_out, *unusual(graph)),
+    ))  # fmt: skip
     if asked.settle:
         from echousd.make.resting import settled
 
         with timer.stage("settle"):
-            made_room = settled(made_room)
-    warn_of_faults(made_room)
-    return made_room
+            made = settled(made)
+    warn_of_faults(made)
+    return made
 
 
 def _read(file: Path, room: str | None, asked: RoomOptions) -> tuple[SceneGraph, str]:
@@ -202,10 +146,8 @@ def with_own_boxes(graph: SceneGraph, boxes: Boxes | None) -> SceneGraph:
         raise ValueError(f"boxes: found {boxes!r:.60}, allowed: size, position and yaw of n boxes")
     if len(boxes) != len(graph.nodes):
         raise ValueError(f"boxes: {len(boxes)} for a graph of {len(graph.nodes)} objects: need one box per object")
-    rows = zip(graph.nodes, boxes.size.tolist(), boxes.position.tolist(), boxes.yaw.tolist(), strict=True)
-    return graph.replaced(
-        nodes=tuple(node.replaced(size=tuple(size), position=tuple(at), yaw=yaw) for node, size, at, yaw in rows)
-    )
+    fields = box_fields(graph.names, boxes)
+    return graph.replaced(nodes=tuple(node.replaced(**fields[node.name]) for node in graph.nodes))
 
 
 def with_own_pieces(graph: SceneGraph, meshes: Mapping[str, str | Path]) -> SceneGraph:

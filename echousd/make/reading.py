@@ -276,17 +276,15 @@ def with_earlier_locks(graph: SceneGraph, earlier: Path | None) -> tuple[SceneGr
         old = graph_from_plain(SceneGraph, manifest.get("graph"))
     except ValueError:  # no graph that can be read
         return graph, ()
-    kept = [
-        node.replaced(locked=True, size=node.size or was.size, position=was.position, yaw=was.yaw)
+    kept = {
+        node.name: node.replaced(locked=True, size=node.size or was.size, position=was.position, yaw=was.yaw)
         for node in graph.nodes
         if node.name in old.names and (node.locked, node.position, node.yaw) == (False, None, None)
         for was in [old.node(node.name)]
         if was.locked and was.category == node.category
-    ]
-    names = {node.name: node for node in kept}
-    graph = graph.replaced(nodes=tuple(names.get(node.name, node) for node in graph.nodes)) if kept else graph
-    return graph, tuple(
-        f"{name} stays locked as in the room that is there; echousd edit --unlock frees it" for name in names
+    }
+    return graph.replaced(nodes=tuple(kept.get(node.name, node) for node in graph.nodes)), tuple(
+        f"{name} stays locked as in the room that is there; echousd edit --unlock frees it" for name in kept
     )
 
 

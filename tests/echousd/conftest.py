@@ -31,8 +31,7 @@ def fine_things_are_coarse() -> Iterator[None]:
     with (
         patch("echousd.make.save.PREVIEW", 96),
         patch("echousd.make.save.SHEET", 64),
-        patch("echousd.make.pipeline.most_drafts", drafts),
-        patch("echousd.make.edit.most_drafts", drafts),
+        patch("echousd.make.furnishing.most_drafts", drafts),
         patch("echomodel.compact.sampling.AFTER", 3),
     ):
         yield

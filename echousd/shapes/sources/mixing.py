@@ -14,7 +14,6 @@ from echomodel.furniture.style import WIDTH, piece_of
 from echomodel.late import Late
 from echomodel.protocols import RoomModel, furnishes
 from echomodel.vocabulary import vocabulary
-from echousd.graph import SceneGraph
 from echousd.graph.arrays import DESCRIPTION, graph_batch, one_thread, rounded, seeded
 from echousd.shapes.geometry import Geometry, Origin
 from echousd.shapes.joinery import assembled
@@ -23,7 +22,6 @@ from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
 from echousd.shapes.styles import stated_styles
 
 WHOLE = "echousd.shapes.sources.whole"
-shape_nearness = Late(f"{WHOLE}:shape_nearness")
 
 
 def needs_furniture(model: RoomModel | None) -> None:
@@ -96,11 +94,6 @@ def default_source(model: RoomModel | None) -> str:
     return "parts" if model is None or "furniture" in model.branches else "sdf"
 
 
-def sources_of(graph: SceneGraph, shapes: str) -> dict[str, str]:
-    """Object name -> name of its source. `shapes`: the source of objects that say nothing."""
-    return {node.name: source_of(node, shapes) for node in graph.nodes}
-
-
 def check_sources(names: Sequence[str], model: RoomModel | None) -> None:
     """Raises ValueError where one of the sources cannot give shapes with this model."""
     for name in dict.fromkeys(names):
@@ -109,15 +102,12 @@ def check_sources(names: Sequence[str], model: RoomModel | None) -> None:
 
 def mixed_shapes(request: ShapeRequest, shapes: str) -> Shapes:
     """Geometry of all wanted objects, each from its own source; raises ValueError as the sources do."""
-    named = sources_of(request.graph, shapes)
     spare = default_source(request.model)
     groups: dict[str, list[str]] = {}
     for row in request.rows:
         name = request.graph.names[row]
-        source = spare if name in request.retrieved.missing else named[name]
+        source = spare if name in request.retrieved.missing else source_of(request.graph.nodes[row], shapes)
         groups.setdefault(source, []).append(name)
-    if len(groups) == 1 and request.wanted is None:
-        return SOURCES[next(iter(groups))].shapes(request)
     owners: dict[str, str] = {}
     geometry: dict[str, Geometry] = {}
     for source, names in groups.items():

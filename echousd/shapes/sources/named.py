@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Container, Sequence
 from pathlib import Path
 
 from echomodel.late import lates
@@ -21,9 +21,10 @@ def source_of(node: Node, shapes: str) -> str:
     return shapes if node.asset is None else "own" if is_file(node.asset) else "library"
 
 
-def names_models(graph: SceneGraph, shapes: str) -> bool:
-    """Whether any object of a graph is somebody's model, or is to be one of a library; `shapes`: the room's source."""
-    return any(node.asset is not None or source_of(node, shapes) in RETRIEVED for node in graph.nodes)
+def names_models(graph: SceneGraph, shapes: str, among: Container[str]) -> bool:
+    """Whether any object of some names is somebody's model, or is to be of a library; `shapes`: the room's source."""
+    named = (node for node in graph.nodes if node.name in among)
+    return any(node.asset is not None or source_of(node, shapes) in RETRIEVED for node in named)
 
 
 def anchored(graph: SceneGraph, folder: Path) -> SceneGraph:
@@ -61,12 +62,3 @@ def _moved(graph: SceneGraph, change: Callable[[str], str]) -> SceneGraph:
 
     nodes = tuple(map(node_of, graph.nodes))
     return graph if nodes == graph.nodes else graph.replaced(nodes=nodes)
-
-
-def with_model_sizes(graph: SceneGraph, sizes: Mapping[str, tuple[float, float, float]]) -> SceneGraph:
-    """The graph in which the sizes that are known of some objects are fixed, unless they state their own."""
-    if not sizes:
-        return graph
-    wanted = {node.name: sizes[node.name] for node in graph.nodes if node.size is None and node.name in sizes}
-    nodes = (node.replaced(size=wanted[node.name]) if node.name in wanted else node for node in graph.nodes)
-    return graph.replaced(nodes=tuple(nodes))

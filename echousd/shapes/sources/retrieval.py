@@ -15,10 +15,10 @@ from echousd.assets.record import AssetRecord
 from echousd.assets.reference import MODELS, is_file
 from echousd.graph import Node, SceneGraph
 from echousd.shapes.finishes.slots import HARMONIES, linear
-from echousd.shapes.looks import palette_of_room
 from echousd.shapes.originals.loading import library_file, own_file, own_record
 from echousd.shapes.sources.named import RETRIEVED, source_of
 from echousd.shapes.sources.source import Retrieved, ShapeRequest
+from echousd.shapes.sources.whole import shape_nearness
 from echousd.shapes.styles import ALIKE, ROOM_STYLE, first_alike
 
 Wanted = Callable[[], AssetWishes]  # what is asked of a library, made where it is needed
@@ -62,25 +62,25 @@ def _named(node: Node, wishes: AssetWishes) -> tuple[AssetRecord, ModelFile]:
     return record, library_file(wishes.library, record)
 
 
-def retrieved(
-    request: ShapeRequest, shapes: str, wishes: Wanted, named: Retrieved,
-    nearness: Mapping[str, Mapping[str, float]] | None = None, palette: str = "",
-) -> Retrieved:  # fmt: skip
-    """The models of all objects that come from a library, and the sizes of those that their boxes do not fit.
+def retrieved(request: ShapeRequest, shapes: str, wishes: Wanted, palette: str) -> Retrieved:
+    """The models of all objects that come from a library besides those that the graph names, which are known.
 
-    `shapes`: the room's source. `named`: what `named_pieces` found. `nearness`: as for `choose`. `palette`: harmony of
-    the room, whose colours models shall go with; "" = that which the seed chooses.
+    The layout must give each the size that it has in the request, or its own where it cannot be stretched to that.
+
+    `shapes`: the room's source. `palette`: harmony of the room, whose colours models shall go with.
     """
-    graph, seed = request.graph, request.seed
-    wanted = [i for i in request.rows if source_of(graph.nodes[i], shapes) in RETRIEVED]
+    graph, named = request.graph, request.retrieved
+    sources = {i: source_of(graph.nodes[i], shapes) for i in request.rows}
+    wanted = [i for i, source in sources.items() if source in RETRIEVED]
     if not wanted:
         return named
     asked = wishes()
-    size = np.asarray(request.boxes.size, float)
+    near = shape_nearness(request, shapes, asked) if "guided" in sources.values() else None
     with request.timer.stage("assets"):
-        tones = np.array([linear(color) for color in HARMONIES[palette or palette_of_room(seed, graph.room.style)]])
+        tones = np.array([linear(color) for color in HARMONIES[palette]])
+        size = np.asarray(request.boxes.size, float)
         pieces = _asked(graph, wanted, size, request.styles)
-        chosen, missing = choose(asked, pieces, seed, kept=named.chosen, nearness=nearness, palette=tones)
+        chosen, missing = choose(asked, pieces, request.seed, kept=named.chosen, nearness=near, palette=tones)
         files, sizes = dict(named.files), dict(named.sizes)
         for i in wanted:
             node = graph.nodes[i]
@@ -89,8 +89,7 @@ def retrieved(
                 continue
             assert asked.library is not None
             files[node.name] = library_file(asked.library, record)
-            if not fits(record, size[i], asked.stretch) and node.size is None:
-                sizes[node.name] = record.dims
+            sizes[node.name] = tuple(size[i].tolist()) if fits(record, size[i], asked.stretch) else record.dims
     return Retrieved(chosen, files, sizes, tuple(missing), asked.collect)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from echomodel.progress import StageTimer
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import floor_centre
 from echousd.shapes.geometry import FACES, Geometry
-from echousd.shapes.styles import shared_assets
+from echousd.shapes.styles import shared_assets, style_groups
 
 if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
@@ -47,7 +48,6 @@ class ShapeRequest:
 
     graph: SceneGraph  # the whole scene graph, n nodes
     boxes: Boxes  # n boxes in the room's frame, in the order of the nodes; a shape fills its box
-    styles: Mapping[str, str]  # object name -> style, see `echousd.shapes.styles.style_groups`
     seed: int = 0  # of all randomness
     model: RoomModel | None = None  # the model that the boxes come from; None where an edit left nothing to sample
     steps: int | None = None  # sampling steps, None for the model's own
@@ -59,6 +59,11 @@ class ShapeRequest:
     change: GraphEdit | None = None  # how the graph was edited, None = not at all
     timer: StageTimer = field(default_factory=StageTimer)  # is told of the stages
     retrieved: Retrieved = field(default_factory=Retrieved)  # the models of other people that were chosen for objects
+
+    @cached_property
+    def styles(self) -> dict[str, str]:
+        """Object name -> its style."""
+        return style_groups(self.graph)
 
     @property
     def rows(self) -> list[int]:

@@ -1,6 +1,5 @@
 import hashlib
 import json
-import sys
 import warnings
 from types import SimpleNamespace
 
@@ -14,7 +13,7 @@ import echousd
 from echomodel.openings import Opening, segment
 from echomodel.protocols import GraphEdit
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
-from echousd.make import layouts
+from echousd.make import furnishing, layouts
 from echousd.make.edit import edit, graph_edit, restyled, touched
 from echousd.make.layouts import repeated
 from echousd.make.reading import read_room
@@ -145,7 +144,7 @@ def test_an_edit_draws_several_layouts_and_keeps_the_best(root, monkeypatch):
         return (0, 0, 1 if len(seen) == 3 else 1 + len(seen))  # no two end alike
 
     monkeypatch.setattr("echousd.make.layouts._wishes", wishes)
-    monkeypatch.setattr("echousd.make.edit.most_drafts", layouts.most_drafts)
+    monkeypatch.setattr("echousd.make.furnishing.most_drafts", layouts.most_drafts)
     room = edit(root, graph, model=model, seed=9, shapes="boxes")
     assert len(seen) == 16  # none was perfect: eight drafts are searched in passing, then each of them in earnest
     assert room.boxes is seen[2]
@@ -215,11 +214,12 @@ def test_the_model_is_told_of_relations_between_what_stays():
 def test_models_are_chosen_for_what_is_new_in_the_colours_of_the_room(root, monkeypatch):
     asked = []
 
-    def chosen(request, *given, palette):
+    def chosen(request, shapes, wishes, palette):
         asked.append((set(request.wanted), palette))
-        return retrieved(request, *given, palette=palette)
+        return retrieved(request, shapes, wishes, palette)
 
-    monkeypatch.setattr(sys.modules["echousd.make.edit"], "retrieved", chosen)
+    monkeypatch.setattr(furnishing, "names_models", lambda graph, shapes, among: bool(among))
+    monkeypatch.setattr(furnishing, "retrieved", chosen)
     graph = small_graph()
     edit(root, graph.relate("wardrobe", "left", "bed"), model=StandIn(), shapes="boxes", place=False)
     assert not asked  # nothing is new
@@ -244,8 +244,8 @@ def test_furniture_of_ours_that_is_told_another_style_is_shaped_anew():
 )  # fmt: skip
 def test_what_is_new_is_made_as_the_room_was_where_its_library_is_at_hand(root, monkeypatch, made, assets, shapes):
     asked = []
-    monkeypatch.setattr(sys.modules["echousd.make.edit"], "check_sources", lambda words, model: asked.append(words[0]))
-    monkeypatch.setattr(sys.modules["echousd.make.edit"], "named_pieces", lambda *given: 1 / 0)  # no further
+    monkeypatch.setattr(furnishing, "check_sources", lambda words, model: asked.extend(words))
+    monkeypatch.setattr(furnishing, "LayoutSearch", lambda *given, **more: 1 / 0)  # no further
     manifest = root.with_suffix(".json")
     manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "shapes": made}))
     with pytest.raises(ZeroDivisionError):

@@ -114,7 +114,7 @@ def test_exports_hold_the_layout_that_was_asked_for_and_say_so(later, tmp_path):
 
 
 def test_more_layouts_are_drawn_again_where_the_first_try_fails(monkeypatch):
-    monkeypatch.setattr("echousd.make.pipeline.most_drafts", lambda model, objects: 4)  # in three rounds
+    monkeypatch.setattr("echousd.make.furnishing.most_drafts", lambda model, objects: 4)  # in three rounds
 
     class Counting(StandIn):
         drawn = 0

@@ -19,7 +19,7 @@ def laid_out(**places):
         asked.append(graph.names)
         sizes = torch.tensor([[0.8, 1.0, 0.3]] * len(graph.nodes))
         at = torch.tensor([[places[name][0], 0.0, places[name][1]] for name in graph.names])
-        return Boxes(sizes, at, torch.zeros(len(graph.nodes))), ()
+        return [Boxes(sizes, at, torch.zeros(len(graph.nodes)))], ()
 
     return arranged, asked
 
