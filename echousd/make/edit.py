@@ -234,12 +234,9 @@ def graph_edit(before: SceneGraph, after: SceneGraph) -> GraphEdit:
 
 def _put_elsewhere(stated: SceneGraph, saved: SavedRoom) -> set[str]:
     """Names of what stands elsewhere than in the saved room, locked or not."""
-    was = dict(zip(saved.graph.names, zip(saved.boxes.position, saved.boxes.yaw, strict=True), strict=True))
-    there = [(node.name, node.position, node.yaw) for node in stated.nodes if node.name in was]
-    return {
-        name for name, position, yaw in there if position and yaw is not None
-        and max(np.abs(was[name][0] - position).max(), abs(was[name][1] - yaw)) > STILL
-    }  # fmt: skip
+    was = {name: [*box["position"], box["yaw"]] for name, box in box_fields(saved.graph.names, saved.boxes).items()}
+    there = {node.name: [*node.position, node.yaw] for node in stated.nodes if node.position and node.yaw is not None}
+    return {name for name in was.keys() & there if np.abs(np.subtract(was[name], there[name])).max() > STILL}
 
 
 def _compare(manifest: Mapping[str, Any], echo: RoomModel, *, chosen: bool, root: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 named_pieces, retrieved = (Late(f"echousd.shapes.sources.retrieval:{name}") for name in ("named_pieces", "retrieved"))
 fitted, with_wider_floor = lates("echousd.make.fitting", "fitted", "with_wider_floor")
 ROUNDS = 4  # times that boxes are placed: what is in the way of what was moved makes way, and what is in its way
+SAME = 1e-4  # metres within which a size is that of its box
 BOX = ("size", "position", "yaw")
 BoxFields = Mapping[str, Any]  # of one object: size and position, each (x, y, z) in metres, and yaw in radians
 
@@ -98,6 +99,10 @@ def furnished(brief: Brief) -> Room:
         sampled = asked.seed, model, asked.steps, asked.faces
         return ShapeRequest(graph, boxes, *sampled, wanted, brief.geometry, brief.change, timer, models)
 
+    def as_made(layouts: Sequence[Boxes]) -> list[Boxes]:  # what is round is as wide as deep, whatever its box was
+        extents = np.array([np.ptp(geometry[name].mesh.bounds, axis=0) for name in graph.names], np.float32)
+        return [replace(one, size=np.where(abs(extents - one.size) > SAME, extents, one.size)) for one in layouts]
+
     models = Retrieved()
     if search is not None and names_models(graph, brief.shapes, wanted):  # their sizes shape the layout
         models = named_pieces(graph, brief.wishes, wanted, timer)
@@ -115,11 +120,12 @@ def furnished(brief: Brief) -> Room:
     shaped = {**brief.geometry, **{name: made.geometry[owner] for name, owner in made.owners.items()}}
     geometry = {name: shaped[name] for name in graph.names}
     assets = own_names(brief.assets, asset_names(made.owners, {node.name: node.category for node in graph.nodes}))
+    layouts = as_made(layouts)
     floor, outcomes = room_floor(graph, layouts), tuple(layout_outcome(graph, boxes) for boxes in layouts)
     for rest in reversed(range(ROUNDS if asked.place else 0)):
         with timer.stage("place"), one_thread():
             pins = [with_boxes(graph, boxes, moving) for boxes in there]
-            layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=asked.walls)
+            layouts, outcomes = cleared_layouts(pins, as_made(layouts), geometry, floor, walls=asked.walls)
         way = brief.in_the_way(layouts[0], outcomes[0], moving) if search is not None and rest else set()
         if not way:
             break

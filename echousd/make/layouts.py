@@ -212,7 +212,8 @@ def finished_boxes(
         same = _alike(graph, found.boxes, styles)
         if not np.array_equal(same.size, found.boxes.size):
             # chairs of one set that had to shrink: all of them, if it fits; else at other places
-            fixed = with_sizes(graph, same)
+            sized = zip(graph.nodes, map(tuple, same.size.tolist()), strict=True)
+            fixed = graph.replaced(nodes=tuple(node.replaced(size=size) for node, size in sized))
             second = placed(fixed, same, config=replace(config, arrange=False))
             if wrong(second) > wrong(found):
                 third = placed(fixed, same, config=config, begun=begun)
@@ -268,12 +269,6 @@ def _obstacles(graph: SceneGraph, layouts: Sequence[Boxes]) -> tuple[np.ndarray,
     front = np.stack([np.sin(yaw[opens]), np.zeros(len(opens)), np.cos(yaw[opens])], 1)
     at = position[opens] + front * (size[opens, 2] + depth)[:, None] / 2
     return np.concatenate([size, before]), np.concatenate([position, at]), np.concatenate([yaw, yaw[opens]])
-
-
-def with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:
-    """The graph with the sizes of the boxes written into its nodes."""
-    sizes = [tuple(row) for row in boxes.size.tolist()]
-    return graph.replaced(nodes=tuple(n.replaced(size=s) for n, s in zip(graph.nodes, sizes, strict=True)))
 
 
 def room_floor(graph: SceneGraph, layouts: Sequence[Boxes]) -> np.ndarray:

@@ -12,6 +12,7 @@ import echousd
 from echomodel.boxes2d import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
+from echousd.make.reading import read_room
 from echousd.make.verdicts import RoomWarning
 
 WORDS = st.sampled_from([row.name for row in vocabulary().categories])
@@ -70,3 +71,16 @@ def test_what_cannot_be_kept_drives_nothing_out_of_the_room(seed):
     assert (low[:, 1] + size[:, 1]).max() < 2.4 + 1e-3
     corners = footprints(size, low, np.asarray(room.boxes.yaw, float))
     assert (np.abs(corners).max((0, 1)) < np.array([1.5, 1.6]) + 0.01).all()
+
+
+def test_boxes_are_as_their_meshes_fill_them(tmp_path):
+    words = ("plant", "floor_lamp", "lazy_sofa", "pendant_lamp", "double_bed")
+    told = (Relation("plant", "close_by", "lazy_sofa"), Relation("floor_lamp", "left", "double_bed"))
+    graph = SceneGraph(RoomSpec("bedroom", size=(4.4, 4.2)), tuple(Node(word, word) for word in words), told)
+    room = echousd.generate(graph, seed=3, drafts=1, dress="none")
+    extents = [np.ptp(room.geometry[name].mesh.bounds, axis=0) for name in room.names]
+    np.testing.assert_allclose(room.boxes.size, extents, atol=1e-4)
+    root = room.save(tmp_path / "room", preview=False)
+    np.testing.assert_allclose(read_room(root).boxes.size, room.boxes.size, atol=1e-4)
+    seen = [verdict.margin for verdict in echousd.check(root).layouts[0].relations]
+    np.testing.assert_allclose(seen, [verdict.margin for verdict in room.verdicts], atol=2e-4)
