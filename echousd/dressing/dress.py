@@ -82,7 +82,7 @@ def dress(room: RoomData) -> Dressing:
             if key not in known:
                 known[key] = free_name(f"small_{found.kind}", taken | set(geometry))
                 geometry[known[key]] = geometry_of(found.kind, tuple(found.size.tolist()), *key[-2:])
-            word = KINDS[found.kind].name
+            word = "_".join([*found.on.split(), KINDS[found.kind].name])  # which stays where other things come or go
             name = free_name(word, taken | set(named))
             while kinds.setdefault(name, key) != key:  # a name has one asset in all layouts
                 name = free_name(word, taken | set(named) | set(kinds))

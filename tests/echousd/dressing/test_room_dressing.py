@@ -561,3 +561,15 @@ def test_niches_are_cut_into_walls_and_hold_what_stands_in_them(tmp_path):
     stage.Save()
     told = [one for layout in check(root).layouts for one in layout.placement]
     assert ("outside", name) in [(one.problem, one.object) for one in told]  # it is in the wall
+
+
+@pytest.mark.parametrize("gone", ["coffee_table", "side_table", "tv_stand"])
+def test_small_things_keep_their_names_where_furniture_goes(room, gone):
+    """An artist's layer over one of them still meets it."""
+    rows = [number for number, name in enumerate(room.names) if name != gone]
+    assert len(rows) < len(room.names)
+    less = replace(room, graph=room.graph.remove_node(gone), layouts=(room.boxes[np.array(rows)],))
+    before, after = (dress(one).layouts[0] for one in (room, less))
+    stand = {name: thing for name, thing in before.items() if thing.on not in ("", gone) and thing.position[1] > 0.1}
+    assert len(stand) > 3
+    assert {name: thing.kind for name, thing in stand.items()}.items() <= {n: t.kind for n, t in after.items()}.items()

@@ -125,10 +125,10 @@ def test_switched_off_things_take_their_relations_along(root, room):
 @pytest.mark.parametrize("word", ["double_bed", "dragon", "x" * 9000])
 def test_a_category_that_no_small_thing_has_is_said(root, word):
     def rename(stage):
-        stage.GetPrimAtPath("/Room/Dressing/rug").GetAttribute("echo:category").Set(word)
+        stage.GetPrimAtPath("/Room/Dressing/sofa_rug").GetAttribute("echo:category").Set(word)
 
     stage = copied(root, rename)
-    with pytest.raises(StageError, match=r"</Room/Dressing/rug>: .*allowed") as error:
+    with pytest.raises(StageError, match=r"</Room/Dressing/sofa_rug>: .*allowed") as error:
         echousd.read_dressing(stage)
     assert "\n" not in str(error.value)
     assert len(str(error.value)) < 1000
