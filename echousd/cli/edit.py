@@ -40,7 +40,7 @@ def edit(
     wishes = EditRequest(**{kind: words for kind, words in asked.items() if words})
     if not recover:
         if wishes == EditRequest(relate=wishes.relate, unrelate=wishes.unrelate) != EditRequest() and is_home(room):
-            edit_home(room_at(room), wishes, output, dry_run=dry_run, force=force, json=json)
+            edit_home(room_at(room), wishes, output, dry_run=dry_run, force=force, wait=wait, json=json)
             return
         refuse_house(room)
         room = room_at(room)
@@ -63,8 +63,8 @@ def edit(
     )  # fmt: skip
 
 
-def edit_home(root: Path, wishes: EditRequest, output: Path | None, *, dry_run: bool, force: bool, json: bool) -> None:
-    """Change how the rooms of a home lie to each other: its plan follows, and the rooms that it moves or opens."""
+def edit_home(root: Path, wishes: EditRequest, output: Path | None, **how: bool) -> None:
+    """Change how its rooms lie to each other (`how`: as of `generate_home`): its plan follows, and what it opens."""
     from echousd.cli.plan import generate_home
     from echousd.home.assemble import remembered
 
@@ -73,7 +73,7 @@ def edit_home(root: Path, wishes: EditRequest, output: Path | None, *, dry_run: 
         home = home.unrelate(sentence)
     for sentence in wishes.relate:
         home = home.relate(sentence)
-    generate_home(root, home, output or root.parent, options, (), force=force, json=json, dry_run=dry_run)
+    generate_home(root, home, output or root.parent, options, (), **how)
 
 
 def update(

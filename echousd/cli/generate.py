@@ -40,7 +40,7 @@ def generate(
     if home is not None:
         from echousd.cli.plan import generate_home
 
-        generate_home(graph, home, output, options, outside or (), force=force, json=json)
+        generate_home(graph, home, output, options, outside or (), force=force, json=json, wait=wait)
         return
     with writing(output, flat=flat, force=force, wait=wait), telling_faults(), progress_bar() as listen:
         from echomodel.progress import StageTimer

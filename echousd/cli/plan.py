@@ -103,7 +103,7 @@ def export(
 
 def generate_home(
     graph: Path, home: HomeGraph, output: Path, options: RoomOptions, outside: Sequence[Path], *, force: bool,
-    json: bool, dry_run: bool = False,
+    json: bool, dry_run: bool = False, wait: bool = False,
 ) -> None:  # fmt: skip
     """Plan a home, make its rooms side by side, and say what became of each; exit code 1 for faults.
 
@@ -129,7 +129,7 @@ def generate_home(
     with progress_bar() as listen:
         made = write_rooms(
             plan, output, options, outside=[str(path) for path in outside], force=force,
-            tell=lambda done, total: listen("rooms", done, total),
+            tell=lambda done, total: listen("rooms", done, total), wait=wait,
         )  # fmt: skip
     faults = [f"{name}: {why}" for name, why in made.failed.items()]
     lines = [f"home     {made.root}", f"plan     {len(plan.floors)} rooms, {plan.area:.1f} m²"]

@@ -23,6 +23,7 @@ from echousd.batches.executor import LocalWorkers, Task
 from echousd.batches.options import BatchOptions
 from echousd.batches.work import Job, room
 from echousd.folder.found import is_home
+from echousd.folder.lock import LOCK, locked
 from echousd.folder.manifest import find_manifest
 from echousd.graph import SceneGraph
 from echousd.home.existing import next_plan
@@ -105,37 +106,37 @@ def digests_of(jobs: Mapping[str, Job]) -> dict[str, str]:
 
 def write_rooms(
     plan: HomePlan, output: Path, options: RoomOptions, *, outside: Sequence[str] = (), force: bool = False,
-    workers: int | None = None, tell: Callable[[int, int], None] = lambda done, total: None,
+    workers: int | None = None, tell: Callable[[int, int], None] = lambda done, total: None, wait: bool = False,
 ) -> Made:  # fmt: skip
     """Make a home in a folder: rooms whose graph, place in the plan and options are as before keep their bytes.
 
     Arguments:
-        tell: called with how many rooms are done, and of how many.
+        tell: called with how many rooms are done, and of how many. wait: for another process that writes the folder.
 
-    Raises ValueError for a folder that holds something else, and where edits of a room would be lost.
+    Raises ValueError for a folder that holds something else or that another process writes, and where edits of a room
+    would be lost.
     """
     root = output / ROOT_FILE
     if not is_home(root):
-        check_ours(output, "home of echousd", force=force, besides=(FOLDER,))
-    wanted, digests = wanted_jobs(plan, output, options, outside)
-    edited = [job.id for job in wanted if not job.begin and _edited(Path(job.folder))]
-    if edited and not force:
-        raise ValueError(
-            f"{output}: {', '.join(edited)} would be made anew, which gives up what was edited in it since; allowed: "
-            "--force, or the same edit in the home's graph"
-        )
-    done: dict[str, Mapping[str, Any] | None] = dict.fromkeys(digests)
-    failed: dict[str, str] = {}
-    for name, value, error in _run(wanted, workers):
-        done[name] = value
-        if error:
-            failed[name] = error
-        tell(sum(value is not None for value in done.values()) + len(failed), len(wanted))
-    made = [name for name in digests if name not in failed]
-    if made:
-        marks = {name: digests[name] for name in made}
-        write_all(home_files(plan, output, made, marks, options))
-    return Made(root, done, failed)
+        check_ours(output, "home of echousd", force=force, besides=(FOLDER, LOCK))
+    with locked(output, wait=wait):  # rooms and the layers over them are of one run
+        wanted, digests = wanted_jobs(plan, output, options, outside)
+        edited = [job.id for job in wanted if not job.begin and _edited(Path(job.folder))]
+        if edited and not force:
+            raise ValueError(
+                f"{output}: {', '.join(edited)} would be made anew, which gives up what was edited in it since; "
+                "allowed: --force, or the same edit in the home's graph"
+            )
+        done: dict[str, Mapping[str, Any] | None] = dict.fromkeys(digests)
+        failed: dict[str, str] = {}
+        for name, value, error in _run(wanted, workers):
+            done[name] = value
+            failed |= {name: error} if error else {}
+            tell(sum(value is not None for value in done.values()) + len(failed), len(wanted))
+        marks = {name: digest for name, digest in digests.items() if name not in failed}
+        if marks:
+            write_all(home_files(plan, output, list(marks), marks, options))
+        return Made(root, done, failed)
 
 
 def _edited(folder: Path) -> bool:

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import threading
 
 import ezdxf
 import numpy as np
@@ -12,6 +13,7 @@ from pxr import Usd, UsdGeom
 import echousd
 from echousd.batches.plan import room_digest
 from echousd.folder.found import room_at
+from echousd.folder.lock import locked
 from echousd.folder.manifest import find_manifest
 from echousd.home.existing import plan_there
 from echousd.home.files import load_home
@@ -44,6 +46,27 @@ def made(kept, tmp_path, monkeypatch, echousd_command):
     shutil.copy(kept / "flat.yaml", tmp_path)
     shutil.copytree(kept / "out", tmp_path / "out")
     return tmp_path / "out", json.loads((kept / "told").read_text().replace(str(kept), str(tmp_path)))
+
+
+def test_a_home_has_one_writer_at_a_time(made, tmp_path, echousd_command):
+    out, entered, leave = made[0], threading.Event(), threading.Event()
+
+    def hold():
+        with locked(out):
+            entered.set()
+            leave.wait()
+
+    holder = threading.Thread(target=hold)
+    holder.start()
+    entered.wait()
+    before = digests(out)
+    done = echousd_command("generate", tmp_path / "flat.yaml", "-o", out, *QUICK, "--seed", "9", "--force")
+    leave.set()
+    holder.join()
+    assert done.code == 2
+    assert "is writing it; try later, or wait for it (--wait)" in done.err
+    assert digests(out) == before
+    assert echousd_command("generate", tmp_path / "flat.yaml", "-o", out, *QUICK, "--wait").code == 0
 
 
 def digests(folder):
