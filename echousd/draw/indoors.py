@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from PIL import Image, ImageFilter
 from pxr import Usd, UsdGeom, UsdLux
 
 from echomodel.triangles import area_normals
@@ -22,10 +22,11 @@ if TYPE_CHECKING:
 SKY = 4.0  # radiance of the sky in a window for a dome of intensity 1, whose light else comes from above as well
 SUN = 4.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
 CEILING = np.array([0.87, 0.86, 0.84], np.float32)
-# Of the sky's radiance, what is seen of it through a window: eyes adapt; and the power of the room's hue that they do
-# not adapt to there.
-VIEW, THERE = 0.65, 0.5
-BLURRED, HAZE = 0.15, 0.35  # degrees that it is out of focus, and the share of its colour that haze takes
+VIEW = 0.65  # of the sky's radiance, what glossy things mirror of it
+# What is seen through windows is exposed for itself, as photographers of interiors blend it in: how bright by day, the
+# power of the sky's light by which it is less in the evening, that by which its shadows are opened, and haze before it.
+THERE, DUSK, OPENED, VEIL = 1.1, 0.5, 0.76, 0.08
+WHITER = 0.36  # how much less coloured the light of lamps is than told: no wall is as yellow to eyes
 DIM = 0.02  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
@@ -60,6 +61,15 @@ class Lights:
         """1 by day, 0 without light from outside."""
         return min(1.0, self.sky / DAY)
 
+    @cached_property
+    def shining(self) -> np.ndarray:
+        """(n, 3) the power as a picture shows it, see `WHITER`."""
+        return self.power + np.float32(WHITER) * ((self.power @ LUMA)[:, None] - self.power)
+
+    def there(self, color: np.ndarray) -> np.ndarray:
+        """(3, n) how a picture shows colours (3, n) of what lies around."""
+        return np.asarray((VEIL + (1 - VEIL) * color**OPENED) * (THERE * self.day**DUSK * self.tint)[:, None], "f4")
+
 
 def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
     """The lights of a stage: domes, the brightest distant light, spheres; flat ones where it is dark and no lamp is.
@@ -78,11 +88,8 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
             strength = float(color.max())
             domes, sky, tint = domes + 1, sky + strength, color / max(strength, 1e-9)
             picture = UsdLux.DomeLight(prim).GetTextureFileAttr().Get(NOW)
-            if picture is not None:  # behind a room that is in focus, what lies around is soft, and in a little haze
-                sharp = Image.fromarray(image_of(str(prim.GetPath()), picture.resolvedPath))
-                soft = sharp.reduce(max(1, round(2 * BLURRED * sharp.width / 360)))  # between its pixels it is
-                hazy = Image.blend(soft, Image.merge("RGB", [soft.convert("L")] * 3), HAZE)
-                view = np.asarray(hazy.filter(ImageFilter.GaussianBlur(1.5)))  # else its pixels show as squares
+            if picture is not None:
+                view = image_of(str(prim.GetPath()), picture.resolvedPath)
         elif prim.IsA(UsdLux.DistantLight):
             towards = world[:3, 2] / max(float(np.linalg.norm(world[:3, 2])), 1e-9)
             suns.append(np.stack([towards, color]))

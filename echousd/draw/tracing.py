@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from echomodel.triangles import along
-from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, THERE, VIEW, Bounced, evened, exposure, rolled
+from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, VIEW, Bounced, evened, exposure, rolled
 from echousd.draw.scenery import SKY_LIGHT, Scenery, next_room, outside
 from echousd.draw.views import View
 
@@ -18,10 +18,11 @@ AROUND = 2  # per ray: rays to what stands around
 # Places at which a room's light is found, rays of each kind from each, and how often light is thrown on.
 PLACES, OFTEN, TURNS = (600, 1200), 3, 3
 # Metres from which on nothing makes a place darker, how dark what touches it does, and how much less if it is white.
-CREVICE, DEPTH, PALE = 0.45, 1.9, 0.55
+CREVICE, DEPTH, PALE = 0.32, 1.25, 0.55
 # Gloss from which on surfaces mirror, and are metal, of which so much is not mirrored; how far from where a mirror
 # would a rough one mirrors.
 GLOSSY, METAL, MATT, BLUR = 0.2, 0.5, 0.4, 0.15
+GLINT = 1.2  # of the mean light: at most what rough surfaces mirror of a lamp, whose noise looks like smoke
 
 
 class RenderUnavailable(ImportError, ValueError):
@@ -63,8 +64,9 @@ def _drawn(world: World, height: int, rays: int) -> np.ndarray:
     own = np.flatnonzero((seen.face >= 0) & ~world.scenery.planes.glows.take(seen.face))  # no lamp, and nothing outside
     tone = exposure(color.take(own, 1) if len(own) else color, world.white, world.scenery.lights.day)
     tone = tone if world.view.inside else rolled
-    color = tone(color)
-    finer = tone(_colored(world, more, _lent(world, more, pixel, seen, light))) - color.take(pixel, 1)
+    color = np.where(seen.shown, color, tone(color))
+    finer = _colored(world, more, _lent(world, more, pixel, seen, light))
+    finer = np.where(more.shown, finer, tone(finer)) - color.take(pixel, 1)
     color += np.stack([np.bincount(pixel, part / many, len(edge)) for part in finer])
     color = color.reshape(3, height, size)
     wide = np.pad(color, ((0, 0), (1, 1), (1, 1)), mode="edge")  # of an edge's pixel each neighbour takes an eighth
@@ -105,13 +107,14 @@ class World(NamedTuple):
 
 class Seen(NamedTuple):
     """What n rays met: faces (n,), -1 for none; points and normals (3, n); places between the face's corners (2, n);
-    and colour (3, n) where none is."""
+    and colour (3, n) where none is, and whether (n,) it is as a picture shows it: that of what lies around."""
 
     face: np.ndarray
     point: np.ndarray
     normal: np.ndarray
     bary: np.ndarray
     glow: np.ndarray
+    shown: np.ndarray
 
     def of(self, rows: np.ndarray) -> Seen:
         """Those of some rays, by their numbers: `take` is four times as fast as an index is."""
@@ -198,14 +201,12 @@ def _at_edges(world: World, seen: Seen, shape: tuple[int, int]) -> np.ndarray:
 def _seen(world: World, origin: np.ndarray, way: np.ndarray, hit: Sequence[np.ndarray]) -> Seen:
     """What rays met, of what `_hit` says of them."""
     scenery, (face, far, (u, v)) = world.scenery, hit
-    glow, missed = np.zeros((3, len(face)), np.float32), np.flatnonzero(face < 0)
+    glow, missed, shown = np.zeros((3, len(face)), np.float32), np.flatnonzero(face < 0), np.zeros(len(face), bool)
     begin, towards = origin.take(missed, 1), way.take(missed, 1)
     glow[:, missed], through = outside(scenery, begin, towards)
     if world.view.inside:
-        light = world.white if world.white.any() else np.ones_like(world.white)  # where no lamp and no sky is
-        hue = (light / light.mean()) ** THERE  # which the picture will take from it
-        glow *= np.float32(VIEW * scenery.lights.sky) * (scenery.lights.tint * hue)[:, None]
-        past = np.flatnonzero(~through)
+        glow[:, missed] = scenery.lights.there(glow[:, missed])
+        shown[missed], past = through, np.flatnonzero(~through)
         glow[:, missed[past]] = next_room(scenery, world.white, begin.take(past, 1), towards.take(past, 1))
     lean = scenery.planes.normal.take(face, 1)
     normal = _unit(lean[:3] + u * lean[3:6] + v * lean[6:])
@@ -213,7 +214,7 @@ def _seen(world: World, origin: np.ndarray, way: np.ndarray, hit: Sequence[np.nd
     a, b, c = (scenery.triangles[face[averted], corner].T for corner in range(3))
     flat = np.cross(b - a, c - a, axis=0)
     normal[:, averted] *= -np.copysign(np.float32(1), along(flat, normal[:, averted]) * along(flat, way[:, averted]))
-    return Seen(face, origin + far * way, normal, hit[2], glow)
+    return Seen(face, origin + far * way, normal, hit[2], glow, shown)
 
 
 def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndarray:
@@ -445,7 +446,8 @@ def _mirrored(world: World, seen: Seen, square: np.ndarray) -> np.ndarray:
     rows = world.thrown.rows(point, way, far, scenery.planes.axis.take(face))
     within = LUMA @ world.thrown.radiance.take(rows, 1)
     bright = np.flatnonzero(scenery.planes.glows.take(face))
-    within[bright] += (scenery.emissive.take(face[bright], 0) * world.glow) @ LUMA
+    lamps = (scenery.emissive.take(face[bright], 0) * world.glow) @ LUMA
+    within[bright] += np.minimum(lamps, np.float32(GLINT) * (world.white @ LUMA))
     sky = np.float32(VIEW * scenery.lights.sky) * np.clip(0.65 + 1.4 * way[1], 0.3, 1)
     share = np.where(gloss > METAL, 1, 0.04 + (0.96 - rough) * (1 - facing) ** 5)  # Schlick's, of Fresnel's law
     out[some] = share * np.where(face < 0, sky, within)
@@ -476,7 +478,7 @@ def _direct(
         facing = np.clip(along(normal, way), 0, None) * len(lights.bulbs) / (away**2 + OWN**2)
         own = np.maximum(OWN, np.ptp(lights.bulbs, axis=1).max(-1))[which]  # what is so near is its shade
         lit = free(scene, point, way, away - own, facing > 0) * facing / np.float32(np.pi)
-        light += lit * lights.power.T.take(which, 1)
+        light += lit * lights.shining.T.take(which, 1)
     return light, _sunny(world, point, normal, spot)
 
 

@@ -88,7 +88,7 @@ def write_lights(pen: Pen, room: RoomData, bounds: np.ndarray) -> None:
 
 def image_files(room: RoomData) -> dict[str, bytes]:
     """Path in the room's folder -> image that its lights name."""
-    return {SKY: baking.sky_image(_own(room, "sky", list(baking.SKIES)))} if room.options.walls else {}
+    return {SKY: _own(room, "sky", baking.VIEWS).read_bytes()} if room.options.walls else {}
 
 
 def _own(room: RoomData, what: str, among: Sequence[Any]) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache, wraps
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 import PIL
 
 from echomodel.dressing import TABLE
-from echomodel.files import digest, from_cache, tables
+from echomodel.files import digest, from_cache
 from echomodel.late import lates
 from echousd.shapes.finishes.slots import HERE, Color
 from echousd.srgb import from_linear
@@ -40,8 +40,8 @@ def _code() -> str:
 
 
 # What bakes them is not loaded where the cache has every image.
-color_image, normal_image, rough_image, sky_image = map(
-    kept, lates("echousd.shapes.finishes.patterns", "color_image", "normal_image", "rough_image", "sky_image")
+color_image, normal_image, rough_image = map(
+    kept, lates("echousd.shapes.finishes.patterns", "color_image", "normal_image", "rough_image")
 )
 
 
@@ -50,4 +50,5 @@ def hexadecimal(color: Color) -> str:
     return "".join(f"{int(v * 255 + 0.5):02x}" for v in from_linear(np.clip(np.asarray(color, float), 0, 1)))
 
 
-SKIES: Mapping[str, Any] = tables("skies.toml", __file__)
+# What lies around a room, by latitude and longitude: pictures that `docs/make_views.py` draws.
+VIEWS = sorted((HERE / "views").glob("*.jpg"))

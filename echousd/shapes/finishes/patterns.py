@@ -6,23 +6,24 @@ Every pattern is the same in every run and on every machine; colour comes later,
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
-from typing import Any
+from itertools import pairwise
 
 import numpy as np
 from PIL import Image
 
 from echomodel.dressing import PRINTS
 from echomodel.late import Compiled, Late
-from echousd.shapes.finishes.baking import SKIES
 from echousd.shapes.finishes.slots import Color
 from echousd.srgb import from_linear
 
 cKDTree = Compiled("scipy.spatial._ckdtree:cKDTree")
 printed = Late("echousd.shapes.finishes.pictures:printed")
 SIZE = 512  # pixels on each side
+# Patterns of wood; the shares of its red that green and blue of no wood are over: what is of another colour is painted,
+# and so much of the grain is seen through it.
+GRAINED, LIKE_WOOD, UNDER_PAINT = ("wood", "veneer"), (0.85, 0.58), 0.2
 QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
 
 
@@ -30,7 +31,9 @@ QUALITY = 86  # of JPEG; without subsampling, because normals live in the colour
 class Relief:
     """One pattern."""
 
-    tone: np.ndarray  # (SIZE, SIZE) or (SIZE, SIZE, 3) float, over its mean what the tint is multiplied with
+    tone: (
+        np.ndarray
+    )  # (n, n) or (n, n, 3) float, n `SIZE` or twice that, over its mean what the tint is multiplied with
     height: np.ndarray | None = None  # (SIZE, SIZE) float, metres above the mean, None for what is flat
     rough: np.ndarray | None = None  # (SIZE, SIZE) float, added to the roughness, None where it is even
 
@@ -55,7 +58,7 @@ def _grid() -> tuple[np.ndarray, np.ndarray]:
 
 def aged(tone: np.ndarray, share: float) -> np.ndarray:
     """A tone as years of use leave it: rubbed paler and darker in patches, by a share of it, its contrasts stronger."""
-    patch = noise(201, 4.0, 4.0, 2.5) + 0.5 * noise(202, 24.0, 24.0)
+    patch = np.tile(0.5 * noise(201, 4.0, 4.0, 2.5) + 0.4 * noise(202, 24.0, 24.0), (len(tone) // SIZE,) * 2)
     worn = (1 + 8 * share) * (tone - 1) + 1
     return worn * (1 + share * (patch if tone.ndim == 2 else patch[..., None]))
 
@@ -72,29 +75,31 @@ def wood(seed: int = 1, rings: int = 9, contrast: float = 0.75) -> Relief:
 veneer = partial(wood, 11, 24, 0.25)  # fine and even
 
 
-def planks(rows: int = 8) -> Relief:
-    """Boards along u with joints, each of a tone of its own."""
-    rng = np.random.default_rng(5)
-    base, board = wood(21, 6, 0.9).tone, SIZE // rows
-    tone, gap = np.ones((SIZE, SIZE)), np.zeros((SIZE, SIZE))
-    for row in range(rows):
-        rowed = slice(row * board, (row + 1) * board)
-        start = int(rng.integers(SIZE))
-        ends = (start, start + SIZE // 2 + int(rng.integers(-SIZE // 12, SIZE // 12)))
-        piece = np.roll(base, int(rng.integers(SIZE)), axis=1)[rowed] * rng.normal(1.0, 0.05)
-        other = np.roll(base, int(rng.integers(SIZE)), axis=1)[rowed] * rng.normal(1.0, 0.05)
-        first = (np.arange(SIZE) - start) % SIZE < ends[1] - ends[0]
-        tone[rowed] = np.where(first[None], piece, other)
-        gap[row * board] = 1
-        for end in ends:
-            gap[rowed, end % SIZE] = 1
-    return Relief(tone * (1 - 0.35 * gap), -0.0006 * gap, 0.06 * noise(23, 3.0, 40.0) + 0.2 * gap)
+def planks(rows: int = 18) -> Relief:
+    """Boards along u in a picture twice as wide as others, none like its neighbours: each of a tone, a hue, a length
+    and a piece of the trunk of its own."""
+    rng, wide = np.random.default_rng(5), 2 * SIZE
+    base = np.tile(wood(21, 6, 0.55).tone, (3, 3))
+    tone, gap = np.ones((wide, wide, 3)), np.zeros((wide, wide))
+    edges = np.arange(rows + 1) * wide // rows
+    start = rng.integers(wide)
+    for top, bottom in pairwise(edges):
+        start += wide // 5 + int(rng.integers(wide // 8))  # no joint beside another
+        ends = [start, start + int(rng.integers(wide // 3, 2 * wide // 3)), start + wide]
+        for first, last in pairwise(ends):
+            x, y = rng.integers(SIZE, size=2)
+            piece = base[y : y + bottom - top, x : x + last - first, None] * rng.normal(1.0, 0.075)
+            tone[top:bottom, np.arange(first, last) % wide] = piece * (1 + rng.normal(0, 0.03) * np.array([-0.4, 0, 1]))
+            gap[top:bottom, first % wide] = 1
+        gap[top] = 1
+    rough = 0.04 * np.tile(noise(23, 3.0, 40.0), (2, 2)) + 0.2 * gap
+    return Relief(tone * (1 - 0.5 * gap[..., None]), -0.0006 * gap, rough)
 
 
 def herringbone(length: int = 4) -> Relief:
     """Blocks of `length` times their width, at right angles to one another."""
     cell = SIZE // (2 * length)
-    rng, base = np.random.default_rng(6), wood(21, 6, 0.9).tone
+    rng, base = np.random.default_rng(6), wood(21, 6, 0.55).tone
     rows, columns = np.indices((SIZE, SIZE))
     i, j = columns // cell, rows // cell
     step = (i - j) % (2 * length)
@@ -269,41 +274,6 @@ def stone() -> Relief:
     return Relief(1 + 0.02 * noise(98, 6.0, 6.0) - 0.5 * np.clip(noise(97, 90.0, 90.0, 4.0) - 1.9, 0, 1))
 
 
-SKY_SIZE = (512, 1024)  # pixels: a window some metres away shows about a hundred of them
-SOFT = 0.5  # degrees that outlines take
-
-
-def sky(row: Mapping[str, Any]) -> np.ndarray:
-    """`SKY_SIZE` + (3,) linear RGB by latitude and longitude, the zenith first: clouds, and a row of `skies.toml`."""
-    height, width = SKY_SIZE
-    elevation, around = 90 - (np.arange(height) + 0.5)[:, None] / height * 180, np.arange(width) / width * 360
-    level, *tones = np.array(row["tones"]).T
-    out = np.stack([np.interp(elevation, level, tone) for tone in tones], -1) * np.ones((1, width, 1))
-    grain, puff = (np.tile(noise(141 + n, *scale), (1, 2)) for n, scale in enumerate(((60.0, 60.0), (3.0, 9.0))))
-    cloud = np.clip(0.55 * puff - 0.25, 0, 0.75) * np.clip((elevation - 5) / 12, 0, 1)
-    out += cloud[..., None] * (np.array([0.95, 0.96, 0.97]) - out)
-    out *= np.where(elevation < 0, 1 + 0.06 * grain, 1.0)[..., None]
-    ridge = noise(151, 14.0, 14.0).repeat(2, axis=1)  # smooth rows of noise, all around
-    rng = np.random.default_rng(7)
-    for line, form in enumerate(row["forms"]):
-        wide, leaves = form.get("wide", 360), form.get("grain", 0)
-        own = rng.integers(len(form["colors"]), size=360 // wide), rng.uniform(-1, 1, 360 // wide)
-        hue, tall = (values[(around / wide).astype(int)] for values in own)
-        top = form["rise"] + form["uneven"] * (tall if "wide" in form else np.clip(ridge[line], -1.2, 1.5))
-        here = slice(*np.searchsorted(-elevation[:, 0], (-top.max() - 3 * leaves, -form.get("foot", -2.5))))
-        up, leaf = elevation[here], leaves * grain[here]
-        shade = 1 + 0.45 * np.clip(leaf, -2, 2) + 0.1 * tall
-        if "wide" in form:
-            pane, eaves = form["pane"], top - form["roof"]
-            top = top - form["roof"] * np.abs(2 * (around / wide % 1) - 1)
-            across, level = around / pane % 1, (eaves - up) / (1.4 * pane) % 1
-            panes = (np.abs(across - 0.5) < 0.2) & (np.abs(level - 0.55) < 0.25) & (up < eaves)
-            shade = np.where(panes, 0.35, np.where((up > eaves) & (form["roof"] > 0), 0.4, shade))
-        share = np.clip((top + leaf - up) / SOFT, 0, 1)[..., None]
-        out[here] += share * (np.array(form["colors"])[hue] * np.clip(shade, 0.1, 2)[..., None] - out[here])
-    return np.clip(out, 0, 1)
-
-
 @cache
 def relief(name: str) -> Relief:
     """The pattern that the function of that name there draws, its tone 1 in the mean."""
@@ -315,7 +285,10 @@ def color_image(pattern: str, color: Color, harmony: str, worn: float = 0.0) -> 
     """A pattern in a colour (linear RGB), `aged` by a share, or what is printed in those of a harmony, as JPEG."""
     if pattern in PRINTS:
         return _jpeg(printed(pattern, harmony))
-    tone = aged(relief(pattern).tone, worn) if worn else relief(pattern).tone
+    tone = relief(pattern).tone
+    if pattern in GRAINED and not (color[1] < LIKE_WOOD[0] * color[0] and color[2] < LIKE_WOOD[1] * color[0]):
+        tone, worn = 1 + UNDER_PAINT * (tone - 1), UNDER_PAINT * worn
+    tone = aged(tone, worn) if worn else tone
     tone = tone[..., None] if tone.ndim == 2 else tone
     return _jpeg(np.clip(tone * np.asarray(color), 0, 1))
 
@@ -337,11 +310,6 @@ def rough_image(pattern: str, roughness: float) -> bytes | None:
     """Roughness about a mean, grey; None where it is even."""
     rough = None if pattern in PRINTS else relief(pattern).rough
     return None if rough is None else _encoded(np.clip(roughness + rough, 0.05, 1), 70)
-
-
-def sky_image(kind: str) -> bytes:
-    """What lies around a room, a row of `SKIES`, for its dome light, as JPEG."""
-    return _jpeg(sky(SKIES[kind]))
 
 
 def _jpeg(value: np.ndarray) -> bytes:

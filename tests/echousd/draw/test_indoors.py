@@ -334,6 +334,23 @@ def test_a_glossy_floor_mirrors_the_window_and_more_so_aslant():
     assert mirrored > near + 0.04  # there one looks down on it
 
 
+def test_what_lies_outside_is_exposed_for_itself_and_darker_in_the_evening():
+    """However dark or bright the room is, the view is neither black nor burnt white."""
+    pane = np.array([[(1.99, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.8, 0.0)]], np.float32)
+    view = View(view_matrix(np.array([-1.8, 1.0, 0.0]), np.array([0.5, 1.0, 0.0])), 0.9, False, inside=True)
+    meadow, seen = np.full((8, 16, 3), 120, np.uint8), []
+    for sky, power in ((1.0, 0.0), (1.0, 40.0), (0.08, 1.0)):
+        lamp = {"bulbs": np.array([[(0.0, 2.0, 0.0)]], np.float32), "power": np.full((1, 3), power, np.float32)}
+        scenery, _ = box_room(sky=sky, sun=None, view=meadow, **lamp)
+        wall = (scenery.triangles[..., 0] > 1.9).all(1)
+        names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "st", "texture", "wall")
+        scenery = replace(scenery, panes=pane, **{name: getattr(scenery, name)[~wall] for name in names})
+        seen.append(trace(scenery, view, 32, rays=1)[15:17, 15:17].mean())
+    assert seen[0] == pytest.approx(seen[1], abs=1e-3)
+    assert 0.4 < seen[0] < 0.8
+    assert seen[2] < 0.8 * seen[0]
+
+
 def test_a_patch_of_sun_has_a_straight_border():
     """The border of a board's shadow, slightly aslant, in the picture's rows: soft by its sun's width alone."""
     pane = np.array([[(1.99, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.8, 0.0)]], np.float32)

@@ -184,7 +184,8 @@ def test_one_looks_out_of_windows_and_past_walls_that_are_away(tmp_path):
     np.testing.assert_allclose(2 * np.linalg.norm(rise), windows[0].height, atol=0.07)
     eye = np.array([0.0, 1.4, 0.0])
     aims = np.array([middle + 0.9 * rise, middle - 0.9 * rise, middle + 1.5 * side, 2 * eye - middle])
-    around = scenery.lights.view
+    assert np.ptp(scenery.lights.view) > 100  # something is seen
+    around = np.array([(120, 150, 200)] * 32 + [(90, 120, 60)] * 32, np.uint8)[:, None].repeat(128, axis=1)
     for view in (around, None):
         plain = replace(scenery, panes=scenery.panes[:1], lights=replace(scenery.lights, view=view))
         colors, through = outside(plain, np.tile(eye, (4, 1)).T, (aims - eye).T)
@@ -217,7 +218,7 @@ def test_what_light_there_is_everywhere_has_the_colour_of_the_rooms():
         embree(scenery.triangles), scenery, view, 64, np.zeros(4), Bounced.dark(*scenery.bounds), 0.0, white=warm
     )
     up, place = np.array([(0.0, 1.0, 0.0)], np.float32).T, np.array([(1.0, 1.2, 0.0)], np.float32).T
-    seen = Seen(np.zeros(1, int), place, up, np.zeros((2, 1)), np.zeros((3, 1)))
+    seen = Seen(np.zeros(1, int), place, up, np.zeros((2, 1)), np.zeros((3, 1)), np.zeros(1, bool))
     light = _light(world, seen, 0, np.zeros((4, 1), np.float32))
     np.testing.assert_allclose(light[:3, 0] / light[0, 0], warm, rtol=1e-4)
 

@@ -77,11 +77,23 @@ def test_harmonies_say_how_glossy_and_how_worn_their_materials_are():
         assert len({one.worn for one in looks}) > 4, word
         assert all(0.1 < one.rough <= 1 and 0 <= one.worn < 0.1 for one in looks)
     assert look("ink", "ceramic").rough == look("oak", "ceramic").rough
-    new, old = (np.asarray(Image.open(io.BytesIO(baking.color_image("planks", (0.3, 0.2, 0.1), "oak", worn))), float)
+    new, old = (np.asarray(Image.open(io.BytesIO(baking.color_image("wood", (0.3, 0.2, 0.1), "oak", worn))), float)
                 for worn in (0.0, 0.03))  # fmt: skip
     assert np.abs(new.mean((0, 1)) - old.mean((0, 1))).max() < 2
     patches = [image[..., 0].reshape(16, 32, 16, 32).mean((1, 3)).std() for image in (new, old)]
     assert patches[1] > 1.2 * patches[0]
+
+
+def test_boards_of_a_floor_differ_and_paint_hides_the_grain():
+    planks = relief("planks").tone
+    middles = planks[np.arange(18) * len(planks) // 18 + 28].reshape(18, 16, -1, 3).mean((2, 3))
+    assert np.corrcoef(middles).max(where=~np.eye(18, dtype=bool), initial=-1) < 0.95
+    assert middles.std() > 0.05
+    wood, paint = (
+        np.asarray(Image.open(io.BytesIO(baking.color_image("veneer", color, "oak", 0.03))), float).std((0, 1)).max()
+        for color in (linear("b98f5f"), linear("dfe4e4"))
+    )
+    assert paint < 0.4 * wood
 
 
 def test_fibres_run_along_the_longer_side_of_a_board():
