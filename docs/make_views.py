@@ -269,9 +269,9 @@ def town() -> tuple[list[Parts], float, float]:
 def lake() -> tuple[list[Parts], float, float]:
     """Over a garden's end, water before wooded hills."""
     rng = np.random.default_rng(6)
-    birches = [
-        tree(101, 9.0, birch=True, leaf=0.11, many=52, bare=0.3, green=(0.10, 0.165, 0.035)),
-        tree(102, 8.0, birch=True, leaf=0.11, many=52, bare=0.3, green=(0.085, 0.15, 0.034)),
+    trees = [
+        tree(101, 9.0, birch=True, leaf=0.15, many=60, bare=0.3, green=(0.10, 0.165, 0.035)),
+        tree(102, 8.0, birch=True, leaf=0.15, many=60, bare=0.3, green=(0.085, 0.15, 0.034)),
         conifer(103, 10.0),
     ]
     turn = np.linspace(0, 2 * np.pi, 129)
@@ -287,7 +287,7 @@ def lake() -> tuple[list[Parts], float, float]:
     out += [each.moved(0, 0, y=-1.0) for each in distant(106, 405, 470, 420)]
     for n in range(17):
         way, away = n * 2.39996 + 0.4, 13 + 0.85 * n
-        out.append(birches[n % 3].moved(away * np.cos(way), away * np.sin(way), n, rng.uniform(0.8, 1.2), -0.03 * away))
+        out.append(trees[n % 3].moved(away * np.cos(way), away * np.sin(way), n, rng.uniform(0.8, 1.2), -0.03 * away))
     out += scattered(rng, [bush(107 + n, (1.6, 1.0, 1.5), many=1800, leaf=0.07) for n in range(3)], 26, 19, 27, y=-0.7)
     return out, 3.0, 0.2
 
@@ -297,7 +297,7 @@ def hillside() -> tuple[list[Parts], float, float]:
     """From high up over a valley: crowns and roofs below, hills behind hills."""
     rng = np.random.default_rng(7)
     kinds = [tree(111, 9.0, leaf=0.2), tree(112, 8.0, leaf=0.2), conifer(113, 10.0), tree(114, 7.0, leaf=0.18)]
-    out = [ground((0.085, 0.13, 0.04), FIELD), *distant(115, 110, 420, 520)]
+    out = [ground((0.09, 0.135, 0.044)), *distant(115, 110, 420, 520)]
     out += [
         hills(116, 300, 1300, 130, (0.075, 0.115, 0.045)),
         hills(117, 1000, 2600, 330, (0.045, 0.085, 0.04)),
@@ -315,12 +315,12 @@ def hillside() -> tuple[list[Parts], float, float]:
 
 
 @view
-def birches() -> tuple[list[Parts], float, float]:
+def wood() -> tuple[list[Parts], float, float]:
     """A clearing in a light wood."""
     rng = np.random.default_rng(8)
     kinds = [
-        tree(121, 10.0, birch=True, leaf=0.11, many=52, bare=0.3, green=(0.105, 0.17, 0.035)),
-        tree(122, 11.0, birch=True, leaf=0.11, many=52, bare=0.33, green=(0.085, 0.15, 0.03)),
+        tree(121, 10.0, birch=True, leaf=0.15, many=60, bare=0.3, green=(0.105, 0.17, 0.035)),
+        tree(122, 11.0, birch=True, leaf=0.15, many=60, bare=0.33, green=(0.085, 0.15, 0.03)),
         conifer(123, 11.0),
         tree(124, 9.0, leaf=0.16, many=30),
     ]
@@ -455,7 +455,7 @@ def drawn(name: str) -> np.ndarray:
         shiny = np.flatnonzero((kind == GLASS) | (kind == WATER))
         if len(shiny):
             upright = kind[shiny] == GLASS
-            wave = normal[shiny] + np.where(upright, 0.0, 0.02)[:, None] * rng.normal(size=(len(shiny), 3))
+            wave = normal[shiny] + np.where(upright, 0.0, 0.004)[:, None] * rng.normal(size=(len(shiny), 3))
             back = way[shiny] - 2 * (way[shiny] * wave).sum(1, keepdims=True) * wave
             back[:, 1] = np.where(upright, back[:, 1], np.abs(back[:, 1]))
             seen, _ = met(start[shiny], back)

@@ -44,6 +44,8 @@ UNSEEN, MANY = 6.0, 8.0  # metres of depth that each of so many pieces in the pi
 # backs, seen where the cosine is larger, and of ceiling. By choices of 40 pictures among eight each.
 SHOWN, FACED, AHEAD, BACKS, AVERTED, OVERHEAD = 30.0, 20.0, 1.0, 320.0, 0.25, 100.0
 UNDER, FLOORED = 200.0, 0.32  # and a picture full of bare floor, and the share of it from which on that costs
+# And a picture full of pieces that its border cuts, and of backs nearer than so many metres, from a share of it on.
+SEVERED, TURNED, CLOSE, SOME = 250.0, 1000.0, 3.5, 0.03
 MOST = SHOWN + FACED * AHEAD + UNSEEN * MANY + 1e-6  # that a view is worth which costs nothing
 STEPS = (0.2, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
 # Or so far behind a wall, which its near plane cuts away, and so much of the room with what hangs and stands there.
@@ -141,11 +143,15 @@ def inside_view(
         which, away, along = everything.met(shot.view, half, shot.near)
         shown, above = np.isfinite(away) & (which < count), RAYS[:, 1] * half > shot.view[1, 2]
         seen = (~shot.blocked & (_aside(shot.points, shot.view) <= half)).mean(-1).sum()
+        shares = np.bincount(which[shown], minlength=count) / len(RAYS)
+        cut = (_aside(furniture.corners, shot.view) > half / MARGIN).any(-1) & (np.arange(count) != main)
+        averted = shown & (along > AVERTED) & (away < CLOSE)
         bare = barest_share(which, np.where(row[which] < len(row) - len(floor), np.inf, away), height, shot.view, half)
         return (
             FACED * min(float((eye[[0, 2]] - middle) @ furniture.facing), AHEAD) + UNSEEN * min(seen, MANY)
             + float((SHOWN * shown - BACKS * (shown & (along > AVERTED)) - OVERHEAD * (above & np.isinf(away))).mean())
             - UNDER * max(0.0, float((~above & np.isinf(away)).mean()) - FLOORED)
+            - SEVERED * float(shares[cut].sum()) - TURNED * max(0.0, float(averted.mean()) - SOME)
             - FILLED * filled(away, reach[which]) - BARE * max(0.0, bare - BAREST) - shot.cost
         )  # fmt: skip
 

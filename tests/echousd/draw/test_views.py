@@ -289,6 +289,29 @@ def test_a_lamp_that_the_picture_has_room_for_is_in_it_and_the_bed_whole() -> No
     assert within(shade, *view) == within(both.corners[0], *view) == 1.0
 
 
+def test_armchairs_before_a_sofa_are_whole_though_the_camera_must_look_from_another_wall() -> None:
+    """A lounge whose best view else cut one of two armchairs and a long radiator before the camera."""
+    half_pi, floor = np.pi / 2, np.array([(-2.65, -2.1), (-2.65, 2.1), (2.65, 2.1), (2.65, -2.1)])
+    things = boxes(
+        (2.51, 0.85, 1.03, -2.11, 0.0, -0.3, half_pi), (1.18, 0.39, 0.83, -0.4, 0.0, -0.22, np.pi),
+        (1.73, 0.63, 0.42, 2.38, 0.0, -0.19, -half_pi), (1.21, 0.74, 0.18, 2.38, 0.63, -0.19, -half_pi),
+        (0.69, 0.78, 0.66, -0.85, 0.0, 0.88, np.pi), (0.69, 0.78, 0.66, 0.3, 0.0, 0.77, np.pi),
+        (0.43, 1.69, 0.43, -2.32, 0.0, -1.89, half_pi), (1.67, 1.58, 0.25, 0.55, 0.0, 1.98, -np.pi),
+        (0.45, 0.72, 0.45, 2.38, 0.0, -1.56, -half_pi),
+    )  # fmt: skip
+    hung = boxes(
+        (0.44, 2.31, 0.08, -1.03, 0.02, -2.01, 0.0), (0.44, 2.31, 0.08, 1.03, 0.02, -2.01, 0.0),
+        (0.4, 1.44, 0.08, -2.56, 0.89, 0.89, half_pi), (0.4, 1.44, 0.08, -2.56, 0.89, -0.89, half_pi),
+        (1.3, 0.6, 0.09, 0.0, 0.0, -2.02, 0.0), (0.91, 0.62, 0.03, 2.63, 1.15, -0.19, -half_pi),
+        (0.75, 0.21, 0.16, 0.1, 1.58, 1.99, -np.pi), (0.43, 0.44, 0.43, -1.79, 0.0, -1.82, 1.66),
+        (0.46, 0.64, 0.03, 2.63, 1.2, 1.15, -half_pi), (0.81, 0.56, 0.04, 1.95, 1.24, -2.08, 0.0),
+        (0.6, 0.44, 0.03, -0.95, 1.3, 2.08, -np.pi), (0.51, 1.12, 0.51, 2.3, 0.0, 1.75, -1.85),
+    )  # fmt: skip
+    windows = boxes((2.0, 1.3, 0.02, 0.0, 0.9, -2.1, 0.0), (1.68, 1.3, 0.02, -2.65, 0.9, 0.0, half_pi))
+    view = inside_view(floor, things, 2.8, hung, windows, main=0)[:2]
+    assert min(within(corners, *view) for corners in things.corners[[0, 1, 4, 5]]) >= 7 / 8
+
+
 @pytest.mark.parametrize("at", [(1.5, 1.7), (1.7, 1.5), (1.4, 1.4), (1.9, 1.9)])
 def test_a_small_dining_room_has_its_chairs_whole_but_for_a_foot(at) -> None:
     floor, (x, z) = np.array([(0.0, 0.0), (0.0, 3.2), (3.4, 3.2), (3.4, 0.0)]), at
