@@ -43,10 +43,13 @@ def cushions(setting: Setting) -> None:
         apart = 0.28 / (wide / 2 - 0.25) if wide > MORE[1] else 0.0
         ends += [(end, odd) for end in dict.fromkeys((-apart, apart)) if more and wide > MORE[0]]
         for end, (kind, size, variant) in ends if wide > 1.3 else [(float(rng.choice([-0.6, 0.6])), narrow)]:
-            spot = seat.resting(end, size)
             turn = -0.12 * end * float(rng.uniform(0.3, 1.6))
-            spot = None if spot is None else _clear_of(host, spot, turn, size)
-            _put(setting, host, _let_down(host, spot, size), kind, size, turn, variant)
+            for lean in (LEAN * size[1], 0.0):  # upright on what is too shallow
+                deep = size + np.array([0.0, 0.0, lean])
+                spot = seat.resting(end, deep)
+                spot = None if spot is None else _clear_of(host, spot, turn, deep)
+                if _put(setting, host, _let_down(host, spot, deep), kind, deep, turn, variant):
+                    break
 
 
 Design = tuple[str, np.ndarray, int]  # kind, extents and variant of a cushion
@@ -265,7 +268,7 @@ def throws(setting: Setting) -> None:
         else:
             deep, everywhere = float(np.clip(0.3 * host.size[2], 0.4, 0.75)), np.full(len(seat.x), True)
             depths = (float(host.size[2]) / 2 - back - deep / 2 for back in (0.1, 0.2, 0.3))
-            over = (_across(host, seat, everywhere, z, deep, 0.22, rng) for z in depths)
+            over = (_across(host, seat, everywhere, z, deep, 0.32, rng) for z in depths)
         setting.put_first(filter(None, over), host=host.name, margin=0.0)
 
 
@@ -294,7 +297,7 @@ def _across(
     if not 0.25 < middle <= top < min(0.95, middle + BOARD):
         return None
     half = float(np.abs(x[(under > top - 0.2).any(1)]).max()) + STEP / 2
-    size = np.round([2 * half + 0.08, 0.012 + min(most, rng.uniform(0.16, 0.22)), deep], 3)
+    size = np.round([2 * half + 0.08, 0.012 + min(most, rng.uniform(0.2, 0.32)), deep], 3)
     rows, columns = np.linspace(0, under.shape[1], LIES[0] + 1), np.linspace(-half, half, LIES[1] + 1)
     near = min(0.08, 0.3 * half)
     cells = [
@@ -302,5 +305,5 @@ def _across(
         for k in rows[:-1]
     ]
     lie = tuple(np.round(np.clip(top - np.array(cells), 0.0, BOARD), 3).ravel().tolist())
-    spot = host.to_room(np.array([[centre, top + 0.014 - size[1], z]]))[0]
+    spot = host.to_room(np.array([[centre, top + 0.019 - size[1], z]]))[0]
     return Thing("throw", size, spot, host.yaw, host.name, int(rng.integers(1 << 30)), lie=lie)

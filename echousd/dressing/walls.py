@@ -28,7 +28,7 @@ BELOW, BEHIND = 0.14, 0.03  # metres of air between a window's sill and a radiat
 PLUGGED = ("bed", "desk", "tv_stand")  # words of what has a socket beside it
 CURTAINS = ("curtain", "tied_curtain", "eyelet_curtain", "pleated_curtain", "sheer_curtain")  # of a room all are alike
 BLINDS = ("blind", "roman_blind", "cafe_curtain")  # as well; where it is wet, the first
-BEFORE = 0.35  # metres from a window: what stands so near is under it
+BUNCHED = (1.0, 0.75, 0.55)  # of how wide a curtain hangs, where something stands beside it
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,35 +61,29 @@ def walls_of(floor: np.ndarray) -> list[Wall]:
 
 
 def curtains(setting: Setting) -> None:
-    """A curtain on either side of every window down to the floor; where there is no room for two, a blind in it.
-
-    Over what stands under a window curtains may end at its sill: in half of the rooms, in the others it has a blind.
-    """
+    """A curtain on either side of every window down to the floor; where there is no room for two, a blind in it."""
     if not setting.walls or setting.use == "outdoor":
         return
     above, before, beyond = RAIL
     for wall in walls_of(setting.floor):
         for window in (o for o in setting.openings if o.kind == "window" and o.edge == wall.edge):
             rail = window.sill + window.height + above
-            beside = _near(setting, wall, window, window.width + 2 * beyond, before + 0.09)
-            if setting.use == "wet" or rail > setting.height - 0.05 or any(one.top > rail - 0.03 for one in beside):
+            middle, reach = wall.at((window.offset + window.end) / 2, before / 2 + 0.045, 0.0), before + 0.09
+            strip = rectangle(middle[[0, 2]], np.array([window.width + 2 * beyond, reach]), wall.yaw)
+            tall = any(o.top > rail - 0.03 and o.footprint.intersects(strip) for o in setting.objects.values())
+            if setting.use == "wet" or rail > setting.height - 0.05 or tall:
                 _blind(setting, wall, window)
                 continue
             rng = setting.rng("curtains")
             kind, variant = str(rng.choice(_styled(setting, CURTAINS))), int(rng.integers(1 << 30))
-            short = rng.random() < 0.5
-            wide = round(min(0.45, 0.16 + 0.14 * window.width), 3)
-            over = [max(0.3, window.sill - 0.12), window.sill - 0.01]
-            under = any(o.position[1] < window.sill for o in _near(setting, wall, window, 0.8 * window.width, BEFORE))
-            feet = [0.015, *(over if short and under else ())]
-            left = max(window.offset - beyond + wide / 2, 0.02 + wide / 2)
-            right = min(window.end + beyond - wide / 2, wall.length - 0.02 - wide / 2)
-            inner = np.linspace(0.0, 0.5 * (right - left) - wide / 2, 4)  # over the pane where something is beside
-            for foot in feet:
-                size = np.array([wide, round(rail + 0.005 - foot, 3), 0.085])
+            full = round(min(0.45, 0.16 + 0.14 * window.width), 3)
+            low, high = np.clip((window.offset - beyond, window.end + beyond), 0.02, wall.length - 0.02).tolist()
+            for wide in (round(full * share, 3) for share in BUNCHED):
+                inner = np.linspace(wide, high - low - wide, 4) / 2  # over the pane where something is beside
+                size = np.array([wide, round(rail - 0.01, 3), 0.085])
                 sides: list[Thing] = []
-                for ends in (left + inner, right - inner):
-                    hung = (Thing(kind, size, wall.at(x, before, foot), wall.yaw, "", variant) for x in ends)
+                for places in (low + inner, high - inner):
+                    hung = (Thing(kind, size, wall.at(x, before, 0.015), wall.yaw, "", variant) for x in places)
                     sides += islice((one for one in hung if setting.clear(one, margin=0.0, floor=False)), 1)
                 if len(sides) == 2:  # one alone looks forgotten
                     setting.placed += sides
@@ -102,13 +96,6 @@ def curtains(setting: Setting) -> None:
 def _styled(setting: Setting, kinds: Sequence[str]) -> Sequence[str]:
     """Those of some curtains that go with the style of a room; all where none is told."""
     return [kind for kind in kinds if kind in setting.style.curtains] if setting.style else kinds
-
-
-def _near(setting: Setting, wall: Wall, window: Opening, wide: float, deep: float) -> list[Standing]:
-    """What stands or hangs within a strip, metres wide and deep, under and right before a window."""
-    middle = wall.at((window.offset + window.end) / 2, deep / 2, 0.0)
-    strip = rectangle(middle[[0, 2]], np.array([wide, deep]), wall.yaw)
-    return [one for one in setting.objects.values() if one.footprint.intersects(strip)]
 
 
 def _blind(setting: Setting, wall: Wall, window: Opening) -> None:

@@ -9,8 +9,9 @@ import pytest
 from echomodel.furniture import Choices, draw_choices, draw_style, mesh_of, sample_size, solids
 from echomodel.furniture.bent import Bow, Shell
 from echomodel.furniture.chairs import BODIES
+from echomodel.furniture.cloth import Pad
 from echomodel.furniture.seating import back_rest
-from echomodel.furniture.solids import Ball, Block, Lathe, Pad, Tube, Turned, rotation
+from echomodel.furniture.solids import Ball, Block, Lathe, Tube, Turned, rotation
 from echomodel.furniture.style import OPEN
 from echomodel.metrics.furniture import loose_solids
 from echomodel.sizes import size_score, size_statistics
@@ -185,7 +186,7 @@ def test_a_cushion_is_fuller_in_its_middle_and_a_bent_board_hollow():
     assert board[abs(board[:, 0]) < 0.05, 2].max() < -0.03
 
 
-def test_cushions_in_a_row_touch_and_no_two_backs_are_dented_alike():
+def test_cushions_in_a_row_touch_and_no_two_are_dented_alike():
     for number in range(8):
         style, choices = drawn(number, arms="box", back="rails")
         parts = solids("multi_seat_sofa", style, choices, np.array([2.2, 0.85, 0.95]))
@@ -194,7 +195,7 @@ def test_cushions_in_a_row_touch_and_no_two_backs_are_dented_alike():
             tops = [pad.mesh()[0] - pad.centre for pad in pads]
             for (left, a), (right, b) in itertools.pairwise(zip(pads, tops, strict=True)):
                 assert (left.centre + a)[:, 0].max() >= (right.centre + b)[:, 0].min(), number
-                assert (np.ptp(abs(a - b), axis=0).max() > 0.001) == (role == "back"), number
+                assert len(a) != len(b) or np.ptp(abs(a - b), axis=0).max() > 0.001, number
 
 
 def test_trestles_and_bows_hold_together():

@@ -13,7 +13,7 @@ from echomodel.furniture.cloth import Sheet, Slumped, folds, pillow, seam
 from echomodel.furniture.solids import Solid, ball, rotation, tube, turned
 
 LIES = (11, 16)  # cells in which a throw knows what it lies on
-FOLD = 0.14  # metres of curtain from one fold to the next
+FOLD, GATHERED = 0.14, 0.018  # metres of curtain from one fold to the next; of a throw from the highest to the lowest
 FULL = (0.4, 1.0)  # of the fullest fold at a foot, the others
 BREAK = (0.05, 0.3)  # share of its height over its foot where a curtain breaks, and of a fold that is less deep there
 BENDS, ROUND = (np.arange(10) + 0.5) * np.pi / 5, 0.075  # where in a fold, radians, points are; wider than a wave there
@@ -151,7 +151,7 @@ def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid
         "button": [ball((0, h / 2, 0), (0.016, 0.016, 0.51 * d), cord)],
         "tassels": [ball((x * w, y, 0), (0.016, low, 0.014), cord) for x in (-0.47, 0.47) for y in (low, h - low)],
     }
-    made = [replace(body, power=float(rng.choice((3.0, 4.0, 5.5)))), *trims.get(trim, [])]
+    made = [replace(body, power=float(rng.choice((1.7, 2.0, 2.4)))), *trims.get(trim, [])]
     return [Slumped(material=one.material, of=one, tall=h, lean=lean) for one in made] if lean else made
 
 
@@ -180,9 +180,9 @@ def throw(size: Size, rng: np.random.Generator, lie: tuple[float, ...] = ()) -> 
     def spread(line: np.ndarray) -> np.ndarray:
         x, deep = np.meshgrid(line[:, 0], z)
         hanging = np.clip((h - line[:, 1]) / max(h, 1e-6), 0, 1)
-        ripple = 0.012 * (1 + np.sin(2 * np.pi * deep / d * 2.5 + phase[0] + np.sign(x))) * hanging  # away from the bed
-        skew = (0.03 * np.sin(2.2 * x + phase[1]) + 0.05 * (phase[2] / 3 - 1) * x) * (1 - hanging / 2)
-        y = line[:, 1] - lower * (1 - hanging) - 0.006 * folds(x, 2.5 * deep, phase) * (hanging < 0.1)
-        return np.stack([x + np.sign(x) * ripple, y, deep + skew], -1)
+        ripple = 0.018 * (1 + np.sin(2 * np.pi * deep / d * 2.5 + phase[0] + np.sign(x))) * hanging  # away from the bed
+        skew = (0.03 * np.sin(2.2 * x + phase[1]) + 0.09 * (phase[2] / 3 - 1) * x) * (1 - hanging / 2)
+        y = line[:, 1] - lower * (1 - hanging) - GATHERED * folds(x, 2.5 * deep, phase) * (1 - hanging)
+        return np.stack([x + np.sign(x) * ripple, y, deep * (1 - 0.16 * np.sin(1.4 * x + phase[2]) ** 2) + skew], -1)
 
     return [Sheet(front=spread(profile), back=spread(inner), material=str(rng.choice(THROWS)))]

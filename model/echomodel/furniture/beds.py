@@ -75,13 +75,13 @@ def bedding(
         place = (-w / 2 + each * (i + 0.5), low + thick + high, z0 + off)
         turn = rotation(x=lean, y=rng.uniform(-0.08, 0.08))
         half = (min(each * 0.46, 0.38), 0.13, 0.25)
-        parts.append(replace(pillow(place, half, "linen", "pillow", turn), power=2.7))
+        parts.append(replace(pillow(place, half, "linen", "pillow", turn), power=2.1))
     if choices.chance("cover", 0.85):
         start = z0 + (z1 - z0) * choices.between("spread", 0.28, 0.42)
         x, y, top = w * 0.53 + 0.02 + 0.03 * style.softness, low - 0.09, low + thick + 0.09
         end = z1 + (0.08 + 0.02 * style.softness if falls else 0.03)
         cloth = str(choices.stream("cover").choice(COVERS))
-        parts.append(cover((-x, y, start), (x, top, end), cloth, 0.085, 0.04, rng, falls=falls))
+        parts.append(cover((-x, y, start), (x, top, end), cloth, 0.12, 0.045, rng, falls=falls))
         fold = 0.16 + 0.1 * style.softness  # the sheet turned back over it
         x, y = x + 0.004, low + thick * 0.4
         parts.append(cover((-x, y, start - 0.01), (x, top + 0.014, start + fold), "linen", 0.04, 0.012, rng))

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.furniture.solids import IDENTITY, Block, Pad, Solid, Turned, ball, rotation, tube, turned, upright
+from echomodel.furniture.cloth import Pad
+from echomodel.furniture.solids import IDENTITY, Block, Solid, Turned, ball, rotation, tube, turned, upright
 from echomodel.furniture.style import Style
 
 Size = np.ndarray  # (3,) width x, height y, depth z, metres
@@ -70,7 +71,7 @@ def cushion(
     """An upholstered body between two corners: its edges rounded as far as the style is soft, bulging at most."""
     a, b = np.asarray(low, float), np.asarray(high, float)
     half = np.maximum((b - a) / 2, 1e-3)
-    fuller = ((0.42, 0.4), (0.05, 0.2) if role == "seat" else (0.14, 0.18))  # what stands on a seat wants it level
+    fuller = ((0.42, 0.4), (0.06, 0.36) if role == "seat" else (0.16, 0.34))  # what stands on a seat wants it level
     radius, crown = (float(half.min() * (low + more * style.softness)) for low, more in fuller)
     return Pad((a + b) / 2, turn, material, role, half=half, radius=radius, crown=crown)
 

@@ -13,14 +13,15 @@ import numpy as np
 from echomodel.files import tables
 from echomodel.furniture.bent import bent
 from echomodel.furniture.carpentry import Size, base, both, box, cushion, of_role
+from echomodel.furniture.cloth import Pad
 from echomodel.furniture.seating import chair_legs, leaning, slim_arms
-from echomodel.furniture.solids import Lathe, Pad, Solid, ball, rotation, superellipse, tube, turned
+from echomodel.furniture.solids import Lathe, Solid, ball, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
 from echomodel.furniture.tufting import Tufted
 
 BODIES: list[dict[str, Any]] = list(tables("bodies.toml", __file__).values())
 padded = partial(turned, material="fabric")
-TOUCH = 0.006  # metres that cushions side by side press into one another
+TOUCH = 0.012  # metres that cushions side by side press into one another
 FLARED = 0.4  # softness up to which arms have no pad and flare
 
 

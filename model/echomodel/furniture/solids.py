@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 IDENTITY = np.eye(3)
-DENTED = 0.7  # of how far a cushion's middle stands out, by how much it is bent
 FINEST = 3  # levels of detail that a solid can be meshed in: 0 to 3
 
 
@@ -102,47 +101,17 @@ class Block(Solid):
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         r = min(self.radius, *(self.half * 0.999))
-        return self._rounded(r, min(detail, 1 if r < 0.008 else 3), 1)
-
-    def _rounded(self, r: float, steps: int, flat: int) -> tuple[Array, Array]:
-        """Its surface with, on every axis, `steps` cells for the rounding at either end and `flat` ones between."""
+        steps = min(detail, 1 if r < 0.008 else 3)
+        cells = 2 * steps + 1  # on every axis: those of the rounding at either end, and one between
+        vertices, faces = cube_surface(1 if r <= 0 else cells)
         if r <= 0 or not steps:
-            vertices, faces = cube_surface(flat)
             return vertices * self.half, faces
-        cells = 2 * steps + flat
-        vertices, faces = cube_surface(cells)
         node = np.rint((vertices + 1) / 2 * cells) - steps
-        corner = (np.minimum(node, 0) + np.maximum(node - flat, 0)) / steps
+        corner = (np.minimum(node, 0) + np.maximum(node - 1, 0)) / steps
         corner = np.sign(corner) * np.tan(np.abs(corner) * np.pi / 4)
         length = np.linalg.norm(corner, axis=1, keepdims=True)
-        core = np.clip(node, 0, flat) * 2 / flat - 1
+        core = np.clip(node, 0, 1) * 2 - 1
         return core * (self.half - r) + r * corner / np.maximum(length, 1e-12), faces
-
-
-@dataclass(frozen=True, eq=False)
-class Pad(Block):
-    """A filled cushion: every side stands out in its middle by `crown` metres over its edges; where one that is no seat
-    stands decides how it is dented, so that no two in a row are alike."""
-
-    crown: float = 0.02
-
-    def puffed(self, points: Array) -> Array:
-        """Points (n, 3) of the block, as far drawn in as its filling lets them be."""
-        place = points / self.half
-        share = np.clip(1 - place**2, 0, 1)
-        flat = share[:, [1, 2, 0]] * share[:, [2, 0, 1]]  # 1 in the middle of the sides of each axis
-        out = points * (1 - np.minimum(self.crown / self.half, 0.2) * (1 - flat))
-        thin, phase = int(np.argmin(self.half)), 9.0 * float(self.centre @ (1.0, 0.7, 1.3))
-        u, v = place[:, (thin + 1) % 3], place[:, (thin + 2) % 3]
-        out[:, thin] += (
-            DENTED * (self.role != "seat") * self.crown * np.sin(2.6 * u + phase) * np.cos(2.2 * v + 1.7 * phase)
-        )
-        return np.asarray(out)
-
-    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        steps, flat = ((0, 1), (1, 1), (1, 3), (2, 3))[detail]
-        vertices, faces = self._rounded(min(self.radius, *(self.half * 0.999)), steps, flat)
-        return self.puffed(vertices), faces
 
 
 @dataclass(frozen=True, eq=False)

@@ -180,20 +180,17 @@ def test_shelves_on_walls_carry_books_and_something_beside(kind, seed, monkeypat
     assert all(board.position[1] < thing.position[1] <= board.position[1] + board.size[1] + 1e-3 for thing in borne)
 
 
-@pytest.mark.parametrize("word", ["", "toy_box"])
-def test_curtains_end_at_the_sill_only_over_what_stands_under_the_window(word):
-    """Something beside the window is no reason: there it has a blind, or curtains further in."""
-    low, kinds = set(), set()
+@pytest.mark.parametrize(("low", "kinds"), [(-1.5, walls.CURTAINS), (-0.9, walls.BLINDS)])
+def test_curtains_reach_the_floor_and_are_bunched_where_little_room_is(low, kinds):
     for seed in range(24):
-        room = setting(word, seed=seed, openings=[WINDOW])
-        sides = (-1.5, 1.5) if word else (-1.2, 1.2)
-        room.placed = [walls.Thing("tent", np.array([2.2, 0.6, 0.3]), np.array([x, 0.0, -1.3]), 0.0) for x in sides]
+        room = setting(seed=seed, openings=[WINDOW])
+        room.placed = [
+            walls.Thing("tent", np.array([1.6, 0.6, 0.3]), np.array([x, 0.0, -1.3]), 0.0) for x in (low, -low)
+        ]
         walls.curtains(room)
-        hung = [thing for thing in room.placed if KINDS[thing.kind].name in ("curtain", "blind")]
-        kinds |= {thing.kind for thing in hung}
-        low |= {thing.position[1] > 0.1 for thing in hung if thing.kind in walls.CURTAINS}
-    assert low == ({True} if word else set())
-    assert kinds & set(walls.BLINDS)
+        hung = room.placed[2:]
+        assert {thing.kind for thing in hung} <= {*kinds}
+        assert all((thing.position[1] < 0.1) == (kinds == walls.CURTAINS) for thing in hung)
 
 
 @pytest.mark.parametrize("resident", ["", "child"])

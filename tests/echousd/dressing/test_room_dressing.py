@@ -225,8 +225,7 @@ def test_an_undressed_room_has_a_rail_only_where_curtains_would_hang(bare):
     assert dress(bare).bare == dress(replace(bare, options=RoomOptions(walls=True, dress="full"))).bare
     windows = {opening.name for opening in bare.graph.room.openings if opening.kind == "window"}
     assert windows
-    drawn = (replace(bare, provenance=replace(bare.provenance, seed=seed)) for seed in range(8))
-    assert {bool(dress(one).bare) for one in drawn} == {False, True}  # its sofa stands under a window
+    assert dress(bare).bare  # its sofa stands under a window
     kitchen = bare.graph.replaced(room=bare.graph.room.replaced(type="kitchen"))
     assert dress(replace(bare, graph=kitchen)).bare == windows
 
