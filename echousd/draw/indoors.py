@@ -25,7 +25,7 @@ CEILING = np.array([0.87, 0.86, 0.84], np.float32)
 VIEW = 0.65  # of the sky's radiance, what glossy things mirror of it
 # What is seen through windows is exposed for itself, as photographers of interiors blend it in: how bright by day, the
 # power of the sky's light by which it is less in the evening, that by which its shadows are opened, and haze before it.
-THERE, DUSK, OPENED, VEIL = 1.1, 0.5, 0.76, 0.08
+THERE, DUSK, OPENED, VEIL = 1.2, 0.5, 0.7, 0.09
 WHITER = 0.36  # how much less coloured the light of lamps is than told: no wall is as yellow to eyes
 DIM = 0.02  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
@@ -65,6 +65,11 @@ class Lights:
     def shining(self) -> np.ndarray:
         """(n, 3) the power as a picture shows it, see `WHITER`."""
         return self.power + np.float32(WHITER) * ((self.power @ LUMA)[:, None] - self.power)
+
+    @cached_property
+    def planes(self) -> np.ndarray:
+        """(3, h * w) uint8, `view` plane by plane: numpy would copy all of it wherever some is taken."""
+        return np.ascontiguousarray(np.asarray(self.view).reshape(-1, 3).T)
 
     def there(self, color: np.ndarray) -> np.ndarray:
         """(3, n) how a picture shows colours (3, n) of what lies around."""

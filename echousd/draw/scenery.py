@@ -194,7 +194,7 @@ def outside(scenery: Scenery, origin: np.ndarray, direction: np.ndarray) -> tupl
         else:  # by latitude and longitude
             x, y, z = direction[:, here]
             across, down = 0.5 + np.arctan2(x, z) / (2 * np.pi), np.arccos(np.clip(y, -1, 1)) / np.pi
-            out[:, here] = between(around.reshape(-1, 3).T, across, down, 0, around.shape[1], around.shape[0])
+            out[:, here] = between(scenery.lights.planes, across, down, 0, around.shape[1], around.shape[0])
         through |= here
     return out, through
 
