@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from echomodel.sizes import size_statistics
-from echomodel.vocabulary import Category, vocabulary
+from echomodel.vocabulary import vocabulary
 from echousd.assets import STRETCH
 from echousd.assets.colors import MOST, apart, oklab, stated_colors
 from echousd.assets.colors import costs as color_costs
@@ -225,22 +225,15 @@ def _shelves_for(word: str, wishes: AssetWishes) -> list[tuple[str, float]]:
     """Categories whose models may stand for one, with what that costs; those of the nearest kind, its own first."""
     row = vocabulary().category(word)
     found = [(word, 0.0)] if word in wishes.shelves else []
-    for kin, cost in ((_same_word, OTHER_WORD), (_same_family, OTHER_FAMILY)):
-        others = [c.name for c in vocabulary().categories if c.name in wishes.shelves and kin(row, c)]
+    # a table lamp does not hang from a ceiling
+    alike = [c for c in vocabulary().categories if c.name in wishes.shelves and c.support == row.support]
+    words = [c.name for c in alike if c.sgfront == row.sgfront or (c.like or c.name) == (row.like or row.name)]
+    family = [c.name for c in alike if (c.coarse, c.role) == (row.coarse, row.role)]
+    for others, cost in ((words, OTHER_WORD), (family, OTHER_FAMILY)):
         found += [(name, cost) for name in others if name != word]
         if found:
             break
     return found
-
-
-def _same_word(one: Category, other: Category) -> bool:
-    if one.support != other.support:  # a table lamp does not hang from a ceiling
-        return False
-    return one.sgfront == other.sgfront or (one.like or one.name) == (other.like or other.name)
-
-
-def _same_family(one: Category, other: Category) -> bool:
-    return (one.coarse, one.role, one.support) == (other.coarse, other.role, other.support)
 
 
 def _unlike(record: AssetRecord, company: Sequence[AssetRecord]) -> float:
