@@ -185,7 +185,7 @@ def test_halls_hold_several_zones_and_stay_tidy():
         scores.pop(name)
     missed = sum(number for rule, number in scores.items() if rule not in spacious)
     assert missed < 0.07 * objects  # .057
-    assert scores.total() < 0.2 * objects  # a full hall's zones stand closer than the rules have them
+    assert scores.total() < 0.22 * objects  # a full hall's zones stand closer than the rules have them
     assert halls[3].to_json() == generate_rooms(1, 4, start=3, halls=1.0)[0].to_json()
 
 

@@ -234,8 +234,8 @@ SERVED = 1.0  # metres: floor further from all furniture serves nothing
 SOFT = 0.2  # metres on both sides of it over which a point of the floor counts in part
 SEAT = 0.7  # metres that a side needs before it to seat somebody
 NOOK, AT_WALL = 0.66, 0.4  # metres between a plant and what is next to it along and across, and to the next wall
-# Metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it; before storage to a low table, a sofa.
-OPENS, LOW, PASSED = 0.55, 0.45, 0.8
+# Metres before a wardrobe to a bed: a leaf of 0.5 m and who stands aside of it; before storage to a sofa.
+OPENS, PASSED = 0.55, 0.8
 # Share of the width of storage from which on nightstands, and other pieces, are before it; of a screen's all.
 BESIDES, FACED, SCREENED = 0.2, 0.1, 0.05
 
@@ -302,8 +302,7 @@ def wardrobe_opens(plan: Plan) -> Found:
     i, j = i[met], j[met]
     share = xp.where(plan.stands("opposite")[i], SCREENED, xp.where(plan.stands("head")[j], BESIDES, FACED))
     share = cast(share, plan.size)
-    needed = xp.where(plan.stands("before"), LOW, xp.where(plan.of("sofa") & ~plan.stands("company"), PASSED, OPENS))
-    needed = cast(needed, plan.size)
+    needed = cast(xp.where(plan.of("sofa") & ~plan.stands("company"), PASSED, OPENS), plan.size)
     return plan.nearest(i, j, plan.more_ahead(i, j, needed[j], share), needed)
 
 

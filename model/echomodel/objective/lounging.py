@@ -21,9 +21,9 @@ CIRCLE = math.radians(85.0)  # a sofa is turned so far at most from the middle o
 BEFORE = 0.8  # metres before the larger sofa, where the middle of the group is
 NEAR = 3.0  # metres: a sofa further away stands for itself
 AHEAD, IN_VIEW = 1.0, 1.5  # metres before a sofa and a group's armchair to other groups: 97 % of real ones have them
-COVERED = 0.25  # share of its width from which on something is before it
+COVERED = 0.1  # share of its width from which on something is before it
 KNEES, KNEES_WALL = 0.4, 0.6  # metres before a sofa or armchair, before furniture of other groups and before a wall
-ROOM = 0.25  # metres before a seat to its own group's lamps and other seats
+ROOM = 0.25  # metres before a seat to its own group's lamps and other seats, and, but for the first sofa, to its table
 END = 0.8  # metres before an armchair that looks at a sofa's end, to that
 TOUCHED = 0.1  # metres between a coffee table and other seats than its sofa: 95 % of real ottomans keep 0.12
 # Metres to what an armchair looks at, to 45 degrees, and to a wall that it does not look at.
@@ -129,11 +129,12 @@ def seat_room(plan: Plan) -> Found:
     lateral, forward = plan.local(one, sofa)
     aside = (abs(lateral) > plan.size[sofa, 0] / 2) & (forward < plan.size[sofa, 2] / 2)
     ends = plan.kit.where(aside, plan.more_ahead(one, sofa, END, MET), FAR)
-    margin = plan.kit.concat([plan.apart(i, j) - TOUCHED, ends])
+    knees = plan.kit.where(ottomans[i], FAR, plan.more_ahead(i, j, ROOM, MET))
+    margin = plan.kit.concat([plan.kit.minimum(plan.apart(i, j) - TOUCHED, knees), ends])
     least, about = plan.worst(plan.kit.concat([i, one]), margin, plan.kit.concat([j, sofa]))
     met = least < 0
     met[close.who[close.margin < 0]] = False
     who = rows(met)
     end = plan.of("sofa")[about[who]]
-    measure = at_least(least[who] + plan.kit.where(end, END, TOUCHED), 0.0)
+    measure = at_least(plan.kit.where(end, least[who] + END, plan.apart(who, about[who])), 0.0)
     return joined(close, found(who, least[who], other=about[who], measure=measure, words=1 * end))

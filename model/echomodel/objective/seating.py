@@ -21,7 +21,8 @@ STAGGERED = 0.12  # metres between a chair's middle and that of the one opposite
 SPACED = 0.16  # metres by which the distances of neighbours at one side of a table differ: 95 % of real sides
 LEVEL = 0.12  # metres by which chairs are pushed under their table unlike each other
 EASY = 0.6  # metres of edge a seat that are enough for anybody: DIN 68880
-SQUEEZED, ROOMY = 0.17, 0.6  # metres behind chairs of one side, and how much more behind those opposite is to spare
+# Metres behind chairs of one side, and how much more behind those opposite is to spare; the same at empty sides.
+SQUEEZED, ROOMY, AT_END, AROUND_BOTH = 0.17, 0.6, 0.3, 1.2
 BEYOND, CORNER = 0.1, 0.1  # metres that a seat may reach beyond its side of a table, and more beyond one end of it
 # Who sits alone at a side of a table: share of it that the middle may be beside its own, metres from which on its ends.
 ALONE, OFF = 0.3, 0.05
@@ -190,7 +191,7 @@ def elbow_room(plan: Plan) -> Found:
     who, free = _free_sides(plan)
     count = xp.bincount(seats.side, minlength=4 * len(plan)).reshape(-1, 4)[who]
     edge = plan.size[who][:, [2, 2, 0, 0]]
-    best = at_most(xp.amax(xp.where(free, edge / (count + 1), 0.0), 1), EASY)
+    best = at_most(xp.amax(xp.where(free > SEAT, edge / (count + 1), 0.0), 1), EASY)
     least = xp.amin(xp.where(count > 1, edge / at_least(count, 1), FAR), 1)
     beside = least < FAR
     who, best, least = who[beside], best[beside], least[beside]
@@ -203,7 +204,7 @@ def chairs_balanced(plan: Plan) -> Found:
     who, free = _free_sides(plan)
     places = at_least((held(plan.size)[:, 0] / ELBOW).round(), 1.0)  # a bench counts for several chairs
     count = sum_of(seats.side, places[seats.i], 4 * len(plan)).reshape(-1, 2, 2)[who]
-    one, other, free = count[..., 0], count[..., 1], free.reshape(-1, 2, 2)
+    one, other, free = count[..., 0], count[..., 1], (free > SEAT).reshape(-1, 2, 2)
     room = xp.where(other < one, free[..., 1], free[..., 0]) | (xp.minimum(one, other) > 0)
     uneven, seated = abs(one - other) * room, count.sum((1, 2))
     more = xp.where(seated > 2, uneven.sum(-1), 2 * at_least(xp.amax(uneven, 1) - 1, 0.0))
@@ -227,22 +228,24 @@ def bench_fits(plan: Plan) -> Found:
 
 
 def table_amid(plan: Plan) -> Found:
-    """A table is not shoved to one side: chairs are not squeezed where those opposite have room to spare."""
+    """A table is not shoved aside: chairs, and ends where nobody sits, have room where it is to spare opposite."""
     seats, xp = seats_at(plan), plan.kit
     half_width, half_depth = plan.reach(seats.i, seats.j)
     edge = xp.where(seats.ahead, plan.size[seats.j, 2], plan.size[seats.j, 0]) / 2
     out = abs(seats.across) + xp.where(seats.ahead, half_depth, half_width) - edge
-    who, _ = _free_sides(plan)
+    who, free = _free_sides(plan)
     most = -least_of(seats.side, -out, 4 * len(plan), FAR).reshape(-1, 4)[who]
-    behind = (free_beside(plan, who) - most).reshape(-1, 2, 2)
-    least, both = xp.amin(behind, 2), (most > -FAR).reshape(-1, 2, 2).all(2)
-    margin = xp.where(both, xp.maximum(least - SQUEEZED, ROOMY - xp.amax(behind, 2) + least), FAR)
+    behind, sits = (free - at_least(most, 0.0)).reshape(-1, 2, 2), (most > -FAR).reshape(-1, 2, 2)
+    least, seated, alike = xp.amin(behind, 2), sits.all(2), sits[..., 0] == sits[..., 1]
+    near, spare = xp.where(seated, SQUEEZED, AT_END), xp.where(seated, ROOMY, AROUND_BOTH)
+    margin = xp.where(alike, xp.maximum(least - near, spare - xp.amax(behind, 2) + least), FAR)
     at = xp.arange(len(who)), held(margin).argmin(1)
-    return found(who, margin[at], measure=at_least(least[at], 0.0)).take(rows(both.any(1) & plan.walled[who]))
+    seen = found(who, margin[at], measure=at_least(least[at], 0.0), words=1 * ~seated[at])
+    return seen.take(rows(alike.any(1) & plan.walled[who]))
 
 
 @once
 def _free_sides(plan: Plan) -> tuple[Array, Array]:
-    """(P,) int64, the tables with seats, and (P, 4) bool, whether one could sit left, right, behind and before them."""
+    """(P,) int64, the tables with seats, and (P, 4), metres free left, right, behind and before them."""
     who = rows(plan.kit.bincount(seats_at(plan).j, minlength=len(plan)) > 0)
-    return who, free_beside(plan, who) > SEAT
+    return who, free_beside(plan, who)

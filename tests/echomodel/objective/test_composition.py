@@ -69,12 +69,12 @@ def test_an_armchair_of_a_group_looks_at_no_chair_of_another(gap, margin):
     assert seen(lounging.sofa_ahead, [armchair, table, (*back[:3], -HALF)], (9.0, 4.0))[0] == {}
 
 
-@pytest.mark.parametrize(("gap", "aside", "margin"), [(0.5, 0.0, -0.1), (0.7, 0.0, 0.1), (0.5, 1.4, 0.4)])
+@pytest.mark.parametrize(("gap", "aside", "margin"), [(0.5, 0.0, -0.1), (0.7, 0.0, 0.1), (0.5, 1.5, 0.1)])
 def test_one_passes_between_a_sofa_and_the_table_behind_it(gap, aside, margin):
     sofa = ("multi_seat_sofa", (2.0, 0.8, 0.9), (0.0, 0.0), 0.0)
     table = ("dining_table", (1.2, 0.75, 0.8), (aside, -0.45 - gap - 0.4), 0.0)
     _, found, _ = seen(lounging.sofa_ahead, [sofa, table])
-    assert found.margin.tolist()[-1] == pytest.approx(margin if not aside else 0.5 - (1.0 + 0.6 - aside))
+    assert found.margin.tolist()[-1] == pytest.approx(margin if not aside else 0.2 - (1.0 + 0.6 - aside))
     assert found.words.tolist()[-1] == 1
     desk = ("desk", (1.2, 0.75, 0.8), (aside, -0.45 - gap - 0.4), 0.0)  # which may stand there
     assert min(seen(lounging.sofa_ahead, [sofa, desk])[0].values(), default=1.0) >= 0
@@ -519,3 +519,47 @@ def test_no_nightstand_stands_before_a_wardrobe(gap, margin):
     bed = ("double_bed", (1.6, 0.5, 2.0), (1.6, 0.2), 0.0)
     stand = ("nightstand", (0.5, 0.5, 0.4), (0.1, -1.4 + gap + 0.2), 0.0)
     assert seen(composition.wardrobe_opens, [wardrobe, bed, stand])[0][0] == pytest.approx(margin)
+
+
+@pytest.mark.parametrize(("left", "floor", "margin"), [(0.2, 5.0, -0.1), (0.4, 5.0, 0.1), (0.2, 3.0, 0.2)])
+def test_no_end_of_a_table_is_shoved_at_a_wall_while_the_other_has_room(left, floor, margin):
+    x = left + 0.8 - floor / 2
+    chairs = [
+        ("dining_chair", (0.5, 0.9, 0.5), (x + 0.4 * a, 0.6 * b), np.pi * (b > 0)) for a in (-1, 1) for b in (-1, 1)
+    ]
+    table = ("dining_table", (1.6, 0.75, 0.9), (x, 0.0), 0.0)
+    found, rows, _ = seen(seating.table_amid, [table, *chairs], (floor, 4.0))
+    assert found == {0: pytest.approx(margin)}
+    assert rows.words.tolist() == [1]
+    assert rows.measure.tolist() == [pytest.approx(left)]
+
+
+@pytest.mark.parametrize("turn", [0.7, 0.77])
+def test_a_second_sofa_does_not_look_away_from_what_its_group_watches(turn):
+    sofa = ("multi_seat_sofa", (2.2, 0.8, 0.9), (0.0, -1.53), 0.0)
+    low = ("coffee_table", (1.1, 0.4, 0.6), (0.0, -0.4), 0.0)
+    stand = ("tv_stand", (1.8, 0.5, 0.4), (0.0, 1.78), np.pi)
+    off = np.arctan2(1.88, 1.7) + turn  # of the front from the screen
+    for word, most in (("loveseat_sofa", 90), ("armchair", 125)):
+        other = (word, (1.2, 0.8, 0.8), (-1.7, -0.1), HALF + turn)
+        assert seen(sight.screen_not_behind, [sofa, low, stand, other])[0] == {
+            3: pytest.approx(np.radians(most) - off, abs=1e-6)
+        }
+
+
+@pytest.mark.parametrize(("covered", "margin"), [(0.3, -0.07), (0.15, 0.07)])
+def test_no_table_of_another_group_stands_before_a_tenth_of_a_sofa(covered, margin):
+    sofa = ("multi_seat_sofa", (2.2, 0.8, 0.9), (0.0, -1.53), 0.0)
+    table = ("dining_table", (0.8, 0.75, 0.8), (-1.1 + covered - 0.4, 0.25), 0.0)  # 0.93 m before it
+    assert seen(lounging.sofa_ahead, [sofa, table])[1].margin.tolist()[0] == pytest.approx(margin)
+
+
+@pytest.mark.parametrize(("gap", "margin"), [(0.2, -0.05), (0.3, 0.05)])
+def test_who_faces_a_coffee_table_has_room_for_the_knees(gap, margin):
+    sofa = ("multi_seat_sofa", (2.2, 0.8, 0.9), (0.0, -1.53), 0.0)
+    low = ("coffee_table", (1.1, 0.4, 0.6), (0.0, -0.4), 0.0)
+    armchair = ("armchair", (0.8, 0.8, 0.8), (0.55 + gap + 0.4, -0.3), -HALF)
+    _, rows, _ = seen(lounging.seat_room, [sofa, low, armchair])
+    assert (2 in rows.who[rows.margin < 0].tolist()) == (margin < 0)
+    if margin < 0:
+        assert rows.measure.tolist()[-1] == pytest.approx(gap)

@@ -208,7 +208,7 @@ MORE = [
      "chair can be pulled back by only 0.15 m before a wall"),
     (with_one(LIVING, "table", kind="dining_table", size=(0.8, 0.75, 0.8), at=(-1.05, 0.7)), ("stand", "view_free"),
      "table stands between stand and who watches it"),  # low, and beside the line
-    (LIVING.moved("coffee", at=(0.0, 0.85)), ("stand", "wardrobe_opens"), "stand has 0.43 m before it, then coffee"),
+    (LIVING.moved("coffee", at=(0.0, 0.8)), ("stand", "wardrobe_opens"), "stand has 0.48 m before it, then coffee"),
     (with_one(BEDROOM, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.5, 1.75)), ("plant", "plant_in_nook"),
      "plant stands amid a bare wall, 0.80 m from what is beside it"),
     (Room({"sofa": {**LIVING.things["sofa"], "at": (0.0, -0.1)}, "desk": {**STUDY.things["desk"], "at": (0.0, -1.6)}}),
@@ -232,7 +232,7 @@ MORE = [
 ]  # fmt: skip
 KEPT = [
     (DINING.moved("chair", at=(0.5, 0.4)), ("chair", "seat_faces")),
-    (LIVING.moved("armchair", at=(1.1, -0.3)), ("armchair", "seat_room")),
+    (LIVING.moved("armchair", at=(1.25, -0.3)), ("armchair", "seat_room")),
     (LIVING.moved("coffee", at=(-0.4, -0.4)), ("coffee", "table_before_sofa")),
     (
         with_one(LIVING, "tv", kind="tv", size=(1.0, 0.6, 0.1), at=(-0.4, 1.78), up=0.5, yaw=np.pi),
@@ -259,7 +259,7 @@ KEPT = [
     (Room({"a": {**ARMCHAIR, "at": (0.1, 1.5), "yaw": -HALF}, "bed": BEDROOM.things["bed"]}), ("a", "looks_in")),
     (BAR.moved("stool_0", at=(0.08, -1.4)), ("bar", "chairs_spaced")),
     (with_one(LIVING, "table", kind="dining_table", size=(0.8, 0.75, 0.8), at=(-1.25, 0.7)), ("stand", "view_free")),
-    (LIVING.moved("coffee", at=(0.0, 0.8)), ("stand", "wardrobe_opens")),
+    (LIVING.moved("coffee", at=(0.0, 0.7)), ("stand", "wardrobe_opens")),
     (with_one(BEDROOM, "plant", kind="plant", size=(0.4, 1.2, 0.4), at=(1.7, 1.75)), ("plant", "plant_in_nook")),
     (Room({"a": {"kind": "chaise_longue_sofa", "size": (0.8, 0.7, 1.6), "at": (1.85, 0.0)}}), ("a", "not_alone")),
     (
@@ -540,7 +540,7 @@ def test_the_room_generator_rarely_breaks_them():
     rooms = generate_rooms(60, 3)
     found = [f for room in rooms for f in faults(plan_of(room, room.categories, room.floor_polygon))]
     unknown = {"halves_used", "corners_used", "bed_side_free", "bed_foot_free"}  # to the recipes
-    assert sum(fault.rule not in unknown for fault in found) < 0.28 * sum(len(room) for room in rooms)
+    assert sum(fault.rule not in unknown for fault in found) < 0.3 * sum(len(room) for room in rooms)
 
 
 def test_the_sofa_that_screen_and_table_are_told_of_is_the_first_whatever_its_size():
