@@ -91,7 +91,7 @@ class Search:
         self.slots: dict[tuple[int, int], np.ndarray] = {}
         self.ways: dict[tuple[int, ...], tuple[list[int], list[list[Row]]]] = {}
         self.lost: dict[bytes, list[int]] = {}
-        self.looks: list[np.ndarray] = []
+        self.looks = np.array([looks_at(problem.plan, term.find) for term in self.terms])
         self.urgent: list[int] = []
         n = len(problem.size)
         at = (np.array(problem.slot_roles) == "at") & (problem.anchor >= 0)
@@ -143,9 +143,8 @@ class Search:
         return np.asarray(sum_of(copies.scene[seen.who], cost, len(yaw)))
 
     def terms_of(self, moved: np.ndarray) -> list[Term]:
-        """The terms that look at any of some boxes (n,) bool; all before any room was judged."""
-        looks = self.looks or [np.ones(len(moved), bool)] * len(self.terms)
-        return [term for term, at in zip(self.terms, looks, strict=True) if at[moved].any()]
+        """The terms that look at any of some boxes (n,) bool."""
+        return [self.terms[k] for k in rows(self.looks[:, moved].any(1)).tolist()]
 
     def _room(self, there: np.ndarray) -> Plan:
         key = there.tobytes()
@@ -157,13 +156,8 @@ class Search:
         """What a room costs in all, and the boxes that terms of at least such a cost are about, the worst first."""
         problem = self.problem
         worst: dict[int, float] = {}
-        room = problem.plan.at(state.position, state.yaw)
-        if self.looks:
-            room = copies_of(problem.plan, room.position[None], room.yaw[None], np.ones_like(room.fixed))
-            every = [term.find(room) for term in self.terms]
-        else:
-            looked = [looks_at(room, term.find) for term in self.terms]
-            self.looks, every = [looks for looks, _ in looked], [found for _, found in looked]
+        room = copies_of(problem.plan, state.position[None], state.yaw[None], np.ones_like(problem.fixed))
+        every = [term.find(room) for term in self.terms]
         seen, cost = costs_of(list(zip(self.terms, every, strict=True)), room)
         total = float(cost.sum())
         firm = self.firm.repeat([len(found.who) for found in every])
@@ -491,7 +485,6 @@ class Search:
         problem, n = self.problem, len(self.problem.size)
         at = problem.position.copy(), problem.yaw.copy()
         state = State(*at, np.array([0.02 + 0.3 * out_of_habit(problem, i, *at) for i in range(n)]))
-        self.faults(state)
         if n < MANY:
             state = self.swept(state, [i for i in range(n) if not self.seated[i]])
         else:  # drafts of so many pieces are too far from what is asked to begin from

@@ -48,14 +48,14 @@ class Watched(Plan):
         return numbers
 
 
-def looks_at(room: Plan, find: Callable[[Plan], Found]) -> tuple[Array, Found]:
-    """(N,) bool, the boxes of a room whose poses decide what a term finds, whatever they are; and what it finds."""
+def looks_at(room: Plan, find: Callable[[Plan], Found]) -> Array:
+    """(N,) bool, the boxes of a room whose poses decide what a term finds, whatever they are."""
     plan = Watched(**{of.name: getattr(room, of.name) for of in fields(Plan)}, asked=room.kit.zeros_like(room.fixed))
     vars(plan).update({name: getattr(room, name) for name in (*OF_WORDS, "turn")})
-    seen = find(plan)
+    find(plan)
     for whom in (room.anchor, room.group, room.carrier):
         plan.asked[whom[plan.asked & (whom >= 0)]] = True
-    return plan.asked, seen
+    return plan.asked
 
 
 def _repeated(name: str) -> cached_property[Array]:
@@ -113,9 +113,6 @@ class Copies(Plan):
         if len(kept.get(asked, ())) < len(self):
             kept[asked] = spread(self.template)
         return kept[asked][: len(self)]
-
-    def _mask(self, values: Any) -> Array:
-        raise NotImplementedError("masks of copies are those of their room")
 
     def of(self, *roles: str) -> Array:
         asked = ("of", *roles)
