@@ -233,7 +233,7 @@ class _Seat:
             return None
         wish = (1 + end) * (len(self.x) - wide) / 2
         i, k = fits[int(np.argmin(fits[:, 1] * 1.5 + np.abs(fits[:, 0] - wish)))]
-        above = self.level + RAISED / 2  # it may be fuller in its middle
+        above = self.level + RAISED / 4  # it may be fuller in its middle
         return np.array([self.x[i] + (wide - 1) * STEP / 2, above, self.z[k] + (deep - 1) * STEP / 2])
 
 

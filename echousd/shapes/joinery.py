@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.furniture.cloth import Sheet
+from echomodel.furniture.cloth import Pad, Sheet
 from echomodel.furniture.solids import FINEST, MeshedSolid, Solid, pieces_of
 from echomodel.triangles import Mesh, area_normals, bounds_of, joined, lengths
 from echousd.shapes.geometry import DRAPED, FRAME, Collider, Geometry, Mass, Origin, Part
@@ -26,7 +26,7 @@ COARSE = 0.7  # share of the faces below which a second level of detail is worth
 COLLIDERS = 64  # convex pieces of one body at most
 SLACK = 0.003  # metres that a mesh may reach beyond its convex pieces
 MOST = 0.8  # share of what the worst face lacks, from which on a face gets a corner in the same round
-PRESSED = 0.03  # metres that an upholstered seat is less full under what lies on it than where nothing does
+PRESSED = 0.035  # metres that an upholstered seat is less full under what lies on it than where nothing does
 FOLDS = 0.03  # metres that folds of a cover are deep
 SMALL = 0.002  # share of its box below which a solid alone is no obstacle
 
@@ -139,7 +139,8 @@ def level(solid: Solid, corners: np.ndarray) -> np.ndarray:
     """Corners (n, 3) of what a solid collides with: soft seats are level on top, and covers, as high as their folds."""
     x, y, z = corners.T
     if solid.role == "seat" and solid.material == "fabric":
-        y = np.minimum(y, y.max() - min(PRESSED, 0.2 * np.ptp(y)))
+        deep, share = (PRESSED, 0.25) if isinstance(solid, Pad) else (PRESSED / 2, 0.1)
+        y = np.minimum(y, y.max() - min(deep, share * np.ptp(y)))
     elif solid.role == "cover":
         y = np.where(y > y.max() - FOLDS, y.max(), y)
     return np.column_stack([x, y, z])

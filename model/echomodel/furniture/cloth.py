@@ -12,7 +12,7 @@ PINCH = 0.11  # of half a pillow's side that its middle stands back behind the c
 FOOT, SPREAD = 0.15, 1.3  # of a slumped cushion's height, below which it does not lean; by how much it is wider there
 SEAM = 0.04  # of half a pillow's thickness that is left at its seams
 # Role of a cushion -> of how far its middle stands out: how much it is dented, and how deep it puckers at its seams.
-GIVES = {"seat": (0.4, 0.36), "back": (0.7, 0.36), "": (0.3, 0.12)}  # others are firm
+GIVES = {"seat": (0.25, 0.36), "back": (0.7, 0.36), "": (0.3, 0.12)}  # others are firm
 PUCKERS = 34.0  # radians a metre, from one to the next
 # Shares of a cushion's radius from its face to its side: how far out, and how far behind; the last lies on its back.
 OVER, DOWN = np.array([0.0, 0.57, 0.97, 0.8]), np.array([0.0, 0.18, 0.75, np.inf])
