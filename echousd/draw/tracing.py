@@ -255,8 +255,8 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     found[6] = found[5] > 0
     gloss = world.scenery.gloss.take(seen.face).reshape(shape)[coarse]
     reach = (
-        (np.s_[:3], RINGS), (np.s_[3:4], RINGS, gloss), (np.s_[4:5], RINGS[:3]), (np.s_[5:6], () if inside else RINGS),
-        (np.s_[6:], RINGS[:1]),
+        (np.s_[:3], RINGS), (np.s_[3:4], RINGS[:3], gloss), (np.s_[4:5], RINGS[:3]),
+        (np.s_[5:6], () if inside else RINGS), (np.s_[6:], RINGS[:1]),
     )  # fmt: skip
     found = found.reshape(7, *asked.shape)
     found = smooth_light(found, known[0], known[1], reach)
@@ -365,7 +365,7 @@ def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, reach
 
     Far passes leave out what is much lighter or darker, so that shadows keep their edges. `normal`, `point`: (3, h, w)
     of the surface. `reach`: layers of the light, a slice of them, `RINGS` that these are smoothed over, and (h, w) what
-    must be equal there if anything: what steel mirrors is nothing that the pane in it does.
+    must be equal there if anything: what steel mirrors is nothing that the pane in it does, and has no other edges.
     """
     height, width = light.shape[1:]
     for apart in sorted({ring for _, rings, *_ in reach for ring in rings}):
@@ -386,7 +386,7 @@ def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, reach
                     sums, ((here, there), (there, here))
                 ):
                     part = share * (alike[0][one] == alike[0][other]) if alike else share
-                    if apart > CLOSE:
+                    if apart > CLOSE and not alike:
                         part = part / (1 + np.square((bright[other] - bright[one]) / (EVEN * bright[one] + 1e-4)) ** 2)
                     total[one] += part * own[other]
                     weight[one] += part

@@ -325,11 +325,11 @@ def test_a_glossy_floor_mirrors_the_window_and_more_so_aslant():
     floor = (np.abs(scenery.triangles[..., 1]) < 0.1).all(1)
     view = View(view_matrix(np.array([-1.8, 0.6, 0.0]), np.array([0.5, 0.0, 0.0])), 0.9, False, inside=True)
     dull, glossy = (
-        trace(replace(scenery, gloss=np.where(floor, gloss, 0).astype(np.float32)), view, 48, rays=2).mean(-1)
+        trace(replace(scenery, gloss=np.where(floor, gloss, 0).astype(np.float32)), view, 144, rays=2).mean(-1)
         for gloss in (0.0, 0.3)
     )
     gain = glossy / dull
-    mirrored, beside, near = gain[24:28, 22:26].mean(), gain[28:32, :4].mean(), gain[44:, 22:26].mean()
+    mirrored, beside, near = gain[72:84, 66:78].mean(), gain[84:96, :12].mean(), gain[132:, 66:78].mean()
     assert mirrored > beside + 0.04
     assert mirrored > near + 0.04  # there one looks down on it
 
