@@ -184,7 +184,8 @@ def _turn(stage: Usd.Stage) -> None:
     turn = Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d.XAxis(), -90.0))
     for placed in list(_outermost(stage.GetPseudoRoot())):
         alone, old = placed.GetResetXformStack(), placed.GetOrderedXformOps()
-        added = placed.AddTransformOp(opSuffix="upright")
+        plain = all(op.GetOpName() != "xformOp:transform" for op in old)  # three.js knows no op with a suffix
+        added = placed.AddTransformOp(opSuffix="" if plain else "upright")
         added.Set(turn)
         placed.SetXformOpOrder([added, *old], alone)
     for prim in stage.Traverse():

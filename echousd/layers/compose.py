@@ -109,7 +109,7 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
             shelf.redirect(layer)
         path = layer_file(name, crate=room.options.crate)
         files[path] = _bytes(room, layer, path)
-    root = root_layer(room, dressing.hung)
+    root = root_layer(room, dressing.hung, [part.extent for part in built if part.label == "wall"])
     if shelf is not None:
         shelf.redirect(root, above=".")
     files[f"{room.name}.usda"] = _bytes(room, root, ".usda")
@@ -232,8 +232,9 @@ def materials_layer(
     return pen.layer
 
 
-def root_layer(room: RoomData, hung: Furniture | None = None) -> Sdf.Layer:
-    """The root layer: metadata, sublayers, lights and cameras; `hung`: what stands in a camera's way at walls."""
+def root_layer(room: RoomData, hung: Furniture | None = None, walls: Sequence[np.ndarray] = ()) -> Sdf.Layer:
+    """The root layer: metadata, sublayers, lights and cameras; `hung`: what stands in a camera's way at walls; `walls`:
+    lower and upper corner of each with its windows, of which a bay stands out."""
     pen = _pen(room, "")
     layer = pen.layer
     layer.customLayerData = {**layer.customLayerData, **simready_data(room)}
@@ -241,7 +242,7 @@ def root_layer(room: RoomData, hung: Furniture | None = None) -> Sdf.Layer:
         "A room made by EchoUSD. Put your own opinions into a stronger layer; layers/ is rewritten. "
         "Readers that compose no sublayers (three.js, tinyusdz) need `echousd export` of it."
     )
-    seen = room_points(room)
+    seen = np.concatenate([room_points(room), *walls])
     bounds = np.array([seen.min(0), seen.max(0)])
     values = {"float3[] extentsHint": bounds.astype(np.float32)}
     pen.define("/Room", "Xform", values, ["GeomModelAPI"], kind="assembly", assetInfo={"name": room.name})

@@ -15,6 +15,7 @@ from environments import RELEASES, python_of, run, three
 from pxr import Usd, UsdGeom, UsdLux, UsdPhysics, UsdShade
 
 import echousd
+from echousd.draw.views import LENSES
 from echousd.exporting.formats import export
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.simready import pack
@@ -194,7 +195,7 @@ def check_blender(file: Path, room: Path, client: str = "blender") -> None:
     cameras = {thing["name"]: thing for thing in things.values() if thing["type"] == "CAMERA"}
     assert set(cameras) == {"perspective", "top"}
     lens, sensor = cameras["perspective"]["lens"]
-    assert 24 - 0.1 < lens * 36 / sensor < 35 + 0.1  # millimetres, of a picture as wide as film
+    assert min(LENSES) - 0.1 < lens * 36 / sensor < 35 + 0.1  # millimetres, of a picture as wide as film
     lights = {name.rpartition("/")[2]: thing["light"] for name, thing in things.items() if thing["type"] == "LIGHT"}
     for prim in stage.GetPrimAtPath("/Room/Lights").GetChildren():
         if prim.GetName() in lights:  # the sky is Blender's world
@@ -386,10 +387,10 @@ def simready(file: Path, profile: str) -> set[str]:
 
 def test_packed_assets_are_simready_props(rooms: list[Path], tmp_path: Path) -> None:
     for number, room in enumerate(rooms):
-        done = pack(room, tmp_path / str(number))
-        hanging = {sentence.partition(":")[0] for sentence in done.hangs}
-        assert done.layers
-        for layer in done.layers:  # what hangs is no body, which two rules ask for
+        layers, _, hangs = pack(room, tmp_path / str(number))
+        hanging = {sentence.partition(":")[0] for sentence in hangs}
+        assert layers
+        for layer in layers:  # what hangs is no body, which two rules ask for
             wanted = {"RB.001", "SR.004"} if layer.stem in hanging else set()
             assert simready(layer, "Robotics-Prop") == wanted, layer
 

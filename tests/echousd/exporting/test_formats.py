@@ -82,6 +82,8 @@ def test_usdz_for_arkit_is_y_up_and_holds_nothing_of_ours_nor_lights(up_axis, ph
     prims = list(stage.TraverseAll())
     types = {str(prim.GetTypeName()) for prim in prims} | {a for prim in prims for a in prim.GetAppliedSchemas()}
     assert not [name for name in types if name.startswith("Echo") or "Light" in name]
+    top = [op.GetOpName() for op in UsdGeom.Xformable(stage.GetDefaultPrim()).GetOrderedXformOps()]
+    assert top == ([] if up_axis == "Y" else ["xformOp:transform"])  # three.js knows no suffix
     assert not [name for prim in prims for name in prim.GetPropertyNames() if name.startswith("echo:")]
     assert {"Mesh", "Material", "Camera", "SemanticsLabelsAPI:category"} <= types
     straight = small_room(shapes="boxes", place=False)

@@ -7,10 +7,14 @@ import pytest
 from pxr import Gf, Usd, UsdGeom, UsdLux
 from small_room import small_graph, small_room
 
+import echousd
+from echomodel.openings import Opening
 from echousd.draw.outside import perspective_views
 from echousd.draw.sight import ASPECT, Furniture
 from echousd.draw.views import inside_view, shifted, stage_views
+from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.cameras import main_piece, room_points, write_cameras
+from echousd.layers.structure import millwork
 from echousd.options import RoomOptions
 from echousd.shapes import walls
 from echousd.stage.pen import Pen
@@ -38,6 +42,25 @@ def test_lenses_are_told_in_tenths_of_a_metre(stage):
     camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective"))
     assert camera.GetHorizontalApertureAttr().Get() == pytest.approx(0.36)
     assert camera.GetFocalLengthAttr().Get() == pytest.approx(0.30)
+
+
+def test_a_bay_is_within_the_hint_and_the_picture_from_above(tmp_path):
+    spec = RoomSpec(
+        "study", size=(3.5, 3.4), style="country", openings=(Opening("bay", "window", 0, 0.8, 1.8, 1.3, 0.9),)
+    )
+    graph = SceneGraph(spec, (Node("desk", "desk"),))
+    rooms = (echousd.generate(graph, seed=seed, shapes="boxes", walls=True, dress="none") for seed in range(9))
+    room = next(one for one in rooms if millwork(one).bay)
+    stage = Usd.Stage.Open(str(room.save(tmp_path / "study", preview=False)))
+    cache = UsdGeom.BBoxCache(0, [UsdGeom.Tokens.default_])
+    box = cache.ComputeWorldBound(stage.GetDefaultPrim()).ComputeAlignedRange()
+    wide = max(box.GetSize()[0], box.GetSize()[2])
+    assert wide > 3.5 + 2 * walls.WALL + 0.3  # a bay stands out
+    hint = np.array(UsdGeom.ModelAPI(stage.GetDefaultPrim()).GetExtentsHint())
+    np.testing.assert_allclose(hint, [box.GetMin(), box.GetMax()], atol=0.02)
+    top = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/top"))
+    high = top.GetPrim().GetAttribute("xformOp:translate").Get()[1] - box.GetMax()[1]
+    assert high * top.GetHorizontalApertureAttr().Get() / top.GetFocalLengthAttr().Get() > wide
 
 
 def test_cameras_see_everything_and_light_is_there(stage, room):
