@@ -28,7 +28,8 @@ BELOW, BEHIND = 0.14, 0.03  # metres of air between a window's sill and a radiat
 PLUGGED = ("bed", "desk", "tv_stand")  # words of what has a socket beside it
 CURTAINS = ("curtain", "tied_curtain", "eyelet_curtain", "pleated_curtain", "sheer_curtain")  # of a room all are alike
 BLINDS = ("blind", "roman_blind", "cafe_curtain")  # as well; where it is wet, the first
-BUNCHED = (1.0, 0.75, 0.55)  # of how wide a curtain hangs, where something stands beside it
+# Of how wide a curtain hangs, where something stands beside it; of a rail, how far in it may hang there.
+BUNCHED, INWARD = (1.0, 0.75, 0.55), 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +80,7 @@ def curtains(setting: Setting) -> None:
             full = round(min(0.45, 0.16 + 0.14 * window.width), 3)
             low, high = np.clip((window.offset - beyond, window.end + beyond), 0.02, wall.length - 0.02).tolist()
             for wide in (round(full * share, 3) for share in BUNCHED):
-                inner = np.linspace(wide, high - low - wide, 4) / 2  # over the pane where something is beside
+                inner = wide / 2 + np.linspace(0.0, INWARD * (high - low), 4)  # where something is beside
                 size = np.array([wide, round(rail - 0.01, 3), 0.085])
                 sides: list[Thing] = []
                 for places in (low + inner, high - inner):
