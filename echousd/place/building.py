@@ -9,8 +9,8 @@ import numpy as np
 from echomodel.late import linear_sum_assignment
 from echomodel.objective import Plan
 from echousd.place.geometry import depths, gaps
-from echousd.place.proposals import along_walls, out_of, slots_at
-from echousd.place.search import DEEP, FARTHEST, GRAIN, HIT, LIKED, NEXT, Search, State
+from echousd.place.proposals import along_walls, out_of, proposals, slots_at
+from echousd.place.search import DEEP, FARTHEST, GRAIN, HIT, JUDGED, LIKED, NEXT, Search, State
 from echousd.place.seats import seatings
 
 
@@ -62,6 +62,28 @@ def involved(search: Search, boxes: list[int]) -> list[int]:
         out += [anchor] if anchor >= 0 else []
         out += search.children[anchor if anchor >= 0 else i] + search.children[i]
     return [i for n, i in enumerate(out) if i not in out[:n]]
+
+
+def filled(search: Search, state: State) -> State:
+    """The state with that piece, and its group, elsewhere that makes most of the floor, if all is better so."""
+    problem, every, number = search.problem, np.ones(len(state.yaw), bool), np.arange(len(state.yaw))
+    pieces = [i for i in number.tolist() if problem.standing(i) and not (problem.fixed[i] or search.seated[i])]
+    tried = [(state.position[None], state.yaw[None], np.zeros((1, len(number))))]
+    for i in pieces:
+        group = search.group(i, every, state)
+        rows = proposals(problem, state.position, state.yaw, every, i)
+        rows = rows[search.hits(state, every, i, group, rows, [i]) < HIT]
+        cost = search.unlikely(state, every, i, group, rows)
+        rows, cost = rows[cost < HIT], cost[cost < HIT]
+        if len(rows):
+            taste, (position, yaw) = search.tastes(i, rows), search.carried(state, i, group, rows)
+            cost = cost + taste + search.costs(every, position, yaw, np.isin(number, group), floor=True)
+            few = np.argsort(np.round(cost * GRAIN), kind="stable")[: max(2, JUDGED // len(pieces))]  # judged in full
+            tried.append((position[few], yaw[few], np.outer(taste[few] - state.taste[i], number == i)))
+    position, yaw, taste = (np.concatenate(part) for part in zip(*tried, strict=True))
+    changed = (position != state.position).any((0, 2)) | (yaw != state.yaw).any(0)
+    best = search.cheapest(every, position, yaw, changed, taste.sum(1))
+    return State(position[best], yaw[best], state.taste + taste[best])
 
 
 def reseated(search: Search, state: State, there: np.ndarray, i: int, seats: list[int]) -> State:

@@ -28,8 +28,8 @@ from echousd.place.problem import Problem
 from echousd.place.proposals import Row, aside, height_of, out_of, out_of_habit, proposals, slots_at, twins
 from echousd.place.solver import PlaceConfig
 
-involved, part_of, rebuilt, reseated, with_along = lates(
-    "echousd.place.building", "involved", "part_of", "rebuilt", "reseated", "with_along"
+filled, involved, part_of, rebuilt, reseated, with_along = lates(
+    "echousd.place.building", "filled", "involved", "part_of", "rebuilt", "reseated", "with_along"
 )
 
 JUDGED = 48  # poses that are judged at once
@@ -80,13 +80,14 @@ class Search:
     """One search in a problem; for terms that yield it does not begin anew."""
 
     def __init__(self, problem: Problem, terms: tuple[Term, ...] = TERMS, yields: frozenset[str] = frozenset()) -> None:
-        self.problem, self.judged, self.walked = problem, 0, False
+        self.problem, self.judged, self.walked, self.bare = problem, 0, False, False
         self.budget = round(BUDGET * max(1.0, len(problem.size) / PIECES))
         numbers, words = {int(number) for number in problem.triplets[:, 1]}, vocabulary().predicates
         stated = {row.name for row in words if row.id in numbers} | {"placed"}
         sizes = {row.name for row in words if row.measures == "size"} | {"scale"} | OF_GRAPHS  # of no pose
         self.terms = tuple(t for t in terms if t.name not in sizes and (t.kind != "relations" or t.name in stated))
         self.firm = np.array([term.name not in yields for term in self.terms])
+        self.whole = np.array([term.name in WHOLE for term in self.terms])
         self.rooms: dict[bytes, Plan] = {}
         self.slots: dict[tuple[int, int], np.ndarray] = {}
         self.ways: dict[tuple[int, ...], tuple[list[int], list[list[Row]]]] = {}
@@ -133,34 +134,29 @@ class Search:
 
     # -- what it costs -----------------------------------------------------------------------------------------------
 
-    def costs(self, there: np.ndarray, position: np.ndarray, yaw: np.ndarray, moved: np.ndarray) -> np.ndarray:
-        """(K,) float: what rooms of boxes `there` (n,) bool cost: position (K, n, 3), yaw (K, n), moved (n,) bool."""
-        room, whole = self._room(there), bool(there.all())
-        self.judged += len(yaw)
-        copies = copies_of(room, position[:, there], yaw[:, there], moved[there])
-        asked = [term for term in self.terms_of(moved) if whole or term.name not in WHOLE]
-        seen, cost = costs_of([(term, term.find(copies)) for term in asked], copies)
-        return np.asarray(sum_of(copies.scene[seen.who], cost, len(yaw)))
-
-    def terms_of(self, moved: np.ndarray) -> list[Term]:
-        """The terms that look at any of some boxes (n,) bool."""
-        return [self.terms[k] for k in rows(self.looks[:, moved].any(1)).tolist()]
-
-    def _room(self, there: np.ndarray) -> Plan:
-        key = there.tobytes()
+    def costs(
+        self, there: np.ndarray, position: np.ndarray, yaw: np.ndarray, moved: np.ndarray, floor: bool = False
+    ) -> np.ndarray:
+        """(K,) float: what rooms of boxes `there` (n,) bool cost: position (K, n, 3), yaw (K, n), moved (n,) bool; for
+        the use of their `floor` alone, which is quick and counts as no pose."""
+        self.judged += 0 if floor else len(yaw)
+        key, whole = there.tobytes(), bool(there.all())
         if key not in self.rooms:
-            self.rooms[key] = self.problem.plan if there.all() else part_of(self.problem.plan, there)
-        return self.rooms[key]
+            self.rooms[key] = self.problem.plan if whole else part_of(self.problem.plan, there)
+        copies = copies_of(self.rooms[key], position[:, there], yaw[:, there], moved[there])
+        asked = self.looks[:, moved].any(1) & (self.whole if floor else ~self.whole | whole)
+        seen, cost = costs_of([(t, t.find(copies)) for t, ask in zip(self.terms, asked, strict=True) if ask], copies)
+        return np.asarray(sum_of(copies.scene[seen.who], cost, len(yaw)))
 
     def faults(self, state: State, least: float = WRONG) -> tuple[float, list[int]]:
         """What a room costs in all, and the boxes that terms of at least such a cost are about, the worst first."""
-        problem = self.problem
         worst: dict[int, float] = {}
-        room = copies_of(problem.plan, state.position[None], state.yaw[None], np.ones_like(problem.fixed))
+        room = copies_of(self.problem.plan, state.position[None], state.yaw[None], np.ones_like(self.problem.fixed))
         every = [term.find(room) for term in self.terms]
         seen, cost = costs_of(list(zip(self.terms, every, strict=True)), room)
         total = float(cost.sum())
-        firm = self.firm.repeat([len(found.who) for found in every])
+        firm, whole = (of.repeat([len(found.who) for found in every]) for of in (self.firm, self.whole))
+        self.bare = len(state.yaw) >= MANY and bool((cost[whole] > WRONG).any())
         for row in rows(firm & (cost > least)).tolist():
             for box in {int(seen.who[row]), int(seen.other[row])} - {-1}:
                 worst[box] = worst.get(box, 0.0) + float(cost[row])
@@ -216,7 +212,7 @@ class Search:
         drawn = proposals(problem, state.position, state.yaw, there, i)
         rows = np.concatenate([drawn, self._joining(state, there, i)])
         near = aside(problem, state.position, state.yaw, i)
-        taste = np.concatenate([self._taste(i, rows), state.taste[i] + 0.3 * near[:, 3]])
+        taste = np.concatenate([self.tastes(i, rows), state.taste[i] + 0.3 * near[:, 3]])
         rows = np.concatenate([rows, near])
         keep = self._promising(state, there, i, group, rows, taste)
         rows, taste = rows[keep], taste[keep]
@@ -308,7 +304,7 @@ class Search:
             return state
         return reseated(self, state, there, i, seats)
 
-    def _taste(self, i: int, rows: np.ndarray) -> np.ndarray:
+    def tastes(self, i: int, rows: np.ndarray) -> np.ndarray:
         """(K,) float: how much others are liked better than these poses of a box."""
         problem = self.problem
         off = np.minimum(np.hypot(rows[:, 0] - problem.position[i, 0], rows[:, 1] - problem.position[i, 2]), FARTHEST)
@@ -358,9 +354,9 @@ class Search:
         if len(rows) > 2 * JUDGED:  # what is lost for where the box itself stands is not looked at with its group
             alone = self.hits(state, there, i, group, rows, [i])
             first = np.argsort(alone + taste, kind="stable")[:JUDGED]
-            most = np.sort(self._unlikely(state, there, i, group, rows[first]) + taste[first])[half - 1]
+            most = np.sort(self.unlikely(state, there, i, group, rows[first]) + taste[first])[half - 1]
             keep = np.flatnonzero((alone < HIT) | (alone + taste <= most + 1 / GRAIN))
-        cost = self._unlikely(state, there, i, group, rows[keep])
+        cost = self.unlikely(state, there, i, group, rows[keep])
         order = np.argsort(np.round((cost + taste[keep]) * GRAIN), kind="stable")
         if len(order) > JUDGED:
             free = order[half:]  # some of all the others that are free, too
@@ -370,7 +366,7 @@ class Search:
             order = order[np.sort(np.unique(order, return_index=True)[1])]
         return keep[order]
 
-    def _unlikely(self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray) -> np.ndarray:
+    def unlikely(self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray) -> np.ndarray:
         """(K,) float: what a box with its group runs into, leaves of the floor and breaks of relations at K poses."""
         along = [*group, *self.screens[i], *(k for k, _ in self.alongside[i])]  # which may go to walls
         return self.hits(state, there, i, group, rows, group) + self.broken(state, there, i, rows, along)
@@ -414,7 +410,7 @@ class Search:
         asked = np.stack([2 * np.arange(count), np.tile(stated[:, 1], len(turn)), 2 * np.arange(count) + 1], 1)
         found = margins(Spread(size.reshape(-1, 3), position, yaw), asked, rules=problem.rules, center=problem.centre,
                         fronts=fronts.ravel())  # fmt: skip
-        return np.asarray(found.reshape(len(turn), -1))
+        return np.asarray(found.reshape(len(turn), len(stated)))
 
     # -- the whole ---------------------------------------------------------------------------------------------------
 
@@ -449,6 +445,7 @@ class Search:
                 break
             anchors = [k for k in self.problem.anchor[wrong].tolist() if k >= 0]
             after = self.swept(state, list(dict.fromkeys([*wrong, *anchors])))
+            after = filled(self, after) if self.bare else after  # perhaps by who is not next to it
             before, (cost, still) = total, self.faults(after)
             if cost < before - GAIN:
                 state, total, wrong = after, cost, still

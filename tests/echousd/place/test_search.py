@@ -16,7 +16,7 @@ from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, margins
 from echomodel.vocabulary import vocabulary
-from echousd.place.building import expecting, involved, with_along
+from echousd.place.building import expecting, filled, involved, with_along
 from echousd.place.placing import place_boxes
 from echousd.place.problem import problem_of
 from echousd.place.proposals import out_of_habit, proposals, slots_at
@@ -123,7 +123,7 @@ def test_a_sofa_turns_to_another_wall_though_its_screen_and_a_plant_beside_that_
     search, state = searched(words, size, [(0, 0, -1.5), (0, 0, 1.8), (1.1, 0, 1.8)], [0.0, np.pi, 0.0], told)
     every = np.ones(3, bool)
     there = np.array([[0.0, -1.5, 0.0, 0.0], [-2.0, 0.0, np.pi / 2, 0.0]])
-    assert search._unlikely(state, every, 0, [0], there).tolist() == [0.0, 0.0]
+    assert search.unlikely(state, every, 0, [0], there).tolist() == [0.0, 0.0]
     assert search.group(1, every, state) == [1, 2]
     position, _ = search.carried(state, 0, [0], there[1:], screens=[[1, 2]])
     assert np.hypot(*(position[0, 2] - position[0, 1])[[0, 2]]) == pytest.approx(1.1, abs=0.05)
@@ -161,6 +161,29 @@ def test_a_room_of_many_pieces_is_built_up(monkeypatch, count):
     search, _ = searched(["stool"] * count, [(0.3, 0.4, 0.3)] * count, [(0.0, 0, 0.0)] * count, [0.0] * count)
     search.run(0)
     assert begun == [list(range(count))] * (count == MANY)
+
+
+def test_a_bare_part_of_the_floor_is_filled_by_one_piece():
+    words, at = ["bookshelf"] * MANY, [(x, 0, z) for x in (-4.0, -1.5) for z in np.linspace(-3.5, 3.5, MANY // 2)]
+    still = range(MANY // 2)
+    search, state = searched(words, [(0.8, 1.8, 0.3)] * MANY, at, [0.0] * MANY, fixed=still, floor=3 * FLOOR)
+    cost, _ = search.faults(state)
+    assert search.bare
+    after = filled(search, state)
+    gone = np.hypot(*(after.position - state.position)[:, ::2].T) > 1.0
+    assert gone[MANY // 2 :].sum() == gone.sum() == 1
+    assert search.faults(after)[0] + after.taste.sum() < cost + state.taste.sum() - 0.5
+
+
+@pytest.mark.parametrize("bare", [False, True])
+def test_others_than_those_next_to_it_are_asked_where_the_floor_is_bare(monkeypatch, bare):
+    search, state = searched(["stool"] * 2, [(0.3, 0.4, 0.3)] * 2, [(0, 0, 0), (1, 0, 1)], [0.0] * 2)
+    asked = []
+    monkeypatch.setattr("echousd.place.search.filled", lambda search, state: asked.append(state) or state)
+    monkeypatch.setattr(search, "faults", lambda state: (9.0, [0]))
+    search.bare = bare
+    search.mended(state, 9.0, [0])
+    assert len(asked) == bare
 
 
 def test_a_second_sofa_is_tried_at_the_sides_of_the_table():
