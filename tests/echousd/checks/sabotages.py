@@ -251,7 +251,7 @@ SABOTAGES: tuple[Sabotage, ...] = (
     Sabotage("cushion through a wall", move(f"{D}/bed_cushion", z=-1.2), "outside", "bed_cushion"),
     Sabotage("cushion five times as large", scale(f"{D}/bed_cushion", 5, 5, 5), "too large", "bed_cushion"),
     Sabotage("cushion as a thimble", scale(f"{D}/bed_cushion", 0.05, 0.05, 0.05), "too small", "bed_cushion"),
-    Sabotage("cushion in a basket", lambda stage: together(stage, f"{D}/bed_cushion", f"{D}/basket"), "collision", "bed_cushion"),
+    Sabotage("cushion in a photo", lambda stage: together(stage, f"{D}/bed_cushion", f"{D}/nightstand_photo"), "collision", "bed_cushion"),
     Sabotage("photo hidden", hidden(f"{D}/nightstand_photo"), "empty", "nightstand_photo"),
     Sabotage("photo upside down", op(f"{D}/nightstand_photo", "rotateX", 180.0, T.Float), "echo:Upright", f"{D}/nightstand_photo"),
     # Furniture.
