@@ -237,7 +237,7 @@ def _footprint(thing: Shape) -> np.ndarray:
 def _air_below(thing: Shape, others: Carriers, *, draped: bool = False) -> float:
     """Height of the bottom over the floor or over the nearest surface below the middle or a corner of the object.
 
-    `draped`: it hangs lower than it lies, and counts from where it lies there.
+    `draped`: it hangs lower than it lies, and counts from where it lies there. What is pressed into a seat has no air.
     """
     feet = np.concatenate((thing.position[None, [0, 2]], 0.5 * (_footprint(thing) + thing.position[[0, 2]])))
     bottom = _surface_gap(feet, 0.0, thing) if draped and len(thing.points) else float(thing.position[1])
@@ -256,7 +256,7 @@ def _surface_gap(feet: np.ndarray, bottom: float, other: Shape) -> float:
     for foot in feet:
         above = ((low <= foot) & (foot <= high)).all(1)
         if above.any():
-            best = min(best, float(np.abs(other.triangles[above, :, 1] - bottom).min()))
+            best = min(best, float(np.abs(bottom - other.triangles[above, :, 1] + PRESSED / 2).min()) - PRESSED / 2)
     return best
 
 

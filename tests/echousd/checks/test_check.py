@@ -319,6 +319,18 @@ def test_a_radiator_is_no_body_and_nobody_asks_for_one(tmp_path: Path) -> None:
     assert (report.placement, report.errors) == ((), ())
 
 
+@pytest.mark.parametrize(("deep", "told"), [(0.033, []), (0.08, ["floating"]), (-0.05, ["floating"])])
+def test_what_lies_on_a_soft_seat_is_pressed_into_it(deep: float, told: list[str]) -> None:
+    prim, none = Usd.Stage.CreateInMemory().DefinePrim("/cushion"), np.zeros((0, 3))
+    cushion = Surrounding(
+        prim, "cushion", Shape(none, none, np.array([0.4, 0.4, 0.2]), np.array([0, 0.45 - deep, 0]), 0.0)
+    )
+    floor = Floor(np.array([(-1.0, -2.0), (1.0, -2.0), (1.0, 2.0), (-1.0, 2.0)]))
+    sofa = thing("sofa", "sofa", box(1.6, 0.45, 0.8), (0.0, 0.0, 0.0))
+    found = _small_faults(cushion, floor, Carriers([sofa]), np.zeros((0, 2, 2)))
+    assert [word for word, _ in found] == told
+
+
 @pytest.mark.parametrize(("rack", "told"), [(1.9, []), (1.0, ["off its wall"]), (0.0, ["off its wall"])])
 def test_coats_hang_from_a_rack_that_stands_off_its_wall(rack: float, told: list[str]) -> None:
     prim = Usd.Stage.CreateInMemory().DefinePrim("/coats")
