@@ -32,8 +32,8 @@ DIM = 0.02  # radiance at every place of a room without lamps and windows, so th
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
 ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.6, 0.75), (0.38, 0.61), 70, 15.0
 EVEN = (0.18, 0.3)  # power of the light's brightness that eyes take from it, and inside whoever photographs rooms
-WHITE, PAPER = 88, 0.95  # what so many of a hundred points are darker than comes to no more than that
-CONTRAST, KNEE = 1.55, 0.6  # power about what is bright, and from where on highlights are rolled off
+WHITE, PAPER = 84, 0.95  # what so many of a hundred points are darker than comes to no more than that
+CONTRAST, KNEE = 1.42, 0.6  # power about what is bright, and from where on highlights are rolled off
 HUE = 0.8  # share of colours that keep their hue where they are bright; film bleaches them
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 DAY = 0.5  # radiance of the sky by day
