@@ -26,7 +26,7 @@ COARSE = 0.7  # share of the faces below which a second level of detail is worth
 COLLIDERS = 64  # convex pieces of one body at most
 SLACK = 0.003  # metres that a mesh may reach beyond its convex pieces
 MOST = 0.8  # share of what the worst face lacks, from which on a face gets a corner in the same round
-PRESSED = 0.035  # metres that an upholstered seat is less full under what lies on it than where nothing does
+PRESSED, FIRM = 0.035, 0.015  # metres that a pad, and a firm seat, are less full under what lies on them than else
 FOLDS = 0.03  # metres that folds of a cover are deep
 SMALL = 0.002  # share of its box below which a solid alone is no obstacle
 
@@ -139,7 +139,7 @@ def level(solid: Solid, corners: np.ndarray) -> np.ndarray:
     """Corners (n, 3) of what a solid collides with: soft seats are level on top, and covers, as high as their folds."""
     x, y, z = corners.T
     if solid.role == "seat" and solid.material == "fabric":
-        deep, share = (PRESSED, 0.25) if isinstance(solid, Pad) else (PRESSED / 2, 0.1)
+        deep, share = (PRESSED, 0.25) if isinstance(solid, Pad) else (FIRM, 0.1)
         y = np.minimum(y, y.max() - min(deep, share * np.ptp(y)))
     elif solid.role == "cover":
         y = np.where(y > y.max() - FOLDS, y.max(), y)
