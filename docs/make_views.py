@@ -51,7 +51,8 @@ SUNNY, FAR = np.array([1.55, 1.42, 1.20]), 2600.0  # what the sun gives to what 
 HAZE = np.array([0.66, 0.76, 0.87])
 
 
-GRASS = (0.095, 0.142, 0.046)
+GRASS, ASPHALT, STONE = (0.095, 0.142, 0.046), (0.11, 0.11, 0.115), (0.36, 0.35, 0.33)
+GOLDEN = 2.39996  # radians from one thing to the next, so that none stands behind another
 VIEWS: dict[str, Callable[[], tuple[list[Parts], float, float]]] = {}  # parts, the eye's height, the sun's azimuth
 
 
@@ -59,6 +60,19 @@ def view(build: Callable[[], tuple[list[Parts], float, float]]) -> Callable[[], 
     """A row of `VIEWS`."""
     VIEWS[build.__name__] = build
     return build
+
+
+def around(away: float, turn: float) -> tuple[float, float]:
+    """(x, z) so many metres from the eye, at an angle."""
+    return away * np.cos(turn), away * np.sin(turn)
+
+
+def road(near: float, far: float, pavement: float, kerb: float, height: float) -> list[Parts]:
+    """A road along x between two distances (z), and a pavement so wide on both sides, beyond a kerb."""
+    low, high = near - kerb, far + kerb
+    strips = [(ASPHALT, PLAIN, near, far, height), (STONE, PAVING, low - pavement, low, 0.03)]
+    strips.append((STONE, PAVING, high, high + pavement, 0.03))
+    return [ground(color, kind, (-90, start), (90, end), y) for color, kind, start, end, y in strips]
 
 
 @view
@@ -72,7 +86,7 @@ def garden() -> tuple[list[Parts], float, float]:
     ]
     out = [ground(GRASS), *distant(20, 60, 120)]
     for turn in np.arange(0, 2 * np.pi, np.pi / 18):  # hedge in a ring of straight pieces
-        x, z = 13.5 * np.cos(turn), 13.5 * np.sin(turn)
+        x, z = around(13.5, turn)
         out.append(
             bush(
                 30 + int(turn * 9), (2.6, 1.35, 0.9), many=6000, leaf=0.10, square=8, green=(0.075, 0.135, 0.035)
@@ -86,7 +100,7 @@ def garden() -> tuple[list[Parts], float, float]:
         )
     blooms = [(0.55, 0.10, 0.22), (0.62, 0.58, 0.60), (0.30, 0.16, 0.50), (0.72, 0.42, 0.08), (0.60, 0.22, 0.30)]
     for n in range(46):
-        turn, away = n * 2.39996, rng.uniform(10.8, 12.4)
+        turn, away = n * GOLDEN, rng.uniform(10.8, 12.4)
         flower = bush(
             90 + n,
             (rng.uniform(0.8, 1.6), rng.uniform(0.5, 1.0), rng.uniform(0.8, 1.3)),
@@ -94,13 +108,13 @@ def garden() -> tuple[list[Parts], float, float]:
             leaf=0.07,
             flowers=blooms[n % 5] if n % 3 else None,
         )
-        out.append(flower.moved(away * np.cos(turn), away * np.sin(turn), turn))
+        out.append(flower.moved(*around(away, turn), turn))
     walls = [(0.62, 0.58, 0.50), (0.40, 0.20, 0.14), (0.66, 0.63, 0.58), (0.52, 0.44, 0.34)]
     for n, turn in enumerate(np.arange(0, 2 * np.pi, 2 * np.pi / 9) + 0.2):
         kind = BRICK if n % 4 == 1 else PLAIN
         out.append(
             house(n, wall=walls[n % 4], kind=kind, tiles=((0.24, 0.10, 0.065), (0.09, 0.09, 0.10))[n % 2]).moved(
-                30 * np.cos(turn), 30 * np.sin(turn), -np.pi / 2 - turn
+                *around(30, turn), -np.pi / 2 - turn
             )
         )
     out += scattered(rng, [tree(14, 9.0, leaf=0.2), tree(15, 8.0, leaf=0.2)], 18, 17, 27)
@@ -118,12 +132,10 @@ def orchard() -> tuple[list[Parts], float, float]:
     ]
     out = [ground((0.10, 0.155, 0.040)), *distant(50, 130, 300, 320), hills(51, 250, 2600, 150, (0.07, 0.11, 0.04))]
     for n in range(22):
-        turn = n * 2.39996
-        out.append(
-            kinds[n % 3].moved((9 + 1.05 * n) * np.cos(turn), (9 + 1.05 * n) * np.sin(turn), n, rng.uniform(0.85, 1.25))
-        )
+        turn = n * GOLDEN
+        out.append(kinds[n % 3].moved(*around(9 + 1.05 * n, turn), n, rng.uniform(0.85, 1.25)))
     for turn in np.arange(0, 2 * np.pi, np.pi / 12):
-        out.append(fence(7.0).moved(26 * np.cos(turn), 26 * np.sin(turn), np.pi / 2 - turn))
+        out.append(fence(7.0).moved(*around(26, turn), np.pi / 2 - turn))
     out += scattered(
         rng,
         [
@@ -141,22 +153,12 @@ def orchard() -> tuple[list[Parts], float, float]:
 def street() -> tuple[list[Parts], float, float]:
     """Houses over a street with pavements, front gardens and trees."""
     rng = np.random.default_rng(3)
-    walls = [
-        (0.64, 0.60, 0.52),
-        (0.38, 0.18, 0.12),
-        (0.70, 0.67, 0.62),
-        (0.52, 0.42, 0.30),
-        (0.44, 0.48, 0.50),
-        (0.60, 0.46, 0.36),
-    ]
+    walls = ((0.64, 0.60, 0.52), (0.38, 0.18, 0.12), (0.70, 0.67, 0.62),
+             (0.52, 0.42, 0.30), (0.44, 0.48, 0.50), (0.60, 0.46, 0.36))  # fmt: skip
     out = [ground(GRASS), *distant(70, 70, 140)]
     kinds = [tree(71, 7.0, bare=0.34, leaf=0.15), tree(72, 8.0, bare=0.34, leaf=0.15)]
     for side in range(4):  # streets on all sides, so that every window has one
-        here = [
-            ground((0.11, 0.11, 0.115), PLAIN, (-90, 9.2), (90, 14.8), 0.012 + side * 1e-3),
-            ground((0.36, 0.35, 0.33), PAVING, (-90, 7.4), (90, 9.1), 0.03),
-            ground((0.36, 0.35, 0.33), PAVING, (-90, 14.9), (90, 16.6), 0.03),
-        ]
+        here = road(9.2, 14.8, 1.7, 0.1, 0.012 + side * 1e-3)
         for n, x in enumerate(np.arange(-34, 35, 11.5)):
             number = side * 7 + n
             kind = BRICK if number % 6 == 1 else PLAIN
@@ -199,8 +201,8 @@ def park() -> tuple[list[Parts], float, float]:
     ]
     out = [ground(GRASS), *distant(85, 80, 170, 340)]
     for n in range(30):
-        turn, away = n * 2.39996, 15 + 1.6 * n
-        out.append(kinds[n % 4].moved(away * np.cos(turn), away * np.sin(turn), n, rng.uniform(0.8, 1.2)))
+        turn, away = n * GOLDEN, 15 + 1.6 * n
+        out.append(kinds[n % 4].moved(*around(away, turn), n, rng.uniform(0.8, 1.2)))
     for away in (11.0, 27.0):
         turn = np.linspace(0, 2 * np.pi, 97)
         inner, outer = (np.stack([r * np.cos(turn), 0 * turn + 0.02, r * np.sin(turn)], 1) for r in (away, away + 2.2))
@@ -222,22 +224,12 @@ def park() -> tuple[list[Parts], float, float]:
 def town() -> tuple[list[Parts], float, float]:
     """From a second floor: fronts over a street with trees, roofs behind them."""
     rng = np.random.default_rng(5)
-    walls = [
-        (0.62, 0.57, 0.48),
-        (0.68, 0.64, 0.58),
-        (0.36, 0.17, 0.12),
-        (0.58, 0.48, 0.36),
-        (0.52, 0.54, 0.55),
-        (0.66, 0.55, 0.42),
-    ]
+    walls = ((0.62, 0.57, 0.48), (0.68, 0.64, 0.58), (0.36, 0.17, 0.12),
+             (0.58, 0.48, 0.36), (0.52, 0.54, 0.55), (0.66, 0.55, 0.42))  # fmt: skip
     out = [ground((0.20, 0.20, 0.20), PLAIN)]
     kinds = [tree(91, 8.5, bare=0.34, leaf=0.16), tree(92, 9.0, bare=0.34, leaf=0.16)]
     for side in range(4):
-        here = [
-            ground((0.11, 0.11, 0.115), PLAIN, (-90, 7), (90, 14), 0.01),
-            ground((0.36, 0.35, 0.33), PAVING, (-90, 14), (90, 18), 0.03),
-            ground((0.36, 0.35, 0.33), PAVING, (-90, 3), (90, 7), 0.03),
-        ]
+        here = road(7.0, 14.0, 4.0, 0.0, 0.01)
         x = -46.0
         for row, deep in ((0, 19.5), (1, 42.0), (2, 66.0)):
             x = -46.0 - 14 * row
@@ -286,8 +278,8 @@ def lake() -> tuple[list[Parts], float, float]:
     out += [hills(104, 420, 1500, 210, (0.030, 0.060, 0.028)), hills(105, 1200, 4200, 620, (0.05, 0.08, 0.06))]
     out += [each.moved(0, 0, y=-1.0) for each in distant(106, 405, 470, 420)]
     for n in range(17):
-        way, away = n * 2.39996 + 0.4, 13 + 0.85 * n
-        out.append(trees[n % 3].moved(away * np.cos(way), away * np.sin(way), n, rng.uniform(0.8, 1.2), -0.03 * away))
+        way, away = n * GOLDEN + 0.4, 13 + 0.85 * n
+        out.append(trees[n % 3].moved(*around(away, way), n, rng.uniform(0.8, 1.2), -0.03 * away))
     out += scattered(rng, [bush(107 + n, (1.6, 1.0, 1.5), many=1800, leaf=0.07) for n in range(3)], 26, 19, 27, y=-0.7)
     return out, 3.0, 0.2
 
@@ -305,10 +297,10 @@ def hillside() -> tuple[list[Parts], float, float]:
     ]
     out += scattered(rng, kinds, 60, 17, 90)
     for n in range(16):
-        turn, away = n * 2.39996, rng.uniform(34, 110)
+        turn, away = n * GOLDEN, rng.uniform(34, 110)
         out.append(
             house(300 + n, wall=((0.66, 0.62, 0.55), (0.62, 0.55, 0.44))[n % 2], tiles=(0.22, 0.095, 0.06)).moved(
-                away * np.cos(turn), away * np.sin(turn), rng.uniform(0, 6.3)
+                *around(away, turn), rng.uniform(0, 6.3)
             )
         )
     return out, 11.0, 4.4
@@ -326,12 +318,8 @@ def wood() -> tuple[list[Parts], float, float]:
     ]
     out = [ground((0.085, 0.135, 0.036)), *distant(125, 55, 100, 300)]
     for n in range(60):
-        turn, away = n * 2.39996, 9.5 + 0.62 * n
-        out.append(
-            kinds[(n * 7) % 4 if n % 3 else n % 2].moved(
-                away * np.cos(turn), away * np.sin(turn), n, rng.uniform(0.8, 1.2)
-            )
-        )
+        turn, away = n * GOLDEN, 9.5 + 0.62 * n
+        out.append(kinds[(n * 7) % 4 if n % 3 else n % 2].moved(*around(away, turn), n, rng.uniform(0.8, 1.2)))
     out += scattered(
         rng, [bush(126 + n, (0.9, 0.6, 0.9), many=500, leaf=0.08) for n in range(3)], 120, 7, 40, (0.5, 1.2)
     )

@@ -31,9 +31,8 @@ QUALITY = 86  # of JPEG; without subsampling, because normals live in the colour
 class Relief:
     """One pattern."""
 
-    tone: (
-        np.ndarray
-    )  # (n, n) or (n, n, 3) float, n `SIZE` or twice that, over its mean what the tint is multiplied with
+    # (n, n) or (n, n, 3) float, n `SIZE` or twice that, over its mean what the tint is multiplied with
+    tone: np.ndarray
     height: np.ndarray | None = None  # (SIZE, SIZE) float, metres above the mean, None for what is flat
     rough: np.ndarray | None = None  # (SIZE, SIZE) float, added to the roughness, None where it is even
 
