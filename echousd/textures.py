@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import stat
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,6 +70,18 @@ def decoded(content: bytes, path: str, halved: int = 0) -> np.ndarray:
     """(h, w, 3) uint8 sRGB of an encoded image; raises TextureError, which calls it `path`, as `read_image` does."""
     from PIL import Image
 
+    with image_in(content, path) as image:
+        width, height = image.size
+        image.draft(None, (max(width >> halved, 1), max(height >> halved, 1)))
+        many = 2**halved * image.width // width  # that are left to be one
+        return _rgb(image) if many < 2 else np.asarray(Image.fromarray(_rgb(image)).reduce(many))
+
+
+@contextmanager
+def image_in(content: bytes, path: str) -> Iterator[Image]:
+    """An encoded image, which the block decodes; raises TextureError, which calls it `path`, for what is none."""
+    from PIL import Image
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our own limit is below
         try:
@@ -75,14 +89,10 @@ def decoded(content: bytes, path: str, halved: int = 0) -> np.ndarray:
                 within_memory(Path(path), path, size=len(content)),
                 Image.open(io.BytesIO(content), formats=FORMATS) as image,
             ):
-                width, height = image.size
-                if width * height > MAX_PIXELS:
-                    raise TextureError(
-                        f"{path}: an image of {width} x {height} pixels, allowed: {MAX_PIXELS} (8192 x 8192)"
-                    )
-                image.draft(None, (max(width >> halved, 1), max(height >> halved, 1)))
-                many = 2**halved * image.width // width  # that are left to be one
-                return _rgb(image) if many < 2 else np.asarray(Image.fromarray(_rgb(image)).reduce(many))
+                if image.width * image.height > MAX_PIXELS:
+                    found = f"{image.width} x {image.height} pixels"
+                    raise TextureError(f"{path}: an image of {found}, allowed: {MAX_PIXELS} (8192 x 8192)")
+                yield image
         except TextureError:
             raise
         except Image.DecompressionBombError:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import re
-import warnings
 from collections.abc import Sequence
 from functools import cache
 
@@ -14,7 +12,7 @@ from PIL import Image
 from echomodel.files import tables
 from echomodel.vocabulary import vocabulary
 from echousd.srgb import from_linear, of_hexadecimal, to_linear
-from echousd.textures import FORMATS, MAX_BYTES, MAX_PIXELS
+from echousd.textures import FORMATS, MAX_PIXELS, TextureError, image_in
 
 MOST = 3  # colours of a model
 TEXELS = 16  # along a side of a texture, made small
@@ -51,14 +49,10 @@ def texels(content: bytes, tint: Sequence[float] | np.ndarray = (1.0, 1.0, 1.0))
     Arguments:
         content: of the file. tint: (3) linear, what the image is multiplied with.
     """
-    if not 0 < len(content) <= MAX_BYTES:
-        return None
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(io.BytesIO(content), formats=FORMATS) as image:
-                return pixels(image, tint)
-    except Exception:  # decoders fail on damaged files in every way there is
+        with image_in(content, "the image") as image:
+            return pixels(image, tint)
+    except TextureError:
         return None
 
 

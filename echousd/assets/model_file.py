@@ -12,11 +12,10 @@ from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from PIL import Image
 from trimesh.resolvers import Resolver
 
 from echomodel.bounded import unpacking
-from echousd.textures import FORMATS, MAX_BYTES, MAX_PIXELS
+from echousd.textures import MAX_BYTES
 
 MAX_MODEL = 2 * 2**30  # bytes
 TEXTS, MAX_TEXT = (".obj", ".gltf"), 2**28  # what is read takes ten times as much memory
@@ -131,18 +130,3 @@ class Beside(Resolver):
     def namespaced(self, namespace: str) -> Beside:
         """Itself."""
         return self
-
-
-def checked_image(content: bytes) -> tuple[str, Any] | None:
-    """(ending, image) of the bytes of an image that may be packed, None for anything else."""
-
-    if not 0 < len(content) <= MAX_BYTES:
-        return None
-    try:
-        with Image.open(io.BytesIO(content), formats=FORMATS) as image:
-            if image.width * image.height > MAX_PIXELS:
-                return None
-            image.load()
-            return {"JPEG": ".jpg", "PNG": ".png"}.get(image.format or "", ""), image
-    except Exception:  # decoders fail on damaged files in every way there is
-        return None

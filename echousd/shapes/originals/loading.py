@@ -8,6 +8,7 @@ import re
 import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -21,7 +22,7 @@ from echomodel.triangles import Mesh, connected_pieces
 from echousd.assets.catalogues import Entry
 from echousd.assets.describe import described, digest_of
 from echousd.assets.measure import Measured, measure
-from echousd.assets.model_file import Beside, ModelFile, checked_image
+from echousd.assets.model_file import Beside, ModelFile
 from echousd.assets.record import AssetRecord
 from echousd.assets.reference import Vector, check_reach, joined, split
 from echousd.assets.table import Library
@@ -34,7 +35,7 @@ from echousd.srgb import to_linear
 from echousd.stage.files import layer_bytes, specs, usd_error
 from echousd.stage.pen import Pen
 from echousd.stage.shading import Image, preview_surface
-from echousd.textures import READABLE, encoded
+from echousd.textures import READABLE, TextureError, encoded, image_in
 
 
 def own_file(asset: str) -> ModelFile:
@@ -162,12 +163,13 @@ class Images:
         """The path of an image (PIL) of a material from the layer, "" where it cannot be packed."""
         file = image.info.get("file_path", "") if hasattr(image, "info") else ""
         content = self.beside.images.get(file, b"") if file else b""
-        found = checked_image(content) if content else None
-        if found is None or not found[0]:
+        ending = ""
+        with suppress(TextureError), image_in(content, file) as found:
+            found.load()
+            ending = {"JPEG": ".jpg", "PNG": ".png"}.get(found.format or "", "")
+        if not ending:
             mode = "RGBA" if "A" in image.getbands() or image.mode == "P" else "RGB"
             content, ending = encoded(image.convert(mode)), ".png"
-        else:
-            ending = found[0]
         stem = re.sub(r"[^A-Za-z0-9_\-]+", "_", PurePosixPath(file.replace("\\", "/")).stem) or "image"
         name = f"{FOLDER}/{stem[:40]}_{hashlib.sha256(content).hexdigest()[:8]}{ending}"
         self.files[name] = content
