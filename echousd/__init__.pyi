@@ -22,10 +22,10 @@ from echousd.make.pipeline import generate as generate
 from echousd.options import RoomOptions as RoomOptions
 from echousd.stage.boxes import read_dressing as read_dressing
 from echousd.stage.boxes import relations_from_boxes as relations_from_boxes
+from echousd.stage.graphs import update_graph as update_graph
 from echousd.stage.graphs import write_graph as write_graph
 from echousd.stage.read import read_graph as read_graph
 from echousd.stage.read import read_rooms as read_rooms
-from echousd.stage.update import update_graph as update_graph
 from echousd.texturing import export_texture_job as export_texture_job
 from echousd.texturing import import_texture_job as import_texture_job
 

@@ -13,8 +13,8 @@ from echousd.stage.boxes import relations_from_boxes, room_boxes
 from echousd.stage.encoding import StageError
 from echousd.stage.foreign import SkippedPrims, boxed_graph, foreign_graph, foreign_pieces
 from echousd.stage.forms import forms
+from echousd.stage.graphs import update_graph
 from echousd.stage.read import read_graph, the_room
-from echousd.stage.update import update_graph
 from echousd.stage.values import NOW
 from echousd.stage.write import graph_layer
 

@@ -11,8 +11,8 @@ import echousd
 from echousd.checks import check
 from echousd.draw.drawables import read_drawables
 from echousd.exporting.formats import export
+from echousd.stage.graphs import update_graph
 from echousd.stage.read import StatedTwice, read_graph
-from echousd.stage.update import update_graph
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 
 from echousd.graph import Node, Relation, SceneGraph
 from echousd.stage.encoding import StageError
-from echousd.stage.graphs import save_layer, write_graph
+from echousd.stage.graphs import save_layer, update_graph, write_graph
 from echousd.stage.read import read_graph
-from echousd.stage.update import update_graph
 from echousd.stage.write import graph_layer
 
 SOME = settings(max_examples=20, deadline=None)

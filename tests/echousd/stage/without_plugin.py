@@ -16,9 +16,8 @@ assert [w.category for w in caught] == [echousd.plugin.PluginNotActive], caught
 assert not echousd.plugin.is_active()
 
 from echousd.graph import SceneGraph  # noqa: E402
-from echousd.stage.graphs import save_layer  # noqa: E402
+from echousd.stage.graphs import save_layer, update_graph  # noqa: E402
 from echousd.stage.read import read_graph  # noqa: E402
-from echousd.stage.update import update_graph  # noqa: E402
 from echousd.stage.write import graph_layer  # noqa: E402
 
 
