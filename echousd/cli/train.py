@@ -59,7 +59,7 @@ Rooms = Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a ro
 @documented_command(data_app, "data build")
 def build(out: Path, recipe: str = "smoke", seed: Seed = 0) -> None:
     """Make rooms and shapes to train on; run again to continue a build that was stopped."""
-    from echomodel.data.build import build_data
+    from echomodel.data.shapeset import build_data
 
     with progress_bar() as listen:
         rooms, shapes = build_data(out, recipe, seed, listen)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from echomodel.data import roomset
-from echomodel.data.build import build_data
 from echomodel.data.roomset import RoomSet, build_rooms, pack_rooms
+from echomodel.data.shapeset import build_data
 from echomodel.furniture.solids import Ball
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from echomodel.config import Objective, Sampler
 from echomodel.samplers import SAMPLERS, Predict, alpha_sigma, clean_from, expand, sample
-from echomodel.training.targets import add_noise, output_from, target
+from echomodel.training.layout_losses import add_noise, output_from, target
 
 MEAN, SPREAD = 0.7, 0.4
 SWEEP = [(s, o) for s in SAMPLERS for o in ("noise", "velocity", "flow")]

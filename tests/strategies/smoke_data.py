@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from echomodel.data.build import build_data
+from echomodel.data.shapeset import build_data
 
 
 def smoke_data(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -10,20 +10,21 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
+from echomodel.arrays import Array, at_least
 from echomodel.boxes import Boxes
 from echomodel.compact.layout import FARTHEST, measurable, measured
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import box_scale
+from echomodel.config import Objective
 from echomodel.objective import Plan
 from echomodel.objective.physics import apart
 from echomodel.objective.plan import UNKNOWN
 from echomodel.randomness import normal
 from echomodel.rules import margins
-from echomodel.samplers import clean_from
+from echomodel.samplers import alpha_sigma, clean_from, expand
 from echomodel.surroundings import kept_free, outside
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import LayoutBatch, draw_levels
-from echomodel.training.targets import add_noise, target
 from echomodel.vocabulary import vocabulary
 
 STATED_SLACK = 0.02  # the hinge asks for this much more than the rule does (metres or ratio)
@@ -188,3 +189,29 @@ def draw_known(scene: Tensor, scenes: int, generator: torch.Generator) -> Tensor
     some = torch.rand(scenes, generator=generator) < 0.5
     share = (torch.rand(scenes, generator=generator) * some).to(scene.device)
     return torch.rand(len(scene), generator=generator).to(scene.device) < share[scene]
+
+
+def add_noise(clean: Array, noise: Array, level: Array, objective: Objective) -> Array:
+    """Noisy samples at a level per node: clean, noise (N, ...), level (N,) -> (N, ...)."""
+    alpha, sigma = alpha_sigma(expand(level, clean), objective)
+    return alpha * clean + sigma * noise
+
+
+def target(clean: Array, noise: Array, level: Array, objective: Objective) -> Array:
+    """The training target: the noise (DDPM), alpha noise - sigma clean (v), or noise - clean (rectified flow)."""
+    if objective == "noise":
+        return noise
+    if objective == "flow":
+        return noise - clean
+    alpha, sigma = alpha_sigma(expand(level, clean), objective)
+    return alpha * noise - sigma * clean
+
+
+def output_from(clean: Array, noisy: Array, level: Array, objective: Objective, floor: float = 0.05) -> Array:
+    """The prediction that a clean sample stands for; levels below `floor` are treated as `floor` (1 / sigma grows)."""
+    level = at_least(level, floor)
+    if objective == "flow":
+        return (noisy - clean) / expand(level, noisy)
+    alpha, sigma = alpha_sigma(expand(level, noisy), objective)
+    noise = (noisy - alpha * clean) / sigma
+    return noise if objective == "noise" else alpha * noise - sigma * clean

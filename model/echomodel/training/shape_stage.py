@@ -21,10 +21,9 @@ from echomodel.data.shapeset import ShapeSet
 from echomodel.graph import GraphBatch
 from echomodel.metrics.pointsets import surface_scores
 from echomodel.randomness import normal
-from echomodel.training.layout_losses import draw_known
+from echomodel.training.layout_losses import add_noise, draw_known, output_from
 from echomodel.training.rooms import PackedRooms, draw_batch, draw_levels
 from echomodel.training.start import Start
-from echomodel.training.targets import add_noise, output_from
 from echomodel.vocabulary import vocabulary
 
 LOWEST = 0.1  # level below which the loss weight 1 / level^2 of a predicted clean latent stops growing
