@@ -30,9 +30,9 @@ from echomodel.compact.model import load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
+from echoscene import unet
 from echoscene.config import shape_unet
 from echoscene.model import ShapeUNet
-from echoscene.unet import pack_linear_maps
 
 Run = Callable[[], Tensor]
 LAST = torch.channels_last_3d
@@ -51,8 +51,7 @@ def bf16(run: Run) -> Run:
 
 def packed(net: nn.Module, *arguments: object) -> Run:
     """A copy of the network with packed linear maps."""
-    own = copy.deepcopy(net)
-    pack_linear_maps(own)
+    own = unet.packed(net)
     return lambda: own(*arguments)
 
 

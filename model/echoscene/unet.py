@@ -53,12 +53,10 @@ def packed(net: Net) -> Net:
     """
     fast = deepcopy(net)
     for module in list(fast.modules()):
-        for name, conv in list(module.named_children()):
-            if isinstance(conv, nn.Conv1d):
-                tap = nn.utils.skip_init(nn.Linear, conv.in_channels, conv.out_channels)
-                tap.weight, tap.bias = nn.Parameter(_tap(conv)), conv.bias
-                setattr(module, name, tap)
-    pack_linear_maps(fast)
+        for name, part in list(module.named_children()):
+            if isinstance(part, nn.Conv1d | nn.Linear):
+                weight = _tap(part) if isinstance(part, nn.Conv1d) else part.weight
+                setattr(module, name, PackedLayer(weight, part.bias))
     return fast
 
 
@@ -269,18 +267,17 @@ class UNet(nn.Module):
 
 
 class PackedLayer(nn.Module):
-    """A linear layer of float32 for inference alone, in this process.
+    """A linear map of float32 on a CPU, for inference alone, in this process.
 
-    On a CPU the weight goes into oneDNN's blocked layout, which reads it two to three times faster than a plain
-    product does for a handful of rows; elsewhere, or where torch lacks the operator, it is an ordinary linear map.
+    The weight goes into oneDNN's blocked layout, which reads it two to three times faster than a plain product does for
+    a handful of rows; where torch lacks the operator, it is an ordinary linear map.
     """
 
-    def __init__(self, layer: nn.Linear) -> None:
+    def __init__(self, weight: Tensor, bias: Tensor | None) -> None:
         super().__init__()
-        self._product, self._added = (
-            None if part is None else part.detach().float().contiguous() for part in (layer.weight, layer.bias)
-        )
-        self._packed = layer.weight.device.type == "cpu" and packing_available()
+        self._product = weight.detach().float().contiguous()
+        self._added = None if bias is None else bias.detach().float()
+        self._packed = packing_available()
         if self._packed:
             self._product = torch.ops.mkldnn._reorder_linear_weight(self._product, None)
 
@@ -289,14 +286,6 @@ class PackedLayer(nn.Module):
         if not self._packed:
             return F.linear(x, self._product, self._added)
         return torch.ops.mkldnn._linear_pointwise(x, self._product, self._added, "none", [], "")
-
-
-def pack_linear_maps(net: nn.Module) -> None:
-    """Put a `PackedLayer` in the place of every linear layer inside."""
-    for module in list(net.modules()):
-        for name, layer in list(module.named_children()):
-            if type(layer) is nn.Linear:
-                setattr(module, name, PackedLayer(layer))
 
 
 @cache

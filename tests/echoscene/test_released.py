@@ -19,6 +19,7 @@ from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig
 from echoscene.echo import published_scene
 from echoscene.encoder import SceneGraphTensors, TripletGCN
 from echoscene.model import GraphChange, ReleasedModel, Schedule, ShapeUNet, node_budget
+from echoscene.unet import UNet, packed
 
 ENCODER = EncoderConfig(text=12, learned=4, flag=4, hidden=16, layers=2, separated=False)
 SMALL = {"hidden": 16, "layers": 2, "code": 8, "predicate": 8, "context": 32}
@@ -182,6 +183,17 @@ def test_ablations_of_table_4(name: str) -> None:
     assert heard == config.echo  # node 1 hears of node 0 through the echo alone
     assert torch.allclose(base[2], run(triples=triples[:0])[2], atol=1e-5)  # isolated: edges of others do not matter
     assert any("shape_time_emb" in key for key, _ in net.named_parameters()) == (config.echo and config.time_in_echo)
+
+
+def test_packed_maps_are_those_that_were_trained() -> None:
+    torch.manual_seed(0)
+    net = UNet(1, CONFIG.layout).eval()
+    with torch.no_grad():
+        for parameter in net.parameters():
+            parameter.add_(0.05 * torch.randn_like(parameter))
+    state = torch.randn(5, 8), net.embed_time(torch.full((5,), 300)), torch.randn(5, CONFIG.layout.context)
+    with torch.inference_mode():
+        assert torch.allclose(packed(net).denoise(*state), net.denoise(*state), rtol=1e-4, atol=1e-4)
 
 
 def test_isolated_nodes_and_missing_edges_work() -> None:

@@ -55,7 +55,10 @@ def generate_room(
         builder = Builder(sample_floor(ground, rng), rng, styles)
         kinds = [room_type_statistics(zone) for zone in zones] or [statistics]
         area = builder.floor.area / len(kinds)
-        builder.wanted = together([wanted(kind, area, rng) for kind in kinds])
+        total: Counter[str] = Counter()
+        for kind in kinds:
+            total.update(wanted(kind, area, rng))
+        builder.wanted = dict(total)
         furnish(builder, room_type)
         if len(builder.items) > 1 and (not builder.lost or attempt >= REDRAWS):
             return _boxes(builder, name, room_type)
@@ -119,11 +122,3 @@ def hall_of(statistics: RoomTypeStatistics, rng: np.random.Generator) -> tuple[R
         short=tuple(side * value for value in statistics.short),
         long=tuple(side * value for value in statistics.long),
     ), types
-
-
-def together(wanted: list[dict[str, int]]) -> dict[str, int]:
-    """What all zones ask for."""
-    total: Counter[str] = Counter()
-    for zone in wanted:
-        total.update(zone)
-    return dict(total)
