@@ -42,7 +42,7 @@ def perspective_views(points: np.ndarray, furniture: Furniture) -> list[np.ndarr
     facing = corners @ (furniture.facing + np.array([1e-3, 2e-3]))
     rise = RISE * max(1.0, np.ptp(points[:, ::2], axis=0).max() / WIDE)
     views = [framed(points, np.array([0.55 * x, rise, 0.85 * z])) for x, z in corners]
-    hidden = [furniture.blocked(view[:3, 3])[1].mean(1).sum() for view in views]
+    hidden = [furniture.hidden(view[:3, 3]).sum() for view in views]
     return [views[corner] for corner in np.argsort(np.array(hidden) - FRONTS * facing, kind="stable")]
 
 

@@ -1,9 +1,11 @@
-"""What of the furniture an eye sees: boxes that hide one another."""
+"""What of the furniture a camera sees: boxes that hide one another."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property, reduce
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +16,11 @@ ASPECT = 1.6  # of a picture from inside: its width over its height
 # rays through such a picture whose half width at distance 1 is 1, and what each of these counts
 SPREAD = np.arange(-6, 7) / 6
 RAYS = np.stack([*(g.ravel() for g in np.meshgrid(SPREAD, SPREAD / ASPECT)), np.full(169, -1.0)], 1)
-# of a box whose size is 1: its corners, and the points that are looked for in it
-CUBE = np.stack(np.meshgrid((-0.5, 0.5), (0.0, 1.0), (-0.5, 0.5), indexing="ij"), -1).reshape(-1, 3)
+# of a box whose size is 1: points that are looked for in it, and its corners
 GRID = np.stack(np.meshgrid(*[(-0.45, 0.0, 0.45)] * 3, indexing="ij"), -1).reshape(-1, 3)
+CUBE = np.stack(np.meshgrid((-0.5, 0.5), (0.0, 1.0), (-0.5, 0.5), indexing="ij"), -1).reshape(-1, 3)
 WEIGHTS = np.where(np.abs(RAYS[:, :2] * (1, ASPECT)).max(1) > 0.8, CUT, 1.0)
+TOGETHER = 16  # pictures whose rays are run at a time: they stay in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +41,8 @@ class Furniture:
     @cached_property
     def corners(self) -> np.ndarray:
         """(n, 8, 3) float, the corners of each box, metres."""
-        return np.asarray(self.position[:, None] + np.einsum("nji,nkj->nki", self._turns, CUBE * self.size[:, None]))
+        turns = upright(-self.yaw)  # from the room's frame to each object's
+        return np.asarray(self.position[:, None] + np.einsum("nji,nkj->nki", turns, CUBE * self.size[:, None]))
 
     def of(self, rows: np.ndarray) -> Furniture:
         """Some of these boxes."""
@@ -49,56 +53,60 @@ class Furniture:
         every = [self, *(other for other in others if other is not None)]
         return Furniture(*(np.concatenate([getattr(one, f.name) for one in every]) for f in fields(Furniture)))
 
-    def met(self, view: np.ndarray, half: float, near: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(169,) int which box is the nearest along each of `RAYS` through a picture from inside, metres to it, inf
-        where there is none, and how far the ray goes where the box looks, 1 = straight at its back.
+    def hidden(self, eye: np.ndarray) -> np.ndarray:
+        """(n,) share of points in each box that others hide from an eye (3,)."""
+        turns, middle, count = upright(-self.yaw), self.position + self.size * (0.0, 0.5, 0.0), len(self.size)
+        points = (middle[:, None] + np.einsum("nji,nkj->nki", turns, GRID * self.size[:, None])).reshape(-1, 3)
+        way = np.einsum("bij,pj->ibp", turns, points - eye)
+        start = np.einsum("bij,bj->ib", turns, eye - middle)[..., None]
+        enter, leave = _crossed(start, way, 0.5 * self.size.T[..., None], -np.inf)
+        met = ((enter < leave) & (leave > 0) & (enter < 1)).reshape(count, count, -1)
+        met[np.arange(count), np.arange(count)] = False
+        return np.asarray(met.any(0).mean(1))
 
-        `view`: (4, 4) float camera to world. `half`: half of the picture's width at distance 1. `near`: metres ahead
-        from where on things are seen.
+    def met(self, views: np.ndarray, halves: np.ndarray, nears: np.ndarray | float = 0.0) -> tuple[np.ndarray, ...]:
+        """What `RAYS` through v pictures meet: along each, (v, 169), int which box is the nearest, metres to it, inf
+        where there is none, and how far the ray goes where the box looks, 1 = straight at its back; of each box, (v,
+        n), the share of the picture that it takes, and that it would take were nothing before it.
+
+        `views`: (v, 4, 4) float camera to world. `halves`: (v,) half of the picture's width at distance 1. `nears`:
+        (v,) metres ahead from where on things are seen.
         """
-        ways = (RAYS * (half, half, 1.0)) @ view[:3, :3].T
-        far = np.linalg.norm(ways, axis=1, keepdims=True)
-        ways, begin = ways / far, near * far[:, 0]
-        turn = self._turns
-        start = np.einsum("nij,nj->ni", turn, view[:3, 3] - self.position - self.size * (0.0, 0.5, 0.0))
-        way = (turn.reshape(-1, 3) @ ways.T).reshape(len(turn), 3, -1).transpose(0, 2, 1)
-        enter, leave = _crossing(start[:, None], way, 0.5 * self.size[:, None])
-        away = np.where((enter < leave) & (leave > begin), np.maximum(enter, begin), np.inf)
-        nearest = away.argmin(0), np.arange(len(RAYS))
-        return nearest[0], away[nearest], way[..., 2][nearest]
-
-    def blocked(self, eye: np.ndarray, others: Furniture | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 27, 3) points in each box, metres, and (n, 27) whether another or one of `others` hides them."""
-        n, boxes = len(self.size), self.with_others(others)
-        turn, middle = boxes._turns, boxes.position + boxes.size * (0.0, 0.5, 0.0)
-        points = middle[:n, None] + np.einsum("nji,nkj->nki", turn[:n], GRID * self.size[:, None])
-        far, wide = (middle - eye)[:, ::2], np.hypot(*boxes.size.T[::2]) / 2
-        share = np.clip(far[:n] @ far.T / (far[:n] ** 2).sum(1)[:, None].clip(1e-12), 0.0, 1.0)[..., None]
-        beside = np.linalg.norm(far - share * far[:n, None], axis=2) - wide - wide[:n, None]  # of b from lines to a
-        a, b = np.nonzero((beside < 1e-6) & ~np.eye(n, len(wide), dtype=bool))
-        # every line of sight (object a, point k) in the frame of every box b
-        start = np.einsum("bij,bj->bi", turn, eye - middle)[b, None]
-        way = np.einsum("bij,bkj->bki", turn[b], points[a] - eye)
-        enter, leave = _crossing(start, way, 0.5 * boxes.size[b, None])
-        hidden = np.zeros(points.shape[:2], bool)
-        np.logical_or.at(hidden, a, (enter < leave) & (leave > 0) & (enter < 1))
-        return points, hidden
-
-    @cached_property
-    def _turns(self) -> np.ndarray:
-        """(n, 3, 3) from the room's frame to each object's."""
-        return upright(-self.yaw)
+        cos, sin = (each.astype("f4")[:, None] for each in (np.cos(self.yaw), np.sin(self.yaw)))
+        middle, half = self.position + self.size * (0.0, 0.5, 0.0), 0.5 * self.size.astype("f4")
+        found, nears = [], np.broadcast_to(nears, len(views))
+        for first in range(0, len(views), TOGETHER):
+            view, wide, near = (each[first : first + TOGETHER] for each in (views, halves, nears))
+            aside = RAYS * np.stack([wide, wide, np.ones(len(wide))], 1)[:, None]
+            ways = aside @ view[:, :3, :3].swapaxes(1, 2)
+            far = np.linalg.norm(ways, axis=2, keepdims=True)
+            x, y, z = np.moveaxis((ways / far).astype("f4"), 2, 0)[:, :, None]
+            begin = (near[:, None, None] * far[..., 0][:, None]).astype("f4")
+            # turned to the frame of each box: (v, boxes, 1) and (v, boxes, 169)
+            a, b, c = np.moveaxis((view[:, None, :3, 3] - middle).astype("f4"), 2, 0)[..., None]
+            ahead = x * sin + z * cos
+            start, way = (a * cos - c * sin, b, a * sin + c * cos), (x * cos - z * sin, y, ahead)
+            enter, leave = _crossed(start, way, half.T[:, :, None], begin)
+            away = np.where(enter < leave, enter, np.float32(np.inf))
+            which, meets = away.argmin(1)[:, None], np.isfinite(away)
+            nearest, along = (np.take_along_axis(each, which, 1) for each in (away, ahead))
+            shares = (meets & (away == nearest)).mean(2), meets.mean(2)
+            found.append((which[:, 0], nearest[:, 0], along[:, 0], *shares))
+        return tuple(np.concatenate(each) for each in zip(*found, strict=True))
 
 
-def filled(away: np.ndarray, reach: np.ndarray) -> float:
-    """Share of a picture that is nearer than `reach` metres: the nearer the more, and what its border cuts off `CUT`
-    times; `away`, `reach`: (169,) metres, as `Furniture.met` has them."""
-    return float((np.clip(1.0 - away / reach, 0.0, 1.0) * WEIGHTS).mean())
+def filled(away: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """Share of pictures that is nearer than `reach` metres: the nearer the more, and what the border cuts off `CUT`
+    times; `away`, `reach`: (..., 169) metres, as `Furniture.met` has them."""
+    return np.asarray((np.clip(1.0 - away / reach, 0.0, 1.0) * WEIGHTS).mean(-1))
 
 
-def _crossing(start: np.ndarray, way: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where rays enter and leave boxes around 0 of these half sizes, in its lengths; later than that, they miss."""
-    way = np.where(np.abs(way) < 1e-9, 1e-9, way)
-    first, second = (-half - start) / way, (half - start) / way
-    enter, leave = (np.moveaxis(each, -1, 0) for each in (np.minimum(first, second), np.maximum(first, second)))
-    return reduce(np.maximum, enter), reduce(np.minimum, leave)  # of three each, which numpy is slow to go through
+def _crossed(start: Sequence, way: Sequence, half: np.ndarray, begin: Any) -> tuple[Any, Any]:
+    """Where rays enter boxes around 0 of these half sizes, after they `begin`, and where they leave, in their lengths;
+    those that enter later than they leave miss. Each of `start`, `way` and `half`: by axis."""
+    enter, leave = begin, np.float32(np.inf)
+    for at, along, reach in zip(start, way, half, strict=True):
+        slow = 1 / np.where(np.abs(along) < 1e-9, np.float32(1e-9), along)
+        through, deep = -at * slow, np.abs(reach * slow)
+        enter, leave = np.maximum(enter, through - deep), np.minimum(leave, through + deep)
+    return enter, leave

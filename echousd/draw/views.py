@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import NamedTuple
@@ -12,7 +12,7 @@ import shapely
 from pxr import Usd, UsdGeom
 
 from echomodel.boxes2d import axes
-from echomodel.openings import direction, edge_lengths, inward_normal, rectangle
+from echomodel.openings import inward_normal, rectangle
 from echomodel.triangles import cross
 from echousd.draw.scenery import Scenery
 from echousd.draw.sight import ASPECT, RAYS, Furniture, filled
@@ -21,60 +21,65 @@ from echousd.stage.units import metres_per_unit, up_axis
 
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
-# mm of a camera inside: 74, 81, 90 and 97 degrees across; metres of depth that each costs: wide ones distort
-LENSES, DISTORTED = (24.0, 21.0, 18.0, 16.0), (0.0, 20.0, 50.0, 90.0)
-EYES, RAISED = (0.5, 0.62), 12  # of the height of the walls: where a camera inside is; so many eyes are raised, too
-SLOPES = (0.05, 0.13, 0.22, 0.32)  # metres that the middle of its picture is lower for a metre ahead
-PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
-WHOLE, CLEAR = 1000.0, 80.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
-LOOKED, CHOSEN, TRIED = 64, 6, 16  # eyes of which one view is looked at closely; eyes, and of each so many views
-LOW = 1.4  # metres: over what is so high one looks
-# one bare wall: what all of a picture costs, from which share on, metres of rounding
-BARE, BAREST, DEEP = 650.0, 0.22, 0.02
-MIDDLE, ASIDE = 60.0, 0.33  # what the main piece at the border costs, from which share of half the width on
-SMALL, LARGE = 20.0, 5.0  # what a metre costs that the main piece is further away, and from where on
-BEFORE, WALLED = 2.6, 1.4  # metres: what is nearer to the eye fills the picture, and which walls do
-FILLED, BEHIND = 650.0, 90.0  # metres of depth that a picture full of what is near costs, and the main piece's back
-# Metres of depth that each thing costs which the border cuts, and which is beyond it: lamps, what hangs from `HIGH`
-# metres on, and furniture.
-CUTS, HIGH = ((90.0, 40.0), (25.0, 0.0), (25.0, 0.0)), 0.25
+# What cameras inside are chosen from. Where they stand: metres from a corner; shares of a wall's length, and metres
+# from it, less than none behind it.
+STEPS, ALONG, OFFS = (0.2, 0.5, 0.8, 1.6, 2.6, 3.8), (0.2, 0.35, 0.5, 0.65, 0.8), (0.4, -0.3, -0.7, -1.2, -1.9)
+# Metres around the main piece; from the middle, where one stands further from its corner; from walls.
+AROUND, APART, AWAY = (2.6, 3.4), 3.0, 0.12
+# Radians by which they turn aside from the main piece (those behind a wall look straight through it as well); share of
+# the height of the walls, where their eyes are; metres that the middle of their picture is lower for a metre ahead.
+PANS, EYES, SLOPES = (0.0, -0.15, 0.15, -0.35, 0.35), (0.42, 0.5, 0.62), (0.0, 0.05, 0.13, 0.22, 0.32)
+# Metres ahead from where on they see: what is nearer as a whole is left out, and nothing is cut open. mm: 65, 74, 81,
+# 90 and 97 degrees across, of which so many where something is left out.
+NEARS, LENSES, STRAIGHT = np.arange(0.5, 3.1, 0.25), (28.0, 24.0, 21.0, 18.0, 16.0), 2
+LOOKED, EACH, BEST = 200, 3, 2  # pictures that rays are run through; of a place; of a place, a way, a lens
+# What each costs. The main piece: not whole in the picture; hidden; at the border, from a share of half the width on;
+# from behind, and from the side; smaller and larger than such shares of the picture's width.
+WHOLE, HIDDEN, MIDDLE, ASIDE, BEHIND, SIDEWAYS = 1000.0, 140.0, 60.0, 0.33, 130.0, 0.45
+SMALL, LARGE, SIZES = 180.0, 150.0, (0.3, 0.48)
+# What the border cuts and what is beyond it: lamps, what hangs from `HIGH` metres on, furniture; and a picture full of
+# cut furniture. What is left out before the eye, and the more the nearer to the main piece, up to so many metres.
+CUTS, HIGH, SEVERED, LEFT_OUT, MISSED, BESIDE = ((90.0, 40.0), (20.0, 0.0), (25.0, 0.0)), 0.25, 350.0, 8.0, 60.0, 0.5
+# A picture full of: what is so near (metres: of things; of walls, and of the main piece); of backs, seen where the
+# cosine is larger, and of backs nearer than so many metres, from a share on; of walls so near at its sides.
+FILLED, BEFORE, WALLED, BACKS, AVERTED, TURNED, CLOSE, SOME = 650.0, 2.6, 1.4, 320.0, 0.25, 1000.0, 3.5, 0.02
+BESIDES, PASSED = 150.0, 2.5
+# Of ceiling; of floor, and of one bare wall, from a share on; and what of each is worth:
+# of furniture, of a thing up to so many, of which such a share shows all; of a metre towards where the room looks.
+OVERHEAD, UNDER, FLOORED, BARE, BAREST = 100.0, 200.0, 0.32, 650.0, 0.22
+SHOWN, SEEN, HANGING, MANY, ENOUGH, FACED, AHEAD = 30.0, 7.0, 0.4, 10.0, 0.012, 12.0, 1.0
+# And each lens, height and slope.
+DISTORTED, CROUCHED, BENT = (0.0, 0.0, 20.0, 50.0, 90.0), (10.0, 0.0, 5.0), (0.0, 0.0, 0.0, 10.0, 25.0)
+LOW, DEEP = 1.4, 0.02  # metres: over what is so high one looks; of rounding
 SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width over which it is cord; metres
-UNSEEN, MANY = 6.0, 8.0  # metres of depth that each of so many pieces in the picture is worth
-# And a picture full of furniture; a metre towards where it looks, up to so many; of what each loses a picture full: of
-# backs, seen where the cosine is larger, and of ceiling. By choices of 40 pictures among eight each.
-SHOWN, FACED, AHEAD, BACKS, AVERTED, OVERHEAD = 30.0, 20.0, 1.0, 320.0, 0.25, 100.0
-UNDER, FLOORED = 200.0, 0.32  # and a picture full of bare floor, and the share of it from which on that costs
-# And a picture full of pieces that its border cuts, and of backs nearer than so many metres, from a share of it on.
-SEVERED, TURNED, CLOSE, SOME = 250.0, 1000.0, 3.5, 0.03
-MOST = SHOWN + FACED * AHEAD + UNSEEN * MANY + 1e-6  # that a view is worth which costs nothing
-STEPS = (0.2, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
-# Or so far behind a wall, which its near plane cuts away, and so much of the room with what hangs and stands there.
-BEYOND, THROUGH = (0.6, 1.2, 2.0), (0.3, 0.5, 0.7, 0.9)
-APART = 3.0  # metres from the middle that it keeps where it stands further from its corner
-ALONG, OFF = (0.2, 0.35, 0.5, 0.65, 0.8), 0.4  # or along a wall, as shares of its length, and metres from it
-BEFORE_IT, TURNS = 3.4, np.arange(8) * np.pi / 4  # or so many metres around the main piece, where the room is so large
 MARGIN = 1.06
 
 
-class Eye(NamedTuple):
-    """Where a camera may stand, before the walls, or beyond one that it looks straight through."""
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """What a picture from inside is of: a floor (k, 2), walls of a height in metres, boxes of `count` pieces of
+    furniture and of what hangs, the row of the main one, everything that hides something, and where (2,) the main piece
+    and the middle of the floor are."""
 
-    spot: np.ndarray  # (2,) x and z, metres
-    near: float = 0.0  # metres ahead from where on things are seen: beyond the wall and what hangs there
-    way: np.ndarray | None = None  # (2,) in which it must look
-    aside: float = np.inf  # metres to the nearer end of the wall
+    floor: np.ndarray
+    height: float
+    count: int
+    things: Furniture
+    main: int
+    everything: Furniture
+    aim: np.ndarray
+    middle: np.ndarray
 
 
-class Shot(NamedTuple):
-    """A camera inside: what it costs at first sight, camera to world (4, 4), mm, metres ahead from where on it sees;
-    and what `Furniture.blocked` says."""
+class Shots(NamedTuple):
+    """m pictures: what each costs at first sight; camera to world (m, 4, 4); mm; metres ahead from where on it sees;
+    and which pieces (m, count) the border cuts."""
 
-    cost: float
+    cost: np.ndarray
     view: np.ndarray
-    lens: float
-    near: float
-    points: np.ndarray
-    blocked: np.ndarray
+    lens: np.ndarray
+    near: np.ndarray
+    cut: np.ndarray
 
 
 def view_matrix(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -108,10 +113,10 @@ def inside_view(
     """Camera to world (4, 4) float, `shifted`, focal length in mm, and metres ahead from where on things are seen, of a
     view inside a room, its main piece whole.
 
-    Of all eyes, headings and lenses those count that have the main piece whole in the picture; of these the one that
-    hides and cuts off least of what stands and hangs, has most furniture in its picture, not its backs, little ceiling
-    and little that is near, the main piece in its middle third, and no bare wall over a third of it. Where there is no
-    room for a lens that draws things as they are, the camera stands behind a wall and looks straight through it.
+    Of all places before and behind the walls, ways, heights, lenses and near planes the picture is taken that costs
+    least: what hides, cuts off or turns away the main piece and others, lets them fill the foreground or shows bare
+    walls, floor and ceiling costs, what is seen is worth something. A near plane leaves out what stands before the eye
+    and the wall that it looks through, and cuts nothing open.
 
     Arguments:
         floor: (k, 2) float, x and z of the corners, metres.
@@ -122,107 +127,147 @@ def inside_view(
         main: row of the furniture that must be whole in the picture; None = the largest that one looks over.
     """
     floor = np.asarray(floor, float)
-    room = shapely.Polygon(floor)
-    middle = np.asarray(room.representative_point().coords[0])
-    if not (count := len(furniture.size)):
+    middle = shapely.get_coordinates(shapely.Polygon(floor).representative_point())[0]
+    if not len(furniture.size):
         furniture = Furniture(np.full((1, 3), 1e-3), np.insert(middle, 1, 0.0)[None], np.zeros(1))
-    things = furniture.with_others(hung)
-    everything = things.with_others(windows, _walls(floor, height))
     if main is None:  # the largest piece that one looks over, of all where there is none
         low = furniture.size[:, 1] + furniture.position[:, 1] < LOW
         main = int((furniture.size[:, [0, 2]].prod(1) * (low | ~low.any())).argmax())
-    row = np.arange(len(everything.size))
-    reach = np.where((row < len(things.size)) & (row != main), BEFORE, WALLED)
-    aim, front = furniture.position[main, [0, 2]], axes(furniture.yaw[main])[1]
-    high, stands = things.position[:, 1] > HIGH, np.arange(len(things.size)) < count
-    shades, lying = _shades(furniture, height), things.corners[stands & ~high]
-
-    def merit(shot: Shot) -> float:
-        """Metres of depth that a view is worth."""
-        eye, half = shot.view[:3, 3], APERTURE / 2 / shot.lens
-        which, away, along = everything.met(shot.view, half, shot.near)
-        shown, above = np.isfinite(away) & (which < count), RAYS[:, 1] * half > shot.view[1, 2]
-        seen = (~shot.blocked & (_aside(shot.points, shot.view) <= half)).mean(-1).sum()
-        shares = np.bincount(which[shown], minlength=count) / len(RAYS)
-        cut = (_aside(furniture.corners, shot.view) > half / MARGIN).any(-1) & (np.arange(count) != main)
-        averted = shown & (along > AVERTED) & (away < CLOSE)
-        bare = barest_share(which, np.where(row[which] < len(row) - len(floor), np.inf, away), height, shot.view, half)
-        return (
-            FACED * min(float((eye[[0, 2]] - middle) @ furniture.facing), AHEAD) + UNSEEN * min(seen, MANY)
-            + float((SHOWN * shown - BACKS * (shown & (along > AVERTED)) - OVERHEAD * (above & np.isinf(away))).mean())
-            - UNDER * max(0.0, float((~above & np.isinf(away)).mean()) - FLOORED)
-            - SEVERED * float(shares[cut].sum()) - TURNED * max(0.0, float(averted.mean()) - SOME)
-            - FILLED * filled(away, reach[which]) - BARE * max(0.0, bare - BAREST) - shot.cost
-        )  # fmt: skip
-
-    halves = APERTURE / 2 / np.array(LENSES)
-
-    def shots(at: Eye, up: float) -> list[Shot]:
-        """The views that cost least of an eye at a height."""
-        spot, seen, wider, way = at.spot, np.full(len(things.size), True), room.buffer(0.05), aim - at.spot
-        if at.way is not None:
-            seen = ((things.corners[..., [0, 2]] - spot) @ at.way).max(1) > at.near
-            wider, way = wider.union(shapely.Point(spot).buffer(1.4 * at.near)), at.way
-        eye = np.array([spot[0], up, spot[1]])
-        points, blocked = furniture.blocked(eye, things.of(seen & ~stands))
-        lines = shapely.linestrings(np.stack(np.broadcast_arrays(eye, points[main]), 1)[..., [0, 2]])
-        hidden = CLEAR * float((blocked[main] | ~shapely.covers(wider, lines)).mean())  # by pieces, or by a corner
-        views = _turned(eye, way)
-        cut = (_aside(furniture.corners[main], views)[..., None] > halves / MARGIN).mean(-2)
-        aside, back = (np.abs(views[..., [0, 2], axis] @ (aim - spot)) for axis in (0, 2))
-        off = MIDDLE * np.clip((aside / np.maximum(back, 1e-9))[..., None] / halves - ASIDE, 0.0, 1.0)
-        far = max(float(np.linalg.norm(aim - spot)), 1e-9)
-        behind = BEHIND * max(0.0, float((aim - spot) @ front)) / far + SMALL * max(0.0, far - LARGE)
-        fragile = [shades, things.corners[high & ~stands & seen], lying]
-        cost = WHOLE * cut + off + _shown(fragile, views, halves) + hidden + behind
-        cost = cost + np.abs(PANS)[:, None, None] + DISTORTED
-        if at.way is not None:  # upright to the wall, and within it where it begins to see
-            low, wide = up - np.array(SLOPES)[:, None] * at.near, halves * at.near
-            beside = (wide > at.aside) | (low < wide / ASPECT) | (low + wide / ASPECT > height)
-            cost = cost + WHOLE * (beside | (np.abs(PANS) > 0)[:, None, None] | (np.array(LENSES) < LENSES[0]))
-        cost = cost.ravel()
-        return [
-            Shot(float(cost[n]), views.reshape(-1, 4, 4)[n // len(LENSES)], LENSES[n % len(LENSES)], at.near, points,
-                 blocked) for n in np.argsort(cost, kind="stable")[:TRIED]
-        ]  # fmt: skip
-
-    every = [(shots(at, EYES[0] * height), at) for at in (*_spots(room, middle, aim), *_beyond(floor, things, main))]
-    every = sorted(every, key=lambda one: one[0][0].cost)[:LOOKED]
-    before_walls = [at for _, at in every if at.way is None]
-    eyes = [views for views, _ in every] + [shots(at, EYES[1] * height) for at in before_walls[:RAISED]]
-    worth: dict[int, float] = {}  # of each eye by the view that costs least
-    for n in sorted(range(len(eyes)), key=lambda n: eyes[n][0].cost):
-        if len(worth) >= CHOSEN and MOST - eyes[n][0].cost < sorted(worth.values())[-CHOSEN]:
-            break  # neither this one nor any dearer one can be among the best
-        worth[n] = merit(eyes[n][0])
-    best, most = eyes[0][0], -np.inf
-    for shot in (shot for n in sorted(worth, key=lambda n: (-worth[n], n))[:CHOSEN] for shot in eyes[n]):
-        if MOST - shot.cost > most and (value := merit(shot)) > most:
-            best, most = shot, value
-    return best.view, best.lens, best.near
+    things = furniture.with_others(hung)
+    everything, aim = things.with_others(windows, _walls(floor, height)), furniture.position[main, [0, 2]]
+    of = Subject(floor, height, len(furniture.size), things, main, everything, aim, middle)
+    shots = _framed(of, *_eyes(of))
+    best = int((shots.cost + sum(_composed(of, shots).values())).argmin())
+    return shots.view[best], float(shots.lens[best]), float(shots.near[best])
 
 
-def barest_share(which: np.ndarray, wall: np.ndarray, height: float, view: np.ndarray, half: float) -> float:
-    """Share of a picture inside a room that one wall takes where nothing is at or before it, of all the greatest.
+def _eyes(of: Subject) -> tuple[np.ndarray, np.ndarray]:
+    """Where a camera may stand and the ways it may look, x and z, (f, 2) each: in corners, along the walls and behind
+    them, around what it sees."""
+    floor, spots, straight = of.floor, [], []
+    for edge, corner in enumerate(floor):
+        away = max(float(np.linalg.norm(of.middle - corner)), 1e-9)
+        spots += [corner + step / away * (of.middle - corner) for step in STEPS if step < max(away - APART, 0.9)]
+        along, inside = floor[(edge + 1) % len(floor)] - corner, inward_normal(floor, edge)
+        opposite = float((of.aim - corner) @ along / max(float(along @ along), 1e-9))
+        for share in (*ALONG, opposite):
+            behind = [corner + share * along + off * inside for off in OFFS]
+            straight += [(spot, inside) for spot in behind[1:]]
+            spots += behind if share is not opposite else []
+    turns = np.arange(8) * np.pi / 4
+    spots += [of.aim + far * np.array([np.cos(turn), np.sin(turn)]) for far in AROUND for turn in turns]
+    spot, cos, sin = np.array(spots), np.cos(PANS)[:, None], np.sin(PANS)[:, None]
+    x, z = (of.aim - spot).T / np.maximum(np.linalg.norm(of.aim - spot, axis=1), 1e-9)
+    ways = np.stack([cos * x - sin * z, sin * x + cos * z], -1).reshape(-1, 2)
+    every = np.concatenate([np.tile(spot, (len(PANS), 1)), ways], 1)
+    return tuple(np.split(np.concatenate([every, np.reshape(straight, (-1, 4))]), 2, axis=1))  # type: ignore[return-value]
 
-    `which`, `wall`: (169,) int walls along `RAYS` and metres to them, inf where there is none or it is not bare.
-    `height`: of the walls, metres. `view`, `half`: as `Furniture.met`.
+
+def _framed(of: Subject, spot: np.ndarray, way: np.ndarray) -> Shots:
+    """The pictures that cost least by what they have whole, of some places and ways (f, 2)."""
+    count, main, front = of.count, of.main, axes(of.things.yaw[of.main])[1]
+    corners = np.concatenate([of.things.corners, _shades(of.things.of(np.arange(count)), of.height)])
+    right = np.stack([-way[:, 1], way[:, 0]], 1)
+    plan = corners[..., [0, 2]].reshape(-1, 2)
+    ahead, aside = ((plan @ to.T - (spot * to).sum(1)).T.reshape(len(spot), -1, 8) for to in (way, right))
+    frame, near, lens = _uncut(of, spot, way, ahead[:, : len(of.things.size)], aside[:, : len(of.things.size)])
+    half, deep = APERTURE / 2 / np.array(LENSES)[lens][:, None], np.maximum(ahead, 0.05)
+    left_out, behind = ahead.max(2)[frame] < near[:, None], ahead.max(2)[frame] < 0.05
+    begins, ends = (aside / deep).min(2)[frame], (aside / deep).max(2)[frame]
+    level, kind = of.things.position[:, 1] > HIGH, np.zeros((len(corners), 2))
+    kind[len(level) :], stands = CUTS[0], np.arange(len(level)) < count
+    kind[: len(level)][level & ~stands], kind[: len(level)][~level & stands] = CUTS[1:]
+    # what no height changes
+    to = of.aim - spot
+    far = np.maximum(np.linalg.norm(to, axis=1), 1e-9)
+    off = np.abs((to * right).sum(1)) / np.maximum((to * way).sum(1), 1e-9)
+    wide = (np.minimum(ends[:, [main]], half) - np.maximum(begins[:, [main]], -half))[:, 0] / (2 * half[:, 0])
+    plans = shapely.convex_hull(shapely.multipoints(corners[:count, :, [0, 2]]))
+    apart = shapely.distance(plans[main], plans)
+    missed = (left_out & ~behind & (begins < half) & (ends > -half))[:, :count]
+    cost = (
+        MIDDLE * np.clip(off[frame] / half[:, 0] - ASIDE, 0, 1) + np.array(DISTORTED)[lens]
+        + (BEHIND * np.maximum(0, (to @ front) / far + SIDEWAYS))[frame]
+        + SMALL * np.maximum(0, SIZES[0] - wide) + LARGE * np.maximum(0, wide - SIZES[1])
+        + (missed * (LEFT_OUT + MISSED * np.clip(1 - apart / BESIDE, 0, 1))).sum(1)
+    )  # fmt: skip
+    shape = len(frame), len(EYES), len(SLOPES)
+    costs, cuts, tall = np.empty(shape), np.empty((*shape, count), bool), half / ASPECT
+    beside, over = (begins > -half / MARGIN) & (ends < half / MARGIN), (begins < half) & (ends > -half) & ~behind
+    aside_main = np.abs(aside / deep)[frame, main]
+    for n, share in enumerate(EYES):
+        rise = (corners[..., 1] - share * of.height) / deep
+        for m, slope in enumerate(SLOPES):
+            low, high = rise.min(2)[frame] + slope, rise.max(2)[frame] + slope
+            within = over & (low < tall) & (high > -tall)
+            cut = within & ~left_out & ~(beside & (low > -tall / MARGIN) & (high < tall / MARGIN))
+            cuts[:, n, m] = cut[:, :count]
+            reach = np.maximum(aside_main, ASPECT * np.abs(rise[frame, main] + slope))
+            begin = share * of.height - slope * near
+            outside = (begin - tall[:, 0] * near < DEEP) | (begin + tall[:, 0] * near > of.height - DEEP)
+            costs[:, n, m] = (
+                cost + CROUCHED[n] + BENT[m] + cut @ kind[:, 0] + (left_out | ~within) @ kind[:, 1]
+                + WHOLE * ((reach > half / MARGIN).mean(1) + (outside & (near > 0)))
+            )  # fmt: skip
+    flat = costs.reshape(len(frame), -1)
+    found = np.argsort(flat, axis=1, kind="stable")[:, :BEST] + np.arange(len(flat))[:, None] * flat.shape[1]
+    taken, rows = Counter[tuple](), list[int]()
+    for row in found.ravel()[np.argsort(flat.ravel()[found.ravel()], kind="stable")].tolist():
+        place = (*spot[frame[row // flat.shape[1]]].round(3).tolist(), bool(near[row // flat.shape[1]]))
+        taken[place] += 1
+        rows += [row] if taken[place] <= EACH and len(rows) < LOOKED else []
+    one, up, down = np.unravel_index(np.array(rows), shape)
+    eye = np.insert(spot[frame[one]], 1, np.array(EYES)[up] * of.height, axis=1)
+    view = shifted(view_matrix(eye, eye + np.insert(way[frame[one]], 1, 0.0, axis=1)), np.array(SLOPES)[down])
+    return Shots(flat.ravel()[rows], view, np.array(LENSES)[lens[one]], near[one], cuts[one, up, down])
+
+
+def _uncut(
+    of: Subject, spot: np.ndarray, way: np.ndarray, ahead: np.ndarray, aside: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which places and ways, metres ahead from where on things are seen, and which lens, (m,) each: where the camera or
+    all of where it begins to see is in the room, and cuts nothing open.
+
+    `ahead`, `aside`: (f, n, 8) metres of the things' corners.
     """
-    way = RAYS[:, 1] * half * view[1, 1] - view[1, 2]  # up, over the length of the ray
-    way = way / np.linalg.norm(RAYS * (half, half, 1.0), axis=1)
-    with np.errstate(divide="ignore"):
-        level = np.where(way < 0, -view[1, 3] / way, (height - view[1, 3]) / np.maximum(way, 1e-12))
-    return float(np.bincount(which[wall < level - DEEP]).max(initial=0)) / len(RAYS)
+    room, right, many = shapely.Polygon(of.floor), np.stack([-way[:, 1], way[:, 0]], 1), len(LENSES)
+    free = np.flatnonzero(shapely.contains_xy(room.buffer(-AWAY), spot))
+    free = free if len(free) else np.arange(len(spot))  # of what is hardly a room
+    found = [(free.repeat(many), np.zeros(len(free) * many), np.tile(np.arange(many), len(free)))]
+    first, last, low, high = ahead.min(2), ahead.max(2), aside.min(2), aside.max(2)
+    for near, lens in product(NEARS, range(STRAIGHT)):
+        reach = near * APERTURE / 2 / LENSES[lens] + DEEP
+        met = (first < near + DEEP) & (last > near - DEEP) & (low < reach) & (high > -reach)
+        rows = np.flatnonzero(~met.any(1) & (first[:, of.main] > near))
+        ends = (spot + near * way)[rows, None] + np.array([[-reach], [reach]]) * right[rows, None]
+        rows = rows[shapely.covers(room, shapely.linestrings(ends))]
+        found.append((rows, np.full(len(rows), near), np.full(len(rows), lens)))
+    frame, near, lens = (np.concatenate(each) for each in zip(*found, strict=True))
+    return frame, near, lens
 
 
-def _aside(points: np.ndarray, view: np.ndarray) -> np.ndarray:
-    """(..., p) float: how far points (..., p, 3) are from the middle of pictures, at distance 1; inf behind the camera.
-
-    What is up or down counts as in the picture's width, whose half is `ASPECT` times that of its height.
-    """
-    into = np.linalg.inv(view[..., :3, :3]).swapaxes(-1, -2)
-    x, y, z = np.moveaxis((points - view[..., None, :3, 3]) @ into, -1, 0)
-    return np.asarray(np.where(z < 0, np.maximum(np.abs(x), ASPECT * np.abs(y)) / np.maximum(-z, 1e-9), np.inf))
+def _composed(of: Subject, shots: Shots) -> dict[str, np.ndarray]:
+    """What each thing costs (m,) by what rays meet in some pictures."""
+    half, row = APERTURE / 2 / shots.lens, np.arange(len(of.everything.size))
+    which, away, along, shares, alone = of.everything.met(shots.view, half, shots.near)
+    hangs = (row >= of.count) & (row < len(of.things.size))
+    reach = np.where(((row < of.count) | hangs) & (row != of.main), BEFORE, WALLED)
+    shown, above = np.isfinite(away) & (which < of.count), RAYS[:, 1] * half[:, None] > shots.view[:, 1, 2, None]
+    wall, averted = which >= len(row) - len(of.floor), shown & (along > AVERTED)
+    towards = (shots.view[:, [0, 2], 3] - of.middle) @ of.things.of(np.arange(of.count)).facing
+    worth = np.where(hangs, HANGING, row < len(row) - len(of.floor))  # windows as much as furniture
+    seen = np.minimum(shares / ENOUGH, 1) @ worth
+    return {
+        "hidden": HIDDEN * (1 - shares[:, of.main] / np.maximum(alone[:, of.main], 1e-9)),
+        "severed": SEVERED * (shares[:, : of.count] * shots.cut).sum(1),
+        "filled": FILLED * filled(away, reach[which]), "backs": BACKS * averted.mean(1),
+        "turned": TURNED * np.maximum(0, (averted & (away < CLOSE)).mean(1) - SOME),
+        "bare": BARE * np.maximum(0, shares[:, -len(of.floor) :].max(1) - BAREST),
+        "walls": BESIDES * (wall & (away < PASSED)).mean(1), "ceiling": OVERHEAD * (above & np.isinf(away)).mean(1),
+        "floor": UNDER * np.maximum(0, (~above & np.isinf(away)).mean(1) - FLOORED),
+        "shown": -SHOWN * shown.mean(1), "seen": -SEEN * np.minimum(seen, MANY),
+        "faced": -FACED * np.minimum(towards, AHEAD),
+    }  # fmt: skip
 
 
 def _shades(furniture: Furniture, height: float) -> np.ndarray:
@@ -233,14 +278,6 @@ def _shades(furniture: Furniture, height: float) -> np.ndarray:
     return replace(furniture, size=size).corners[hangs]
 
 
-def _shown(fragile: Sequence[np.ndarray], views: np.ndarray, halves: np.ndarray) -> np.ndarray:
-    """(..., k) float: what boxes (n, 8, 3) of all kinds of `CUTS` cost, in pictures of half widths `halves` (k,)."""
-    cut, lacked = np.repeat(CUTS, [len(boxes) for boxes in fragile], axis=0).T
-    aside = _aside(np.concatenate(fragile).reshape(-1, 3), views).reshape(*views.shape[:-2], 1, -1, 8)
-    beyond, within = aside.max(-1) > (halves / MARGIN)[:, None], aside.min(-1) < halves[:, None]
-    return np.asarray((beyond * np.where(within, cut, lacked)).sum(-1))
-
-
 def _walls(floor: np.ndarray, height: float) -> Furniture:
     """The walls as thin boxes that stand outside of a floor (k, 2)."""
     way = np.roll(floor, -1, 0) - floor
@@ -248,44 +285,6 @@ def _walls(floor: np.ndarray, height: float) -> Furniture:
     middle = floor + way / 2 + 0.05 * outwards
     size = np.stack([np.linalg.norm(way, axis=1), np.full(len(floor), height), np.full(len(floor), 0.1)], 1)
     return Furniture(size, np.insert(middle, 1, 0.0, axis=1), np.arctan2(outwards[:, 0], outwards[:, 1]))
-
-
-def _beyond(floor: np.ndarray, things: Furniture, main: int) -> Iterator[Eye]:
-    """Eyes behind the walls, which see from where on nothing in their picture is cut open, and the main thing whole."""
-    for edge in range(len(floor)):
-        inside, along, length = inward_normal(floor, edge), direction(floor, edge), float(edge_lengths(floor)[edge])
-        deep, wide = ((things.corners[..., [0, 2]] - floor[edge]) @ way for way in (inside, along))
-        for out, middle in product(BEYOND, dict.fromkeys((float(wide[main].mean()), length / 2))):
-            for through in THROUGH:
-                reach = (out + through) * APERTURE / 2 / LENSES[0]  # half of the picture's width there
-                at = min(max(middle, reach + DEEP), length - reach - DEEP)
-                met = np.abs(wide - at).min(1) < reach
-                if not (met & (deep.min(1) < through) & (deep.max(1) > through)).any():
-                    if 2 * (reach + DEEP) < length and deep[main].min() > through:
-                        yield Eye(floor[edge] + at * along - out * inside, out + through, inside, min(at, length - at))
-                    break
-
-
-def _spots(room: shapely.Polygon, middle: np.ndarray, aim: np.ndarray) -> list[Eye]:
-    """Where a camera inside may stand: in corners, along the walls, around what it sees."""
-    floor, spots = np.array(room.exterior.coords)[:-1], []
-    for corner in floor:
-        away = max(float(np.linalg.norm(middle - corner)), 1e-9)
-        spots += [corner + step / away * (middle - corner) for step in STEPS if step < max(away - APART, 0.9)]
-    for edge in range(len(floor)):
-        start, end = floor[edge], floor[(edge + 1) % len(floor)]
-        spots += [start + share * (end - start) + OFF * inward_normal(floor, edge) for share in ALONG]
-    around = aim + BEFORE_IT * np.stack([np.cos(TURNS), np.sin(TURNS)], 1)
-    return [Eye(spot) for spot in (*spots, *around[shapely.contains_xy(room.buffer(-OFF), around)])]
-
-
-def _turned(eye: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """(`PANS`, `SLOPES`, 4, 4) float camera to world of an eye that looks along a way (2,), turned, `shifted`."""
-    cos, sin = np.cos(PANS), np.sin(PANS)
-    ways = np.stack([cos * way[0] - sin * way[1], 0 * cos, sin * way[0] + cos * way[1]], 1)
-    views = view_matrix(np.broadcast_to(eye, ways.shape), eye + ways)
-    shape = (len(PANS), len(SLOPES), 4, 4)
-    return shifted(np.broadcast_to(views[:, None], shape), np.broadcast_to(SLOPES, shape[:-2]))
 
 
 WIDEST = 4.0  # width of a picture over its height, and the other way round

@@ -150,13 +150,13 @@ def test_camera_stands_where_no_tall_piece_hides_the_others():
     size = np.array([*low, (1.8, 2.3, 0.6)])
     position = np.array([(-1.0, 0, -0.5), (0.0, 0, -0.5), (1.0, 0, -0.5), (0.6, 0, 1.0)])
     furniture = Furniture(size, position, np.array([0, 0, 0, np.pi]))
-    assert furniture.blocked(np.array([0.6, 1.5, 4.0]))[1].mean(1).sum() > 1.5  # from behind the wardrobe
-    assert not furniture.blocked(np.array([0.0, 6.0, 0.0]))[1].any()
+    assert furniture.hidden(np.array([0.6, 1.5, 4.0])).sum() > 1.5  # from behind the wardrobe
+    assert not furniture.hidden(np.array([0.0, 6.0, 0.0])).any()
     corners = np.concatenate([position - size / 2, position + size * (0.5, 1, 0.5)])
     for turn in range(4):  # wherever the wardrobe stands, the camera stands elsewhere
         cos, sin = np.cos(turn * np.pi / 2), np.sin(turn * np.pi / 2)
         rotate = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
         turned = Furniture(size, position @ rotate.T, furniture.yaw + turn * np.pi / 2)
         eye = perspective_views(corners @ rotate.T, turned)[0][:3, 3]
-        assert turned.blocked(eye)[1].mean(1).sum() < 1.0
+        assert turned.hidden(eye).sum() < 1.0
         assert (rotate.T @ eye)[2] < 0
