@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from echomodel.arrays import norm
-from echomodel.boxes2d import footprints, seen, to_frame
+from echomodel.boxes2d import outline, seen, to_frame
 from echomodel.floors import Walls, signed_distance
 from echomodel.objective.support import allowed_overlap
 from echomodel.openings import edge_lengths, signed_area
@@ -59,17 +59,18 @@ def separation(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, pairs: n
 def depths(
     size: np.ndarray, at: np.ndarray, turn: np.ndarray, others: np.ndarray, position: np.ndarray, yaw: np.ndarray
 ) -> np.ndarray:
-    """(K, m) float: how deep a box runs into m others, 0 where it does not, metres.
+    """(..., m) float: how deep boxes run into m others, 0 where they do not, metres.
 
     Arguments:
-        size: (3,) float of the box; at: (K, 3) and turn: (K,) float, its poses.
+        size, at: (..., 3) and turn: (...) float, of the boxes; their sizes may be those of one.
         others, position: (m, 3) float, sizes and places of the others; yaw: (m,) float.
     """
-    reach = (np.hypot(size[0], size[2]) + np.hypot(others[:, 0], others[:, 2])) / 2
-    x, z = (position[:, axis] - at[:, None, axis] for axis in (0, 2))
-    k, j = np.nonzero(x * x + z * z < reach * reach)  # of the few that are near the depth is asked for
-    out = np.zeros(x.shape)
-    out[k, j] = np.maximum(-gaps(size, at[k], turn[k], others[j], position[j], yaw[j]), 0.0)
+    size = np.broadcast_to(size, at.shape)
+    reach = (np.hypot(size[..., 0], size[..., 2])[..., None] + np.hypot(others[:, 0], others[:, 2])) / 2
+    x, z = (position[:, axis] - at[..., None, axis] for axis in (0, 2))
+    *k, j = np.nonzero(x * x + z * z < reach * reach)  # of the few that are near the depth is asked for
+    out, box = np.zeros(x.shape), tuple(k)
+    out[(*box, j)] = np.maximum(-gaps(size[box], at[box], turn[box], others[j], position[j], yaw[j]), 0.0)
     return out
 
 
@@ -129,13 +130,13 @@ def depth_inside(floor: Floor, points: np.ndarray) -> np.ndarray:
 
 
 def beyond(floor: Floor, size: np.ndarray, at: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """(K,) float: how far a box (3,), or each of K, leaves the floor at (K, 3) and turn (K,), metres."""
-    size = np.broadcast_to(size, at.shape)
-    corner = footprints(size, at, turn)
-    out: np.ndarray = -depth_inside(floor, corner.reshape(-1, 2)).reshape(-1, 4).min(1)
+    """(...) float: how far boxes (..., 3), or one box, leave the floor at (..., 3) and turn (...), metres."""
+    half = np.broadcast_to(size, at.shape)[..., ::2] / 2
+    corner = outline(half, turn) + at[..., None, ::2]
+    out: np.ndarray = -depth_inside(floor, corner.reshape(-1, 2)).reshape(corner.shape[:-1]).min(-1)
     if len(floor.reflex):
-        away: np.ndarray = seen(floor.reflex - at[:, None, ::2], turn[:, None])
-        out = np.maximum(out, -(np.abs(away) - size[:, None, ::2] / 2).max(2).min(1))
+        away: np.ndarray = seen(floor.reflex - at[..., None, ::2], turn[..., None])
+        out = np.maximum(out, -(np.abs(away) - half[..., None, :]).max(-1).min(-1))
     return out
 
 

@@ -387,17 +387,14 @@ class Search:
     ) -> np.ndarray:
         """(K,) float: what some boxes of a group run into and leave of the floor where one of it is at K poses."""
         problem = self.problem
-        position, yaw = self.carried(state, i, which, rows)
+        position, yaw = (of[:, which] for of in self.carried(state, i, which, rows))
         apart = there.copy()
         apart[group] = False
-        others, cost = np.flatnonzero(apart), np.zeros(len(rows))
-        for k in which:
-            deep = depths(problem.size[k], position[:, k], yaw[:, k], problem.size[others], state.position[others],
-                          state.yaw[others])  # fmt: skip
-            deep = np.maximum(deep - problem.shared[k, others], 0.0)
-            out = np.maximum(beyond(problem.floor, problem.size[k], position[:, k], yaw[:, k]), 0.0)
-            cost += (HIT * (deep > 0.01) + DEEP * deep).sum(1) + HIT * (out > 0.01) + DEEP * out
-        return cost
+        others, size = np.flatnonzero(apart), problem.size[which]
+        deep = depths(size, position, yaw, problem.size[others], state.position[others], state.yaw[others])
+        deep = np.maximum(deep - problem.shared[which][:, others], 0.0)
+        out = np.maximum(beyond(problem.floor, size, position, yaw), 0.0)
+        return np.asarray(((HIT * (deep > 0.01) + DEEP * deep).sum(2) + HIT * (out > 0.01) + DEEP * out).sum(1))
 
     def margins_at(self, state: State, i: int, at: np.ndarray, turn: np.ndarray, stated: np.ndarray) -> np.ndarray:
         """(K, e) float: margins of relations (e, 3) of box i at poses (K, 3) and (K,), the others as in the state or in
