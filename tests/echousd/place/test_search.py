@@ -147,6 +147,15 @@ def test_a_table_and_the_sideboard_told_near_it_go_to_another_wall_together():
     assert np.hypot(*(position[1] - position[0])[[1, 2], ::2].T).min() > 0.5  # each time at another wall
 
 
+def test_a_table_is_put_in_where_there_is_a_wall_for_the_sideboard_told_near_it():
+    words, told, size = ["dining_table", "sideboard"], [(1, "close_by", 0)], [(1.6, 0.75, 0.9), (1.2, 0.8, 0.4)]
+    search, state = searched(words, size, [(0, 0, 0), (2.29, 0, 3.0)], [0, -np.pi / 2], told, floor=2 * FLOOR)
+    there = np.array([True, False])
+    after = search.moved(expecting(search, state, there, 0), there, 0)
+    assert there.all()
+    assert search.faults(after)[1] == []
+
+
 def test_storage_that_is_longer_than_every_wall_stays():
     words, told = ["dining_table", "sideboard"], [(1, "close_by", 0)]
     search, state = searched(words, [(1.6, 0.75, 0.9), (5.5, 0.8, 0.4)], [(0, 0, 0), (0, 0, -1.8)], [0, 0], told)
