@@ -1,7 +1,5 @@
 """What EchoUSD finds on this machine, and what to do about each gap."""
 
-from __future__ import annotations
-
 import platform
 from collections.abc import Iterator
 from dataclasses import dataclass

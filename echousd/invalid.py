@@ -1,7 +1,5 @@
 """What pydantic found wrong with somebody's data, in one line."""
 
-from __future__ import annotations
-
 import re
 
 from pydantic import BaseModel, ValidationError

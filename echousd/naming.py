@@ -1,7 +1,5 @@
 """Names as USD takes them, names that nobody has yet, and by which ending of its name a file is read."""
 
-from __future__ import annotations
-
 import unicodedata
 from collections.abc import Callable, Container
 from typing import Literal

@@ -1,7 +1,5 @@
 """Folders of rooms in which a run was interrupted while it moved its files into place (no pxr here)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Where the USD schema plugin lies, and how any pxr of this process comes to know it. Importing this needs no pxr."""
 
-from __future__ import annotations
-
 import os
 import sys
 import warnings

@@ -1,7 +1,5 @@
 """The curve of sRGB (IEC 61966-2-1), between colours as images keep them and light as renderers add it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

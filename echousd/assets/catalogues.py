@@ -3,8 +3,6 @@
 A new one is a function that finds its tables at a path, one that lists their models, and a row of `CATALOGUES`.
 """
 
-from __future__ import annotations
-
 import csv
 import gzip
 import io

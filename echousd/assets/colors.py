@@ -1,7 +1,5 @@
 """Colours of a model, as a person would name them, and how well they go with a room, its graph and each other."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from functools import cache

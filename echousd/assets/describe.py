@@ -1,7 +1,5 @@
 """One entry of a catalogue becomes one row of the index: opened, measured, named, turned to the front."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Numbers that say what a shape is like: the shape branch's latent of its signed distances, made coarse."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

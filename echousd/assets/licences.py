@@ -1,7 +1,5 @@
 """Licences by their SPDX identifiers, from what catalogues, files and texts beside models call them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from functools import lru_cache

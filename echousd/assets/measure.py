@@ -1,7 +1,5 @@
 """Models as they were read: stages by USD, glTF and OBJ by trimesh."""
 
-from __future__ import annotations
-
 import contextlib
 import warnings
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """What a model is, by what it is called and how large it is."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Iterable, Sequence

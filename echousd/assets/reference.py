@@ -1,7 +1,5 @@
 """How graphs and options refer to models of other people: by an id in a library, or a file and a prim in it."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from pathlib import Path

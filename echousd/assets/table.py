@@ -1,7 +1,5 @@
 """The index of a library: one Parquet file, a row for each model."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """What runs tasks: processes of this machine that may die, stall or eat memory; Ray, whose nodes may be lost."""
 
-from __future__ import annotations
-
 import contextlib
 import multiprocessing
 import os

@@ -1,7 +1,5 @@
 """What a run of many rooms is asked: options of every room, variations, and the file `batch.toml` that holds it all."""
 
-from __future__ import annotations
-
 import itertools
 import tomllib
 from collections.abc import Mapping, Sequence

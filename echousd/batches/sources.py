@@ -1,7 +1,5 @@
 """Graphs from files, folders, globs, JSONL, Parquet and the room generator; what cannot be read is told, not raised."""
 
-from __future__ import annotations
-
 import glob
 import json
 from collections.abc import Iterator, Sequence

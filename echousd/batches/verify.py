@@ -1,7 +1,5 @@
 """What a run leaves (manifest, sheet, index, tars), how far it is, and whether its rooms are what the journal says."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

@@ -1,7 +1,5 @@
 """Rules on the files and values of a stage: paths that work elsewhere, images and values that can be read, at rest."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """Rules on what a room looks like (materials, lights, cameras), and the numbers that single attributes may hold."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Rules on the scene graph and its objects: edges, types, labels; upright, as large and turned as it says."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 

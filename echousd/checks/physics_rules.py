@@ -1,7 +1,5 @@
 """Rules on physics: no body inside another, colliders that engines take and that fit, gravity that points down."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

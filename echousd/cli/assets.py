@@ -1,7 +1,5 @@
 """`echousd assets`: libraries of other people's furniture; `echousd store`: where many rooms keep assets once."""
 
-from __future__ import annotations
-
 import os
 from functools import partial
 from pathlib import Path

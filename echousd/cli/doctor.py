@@ -1,7 +1,5 @@
 """`echousd plugin-path` and `echousd doctor`: where the schema lies, and what is missing on this machine."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 
 import typer

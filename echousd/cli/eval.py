@@ -1,7 +1,5 @@
 """`echousd eval`: systems that lay out rooms, scored by one protocol (`suite`), and studies with people."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any

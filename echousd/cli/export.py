@@ -1,7 +1,5 @@
 """`echousd export`, `render`, `convert`: a room as one file or a picture; a published checkpoint as one file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

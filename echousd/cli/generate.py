@@ -1,7 +1,5 @@
 """`echousd generate`: from a graph to a room on disk."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`echousd`: gathers the commands of all topics and turns errors into one line and an exit code."""
 
-from __future__ import annotations
-
 import gc
 import importlib
 import os

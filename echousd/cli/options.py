@@ -1,7 +1,5 @@
 """Options that several commands have in the same words, and flags made of the table of a room's options."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import fields
 from functools import wraps

@@ -1,7 +1,5 @@
 """How far long work is, told while it is done: on a terminal by bars of rich, elsewhere in lines without it."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator

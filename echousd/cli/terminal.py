@@ -1,7 +1,5 @@
 """The console that commands print on: what stands in files cannot steer the terminal; bars of long work."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any

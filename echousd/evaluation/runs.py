@@ -1,7 +1,5 @@
 """Runs of an evaluation: which rooms are asked, what every system made of them, and rooms from elsewhere."""
 
-from __future__ import annotations
-
 import json
 import math
 import time

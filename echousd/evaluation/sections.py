@@ -1,7 +1,5 @@
 """The sections of a suite: each makes its tables of one run."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections import Counter

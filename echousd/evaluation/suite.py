@@ -1,7 +1,5 @@
 """The suite: every system is asked the same rooms; its report, equal for equal runs; a study with people."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import io

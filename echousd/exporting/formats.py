@@ -1,7 +1,5 @@
 """The kinds of files that a room can be written as, a row each; all that a stage composes to in one layer."""
 
-from __future__ import annotations
-
 import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -4,8 +4,6 @@ Images go in as they are on disk, equal arrays once; trimesh's exporter would en
 and knows neither lights nor several materials in one mesh.
 """
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Mapping

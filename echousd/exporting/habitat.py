@@ -1,7 +1,5 @@
 """A room or a home for Habitat and for SceneEval: descriptions of the scene, and a glb for every object."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path

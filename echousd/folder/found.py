@@ -1,7 +1,5 @@
 """Which rooms a path means: a file, the folder of a room, a folder of such folders, or a pattern."""
 
-from __future__ import annotations
-
 import glob
 from pathlib import Path
 from typing import Any

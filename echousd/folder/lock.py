@@ -1,7 +1,5 @@
 """One writer per room folder: a lock file that names its owner and that dies with the owner's process (no pxr here)."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import socket

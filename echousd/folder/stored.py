@@ -1,7 +1,5 @@
 """A room's assets and images in a store: which folders they become, and what its layers call them then."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field

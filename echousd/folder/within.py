@@ -1,7 +1,5 @@
 """Names of files that were read from a folder: none leads out of it, by `..`, a root or a link (no pxr here)."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path, PurePosixPath, PureWindowsPath
 

@@ -1,7 +1,5 @@
 """A home on disk: every room furnished in its place by workers side by side, and the layers that compose them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import zlib

@@ -1,7 +1,5 @@
 """A home judged as a whole: the plan against the graph, shared walls and doors, ways of a robot, then every room."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Plans as drawings: walls, doors, windows, names and areas; PNG, SVG and PDF, DXF for CAD, a house of ProcTHOR."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

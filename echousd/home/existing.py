@@ -1,7 +1,5 @@
 """Plans that are there already: rooms whose floors are stated side by side, drawn by hand or planned before."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

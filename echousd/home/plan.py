@@ -1,7 +1,5 @@
 """The plan of a home: conflicts named first, then cells from the solver, floors between walls, doors and windows."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace

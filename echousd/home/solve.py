@@ -1,7 +1,5 @@
 """Rectangles for rooms: a constraint solver finds how they lie, then wall lines are moved until the areas are right."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product

@@ -1,7 +1,5 @@
 """Homes on stages: /House/Graph, and below /House/Rooms the rooms, each with its own graph and, if planned, place."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One piece of furniture as a USD asset: a light component layer with a payload, and the heavy geometry behind it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Cameras that belong to a room: a view from above and one from a corner."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ The variant set `light` of `/Room` dims them for `day`, `evening` and `night`; i
 as a light's own opinion would be stronger than theirs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`layers/materials.usda`: the looks of the room, one per style and material group, and where they are bound."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

@@ -4,8 +4,6 @@ Their surface is MaterialX's own UsdPreviewSurface, so both networks of a materi
 MaterialX 1.38 and 1.39 both have.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

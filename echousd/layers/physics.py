@@ -1,7 +1,5 @@
 """Physics of a room: bodies, colliders and joints in every asset; the scene and what never moves in its own layer."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 import numpy as np

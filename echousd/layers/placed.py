@@ -1,7 +1,5 @@
 """A model of somebody else's as a USD asset: a component that places it, refers to it or holds it; whose they are."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which pieces of a room do not rest, and why: convex pieces as plain data, simulated in MuJoCo for a while."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

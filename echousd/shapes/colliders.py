@@ -1,7 +1,5 @@
 """Colliders of furniture that is one mesh: a hull, or convex pieces that follow the shape."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 
 import numpy as np

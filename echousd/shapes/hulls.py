@@ -1,7 +1,5 @@
 """Convex hulls: exact ones, those of what stands and is stood on; moves in plan by which such solids would meet."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import fast_simplification

@@ -1,7 +1,5 @@
 """Geometry of furniture that is made of solids: exact meshes in a face budget, convex colliders, mass."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 

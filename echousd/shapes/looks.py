@@ -1,7 +1,5 @@
 """How things look: palettes per style."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass

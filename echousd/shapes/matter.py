@@ -1,7 +1,5 @@
 """What solids weigh: boards, tubes and shells by what they are made of; a piece's mass, written and read back."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache

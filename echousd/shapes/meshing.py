@@ -1,7 +1,5 @@
 """Closed meshes: what a generated shape becomes, clean and of few faces, and how any mesh loses faces."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Style groups of a graph, and which of their objects can share one asset."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Surfaces ready to be shown: triangles with creased normals, texture coordinates and material groups."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

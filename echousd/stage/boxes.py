@@ -1,7 +1,5 @@
 """Relations that the boxes of a graph show."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections import Counter

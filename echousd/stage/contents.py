@@ -1,7 +1,5 @@
 """What stands in a room on a stage: the meshes and boxes of its objects in the room frame (+Y up, metres)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial

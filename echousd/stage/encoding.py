@@ -1,7 +1,5 @@
 """How a scene graph is written in USD: type names, properties and the values they hold. The one place that knows."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Open stages and save layers: errors that say which file, and files that appear whole or not at all."""
 
-from __future__ import annotations
-
 import os
 import re
 import warnings

@@ -1,7 +1,5 @@
 """Scene graphs of stages that others authored: semantics labels and bounds become nodes, boxes become relations."""
 
-from __future__ import annotations
-
 import math
 import os
 import warnings

@@ -3,8 +3,6 @@
 A change puts all questions to the composed stage first, then makes all edits as Sdf specs in the edit target's layer.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from functools import partial

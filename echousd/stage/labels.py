@@ -1,7 +1,5 @@
 """What other people's prims are called: semantics labels, and names where there are none."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """What a light of a stage gives, whoever wrote it: UsdLux has its size within or without its intensity, in any unit."""
 
-from __future__ import annotations
-
 import numpy as np
 from pxr import Usd, UsdGeom, UsdLux
 

@@ -1,7 +1,5 @@
 """Where things stand in a room: prim paths and names, files of an asset."""
 
-from __future__ import annotations
-
 ROOM = "/Room"
 OBJECTS = "/Room/Objects"
 SHELL = "/Room/Shell"

@@ -1,7 +1,5 @@
 """Read scene graphs from a composed stage: through references, instances, variants and sublayers."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Materials as UsdPreviewSurface, with images or without."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 

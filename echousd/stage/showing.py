@@ -1,7 +1,5 @@
 """Stages that show one layout or variant for a while, without a change to any file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

@@ -1,7 +1,5 @@
 """ADE20K names (the 150 scene-parsing classes) for our categories and for the parts of a room's shell."""
 
-from __future__ import annotations
-
 from echomodel.dressing import SMALL
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node

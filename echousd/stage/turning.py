@@ -3,8 +3,6 @@
 Points, places, masses, joints, cameras and lights change with the unit and the up axis; no prim gets a scale for it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -4,8 +4,6 @@ OpenUSD reads both from the root layer alone and takes centimetres and its own u
 stronger layer without them shows a room of metres a hundred times too small.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom
 

@@ -1,7 +1,5 @@
 """Values on stages, read with doubt: a file may hold any type anywhere, and OpenUSD hands it on as it is."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass

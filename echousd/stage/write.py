@@ -1,7 +1,5 @@
 """Author a scene graph in bulk: Sdf specs within one change block, no stage needed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pxr import Sdf

@@ -1,7 +1,5 @@
 """Texture coordinates without overlaps in the unit square (xatlas), for one object or for all in one picture."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A room as a job for a texturing tool."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

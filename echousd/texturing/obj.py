@@ -1,7 +1,5 @@
 """Meshes as texturing tools exchange them: Wavefront OBJ, and binary glTF of one material with images."""
 
-from __future__ import annotations
-
 import io
 import json
 import struct

@@ -1,7 +1,5 @@
 """What a tool made of a job: for every object its picture, and its texture coordinates where the tool made its own."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections.abc import Mapping

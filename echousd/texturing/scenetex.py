@@ -1,7 +1,5 @@
 """What SceneTex reads of a job: cameras, meshes of stuff and things, its own parametrisation, a script to run it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Cameras for a painter: a sphere of views from free space in the room, and which texels they see."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -3,8 +3,6 @@
 Both call most functions alike (`kit(x).where(...)`, `maximum`, `stack`, `concat`, `amin`, `atan2`); here is the rest.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext

@@ -1,7 +1,5 @@
 """Files that anybody may have put there, read up to a limit; archives that may be damaged."""
 
-from __future__ import annotations
-
 import json
 import os
 import stat

@@ -3,8 +3,6 @@
 Yaws are in radians; a yaw of shape (...) belongs to points or half extents (..., 2).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from echomodel.arrays import Array, cast, kit

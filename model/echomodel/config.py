@@ -1,7 +1,5 @@
 """Frozen, serialisable configurations of the compact echo model; they travel inside the weights files."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from types import UnionType

@@ -1,7 +1,5 @@
 """Files that appear whole or not at all, and files of others that are read with doubt."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Floors as padded polygons: how far points lie from the walls; of numpy and torch alike."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echomodel.arrays import NUMPY, Array, at_least, at_most, cast, dot, kit

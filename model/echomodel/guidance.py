@@ -4,8 +4,6 @@ This is reconstruction guidance (Chung et al. 2023, posterior sampling) with the
 asked to grow or shrink, each stands at the height of what carries it, and what is almost square to a wall ends so.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 

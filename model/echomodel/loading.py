@@ -4,8 +4,6 @@ A loaded model can be pickled, but another process had better call `load_model` 
 the last models that it loaded.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Doors, windows and passages in the edges of a floor, and what they need in plan (numpy only)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace

@@ -1,7 +1,5 @@
 """Floors that nobody stated: area from the furniture with the space that its use takes, extents, and an outline."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Who is told how far a long piece of work is, and how long each of its stages took."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

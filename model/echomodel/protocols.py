@@ -1,7 +1,5 @@
 """What every model of rooms can do, whatever its preset: the pipeline, edits and scores know no more of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeGuard
 

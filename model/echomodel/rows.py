@@ -1,7 +1,5 @@
 """What a row of the vocabulary holds: all that the product knows of a category, a predicate, a room type."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Sizes of furniture: those of each class in real rooms, what pieces cover, what fitted units are built by."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Rooms of graphs as the objective sees them, and drawn boxes in them at the heights of what carries them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What a denoiser is told of floors and openings: padded floors, openings as padded rows, and features of both."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Text features of labels and relations behind one protocol, with a cache on disk (EchoScene, section 3.1)."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from collections.abc import Sequence

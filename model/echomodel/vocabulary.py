@@ -1,7 +1,5 @@
 """The words of the project: rows of `vocabulary.json` (data, not code)."""
 
-from __future__ import annotations
-
 import difflib
 import json
 import re

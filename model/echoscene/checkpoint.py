@@ -1,7 +1,5 @@
 """Published checkpoints in, one safetensors file out, with config and vocabulary; no pickle is ever executed."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

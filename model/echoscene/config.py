@@ -1,7 +1,5 @@
 """Sizes and switches of the published networks, and their `released` and `paper` presets."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

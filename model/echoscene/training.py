@@ -1,7 +1,5 @@
 """The `paper` stages: the paper's own sizes and wiring trained on our rooms (EchoScene 3.5 and its supplement)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -6,8 +6,6 @@ context is a single token, so cross-attention is its value path, broadcast. The 
 (outer taps, queries and keys, `norm2`) are kept: files hold them and training decays them.
 """
 
-from __future__ import annotations
-
 import math
 from collections import OrderedDict
 from copy import deepcopy

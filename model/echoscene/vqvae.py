@@ -1,7 +1,5 @@
 """The shape autoencoder: signed distance grids to quantised latents and back (EchoScene, section 3.4)."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 
 import torch

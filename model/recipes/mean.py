@@ -6,8 +6,6 @@ What the first of the files that know the most words says of itself stays, and w
 that know it (Wortsman et al. 2022, model soups).
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Drawings (DXF, SVG), whose layers say what a line is; buildings (IFC), read in a process that damage may end."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections import Counter

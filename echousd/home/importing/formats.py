@@ -1,7 +1,5 @@
 """Which formats of floor plans are read, how each is known, and by whom it is read."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace

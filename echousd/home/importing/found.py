@@ -1,7 +1,5 @@
 """What a floor plan of somebody's holds, in the home's frame and in metres: what every reader yields."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """What a reader found as a home: rooms with floors between walls, openings in them, furniture that stays put."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Houses of simulators (ProcTHOR, Holodeck, SceneSmith, SAGE, Infinigen), RoomPlan's scans, Sweet Home 3D."""
 
-from __future__ import annotations
-
 import ast
 import io
 import math

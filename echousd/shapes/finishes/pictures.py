@@ -3,8 +3,6 @@
 Places on a sheet are (x, y) from its middle in heights of it, y downwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 from zlib import crc32

@@ -1,7 +1,5 @@
 """Material slots of furniture, small things and shell: colour, pattern and gloss; harmonies of colours for them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path

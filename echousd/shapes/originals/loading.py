@@ -1,7 +1,5 @@
 """A row of an index, or a file of one's own, as the geometry of an object that fills its box."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re

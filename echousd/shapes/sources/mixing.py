@@ -1,7 +1,5 @@
 """Sources of shapes by name: furniture of parts, sampled shapes, boxes, models of a library; a room of several."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Which models of other people a graph names: the source of each object, and the files, from where and allowed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Which objects of a room are models of other people, which ones, and what sizes they insist on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container, Mapping
 
 import numpy as np

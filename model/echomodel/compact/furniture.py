@@ -4,8 +4,6 @@ A description (`echomodel.furniture.style`) has the same places in all classes, 
 table it can say of itself: legs, edges, fronts, how soft, how slender.
 """
 
-from __future__ import annotations
-
 from itertools import accumulate, pairwise
 
 from echomodel.arrays import Array, at_least, cast, clipped, kit, parted, softmax, sum_of

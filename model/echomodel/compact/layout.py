@@ -5,8 +5,6 @@ doors and windows, and how each pair stands to one another. The next layers hear
 the config says.
 """
 
-from __future__ import annotations
-
 import math
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """What weights know of the vocabulary: the words that they name, wherever those stand in it today."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 import numpy as np

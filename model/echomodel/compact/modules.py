@@ -1,7 +1,5 @@
 """The networks as modules of torch: what they are made of, how they begin, and what training keeps of them."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor, nn
 

@@ -1,7 +1,5 @@
 """Sampling with a compact model: what a caller gives, what samplers call, boxes and descriptions that come of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias

@@ -5,8 +5,6 @@ of a room: boxes, shapes, furniture. A further branch is a module with its netwo
 `CompactConfig`, its row here (and in `plain.NETS`), and a training stage in `echomodel.training`.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ Whoever has the files puts them in one folder: `relationships_{room}_{split}.jso
 `classes_{room}.txt`, `relationships.txt`.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """Small shaded pictures of meshes, drawn point by point, and plans of rooms beside one another."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from pathlib import Path

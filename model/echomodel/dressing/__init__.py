@@ -4,8 +4,6 @@ One row per kind (`things.toml`), and per print (`prints.toml`) by the name of i
 furniture's vocabulary, because no graph and no weights know them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Books: single ones, rows, stacks, a notebook."""
 
-from __future__ import annotations
-
 from itertools import islice
 
 import numpy as np

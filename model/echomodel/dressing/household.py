@@ -1,7 +1,5 @@
 """What hangs on walls and stands about: pictures, mirrors, clocks, a lamp's cable."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Cloth: rugs, curtains, cushions, throws."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Parametric furniture for every category: solids that give a watertight mesh and a signed distance."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace

@@ -3,8 +3,6 @@
 Heights and places after VDI 6000: seats at 0.42 m, basins at 0.85 m, showers from 0.8 x 0.8 m.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise

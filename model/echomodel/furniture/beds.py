@@ -1,7 +1,5 @@
 """Beds: a frame, a headboard, a mattress and bedding; for children cots, bunks, stilts, houses and rails."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 

@@ -1,7 +1,5 @@
 """Solids that are bent: boards that give to a back, walls round one, leaves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any

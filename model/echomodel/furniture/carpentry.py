@@ -1,7 +1,5 @@
 """What all furniture shares: boards, cushions, tops, legs and bases."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

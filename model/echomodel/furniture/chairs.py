@@ -1,7 +1,5 @@
 """Seats: dining, plain, Chinese, dressing, bar and office chairs; without a back stools, benches and ottomans."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """What is filled or hangs in folds: pillows, covers of beds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -5,8 +5,6 @@ metric distance and `n` its unit gradient, the distance in voxels is `f / |S n|`
 planes and first-order exact elsewhere, which is what the few voxels inside the truncation need.
 """
 
-from __future__ import annotations
-
 from functools import singledispatch
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Styles, choices and sizes by lot."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What storage is put together from: fronts that open, with drawers and handles, carcasses, shelves."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

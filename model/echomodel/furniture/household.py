@@ -1,7 +1,5 @@
 """What houses have besides: coats and shoes, toys, music, warmth, a table outdoors, plants in pots, television."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Beds of children: cots, houses, lofts and bunks."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echomodel.furniture.beds import bed

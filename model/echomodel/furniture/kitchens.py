@@ -3,8 +3,6 @@
 Heights after DIN EN 1116: worktops at 0.9 m, 0.6 m deep, units in steps of 0.1 or 0.15 m.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Plants above their pots: leaves as the rows of `plants.toml` have them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

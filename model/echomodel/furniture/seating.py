@@ -1,7 +1,5 @@
 """Seats, leaning backs, legs and slim arms of chairs and sofas."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

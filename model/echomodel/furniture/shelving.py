@@ -1,7 +1,5 @@
 """Open storage: bookshelves, shelves and wine cabinets."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Upholstered: armchairs and lounge chairs; sofas of two, three and more seats, chaises longues and bean bags."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

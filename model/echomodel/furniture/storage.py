@@ -1,7 +1,5 @@
 """Closed storage of bedrooms: nightstands and wardrobes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, box, core

@@ -5,8 +5,6 @@ A kind is told by one number per word, +1 for the one that holds; a proportion o
 [-1, 1]. Every vector is a description: of a kind the largest number counts, other numbers are cut at their ends.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

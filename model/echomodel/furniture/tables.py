@@ -1,7 +1,5 @@
 """Tables of every height: dining, coffee, side, console and corner tables, desks and dressing tables."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

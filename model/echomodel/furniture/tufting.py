@@ -1,7 +1,5 @@
 """Padding that is drawn in: backs and headboards with buttons amid diamonds, or in channels."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

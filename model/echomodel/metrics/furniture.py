@@ -1,7 +1,5 @@
 """Scores of furniture made of parts: do pieces hold together, share a told style, differ else."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -6,8 +6,6 @@ colour a class; its shader is followed here term by term. Features are those of 
 Bodies stand in the boxes: furniture of the programs, the same pieces for every system, and what they run into.
 """
 
-from __future__ import annotations
-
 import colorsys
 import zlib
 from collections.abc import Callable, Sequence

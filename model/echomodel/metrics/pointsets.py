@@ -4,8 +4,6 @@ Distances are measured in the box frame, in which a shape fills the unit box; on
 the F-score's threshold is 1/64. Sets are compared as in EchoScene's table 3.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import numpy as np

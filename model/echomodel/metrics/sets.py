@@ -1,7 +1,5 @@
 """Two sets of rooms beside each other: can they be told apart, does one cover the other, do they hold the same."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace

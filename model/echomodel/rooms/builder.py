@@ -1,7 +1,5 @@
 """A room under construction: boxes placed so far, and where the next one may stand."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Floors: a rectangle with corners cut away, its walls, doors and windows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

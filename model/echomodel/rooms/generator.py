@@ -1,7 +1,5 @@
 """The generator of rooms: a floor, what it holds, and where everything stands, as `RoomBoxes`."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter

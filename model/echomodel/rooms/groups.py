@@ -1,7 +1,5 @@
 """Groups of furniture: sofas, tables and desks with what belongs to them, kitchens in runs, bathrooms and hallways."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Doors and windows that nobody stated: where in the walls of a floor they go, before or after it is furnished."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 

@@ -1,7 +1,5 @@
 """Recipes: what a room of each kind holds and in which order it is furnished."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

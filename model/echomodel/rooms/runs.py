@@ -4,8 +4,6 @@ A run is planned as a person plans a kitchen: which walls, in which order, how w
 objective to judge. Lengths along a wall count from its first corner, metres.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

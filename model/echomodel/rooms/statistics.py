@@ -1,7 +1,5 @@
 """What rooms of each type look like in the statistics of real ones, and draws from their percentiles."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import dataclass, replace

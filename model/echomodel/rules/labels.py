@@ -1,7 +1,5 @@
 """Labelling: the relations that hold in a room, found by the same rules that check them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """Margins and verdicts of given relations: how well boxes keep what a graph asks for."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any

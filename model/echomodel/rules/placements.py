@@ -3,8 +3,6 @@
 As relations beyond SG-FRONT they are measured, guided to, placed and checked; the networks do not know them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 

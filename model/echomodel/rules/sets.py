@@ -3,8 +3,6 @@
 A rule is registered here or with `@rule("name")` in a module that `echomodel.rules` imports, and nowhere else.
 """
 
-from __future__ import annotations
-
 import inspect
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Which relations a person would write down: of near pairs first, one for each, places before sizes."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from torch import Tensor

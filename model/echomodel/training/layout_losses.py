@@ -3,8 +3,6 @@
 Those are a hinge on the relations told, what true boxes measure, collisions and walls.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import torch

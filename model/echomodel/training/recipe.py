@@ -1,7 +1,5 @@
 """Recipes: small TOML files that say what to train, on what and for how long."""
 
-from __future__ import annotations
-
 import json
 import math
 import tomllib

@@ -1,7 +1,5 @@
 """The trainer: one loop for all stages, seeded per step so that a resumed run continues bit for bit."""
 
-from __future__ import annotations
-
 import copy
 import csv
 import json
