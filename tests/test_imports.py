@@ -15,7 +15,7 @@ LINES = 600  # of a module that is read in one sitting
 LAYERS = (
     ("cli",),
     ("home",),
-    ("batches", "diagnosis", "evaluation"),
+    ("batches", "evaluation"),
     ("checks", "texturing"),
     ("make",),
     ("settle",),
