@@ -18,7 +18,7 @@ import torch
 from echomodel.compact.model import CompactModel
 from echomodel.samplers import SAMPLERS
 from echomodel.training.recipe import read_recipe
-from echomodel.training.start import open_run
+from echomodel.training.run import open_run
 
 RECIPE = Path(__file__).parents[1] / "model" / "recipes" / "latent.toml"
 

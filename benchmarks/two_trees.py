@@ -31,7 +31,6 @@ def measure(tree: Path) -> None:
     import echousd
     from echousd.graph import load_graph
     from echousd.stage.graphs import save_layer
-    from echousd.stage.read import read_graph
     from echousd.stage.write import graph_layer
 
     warnings.simplefilter("ignore")
@@ -48,7 +47,7 @@ def measure(tree: Path) -> None:
 
     def stage() -> None:
         save_layer(graph_layer(graph), folder / "graph.usda")
-        read_graph(str(folder / "graph.usda"))
+        echousd.read_graph(str(folder / "graph.usda"))
 
     def write() -> None:
         room.save(Path(tempfile.mkdtemp(dir=folder)), preview=False)

@@ -16,8 +16,9 @@ from pydantic.fields import FieldInfo
 
 from echomodel.late import Late
 from echousd.assets import STRETCH
-from echousd.graph.fields import IDENTIFIER, RESIDENTS, SHAPES
+from echousd.graph.fields import RESIDENTS, SHAPES
 from echousd.graph.nodes import PlainModel
+from echousd.graph.values import IDENTIFIER
 
 if TYPE_CHECKING:
     from echousd.assets.choose import AssetWishes

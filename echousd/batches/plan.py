@@ -22,7 +22,7 @@ from echousd.folder.lock import LOCK
 from echousd.folder.manifest import MAX_SEED, Name, find_manifest
 from echousd.folder.within import check_links, inside
 from echousd.graph import SceneGraph
-from echousd.graph.fields import IDENTIFIER
+from echousd.graph.values import IDENTIFIER
 from echousd.invalid import validation_message
 from echousd.naming import LAYER_FORMS, as_identifier
 from echousd.pending import STAGING

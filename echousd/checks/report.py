@@ -17,7 +17,7 @@ import echousd
 from echousd.checks.placement import Misplacement, Whole, find_collisions, find_misplaced
 from echousd.checks.reading import RULES, Finding, Reading, StageRule
 from echousd.draw.sight import Furniture
-from echousd.folder.folder import digest_of
+from echousd.folder.journal import digest_of
 from echousd.folder.manifest import find_manifest
 from echousd.graph import RoomSpec, SceneGraph
 from echousd.graph.consistency import GraphError

@@ -104,7 +104,7 @@ def update(
 
 def _name_of(*asked: object) -> str:
     """A word that tells a run from those of which something else was asked."""
-    from echousd.folder.folder import digest
+    from echomodel.files import digest
 
     return digest(repr(asked).encode())
 

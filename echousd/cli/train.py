@@ -32,7 +32,7 @@ def train(
 ) -> None:  # fmt: skip
     """Train a part of the echo model; a run that was stopped continues bit for bit with --resume."""
     from echomodel.training.recipe import read_recipe
-    from echomodel.training.start import open_run
+    from echomodel.training.run import open_run
 
     console = Terminal(stderr=True)
     folder = out or Path("runs") / recipe.stem

@@ -10,75 +10,21 @@ import os
 import shutil
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, Field
-
-from echomodel.files import check_free, check_ours, digest, flush, telling
+from echomodel.files import check_free, check_ours, digest, telling
 from echomodel.late import Late
+from echousd.folder.journal import DONE, Journal, Move, Removal, digest_of, flush_all, write_journal
 from echousd.folder.lock import LOCK, locked, run_of
-from echousd.folder.manifest import Digest, find_manifest
+from echousd.folder.manifest import find_manifest
 from echousd.folder.within import inside
 from echousd.naming import STAGE_FORMS, free_name
 from echousd.pending import JOURNAL, STAGING, half_written
 from echousd.stage.files import check_path
 
 read_journal, whole = (Late(f"echousd.folder.interrupted:{name}") for name in ("read_journal", "whole"))
-DONE = "done.json"  # the journal of a run that has more to do once its files are in place
-
-
-class Move(BaseModel, extra="forbid", strict=True):
-    """A staged file that belongs at `to`; `over` is the digest of what it may replace there, "" for nothing."""
-
-    staged: Annotated[str, Field(pattern=r"^[0-9]{1,9}$")]
-    to: str
-    digest: Digest
-    over: Digest = ""
-
-
-class Removal(BaseModel, extra="forbid", strict=True):
-    """A file that goes if it still has this digest."""
-
-    path: str
-    digest: Digest
-
-
-class Journal(BaseModel, extra="forbid", strict=True):
-    """All that is left to do once every file of a run is staged, in order.
-
-    `run` is what it does, "" = nobody asks; `kept` are files that are not ours, and what each is called from then on.
-    """
-
-    echousd_journal: Literal[2] = 2
-    run: Annotated[str, Field(max_length=200)] = ""
-    move: list[Move]
-    remove: list[Removal]
-    kept: dict[str, str] = {}
-
-
-def digest_of(path: Path) -> str:
-    """Digest of the plain file at `path`, "" where there is none."""
-    try:
-        return digest(path.read_bytes()) if path.is_file() else ""
-    except OSError:
-        return ""
-
-
-def _flush_all(places: Iterable[Path]) -> None:
-    with ThreadPoolExecutor() as pool:  # one after another a room's hundred files wait a third of a second
-        list(pool.map(flush, places))
-
-
-def write_journal(staging: Path, journal: Journal) -> None:
-    """Put the journal beside its staged files: these are on the disk before, and it is there as a whole."""
-    _flush_all(staging / entry.staged for entry in journal.move)
-    (staging / "journal.new").write_text(journal.model_dump_json(), "utf-8")
-    flush(staging / "journal.new")
-    (staging / "journal.new").replace(staging / JOURNAL)
-    flush(staging)
 
 
 def claim(folder: Path, *, force: bool, root: str = "") -> dict[str, Any]:
@@ -261,7 +207,7 @@ def _finish(folder: Path, journal: Journal) -> None:
         _remove_empty(place.parent, folder)
     for path, name in journal.kept.items():
         tell_kept(folder, path, name)
-    _flush_all(place for place in touched if place.is_dir())
+    flush_all(place for place in touched if place.is_dir())
 
 
 def _discard(staging: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from echousd.folder.folder import Journal, digest_of
+from echousd.folder.journal import Journal, digest_of
 from echousd.folder.manifest import LARGEST
 from echousd.folder.within import check_links, inside
 from echousd.invalid import validation_message
@@ -19,7 +19,7 @@ def read_journal(folder: Path, name: str = JOURNAL) -> Journal | None:
     """The journal of an interrupted run in `folder`; None where it had not come so far, or cannot be read any more.
 
     Arguments:
-        name: `JOURNAL`, or `folder.DONE` for that of a run whose files are in place.
+        name: `JOURNAL`, or `journal.DONE` for that of a run whose files are in place.
 
     Raises ValueError for entries that name anything outside of the folder; nothing was changed then.
     """

@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from echomodel.late import Late
 from echousd.folder.within import check_links, inside
-from echousd.graph.fields import IDENTIFIER
+from echousd.graph.values import IDENTIFIER
 from echousd.options import MAX_SEED, Look
 
 validation_message = Late("echousd.invalid:validation_message")

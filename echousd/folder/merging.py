@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 from pxr import Sdf, Tf
 
 from echomodel.late import Late
-from echousd.folder.folder import digest_of
+from echousd.folder.journal import digest_of
 from echousd.naming import STAGE_FORMS
 from echousd.pending import STAGING
 from echousd.stage.harmless import check_harmless

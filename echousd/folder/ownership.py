@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echomodel.files import telling
+from echomodel.files import digest, telling
 from echousd.draw.pictures import is_ours
-from echousd.folder.folder import backup_name, digest
+from echousd.folder.folder import backup_name
 from echousd.folder.within import inside
 from echousd.naming import free_name
 from echousd.stage.paths import coarse_file, component_file, payload_file

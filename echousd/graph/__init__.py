@@ -5,9 +5,9 @@ Nothing here imports pxr or torch; `load_graph` and `save_graph` load `echousd.s
 
 from echomodel.late import Late
 from echousd.graph.consistency import GraphError
-from echousd.graph.fields import MAX_TEXT
 from echousd.graph.nodes import Node, Placed, Relation, RoomSpec
 from echousd.graph.scene import SceneGraph
+from echousd.graph.values import MAX_TEXT
 
 load_graph, save_graph = Late("echousd.graph.files:load_graph"), Late("echousd.graph.files:save_graph")
 starting_graph = Late("echousd.graph.starting:starting_graph")

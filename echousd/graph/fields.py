@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
-import re
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping
-from numbers import Real
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeAlias
 
 from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema
@@ -14,31 +11,29 @@ from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema
 from echomodel.late import lates
 from echomodel.openings import Opening, opening_from_json
 from echomodel.vocabulary import vocabulary
+from echousd.graph.values import (
+    IDENTIFIER,
+    MAX_NAME,
+    Point,
+    Vector,
+    checked_identifier,
+    finite,
+    items,
+    numbers_of,
+    real,
+    shown,
+    storable,
+)  # fmt: skip
 
-MAX_TEXT = 65_536  # characters in one string: what an attribute may hold before it is taken for a mistake
 MAX_NODES = 5000  # of a graph
-MAX_CORNERS = 500  # of a floor: the work on walls and furniture grows with their square
-MAX_NAME = 100  # characters: names become file names of assets
 SHAPES = ("parts", "sdf", "boxes", "library", "guided", "own")  # of the geometry of one object
 # what `echousd.dressing` has stories of
 RESIDENTS = ("child", "teen", "couple", "senior", "student", "office", "guest")
-IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 angle, attributes, corners, place, two_names = lates(
     "echousd.graph.stated", "angle", "attributes", "corners", "place", "two_names"
 )
 
-Point: TypeAlias = tuple[float, float]
-Vector: TypeAlias = tuple[float, float, float]
 Scalar: TypeAlias = StrictBool | int | float | str
-
-
-def checked_identifier(value: Any) -> str:
-    """A valid USD identifier of at most `MAX_NAME` characters; raises ValueError."""
-    if not isinstance(value, str) or not IDENTIFIER.fullmatch(value):
-        raise ValueError(f"{shown(value)} is no identifier, allowed: letters, digits and _, not starting with a digit")
-    if len(value) > MAX_NAME:
-        raise ValueError(f"{shown(value)} has {len(value)} characters, allowed: {MAX_NAME}")
-    return value
 
 
 def _text(value: Any) -> str:
@@ -65,58 +60,8 @@ def _one_of(words: tuple[str, ...]) -> tuple[BeforeValidator, WithJsonSchema]:
     return _optional(check), WithJsonSchema({"anyOf": [{"enum": list(words)}, {"type": "null"}]})
 
 
-def storable(value: str) -> str:
-    """A text that a USD file can hold; raises ValueError."""
-    if len(value) > MAX_TEXT:
-        raise ValueError(f"a text of {len(value)} characters, allowed: {MAX_TEXT}")
-    if "\0" in value or any("\ud800" <= character <= "\udfff" for character in value):
-        raise ValueError(f"{shown(value)} holds a character that a USD file cannot hold")
-    return value
-
-
-def converted(value: Any) -> float:
-    """A number, not a number where the value is none."""
-    try:
-        return math.nan if isinstance(value, bool) or not isinstance(value, Real) else float(value)
-    except OverflowError:
-        return math.inf
-
-
-def _real(allowed: str, test: Callable[[float], bool] = math.isfinite) -> Callable[[Any], float]:
-    def check(value: Any) -> float:
-        number = value if type(value) is float else converted(value)
-        if not (math.isfinite(number) and test(number)):
-            raise ValueError(f"found {shown(value)}, allowed: {allowed}")
-        return number
-
-    return check
-
-
-finite = _real("a finite number")
-_positive = _real("a positive number, metres", lambda number: number > 0)
-_share = _real("a number from 0 to 1", lambda number: 0 <= number <= 1)
-
-
-def numbers_of(count: int, each: Callable[[Any], float], allowed: str) -> Callable[[Any], tuple[float, ...]]:
-    """A check for so many numbers, `allowed` in words."""
-
-    def check(value: Any) -> tuple[float, ...]:
-        try:
-            numbers = tuple(each(number) for number in items(value))
-        except ValueError:
-            numbers = ()
-        if len(numbers) != count:
-            raise ValueError(f"found {shown(value)}, allowed: {allowed}")
-        return numbers
-
-    return check
-
-
-def items(value: Any) -> Iterable[Any]:
-    """What a list holds; raises ValueError for anything else."""
-    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
-        raise ValueError(f"found {shown(value)}, allowed: a list")
-    return value
+_positive = real("a positive number, metres", lambda number: number > 0)
+_share = real("a number from 0 to 1", lambda number: 0 <= number <= 1)
 
 
 def _openings(value: Any) -> tuple[Opening, ...]:
@@ -196,9 +141,3 @@ def bounding_extents(corners: tuple[Point, ...]) -> Point:
     """(x, z) extents of the bounding box of `corners`, metres."""
     xs, zs = [x for x, _ in corners], [z for _, z in corners]
     return max(xs) - min(xs), max(zs) - min(zs)
-
-
-def shown(value: Any, most: int = 60) -> str:
-    """`repr(value)` cut to about `most` characters: what an error message shows of a value."""
-    text = repr(value[: most + 1] if isinstance(value, str) else value)
-    return text if len(text) <= most + 2 else f"{text[:most]}..."

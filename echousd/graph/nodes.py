@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_va
 from echomodel.openings import check_openings, rectangle
 from echousd.graph import fields as field
 from echousd.graph.consistency import GraphError
+from echousd.graph.values import Point, shown
 
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass
@@ -128,7 +129,7 @@ class RoomSpec(PlainModel):
         return self
 
     @property
-    def extents(self) -> field.Point | None:
+    def extents(self) -> Point | None:
         """(x, z) extents of the floor's bounding box in metres, None where nothing is known."""
         return field.bounding_extents(self.floor_polygon) if self.floor_polygon else self.size
 
@@ -221,7 +222,7 @@ class Node(PlainModel):
 
     @classmethod
     def _title(cls, fields: dict[str, Any]) -> str:
-        return f"object {field.shown(fields['name'])}: "
+        return f"object {shown(fields['name'])}: "
 
 
 class Relation(PlainModel):
@@ -245,7 +246,7 @@ class Relation(PlainModel):
     @classmethod
     def _title(cls, fields: dict[str, Any]) -> str:
         sentence = " ".join(str(fields[part]) for part in ("subject", "predicate", "object"))
-        return f"relation {field.shown(sentence)}: "
+        return f"relation {shown(sentence)}: "
 
     @property
     def triple(self) -> tuple[str, str, str]:
@@ -260,7 +261,7 @@ def _small_word(value: str) -> str:
     from echomodel.dressing import SMALL
 
     if value not in SMALL:
-        raise ValueError(f"found {field.shown(value)}, allowed of a small thing: {', '.join(sorted(SMALL))}")
+        raise ValueError(f"found {shown(value)}, allowed of a small thing: {', '.join(sorted(SMALL))}")
     return value
 
 
@@ -285,7 +286,7 @@ class SmallNode(PlainModel):
 
     @classmethod
     def _title(cls, fields: dict[str, Any]) -> str:
-        return f"object {field.shown(fields['name'])}: "
+        return f"object {shown(fields['name'])}: "
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph import fields as field
 from echousd.graph.consistency import GraphError, listed, name_faults, raise_all, triple_faults
 from echousd.graph.nodes import Node, Placed, PlainModel, Relation, RoomSpec
+from echousd.graph.values import shown
 
 if TYPE_CHECKING:
     from echousd.graph.difference import GraphDiff
@@ -61,7 +62,7 @@ class SceneGraph(PlainModel):
     def node(self, name: str) -> Node:
         """The node called `name`; raises `GraphError`."""
         if name not in self._by_name:
-            raise GraphError(f"no object {field.shown(name)} in this graph, allowed: {listed(sorted(self._by_name))}")
+            raise GraphError(f"no object {shown(name)} in this graph, allowed: {listed(sorted(self._by_name))}")
         return self._by_name[name]
 
     @property

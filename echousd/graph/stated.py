@@ -9,7 +9,7 @@ from typing import Any
 
 from echomodel.openings import signed_area
 from echomodel.vocabulary import vocabulary
-from echousd.graph.fields import (
+from echousd.graph.values import (
     MAX_CORNERS,
     Point,
     checked_identifier,

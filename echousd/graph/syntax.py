@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import yaml
 
 from echousd.graph.consistency import GraphError
-from echousd.graph.fields import shown
+from echousd.graph.values import shown
 
 Path = tuple[str | int, ...]
 DEEPEST = 64  # lists and mappings within each other

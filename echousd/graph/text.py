@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from echomodel.late import Late
 from echomodel.vocabulary import TYPO, UnknownWord, normalised, vocabulary
 from echousd.graph.consistency import MAX_ERRORS, GraphError, listed, name_faults, raise_all, unknown_ends
-from echousd.graph.fields import IDENTIFIER, shown
 from echousd.graph.nodes import Node, Placed, PlainModel, Relation, RoomSpec
 from echousd.graph.openings import LISTS, listed_words, opening_from_words
 from echousd.graph.scene import SceneGraph, plain
 from echousd.graph.titles import composed, identifier_of, is_title, name_of, with_names
+from echousd.graph.values import IDENTIFIER, shown
 
 if TYPE_CHECKING:
     from echousd.graph.syntax import Located, Path

@@ -8,7 +8,7 @@ from collections.abc import Container, Mapping
 from typing import Any
 
 from echomodel.vocabulary import normalised, vocabulary
-from echousd.graph.fields import IDENTIFIER, MAX_NAME
+from echousd.graph.values import IDENTIFIER, MAX_NAME
 from echousd.naming import free_name, in_ascii
 
 

@@ -25,6 +25,7 @@ from echousd.graph.openings import LISTS
 from echousd.graph.scene import plain
 from echousd.graph.syntax import flow
 from echousd.graph.text import graph_from_plain, only_fields
+from echousd.graph.values import IDENTIFIER, shown
 
 if TYPE_CHECKING:
     import networkx
@@ -135,9 +136,9 @@ class HomeGraph(PlainModel):
         relations: list[HomeRelation] = []
 
         def rooms(word: str) -> list[str]:
-            match = re.fullmatch(rf"({field.IDENTIFIER.pattern})(?:\*([1-9]|[1-3][0-9]))?", word)
+            match = re.fullmatch(rf"({IDENTIFIER.pattern})(?:\*([1-9]|[1-3][0-9]))?", word)
             if match is None:
-                raise GraphError(f"rooms: {field.shown(word)}, allowed: a room type, or several of it as in bedroom*2")
+                raise GraphError(f"rooms: {shown(word)}, allowed: a room type, or several of it as in bedroom*2")
             many = match[2] and match[2] != "1"
             several = [f"{match[1]}_{i + 1}" for i in range(int(match[2]))] if many else [match[1]]
             names.update(dict.fromkeys(several))
@@ -150,7 +151,7 @@ class HomeGraph(PlainModel):
                 continue
             ends = [rooms(words[0]), rooms(words[-1])] if len(words) > 2 else []
             if not ends:
-                raise GraphError(f"rooms: {field.shown(part)}, allowed: room predicate room, such as hall door bedroom")
+                raise GraphError(f"rooms: {shown(part)}, allowed: room predicate room, such as hall door bedroom")
             middle = " ".join(words[1:-1])
             relations += [relation_of([one, middle, other]) for one in ends[0] for other in ends[1]]
         outline, kinds = fields.get("outline"), {name: _type_of(name) for name in names}
@@ -165,7 +166,7 @@ class HomeGraph(PlainModel):
         found = next((room for room in self.rooms if room.name == name), None)
         if found is None:
             listed = ", ".join(room.name for room in self.rooms)
-            raise GraphError(f"no room {field.shown(name)} in this home, allowed: {listed}")
+            raise GraphError(f"no room {shown(name)} in this home, allowed: {listed}")
         return found
 
     @property
@@ -253,7 +254,7 @@ def relation_of(sentence: Any) -> HomeRelation:
     """The relation that `kitchen open to living` or [kitchen, open_to, living] states; raises `GraphError`."""
     words = sentence.split() if isinstance(sentence, str) else sentence
     if not isinstance(words, list) or len(words) < 3 or not all(isinstance(word, str) for word in words):
-        raise GraphError(f"relation {field.shown(sentence)}: allowed: room predicate room, such as hall door bedroom")
+        raise GraphError(f"relation {shown(sentence)}: allowed: room predicate room, such as hall door bedroom")
     return HomeRelation(words[0], " ".join(words[1:-1]), words[-1])
 
 
@@ -269,7 +270,7 @@ def home_of_plain(data: Any) -> HomeGraph:
     forms = {"home": (Mapping, "a mapping with area, outline, entrance"), "relations": (list, "a list of relations")}
     for key, (kind, allowed) in forms.items():
         if data.get(key) and not isinstance(data[key], kind):
-            raise GraphError(f"{key}: found {field.shown(data[key])}, allowed: {allowed}", (key,))
+            raise GraphError(f"{key}: found {shown(data[key])}, allowed: {allowed}", (key,))
     about = data.get("home") or {}
     only_fields(about, ("area", "outline", "entrance"), ("home",))
     rooms = [_room(str(name), entry) for name, entry in data["rooms"].items()]
@@ -286,7 +287,7 @@ def _room(name: str, entry: Any) -> HomeRoom:
     where = ("rooms", name)
     fields = {"type": entry} if isinstance(entry, str) else {} if entry is None else entry
     if not isinstance(fields, Mapping):
-        raise GraphError(f"room {name!r}: found {field.shown(entry)}, allowed: a room type or a mapping", where)
+        raise GraphError(f"room {name!r}: found {shown(entry)}, allowed: a room type or a mapping", where)
     own = {key: fields[key] for key in OF_ROOM if key in fields}
     spec = {key: value for key, value in fields.items() if key in (*RoomSpec.model_fields, *LISTS)}
     inside = {key: value for key, value in fields.items() if key in ("objects", "nodes", "relations")}

@@ -16,8 +16,9 @@ from echousd.draw.surfaces import DRESSING, Surfaces, read_surfaces
 from echousd.folder.within import inside
 from echousd.stage.encoding import StageError
 from echousd.stage.files import layer_bytes, open_stage
-from echousd.stage.harmless import check_harmless, just_written
+from echousd.stage.harmless import check_harmless
 from echousd.stage.paths import UNFIT
+from echousd.stage.vouched import just_written
 
 FOLDER = "looks"
 VARIANTS, MADE = "looks", "made"  # the variant set of the room, and its variant without paint

@@ -19,9 +19,10 @@ from echousd.folder.within import inside
 from echousd.pending import check_written
 from echousd.stage.encoding import LABELS
 from echousd.stage.files import layer_bytes, write_all
-from echousd.stage.harmless import check_harmless, just_written
+from echousd.stage.harmless import check_harmless
 from echousd.stage.paths import coarse_file, coarse_name, component_file, payload_file, payload_name
 from echousd.stage.turning import rescale, turn_up
+from echousd.stage.vouched import just_written
 
 FURNITURE = "Q14745"  # Wikidata's number of what all of these are
 INSIDE = "usd"  # the folder between a package's name and its layer

@@ -15,16 +15,16 @@ from echomodel.boxes2d import footprints
 from echomodel.furniture.solids import Joint
 from echomodel.late import Late
 from echomodel.openings import Opening, edge_lengths
-from echomodel.triangles import Mesh
+from echomodel.triangles import Mesh, joined
 from echomodel.vocabulary import Category, vocabulary
 from echousd.dressing.walls import behind, walls_of
 from echousd.layers import assets
 from echousd.room import RoomData
-from echousd.shapes.fittings import PLAIN, Millwork, millwork_of
+from echousd.shapes.fittings import BEAM, PLAIN, Millwork, millwork_of
 from echousd.shapes.geometry import CREASE, Mass
 from echousd.shapes.matter import hull_moments
 from echousd.shapes.surface import Surface, surfaces
-from echousd.shapes.walls import BEAM, COVED, THICKNESS, ShellPart, ShellPiece, slab, wall_name, walls
+from echousd.shapes.walls import COVED, THICKNESS, ShellPart, ShellPiece, slab, wall_name, walls
 from echousd.stage import encoding
 from echousd.stage.paths import OPENINGS, SHELL, piece_name
 from echousd.stage.pen import Pen, ops
@@ -131,7 +131,10 @@ def shell_prims(room: RoomData, bare: frozenset[str] = frozenset(), cuts: Sequen
         size, position, yaw = (np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw))
         tall = position[:, 1] + size[:, 1] > room.height - BEAM[1]
         plans = shapely.polygons(footprints(size, position, yaw)[tall])
-        parts += beams(room.corners, room.height, look, shapely.union_all(plans).buffer(0.05))
+        bars = beams(room.corners, room.height, shapely.union_all(plans).buffer(0.05))
+        if bars:
+            pieces = (ShellPiece(piece_name("Beams", "mesh"), look, joined(bars)),)
+            parts.append(ShellPart("Beams", "beam", pieces))
     coverings = {"Floor": floor_slot(room)} | covered_walls(room)
     forms = iter(surfaces([form for part in parts for form in _forms(part, coverings)]))
     return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component, forms)]

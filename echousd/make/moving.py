@@ -15,7 +15,7 @@ from echomodel.objective import Plan, faults_of, unreached
 from echomodel.objective.copies import copies_of
 from echomodel.objective.support import ON_CEILING
 from echousd.graph import Placed, Relation, SceneGraph
-from echousd.make.clearing import EDGE, REACH, Scene
+from echousd.make.scene import EDGE, REACH, Scene
 from echousd.make.verdicts import unbroken
 from echousd.shapes.hulls import depth
 

@@ -26,9 +26,10 @@ from echousd.room import LayoutOutcome, RoomData
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.sources.named import beside
 from echousd.stage.files import open_stage, write_all
-from echousd.stage.harmless import check_harmless, just_written
+from echousd.stage.harmless import check_harmless
 from echousd.stage.paths import UNFIT, layer_file
 from echousd.stage.pen import layout_names
+from echousd.stage.vouched import just_written
 
 if TYPE_CHECKING:
     from echousd.folder.stored import Shelf

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import groupby, product
 
 import numpy as np
 
+from echomodel.boxes2d import hull
 from echomodel.late import linear_sum_assignment
 from echomodel.objective import Plan
+from echomodel.objective.sizes import places_of
 from echousd.place.geometry import depths, gaps
-from echousd.place.proposals import along_walls, out_of, proposals, slots_at
+from echousd.place.problem import Problem
+from echousd.place.proposals import along_walls, out_of, proposals, slot_role, slots_at
 from echousd.place.search import DEEP, FARTHEST, GRAIN, HIT, JUDGED, LIKED, NEXT, Search, State
-from echousd.place.seats import seatings
+from echousd.place.slots import Row
 
 
 def rebuilt(search: Search, state: State, out: list[int]) -> State:
@@ -170,3 +175,37 @@ def with_along(
         position[:, k, ::2], yaw[:, k] = best[:, :2], best[:, 2]
         met.append(k)
     return position, yaw
+
+
+def seatings(problem: Problem, i: int, seats: Sequence[int]) -> tuple[list[int], list[list[Row]]]:
+    """Who of some boxes stands around box i, wide ones first, and ways to do so: a slot for each, the best ways first.
+
+    Benches take the middle of a long side, chairs what is left.
+    """
+    places = places_of(problem.size)
+    seats = sorted((k for k in seats if slot_role(problem, k, i) == "around"), key=lambda k: -places[k])
+    ways: list[list[tuple[Row, np.ndarray]]] = [[]] if len(seats) > 1 else []
+    for alike in (list(group) for _, group in groupby(seats, key=lambda k: places[k])):
+        largest = max(alike, key=lambda k: float(problem.size[k, 0]))
+        slots = sorted(slots_at(problem, largest, i), key=lambda slot: slot[3])
+        table = np.array(slots).reshape(-1, 4)
+        room = np.concatenate([table[:, :2], hull(problem.size[largest, ::2][None] / 2, table[:, 2])], 1)
+        first = 2 if places[largest] > 1 and len(alike) < len(seats) else len(slots)
+        after = []
+        for begun, start in product(ways, range(min(first, len(slots)))):  # those that go with each, its likes first
+            chosen, free = [*begun], np.ones(len(slots), bool)
+            for _, taken in begun:
+                free &= _clear_of(room, taken)
+            for k in (start, *np.flatnonzero(table[:, 3] == table[start, 3]).tolist(), *range(len(slots))):
+                if free[k] and len(chosen) < len(begun) + len(alike):
+                    chosen.append((slots[k], room[k]))
+                    free &= _clear_of(room, room[k])
+            after += [chosen] * (len(chosen) == len(begun) + len(alike))
+        ways = after
+    found = [[slot for slot, _ in way] for way in ways]
+    return seats, [way for number, way in enumerate(found) if not any({*way} == {*one} for one in found[:number])]
+
+
+def _clear_of(room: np.ndarray, taken: np.ndarray) -> np.ndarray:
+    """(k,) bool: which rectangles (k, 4), middles and half extents, another one leaves free."""
+    return np.asarray((abs(room[:, :2] - taken[:2]) - room[:, 2:] - taken[2:]).max(1) > -0.01)

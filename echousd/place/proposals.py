@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
-from echomodel.late import lates
+from echomodel.late import Late, lates
 from echomodel.objective.sizes import places_of
 from echomodel.objective.support import FREE, ON_CEILING
-from echomodel.vocabulary import vocabulary
+from echomodel.vocabulary import Category, vocabulary
 from echousd.place.distances import APART, MOST_UNDER, kept_apart, over_bed, seen_from, spread_at_walls
 from echousd.place.geometry import depth_inside
 from echousd.place.problem import Problem
-from echousd.place.slots import HALF_PI, INNER, SEATS, STANDS
+from echousd.place.slots import HALF_PI, INNER, Row, Size, Slot, head, on_top, over
 
+SEATS = "echousd.place.seats"
 in_view, midway, sides = lates(SEATS, "in_view", "midway", "sides")
+STANDS: dict[str, Callable[[Size, Size, Category, int, float, float], list[Slot]]] = {
+    "head": head, "on_top": on_top, "over": over, "with": Late(f"{SEATS}:joined"),
+    **{name: Late(f"{SEATS}:{name}") for name in ("around", "at_front", "before", "beside", "company", "foot")},
+}  # fmt: skip
 STEP = 0.2  # metres between two places at a wall
 GRID, PLACES = 0.35, 1000  # metres between two places in the open; in a hall so many, farther apart
 SLIDES = (0.08, 0.2, 0.45, 0.8)  # metres by which a piece is moved along its width and its depth
-Row = tuple[float, float, float, float]  # x, z, yaw, and how much others are preferred
 
 
 def proposals(problem: Problem, position: np.ndarray, yaw: np.ndarray, there: np.ndarray, i: int) -> np.ndarray:

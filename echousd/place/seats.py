@@ -1,22 +1,18 @@
 """Slots of seats, as slots.py gives them: chairs at tables, sofas and armchairs in a group, and what goes with them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
-from itertools import groupby, product
 
 import numpy as np
 
-from echomodel.boxes2d import axes, hull
+from echomodel.boxes2d import axes
 from echomodel.objective.access import DEEP, PASSAGE, WALKED_BEHIND, WATCHED_FREE, to_wall
 from echomodel.objective.crowding import HAND
 from echomodel.objective.sight import WATCHED_FROM
-from echomodel.objective.sizes import TUCKED, places_of
+from echomodel.objective.sizes import TUCKED
 from echomodel.vocabulary import Category, vocabulary
 from echousd.place.problem import Problem
-from echousd.place.proposals import Row, slot_role, slots_at
-from echousd.place.slots import HALF_PI, INNER, Size, Slot, head
+from echousd.place.slots import HALF_PI, INNER, Row, Size, Slot, head
 
 DEEPER = 0.27  # metres that a chair is pushed under its table where room is scarce
 AMID = 0.7  # share of the farthest watching distance at which a sofa stands in the room
@@ -156,40 +152,6 @@ def in_view(problem: Problem, i: int, at_walls: Sequence[Row]) -> list[Row]:
     keep = [free > max(far, AMID * far + PASSAGE), deep, deep & (free > WATCHED_FREE + WALKED_BEHIND)]
     out = [(rows + np.pad(off[:, None] * front, ((0, 0), (0, 2))))[at] for off, at in zip(away, keep, strict=True)]
     return [(x, z, yaw, more) for x, z, yaw, more in np.concatenate(out).tolist()]
-
-
-def seatings(problem: Problem, i: int, seats: Sequence[int]) -> tuple[list[int], list[list[Row]]]:
-    """Who of some boxes stands around box i, wide ones first, and ways to do so: a slot for each, the best ways first.
-
-    Benches take the middle of a long side, chairs what is left.
-    """
-    places = places_of(problem.size)
-    seats = sorted((k for k in seats if slot_role(problem, k, i) == "around"), key=lambda k: -places[k])
-    ways: list[list[tuple[Row, np.ndarray]]] = [[]] if len(seats) > 1 else []
-    for alike in (list(group) for _, group in groupby(seats, key=lambda k: places[k])):
-        largest = max(alike, key=lambda k: float(problem.size[k, 0]))
-        slots = sorted(slots_at(problem, largest, i), key=lambda slot: slot[3])
-        table = np.array(slots).reshape(-1, 4)
-        room = np.concatenate([table[:, :2], hull(problem.size[largest, ::2][None] / 2, table[:, 2])], 1)
-        first = 2 if places[largest] > 1 and len(alike) < len(seats) else len(slots)
-        after = []
-        for begun, start in product(ways, range(min(first, len(slots)))):  # those that go with each, its likes first
-            chosen, free = [*begun], np.ones(len(slots), bool)
-            for _, taken in begun:
-                free &= _clear_of(room, taken)
-            for k in (start, *np.flatnonzero(table[:, 3] == table[start, 3]).tolist(), *range(len(slots))):
-                if free[k] and len(chosen) < len(begun) + len(alike):
-                    chosen.append((slots[k], room[k]))
-                    free &= _clear_of(room, room[k])
-            after += [chosen] * (len(chosen) == len(begun) + len(alike))
-        ways = after
-    found = [[slot for slot, _ in way] for way in ways]
-    return seats, [way for number, way in enumerate(found) if not any({*way} == {*one} for one in found[:number])]
-
-
-def _clear_of(room: np.ndarray, taken: np.ndarray) -> np.ndarray:
-    """(k,) bool: which rectangles (k, 4), middles and half extents, another one leaves free."""
-    return np.asarray((abs(room[:, :2] - taken[:2]) - room[:, 2:] - taken[2:]).max(1) > -0.01)
 
 
 def beside(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:

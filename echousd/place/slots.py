@@ -7,16 +7,14 @@ something is before the middle of that (`distances.kept_apart`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
-from echomodel.late import Late
 from echomodel.vocabulary import Category
 
 Size = np.ndarray
 Slot = tuple[float, float, float, float]
-Slots = Callable[[Size, Size, Category, int, float, float], list[Slot]]
+Row = tuple[float, float, float, float]  # x, z, yaw, and how much others are preferred
 HALF_PI = math.pi / 2
 INNER = 0.25  # metres that a coffee table reaches into the corner of a sofa
 
@@ -44,10 +42,3 @@ def on_top(own: Size, anchor: Size, kind: Category, count: int, apart: float, ah
 def over(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
     """Mirrors and hoods: over the middle, at the same wall."""
     return [(0.0, (own[2] - anchor[2]) / 2, 0.0, 0.0)]
-
-
-SEATS = "echousd.place.seats"
-STANDS: dict[str, Slots] = {
-    "head": head, "on_top": on_top, "over": over, "with": Late(f"{SEATS}:joined"),
-    **{name: Late(f"{SEATS}:{name}") for name in ("around", "at_front", "before", "beside", "company", "foot")},
-}  # fmt: skip

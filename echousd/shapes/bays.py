@@ -1,7 +1,5 @@
 """What the shell of few rooms has: beams below the ceiling, a window that stands out, doors of glass or that slide."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -10,11 +8,20 @@ import shapely
 
 from echomodel.openings import SLID, Opening, zone
 from echomodel.triangles import Mesh, joined
-from echousd.shapes.fittings import TRACK, WALL, board, leaf_of, lights_of, upright, window_frame, window_glass
-from echousd.shapes.walls import BEAM, BETWEEN, ShellPart, ShellPiece
-from echousd.stage.paths import piece_name
+from echousd.shapes.fittings import (
+    BEAM,
+    TRACK,
+    WALL,
+    board,
+    leaf_of,
+    lights_of,
+    upright,
+    window_frame,
+    window_glass,
+)  # fmt: skip
 
 BAY = (0.35, 0.45)  # of a bay window: along the wall to where its front begins, and how far that is before it
+BETWEEN = 1.0  # metres from one beam to the next
 BROAD = 1.3  # metres, width of windows from which on one may stand out before its wall
 
 
@@ -27,8 +34,8 @@ def stands_out(polygon: np.ndarray, openings: Sequence[Opening]) -> Opening | No
     return max(can, key=lambda one: one.width, default=None)
 
 
-def beams(polygon: np.ndarray, height: float, look: str, below: shapely.Geometry) -> list[ShellPart]:
-    """Beams of a material along the shorter side of a room, where nothing is `below` that reaches up to them."""
+def beams(polygon: np.ndarray, height: float, below: shapely.Geometry) -> list[Mesh]:
+    """Beams along the shorter side of a room, where nothing is `below` that reaches up to them."""
     room, (low, high) = shapely.Polygon(polygon), (polygon.min(0), polygon.max(0))
     long, (wide, deep) = int(np.ptp(polygon, axis=0).argmax()), BEAM
     usual, free = max(round(float((high - low)[long]) / BETWEEN), 2), list[shapely.Geometry]()
@@ -42,8 +49,7 @@ def beams(polygon: np.ndarray, height: float, look: str, below: shapely.Geometry
         free = [one for one in strips if not one.intersects(below)]
         if len(free) == len(strips):
             break
-    bars = [upright(np.array(one.exterior.coords)[:-1], height - deep, height) for one in free]
-    return [ShellPart("Beams", "beam", (ShellPiece(piece_name("Beams", "mesh"), look, joined(bars)),))] if bars else []
+    return [upright(np.array(one.exterior.coords)[:-1], height - deep, height) for one in free]
 
 
 def bay_window(opening: Opening, kind: str, wall: float = WALL) -> tuple[Mesh, list[Mesh], Mesh, Mesh]:

@@ -30,6 +30,7 @@ RAIL = (0.12, 0.09, 0.25)  # curtain rail: above the window, before the wall, be
 WINDOWS = {"plain": 3, "sash": 2, "bars": 2, "transom": 2}
 DOORS = {"panelled": 3, "four_panels": 2, "flush": 3, "boarded": 1, "glazed": 2}
 SKIRTINGS, CORNICES = (0.06, 0.08, 0.1, 0.14), (0.0, 0.0, 0.06, 0.09)  # heights, metres
+BEAM = (0.13, 0.15)  # metres, width and depth of beams
 BEAMS, BAYS = (*[""] * 11, "beam"), 0.1  # of rooms without a style
 
 

@@ -21,7 +21,6 @@ bay_window, door_glass, door_track, stands_out = lates(
 )
 
 THICKNESS = 0.1  # metres, of floor and ceiling
-BEAM, BETWEEN = (0.13, 0.15), 1.0  # metres, width and depth of beams, and from one to the next
 COVED = 2.5  # metres, height of rooms from which on there may be a cornice
 PARAPET = 1.05  # metres, height of a wall outdoors that nothing opens
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from echomodel import files
 from echousd.stage.encoding import StageError
-from echousd.stage.harmless import read_here, stamp_of
+from echousd.stage.vouched import read_here, stamp_of
 
 READER = Path(__file__).with_name("reader.py")
 PATIENCE = 600.0  # seconds for all files of one call

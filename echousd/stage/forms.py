@@ -13,7 +13,6 @@ from pxr import Sdf, Usd, UsdGeom
 from echomodel.late import lates
 from echousd.stage import values
 
-MAX_INSTANCES = 50_000  # of one instancer
 SOLIDS = ("Cube", "Sphere", "Cylinder", "Cone", "Capsule", "Plane")
 instances, refined, smooth_normals, solid = lates(
     "echousd.stage.subdivision", "instances", "refined", "smooth_normals", "solid"
@@ -57,7 +56,7 @@ def forms(
         others: prims that are left out with all below them.
 
     Warns `SkippedForms` of curves, points, volumes and the like. Raises StageError for an instancer that holds more
-    than `MAX_INSTANCES`.
+    than `subdivision.MAX_INSTANCES`.
     """
     skipped: Counter[str] = Counter()
     first: dict[str, str] = {}
@@ -68,7 +67,7 @@ def forms(
         elif prim.IsA(UsdGeom.PointInstancer):
             prims.PruneChildren()  # prototypes are seen where they are placed
             if shown(prim):
-                yield from instances(UsdGeom.PointInstancer(prim), cache)
+                yield from instances(UsdGeom.PointInstancer(prim), cache, forms)
         elif prim.IsA(UsdGeom.Boundable) and prim.IsA(UsdGeom.Gprim) and shown(prim):
             if prim.IsA(UsdGeom.Mesh) or prim.GetTypeName() in SOLIDS:
                 yield Form(prim, str(prim.GetPath()), values.matrix(cache.GetLocalToWorldTransform(prim), prim))

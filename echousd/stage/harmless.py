@@ -1,7 +1,5 @@
 """Files that this process may read itself: what a manifest or the key of a store vouches for, and shallow texts."""
 
-import os
-from collections.abc import Iterable
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
@@ -10,12 +8,12 @@ from echomodel import files
 from echomodel.late import Late
 from echousd.naming import CRATE
 from echousd.pending import DEEP
+from echousd.stage.vouched import read_here, stamp_of
 
 NESTED = 4_000  # brackets that a text may open: OpenUSD is at its end where some 10,000 stand within each other
 check_apart, stored = Late("echousd.stage.apart:check_apart"), Late("echousd.store:stored")
 read_json = Late("echomodel.bounded:read_json")
 LARGE = 64 * 2**20  # bytes of a file that is looked at here, before it is read
-read_here: set[tuple[str, int, int]] = set()  # path, size and time of those that this process may read
 
 
 def check_harmless(path: Path, stage: Path | None = None) -> None:
@@ -60,14 +58,3 @@ def _listed(path: Path, digest: str) -> bool:
 @lru_cache(maxsize=16)
 def _digests(listing: Path, changed: int) -> frozenset[str]:
     return frozenset(read_json(listing, LARGE)["files"].values())
-
-
-def just_written(paths: Iterable[Path]) -> None:
-    """Have files that this process has just written taken for harmless."""
-    read_here.update(map(stamp_of, paths))
-
-
-def stamp_of(path: Path) -> tuple[str, int, int]:
-    """What tells a file that changed from the same file: path, size and time."""
-    found = path.stat()
-    return os.path.realpath(path), found.st_size, found.st_mtime_ns

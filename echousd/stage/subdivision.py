@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,11 +11,13 @@ from pxr import Usd, UsdGeom
 
 from echousd.stage import values
 from echousd.stage.encoding import StageError
-from echousd.stage.forms import MAX_INSTANCES, Form, forms
 
 if TYPE_CHECKING:
     import trimesh
 
+    from echousd.stage.forms import Form
+
+MAX_INSTANCES = 50_000  # of one instancer
 LEVELS = 2
 SIDES = 32  # corners of a circle
 MAX_FACES = 400_000  # beyond which a level less is made
@@ -126,8 +129,10 @@ def solid(prim: Usd.Prim) -> trimesh.Trimesh:
     return mesh
 
 
-def instances(instancer: UsdGeom.PointInstancer, cache: UsdGeom.XformCache) -> Iterator[Form]:
-    """The forms below the prototypes of an instancer, wherever it places them; raises StageError."""
+def instances(
+    instancer: UsdGeom.PointInstancer, cache: UsdGeom.XformCache, below: Callable[..., Iterable[Form]]
+) -> Iterator[Form]:
+    """The forms `below` the prototypes of an instancer, wherever it places them; raises StageError."""
     prim = instancer.GetPrim()
     which = values.array(instancer.GetProtoIndicesAttr(), whole=True)
     if len(which) > MAX_INSTANCES:
@@ -149,7 +154,7 @@ def instances(instancer: UsdGeom.PointInstancer, cache: UsdGeom.XformCache) -> I
             continue
         if kind not in known:  # below the prototype, relative to it
             base = np.linalg.inv(values.matrix(cache.GetLocalToWorldTransform(prototypes[kind]), prototypes[kind]))
-            known[kind] = [(form, base @ form.world) for form in forms(prototypes[kind], cache)]
+            known[kind] = [(form, base @ form.world) for form in below(prototypes[kind], cache)]
         for form, local in known[kind]:
             world = own @ values.matrix(place, prim) @ local
-            yield Form(form.prim, f"{prim.GetPath()}[{number}]{form.path}", world, prim)
+            yield replace(form, path=f"{prim.GetPath()}[{number}]{form.path}", world=world, above=prim)

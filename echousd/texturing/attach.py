@@ -17,7 +17,7 @@ from echousd.folder import folder as folders
 from echousd.folder import ownership
 from echousd.folder.manifest import find_manifest
 from echousd.folder.merging import loses_text
-from echousd.graph.fields import IDENTIFIER
+from echousd.graph.values import IDENTIFIER
 from echousd.layers import paintings
 from echousd.layers.paintings import FOLDER, MADE, RECORD, VARIANTS, primvar
 from echousd.make.save import write_preview

@@ -14,7 +14,7 @@ from pydantic import BaseModel, Field, ValidationError
 from echomodel.bounded import read_bounded
 from echomodel.files import telling
 from echousd.folder.within import inside
-from echousd.graph.fields import IDENTIFIER
+from echousd.graph.values import IDENTIFIER
 from echousd.invalid import validation_message
 from echousd.texturing.atlas import Unwrapped, layout_digest
 from echousd.texturing.obj import read_obj

@@ -15,7 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from echomodel.training.recipe import read_recipe
-from echomodel.training.start import open_run
+from echomodel.training.run import open_run
 
 
 def main() -> None:

@@ -14,7 +14,7 @@ from echomodel.data.roomset import RoomSet
 from echomodel.data.shapeset import ShapeSet
 from echomodel.text import RandomTextEncoder, TextEncoder
 from echomodel.training.recipe import Recipe, read_recipe
-from echomodel.training.start import open_run
+from echomodel.training.run import open_run
 from echomodel.training.trainer import read_log, step_generator
 from echoscene.checkpoint import load_released
 from echoscene.echo import DISTANCE, ReleasedEcho, published_grids, turned_back

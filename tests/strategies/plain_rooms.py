@@ -37,8 +37,7 @@ def plain_files():
     with (
         patch.object(saving, "room_files", _files),
         patch.object(saving, "manifest_of", _manifest),
-        patch("echousd.folder.folder.flush", lambda path: None),
-        patch("echousd.folder.folder.flush", lambda path: None),
+        patch("echousd.folder.journal.flush", lambda path: None),
         patch("echousd.store.flush", lambda path: None),
     ):
         yield

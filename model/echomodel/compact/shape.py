@@ -7,6 +7,7 @@ per object on principal components.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -15,7 +16,6 @@ from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import seen
-from echomodel.compact.model import CompactModel
 from echomodel.compact.modules import EchoLayer, WordTable
 from echomodel.compact.pairs import Pairs, level_features, pairs_of
 from echomodel.compact.sampling import CompactSampling, Latent, agreeing, group_means
@@ -25,6 +25,9 @@ from echomodel.progress import part_of
 from echomodel.samplers import Predict
 from echomodel.tsdf import FILLED
 from echomodel.vocabulary import vocabulary
+
+if TYPE_CHECKING:
+    from echomodel.compact.model import CompactModel
 
 GRID = 64
 TOGETHER = 256  # objects that are denoised at a time when several draws are made: larger products, bounded memory

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, both, box
-from echomodel.furniture.lamps import disc, kind_of, one_shade, shade
+from echomodel.furniture.shades import disc, kind_of, one_shade, shade
 from echomodel.furniture.solids import Solid, Tube, rotation, tube, turned
 from echomodel.furniture.style import Choices, Style
 

@@ -18,7 +18,7 @@ from echomodel.config import CompactConfig, LatentConfig
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.training.recipe import Recipe, Stage
-from echomodel.training.start import STAGES, open_run
+from echomodel.training.run import STAGES, open_run
 
 GRAPH = GraphBatch.single([0, 1], [(0, 0, 1)])
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3)

@@ -24,7 +24,7 @@ from echomodel.rooms.generator import generate_rooms
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import OptimizerConfig, Recipe
-from echomodel.training.start import open_run, started
+from echomodel.training.run import open_run, started
 from echomodel.vocabulary import speaking, vocabulary
 
 WORDS = vocabulary()

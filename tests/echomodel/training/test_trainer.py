@@ -27,8 +27,8 @@ from echomodel.training.layout_losses import as_carried, measure_distance, state
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.recipe import OptimizerConfig, Recipe, read_recipe
 from echomodel.training.rooms import PackedRooms, draw_batch, make_batch
+from echomodel.training.run import open_run
 from echomodel.training.shape_stage import AutoencoderStage
-from echomodel.training.start import open_run
 from echomodel.training.trainer import read_log, step_generator
 from echomodel.vocabulary import vocabulary
 
@@ -336,8 +336,8 @@ class Bare(MetaPathFinder):
             raise ModuleNotFoundError(name)
 
 sys.meta_path.insert(0, Bare())
-import echomodel.training.start
-assert echomodel.training.start.STAGES["layout"].itself.__name__ == "LayoutStage"
+import echomodel.training.run
+assert echomodel.training.run.STAGES["layout"].itself.__name__ == "LayoutStage"
 """
 
 

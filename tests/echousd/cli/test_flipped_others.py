@@ -57,7 +57,9 @@ def ran(*commands: tuple[str, ...]) -> Callable[[Path], object]:
 
 def interrupted(top: Path) -> None:
     """A room whose last run was killed when its journal was there."""
-    from echousd.folder.folder import STAGING, Journal, Move, digest, digest_of, write_journal
+    from echomodel.files import digest
+    from echousd.folder.journal import Journal, Move, digest_of, write_journal
+    from echousd.pending import STAGING
 
     ran(MADE)(top)
     staging = top / "room" / STAGING

@@ -21,7 +21,7 @@ from echousd.assets.index import index
 from echousd.assets.table import read_library
 from echousd.batches.verify import finish
 from echousd.folder import history
-from echousd.folder.folder import DONE
+from echousd.folder.journal import DONE
 from echousd.folder.manifest import find_manifest
 from echousd.make.save import save_room
 from echousd.pending import STAGING

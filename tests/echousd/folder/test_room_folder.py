@@ -9,9 +9,10 @@ from dying_process import killed
 from pydantic import ValidationError
 from stopped_disk import stopped_disk
 
-from echousd.folder import folder
+from echousd.folder import journal
 from echousd.folder.folder import check_output, check_writable, claim, recover, write_together
 from echousd.folder.found import room_at, rooms_at
+from echousd.folder.interrupted import read_journal
 from echousd.folder.lock import LOCK
 from echousd.folder.manifest import Manifest
 from echousd.pending import JOURNAL, STAGING
@@ -49,9 +50,9 @@ def test_writes_changes_only_and_leaves_other_files(tmp_path):
 
 def test_a_journal_is_on_the_disk_after_all_that_it_names(tmp_path, monkeypatch):
     flushed = []
-    monkeypatch.setattr(folder, "flush", lambda path: flushed.append((path.name, (tmp_path / JOURNAL).exists())))
-    entry = folder.Move(staged="0", to="room.usda", digest="")
-    folder.write_journal(tmp_path, folder.Journal(move=[entry], remove=[]))
+    monkeypatch.setattr(journal, "flush", lambda path: flushed.append((path.name, (tmp_path / JOURNAL).exists())))
+    entry = journal.Move(staged="0", to="room.usda", digest="")
+    journal.write_journal(tmp_path, journal.Journal(move=[entry], remove=[]))
     assert flushed == [("0", False), ("journal.new", False), (tmp_path.name, True)]
 
 
@@ -60,10 +61,10 @@ def test_a_journal_names_no_file_of_the_runs_themselves(tmp_path, entry):
     (tmp_path / STAGING).mkdir()
     own = f"{STAGING}/0"
     told = {"move": [{"staged": "0", "to": own, "digest": ""}], "remove": [{"path": own, "digest": ""}]}
-    journal = folder.Journal.model_validate({"move": [], "remove": [], entry: told[entry]})
-    (tmp_path / STAGING / JOURNAL).write_text(journal.model_dump_json())
+    left = journal.Journal.model_validate({"move": [], "remove": [], entry: told[entry]})
+    (tmp_path / STAGING / JOURNAL).write_text(left.model_dump_json())
     with pytest.raises(ValueError, match=rf"{entry}\[0\] names .*, where runs keep their own files"):
-        folder.read_journal(tmp_path)
+        read_journal(tmp_path)
 
 
 @pytest.mark.parametrize(("field", "most"), [("restores", 4096), ("store", 4096), ("name", 255)])

@@ -18,9 +18,9 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from plain_rooms import CATEGORIES, plain_files, plain_room
 from pxr import Sdf
 
+from echomodel.files import digest
 from echousd.folder import folder as folders
 from echousd.folder import history
-from echousd.folder.folder import digest
 from echousd.folder.lock import LOCK
 from echousd.folder.manifest import find_manifest
 from echousd.make.save import save_room

@@ -193,17 +193,17 @@ def test_a_leaf_slides_no_further_than_its_wall(offset, reach) -> None:
 )
 def test_beams_lie_from_wall_to_wall_below_the_ceiling_but_for_what_hangs_there(polygon) -> None:
     middle = shapely.Point(polygon.mean(0)).buffer(0.3)
-    (free,), (hung,) = (beams(polygon, 2.6, "beam", below) for below in (shapely.Polygon(), middle))
+    free, hung = (beams(polygon, 2.6, below) for below in (shapely.Polygon(), middle))
     room = shapely.Polygon(polygon)
-    for part, below in ((free, shapely.Polygon()), (hung, middle)):
-        for one in part.pieces[0].mesh.trimesh.split():
+    for bars, below in ((free, shapely.Polygon()), (hung, middle)):
+        for one in (bar.trimesh for bar in bars):
             assert one.is_watertight
             np.testing.assert_allclose(one.bounds[:, 1], [2.45, 2.6])
             plan = shapely.MultiPoint(one.vertices[:, [0, 2]]).envelope
             assert room.buffer(1e-6).covers(plan)
             assert plan.boundary.intersection(room.boundary).length == pytest.approx(2 * 0.13)
             assert not plan.intersects(below)
-    assert beams(polygon, 2.6, "beam", room) == []
+    assert beams(polygon, 2.6, room) == []
 
 
 @pytest.mark.parametrize("turn", [1, -1])
