@@ -31,6 +31,8 @@ windows: [north, {wall: 0, at: middle, width: 1.0}]
         ({"wall": "left", "at": "end"}, "door", Opening("door", "door", 0, 3.0, 0.9, 2.0)),
         ({"edge": 2}, "passage", Opening("passage", "passage", 2, 1.4, 1.2, 2.1)),
         (2, "door", Opening("door", "door", 2, 0.1, 0.9, 2.0)),
+        ({"wall": 2, "width": 2.9}, "door", Opening("door", "door", 2, 0.1, 2.9, 2.0)),
+        ({"wall": 3, "width": 2.9}, "door", Opening("door", "door", 3, 0.05, 2.9, 2.0)),  # no more is free at each side
     ],
 )  # fmt: skip
 def test_words(entry: object, kind: str, expected: Opening) -> None:

@@ -8,6 +8,7 @@ import os
 import pytest
 
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph, load_graph, save_graph
+from echousd.graph.text import graph_from_text
 
 FIVE_LINES = """\
 room: bedroom
@@ -186,6 +187,12 @@ def test_faults_in_json_name_file_and_line(tmp_path, monkeypatch, text, message)
     with pytest.raises(GraphError) as error:
         load_graph("x.json")
     assert str(error.value).startswith(message)
+
+
+@pytest.mark.parametrize(("depth", "told"), [(64, "allowed: a mapping"), (65, "nested too deeply")])
+def test_yaml_is_nested_in_64_levels_at_most(depth, told):
+    with pytest.raises(GraphError, match=told):
+        graph_from_text(SceneGraph, "[" * depth + "]" * depth, "yaml")
 
 
 def test_faults_in_a_text_without_a_file():
