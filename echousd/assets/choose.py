@@ -130,14 +130,9 @@ class Asked:
 
 
 def choose(
-    wishes: AssetWishes,
-    asked: Sequence[Asked],
-    seed: int,
-    *,
-    kept: Mapping[str, AssetRecord] | None = None,
-    nearness: Mapping[str, Mapping[str, float]] | None = None,
-    palette: np.ndarray | None = None,
-) -> tuple[dict[str, AssetRecord], list[str]]:
+    wishes: AssetWishes, asked: Sequence[Asked], seed: int, *, kept: Mapping[str, AssetRecord] | None = None,
+    nearness: Mapping[str, Mapping[str, float]] | None = None, palette: np.ndarray | None = None,
+) -> tuple[dict[str, AssetRecord], list[str]]:  # fmt: skip
     """Object name -> its model, and the objects that the library has nothing for; equal arguments give equal choices.
 
     Arguments:
@@ -182,14 +177,9 @@ def fits(record: AssetRecord, size: Sequence[float] | np.ndarray, stretch: float
 
 
 def _best(
-    wishes: AssetWishes,
-    one: Asked,
-    used: set[str],
-    company: Sequence[AssetRecord],
-    seed: str,
-    nearness: Mapping[str, float] | None,
-    tones: np.ndarray,
-) -> AssetRecord | None:
+    wishes: AssetWishes, one: Asked, used: set[str], company: Sequence[AssetRecord], seed: str,
+    nearness: Mapping[str, float] | None, tones: np.ndarray,
+) -> AssetRecord | None:  # fmt: skip
     ranked: list[tuple[float, str, AssetRecord]] = []
     wanted = np.reshape(stated_colors(one.stated), (-1, 3))
     worn = np.array([other.colors[1:4] for other in company if other.colors]).reshape(-1, 3)  # their main ones

@@ -55,14 +55,9 @@ class Indexed:
 
 
 def index(
-    folders: Sequence[Path],
-    file: Path,
-    *,
-    workers: int = 1,
-    table: Path | None = None,
-    descriptors: bool = False,
+    folders: Sequence[Path], file: Path, *, workers: int = 1, table: Path | None = None, descriptors: bool = False,
     progress: Progress | None = None,
-) -> Indexed:
+) -> Indexed:  # fmt: skip
     """Index the models of some folders and libraries.
 
     Arguments:

@@ -67,15 +67,10 @@ class BatchResult:
 
 
 def batch(
-    sources: str | Path | Sequence[str | Path] = (),
-    out: str | Path = "batch",
-    *,
-    sample: Mapping[str, int] | None = None,
-    count: int = 1,
-    seed: int = 0,
-    variations: Mapping[str, Sequence[Any]] | None = None,
-    **options: Any,
-) -> BatchResult:
+    sources: str | Path | Sequence[str | Path] = (), out: str | Path = "batch", *,
+    sample: Mapping[str, int] | None = None, count: int = 1, seed: int = 0,
+    variations: Mapping[str, Sequence[Any]] | None = None, **options: Any,
+) -> BatchResult:  # fmt: skip
     """Make many rooms in one folder, each whole or not at all; a run that was ended is gone on with (`resume=True`).
 
     The rooms are the same bytes for any number of workers and shards, whatever died on the way.

@@ -69,13 +69,9 @@ class LocalWorkers:
     """
 
     def __init__(
-        self,
-        workers: int,
-        *,
-        devices: Sequence[dict[str, str]] = (),
-        timeout: float | None = None,
+        self, workers: int, *, devices: Sequence[dict[str, str]] = (), timeout: float | None = None,
         memory: int | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._timeout, self._memory = timeout, memory
         self._context = multiprocessing.get_context("spawn")
         self._workers = [self._start(one) for one in islice(cycle(devices or [{}]), workers)]
@@ -248,14 +244,9 @@ class RayCluster:
     """
 
     def __init__(
-        self,
-        address: str = "auto",
-        *,
-        workers: int | None = None,
-        timeout: float | None = None,
-        memory: int | None = None,
-        gpus: bool = False,
-    ) -> None:
+        self, address: str = "auto", *, workers: int | None = None, timeout: float | None = None,
+        memory: int | None = None, gpus: bool = False,
+    ) -> None:  # fmt: skip
         self._ray = extra("ray", "--ray needs Ray", "ray")
         self._ours = not self._ray.is_initialized()
         if self._ours:

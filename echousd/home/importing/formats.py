@@ -81,13 +81,9 @@ def unit_of(text: str | None) -> float | None:
 
 
 def import_plan(
-    path: str | Path,
-    *,
-    format: str | None = None,
-    unit: str | None = None,
-    storey: str | None = None,
+    path: str | Path, *, format: str | None = None, unit: str | None = None, storey: str | None = None,
     lenient: bool = False,
-) -> Imported:
+) -> Imported:  # fmt: skip
     """The home in somebody's floor plan: DXF, SVG, IFC, Sweet Home 3D, or JSON of RoomPlan and simulators.
 
     Arguments:
@@ -96,7 +92,7 @@ def import_plan(
         storey: one of several, None = the lowest. lenient: leave out doors and windows that meet no wall.
 
     Raises `GraphError` that names the file.
-    """  # fmt: skip
+    """
     name, found = read_plan(Path(path), format, unit_of(unit))
     with faults_of(str(path)):
         return imported(replace(found, format=name), storey, lenient=lenient)

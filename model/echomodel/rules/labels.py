@@ -22,13 +22,9 @@ def label_relations(room: RoomBoxes, **how: Any) -> np.ndarray:
 
 
 def label_rooms(
-    rooms: Sequence[RoomBoxes],
-    *,
-    rules: str = "strict",
-    drop: float = 0.0,
-    rng: np.random.Generator | None = None,
+    rooms: Sequence[RoomBoxes], *, rules: str = "strict", drop: float = 0.0, rng: np.random.Generator | None = None,
     headings: bool = False,
-) -> list[np.ndarray]:
+) -> list[np.ndarray]:  # fmt: skip
     """All relations that hold in each room, less a random share.
 
     Arguments:

@@ -25,14 +25,9 @@ def measured(rules: str = "strict") -> frozenset[int]:
 
 
 def margins(
-    boxes: BoxesLike,
-    triplets: Array,
-    *,
-    rules: str = "strict",
-    center: Array | None = None,
-    fronts: Array | None = None,
-    rigid: bool = False,
-) -> Array:
+    boxes: BoxesLike, triplets: Array, *, rules: str = "strict", center: Array | None = None,
+    fronts: Array | None = None, rigid: bool = False,
+) -> Array:  # fmt: skip
     """Signed margin of every relation, >= 0 iff it is satisfied; differentiable in size, position and yaw.
 
     Arguments:

@@ -79,11 +79,9 @@ def placement_margins(
 
 
 def margin_of(
-    one: Stated,
-    every: Sequence[Spread] | Mapping[int, Spread],
-    walls: Walls | None,
+    one: Stated, every: Sequence[Spread] | Mapping[int, Spread], walls: Walls | None,
     categories: Sequence[str] | Mapping[int, str],
-) -> Array:
+) -> Array:  # fmt: skip
     """(K,) margin of one placement, metres; NaN where it needs walls and there are none.
 
     Arguments:
