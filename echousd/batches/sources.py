@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from echomodel.files import within_memory
+from echomodel.files import telling, within_memory
 from echomodel.late import extra
 from echomodel.vocabulary import vocabulary
 from echousd.assets.table import LARGEST, unpacked
@@ -127,15 +127,12 @@ def _rooms_of(path: Path) -> list[str]:
 
 
 def _lines(path: Path) -> Iterator[FoundGraph]:
-    try:
-        with path.open(encoding="utf-8", errors="replace") as file:
-            for number, line in enumerate(iter(lambda: file.readline(MAX_BYTES + 1), ""), 1):
-                if len(line) > MAX_BYTES:
-                    raise ValueError(f"{path}:{number}: more than {MAX_BYTES} characters, allowed for a scene graph")
-                if line.strip():
-                    yield _text(path, number, line)
-    except OSError as error:
-        raise ValueError(f"{path}: {(error.strerror or str(error)).lower()}") from None
+    with telling(path, "cannot be read"), path.open(encoding="utf-8", errors="replace") as file:
+        for number, line in enumerate(iter(lambda: file.readline(MAX_BYTES + 1), ""), 1):
+            if len(line) > MAX_BYTES:
+                raise ValueError(f"{path}:{number}: more than {MAX_BYTES} characters, allowed for a scene graph")
+            if line.strip():
+                yield _text(path, number, line)
 
 
 def _rows(path: Path) -> Iterator[FoundGraph]:

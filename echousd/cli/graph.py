@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from echomodel.files import check_free
+from echomodel.files import check_free, telling
 from echomodel.late import Late
 from echousd.cli.options import AsJson, Replace, ReplacePicture, documented_command
 from echousd.cli.output import check_picture, counted, say, say_done, say_json
@@ -67,10 +67,8 @@ def new(
     words = [("door", text) for text in door or ()] + [("window", text) for text in window or ()]
     if words:
         made = made.replaced(room=with_openings(made.room, words))
-    try:
+    with telling(out.parent, "cannot be made"):
         out.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise GraphError(f"{out.parent}: cannot be made ({(error.strerror or str(error)).lower()})") from None
     save_graph(made, out)
     counts = {"objects": len(made.nodes), "relations": len(made.relations), "placements": len(made.placements)}
     say_done(json, [out], [f"wrote {out}: {_summary(made)}"], counts)
