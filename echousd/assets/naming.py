@@ -83,18 +83,11 @@ def fitted(category: str, *texts: str) -> bool:
 
 
 @cache
-def _words() -> dict[str, str]:
-    """Every name and alias of a category -> the category."""
-    rows = vocabulary().categories
-    return {word: row.name for row in rows for word in row.aliases} | {row.name: row.name for row in rows}
-
-
-@cache
 def known_word(text: str) -> str:
     """The category that a text is the name or an alias of, "" where it is none."""
-    words = _words()
-    word = re.sub(r"_?\d+$", "", normalised(text))
-    return words.get(word) or words.get(word.removesuffix("s"), "")
+    word, known = re.sub(r"_?\d+$", "", normalised(text)), vocabulary().known_category
+    found = known(word) or known(word.removesuffix("s"))
+    return found.name if found else ""
 
 
 def _within(text: str, least: int = 1) -> str:

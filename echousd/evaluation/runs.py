@@ -3,13 +3,11 @@
 import json
 import math
 import time
-import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from importlib import resources
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -20,7 +18,7 @@ import trimesh
 from echomodel.boxes2d import seen
 from echomodel.data.roomset import load_rooms, with_known_words
 from echomodel.data.sgfront import SGFront
-from echomodel.files import raising
+from echomodel.files import raising, tables
 from echomodel.metrics.layouts import Task
 from echomodel.metrics.statistics import Counts, Figure, Pair, figure
 from echomodel.progress import StageListener
@@ -214,8 +212,7 @@ def rooms_of(system: System, settings: SuiteSettings) -> tuple[list[Task], list[
 
 def note(section: str, **values: Any) -> str:
     """What a table measures, as notes.toml has it."""
-    text = resources.files("echousd.evaluation").joinpath("notes.toml").read_text("utf-8")
-    return " ".join(tomllib.loads(text)[section].split()).format(**values)
+    return " ".join(tables("notes.toml", __file__)[section].split()).format(**values)
 
 
 def figures(
