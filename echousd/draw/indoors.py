@@ -30,7 +30,7 @@ WHITER = 0.36  # how much less coloured the light of lamps is than told: no wall
 DIM = 0.02  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
-ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.6, 0.75), (0.38, 0.61), 70, 15.0
+ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.6, 0.75), (0.38, 0.61), 70, 40.0
 EVEN = (0.18, 0.3)  # power of the light's brightness that eyes take from it, and inside whoever photographs rooms
 WHITE, PAPER = 84, 0.95  # what so many of a hundred points are darker than comes to no more than that
 CONTRAST, KNEE = 1.42, 0.6  # power about what is bright, and from where on highlights are rolled off

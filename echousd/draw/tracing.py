@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -10,7 +10,8 @@ import numpy as np
 
 from echomodel.triangles import along
 from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, VIEW, Bounced, evened, exposure, rolled
-from echousd.draw.scenery import SKY_LIGHT, Scenery, next_room, outside
+from echousd.draw.scenery import CLOTH, SKY_LIGHT, Scenery, next_room, outside
+from echousd.draw.smoothing import RINGS, same_surface, smooth_light
 from echousd.draw.views import View
 
 FINE, QUICK = 3, 2  # squared: rays per pixel
@@ -64,9 +65,9 @@ def _drawn(world: World, height: int, rays: int) -> np.ndarray:
     own = np.flatnonzero((seen.face >= 0) & ~world.scenery.planes.glows.take(seen.face))  # no lamp, and nothing outside
     tone = exposure(color.take(own, 1) if len(own) else color, world.white, world.scenery.lights.day)
     tone = tone if world.view.inside else rolled
-    color = np.where(seen.shown, color, tone(color))
+    color = _blended(seen, color, tone)
     finer = _colored(world, more, _lent(world, more, pixel, seen, light))
-    finer = np.where(more.shown, finer, tone(finer)) - color.take(pixel, 1)
+    finer = _blended(more, finer, tone) - color.take(pixel, 1)
     color += np.stack([np.bincount(pixel, part / many, len(edge)) for part in finer])
     color = color.reshape(3, height, size)
     wide = np.pad(color, ((0, 0), (1, 1), (1, 1)), mode="edge")  # of an edge's pixel each neighbour takes an eighth
@@ -75,16 +76,20 @@ def _drawn(world: World, height: int, rays: int) -> np.ndarray:
     return np.where(edge.reshape(height, size), soft, color)
 
 
+def _blended(seen: Seen, color: np.ndarray, tone: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """(3, n) radiance as a picture shows it, and over it the share of what lies around."""
+    return np.asarray(tone(color) * (1 - seen.shown) + seen.shown * seen.glow)
+
+
 BLOCK = 32_000  # rays at a time, which bounds the memory and stays in the cache
-BAND = 64  # rows of a picture at a time, for the same reasons
-RINGS = (1, 2, 4, 8)  # places between neighbours, pass by pass
 # Pixels to the right and down, near ones first.
 BESIDE = np.array(sorted(product(range(-2, 3), repeat=2), key=lambda at: at[0] ** 2 + at[1] ** 2)[:13])
 POOL, CORNERS = 0.15, np.array(list(product((0, 1), repeat=3)))  # metres; of a cell of these
-CLOSE, EVEN = 2, 0.4  # from which ring on it matters how bright neighbours are, and the share that they may differ by
-ALIKE, FLAT = 0.97, 0.02  # cosine and metres within which two points lie on one flat piece of surface
 # metres before a surface, from where on it is no more in the way of its own light; and of what cloth is thick
 BEFORE, THICK = np.float32(2e-3), np.float32(0.016)
+# Of thin cloth before a pane: metres behind it where one begins to see, the share of what is there, the power of the
+# cosine by which that is less aside; how bright bars of the window are before the light.
+BEHIND, SEEN_BY, CLOSER, BAR = 0.05, 0.42, 6, 0.45
 MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
 
 
@@ -107,7 +112,8 @@ class World(NamedTuple):
 
 class Seen(NamedTuple):
     """What n rays met: faces (n,), -1 for none; points and normals (3, n); places between the face's corners (2, n);
-    and colour (3, n) where none is, and whether (n,) it is as a picture shows it: that of what lies around."""
+    and colour (3, n) of what lies around, and the share (n,) that it has in the picture as it is: all through a pane,
+    some through thin cloth before one."""
 
     face: np.ndarray
     point: np.ndarray
@@ -183,7 +189,7 @@ def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None 
 def _other(world: World, one: Seen, two: Seen) -> np.ndarray:
     """(n,) bool: what is another surface or material."""
     material = world.scenery.planes.material
-    same = _same(one.normal, one.point, two.normal, two.point)
+    same = same_surface(one.normal, one.point, two.normal, two.point)
     return (material.take(one.face) != material.take(two.face)) | ~same
 
 
@@ -201,7 +207,11 @@ def _at_edges(world: World, seen: Seen, shape: tuple[int, int]) -> np.ndarray:
 def _seen(world: World, origin: np.ndarray, way: np.ndarray, hit: Sequence[np.ndarray]) -> Seen:
     """What rays met, of what `_hit` says of them."""
     scenery, (face, far, (u, v)) = world.scenery, hit
-    glow, missed, shown = np.zeros((3, len(face)), np.float32), np.flatnonzero(face < 0), np.zeros(len(face), bool)
+    glow, missed, shown = (
+        np.zeros((3, len(face)), np.float32),
+        np.flatnonzero(face < 0),
+        np.zeros(len(face), np.float32),
+    )
     begin, towards = origin.take(missed, 1), way.take(missed, 1)
     glow[:, missed], through = outside(scenery, begin, towards)
     if world.view.inside:
@@ -214,7 +224,24 @@ def _seen(world: World, origin: np.ndarray, way: np.ndarray, hit: Sequence[np.nd
     a, b, c = (scenery.triangles[face[averted], corner].T for corner in range(3))
     flat = np.cross(b - a, c - a, axis=0)
     normal[:, averted] *= -np.copysign(np.float32(1), along(flat, normal[:, averted]) * along(flat, way[:, averted]))
-    return Seen(face, origin + far * way, normal, hit[2], glow, shown)
+    seen = Seen(face, origin + far * way, normal, hit[2], glow, shown)
+    if world.view.inside:
+        _see_through(world, way, seen)
+    return seen
+
+
+def _see_through(world: World, way: np.ndarray, seen: Seen) -> None:
+    """Tell of thin cloth before a pane, which rays (3, n) met, what lies behind it: what is around, or a bar; where its
+    folds turn aside it is closer."""
+    scenery = world.scenery
+    sheer = np.flatnonzero((scenery.thin.take(seen.face) > CLOTH) & (seen.face >= 0))
+    way = way.take(sheer, 1)
+    point, facing = seen.point.take(sheer, 1) + BEHIND * way, np.abs(along(way, seen.normal.take(sheer, 1)))
+    around, through = outside(scenery, point, way)
+    behind = _hit(world, point, way)[0]
+    open_ = (behind < 0) | (scenery.thin.take(behind) > 0)
+    seen.glow[:, sheer] = scenery.lights.there(around) * np.where(open_, 1, np.float32(BAR))
+    seen.shown[sheer] = SEEN_BY * through * facing**CLOSER
 
 
 def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndarray:
@@ -271,7 +298,7 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
         many, lent = weight[here].copy(), light[here].copy()
         for down, right in product(*(range(each + 1) for each in odd)):
             beside = np.s_[..., down : down + many.shape[0], right : right + many.shape[1]]
-            fits = there[beside] & _same(*own, *(each[beside] for each in known)) if any(odd) else there[beside]
+            fits = there[beside] & same_surface(*own, *(each[beside] for each in known)) if any(odd) else there[beside]
             lent += fits * found[beside]
             many += fits
         light[here], weight[here] = lent / np.maximum(many, 1), many
@@ -304,18 +331,13 @@ def _pooled(seen: Seen, light: np.ndarray) -> np.ndarray:
     return np.asarray(taken[1:] / np.maximum(taken[0], 1e-9), np.float32)
 
 
-def _same(normal: np.ndarray, point: np.ndarray, other_normal: np.ndarray, other_point: np.ndarray) -> np.ndarray:
-    """Whether points lie on one flat piece of surface, (...) bool of (3, ...)."""
-    return (along(normal, other_normal) > ALIKE) & (np.abs(along(normal, point - other_point)) < FLAT)
-
-
 def _lent(world: World, more: Seen, pixel: np.ndarray, seen: Seen, light: np.ndarray) -> np.ndarray:
     """(6, n) light of what further rays in some pixels met: that of the same surface there or beside it, else asked."""
     out, wanted = np.zeros((6, len(pixel)), np.float32), np.flatnonzero(more.face >= 0)
     for apart in BESIDE @ (1, world.size):
         other = np.clip(pixel.take(wanted) + apart, 0, light.shape[1] - 1)
         own = more.normal.take(wanted, 1), more.point.take(wanted, 1)
-        fits = (seen.face.take(other) >= 0) & _same(*own, seen.normal.take(other, 1), seen.point.take(other, 1))
+        fits = (seen.face.take(other) >= 0) & same_surface(*own, seen.normal.take(other, 1), seen.point.take(other, 1))
         out[:, wanted[fits]] = light.take(other[fits], 1)
         wanted = wanted[~fits]
     rest, pixel = more.of(wanted), pixel[wanted]
@@ -358,41 +380,6 @@ def _breadth(world: World, seen: Seen) -> np.ndarray:
     away = np.sqrt(np.maximum(along(back, back), np.float32(1e-9)))
     slant = np.clip(along(back, seen.normal) / away, 0.05, 1)
     return np.asarray(2 * world.view.half / world.size * (away / np.sqrt(slant)) ** (not world.view.orthographic))
-
-
-def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, reach: Sequence[Any]) -> np.ndarray:
-    """Mean of the light (c, h, w) over neighbours on the same flat piece of surface (joint bilateral filter).
-
-    Far passes leave out what is much lighter or darker, so that shadows keep their edges. `normal`, `point`: (3, h, w)
-    of the surface. `reach`: layers of the light, a slice of them, `RINGS` that these are smoothed over, and (h, w) what
-    must be equal there if anything: what steel mirrors is nothing that the pane in it does, and has no other edges.
-    """
-    height, width = light.shape[1:]
-    for apart in sorted({ring for _, rings, *_ in reach for ring in rings}):
-        # passes with ever wider holes reach far with few neighbours ("a trous")
-        parts = [(layers, light[layers], *alike) for layers, rings, *alike in reach if apart in rings]
-        sums = [(layers, own, own.mean(0), own.copy(), np.ones_like(own[0]), *alike) for layers, own, *alike in parts]
-        # what two share they give each other: half of all eight are met
-        for down, across in ((0, apart), (apart, -apart), (apart, 0), (apart, apart)):
-            for top in range(0, height - down, BAND):
-                bottom, left, right = min(top + BAND, height - down), max(-across, 0), width - max(across, 0)
-                here = np.s_[..., top:bottom, left:right]
-                there = np.s_[..., top + down : bottom + down, left + across : right + across]
-                share = np.maximum(along(normal[here], normal[there]), 0)
-                for _ in range(5):  # to the power of 32
-                    share *= share
-                share *= np.abs(along(normal[here], point[there] - point[here])) < FLAT
-                for (_, own, bright, total, weight, *alike), (one, other) in product(
-                    sums, ((here, there), (there, here))
-                ):
-                    part = share * (alike[0][one] == alike[0][other]) if alike else share
-                    if apart > CLOSE and not alike:
-                        part = part / (1 + np.square((bright[other] - bright[one]) / (EVEN * bright[one] + 1e-4)) ** 2)
-                    total[one] += part * own[other]
-                    weight[one] += part
-        for layers, _, _, total, weight, *_ in sums:
-            light[layers] = total / weight
-    return light
 
 
 ABOVE = np.array([0.38, 0.84, 0.32], np.float32) / np.float32(0.9759)

@@ -16,7 +16,7 @@ from echousd.draw.drawables import image_of
 from echousd.draw.from_files import render
 from echousd.draw.indoors import BRIGHT, SHARE, evened, exposure, read_lights, with_ceiling
 from echousd.draw.rendering import render_stage
-from echousd.draw.scenery import read_scenery
+from echousd.draw.scenery import CLOTH, SHEER, read_scenery
 from echousd.draw.tracing import trace
 from echousd.draw.views import View, hero_view, view_matrix
 from echousd.options import RoomOptions
@@ -284,10 +284,30 @@ def test_the_rim_of_what_is_round_is_lit_as_what_is_beside_it():
 def test_light_comes_through_a_curtain_and_not_through_a_board():
     scenery, down = box_room(sky=0.0, **LAMP)
     curtain, board = (
-        trace(with_sheet(scenery, level_sheet(1.0, 1.0, y=2.0), thin=np.full(2, thin)), down, 32, rays=2).mean(-1)
+        trace(with_sheet(scenery, level_sheet(0.3, 0.3, y=2.0), thin=np.full(2, thin)), down, 32, rays=2).mean(-1)
         for thin in (0.3, 0.0)
     )
-    assert curtain[14:18, 14:18].mean() > board[14:18, 14:18].mean() + 0.1
+    darker = [picture[:2].mean() - picture[14:18, 14:18].mean() for picture in (curtain, board)]  # than the floor
+    assert darker[0] < darker[1] - 0.1
+
+
+def test_one_sees_through_thin_cloth_before_a_window_what_lies_outside_and_its_folds():
+    pane = np.array([[(1.99, 1.0, 0.0), (0.0, 0.0, 1.5), (0.0, 0.8, 0.0)]], np.float32)
+    view = View(view_matrix(np.array([-1.8, 1.0, 0.0]), np.array([0.5, 1.0, 0.0])), 0.3, False, inside=True)
+    lawn = np.full((8, 16, 3), (40, 160, 40), np.uint8)
+    scenery, _ = box_room(sky=1.0, sun=None, view=lawn)
+    wall = (scenery.triangles[..., 0] > 1.9).all(1)
+    names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "thin", "st", "texture", "wall")
+    scenery = replace(scenery, panes=pane, **{name: getattr(scenery, name)[~wall] for name in names})
+
+    def green(thin: float, aside: float = 0.0) -> float:
+        x = np.array([1.8 - aside, 1.8 + aside])  # of the left and the right border
+        sheet = np.array([(x[0], 0, -0.7), (x[1], 0, 0.7), (x[1], 2, 0.7), (x[0], 2, -0.7)])
+        picture = trace(with_sheet(scenery, sheet, thin=np.full(2, thin)), view, 32, rays=1)[14:18, 14:18]
+        return float(picture[..., 1].mean() - picture[..., 0].mean())
+
+    assert green(CLOTH) < 0.02
+    assert green(SHEER * CLOTH) > green(SHEER * CLOTH, 0.12) + 0.01 > 0.05  # less where it turns aside
 
 
 def test_a_shade_is_brightest_at_its_bulb():

@@ -74,7 +74,7 @@ def test_solids_that_the_budget_has_no_room_for_are_told_of():
 
 @pytest.mark.parametrize("wide", [0.6, 2.4, 3.6])
 def test_a_wide_window_has_the_cloth_of_its_curtain(wide):
-    size, made = np.array([wide, 0.68, 0.026]), dressing.KINDS["cafe_curtain"]
+    size, made = np.array([wide, 0.68, 0.036]), dressing.KINDS["cafe_curtain"]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         within_budget(dressing.thing("cafe_curtain", size, np.random.default_rng(0)), size, made.faces)
