@@ -130,7 +130,7 @@ def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: 
 
 
 # Metres of bare wall that ask for a picture, a wide one, three, for two groups; and for one beside a longer stretch.
-STRETCH, UPRIGHT, LONG, HALL, SECOND = 1.0, 2.0, 3.0, 4.4, 1.7
+STRETCH, UPRIGHT, LONG, HALL, SECOND = 1.0, 2.0, 3.0, 4.4, 1.5
 DECOR, OTHER = ("macrame", "wall_baskets", "wall_plates", "sunburst_mirror"), 0.3  # share of stretches with it
 STEP = 0.1  # metres from spot to spot along a wall
 PROBE = np.array([0.3, 0.8, 0.03])  # a picture that tells whether a spot is bare
@@ -147,7 +147,7 @@ def bare_walls(setting: Setting) -> None:
     for length, middle, wall in sorted(found, key=lambda one: -one[0]):
         rng = setting.rng(f"wall {wall.edge}", f"bare {middle:.1f}")
         kind, variant = str(rng.choice(DECOR)), int(rng.integers(1 << 30))
-        wide = float(np.clip(0.4 * length, 0.6, 1.3))
+        wide = float(np.clip(0.48 * length, 0.6, 1.5))
         size = np.round([wide, wide * rng.uniform(0.66, 0.75), 0.03], 2)
         if setting.resident != "child" and rng.random() < OTHER and kind not in {one.kind for one in setting.placed}:
             other = usual_size(kind, rng)
@@ -158,7 +158,7 @@ def bare_walls(setting: Setting) -> None:
             size[:2] = rng.permutation(size[:2])
         spots = [middle]
         if length > LONG:
-            wide = float(np.clip(0.19 * length, 0.6, 0.8))
+            wide = float(np.clip(0.21 * length, 0.55, 0.85))
             size = np.round([wide, 1.36 * wide, 0.03], 2)
             spots = [middle + step * (wide + 0.12) for step in (-1, 0, 1)]
         places = [(x, EYE - float(size[1]) / 2) for x in spots]

@@ -86,8 +86,8 @@ def _under(setting: Setting, host: Standing) -> tuple[tuple[float, float], tuple
         reach = 1.7
         for table in tables[:1]:
             ahead = host.in_plan(table.position)[1] - d / 2
-            reach = float(np.clip(ahead, 0.4, 1.3)) + float(table.size[2]) / 2 + 0.45
-        return (0.0, d / 2 + reach / 2 - 0.15), (w + 0.5, reach + 0.3)
+            reach = float(np.clip(ahead, 0.4, 1.3)) + float(table.size[2]) / 2 + 0.6
+        return (0.0, d / 2 + reach / 2 - 0.15), (w + 0.8, reach + 0.3)
     if host.row.access:  # a desk, which may stand at a wall
         return (0.0, d / 2 + 0.3), (w + 0.9, 1.5)
     return (0.0, 0.0), (w + 1.2, d + 1.2)

@@ -182,7 +182,7 @@ def _group(setting: Setting, wall: Wall, along: float, host: Standing, rng: np.r
         return False
     free = setting.height - 0.25 - host.top - OVER
     rows = 2 if free > 1.15 and wide > 1.7 and rng.random() < 0.5 else 1
-    w = float(np.clip((0.8 * wide - 0.16) / 3, 0.28, 0.5))
+    w = float(np.clip((0.85 * wide - 0.16) / 3, 0.28, 0.6))
     h = round(min(w * 1.3, (free - 0.08 * (rows - 1)) / rows), 2)
     if h < 0.3:
         return False
@@ -222,10 +222,10 @@ def _over(host: Standing, setting: Setting, rng: np.random.Generator) -> list[tu
     if "mirror" in host.row.invites and not any("mirror" in part.slots for part in host.geometry.parts):
         mirror = "round_mirror" if rng.random() < 0.5 else "mirror"
         out.append((mirror, usual_size(mirror, rng)))
-    share = rng.uniform(0.5, 0.62)
-    w = float(np.clip(wide * share, 0.35, 1.3))
+    share = rng.uniform(0.6, 0.75)  # two thirds of what it hangs over
+    w = float(np.clip(wide * share, 0.35, 1.5))
     ratio = rng.uniform(0.6, 0.72) if w > 0.55 else rng.uniform(1.25, 1.4)
-    for scale in (1.0, 0.8, 0.6):
+    for scale in (1.0, 0.85, 0.7, 0.55):
         size = np.round([w * scale, w * ratio * scale, 0.03], 2)
         if size[0] >= 0.28:
             out.append(("picture", size))
@@ -260,7 +260,7 @@ def meets(opening: Opening, along: float, half: float, low: float, high: float) 
     return not beside and opening.sill - 0.1 < high and opening.sill + opening.height + 0.2 > low
 
 
-SHARES = (0.5, 0.3, 0.7, 0.18, 0.82)  # of a wall's length, the middle first
+SHARES = (0.3, 0.7, 0.5, 0.18, 0.82)  # of a wall's length: aside first, so that a picture has room beside it
 SHELF, LOW = 1.38, 0.85  # metres from the floor to the board of a wall shelf, and to a niche
 WALL_SHELVES = ("wall_shelf", "ledge", "box_shelf", "niche")  # without a style; of a room both are alike
 ABOVE, STANDING = 0.3, 0.6  # metres that stay free over a shelf, and before a mirror in which one sees all of oneself
