@@ -5,7 +5,7 @@ python docs/make_rules.py
 
 from pathlib import Path
 
-from echomodel.objective import KINDS, TERMS, Term
+from echomodel.objective import KINDS, TERMS, WALKED, Term
 
 PAGE = Path(__file__).with_name("RULES.md")
 KIND = {
@@ -31,7 +31,7 @@ def page() -> str:
         "generator has none.*",
     ]  # fmt: skip
     for kind in KINDS:
-        rows = [term for term in TERMS if term.kind == kind]
+        rows = [term for term in (*TERMS, *WALKED) if term.kind == kind]
         if rows:
             lines += ["", f"## {kind.capitalize()}", "", KIND[kind], ""]
             lines += ["| term | what is expected | margin in | slack | weight | where its numbers come from |"]

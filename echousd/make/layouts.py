@@ -47,7 +47,7 @@ CROWD = 160  # objects of all drafts together, unless somebody says how many dra
 MAX_OBJECTS = 200  # of one room: up to here time grows no faster than their number, 400 take four times that of 200
 TALL = 2.0  # metres by which a screen counts as higher where openings are placed: it wants no window behind it
 DEFAULTS = PlaceConfig()
-OF_OPENINGS = frozenset({"door_free", "leaf_aside", "window_free"})  # terms
+OF_OPENINGS = frozenset({"door_free", "leaf_aside", "window_free", "way_in"})  # terms
 DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
 judged_faults = lru_cache(4 * DRAFTS)(living_faults)  # of boxes that nobody changes: openings that make way ask again
 

@@ -15,7 +15,7 @@ import torch
 from echomodel.boxes2d import footprints
 from echomodel.graph import GraphBatch
 from echomodel.metrics.statistics import Pair
-from echomodel.objective import BY_EYE, KINDS, REACHED, TERMS, faults_of, plan_of, unreached, walk
+from echomodel.objective import BY_EYE, KINDS, TERMS, WALKED, faults_of, plan_of, unreached, walk
 from echomodel.openings import segment, zone
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms, verdicts
@@ -122,7 +122,7 @@ OVERHEAD = 2.0  # metres: what has its middle higher is in nobody's way there
 BEFORE_WINDOW = 0.5  # metres that it wants free before a window; before a door the door's width
 JUDGED = tuple(term.name for term in TERMS if term.kind in BY_EYE)
 # Half of the terms chooses, the other one judges; they take turns down the table, so that both look at everything.
-HALVES = (frozenset(JUDGED[::2]), frozenset(JUDGED[1::2]) | {REACHED})
+HALVES = (frozenset(JUDGED[::2]), frozenset(JUDGED[1::2]) | {term.name for term in WALKED})
 COUNTED = {
     "faults": HALVES[0] | HALVES[1], "faults A": HALVES[0], "faults B": HALVES[1],
     "physics": frozenset(term.name for term in TERMS if term.kind == "physics"),

@@ -16,7 +16,7 @@ from functools import cached_property
 from echomodel.arrays import Array, at_least, at_most, repeat
 from echomodel.files import tables
 from echomodel.late import Late
-from echomodel.objective import access, company, composition, crowding, physics, sizes
+from echomodel.objective import access, company, composition, crowding, physics, sizes, walks
 from echomodel.objective.plan import Found, Plan, found, nobody
 from echomodel.vocabulary import Category, vocabulary
 
@@ -76,7 +76,7 @@ class Term:
 
 REAL = "real rooms (statistics of 896, 300 measured): "
 MODULES = {"access": access, "company": company, "composition": composition, "crowding": crowding,
-           "physics": physics, "sizes": sizes}  # fmt: skip
+           "physics": physics, "sizes": sizes, "walks": walks}  # fmt: skip
 # Modules of which every term looks at boxes of some kind, alone or beside others: asked of rooms that have one.
 OF_KINDS: dict[str, Callable[[Category], object]] = {
     "seating": lambda kind: kind.role == "board" or kind.stands == "at",
@@ -92,19 +92,20 @@ RELATIONS = (
 )  # fmt: skip
 
 
-def _read() -> Iterator[Term]:
-    """The rows of `terms.toml`, kind by kind."""
+def _read(*sections: str) -> Iterator[Term]:
+    """The rows of `terms.toml`, section by section, those of walks being of the kind `living`."""
     rows = tables("terms.toml", __file__)
-    for kind in KINDS:
-        for row in rows.get(kind, ()):
+    for section in sections:
+        for row in rows.get(section, ()):
             module, _, name = row.pop("find").partition(".")
             source = row.pop("source", None) or REAL + row.pop("real")
             place = f"echomodel.objective.{module}:{name}"
             find = OfKind(place, OF_KINDS[module]) if module in OF_KINDS else getattr(MODULES[module], name)
-            yield Term(find, tuple(row.pop("says")), source, kind, **row)
+            yield Term(find, tuple(row.pop("says")), source, section if section in KINDS else "living", **row)
 
 
-TERMS = (*RELATIONS, *_read())
+TERMS = (*RELATIONS, *_read(*KINDS))
+WALKED = tuple(_read("walked"))  # of one room, told apart: a walk takes as long as many poses, and has no gradient
 
 
 def costs_of(rows_of: Sequence[tuple[Term, Found]], room: Plan) -> tuple[Found, Array]:

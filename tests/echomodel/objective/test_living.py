@@ -399,7 +399,7 @@ def test_doors_swing_free_and_windows_are_not_covered():
     window = Opening("window", "window", 3, 0.3, 1.4, 1.3, sill=0.9)
     found = BEDROOM.found(openings=(door,))
     assert "wardrobe reaches 0.88 m into the way of a door" in found["wardrobe", "door_free"]
-    assert found.keys() == {("wardrobe", "door_free"), ("wardrobe", "leaf_aside")}
+    assert found.keys() == {("wardrobe", "door_free"), ("wardrobe", "leaf_aside"), ("wardrobe", "way_in")}
     assert set(BEDROOM.found(openings=(window,))) == {("wardrobe", "window_free")}
     for height, seen in ((0.95, False), (1.05, True)):  # storage a hand over the sill
         low = BEDROOM.moved("wardrobe", size=(1.8, height, 0.6))

@@ -90,7 +90,7 @@ def test_a_door_that_may_make_way_asks_for_no_further_draft():
     boxes = Boxes(torch.tensor([(2.0, 0.85, 0.9)]), torch.tensor([(0.0, 0.0, -1.7)]), torch.tensor([0.0]))
     door = Opening("door", "door", 0, 1.85, 0.9, 2.0)
     graph = SceneGraph(room.replaced(openings=(door,)), (Node("sofa", "multi_seat_sofa"),))
-    assert [fault.rule for fault in living_faults(graph, boxes)] == ["door_free"]
+    assert [fault.rule for fault in living_faults(graph, boxes)] == ["door_free", "way_in"]
     assert layouts._wishes(graph, (boxes, ()), None)[2] > 1
     assert not any(layouts._wishes(graph, (boxes, ()), 0))
 

@@ -10,7 +10,7 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.graph import Stated
-from echomodel.objective import TERMS, plan_of
+from echomodel.objective import TERMS, plan_of, unreached
 from echomodel.objective.table import COST, costs_of
 from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
@@ -534,3 +534,18 @@ def test_what_stands_at_a_leafs_edge_is_moved_a_hand_away_from_it():
     )  # fmt: skip
     assert done.position[0, 0] - done.size[0, 0] / 2 > -1.5
     assert done.position[0, 0] < 0.5  # no further than it must
+
+
+def test_what_stands_in_the_way_in_is_moved_out_of_it():
+    words, door = ["double_bed", "wardrobe", "plant", "dresser"], Opening("door", "door", 1, 0.2, 0.9, 2.0)
+    size = np.array([(1.8, 1.0, 2.1), (1.8, 2.2, 0.6), (0.6, 1.2, 0.6), (1.2, 0.8, 0.45)])
+    position = np.array([(-0.4, 0.0, -0.93), (-0.6, 0.0, 1.7), (1.3, 0.0, -0.6), (1.25, 0.0, 0.9)])
+    floor, none = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)]), np.zeros((0, 3), int)
+
+    def told(boxes):
+        return {fault.rule for fault in unreached(plan_of(boxes, words, floor, (door,)))}
+
+    drawn = Boxes(size, position, np.array([0.0, np.pi, 0.0, np.pi]))
+    assert told(drawn) == {"way_in"}
+    done = place_boxes(words, size, position, drawn.yaw, none, floor_polygon=floor, height=2.7, openings=(door,))
+    assert told(done) == set()
