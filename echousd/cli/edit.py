@@ -38,22 +38,23 @@ def edit(
 
     asked = {kind: changes.pop(kind, None) for kind in EditRequest.__dataclass_fields__}
     wishes = EditRequest(**{kind: words for kind, words in asked.items() if words})
-    if not recover:
-        if wishes == EditRequest(relate=wishes.relate, unrelate=wishes.unrelate) != EditRequest() and is_home(room):
-            edit_home(room_at(room), wishes, output, dry_run=dry_run, force=force, wait=wait, json=json)
-            return
-        refuse_house(room)
-        room = room_at(room)
-        check_ours(room)
-    if undo or redo or recover:
-        if wishes != EditRequest() or dry_run or output is not None or undo + redo + recover > 1:
-            does = "--undo takes the last edit back" if undo else "--redo makes it again"
-            does = "--recover finishes what was interrupted" if recover else does
-            raise ValueError(f"{does} and does nothing else; leave the other options out")
-        if recover:
-            _recover(room, wait, json)
-        else:
-            _step(own_root(room), wait, json, "undo" if undo else "redo")
+    alone = undo + redo + recover
+    if alone and (wishes != EditRequest() or dry_run or output is not None or alone > 1):
+        does = "--undo takes the last edit back" if undo else "--redo makes it again"
+        does = "--recover finishes what was interrupted" if recover else does
+        raise ValueError(f"{does} and does nothing else; leave the other options out")
+    if recover:
+        _recover(room, wait, json)
+        return
+    of_home = undo or redo or wishes == EditRequest(relate=wishes.relate, unrelate=wishes.unrelate) != EditRequest()
+    if of_home and is_home(room):
+        edit_home(room_at(room), wishes, redo - undo, output, dry_run=dry_run, force=force, wait=wait, json=json)
+        return
+    refuse_house(room)
+    room = room_at(room)
+    check_ours(room)
+    if alone:
+        _step(own_root(room), wait, json, "undo" if undo else "redo")
         return
     changes["outside"] = outside or ()
     nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
@@ -63,17 +64,26 @@ def edit(
     )  # fmt: skip
 
 
-def edit_home(root: Path, wishes: EditRequest, output: Path | None, **how: bool) -> None:
-    """Change how its rooms lie to each other (`how`: as of `generate_home`): its plan follows, and what it opens."""
+def edit_home(
+    root: Path, wishes: EditRequest, step: int, output: Path | None, *, dry_run: bool, force: bool, wait: bool,
+    json: bool,
+) -> None:  # fmt: skip
+    """Change how its rooms lie to each other, or take that back (`step` -1) or make it again (1).
+
+    Its plan follows, and what it opens.
+    """
     from echousd.cli.plan import generate_home
-    from echousd.home.assemble import remembered
+    from echousd.home.assemble import remembered, stepped
 
     home, options = remembered(root)
+    there = stepped(root, step) if step else None
     for sentence in wishes.unrelate:
         home = home.unrelate(sentence)
     for sentence in wishes.relate:
         home = home.relate(sentence)
-    generate_home(root, home, output or root.parent, options, (), **how)
+    generate_home(
+        root, home, output or root.parent, options, (), force=force, json=json, dry_run=dry_run, wait=wait, there=there
+    )
 
 
 def update(

@@ -16,6 +16,7 @@ from echousd.naming import LAYER_FORMS
 
 if TYPE_CHECKING:
     from echousd.home.graph import HomeGraph
+    from echousd.home.plan import HomePlan
     from echousd.options import RoomOptions
 
 
@@ -103,13 +104,14 @@ def export(
 
 def generate_home(
     graph: Path, home: HomeGraph, output: Path, options: RoomOptions, outside: Sequence[Path], *, force: bool,
-    json: bool, dry_run: bool = False, wait: bool = False,
+    json: bool, dry_run: bool = False, wait: bool = False, there: tuple[HomePlan, int] | None = None,
 ) -> None:  # fmt: skip
     """Plan a home, make its rooms side by side, and say what became of each; exit code 1 for faults.
 
     Arguments:
         graph: the file that it comes from; a home that was made is planned anew, from the plan that it has.
         dry_run: say what would be made, and make nothing.
+        there: a plan that it had, and its number; None = a new one.
     """
     from echousd.cli.progress import progress_bar
     from echousd.folder.found import is_home
@@ -119,7 +121,7 @@ def generate_home(
     stated = None if is_home(graph) else plan_there(graph, home)
     before = graph if is_home(graph) else earlier(output, options.seed)
     with faults_of(str(graph)):
-        plan = stated or next_plan(home, seed=options.seed, before=before)
+        plan, number = there or (stated or next_plan(home, seed=options.seed, before=before), None)
     if dry_run:
         again, _ = wanted_jobs(plan, output, options)
         lines = [f"{'opened' if job.begin else 'new':8} {job.id}" for job in again]
@@ -129,7 +131,7 @@ def generate_home(
     with progress_bar() as listen:
         made = write_rooms(
             plan, output, options, outside=[str(path) for path in outside], force=force,
-            tell=lambda done, total: listen("rooms", done, total), wait=wait,
+            tell=lambda done, total: listen("rooms", done, total), wait=wait, number=number,
         )  # fmt: skip
     faults = [f"{name}: {why}" for name, why in made.failed.items()]
     lines = [f"home     {made.root}", f"plan     {len(plan.floors)} rooms, {plan.area:.1f} m²"]

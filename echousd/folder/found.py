@@ -79,7 +79,7 @@ def refuse_house(place: Path) -> None:
     if is_home(place):
         place = room_at(place)
         rooms = ", ".join(str(path.relative_to(place.parent)) for path in _rooms_below(place.parent)[:8])
-        allowed = "allowed for it are --relate and --unrelate alone, and no --undo of these"
+        allowed = "allowed for it are --relate and --unrelate alone, their --undo and --redo"
         raise ValueError(f"{place}: a home, which composes rooms; name one of them: {rooms}; {allowed}")
 
 

@@ -24,7 +24,7 @@ from echousd.folder.found import is_home
 from echousd.folder.lock import LOCK, locked
 from echousd.folder.manifest import find_manifest
 from echousd.graph import SceneGraph
-from echousd.home.existing import next_plan
+from echousd.home.existing import next_plan, plan_there
 from echousd.home.graph import HomeGraph, home_of_plain
 from echousd.home.plan import HomePlan, doorways
 from echousd.home.stages import HOME, home_layer, room_path
@@ -42,7 +42,7 @@ from echousd.stage.shading import preview_surface
 from echousd.stage.turning import rescale, turn_up
 
 PLAN = "plan.usda"
-FOLDER = "rooms"
+FOLDER, PLANS = "rooms", "plans"  # below a home: its rooms, and by number all plans that it had
 ONCE = ("DomeLight", "DistantLight", "PhysicsScene")  # a home has one of each, its first room's
 THRESHOLD = (0.45, 0.36, 0.27)  # colour, linear
 
@@ -105,18 +105,20 @@ def digests_of(jobs: Mapping[str, Job]) -> dict[str, str]:
 def write_rooms(
     plan: HomePlan, output: Path, options: RoomOptions, *, outside: Sequence[str] = (), force: bool = False,
     workers: int | None = None, tell: Callable[[int, int], None] = lambda done, total: None, wait: bool = False,
+    number: int | None = None,
 ) -> Made:  # fmt: skip
     """Make a home in a folder: rooms whose graph, place in the plan and options are as before keep their bytes.
 
     Arguments:
         tell: called with how many rooms are done, and of how many. wait: for another process that writes the folder.
+        number: of a plan that the home had (`stepped`), None = it is new, and what was undone is given up.
 
     Raises ValueError for a folder that holds something else or that another process writes, and where edits of a room
     would be lost.
     """
     root = output / ROOT_FILE
     if not is_home(root):
-        check_ours(output, "home of echousd", force=force, besides=(FOLDER, LOCK))
+        check_ours(output, "home of echousd", force=force, besides=(FOLDER, PLANS, LOCK))
     with locked(output, wait=wait):  # rooms and the layers over them are of one run
         wanted, digests = wanted_jobs(plan, output, options, outside)
         edited = [job.id for job in wanted if not job.begin and _edited(Path(job.folder))]
@@ -133,7 +135,11 @@ def write_rooms(
             tell(sum(value is not None for value in done.values()) + len(failed), len(wanted))
         marks = {name: digest for name, digest in digests.items() if name not in failed}
         if marks:
-            write_all(home_files(plan, output, list(marks), marks, options))
+            write_all(files := home_files(plan, output, marks, options, number))
+            *_, now = files
+            for undone in now.parent.glob("*.usda") if number is None else ():
+                if int(undone.stem) > int(now.stem):
+                    undone.unlink()
         return Made(root, done, failed)
 
 
@@ -178,6 +184,25 @@ def remembered(root: Path) -> tuple[HomeGraph, RoomOptions]:
     return home_of_plain(json.loads(data["asked"])), RoomOptions(**json.loads(data["options"]))
 
 
+def stepped(root: Path, by: int) -> tuple[HomePlan, int]:
+    """The plan that a home had before its last edit (`by` -1), or before that was taken back (1), and its number.
+
+    Raises ValueError where there is none.
+    """
+    number = _number(root) + by
+    file = root.parent / PLANS / f"{number}.usda"
+    plan = plan_there(file) if file.is_file() else None
+    if plan is None:
+        raise ValueError(f"{root}: no edit of the home to {'undo' if by < 0 else 'redo'}")
+    return plan, number
+
+
+def _number(root: Path) -> int:
+    """Which of its plans a home has."""
+    layer = layer_there(root)
+    return int(layer.customLayerData.get("plan", 0)) if layer else 0
+
+
 def _run(jobs: Sequence[Job], workers: int | None) -> Iterator[tuple[str, Mapping[str, Any] | None, str]]:
     """Name, row and error of every job, as they end; nothing is started for none."""
     waiting = sorted(jobs, key=lambda job: -len(job.text))  # the fullest first
@@ -206,24 +231,33 @@ def earlier(output: Path, seed: int) -> Path | None:
 
 
 def home_files(
-    plan: HomePlan, output: Path, names: Sequence[str], digests: Mapping[str, str], options: RoomOptions
+    plan: HomePlan, output: Path, digests: Mapping[str, str], options: RoomOptions, number: int | None = None
 ) -> dict[Path, bytes]:
-    """The root layer, which has the rooms as payloads, and below it the layer of the graph and the plan."""
-    below = home_layer(plan.home, plan, rooms=False)
+    """The root layer, which has the rooms as payloads, below it the layer of the graph and the plan, and the same with
+    the rooms' graphs, as it is kept for `stepped`.
+
+    Arguments:
+        digests: of the rooms that there are. number: of a plan that the home had, None = a new one.
+    """
+    below, whole = home_layer(plan.home, plan, rooms=False), layer_bytes(home_layer(plan.home, plan), ".usda")
+    if number is None:
+        number = _number(output / ROOT_FILE)
+        kept = output / PLANS / f"{number}.usda"
+        number += kept.is_file() and kept.read_bytes() != whole
     _thresholds(below, plan)
     root = Sdf.Layer.CreateAnonymous(".usda")
     root.subLayerPaths.append(f"./{PLAN}")
     root.defaultPrim = HOME[1:]
     about = {MARK: 1, "generator": f"echousd {echousd.__version__}", "seed": options.seed}
     asked = {"asked": plan.home.to_json(), "options": json.dumps(options.model_dump(exclude_defaults=True))}
-    root.customLayerData = {**about, **asked, "rooms": dict(digests)}
+    root.customLayerData = {**about, **asked, "plan": number, "rooms": dict(digests)}
     for key in ("metersPerUnit", "upAxis"):
         root.pseudoRoot.SetInfo(key, below.pseudoRoot.GetInfo(key))
-    for number, name in enumerate(names):
+    for place, name in enumerate(digests):
         spec = Sdf.CreatePrimInLayer(root, room_path(name))
         file = Path(FOLDER) / name / f"{(find_manifest(output / FOLDER / name) or {})['name']}.usda"
         spec.payloadList.prependedItems.append(Sdf.Payload(f"./{file.as_posix()}"))
-        if number:
+        if place:
             stage = open_stage(output / file)
             for prim in stage.Traverse():
                 if prim.GetTypeName() in ONCE and prim.GetPath().HasPrefix(stage.GetDefaultPrim().GetPath()):
@@ -233,7 +267,8 @@ def home_files(
         rescale(layer, options.meters_per_unit)
         if options.up_axis == "Z":
             turn_up(layer)
-    return {output / ROOT_FILE: layer_bytes(root, ".usda"), output / PLAN: layer_bytes(below, ".usda")}
+    files = {output / ROOT_FILE: layer_bytes(root, ".usda"), output / PLAN: layer_bytes(below, ".usda")}
+    return {**files, output / PLANS / f"{number}.usda": whole}
 
 
 def _thresholds(layer: Sdf.Layer, plan: HomePlan) -> None:

@@ -211,7 +211,30 @@ def test_an_edit_follows_through(made, echousd_command):
     assert "no relation 'living door bedroom' in this home, allowed: 'living open_to bedroom'" in done.err
     done = echousd_command("edit", folder, "--add", "fern:plant")
     assert "home.usda: a home, which composes rooms; name one of them: rooms/bedroom/bedroom.usda" in done.err
-    assert "allowed for it are --relate and --unrelate alone, and no --undo of these" in done.err
+    assert "allowed for it are --relate and --unrelate alone, their --undo and --redo" in done.err
+
+
+def test_edits_are_taken_back_and_made_again(made, echousd_command):
+    folder, _ = made
+    plans = [(folder / "plan.usda").read_bytes()]
+    for sentence in ("living open to bedroom", "bedroom larger than living"):
+        assert echousd_command("edit", folder, "--relate", sentence).code == 0
+        plans.append((folder / "plan.usda").read_bytes())
+    assert len(set(plans)) == 3
+    steps = [("undo", 1), ("undo", 0), ("redo", 1), ("redo", 2), ("undo", 1)]
+    for word, number in steps:
+        done = echousd_command("edit", folder, f"--{word}")
+        assert done.code == 0, done.err
+        assert (folder / "plan.usda").read_bytes() == plans[number]
+        assert echousd_command("check", folder).code == 0
+    assert echousd_command("edit", folder, "--relate", "living larger than bedroom").code == 0
+    done = echousd_command("edit", folder, "--redo")
+    assert (done.code, "home.usda: no edit of the home to redo" in done.err) == (2, True)
+    assert echousd_command("edit", folder, "--undo").code == 0
+    assert (folder / "plan.usda").read_bytes() == plans[1]
+    assert echousd_command("edit", folder, "--undo").code == 0
+    done = echousd_command("edit", folder, "--undo")
+    assert (done.code, "home.usda: no edit of the home to undo" in done.err) == (2, True)
 
 
 def test_edits_inside_a_room_are_not_lost_unsaid(made, tmp_path, echousd_command):
