@@ -16,11 +16,7 @@ IMAGES = {"diffuseColor": "image", "normal": "normal", "roughness": "roughness"}
 
 def texture_files(looks: Mapping[str, Look], harmony: str) -> dict[str, bytes]:
     """Path in the room's folder -> image, for all patterns of some looks; equal ones are one file."""
-    files: dict[str, bytes] = {}
-    for look in looks.values():
-        for path, content in look_images(look, harmony).values():
-            files[path] = content
-    return files
+    return dict(image for look in looks.values() for image in look_images(look, harmony).values())
 
 
 def look_images(look: Look, harmony: str) -> dict[str, tuple[str, bytes]]:

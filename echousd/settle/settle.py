@@ -152,7 +152,6 @@ def _gravity(stage: Usd.Stage, metres: float) -> np.ndarray:
     return GRAVITY * down
 
 
-__all__ = ["Motion", "SettleReport", "SettleUnavailable", "settle", "settle_layouts"]
 SECONDS = 2.0
 SHIFT, TURN = 0.01, 1.0  # metres and degrees that a piece may move
 FALL, TOPPLE = 0.01, 20.0  # metres and degrees from which we say that it fell
