@@ -9,12 +9,11 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import echousd
-from echomodel.files import check_ours, raising
+from echomodel.files import SHIPPED, check_ours, raising
 from echousd.batches import work
 from echousd.batches.executor import Executor, LocalWorkers, Outcome, RayCluster, Task
 from echousd.batches.options import BatchRequest, request_of
@@ -153,7 +152,7 @@ def cores() -> int:
 
 def weights_hash(weights: str | None) -> str:
     """Short hash of the weights files; raises ValueError where there are none."""
-    source = Path(weights) if weights else Path(str(resources.files("echomodel") / "weights"))
+    source = Path(weights) if weights else SHIPPED
     files = sorted(source.rglob("*")) if source.is_dir() else [source]
     found, digest = [path for path in files if path.is_file()], hashlib.sha256()
     if not found:

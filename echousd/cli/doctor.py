@@ -3,12 +3,12 @@
 import platform
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from importlib import import_module, metadata, resources, util
+from importlib import import_module, metadata, util
 from pathlib import Path
 
 import typer
 
-from echomodel.files import tables
+from echomodel.files import SHIPPED, tables
 from echousd import plugin
 from echousd.cli.options import documented_command
 from echousd.cli.output import say_json
@@ -118,15 +118,11 @@ def _torch() -> Iterator[Diagnosis]:
 
 
 def _weights() -> Iterator[Diagnosis]:
-    folder = resources.files("echomodel").joinpath("weights")
-    entries = folder.iterdir() if folder.is_dir() else ()
-    files = sorted(entry.name for entry in entries if entry.name.endswith(".safetensors"))
+    files = [f"{file.name} ({file.stat().st_size / 2**20:.1f} MiB)" for file in sorted(SHIPPED.glob("*.safetensors"))]
     if files:
-        sizes = (Path(str(folder.joinpath(name))).stat().st_size / 2**20 for name in files)
-        listed = ", ".join(f"{name} ({size:.1f} MiB)" for name, size in zip(files, sizes, strict=True))
-        yield Diagnosis("weights", "ok", f"{listed} in {folder}")
+        yield Diagnosis("weights", "ok", f"{', '.join(files)} in {SHIPPED}")
     else:
-        yield Diagnosis("weights", "gap", f"no .safetensors file in {folder}", "reinstall echousd, or echousd train")
+        yield Diagnosis("weights", "gap", f"no .safetensors file in {SHIPPED}", "reinstall echousd, or echousd train")
 
 
 def _extras() -> Iterator[Diagnosis]:

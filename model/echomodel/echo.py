@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from echomodel.compact.sampling import (
 )
 from echomodel.compact.weights import WeightsError, branches
 from echomodel.config import CompactConfig
+from echomodel.files import SHIPPED
 from echomodel.graph import GraphBatch
 from echomodel.late import Late
 from echomodel.protocols import GraphEdit, touched_nodes
@@ -60,7 +60,7 @@ class EchoModel:
 
         Raises WeightsError where there are none, or they are damaged or do not belong together.
         """
-        source = Path(str(resources.files("echomodel") / "weights")) if path is None else Path(path)
+        source = SHIPPED if path is None else Path(path)
         files = [source]
         if source.is_dir():
             files = sorted(file for file in source.glob("*.safetensors") if file.name != CHECKPOINT)

@@ -15,6 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+SHIPPED = Path(__file__).with_name("weights")  # those that come with the package
 HELD = 512 * 2**20  # bytes of memory that reading any file of somebody's may take
 EACH = 16  # and for each of its bytes: plain data takes more than its text
 HOST = f"{zlib.crc32(socket.gethostname().encode()):08x}"

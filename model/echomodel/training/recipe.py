@@ -4,12 +4,11 @@ import json
 import math
 import tomllib
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
 from echomodel.config import C, CompactConfig, from_dict, to_json
-from echomodel.files import raising
+from echomodel.files import SHIPPED, raising
 
 Stage = Literal["vqvae", "layout", "shape", "parts", "paper_vqvae", "paper"]
 
@@ -121,9 +120,8 @@ class Recipe:
     @property
     def warm_files(self) -> tuple[Path, ...]:
         """Where the files of `warm` lie."""
-        ships = Path(str(resources.files("echomodel") / "weights"))
         return tuple(
-            ships / one if Path(one).name == one and not Path(one).exists() else Path(one) for one in self.warm
+            SHIPPED / one if Path(one).name == one and not Path(one).exists() else Path(one) for one in self.warm
         )
 
     def __post_init__(self) -> None:
