@@ -60,7 +60,7 @@ class Furniture:
         way = np.einsum("bij,pj->ibp", turns, points - eye)
         start = np.einsum("bij,bj->ib", turns, eye - middle)[..., None]
         enter, leave = _crossed(start, way, 0.5 * self.size.T[..., None], -np.inf)
-        met = ((enter < leave) & (leave > 0) & (enter < 1)).reshape(count, count, -1)
+        met = ((enter < leave) & (leave > 0) & (enter < 1)).reshape(count, count, len(GRID))
         met[np.arange(count), np.arange(count)] = False
         return np.asarray(met.any(0).mean(1))
 

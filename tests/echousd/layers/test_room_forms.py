@@ -63,6 +63,7 @@ def test_shared_assets_are_instances_that_look_and_collide_alike(tmp_path):
     (wanted, _), (found, stage) = shown(made(tmp_path / "plain")), shown(made(tmp_path / "shared", instances=True))
     alike = [prim.GetName() for prim in stage.Traverse() if prim.IsInstance()]
     assert {"nightstand_left", "nightstand_right"} <= set(alike)
+    assert not {"bed", "wardrobe"} & set(alike)  # nobody else has their assets
     left, right = (stage.GetPrimAtPath(f"/Room/Objects/nightstand_{side}") for side in ("left", "right"))
     assert left.GetPrototype() == right.GetPrototype()
     assert left.HasAPI(UsdPhysics.RigidBodyAPI)

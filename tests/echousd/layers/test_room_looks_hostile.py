@@ -28,6 +28,8 @@ def test_records_name_prims_inside_a_room():
         assert read_look(layer_of(meshes=Vt.StringArray([place])), "") is None
         if place:
             assert read_look(layer_of(objects={place: "0"}), "") is None
+            assert read_look(layer_of(objects={"/Room/Objects/bed": "0", place: "0"}), "") is None
+    assert read_look(layer_of(objects={"/Room/Objects/bed": "0", "/Room/Objects/desk": 5}), "") is None
     for name in ("a:b", "a" * 65, "", "1"):
         assert read_look(layer_of(name=name), "") is None
 

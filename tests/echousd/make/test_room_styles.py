@@ -1,9 +1,12 @@
 """Rooms of a told style: furniture, colours, walls, doors and windows keep to it; told later, it reshapes in place."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import echousd
+from echomodel.boxes import Boxes
 from echomodel.vocabulary import vocabulary
 from echousd.draw.indoors import with_ceiling
 from echousd.draw.scenery import read_scenery
@@ -61,6 +64,9 @@ def test_beams_lie_below_ceilings_of_country_rooms_and_are_drawn_below_them_alon
     assert {len(one) for one in found} == {0, 1}
     room, (beams,) = next((room, one) for room, one in zip(made, found, strict=True) if one)
     assert millwork(room).cornice == 0
+    down = Boxes(room.boxes.size, room.boxes.position - np.array((0, 0.3, 0), np.float32), room.boxes.yaw)
+    low = replace(room, graph=room.graph.with_room(height=2.4), layouts=(down,))
+    assert not any(one.label == "beam" for one in shell_prims(low))
     corners = beams.meshes[0].form.points
     assert (corners[:, 1] > 2.4).all()
     assert not ((abs(corners[:, 0] - 0.1) < 0.25) & (abs(corners[:, 2] - 0.2) < 0.25)).any()
