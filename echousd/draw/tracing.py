@@ -62,7 +62,9 @@ def _drawn(world: World, height: int, rays: int) -> np.ndarray:
     light = _light_of(world, seen, near, edge, 2 * rays, max(1, (rays - 1) ** 2))
     world = world._replace(atlas=world.scenery.atlas(seen.face, _breadth(world, seen)))
     color = _colored(world, seen, light)
-    own = np.flatnonzero((seen.face >= 0) & ~world.scenery.planes.glows.take(seen.face))  # no lamp, and nothing outside
+    own = np.flatnonzero((seen.face >= 0) & ~world.scenery.planes.glows.take(seen.face))[
+        ::4
+    ]  # no lamp, nothing outside
     tone = exposure(color.take(own, 1) if len(own) else color, world.white, world.scenery.lights.day)
     tone = tone if world.view.inside else rolled
     color = _blended(seen, color, tone)
@@ -78,7 +80,9 @@ def _drawn(world: World, height: int, rays: int) -> np.ndarray:
 
 def _blended(seen: Seen, color: np.ndarray, tone: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     """(3, n) radiance as a picture shows it, and over it the share of what lies around."""
-    return np.asarray(tone(color) * (1 - seen.shown) + seen.shown * seen.glow)
+    color, through = tone(color), np.flatnonzero(seen.shown)
+    color[:, through] += seen.shown.take(through) * (seen.glow.take(through, 1) - color.take(through, 1))
+    return color
 
 
 BLOCK = 32_000  # rays at a time, which bounds the memory and stays in the cache
@@ -235,6 +239,8 @@ def _see_through(world: World, way: np.ndarray, seen: Seen) -> None:
     folds turn aside it is closer."""
     scenery = world.scenery
     sheer = np.flatnonzero((scenery.thin.take(seen.face) > CLOTH) & (seen.face >= 0))
+    if not len(sheer):
+        return
     way = way.take(sheer, 1)
     point, facing = seen.point.take(sheer, 1) + BEHIND * way, np.abs(along(way, seen.normal.take(sheer, 1)))
     around, through = outside(scenery, point, way)
