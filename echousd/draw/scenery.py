@@ -30,7 +30,8 @@ LEVELS = 7  # sizes of an image, each half of the one before
 # Opacity of a pane below which one looks through it; twice the m² of upright glass from which on it glazes a front.
 SEEN_THROUGH, GLAZED = 0.5, 0.03
 NEXT, NEAR, FAR = 2.5, 1.2, 0.6  # metres from a passage to the wall beyond, and what light there is on the way to it
-HANGING, CLOTH, SHEER = ("curtain", "blind"), 0.22, 1.25  # the share of light that comes through cloth, thin cloth more
+CLOTH, SHEER = 0.22, 1.25  # the share of light that comes through cloth, and how much more through thin cloth
+HANGING = {"curtain": CLOTH, "blind": 0.08}  # of blinds, which are closer: they would be blank where it is bright
 SKY_LIGHT = np.array([0.90, 0.93, 0.97], np.float32)
 BACKGROUND = np.array([0.90, 0.905, 0.915], np.float32) ** 2.2
 HUNG = (  # goes with its wall
@@ -256,7 +257,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             "normals": turned.reshape(-1, 3, 3).astype(np.float32),
             "st": np.zeros((count, 3, 2), np.float32) if mesh.st is None else mesh.st.astype(np.float32),
             "flat_colors": np.zeros((count, 3), np.float32), "emissive": np.zeros((count, 3), np.float32),
-            "gloss": np.zeros(count, np.float32), "thin": np.full(count, CLOTH * (mesh.category in HANGING), "f4"),
+            "gloss": np.zeros(count, np.float32), "thin": np.full(count, HANGING.get(mesh.category, 0.0), "f4"),
             "texture": np.full(count, -1), "wall": np.full(count, walls.get(mesh.component, -1)),
         }  # fmt: skip
         plain, clear = Paint(color=class_color(mesh.category), roughness=1.0), np.zeros(count, bool)
