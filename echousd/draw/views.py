@@ -32,7 +32,7 @@ PANS, EYES, SLOPES = (0.0, -0.15, 0.15, -0.35, 0.35), (0.42, 0.5, 0.62), (0.0, 0
 # Metres ahead from where on they see: what is nearer as a whole is left out, and nothing is cut open. mm: 65, 74, 81,
 # 90 and 97 degrees across, of which so many where something is left out.
 NEARS, LENSES, STRAIGHT = np.arange(0.5, 3.1, 0.25), (28.0, 24.0, 21.0, 18.0, 16.0), 2
-LOOKED, EACH, BEST = 200, 3, 2  # pictures that rays are run through; of a place; of a place, a way, a lens
+LOOKED, EACH, BEST = 400, 6, 3  # pictures that rays are run through; of a place; of a place, a way, a lens
 # What each costs. The main piece: not whole in the picture; hidden; at the border, from a share of half the width on;
 # from behind, and from the side; smaller and larger than such shares of the picture's width.
 WHOLE, HIDDEN, MIDDLE, ASIDE, BEHIND, SIDEWAYS = 1000.0, 140.0, 60.0, 0.33, 130.0, 0.45
