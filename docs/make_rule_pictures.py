@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from echomodel.boxes2d import footprints
 from echomodel.data.roomset import with_known_words
-from echomodel.objective import KINDS, TERMS, faults_of, plan_of, unreached
+from echomodel.objective import KINDS, TERMS, WALKED, faults_of, plan_of, unreached
 from echomodel.objective.faults import Fault
 from echomodel.openings import segment
 from echomodel.roomboxes import RoomBoxes
@@ -86,8 +86,8 @@ def main() -> None:
                 cost = len(seen) + 0.1 * len(one) + (0.0 if fault.other >= 0 else 0.05)
                 if fault.rule not in best or cost < best[fault.rule][0]:
                     best[fault.rule] = (cost, one, fault)
-    names = [term.name for term in TERMS if term.kind != "relations"]
-    cells = [drawn(*best[name][1:]) for name in [*names, "reached"] if name in best]
+    names = [term.name for term in (*TERMS, *WALKED) if term.kind != "relations"]
+    cells = [drawn(*best[name][1:]) for name in names if name in best]
     sheet = Image.new("RGB", (COLUMNS * CELL, -(-len(cells) // COLUMNS) * CELL), "white")
     for number, cell in enumerate(cells):
         sheet.paste(cell, (number % COLUMNS * CELL, number // COLUMNS * CELL))
