@@ -1,7 +1,5 @@
 """The plan of a run, written down before the first room, and its journals: a line for every room made or failed."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

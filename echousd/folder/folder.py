@@ -4,8 +4,6 @@ Everything new is first written to `.echousd/` inside the folder. A journal besi
 says which files move where; from then on the run can be finished by whoever comes next, before nothing was changed.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import warnings

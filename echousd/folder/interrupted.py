@@ -1,7 +1,5 @@
 """What a run that was interrupted left in a folder: its journal, read with doubt, and the files that it had staged."""
 
-from __future__ import annotations
-
 import json
 import warnings
 from pathlib import Path

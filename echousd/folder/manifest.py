@@ -1,7 +1,5 @@
 """A room's manifest `<name>.json`, read back with doubt, as anybody may have sent or edited it (no pxr here)."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Annotated, Any, Literal

@@ -1,7 +1,5 @@
 """Layers of others in a room's folder: a root layer that an artist edited, and which of them refer to what goes."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path, PurePosixPath
 

@@ -1,7 +1,5 @@
 """Painted looks of a room, `looks/<name>.usda`: layers of the user's own, and what of them fits no longer."""
 
-from __future__ import annotations
-
 import glob
 import shutil
 import tempfile

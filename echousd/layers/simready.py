@@ -1,7 +1,5 @@
 """Furniture of a room as packages for SimReady hosts: Z up, a payload folder, a picture, provenance."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path

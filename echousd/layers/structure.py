@@ -1,7 +1,5 @@
 """The shell of a room as prims: its parts and their surfaces, and what covers floor and walls, by the seed."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 All in a wall's own frame: u along the wall from its first corner, v up, w outwards from its inner face; metres.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

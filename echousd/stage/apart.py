@@ -1,7 +1,5 @@
 """Files of others are read in another process first: OpenUSD may end the one that reads a damaged file."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Everything on a stage that has a surface, as polygons: meshes, subdivision surfaces, solids, placed instances."""
 
-from __future__ import annotations
-
 import warnings
 from collections import Counter
 from collections.abc import Iterator

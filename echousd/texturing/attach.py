@@ -1,7 +1,5 @@
 """A painted job brought back into its room: files checked, then written as one step."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A texture job on disk: its `job.json`, read back with doubt, as it may have been to other machines."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections import Counter

@@ -5,8 +5,6 @@
 The same command again goes on.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

@@ -1,7 +1,5 @@
 """Patterns as image files whose bytes are the same in every run, kept for later ones."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache, wraps
 from typing import Any

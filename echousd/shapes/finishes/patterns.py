@@ -3,8 +3,6 @@
 Every pattern is the same in every run and on every machine; colour comes later, as one tint for the whole picture.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
 from itertools import pairwise
