@@ -19,6 +19,7 @@ from echousd.assets import STRETCH
 from echousd.graph.fields import RESIDENTS, SHAPES
 from echousd.graph.nodes import PlainModel
 from echousd.graph.values import IDENTIFIER
+from echousd.shapes import FACES
 
 if TYPE_CHECKING:
     from echousd.assets.choose import AssetWishes
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 wishes_of = Late("echousd.assets.choose:wishes_of")
 validation_message = Late("echousd.invalid:validation_message")
 
-FACES = 5000  # budget of each mesh
 MAX_SEED = 2**63 - 1  # what a layer stores as a whole number
 # options of an edit: how what is new is made; all others stay those of the room
 OF_NEW = (

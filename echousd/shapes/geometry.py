@@ -13,7 +13,6 @@ from echomodel.furniture.solids import Joint
 from echomodel.triangles import Mesh, joined
 
 CONVERTED = "model.usdc"
-FACES = 5000  # budget of each mesh
 # Neighbours that fold more sharply than this keep a hard edge; those of cloth, on which what is woven runs on.
 CREASE, DRAPED = np.radians((42.0, 80.0))
 

@@ -9,7 +9,7 @@ from scipy import ndimage
 from trimesh import smoothing
 
 from echomodel.late import Late
-from echousd.shapes.geometry import FACES
+from echousd.shapes import FACES
 
 mesh_from_tsdf = Late("echomodel.tsdf:mesh_from_tsdf")
 SMALLEST = 0.004  # solids below this share of the largest one are noise

@@ -29,8 +29,6 @@ from echousd.stage.values import reading
 from echousd.texturing.job import Job, read_job
 from echousd.texturing.results import Results, read_results
 
-LONGEST = 64  # characters of a name
-
 
 @dataclass(frozen=True)
 class ImportedLook:
@@ -80,7 +78,7 @@ def import_texture_job(
         raise ValueError(f"{room}: allowed: a room's root layer, {', '.join(LAYER_FORMS)}")
     task = read_job(folder)
     name = name or task.tool
-    if not IDENTIFIER.fullmatch(name) or len(name) > LONGEST or name == paintings.MADE:
+    if not IDENTIFIER.fullmatch(name) or len(name) > paintings.LONGEST or name == paintings.MADE:
         raise ValueError(
             f"name is {name!r:.80}, allowed: letters, digits and _, not beginning with a digit, not {paintings.MADE!r}"
         )

@@ -13,7 +13,8 @@ from echomodel.boxes import Boxes
 from echomodel.progress import StageTimer
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import floor_centre
-from echousd.shapes.geometry import FACES, Geometry
+from echousd.shapes import FACES
+from echousd.shapes.geometry import Geometry
 from echousd.shapes.styles import shared_assets, style_groups
 
 if TYPE_CHECKING:
