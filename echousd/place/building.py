@@ -37,14 +37,14 @@ def rebuilt(search: Search, state: State, out: list[int]) -> State:
 
 
 def expecting(search: Search, state: State, there: np.ndarray, i: int) -> State:
-    """The state with those who attend box i, and are not there, at their slots; they are there then."""
-    problem = search.problem
-    walled = [k for k, _ in search.alongside[i]]  # which go to the walls that are near each of its poses
-    for k in [*search.children[i], *search.screens[i], *walled]:
-        if there[k]:
-            continue
-        slots = sorted(slots_at(problem, k, i), key=lambda slot: slot[3])
-        if not slots and k not in [*search.screens[i], *walled]:
+    """The state with those who attend box i, and are not there, at their slots; they are there then.
+
+    So are screens, and what is told near it, which go to the walls that are near each of its poses.
+    """
+    problem, attending = search.problem, search.children[i]
+    for k in [*attending, *search.screens[i], *(k for k, _ in search.alongside[i])]:
+        slots = sorted(slots_at(problem, k, i), key=lambda slot: slot[3]) if k in attending else []
+        if there[k] or (k in attending and not slots):
             continue
         rows = np.array([out_of(state.position[i], float(state.yaw[i]), slot) for slot in slots]).reshape(-1, 4)
         if len(rows):

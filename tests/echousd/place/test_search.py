@@ -156,6 +156,17 @@ def test_a_table_is_put_in_where_there_is_a_wall_for_the_sideboard_told_near_it(
     assert search.faults(after)[1] == []
 
 
+def test_a_nightstand_told_near_a_dresser_is_expected_there_at_a_wall_and_not_at_a_bed_of_it():
+    words, told = ["single_bed", "nightstand", "dresser"], [(1, "close_by", 2)]
+    size = [(0.9, 0.5, 2.0), (0.45, 0.5, 0.4), (1.0, 0.8, 0.45)]
+    search, state = searched(words, size, [(-1.5, 0, -1.0), (-0.8, 0, -1.8), (1.0, 0, -1.7)], [0, 0, 0], told)
+    assert [search.problem.anchor[1], search.alongside[2]] == [0, [(1, 2)]]
+    there = np.array([True, False, True])
+    expected = expecting(search, state, there, 2)
+    assert there.all()
+    np.testing.assert_array_equal(expected.position, state.position)
+
+
 def test_storage_that_is_longer_than_every_wall_stays():
     words, told = ["dining_table", "sideboard"], [(1, "close_by", 0)]
     search, state = searched(words, [(1.6, 0.75, 0.9), (5.5, 0.8, 0.4)], [(0, 0, 0), (0, 0, -1.8)], [0, 0], told)
