@@ -35,8 +35,8 @@ NEARS, LENSES, STRAIGHT = np.arange(0.5, 3.1, 0.25), (28.0, 24.0, 21.0, 18.0, 16
 LOOKED, EACH, BEST = 400, 6, 3  # pictures that rays are run through; of a place; of a place, a way, a lens
 # What each costs. The main piece: not whole in the picture; hidden; at the border, from a share of half the width on;
 # from behind, and from the side; smaller and larger than such shares of the picture's width.
-WHOLE, HIDDEN, MIDDLE, ASIDE, BEHIND, SIDEWAYS = 1000.0, 140.0, 60.0, 0.33, 130.0, 0.45
-SMALL, LARGE, SIZES = 300.0, 150.0, (0.3, 0.48)
+WHOLE, HIDDEN, MIDDLE, ASIDE, BEHIND, SIDEWAYS = 1000.0, 140.0, 60.0, 0.33, 180.0, 0.55
+SMALL, LARGE, SIZES = 300.0, 150.0, (0.36, 0.55)
 # What the border cuts and what is beyond it: lamps, what hangs from `HIGH` metres on, furniture; and a picture full of
 # cut furniture. What is left out before the eye, and the more the nearer to the main piece, up to so many metres.
 CUTS, HIGH, SEVERED, LEFT_OUT, MISSED, BESIDE = ((90.0, 40.0), (20.0, 0.0), (25.0, 0.0)), 0.25, 350.0, 8.0, 60.0, 0.5
@@ -47,7 +47,7 @@ BESIDES, PASSED = 150.0, 2.5
 # Of ceiling; of floor, and of one bare wall, from a share on; and what of each is worth:
 # of furniture, of a thing up to so many, of which such a share shows all; of a metre towards where the room looks.
 OVERHEAD, UNDER, FLOORED, BARE, BAREST = 100.0, 300.0, 0.27, 650.0, 0.22
-SHOWN, SEEN, HANGING, MANY, ENOUGH, FACED, AHEAD = 30.0, 7.0, 0.4, 10.0, 0.012, 12.0, 1.0
+SHOWN, SEEN, HANGING, MANY, ENOUGH, FACED, AHEAD = 130.0, 7.0, 0.4, 10.0, 0.012, 12.0, 1.0
 # And each lens, height and slope.
 DISTORTED, CROUCHED, BENT = (0.0, 0.0, 20.0, 50.0, 90.0), (10.0, 0.0, 5.0), (0.0, 0.0, 0.0, 10.0, 25.0)
 LOW, DEEP = 1.4, 0.02  # metres: over what is so high one looks; of rounding

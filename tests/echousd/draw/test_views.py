@@ -166,7 +166,8 @@ def test_the_camera_sees_seats_from_before_rather_than_their_backs() -> None:
     which, away, along, *_ = met(things.with_others(_walls(floor, 2.8)), view, APERTURE / 2 / lens, near)
     shown = np.isfinite(away) & (which < len(things.size))
     assert (shown & (along > 0.25)).mean() < 0.02  # before backs counted: 0.05
-    assert view[0, 3] - things.position[0, 0] > 2.0  # the sofa looks that way
+    assert view[0, 3] - things.position[0, 0] > 1.5  # the sofa looks that way
+    assert shown.mean() > 0.3
 
 
 @pytest.mark.parametrize("number", range(9))  # every pair of floor, piece and place
