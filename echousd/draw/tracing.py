@@ -62,9 +62,8 @@ def _drawn(world: World, height: int, rays: int) -> np.ndarray:
     light = _light_of(world, seen, near, edge, 2 * rays, max(1, (rays - 1) ** 2))
     world = world._replace(atlas=world.scenery.atlas(seen.face, _breadth(world, seen)))
     color = _colored(world, seen, light)
-    own = np.flatnonzero((seen.face >= 0) & ~world.scenery.planes.glows.take(seen.face))[
-        ::4
-    ]  # no lamp, nothing outside
+    own = np.flatnonzero((seen.face >= 0) & ~world.scenery.planes.glows.take(seen.face))  # no lamp, nothing outside
+    own = own[::4]  # which tell as well how bright it is
     tone = exposure(color.take(own, 1) if len(own) else color, world.white, world.scenery.lights.day)
     tone = tone if world.view.inside else rolled
     color = _blended(seen, color, tone)
@@ -211,11 +210,8 @@ def _at_edges(world: World, seen: Seen, shape: tuple[int, int]) -> np.ndarray:
 def _seen(world: World, origin: np.ndarray, way: np.ndarray, hit: Sequence[np.ndarray]) -> Seen:
     """What rays met, of what `_hit` says of them."""
     scenery, (face, far, (u, v)) = world.scenery, hit
-    glow, missed, shown = (
-        np.zeros((3, len(face)), np.float32),
-        np.flatnonzero(face < 0),
-        np.zeros(len(face), np.float32),
-    )
+    missed, count = np.flatnonzero(face < 0), len(face)
+    glow, shown = np.zeros((3, count), np.float32), np.zeros(count, np.float32)
     begin, towards = origin.take(missed, 1), way.take(missed, 1)
     glow[:, missed], through = outside(scenery, begin, towards)
     if world.view.inside:

@@ -427,9 +427,8 @@ def test_exposure_brings_dark_and_bright_rooms_to_one_tone():
     left = exposed(warm * room, warm).mean((0, 1)) / exposed(room, white).mean((0, 1))
     assert 1.0 < left[0] / left[2] < 1.6  # of 2.5: the eye adapts to most of a lamp's colour
     by_night = exposed(warm * room, warm, day=0.0).mean((0, 1))
-    assert (
-        left[0] / left[2] < by_night[0] / by_night[2] < 1.7
-    )  # to less of it by night, when lamps are warm, not yellow
+    # to less of it by night, when lamps are warm, not yellow
+    assert left[0] / left[2] < by_night[0] / by_night[2] < 1.7
 
 
 def test_what_glares_is_bleached_and_what_does_not_keeps_its_hue():
