@@ -138,7 +138,7 @@ def write_rooms(
             write_all(files := home_files(plan, output, marks, options, number))
             *_, now = files
             for undone in now.parent.glob("*.usda") if number is None else ():
-                if int(undone.stem) > int(now.stem):
+                if undone.stem.isdecimal() and int(undone.stem) > int(now.stem):
                     undone.unlink()
         return Made(root, done, failed)
 
@@ -200,7 +200,8 @@ def stepped(root: Path, by: int) -> tuple[HomePlan, int]:
 def _number(root: Path) -> int:
     """Which of its plans a home has."""
     layer = layer_there(root)
-    return int(layer.customLayerData.get("plan", 0)) if layer else 0
+    number = layer.customLayerData.get("plan", 0) if layer else 0
+    return number if isinstance(number, int) else 0
 
 
 def _run(jobs: Sequence[Job], workers: int | None) -> Iterator[tuple[str, Mapping[str, Any] | None, str]]:

@@ -8,7 +8,7 @@ import ezdxf
 import numpy as np
 import pytest
 from homes import QUICK, inline
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 import echousd
 from echousd.batches.plan import room_digest
@@ -227,7 +227,9 @@ def test_edits_are_taken_back_and_made_again(made, echousd_command):
         assert done.code == 0, done.err
         assert (folder / "plan.usda").read_bytes() == plans[number]
         assert echousd_command("check", folder).code == 0
+    (folder / "plans" / "mine.usda").write_text("#usda 1.0\n")
     assert echousd_command("edit", folder, "--relate", "living larger than bedroom").code == 0
+    assert sorted(path.name for path in (folder / "plans").iterdir()) == ["0.usda", "1.usda", "2.usda", "mine.usda"]
     done = echousd_command("edit", folder, "--redo")
     assert (done.code, "home.usda: no edit of the home to redo" in done.err) == (2, True)
     assert echousd_command("edit", folder, "--undo").code == 0
@@ -235,6 +237,11 @@ def test_edits_are_taken_back_and_made_again(made, echousd_command):
     assert echousd_command("edit", folder, "--undo").code == 0
     done = echousd_command("edit", folder, "--undo")
     assert (done.code, "home.usda: no edit of the home to undo" in done.err) == (2, True)
+    layer = Sdf.Layer.FindOrOpen(str(folder / "home.usda"))
+    layer.customLayerData = {**layer.customLayerData, "plan": {"a": 1}}
+    layer.Save()
+    done = echousd_command("edit", folder, "--redo")  # no number is the first plan
+    assert done.code == 0, done.err
 
 
 def test_edits_inside_a_room_are_not_lost_unsaid(made, tmp_path, echousd_command):
