@@ -43,7 +43,6 @@ def main() -> None:
     """Entry point of the `echousd` command."""
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # torch's threads sleep between products
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy's products are small: a second thread is waited for
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else every package installed is asked for some
     warnings.formatwarning = lambda message, *_, **__: f"warning: {safe(str(message))}\n"  # no line of our source
     sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: PTH123, SIM115  # `echousd check room.usda >&-`
     sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: PTH123, SIM115
