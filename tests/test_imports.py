@@ -17,7 +17,7 @@ LINES = 600  # of a module that is read in one sitting
 LAYERS = (
     ("cli",),
     ("home",),
-    ("batches", "evaluation"),
+    ("batches", "diagnosis", "evaluation"),
     ("checks", "texturing"),
     ("make",),
     ("settle",),

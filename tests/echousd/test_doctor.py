@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from echousd import plugin
-from echousd.cli import doctor
+from echousd import diagnosis, plugin
 
 
 def test_plugin_path(echousd_command):
@@ -41,7 +40,7 @@ def test_doctor_as_json(echousd_command):
         "remedy": "",
     }
     assert "cpu" in found["torch"]["found"]
-    assert {f"extra {extra}" for extra in doctor.EXTRAS} <= set(found)
+    assert {f"extra {extra}" for extra in diagnosis.EXTRAS} <= set(found)
     assert all(finding["remedy"] for finding in report["findings"] if finding["state"] != "ok")
     assert report["ok"] == all(finding["state"] != "gap" for finding in report["findings"])
     assert done.code == (0 if report["ok"] else 1)
@@ -50,8 +49,8 @@ def test_doctor_as_json(echousd_command):
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere torch is asked for its devices")
 def test_doctor_asks_torch_only_where_there_may_be_a_gpu():
     code = (
-        "import sys\nfrom echousd.cli import doctor\ndoctor.GPUS = ({!r},)\n"
-        "found = {{one.name: one for one in doctor.diagnose()}}\n"
+        "import sys\nfrom echousd import diagnosis\ndiagnosis.GPUS = ({!r},)\n"
+        "found = {{one.name: one for one in diagnosis.diagnose()}}\n"
         "assert 'cpu' in found['torch'].found, found\nprint('torch' in sys.modules)"
     )
     for device, imported in (("/dev/no_such_device", "False"), ("/dev/null", "True")):
@@ -61,7 +60,7 @@ def test_doctor_asks_torch_only_where_there_may_be_a_gpu():
 
 def test_every_extra_of_the_distribution_is_looked_at():
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))["project"]
-    assert doctor.EXTRAS.keys() == project["optional-dependencies"].keys() - {"dev"}
+    assert diagnosis.EXTRAS.keys() == project["optional-dependencies"].keys() - {"dev"}
 
 
 def test_doctor_as_a_table(echousd_command):
@@ -84,14 +83,14 @@ def without(monkeypatch):
 
 def test_missing_extras_are_no_gap(without, echousd_command):
     without("xatlas")
-    found = {finding.name: finding for finding in doctor.diagnose()}
+    found = {finding.name: finding for finding in diagnosis.diagnose()}
     assert found["extra texture"].state == "optional"
     assert found["extra texture"].remedy == "pip install 'echousd[texture]'"
 
 
 def test_missing_usd_and_torch_are(without, echousd_command):
     without("pxr", "torch")
-    found = {finding.name: finding for finding in doctor.diagnose()}
+    found = {finding.name: finding for finding in diagnosis.diagnose()}
     assert (found["usd"].state, found["usd"].remedy) == ("gap", "pip install usd-core")
     assert (found["torch"].state, found["torch"].remedy) == ("gap", "pip install torch")
     assert found["schema plugin"].state == "gap"
@@ -100,7 +99,7 @@ def test_missing_usd_and_torch_are(without, echousd_command):
 
 def test_an_inactive_plugin_is_a_gap(monkeypatch):
     monkeypatch.setattr(plugin, "is_active", lambda: False)
-    found = {finding.name: finding for finding in doctor.diagnose()}
+    found = {finding.name: finding for finding in diagnosis.diagnose()}
     assert found["schema plugin"].state == "gap"
     assert f"PXR_PLUGINPATH_NAME={plugin.plugin_path()}" in found["schema plugin"].remedy
 
@@ -109,7 +108,7 @@ def test_an_old_usd_is_a_gap(monkeypatch):
     from pxr import Usd
 
     monkeypatch.setattr(Usd, "GetVersion", lambda: (0, 24, 8))
-    found = {finding.name: finding for finding in doctor.diagnose()}
+    found = {finding.name: finding for finding in diagnosis.diagnose()}
     assert found["usd"].state == "gap"
     assert found["usd"].remedy.startswith("OpenUSD 24.11 or newer is needed")
 
