@@ -11,7 +11,7 @@ import numpy as np
 from echomodel.boxes2d import axes, footprints
 from echomodel.dressing import SMALL
 from echomodel.openings import SKIRTING, segment
-from echomodel.triangles import along, area_normals, bounds_of, distances, spans_of, spread
+from echomodel.triangles import along, area_normals, bounds_of, cross, spans_of, spread
 from echomodel.vocabulary import vocabulary
 from echousd.checks.reading import Reading
 from echousd.graph.nodes import HEIGHT
@@ -324,6 +324,17 @@ def _one_place(one: Shape, other: Shape) -> bool:
 def mesh_depth(first: Shape, second: Shape, deep: float = SOLID) -> float:
     """How deep one surface reaches into the other solid in metres, no more than `deep` where that is not deeper."""
     return max(_reach(first, second, deep), _reach(second, first, deep))
+
+
+def distances(point: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(f,) from a point (3,), or of each its own (f, 1, 3), to the triangles (f, 3, 3)."""
+    corner, side = triangles - point, np.roll(triangles, -1, axis=1) - triangles
+    share = -(corner * side).sum(2) / np.maximum((side**2).sum(2), 1e-30)
+    out = np.linalg.norm(corner + np.clip(share, 0, 1)[..., None] * side, axis=2).min(1)  # to their edges
+    normal = area_normals(triangles)
+    length = np.linalg.norm(normal, axis=1)
+    over = (length > 0) & ((cross(corner, side) * normal[:, None]).sum(2) >= 0).all(1)
+    return np.where(over, np.abs((corner[:, 0] * normal).sum(1)) / np.maximum(length, 1e-30), out)
 
 
 def _reach(surface: Shape, solid: Shape, deep: float) -> float:

@@ -15,6 +15,9 @@ from pxr import Usd
 
 from echomodel.progress import StageTimer
 from echousd.room import RoomData
+from echousd.textures import encoded
+
+SHOWN = 360  # pixels that a picture in a notebook is wide
 
 
 class Room(RoomData):
@@ -58,21 +61,15 @@ class Room(RoomData):
         return render_stage(self.stage, view=view, size=size)
 
     def _repr_html_(self) -> str:
-        from echousd.textures import encoded
+        from echousd.pages import template
 
-        kept = sum(v.state == "kept" for v in self.verdicts)
-        measured = sum(v.state != "unmeasured" for v in self.verdicts)
-        size = [" × ".join(f"{v:.2f}" for v in row) for row in self.boxes.size.tolist()]
-        position = [", ".join(f"{v:.2f}" for v in row) for row in self.boxes.position.tolist()]
-        cells = [(n.name, n.category, s, p) for n, s, p in zip(self.graph.nodes, size, position, strict=True)]
-        rows = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in cells)
-        head = "".join(f"<th>{title}</th>" for title in ("object", "category", "size (m)", "position (m)"))
-        count = f"{len(self.names)} objects, {kept} of {measured} measured relations kept"
-        picture = ""
+        states, picture = [verdict.state for verdict in self.verdicts], ""
+        kept, measured = states.count("kept"), len(states) - states.count("unmeasured")
         with suppress(ValueError):  # without embreex a notebook shows the table alone
-            png = base64.b64encode(encoded(self.image(size=360))).decode()
-            picture = f'<img width="360" src="data:image/png;base64,{png}">'
-        return f"<div><b>{self.name}</b>: {count}<br>{picture}<table><tr>{head}</tr>{rows}</table></div>"
+            picture = base64.b64encode(encoded(self.image(size=SHOWN))).decode()
+        count = f"{len(self.names)} objects, {kept} of {measured} measured relations kept"
+        page = template("echousd.make", "room.html.j2")
+        return page.render(room=self, count=count, picture=picture, size=SHOWN, zip=zip)
 
     def __repr__(self) -> str:
         count = f"{len(self.names)} objects, {len(self.verdicts)} relations"

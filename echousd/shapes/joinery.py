@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.furniture.cloth import Pad, Sheet
 from echomodel.furniture.solids import FINEST, MeshedSolid, Solid, pieces_of
 from echomodel.triangles import Mesh, area_normals, bounds_of, joined, lengths
 from echousd.shapes.geometry import DRAPED, FRAME, Collider, Geometry, Mass, Origin, Part
@@ -24,7 +23,6 @@ COARSE = 0.7  # share of the faces below which a second level of detail is worth
 COLLIDERS = 64  # convex pieces of one body at most
 SLACK = 0.003  # metres that a mesh may reach beyond its convex pieces
 MOST = 0.8  # share of what the worst face lacks, from which on a face gets a corner in the same round
-PRESSED, FIRM = 0.035, 0.015  # metres that a pad, and a firm seat, are less full under what lies on them than else
 FOLDS = 0.03  # metres that folds of a cover are deep
 SMALL = 0.002  # share of its box below which a solid alone is no obstacle
 
@@ -111,7 +109,7 @@ def part_of(name: str, pieces: Sequence[MeshedSolid], body: str = "") -> Part:
     mesh = joined([Mesh(piece.vertices, piece.faces) for piece in pieces])
     words = [SLOTS.get(piece.solid.material, piece.solid.material) for piece in pieces]
     slot = np.repeat(words, [len(piece.faces) for piece in pieces])
-    crease = DRAPED if any(isinstance(piece.solid, Sheet) for piece in pieces) else CREASE
+    crease = DRAPED if any(piece.solid.draped for piece in pieces) else CREASE
     return Part(name, mesh, {word: np.flatnonzero(slot == word) for word in sorted(set(words))}, crease, body)
 
 
@@ -137,7 +135,7 @@ def level(solid: Solid, corners: np.ndarray) -> np.ndarray:
     """Corners (n, 3) of what a solid collides with: soft seats are level on top, and covers, as high as their folds."""
     x, y, z = corners.T
     if solid.role == "seat" and solid.material == "fabric":
-        deep, share = (PRESSED, 0.25) if isinstance(solid, Pad) else (FIRM, 0.1)
+        deep, share = solid.gives
         y = np.minimum(y, y.max() - min(deep, share * np.ptp(y)))
     elif solid.role == "cover":
         y = np.where(y > y.max() - FOLDS, y.max(), y)

@@ -108,17 +108,6 @@ def area_normals(triangles: np.ndarray) -> np.ndarray:
     return cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
 
 
-def distances(point: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(f,) from a point (3,), or of each its own (f, 1, 3), to the triangles (f, 3, 3)."""
-    corner, side = triangles - point, np.roll(triangles, -1, axis=1) - triangles
-    share = -(corner * side).sum(2) / np.maximum((side**2).sum(2), 1e-30)
-    out = np.linalg.norm(corner + np.clip(share, 0, 1)[..., None] * side, axis=2).min(1)  # to their edges
-    normal = area_normals(triangles)
-    length = np.linalg.norm(normal, axis=1)
-    over = (length > 0) & ((cross(corner, side) * normal[:, None]).sum(2) >= 0).all(1)
-    return np.where(over, np.abs((corner[:, 0] * normal).sum(1)) / np.maximum(length, 1e-30), out)
-
-
 def spread(triangles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """(count, 3) points of triangles (f, 3, 3) that have any area, and the triangle that each is on, (count,) int.
 

@@ -9,7 +9,7 @@ import pytest
 from echomodel.furniture import Choices, draw_choices, draw_style, mesh_of, sample_size, solids
 from echomodel.furniture.bent import Bow, Shell
 from echomodel.furniture.chairs import BODIES
-from echomodel.furniture.cloth import Pad
+from echomodel.furniture.pads import Pad
 from echomodel.furniture.seating import back_rest
 from echomodel.furniture.solids import Ball, Block, Lathe, Tube, Turned, rotation
 from echomodel.furniture.style import OPEN

@@ -39,7 +39,7 @@ def curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
 def tied_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     """One curtain that a band of its cloth holds together below its middle."""
     w, h, d = size
-    cloth = _drape(rng)
+    cloth = drape(rng)
     band = turned((0, 0.37 * h, 0), (0.29 * w, 0.4 * d), 0.04, rounding=0.012, power=3.0, material=cloth)
     return [*_hung(size, rng, FOLD, top=0.5, drift=0.3, material=cloth, tied=0.5), band]
 
@@ -57,7 +57,7 @@ def cafe_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     return [*_hung(*cloth, top=0.7, drift=0.3, narrow=0.0, material="sheer"), *_rings(size, 1.5 * FOLD), rod]
 
 
-def _drape(rng: np.random.Generator) -> str:
+def drape(rng: np.random.Generator) -> str:
     return str(rng.choice(DRAPES))
 
 
@@ -81,7 +81,7 @@ def _hung(
     `tied`: share of its width that is drawn in below its middle.
     """
     w, h, d = size
-    cloth = material or _drape(rng)
+    cloth = material or drape(rng)
     count = max(2, round(w / fold))
     phase, wander = rng.uniform(0, 2 * np.pi, 4), drift * rng.uniform(-1, 1, 3)
     turn = (np.arange(count)[:, None] * 2 * np.pi + BENDS).ravel()
@@ -106,28 +106,6 @@ def _hung(
 # narrow pleats at its head and a wide foot; thin cloth in many small folds, through which light comes
 pleated_curtain = partial(_hung, fold=0.9 * FOLD, top=0.3, drift=0.5, narrow=0.16)
 sheer_curtain = partial(_hung, fold=0.85 * FOLD, top=0.5, drift=0.8, material="sheer")
-
-
-def blind(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A roller blind let down: cloth from the roller at its top to the bar at its foot."""
-    (w, h, d), cloth = size, _drape(rng)
-    roller, bar = min(0.03, 0.2 * h), min(0.02, 0.1 * h)
-    return [
-        box((-w / 2, h - roller, -d / 2), (w / 2, h, d / 2), "frame", 0.3 * d),
-        box((-0.49 * w, bar, -0.001), (0.49 * w, h - roller, 0.001), cloth),
-        box((-0.49 * w, 0, -0.3 * d), (0.49 * w, bar, 0.3 * d), "frame", 0.1 * d),
-    ]
-
-
-def roman_blind(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A blind drawn up: cloth that falls flat from its head, and below in folds one before the other."""
-    (w, h, d), cloth = size, _drape(rng)
-    stack = min(0.16, 0.5 * h)
-    x, shares, back = 0.495 * w, (0.0, 0.2, 0.4), -d / 2
-    head = box((-w / 2, h - 0.03, back), (w / 2, h, d / 2), cloth, 0.2 * d)
-    flat = box((-x, 0.8 * stack, -0.002), (x, h - 0.03, 0.002), cloth)
-    folded = (((x, (s + 0.5) * stack, d * (0.5 - s)), s * stack) for s in shares)
-    return [head, flat, *(box((-x, low, back), high, cloth, 0.3 * d) for high, low in folded)]
 
 
 CLOTHS = ("accent_cloth", "accent_plain", "accent_striped", "accent_checked", "blanket", "velvet", "linen", "drape")

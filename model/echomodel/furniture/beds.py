@@ -5,13 +5,13 @@ from itertools import product
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, base, both, box, core, cushion, of_role
+from echomodel.furniture.carpentry import Size, base, both, box, core, of_role
 from echomodel.furniture.cloth import cover, pillow
 from echomodel.furniture.solids import Solid, ball, rotation, turned
 from echomodel.furniture.style import Choices, Style
 from echomodel.late import Late
 
-tufted = Late("echomodel.furniture.tufting:Tufted")
+tufted, cushion = Late("echomodel.furniture.tufting:Tufted"), Late("echomodel.furniture.pads:cushion")
 COVERS = ("blanket", "blanket", "blanket_striped", "blanket_checked", "linen_striped")  # of beds
 SET_BACK = 0.006  # metres between two faces that would lie in one plane
 

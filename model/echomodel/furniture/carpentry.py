@@ -1,4 +1,4 @@
-"""What all furniture shares: boards, cushions, tops, legs and bases."""
+"""What all furniture shares: boards, tops, legs and bases."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.furniture.cloth import Pad
-from echomodel.furniture.solids import IDENTITY, Block, Solid, Turned, ball, rotation, tube, turned, upright
+from echomodel.furniture.solids import Block, Solid, Turned, ball, rotation, tube, turned, upright
 from echomodel.furniture.style import Style
 
 Size = np.ndarray  # (3,) width x, height y, depth z, metres
@@ -61,17 +60,6 @@ def core(low: tuple, high: tuple, material: str = "wood") -> Block:
 def of_role(role: str, parts: Sequence[Solid], **changes: Any) -> list[Solid]:
     """The parts with this role and other fields changed."""
     return [replace(part, role=role, **changes) for part in parts]
-
-
-def cushion(
-    low: tuple, high: tuple, style: Style, material: str = "fabric", turn: np.ndarray = IDENTITY, role: str = "seat"
-) -> Pad:
-    """An upholstered body between two corners: its edges rounded as far as the style is soft, bulging at most."""
-    a, b = np.asarray(low, float), np.asarray(high, float)
-    half = np.maximum((b - a) / 2, 1e-3)
-    fuller = ((0.42, 0.4), (0.06, 0.36) if role == "seat" else (0.16, 0.34))  # what stands on a seat wants it level
-    radius, crown = (float(half.min() * (low + more * style.softness)) for low, more in fuller)
-    return Pad((a + b) / 2, turn, material, role, half=half, radius=radius, crown=crown)
 
 
 def corner_power(style: Style) -> float:

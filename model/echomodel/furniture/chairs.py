@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from echomodel.furniture.bent import bent
-from echomodel.furniture.carpentry import Size, base, both, box, cushion, four, leg, of_role, top, within
+from echomodel.furniture.carpentry import Size, base, both, box, four, leg, of_role, top, within
 from echomodel.furniture.cloth import seam
+from echomodel.furniture.pads import cushion
 from echomodel.furniture.seating import back_rest, chair_legs, leaning, seat_of, slim_arms
 from echomodel.furniture.solids import Block, Solid, ball, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style

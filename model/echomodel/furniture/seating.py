@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from echomodel.furniture.bent import Bow
-from echomodel.furniture.carpentry import base, both, box, cushion, leg, of_role, top
+from echomodel.furniture.carpentry import base, both, box, leg, of_role, top
+from echomodel.furniture.pads import cushion
 from echomodel.furniture.solids import IDENTITY, Block, Solid, ball, rotation
 from echomodel.furniture.style import Style
 

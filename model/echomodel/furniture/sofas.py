@@ -10,8 +10,8 @@ import numpy as np
 
 from echomodel.files import tables
 from echomodel.furniture.bent import bent
-from echomodel.furniture.carpentry import Size, base, both, box, cushion, of_role
-from echomodel.furniture.cloth import Pad
+from echomodel.furniture.carpentry import Size, base, both, box, of_role
+from echomodel.furniture.pads import Pad, cushion
 from echomodel.furniture.seating import chair_legs, leaning, slim_arms
 from echomodel.furniture.solids import Lathe, Solid, ball, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
 
@@ -64,8 +64,12 @@ class Solid:
         material: names its look. role: what it is in the piece: leg, top, seat, drawer, handle ...
         joint: how it moves, None = it is fixed.
         core: fills what boards enclose, so that a coarse grid sees one body; it has distances and no mesh.
+        gives: metres, and the most as a share of its height, that a seat of it is less full under what lies on it.
+        draped: it lies in folds, which shade as one surface.
     """
 
+    gives: ClassVar[tuple[float, float]] = (0.015, 0.1)
+    draped: ClassVar[bool] = False
     centre: Array = field(default_factory=lambda: np.zeros(3))
     turn: Array = field(default_factory=lambda: IDENTITY)
     material: str = "wood"

@@ -11,12 +11,12 @@ import trimesh
 from pxr import Gf, Usd, UsdGeom
 
 import echousd
-from echomodel.triangles import distances
 from echousd.checks import Collision, check
 from echousd.checks.placement import (
     Carriers,
     Whole,
     _small_faults,
+    distances,
     find_collisions,
     mesh_depth,
     surface_points,

@@ -15,13 +15,14 @@ from echomodel.data.shapeset import piece as styled
 from echomodel.furniture import solids
 from echomodel.furniture.bent import bent
 from echomodel.furniture.carpentry import box as solid_box
+from echomodel.furniture.pads import Pad
 from echomodel.furniture.style import WIDTH, piece_of
 from echomodel.triangles import Mesh, box
 from echomodel.vocabulary import vocabulary
 from echousd.shapes import joinery
 from echousd.shapes.colliders import collider as light_collider
 from echousd.shapes.geometry import FRAME, Origin
-from echousd.shapes.joinery import COLLIDERS, PRESSED, SLACK, assembled, convex_pieces, covering, within_budget
+from echousd.shapes.joinery import COLLIDERS, SLACK, assembled, convex_pieces, covering, within_budget
 
 SIZE = np.array([0.9, 1.0, 0.45])
 STANDING = {"lazy_sofa": 6, "shelf": 6}  # styles: bags on a point and shelves that lean on nothing are among them
@@ -114,7 +115,7 @@ def test_no_mesh_reaches_out_of_its_colliders(category):
         planes = [ConvexHull(collider.mesh.vertices).equations for collider in made.colliders]
         for part in made.parts:  # but a seat, which gives way under what lies on it
             beyond = [(part.mesh.vertices @ each[:, :3].T + each[:, 3]).max(1) for each in planes]
-            gives = PRESSED if part.name == "seat" and "fabric" in part.slots else 0.0
+            gives = Pad.gives[0] if part.name == "seat" and "fabric" in part.slots else 0.0
             assert np.min(beyond, axis=0).max() <= SLACK + gives + 1e-9, (category, style)
 
 
