@@ -27,6 +27,7 @@ INK = {"door": "#8a5a2b", "window": "#3a6ea5", "passage": "#c9c2b2"}
 FRONT = [2, 3]  # corners of a footprint at its front
 ASIDE = 0.5  # metres from the walls to what says how long they are
 ACROSS = 5.0  # inches of one plan
+NARROW = 2.4  # metres of a room across which what is written reaches into its walls
 
 
 Place = tuple[float, float]
@@ -111,9 +112,10 @@ def draw_plans(
             row = vocabulary().room_type(plan.home.room(name).type)
             axes.fill(*on_paper(floor).T, color=TINTS[row.use])
             middle = shapely.Polygon(on_paper(floor)).representative_point()
-            sides = " x ".join(f"{side:.2f}" for side in np.ptp(on_paper(floor), 0))
-            label = f"{name.replace('_', ' ')}\n{abs(signed_area(floor)):.1f} m²\n{sides} m"
-            axes.text(middle.x, middle.y, label, ha="center", va="center", fontsize=7)
+            width, height = np.ptp(on_paper(floor), 0)
+            label = f"{name.replace('_', ' ')}\n{abs(signed_area(floor)):.1f} m²\n{width:.2f} x {height:.2f} m"
+            turn = 90 if width < min(height, NARROW) else 0
+            axes.text(middle.x, middle.y, label, ha="center", va="center", fontsize=7, rotation=turn)
         for line in lines_of(plan):
             points = np.vstack([line.points, line.points[:1]]) if line.closed else line.points
             if line.layer == "wall":
@@ -128,6 +130,7 @@ def draw_plans(
             x, y = corners.mean(0).tolist()
             axes.text(x, y, word, ha="center", va="center", fontsize=3.5, color="#5a5a5a")
         for start, end, label in dimensions_of(plan):
+            axes.update_datalim([start, end])  # what is noted alone widens no picture
             axes.annotate("", start, end, arrowprops={"arrowstyle": "<->", "linewidth": 0.6})
             middle = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
             upright = 90 if start[0] == end[0] else 0

@@ -5,8 +5,10 @@ import json
 import ezdxf
 import pytest
 import shapely
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from echomodel.vocabulary import vocabulary
+from echousd.home import draw
 from echousd.home.draw import lines_of, write_dxf
 from echousd.home.existing import plan_there
 from echousd.home.files import load_home
@@ -46,6 +48,25 @@ def test_a_plan_becomes_a_picture_a_drawing_and_a_stage(file, tmp_path, echousd_
     plan = plan_there(tmp_path / "plan.usda", load_home(tmp_path / "plan.usda"))
     assert {name: round(area, 3) for name, area in plan.areas.items()} == pytest.approx(areas, abs=5e-3)
     assert plan.broken() == ()
+
+
+def test_what_is_written_on_a_plan_is_seen_whole(tmp_path, monkeypatch):
+    figures = []
+    monkeypatch.setattr(draw, "save_figure", lambda figure, path: figures.append(figure))
+    plan = plan_home(HomeGraph.from_words("hall door bedroom, hall door kitchen, hall door bathroom, hall door study"))
+    draw.draw_plans([plan], tmp_path / "plan.png")
+    (figure,) = figures
+    FigureCanvasAgg(figure).draw()
+    (axes,) = figure.axes
+    lengths = [note for note in axes.texts if hasattr(note, "xy") and note.get_text()]
+    assert [note.get_text() for note in lengths] == [label for *_, label in draw.dimensions_of(plan)]
+    for note in lengths:  # what is outside of the axes is not drawn
+        assert axes.get_window_extent().contains(*axes.transData.transform(note.xy))
+    for name, floor in plan.floors.items():
+        (label,) = (text for text in axes.texts if text.get_text().startswith(f"{name}\n"))
+        low, high = axes.transData.transform([draw.on_paper(floor).min(0), draw.on_paper(floor).max(0)])
+        assert label.get_window_extent().x0 >= low[0]
+        assert label.get_window_extent().x1 <= high[0]
 
 
 def test_plans_side_by_side(file, tmp_path, echousd_command):
