@@ -263,8 +263,8 @@ def floor_served(plan: Plan) -> Found:
     return out
 
 
-def free_beside(plan: Plan, who: Array) -> Array:
-    """(P, 4): metres free left, right, behind and before of tables, to walls and to what is neither seat nor lamp."""
+def free_beside(plan: Plan, who: Array, but: Array) -> Array:
+    """(P, 4): metres free left, right, behind and before of boxes, to walls and pieces, but for some (N,) bool."""
     (right, front), xp = plan.axes(who), plan.kit
     out = xp.stack([-right, right, -front, front], 1)
     half = plan.size[:, [0, 0, 2, 2]] / 2
@@ -272,7 +272,7 @@ def free_beside(plan: Plan, who: Array) -> Array:
     walls = plan.inside(edge + out * SEAT, who) + SEAT
     asked = full(plan.fixed, len(plan.first), False)
     asked[who % len(asked)] = True
-    others = plan.standing & ~plan.of("seat", "light") & (plan.size[:, 1] > CLEAR_HEIGHT)
+    others = plan.standing & ~but & (plan.size[:, 1] > CLEAR_HEIGHT)
     j, k = plan.pairs(asked, others, least=True)
     lateral, forward = plan.local(k, j)
     wide, deep = plan.reach(k, j)
@@ -284,9 +284,10 @@ def free_beside(plan: Plan, who: Array) -> Array:
 
 
 def plant_in_nook(plan: Plan) -> Found:
-    """A plant fills a corner, or the end of what stands at a wall; it stands amid no bare wall and no floor."""
+    """A plant fills a corner, or the end of storage or a table; it stands amid no bare wall, nor beside seats alone."""
     who, xp = plan.those(plan.of("decor") & plan.standing & plan.walled), plan.kit
-    free = free_beside(plan, who)
+    no_nook = plan.of("seat", "light", "sofa", "bed") | plan.stands("before")
+    free = free_beside(plan, who, no_nook)
     widest = xp.maximum(xp.minimum(free[:, 0], free[:, 1]), xp.minimum(free[:, 2], free[:, 3]))
     wall = xp.amin(plan.inside(footprint(plan.size[who], plan.position[who], plan.yaw[who]), who), 1)
     return first_of(who, xp.full_like(who, -1), [NOOK - widest, AT_WALL - wall], [widest, wall])

@@ -248,4 +248,4 @@ def table_amid(plan: Plan) -> Found:
 def _free_sides(plan: Plan) -> tuple[Array, Array]:
     """(P,) int64, the tables with seats, and (P, 4), metres free left, right, behind and before them."""
     who = rows(plan.kit.bincount(seats_at(plan).j, minlength=len(plan)) > 0)
-    return who, free_beside(plan, who)
+    return who, free_beside(plan, who, plan.of("seat", "light"))

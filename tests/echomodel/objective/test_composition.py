@@ -97,8 +97,12 @@ def test_a_wardrobe_keeps_off_the_side_of_a_bed(gap, margin):
     assert min(seen(crowding.groups_apart, [bed, *nightstands, other])[0].values()) > 0
 
 
-@pytest.mark.parametrize(("beside", "margin"), [("side_table", 0.4), ("floor_lamp", -0.24)])
-def test_a_lamp_makes_no_nook_for_a_plant(beside, margin):
+@pytest.mark.parametrize(
+    ("beside", "margin"),
+    [("side_table", 0.4), ("cabinet", 0.4), ("floor_lamp", -0.24), ("single_bed", -0.24), ("loveseat_sofa", -0.24),
+     ("coffee_table", -0.24)],
+)  # fmt: skip
+def test_lamps_seats_beds_and_low_tables_make_no_nook_for_a_plant(beside, margin):
     plant = ("plant", (0.4, 1.0, 0.4), (0.0, -1.8), 0.0)
     found, *_ = seen(composition.plant_in_nook, [plant, (beside, (0.4, 1.2, 0.4), (0.6, -1.8), 0.0)], (4.4, 4.0))
     assert found == {0: pytest.approx(margin, abs=1e-3)}
