@@ -162,6 +162,15 @@ def test_chairs_are_not_squeezed_where_there_is_room_at_the_other_side():
     assert 2.4 - np.abs(position[1:, 2]).max() - 0.25 > 0.38
 
 
+def test_a_plant_goes_to_a_corner_not_beside_a_bed():
+    size = [(1.7, 1.0, 2.1), (1.5, 2.2, 0.6), (0.5, 1.2, 0.5)]
+    drawn = [(-0.8, 0, -1.3), (0.4, 0, 2.1), (-0.9, 0, -0.3)]
+    position, _ = arranged(["double_bed", "wardrobe", "plant"], size, drawn, [0.0, np.pi, 0.0])
+    gaps = 2.4 - np.abs(position[2, ::2]) - 0.25
+    assert gaps.max() < 0.35
+    assert gaps.min() < 0.2
+
+
 def test_a_bench_lies_along_the_foot_of_its_bed():
     size = [(1.8, 1.0, 2.1), (1.2, 0.45, 0.4)]
     drawn = [(-1.2, 0, 0.0), (2.0, 0, 0.4)]
