@@ -48,7 +48,8 @@ def cell(room: Room, title: str) -> tuple[Image.Image, list[str]]:
     scale = (CELL - 40) / float((high - low).max())
 
     def at(points: np.ndarray) -> list[tuple[float, float]]:
-        return [tuple(p) for p in ((np.asarray(points) - low) * scale + (20, 20 + TITLE)).tolist()]
+        x, z = np.asarray(points).T  # the front is up, as on plans
+        return list(zip((z - low[1]) * scale + 20, (high[0] - x) * scale + 20 + TITLE, strict=True))
 
     draw.polygon(at(room.floor), fill="#f7f5f2", outline="black", width=3)
     outline = room.floor if room.graph.room.corners is None else np.asarray(room.graph.room.corners)

@@ -61,10 +61,10 @@ def framed(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
 
 
 def top_view(scenery: Scenery) -> View:
-    """Straight down on the whole scene."""
+    """Straight down on the whole scene, the front (+X) up, as on plans and drawn graphs."""
     lower, upper = scenery.bounds
     matrix = np.eye(4)
-    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = (1, 0, 0), (0, 0, -1), (0, 1, 0)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = (0, 0, 1), (1, 0, 0), (0, 1, 0)
     centre = (lower + upper) / 2
     matrix[:3, 3] = (centre[0], upper[1] + 1.0, centre[2])
     return View(matrix, float((upper - lower)[[0, 2]].max()) / 2 * 1.06, True)

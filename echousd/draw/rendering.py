@@ -33,8 +33,8 @@ def render_stage(
     Arguments:
         stage: any stage; its up axis and units are taken care of.
         view: `hero` (8:5, from inside, with a ceiling, lit by windows and lamps; of a stage without walls as
-            `dollhouse`), `dollhouse` (from above a corner, without the walls before it), `top` (orthographic, -Z of a
-            Y-up stage is up in the picture), `every-camera` (through every camera of the stage, in the order of their
+            `dollhouse`), `dollhouse` (from above a corner, without the walls before it), `top` (orthographic, the
+            front, +X of a Y-up stage, is up), `every-camera` (through every camera of the stage, in the order of their
             paths), or `sheet` (dollhouse, hero, top; below from the other corners).
         size: pixels across, 16 to 4096.
         colors: `materials`, or `class` for one flat colour per category.

@@ -47,7 +47,7 @@ def write_cameras(
     pen: Pen, points: np.ndarray, furniture: Furniture, walled: np.ndarray | None = None,
     hung: Furniture | None = None, windows: Furniture | None = None, main: int | None = None,
 ) -> None:  # fmt: skip
-    """Author `/Room/Cameras/top` (from afar, -Z up in the picture) and `/Room/Cameras/perspective`.
+    """Author `/Room/Cameras/top` (from afar, the front, +X, up in the picture) and `/Room/Cameras/perspective`.
 
     Arguments:
         pen: writes the cameras.
@@ -67,7 +67,7 @@ def write_cameras(
         "float focalLength": FAR * APERTURE * TENTHS, "float horizontalAperture": APERTURE * TENTHS,
         "float verticalAperture": APERTURE * TENTHS, "float focusDistance": height,
         "float2 clippingRange": (0.5 * FAR * width, height + 1.0),
-        **ops(translate=("double3", above), rotateX=("float", -90.0)),
+        **ops(translate=("double3", above), rotateY=("float", -90.0), rotateX=("float", -90.0)),
     }  # fmt: skip
     pen.define("/Room/Cameras/top", "Camera", top)
     if walled is not None:

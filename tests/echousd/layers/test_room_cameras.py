@@ -83,7 +83,7 @@ def test_the_camera_above_has_the_whole_room_and_little_else_in_its_picture(stag
     eye = np.array(camera.transform.ExtractTranslation())
     np.testing.assert_allclose(eye[[0, 2]], ((low + high) / 2)[[0, 2]], atol=1e-5)
     assert np.array(camera.transform.TransformDir(Gf.Vec3d(0, 0, -1))).round(6).tolist() == [0, -1, 0]
-    assert np.array(camera.transform.TransformDir(Gf.Vec3d(0, 1, 0))).round(6).tolist() == [0, 0, -1]
+    assert np.array(camera.transform.TransformDir(Gf.Vec3d(0, 1, 0))).round(6).tolist() == [1, 0, 0]
     assert camera.horizontalAperture == camera.verticalAperture
     side = camera.horizontalAperture / camera.focalLength * (eye[1] - high[1])  # of the picture at the tops, metres
     assert 1.0 < side / (high - low)[[0, 2]].max() < 1.1
