@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import groupby
 
 import numpy as np
 import shapely
@@ -20,7 +19,7 @@ from echousd.dressing import floors, tabletops, upholstery, walls
 from echousd.dressing.floors import CORNER_AIR, GREEN
 from echousd.dressing.setting import Setting, Thing, standing
 from echousd.dressing.stories import guessed, story
-from echousd.dressing.walls import EYE, Wall, hung_at, hung_together, walls_of
+from echousd.dressing.walls import EYE, WIDEST, arranged, free_walls, hung_at
 from echousd.graph.nodes import DressingGraph
 from echousd.naming import free_name
 from echousd.room import RoomData
@@ -129,53 +128,26 @@ def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: 
     return Geometry((part,), (*hulls,) or (standing_hull(part.mesh, KINDS[kind].gives),), ORIGIN, weighed(pieces))
 
 
-# Metres of bare wall that ask for a picture, a wide one, three, for two groups; and for one beside a longer stretch.
-STRETCH, UPRIGHT, LONG, HALL, SECOND = 1.0, 2.0, 3.0, 4.4, 1.5
-DECOR, OTHER = ("macrame", "wall_baskets", "wall_plates", "sunburst_mirror"), 0.3  # share of stretches with it
-STEP = 0.1  # metres from spot to spot along a wall
-PROBE = np.array([0.3, 0.8, 0.03])  # a picture that tells whether a spot is bare
+DECOR, OTHER = ("macrame", "wall_baskets", "wall_plates", "sunburst_mirror"), 0.3  # share of short stretches with it
+SHORT, FULL = 1.9, (0.54, 0.66)  # metres of such a stretch; shares of one that pictures take
 EMPTY = 0.65  # metres around a corner where nothing stands
 FLOORS = (5.0, 13.0, 24.0)  # m² of floor from which on one, two, three corners get something
 
 
 def bare_walls(setting: Setting) -> None:
-    """Pictures on the bare stretches of every wall, as wide as suits them, three equal ones on a very long one; on some
-    other things instead."""
+    """Pictures on the free stretches of every wall, as wide as suits them; on some short ones other things instead."""
     if not setting.walls or setting.use:
         return
-    found = [(*one, wall) for wall in walls_of(setting.floor) for one in stretches(setting, wall)]
-    for length, middle, wall in sorted(found, key=lambda one: -one[0]):
+    for length, middle, wall in free_walls(setting):
         rng = setting.rng(f"wall {wall.edge}", f"bare {middle:.1f}")
         kind, variant = str(rng.choice(DECOR)), int(rng.integers(1 << 30))
-        wide = float(np.clip(0.48 * length, 0.6, 1.5))
-        size = np.round([wide, wide * rng.uniform(0.66, 0.75), 0.03], 2)
-        if setting.resident != "child" and rng.random() < OTHER and kind not in {one.kind for one in setting.placed}:
-            other = usual_size(kind, rng)
-            if one := hung_at(setting, wall, middle, kind, other, EYE - float(other[1]) / 2, variant):
+        if length < SHORT and setting.resident != "child" and rng.random() < OTHER:
+            size = usual_size(kind, rng)
+            one = hung_at(setting, wall, middle, kind, size, EYE - float(size[1]) / 2, variant)
+            if one and kind not in {thing.kind for thing in setting.placed}:
                 setting.placed.append(one)
                 continue
-        if length < UPRIGHT:
-            size[:2] = rng.permutation(size[:2])
-        spots = [middle]
-        if length > LONG:
-            wide = float(np.clip(0.21 * length, 0.55, 0.85))
-            size = np.round([wide, 1.36 * wide, 0.03], 2)
-            spots = [middle + step * (wide + 0.12) for step in (-1, 0, 1)]
-        places = [(x, EYE - float(size[1]) / 2) for x in spots]
-        hung_together(setting, wall, size, places, variant)
-
-
-def stretches(setting: Setting, wall: Wall) -> list[tuple[float, float]]:
-    """Length and middle (metres along the wall) of its longest bare stretch at eye height and of others that are long,
-    in halves where it is as long as a hall; [] where all are short."""
-    spots = np.arange(0.3, wall.length - 0.25, STEP).tolist()
-    low = EYE - float(PROBE[1]) / 2
-    bare = [hung_at(setting, wall, spot, "picture", PROBE, low, 0) is not None for spot in spots]
-    runs = [[spots[n] for n, _ in run] for free, run in groupby(enumerate(bare), key=lambda one: one[1]) if free]
-    long = sorted(((run[-1] - run[0] + float(PROBE[0]), (run[0] + run[-1]) / 2) for run in runs), reverse=True)
-    kept = [one for n, one in enumerate(long) if one[0] >= (SECOND if n else STRETCH)]
-    halves = [(length / 2, at + side * length / 4) for length, at in kept if length > HALL for side in (-1, 1)]
-    return [one for one in kept if one[0] <= HALL] + halves
+        arranged(setting, wall, middle, min(length * rng.uniform(*FULL), WIDEST), rng)
 
 
 def bare_corners(setting: Setting) -> None:

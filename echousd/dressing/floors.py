@@ -15,6 +15,7 @@ PILE = 0.008  # metres; furniture stands on the floor below, through the rug
 FROM_WALL = 0.12
 SHOES = 0.25  # share of rooms with a door that somebody leaves shoes at
 LARGEST, ALONE = (4.0, 3.0), (2.6, 1.7)  # metres: of rugs, and of one that nothing stands on
+RUGS, BETWEEN = 3, 0.4  # of a room, and metres from a rug to what has one of its own
 RUNNER = 2.1  # times as long as wide
 OVALS, ROUNDS = 0.1, 0.25  # shares of rugs, of those that are about square
 AROUND = 1.2  # metres from a table: a seat that belongs to it
@@ -24,30 +25,46 @@ SHRUNK = sorted(((x, z) for x in SHARES for z in SHARES), key=lambda share: -sha
 
 def rugs(setting: Setting) -> None:
     """One rug below every sofa group, bed and dining table that has room for it; else below the table that armchairs
-    stand around, below an armchair or before the only desk; between the furniture where none of these has one."""
+    stand around, below armchairs or before the only desk; between the furniture where none of these has one. Then, up
+    to `RUGS` in all, at armchairs and that desk where none is near."""
     hosts = setting.inviting("rug")
     seats = [o for o in hosts if o.row.role == "seat"]
     desks = [o for o in hosts if o.row.role == "board" and o.row.access]
     shared = [o for o in setting.stands("before") if sum(o.footprint.distance(s.footprint) < AROUND for s in seats) > 1]
-    groups = [o for o in hosts if o not in seats and o not in desks] or shared or seats or desks[: len(desks) == 1]
-    for host in sorted(groups, key=lambda o: -float(o.size[0] * o.size[2])):
-        centre, size = _under(setting, host)
-        if np.prod(size) < 1.2:
-            continue
-        group = setting.of("seat", "light", "decor", "sofa" if host.row.role == "sofa" else "seat")
-        free = _free(setting, [host, *group, *setting.stands("head", "before", "beside")])
-        spot = host.on_floor(*centre)
-        for share in SHRUNK:
-            extents = np.round(np.minimum(np.array(size) * share, LARGEST), 2)
-            if free.contains(rectangle(spot[[0, 2]], extents, host.yaw)):
-                setting.placed.append(_rug(setting, host, spot, extents))
-                break
-    if not (setting.placed or setting.use):
+    groups = [o for o in hosts if o not in seats and o not in desks] or shared
+    for host in sorted(groups, key=_area):
+        _lay(setting, host)
+    if groups:
         _between(setting)
+    for host in sorted(seats, key=_area) + desks * (len(desks) == 1):
+        if len(setting.placed) < RUGS and not host.footprint.distance(_rugs(setting)) < BETWEEN:
+            _lay(setting, host)
+    _between(setting)
+
+
+def _area(host: Standing) -> float:
+    return -float(host.size[0] * host.size[2])
+
+
+def _lay(setting: Setting, host: Standing) -> None:
+    """A rug at a piece, as large as there is room for."""
+    centre, size = _under(setting, host)
+    if np.prod(size) < 1.2:
+        return
+    group = setting.of("seat", "light", "decor", "sofa" if host.row.role == "sofa" else "seat")
+    free = _free(setting, [host, *group, *setting.stands("head", "before", "beside")])
+    spot = host.on_floor(*centre)
+    for share in SHRUNK:
+        extents = np.round(np.minimum(np.array(size) * share, LARGEST), 2)
+        if free.contains(rectangle(spot[[0, 2]], extents, host.yaw)):
+            setting.placed.append(_rug(setting, host, spot, extents))
+            return
 
 
 def _between(setting: Setting) -> None:
-    """A rug along the room near its middle, below seats at most."""
+    """A rug along the room near its middle, below seats at most, where there is none."""
+    if setting.placed or setting.use:
+        return
     free, low, high = _free(setting, setting.of("seat")), setting.floor.min(0), setting.floor.max(0)
     middles = np.stack(np.meshgrid(*np.linspace(low, high, 16).T), -1).reshape(-1, 2)
     middles = middles[np.argsort(np.linalg.norm(middles - (low + high) / 2, axis=1))]

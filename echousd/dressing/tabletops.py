@@ -227,7 +227,7 @@ def stocked(setting: Setting, host: Standing, surface: Surface) -> None:
     wide, deep = 2 * surface.span[1]
     side = 1.0 if rng.random() < 0.5 else -1.0
     ware = WARE if host.row.task else LINEN if setting.use == "wet" else ()
-    if rng.random() < (0.95 if setting.full else 0.85) and not ware:
+    if setting.has(0.85, rng) and not ware:
         length = min(wide * rng.uniform(0.4, 0.75), ROW)
         for share in (1.0, 0.6, 0.35):
             tall = min(surface.air - 0.015, rng.uniform(0.2, 0.27))

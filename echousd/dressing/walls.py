@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice, product
@@ -13,14 +14,17 @@ from echomodel.dressing import KINDS, printed, usual_size
 from echomodel.dressing import thing as solids_of
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, rectangle, standing
+from echousd.dressing.stories import TABLE
 from echousd.dressing.tabletops import stocked, surfaces
 from echousd.shapes.fittings import NICHE, RAIL
 from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
 
 EYE = 1.52  # metres, height of a picture's middle on an empty wall
-OVER, LOWEST = 0.22, 1.15  # metres between furniture and what hangs over it, which hangs no lower
-ASIDE = (0.0, 0.4, -0.4)  # to which side of its middle: shares of the width that what hangs there leaves
+OVER, LOWEST = 0.2, 1.15  # metres between furniture and what hangs over it; no mirror hangs lower
+TALLEST, HIGHEST, WIDEST = 1.3, 1.9, 2.2  # metres: what has pictures over it; their middle; all together
+MOST, CROWD = 6, 7  # pictures of one wall, and of a room: there are none in groups beyond
+NARROWER = (1.0, 0.85, 0.7, 0.55)  # shares of its wished width that what hangs may have
 NEAR = 0.45  # metres: furniture whose back is so near to a wall stands at it
 SIDE = 0.32  # metres that curtains take beside a window
 RADIATORS = ("panel_radiator", "panel_radiator", "flat_radiator", "column_radiator")  # without a style
@@ -28,6 +32,7 @@ BELOW, BEHIND = 0.14, 0.03  # metres of air between a window's sill and a radiat
 PLUGGED = ("bed", "desk", "tv_stand")  # words of what has a socket beside it
 CURTAINS = ("curtain", "tied_curtain", "eyelet_curtain", "pleated_curtain", "sheer_curtain")  # of a room all are alike
 BLINDS = ("blind", "roman_blind", "cafe_curtain")  # as well; where it is wet, the first
+HEMS = (0.14, -0.02, -0.2)  # metres below the sill that others end at
 # Of how wide a curtain hangs, where something stands beside it; of a rail, how far in it may hang there.
 BUNCHED, INWARD = (1.0, 0.75, 0.55), 0.2
 
@@ -62,7 +67,8 @@ def walls_of(floor: np.ndarray) -> list[Wall]:
 
 
 def curtains(setting: Setting) -> None:
-    """A curtain on either side of every window down to the floor; where there is no room for two, a blind in it."""
+    """A curtain on either side of every window down to the floor, or to its sill where something stands before it; a
+    blind in it where there is no room for two."""
     if not setting.walls or setting.use == "outdoor":
         return
     above, before, beyond = RAIL
@@ -79,12 +85,13 @@ def curtains(setting: Setting) -> None:
             kind, variant = str(rng.choice(_styled(setting, CURTAINS))), int(rng.integers(1 << 30))
             full = round(min(0.45, 0.16 + 0.14 * window.width), 3)
             low, high = np.clip((window.offset - beyond, window.end + beyond), 0.02, wall.length - 0.02).tolist()
-            for wide in (round(full * share, 3) for share in BUNCHED):
+            feet = (0.015, *(window.sill - off for off in HEMS if window.sill > 0.5))
+            for foot, wide in product(feet, (round(full * share, 3) for share in BUNCHED)):
                 inner = wide / 2 + np.linspace(0.0, INWARD * (high - low), 4)  # where something is beside
-                size = np.array([wide, round(rail - 0.01, 3), 0.085])
+                size = np.array([wide, round(rail - foot + 0.005, 3), 0.085])
                 sides: list[Thing] = []
                 for places in (low + inner, high - inner):
-                    hung = (Thing(kind, size, wall.at(x, before, 0.015), wall.yaw, "", variant) for x in places)
+                    hung = (Thing(kind, size, wall.at(x, before, foot), wall.yaw, "", variant) for x in places)
                     sides += islice((one for one in hung if setting.clear(one, margin=0.0, floor=False)), 1)
                 if len(sides) == 2:  # one alone looks forgotten
                     setting.placed += sides
@@ -142,65 +149,72 @@ def sockets(setting: Setting) -> None:
 
 
 def pictures(setting: Setting) -> None:
-    """A picture or a mirror over what stands at a wall."""
+    """Pictures or a mirror over what stands at a wall and is no taller than a person."""
     if not setting.walls or setting.use:
         return
     every = walls_of(setting.floor)
     for host in setting.inviting("picture", "mirror"):
         wall, along = behind(host.size, host.position, host.yaw, every) or (None, 0.0)
-        if wall is None:
+        if wall is None or host.top > TALLEST:
             continue
-        rng = setting.rng(host.name, "picture")
-        for (kind, size), aside in product(_over(host, setting, rng), ASIDE):
-            if kind == "picture" and setting.has(GROUPS, rng) and _group(setting, wall, along, host, rng):
-                break
-            if kind == "picture":
-                (kind,) = shown(setting, size, 1, host.name)
-            least, variant = host.top + OVER, int(rng.integers(1 << 30))
-            low = min(max(least, LOWEST), setting.height - 0.2 - size[1])
-            spot = along + aside * max(0.0, float(host.size[0] - size[0]))
-            thing = hung_at(setting, wall, spot, kind, size, low, variant, host.name)
-            if thing and low > least - 0.1:
-                setting.placed.append(thing)
-                break
+        rng, least = setting.rng(host.name, "picture"), host.top + OVER
+        mirrors = (
+            hung_at(setting, wall, along, kind, size, max(least, LOWEST), int(rng.integers(1 << 30)), host.name)
+            for kind, size in _over(host, rng)
+        )
+        if found := next((one for one in mirrors if one is not None), None):
+            setting.placed.append(found)
+        else:
+            wide = min(float(host.size[0]) * rng.uniform(0.62, 0.76), WIDEST)  # two thirds of what is below
+            arranged(setting, wall, along, wide, rng, least, host.name)
+
+
+def arranged(
+    setting: Setting, wall: Wall, along: float, wide: float, rng: np.random.Generator, least: float = 0.0, on: str = ""
+) -> bool:
+    """Hang pictures about a place along a wall as a row of `hung` in `stories.toml` says, as wide as wished or less.
+
+    `least`: what they hang above, metres. A room has one group at most of as many as they are; False where none fits.
+    """
+    met = [one for one in setting.placed if KINDS[one.kind].name == "picture"]
+    groups, here = Counter(one.variant for one in met), sum(abs(one.yaw - wall.yaw) < 0.01 for one in met)
+    free = min(MOST - here, CROWD - len(met))
+    rows = [row for row in TABLE["hung"] if (n := len(row["of"])) == 1 or (n <= free and n not in groups.values())]
+    order, side, variant = rng.permutation(len(rows)), rng.choice((-1, 1)), int(rng.integers(1 << 30))
+    for width, row in product(wide * np.array(NARROWER), (rows[k] for k in order)):
+        x, y, w, h = (width * np.array(row["of"], float)).T
+        if not row["wide"][0] <= width <= row["wide"][1]:
+            continue
+        half = float((y + h / 2).max())
+        middle = max(EYE, least + half)
+        if middle > HIGHEST or middle + half > setting.height - 0.2:
+            continue
+        sizes = np.round(np.stack([w, h, np.full(len(w), 0.03)], 1), 2)
+        places = np.stack([along + side * x, middle + y - sizes[:, 1] / 2], 1)
+        if hung_together(setting, wall, sizes, places.tolist(), variant, on):
+            return True
+    return False
 
 
 def shown(setting: Setting, size: np.ndarray, count: int, *words: str) -> list[str]:
-    """Pictures of one kind that hang together, for who lives there; new to the room while there are enough."""
+    """Pictures of one kind that hang together, for who lives there, new to the room; none where there are too few."""
     hung, rng = {thing.kind for thing in setting.placed}, setting.rng(*words, "shown")
     kinds = list(printed("picture", "wide" if size[0] > size[1] else "tall", setting.resident, setting.style).values())
     series = sorted(kinds, key=lambda names: -(rng.random() ** (1 / len(names))))  # every picture alike often
     new = ([name for name in names if name not in hung] for names in series)
-    names = next((names for names in new if len(names) >= count), max(series, key=len) * count)
+    names = next((names for names in new if len(names) >= count), [])
     return [names[k] for k in rng.permutation(len(names))[:count]]
 
 
-def _group(setting: Setting, wall: Wall, along: float, host: Standing, rng: np.random.Generator) -> bool:
-    """Three equal pictures in a row, or three pairs, over a long piece; all of them or none."""
-    wide = float(host.size[0])
-    if wide < 1.3:
-        return False
-    free = setting.height - 0.25 - host.top - OVER
-    rows = 2 if free > 1.15 and wide > 1.7 and rng.random() < 0.5 else 1
-    w = float(np.clip((0.85 * wide - 0.16) / 3, 0.28, 0.6))
-    h = round(min(w * 1.3, (free - 0.08 * (rows - 1)) / rows), 2)
-    if h < 0.3:
-        return False
-    size, low = np.array([round(w, 2), h, 0.03]), max(host.top + OVER, LOWEST if rows == 1 else 0.0)
-    steps = product(range(rows), (-1, 0, 1))
-    places = [(along + column * (float(size[0]) + 0.08), low + row * (h + 0.08)) for row, column in steps]
-    return hung_together(setting, wall, size, places, int(rng.integers(1 << 30)), host.name)
-
-
 def hung_together(
-    setting: Setting, wall: Wall, size: np.ndarray, places: Sequence[tuple[float, float]], variant: int, on: str = ""
+    setting: Setting, wall: Wall, sizes: np.ndarray, places: Sequence[tuple[float, float]], variant: int, on: str = ""
 ) -> bool:
-    """Hang pictures of one kind and size at places (along and low) of a wall; all of them or none."""
-    kinds = shown(setting, size, len(places), on or f"wall {wall.edge}")
-    every = zip(kinds, places, strict=True)
-    row = [hung_at(setting, wall, along, kind, size, low, variant, on) for kind, (along, low) in every]
+    """Hang pictures of one kind and of sizes (n, 3) at places (along and low) of a wall; all of them or none."""
+    kinds = shown(setting, sizes[0], len(places), on or f"wall {wall.edge}")
+    every = zip(kinds, sizes, places, strict=False)
+    row = [hung_at(setting, wall, along, kind, size, low, variant, on) for kind, size, (along, low) in every]
     setting.placed += [one for one in row if one is not None and None not in row]
-    return None not in row
+    return bool(row) and None not in row
 
 
 def behind(size: np.ndarray, position: np.ndarray, yaw: float, walls: list[Wall]) -> tuple[Wall, float] | None:
@@ -215,21 +229,12 @@ def behind(size: np.ndarray, position: np.ndarray, yaw: float, walls: list[Wall]
     return None
 
 
-def _over(host: Standing, setting: Setting, rng: np.random.Generator) -> list[tuple[str, np.ndarray]]:
-    """What would look good over an object, best first."""
-    wide = float(host.size[0])
-    out: list[tuple[str, np.ndarray]] = []
-    if "mirror" in host.row.invites and not any("mirror" in part.slots for part in host.geometry.parts):
-        mirror = "round_mirror" if rng.random() < 0.5 else "mirror"
-        out.append((mirror, usual_size(mirror, rng)))
-    share = rng.uniform(0.6, 0.75)  # two thirds of what it hangs over
-    w = float(np.clip(wide * share, 0.35, 1.5))
-    ratio = rng.uniform(0.6, 0.72) if w > 0.55 else rng.uniform(1.25, 1.4)
-    for scale in (1.0, 0.85, 0.7, 0.55):
-        size = np.round([w * scale, w * ratio * scale, 0.03], 2)
-        if size[0] >= 0.28:
-            out.append(("picture", size))
-    return out
+def _over(host: Standing, rng: np.random.Generator) -> list[tuple[str, np.ndarray]]:
+    """The mirror, if any, that would look good over an object, and its size."""
+    if "mirror" not in host.row.invites or any("mirror" in part.slots for part in host.geometry.parts):
+        return []
+    mirror = "round_mirror" if rng.random() < 0.5 else "mirror"
+    return [(mirror, usual_size(mirror, rng))]
 
 
 def hung_at(
@@ -260,13 +265,54 @@ def meets(opening: Opening, along: float, half: float, low: float, high: float) 
     return not beside and opening.sill - 0.1 < high and opening.sill + opening.height + 0.2 > low
 
 
+# Metres of free wall on which something hangs, alone on its wall or beside something else; more is two.
+STRETCH, SECOND, HALL = 0.9, 1.1, 4.4
+LEVELS, BESIDE = (1.05, 2.0), 0.1  # metres: heights between which a wall must be free, and air to what is not
+
+
+def free_walls(setting: Setting, least: float = 0.0) -> list[tuple[float, float, Wall]]:
+    """Length and middle (metres along the wall) of all stretches of walls where nothing hangs, stands or opens at eye
+    height, the longest first; of a hall's walls halves.
+
+    `least`: length of all, metres; else as a wall has one or several of them.
+    """
+    low, high = LEVELS
+    things = [(o.footprint, o.position[1], o.top, False) for o in setting.objects.values()]
+    things += [(way, 0.0, door.height, False) for way, door in setting.ways]
+    for one in setting.placed:
+        hangs = KINDS[one.kind].fixed and not KINDS[one.kind].yields
+        things.append((one.footprint, one.position[1], one.position[1] + one.size[1], hangs))
+    things = [one for one in things if one[1] < high and one[2] > low]
+    every = [(np.array(plan.exterior.coords)[:-1], hangs) for plan, _, _, hangs in things]
+    found: list[tuple[float, float, Wall]] = []
+    for wall in walls_of(setting.floor):
+        taken, more = [(-1.0, 0.0), (wall.length, wall.length + 1.0)], False
+        for corners, hangs in every:
+            along, off = (corners - wall.start) @ wall.along, (corners - wall.start) @ wall.inside
+            if off.min() < 0.3 and off.max() > -0.2 and along.max() > 0.0 and along.min() < wall.length:
+                taken.append((along.min() - BESIDE, along.max() + BESIDE))
+                more |= hangs
+        here = (o for o in setting.openings if o.edge == wall.edge and o.sill < high and o.sill + o.height > low)
+        taken += [(o.offset - 0.15, o.end + 0.15) for o in here]
+        ends = np.maximum.accumulate([end for _, end in sorted(taken)]).tolist()
+        runs = [(start, end) for (start, _), end in zip(sorted(taken)[1:], ends, strict=False) if start > end]
+        long = sorted(((start - end, (start + end) / 2) for start, end in runs), reverse=True)
+        kept = [one for n, one in enumerate(long) if one[0] >= (least or (SECOND if n or more else STRETCH))]
+        for length, middle in kept:
+            parts = 2 if length > HALL and not least else 1
+            steps = (np.arange(parts) + 0.5) / parts - 0.5
+            found += [(length / parts, middle + step * length, wall) for step in steps.tolist()]
+    return sorted(found, key=lambda one: (-round(one[0], 4), one[2].edge, one[1]))
+
+
 SHARES = (0.3, 0.7, 0.5, 0.18, 0.82)  # of a wall's length: aside first, so that a picture has room beside it
+BROAD, CLOCK = 1.7, 0.6  # metres of free wall: a shelf is aside on a longer one, a clock hangs on one so short
+DOUBLE, HIGHER = 0.5, 0.28  # share of shelves with another below, and metres between them
 SHELF, LOW = 1.38, 0.85  # metres from the floor to the board of a wall shelf, and to a niche
 WALL_SHELVES = ("wall_shelf", "ledge", "box_shelf", "niche")  # without a style; of a room both are alike
 ABOVE, STANDING = 0.3, 0.6  # metres that stay free over a shelf, and before a mirror in which one sees all of oneself
-# Shares of rooms with a clock, of those where people sit together or work; with shelves, coats, a tall mirror; of the
-# pieces with a picture above them, those that have three.
-CLOCKS, WITH_SHELVES, COATS, MIRRORS, GROUPS = 0.4, 0.5, 0.3, 0.6, 0.5
+# Shares of rooms with a clock, of those where people sit together or work; with shelves, coats, a tall mirror.
+CLOCKS, WITH_SHELVES, COATS, MIRRORS = 0.4, 0.5, 0.3, 0.6
 
 
 def shelves(setting: Setting) -> None:
@@ -278,19 +324,22 @@ def shelves(setting: Setting) -> None:
         kind for kind in (setting.style.shelves if setting.style else WALL_SHELVES) if setting.own or kind != "niche"
     ]
     kind, variant = str(rng.choice(kinds)), int(rng.integers(1 << 30))
-    for wall in _roomiest(setting):
-        size = usual_size(kind, setting.rng(f"wall {wall.edge}", "shelf"))
-        one, spots = Thing(kind, size, np.zeros(3), 0.0, "", variant), [(wall, share) for share in SHARES]
-        board = _hung(setting, one, spots, max(SHELF - float(size[1]), LOW), above=ABOVE)
-        if board:
-            solids, name = solids_of(kind, size, np.random.default_rng(variant)), f"wall shelf {wall.edge}"
+    size = usual_size(kind, rng)
+    low, step = max(SHELF - float(size[1]), LOW), float(size[1]) + HIGHER
+    one = Thing(kind, size, np.zeros(3), 0.0, "", variant)
+    for length, middle, wall in free_walls(setting):
+        aside = max(0.0, length / 2 - size[0] / 2 - 0.25) if length > BROAD else 0.0
+        spot = (middle + aside * float(rng.choice((-1, 1)))) / wall.length
+        lows = (low + 0.1, low + 0.1 - step) if kind != "niche" and rng.random() < DOUBLE else (low,)
+        for board in [found for at in lows if (found := _hung(setting, one, [(wall, spot)], at, above=ABOVE))]:
+            solids, name = solids_of(kind, size, np.random.default_rng(variant)), f"wall shelf {done + 1}"
             made = assembled(solids, size, faces=1200, origin=Origin("dressing"))
             carrier = setting.carriers[name] = standing(name, "shelf", size, board.position, board.yaw, made)
             levels = surfaces(carrier)
             for level in levels[1:] if kind == "niche" else [max(levels, key=lambda level: level.area.area)]:
                 stocked(setting, carrier, level)
             done += 1
-        if done == 2:
+        if done > 1:
             return
 
 
@@ -298,7 +347,8 @@ def clock(setting: Setting) -> None:
     """A clock on a wall where people sit together or work."""
     rng = setting.rng("wall clock")
     if setting.walls and setting.inviting("clock") and setting.has(CLOCKS, rng):
-        _hung(setting, _new("wall_clock", rng), product(_roomiest(setting), SHARES), 1.72)
+        least = sorted(free_walls(setting, CLOCK), key=lambda one: one[0])  # where nothing larger fits
+        _hung(setting, _new("wall_clock", rng), [(wall, middle / wall.length) for _, middle, wall in least], 1.62)
 
 
 def coats(setting: Setting) -> None:

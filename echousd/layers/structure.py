@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -144,7 +144,8 @@ def millwork(room: RoomData) -> Millwork:
         return PLAIN
     slept = any(vocabulary().category(node.category).role == "bed" for node in room.graph.nodes)
     wet = vocabulary().room_type(room.graph.room.type).use == "wet"
-    return millwork_of(room.provenance.seed, room.graph.room.style, private=slept or wet)
+    made = millwork_of(room.provenance.seed, room.graph.room.style, private=slept or wet)
+    return replace(made, dado="") if wet else made
 
 
 def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any], openings: Sequence[Opening] = ()) -> Sdf.Layer:

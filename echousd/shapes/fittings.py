@@ -29,7 +29,8 @@ WINDOWS = {"plain": 3, "sash": 2, "bars": 2, "transom": 2}
 DOORS = {"panelled": 3, "four_panels": 2, "flush": 3, "boarded": 1, "glazed": 2}
 SKIRTINGS, CORNICES = (0.06, 0.08, 0.1, 0.14), (0.0, 0.0, 0.06, 0.09)  # heights, metres
 BEAM = (0.13, 0.15)  # metres, width and depth of beams
-BEAMS, BAYS = (*[""] * 11, "beam"), 0.1  # of rooms without a style
+BEAMS, BAYS, DADOS = (*[""] * 11, "beam"), 0.1, ("", "", "boarding", "paint")  # of rooms without a style
+DADO = (0.91, 0.95)  # metres: the rail over what covers the foot of walls
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class Millwork:
     boxed: bool = False  # curtains hang from behind boards, in a fifth of rooms without a style
     bay: bool = False  # the widest window stands out before its wall
     beams: str = ""  # slot of beams below the ceiling, "" = none; cornices are in rooms without them
+    dado: str = ""  # slot of what covers all walls up to `DADO`, "" = nothing
 
 
 PLAIN = Millwork()
@@ -58,8 +60,8 @@ def millwork_of(seed: int, style: str | None = None, *, private: bool = False) -
     )
     skirting, cornice = rng.choice(SKIRTINGS), rng.choice(row.cornices if row else CORNICES)
     boxed, beams = rng.random() < (row.boxed if row else 0.2), str(rng.choice(row.beams if row else BEAMS))
-    bay = rng.random() < (row.bays if row else BAYS)
-    return Millwork(window, door, float(skirting), 0.0 if beams else float(cornice), boxed, bay, beams)
+    bay, dado = rng.random() < (row.bays if row else BAYS), str(rng.choice(row.dados if row else DADOS))
+    return Millwork(window, door, float(skirting), 0.0 if beams else float(cornice), boxed, bay, beams, dado)
 
 
 def board(u: tuple[float, float], v: tuple[float, float], w: tuple[float, float]) -> Mesh:
@@ -216,13 +218,14 @@ def curtain_rail(opening: Opening, length: float, height: float, *, boxed: bool 
     return joined([rod, *holders])
 
 
-def skirting(openings: Sequence[Opening], length: float, tall: float = 0.08) -> Mesh | None:
-    """Boards of this height along the foot of a wall, but for its doors and passages; None where nothing is left."""
-    holes = sorted((o.offset, o.end, CASING if o.kind == "door" else 0.0) for o in openings if o.sill <= tall)
+def skirting(openings: Sequence[Opening], length: float, tall: float = 0.08, low: float = 0.0) -> Mesh | None:
+    """Boards from one height to another along a wall, but for what is open there; None where nothing is left."""
+    here = [o for o in openings if o.sill <= tall and o.sill + o.height > low]
+    holes = sorted((o.offset, o.end, CASING if o.kind == "door" else 0.0) for o in here)
     boards, at = [], 0.0
     for start, end, trim in [*holes, (length, length, 0.0)]:
         if start - trim - at > 0.01:
-            boards.append(board((at, start - trim), (0.0, tall), (-SKIRTING, 0.0)))
+            boards.append(board((at, start - trim), (low, tall), (-SKIRTING, 0.0)))
         at = max(at, end + trim)
     return joined(boards) if boards else None
 

@@ -13,7 +13,7 @@ from echomodel.late import lates
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal, signed_area
 from echomodel.triangles import Mesh, joined
 from echousd.shapes import fittings
-from echousd.shapes.fittings import NICHE, PLAIN, WALL, Millwork
+from echousd.shapes.fittings import DADO, NICHE, PLAIN, WALL, Millwork
 from echousd.stage.paths import piece_name
 
 bay_window, door_glass, door_track, stands_out = lates(
@@ -69,10 +69,17 @@ def walls(
         here = [opening for opening in openings if opening.edge == edge]
         frame = wall_frame(polygon, edge)
         tall = min(height, PARAPET) if outdoor and not here else height
-        mesh = _wall(polygon, edge, tall, here, deep, [cut for cut in cuts if cut.edge == edge])
-        pieces = [ShellPiece(piece_name(name, "mesh"), "wall", _placed(mesh, frame))]
-        if (boards := fittings.skirting(here, length, millwork.skirting)) is not None:
-            pieces.append(ShellPiece(piece_name(name, "skirting"), "trim", _placed(boards, frame), solid=False))
+        sunk, below = [cut for cut in cuts if cut.edge == edge], -THICKNESS
+        pieces, boards = list[ShellPiece](), {"skirting": fittings.skirting(here, length, millwork.skirting)}
+        if millwork.dado and not outdoor:
+            below = DADO[1]
+            mesh = _wall(polygon, edge, (-THICKNESS, below), here, deep, sunk)
+            pieces.append(ShellPiece(piece_name(name, "dado"), millwork.dado, _placed(mesh, frame)))
+            boards["dado_rail"] = fittings.skirting([*here, *sunk], length, *DADO[::-1])
+        mesh = _wall(polygon, edge, (below, tall), here, deep, sunk)
+        pieces.append(ShellPiece(piece_name(name, "mesh"), "wall", _placed(mesh, frame)))
+        for what, made in ((what, made) for what, made in boards.items() if made is not None):
+            pieces.append(ShellPiece(piece_name(name, what), "trim", _placed(made, frame), solid=False))
         if millwork.cornice and tall == height >= COVED:
             coving = _cornice(polygon, edge, height, millwork.cornice)
             pieces.append(ShellPiece(piece_name(name, "cornice"), "trim", coving, solid=False))
@@ -118,20 +125,21 @@ def wall_frame(polygon: np.ndarray, edge: int) -> np.ndarray:
 
 
 def _wall(
-    polygon: np.ndarray, edge: int, height: float, openings: Sequence[Opening], thickness: np.ndarray,
+    polygon: np.ndarray, edge: int, span: tuple[float, float], openings: Sequence[Opening], thickness: np.ndarray,
     cuts: Sequence[Opening],
 ) -> Mesh:  # fmt: skip
-    """The wall with its holes and recesses, in its own frame."""
+    """The wall between two heights with its holes and recesses, in its own frame."""
     length = float(edge_lengths(polygon)[edge])
-    face = shapely.box(0.0, -THICKNESS, length, height)
+    face = shapely.box(0.0, span[0], length, span[1])
     for opening in openings:
         low = opening.sill if opening.sill > 0 else 0.0
-        face = face.difference(shapely.box(opening.offset, low, opening.end, min(low + opening.height, height)))
+        face = face.difference(shapely.box(opening.offset, low, opening.end, min(low + opening.height, span[1])))
     backs = []
     for cut in cuts:
-        high = cut.sill + cut.height
-        face = face.difference(shapely.box(cut.offset, cut.sill, cut.end, high))
-        backs.append(fittings.board((cut.offset, cut.end), (cut.sill, high), (NICHE, float(thickness[edge]))))
+        low, high = np.clip((cut.sill, cut.sill + cut.height), *span).tolist()
+        if high > low:
+            face = face.difference(shapely.box(cut.offset, low, cut.end, high))
+            backs.append(fittings.board((cut.offset, cut.end), (low, high), (NICHE, float(thickness[edge]))))
     pieces = [p for p in getattr(face, "geoms", [face]) if p.area > 1e-6]
     mesh = joined([*(fittings.extruded(p, thickness[edge]) for p in pieces), *backs])
     outer = outline(polygon, thickness)

@@ -229,7 +229,7 @@ class RoomStyle:
         boxed, sliding, bays: shares of rooms whose curtains hang from behind boards, whose door slides, with a bay.
         french, tall: shares of those whose windows reach down to the floor, or nearly, where nothing is before them.
         covers: what a wall behind a bed or sofa has, "" = nothing. floors: slots of those of wood or the like.
-        beams: slots of what lies below the ceiling, "" = nothing.
+        beams, dados: slots of what lies below the ceiling, and of what covers the foot of all walls, "" = nothing.
         radiators, curtains, shelves: small things that stand under windows, hang before them, and on walls.
         prints: kinds of pictures and names of rugs and cushions (`prints.toml`).
         aliases: other words for it.
@@ -246,6 +246,7 @@ class RoomStyle:
     prints: tuple[str, ...]
     cornices: tuple[float, ...] = (0.0,)
     beams: tuple[str, ...] = ("",)
+    dados: tuple[str, ...] = ("",)
     boxed: float = 0.0
     bays: float = 0.0
     sliding: float = 0.0

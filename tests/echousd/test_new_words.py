@@ -196,7 +196,7 @@ def test_rows_of_styles_name_what_there_is():
         assert set(row.windows) <= set(WINDOWS)
         assert set(row.doors) <= set(DOORS)
         assert set(row.doors) != {"glazed"}  # a bedroom has one, too
-        assert set(row.covers) <= set(COVERS)
+        assert {*row.covers, *row.dados} <= set(COVERS)
 
 
 def test_rooms_of_a_new_type_are_drawn_with_their_share(music):

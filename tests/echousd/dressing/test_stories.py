@@ -1,7 +1,10 @@
 """Small things tell who lives in a room: what is asked for, what the furniture suggests, and where it lies."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
+import shapely
 import trimesh
 
 import echousd
@@ -42,8 +45,7 @@ def test_no_mirror_hangs_over_a_table_that_has_one(mirrored):
     part = Part("mesh", trimesh.creation.box(size), {slot: np.arange(12)})
     made = Geometry((part,), (standing_hull(part.mesh),), Origin("parts"))
     host = standing("table", "dressing_table", size, np.zeros(3), 0.0, made)
-    setting = Setting({"table": host}, np.zeros((4, 2)), (), 2.6, True, True, 0)
-    kinds = [kind for kind, _ in _over(host, setting, np.random.default_rng(0))]
+    kinds = [kind for kind, _ in _over(host, np.random.default_rng(0))]
     assert any("mirror" in kind for kind in kinds) != mirrored
 
 
@@ -61,7 +63,7 @@ def kinds_on(room, name):
 
 
 def test_every_resident_has_a_story_of_kinds_and_tops_that_there_are():
-    assert set(TABLE) == {"places", "once", "anyone", *RESIDENTS}
+    assert set(TABLE) == {"places", "once", "hung", "anyone", *RESIDENTS}
     assert set(TABLE["once"]) <= {*KINDS}
     tops = {row.top for row in vocabulary().categories}
     words = {word for row in vocabulary().categories for word in (row.role, row.top, *row.invites)}
@@ -150,3 +152,15 @@ def test_a_room_has_one_knitting(rooms):
     size, far = np.array([0.26, 0.1, 0.17]), np.array([1.0, 0.0, 0.0])
     put = [setting.put_first([Thing("knitting", size, side * far, 0.0)], floor=False, margin=-9.0) for side in (-1, 1)]
     assert [one is None for one in put] == [False, True]
+
+
+@pytest.mark.parametrize("row", TABLE["hung"])
+def test_pictures_that_hang_together_fill_their_width_in_one_form_and_apart(row):
+    x, y, w, h = np.array(row["of"], float).T
+    assert ((x - w / 2).min(), (x + w / 2).max()) == pytest.approx((-0.5, 0.5), abs=0.002)
+    assert (y + h / 2).max() == pytest.approx(-(y - h / 2).min(), abs=0.002)
+    assert len(set(w > h)) == 1
+    assert ((w / h > 0.7) & (w / h < 0.78) | (w / h > 1.4) & (w / h < 1.5)).all()  # of the sheets
+    assert 0.25 < row["wide"][0] * w.min() < row["wide"][1] * w.max() < 1.7
+    boxes = shapely.box(x - w / 2, y - h / 2, x + w / 2, y + h / 2)
+    assert all(one.distance(other) > 0.02 for one, other in combinations(boxes, 2))

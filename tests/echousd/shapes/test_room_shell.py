@@ -19,7 +19,7 @@ from echousd.checks.reading import Reading
 from echousd.graph import RoomSpec
 from echousd.options import RoomOptions
 from echousd.shapes.bays import beams
-from echousd.shapes.fittings import DOORS, NICHE, RAIL, WINDOWS, Millwork, millwork_of, window_frame
+from echousd.shapes.fittings import DADO, DOORS, NICHE, RAIL, WINDOWS, Millwork, millwork_of, window_frame
 from echousd.shapes.walls import WALL, outline, slab, walls
 
 NOTCHED = np.array([(0, 0), (1, 0), (1, 1), (4, 1), (4, 3), (0, 3)], float)
@@ -42,6 +42,26 @@ def test_walls_fill_the_ring_around_the_floor_but_for_the_openings(polygon) -> N
     solid = sum(made[f"Wall_{edge + 1}_mesh"].volume for edge in range(len(polygon)))
     ring = shapely.Polygon(outline(polygon)).area - shapely.Polygon(polygon).area
     assert solid == pytest.approx(ring * 2.7 - WALL * sum(o.width * o.height for o in openings), rel=1e-6)
+
+
+def test_a_dado_is_the_foot_of_all_walls_below_a_rail_that_leaves_openings_free() -> None:
+    niche, floor = Opening("niche", "window", 1, 1.0, 0.6, 0.7, 0.85), rectangle(4.0, 3.0)
+    openings, dado = (DOOR, WINDOW, PASSAGE), Millwork(dado="boarding")
+    parts = walls(floor, 2.6, openings, millwork=dado, cuts=[niche])
+    plain, made = pieces(walls(floor, 2.6, openings, cuts=[niche])), pieces(parts)
+    assert all(mesh.is_watertight and mesh.volume > 0 for mesh in made.values())
+    for wall in ("Wall_1", "Wall_2", "Wall_3", "Wall_4"):
+        low, high = made[f"{wall}_dado"], made[f"{wall}_mesh"]
+        assert low.volume + high.volume == pytest.approx(plain[f"{wall}_mesh"].volume, rel=1e-6)
+        assert low.bounds[1, 1] == high.bounds[0, 1] == made[f"{wall}_dado_rail"].bounds[1, 1] == DADO[1]
+    looks = {piece.name: piece.look for part in parts for piece in part.pieces}
+    assert {look for name, look in looks.items() if name.endswith("dado")} == {"boarding"}
+    rail = made["Wall_3_dado_rail"]
+    assert rail.contains([[1.9, 0.93, 1.495]])[0]
+    assert not rail.contains([[2.0 - 0.85, 0.93, 1.495]])[0]  # the door
+    assert not made["Wall_2_dado_rail"].contains([[1.995, 0.93, -1.5 + 1.3]])[0]  # the niche
+    outside = pieces(walls(floor, 2.6, openings, outdoor=True, millwork=dado))
+    assert not [name for name in outside if "dado" in name]
 
 
 def test_parts_of_openings_stand_in_their_holes() -> None:
