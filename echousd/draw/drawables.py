@@ -16,6 +16,8 @@ from echousd.stage.forms import forms, polygons
 from echousd.stage.units import to_metres
 from echousd.textures import TextureError, read_image
 
+LINEAR = (np.arange(256, dtype=np.float32) / 255) ** 2.2  # of a byte of sRGB
+
 
 @dataclass(frozen=True)
 class Texture:

@@ -11,38 +11,37 @@ import numpy as np
 from pxr import Usd, UsdGeom, UsdLux
 
 from echomodel.triangles import area_normals
-from echousd.draw.drawables import image_of
-from echousd.stage.lights import emitted
+from echousd.draw.drawables import LINEAR, image_of
+from echousd.stage.lights import SHARES, emitted, level_size
 from echousd.stage.units import to_metres
 from echousd.stage.values import NOW
 
 if TYPE_CHECKING:
     from echousd.draw.scenery import Scenery
 
-SKY = 4.0  # radiance of the sky in a window for a dome of intensity 1, whose light else comes from above as well
-SUN = 4.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
+SUN = 4.0  # of what is told of the sun, as Blender has it: eyes see it brighter than a camera in the room would bear
 CEILING = np.array([0.87, 0.86, 0.84], np.float32)
-VIEW = 0.65  # of the sky's radiance, what glossy things mirror of it
 # What is seen through windows is exposed for itself, as photographers of interiors blend it in: how bright by day, the
 # power of the sky's light by which it is less in the evening, that by which its shadows are opened, and haze before it.
-THERE, DUSK, OPENED, VEIL = 1.2, 0.5, 0.7, 0.09
+THERE, DUSK, OPENED, VEIL = 1.4, 0.5, 0.85, 0.03
 WHITER = 0.36  # how much less coloured the light of lamps is than told: no wall is as yellow to eyes
-DIM = 0.02  # radiance at every place of a room without lamps and windows, so that one sees it
+DIM = 0.004  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
-ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.6, 0.75), (0.38, 0.61), 70, 40.0
-EVEN = (0.18, 0.3)  # power of the light's brightness that eyes take from it, and inside whoever photographs rooms
+ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.5, 0.58), (0.34, 0.55), 70, 40.0
+EVEN = (0.18, 0.08)  # power of the light's brightness that eyes take from it, and inside whoever photographs rooms
 WHITE, PAPER = 84, 0.95  # what so many of a hundred points are darker than comes to no more than that
-CONTRAST, KNEE = 1.42, 0.6  # power about what is bright, and from where on highlights are rolled off
+CONTRAST, KNEE = 1.33, 0.66  # power about what is bright, and from where on highlights are rolled off
 HUE = 0.8  # share of colours that keep their hue where they are bright; film bleaches them
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 DAY = 0.5  # radiance of the sky by day
+BANDS = 64  # heights of the sky whose light is told apart
 # The brightest shade over what white paper is on the average in the room, by night and by day, as eyes see it; the
 # share of its light that is seen at its rim.
 GLOWING, RIM = (3.2, 3.5), 0.25
 # Metres around a lamp where it throws no shadow of its own, and how far from a bulb its shade may be; its places that
 # light comes from, where it has no shade as far around the bulb.
-OWN, SHADED, SPOTS, BULB = 0.25, 0.5, 24, 0.05
+OWN, SHADED, SPOTS, BULB = 0.12, 0.5, 24, 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +52,9 @@ class Lights:
     sun: np.ndarray | None  # (2, 3) float32, direction towards it and irradiance by colour
     bulbs: np.ndarray  # (n, k, 3) float32 places all over the shades of lamps
     power: np.ndarray  # (n, 3) float32, radiant intensity by colour
+    # (q, 4, 3) float32 middle, half of the width and of the depth of panels, which shine against the product of these,
+    # and their radiance by colour
+    panels: np.ndarray
     tint: np.ndarray  # (3,) float32, colour of the dome
     view: np.ndarray | None  # (h, w, 3) uint8 sRGB, what lies around by latitude and longitude, the zenith first
 
@@ -71,6 +73,28 @@ class Lights:
         """(3, h * w) uint8, `view` plane by plane: numpy would copy all of it wherever some is taken."""
         return np.ascontiguousarray(np.asarray(self.view).reshape(-1, 3).T)
 
+    @cached_property
+    def falling(self) -> np.ndarray:
+        """(3, `BANDS`) float32 radiance of the sky by how far down it is, the zenith first."""
+        down = 1 - (2 * np.arange(BANDS) + 1) / BANDS
+        if self.view is None:
+            color = np.clip(0.65 + 1.4 * down, 0.3, 1) * np.ones((3, 1))
+        else:
+            rows = (np.arccos(down) / np.pi * len(self.view)).astype(int)
+            color = LINEAR.take(self.view[rows, :: max(self.view.shape[1] // BANDS, 1)]).mean(1).T
+        return np.asarray(self.sky * self.tint[:, None] * color, np.float32)
+
+    def from_sky(self, way: np.ndarray) -> np.ndarray:
+        """(3, n) radiance of the sky in directions (3, n)."""
+        return self.falling.take(((1 - way[1]) * np.float32(BANDS / 2 - 0.01)).astype(int), 1, mode="clip")
+
+    def below_ceiling(self) -> Lights:
+        """Those of one of our rooms were it made with a ceiling, but as bright outside."""
+        (sky, panel, _), (open_sky, open_panel, _) = SHARES["ceiling"], SHARES["walls"]
+        darker, share = open_sky / sky, panel / open_panel if self.day >= 1 else 1.0
+        panels = self.panels * np.array([1, 1, 1, darker * share], np.float32)[:, None]
+        return replace(self, panels=panels, power=self.power * np.float32(darker))
+
     def there(self, color: np.ndarray) -> np.ndarray:
         """(3, n) how a picture shows colours (3, n) of what lies around."""
         return np.asarray((VEIL + (1 - VEIL) * color**OPENED) * (THERE * self.day**DUSK * self.tint)[:, None], "f4")
@@ -83,7 +107,7 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
     """
     frame, cache = to_metres(stage), UsdGeom.XformCache(NOW)
     sky, suns, bulbs, power, tint = 0.0, [], [], [], np.ones(3, np.float32)
-    domes, view, panels = 0, None, list[tuple[np.ndarray, np.ndarray]]()
+    domes, view, panels = 0, None, list[np.ndarray]()
     for prim in stage.Traverse():
         if not prim.HasAPI(UsdLux.LightAPI) or UsdGeom.Imageable(prim).ComputeVisibility(NOW) == "invisible":
             continue
@@ -102,14 +126,14 @@ def read_lights(stage: Usd.Stage, shades: Sequence[np.ndarray] = ()) -> Lights:
             bulbs.append(_spots(world[:3, 3], shades))
             power.append(color / 4)  # what goes each way
         elif prim.IsA(UsdLux.RectLight) or prim.IsA(UsdLux.DiskLight):
-            panels.append((_spots(world[:3, 3] - (0, OWN, 0), ()), color / 4))
-    if not bulbs and domes and sky < DAY:
-        bulbs, power = [list(each) for each in zip(*panels, strict=True)] or [[], []]
+            sides = world[:3, :2].T * np.array(level_size(prim))[:, None] / 2
+            area = 4 * float(np.linalg.norm(np.cross(*sides)))
+            panels.append(np.stack([world[:3, 3], *sides, color / max(area, 1e-9)]))
     sun = max(suns, key=lambda one: float(one[1].sum()), default=None)
     return Lights(
         sky=sky if domes else 1.0, sun=None if sun is None else sun.astype(np.float32),
         bulbs=np.array(bulbs, np.float32).reshape(-1, SPOTS, 3), power=np.array(power, np.float32).reshape(-1, 3),
-        tint=tint, view=view,
+        panels=np.array(panels, np.float32).reshape(-1, 4, 3), tint=tint, view=view,
     )  # fmt: skip
 
 
@@ -130,7 +154,7 @@ def _spots(bulb: np.ndarray, shades: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def with_ceiling(scenery: Scenery) -> Scenery:
-    """The scene with a ceiling over its walls, and its beams."""
+    """The scene with a ceiling over its walls, and its beams; where it has none, in the light that it would be told."""
     (left, _, back), (right, _, front) = scenery.bounds
     y = scenery.triangles[scenery.wall >= 0][..., 1].max()
     corners = np.array([(left, y, back), (right, y, back), (right, y, front), (left, y, front)], np.float32)
@@ -144,7 +168,8 @@ def with_ceiling(scenery: Scenery) -> Scenery:
     }  # fmt: skip
     parts = [{key: getattr(scenery, key) for key in added}, *scenery.above, added]
     joined: dict[str, Any] = {key: np.concatenate([part[key] for part in parts]) for key in added}
-    return replace(scenery, above=(), **joined)
+    lights = scenery.lights if scenery.roofed else scenery.lights.below_ceiling()
+    return replace(scenery, above=(), lights=lights, **joined)
 
 
 def evened(light: np.ndarray, white: np.ndarray, inside: bool = True) -> np.ndarray:
@@ -191,7 +216,6 @@ def rolled(level: np.ndarray, knee: float = 0.72) -> np.ndarray:
 
 
 CELL = 0.5  # metres
-THROWN = 0.7  # of what surfaces of their colours would: so rooms have the contrast that photographs have
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,4 +253,4 @@ class Bounced:
         count = np.bincount(rows, minlength=many)
         even = total.reshape(3, -1, 6).sum(1) / np.maximum(count.reshape(-1, 6).sum(0), 1)
         mean = np.where(count > 0, total / np.maximum(count, 1), np.tile(even, many // 6))
-        return replace(self, radiance=(THROWN * mean).astype(np.float32))
+        return replace(self, radiance=mean.astype(np.float32))

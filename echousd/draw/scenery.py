@@ -15,14 +15,13 @@ from pxr import Usd
 from echomodel.late import Late
 from echomodel.triangles import area_normals, bounds_of, box, lengths
 from echomodel.vocabulary import vocabulary
-from echousd.draw.drawables import Paint, image_of, read_drawables
+from echousd.draw.drawables import LINEAR, Paint, image_of, read_drawables
 from echousd.draw.indoors import LUMA, Lights, read_lights
 from echousd.draw.sight import Furniture
 
 upright_box = Late("echousd.stage.contents:upright_box")
 
 GOLDEN = 0.61803398875
-LINEAR = (np.arange(256, dtype=np.float32) / 255) ** 2.2  # of a byte of sRGB
 MIXED = np.array([0.3141, 0.2718, 0.1618], np.float32)  # so that no two colours of a room add up to the same
 SHELL = ("floor", "wall", "ceiling", "door", "window")
 SMALL = 0.35  # metres: what is no larger hides nothing that a picture is of
@@ -59,6 +58,7 @@ class Scenery:
     panes: np.ndarray  # (p, 3, 3) float32: middle, half of the width and half of the height of every window's pane
     pane_wall: np.ndarray  # (p,) int, the walls of the panes
     lights: Lights  # of the stage
+    roofed: bool = False  # whether the stage has a ceiling, whose light it is then told for
     above: tuple[dict[str, np.ndarray], ...] = ()  # what only a ceiling shows: the fields with an f of beams
 
     @cached_property
@@ -240,8 +240,10 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     above = list[dict[str, np.ndarray]]()
     walls: dict[str, int] = {}  # component -> number; doors and windows belong to their wall
     panes: list[tuple[str, np.ndarray]] = []
+    roofed = False
     for mesh in read_drawables(stage):
         if mesh.category == "ceiling":  # pictures look in from above
+            roofed = True
             continue
         points = mesh.triangles.reshape(-1, 3) @ mesh.world[:3, :3].T + mesh.world[:3, 3]
         if mesh.category == "window" and not by_class and all(p.opacity < SEEN_THROUGH for p, _ in mesh.paints):
@@ -296,7 +298,8 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
         images=tuple(images.values()), things=tuple(things),
         panes=np.array([pane for _, pane in panes], np.float32).reshape(-1, 3, 3),
         pane_wall=np.array([walls.get(wall, -1) for wall, _ in panes], int),
-        lights=read_lights(stage, [np.concatenate(each) for each in shades.values()]), above=tuple(above), **joined,
+        lights=read_lights(stage, [np.concatenate(each) for each in shades.values()]),
+        roofed=roofed, above=tuple(above), **joined,
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from echomodel.triangles import along
-from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SKY, SUN, VIEW, Bounced, evened, exposure, rolled
+from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SUN, Bounced, evened, exposure, rolled
 from echousd.draw.scenery import CLOTH, SKY_LIGHT, Scenery, next_room, outside
 from echousd.draw.smoothing import RINGS, same_surface, smooth_light
 from echousd.draw.views import View
@@ -17,9 +17,10 @@ from echousd.draw.views import View
 FINE, QUICK = 3, 2  # squared: rays per pixel
 AROUND = 2  # per ray: rays to what stands around
 # Places at which a room's light is found, rays of each kind from each, and how often light is thrown on.
-PLACES, OFTEN, TURNS = (600, 1200), 3, 3
-# Metres from which on nothing makes a place darker, how dark what touches it does, and how much less if it is white.
-CREVICE, DEPTH, PALE = 0.32, 1.25, 0.55
+PLACES, OFTEN, TURNS = (600, 1200), 3, 5
+# Metres from which on what stands near throws on all of its light, which is in a shadow itself, and of how much it
+# throws on more if it is white; what any surface mirrors of all around it.
+CREVICE, PALE, SHEEN = 1.0, 0.55, 0.05
 # Gloss from which on surfaces mirror, and are metal, of which so much is not mirrored; how far from where a mirror
 # would a rough one mirrors.
 GLOSSY, METAL, MATT, BLUR = 0.2, 0.5, 0.4, 0.15
@@ -247,9 +248,9 @@ def _see_through(world: World, way: np.ndarray, seen: Seen) -> None:
 
 
 def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndarray:
-    """(6, n) what falls on what was seen in some pixels: soft light by colour, what is mirrored to the eye, how
-    free the place is of what stands near, see `CREVICE`, and the share of the sun that shines there."""
-    out = np.zeros((6, len(pixel)), np.float32)
+    """(5, n) what falls on what was seen in some pixels: soft light by colour, what is mirrored to the eye, and the
+    share of the sun that shines there."""
+    out = np.zeros((5, len(pixel)), np.float32)
     for here, part in seen.blocks():
         part, shift = part._replace(point=part.point + BEFORE * part.normal), _shifts(world, pixel[here])
         for sample in range(samples):
@@ -265,7 +266,7 @@ def _shifts(world: World, pixel: np.ndarray) -> np.ndarray:
 
 
 def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, often: int, seldom: int) -> np.ndarray:
-    """(6, n) light at all pixels: asked at every second of every second row, lent to those of the same surface.
+    """(5, n) light at all pixels: asked at every second of every second row, lent to those of the same surface.
 
     Where there is little of a surface around to smooth the light over, at an `edge` (n,), it is asked `often`, and what
     is `near` one (n,) shares it by place: trims a pixel wide have no neighbours in rows and columns.
@@ -274,25 +275,25 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     met, coarse, inside = seen.face.reshape(shape) >= 0, np.s_[..., ::2, ::2], world.view.inside
     normal, point = (each.reshape(3, *shape) for each in (seen.normal, seen.point))
     asked, torn, number = met[coarse], edge.reshape(shape)[coarse], np.arange(met.size).reshape(shape)[coarse]
-    found = np.zeros((7, asked.size), np.float32)  # the last: whether the sun shines
+    found = np.zeros((6, asked.size), np.float32)  # the last: whether the sun shines
     known = [normal[coarse].copy(), point[coarse].copy()]
     for here, times in ((asked & torn, often), (asked & ~torn, seldom)):
-        found[:6, here.ravel()] = _asked(world, seen.of(number[here]), number[here], times)
+        found[:5, here.ravel()] = _asked(world, seen.of(number[here]), number[here], times)
     thin = np.flatnonzero(asked & near.reshape(shape)[coarse])
-    raw, slim = found[:6, thin], number.ravel()[thin]
-    found[:5, thin] = _pooled(seen.of(slim), raw[:5])
-    found[6] = found[5] > 0
+    raw, slim = found[:5, thin], number.ravel()[thin]
+    found[:4, thin] = _pooled(seen.of(slim), raw[:4])
+    found[5] = found[4] > 0
     gloss = world.scenery.gloss.take(seen.face).reshape(shape)[coarse]
     reach = (
-        (np.s_[:3], RINGS), (np.s_[3:4], RINGS[:3], gloss), (np.s_[4:5], RINGS[:3]),
-        (np.s_[5:6], () if inside else RINGS), (np.s_[6:], RINGS[:1]),
+        (np.s_[:3], RINGS), (np.s_[3:4], RINGS[:3], gloss), (np.s_[4:5], () if inside else RINGS),
+        (np.s_[5:], RINGS[:1]),
     )  # fmt: skip
-    found = found.reshape(7, *asked.shape)
+    found = found.reshape(6, *asked.shape)
     found = smooth_light(found, known[0], known[1], reach)
-    mixed = ((found[6] > 0.01) & (found[6] < 0.99)).repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
-    light, weight = np.zeros((6, *shape), np.float32), np.zeros(shape, np.float32)
+    mixed = ((found[5] > 0.01) & (found[5] < 0.99)).repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
+    light, weight = np.zeros((5, *shape), np.float32), np.zeros(shape, np.float32)
     there, *known, found = (
-        np.pad(each, [(0, 0)] * (each.ndim - 2) + [(0, 1)] * 2, "edge") for each in (asked, *known, found[:6])
+        np.pad(each, [(0, 0)] * (each.ndim - 2) + [(0, 1)] * 2, "edge") for each in (asked, *known, found[:5])
     )
     for odd in product((0, 1), repeat=2):  # of the one, two or four that were asked around it, those of its own surface
         here = np.s_[..., odd[0] :: 2, odd[1] :: 2]
@@ -304,15 +305,15 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
             lent += fits * found[beside]
             many += fits
         light[here], weight[here] = lent / np.maximum(many, 1), many
-    rest, flat = np.flatnonzero(met & (weight == 0)), light.reshape(6, -1)
+    rest, flat = np.flatnonzero(met & (weight == 0)), light.reshape(5, -1)
     # with what was asked of slim things beside them: alone they would be lighter and darker dashes along a trim
     more = np.concatenate([_asked(world, seen.of(rest), rest, often // 2), raw], 1)
     flat[:, rest] = _pooled(seen.of(np.concatenate([rest, slim])), more)[:, : len(rest)]
     border = np.flatnonzero(met & mixed & inside)  # of the sun's light: sharper than two pixels
     facing, shift = seen.normal.take(border, 1), _shifts(world, border)[:2]
     there = seen.point.take(border, 1) + BEFORE * facing
-    flat[5, border] = np.mean([_sunny(world, there, facing, _even(n, shift)) for n in range(often)], 0)
-    return smooth_light(light, normal, point, ((np.s_[:], RINGS[:1]),)).reshape(6, -1)
+    flat[4, border] = np.mean([_sunny(world, there, facing, _even(n, shift)) for n in range(often)], 0)
+    return smooth_light(light, normal, point, ((np.s_[:], RINGS[:1]),)).reshape(5, -1)
 
 
 def _pooled(seen: Seen, light: np.ndarray) -> np.ndarray:
@@ -334,8 +335,8 @@ def _pooled(seen: Seen, light: np.ndarray) -> np.ndarray:
 
 
 def _lent(world: World, more: Seen, pixel: np.ndarray, seen: Seen, light: np.ndarray) -> np.ndarray:
-    """(6, n) light of what further rays in some pixels met: that of the same surface there or beside it, else asked."""
-    out, wanted = np.zeros((6, len(pixel)), np.float32), np.flatnonzero(more.face >= 0)
+    """(5, n) light of what further rays in some pixels met: that of the same surface there or beside it, else asked."""
+    out, wanted = np.zeros((5, len(pixel)), np.float32), np.flatnonzero(more.face >= 0)
     for apart in BESIDE @ (1, world.size):
         other = np.clip(pixel.take(wanted) + apart, 0, light.shape[1] - 1)
         own = more.normal.take(wanted, 1), more.point.take(wanted, 1)
@@ -348,14 +349,14 @@ def _lent(world: World, more: Seen, pixel: np.ndarray, seen: Seen, light: np.nda
 
 
 def _colored(world: World, everything: Seen, falling: np.ndarray) -> np.ndarray:
-    """(3, n) radiance of what was seen in light (6, n)."""
+    """(3, n) radiance of what was seen in light (5, n)."""
     scenery, out, sun = world.scenery, np.empty_like(everything.glow), world.sun[:, None]
     for here, seen in everything.blocks():
         light = falling[:, here]
         color = scenery.colors(seen.face, seen.bary, _breadth(world, seen), world.atlas)
-        fallen = light[5] * sun
-        fallen, whole = light[:3] * light[4] ** np.float32(DEPTH) + fallen, light[:3] + fallen
-        fallen *= evened(whole, world.white, world.view.inside)
+        fallen = light[:3] + light[4] * sun
+        fallen *= evened(fallen, world.white, world.view.inside)
+        color += np.float32(SHEEN) * (1 - color)
         metal = scenery.gloss.take(seen.face) > METAL
         out[:, here] = color * fallen * np.where(metal, np.float32(MATT), 1) + light[3] * np.where(metal, color, 1)
         if len(shade := np.flatnonzero(scenery.planes.glows.take(seen.face))):  # less what they throw on themselves
@@ -405,10 +406,10 @@ def embree(triangles: np.ndarray) -> Any:
 
 
 def _light(world: World, seen: Seen, sample: int, shift: np.ndarray) -> np.ndarray:
-    """(6, n) what falls on points by one sample of the sun, a window and a lamp, and what is around, see `_asked`."""
-    out, at = np.zeros((6, len(seen.face)), np.float32), (seen.point, seen.normal)
+    """(5, n) what falls on points by one sample of the sun, a window and a lamp, and what is around, see `_asked`."""
+    out, at = np.zeros((5, len(seen.face)), np.float32), (seen.point, seen.normal)
     spots = [_even(sample, part) for part in (shift[:2], shift[2:])]
-    out[:3], out[5] = _direct(world, *at, *spots)
+    out[:3], out[4] = _direct(world, *at, *spots)
     share = world.scenery.thin.take(seen.face)
     if len(cloth := np.flatnonzero(share)):  # which light comes through
         point, normal, *spots = (each.take(cloth, 1) for each in (*at, *spots))
@@ -417,8 +418,7 @@ def _light(world: World, seen: Seen, sample: int, shift: np.ndarray) -> np.ndarr
     dim = np.float32(DIM * max(world.scenery.lights.sky, 0.1)) * world.white / max(float(world.white @ LUMA), 1e-6)
     out[:3], out[3] = out[:3] + dim[:, None], _mirrored(world, seen, _even(sample, shift[:2]))
     for ray in range(AROUND):
-        thrown, free = _gathered(world, *at, _even(sample * AROUND + ray, shift[2:]))
-        out[:3], out[4] = out[:3] + thrown / AROUND, out[4] + free / AROUND
+        out[:3] += _gathered(world, *at, _even(sample * AROUND + ray, shift[2:])) / AROUND
     return out
 
 
@@ -437,7 +437,7 @@ def _mirrored(world: World, seen: Seen, square: np.ndarray) -> np.ndarray:
     bright = np.flatnonzero(scenery.planes.glows.take(face))
     lamps = (scenery.emissive.take(face[bright], 0) * world.glow) @ LUMA
     within[bright] += np.minimum(lamps, np.float32(GLINT) * (world.white @ LUMA))
-    sky = np.float32(VIEW * scenery.lights.sky) * np.clip(0.65 + 1.4 * way[1], 0.3, 1)
+    sky = LUMA @ scenery.lights.from_sky(way)
     share = np.where(gloss > METAL, 1, 0.04 + (0.96 - rough) * (1 - facing) ** 5)  # Schlick's, of Fresnel's law
     out[some] = share * np.where(face < 0, sky, within)
     return out
@@ -452,15 +452,18 @@ def _direct(
     """
     scene, scenery, lights = world.scene, world.scenery, world.scenery.lights
     light, inside = np.zeros(point.shape, np.float32), world.view.inside
-    if inside and len(scenery.panes):  # one place in one window for each ray
-        which = np.minimum((turn[0] * len(scenery.panes)).astype(int), len(scenery.panes) - 1)
-        pane = scenery.panes.reshape(-1, 9).T.take(which, 1)
-        way, away = way_to(point, pane[:3] + (2 * spot[0] - 1) * pane[3:6] + (2 * spot[1] - 1) * pane[6:])
-        area = np.cross(scenery.panes[:, 1], scenery.panes[:, 2]).T.take(which, 1)  # a quarter of it
-        seen = np.clip(along(way, normal), 0, None) * 4 * np.abs(along(way, area)) / np.maximum(away, 0.2) ** 2
-        seen *= np.clip(0.65 + 1.4 * way[1], 0.3, 1)  # sky above, ground below
+    panes, panels = scenery.panes.reshape(-1, 9).T, lights.panels.reshape(-1, 12).T
+    for flat in (panes, panels) if inside else ():  # one place in one window and in one panel for each ray
+        if not (many := flat.shape[1]):
+            continue
+        which = np.minimum((turn[0] * many).astype(int), many - 1)
+        plane, (u, v) = flat.take(which, 1), spot if flat is panes else (turn[0] * many - which, turn[1])
+        way, away = way_to(point, plane[:3] + (2 * u - 1) * plane[3:6] + (2 * v - 1) * plane[6:9])
+        outwards = along(way, np.cross(plane[3:6], plane[6:9], axis=0))  # for a quarter of its area
+        outwards = np.abs(outwards) if flat is panes else np.maximum(outwards, 0)
+        seen = np.clip(along(way, normal), 0, None) * 4 * outwards / np.maximum(away, 0.2) ** 2
         share = free(scene, point, way, away, seen > 1e-4) * np.minimum(seen, 1.5)  # none a spark near a pane
-        light += share * (len(scenery.panes) * SKY * lights.sky / np.pi * SKY_LIGHT * lights.tint)[:, None]
+        light += share * np.float32(many / np.pi) * (lights.from_sky(way) if flat is panes else plane[9:])
     if inside and len(lights.bulbs):  # one lamp for each ray
         which = np.minimum((turn[1] * len(lights.bulbs)).astype(int), len(lights.bulbs) - 1)
         way, away = way_to(point, lights.bulbs[which, (spot[0] * lights.bulbs.shape[1]).astype(int)].T)
@@ -482,17 +485,15 @@ def _sunny(world: World, point: np.ndarray, normal: np.ndarray, spot: np.ndarray
     return free(world.scene, point, towards, np.full(len(facing), 1e3, np.float32), facing > 0) * facing
 
 
-def _gathered(world: World, point: np.ndarray, normal: np.ndarray, square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(3, n) what surfaces throw on points by one ray each, which goes to `square` (2, n), and (n,) shares of
-    `CREVICE`."""
+def _gathered(world: World, point: np.ndarray, normal: np.ndarray, square: np.ndarray) -> np.ndarray:
+    """(3, n) what surfaces throw on points by one ray each, which goes to `square` (2, n), see `CREVICE`."""
     way = _unit(normal + _on_sphere(square))  # cosine-weighted
     face, far, _ = _hit(world, point, way)
     rows = world.thrown.rows(point, way, far, world.scenery.planes.axis.take(face))
     thrown, missed = world.thrown.radiance.take(rows, 1), np.flatnonzero(face < 0)
     thrown[:, missed] = 0 if world.view.inside else (0.92 + 0.35 * way[1].take(missed)) * SKY_LIGHT[:, None]
-    pale, open_ = PALE * world.scenery.planes.luma.take(face), np.minimum(far / np.float32(CREVICE), 1)
-    open_[missed] = 1
-    return thrown, pale + (1 - pale) * open_
+    pale, far[missed] = PALE * world.scenery.planes.luma.take(face), CREVICE
+    return thrown * (pale + (1 - pale) * np.minimum(far / np.float32(CREVICE), 1))
 
 
 def _lit(world: World) -> World:
@@ -529,7 +530,7 @@ def _lit(world: World) -> World:
     for _ in range(TURNS):
         world = world._replace(thrown=world.thrown.lit(rows, albedo * (direct + light)))
         squares = rng.random((OFTEN, len(rows), 2), np.float32).transpose(2, 0, 1).reshape(2, -1)
-        light = _gathered(world, *often, squares)[0].reshape(3, OFTEN, -1).mean(1)
+        light = _gathered(world, *often, squares).reshape(3, OFTEN, -1).mean(1)
     white, emissive = (direct + light).mean(1), world.scenery.emissive
     # shades of the room's whole colour would be yellower than what they light
     tinted = white**0.8 * (white @ LUMA) ** 0.2

@@ -17,6 +17,7 @@ from echousd.draw.views import view_matrix
 from echousd.layers.structure import drawn
 from echousd.room import RoomData
 from echousd.shapes.finishes import baking
+from echousd.stage.lights import SHARES
 from echousd.stage.pen import Pen, layout_pens, ops
 
 LIGHTS = "/Room/Lights"
@@ -24,14 +25,8 @@ NITS = 30.0  # cd/m² of a surface that comes to 1 in the picture: a camera in a
 # Lumens and kelvin of a lamp, by what it rests on. White is 6504 to a renderer, which adapts to nothing as eyes do:
 # lamps of 2,700 K would turn a room orange. They are written as colours, as Blender reads no temperatures.
 LAMPS = {"ceiling": (1500.0, 3700.0), "floor": (1000.0, 3100.0), "table": (450.0, 3000.0), "wall": (400.0, 3000.0)}
-# Of sky and panel: without walls, with walls, which throw back what they get, and below a ceiling, where the sky is
-# seen through the windows alone.
-SHARES = {"open": (1.0, 1.0), "walls": (1.4, 0.12), "ceiling": (3.6, 0.95)}
 SKY = "textures/sky.jpg"
 BULB = 0.04  # metres, radius
-# Irradiance of the sun: through windows alone a white surface that faces it gains 0.45, about what the sky gives; over
-# walls without a ceiling, which have the sky already, so much would leave them blank.
-SUN, OVERHEAD = 1.4, 0.55
 # Degrees of the sun over the horizon, how far it comes from the side, and kelvin at these ends.
 ELEVATION, ASIDE, WARM = (26.0, 46.0), (0.2, 0.8), (5200.0, 6000.0)
 # What is left of sky, sun and lamps; the sky's colour.
@@ -61,11 +56,11 @@ def write_lights(pen: Pen, room: RoomData, bounds: np.ndarray) -> None:
         sky |= {"asset inputs:texture:file": f"./{SKY}", "token inputs:texture:format": "latlong"}
     pen.define(f"{LIGHTS}/sky", "DomeLight", sky)
     kind = "open" if not room.options.walls else "ceiling" if room.options.ceiling else "walls"
-    above, share = SHARES[kind]
+    above, share, sun = SHARES[kind]
     flux = _panel(pen, bounds, room.height)
     full: Intensities = {"sky": (0, 0.5 * above)}
     if room.options.walls:
-        full |= _sun(pen, room)
+        full |= _sun(pen, room, sun)
     lamps = _lamps(pen, room)
     full |= lamps
     area = shapely.Polygon(room.floor).area
@@ -107,7 +102,7 @@ def _panel(pen: Pen, bounds: np.ndarray, height: float) -> float:
     return np.pi * NITS * width * depth
 
 
-def _sun(pen: Pen, room: RoomData) -> Intensities:
+def _sun(pen: Pen, room: RoomData, irradiance: float) -> Intensities:
     """The sun through the widest window, from a little aside."""
     corners, windows = room.corners, [opening for opening in room.graph.room.openings if opening.kind == "window"]
     if not windows:
@@ -129,7 +124,7 @@ def _sun(pen: Pen, room: RoomData) -> Intensities:
         **ops(transform=("matrix4d", Gf.Matrix4d(np.ascontiguousarray(matrix.T)))),
     }
     pen.define(f"{LIGHTS}/sun", "DistantLight", values)
-    return {"sun": (1, SUN if room.options.ceiling else OVERHEAD)}
+    return {"sun": (1, irradiance)}
 
 
 def _lamps(pen: Pen, room: RoomData) -> Intensities:

@@ -20,6 +20,7 @@ from echousd.draw.scenery import CLOTH, SHEER, read_scenery
 from echousd.draw.tracing import trace
 from echousd.draw.views import View, hero_view, view_matrix
 from echousd.options import RoomOptions
+from echousd.stage.showing import showing_variant
 
 WALLED = RoomOptions(walls=True, dress="none")
 
@@ -90,12 +91,38 @@ def test_lights_are_read_in_any_unit_and_axis():
     assert read_lights(lights_of()).sky == 1.0  # a stage that tells nothing of light is seen by day
 
 
-def test_a_panel_lights_what_is_dark_and_has_no_lamp():
-    lights = read_lights(lights_of(dome=0.1, panel=40000.0))  # a square centimetre
-    np.testing.assert_allclose(lights.power, [(1.0, 0.5, 0.25)], rtol=1e-6)
-    np.testing.assert_allclose(lights.bulbs - np.float32((1, 2.75, -2)), 0, atol=0.051)
-    assert len(read_lights(lights_of(dome=1.0, panel=40000.0)).power) == 0
-    assert read_lights(lights_of(dome=0.1, panel=40000.0, lamp=80000.0)).power.max() == 2.0
+def test_panels_are_read_in_any_unit_and_axis_and_shine_down():
+    lights = read_lights(lights_of(dome=1.0, panel=40000.0, lamp=80000.0))  # a square centimetre
+    (panel,) = lights.panels
+    np.testing.assert_allclose(panel[0], (1, 3, -2), atol=1e-6)
+    np.testing.assert_allclose(np.cross(panel[1], panel[2]), (0, 0.005**2, 0), atol=1e-9)
+    np.testing.assert_allclose(panel[3], (40000.0, 20000.0, 10000.0), rtol=1e-5)
+    assert lights.power.max() == 2.0
+    assert len(read_lights(lights_of(dome=1.0)).panels) == 0
+
+
+def test_a_panel_lights_what_is_below_it_and_nothing_above():
+    side = np.array([(0.0, 1.5, 0.0), (0.0, 0.0, 0.4), (0.4, 0.0, 0.0), (1.0, 1.0, 1.0)], np.float32)
+    scenery, _ = box_room(sky=0.0, sun=None, panels=side[None])
+    black = replace(scenery, flat_colors=np.full_like(scenery.flat_colors, 0.02))
+    both = View(view_matrix(np.array([-1.9, 1.5, 0.0]), np.array([0.0, 1.5, 0.0])), 1.2, False, inside=True)
+    picture = trace(black, both, 48, rays=2).mean(-1)
+    assert picture[-8:].mean() > 4 * picture[:8].mean()
+
+
+def test_a_room_without_a_ceiling_is_lit_as_it_were_told_with_one(tmp_path):
+    """By day and in the evening: sky to sun to panel to lamps."""
+    for light in ("day", "evening"):
+        found = []
+        for ceiling in (False, True):
+            options = RoomOptions(walls=True, dress="none", ceiling=ceiling)
+            room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, options=options)
+            stage = Usd.Stage.Open(str(room.save(tmp_path / f"{light}{ceiling}", preview=False)))
+            with showing_variant(stage, "light", light):
+                lights = with_ceiling(read_scenery(stage)).lights
+            sun = np.zeros(3) if lights.sun is None else lights.sun[1]
+            found.append(np.concatenate([sun, lights.panels[0, 3], *lights.power]) / lights.sky)
+        np.testing.assert_allclose(*found, rtol=0.02)
 
 
 def box_room(**lights) -> tuple:
@@ -294,7 +321,8 @@ def test_light_comes_through_a_curtain_and_not_through_a_board():
 def test_one_sees_through_thin_cloth_before_a_window_what_lies_outside_and_its_folds():
     pane = np.array([[(1.99, 1.0, 0.0), (0.0, 0.0, 1.5), (0.0, 0.8, 0.0)]], np.float32)
     view = View(view_matrix(np.array([-1.8, 1.0, 0.0]), np.array([0.5, 1.0, 0.0])), 0.3, False, inside=True)
-    lawn = np.full((8, 16, 3), (40, 160, 40), np.uint8)
+    lawn = np.full((8, 64, 3), 255, np.uint8)  # behind the cloth alone, so that light is white
+    lawn[:, 46:51] = 40, 160, 40
     scenery, _ = box_room(sky=1.0, sun=None, view=lawn)
     wall = (scenery.triangles[..., 0] > 1.9).all(1)
     names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "thin", "st", "texture", "wall")

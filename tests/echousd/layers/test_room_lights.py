@@ -15,8 +15,9 @@ from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.graph import RoomSpec
 from echousd.layers.cameras import room_points
-from echousd.layers.lights import ASIDE, ELEVATION, HUES, LAMPS, OVERHEAD, SHARES, TIMES, image_files, write_lights
+from echousd.layers.lights import ASIDE, ELEVATION, HUES, LAMPS, TIMES, image_files, write_lights
 from echousd.options import RoomOptions
+from echousd.stage.lights import SHARES
 from echousd.stage.pen import Pen
 
 WINDOW = Opening("window", "window", 0, 0.8, 1.4, 1.3, 0.9)  # in the wall at -z
@@ -46,7 +47,9 @@ def test_day_evening_and_night(stage) -> None:
     times.SetVariantSelection("day")
     assert seen["day"][0] > seen["evening"][0] > seen["night"][0] > 0
     assert seen["day"][1] > seen["evening"][1] == seen["night"][1] == 0
-    assert seen["day"][:2] == pytest.approx([0.5 * SHARES["walls"][0], OVERHEAD])  # as they are said, nothing taken
+    assert seen["day"][:2] == pytest.approx(
+        [0.5 * SHARES["walls"][0], SHARES["walls"][2]]
+    )  # as they are said, nothing taken
     assert seen["day"][2] < seen["evening"][2] == seen["night"][2]
     for name in ("evening", "night"):  # the panel stands for lamps then, and has the colour of those at ceilings
         times.SetVariantSelection(name)
@@ -292,6 +295,6 @@ def test_rooms_of_a_home_have_one_sun_and_others_their_own() -> None:
 
 def test_what_is_left_of_lights_and_colours_of_the_sky_are_shares_and_the_sky_makes_up_for_what_is_closed() -> None:
     assert {*TIMES} == {*HUES}
-    numbers = np.array([*TIMES.values(), *HUES.values(), *((panel,) * 3 for _, panel in SHARES.values())])
+    numbers = np.array([*TIMES.values(), *HUES.values(), *((panel,) * 3 for _, panel, _ in SHARES.values())])
     assert ((numbers >= 0) & (numbers <= 1)).all()
     assert SHARES["open"][0] < SHARES["walls"][0] < SHARES["ceiling"][0]
