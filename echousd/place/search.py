@@ -35,7 +35,7 @@ filled, involved, part_of, rebuilt, reseated, with_along = lates(
 JUDGED = 48  # poses that are judged at once
 MANY = 12  # pieces from which on a room is built up, one piece after the other
 SWEEPS = 3  # times that what misses something is looked at after the first time
-BUDGET, PIECES = 4500, 15  # poses that are judged in all, each a whole room; more where there are more pieces
+BUDGET, PIECES = 4500, 15  # poses that are judged in all, each a whole room; more in halls, of more pieces than that
 GAIN = 1e-3  # by which a move must be better
 WORTH = 0.5  # that a sweep must gain for another one
 WRONG, UNEASY = 0.5, 0.1  # what a term costs that is broken, or kept so barely that it shows
@@ -43,7 +43,7 @@ GRAIN = 1e4  # costs are compared to so many parts of one
 PULL, FARTHEST, TURN = 0.08, 4.0, 0.1  # for a metre from the draft, up to so many, and for looking the other way
 ATTENDING = 0.25  # share of that for pieces that attend another
 OF_GRAPHS = frozenset({"floor_filled"})  # terms that only more furniture meets, no other place
-WHOLE = ("floor_used", "corners_used", "floor_served", "each_served")  # terms that ask for all pieces of a room
+WHOLE = ("floor_used", "corners_used", "floor_served", "each_served")  # of all pieces, in halls of those there
 FIRST = {"bed": 0.0, "sofa": 1.0, "board": 3.0, "storage": 4.0, "seat": 6.0, "screen": 7.0, "decor": 8.5, "light": 8.0}
 HIT, DEEP, MISSED = 1.0, 4.0, 3.0  # before anything is judged: for running into something, per metre, and relations
 WALKS = 24  # states of those judged at once that are walked through, where something cannot be walked to
@@ -140,9 +140,9 @@ class Search:
         """(K,) float: what rooms of boxes `there` (n,) bool cost: position (K, n, 3), yaw (K, n), moved (n,) bool; for
         the use of their `floor` alone, which is quick and counts as no pose."""
         self.judged += 0 if floor else len(yaw)
-        key, whole = there.tobytes(), bool(there.all())
+        key, whole = there.tobytes(), len(there) > PIECES or bool(there.all())
         if key not in self.rooms:
-            self.rooms[key] = self.problem.plan if whole else part_of(self.problem.plan, there)
+            self.rooms[key] = self.problem.plan if there.all() else part_of(self.problem.plan, there)
         copies = copies_of(self.rooms[key], position[:, there], yaw[:, there], moved[there])
         asked = self.looks[:, moved].any(1) & (self.whole if floor else ~self.whole | whole)
         seen, cost = costs_of([(t, t.find(copies)) for t, ask in zip(self.terms, asked, strict=True) if ask], copies)

@@ -20,7 +20,7 @@ from echousd.place.building import expecting, filled, involved, with_along
 from echousd.place.placing import place_boxes
 from echousd.place.problem import problem_of
 from echousd.place.proposals import out_of_habit, proposals, slots_at
-from echousd.place.search import MANY, UNEASY, Search, State
+from echousd.place.search import MANY, PIECES, UNEASY, Search, State
 from echousd.place.seats import sides
 
 ID = {row.name: row.id for row in vocabulary().predicates}
@@ -193,6 +193,18 @@ def test_a_bare_part_of_the_floor_is_filled_by_one_piece():
     gone = np.hypot(*(after.position - state.position)[:, ::2].T) > 1.0
     assert gone[MANY // 2 :].sum() == gone.sum() == 1
     assert search.faults(after)[0] + after.taste.sum() < cost + state.taste.sum() - 0.5
+
+
+@pytest.mark.parametrize("count", [PIECES, PIECES + 1])
+def test_the_floor_counts_while_the_pieces_of_a_hall_are_put_in(count):
+    at = [(x, 0, z) for x in (-4.0, -1.5) for z in np.linspace(-3.5, 3.5, PIECES // 2 + 1)][:count]
+    search, state = searched(["bookshelf"] * count, [(0.8, 1.8, 0.3)] * count, at, [0.0] * count, floor=3 * FLOOR)
+    search.looks &= search.whole[:, None]  # no other terms
+    there, moved = np.arange(count) < count - 1, np.arange(count) == count - 2
+    position = np.repeat(state.position[None], 2, 0)
+    position[1, moved, 0] = 4.0
+    near, far = search.costs(there, position, np.repeat(state.yaw[None], 2, 0), moved)
+    assert (far < near - 0.1) == (near > 0.0) == (count > PIECES)
 
 
 @pytest.mark.parametrize("bare", [False, True])
