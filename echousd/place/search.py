@@ -81,6 +81,7 @@ class Search:
 
     def __init__(self, problem: Problem, terms: tuple[Term, ...] = TERMS, yields: frozenset[str] = frozenset()) -> None:
         self.problem, self.judged, self.walked, self.bare = problem, 0, False, False
+        self.fine = False  # whether little moves are looked at before all others
         self.budget = round(BUDGET * max(1.0, len(problem.size) / PIECES))
         numbers, words = {int(number) for number in problem.triplets[:, 1]}, vocabulary().predicates
         stated = {row.name for row in words if row.id in numbers} | {"placed"}
@@ -212,9 +213,11 @@ class Search:
         drawn = proposals(problem, state.position, state.yaw, there, i)
         rows = np.concatenate([drawn, self._joining(state, there, i)])
         near = aside(problem, state.position, state.yaw, i)
-        taste = np.concatenate([self.tastes(i, rows), state.taste[i] + 0.3 * near[:, 3]])
+        little = state.taste[i] + 0.3 * near[:, 3]
+        first = np.concatenate([self.tastes(i, rows), little * (not self.fine)])
+        taste = np.concatenate([first[: len(rows)], little])
         rows = np.concatenate([rows, near])
-        keep = self._promising(state, there, i, group, rows, taste)
+        keep = self._promising(state, there, i, group, rows, first)
         rows, taste = rows[keep], taste[keep]
         states = [(state.position[None], state.yaw[None]), self.carried(state, i, group, rows)]
         tastes = [state.taste[i : i + 1], taste]
@@ -468,7 +471,9 @@ class Search:
             if cost < total - GAIN:
                 state, total, wrong = self.mended(after, cost, still)
         if not wrong and (uneasy := self.faults(state, UNEASY)[1]):
+            self.fine = True
             after = self.swept(state, uneasy)
+            self.fine = False
             cost, still = self.faults(after)
             if not still and cost < total - GAIN:
                 state, total = after, cost
