@@ -192,9 +192,9 @@ def outside(scenery: Scenery, origin: np.ndarray, direction: np.ndarray) -> tupl
         here = (reach > 0) & (np.abs(u) <= 1) & (np.abs(v) <= 1)
         if around is None:
             out[:, here] = SKY_LIGHT[:, None]
-        else:  # by latitude and longitude
+        else:  # by latitude and longitude, +Z in the middle and +X left of it, as OpenEXR and Hydra have them
             x, y, z = direction[:, here]
-            across, down = 0.5 + np.arctan2(x, z) / (2 * np.pi), np.arccos(np.clip(y, -1, 1)) / np.pi
+            across, down = 0.5 - np.arctan2(x, z) / (2 * np.pi), np.arccos(np.clip(y, -1, 1)) / np.pi
             out[:, here] = between(scenery.lights.planes, across, down, 0, around.shape[1], around.shape[0])
         through |= here
     return out, through

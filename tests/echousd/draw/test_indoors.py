@@ -322,7 +322,7 @@ def test_one_sees_through_thin_cloth_before_a_window_what_lies_outside_and_its_f
     pane = np.array([[(1.99, 1.0, 0.0), (0.0, 0.0, 1.5), (0.0, 0.8, 0.0)]], np.float32)
     view = View(view_matrix(np.array([-1.8, 1.0, 0.0]), np.array([0.5, 1.0, 0.0])), 0.3, False, inside=True)
     lawn = np.full((8, 64, 3), 255, np.uint8)  # behind the cloth alone, so that light is white
-    lawn[:, 46:51] = 40, 160, 40
+    lawn[:, 14:19] = 40, 160, 40
     scenery, _ = box_room(sky=1.0, sun=None, view=lawn)
     wall = (scenery.triangles[..., 0] > 1.9).all(1)
     names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "thin", "st", "texture", "wall")

@@ -195,6 +195,11 @@ def test_one_looks_out_of_windows_and_past_walls_that_are_away(tmp_path):
         assert sky[2] > sky[1] > sky[0]
         assert field[1] > field[2] if view is around else (field == sky).all()
         np.testing.assert_array_equal([beside, behind], [BACKGROUND] * 2)
+    turned = np.zeros((64, 128, 3), np.uint8)
+    turned[:, 24:40, 0], turned[:, 88:104, 1] = 255, 255  # red at +X, green at -X
+    for number, pane in enumerate(np.float32([[(x, 1.4, 0), (0, 0, 1), (0, 1, 0)] for x in (2, -2)])):
+        plain = replace(scenery, panes=pane[None], lights=replace(scenery.lights, view=turned))
+        assert outside(plain, eye[:, None], pane[0][:, None] - eye[:, None])[0].argmax() == number
     side = scenery.bounds[1][0]
     ways = np.array([(side, 0.0, 0.0), (side + 0.3, -1.4, 0.0)])
     wall, floor = next_room(scenery, np.full(3, 0.5), np.tile(eye, (2, 1)).T, ways.T).T
