@@ -1,6 +1,8 @@
 """Render a room in Blender (Cycles on the CPU) through its own perspective camera and lights.
 
 python blender_render.py ROOM.usda PICTURE.png [--size 512] [--samples 48] [--camera perspective]
+
+A picture called .npy is its linear radiance, (height, width, 3) float32.
 """
 
 import argparse
@@ -8,6 +10,7 @@ import sys
 import time
 
 import bpy
+import numpy as np
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("room")
@@ -36,9 +39,16 @@ film = wanted[0].data
 scene.render.resolution_x = arguments.size
 scene.render.resolution_y = round(arguments.size * film.sensor_height / film.sensor_width)
 scene.render.resolution_percentage = 100
-scene.render.image_settings.file_format = "PNG"
-scene.render.filepath = arguments.picture
+linear = arguments.picture.endswith(".npy")
+scene.render.image_settings.file_format = "OPEN_EXR" if linear else "PNG"
+scene.render.image_settings.color_depth = "32" if linear else "8"
+scene.render.filepath = arguments.picture.replace(".npy", ".exr")
 start = time.perf_counter()
 bpy.ops.render.render(write_still=True)
+if linear:
+    image = bpy.data.images.load(scene.render.filepath)
+    image.colorspace_settings.name = "Non-Color"
+    pixels = np.array(image.pixels[:], np.float32).reshape(*image.size[::-1], -1)
+    np.save(arguments.picture, pixels[::-1, :, :3])
 lights = [f"{light.name} {light.data.energy:.0f} W" for light in bpy.data.objects if light.type == "LIGHT"]
 print(f"{arguments.picture}: {time.perf_counter() - start:.1f} s, lights {lights}")
