@@ -22,7 +22,7 @@ from echousd.shapes.joinery import assembled
 
 EYE = 1.52  # metres, height of a picture's middle on an empty wall
 OVER, LOWEST = 0.2, 1.15  # metres between furniture and what hangs over it; no mirror hangs lower
-TALLEST, HIGHEST, WIDEST = 1.3, 1.9, 2.2  # metres: what has pictures over it; their middle; all together
+TALLEST, HIGHEST, WIDEST = 1.45, 1.95, 2.2  # metres: what has pictures over it; their middle; all together
 MOST, CROWD = 6, 7  # pictures of one wall, and of a room: there are none in groups beyond
 NARROWER = (1.0, 0.85, 0.7, 0.55)  # shares of its wished width that what hangs may have
 NEAR = 0.45  # metres: furniture whose back is so near to a wall stands at it

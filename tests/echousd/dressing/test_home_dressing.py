@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 
 from echomodel.dressing import KINDS, PRINTS
 from echomodel.dressing import thing as solids_of
@@ -218,6 +219,19 @@ def test_pictures_of_one_wall_are_of_one_kind_and_a_childs_are_a_childs(resident
         walls_seen |= {PRINTS[name]["kind"] for name in names}
     assert (walls_seen == {"childs"}) == (resident == "child")
     assert resident or len(walls_seen) > 4
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_pictures_over_a_piece_hang_on_its_axis_and_about_two_thirds_as_wide(seed):
+    room = setting("sideboard", seed=seed)
+    walls.pictures(room)
+    assert {thing.on for thing in room.placed} == {"sideboard"}
+    left, _, right, _ = shapely.union_all([thing.footprint for thing in room.placed]).bounds
+    assert left + right == pytest.approx(0.0, abs=0.02)
+    assert 0.33 < (right - left) / SIZES["sideboard"][0] < 0.78
+    low, high = (pick(one.position[1] + k * one.size[1] for one in room.placed) for pick, k in ((min, 0), (max, 1)))
+    assert low >= SIZES["sideboard"][1] + walls.OVER - 0.006
+    assert walls.EYE - 0.01 < (low + high) / 2 < walls.HIGHEST
 
 
 def test_bare_walls_have_other_things_than_pictures_each_once():
