@@ -28,11 +28,12 @@ WHITER = 0.36  # how much less coloured the light of lamps is than told: no wall
 DIM = 0.004  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
-ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.54, 0.6), (0.34, 0.55), 70, 40.0
+ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.58, 0.63), (0.34, 0.55), 70, 40.0
 EVEN = (0.18, 0.08)  # power of the light's brightness that eyes take from it, and inside whoever photographs rooms
 WHITE, PAPER = 84, 0.95  # what so many of a hundred points are darker than comes to no more than that
-CONTRAST, KNEE = 1.33, 0.66  # power about what is bright, and from where on highlights are rolled off
-HUE = 0.5  # share of colours that keep their hue where they are bright; film bleaches them
+CONTRAST, KNEE = 1.33, 0.7  # power about what is bright, and from where on highlights are rolled off
+# Share of colours that keep their hue where they are bright, which film bleaches, and how much more coloured all are.
+HUE, CHROMA = 0.5, 1.1
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 DAY = 0.5  # radiance of the sky by day
 BANDS = 64  # heights of the sky whose light is told apart
@@ -197,6 +198,7 @@ def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable
     def shown(color: np.ndarray) -> np.ndarray:
         color = color * scale
         level = np.maximum(LUMA @ color, np.float32(1e-6))
+        color = np.maximum(level + np.float32(CHROMA) * (color - level), 0)
         mapped = _filmic(level, bright)
         kept = HUE * np.sqrt(1 - mapped)
         return np.clip(kept * color * mapped / level + (1 - kept) * _filmic(color, bright), 0, 1)
