@@ -33,21 +33,37 @@ PANS, EYES, SLOPES = (0.0, -0.15, 0.15, -0.35, 0.35), (0.42, 0.5, 0.62), (0.0, 0
 # 90 and 97 degrees across, of which so many where something is left out.
 NEARS, LENSES, STRAIGHT = np.arange(0.5, 3.1, 0.25), (28.0, 24.0, 21.0, 18.0, 16.0), 2
 LOOKED, EACH, BEST = 400, 6, 3  # pictures that rays are run through; of a place; of a place, a way, a lens
-# What each costs. The main piece: not whole in the picture; hidden; at the border, from a share of half the width on;
-# from behind, and from the side; smaller and larger than such shares of the picture's width.
-WHOLE, HIDDEN, MIDDLE, ASIDE, BEHIND, SIDEWAYS = 1000.0, 140.0, 60.0, 0.33, 180.0, 0.55
-SMALL, LARGE, SIZES = 300.0, 150.0, (0.36, 0.55)
-# What the border cuts and what is beyond it: lamps, what hangs from `HIGH` metres on, furniture; and a picture full of
-# cut furniture. What is left out before the eye, and the more the nearer to the main piece, up to so many metres.
-CUTS, HIGH, SEVERED, LEFT_OUT, MISSED, BESIDE = ((90.0, 40.0), (20.0, 0.0), (25.0, 0.0)), 0.25, 350.0, 8.0, 60.0, 0.5
-# A picture full of: what is so near (metres: of things; of walls, and of the main piece); of backs, seen where the
-# cosine is larger, and of backs nearer than so many metres, from a share on; of walls so near at its sides.
-FILLED, BEFORE, WALLED, BACKS, AVERTED, TURNED, CLOSE, SOME = 650.0, 2.6, 1.4, 320.0, 0.25, 1000.0, 3.5, 0.02
-BESIDES, PASSED = 150.0, 2.5
-# Of ceiling; of floor, and of one bare wall, from a share on; and what of each is worth:
-# of furniture, of a thing up to so many, of which such a share shows all; of a metre towards where the room looks.
-OVERHEAD, UNDER, FLOORED, BARE, BAREST = 100.0, 300.0, 0.27, 650.0, 0.22
-SHOWN, SEEN, HANGING, MANY, ENOUGH, FACED, AHEAD = 130.0, 7.0, 0.4, 10.0, 0.012, 12.0, 1.0
+# What each costs: weight of what is looked at, and why.
+COSTS: dict[str, float] = {
+    # the main piece
+    "whole": 1000.0,  # share of its corners beyond the border: a picture must have all of it
+    "hidden": 140.0,  # share of it that others hide
+    "middle": 60.0,  # how far off the middle it is, from `ASIDE` of half the width on
+    "behind": 180.0,  # cosine from behind it, from `SIDEWAYS` on: its front is what one wants to see
+    "small": 300.0, "large": 150.0,  # shares of the picture's width by which it is out of `SIZES`
+    # others
+    "cut_lamp": 90.0, "cut_hung": 20.0, "cut": 25.0,  # whether the border cuts a lamp, what hangs high, furniture
+    "lamp_out": 40.0,  # whether a lamp is beyond the border: it lights what one sees
+    "severed": 350.0,  # share of the picture that cut furniture takes
+    "left_out": 8.0, "missed": 60.0,  # whether one is left out before the eye, and that near the main piece
+    "filled": 650.0,  # share of what is near, which hides the room
+    "backs": 320.0, "turned": 1000.0,  # share of backs, and of near ones from `SOME` on
+    # what is bare
+    "walls": 150.0,  # share of walls so near that they fill a side
+    "ceiling": 100.0,  # share of ceiling
+    "floor": 300.0, "bare": 650.0,  # shares of floor and of one bare wall, from `FLOORED` and `BAREST` on
+    # what is worth something
+    "shown": -130.0,  # share of furniture
+    "seen": -7.0,  # a thing, up to `MANY`, of which `ENOUGH` shows all
+    "faced": -12.0,  # metres towards where the room looks, up to `AHEAD`
+}  # fmt: skip
+# Of half the width; cosine; shares of the picture's width; metres over the floor from which on a lamp or what hangs is
+# high; metres from the main piece within which one is missed.
+ASIDE, SIDEWAYS, SIZES, HIGH, BESIDE = 0.33, 0.55, (0.36, 0.55), 0.25, 0.5
+# Metres within which things, and walls and the main piece, are near; cosine from which on a back is seen, metres within
+# which it is near, and the share that is free; metres within which walls at the sides are near.
+BEFORE, WALLED, AVERTED, CLOSE, SOME, PASSED = 2.6, 1.4, 0.25, 3.5, 0.02, 2.5
+FLOORED, BAREST, HANGING, MANY, ENOUGH, AHEAD = 0.27, 0.22, 0.4, 10.0, 0.012, 1.0
 # And each lens, height and slope.
 DISTORTED, CROUCHED, BENT = (0.0, 0.0, 20.0, 50.0, 90.0), (10.0, 0.0, 5.0), (0.0, 0.0, 0.0, 10.0, 25.0)
 LOW, DEEP = 1.4, 0.02  # metres: over what is so high one looks; of rounding
@@ -175,8 +191,8 @@ def _framed(of: Subject, spot: np.ndarray, way: np.ndarray) -> Shots:
     left_out, behind = ahead.max(2)[frame] < near[:, None], ahead.max(2)[frame] < 0.05
     begins, ends = (aside / deep).min(2)[frame], (aside / deep).max(2)[frame]
     level, kind = of.things.position[:, 1] > HIGH, np.zeros((len(corners), 2))
-    kind[len(level) :], stands = CUTS[0], np.arange(len(level)) < count
-    kind[: len(level)][level & ~stands], kind[: len(level)][~level & stands] = CUTS[1:]
+    kind[len(level) :], stands = (COSTS["cut_lamp"], COSTS["lamp_out"]), np.arange(len(level)) < count
+    kind[: len(level), 0][level & ~stands], kind[: len(level), 0][~level & stands] = COSTS["cut_hung"], COSTS["cut"]
     # what no height changes
     to = of.aim - spot
     far = np.maximum(np.linalg.norm(to, axis=1), 1e-9)
@@ -186,10 +202,10 @@ def _framed(of: Subject, spot: np.ndarray, way: np.ndarray) -> Shots:
     apart = shapely.distance(plans[main], plans)
     missed = (left_out & ~behind & (begins < half) & (ends > -half))[:, :count]
     cost = (
-        MIDDLE * np.clip(off[frame] / half[:, 0] - ASIDE, 0, 1) + np.array(DISTORTED)[lens]
-        + (BEHIND * np.maximum(0, (to @ front) / far + SIDEWAYS))[frame]
-        + SMALL * np.maximum(0, SIZES[0] - wide) + LARGE * np.maximum(0, wide - SIZES[1])
-        + (missed * (LEFT_OUT + MISSED * np.clip(1 - apart / BESIDE, 0, 1))).sum(1)
+        COSTS["middle"] * np.clip(off[frame] / half[:, 0] - ASIDE, 0, 1) + np.array(DISTORTED)[lens]
+        + (COSTS["behind"] * np.maximum(0, (to @ front) / far + SIDEWAYS))[frame]
+        + COSTS["small"] * np.maximum(0, SIZES[0] - wide) + COSTS["large"] * np.maximum(0, wide - SIZES[1])
+        + (missed * (COSTS["left_out"] + COSTS["missed"] * np.clip(1 - apart / BESIDE, 0, 1))).sum(1)
     )  # fmt: skip
     shape = len(frame), len(EYES), len(SLOPES)
     costs, cuts, tall = np.empty(shape), np.empty((*shape, count), bool), half / ASPECT
@@ -207,7 +223,7 @@ def _framed(of: Subject, spot: np.ndarray, way: np.ndarray) -> Shots:
             outside = (begin - tall[:, 0] * near < DEEP) | (begin + tall[:, 0] * near > of.height - DEEP)
             costs[:, n, m] = (
                 cost + CROUCHED[n] + BENT[m] + cut @ kind[:, 0] + (left_out | ~within) @ kind[:, 1]
-                + WHOLE * ((reach > half / MARGIN).mean(1) + (outside & (near > 0)))
+                + COSTS["whole"] * ((reach > half / MARGIN).mean(1) + (outside & (near > 0)))
             )  # fmt: skip
     flat = costs.reshape(len(frame), -1)
     found = np.argsort(flat, axis=1, kind="stable")[:, :BEST] + np.arange(len(flat))[:, None] * flat.shape[1]
@@ -257,17 +273,16 @@ def _composed(of: Subject, shots: Shots) -> dict[str, np.ndarray]:
     towards = (shots.view[:, [0, 2], 3] - of.middle) @ of.things.of(np.arange(of.count)).facing
     worth = np.where(hangs, HANGING, row < len(row) - len(of.floor))  # windows as much as furniture
     seen = np.minimum(shares / ENOUGH, 1) @ worth
-    return {
-        "hidden": HIDDEN * (1 - shares[:, of.main] / np.maximum(alone[:, of.main], 1e-9)),
-        "severed": SEVERED * (shares[:, : of.count] * shots.cut).sum(1),
-        "filled": FILLED * filled(away, reach[which]), "backs": BACKS * averted.mean(1),
-        "turned": TURNED * np.maximum(0, (averted & (away < CLOSE)).mean(1) - SOME),
-        "bare": BARE * np.maximum(0, shares[:, -len(of.floor) :].max(1) - BAREST),
-        "walls": BESIDES * (wall & (away < PASSED)).mean(1), "ceiling": OVERHEAD * (above & np.isinf(away)).mean(1),
-        "floor": UNDER * np.maximum(0, (~above & np.isinf(away)).mean(1) - FLOORED),
-        "shown": -SHOWN * shown.mean(1), "seen": -SEEN * np.minimum(seen, MANY),
-        "faced": -FACED * np.minimum(towards, AHEAD),
+    found = {
+        "hidden": 1 - shares[:, of.main] / np.maximum(alone[:, of.main], 1e-9),
+        "severed": (shares[:, : of.count] * shots.cut).sum(1), "filled": filled(away, reach[which]),
+        "backs": averted.mean(1), "turned": np.maximum(0, (averted & (away < CLOSE)).mean(1) - SOME),
+        "bare": np.maximum(0, shares[:, -len(of.floor) :].max(1) - BAREST),
+        "walls": (wall & (away < PASSED)).mean(1), "ceiling": (above & np.isinf(away)).mean(1),
+        "floor": np.maximum(0, (~above & np.isinf(away)).mean(1) - FLOORED),
+        "shown": shown.mean(1), "seen": np.minimum(seen, MANY), "faced": np.minimum(towards, AHEAD),
     }  # fmt: skip
+    return {name: COSTS[name] * value for name, value in found.items()}
 
 
 def _shades(furniture: Furniture, height: float) -> np.ndarray:

@@ -14,6 +14,7 @@ from echousd.draw.outside import perspective_views
 from echousd.draw.sight import ASPECT, GRID, RAYS, Furniture, filled
 from echousd.draw.views import (
     APERTURE,
+    COSTS,
     LENSES,
     _walls,
     inside_view,
@@ -208,7 +209,7 @@ def test_the_camera_shows_less_bare_floor_where_it_is_asked_to(monkeypatch: pyte
     shares = []
     monkeypatch.setattr("echousd.draw.views.FLOORED", 0.0)
     for price in (0.0, 1000.0):
-        monkeypatch.setattr("echousd.draw.views.UNDER", price)
+        monkeypatch.setitem(COSTS, "floor", price)
         view, lens, near = inside_view(room, things, 2.8)
         half = APERTURE / 2 / lens
         away = met(things.with_others(_walls(room, 2.8)), view, half, near)[1]
