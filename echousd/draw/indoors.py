@@ -28,8 +28,9 @@ WHITER = 0.36  # how much less coloured the light of lamps is than told: no wall
 DIM = 0.004  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
-ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.58, 0.63), (0.34, 0.55), 70, 40.0
+ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.58, 0.75), (0.34, 0.55), 70, 40.0
 EVEN = (0.18, 0.08)  # power of the light's brightness that eyes take from it, and inside whoever photographs rooms
+PALER = 0.5  # share of how its colour differs from the mean that they take from it, too
 WHITE, PAPER = 84, 0.95  # what so many of a hundred points are darker than comes to no more than that
 CONTRAST, KNEE = 1.33, 0.7  # power about what is bright, and from where on highlights are rolled off
 # Share of colours that keep their hue where they are bright, which film bleaches, and how much more coloured all are.
@@ -174,13 +175,15 @@ def with_ceiling(scenery: Scenery) -> Scenery:
 
 
 def evened(light: np.ndarray, white: np.ndarray, inside: bool = True) -> np.ndarray:
-    """(n,) what light (3, n) is multiplied by: less than 1 where it is brighter than the mean, more where it is less,
-    so that walls at lamps and windows keep their colour and corners are not black.
+    """Light (3, n) as eyes take it: less bright where it is brighter than the mean and more where it is less, so that
+    walls at lamps and windows keep their colour and corners are not black; and nearer to the mean's colour, so that
+    white ceilings over wooden floors and lawns stay white.
 
     `white`: (3,) the mean light in the room. `inside`: whether it is seen from there.
     """
-    level = LUMA @ light / max(float(white @ LUMA), 1e-6)
-    return np.asarray(np.maximum(level, np.float32(1e-3)) ** np.float32(-EVEN[inside]))
+    level, mean = LUMA @ light, white / max(float(white @ LUMA), 1e-6)
+    light = light + np.float32(PALER) * (mean.astype("f4")[:, None] * level - light)
+    return light * np.maximum(level / max(float(white @ LUMA), 1e-6), np.float32(1e-3)) ** np.float32(-EVEN[inside])
 
 
 def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable[[np.ndarray], np.ndarray]:

@@ -355,7 +355,7 @@ def _colored(world: World, everything: Seen, falling: np.ndarray) -> np.ndarray:
         light = falling[:, here]
         color = scenery.colors(seen.face, seen.bary, _breadth(world, seen), world.atlas)
         fallen = light[:3] + light[4] * sun
-        fallen *= evened(fallen, world.white, world.view.inside)
+        fallen = evened(fallen, world.white, world.view.inside)
         color += np.float32(SHEEN) * (1 - color)
         metal = scenery.gloss.take(seen.face) > METAL
         out[:, here] = color * fallen * np.where(metal, np.float32(MATT), 1) + light[3] * np.where(metal, color, 1)

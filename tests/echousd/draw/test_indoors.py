@@ -14,7 +14,7 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echousd.draw.drawables import image_of
 from echousd.draw.from_files import render
-from echousd.draw.indoors import BRIGHT, SHARE, evened, exposure, read_lights, with_ceiling
+from echousd.draw.indoors import BRIGHT, LUMA, SHARE, evened, exposure, read_lights, with_ceiling
 from echousd.draw.rendering import render_stage
 from echousd.draw.scenery import CLOTH, SHEER, read_scenery
 from echousd.draw.tracing import trace
@@ -430,9 +430,18 @@ def test_what_is_white_darkens_less_where_it_touches():
 
 def test_light_is_evened_about_its_mean():
     light = np.array([0.1, 1.0, 10.0], np.float32) * np.ones((3, 1), np.float32)
-    even = (light * evened(light, np.ones(3, np.float32)))[0]
+    even = evened(light, np.ones(3, np.float32))[0]
     assert even[1] == pytest.approx(1.0)
     assert 10 < even[2] / even[0] < 70  # of 100
+
+
+def test_light_over_wood_and_lawns_comes_nearer_to_the_colour_of_all_of_it():
+    white, warm = np.array([1.0, 0.9, 0.8], np.float32), np.array([1.2, 0.9, 0.5], np.float32)
+    shown = [evened(one[:, None], white)[:, 0] for one in (white, warm)]
+    np.testing.assert_allclose(shown[0], white, atol=1e-6)
+    far, near = (np.ptp(np.log(one / white)) for one in (warm, shown[1]))
+    assert 0.3 * far < near < 0.7 * far
+    assert LUMA @ shown[1] == pytest.approx(LUMA @ warm, rel=0.02)  # as bright
 
 
 def exposed(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> np.ndarray:
