@@ -4,32 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import shapely
 
 from echomodel.dressing import KINDS, usual_size
-from echomodel.dressing import thing as solids_of
 from echomodel.late import Late
 from echomodel.openings import Opening, inward_normal
 from echomodel.vocabulary import vocabulary
 from echousd.draw.sight import Furniture
 from echousd.dressing import floors, tabletops, upholstery, walls
 from echousd.dressing.floors import CORNER_AIR, GREEN
-from echousd.dressing.setting import Setting, Thing, standing
+from echousd.dressing.setting import Setting, Thing, geometry_of, standing
 from echousd.dressing.stories import guessed, story
 from echousd.dressing.walls import EYE, WIDEST, arranged, free_walls, hung_at
 from echousd.graph.nodes import DressingGraph
 from echousd.naming import free_name
 from echousd.room import RoomData
-from echousd.shapes.geometry import Collider, Geometry, Origin
-from echousd.shapes.hulls import rounded_hull, standing_hull
-from echousd.shapes.joinery import part_of, within_budget
-from echousd.shapes.matter import weighed
+from echousd.shapes.geometry import Geometry
 
 graph_of = Late("echousd.dressing.nodes:graph_of")
-ORIGIN = Origin("dressing")
 TALL, SEEN = 0.7, 0.3  # metres: what is or hangs higher may stand in a camera's way if it is so large
 LOW = 0.2  # metres: the same of what stands on the floor, which a near plane might cut open
 
@@ -115,17 +109,6 @@ def setting_of(room: RoomData, layout: int = 0) -> Setting:
         story(who), who if any(o.row.role == "bed" for o in objects.values()) else "",
         vocabulary().known_style(room.graph.room.style), not room.graph.room.walls and len(room.layouts) == 1,
     )  # fmt: skip
-
-
-@lru_cache(maxsize=100)  # a room that is edited keeps most of its things
-def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: tuple[float, ...] = ()) -> Geometry:
-    """The geometry of a thing, with one hull to bump into that stands; a niche holds things, and has one a board."""
-    solids = solids_of(kind, np.array(size), np.random.default_rng(variant), **({"lie": lie} if lie else {}))
-    pieces = within_budget(solids, np.array(size), KINDS[kind].faces)
-    part = part_of("mesh", pieces)
-    boards = [rounded_hull(piece.vertices) for piece in pieces] if kind == "niche" else []
-    hulls = [Collider(f"collider_{n}", hull, "convexHull") for n, hull in enumerate(boards)]
-    return Geometry((part,), (*hulls,) or (standing_hull(part.mesh, KINDS[kind].gives),), ORIGIN, weighed(pieces))
 
 
 DECOR, OTHER = ("macrame", "wall_baskets", "wall_plates", "sunburst_mirror"), 0.3  # share of short stretches with it

@@ -12,12 +12,17 @@ import shapely
 
 from echomodel.boxes2d import footprints, seen, turned
 from echomodel.dressing import KINDS
+from echomodel.dressing import thing as solids_of
 from echomodel.openings import STEP, Opening, free_area, zone
 from echomodel.triangles import bounds_of, spans_of
 from echomodel.vocabulary import Category, RoomStyle, vocabulary
 from echousd.dressing.stories import TABLE, Story, story
-from echousd.shapes.geometry import Geometry
+from echousd.shapes.geometry import Collider, Geometry, Origin
+from echousd.shapes.hulls import rounded_hull, standing_hull
+from echousd.shapes.joinery import part_of, within_budget
+from echousd.shapes.matter import weighed
 
+ORIGIN = Origin("dressing")
 SKIN = 1e-4  # metres that count as nothing
 APART = 0.008  # metres of air between a small thing and everything else
 BESIDE = 0.04  # and between two that stand beside each other, each with its margin
@@ -233,3 +238,14 @@ def _section(thing: Standing, number: int, low: float, high: float) -> shapely.G
     inside = np.concatenate(found)[:, [0, 2]]
     # a line has the hull of its points and is one object rather than thousands
     return shapely.convex_hull(shapely.linestrings(np.concatenate([inside, inside[:1]])))
+
+
+@lru_cache(maxsize=100)  # a room that is edited keeps most of its things
+def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: tuple[float, ...] = ()) -> Geometry:
+    """The geometry of a thing, with one hull to bump into that stands; a niche holds things, and has one a board."""
+    solids = solids_of(kind, np.array(size), np.random.default_rng(variant), **({"lie": lie} if lie else {}))
+    pieces = within_budget(solids, np.array(size), KINDS[kind].faces)
+    part = part_of("mesh", pieces)
+    boards = [rounded_hull(piece.vertices) for piece in pieces] if kind == "niche" else []
+    hulls = [Collider(f"collider_{n}", hull, "convexHull") for n, hull in enumerate(boards)]
+    return Geometry((part,), (*hulls,) or (standing_hull(part.mesh, KINDS[kind].gives),), ORIGIN, weighed(pieces))

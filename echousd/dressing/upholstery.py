@@ -11,15 +11,14 @@ from echomodel.boxes2d import hull, upright
 from echomodel.dressing import names_of, usual_size
 from echomodel.dressing.textiles import LEAN, LIES
 from echomodel.triangles import area_normals, spans_of
-from echousd.dressing.setting import Setting, Standing, Thing
+from echousd.dressing.setting import Setting, Standing, Thing, geometry_of
 from echousd.shapes.hulls import forbidden_moves
 
 ASIDE = 0.15  # metres that a cushion moves at most so that it stands in nothing
-PILLOW = 3.2  # exponent of the outline of a cushion
 STEP = 0.02  # metres from place to place
 WIDE_BED = 1.3  # metres
 MORE = (1.9, 2.4)  # metres of a sofa with a third cushion in its middle, and with two
-LEVEL = 0.003  # metres: what is as high as that is one height
+LEVEL, LIFTED = 0.003, 0.002  # metres: what is as high as that is one height; what stands so far over it is clear of it
 DRAPED = {"sofa": 0.9, "seat": 0.4}  # shares of sofas and armchairs with a blanket over an arm
 # Metres between folds of a bed, and over its middle from where on it is a board; places behind pillows for cushions.
 SOFT, BOARD, BEYOND = 0.04, 0.12, 12
@@ -46,9 +45,8 @@ def cushions(setting: Setting) -> None:
             turn = -0.12 * end * float(rng.uniform(0.3, 1.6))
             for lean in (LEAN * size[1], 0.0):  # upright on what is too shallow
                 deep = size + np.array([0.0, 0.0, lean])
-                spot = seat.resting(end, deep)
-                spot = None if spot is None else _clear_of(host, spot, turn, deep)
-                if _put(setting, host, _let_down(host, spot, deep), kind, deep, turn, variant):
+                spot = _standing(host, seat.resting(end, deep), turn, deep, _corners(kind, deep, variant))
+                if _put(setting, host, spot, kind, deep, turn, variant):
                     break
 
 
@@ -73,8 +71,10 @@ def bed_cushions(setting: Setting) -> None:
         two, size = size[0] < 1.3 * size[1], size + np.array([0.0, 0.0, LEAN * size[1]])
         for side in (-1.0, 1.0) if wide > WIDE_BED and two else (0.0,):
             turn = float(rng.uniform(-0.12, 0.12))
-            spot = _lying(host, seat, seat.before_pillows(side * 0.21 * wide, size), turn, size)
-            _put(setting, host, _let_down(host, spot, size), kind, size, turn, variant)
+            spot, body = seat.before_pillows(side * 0.21 * wide, size), _corners(kind, size, variant)
+            spot = _lying(host, seat, spot, turn, size, body)
+            spot = None if spot is None else _let_down(host, spot, size)
+            _put(setting, host, spot, kind, size, turn, variant)
 
 
 def on_covers(setting: Setting) -> None:
@@ -90,7 +90,8 @@ def on_covers(setting: Setting) -> None:
             for at in wish.at:
                 x, z = (0.0, 0.0) if at == "pillows" else np.array(at) * host.size[[0, 2]] / 2
                 spot = seat.before_pillows(x, size) if at == "pillows" else np.array([x, seat.level, z])
-                if _put(setting, host, _lying(host, seat, spot, turn, size), kind, size, turn, variant):
+                spot = _lying(host, seat, spot, turn, size, _corners(kind, size, variant))
+                if _put(setting, host, spot, kind, size, turn, variant):
                     break
 
 
@@ -112,14 +113,32 @@ def _upon(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | No
     return np.array([spot[0], top, spot[2]]) if level and top - spot[1] < RAISED else None
 
 
-def _let_down(host: Standing, spot: np.ndarray | None, size: np.ndarray) -> np.ndarray | None:
+def _let_down(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | None:
     """The spot (3,) let down onto what of its seat is level; None where that is too little for a cushion to stand."""
-    if spot is None:
-        return None
     tops = _tops(host, spot, size * BASE)
     top = float(tops[tops < spot[1] + RAISED].max(initial=-np.inf))
     level = (tops > top - LEVEL).mean() > STEADY and top > spot[1] - RAISED
     return np.array([spot[0], top, spot[2]]) if level else None
+
+
+def _corners(kind: str, size: np.ndarray, variant: int) -> np.ndarray:
+    """(n, 3) float, metres: corners of what a thing collides with, in its own frame."""
+    return geometry_of(kind, tuple(size.tolist()), variant, ()).colliders[0].mesh.vertices
+
+
+def _standing(
+    host: Standing, spot: np.ndarray | None, turn: float, size: np.ndarray, body: np.ndarray
+) -> np.ndarray | None:
+    """The spot (3,) or one near it where a turned cushion stands level and reaches into nothing; None = nowhere."""
+    for _ in range(TRIES):
+        spot = None if spot is None else _clear_of(host, spot, turn, body)
+        down = None if spot is None else _let_down(host, spot, size)
+        if down is None:
+            return None
+        spot = _clear_of(host, down + np.array([0.0, LIFTED, 0.0]), turn, body)
+        if spot is not None and np.abs(spot - down).max() < LEVEL:
+            return np.array([spot[0], down[1], spot[2]])
+    return None
 
 
 def _tops(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray:
@@ -139,15 +158,10 @@ def _tops(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray:
     return tops
 
 
-def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -> np.ndarray | None:
-    """The spot (3,) or one near it where a turned cushion reaches into no solid of its seat; None = nowhere."""
-    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
-    ring = np.stack([np.cos(angle), np.sin(angle)], 1)
-    ring = np.sign(ring) * np.abs(ring) ** (2 / PILLOW) / 2
-    pillow = np.concatenate([
-        np.stack([ring[:, 0] * size[0], np.full(24, y), ring[:, 1] * size[2]], 1) for y in (0.0, size[1])
-    ])  # fmt: skip
-    stood = pillow @ upright(-turn) + spot
+def _clear_of(host: Standing, spot: np.ndarray, turn: float, body: np.ndarray) -> np.ndarray | None:
+    """The spot (3,) or one near it where a turned thing, of corners (n, 3), reaches into no solid of its seat; None =
+    nowhere."""
+    stood = body @ upright(-turn) + spot
     taken = forbidden_moves([stood], [collider.mesh.vertices for collider in host.geometry.colliders], ASIDE)
     free = shapely.Point(0, 0).buffer(ASIDE).difference(taken)
     if free.is_empty:
@@ -156,7 +170,9 @@ def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -
     return spot + np.array([way[0], 0.0, way[1]])
 
 
-def _lying(host: Standing, seat: _Seat, spot: np.ndarray | None, turn: float, size: np.ndarray) -> np.ndarray | None:
+def _lying(
+    host: Standing, seat: _Seat, spot: np.ndarray | None, turn: float, size: np.ndarray, body: np.ndarray
+) -> np.ndarray | None:
     """A place near a spot (3,), or before it, that is clear of the host and on what is below; None where none is."""
     if spot is None:
         return None
@@ -167,7 +183,7 @@ def _lying(host: Standing, seat: _Seat, spot: np.ndarray | None, turn: float, si
         if upon is None:
             spot = spot + np.array([0.0, 0.0, 2 * STEP])
             continue
-        spot = _clear_of(host, upon + np.array([0.0, 0.002, 0.0]), turn, size)
+        spot = _clear_of(host, upon + np.array([0.0, LIFTED, 0.0]), turn, body)
         if spot is None or np.abs(spot - upon).max() < LEVEL:
             return spot
     return None

@@ -5,14 +5,14 @@ import itertools
 import numpy as np
 import pytest
 
+from echomodel.boxes2d import upright
 from echomodel.dressing import usual_size
 from echomodel.dressing.textiles import LEAN
 from echomodel.triangles import joined
-from echousd.dressing.dress import ORIGIN, geometry_of
-from echousd.dressing.setting import standing
-from echousd.dressing.upholstery import STEP, _let_down, _Seat
+from echousd.dressing.setting import ORIGIN, geometry_of, standing
+from echousd.dressing.upholstery import STEP, _let_down, _Seat, _standing
 from echousd.shapes.geometry import Collider, Geometry, Part
-from echousd.shapes.hulls import convex_hull
+from echousd.shapes.hulls import convex_hull, depth, forbidden_moves
 
 
 def seat_of(*solids):
@@ -53,3 +53,17 @@ def test_a_cushion_that_leans_stands_on_its_foot(variant):
     corners = np.concatenate([collider.mesh.vertices for collider in made.colliders])
     foot = corners[corners[:, 1] < corners[:, 1].min() + 0.005]
     assert foot[:, 2].min() + 0.005 < made.mass.centre[2] < foot[:, 2].max() - 0.005
+
+
+@pytest.mark.parametrize("variant", range(4))
+def test_corners_of_a_cushion_that_leans_reach_into_no_curved_back(variant):
+    size = np.array([0.44, 0.42, 0.17 + LEAN * 0.42])
+    body = geometry_of("cushion", tuple(size.tolist()), variant).colliders[0].mesh.vertices
+    floor = np.array([(x, y, z) for x in (-0.4, 0.4) for y in (0.2, 0.42) for z in (-0.4, 0.4)])
+    wall = floor * (0.6, 3.0, 0.05) + (0.0, -0.2, -0.25)
+    backs = [wall @ upright(turn) for turn in np.radians((-64, 64))]
+    host = seat_of(floor, *backs)
+    spot = _standing(host, np.array([0.0, 0.43, 0.0]), 0.1, size, body)
+    assert spot[1] == pytest.approx(0.42)
+    stood = body @ upright(-0.1) + spot + (0.0, 0.002, 0.0)
+    assert depth(forbidden_moves([stood], [floor, *backs], 0.1), np.zeros(2)) < 0.001
