@@ -48,7 +48,7 @@ bpy.ops.render.render(write_still=True)
 if linear:
     image = bpy.data.images.load(scene.render.filepath)
     image.colorspace_settings.name = "Non-Color"
-    pixels = np.array(image.pixels[:], np.float32).reshape(*image.size[::-1], -1)
+    pixels = np.array(image.pixels[:], np.float32).reshape(*tuple(image.size)[::-1], -1)
     np.save(arguments.picture, pixels[::-1, :, :3])
 lights = [f"{light.name} {light.data.energy:.0f} W" for light in bpy.data.objects if light.type == "LIGHT"]
 print(f"{arguments.picture}: {time.perf_counter() - start:.1f} s, lights {lights}")
