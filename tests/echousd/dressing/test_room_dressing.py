@@ -500,7 +500,7 @@ def test_what_lies_on_a_bed_is_put_before_a_fold_that_would_tilt_it():
     seat = _Seat(line, line, np.full((len(line), len(line)), 0.5), 0.5)
     for turn in (0.0, -0.4, 0.4):
         size = np.array([0.3, 0.02, 0.2])
-        body = trimesh.creation.box(size).vertices + (0.0, size[1] / 2, 0.0)
+        body = trimesh.creation.box(size).vertices + np.array([0.0, size[1] / 2, 0.0])
         spot = upholstery._lying(host, seat, np.array([0.0, 0.5, -0.25]), turn, size, body)
         deep = 0.15 * abs(np.sin(turn)) + 0.1 * np.cos(turn)
         assert -0.25 + deep <= spot[2] < -0.05 + deep
