@@ -10,7 +10,7 @@ from echomodel.dressing import SMALL
 from echomodel.vocabulary import UnknownWord, normalised
 from echousd.checks.reading import Finding, Reading, applied, below, rule
 from echousd.graph.nodes import OBSTACLE
-from echousd.layers.physics import FRICTION_API
+from echousd.layers.physics import CORNERS_API, FRICTION_API
 from echousd.stage import encoding as usd
 from echousd.stage.boxes import read_small
 from echousd.stage.contents import components, room_frame, words_of
@@ -199,7 +199,7 @@ def agreeing_labels(reading: Reading, prim: Usd.Prim) -> Iterator[Finding | str]
 
 # Known to this package even in a process that opened a stage before it could register the schema plugin.
 OURS = frozenset((*usd.TYPES, usd.NODE_API, usd.ROOM_API))
-WRITTEN = OURS | {FRICTION_API}
+WRITTEN = OURS | {CORNERS_API, FRICTION_API}
 
 
 @rule("echo:EdgeTargets")

@@ -1,6 +1,7 @@
 """Physics of a room: bodies, colliders and joints in every asset; the scene and what never moves in its own layer."""
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 from pxr import Gf
@@ -58,8 +59,11 @@ def write_asset_physics(pen: Pen, asset: str, category: str, geometry: Geometry,
 
 def collides(pen: Pen, path: str, approximation: str) -> None:
     """Have a mesh stop things; `approximation`: how, a token of `physics:approximation`."""
-    values = {"uniform token physics:approximation": approximation}
-    pen.over(path, values, ["PhysicsCollisionAPI", "PhysicsMeshCollisionAPI"])
+    values: dict[str, Any] = {"uniform token physics:approximation": approximation}
+    apis = ["PhysicsCollisionAPI", "PhysicsMeshCollisionAPI"]
+    if approximation == "convexHull":  # else Newton drops corners beyond the 64th, and a bed's top with them
+        values[f"uniform int {CORNERS}"], apis = -1, [*apis, CORNERS_API]
+    pen.over(path, values, apis)
 
 
 def bind_contact(
@@ -94,7 +98,9 @@ def write_physics(pen: Pen, shell: Mapping[str, str]) -> None:
 
 
 STATIC = "static"
-FRICTION_API, FRICTION = "NewtonJointAPI", "newton:friction"  # of a schema that MuJoCo and Newton bring with them
+# Of a schema that MuJoCo and Newton bring with them.
+FRICTION_API, FRICTION = "NewtonJointAPI", "newton:friction"
+CORNERS_API, CORNERS = "NewtonMeshCollisionAPI", "newton:maxHullVertices"  # of which -1 is as many as there are
 Point = tuple[float, float, float]
 BRAKE = 20.0  # 1/s: what drifts on a runner or hinge stops in a twentieth of a second
 SLOPE, GRAVITY = 0.03, 9.81  # what rubs there holds it on a slope of 3 %; m/s²

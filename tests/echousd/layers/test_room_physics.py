@@ -15,7 +15,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
 from echousd.layers.assets import coarse_layer, component_layer, geometry_layer
 from echousd.layers.compose import _forms
-from echousd.layers.physics import CONTACT, WOODEN, movable, write_asset_physics
+from echousd.layers.physics import CONTACT, WOODEN, collides, movable, write_asset_physics
 from echousd.shapes.colliders import collider, colliders_of
 from echousd.shapes.geometry import Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.hulls import convex_hull, hull_volume, standing_hull
@@ -251,3 +251,15 @@ def test_a_hull_that_is_kept_keeps_nothing_of_manifold3d():
     hull = convex_hull(np.random.default_rng(3).normal(size=(40, 3)))
     assert hull.vertices.base is None
     assert hull.faces.base is None
+
+
+def test_no_hull_loses_corners_in_newton():
+    """Newton keeps 64 corners of a hull where nobody says otherwise: a bed was 12 cm lower there."""
+    stage = Usd.Stage.CreateInMemory()
+    for name, form in (("turns", "convexHull"), ("stays", "none")):
+        UsdGeom.Mesh.Define(stage, f"/{name}")
+        collides(Pen(stage.GetRootLayer()), f"/{name}", form)
+    turns, stays = (stage.GetPrimAtPath(path) for path in ("/turns", "/stays"))
+    assert turns.GetAttribute("newton:maxHullVertices").Get() == -1
+    assert "NewtonMeshCollisionAPI" in turns.GetPrimTypeInfo().GetAppliedAPISchemas()
+    assert not stays.HasAttribute("newton:maxHullVertices")
