@@ -4,7 +4,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from trimesh.triangles import closest_point
 
 from echomodel.triangles import (
     Mesh,
@@ -13,7 +12,6 @@ from echomodel.triangles import (
     box,
     connected_pieces,
     cross,
-    distances,
     joined,
     lengths,
     spans_of,
@@ -45,16 +43,6 @@ def test_lengths_and_bounds_are_numpy_s_bit_for_bit(shape, kind):
 def test_a_normal_is_twice_as_long_as_its_triangle_s_area():
     triangle = np.array([[[0, 0, 0], [2, 0, 0], [0, 3, 0]]], float)
     np.testing.assert_array_equal(area_normals(triangle), [[0, 0, 6]])
-
-
-def test_distances_are_those_of_trimesh_and_of_the_edge_where_there_is_no_area():
-    rng = np.random.default_rng(0)
-    triangles, points = rng.normal(size=(40, 3, 3)), 2 * rng.normal(size=(200, 3))
-    for point in points:
-        near = closest_point(triangles, np.broadcast_to(point, (40, 3)))
-        np.testing.assert_allclose(distances(point, triangles), np.linalg.norm(near - point, axis=1), atol=1e-12)
-    flat = np.array([np.zeros((3, 3)), [[0, 0, 0], [1, 0, 0], [2, 0, 0]]])
-    np.testing.assert_allclose(distances(np.array([0.5, 1.0, 0.0]), flat), [np.sqrt(1.25), 1.0])
 
 
 @given(st.integers(1, 60), st.integers(0, 2**31))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 from pxr import Gf, Usd, UsdGeom
+from trimesh.triangles import closest_point
 
 import echousd
 from echousd.checks import Collision, check
@@ -341,3 +342,13 @@ def test_coats_hang_from_a_rack_that_stands_off_its_wall(rack: float, told: list
     carriers = [thing("rack", "coat_rack", box(0.4, rack, 1.0), (-0.7, 0.0, 0.0))] if rack else []
     found = _small_faults(coats, floor, Carriers(carriers), np.zeros((0, 2, 2)))
     assert [word for word, _ in found] == told
+
+
+def test_distances_are_those_of_trimesh_and_of_the_edge_where_there_is_no_area():
+    rng = np.random.default_rng(0)
+    triangles, points = rng.normal(size=(40, 3, 3)), 2 * rng.normal(size=(200, 3))
+    for point in points:
+        near = closest_point(triangles, np.broadcast_to(point, (40, 3)))
+        np.testing.assert_allclose(distances(point, triangles), np.linalg.norm(near - point, axis=1), atol=1e-12)
+    flat = np.array([np.zeros((3, 3)), [[0, 0, 0], [1, 0, 0], [2, 0, 0]]])
+    np.testing.assert_allclose(distances(np.array([0.5, 1.0, 0.0]), flat), [np.sqrt(1.25), 1.0])
