@@ -27,7 +27,7 @@ INK = {"door": "#8a5a2b", "window": "#3a6ea5", "passage": "#c9c2b2"}
 FRONT = [2, 3]  # corners of a footprint at its front
 ASIDE = 0.5  # metres from the walls to what says how long they are
 ACROSS = 5.0  # inches of one plan
-NARROW = 2.4  # metres of a room across which what is written reaches into its walls
+WRITTEN = 0.17  # of a plan's longer side, which is drawn equally long: as far as words in a room reach
 
 
 Place = tuple[float, float]
@@ -108,13 +108,14 @@ def draw_plans(
         axes = figure.add_subplot(high, wide, number + 1)
         axes.set_aspect("equal")
         axes.axis("off")
+        narrow = WRITTEN * np.ptp(np.concatenate([*plan.cells.values()]), axis=0).max()
         for name, floor in plan.floors.items():
             row = vocabulary().room_type(plan.home.room(name).type)
             axes.fill(*on_paper(floor).T, color=TINTS[row.use])
             middle = shapely.Polygon(on_paper(floor)).representative_point()
             width, height = np.ptp(on_paper(floor), 0)
             label = f"{name.replace('_', ' ')}\n{abs(signed_area(floor)):.1f} m²\n{width:.2f} x {height:.2f} m"
-            turn = 90 if width < min(height, NARROW) else 0
+            turn = 90 if width < min(height, narrow) else 0
             axes.text(middle.x, middle.y, label, ha="center", va="center", fontsize=7, rotation=turn)
         for line in lines_of(plan):
             points = np.vstack([line.points, line.points[:1]]) if line.closed else line.points

@@ -15,7 +15,6 @@ from pxr import Usd
 
 from echomodel.progress import StageTimer
 from echousd.room import RoomData
-from echousd.textures import encoded
 
 SHOWN = 360  # pixels that a picture in a notebook is wide
 
@@ -62,6 +61,7 @@ class Room(RoomData):
 
     def _repr_html_(self) -> str:
         from echousd.pages import template
+        from echousd.textures import encoded
 
         states, picture = [verdict.state for verdict in self.verdicts], ""
         kept, measured = states.count("kept"), len(states) - states.count("unmeasured")
