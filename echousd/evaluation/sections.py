@@ -35,7 +35,7 @@ from echomodel.metrics.pictures import WEIGHTS, body_scores, cnn_accuracy, featu
 from echomodel.metrics.pointsets import chamfer, set_scores, surface_points
 from echomodel.metrics.sets import AXES, forest_auc, layout_distance, set_figures, size_distances, size_scores
 from echomodel.metrics.statistics import Counts, Figure, figure, mean
-from echomodel.protocols import FurnitureModel, RoomModel, furnishes
+from echomodel.protocols import RoomModel
 from echomodel.roomboxes import RoomBoxes
 from echomodel.tsdf import mesh_from_tsdf
 from echomodel.vocabulary import vocabulary
@@ -338,7 +338,7 @@ def pieces(model: RoomModel, scenes: Sequence[Sequence[str]], sizes: np.ndarray,
         for scene in scenes
     ])  # fmt: skip
     generator, words = torch.Generator().manual_seed(seed), [word for scene in scenes for word in scene]
-    if furnishes(model):
+    if "furniture" in model.branches:
         found = sampled(model, graph, sizes, generator).numpy()
         rows = zip(words, found, sizes, strict=True)
         return [piece_scores(solids(word, *piece_of(vector), size), size) for word, vector, size in rows]
@@ -373,7 +373,7 @@ def _consistency(models: Mapping[str, RoomModel], sizes: Mapping[str, np.ndarray
     rows: dict[str, dict[str, Figure]] = {}
     for name, model in {**models, "independent shapes": models["network"]}.items():
         stated = "same_style_as" if name in models else ""
-        rows[name] = _styles(model, bool(stated), seed) if furnishes(model) else {}
+        rows[name] = _styles(model, bool(stated), seed) if "furniture" in model.branches else {}
         for word in CONSISTENT:
             doubled = np.repeat(sizes[word][:PAIRS], 2, axis=0)
             scenes = [[word] * 2] * (len(doubled) // 2) if stated else [[word]] * len(doubled)
@@ -384,7 +384,7 @@ def _consistency(models: Mapping[str, RoomModel], sizes: Mapping[str, np.ndarray
     return Table("shapes", "Consistency", note("consistency"), rows)
 
 
-def _styles(model: FurnitureModel, together: bool, seed: int) -> dict[str, Figure]:
+def _styles(model: RoomModel, together: bool, seed: int) -> dict[str, Figure]:
     generator = torch.Generator().manual_seed(seed)
 
     def drawn(graph: GraphBatch, wanted: np.ndarray) -> torch.Tensor:

@@ -16,11 +16,11 @@ from torch import nn
 
 from echomodel.compact.modules import EchoLayer
 from echomodel.echo import EchoModel
-from echomodel.graph import GraphBatch
+from echomodel.graph import GraphBatch, GraphEdit
 from echomodel.loading import load_model
 from echomodel.metrics.furniture import usual_size
 from echomodel.metrics.layouts import HALVES, Task, layout_scores
-from echomodel.protocols import GraphEdit, RoomModel
+from echomodel.protocols import RoomModel
 from echomodel.randomness import Randomness, SceneGenerators
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_room, generate_rooms

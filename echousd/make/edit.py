@@ -11,16 +11,16 @@ from dataclasses import replace
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import turned
+from echomodel.graph import GraphEdit
 from echomodel.objective import Plan, faults_of
 from echomodel.objective.support import ON_CEILING
 from echomodel.progress import StageListener, StageTimer
-from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph, consistency
 from echousd.graph.arrays import graph_batch, one_thread
@@ -37,6 +37,9 @@ from echousd.room import LayoutOutcome, Provenance
 from echousd.shapes.sources.mixing import default_source
 from echousd.shapes.sources.named import anchored, check_files
 from echousd.shapes.styles import stated_styles
+
+if TYPE_CHECKING:
+    from echomodel.protocols import RoomModel
 
 
 @takes_options(OF_NEW)

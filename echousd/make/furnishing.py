@@ -13,7 +13,6 @@ from echomodel.boxes import Boxes
 from echomodel.boxes2d import footprints
 from echomodel.late import Late, lates
 from echomodel.progress import StageTimer
-from echomodel.protocols import GraphEdit, RoomModel
 from echousd.graph import Node, SceneGraph
 from echousd.graph.arrays import graph_batch, one_thread
 from echousd.graph.floors import with_lowered_windows
@@ -38,6 +37,8 @@ from echousd.shapes.sources.source import Retrieved, ShapeRequest
 from echousd.shapes.styles import asset_names
 
 if TYPE_CHECKING:
+    from echomodel.graph import GraphEdit
+    from echomodel.protocols import RoomModel
     from echousd.assets.choose import AssetWishes
     from echousd.assets.reference import Vector
     from echousd.shapes.geometry import Geometry

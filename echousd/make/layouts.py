@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -14,14 +14,13 @@ import shapely
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import footprints
 from echomodel.echo import EchoModel
-from echomodel.graph import GraphBatch
+from echomodel.graph import GraphBatch, GraphEdit
 from echomodel.late import Late
 from echomodel.loading import load_model
 from echomodel.objective.access import LEAF, NEEDED
 from echomodel.objective.physics import TOUCH
 from echomodel.openings import signed_area
 from echomodel.progress import StageTimer
-from echomodel.protocols import GraphEdit, RoomModel
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.graph.arrays import floor_centre, graph_batch, one_thread, rounded_boxes, seeded
@@ -34,6 +33,9 @@ from echousd.place.placing import place as placed
 from echousd.place.search import OF_GRAPHS
 from echousd.place.solver import PlaceConfig
 from echousd.shapes.styles import equal_sizes, style_groups, unequal_pairs
+
+if TYPE_CHECKING:
+    from echomodel.protocols import RoomModel
 
 sentence = Late("echousd.place.conflicts:sentence")
 DRAFTS = 8  # of which the best is kept
@@ -94,7 +96,7 @@ class LayoutSearch:
         if self.place and isinstance(self.model, EchoModel):
             extra["relation_guidance"] = 0.0  # where boxes are placed by search afterwards guidance changes nothing
         if self.change is not None:
-            extra["edit"] = repeated(self.change, len(nodes), count)
+            extra["edit"] = self.change.repeated(count)
         generator = seeded(self.seed, "layout", number)
         with self.timer.stage("layout") as tell, one_thread():
             drawn = not known_nodes.all()  # else nothing is left to draw
@@ -148,12 +150,6 @@ class LayoutSearch:
                 break
         assert best is not None
         return best
-
-
-def repeated(change: GraphEdit, nodes: int, count: int) -> GraphEdit:
-    """The edit of one graph of `nodes` objects for `count` copies of it behind one another."""
-    shift = np.arange(count)[:, None, None] * [nodes, 0, nodes]
-    return GraphEdit((change.before + shift).reshape(-1, 3), np.tile(change.added, count))
 
 
 def most_drafts(model: RoomModel, objects: int) -> int:

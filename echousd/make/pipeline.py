@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from echomodel.boxes import Boxes
 from echomodel.late import Late, lates
 from echomodel.progress import StageListener, StageTimer
-from echomodel.protocols import RoomModel
 from echousd.graph import SceneGraph, load_graph
 from echousd.graph.arrays import one_thread
 from echousd.graph.consistency import faults_of
@@ -28,6 +27,9 @@ from echousd.shapes.sources.named import anchored, check_files
 from echousd.stage.files import open_stage
 from echousd.stage.read import read_graph
 from echousd.stage.units import conventions
+
+if TYPE_CHECKING:
+    from echomodel.protocols import RoomModel
 
 # of a room that is there already
 with_earlier_locks, with_locked_places = lates("echousd.make.reading", "with_earlier_locks", "with_locked_places")

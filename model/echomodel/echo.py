@@ -24,9 +24,8 @@ from echomodel.compact.sampling import (
 from echomodel.compact.weights import WeightsError, branches
 from echomodel.config import CompactConfig
 from echomodel.files import SHIPPED
-from echomodel.graph import GraphBatch
+from echomodel.graph import GraphBatch, GraphEdit
 from echomodel.late import Late
-from echomodel.protocols import GraphEdit, touched_nodes
 from echomodel.triangles import firsts
 from echomodel.vocabulary import vocabulary
 
@@ -99,10 +98,7 @@ class EchoModel:
 
         Raises ValueError for a graph, box or argument that the model cannot work with; the message names it.
         """
-        if "layout" not in self.branches:
-            held = ", ".join(sorted(self.model.parts))
-            raise ValueError(f"these weights hold {held}, rooms need latent and layout; name others")
-        graph = self._checked(graph)
+        graph = self._checked(graph, "layout")
         return sample_boxes(self.model, self.graph_latent, graph, self._how(graph, how))
 
     @without_slopes
@@ -114,7 +110,7 @@ class EchoModel:
         added = on_device(edit.added, self.device)
         old = pairs_of(graph.with_triplets(on_device(edit.before, self.device)), self.config.predicates)
         old = old.without(~added, old.stated)
-        return self.model.latent(graph.category, pairs, before=old, added=added, touched=touched_nodes(graph, edit))
+        return self.model.latent(graph.category, pairs, before=old, added=added, touched=edit.touched(graph))
 
     def unlearned(self, graph: GraphBatch) -> tuple[str, ...]:
         """One sentence for every word of the graph that the weights do not know, and what becomes of it."""
@@ -128,7 +124,7 @@ class EchoModel:
         Returns (N, 64, 64, 64) float32 truncated signed distances on the box-normalised grid, negative inside.
         """
         own = self.in_torch
-        graph, boxes = own._checked(graph), own._of(graph, boxes)
+        graph, boxes = own._checked(graph, "shape"), own._of(graph, boxes)
         found = sample_shapes(own.model, own.graph_latent, graph, boxes, equal_furniture(graph), own._how(graph, how))
         return on_device(found, self.device)
 
@@ -140,7 +136,7 @@ class EchoModel:
 
         Returns (N, D) float32; pieces of one class that relations of style or material join are equal.
         """
-        graph, boxes = self._checked(graph), self._of(graph, boxes)
+        graph, boxes = self._checked(graph, "furniture"), self._of(graph, boxes)
         by, equal = self._how(graph, how), equal_furniture(graph)
         own = self.config.furniture
         start = by.start(graph.num_nodes, sum(own.kinds) + own.numbers, self.device)
@@ -156,7 +152,10 @@ class EchoModel:
         known, mask = known_values(graph, how.known, how.known_mask, self.device)
         return replace(how, known=known, known_mask=mask)
 
-    def _checked(self, graph: GraphBatch) -> GraphBatch:
+    def _checked(self, graph: GraphBatch, branch: str) -> GraphBatch:
+        if branch not in self.branches:
+            held = ", ".join(sorted(self.model.parts))
+            raise ValueError(f"these weights hold {held}, this needs latent and {branch}; name others")
         graph.check()
         return graph.to(self.device)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.arrays import Array, cast, full, kit, on_device
+from echomodel.arrays import Array, beside, cast, full, kit, on_device
 from echomodel.floors import area
 from echomodel.openings import Opening
 from echomodel.surroundings import ROW, centred, extents, opening_rows, padded
@@ -195,6 +195,33 @@ class GraphBatch:
             middle = (used.max(0) + used.min(0)) / 2 if len(used) else np.zeros(2)
             if float(abs(middle).max()) > 1e-3:
                 raise ValueError(f"floor of scene {at} has its middle at {middle.tolist()} m, expected [0.0, 0.0]")
+
+
+@dataclass(frozen=True, eq=False)
+class GraphEdit:
+    """How a graph came about by editing another one over the same nodes (EchoScene 3.2).
+
+    Arguments:
+        before: (E, 3) int64, the triplets before the edit.
+        added: (N,) bool, nodes that were not there before; triplets of `before` do not touch them.
+    """
+
+    before: Array
+    added: Array
+
+    def touched(self, graph: GraphBatch) -> Array:
+        """(N,) bool: nodes that were added, and both ends of every triplet that came or went; `graph`: as it is now."""
+        nodes = np.array(self.added.tolist(), bool)
+        now, before = ({tuple(row) for row in triplets.tolist()} for triplets in (graph.triplets, self.before))
+        for subject, _, target in now ^ before:
+            nodes[[subject, target]] = True
+        return beside(nodes, graph.category)
+
+    def repeated(self, count: int) -> GraphEdit:
+        """That of so many copies of the graph behind one another."""
+        nodes = len(self.added)
+        shift = np.arange(count)[:, None, None] * [nodes, 0, nodes]
+        return GraphEdit((self.before + shift).reshape(-1, 3), np.tile(self.added, count))
 
 
 def shifted(placements: Array, nodes: int) -> Array:

@@ -4,14 +4,19 @@ A loaded model can be pickled, but another process had better call `load_model` 
 the last models that it loaded.
 """
 
+from __future__ import annotations
+
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from safetensors import SafetensorError, safe_open
 
 from echomodel.compact.weights import FORMAT as COMPACT
 from echomodel.late import Late
-from echomodel.protocols import RoomModel
+
+if TYPE_CHECKING:
+    from echomodel.protocols import RoomModel
 
 RUN = "weights.safetensors"  # what a training calls its weights
 # format of a weights file -> what gives the model of a path, on a `device`

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +18,9 @@ from echomodel.arrays import Array, cast, device_of, full, kit
 from echomodel.config import Objective, Sampler
 from echomodel.progress import StepListener
 from echomodel.randomness import Randomness, normal
+
+if TYPE_CHECKING:
+    from echomodel.graph import GraphEdit
 
 
 def alpha_sigma(level: Array, objective: Objective) -> tuple[Array, Array]:
@@ -43,6 +48,27 @@ def clean_from(output: Array, noisy: Array, level: Array, objective: Objective) 
     if objective == "velocity":
         return alpha * noisy - sigma * output
     return (noisy - sigma * output) / alpha
+
+
+@dataclass(frozen=True, eq=False)
+class Sampling:
+    """How a model samples and what it is given: the keyword arguments of every `sample_...` of a `RoomModel`.
+
+    Arguments:
+        generator: source of all randomness, or one a scene.
+        steps: of the sampler, None = the model's own; those that there are not raise ValueError.
+        known, known_mask: what is sampled (boxes, distances or descriptions) of N nodes, and (N,) bool; where true it
+            is given and comes back unchanged.
+        edit: what was changed in the graph, None = nothing.
+        progress: called with (steps done, steps).
+    """
+
+    generator: Randomness
+    steps: int | None = None
+    known: Any = None
+    known_mask: Array | None = None
+    edit: GraphEdit | None = None
+    progress: StepListener | None = None
 
 
 Predict = Callable[[Array, Array], Array]

@@ -16,9 +16,9 @@ from torch import Tensor
 from echomodel.arrays import Array, cast, kit, on_device
 from echomodel.boxes import Boxes
 from echomodel.files import raising
-from echomodel.graph import GraphBatch, shifted
-from echomodel.protocols import GraphEdit, Sampling, touched_nodes
+from echomodel.graph import GraphBatch, GraphEdit, shifted
 from echomodel.randomness import SceneGenerators
+from echomodel.samplers import Sampling
 from echomodel.surroundings import trimmed
 from echomodel.text import TextEncoder, edge_text, encoder_named, node_text
 from echomodel.vocabulary import vocabulary
@@ -116,6 +116,10 @@ class ReleasedEcho:
         )[objects]
         return turned_back(torch.cat([self.model.vqvae.decode(part) for part in latents.split(DECODED)])) - LEVEL
 
+    def sample_furniture(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Tensor:
+        """Raises ValueError: the published networks describe no furniture."""
+        raise ValueError(f"weights of the preset {self.preset} have no furniture branch")
+
     def unlearned(self, graph: GraphBatch) -> tuple[str, ...]:
         """One sentence for every relation of the graph that SG-FRONT lacks; categories have classes, see `labels`."""
         words = vocabulary()
@@ -173,7 +177,7 @@ class ReleasedEcho:
         """The edit in the model's own form: the graph before without the nodes that were added."""
         changes, start = [], 0
         befores = unpacked(in_published_words(replace(graph, triplets=edit.before)))
-        touched = touched_nodes(graph, edit) & ~edit.added
+        touched = edit.touched(graph) & ~edit.added
         labels = self.labels(graph)
         for before in befores:
             stop = start + before.num_nodes

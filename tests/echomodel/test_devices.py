@@ -15,8 +15,8 @@ from echomodel.compact.model import CompactModel
 from echomodel.config import CompactConfig, from_dict
 from echomodel.echo import EchoModel
 from echomodel.furniture.style import WIDTH
+from echomodel.graph import GraphEdit
 from echomodel.metrics import pointsets
-from echomodel.protocols import GraphEdit
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 from echomodel.training import parts_stage

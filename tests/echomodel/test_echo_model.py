@@ -16,8 +16,7 @@ from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import agreeing
 from echomodel.config import CompactConfig, from_dict, to_json
 from echomodel.echo import EchoModel, equal_furniture
-from echomodel.graph import GraphBatch
-from echomodel.protocols import GraphEdit, touched_nodes
+from echomodel.graph import GraphBatch, GraphEdit
 from echomodel.training.recipe import with_settings
 from echomodel.vocabulary import vocabulary
 
@@ -109,7 +108,7 @@ def test_what_is_known_shapes_the_rest(model: EchoModel) -> None:
 def test_an_edit_changes_the_result(model: EchoModel) -> None:
     graph, noise = bedroom(), torch.randn(3, 8, generator=seeded())
     edit = GraphEdit(before=graph.triplets[1:], added=torch.zeros(3, dtype=torch.bool))
-    assert touched_nodes(graph, edit).tolist() == [True, True, False]
+    assert edit.touched(graph).tolist() == [True, True, False]
     plain = model.sample_layout(graph, generator=seeded(), noise=noise)
     edited = model.sample_layout(graph, generator=seeded(), noise=noise, edit=edit)
     assert not torch.equal(plain.position, edited.position)

@@ -10,8 +10,7 @@ import torch
 from second_device import SECOND, second_device
 
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.graph import GraphBatch
-from echomodel.protocols import GraphEdit
+from echomodel.graph import GraphBatch, GraphEdit
 from echomodel.text import RandomTextEncoder
 from echomodel.vocabulary import vocabulary
 from echoscene.config import paper

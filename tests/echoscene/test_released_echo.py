@@ -12,8 +12,7 @@ import trimesh
 from published_shapes import fit_to_box, mesh_from_grid
 
 from echomodel.boxes import Boxes
-from echomodel.graph import GraphBatch
-from echomodel.protocols import GraphEdit
+from echomodel.graph import GraphBatch, GraphEdit
 from echomodel.vocabulary import vocabulary
 from echoscene.checkpoint import class_names, convert, statistics_from_bounds, write_released
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet

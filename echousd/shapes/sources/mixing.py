@@ -1,8 +1,11 @@
 """Sources of shapes by name: furniture of parts, sampled shapes, boxes, models of a library; a room of several."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,7 +13,6 @@ from echomodel.arrays import on_device
 from echomodel.furniture import solids
 from echomodel.furniture.style import WIDTH, piece_of
 from echomodel.late import Late
-from echomodel.protocols import RoomModel, furnishes
 from echomodel.vocabulary import vocabulary
 from echousd.graph.arrays import DESCRIPTION, graph_batch, one_thread, rounded, seeded
 from echousd.shapes.geometry import Geometry, Origin
@@ -19,13 +21,17 @@ from echousd.shapes.sources.named import source_of
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
 from echousd.shapes.styles import stated_styles
 
+if TYPE_CHECKING:
+    from echomodel.protocols import RoomModel
+
 WHOLE = "echousd.shapes.sources.whole"
 
 
-def needs_furniture(model: RoomModel | None) -> None:
-    """Raises ValueError for a model without a furniture branch."""
-    if not furnishes(model):
+def needs_furniture(model: RoomModel | None) -> RoomModel:
+    """The model; raises ValueError for none, and for one without a furniture branch."""
+    if model is None or "furniture" not in model.branches:
         raise ValueError("these weights have no furniture branch; use --shapes sdf, --shapes boxes or other weights")
+    return model
 
 
 def furniture_of_parts(request: ShapeRequest) -> Shapes:
@@ -49,9 +55,7 @@ def descriptions(request: ShapeRequest) -> np.ndarray:
 
     Raises ValueError as `needs_furniture` does.
     """
-    graph, model = request.graph, request.model
-    needs_furniture(model)
-    assert furnishes(model)
+    graph, model = request.graph, needs_furniture(request.model)
     words = sorted(set(request.styles.values()))
     styles = np.array([words.index(request.styles[name]) for name in graph.names])
     extra = request.edited
@@ -74,7 +78,7 @@ class ShapeSource:
     # gives geometry of the wanted objects; raises ValueError naming the object that there is none for
     shapes: Callable[[ShapeRequest], Shapes]
     # raises ValueError, before any long work, where the source cannot give shapes with a model
-    check: Callable[[RoomModel | None], None] = lambda model: None
+    check: Callable[[RoomModel | None], object] = lambda model: None
 
 
 SOURCES = {  # those of `echousd.graph.fields.SHAPES`

@@ -18,7 +18,8 @@ from echousd.shapes.geometry import Geometry
 from echousd.shapes.styles import shared_assets, style_groups
 
 if TYPE_CHECKING:
-    from echomodel.protocols import GraphEdit, RoomModel
+    from echomodel.graph import GraphEdit
+    from echomodel.protocols import RoomModel
     from echousd.assets.model_file import ModelFile
     from echousd.assets.record import AssetRecord
     from echousd.assets.reference import Vector

@@ -12,11 +12,10 @@ from echomodel.compact.layout import temperatures
 from echomodel.compact.learned import places
 from echomodel.compact.pairs import Pairs, pairs_of
 from echomodel.config import BranchConfig, Sampler
-from echomodel.graph import GraphBatch
+from echomodel.graph import GraphBatch, GraphEdit
 from echomodel.late import Late
-from echomodel.protocols import GraphEdit, Sampling
 from echomodel.randomness import normal
-from echomodel.samplers import Predict, clean_from, sample
+from echomodel.samplers import Predict, Sampling, clean_from, sample
 from echomodel.standing import plan_of_graph, settled
 from echomodel.vocabulary import vocabulary
 

@@ -14,7 +14,7 @@ from echomodel.furniture.solids import Array, Solid
 from echomodel.furniture.style import GROUPS, HOT, STYLE
 from echomodel.graph import GraphBatch
 from echomodel.objective.sizes import size_range
-from echomodel.protocols import FurnitureModel
+from echomodel.protocols import RoomModel
 from echomodel.triangles import linked, spread
 from echomodel.vocabulary import vocabulary
 
@@ -111,7 +111,7 @@ def usual_size(category: str, rng: np.random.Generator) -> np.ndarray:
     return np.clip(sample_size(category, rng), *map(np.array, size_range(category)))
 
 
-def sampled(model: FurnitureModel, graph: GraphBatch, sizes: np.ndarray, generator: torch.Generator) -> Tensor:
+def sampled(model: RoomModel, graph: GraphBatch, sizes: np.ndarray, generator: torch.Generator) -> Tensor:
     """(N, D) float32 descriptions of the furniture of a graph in boxes `sizes` (N, 3), metres."""
     count = graph.num_nodes
     boxes = Boxes(torch.from_numpy(sizes).float(), torch.zeros(count, 3), torch.zeros(count))

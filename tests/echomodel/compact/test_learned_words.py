@@ -11,7 +11,7 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
 
-from echomodel.boxes import BoxStatistics
+from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel, load_weights
 from echomodel.compact.modules import WordTable
@@ -248,5 +248,8 @@ def test_a_room_set_names_its_words(tmp_path):
 
 def test_weights_without_a_layout_say_what_they_hold():
     weights = EchoModel.load(resources.files("echomodel") / "weights" / "parts.safetensors")
-    with pytest.raises(ValueError, match="these weights hold furniture, rooms need latent and layout"):
+    with pytest.raises(ValueError, match="these weights hold furniture, this needs latent and layout"):
         weights.sample_layout(GraphBatch.single([0]))
+    weights = EchoModel.load(resources.files("echomodel") / "weights" / "layout.safetensors")
+    with pytest.raises(ValueError, match="these weights hold latent, layout, this needs latent and furniture"):
+        weights.sample_furniture(GraphBatch.single([0]), Boxes(*np.ones((2, 1, 3), np.float32), np.zeros(1, np.float32)))

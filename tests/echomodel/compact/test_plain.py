@@ -8,9 +8,8 @@ from echomodel.boxes import Boxes
 from echomodel.compact.modules import Alone
 from echomodel.compact.plain import Net
 from echomodel.echo import EchoModel
-from echomodel.graph import GraphBatch
+from echomodel.graph import GraphBatch, GraphEdit
 from echomodel.openings import Opening
-from echomodel.protocols import GraphEdit
 from echomodel.randomness import Noise
 from echomodel.vocabulary import vocabulary
 

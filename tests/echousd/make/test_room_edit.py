@@ -10,12 +10,11 @@ from pxr import Sdf, Usd
 from small_room import BARE, StandIn, saved_room, small_graph, small_room
 
 import echousd
+from echomodel.graph import GraphEdit
 from echomodel.openings import Opening, segment
-from echomodel.protocols import GraphEdit
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.make import furnishing, layouts
 from echousd.make.edit import edit, graph_edit, restyled, touched
-from echousd.make.layouts import repeated
 from echousd.make.reading import read_room
 from echousd.options import RoomOptions
 from echousd.place.living import living_faults
@@ -161,7 +160,7 @@ def test_an_edit_draws_several_layouts_and_keeps_the_best(root, monkeypatch):
 
 def test_an_edit_is_told_once_for_every_copy_of_the_graph():
     change = GraphEdit(torch.tensor([[0, 1, 2], [2, 7, 1]]), torch.tensor([False, False, True]))
-    twice = repeated(change, 3, 2)
+    twice = change.repeated(2)
     assert twice.before.tolist() == [[0, 1, 2], [2, 7, 1], [3, 1, 5], [5, 7, 4]]
     assert twice.added.tolist() == [False, False, True, False, False, True]
 
