@@ -19,7 +19,7 @@ from echomodel.metrics.pointsets import chamfer, surface_points
 from echomodel.roomboxes import RoomBoxes, read_rooms
 from echomodel.rules import label_rooms, verdicts
 from echomodel.samplers import SAMPLERS
-from echomodel.surroundings import outside
+from echomodel.training.layout_losses import outside
 from echomodel.tsdf import mesh_from_tsdf
 
 RULES = "sgfront"

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, at_most, cast, dot, full, held, kit, norm, picked
+from echomodel.arrays import Array, at_least, at_most, cast, dot, full, kit, norm, picked
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import axes
-from echomodel.floors import edges, footprint, known, meeting, signed_area, signed_distance
+from echomodel.floors import edges, known, meeting, signed_area, signed_distance
 from echomodel.openings import Opening, inward_normal, rectangle, segment
 
 GRID = 6  # the floor's plan is told as signed distances at GRID x GRID places of its bounding box
@@ -92,15 +92,6 @@ def wall_distances(points: Array, floor: Array) -> Array:
     return xp.stack(out, 1)
 
 
-def outside(boxes: Boxes, floor: Array) -> Array:
-    """How far the corners and the middles of the sides lie beyond the walls: (N, 8) metres, 0 where unknown.
-
-    Arguments:
-        boxes: N boxes; none is asked to shrink. floor: (N, K, 2) float32, corners of the floor under each.
-    """
-    return at_least(-signed_distance(footprint(held(boxes.size), boxes.position, boxes.yaw), floor), 0.0)
-
-
 def plan_features(floor: Array) -> Array:
     """What a floor looks like: (S, K, 2) -> (S, 6 + GRID^2), zeros where it is unknown.
 
@@ -150,7 +141,7 @@ def clearances(boxes: Boxes, rows: Array) -> Array:
     """
     if not rows.shape[1]:
         return full(boxes.size, (len(boxes), OPENING_FEATURES), 0.0)
-    there, window, beside, before, under = _gaps(boxes, rows)
+    there, window, beside, before, under = opening_gaps(boxes, rows)
     xp, out = kit(rows), []
     for mask, gaps in ((there & ~window, (beside, before)), (there & window, (beside, before, under))):
         clear = xp.maximum(*gaps[:2])
@@ -163,24 +154,7 @@ def clearances(boxes: Boxes, rows: Array) -> Array:
     return xp.concat(out, 1)
 
 
-def kept_free(boxes: Boxes, rows: Array) -> Array:
-    """How far each box keeps out of the way of the openings of its room: the least of all, metres, differentiable.
-
-    Arguments:
-        boxes: N boxes that stand on the floor. rows: (N, O, ROW), openings of the room of each, NaN = none.
-
-    Returns (N,) float32, negative in the way of a door or passage, or before a window and higher than its sill; `AWAY`
-    where there is no opening.
-    """
-    if not rows.shape[1]:
-        return full(boxes.size, len(boxes), AWAY)
-    xp, (there, window, beside, before, under) = kit(rows), _gaps(boxes, rows)
-    clear = xp.maximum(beside, before)
-    clear = xp.where(window, xp.maximum(clear, under), clear)
-    return at_most(xp.amin(xp.where(there, clear, xp.full_like(clear, AWAY)), 1), AWAY)
-
-
-def _gaps(boxes: Boxes, rows: Array) -> tuple[Array, Array, Array, Array, Array]:
+def opening_gaps(boxes: Boxes, rows: Array) -> tuple[Array, Array, Array, Array, Array]:
     """(N, O) each: which openings there are and which are windows; how far each box stands beside, before and below."""
     xp, there = kit(rows), kit(rows).isfinite(rows[..., 0])
     rows = xp.where(there[..., None], rows, xp.zeros_like(rows))

@@ -12,7 +12,8 @@ from echomodel.guidance import LATE, guided, mended
 from echomodel.objective import KINDS, faults_of
 from echomodel.openings import Opening
 from echomodel.standing import openings_of, plan_of_graph, settled
-from echomodel.surroundings import centred, outside
+from echomodel.surroundings import centred
+from echomodel.training.layout_losses import outside
 from echomodel.vocabulary import vocabulary
 
 FLOOR = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])

@@ -14,13 +14,14 @@ from echomodel.compact.layout import FARTHEST, measurable, measured
 from echomodel.compact.model import CompactModel
 from echomodel.compact.sampling import box_scale
 from echomodel.config import Objective
+from echomodel.floors import footprint, signed_distance
 from echomodel.objective import Plan
 from echomodel.objective.physics import apart
 from echomodel.objective.plan import UNKNOWN
 from echomodel.randomness import normal
 from echomodel.rules import margins
 from echomodel.samplers import alpha_sigma, clean_from, expand
-from echomodel.surroundings import kept_free, outside
+from echomodel.surroundings import AWAY, opening_gaps
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import LayoutBatch, draw_levels
 from echomodel.vocabulary import vocabulary
@@ -86,6 +87,30 @@ def physics_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor,
     walls = deep(TOUCHING - over) + deep(clear) * stands[graph.category]
     total = (deep(apart(plan).margin - asked) * weight).sum() + (walls * sure * ~known).sum()
     return total / (sure * ~known).sum().clamp_min(1)
+
+
+def outside(boxes: Boxes, floor: Tensor) -> Tensor:
+    """How far the corners and the middles of the sides lie beyond the walls: (N, 8) metres, 0 where unknown.
+
+    Arguments:
+        boxes: N boxes; none is asked to shrink. floor: (N, K, 2) float32, corners of the floor under each.
+    """
+    return (-signed_distance(footprint(boxes.size.detach(), boxes.position, boxes.yaw), floor)).clamp_min(0)
+
+
+def kept_free(boxes: Boxes, rows: Tensor) -> Tensor:
+    """How far each box keeps out of the way of the openings of its room: the least of all, metres.
+
+    Arguments:
+        boxes: N boxes that stand on the floor. rows: (N, O, ROW), openings of the room of each, NaN = none.
+
+    Returns (N,) float32, negative in the way of a door or passage, or before a window and higher than its sill; `AWAY`
+    where there is no opening.
+    """
+    there, window, beside, before, under = opening_gaps(boxes, rows)
+    clear = torch.maximum(beside, before)
+    clear = clear.where(~window, torch.maximum(clear, under)).where(there, clear.new_full((), AWAY))
+    return torch.cat([clear, clear.new_full((len(boxes), 1), AWAY)], 1).amin(1)
 
 
 def plan_of_batch(batch: LayoutBatch, boxes: Boxes, known: Tensor) -> Plan:

@@ -252,4 +252,4 @@ def test_weights_without_a_layout_say_what_they_hold():
         weights.sample_layout(GraphBatch.single([0]))
     weights = EchoModel.load(resources.files("echomodel") / "weights" / "layout.safetensors")
     with pytest.raises(ValueError, match="these weights hold latent, layout, this needs latent and furniture"):
-        weights.sample_furniture(GraphBatch.single([0]), Boxes(*np.ones((2, 1, 3), np.float32), np.zeros(1, np.float32)))
+        weights.sample_furniture(GraphBatch.single([0]), Boxes(*torch.ones(2, 1, 3), torch.zeros(1)))

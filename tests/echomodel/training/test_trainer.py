@@ -21,9 +21,8 @@ from echomodel.floors import known
 from echomodel.graph import GraphBatch
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts
-from echomodel.surroundings import outside
 from echomodel.training import trainer
-from echomodel.training.layout_losses import as_carried, measure_distance, stated_triplets
+from echomodel.training.layout_losses import as_carried, measure_distance, outside, stated_triplets
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.recipe import OptimizerConfig, Recipe, read_recipe
 from echomodel.training.rooms import PackedRooms, draw_batch, make_batch
