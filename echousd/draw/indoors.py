@@ -19,7 +19,9 @@ from echousd.stage.values import NOW
 if TYPE_CHECKING:
     from echousd.draw.scenery import Scenery
 
-SUN = 4.0  # of what is told of the sun, as Blender has it: eyes see it brighter than a camera in the room would bear
+# Of what is told of the sun, by colour, as Blender has it: eyes see it brighter than a camera in the room would bear,
+# and pictures of rooms have it warmer than the light of the sky.
+SUN = 4 * np.array([1.12, 1.0, 0.78], np.float32)
 CEILING = np.array([0.87, 0.86, 0.84], np.float32)
 # What is seen through windows is exposed for itself, as photographers of interiors blend it in: how bright by day, the
 # power of the sky's light by which it is less in the evening, that by which its shadows are opened, and haze before it.
@@ -28,13 +30,16 @@ WHITER = 0.36  # how much less coloured the light of lamps is than told: no wall
 DIM = 0.004  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
 # darker than comes to, by night and by day, and how much at most it is brightened for that.
-ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.58, 0.75), (0.34, 0.55), 70, 40.0
-EVEN = (0.18, 0.08)  # power of the light's brightness that eyes take from it, and inside whoever photographs rooms
+ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.58, 0.75), (0.34, 0.53), 70, 40.0
+# Power of the light's brightness that eyes take from it, and inside whoever photographs rooms gives it; and what it
+# comes near to over the mean inside, where sun and lamps are blended in from darker exposures: floors keep their look.
+EVEN, LIMIT = (0.18, -0.15), (np.inf, 1.6)
 PALER = 0.5  # share of how its colour differs from the mean that they take from it, too
 WHITE, PAPER = 84, 0.95  # what so many of a hundred points are darker than comes to no more than that
-CONTRAST, KNEE = 1.33, 0.7  # power about what is bright, and from where on highlights are rolled off
-# Share of colours that keep their hue where they are bright, which film bleaches, and how much more coloured all are.
-HUE, CHROMA = 0.5, 1.1
+CONTRAST, KNEE = 1.5, 0.7  # power about what is bright, and from where on highlights are rolled off
+# Share of colours that keep their hue where they are bright, which film bleaches, and how much more coloured all are,
+# by night, when lamps are warm, not yellow, and by day.
+HUE, CHROMA = (0.5, 0.8), (1.0, 1.3)
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 DAY = 0.5  # radiance of the sky by day
 BANDS = 64  # heights of the sky whose light is told apart
@@ -181,9 +186,10 @@ def evened(light: np.ndarray, white: np.ndarray, inside: bool = True) -> np.ndar
 
     `white`: (3,) the mean light in the room. `inside`: whether it is seen from there.
     """
-    level, mean = LUMA @ light, white / max(float(white @ LUMA), 1e-6)
-    light = light + np.float32(PALER) * (mean.astype("f4")[:, None] * level - light)
-    return light * np.maximum(level / max(float(white @ LUMA), 1e-6), np.float32(1e-3)) ** np.float32(-EVEN[inside])
+    level, mean = LUMA @ light, max(float(white @ LUMA), 1e-6)
+    light = light + np.float32(PALER) * ((white / mean).astype("f4")[:, None] * level - light)
+    over, limit = np.maximum(level / np.float32(mean), np.float32(1e-3)), np.float32(LIMIT[inside])
+    return light * over ** np.float32(-EVEN[inside]) * np.sqrt((1 + limit**-2) / (1 + np.square(over / limit)))
 
 
 def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable[[np.ndarray], np.ndarray]:
@@ -193,7 +199,8 @@ def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable
     `color`: (3, n) linear radiance of the picture. `light`: (3,) that of the room, to whose colour the eye adapts in
     part. `day`: 1 by day, 0 by night, see `Lights.day`.
     """
-    adapted, bright = (float(np.interp(day, (0, 1), ends)) for ends in (ADAPTED, BRIGHT))  # floats keep float32
+    by_day = (float(np.interp(day, (0, 1), ends)) for ends in (ADAPTED, BRIGHT, HUE, CHROMA))  # floats keep float32
+    adapted, bright, hue, chroma = by_day
     white = (np.maximum(light, 1e-6) / max(float(light.mean()), 1e-6)) ** adapted
     seen, most = np.maximum(np.percentile((LUMA / white).astype("f4") @ color, (SHARE, WHITE)), 1e-4)
     scale = (min(bright / seen, bright / BRIGHT[1] * PAPER / most, BRIGHTEST) / white).astype("f4")[:, None]
@@ -201,9 +208,9 @@ def exposure(color: np.ndarray, light: np.ndarray, day: float = 1.0) -> Callable
     def shown(color: np.ndarray) -> np.ndarray:
         color = color * scale
         level = np.maximum(LUMA @ color, np.float32(1e-6))
-        color = np.maximum(level + np.float32(CHROMA) * (color - level), 0)
+        color = np.maximum(level + chroma * (color - level), 0)
         mapped = _filmic(level, bright)
-        kept = HUE * np.sqrt(1 - mapped)
+        kept = hue * np.sqrt(1 - mapped)
         return np.clip(kept * color * mapped / level + (1 - kept) * _filmic(color, bright), 0, 1)
 
     return shown
