@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import shapely
 
+from echomodel.boxes2d import seen, turned
 from echomodel.dressing import KINDS, names_of, usual_size
 from echomodel.openings import hinge_point, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, around, rectangle
@@ -14,13 +17,17 @@ from echousd.dressing.walls import walls_of
 PILE = 0.008  # metres; furniture stands on the floor below, through the rug
 FROM_WALL = 0.12
 SHOES = 0.25  # share of rooms with a door that somebody leaves shoes at
-LARGEST, ALONE = (4.0, 3.0), (2.6, 1.7)  # metres: of rugs, and of one that nothing stands on
+LARGEST, ALONE = (4.2, 3.4), (2.6, 1.7)  # metres: of rugs, and of one that nothing stands on
+LEAST, SHOWS = 1.2, 0.3  # m² of a rug; metres by which it is wider than what stands on it
+LEGS, BEYOND = 0.3, 0.45  # metres from the front of a seat that a rug carries, where its legs stand; around a group
 RUGS, BETWEEN = 3, 0.4  # of a room, and metres from a rug to what has one of its own
 RUNNER = 2.1  # times as long as wide
 OVALS, ROUNDS = 0.1, 0.25  # shares of rugs, of those that are about square
 AROUND = 1.2  # metres from a table: a seat that belongs to it
-SHARES = (1.0, 0.9, 0.8, 0.7, 0.6)  # of its wished width and depth that a rug may have, the largest area first
-SHRUNK = sorted(((x, z) for x in SHARES for z in SHARES), key=lambda share: -share[0] * share[1])
+# Of half its wished width and depth that a rug may have: (n, 2) about its middle, (m, 2, 2) to each of its sides.
+SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
+SHRUNK = np.array(list(product(SHARES, repeat=2)))
+SIDES = np.array(list(product(SHARES, repeat=4))).reshape(-1, 2, 2) * [[-1], [1]]
 
 
 def rugs(setting: Setting) -> None:
@@ -47,17 +54,19 @@ def _area(host: Standing) -> float:
 
 
 def _lay(setting: Setting, host: Standing) -> None:
-    """A rug at a piece, as large as there is room for."""
-    centre, size = _under(setting, host)
-    if np.prod(size) < 1.2:
-        return
-    group = setting.of("seat", "light", "decor", "sofa" if host.row.role == "sofa" else "seat")
+    """A rug at a piece, as large as there is room for; at a sofa each of its sides goes as far as it may."""
+    low, high = _wished(setting, host)
+    sofa, middle, half = host.row.role == "sofa", (low + high) / 2, np.minimum(high - low, LARGEST) / 2
+    group = setting.of("seat", "light", "decor", "sofa" if sofa else "seat")
     free = _free(setting, [host, *group, *setting.stands("head", "before", "beside")])
-    spot = host.on_floor(*centre)
-    for share in SHRUNK:
-        extents = np.round(np.minimum(np.array(size) * share, LARGEST), 2)
-        if free.contains(rectangle(spot[[0, 2]], extents, host.yaw)):
-            setting.placed.append(_rug(setting, host, spot, extents))
+    ends = half * (SIDES if sofa else np.stack([-SHRUNK, SHRUNK], 1)) + middle
+    plans = turned(ends[:, [[0, 0], [1, 0], [1, 1], [0, 1]], [0, 1]], np.array(host.yaw)) + host.position[[0, 2]]
+    wide, deep = (ends[:, 1] - ends[:, 0]).T
+    area = np.where((wide > host.size[0] + SHOWS) | sofa, wide * deep, 0.0)
+    for number in np.argsort(-area, kind="stable")[: int((area >= LEAST).sum())]:
+        if free.contains(shapely.Polygon(plans[number])):
+            extents = np.round([wide[number], deep[number]], 2)
+            setting.placed.append(_rug(setting, host, host.on_floor(*ends[number].mean(0)), extents))
             return
 
 
@@ -69,7 +78,7 @@ def _between(setting: Setting) -> None:
     middles = np.stack(np.meshgrid(*np.linspace(low, high, 16).T), -1).reshape(-1, 2)
     middles = middles[np.argsort(np.linalg.norm(middles - (low + high) / 2, axis=1))]
     whole = np.minimum(high - low - 2 * FROM_WALL, ALONE if high[0] - low[0] > high[1] - low[1] else ALONE[::-1])
-    for extents in (np.round(whole * share, 2) for share in SHRUNK):
+    for extents in np.round(whole * SHRUNK[np.argsort(-SHRUNK.prod(1), kind="stable")], 2):
         lies = shapely.contains(free, shapely.box(*(middles - extents / 2).T, *(middles + extents / 2).T))
         if lies.any():
             x, z = middles[lies.argmax()]
@@ -79,35 +88,40 @@ def _between(setting: Setting) -> None:
 
 def _rug(setting: Setting, host: Standing | None, spot: np.ndarray, extents: np.ndarray) -> Thing:
     """A rug of a design new to the room, along its longer side; below a seat and on some squares round."""
-    of, own, seat = (host.name, host.yaw, host.row.role == "seat") if host else ("", 0.0, False)
+    of, own, role = (host.name, host.yaw, host.row.role) if host else ("", 0.0, "")
     rng, (short, long) = setting.rng(of, "rug"), np.sort(extents)
-    form = "runner" if long > RUNNER * short else "oval" if rng.random() < OVALS else "rug"
-    if long < 1.3 * short and (seat or rng.random() < ROUNDS):
-        form, long = "round", short
+    form = "runner" if long > RUNNER * short else "rug"
+    if form == "rug" and role != "board":  # chairs around a table would be half off a round one
+        form = "oval" if rng.random() < OVALS else form
+        if long < 1.3 * short and (role == "seat" or rng.random() < ROUNDS):
+            form, long = "round", short
     names = names_of("rug", form, rng.choice((setting.resident, "")), setting.style)
     new = [name for name in names if all(thing.kind != name for thing in setting.placed)]
     yaw = own if extents[0] >= extents[1] else own + np.pi / 2
     return Thing(str(rng.choice(new or names)), np.array([long, PILE, short]), spot, yaw, of)
 
 
-def _under(setting: Setting, host: Standing) -> tuple[tuple[float, float], tuple[float, float]]:
-    """The middle of the rug of a group in the host's frame and its wished extents."""
+def _wished(setting: Setting, host: Standing) -> tuple[np.ndarray, np.ndarray]:
+    """(2,) each: the lower and upper corner of the rug that a group would have, in the host's frame."""
     w, _, d = (float(v) for v in host.size)
     if host.row.role == "bed":
-        long = min(d * 0.75 + 0.5, 2.4)
-        return (0.0, d / 2 + 0.45 - long / 2), (w + 1.3, long)
+        end = d / 2 + 0.45
+        return np.array([-w / 2 - 0.65, end - min(d * 0.75 + 0.5, 2.4)]), np.array([w / 2 + 0.65, end])
     if host.row.role == "seat":
-        return (0.0, 0.25), (w + 0.9, d + 0.8)
-    if host.row.role == "sofa":
-        tables = [o for o in setting.stands("before") if host.footprint.distance(o.footprint) < AROUND]
-        reach = 1.7
-        for table in tables[:1]:
-            ahead = host.in_plan(table.position)[1] - d / 2
-            reach = float(np.clip(ahead, 0.4, 1.3)) + float(table.size[2]) / 2 + 0.6
-        return (0.0, d / 2 + reach / 2 - 0.15), (w + 0.8, reach + 0.3)
-    if host.row.access:  # a desk, which may stand at a wall
-        return (0.0, d / 2 + 0.3), (w + 0.9, 1.5)
-    return (0.0, 0.0), (w + 1.2, d + 1.2)
+        return np.array([-w / 2 - 0.45, -d / 2 - 0.15]), np.array([w / 2 + 0.45, d / 2 + 0.65])
+    if host.row.access and host.row.role != "sofa":  # a desk, which may stand at a wall
+        return np.array([-w / 2 - 0.45, d / 2 - 0.45]), np.array([w / 2 + 0.45, d / 2 + 1.05])
+    if host.row.role != "sofa":
+        return np.array([-w / 2 - 0.65, -d / 2 - 0.65]), np.array([w / 2 + 0.65, d / 2 + 0.65])
+    tables = [o for o in setting.stands("before") if host.footprint.distance(o.footprint) < AROUND]
+    seats = [o for o in setting.inviting("rug") if o.row.role in ("seat", "sofa") and o is not host]
+    near = [o for o in seats if any(o.footprint.distance(one.footprint) < AROUND for one in (host, *tables))]
+    held = np.array([[-w / 2 - BEYOND, d / 2 - LEGS], [w / 2 + BEYOND, d / 2 + 1.75]])
+    fronts = [rectangle(o.on_floor(0, (o.size[2] - LEGS) / 2)[[0, 2]], (o.size[0], LEGS), o.yaw) for o in near]
+    for plan, beyond in [(o.footprint, BEYOND) for o in tables] + [(front, 0.05) for front in fronts]:
+        at = seen(shapely.get_coordinates(plan) - host.position[[0, 2]], np.array(host.yaw))
+        held = np.array([np.minimum(held[0], at.min(0) - beyond), np.maximum(held[1], at.max(0) + beyond)])
+    return held[0], held[1]
 
 
 def _free(setting: Setting, group: list[Standing]) -> shapely.Geometry:

@@ -20,7 +20,7 @@ from echomodel.openings import Opening
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.checks import check
-from echousd.dressing import tabletops, upholstery
+from echousd.dressing import floors, tabletops, upholstery
 from echousd.dressing.dress import RULES, TALL, Dressing, dress, dressed, setting_of
 from echousd.dressing.setting import Setting, Thing, meets, standing
 from echousd.dressing.tabletops import surfaces
@@ -393,6 +393,24 @@ def test_armchairs_around_a_table_share_a_rug():
     ]
     assert [rug.on for rug in rugs] == ["table"]
     assert rugs[0].size[0] > 1.6  # under the chairs' feet, too
+
+
+def test_the_rug_of_a_sofa_carries_the_front_legs_of_all_seats_around():
+    seats = (
+        Node("sofa", "multi_seat_sofa", size=(2.2, 0.9, 0.95), position=(0.0, 0.0, -1.7), yaw=0.0),
+        Node("left", "armchair", size=(0.8, 0.8, 0.8), position=(-1.5, 0.0, 0.2), yaw=np.pi / 2),
+        Node("across", "armchair", size=(0.8, 0.8, 0.8), position=(0.3, 0.0, 1.4), yaw=np.pi),
+    )
+    table = Node("table", "coffee_table", size=(1.0, 0.4, 0.6), position=(0.0, 0.0, -0.3), yaw=0.0)
+    graph = SceneGraph(RoomSpec("living_room", size=(6.0, 5.0)), (*seats, table))
+    made = echousd.generate(graph, shapes="boxes", place=False, **BARE)
+    setting = setting_of(replace(made, options=RoomOptions(walls=True, dress="some")))
+    floors.rugs(setting)
+    (rug,) = setting.placed
+    for one in (setting.objects[node.name] for node in seats):
+        x, _, z = one.size / 2
+        front = one.to_room(np.array([[-x, 0.0, z], [x, 0.0, z]]))[:, [0, 2]]
+        assert rug.footprint.covers(shapely.LineString(front)), one.name
 
 
 def test_cushions_lie_before_the_pillows_of_wide_beds():
