@@ -78,7 +78,7 @@ class LayoutSearch:
     change: GraphEdit | None = None  # what was edited in the graph, None = nothing
     drafts: int = 1  # at most
     place: bool = True  # whether drafts are placed by search
-    proposed: bool = False  # nobody stated the openings, which may still be moved: what is in their way counts least
+    proposed: bool = False  # nobody stated the openings, which make way for furniture
 
     def sampled(self, graph: SceneGraph, number: int, count: int = 1) -> list[Boxes]:
         """So many drafts at once from the layout branch, in the room's frame; what the graph fixes comes back."""
@@ -179,11 +179,9 @@ def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int |
     boxes, conflicts = found
     faults = judged_faults(graph, boxes)
     if seed is not None and any(fault.rule in OF_OPENINGS for fault in faults):
-        graph = with_free_openings(graph, [boxes], seed)
-        faults = judged_faults(graph, boxes)
-    late = [fault for fault in faults if seed is not None and fault.rule in OF_OPENINGS]
-    now = [fault for fault in faults if fault not in late and fault.rule not in OF_GRAPHS]
-    return len(layout_outcome(graph, boxes).faults), len(conflicts), round(severity(now), 2), round(severity(late), 2)
+        faults = judged_faults(with_free_openings(graph, [boxes], seed), boxes)
+    left = [fault for fault in faults if fault.rule not in OF_GRAPHS]
+    return len(layout_outcome(graph, boxes).faults), len(conflicts), round(severity(left), 2)
 
 
 def finished_boxes(

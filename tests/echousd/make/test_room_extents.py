@@ -10,6 +10,7 @@ from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
 from echousd.graph import Node, RoomSpec, SceneGraph
+from echousd.graph.floors import with_plan
 from echousd.make import layouts
 from echousd.make.layouts import with_free_openings
 from echousd.make.verdicts import colliding
@@ -93,6 +94,25 @@ def test_a_door_that_may_make_way_asks_for_no_further_draft():
     assert [fault.rule for fault in living_faults(graph, boxes)] == ["door_free", "way_in"]
     assert layouts._wishes(graph, (boxes, ()), None)[2] > 1
     assert not any(layouts._wishes(graph, (boxes, ()), 0))
+
+
+def test_shelves_that_leave_no_wall_to_a_door_are_worse_than_one_off_its_wall():
+    """Wherever a door goes that nobody stated, in the first layout it opens at a shelf."""
+    room = RoomSpec("study", size=(3.0, 3.0))
+    graph = with_plan(SceneGraph(room, tuple(Node(name, "bookshelf") for name in "abcd")), 0)
+    turns = np.arange(4) * np.pi / 2  # one at each wall
+
+    def wishes(aside, off):
+        along, away = 1.0 * np.full(4, aside), np.array([1.35 - off, 1.35, 1.35, 1.35])
+        x, z = np.cos(turns) * along - np.sin(turns) * away, -np.sin(turns) * along - np.cos(turns) * away
+        boxes = Boxes(*map(torch.tensor, ([(1.4, 1.8, 0.3)] * 4, np.stack([x, 0 * x, z], 1), turns)))
+        faults = living_faults(with_free_openings(graph, [boxes], 0), boxes)
+        return layouts._wishes(graph, (boxes, ()), 0), {fault.rule for fault in faults}
+
+    (shut, at_door), (untidy, astray) = wishes(0.0, 0.0), wishes(0.79, 0.4)
+    assert {"door_free", "window_free"} < at_door
+    assert astray == at_door - {"door_free", "window_free"} | {"at_wall"}
+    assert untidy < shut
 
 
 def test_of_two_layouts_the_one_that_misses_less_is_better_not_the_one_that_misses_fewer_terms():

@@ -419,7 +419,7 @@ def test_a_hall_that_holds_too_little_wishes_for_no_other_draft():
     assert "floor_filled" in faults
     wishes = layouts._wishes(graph, (boxes, ()), None)
     rest = [fault for fault in living_faults(graph, boxes) if fault.rule != "floor_filled"]
-    assert wishes == (0, 0, round(severity(rest), 2), 0.0)
+    assert wishes == (0, 0, round(severity(rest), 2))
 
 
 def test_drafts_that_end_alike_are_searched_once_in_earnest(monkeypatch):
