@@ -117,7 +117,8 @@ def _wished(setting: Setting, host: Standing) -> tuple[np.ndarray, np.ndarray]:
     seats = [o for o in setting.inviting("rug") if o.row.role in ("seat", "sofa") and o is not host]
     near = [o for o in seats if any(o.footprint.distance(one.footprint) < AROUND for one in (host, *tables))]
     held = np.array([[-w / 2 - BEYOND, d / 2 - LEGS], [w / 2 + BEYOND, d / 2 + 1.75]])
-    fronts = [rectangle(o.on_floor(0, (o.size[2] - LEGS) / 2)[[0, 2]], (o.size[0], LEGS), o.yaw) for o in near]
+    middles = [o.on_floor(0, (o.size[2] - LEGS) / 2)[[0, 2]] for o in near]
+    fronts = [rectangle(at, np.array([o.size[0], LEGS]), o.yaw) for at, o in zip(middles, near, strict=True)]
     for plan, beyond in [(o.footprint, BEYOND) for o in tables] + [(front, 0.05) for front in fronts]:
         at = seen(shapely.get_coordinates(plan) - host.position[[0, 2]], np.array(host.yaw))
         held = np.array([np.minimum(held[0], at.min(0) - beyond), np.maximum(held[1], at.max(0) + beyond)])
