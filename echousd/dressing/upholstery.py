@@ -1,59 +1,29 @@
-"""Cushions on sofas, armchairs and beds, throws over the foot of beds and the arms of sofas."""
+"""Cushions and what somebody left on beds, cushions on sofas and armchairs, throws over all of them."""
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
-import shapely
 
-from echomodel.boxes2d import hull, upright
 from echomodel.dressing import names_of, usual_size
-from echomodel.dressing.textiles import LEAN, LIES
-from echomodel.triangles import area_normals, spans_of
-from echousd.dressing.setting import Setting, Standing, Thing, geometry_of
-from echousd.shapes.hulls import forbidden_moves
+from echomodel.dressing.textiles import LEAN
+from echomodel.late import lates
+from echousd.dressing.setting import Setting
+from echousd.dressing.soft_tops import Design, Seat, across, corners_of, let_down, lying, put
 
-ASIDE = 0.15  # metres that a cushion moves at most so that it stands in nothing
-STEP = 0.02  # metres from place to place
+cushions_on, over_arm = lates("echousd.dressing.seats", "cushions_on", "over_arm")
 WIDE_BED = 1.3  # metres
-MORE = (1.9, 2.4)  # metres of a sofa with a third cushion in its middle, and with two
-LEVEL, LIFTED = 0.003, 0.002  # metres: what is as high as that is one height; what stands so far over it is clear of it
 DRAPED = {"sofa": 0.9, "seat": 0.4}  # shares of sofas and armchairs with a blanket over an arm
-# Metres between folds of a bed, and over its middle from where on it is a board; places behind pillows for cushions.
-SOFT, BOARD, BEYOND = 0.04, 0.12, 12
-RIDGE = 0.1  # metres that an arm is higher than the seat at least so that a throw hangs over it
-RAISED = 0.04  # metres that a thing is raised, or let down, at most so that it lies on the solids of a seat
-# Shares of a cushion's extents that it stands on, and the part of that which must be level.
-BASE, STEADY = np.array([0.9, 1.0, 0.6]), 0.6
-HELD, TRIES = 0.5, 6  # share of what lies flat that is on what it lies on; places that are tried for it
 
 
 def cushions(setting: Setting) -> None:
-    """Cushions in the corners of sofas, a pair or two that differ, on wide ones others between; one on an armchair."""
+    """Cushions on all that invites them."""
     for host in setting.inviting("cushions"):
-        rng, seat = setting.rng(host.name, "cushion"), _Seat.of(host)
-        if seat is None:
-            continue
-        wide, pair, odd = float(host.size[0]), *_designs(setting, rng)
-        narrow = min(pair, odd, key=lambda design: float(design[1][0]))
-        ends = [(-1.0, pair), (1.0, pair if rng.random() < 0.6 else odd)]
-        more = setting.full or rng.random() < 0.75
-        apart = 0.28 / (wide / 2 - 0.25) if wide > MORE[1] else 0.0
-        ends += [(end, odd) for end in dict.fromkeys((-apart, apart)) if more and wide > MORE[0]]
-        for end, (kind, size, variant) in ends if wide > 1.3 else [(float(rng.choice([-0.6, 0.6])), narrow)]:
-            turn = -0.12 * end * float(rng.uniform(0.3, 1.6))
-            for lean in (LEAN * size[1], 0.0):  # upright on what is too shallow
-                deep = size + np.array([0.0, 0.0, lean])
-                spot = _standing(host, seat.resting(end, deep), turn, deep, _corners(kind, deep, variant))
-                if _put(setting, host, spot, kind, deep, turn, variant):
-                    break
+        rng, seat = setting.rng(host.name, "cushion"), Seat.of(host)
+        if seat is not None:
+            cushions_on(setting, host, seat, *designs(setting, rng), rng)
 
 
-Design = tuple[str, np.ndarray, int]  # kind, extents and variant of a cushion
-
-
-def _designs(setting: Setting, rng: np.random.Generator) -> tuple[Design, Design]:
+def designs(setting: Setting, rng: np.random.Generator) -> tuple[Design, Design]:
     """Two cushions that go together: one plain, one of a print, either of them first; the second often a long one."""
     form = str(rng.choice(("square", "lumbar")))
     kinds = [str(rng.choice(names_of("cushion", form, setting.resident, setting.style) or ["cushion"])), "cushion"]
@@ -64,23 +34,23 @@ def _designs(setting: Setting, rng: np.random.Generator) -> tuple[Design, Design
 def bed_cushions(setting: Setting) -> None:
     """Two cushions before the pillows of a wide bed, or one, as on a narrow one."""
     for host in setting.of("bed"):
-        rng, seat = setting.rng(host.name, "bed cushion"), _Seat.of(host)
-        wide, (kind, size, variant) = float(host.size[0]), _designs(setting, rng)[int(rng.integers(2))]
+        rng, seat = setting.rng(host.name, "bed cushion"), Seat.of(host)
+        wide, (kind, size, variant) = float(host.size[0]), designs(setting, rng)[int(rng.integers(2))]
         if seat is None:
             continue
         two, size = size[0] < 1.3 * size[1], size + np.array([0.0, 0.0, LEAN * size[1]])
         for side in (-1.0, 1.0) if wide > WIDE_BED and two else (0.0,):
             turn = float(rng.uniform(-0.12, 0.12))
-            spot, body = seat.before_pillows(side * 0.21 * wide, size), _corners(kind, size, variant)
-            spot = _lying(host, seat, spot, turn, size, body)
-            spot = None if spot is None else _let_down(host, spot, size)
-            _put(setting, host, spot, kind, size, turn, variant)
+            spot, body = seat.before_pillows(side * 0.21 * wide, size), corners_of(kind, size, variant)
+            spot = lying(host, seat, spot, turn, size, body)
+            spot = None if spot is None else let_down(host, spot, size)
+            put(setting, host, spot, kind, size, turn, variant)
 
 
 def on_covers(setting: Setting) -> None:
     """What somebody left on the largest bed, as the story has it."""
     for host in sorted(setting.of("bed"), key=lambda o: -float(o.size[0]))[:1]:
-        seat = _Seat.of(host)
+        seat = Seat.of(host)
         for number, wish in enumerate(setting.story.beds):
             rng = setting.rng(host.name, "cover", str(number))
             if seat is None or not setting.has(wish.share, rng):
@@ -90,236 +60,21 @@ def on_covers(setting: Setting) -> None:
             for at in wish.at:
                 x, z = (0.0, 0.0) if at == "pillows" else np.array(at) * host.size[[0, 2]] / 2
                 spot = seat.before_pillows(x, size) if at == "pillows" else np.array([x, seat.level, z])
-                spot = _lying(host, seat, spot, turn, size, _corners(kind, size, variant))
-                if _put(setting, host, spot, kind, size, turn, variant):
+                spot = lying(host, seat, spot, turn, size, corners_of(kind, size, variant))
+                if put(setting, host, spot, kind, size, turn, variant):
                     break
-
-
-def _put(
-    setting: Setting, host: Standing, spot: np.ndarray | None, kind: str, size: np.ndarray, turn: float, variant: int
-) -> Thing | None:
-    """Put a thing on a spot (3,) of its host, turned in its frame; None where there is none or it is not clear."""
-    if spot is None:
-        return None
-    thing = Thing(kind, size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
-    return setting.put_first([thing], host=host.name, margin=0.0, floor=False)
-
-
-def _upon(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | None:
-    """The spot (3,) for a thing, raised onto the solids below it; None where one stands far out, or few hold it."""
-    tops = _tops(host, spot, size)
-    top = max(float(spot[1]), float(tops.max()))
-    level = (tops > tops.max() - LEVEL).mean() > HELD
-    return np.array([spot[0], top, spot[2]]) if level and top - spot[1] < RAISED else None
-
-
-def _let_down(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | None:
-    """The spot (3,) let down onto what of its seat is level; None where that is too little for a cushion to stand."""
-    tops = _tops(host, spot, size * BASE)
-    top = float(tops[tops < spot[1] + RAISED].max(initial=-np.inf))
-    level = (tops > top - LEVEL).mean() > STEADY and top > spot[1] - RAISED
-    return np.array([spot[0], top, spot[2]]) if level else None
-
-
-def _corners(kind: str, size: np.ndarray, variant: int) -> np.ndarray:
-    """(n, 3) float, metres: corners of what a thing collides with, in its own frame."""
-    return geometry_of(kind, tuple(size.tolist()), variant, ()).colliders[0].mesh.vertices
-
-
-def _standing(
-    host: Standing, spot: np.ndarray | None, turn: float, size: np.ndarray, body: np.ndarray
-) -> np.ndarray | None:
-    """The spot (3,) or one near it where a turned cushion stands level and reaches into nothing; None = nowhere."""
-    for _ in range(TRIES):
-        spot = None if spot is None else _clear_of(host, spot, turn, body)
-        down = None if spot is None else _let_down(host, spot, size)
-        if down is None:
-            return None
-        spot = _clear_of(host, down + np.array([0.0, LIFTED, 0.0]), turn, body)
-        if spot is not None and np.abs(spot - down).max() < LEVEL:
-            return np.array([spot[0], down[1], spot[2]])
-    return None
-
-
-def _tops(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """(49,) float: heights of the host's solids all over the base of a thing at a spot (3,), -inf where none is."""
-    x, z = (spot[axis] + size[axis] * np.linspace(-0.5, 0.5, 7) for axis in (0, 2))
-    points = np.stack(np.meshgrid(x, z), -1).reshape(-1, 2)
-    tops = np.full(len(points), -np.inf)
-    for collider in host.geometry.colliders:
-        normal = area_normals(collider.mesh.triangles)
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
-        beyond = (normal * collider.mesh.triangles[:, 0]).sum(1) - points @ normal[:, [0, 2]].T  # metres, of y = 0
-        up, down = normal[:, 1] > 1e-6, normal[:, 1] < -1e-6
-        high = (beyond[:, up] / normal[up, 1]).min(1)
-        low = (beyond[:, down] / normal[down, 1]).max(1)
-        over = (high > low) & (beyond[:, ~up & ~down] > 0).all(1)
-        tops[over] = np.maximum(tops[over], high[over])
-    return tops
-
-
-def _clear_of(host: Standing, spot: np.ndarray, turn: float, body: np.ndarray) -> np.ndarray | None:
-    """The spot (3,) or one near it where a turned thing, of corners (n, 3), reaches into no solid of its seat; None =
-    nowhere."""
-    stood = body @ upright(-turn) + spot
-    taken = forbidden_moves([stood], [collider.mesh.vertices for collider in host.geometry.colliders], ASIDE)
-    free = shapely.Point(0, 0).buffer(ASIDE).difference(taken)
-    if free.is_empty:
-        return None
-    way = shapely.get_coordinates(shapely.shortest_line(shapely.Point(0, 0), free))[1]
-    return spot + np.array([way[0], 0.0, way[1]])
-
-
-def _lying(
-    host: Standing, seat: _Seat, spot: np.ndarray | None, turn: float, size: np.ndarray, body: np.ndarray
-) -> np.ndarray | None:
-    """A place near a spot (3,), or before it, that is clear of the host and on what is below; None where none is."""
-    if spot is None:
-        return None
-    base = np.insert(2 * hull(size[[0, 2]] / 2, np.array(turn)), 1, size[1])
-    for _ in range(TRIES):
-        down = seat.below(spot, size)
-        upon = None if down is None else _upon(host, np.array([spot[0], down, spot[2]]), base)
-        if upon is None:
-            spot = spot + np.array([0.0, 0.0, 2 * STEP])
-            continue
-        spot = _clear_of(host, upon + np.array([0.0, LIFTED, 0.0]), turn, body)
-        if spot is None or np.abs(spot - upon).max() < LEVEL:
-            return spot
-    return None
-
-
-class _Seat:
-    """Heights of an upholstered piece on a grid, object frame."""
-
-    def __init__(self, x: np.ndarray, z: np.ndarray, height: np.ndarray, level: float) -> None:
-        self.x, self.z, self.height, self.level = x, z, height, level
-
-    @classmethod
-    @lru_cache(maxsize=4)  # three rules ask about one bed
-    def of(cls, host: Standing) -> _Seat | None:
-        """The seat of an object, None where nothing of it looks like one."""
-        corners = host.geometry.mesh.triangles
-        normal = area_normals(corners)
-        double = np.linalg.norm(normal, axis=1)
-        y = corners[..., 1].mean(1)
-        top = 0.75 * float(host.size[1])
-        up = (normal[:, 1] > 0.85 * double) & (y > 0.2) & (y < min(0.62, top)) & (double > 0)
-        if double[up].sum() / 2 < 0.12:
-            return None
-        order = np.argsort(y[up])
-        share = np.cumsum(double[up][order])
-        level = float(y[up][order][np.searchsorted(share, 0.6 * share[-1])])
-        half = host.size[[0, 2]] / 2
-        x = np.arange(-half[0], half[0], STEP) + STEP / 2
-        z = np.arange(-half[1], half[1], STEP) + STEP / 2
-        return cls(x, z, _heights(corners[normal[:, 1] > 0.05 * double], x, z), level)
-
-    def before_pillows(self, x: float, size: np.ndarray) -> np.ndarray | None:
-        """(3,) a place at `x` right before what lies at the head; None where it would not lie flat."""
-        rows = np.abs(self.x - x) < size[0] / 2
-        deep = int(np.ceil(size[2] / STEP))
-        head = self.z < 0.1 * self.z[0]  # the half of the head and a little more
-        raised = np.flatnonzero(head & (self.height[rows].max(0) > self.level + 0.08))
-        first = int(raised[-1]) + 1 if len(raised) else len(self.z)
-        for at in range(first, min(first + BEYOND, len(self.z) - deep)):
-            under = self.height[rows, at : at + deep]
-            if np.ptp(under) < SOFT:
-                return np.array([x, float(under.max()), self.z[at] + (deep - 1) * STEP / 2])
-        return None
-
-    def below(self, spot: np.ndarray, size: np.ndarray) -> float | None:
-        """Height of the level surface below most of what lies at a spot (3,); None where it is not level."""
-        # without its edges, which touch an arm's or a back's foot
-        rows, columns = np.abs(self.x - spot[0]) < 0.4 * size[0], np.abs(self.z - spot[2]) < 0.4 * size[2]
-        under = self.height[np.ix_(rows, columns)]
-        top = float(under.max(initial=-np.inf))
-        return top if np.isfinite(top) and (under > top - SOFT).mean() > 0.6 else None
-
-    def resting(self, end: float, size: np.ndarray) -> np.ndarray | None:
-        """(3,) a place on the seat against the back, towards one end (-1 to 1); None where there is none."""
-        free = np.abs(self.height - self.level) < 0.07
-        wide, deep = (max(1, int(np.ceil(size[k] / STEP))) for k in (0, 2))
-        if wide > len(self.x) or deep > len(self.z):
-            return None
-        total = np.cumsum(np.cumsum(np.pad(free.astype(int), ((1, 0), (1, 0))), 0), 1)
-        count = total[wide:, deep:] - total[:-wide, deep:] - total[wide:, :-deep] + total[:-wide, :-deep]
-        fits = np.argwhere(count >= 0.93 * wide * deep)
-        if not len(fits):
-            return None
-        wish = (1 + end) * (len(self.x) - wide) / 2
-        i, k = fits[int(np.argmin(fits[:, 1] * 1.5 + np.abs(fits[:, 0] - wish)))]
-        above = self.level + RAISED / 4  # it may be fuller in its middle
-        return np.array([self.x[i] + (wide - 1) * STEP / 2, above, self.z[k] + (deep - 1) * STEP / 2])
-
-
-def _heights(corners: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """(len(x), len(z)) float: height of the highest surface over each cell of a grid, -inf where there is none."""
-    out = np.full((len(x), len(z)), -np.inf)
-    flat = corners[:, :, [0, 2]]
-    one, two = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
-    area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-    large = np.flatnonzero(np.abs(area) > 1e-10)
-    ends = spans_of(flat)[:, large]
-    (top, bottom), (left, right) = (np.searchsorted(line, ends[..., axis]) for axis, line in enumerate((x, z)))
-    count = (bottom - top) * (right - left)  # of cells that its box covers
-    cell, n = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count), np.repeat(large, count)
-    wide = np.repeat(right - left, count)
-    i, k = np.repeat(top, count) + cell // wide, np.repeat(left, count) + cell % wide
-    px, pz = x[i] - flat[n, 0, 0], z[k] - flat[n, 0, 1]
-    u, v = (px * two[n, 1] - pz * two[n, 0]) / area[n], (one[n, 0] * pz - one[n, 1] * px) / area[n]
-    inside, (y0, y1, y2) = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9), corners[n, :, 1].T
-    np.maximum.at(out, (i[inside], k[inside]), (y0 + u * (y1 - y0) + v * (y2 - y0))[inside])
-    return out
 
 
 def throws(setting: Setting) -> None:
     """A blanket across the foot of every bed that lets it lie flat and hang down, over an arm of most other seats."""
     for host in dict.fromkeys([*setting.of("bed", "sofa"), *setting.inviting("cushions")]):
-        rng, seat, role = setting.rng(host.name, "throw"), _Seat.of(host), host.row.role
+        rng, seat, role = setting.rng(host.name, "throw"), Seat.of(host), host.row.role
         if seat is None or (role in DRAPED and not setting.has(DRAPED[role], rng)):
             continue
         if role in DRAPED:
-            over = (_over_arm(host, seat, side, rng) for side in rng.permutation((-1.0, 1.0)))
+            over = (over_arm(host, seat, side, rng) for side in rng.permutation((-1.0, 1.0)))
         else:
             deep, everywhere = float(np.clip(0.3 * host.size[2], 0.4, 0.75)), np.full(len(seat.x), True)
             depths = (float(host.size[2]) / 2 - back - deep / 2 for back in (0.1, 0.2, 0.3))
-            over = (_across(host, seat, everywhere, z, deep, 0.32, rng) for z in depths)
+            over = (across(host, seat, everywhere, z, deep, 0.32, rng) for z in depths)
         setting.put_first(filter(None, over), host=host.name, margin=0.0)
-
-
-def _over_arm(host: Standing, seat: _Seat, side: float, rng: np.random.Generator) -> Thing | None:
-    """A throw over the arm of a sofa at a side, below 0 the left one; None where there is none to hang it over."""
-    z, deep = 0.16 * float(host.size[2]), float(rng.uniform(0.34, 0.46))
-    level = seat.height[:, np.abs(seat.z - z) < deep / 2].min(1)
-    arm = (level > seat.level + RIDGE) & (np.sign(side) * seat.x > 0.3 * host.size[0])
-    if not 0.08 < arm.sum() * STEP < 0.34:
-        return None
-    return _across(host, seat, arm, z, deep, float(np.median(level[arm])) - seat.level - 0.04, rng)
-
-
-def _across(
-    host: Standing, seat: _Seat, where: np.ndarray, z: float, deep: float, most: float, rng: np.random.Generator
-) -> Thing | None:
-    """A throw across a bed or an arm, its middle at `z`, that lies on all of it; None where nothing flat of its height
-    is.
-
-    `where`: (len(seat.x),) bool, what it lies on. `most`: metres that it hangs down at most.
-    """
-    under, x = seat.height[where][:, np.abs(seat.z - z) < deep / 2], seat.x[where]
-    centre = float(x[0] + x[-1]) / 2
-    x = x - centre
-    middle, top = float(np.median(under[np.abs(x) < 0.6 * x[-1] + STEP])), float(under.max())
-    if not 0.25 < middle <= top < min(0.95, middle + BOARD):
-        return None
-    half = float(np.abs(x[(under > top - 0.2).any(1)]).max()) + STEP / 2
-    size = np.round([2 * half + 0.08, 0.012 + min(most, rng.uniform(0.2, 0.32)), deep], 3)
-    rows, columns = np.linspace(0, under.shape[1], LIES[0] + 1), np.linspace(-half, half, LIES[1] + 1)
-    near = min(0.08, 0.3 * half)
-    cells = [
-        [under[np.abs(x - at - half / LIES[1]) < near, max(int(k) - 2, 0) : int(k) + 5].max() for at in columns[:-1]]
-        for k in rows[:-1]
-    ]
-    lie = tuple(np.round(np.clip(top - np.array(cells), 0.0, BOARD), 3).ravel().tolist())
-    spot = host.to_room(np.array([[centre, top + 0.019 - size[1], z]]))[0]
-    return Thing("throw", size, spot, host.yaw, host.name, int(rng.integers(1 << 30)), lie=lie)

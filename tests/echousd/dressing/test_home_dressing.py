@@ -11,7 +11,7 @@ from echomodel.dressing import KINDS, PRINTS
 from echomodel.dressing import thing as solids_of
 from echomodel.furniture import draw_choices, draw_style, solids
 from echomodel.openings import Opening
-from echousd.dressing import floors, tabletops, upholstery, walls
+from echousd.dressing import floors, soft_tops, tabletops, upholstery, walls
 from echousd.dressing.dress import DECOR, RULES, bare_walls
 from echousd.dressing.setting import Setting, standing
 from echousd.dressing.stories import story
@@ -297,7 +297,7 @@ def test_a_throw_hangs_over_an_arm_and_not_into_the_seat():
         upholstery.throws(room)
         for throw in room.placed:
             found += 1
-            seat, side = upholstery._Seat.of(host), float(throw.position[0])
+            seat, side = soft_tops.Seat.of(host), float(throw.position[0])
             assert 0.8 < abs(side) < 1.05
             assert throw.position[1] > seat.level + 0.02
             x, z = host.in_plan(throw.position)

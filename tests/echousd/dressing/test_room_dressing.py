@@ -20,11 +20,11 @@ from echomodel.openings import Opening
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.checks import check
-from echousd.dressing import floors, tabletops, upholstery
+from echousd.dressing import floors, soft_tops, tabletops, upholstery
 from echousd.dressing.dress import RULES, TALL, Dressing, dress, dressed, setting_of
 from echousd.dressing.setting import Setting, Thing, meets, standing
+from echousd.dressing.soft_tops import STEP, Seat
 from echousd.dressing.tabletops import surfaces
-from echousd.dressing.upholstery import STEP, _Seat
 from echousd.dressing.walls import BLINDS, CURTAINS, RADIATORS, curtains, radiators, sockets
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.compose import room_files
@@ -470,7 +470,7 @@ def test_cushions_lie_on_what_is_level_below_them():
     x = z = np.arange(-0.5, 0.5, STEP)
     height = np.full((len(x), len(z)), 0.5)
     height[:, z > 0.2] = 0.545  # a duvet, turned down
-    seat, size = _Seat(x, z, height, 0.5), np.array([0.4, 0.15, 0.3])
+    seat, size = Seat(x, z, height, 0.5), np.array([0.4, 0.15, 0.3])
     assert seat.below(np.array([0.0, 0.6, -0.2]), size) == pytest.approx(0.5)
     assert seat.below(np.array([0.0, 0.6, 0.37]), size) == pytest.approx(0.545)
     assert seat.below(np.array([0.0, 0.6, 0.13]), size) is None  # on the edge of the duvet
@@ -500,13 +500,13 @@ def test_what_is_flat_lies_on_the_solids_of_its_seat():
     back.apply_translation((0, 0.4, -0.35))
     host = SimpleNamespace(geometry=SimpleNamespace(colliders=[SimpleNamespace(mesh=seat), SimpleNamespace(mesh=back)]))
     size = np.array([0.4, 0.06, 0.3])
-    np.testing.assert_allclose(upholstery._upon(host, np.array([0.3, 0.385, 0.1]), size), (0.3, 0.4, 0.1), atol=1e-9)
-    assert upholstery._upon(host, np.array([0.3, 0.4, -0.12]), size) is None  # its back edge is in the back
-    assert upholstery._upon(host, np.array([0.3, 0.35, 0.1]), size) is None  # as high as no seat is above what one sees
+    np.testing.assert_allclose(soft_tops.upon(host, np.array([0.3, 0.385, 0.1]), size), (0.3, 0.4, 0.1), atol=1e-9)
+    assert soft_tops.upon(host, np.array([0.3, 0.4, -0.12]), size) is None  # its back edge is in the back
+    assert soft_tops.upon(host, np.array([0.3, 0.35, 0.1]), size) is None  # as high as no seat is above what one sees
     ridge = trimesh.creation.box((1.6, 0.41, 0.04))
     ridge.apply_translation((0, 0.205, 0.2))
     host.geometry.colliders.append(SimpleNamespace(mesh=ridge))
-    assert upholstery._upon(host, np.array([0.3, 0.4, 0.1]), size) is None  # it would lie askew
+    assert soft_tops.upon(host, np.array([0.3, 0.4, 0.1]), size) is None  # it would lie askew
 
 
 def test_what_lies_on_a_bed_is_put_before_a_fold_that_would_tilt_it():
@@ -515,11 +515,11 @@ def test_what_lies_on_a_bed_is_put_before_a_fold_that_would_tilt_it():
     fold.apply_translation((0, 0.26, -0.3))
     host = SimpleNamespace(geometry=SimpleNamespace(colliders=[SimpleNamespace(mesh=bed), SimpleNamespace(mesh=fold)]))
     line = np.arange(-1.0, 1.0, STEP) + STEP / 2
-    seat = _Seat(line, line, np.full((len(line), len(line)), 0.5), 0.5)
+    seat = Seat(line, line, np.full((len(line), len(line)), 0.5), 0.5)
     for turn in (0.0, -0.4, 0.4):
         size = np.array([0.3, 0.02, 0.2])
         body = trimesh.creation.box(size).vertices + np.array([0.0, size[1] / 2, 0.0])
-        spot = upholstery._lying(host, seat, np.array([0.0, 0.5, -0.25]), turn, size, body)
+        spot = soft_tops.lying(host, seat, np.array([0.0, 0.5, -0.25]), turn, size, body)
         deep = 0.15 * abs(np.sin(turn)) + 0.1 * np.cos(turn)
         assert -0.25 + deep <= spot[2] < -0.05 + deep
         assert spot[1] == pytest.approx(0.5, abs=0.003)
@@ -545,7 +545,7 @@ def test_cushions_of_a_sofa_are_a_pair_or_go_together():
     for who in seen:
         for seed in range(40):
             setting = Setting({}, floor, (), 2.7, True, False, seed, resident=who)
-            both = upholstery._designs(setting, setting.rng("sofa"))
+            both = upholstery.designs(setting, setting.rng("sofa"))
             assert sum(kind == "cushion" for kind, _, _ in both) == 1
             seen[who] |= {kind for kind, _, _ in both} - {"cushion"}
     assert len(seen[""]) >= 14

@@ -9,8 +9,9 @@ from echomodel.boxes2d import upright
 from echomodel.dressing import usual_size
 from echomodel.dressing.textiles import LEAN
 from echomodel.triangles import joined
+from echousd.dressing.seats import at_back, standing_on
 from echousd.dressing.setting import ORIGIN, geometry_of, standing
-from echousd.dressing.upholstery import STEP, _let_down, _Seat, _standing
+from echousd.dressing.soft_tops import STEP, Seat, let_down
 from echousd.shapes.geometry import Collider, Geometry, Part
 from echousd.shapes.hulls import convex_hull, depth, forbidden_moves
 
@@ -25,12 +26,12 @@ def seat_of(*solids):
 def test_a_cushion_stands_on_what_of_its_seat_is_level():
     corners = np.array(list(itertools.product((-0.4, 0.4), (0.0, 0.42), (-0.4, 0.4))))
     size = np.array([0.45, 0.42, 0.15])
-    assert _let_down(seat_of(corners), np.array([0.1, 0.435, 0.0]), size) == pytest.approx([0.1, 0.42, 0.0])
-    assert _let_down(seat_of(corners), np.array([0.1, 0.5, 0.0]), size) is None  # far above it
-    assert _let_down(seat_of(corners), np.array([0.5, 0.42, 0.0]), size) is None  # half beside it
+    assert let_down(seat_of(corners), np.array([0.1, 0.435, 0.0]), size) == pytest.approx([0.1, 0.42, 0.0])
+    assert let_down(seat_of(corners), np.array([0.1, 0.5, 0.0]), size) is None  # far above it
+    assert let_down(seat_of(corners), np.array([0.5, 0.42, 0.0]), size) is None  # half beside it
     raked = corners.copy()
     raked[:, 1] += np.where(corners[:, 1] > 0.2, 0.2 * corners[:, 2], 0.0)
-    assert _let_down(seat_of(raked), np.array([0.1, 0.43, 0.0]), size) is None
+    assert let_down(seat_of(raked), np.array([0.1, 0.43, 0.0]), size) is None
 
 
 def test_cushions_lie_on_their_seat_not_on_the_foot_of_its_back():
@@ -38,8 +39,8 @@ def test_cushions_lie_on_their_seat_not_on_the_foot_of_its_back():
     line = np.arange(-0.5, 0.5, STEP) + STEP / 2
     height, size = np.full((len(line), len(line)), 0.42), np.array([0.5, 0.48, 0.18])
     height[:, :5], height[:, 5] = 0.8, 0.485
-    seat = _Seat(line, line, height, 0.42)
-    spot = seat.resting(0.0, size)
+    seat = Seat(line, line, height, 0.42)
+    spot = at_back(seat, 0.0, size)
     assert spot[2] < -0.25  # against the back
     assert spot[1] == pytest.approx(0.43)
 
@@ -63,7 +64,7 @@ def test_corners_of_a_cushion_that_leans_reach_into_no_curved_back(variant):
     wall = floor * (0.6, 3.0, 0.05) + (0.0, -0.2, -0.25)
     backs = [wall @ upright(turn) for turn in np.radians((-64, 64))]
     host = seat_of(floor, *backs)
-    spot = _standing(host, np.array([0.0, 0.43, 0.0]), 0.1, size, body)
+    spot = standing_on(host, np.array([0.0, 0.43, 0.0]), 0.1, size, body)
     assert spot[1] == pytest.approx(0.42)
     stood = body @ upright(-0.1) + spot + (0.0, 0.002, 0.0)
     assert depth(forbidden_moves([stood], [floor, *backs], 0.1), np.zeros(2)) < 0.001

@@ -1,0 +1,89 @@
+"""Cushions and throws on sofas and armchairs, which have arms and a back."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echomodel.dressing.textiles import LEAN
+from echousd.dressing.setting import Setting, Standing, Thing
+from echousd.dressing.soft_tops import (
+    LEVEL,
+    LIFTED,
+    RAISED,
+    STEP,
+    TRIES,
+    Design,
+    Seat,
+    across,
+    clear_of,
+    corners_of,
+    let_down,
+    put,
+)
+
+MORE = (1.9, 2.4)  # metres of a sofa with a third cushion in its middle, and with two
+RIDGE = 0.1  # metres that an arm is higher than the seat at least so that a throw hangs over it
+
+
+def cushions_on(
+    setting: Setting, host: Standing, seat: Seat, pair: Design, odd: Design, rng: np.random.Generator
+) -> None:
+    """Cushions in the corners of a sofa, a pair or two that differ, on a wide one others between; one on an armchair.
+
+    `seat`: of the host. `pair`, `odd`: designs that go together.
+    """
+    wide = float(host.size[0])
+    narrow = min(pair, odd, key=lambda design: float(design[1][0]))
+    ends = [(-1.0, pair), (1.0, pair if rng.random() < 0.6 else odd)]
+    more = setting.full or rng.random() < 0.75
+    apart = 0.28 / (wide / 2 - 0.25) if wide > MORE[1] else 0.0
+    ends += [(end, odd) for end in dict.fromkeys((-apart, apart)) if more and wide > MORE[0]]
+    for end, (kind, size, variant) in ends if wide > 1.3 else [(float(rng.choice([-0.6, 0.6])), narrow)]:
+        turn = -0.12 * end * float(rng.uniform(0.3, 1.6))
+        for lean in (LEAN * size[1], 0.0):  # upright on what is too shallow
+            deep = size + np.array([0.0, 0.0, lean])
+            spot = standing_on(host, at_back(seat, end, deep), turn, deep, corners_of(kind, deep, variant))
+            if put(setting, host, spot, kind, deep, turn, variant):
+                break
+
+
+def standing_on(
+    host: Standing, spot: np.ndarray | None, turn: float, size: np.ndarray, body: np.ndarray
+) -> np.ndarray | None:
+    """The spot (3,) or one near it where a turned cushion stands level and reaches into nothing; None = nowhere."""
+    for _ in range(TRIES):
+        spot = None if spot is None else clear_of(host, spot, turn, body)
+        down = None if spot is None else let_down(host, spot, size)
+        if down is None:
+            return None
+        spot = clear_of(host, down + np.array([0.0, LIFTED, 0.0]), turn, body)
+        if spot is not None and np.abs(spot - down).max() < LEVEL:
+            return np.array([spot[0], down[1], spot[2]])
+    return None
+
+
+def at_back(seat: Seat, end: float, size: np.ndarray) -> np.ndarray | None:
+    """(3,) a place on the seat against the back, towards one end (-1 to 1); None where there is none."""
+    free = np.abs(seat.height - seat.level) < 0.07
+    wide, deep = (max(1, int(np.ceil(size[k] / STEP))) for k in (0, 2))
+    if wide > len(seat.x) or deep > len(seat.z):
+        return None
+    total = np.cumsum(np.cumsum(np.pad(free.astype(int), ((1, 0), (1, 0))), 0), 1)
+    count = total[wide:, deep:] - total[:-wide, deep:] - total[wide:, :-deep] + total[:-wide, :-deep]
+    fits = np.argwhere(count >= 0.93 * wide * deep)
+    if not len(fits):
+        return None
+    wish = (1 + end) * (len(seat.x) - wide) / 2
+    i, k = fits[int(np.argmin(fits[:, 1] * 1.5 + np.abs(fits[:, 0] - wish)))]
+    above = seat.level + RAISED / 4  # it may be fuller in its middle
+    return np.array([seat.x[i] + (wide - 1) * STEP / 2, above, seat.z[k] + (deep - 1) * STEP / 2])
+
+
+def over_arm(host: Standing, seat: Seat, side: float, rng: np.random.Generator) -> Thing | None:
+    """A throw over the arm of a sofa at a side, below 0 the left one; None where there is none to hang it over."""
+    z, deep = 0.16 * float(host.size[2]), float(rng.uniform(0.34, 0.46))
+    level = seat.height[:, np.abs(seat.z - z) < deep / 2].min(1)
+    arm = (level > seat.level + RIDGE) & (np.sign(side) * seat.x > 0.3 * host.size[0])
+    if not 0.08 < arm.sum() * STEP < 0.34:
+        return None
+    return across(host, seat, arm, z, deep, float(np.median(level[arm])) - seat.level - 0.04, rng)
