@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from inspect import Parameter, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
@@ -21,10 +21,6 @@ from echousd.graph.nodes import PlainModel
 from echousd.graph.values import IDENTIFIER
 from echousd.shapes import FACES
 
-if TYPE_CHECKING:
-    from echousd.assets.choose import AssetWishes
-
-wishes_of = Late("echousd.assets.choose:wishes_of")
 validation_message = Late("echousd.invalid:validation_message")
 
 MAX_SEED = 2**63 - 1  # what a layer stores as a whole number
@@ -156,19 +152,6 @@ class RoomOptions(PlainModel, Look):
         if self.text and self.assets is None:
             raise ValueError(f"text {self.text!r} needs models to choose from; name a library's index (assets)")
         return self
-
-    def wishes(self, outside: Sequence[str | Path] = ()) -> AssetWishes:
-        """What is asked of a library; raises ValueError for what is not there.
-
-        Arguments:
-            outside: folders besides that of the index in which its models may lie.
-        """
-        index = Path(self.assets or "")
-        changed = index.stat().st_mtime_ns if self.assets and index.is_file() else 0
-        beyond = tuple(map(str, outside))
-        asked = self.stretch, self.licenses or "", self.text, self.collect, beyond
-        wishes: AssetWishes = wishes_of(self.assets, changed, *asked)
-        return wishes
 
     @classmethod
     def _explained(cls, fields: dict[str, Any], error: ValidationError) -> ValueError:

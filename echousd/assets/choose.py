@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from echousd.assets.colors import table as color_table
 from echousd.assets.licences import allowed
 from echousd.assets.record import AssetRecord
 from echousd.assets.table import Library, read_library
+
+if TYPE_CHECKING:
+    from echousd.options import RoomOptions
 
 EQUALLY_GOOD = 0.12  # difference of costs among which the seed decides
 OTHER_WORD, OTHER_FAMILY = 0.35, 0.8  # cost of a model of a related category
@@ -249,11 +253,22 @@ def _split(texts: tuple[str, ...]) -> frozenset[str]:
     return frozenset(word for word in words if len(word) > 2 and word.isalpha())
 
 
+def wishes_of(asked: RoomOptions, outside: Sequence[str | Path] = ()) -> AssetWishes:
+    """What options ask of a library; raises ValueError for what is not there.
+
+    `outside`: folders besides that of the index in which its models may lie.
+    """
+    index = Path(asked.assets or "")
+    changed = index.stat().st_mtime_ns if asked.assets and index.is_file() else 0
+    beyond = tuple(map(str, outside))
+    return _wishes(asked.assets, changed, asked.stretch, asked.licenses or "", asked.text, asked.collect, beyond)
+
+
 @lru_cache(maxsize=4)  # words are compared with those of all models once in a process
-def wishes_of(
+def _wishes(
     assets: str | None, changed: int, stretch: float, licenses: str, text: str, collect: bool, outside: tuple[str, ...]
 ) -> AssetWishes:
-    """What options wish of models; `changed`: when the index was written, licences with commas between."""
+    """`changed`: when the index was written. `licenses`: with commas between."""
     words = tuple(word.strip() for word in licenses.split(",") if word.strip())
     library = None if assets is None else read_library(assets)
     wishes = AssetWishes(library, stretch, words, text, collect, outside=tuple(map(Path, outside)))

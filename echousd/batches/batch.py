@@ -164,8 +164,10 @@ def weights_hash(weights: str | None) -> str:
 
 def _with_libraries(plan: RunPlan, outside: tuple[str, ...]) -> RunPlan:
     """The plan that knows its libraries by their bytes; raises ValueError for what its rooms would miss."""
+    from echousd.assets.choose import wishes_of
+
     for options in plan.options:
-        options.wishes(outside)
+        wishes_of(options, outside)
         if options.settle:
             from echousd.settle.settle import require_engine
 

@@ -18,6 +18,7 @@ import numpy as np
 from echomodel.boxes import Boxes
 from echomodel.boxes2d import turned
 from echomodel.graph import GraphEdit
+from echomodel.late import Late
 from echomodel.objective import Plan, faults_of
 from echomodel.objective.support import ON_CEILING
 from echomodel.progress import StageListener, StageTimer
@@ -40,6 +41,8 @@ from echousd.shapes.styles import stated_styles
 
 if TYPE_CHECKING:
     from echomodel.protocols import RoomModel
+
+wishes_of = Late("echousd.assets.choose:wishes_of")
 
 
 @takes_options(OF_NEW)
@@ -73,7 +76,7 @@ def edit(
         saved = read_room(room)
     manifest, beside = saved.manifest, Path(room).parent
     asked = RoomOptions(**{name: manifest[name] for name in Look.model_fields} | changes)
-    wishes = partial(asked.wishes, outside)
+    wishes = partial(wishes_of, asked, outside)
     check_objects(graph, str(room))
     graph = with_plan_of(anchored(graph, beside), saved.graph)
     fresh, moving = touched(anchored(saved.graph, beside), graph, saved.boxes)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 # of a room that is there already
 with_earlier_locks, with_locked_places = lates("echousd.make.reading", "with_earlier_locks", "with_locked_places")
-with_space = Late("echousd.make.fitting:with_space")
+with_space, wishes_of = Late("echousd.make.fitting:with_space"), Late("echousd.assets.choose:wishes_of")
 
 
 @takes_options()
@@ -75,7 +75,7 @@ def generate(
     timer = StageTimer(progress)
     file, beside, other, read = "", Path.cwd(), "", None
     held, homeless = (), ()
-    wishes = partial(asked.wishes, outside)
+    wishes = partial(wishes_of, asked, outside)
     if asked.assets:  # what is absent is told before any long work
         wishes()
     if asked.settle:
