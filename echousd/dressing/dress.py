@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -18,10 +19,12 @@ from echousd.dressing.floors import CORNER_AIR, GREEN
 from echousd.dressing.setting import Setting, Thing, geometry_of, standing
 from echousd.dressing.stories import guessed, story
 from echousd.dressing.walls import EYE, WIDEST, arranged, free_walls, hung_at
-from echousd.graph.nodes import DressingGraph
 from echousd.naming import free_name
 from echousd.room import RoomData
 from echousd.shapes.geometry import Geometry
+
+if TYPE_CHECKING:
+    from echousd.graph.dressing import DressingGraph
 
 graph_of = Late("echousd.dressing.nodes:graph_of")
 TALL, SEEN = 0.7, 0.3  # metres: what is or hangs higher may stand in a camera's way if it is so large

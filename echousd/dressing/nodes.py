@@ -16,7 +16,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.draw.sight import Furniture
 from echousd.dressing.setting import Setting, Standing, Thing
 from echousd.graph import Relation
-from echousd.graph.nodes import DressingGraph, SmallNode
+from echousd.graph.dressing import DressingGraph, SmallNode
 from echousd.stage import encoding as usd
 from echousd.stage.paths import DRESSING, OBJECTS
 from echousd.stage.pen import apply_apis

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from inspect import Parameter, Signature, signature
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from echomodel.openings import check_openings, rectangle
 from echousd.graph import fields as field
@@ -255,48 +255,3 @@ class Relation(PlainModel):
 
     def __str__(self) -> str:
         return " ".join(self.triple)
-
-
-def _small_word(value: str) -> str:
-    from echomodel.dressing import SMALL
-
-    if value not in SMALL:
-        raise ValueError(f"found {shown(value)}, allowed of a small thing: {', '.join(sorted(SMALL))}")
-    return value
-
-
-class SmallNode(PlainModel):
-    """A small thing of the room's dressing, such as a book or a rug.
-
-    Arguments:
-        name: valid USD identifier, unique among all nodes of the room.
-        category: a category of small things (`echomodel.dressing.SMALL`).
-        size: (x, y, z) extents in its own frame, metres.
-        position: (x, y, z) centre of the bottom face in the room frame, metres.
-        yaw: radians about +Y; at 0 the front looks along +Z.
-        place: against_wall for what hangs on a wall.
-    """
-
-    name: field.Name
-    category: Annotated[str, AfterValidator(_small_word)]
-    size: field.Size = None
-    position: field.Position = None
-    yaw: field.Angle = None
-    place: field.Place = None
-
-    @classmethod
-    def _title(cls, fields: dict[str, Any]) -> str:
-        return f"object {shown(fields['name'])}: "
-
-
-@dataclass(frozen=True)
-class DressingGraph:
-    """The small things of a room as nodes.
-
-    Arguments:
-        nodes: one for every thing.
-        relations: of small things to furniture, or to another small thing; a subject is in `nodes`.
-    """
-
-    nodes: tuple[SmallNode, ...] = ()
-    relations: tuple[Relation, ...] = ()

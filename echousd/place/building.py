@@ -9,7 +9,7 @@ from itertools import groupby, product
 import numpy as np
 
 from echomodel.boxes2d import hull
-from echomodel.late import linear_sum_assignment
+from echomodel.compiled import linear_sum_assignment
 from echomodel.objective import Plan
 from echomodel.objective.sizes import places_of
 from echousd.place.geometry import depths, gaps

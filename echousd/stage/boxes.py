@@ -15,7 +15,7 @@ from echomodel.rules import label_relations
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.arrays import triplets_of
-from echousd.graph.nodes import DressingGraph, SmallNode
+from echousd.graph.dressing import DressingGraph, SmallNode
 from echousd.naming import free_name
 from echousd.stage import encoding as usd
 from echousd.stage import values

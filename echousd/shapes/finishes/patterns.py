@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from echomodel.late import Compiled
+from echomodel.compiled import Compiled
 
 cKDTree = Compiled("scipy.spatial._ckdtree:cKDTree")
 SIZE = 512  # pixels on each side

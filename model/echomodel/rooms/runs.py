@@ -13,7 +13,7 @@ from itertools import combinations, pairwise, product
 import numpy as np
 
 from echomodel.boxes2d import footprints
-from echomodel.late import linear_sum_assignment
+from echomodel.compiled import linear_sum_assignment
 from echomodel.openings import Opening, free_area, signed_area
 from echomodel.rooms.floor import Wall, walls_of
 from echomodel.sizes import AISLE, LANDING, TALL, TRIANGLE, usual_range

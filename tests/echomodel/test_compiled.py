@@ -1,4 +1,4 @@
-"""What is imported when it is called."""
+"""Functions of compiled modules: as their packages have them, without these."""
 
 import subprocess
 import sys
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from echomodel.late import Compiled, linear_sum_assignment
+from echomodel.compiled import Compiled, linear_sum_assignment
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -17,7 +17,7 @@ def test_the_compiled_assignment_is_that_of_scipy(seed):
 
 
 def test_it_is_loaded_without_its_package():
-    told = "import sys, numpy; from echomodel.late import linear_sum_assignment as of; of(numpy.eye(3)); "
+    told = "import sys, numpy; from echomodel.compiled import linear_sum_assignment as of; of(numpy.eye(3)); "
     told += "print([name for name in sys.modules if name.startswith('scipy')])"
     assert subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True).stdout == "[]\n"
 
