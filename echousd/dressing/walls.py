@@ -158,12 +158,12 @@ def pictures(setting: Setting) -> None:
         if wall is None or host.top > TALLEST:
             continue
         rng, least = setting.rng(host.name, "picture"), host.top + OVER
-        mirrors = (
-            hung_at(setting, wall, along, kind, size, max(least, LOWEST), int(rng.integers(1 << 30)), host.name)
-            for kind, size in _over(host, rng)
-        )
-        if found := next((one for one in mirrors if one is not None), None):
-            setting.placed.append(found)
+        kind, one = mirror_over(host, rng), None
+        if kind:
+            size, variant = usual_size(kind, rng), int(rng.integers(1 << 30))
+            one = hung_at(setting, wall, along, kind, size, max(least, LOWEST), variant, host.name)
+        if one is not None:
+            setting.placed.append(one)
         else:
             wide = min(float(host.size[0]) * rng.uniform(0.62, 0.76), WIDEST)  # two thirds of what is below
             arranged(setting, wall, along, wide, rng, least, host.name)
@@ -229,12 +229,11 @@ def behind(size: np.ndarray, position: np.ndarray, yaw: float, walls: list[Wall]
     return None
 
 
-def _over(host: Standing, rng: np.random.Generator) -> list[tuple[str, np.ndarray]]:
-    """The mirror, if any, that would look good over an object, and its size."""
+def mirror_over(host: Standing, rng: np.random.Generator) -> str:
+    """The kind of mirror that would look good over an object, "" = none."""
     if "mirror" not in host.row.invites or any("mirror" in part.slots for part in host.geometry.parts):
-        return []
-    mirror = "round_mirror" if rng.random() < 0.5 else "mirror"
-    return [(mirror, usual_size(mirror, rng))]
+        return ""
+    return "round_mirror" if rng.random() < 0.5 else "mirror"
 
 
 def hung_at(

@@ -143,9 +143,9 @@ def millwork(room: RoomData) -> Millwork:
     if room.graph.room.walls:
         return PLAIN
     slept = any(vocabulary().category(node.category).role == "bed" for node in room.graph.nodes)
-    wet = vocabulary().room_type(room.graph.room.type).use == "wet"
-    made = millwork_of(room.provenance.seed, room.graph.room.style, private=slept or wet)
-    return replace(made, dado="") if wet else made
+    use = vocabulary().room_type(room.graph.room.type).use
+    made = millwork_of(room.provenance.seed, room.graph.room.style, private=slept or use == "wet")
+    return replace(made, dado="") if use else made
 
 
 def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any], openings: Sequence[Opening] = ()) -> Sdf.Layer:

@@ -71,7 +71,7 @@ def walls(
         tall = min(height, PARAPET) if outdoor and not here else height
         sunk, below = [cut for cut in cuts if cut.edge == edge], -THICKNESS
         pieces, boards = list[ShellPiece](), {"skirting": fittings.skirting(here, length, millwork.skirting)}
-        if millwork.dado and not outdoor:
+        if millwork.dado:
             below = DADO[1]
             mesh = _wall(polygon, edge, (-THICKNESS, below), here, deep, sunk)
             pieces.append(ShellPiece(piece_name(name, "dado"), millwork.dado, _placed(mesh, frame)))

@@ -139,6 +139,14 @@ def test_nobody_looks_through_the_door_of_a_bedroom_or_bathroom(room, kind, word
     assert len(doors) > 2
 
 
+@pytest.mark.parametrize(
+    ("kind", "word", "bare"), [("bathroom", "toilet", True), ("balcony", "armchair", True), ("study", "sofa", False)]
+)
+def test_only_walls_of_dry_rooms_have_dados(room, kind, word, bare):
+    dados = {millwork(seeded(wet(room, kind, word), seed)).dado for seed in range(30)}
+    assert dados == ({""} if bare else {"", "boarding", "paint"})
+
+
 def test_where_it_is_wet_there_are_tiles(room):
     bath = wet(room, "bathroom", "toilet")
     assert covered_walls(bath) == {f"Wall_{n}": "wall_tiles" for n in range(1, 5)}
