@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import accumulate
 from pathlib import Path
@@ -13,13 +13,12 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from echomodel.arrays import Array, cast, kit, on_device
+from echomodel.arrays import cast, on_device
 from echomodel.boxes import Boxes
 from echomodel.files import raising
-from echomodel.graph import GraphBatch, GraphEdit, shifted
+from echomodel.graph import GraphBatch, GraphEdit
 from echomodel.randomness import SceneGenerators
 from echomodel.samplers import Sampling
-from echomodel.surroundings import trimmed
 from echomodel.text import TextEncoder, edge_text, encoder_named, node_text
 from echomodel.vocabulary import vocabulary
 from echoscene.checkpoint import load_released
@@ -159,13 +158,11 @@ class ReleasedEcho:
 
     def _scenes(self, graph: GraphBatch) -> tuple[list[SceneGraphTensors], Tensor]:
         """Each scene with its floor and `_scene_` nodes, and which nodes of all of them are objects, (M,) bool."""
-        labels, parts = self.labels(graph), unpacked(graph)
-        scenes, start = [], 0
-        for part in parts:
-            scenes.append(self._scene(labels[start : start + part.num_nodes], part.category, part.triplets))
-            start += part.num_nodes
-        objects = [[*[True] * part.num_nodes, *[False] * len(STRUCTURE)] for part in parts]
-        return scenes, torch.tensor([flag for flags in objects for flag in flags])
+        labels, scenes, objects = self.labels(graph), list[SceneGraphTensors](), list[bool]()
+        for nodes, triplets in by_scene(graph):
+            scenes.append(self._scene(labels[nodes], graph.category[nodes], triplets))
+            objects += [True] * len(labels[nodes]) + [False] * len(STRUCTURE)
+        return scenes, torch.tensor(objects)
 
     def _scene(self, labels: Sequence[str], nodes: Tensor, triplets: Tensor) -> SceneGraphTensors:
         if self.preset == "paper":  # trained here, on graphs that do not mention the floor
@@ -175,21 +172,15 @@ class ReleasedEcho:
 
     def _change(self, graph: GraphBatch, scenes: Sequence[SceneGraphTensors], edit: GraphEdit) -> GraphChange:
         """The edit in the model's own form: the graph before without the nodes that were added."""
-        changes, start = [], 0
-        befores = unpacked(in_published_words(replace(graph, triplets=edit.before)))
-        touched = edit.touched(graph) & ~edit.added
-        labels = self.labels(graph)
-        for before in befores:
-            stop = start + before.num_nodes
-            new = edit.added[start:stop]
+        touched, labels, changes = edit.touched(graph) & ~edit.added, self.labels(graph), []
+        for nodes, triplets in by_scene(in_published_words(replace(graph, triplets=edit.before))):
+            new = edit.added[nodes]
             place = torch.cumsum(~new, 0) - 1  # of the nodes that stay, in the graph before
-            triplets = before.triplets.clone()
             triplets[:, [0, 2]] = place[triplets[:, [0, 2]]]
-            names = [word for word, gone in zip(labels[start:stop], new.tolist(), strict=True) if not gone]
-            old = self._scene(names, before.category[~new], triplets)
+            names = [word for word, gone in zip(labels[nodes], new.tolist(), strict=True) if not gone]
+            old = self._scene(names, graph.category[nodes][~new], triplets)
             added = tuple(int(node) - number for number, node in enumerate(new.nonzero()[:, 0]))
-            changes.append(GraphChange(old, added, tuple(touched[start:stop].nonzero()[:, 0].tolist())))
-            start = stop
+            changes.append(GraphChange(old, added, tuple(touched[nodes].nonzero()[:, 0].tolist())))
         return pack_changes(scenes, changes)
 
 
@@ -351,24 +342,9 @@ def pack_changes(graphs: Sequence[SceneGraphTensors], changes: Sequence[GraphCha
     )
 
 
-def unpacked(packed: GraphBatch) -> list[GraphBatch]:
-    """One graph per scene, the inverse of `GraphBatch.pack`."""
-    owner, placed = packed.scene[packed.triplets[:, 0]], packed.scene[packed.placements[:, 0]]
-    out, start = [], 0
-    for number, count in enumerate(packed.node_counts.tolist()):
-        nodes, room = slice(start, start + count), slice(number, number + 1)
-        triplets = packed.triplets[owner == number] - cast([start, 0, start], packed.triplets)
-        names = None if packed.names is None else packed.names[nodes]
-        graph = GraphBatch(
-            packed.category[nodes], triplets, packed.scene[nodes] * 0, packed.room_type[room],
-            trimmed(packed.floor[room]), names, _there(packed.openings[room]),
-            shifted(packed.placements[placed == number], -start), packed.height[room],
-        )  # fmt: skip
-        out.append(graph)
+def by_scene(graph: GraphBatch) -> Iterator[tuple[slice, Tensor]]:
+    """The nodes of every scene, and a copy of its triplets (E, 3) among them."""
+    owner, start = graph.scene[graph.triplets[:, 0]], 0
+    for number, count in enumerate(graph.node_counts.tolist()):
+        yield slice(start, start + count), graph.triplets[owner == number] - cast([start, 0, start], graph.triplets)
         start += count
-    return out
-
-
-def _there(rows: Array) -> Array:
-    """The rows (1, O, ROW) of one scene without padding."""
-    return rows[:, : int(kit(rows).isfinite(rows[0, :, 0]).sum())]

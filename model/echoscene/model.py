@@ -186,18 +186,6 @@ class ShapeUNet(Denoiser):
         )
 
 
-class ShapeNet(nn.Module):
-    """`ShapeUNet` under the prefix `diffusion_net.` that the published files have."""
-
-    def __init__(self, config: UNetConfig) -> None:
-        super().__init__()
-        self.diffusion_net = ShapeUNet(config)
-
-    def forward(self, *state: Tensor | None) -> Tensor:
-        """As `ShapeUNet.forward`."""
-        return self.diffusion_net(*state)
-
-
 STRUCTURE = ("floor", "_scene_")  # nodes that take part in both diffusions and have no shape
 
 
@@ -244,7 +232,7 @@ class ReleasedModel(GraphEncoder):
             inner = (latent + out) // 2
             parts: list[nn.Module] = [nn.Linear(latent, inner), nn.BatchNorm1d(inner), nn.ReLU(), nn.Linear(inner, out)]
             self.rel_s_mlp = nn.Sequential(*parts)
-            self.shape_df = ShapeNet(config.shape)
+            self.shape_df = nn.ModuleDict({"diffusion_net": ShapeUNet(config.shape)})
         if config.vqvae is not None:
             self.vqvae = VQVAE(config.vqvae)
 
@@ -361,7 +349,7 @@ class ReleasedModel(GraphEncoder):
         start = drawn.expand(count, -1, -1, -1, -1).contiguous()
 
         def denoise(x: Tensor, t: Tensor) -> Tensor:
-            return self.shape_df(x, nodes, graph.triples, t, edge_attr)
+            return self.shape_df["diffusion_net"](x, nodes, graph.triples, t, edge_attr)
 
         return last(ddim(denoise, start, self.shape_tables.ddim(steps)), progress, steps)
 
@@ -398,7 +386,8 @@ class ReleasedModel(GraphEncoder):
             clean = latents[:kept].to(device)
             noise = normal(clean.shape, generator, device)
             context, tables = shapes[:kept], self.shape_tables
-            losses["shape"] = shape_loss(self.shape_df, clean, context, triples, t, noise, tables, edge_attr)
+            net = self.shape_df["diffusion_net"]
+            losses["shape"] = shape_loss(net, clean, context, triples, t, noise, tables, edge_attr)
             losses["loss"] = losses["layout"] + losses["shape"]
         return losses
 
@@ -499,7 +488,7 @@ def shape_loss(
     """Noise prediction loss of the shape branch (EchoScene, equation 6): mean square over everything, a scalar.
 
     Arguments:
-        net: `ShapeNet`.
+        net: `ShapeUNet`.
         latents: (N, 3, 16, 16, 16) float32, encoder output before quantisation, not scaled.
         t: (N,) int64; the published training draws one step per object.
         others: as `layout_loss`.

@@ -10,9 +10,10 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echomodel.graph import GraphBatch
+from echomodel.arrays import cast, kit
+from echomodel.graph import GraphBatch, shifted
 from echomodel.roomboxes import RoomBoxes
-from echoscene.echo import unpacked
+from echomodel.surroundings import trimmed
 
 
 @st.composite
@@ -36,6 +37,29 @@ def equal(a: GraphBatch, b: GraphBatch) -> bool:
     fields = ("category", "triplets", "scene", "room_type", "placements")
     same = all(torch.equal(getattr(a, k), getattr(b, k)) for k in fields)
     return same and torch.equal(a.floor.nan_to_num(-1), b.floor.nan_to_num(-1)) and a.names == b.names
+
+
+def unpacked(packed: GraphBatch) -> list[GraphBatch]:
+    """One graph per scene, the inverse of `GraphBatch.pack`."""
+    owner, placed = packed.scene[packed.triplets[:, 0]], packed.scene[packed.placements[:, 0]]
+    out, start = [], 0
+    for number, count in enumerate(packed.node_counts.tolist()):
+        nodes, room = slice(start, start + count), slice(number, number + 1)
+        triplets = packed.triplets[owner == number] - cast([start, 0, start], packed.triplets)
+        names = None if packed.names is None else packed.names[nodes]
+        graph = GraphBatch(
+            packed.category[nodes], triplets, packed.scene[nodes] * 0, packed.room_type[room],
+            trimmed(packed.floor[room]), names, there(packed.openings[room]),
+            shifted(packed.placements[placed == number], -start), packed.height[room],
+        )  # fmt: skip
+        out.append(graph)
+        start += count
+    return out
+
+
+def there(rows):
+    """The rows (1, O, ROW) of one scene without padding."""
+    return rows[:, : int(kit(rows).isfinite(rows[0, :, 0]).sum())]
 
 
 @settings(max_examples=60)

@@ -7,8 +7,20 @@ import torch
 from parity_configs import shape_config, vq_config
 from parity_numbers import Numbers, check_gradients, close
 
-from echoscene.model import Schedule, ShapeNet, ddim, shape_loss
+from echoscene.config import UNetConfig
+from echoscene.model import Schedule, ShapeUNet, ddim, shape_loss
 from echoscene.vqvae import VQVAE
+
+
+class ShapeNet(torch.nn.Module):
+    """The denoiser under the prefix that the published files have."""
+
+    def __init__(self, config: UNetConfig) -> None:
+        super().__init__()
+        self.diffusion_net = ShapeUNet(config)
+
+    def forward(self, *state: torch.Tensor | None) -> torch.Tensor:
+        return self.diffusion_net(*state)
 
 
 def _net(numbers: Numbers) -> ShapeNet:
