@@ -15,7 +15,7 @@ from trimesh.util import append_faces
 from echomodel.files import within_memory
 from echomodel.triangles import area_normals
 from echousd.assets.colors import Coat, flat, pixels, texels
-from echousd.assets.model_file import ModelFile
+from echousd.assets.model_file import Beside, ModelFile
 from echousd.draw.drawables import Paint, paints_of
 from echousd.naming import STAGE_FORMS
 from echousd.srgb import to_linear
@@ -105,7 +105,7 @@ def _measured(model: ModelFile, painted: bool) -> Measured:
 
 
 def _mesh(model: ModelFile, painted: bool) -> Measured:
-    beside = model.beside()
+    beside = Beside(model)
     obj = model.suffix == ".obj"  # whose materials are in a file of their own
     with model.opened() as file, warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -60,10 +60,6 @@ class ModelFile:
             _check_size(self, archive.getinfo(self.member).file_size)
             yield io.BytesIO(archive.read(self.member))
 
-    def beside(self) -> Beside:
-        """The files that the model may name."""
-        return Beside(self)
-
 
 @lru_cache(maxsize=4)
 def _archive(path: Path, changed: int) -> zipfile.ZipFile:

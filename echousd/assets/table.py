@@ -20,7 +20,6 @@ from echousd.assets.reference import check_reach
 VERSION = 2
 KEY = b"echousd.assets"
 LARGEST = 4 * 2**30  # bytes of an index when it is unpacked
-KINDS = {"str": "string", "float": "float64", "int": "int64", "bool": "bool_", "bytes": "binary"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,16 +68,10 @@ def arrow() -> Any:
 
 def _schema() -> Any:
     pa = arrow()
-    columns = []
-    for field in fields(AssetRecord):
-        kind = str(field.type)
-        if kind == "Vector" or kind.startswith("tuple[float"):
-            columns.append((field.name, pa.list_(pa.float64())))
-        elif kind.startswith("tuple[str"):
-            columns.append((field.name, pa.list_(pa.string())))
-        else:
-            columns.append((field.name, getattr(pa, KINDS[kind])()))
-    return pa.schema(columns)
+    kinds = {"str": pa.string(), "float": pa.float64(), "int": pa.int64(), "bool": pa.bool_(), "bytes": pa.binary()}
+    kinds |= {f"tuple[{kind}, ...]": pa.list_(kinds[kind]) for kind in ("str", "float")}
+    kinds["Vector"] = kinds["tuple[float, ...]"]
+    return pa.schema([(field.name, kinds[str(field.type)]) for field in fields(AssetRecord)])
 
 
 def write_library(file: Path, records: Iterable[AssetRecord], about: Mapping[str, Any] | None = None) -> None:

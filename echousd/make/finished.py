@@ -42,9 +42,14 @@ class Room(RoomData):
             ValueError: the folder is not ours, is being written by another process, cannot be written, or the disk is
                 full; nothing is half-written.
         """
-        from echousd.make.save import save_room
+        from echousd.folder.folder import held
+        from echousd.make.save import save_layers, write_pictures
 
-        return save_room(self, Path(folder), force=force, preview=preview, wait=wait, store=store)
+        with held(Path(folder), wait=wait):
+            root = save_layers(self, Path(folder), force=force, store=store)
+            if self.options.preview if preview is None else preview:
+                write_pictures(root)
+            return root
 
     @cached_property
     def stage(self) -> Usd.Stage:

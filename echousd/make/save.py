@@ -41,18 +41,6 @@ loses_text, merged_root, referenced = lates("echousd.folder.merging", "loses_tex
 showing_layout = Late("echousd.stage.showing:showing_layout")
 
 
-def save_room(
-    room: RoomData, folder: Path, *, force: bool = False, preview: bool | None = None, wait: bool = False,
-    store: str | Path | None = None,
-) -> Path:  # fmt: skip
-    """Write the layered room and its preview; see `Room.save`."""
-    with folders.held(folder, wait=wait):
-        root = save_layers(room, folder, force=force, store=store)
-        if room.options.preview if preview is None else preview:
-            write_pictures(root)
-        return root
-
-
 def save_layers(room: RoomData, folder: Path, *, force: bool = False, store: str | Path | None = None) -> Path:
     """Write the layers, assets and the manifest of a room; see `Room.save`.
 

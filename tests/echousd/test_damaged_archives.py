@@ -11,7 +11,7 @@ import pytest
 
 from echousd.assets.catalogues import read_library
 from echousd.assets.measure import measure
-from echousd.assets.model_file import ModelFile
+from echousd.assets.model_file import Beside, ModelFile
 from echousd.folder.history import _read_archive
 from echousd.store import Store
 
@@ -27,7 +27,7 @@ def model(path):
 
 
 def beside(path):
-    ModelFile(path, path.parent, "a.obj").beside().get("a.mtl")
+    Beside(ModelFile(path, path.parent, "a.obj")).get("a.mtl")
 
 
 def library(path):

@@ -8,7 +8,8 @@ from echousd.folder.manifest import MANIFEST_KEY, find_manifest
 from echousd.folder.stored import Shelf, asset_from, shelf_of
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.make import save as saving
-from echousd.room import Provenance, RoomData
+from echousd.make.finished import Room
+from echousd.room import Provenance
 
 CATEGORIES = {"bed": "double_bed", "lamp": "floor_lamp", "desk": "desk"}
 
@@ -28,7 +29,7 @@ def plain_room(names, seed, root=None):
             else:
                 paths = [path for path in _asset(asset, 0) if (root.parent / path).is_file()]
                 carried[asset] = {path: (root.parent / path).read_bytes() for path in paths}
-    return RoomData("bedroom", graph, None, {}, assets, None, provenance=Provenance(seed), carried=carried, edited=root)
+    return Room("bedroom", graph, None, {}, assets, None, provenance=Provenance(seed), carried=carried, edited=root)
 
 
 @contextmanager

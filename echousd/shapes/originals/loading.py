@@ -179,7 +179,7 @@ def converted(model: ModelFile) -> Mapping[str, bytes]:
 
     The model's own frame and unit are kept. Raises ValueError that names the file where it cannot be read.
     """
-    beside = model.beside()
+    beside = Beside(model)
     try:
         with within_memory(model.path, str(model)), model.opened() as file, warnings.catch_warnings():
             warnings.simplefilter("ignore")

@@ -23,7 +23,6 @@ from echousd.batches.verify import finish
 from echousd.folder import history
 from echousd.folder.journal import DONE
 from echousd.folder.manifest import find_manifest
-from echousd.make.save import save_room
 from echousd.pending import STAGING
 from echousd.stage.files import open_stage
 from echousd.texturing import attach
@@ -107,16 +106,16 @@ def test_rooms(tmp_path, quiet, run, store):
     rooms = []
 
     def begin():
-        save_room(plain_room(OLD, 0), folder, preview=False, store=shared)
+        plain_room(OLD, 0).save(folder, preview=False, store=shared)
         if run in ("undo", "redo"):
-            save_room(plain_room(NEW, 0, root), folder, preview=False)
+            plain_room(NEW, 0, root).save(folder, preview=False)
         if run == "redo":
             history.undo(root)
         rooms[:] = [plain_room(NEW, 1 if run == "generate" else 0, root if run == "edit" else None)]
 
     acts = {"undo": lambda: history.undo(root), "redo": lambda: history.redo(root)}
     told = at_every_operation(
-        top, begin, acts.get(run, lambda: save_room(rooms[0], folder, preview=False)), lambda: [seen(folder)],
+        top, begin, acts.get(run, lambda: rooms[0].save(folder, preview=False)), lambda: [seen(folder)],
         ended=lambda: run in acts and not (folder / STAGING / DONE).exists(),
     )  # fmt: skip
     assert told > 3

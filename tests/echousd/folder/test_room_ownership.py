@@ -15,7 +15,7 @@ from echousd.folder.folder import recover, write_together
 from echousd.folder.manifest import MAX_SEED, find_manifest
 from echousd.folder.merging import merged_root
 from echousd.make.edit import edit
-from echousd.make.save import save_room, write_preview
+from echousd.make.save import write_preview
 from echousd.pending import STAGING
 
 MINE = '#usda 1.0\n(\n    defaultPrim = "fern"\n)\ndef Sphere "fern" {}\n'
@@ -65,13 +65,13 @@ def test_a_room_saved_again_beside_an_artists_file_is_the_same_room(tmp_path, ed
     folder = tmp_path / "bedroom"
     with plain_files(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        root = save_room(plain_room(["bed"], 0), folder, preview=False)
+        root = plain_room(["bed"], 0).save(folder, preview=False)
         (folder / "assets/desk").mkdir()
         (folder / "assets/desk/desk.usda").write_text(MINE)
         made = plain_room(["bed", "desk"], 0, root if edits else None)
         seen = []
         for _ in range(3):
-            save_room(made, folder, preview=False)
+            made.save(folder, preview=False)
             seen.append({path: path.read_bytes() for path in folder.rglob("*") if path.is_file()})
     assert find_manifest(folder)["assets"]["desk"] == "desk_2"
     assert seen[0] == seen[1] == seen[2]
@@ -224,7 +224,7 @@ def test_largest_seed_is_stored(tmp_path):
     assert json.loads((tmp_path / "room/room.json").read_text())["seed"] == MAX_SEED
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        save_room(make(1), tmp_path / "room", preview=False)
+        make(1).save(tmp_path / "room", preview=False)
 
 
 ROOT = '#usda 1.0\n(\n    defaultPrim = "Room"\n    metersPerUnit = 1\n    upAxis = "Y"\n)\n'

@@ -23,7 +23,6 @@ from echousd.folder import folder as folders
 from echousd.folder import history
 from echousd.folder.lock import LOCK
 from echousd.folder.manifest import find_manifest
-from echousd.make.save import save_room
 from echousd.pending import STAGING, check_written, half_written
 from echousd.store import Store
 
@@ -67,7 +66,7 @@ class Sequences(RuleBasedStateMachine):
         self.listening = warnings.catch_warnings(record=True)
         self.told = self.listening.__enter__()
         warnings.simplefilter("always")
-        save_room(plain_room(names, 0), self.folder, preview=False, store=self.store)
+        plain_room(names, 0).save(self.folder, preview=False, store=self.store)
         self.now, self.step = self.state(), False
 
     def teardown(self):
@@ -110,14 +109,14 @@ class Sequences(RuleBasedStateMachine):
 
     @rule(names=NAMES, seed=st.integers(0, 2), kill=KILL, again=AGAIN)
     def generates(self, names, seed, kill, again):
-        self.runs(lambda: save_room(plain_room(names, seed), self.folder, preview=False), kill, again)
+        self.runs(lambda: plain_room(names, seed).save(self.folder, preview=False), kill, again)
 
     @rule(names=NAMES, kill=KILL, again=AGAIN)
     def edits(self, names, kill, again):
         self.follows()
         folders.recover(self.folder)
         made = plain_room(names, 0, self.root)
-        self.runs(lambda: save_room(made, self.folder, preview=False), kill, again)
+        self.runs(lambda: made.save(self.folder, preview=False), kill, again)
 
     @rule(kill=KILL, again=AGAIN)
     def undoes(self, kill, again):
