@@ -176,7 +176,7 @@ class GraphEncoder(nn.Module):
 
     def manipulate(
         self, latent: Tensor, graph: SceneGraphTensors, *, added: Sequence[int] = (), touched: Sequence[int] = (),
-        noise: Tensor | None = None, generator: Randomness | None = None,
+        generator: Randomness | None = None,
     ) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
         """Latents of an edited graph from those of the graph before (generation: no edit).
 
@@ -186,8 +186,8 @@ class GraphEncoder(nn.Module):
             added: nodes missing before, each the index that the node has before later ones are inserted; a zero
                 latent is inserted there.
             touched: ends of changed triples, in the numbering after the edit.
-            noise: (added and touched nodes, flag) float32, change flags, a row a node in ascending order of the nodes
-                after the edit; drawn with `generator` when None.
+            generator: draws change flags (added and touched nodes, flag) float32, a row a node in ascending order of
+                the nodes after the edit.
 
         Returns (N, node) latents, (E, node) edge latents and (N,) bool, the nodes that were kept.
         Raises ValueError where the counts do not add up, or the graph is one that `SceneGraphTensors.check` refuses.
@@ -200,10 +200,7 @@ class GraphEncoder(nn.Module):
         if len(latent) != count:
             raise ValueError(f"{len(latent)} latents with {len(places)} added nodes for a graph of {count} nodes")
         edited = sorted({*places, *touched})  # the published code draws node by node
-        if noise is None:
-            noise = normal((len(edited), config.flag), generator, latent.device)
-        if tuple(noise.shape) != (len(edited), config.flag):
-            raise ValueError(f"change flags are {tuple(noise.shape)}, expected {(len(edited), config.flag)}")
+        noise = normal((len(edited), config.flag), generator, latent.device)
         flags = latent.new_zeros(count, config.flag)
         keep = torch.ones(count, dtype=torch.bool, device=latent.device)
         for row, node in enumerate(edited):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 import torch
+from drawn_noise import Drawn
 
 from echoscene.config import EncoderConfig
 from echoscene.echo import pack_changes, pack_scenes, pseudo_graph, without_node
@@ -84,11 +85,13 @@ def test_a_packed_change_is_what_single_changes_are() -> None:
     )  # of one added node, two touched ones and one added: ascending, as they stand in the batch
     with torch.inference_mode():
         latent, _ = net.encode(change.before)
-        new, _, keep = net.manipulate(latent, whole, added=change.added, touched=change.touched, noise=flags)
+        new, _, keep = net.manipulate(latent, whole, added=change.added, touched=change.touched, generator=Drawn(flags))
         singles = []
         for graph, single, noise in zip(graphs, changes, (flags[:1], flags[1:3], flags[3:]), strict=True):
             latent, _ = net.encode(single.before)
-            singles.append(net.manipulate(latent, graph, added=single.added, touched=single.touched, noise=noise))
+            singles.append(
+                net.manipulate(latent, graph, added=single.added, touched=single.touched, generator=Drawn(noise))
+            )
     assert torch.allclose(new, torch.cat([s[0] for s in singles]), atol=1e-5)
     assert torch.equal(keep, torch.cat([s[2] for s in singles]))
     assert int((~keep).sum()) == 4

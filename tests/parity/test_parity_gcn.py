@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 import torch
+from drawn_noise import Drawn
 from parity_configs import encoder_config
 from parity_numbers import Numbers, close, value
 from torch import nn
@@ -98,7 +99,9 @@ def test_manipulator_adds_a_node_and_changes_a_relation(edit, before, after, nod
     net = _encoder()
     latent, _ = net.encode(_graph(numbers, *before))
     graph, (how, which) = _graph(numbers, *after), nodes
-    new, _, keep = net.manipulate(latent, graph, **{how: numbers[which].tolist()}, noise=numbers[f"{edit}_noise"])
+    new, _, keep = net.manipulate(
+        latent, graph, **{how: numbers[which].tolist()}, generator=Drawn(numbers[f"{edit}_noise"])
+    )
     close(new, numbers[f"{edit}_c_b"], 1e-4)
     close(net.embed(graph)[0], numbers[f"{edit}_uc_b"], 1e-6)
     assert keep.long().tolist() == numbers[f"{edit}_keep"].tolist()
@@ -109,17 +112,17 @@ def test_change_flags_belong_to_the_nodes_in_ascending_order() -> None:
     net, numbers, graph = _opened("manipulator")
     latent, _ = net.encode(graph)
     touched = numbers["chg_nodes"].tolist()
-    one, _, _ = net.manipulate(latent, graph, touched=touched, noise=numbers["chg_noise"])
+    one, _, _ = net.manipulate(latent, graph, touched=touched, generator=Drawn(numbers["chg_noise"]))
     for order in (sorted(touched), sorted(touched, reverse=True), [*touched, touched[0]]):
-        again, _, _ = net.manipulate(latent, graph, touched=order, noise=numbers["chg_noise"])
+        again, _, _ = net.manipulate(latent, graph, touched=order, generator=Drawn(numbers["chg_noise"]))
         assert torch.equal(again, one)
     # An added node behind a touched one gets the second row.
     last = len(graph.classes) - 1
     seen, noise = numbers["chg_noise"][:2], latent[:last]
-    late, _, _ = net.manipulate(noise, graph, added=[last], touched=[0], noise=seen)
-    swapped, _, _ = net.manipulate(noise, graph, added=[last], touched=[0], noise=seen.flip(0))
+    late, _, _ = net.manipulate(noise, graph, added=[last], touched=[0], generator=Drawn(seen))
+    swapped, _, _ = net.manipulate(noise, graph, added=[last], touched=[0], generator=Drawn(seen.flip(0)))
     assert not torch.equal(late, swapped)
     flagged, _, _ = net.manipulate(
-        torch.cat([noise, noise.new_zeros(1, noise.shape[1])]), graph, touched=[0, last], noise=seen
+        torch.cat([noise, noise.new_zeros(1, noise.shape[1])]), graph, touched=[0, last], generator=Drawn(seen)
     )
     assert torch.equal(flagged, late)

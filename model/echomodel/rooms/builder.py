@@ -222,12 +222,8 @@ class Builder:
         gap = middle + z * ((high - middle) if z > 0 else (middle - low)) / QUARTILE
         return min(max(gap, SUNK), FAR_BACK)
 
-    def somewhere(
-        self, category: str, *, size: Size | None = None, style: int | None = None, clearance: float = 0.1
-    ) -> Item | None:
+    def somewhere(self, category: str, size: Size, style: int, clearance: float = 0.1) -> Item | None:
         """Place one item on open floor."""
-        size = size or self.size(category)
-        style = self.style() if style is None else style
         for _ in range(12):
             x = self.uniform(-self.floor.half_x, self.floor.half_x)
             z = self.uniform(-self.floor.half_z, self.floor.half_z)

@@ -69,7 +69,7 @@ def sofa_group(room: Builder, category: str) -> Item | None:
         if sofa:
             break
     if sofa is None:
-        sofa = room.somewhere(category, size=size, style=style)
+        sofa = room.somewhere(category, size, style)
     if sofa is None:
         return None
     if room.wanted.get("tv_stand") and television(room, sofa, nearest=1.0, farthest=9.0 if room.chance(0.2) else 4.4):
@@ -281,19 +281,17 @@ def _chairs_around(room: Builder, table: Item, category: str, size: Size, count:
 
 def desk_group(
     room: Builder, category: str = "desk", seats: tuple[str, ...] = ("office_chair",), yaw: float | None = None
-) -> Item | None:
+) -> None:
     """A desk or dressing table at a wall (a desk may stand free) with its chair."""
     style = room.style()
     size = room.size(category)
     desk = None
     if category == "desk" and room.chance(0.15):
-        desk = room.somewhere(category, size=size, style=style, clearance=0.3)
+        desk = room.somewhere(category, size, style, clearance=0.3)
     desk = desk or room.against_wall(category, size=size, style=style, corner=0.45, tries=20, yaw=yaw)
     desk = desk or room.against_wall(category, size=size, style=style, corner=0.45, tries=12)
-    if desk is None:
-        return None
-    seat_at(room, desk, seats, style)
-    return desk
+    if desk is not None:
+        seat_at(room, desk, seats, style)
 
 
 def seat_at(room: Builder, desk: Item, seats: tuple[str, ...], style: int) -> None:

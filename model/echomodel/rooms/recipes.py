@@ -417,7 +417,7 @@ def _loose(room: Builder, category: str, size: tuple[float, float, float], style
             if room.put(category, size, x, z, spot[0].yaw + turn, style, play=0.0):
                 return
     if not (group and category in LOUNGERS):
-        room.somewhere(category, size=size, style=style)
+        room.somewhere(category, size, style)
 
 
 def _faces(wall: Wall, along: float, group: Item) -> bool:
