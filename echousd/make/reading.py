@@ -13,7 +13,6 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom
 
 from echomodel.boxes import Boxes
-from echomodel.furniture.solids import Joint
 from echomodel.triangles import Mesh
 from echousd.folder.folder import recover
 from echousd.folder.found import manifest_of
@@ -25,7 +24,7 @@ from echousd.graph.text import graph_from_plain
 from echousd.layers.placed import MODEL, PLACES
 from echousd.naming import STAGE_FORMS
 from echousd.shapes.colliders import approximation, collider_of
-from echousd.shapes.geometry import FRAME, LICENCE, Collider, Geometry, Origin, Original, Part
+from echousd.shapes.geometry import LICENCE, Collider, Geometry, Origin, Original, Part
 from echousd.shapes.matter import read_mass
 from echousd.stage.contents import read_contents, room_frame, surface_of
 from echousd.stage.files import open_stage, opened
@@ -147,7 +146,7 @@ def _geometry(root: Usd.Prim, asset: str | None, category: str, manifest: Mappin
     entry = manifest.get("meshes", {}).get(asset, {})
     origin = Origin(entry.get("shapes", manifest["shapes"]), entry.get("licence", LICENCE), entry.get("credit", ""))
     return Geometry(
-        tuple(parts), tuple(colliders), origin, read_mass(root), read_joints(root, asset or ""),
+        tuple(parts), tuple(colliders), origin, read_mass(root),
         description=tuple(root.GetAttribute(DESCRIPTION).Get() or ()),
     )  # fmt: skip
 
@@ -223,7 +222,7 @@ def stands_z_up(room: Usd.Prim) -> bool:
 
 
 def in_our_frame(geometry: Geometry, metres: float, *, z_up: bool) -> Geometry:
-    """A piece in the object's frame: metres, +Y up, +Z its front; joints have no places when read.
+    """A piece in the object's frame: metres, +Y up, +Z its front.
 
     `metres`: per unit in which it was read. `z_up`: read with +Z up, -Y its front.
     """
@@ -311,12 +310,3 @@ def _filled(graph: SceneGraph, file: Path, wanted: set[str]) -> tuple[SceneGraph
             )
         nodes.append(node)
     return graph.replaced(nodes=tuple(nodes)), found
-
-
-def read_joints(root: Usd.Prim, asset: str) -> tuple[Joint, ...]:
-    """Names of the bodies of an asset that move, as joints without places: its files are carried on as they are."""
-    geo = root.GetChild(GEO)
-    below = geo.GetChildren() if geo else ()
-    bodies = [piece_of(asset, prim.GetName()) for prim in below if prim.GetTypeName() == "Xform"]
-    moving = [body for body in bodies if body and body != FRAME]
-    return tuple(Joint(body, "prismatic", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 0.0) for body in sorted(moving))

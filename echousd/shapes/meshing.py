@@ -105,11 +105,3 @@ def fit(mesh: trimesh.Trimesh, size: np.ndarray) -> trimesh.Trimesh:
     if out.volume < 0:
         out = trimesh.Trimesh(points, faces[:, ::-1], process=False)
     return out
-
-
-def box_mesh(size: Any) -> trimesh.Trimesh:
-    """A plain box of (3,) `size` metres standing on the origin."""
-    extent = np.asarray(size, float)
-    mesh = trimesh.creation.box(extent)
-    mesh.apply_translation((0, extent[1] / 2, 0))
-    return mesh

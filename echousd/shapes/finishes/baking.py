@@ -39,7 +39,7 @@ def _code() -> str:
 
 # What bakes them is not loaded where the cache has every image.
 color_image, normal_image, rough_image = map(
-    kept, lates("echousd.shapes.finishes.images", "color_image", "normal_image", "rough_image")
+    kept, lates("echousd.shapes.finishes.pictures", "color_image", "normal_image", "rough_image")
 )
 
 

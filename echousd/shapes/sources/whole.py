@@ -20,7 +20,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph.arrays import DISTANCE, graph_batch, one_thread, rounded, seeded
 from echousd.shapes.colliders import colliders_of
 from echousd.shapes.geometry import Geometry, Origin, Part
-from echousd.shapes.meshing import LEAST_FACES, box_mesh, mesh_from_shape
+from echousd.shapes.meshing import LEAST_FACES, mesh_from_shape
 from echousd.shapes.sources.named import source_of
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
 from echousd.shapes.styles import EQUAL, first_alike
@@ -38,7 +38,9 @@ def plain_boxes(request: ShapeRequest) -> Shapes:
     size, origin = np.asarray(request.boxes.size, float), Origin("boxes")
 
     def make(row: int) -> Geometry:
-        return solid_geometry(box_mesh(size[row]), request.graph.nodes[row].category, origin)
+        x, y, z = size[row]
+        box = trimesh.creation.box(bounds=[(-x / 2, 0.0, -z / 2), (x / 2, y, z / 2)])
+        return solid_geometry(box, request.graph.nodes[row].category, origin)
 
     return per_asset(request, make)
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from solid_boxes import box_mesh
 
 from echomodel.dressing import KINDS, PRINTS
 from echomodel.dressing import thing as solids_of
@@ -17,7 +18,6 @@ from echousd.dressing.setting import Setting, standing
 from echousd.dressing.stories import story
 from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
-from echousd.shapes.meshing import box_mesh
 from echousd.shapes.sources.whole import solid_geometry
 
 FLOOR = np.array([(-2.0, -1.5), (2.0, -1.5), (2.0, 1.5), (-2.0, 1.5)])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from pxr import Usd, UsdGeom, UsdPhysics
+from solid_boxes import box_mesh
 
 from echomodel.dressing import KINDS
 from echomodel.dressing import thing as solids_of
@@ -21,7 +22,6 @@ from echousd.shapes.geometry import Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.hulls import convex_hull, hull_volume, standing_hull
 from echousd.shapes.joinery import level, part_of, within_budget
 from echousd.shapes.matter import ballasted, mass_of, read_mass
-from echousd.shapes.meshing import box_mesh
 from echousd.shapes.sources.whole import solid_geometry
 from echousd.stage.pen import Pen
 

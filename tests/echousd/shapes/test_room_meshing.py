@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 import trimesh
 from small_room import ball_tsdf, table_tsdf
+from solid_boxes import box_mesh
 
-from echousd.shapes.meshing import box_mesh, decimate, fit, largest_solids, mesh_from_shape
+from echousd.shapes.meshing import decimate, fit, largest_solids, mesh_from_shape
 
 
 @pytest.mark.parametrize("grid", [ball_tsdf(), table_tsdf()], ids=["ball", "table"])

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 import trimesh
+from solid_boxes import box_mesh
 
 from echomodel.furniture.cloth import Sheet
 from echomodel.furniture.solids import Tube
@@ -9,7 +10,6 @@ from echomodel.vocabulary import vocabulary
 from echousd.shapes.finishes.slots import HARMONIES, metres_of
 from echousd.shapes.geometry import CREASE, DRAPED
 from echousd.shapes.looks import SHOWN, alternatives, look, palette_for
-from echousd.shapes.meshing import box_mesh
 from echousd.shapes.sources.whole import BANDS, cut, material_groups
 from echousd.shapes.surface import creased_normals, surfaces, unshared
 from echousd.stage.taxonomy import ade20k
