@@ -13,6 +13,7 @@ from echomodel.compiled import Compiled
 
 cKDTree = Compiled("scipy.spatial._ckdtree:cKDTree")
 SIZE = 512  # pixels on each side
+CREASES = ((54, 2.0, 5.0), (55, 6.0, 3.0))  # of cloth: seeds, features along and across
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,14 +139,24 @@ def brick(rows: int = 16, across: int = 4) -> Relief:
     return Relief(tone, 0.0006 * grain * (1 - joint) - 0.004 * joint, 0.1 * joint)
 
 
-def woven(threads: int = 64) -> Relief:
-    """Plain weave, flecked."""
+def woven(threads: int = 176) -> Relief:
+    """Plain weave, flecked, in the soft folds of what is sat on."""
     u, v = _grid()
     warp, weft = np.sin(2 * np.pi * threads * u), np.sin(2 * np.pi * threads * v)
     over = np.sign(np.sin(np.pi * threads * u) * np.sin(np.pi * threads * v))
-    height = np.where(over > 0, np.abs(warp), np.abs(weft))
-    fleck = 0.6 * noise(31, 20.0, 120.0) + 0.6 * noise(32, 120.0, 20.0)
-    return Relief(1 + 0.16 * (height - 0.6) + 0.045 * fleck, 0.0004 * height)
+    height, (folds, lit) = np.where(over > 0, np.abs(warp), np.abs(weft)), creased()
+    fleck = 0.6 * noise(31, 60.0, 160.0) + 0.6 * noise(32, 160.0, 60.0)
+    return Relief(1 + 0.12 * (height - 0.6) + 0.035 * fleck + 0.055 * lit, 0.0001 * height + 0.4 * folds)
+
+
+def creased() -> tuple[np.ndarray, np.ndarray]:
+    """(SIZE, SIZE) each: how high cloth of about a metre lies that was used, metres, and how light its slopes are."""
+    height = 0.008 * noise(53, 4.0, 7.0, 4.0) + 0.003 * noise(56, 11.0, 16.0, 4.0)
+    for seed, *features in CREASES:  # each ends where others begin
+        line = np.exp(-4.0 * np.abs(noise(seed, *features, 4.0)))
+        height -= 0.005 * line * np.clip(noise(seed + 10, *features, 4.0), 0, 2)
+    slope = height - np.roll(height, (3, 2), (0, 1))
+    return height, np.tanh(0.7 * slope / slope.std())
 
 
 def knitted(stitches: int = 32) -> Relief:
@@ -157,22 +168,27 @@ def knitted(stitches: int = 32) -> Relief:
 
 
 def linen() -> Relief:
-    """Fine cloth with thick threads here and there and soft creases."""
+    """Fine cloth with thick threads here and there."""
     slubs = 0.6 * noise(51, 6.0, 170.0) + 0.6 * noise(52, 170.0, 6.0)
-    crease = noise(53, 4.0, 4.0, 3.0)
-    return Relief(1 + 0.028 * slubs + 0.012 * crease, 0.0002 * slubs + 0.002 * crease)
+    return Relief(1 + 0.028 * slubs, 0.0002 * slubs)
+
+
+def rumpled() -> Relief:
+    """Linen in the creases and soft folds that sleep leaves in it."""
+    slubs, (folds, lit) = 0.6 * noise(51, 12.0, 220.0) + 0.6 * noise(52, 220.0, 12.0), creased()
+    return Relief(1 + 0.024 * slubs + 0.1 * lit, 0.0002 * slubs + folds)
 
 
 def striped(pairs: int = 4) -> Relief:
     """Linen with broad stripes along u, a narrow one beside each."""
-    cloth, place = linen(), (pairs * _grid()[1]) % 1.0
+    cloth, place = rumpled(), (pairs * _grid()[1]) % 1.0
     broad, narrow = np.abs(place - 0.3) < 0.2, np.abs(place - 0.62) < 0.04
     return Relief(cloth.tone * (1 + 0.55 * broad + 0.4 * narrow), cloth.height)
 
 
 def checked(pairs: int = 6) -> Relief:
     """Linen woven in squares, darkest where its stripes cross."""
-    cloth, band = linen(), np.where((pairs * np.arange(SIZE) / SIZE) % 1.0 < 0.5, 0.3, 0.0)
+    cloth, band = rumpled(), np.where((pairs * np.arange(SIZE) / SIZE) % 1.0 < 0.5, 0.3, 0.0)
     return Relief(cloth.tone * (1 + band + band[:, None]), cloth.height)
 
 
