@@ -132,17 +132,9 @@ class Setting:
         """Whether this room has what a share of rooms has, and every one that is dressed in full."""
         return self.full or bool(rng.random() < share)
 
-    def of(self, *roles: str) -> list[Standing]:
-        """The objects of some roles, in the order of the graph."""
-        return [o for o in self.objects.values() if o.row.role in roles]
-
-    def inviting(self, *words: str) -> list[Standing]:
-        """The objects that some small things go with (`echomodel.rows.INVITES`), in the order of the graph."""
-        return [o for o in self.objects.values() if any(word in o.row.invites for word in words)]
-
-    def near(self, word: str) -> list[Standing]:
-        """The objects of a role or a `top`, or that a small thing goes with, in the order of the graph."""
-        return [o for o in self.objects.values() if word in (o.row.role, o.row.top, *o.row.invites)]
+    def near(self, *words: str) -> list[Standing]:
+        """The objects of a role or a `top`, or that a small thing goes with (`echomodel.rows.INVITES`), in order."""
+        return [o for o in self.objects.values() if {o.row.role, o.row.top, *o.row.invites}.intersection(words)]
 
     @property
     def plants(self) -> int:

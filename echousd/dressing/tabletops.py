@@ -150,7 +150,7 @@ BARE = ("coat_rack", "toy_box", "hall")  # tops whose shelves and seats hold no 
 
 def tabletops(setting: Setting) -> None:
     """Things on everything that carries."""
-    for host in setting.of("board", "storage"):
+    for host in setting.near("board", "storage"):
         levels = surfaces(host)
         if not levels:
             continue
@@ -170,7 +170,7 @@ def tabletops(setting: Setting) -> None:
 def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
     rng = setting.rng(host.name, "top")
     taken: set[str] = set()
-    if name == "tv_stand" and not setting.of("screen"):
+    if name == "tv_stand" and not setting.near("screen"):
         _television(setting, host, surface)
     for number, wish in enumerate(setting.story.tops[name]):
         order = [str(k) for k in rng.permutation(wish.of)]
@@ -203,7 +203,7 @@ def _laid(setting: Setting, host: Standing, surface: Surface) -> None:
     rng = setting.rng(host.name, "laid")
     sizes, variant = [usual_size(kind, rng) for kind in COVER], int(rng.integers(1 << 30))
     middle, half = surface.span
-    for seat in setting.of("seat"):
+    for seat in setting.near("seat"):
         local = host.in_plan(seat.position) - middle
         beyond = np.abs(local) - half
         if np.max(beyond) > 0.6 or np.min(beyond) > 0:
