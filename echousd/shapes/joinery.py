@@ -24,6 +24,8 @@ COLLIDERS = 64  # convex pieces of one body at most
 SLACK = 0.003  # metres that a mesh may reach beyond its convex pieces
 MOST = 0.8  # share of what the worst face lacks, from which on a face gets a corner in the same round
 FOLDS = 0.03  # metres that folds of a cover are deep
+# Levels of detail of what is hard and of what is soft, whose form is its mesh's, from the finest to boxes.
+FINENESS = ((FINEST, FINEST), (2, FINEST), (1, FINEST), (1, 2), (1, 1), (0, 1), (0, 0))
 SMALL = 0.002  # share of its box below which a solid alone is no obstacle
 
 
@@ -89,17 +91,19 @@ def _parts(prefix: str, pieces: Sequence[MeshedSolid], body: str) -> list[Part]:
 
 
 def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int, *, round: bool = False) -> list[MeshedSolid]:
-    """The solids as fine as `faces` triangles allow; of too many boxes the smallest are left out and it warns."""
-    for detail in range(FINEST, -1, -1):
-        pieces = pieces_of(solids, size, detail, round=round)
-        if sum(len(piece.faces) for piece in pieces) <= faces:
+    """The solids as fine as `faces` triangles allow, what is soft before what is hard; of too many boxes the smallest
+    are left out and it warns."""
+    soft = np.array([solid.soft for solid in solids if not solid.core])
+    for hard, cloth in FINENESS:
+        pieces = pieces_of(solids, size, np.where(soft, cloth, hard), round=round)
+        count = np.array([len(piece.faces) for piece in pieces])
+        if count.sum() <= faces:
             return pieces
-    volume = [float(np.prod(np.ptp(piece.vertices, axis=0))) for piece in pieces]
-    kept, total = [], 0
-    for number in np.argsort(volume)[::-1].tolist():
-        if total + len(pieces[number].faces) <= faces:
+    kept, left = [], faces
+    for number in np.argsort([-float(np.prod(np.ptp(piece.vertices, axis=0))) for piece in pieces]).tolist():
+        if count[number] <= left:
             kept.append(number)
-            total += len(pieces[number].faces)
+            left -= count[number]
     warnings.warn(f"{faces} faces are too few: {len(pieces) - len(kept)} small solids are left out", stacklevel=2)
     return pieces_of([pieces[number].solid for number in sorted(kept)], size, 0, round=round)
 

@@ -8,28 +8,42 @@ from echomodel.furniture.solids import FINEST, IDENTITY, Array, Ball, Block, Sol
 
 PINCH = 0.11  # of half a pillow's side that its middle stands back behind the corners
 FOOT, SPREAD = 0.15, 1.3  # of a slumped cushion's height, below which it does not lean; by how much it is wider there
-SEAM = 0.04  # of half a pillow's thickness that is left at its seams
+SEAM = 0.025  # of half a pillow's thickness that is left at its seams
+DROOP = 0.25  # of half a pillow's thickness that its corners hang down
+CHOP = 0.42  # of half a pillow's width, how wide a blow to its top dents it
 
 
 @dataclass(frozen=True, eq=False)
 class Pillow(Ball):
     """Two cloths sewn together at four sides and filled, the fuller the more `power`: corners stand out, sides draw
-    in; thin on its least axis. Power 2 is about an ellipse from seam to seam, 5 a board.
+    in and pucker; thin on its least axis. Power 2 is about an ellipse from seam to seam, 5 a board. Its filling has
+    settled by where it lies, so that no two are alike; its corners droop, and `chop` of its height its top is dented.
     """
 
+    soft = True
+    chop: float = 0.0
+
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        count = (4, 6, 8, 12)[detail]
+        count, phase = (4, 8, 10, 12)[detail], 7.0 * float(self.centre @ (1.0, 0.3, 1.7)) + 1.0
         line = np.sin(np.linspace(-1, 1, count + 1) * np.pi / 2)
         u, v = np.meshgrid(line, line, indexing="ij")
-        wrinkles = 0.07 * np.cos(9 * np.arctan2(v, u)) * (u**2 + v**2)
-        full = ((1 - u**2) * (1 - v**2)) ** (1.04 / self.power) * (1 - wrinkles)
+        dent = 0.14 * np.sin(2.2 * u + phase) * np.cos(1.8 * v + 1.6 * phase) - 0.12 * v
+        pulled = 0.3 * np.cos(9 * np.arctan2(v, u) + 0.4 * np.sin(phase)) * np.abs(u * v) ** 0.7
+        seams = 0.2 * (np.sin(9 * v + phase) * u**6 + np.sin(8 * u + 2 * phase) * v**6)
+        full = ((1 - u**2) * (1 - v**2)) ** (1.04 / self.power) * (1 + dent + pulled + seams)
         thin = int(np.argmin(self.half))
         # a ring is one loop around the pillow at one u: over its front, back behind
         u, flat = u[:, :1], np.concatenate([v, v[:, -2:0:-1]], 1)
-        side = np.concatenate([full + SEAM, -full[:, -2:0:-1] - SEAM], 1) / (1 + SEAM)
-        rings = np.stack([side, u * (1 - PINCH * (1 - flat**2)), flat * (1 - PINCH * (1 - u**2))], -1)
-        vertices, faces = loft(np.roll(rings, thin, -1) * self.half)
+        side = np.concatenate([full + SEAM, -full[:, -2:0:-1] - SEAM], 1) - DROOP * (u * flat) ** 2
+        side = side / max(1, np.abs(side).max())
+        vertices, faces = loft(np.roll(np.stack([side, *outline(u, flat, self.chop)], -1), thin, -1) * self.half)
         return vertices, _outward(vertices, faces)
+
+
+def outline(u: Array, v: Array, chop: float = 0.0) -> tuple[Array, Array]:
+    """Places on a pillow, -1 to 1, as its seams draw them in and a blow to its top dents them."""
+    down = chop * np.exp(-((u / CHOP) ** 2)) * np.clip(v, 0, 1) ** 2
+    return u * (1 - PINCH * (1 - v**2)), v * (1 - PINCH * (1 - u**2)) - 2 * down
 
 
 def pillow(centre: Vector, half: Vector, material: str, role: str = "", turn: Array = IDENTITY) -> Pillow:
@@ -53,14 +67,11 @@ class Slumped(Solid):
         return np.stack([x, y, z * (1 + SPREAD * (1 - high) ** 2) - back], 1), faces
 
 
-def seam(wide: float, tall: float) -> Array:
-    """(k, 3): a line around the seam of a pillow that is thin on z, of half sides in metres."""
-    t = np.linspace(-1, 1, 9)[:-1]
-    u, v = (
-        np.concatenate([t, np.ones(8), -t, -np.ones(8), t[:1]]),
-        np.concatenate([-np.ones(8), t, np.ones(8), -t, -np.ones(1)]),
-    )
-    return np.stack([wide * u * (1 - PINCH * (1 - v**2)), tall * v * (1 - PINCH * (1 - u**2)), 0 * u], 1)
+def seam(half: Vector, chop: float = 0.0) -> Array:
+    """(k, 3): a line around the seam of a pillow of `half` sides, thin on z, metres."""
+    t, one = np.sin(np.linspace(-1, 1, 13) * np.pi / 2)[:-1], np.ones(12)  # as of its finest mesh
+    u, v = np.concatenate([t, one, -t, -one, t[:1]]), np.concatenate([-one, t, one, -t, -one[:1]])
+    return np.stack([*outline(u, v, chop), -DROOP * (u * v) ** 2], 1) * half
 
 
 def folds(x: Array, z: Array, phase: Array) -> Array:
@@ -82,18 +93,19 @@ class Cover(Block):
     `depth`: metres from the highest folds to the lowest; `phase` as of `folds`.
     """
 
+    soft = True
     depth: float = 0.03
     phase: Vector = (0.0, 0.0, 0.0)
     falls: bool = False
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         w, h, d = self.half
-        r, steps, phase = min(self.radius, h, w / 2, d / 2), (5, 7, 11, 15)[detail], np.array(self.phase)
+        r, steps, phase = min(self.radius, h, w / 2, d / 2), (5, 8, 14, 19)[detail], np.array(self.phase)
         bend = r * np.pi / 2  # metres of cloth around an edge
         roll, hang = np.linspace(0, bend, 4), bend + np.array([0.3, 0.65, 1.0]) * max(2 * h - r, 1e-3)
         side, over = np.concatenate([roll, hang]), np.linspace(r - w, w - r, steps + 1)[1:-1]
         across = np.concatenate([r - w - side[::-1], over, w - r + side])
-        flat = np.linspace(r - d, d - r, max(3, round(steps * d / w)) + 1)[1:-1]
+        flat = np.linspace(r - d, d - r, max(3, round(1.2 * steps * d / w)) + 1)[1:-1]
         along = np.concatenate([r - d - roll[::-1], flat, d - r + (side if self.falls else roll)])
         s, t = np.meshgrid(across, along)
         q = np.stack([np.maximum(np.abs(s) - w + r, 0), np.maximum(np.abs(t) - d + r, 0)])
@@ -116,7 +128,7 @@ class Cover(Block):
 class Sheet(Solid):
     """Cloth: `front` and `back` (n, m, 3) float are its two sides, point for point, metres."""
 
-    draped = True
+    soft = draped = True
     front: Array = field(default_factory=lambda: np.zeros((2, 2, 3)))
     back: Array = field(default_factory=lambda: np.zeros((2, 2, 3)))
 

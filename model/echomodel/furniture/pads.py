@@ -9,7 +9,7 @@ from echomodel.furniture.solids import FINEST, IDENTITY, Array, Block
 from echomodel.furniture.style import Style
 
 # Role of a cushion -> of how far its middle stands out: how much it is dented, and how deep it puckers at its seams.
-GIVES = {"seat": (0.25, 0.36), "back": (0.7, 0.36), "": (0.3, 0.12)}  # others are firm
+GIVES = {"seat": (0.3, 0.14), "back": (0.45, 0.16), "": (0.3, 0.08)}  # others are firm
 PUCKERS = 34.0  # radians a metre, from one to the next
 # Shares of a cushion's radius from its face to its side: how far out, and how far behind; the last lies on its back.
 OVER, DOWN = np.array([0.0, 0.57, 0.97, 0.8]), np.array([0.0, 0.18, 0.75, np.inf])
@@ -21,6 +21,7 @@ class Pad(Block):
     puckers at its seams by where it stands, so that no two in a row are alike; behind it is flat.
     """
 
+    soft = True
     gives = (0.035, 0.25)
     crown: float = 0.02
 

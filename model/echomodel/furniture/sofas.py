@@ -62,7 +62,7 @@ def upholstered_arms(w: float, foot: float, y: float, d: float, arm: float, styl
         side = cushion(
             (x0, foot, -d / 2 + 0.03), (x1 - 0.016, y - 0.6 * thick, d / 2 - 0.03), replace(style, softness=0.05)
         )
-        return of_role("arm", both(side, pad, *(_piping(pad) if style.piping > 0.55 else ())))
+        return of_role("arm", both(side, pad, *(_piping(pad) if style.piping > 0.3 else ())))
     r = arm * 0.6
     x = (x0 + x1) / 2 - (r - arm / 2) * 0.5
     below = box((x0 + arm * 0.14, foot, -d / 2 + 0.03), (x1 - arm * 0.14, y - r, d / 2 - 0.02), "fabric", 0.03)
@@ -101,23 +101,19 @@ def _cushions(
     """A row of cushions from x0 to x1."""
     edges = pairwise(np.linspace(x0, x1, count + 1))
     pads = [cushion((a - TOUCH, y0, z0), (b + TOUCH, y1, z1), style, **form) for a, b in edges]
-    return [*pads, *(cord for pad in pads if pad.role == "seat" for cord in _piping(pad) if style.piping > 0.55)]
+    return [*pads, *(cord for pad in pads if pad.role == "seat" for cord in _piping(pad) if style.piping > 0.3)]
 
 
 def _piping(pad: Pad) -> list[Solid]:
-    """Cords along the seams of a cushion, above and below its side."""
+    """The cord along the seam of a cushion, above its side."""
     if min(pad.half) < 0.03:
         return []
     r = min(pad.radius, *pad.half)
     sunk = r * (1 - 2**-0.5)
-    a, b = pad.half[0] - sunk, pad.half[2] - sunk
-    plan = superellipse(2 + 1.5 * min(a, b) / (r + 0.01), 24) * (a, b)
-    plan = np.concatenate([plan, plan[:1]])
-    cords: list[Solid] = []
-    for y in (pad.half[1] - sunk, -pad.half[1] + sunk):
-        points = pad.puffed(np.insert(plan, 1, y, axis=1)) @ pad.turn.T + pad.centre
-        cords.append(tube(points, 0.005, pad.material, "seam"))
-    return cords
+    a, y, b = pad.half - sunk
+    plan = superellipse(2 + 1.5 * min(a, b) / (r + 0.01), 20) * (a, b)
+    line = np.insert(np.concatenate([plan, plan[:1]]), 1, y, axis=1)
+    return [tube(pad.puffed(line) @ pad.turn.T + pad.centre, 0.005, pad.material, "seam")]
 
 
 def _couch(

@@ -65,10 +65,11 @@ class Solid:
         joint: how it moves, None = it is fixed.
         core: fills what boards enclose, so that a coarse grid sees one body; it has distances and no mesh.
         gives: metres, and the most as a share of its height, that a seat of it is less full under what lies on it.
-        draped: it lies in folds, which shade as one surface.
+        soft: it is filled or hangs. draped: it lies in folds, which shade as one surface.
     """
 
     gives: ClassVar[tuple[float, float]] = (0.015, 0.1)
+    soft: ClassVar[bool] = False
     draped: ClassVar[bool] = False
     centre: Array = field(default_factory=lambda: np.zeros(3))
     turn: Array = field(default_factory=lambda: IDENTITY)
@@ -105,7 +106,7 @@ class Block(Solid):
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         r = min(self.radius, *(self.half * 0.999))
-        steps = min(detail, 1 if r < 0.008 else 3)
+        steps = min(detail, 1 if r < 0.03 else 3)
         cells = 2 * steps + 1  # on every axis: those of the rounding at either end, and one between
         vertices, faces = cube_surface(1 if r <= 0 else cells)
         if r <= 0 or not steps:
@@ -172,7 +173,7 @@ class Tube(Solid):
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         tangents = np.gradient(self.points, axis=0)
-        circle = superellipse(2.0, (4, 6, 8, 12)[detail]) * self.radius
+        circle = superellipse(2.0, 4 if self.radius < 0.006 else (4, 6, 8, 12)[detail]) * self.radius
         rings, x = [], None
         for point, tangent in zip(self.points, tangents, strict=True):
             y = tangent / np.linalg.norm(tangent)
@@ -323,7 +324,7 @@ class MeshedSolid:
 
 
 def pieces_of(
-    solids: Sequence[Solid], size: np.ndarray | None = None, detail: int = FINEST, *, round: bool = False
+    solids: Sequence[Solid], size: np.ndarray | None = None, detail: int | Array = FINEST, *, round: bool = False
 ) -> list[MeshedSolid]:
     """Every solid meshed, all of them stretched together to fill `size`, standing on y = 0, centred in x and z.
 
@@ -331,10 +332,10 @@ def pieces_of(
         solids: parts in the object's frame, metres.
         size: (3,) float, the box to fill, metres; None keeps the parts' own extents.
         round: fill it in width or in depth, so that what is round stays round.
-        detail: 0 (boxes and hexagons) to 3.
+        detail: 0 (boxes and hexagons) to 3, of all or of each that is seen.
     """
     seen = [solid for solid in solids if not solid.core]
-    meshes = [solid.mesh(detail) for solid in seen]
+    meshes = [solid.mesh(fine) for solid, fine in zip(seen, np.broadcast_to(detail, len(seen)).tolist(), strict=True)]
     lower = np.min([vertices.min(0) for vertices, _ in meshes], axis=0)
     upper = np.max([vertices.max(0) for vertices, _ in meshes], axis=0)
     stretch = np.ones(3) if size is None else np.asarray(size, float) / np.maximum(upper - lower, 1e-9)

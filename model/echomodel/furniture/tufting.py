@@ -14,6 +14,7 @@ BUTTON = ((0.014, -0.003), (0.015, 0.003), (0.008, 0.008))  # half widths of a b
 class Tufted(Block):
     """A padded panel whose front (+z) is drawn in every `apart` metres: to buttons amid diamonds, or along channels."""
 
+    soft = True
     apart: float = 0.2
     channels: bool = False
 
