@@ -153,3 +153,10 @@ def test_padded_panels_have_no_face_without_area(channels):
             vertices, faces = panel.local_mesh(detail)
             one, other = (vertices[faces[:, k]] - vertices[faces[:, 0]] for k in (1, 2))
             assert np.linalg.norm(np.cross(one, other), axis=1).min() > 1e-7, (apart, detail)
+
+
+def test_every_bed_is_made():
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        made = solids("double_bed", draw_style(rng), draw_choices(rng), np.array([1.7, 1.0, 2.1]))
+        assert sum(one.role == "cover" for one in made) == 2  # and a sheet turned back over it
