@@ -24,11 +24,11 @@ from room_sheets import drawn_by_lot, graphs_of
 from echousd import generate
 from echousd.assets.colors import oklab
 from echousd.shapes.finishes.baking import hexadecimal
-from echousd.shapes.finishes.slots import HARMONIES, Harmony
+from echousd.shapes.finishes.slots import HARMONIES
 from echousd.srgb import of_hexadecimal
 
-ROLES = Harmony._fields
-TABLE = np.array([[oklab(np.array([of_hexadecimal(word)]))[0] for word in row] for row in HARMONIES.values()])
+ROLES = list(HARMONIES["oak"])
+TABLE = np.array([[oklab(np.array([of_hexadecimal(word)]))[0] for word in row.values()] for row in HARMONIES.values()])
 MEAN, STD = TABLE.mean(0), TABLE.std(0) + 0.02
 STEPS, BATCH, DRAWS, TIMES = 2500, 64, 16, 24
 # From OKLab to linear RGB.
@@ -119,7 +119,7 @@ def rooms(lot: int, folder: Path, count: int) -> None:
     table = list(HARMONIES)
     draws = drawn(trained(np.arange(len(TABLE)), 7, steps=900), MEAN, np.zeros(len(ROLES), bool))
     for number, colors in enumerate(np.clip((draws @ CONES.T) ** 3 @ LINEAR.T, 0, 1)[:count]):
-        HARMONIES[f"drawn_{number}"] = Harmony(*(hexadecimal(tuple(color)) for color in colors))
+        HARMONIES[f"drawn_{number}"] = dict(zip(ROLES, (hexadecimal(tuple(color)) for color in colors), strict=True))
     folder.mkdir(parents=True, exist_ok=True)
     graphs = list(graphs_of(["samples", "people", "more"]))
     for number, (name, graph, seed) in enumerate(drawn_by_lot(graphs, count, lot)):

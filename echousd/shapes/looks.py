@@ -46,7 +46,7 @@ def look(palette: str, slot: str, variant: int = 0) -> Look:
     """
     harmony, made = HARMONIES[palette], SLOTS[slot]
     word = SECOND.get(made.color, made.color) if variant % 2 else made.color
-    color = mixed(getattr(harmony, word, word), made.mix, made.share)
+    color = mixed(harmony.get(word, word), made.mix, made.share)
     emissive = (GLOW[0], GLOW[1], GLOW[2]) if slot == "shade" else (0.0, 0.0, 0.0)
     how = made.metallic, made.opacity, emissive, made.pattern, made.metres
     return Look(color, made.roughness, *how, *finish_of(palette, slot))

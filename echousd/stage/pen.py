@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from pxr import Sdf, Usd
@@ -106,21 +106,14 @@ def say(spec: Sdf.PrimSpec, values: Mapping[str, Any], apis: Iterable[str] = (),
     return spec
 
 
-class _Property(NamedTuple):
-    name: str
-    type: Sdf.ValueTypeName | None  # None = a relationship
-    variability: Sdf.Variability
-    custom: bool
-    connects: bool
-
-
 @cache
-def _parsed(words: str) -> _Property:
+def _parsed(words: str) -> tuple[str, Sdf.ValueTypeName | None, Sdf.Variability, bool, bool]:
+    """Name, type (None = a relationship) and variability of a property, whether it is custom, and a connection."""
     *before, name = words.split()
     name = name.removesuffix(".connect")
     kind = None if before[-1] == "rel" else Sdf.ValueTypeNames.Find(before[-1])
     variability = UNIFORM if "uniform" in before else Sdf.VariabilityVarying
-    return _Property(name, kind, variability, "custom" in before, words.endswith(".connect"))
+    return name, kind, variability, "custom" in before, words.endswith(".connect")
 
 
 def ops(**steps: tuple[str, Any]) -> dict[str, Any]:

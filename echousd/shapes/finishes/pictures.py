@@ -29,7 +29,7 @@ class Sheet:
     """What colours are laid on, in those of a harmony."""
 
     def __init__(self, name: str, harmony: str) -> None:
-        self.row, self.tones = PRINTS[name], STOCK | HARMONIES[harmony]._asdict()
+        self.row, self.tones = PRINTS[name], {**STOCK, **HARMONIES[harmony]}
         self.aspect, self.seed = ASPECTS[self.row["form"]], crc32(name.encode()) % 9973
         axis = (np.arange(SIZE) + 0.5) / SIZE - 0.5
         self.x, self.y = axis[None] * self.aspect, axis[:, None]

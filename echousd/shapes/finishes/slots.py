@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -54,32 +53,12 @@ def metres_of(slot: str) -> float:
 Color = tuple[float, float, float]
 
 
-class Harmony(NamedTuple):
-    """Colours as sRGB hex, as `harmonies.toml` says which are for what."""
-
-    wall: str
-    floor: str
-    curtain: str
-    linen: str
-    wood: str
-    wood2: str
-    front: str
-    cloth: str
-    cloth2: str
-    rug: str
-    blanket: str
-    accent: str
-    ceramic: str
-    metal: str
-    metal2: str
-
-
 _TABLE = tables("harmonies.toml", __file__)
 FINISHED = {"wood": "wood", "metal": "metal", "plaster": "wall"} | dict.fromkeys(("fabric", "linen", "wool"), "cloth")
 FINISHES: Mapping[str, Mapping[str, tuple[float, float]]] = {name: row.pop("finish") for name, row in _TABLE.items()}
-HARMONIES: Mapping[str, Harmony] = {
-    name: Harmony(**{word: color for shares in row.values() for word, color in shares.items()})
-    for name, row in _TABLE.items()
+# Harmony -> word, as `harmonies.toml` says which are for what -> colour as sRGB hex, in one order.
+HARMONIES: Mapping[str, Mapping[str, str]] = {
+    name: {word: color for shares in row.values() for word, color in shares.items()} for name, row in _TABLE.items()
 }
 
 

@@ -75,7 +75,7 @@ def retrieved(request: ShapeRequest, shapes: str, wishes: Wanted, palette: str) 
     asked = wishes()
     near = shape_nearness(request, shapes, asked) if "guided" in sources.values() else None
     with request.timer.stage("assets"):
-        tones = np.array([linear(color) for color in HARMONIES[palette]])
+        tones = np.array([linear(color) for color in HARMONIES[palette].values()])
         size = np.asarray(request.boxes.size, float)
         pieces = _asked(graph, wanted, size, request.styles)
         chosen, missing = choose(asked, pieces, request.seed, kept=named.chosen, nearness=near, palette=tones)

@@ -105,7 +105,7 @@ def test_pieces_of_no_set_are_of_two_woods_at_most_and_not_all_of_one(room):
         if "room_others_wood" in looks:
             shader = UsdShade.Shader(stage.GetPrimAtPath("/Room/Looks/room_others_wood/image"))
             file = str(shader.GetInput("file").Get().path)
-            assert file.split("_")[1].removesuffix(".jpg") == HARMONIES[palette_of_room(seed)].wood2
+            assert file.split("_")[1].removesuffix(".jpg") == HARMONIES[palette_of_room(seed)]["wood2"]
     assert {"room_wood", "room_others_wood"} <= woods
 
 

@@ -65,8 +65,8 @@ def test_every_slot_has_a_look_in_every_harmony():
 def test_no_cloth_of_furniture_is_nearly_as_bright_as_the_walls(harmony):
     """The second one of some was: sofas of it glared white in the sun."""
     bright, tones = np.array([0.2126, 0.7152, 0.0722]), HARMONIES[harmony]
-    for cloth in (tones.cloth, tones.cloth2):
-        assert bright @ linear(cloth) < 0.7 * bright @ linear(tones.wall)
+    for cloth in (tones["cloth"], tones["cloth2"]):
+        assert bright @ linear(cloth) < 0.7 * bright @ linear(tones["wall"])
 
 
 def test_harmonies_say_how_glossy_and_how_worn_their_materials_are():
@@ -244,7 +244,7 @@ def test_no_two_prints_are_nearly_the_same(what, monkeypatch):
 
 @pytest.mark.parametrize("harmony", HARMONIES)
 def test_what_is_printed_names_colours_and_programs_that_there_are(harmony):
-    tones = HARMONIES[harmony]._asdict().keys() | STOCK.keys()
+    tones = HARMONIES[harmony].keys() | STOCK.keys()
     for name, row in PRINTS.items():
         words = [row.get("on", "paper"), *(word for one in row["of"] for word in one.get("colors", [one.get("color")]))]
         assert all(word in tones or re.fullmatch("[0-9a-f]{6}", word) for word in words), name
