@@ -20,7 +20,7 @@ from echomodel.data.shapeset import ShapeSet
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.samplers import sample
-from echomodel.training.shape_stage import draw_suites, read, shape_loss
+from echomodel.training.shape_stage import draw_suites, shape_loss
 from echomodel.vocabulary import vocabulary
 
 SUITES = 200
@@ -43,7 +43,8 @@ def held_out(model: EchoModel, shapes: ShapeSet) -> HeldOut:
     row = torch.full((len(shapes),), -1)
     row[numbers] = torch.arange(len(numbers))
     coder = model.model.autoencoder
-    latents = torch.cat([coder.encode(read(shapes, part)) for part in np.array_split(numbers, len(numbers) // 16 + 1)])
+    parts = np.array_split(numbers, len(numbers) // 16 + 1)
+    latents = torch.cat([coder.encode(torch.from_numpy(shapes.tsdf(part))) for part in parts])
     styles = torch.from_numpy(np.unique(shapes.style[numbers]))
     return HeldOut(latents, row, torch.from_numpy(np.asarray(shapes.size, np.float32)), styles)
 

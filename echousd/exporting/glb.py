@@ -7,7 +7,6 @@ and knows neither lights nor several materials in one mesh.
 import json
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -69,18 +68,11 @@ def glb(stage: Usd.Stage, reach: Reach) -> bytes:
     return tree.encoded()
 
 
-@dataclass
 class _Tree:
-    """A glTF file as it grows.
+    """A glTF file as it grows; `stage`: what is written, `reach`: where its images may lie."""
 
-    Arguments:
-        stage, reach: what is written, and where its images may lie.
-    """
-
-    stage: Usd.Stage
-    reach: Reach
-
-    def __post_init__(self) -> None:
+    def __init__(self, stage: Usd.Stage, reach: Reach) -> None:
+        self.stage, self.reach = stage, reach
         self.worlds: list[np.ndarray] = []  # of every node, (4, 4) float
         self.tables: dict[str, list[dict[str, Any]]] = {}
         self.lights: list[dict[str, Any]] = []

@@ -7,7 +7,7 @@ import os
 import struct
 import warnings
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -147,7 +147,7 @@ def images_beside(file: Path) -> str:
     return f"{file.stem}_{FOLDER}"
 
 
-def take_assets(layer: Sdf.Layer, package: Package | None) -> Mapping[str, str]:
+def take_assets(layer: Sdf.Layer, package: Package | None) -> None:
     """Point every asset path of a flat layer (attributes, arrays, samples, metadata) into the archive, or nowhere.
 
     Arguments:
@@ -159,7 +159,6 @@ def take_assets(layer: Sdf.Layer, package: Package | None) -> Mapping[str, str]:
     for where, path in asset_paths(specs(layer)):
         renamed[path] = package.take(path, f"<{where}>") if package is not None else ""
     UsdUtils.ModifyAssetPaths(layer, lambda path: renamed.get(path, ""))
-    return renamed
 
 
 def without_clock(archive: bytes) -> bytes:

@@ -18,7 +18,6 @@ from echomodel.late import extra
 from echomodel.roomboxes import RoomBoxes
 from echomodel.text import CachedTextEncoder, ClipTextEncoder, RandomTextEncoder, TextEncoder, edge_text
 from echomodel.training.recipe import Recipe
-from echomodel.training.shape_stage import read
 from echomodel.training.start import data_folder
 from echomodel.training.trainer import Report, Trainer
 from echomodel.vocabulary import vocabulary
@@ -248,7 +247,7 @@ def grids_of(shapes: ShapeSet | PublishedShapes, numbers: np.ndarray, side: int)
     """(K, 1, side, side, side) float32 distances of some shapes in the published frame."""
     if isinstance(shapes, PublishedShapes):
         return shapes.published(numbers, side)
-    return published_grids(read(shapes, numbers), side)
+    return published_grids(torch.from_numpy(shapes.tsdf(numbers)), side)
 
 
 def paper_model(settings: Mapping[str, Any], start: tuple[str, ...] = ()) -> PaperModel:

@@ -108,11 +108,6 @@ def test_names_outside_the_set_are_refused(smoke):
         smoke.index_of("s2_chair")
 
 
-def test_a_set_travels_to_a_worker_process(smoke):
-    copy = pickle.loads(pickle.dumps(smoke))
-    np.testing.assert_array_equal(copy.codes(5), smoke.codes(5))
-
-
 def test_levels_are_fine_about_the_surface():
     values = np.linspace(-1, 1, 4001, dtype=np.float32)
     error = np.abs(LEVELS[quantised(values)] - values)

@@ -115,8 +115,8 @@ def _records(styles: range, names: list[str], seed: int, done: Callable[[int], o
         done((style + 1) * len(names))
 
 
-def write_shard(path: str | os.PathLike[str], records: Iterable[ShapeRecord]) -> int:
-    """Write one shard, complete or not at all, and return the number of its shapes."""
+def write_shard(path: str | os.PathLike[str], records: Iterable[ShapeRecord]) -> None:
+    """Write one shard, complete or not at all."""
     path = Path(path)
     compressor = zstandard.ZstdCompressor(level=COMPRESSION, write_content_size=True)
     blobs, entries, offset = [], [], 0
@@ -129,7 +129,6 @@ def write_shard(path: str | os.PathLike[str], records: Iterable[ShapeRecord]) ->
     with whole_file(path) as beside, beside.open("wb") as file:
         file.write(MAGIC + np.array([len(table)], "<u8").tobytes() + table.tobytes())
         file.writelines(blobs)
-    return len(table)
 
 
 class ShapeSet:
@@ -162,12 +161,6 @@ class ShapeSet:
 
     def __len__(self) -> int:
         return len(self._table)
-
-    def __getstate__(self) -> dict:
-        return {"directory": self.directory}
-
-    def __setstate__(self, state: dict) -> None:
-        self.__init__(state["directory"])  # type: ignore[misc]
 
     def codes(self, index: int) -> np.ndarray:
         """Level numbers (64, 64, 64) uint8 of one shape; `LEVELS[codes]` is its TSDF."""

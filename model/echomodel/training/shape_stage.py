@@ -211,7 +211,7 @@ def encoded_set(autoencoder: Autoencoder, shapes: ShapeSet) -> EncodedShapes:
         raise ValueError(f"{shapes.directory}: is no parametric shape set (every category in every style, in order)")
     device = autoencoder.basis.device
     out = [
-        autoencoder.encode(read(shapes, part).to(device)).half().cpu()
+        autoencoder.encode(torch.from_numpy(shapes.tsdf(part)).to(device)).half().cpu()
         for part in np.array_split(np.arange(len(shapes)), max(1, len(shapes) // 16))
     ]
     held = torch.from_numpy(shapes.held_out.reshape(-1, categories)[:, 0])
@@ -222,14 +222,10 @@ def encoded_set(autoencoder: Autoencoder, shapes: ShapeSet) -> EncodedShapes:
     return EncodedShapes(torch.cat(out), sizes, categories, used, kept)
 
 
-def read(shapes: ShapeSet, numbers: np.ndarray) -> Tensor:
-    """Grids (K, 64, 64, 64) float32 of some shapes."""
-    return torch.from_numpy(shapes.tsdf(numbers))
-
-
 def draw_grids(shapes: ShapeSet, numbers: np.ndarray, count: int, generator: torch.Generator) -> Tensor:
     """Random shapes among `numbers`, mirrored along x at random: (count, 64, 64, 64) float32."""
-    grids = read(shapes, numbers[torch.randint(len(numbers), (count,), generator=generator).numpy()])
+    picked = numbers[torch.randint(len(numbers), (count,), generator=generator).numpy()]
+    grids = torch.from_numpy(shapes.tsdf(picked))
     flip = torch.rand(count, generator=generator) < 0.5
     return torch.where(flip[:, None, None, None], grids.flip(1), grids)
 
@@ -286,7 +282,7 @@ class AutoencoderStage:
         if self.components is None:
             return error, {"reconstruction": error}
         picked = torch.randint(len(self.used), (self.batch,), generator=generator)
-        whole = read(self.shapes, self.used[picked.numpy()]).to(model.device)
+        whole = torch.from_numpy(self.shapes.tsdf(self.used[picked.numpy()])).to(model.device)
         blurred = self.projected(model.autoencoder.encode(whole), generator)
         projected = reconstruction_loss(whole, model.autoencoder.decode(blurred).float())
         return error + projected, {"reconstruction": error, "projected": projected}
@@ -308,7 +304,7 @@ class AutoencoderStage:
         scores: list[dict[str, float]] = []
         through: list[float] = []
         for start in range(0, len(picked), 8):
-            grids = read(self.shapes, picked[start : start + 8]).to(model.device)
+            grids = torch.from_numpy(self.shapes.tsdf(picked[start : start + 8])).to(model.device)
             rebuilt = model.autoencoder(grids)
             errors.append((grids - rebuilt).abs().mean())
             scores += _scores(rebuilt, grids)
