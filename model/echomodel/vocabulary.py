@@ -168,14 +168,12 @@ class Vocabulary:
 
     def _check(self) -> None:
         categories, predicates = ({entry.name for entry in rows} for rows in (self.categories, self.predicates))
+        words = {"coarse": self.coarse_categories, "support": SUPPORTS, "role": ROLES, "stands": STANCES,
+                 "task": TASKS, "like": {"", *categories}}  # fmt: skip
         for row in self.categories:
-            _known(f"category {row.name}", "coarse", (row.coarse,), self.coarse_categories)
-            _known(f"category {row.name}", "support", (row.support,), SUPPORTS)
-            _known(f"category {row.name}", "role", (row.role,), ROLES)
+            for what, allowed in words.items():
+                _known(f"category {row.name}", what, (getattr(row, what),), allowed)
             _known(f"category {row.name}", "belongs_to", row.belongs_to, categories)
-            _known(f"category {row.name}", "stands", (row.stands,), STANCES)
-            _known(f"category {row.name}", "task", (row.task,), TASKS)
-            _known(f"category {row.name}", "like", (row.like,), {"", *categories})
             _known(f"category {row.name}", "invites", row.invites, INVITES)
             _known(f"category {row.name}", "admits", (word for word, _ in row.admits), categories | set(ROLES))
         kinds = {kind.name for kind in self.predicate_kinds}
