@@ -155,6 +155,20 @@ def test_a_bed_behind_a_wardrobe_is_not_before_it():
     assert seen(composition.wardrobe_opens, [bed, ("wardrobe", (1.6, 2.2, 0.6), (0.0, 1.5), 0.0)])[0][1] > 0
 
 
+def test_the_floor_is_as_far_from_pieces_that_stand_square_as_from_all_others():
+    rng = np.random.default_rng(5)
+    boxes = Boxes(rng.uniform(0.4, 1.6, (6, 3)), rng.uniform(-3, 3, (6, 3)), np.pi / 2 * rng.integers(0, 4, 6))
+    plan = plan_of(boxes, ["bookshelf"] * 6, np.array([(-4.0, -3.0), (4.0, -3.0), (4.0, 3.0), (-4.0, 3.0)]))
+    who, points = np.arange(6).reshape(2, 3), composition.floor_points(plan)[0][2]
+    away = abs(points - boxes.position[who][:, :, None, ::2])
+    turned = (np.round(boxes.yaw / (np.pi / 2)) % 2 == 1)[who]
+    half = np.where(turned[..., None], boxes.size[who][..., ::-2], boxes.size[who][..., ::2]) / 2
+    slow = (np.maximum(away - half[:, :, None], 0) ** 2).sum(-1)
+    np.testing.assert_allclose(composition._squares(plan, who, points), slow, atol=1e-9)
+    askew = plan.at(plan.position, plan.yaw + 1e-7)
+    np.testing.assert_allclose(composition._squares(askew, who, points), slow, atol=1e-5)
+
+
 def test_furniture_huddled_at_one_end_leaves_the_floor_unserved():
     one = np.array([(-2.9, -1.7), (-1.5, -1.6), (-2.8, 0.0), (-2.9, 1.7), (-1.5, 1.6), (-1.4, 0.2)])
     other = one * [(1, 1), (-1, 1), (1, 1), (1, 1), (-1, 1), (-1, 1)]  # half of them at the other end
