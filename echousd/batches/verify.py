@@ -140,7 +140,7 @@ INDEX = "index.usda"
 GAP = 2.0  # metres between two rooms
 
 
-def write_index(plan: RunPlan, folder: Path) -> Path:
+def write_index(plan: RunPlan, folder: Path) -> None:
     """Write `index.usda`; rooms are payloads, so that it opens without them (`Usd.Stage.LoadNone`).
 
     Rooms that are missing take no place. Unit and up axis are the first that the plan has; rooms of others are turned.
@@ -172,7 +172,6 @@ def write_index(plan: RunPlan, folder: Path) -> Path:
             else:
                 say(prim, ops(**{"transform:grid": ("matrix4d", Gf.Matrix4d(np.ascontiguousarray(place.T)))}))
     write_all({folder / INDEX: layer_bytes(layer, ".usda")})
-    return folder / INDEX
 
 
 def verify(folder: Path, *, check: bool = False) -> Iterator[tuple[str, str]]:

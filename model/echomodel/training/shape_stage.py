@@ -140,13 +140,10 @@ class ShapeStage:
         rooms = start.rooms(held=False)
         stage = cls(rooms, encoded_set(start.model.autoencoder, start.shapes()), start.recipe.shapes_per_batch)
         if "shape" not in start.loaded and not start.resume:
-            stage.initialise(start.model, start.generator)
+            shapes = stage.shapes  # those of the styles that are trained on
+            used = shapes.styles[:, None] * shapes.categories + torch.arange(shapes.categories)
+            start.model.shape.initialise(shapes.latents[used.flatten()], start.generator)
         return stage
-
-    def initialise(self, model: CompactModel, generator: torch.Generator) -> None:
-        """Fit the denoiser's components to the styles that are trained on."""
-        used = self.shapes.styles[:, None] * self.shapes.categories + torch.arange(self.shapes.categories)
-        model.shape.initialise(self.shapes.latents[used.flatten()], generator)
 
     @torch.no_grad()
     def codes(self, model: CompactModel) -> Tensor:
@@ -265,12 +262,8 @@ class AutoencoderStage:
         """The stage of a recipe; a new autoencoder starts from the shapes' PCA."""
         stage = cls(start.shapes(), start.recipe.shapes_per_batch, start.components)
         if "autoencoder" not in start.loaded:
-            stage.initialise(start.model, start.generator)
+            start.model.autoencoder.initialise(draw_grids(stage.shapes, stage.used, 64, start.generator))
         return stage
-
-    def initialise(self, model: CompactModel, generator: torch.Generator) -> None:
-        """Start from the PCA of patches."""
-        model.autoencoder.initialise(draw_grids(self.shapes, self.used, 64, generator))
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch."""

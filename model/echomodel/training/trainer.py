@@ -86,7 +86,8 @@ class Trainer:
         """Train to the recipe's last step, or to step `until`, or for so many seconds; returns the step reached."""
         recipe, last = self.recipe, self.recipe.steps if until is None else min(until, self.recipe.steps)
         self.folder.mkdir(parents=True, exist_ok=True)
-        log = RunLog(self.folder, self.step)
+        log = self.folder / "log.csv"
+        begin_log(log, self.step)
         started = marked = time.monotonic()
         sums, logged = dict[str, float](), self.step
         self.model.train()
@@ -97,14 +98,14 @@ class Trainer:
                 count = self.step - logged
                 means = {name: value / count for name, value in sums.items()}
                 means["steps_per_second"] = count / (time.monotonic() - marked)
-                log.write(self.step, means)
+                write_log(log, self.step, means)
                 self.report(self.step, means)
                 marked, sums, logged = time.monotonic(), {}, self.step
             if self.step % recipe.validate_every == 0 or self.step == last:
                 scores = self.stage.validate(self.average)
-                log.write(self.step, scores)
+                write_log(log, self.step, scores)
                 self.report(self.step, scores)
-                plot_log(log.path, self.folder / "curves.png")
+                plot_log(log, self.folder / "curves.png")
             if self.step % recipe.save_every == 0 or self.step == last:
                 self.save()
         self.save()
@@ -206,26 +207,17 @@ def step_generator(seed: int, step: int) -> torch.Generator:
     return torch.Generator().manual_seed(mixed)
 
 
-class RunLog:
-    """Appends numbers per step to `log.csv` in long form (step, name, value).
+def begin_log(path: Path, start: int) -> None:
+    """Begin a log in long form (step, name, value); of a run that was cut off, drop the rows after step `start`."""
+    rows = [row for row in read_log(path) if row[0] <= start]
+    with path.open("w", newline="") as handle:
+        csv.writer(handle).writerows([("step", "name", "value"), *rows])
 
-    Arguments:
-        folder: the run's folder.
-        start: steps done before this process; later rows (of a run that was cut off) are dropped.
-    """
 
-    def __init__(self, folder: Path, start: int = 0) -> None:
-        self.path = folder / "log.csv"
-        rows = [row for row in read_log(self.path) if row[0] <= start]
-        with self.path.open("w", newline="") as handle:
-            writer = csv.writer(handle)
-            writer.writerow(["step", "name", "value"])
-            writer.writerows(rows)
-
-    def write(self, step: int, values: dict[str, float]) -> None:
-        """Record the values of one step."""
-        with self.path.open("a", newline="") as handle:
-            csv.writer(handle).writerows([step, name, f"{value:.6g}"] for name, value in values.items())
+def write_log(path: Path, step: int, values: dict[str, float]) -> None:
+    """Append the values of one step to a log."""
+    with path.open("a", newline="") as handle:
+        csv.writer(handle).writerows([step, name, f"{value:.6g}"] for name, value in values.items())
 
 
 def read_log(path: Path) -> list[tuple[int, str, float]]:
