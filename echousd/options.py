@@ -5,8 +5,7 @@ Flags of commands, `batch.toml`, `--set`, the manifest and the signatures of Pyt
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection
 from inspect import Parameter, signature
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args
@@ -163,27 +162,6 @@ def words_of(field: FieldInfo) -> str:
     extra: Any = field.json_schema_extra
     literal = [str(word) for word in get_args(field.annotation) if isinstance(word, str)]
     return extra["words"] or "|".join(literal)
-
-
-def _ask(help: str) -> Any:
-    return field(default=(), metadata={"help": help})
-
-
-@dataclass(frozen=True)
-class EditRequest:
-    """Changes to one room, in the words of the command line; all of a kind are applied in turn, the kinds as here."""
-
-    remove: Sequence[str] = _ask("Object to remove.")
-    unrelate: Sequence[str] = _ask("Relation to take out.")
-    relabel: Sequence[str] = _ask("Other category in its place, name:category.")
-    add: Sequence[str] = _ask("Object to add, as name:category.")
-    relate: Sequence[str] = _ask('Relation to add: "stool close by bed".')
-    lock: Sequence[str] = _ask("Object that stays as it stands.")
-    unlock: Sequence[str] = _ask("Object that may move and change again.")
-    move: Sequence[str] = _ask("Where to, name:x,z or name:x,y,z, metres.")
-    turn: Sequence[str] = _ask("Heading, name:degrees; 0 looks along +Z.")
-    resize: Sequence[str] = _ask("Size at heading 0, name:x,y,z, metres.")
-    restyle: Sequence[str] = _ask("Style, name:style, or room:industrial; without a style none.")
 
 
 Function = TypeVar("Function", bound=Callable[..., Any])

@@ -14,7 +14,7 @@ from echousd.cli.output import report, say, say_done, telling_faults
 
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
-    from echousd.options import EditRequest
+    from echousd.graph.changes import EditRequest
 
 check_output, held, writing = (Late(f"echousd.folder.folder:{word}") for word in ("check_output", "held", "writing"))
 check_ours, own_root, room_at = (Late(f"echousd.folder.found:{word}") for word in ("check_ours", "own_root", "room_at"))
@@ -33,8 +33,8 @@ def edit(
     Every option may be given several times.
     """
     from echousd.folder.found import is_home, refuse_house
+    from echousd.graph.changes import EditRequest
     from echousd.make.wishes import wished
-    from echousd.options import EditRequest
 
     asked = {kind: changes.pop(kind, None) for kind in EditRequest.__dataclass_fields__}
     wishes = EditRequest(**{kind: words for kind, words in asked.items() if words})

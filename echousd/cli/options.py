@@ -130,7 +130,8 @@ def click_options(*flags: Parameter) -> list[Any]:
 
 
 def _flags(*, edits: bool, asks: bool, batch: bool) -> list[Parameter]:
-    from echousd.options import GROUPS, OF_NEW, EditRequest, RoomOptions
+    from echousd.graph.changes import EditRequest
+    from echousd.options import GROUPS, OF_NEW, RoomOptions
 
     table = RoomOptions
     if batch:

@@ -12,11 +12,11 @@ from echomodel.vocabulary import vocabulary
 from echousd.assets.reference import joined
 from echousd.folder.found import own_root
 from echousd.graph import GraphError, Node, SceneGraph
+from echousd.graph.changes import EditRequest
 from echousd.graph.starting import ONE_IS_ENOUGH
 from echousd.graph.text import stating, without
 from echousd.graph.titles import composed, identifier_of, is_title, name_of
 from echousd.make.reading import SavedRoom, read_room
-from echousd.options import EditRequest
 from echousd.place.living import living_faults
 from echousd.room import RoomData
 from echousd.stage.files import open_stage

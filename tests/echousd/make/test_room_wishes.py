@@ -12,9 +12,9 @@ from small_room import BARE, StandIn, saved_room, small_graph
 
 import echousd
 from echousd.graph import GraphError
+from echousd.graph.changes import EditRequest
 from echousd.make.reading import read_room
 from echousd.make.wishes import wished
-from echousd.options import EditRequest
 
 
 @pytest.fixture(autouse=True)
