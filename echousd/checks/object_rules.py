@@ -16,8 +16,9 @@ from echousd.stage.boxes import read_small
 from echousd.stage.contents import components, room_frame, words_of
 from echousd.stage.encoding import StageError
 from echousd.stage.forms import shown
-from echousd.stage.labels import LABELS_SCHEMA, SHELL, ade20k, is_structure, known_category, spaced
+from echousd.stage.labels import LABELS_SCHEMA, is_structure, known_category, spaced
 from echousd.stage.read import StatedTwice, find_rooms, node_names, relation_of, room_graph, value
+from echousd.stage.taxonomy import SHELL, ade20k
 from echousd.stage.values import UNREADABLE, lineage, targets, texts
 
 UPRIGHT = 0.5  # cosine of the angle between an object's up and the room's

@@ -17,8 +17,9 @@ from echousd.checks.reading import Reading
 from echousd.graph.nodes import HEIGHT
 from echousd.place.geometry import SOLID, TOUCH, Collision, Floor, depth_inside, pair_indices, separation
 from echousd.stage.contents import RoomContents, RoomObject, Shape, Surrounding, surroundings
-from echousd.stage.labels import SHELL, known_category
+from echousd.stage.labels import known_category
 from echousd.stage.read import RoomPrims
+from echousd.stage.taxonomy import SHELL
 
 DRESSED = "Dressing"  # name of the group that holds the small things of a room
 OUTSIDE = 0.03  # metres beyond the floor's edge

@@ -15,9 +15,9 @@ from echousd.options import Look
 from echousd.shapes.geometry import CREASE, Geometry
 from echousd.shapes.looks import alternatives, look, palette_for
 from echousd.shapes.surface import Surface, surfaces
-from echousd.stage.labels import ade20k
 from echousd.stage.paths import CLASSES, DESCRIPTION, GEO, MTL, ROOM, class_path, coarse_name, payload_name, piece_path
 from echousd.stage.pen import Pen, ops, say
+from echousd.stage.taxonomy import ade20k
 from echousd.stage.units import METRES
 
 move_room, rescale, turn_up = lates("echousd.stage.turning", "move_room", "rescale", "turn_up")

@@ -27,7 +27,6 @@ from echousd.shapes.styles import ROOM_STYLE
 from echousd.shapes.surface import Surface, surfaces
 from echousd.stage.encoding import relation_name
 from echousd.stage.files import layer_bytes
-from echousd.stage.labels import ade20k, word_of
 from echousd.stage.paths import (
     DRESSING,
     OBJECTS,
@@ -40,6 +39,7 @@ from echousd.stage.paths import (
     piece_path,
 )
 from echousd.stage.pen import Pen, layout_pens, ops
+from echousd.stage.taxonomy import ade20k, word_of
 from echousd.stage.write import graph_layer as write_graph_layer
 
 if TYPE_CHECKING:

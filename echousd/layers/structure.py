@@ -24,9 +24,9 @@ from echousd.shapes.matter import hull_moments
 from echousd.shapes.surface import Surface, surfaces
 from echousd.shapes.walls import COVED, THICKNESS, ShellPart, ShellPiece, slab, wall_name, walls
 from echousd.stage import encoding
-from echousd.stage.labels import ade20k
 from echousd.stage.paths import OPENINGS, SHELL, piece_name
 from echousd.stage.pen import Pen, ops
+from echousd.stage.taxonomy import ade20k
 
 beams = Late("echousd.shapes.bays:beams")
 

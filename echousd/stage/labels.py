@@ -1,14 +1,11 @@
-"""What prims are called: ADE20K names for ours, labels of those of other people, and names where there are none."""
+"""What other people's prims are called: semantics labels, and names where there are none."""
 
 import re
 from collections.abc import Iterator
 
 from pxr import Usd
 
-from echomodel.dressing import SMALL
 from echomodel.vocabulary import normalised, vocabulary
-from echousd.graph import Node
-from echousd.graph.nodes import OBSTACLE
 from echousd.stage.values import texts
 
 LABELS_SCHEMA = "SemanticsLabelsAPI:"
@@ -16,22 +13,6 @@ OLD_SCHEMA = "SemanticsAPI:"  # Omniverse before UsdSemantics
 STRUCTURE = frozenset(
     {"floor", "wall", "walls", "ceiling", "door", "window", "room", "building", "curtain", "blind", "rug"}
 )
-# Parts of a room's shell -> their ADE20K names, of its 150 scene-parsing classes.
-SHELL = {name: name for name in ("floor", "wall", "ceiling", "door")} | {"beam": "ceiling", "window": "windowpane"}
-
-
-def word_of(node: Node) -> str:
-    """The word for what an object is: its category, or `OBSTACLE` for what stands in the way and is no furniture."""
-    return OBSTACLE if node.obstacle else node.category
-
-
-def ade20k(word: str) -> str:
-    """The ADE20K class of a category of the vocabulary or of a part of the shell; raises `UnknownWord`."""
-    if word == OBSTACLE:
-        return "box"
-    if word in SMALL:
-        return SMALL[word].ade20k
-    return SHELL[word] if word in SHELL else vocabulary().category(word).ade20k
 
 
 def labels(prim: Usd.Prim) -> Iterator[str]:

@@ -12,7 +12,7 @@ from echousd.shapes.geometry import CREASE, DRAPED
 from echousd.shapes.looks import SHOWN, alternatives, look, palette_for
 from echousd.shapes.sources.whole import BANDS, cut, material_groups
 from echousd.shapes.surface import creased_normals, surfaces, unshared
-from echousd.stage.labels import ade20k
+from echousd.stage.taxonomy import ade20k
 
 
 def surface(mesh, groups, *, atlas=False, crease=CREASE):

@@ -3,7 +3,7 @@
 from echomodel.dressing import SMALL
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
-from echousd.stage.labels import SHELL, ade20k
+from echousd.stage.taxonomy import SHELL, ade20k
 
 CLASSES = """
 airplane; animal; apparel; arcade machine; armchair; ashcan; awning; bag; ball; bannister; bar; barrel; base;
