@@ -24,6 +24,7 @@ from echousd.shapes.matter import weighed
 
 ORIGIN = Origin("dressing")
 SKIN = 1e-4  # metres that count as nothing
+EDGE = 0.01  # metres that a small thing keeps from the edge of what it stands on
 APART = 0.008  # metres of air between a small thing and everything else
 BESIDE = 0.04  # and between two that stand beside each other, each with its margin
 

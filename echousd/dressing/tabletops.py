@@ -13,14 +13,14 @@ from echomodel.boxes2d import turned
 from echomodel.dressing import KINDS, usual_size
 from echomodel.late import Late
 from echomodel.triangles import area_normals, spans_of
-from echousd.dressing.setting import APART, Setting, Standing, Thing, around, rectangle
+from echousd.dressing.setting import APART, EDGE, Setting, Standing, Thing, around, rectangle
 from echousd.shapes.geometry import Geometry
 
 book_size, fitting_books = (Late(f"echomodel.dressing.books:{name}") for name in ("book_size", "fitting_books"))
+laid = Late("echousd.dressing.laid:laid")
 
 LEVEL = 0.006  # metres: what differs less in height is one level
 LEAST = 0.012  # m² of a level
-EDGE = 0.01  # metres that things keep from the edge
 AIR = 0.6  # metres of air above a top that nothing covers
 ROW = 0.8  # metres of books side by side at most, so that all are drawn
 
@@ -137,7 +137,6 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
 
 
 LAID = 0.6  # share of rooms whose dining table is set
-COVER = {"plate": (0.0, 0.17), "napkin": (-0.225, 0.15), "glass": (0.2, 0.28)}  # metres to the right, and from the edge
 VOLUMES = 7  # kinds of single books that a row is of
 BETWEEN = 0.002  # metres from book to book
 EYE = 1.7  # metres: what is put higher cannot be seen
@@ -156,7 +155,7 @@ def tabletops(setting: Setting) -> None:
             continue
         name = host.row.top
         if name == "dining_table" and setting.has(LAID, setting.rng(host.name, "set")):
-            _laid(setting, host, levels[0])
+            laid(setting, host, levels[0])
         footprint = float(host.size[0] * host.size[2])
         tops = [s for s in levels if s.area.area > 0.3 * footprint and s.host.position[1] + s.y < EYE]
         if name in setting.story.tops and tops:
@@ -196,27 +195,6 @@ def _television(setting: Setting, host: Standing, surface: Surface) -> None:
         size = np.array([wide, round(0.56 * wide + 0.045, 3), 0.2])
         if surface.put(setting, "television", spots, size=size, variant=variant):
             return
-
-
-def _laid(setting: Setting, host: Standing, surface: Surface) -> None:
-    """A plate before every seat at a table, a napkin with a knife and a fork at its left, a glass behind it."""
-    rng = setting.rng(host.name, "laid")
-    sizes, variant = [usual_size(kind, rng) for kind in COVER], int(rng.integers(1 << 30))
-    middle, half = surface.span
-    for seat in setting.near("seat"):
-        local = host.in_plan(seat.position) - middle
-        beyond = np.abs(local) - half
-        if np.max(beyond) > 0.6 or np.min(beyond) > 0:
-            continue
-        side, out = int(np.argmax(beyond)), np.zeros(2)
-        out[side] = np.sign(local[side])
-        right = np.array([out[1], -out[0]])  # of who sits there
-        edge = np.where(out == 0.0, np.clip(local, 0.29 - half, half - 0.29), out * half)
-        turn = float(np.arctan2(-out[0], -out[1]))
-        for (kind, (aside, ahead)), size in zip(COVER.items(), sizes, strict=True):
-            room = half - np.roll(size[[0, 2]], 1 - side) / 2 - EDGE
-            share = (edge + aside * right - ahead * out) / np.maximum(room, 1e-6)
-            surface.put(setting, kind, [tuple(share)], size=size, turn=turn, variant=variant, word=seat.name)
 
 
 def stocked(setting: Setting, host: Standing, surface: Surface) -> None:

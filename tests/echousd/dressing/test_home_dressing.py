@@ -14,6 +14,7 @@ from echomodel.furniture import draw_choices, draw_style, solids
 from echomodel.openings import Opening
 from echousd.dressing import floors, soft_tops, tabletops, upholstery, walls
 from echousd.dressing.dress import DECOR, RULES, bare_walls
+from echousd.dressing.laid import laid
 from echousd.dressing.setting import Setting, standing
 from echousd.dressing.stories import story
 from echousd.shapes.geometry import Origin
@@ -332,7 +333,7 @@ def test_a_set_table_has_a_napkin_at_the_left_and_a_glass_at_the_right_of_each_p
     seats = [(0.0, 0.7, np.pi), (0.0, -0.7, 0.0)]
     sat = [stood("bench", 1, [x, 0.0, z], yaw, f"seat_{n}") for n, (x, z, yaw) in enumerate(seats)]
     room.objects = {one.name: one for one in (table, *sat)}
-    tabletops._laid(room, table, tabletops.surfaces(table)[0])
+    laid(room, table, tabletops.surfaces(table)[0])
     plates = [thing for thing in room.placed if thing.kind == "plate"]
     assert len(plates) == len(seats)
     for plate in plates:
