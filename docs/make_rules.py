@@ -23,8 +23,8 @@ def page() -> str:
         "# Rules", "",
         "Made by `python docs/make_rules.py` from `echomodel.objective`, the one table by which rooms are searched,",
         "learned, placed, checked and explained. In a conflict the kinds count in this order. A term is kept where",
-        "its margin is not negative; a search asks for its slack on top, and pays 2 for a broken term and its weight",
-        "for each unit that is missed.", "",
+        "its margin is not negative; a search asks for its slack on top (in brackets: once nothing is wrong any",
+        "longer), and pays 2 for a broken term and its weight for each unit that is missed.", "",
         "![Rooms that break a term each](rules.png)", "",
         "*A room from above for each term that breaks it; what is at fault red, what it is about orange, a thick side",
         "the front; `python docs/make_rule_pictures.py`. Terms of fitted kitchens and baths are missing, as the room",
@@ -42,7 +42,8 @@ def page() -> str:
 def _row(term: Term) -> str:
     says = "; ".join(f"“{sentence}”" for sentence in term.says) if term.kind != "relations" else ""
     means = f"{term.means.rstrip('.')}. {says}".strip()
-    return f"| {term.name} | {means} | {UNITS[term.unit]} | {term.slack:g} | {term.weight:g} | {term.source} |"
+    slack = f"{term.slack:g} ({term.ease:g})" if term.ease else f"{term.slack:g}"
+    return f"| {term.name} | {means} | {UNITS[term.unit]} | {slack} | {term.weight:g} | {term.source} |"
 
 
 if __name__ == "__main__":

@@ -2,7 +2,8 @@
 
 First every piece, anchors before those who attend them, in rooms of many pieces one put in after the other; then what
 the terms that are still missed are about: single pieces and groups; then such pieces are taken out and put in anew, the
-worst first. The same for equal settings on any machine: costs are compared to a ten-thousandth, of equal ones the first
+worst first. Where nothing is wrong any longer, what has little room is moved to where there is more (`Term.ease`).
+The same for equal settings on any machine: costs are compared to a ten-thousandth, of equal ones the first
 counts.
 """
 
@@ -35,6 +36,7 @@ filled, involved, part_of, rebuilt, reseated, with_along = lates(
 JUDGED = 48  # poses that are judged at once
 MANY = 12  # pieces from which on a room is built up, one piece after the other
 SWEEPS = 3  # times that what misses something is looked at after the first time
+EASED = 3  # times that what has little room is looked at where nothing is wrong
 BUDGET, PIECES = 4500, 15  # poses that are judged in all, each a whole room; more in halls, of more pieces than that
 GAIN = 1e-3  # by which a move must be better
 WORTH = 0.5  # that a sweep must gain for another one
@@ -470,14 +472,30 @@ class Search:
             cost, still = self.faults(after)
             if cost < total - GAIN:
                 state, total, wrong = self.mended(after, cost, still)
-        if not wrong and (uneasy := self.faults(state, UNEASY)[1]):
-            self.fine = True
-            after = self.swept(state, uneasy)
-            self.fine = False
-            cost, still = self.faults(after)
-            if not still and cost < total - GAIN:
-                state, total = after, cost
+        if not wrong:
+            state, total = self.eased(state, total)
         return Arranged(state, total, self.judged, tuple(wrong))
+
+    def eased(self, state: State, total: float) -> tuple[State, float]:
+        """A state where nothing is wrong after what has little room was moved to where there is more, and its cost."""
+        usual, self.fine = self.terms, True
+        eased = tuple(term.eased for term in usual)
+        for _ in range(EASED):
+            self.terms = eased
+            before, uneasy = self.faults(state, UNEASY)
+            anchors = [k for k in self.problem.anchor[uneasy].tolist() if k >= 0]
+            boxes = [i for i in dict.fromkeys([*anchors, *uneasy]) if not self.seated[i]]  # who sits goes along
+            after = self.swept(state, boxes)
+            gained = before - self.faults(after)[0]
+            self.terms = usual
+            cost, wrong = self.faults(after)
+            if wrong or gained < GAIN:
+                break
+            state, total = after, cost
+            if gained < UNEASY:
+                break
+        self.fine = False
+        return state, total
 
     def _first(self) -> tuple[State, float, list[int]]:
         """Where all were moved once from where they were drawn and what is missed was mended, as `mended`."""

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from echomodel.arrays import Array, at_least, at_most, cast, dot, full, held, kit, picked, put
+from echomodel.arrays import Array, at_least, at_most, cast, dot, full, held, kit, once, picked, put
 from echomodel.objective.company import first_of
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Found, Plan, found, nobody, worst
 from echomodel.openings import BOARD, SLID, Opening, hinge_point, inward_normal, segment
@@ -133,25 +133,45 @@ def before_fronts(plan: Plan, opens: Array, depth: Array) -> Found:
 
 
 def bed_side_free(plan: Plan) -> Found:
-    """At least one long side of a bed can be reached, below the nightstands, both of one for two where there is room;
-    the other is at the wall, not near it: that of a narrow child's bed always, or at something."""
-    beds = plan.of("bed") & plan.standing
-    who, xp = plan.those(beds), plan.kit
+    """A long side of a bed can be reached, below the nightstands, both of one for two where there is room."""
+    who, free, _, beside = _bed_sides(plan)
+    xp, two = plan.kit, (plan.size[who, 0] > FOR_TWO) & ~_of_child(plan)[who]
+    most, least = xp.maximum(*free), xp.minimum(*free)
+    both = xp.where(two, xp.maximum(least - BEDSIDE, SPARE + least - most), FAR)
+    seen = first_of(who, who, [most - xp.where(two, AT_TWO, BEDSIDE), both], [most, least])
+    told = xp.where((free[0] < free[1]) ^ (seen.words == 0), *beside)  # who is at the side that is told
+    return found(who, seen.margin, other=told, measure=seen.measure, words=seen.words)
+
+
+def bed_along_wall(plan: Plan) -> Found:
+    """A bed is at a wall, or so far off that one gets in there; a child's narrow one always is, or at something."""
+    who, free, gaps, _ = _bed_sides(plan)
+    child, xp = _of_child(plan)[who], plan.kit
+    near = xp.where(child, xp.minimum(*free), xp.minimum(*gaps))
+    least = xp.where(child, xp.where(plan.size[who, 0] > FOR_TWO, AMID, FAR), BEDSIDE)
+    return found(who, xp.maximum(near - least, SLIT - near), measure=near)
+
+
+def _of_child(plan: Plan) -> Array:
+    return plan.which(lambda kind: kind.sgfront == "kids_bed")
+
+
+@once
+def _bed_sides(plan: Plan) -> tuple[Array, list[Array], list[Array], list[Array]]:
+    """(P,) int64, beds; and for each side (P,) metres that are free there, those to the wall, and who is next, -1 = a
+    wall."""
+    beds, xp = plan.of("bed") & plan.standing, plan.kit
+    who, free, gaps, beside = plan.those(beds), [], [], []
     i, j = plan.pairs(beds, plan.standing & ~plan.stands("head") & ~plan.movable, least=True)
     lateral, aside, along = _at_side(plan, j, i)
-    free, gaps = [], []
     for sign in (1.0, -1.0):
-        beside = xp.maximum(xp.where(sign * lateral > 0, aside, FAR), 0.4 * plan.size[i, 2] - along)
+        off = xp.maximum(xp.where(sign * lateral > 0, aside, FAR), 0.4 * plan.size[i, 2] - along)
         way = sign * plan.axes(who)[0]
         gaps.append(to_wall(plan, who, plan.position[who][:, ::2] + way * plan.size[who, :1] / 2, way))
-        free.append(xp.minimum(plan.worst(i, beside, j)[0][who], gaps[-1]))
-    most, least, wall = xp.maximum(*free), xp.minimum(*free), xp.minimum(*gaps)
-    child = plan.which(lambda kind: kind.sgfront == "kids_bed")[who]
-    wide, near = plan.size[who, 0] > FOR_TWO, xp.where(child, least, wall)
-    two, free_of = wide & ~child, xp.where(child, xp.where(wide, AMID, FAR), BEDSIDE)
-    both = xp.where(two, xp.maximum(least - BEDSIDE, SPARE + least - most), FAR)
-    margins = [most - xp.where(two, AT_TWO, BEDSIDE), both, xp.maximum(near - free_of, SLIT - near)]
-    return first_of(who, xp.full_like(who, -1), margins, [most, least, near])
+        nearest, about = (of[who] for of in plan.worst(i, off, j))
+        free.append(xp.minimum(nearest, gaps[-1]))
+        beside.append(xp.where(nearest < gaps[-1], about, -1))
+    return who, free, gaps, beside
 
 
 def _at_side(plan: Plan, i: Array, j: Array) -> tuple[Array, Array, Array]:

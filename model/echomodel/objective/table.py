@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from echomodel.arrays import Array, at_least, at_most, repeat
@@ -51,6 +51,7 @@ class Term:
         source: where its numbers come from.
         kind: one of `KINDS`. unit: of the margin: `m`, `rad` or `share`.
         slack: what a search and a loss ask for beyond the margin, in its unit.
+        ease: the same of a room where nothing is wrong any longer, 0 = no more than its slack.
         weight: of a missed unit; none counts twice what breaking it at all does.
     """
 
@@ -60,7 +61,13 @@ class Term:
     kind: str = "living"
     unit: str = "m"
     slack: float = 0.01
+    ease: float = 0.0
     weight: float = 1.0
+
+    @property
+    def eased(self) -> Term:
+        """The same term, as it is asked of a room where nothing is wrong any longer."""
+        return replace(self, slack=max(self.slack, self.ease))
 
     @property
     def name(self) -> str:

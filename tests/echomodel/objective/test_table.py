@@ -51,6 +51,13 @@ def test_names_are_there_once_and_every_term_explains_itself():
     assert [KINDS.index(term.kind) for term in TERMS] == sorted(KINDS.index(term.kind) for term in TERMS)
 
 
+def test_a_room_where_nothing_is_wrong_is_asked_for_more_by_some_terms():
+    eased = {term.name for term in TERMS if term.eased.slack > term.slack}
+    assert eased == {term.name for term in TERMS if term.ease}
+    assert {"chair_pulls_out", "groups_apart", "bed_side_free"} <= eased
+    assert all(term.eased.find is term.find and term.eased.weight == term.weight for term in TERMS)
+
+
 @pytest.mark.parametrize("term", [term for term in TERMS if isinstance(term.find, OfKind)], ids=lambda term: term.name)
 def test_terms_that_wait_for_a_kind_find_nothing_in_rooms_without(term):
     others = [row for row in vocabulary().categories if not term.find.kind(row)]

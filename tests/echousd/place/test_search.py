@@ -549,6 +549,32 @@ def test_what_is_barely_as_it_shall_be_is_moved_where_nothing_is_wrong(monkeypat
     assert abs(found.state.position[1, 0] - found.state.position[0, 0]) < 0.05
 
 
+def test_a_table_goes_with_its_chairs_to_where_these_have_more_room_where_nothing_is_wrong(monkeypatch):
+    """Drawn 0.33 m from the wall behind two of its chairs, with 1.13 m behind those opposite."""
+    table, chair, floor = (1.6, 0.75, 0.8), (0.45, 0.9, 0.5), FLOOR * (0.8, 0.85)
+    drawn = ((0.0, 0.0, -0.4), (-0.4, 0.0, -1.12), (0.4, 0.0, -1.12), (-0.4, 0.0, 0.32), (0.4, 0.0, 0.32))
+    words, yaw = ("dining_table", *["dining_chair"] * 4), (0.0, 0.0, 0.0, np.pi, np.pi)
+    search, state = searched(words, (table, *[chair] * 4), drawn, yaw, floor=floor)
+    search = Search(search.problem, tuple(term for term in TERMS if term.name != "ends_used"))
+    monkeypatch.setattr(search, "_first", lambda: (state, *search.faults(state)))
+    assert not search.faults(state)[1]
+    found = search.run()
+    assert not found.wrong
+    behind = found.state.position[:, 2]
+    assert 1.45 + behind[1:3].min() > 0.58
+    assert 1.45 - behind[3:].max() > 0.58
+    assert np.allclose(behind[1:] - behind[0], [-0.72, -0.72, 0.72, 0.72])  # as they sat
+
+
+def test_a_bed_without_room_beside_it_tells_who_is_there():
+    plan = plan_of(
+        Boxes(torch.tensor([(1.6, 0.9, 2.0), (1.0, 0.9, 0.5)]), torch.tensor([(-1.68, 0.0, -0.95), (-0.1, 0.0, -0.5)]),
+              torch.tensor([0.0, -np.pi / 2])), ["double_bed", "dresser"], FLOOR,
+    )  # fmt: skip
+    seen = next(term for term in TERMS if term.name == "bed_side_free").find(plan)
+    assert seen.other.tolist() == [1]
+
+
 def test_what_stands_at_a_leafs_edge_is_moved_a_hand_away_from_it():
     door = Opening("door", "door", 3, 0.3, 0.9, 2.0)  # the left wall, z from 0.8 to 1.7; the leaf reaches x = -1.6
     done = place_boxes(
