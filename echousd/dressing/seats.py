@@ -81,7 +81,7 @@ def at_back(seat: Seat, end: float, size: np.ndarray) -> np.ndarray | None:
 
 def over_arm(host: Standing, seat: Seat, side: float, rng: np.random.Generator) -> Thing | None:
     """A throw over the arm of a sofa at a side, below 0 the left one; None where there is none to hang it over."""
-    z, deep = 0.16 * float(host.size[2]), float(rng.uniform(0.34, 0.46))
+    z, deep = 0.12 * float(host.size[2]), float(rng.uniform(0.42, 0.6))
     level = seat.height[:, np.abs(seat.z - z) < deep / 2].min(1)
     arm = (level > seat.level + RIDGE) & (np.sign(side) * seat.x > 0.3 * host.size[0])
     if not 0.08 < arm.sum() * STEP < 0.34:

@@ -146,7 +146,7 @@ def woven(threads: int = 176) -> Relief:
     over = np.sign(np.sin(np.pi * threads * u) * np.sin(np.pi * threads * v))
     height, (folds, lit) = np.where(over > 0, np.abs(warp), np.abs(weft)), creased()
     fleck = 0.6 * noise(31, 60.0, 160.0) + 0.6 * noise(32, 160.0, 60.0)
-    return Relief(1 + 0.12 * (height - 0.6) + 0.035 * fleck + 0.055 * lit, 0.0001 * height + 0.4 * folds)
+    return Relief(1 + 0.12 * (height - 0.6) + 0.035 * fleck + 0.045 * lit, 0.0001 * height + 0.4 * folds)
 
 
 def creased() -> tuple[np.ndarray, np.ndarray]:
