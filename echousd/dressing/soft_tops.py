@@ -197,5 +197,5 @@ def across(
         for k in rows[:-1]
     ]
     lie = tuple(np.round(np.clip(top - np.array(cells), 0.0, BOARD), 3).ravel().tolist())
-    spot = host.to_room(np.array([[centre, top + 0.019 - size[1], z]]))[0]
+    spot = host.to_room(np.array([[centre, top + 0.024 - size[1], z]]))[0]
     return Thing("throw", size, spot, host.yaw, host.name, int(rng.integers(1 << 30)), lie=lie)

@@ -158,7 +158,7 @@ def throw(size: Size, rng: np.random.Generator, lie: tuple[float, ...] = ()) -> 
         x, deep = np.meshgrid(line[:, 0], z)
         hanging = np.clip((h - line[:, 1]) / max(h, 1e-6), 0, 1)
         ripple = 0.018 * (1 + np.sin(2 * np.pi * deep / d * 2.5 + phase[0] + np.sign(x))) * hanging  # away from the bed
-        skew = (0.03 * np.sin(2.2 * x + phase[1]) + 0.17 * (phase[2] / 3 - 1) * x) * (1 - hanging / 2)
+        skew = (0.03 * np.sin(2.2 * x + phase[1]) + 0.09 * (phase[2] / 3 - 1) * x) * (1 - hanging / 2)
         y = line[:, 1] - lower * (1 - hanging) - GATHERED * folds(x, 2.5 * deep, phase) * (1 - hanging)
         return np.stack([x + np.sign(x) * ripple, y, deep * (1 - 0.16 * np.sin(1.4 * x + phase[2]) ** 2) + skew], -1)
 

@@ -9,9 +9,12 @@ from echomodel.boxes2d import upright
 from echomodel.dressing import usual_size
 from echomodel.dressing.textiles import LEAN
 from echomodel.triangles import joined
+from echousd import generate
+from echousd.dressing.dress import dressed
 from echousd.dressing.seats import at_back, standing_on
 from echousd.dressing.setting import ORIGIN, geometry_of, standing
-from echousd.dressing.soft_tops import STEP, Seat, let_down
+from echousd.dressing.soft_tops import STEP, Seat, heights_of, let_down
+from echousd.graph import SceneGraph
 from echousd.shapes.geometry import Collider, Geometry, Part
 from echousd.shapes.hulls import convex_hull, depth, forbidden_moves
 
@@ -68,3 +71,15 @@ def test_corners_of_a_cushion_that_leans_reach_into_no_curved_back(variant):
     assert spot[1] == pytest.approx(0.42)
     stood = body @ upright(-0.1) + spot + (0.0, 0.002, 0.0)
     assert depth(forbidden_moves([stood], [floor, *backs], 0.1), np.zeros(2)) < 0.001
+
+
+@pytest.mark.parametrize("seed", [106, 108])
+def test_no_bed_comes_through_its_throw(seed):
+    made = dressed(generate(SceneGraph.from_yaml("room: bedroom\nobjects: {bed: double_bed}"), seed=seed))
+    bed, throw = made.objects["bed"], next(thing for thing in made.placed if thing.kind == "throw")
+    mesh = geometry_of("throw", tuple(throw.size.tolist()), throw.variant, throw.lie).parts[0].mesh
+    x, z = (np.arange(0.1 - half, half - 0.1, 0.02) for half in bed.size[[0, 2]] / 2)
+    at = bed.in_plan(throw.position)
+    cloth = heights_of(mesh.triangles + np.insert(at, 1, throw.position[1] - bed.position[1]), x, z)
+    below = heights_of(bed.geometry.mesh.triangles, x, z)
+    assert np.nanmax(np.where(np.isfinite(cloth), below - cloth, -1)) < 0.004
