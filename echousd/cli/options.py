@@ -130,7 +130,6 @@ def click_options(*flags: Parameter) -> list[Any]:
 
 
 def _flags(*, edits: bool, asks: bool, batch: bool) -> list[Parameter]:
-    from echousd.graph.changes import EditRequest
     from echousd.options import GROUPS, OF_NEW, RoomOptions
 
     table = RoomOptions
@@ -140,9 +139,12 @@ def _flags(*, edits: bool, asks: bool, batch: bool) -> list[Parameter]:
     chosen = OF_NEW if edits else [name for name in rows if not (batch and name == "seed")]
     ordered = sorted(chosen, key=lambda name: GROUPS.index(rows[name].json_schema_extra["group"]))
     wishes = []
-    for one in fields(EditRequest) if asks else ():
-        kind: Any = Annotated[list[str] | None, typer.Option(help=one.metadata["help"])]
-        wishes.append(Parameter(one.name, Parameter.KEYWORD_ONLY, default=None, annotation=kind))
+    if asks:
+        from echousd.graph.changes import EditRequest
+
+        for one in fields(EditRequest):
+            kind: Any = Annotated[list[str] | None, typer.Option(help=one.metadata["help"])]
+            wishes.append(Parameter(one.name, Parameter.KEYWORD_ONLY, default=None, annotation=kind))
     return [*wishes, *(_flag(name, rows[name]) for name in ordered)]
 
 
