@@ -36,7 +36,7 @@ ADAPTED, BRIGHT, SHARE, BRIGHTEST = (0.58, 0.75), (0.34, 0.53), 70, 40.0
 EVEN, LIMIT = (0.18, -0.15), (np.inf, 1.6)
 PALER = 0.5  # share of how its colour differs from the mean that they take from it, too
 WHITE, PAPER = 84, 0.95  # what so many of a hundred points are darker than comes to no more than that
-CONTRAST, KNEE = 1.5, 0.7  # power about what is bright, and from where on highlights are rolled off
+CONTRAST, KNEE = 1.5, 0.6  # power about what is bright, and from where on highlights are rolled off
 # Share of colours that keep their hue where they are bright, which film bleaches, and how much more coloured all are,
 # by night, when lamps are warm, not yellow, and by day.
 HUE, CHROMA = (0.5, 0.8), (1.0, 1.3)

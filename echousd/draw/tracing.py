@@ -15,6 +15,7 @@ from echousd.draw.smoothing import RINGS, same_surface, smooth_light
 from echousd.draw.views import View
 
 FINE, QUICK = 3, 2  # squared: rays per pixel
+SHARPER = 0.6  # of how a pixel within a surface differs from those around it: grain and weave are seen from afar
 AROUND = 2  # per ray: rays to what stands around
 # Places at which a room's light is found, rays of each kind from each, and how often light is thrown on.
 PLACES, OFTEN, TURNS = (600, 1200), 3, 5
@@ -75,7 +76,7 @@ def _drawn(world: World, height: int, rays: int) -> np.ndarray:
     wide = np.pad(color, ((0, 0), (1, 1), (1, 1)), mode="edge")  # of an edge's pixel each neighbour takes an eighth
     rows = wide[:, 1:-1] * 0.75 + (wide[:, :-2] + wide[:, 2:]) * 0.125
     soft = rows[..., 1:-1] * 0.75 + (rows[..., :-2] + rows[..., 2:]) * 0.125
-    return np.where(edge.reshape(height, size), soft, color)
+    return np.where(edge.reshape(height, size), soft, np.maximum(color + np.float32(SHARPER) * (color - soft), 0))
 
 
 def _blended(seen: Seen, color: np.ndarray, tone: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
