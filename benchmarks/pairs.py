@@ -127,10 +127,11 @@ def _piece(model: str, size: object, position: object, yaw: float) -> str:
 
 
 def eye(stage: Usd.Stage) -> str:
-    """The camera of a room as a line: place, yaw, pitch and degrees across in radians; a shift becomes a pitch."""
+    """The camera of a room as a line: place, yaw, pitch and degrees across in radians; a shift becomes a turn."""
     camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective")).GetCamera(0)
     matrix = np.array(Gf.Matrix4d(camera.transform)).T
-    ahead, (x, y, z) = -matrix[:3, 2], matrix[:3, 3]
+    (x, y, z), aside = matrix[:3, 3], camera.horizontalApertureOffset / camera.focalLength
+    ahead = aside * matrix[:3, 0] - matrix[:3, 2]
     pitch = np.arctan2(-camera.verticalApertureOffset, camera.focalLength)  # ours are level and shifted
     across = 2 * np.arctan2(camera.horizontalAperture / 2, camera.focalLength)
     return "\t".join(

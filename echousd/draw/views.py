@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -26,13 +25,18 @@ FOCAL_LENGTH = 30.0  # mm: 62 degrees across
 STEPS, ALONG, OFFS = (0.2, 0.5, 0.8, 1.6, 2.6, 3.8), (0.2, 0.35, 0.5, 0.65, 0.8), (0.4, -0.3, -0.7, -1.2, -1.9)
 # Metres around the main piece; from the middle, where one stands further from its corner; from walls.
 AROUND, APART, AWAY = (2.6, 3.4), 3.0, 0.12
-# Radians by which they turn aside from the main piece (those behind a wall look straight through it as well); share of
-# the height of the walls, where their eyes are; metres that the middle of their picture is lower for a metre ahead.
-PANS, EYES, SLOPES = (0.0, -0.15, 0.15, -0.35, 0.35), (0.42, 0.5, 0.62), (0.0, 0.05, 0.13, 0.22, 0.32)
-# Metres ahead from where on they see: what is nearer as a whole is left out, and nothing is cut open. mm: 65, 74, 81,
-# 90 and 97 degrees across, of which so many where something is left out.
-NEARS, LENSES, STRAIGHT = np.arange(0.5, 3.1, 0.25), (28.0, 24.0, 21.0, 18.0, 16.0), 2
-LOOKED, EACH, BEST = 400, 6, 3  # pictures that rays are run through; of a place; of a place, a way, a lens
+# Radians by which they turn aside from the main piece; those that look straight at a wall have the middle of their
+# picture so many metres aside for a metre ahead. Share of the height of the walls, where their eyes are; metres that
+# the middle of their picture is lower.
+PANS = (0.0, -0.15, 0.15, -0.35, 0.35)
+ASIDES, EYES = (0.0, -0.1, 0.1, -0.2, 0.2, -0.35, 0.35), (0.42, 0.5, 0.62)
+SLOPES, BENT = (0.0, 0.04, 0.08, 0.13, 0.18, 0.22, 0.27), (0.0, 0.0, 0.0, 0.0, 5.0, 15.0, 30.0)
+# Metres ahead from where on they see: what is nearer as a whole is left out, and nothing is cut open. mm: 54, 65, 74,
+# 81, 90 and 97 degrees across, of which so many where something is left out.
+NEARS, LENSES, STRAIGHT = np.arange(0.5, 3.1, 0.25), (35.0, 31.0, 28.0, 26.0, 24.0, 21.0, 18.0, 16.0), 5
+# Which heights and slopes all are tried at; how many of a place and of all, which cost least there, at every one; how
+# many of those rays are run through; of a place, a way, a lens.
+USUAL, TRIED, LOOKED, BEST = ((1,), (1, 4)), (16, 1000), (6, 250), 3
 # What each costs: weight of what is looked at, and why.
 COSTS: dict[str, float] = {
     # the main piece
@@ -51,6 +55,7 @@ COSTS: dict[str, float] = {
     # what is bare
     "walls": 150.0,  # share of walls so near that they fill a side
     "ceiling": 100.0,  # share of ceiling
+    "doors": 250.0,  # share of doors
     "floor": 300.0, "bare": 650.0,  # shares of floor and of one bare wall, from `FLOORED` and `BAREST` on
     # what is worth something
     "shown": -130.0,  # share of furniture
@@ -65,7 +70,7 @@ ASIDE, SIDEWAYS, SIZES, HIGH, BESIDE = 0.33, 0.55, (0.36, 0.55), 0.25, 0.5
 BEFORE, WALLED, AVERTED, CLOSE, SOME, PASSED = 2.6, 1.4, 0.25, 3.5, 0.02, 2.5
 FLOORED, BAREST, HANGING, MANY, ENOUGH, AHEAD = 0.27, 0.22, 0.4, 10.0, 0.012, 1.0
 # And each lens, height and slope.
-DISTORTED, CROUCHED, BENT = (0.0, 0.0, 20.0, 50.0, 90.0), (10.0, 0.0, 5.0), (0.0, 0.0, 0.0, 10.0, 25.0)
+DISTORTED, CROUCHED = (0.0, 0.0, 0.0, 0.0, 0.0, 20.0, 50.0, 90.0), (10.0, 0.0, 5.0)
 LOW, DEEP = 1.4, 0.02  # metres: over what is so high one looks; of rounding
 SHADE, AT_CEILING = (0.55, 0.8), 0.15  # shares of a lamp's height and width over which it is cord; metres
 MARGIN = 1.06
@@ -74,8 +79,8 @@ MARGIN = 1.06
 @dataclass(frozen=True, eq=False)
 class Subject:
     """What a picture from inside is of: a floor (k, 2), walls of a height in metres, boxes of `count` pieces of
-    furniture and of what hangs, the row of the main one, everything that hides something, and where (2,) the main piece
-    and the middle of the floor are."""
+    furniture and of what hangs, the row of the main one, everything that hides something, at its end `doors` and the
+    walls, and where (2,) the main piece and the middle of the floor are."""
 
     floor: np.ndarray
     height: float
@@ -85,6 +90,7 @@ class Subject:
     everything: Furniture
     aim: np.ndarray
     middle: np.ndarray
+    doors: int = 0
 
 
 class Shots(NamedTuple):
@@ -110,21 +116,22 @@ def view_matrix(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def shifted(view: np.ndarray, slope: np.ndarray | float) -> np.ndarray:
-    """(..., 4, 4) float: level views whose pictures are moved down by `slope` (...,) metres for a metre ahead.
+def shifted(view: np.ndarray, slope: np.ndarray | float, side: np.ndarray | float = 0.0) -> np.ndarray:
+    """(..., 4, 4) float: level views whose pictures are moved down by `slope` and right by `side` (...,) metres for a
+    metre ahead.
 
     So a lens with a shift looks: the third column is no longer upright to the others, and walls stay upright in the
-    picture, as whoever photographs interiors has them.
+    picture, and the wall that one looks at level, as whoever photographs interiors has them.
     """
     view = np.array(view, float)
-    down: np.ndarray = np.asarray(slope, float)[..., None]
-    view[..., :3, 2] += down * view[..., :3, 1]
+    down, right = (np.asarray(each, float)[..., None] for each in (slope, side))
+    view[..., :3, 2] += down * view[..., :3, 1] - right * view[..., :3, 0]
     return view
 
 
 def inside_view(
     floor: np.ndarray, furniture: Furniture, height: float, hung: Furniture | None = None,
-    windows: Furniture | None = None, main: int | None = None,
+    windows: Furniture | None = None, doors: Furniture | None = None, main: int | None = None,
 ) -> tuple[np.ndarray, float, float]:  # fmt: skip
     """Camera to world (4, 4) float, `shifted`, focal length in mm, and metres ahead from where on things are seen, of a
     view inside a room, its main piece whole.
@@ -139,7 +146,7 @@ def inside_view(
         furniture: what shall be seen, its fronts rather than its backs.
         height: of the walls, metres.
         hung: what hangs or stands at the walls: none of it shall be right before the eye.
-        windows: as boxes in the walls, which are then not bare.
+        windows, doors: as boxes in the walls: windows are not bare, doors are nothing to look at.
         main: row of the furniture that must be whole in the picture; None = the largest that one looks over.
     """
     floor = np.asarray(floor, float)
@@ -150,16 +157,17 @@ def inside_view(
         low = furniture.size[:, 1] + furniture.position[:, 1] < LOW
         main = int((furniture.size[:, [0, 2]].prod(1) * (low | ~low.any())).argmax())
     things = furniture.with_others(hung)
-    everything, aim = things.with_others(windows, _walls(floor, height)), furniture.position[main, [0, 2]]
-    of = Subject(floor, height, len(furniture.size), things, main, everything, aim, middle)
+    everything, aim = things.with_others(windows, doors, _walls(floor, height)), furniture.position[main, [0, 2]]
+    leaves = 0 if doors is None else len(doors.size)
+    of = Subject(floor, height, len(furniture.size), things, main, everything, aim, middle, leaves)
     shots = _framed(of, *_eyes(of))
     best = int((shots.cost + sum(_composed(of, shots).values())).argmin())
     return shots.view[best], float(shots.lens[best]), float(shots.near[best])
 
 
-def _eyes(of: Subject) -> tuple[np.ndarray, np.ndarray]:
+def _eyes(of: Subject) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where a camera may stand and the ways it may look, x and z, (f, 2) each: in corners, along the walls and behind
-    them, around what it sees."""
+    them, around what it sees; and how far aside the middle of its picture is, (f,)."""
     floor, spots, straight = of.floor, [], []
     for edge, corner in enumerate(floor):
         away = max(float(np.linalg.norm(of.middle - corner)), 1e-9)
@@ -175,89 +183,113 @@ def _eyes(of: Subject) -> tuple[np.ndarray, np.ndarray]:
     spot, cos, sin = np.array(spots), np.cos(PANS)[:, None], np.sin(PANS)[:, None]
     x, z = (of.aim - spot).T / np.maximum(np.linalg.norm(of.aim - spot, axis=1), 1e-9)
     ways = np.stack([cos * x - sin * z, sin * x + cos * z], -1).reshape(-1, 2)
-    every = np.concatenate([np.tile(spot, (len(PANS), 1)), ways], 1)
-    return tuple(np.split(np.concatenate([every, np.reshape(straight, (-1, 4))]), 2, axis=1))  # type: ignore[return-value]
+    turned = np.concatenate([np.tile(spot, (len(PANS), 1)), ways, np.zeros((len(ways), 1))], 1)
+    level = np.tile(np.reshape(straight, (-1, 4)), (len(ASIDES), 1))
+    level = np.concatenate([level, np.repeat(ASIDES, len(straight))[:, None]], 1)
+    spot, way, side = np.split(np.concatenate([turned, level]), (2, 4), axis=1)
+    return spot, way, side[:, 0]
 
 
-def _framed(of: Subject, spot: np.ndarray, way: np.ndarray) -> Shots:
-    """The pictures that cost least by what they have whole, of some places and ways (f, 2)."""
+def _framed(of: Subject, spot: np.ndarray, way: np.ndarray, side: np.ndarray) -> Shots:
+    """The pictures that cost least by what they have whole, of some places and ways, see `_eyes`."""
     count, main, front = of.count, of.main, axes(of.things.yaw[of.main])[1]
     corners = np.concatenate([of.things.corners, _shades(of.things.of(np.arange(count)), of.height)])
-    right = np.stack([-way[:, 1], way[:, 0]], 1)
-    plan = corners[..., [0, 2]].reshape(-1, 2)
-    ahead, aside = ((plan @ to.T - (spot * to).sum(1)).T.reshape(len(spot), -1, 8) for to in (way, right))
-    frame, near, lens = _uncut(of, spot, way, ahead[:, : len(of.things.size)], aside[:, : len(of.things.size)])
-    half, deep = APERTURE / 2 / np.array(LENSES)[lens][:, None], np.maximum(ahead, 0.05)
-    left_out, behind = ahead.max(2)[frame] < near[:, None], ahead.max(2)[frame] < 0.05
-    begins, ends = (aside / deep).min(2)[frame], (aside / deep).max(2)[frame]
-    level, kind = of.things.position[:, 1] > HIGH, np.zeros((len(corners), 2))
-    kind[len(level) :], stands = (COSTS["cut_lamp"], COSTS["lamp_out"]), np.arange(len(level)) < count
-    kind[: len(level), 0][level & ~stands], kind[: len(level), 0][~level & stands] = COSTS["cut_hung"], COSTS["cut"]
-    # what no height changes
-    to = of.aim - spot
+    right, (bottom, top) = np.stack([-way[:, 1], way[:, 0]], 1), corners[:, [0, 2], 1].T
+    plan = corners[:, [0, 1, 4, 5]][..., [0, 2]].reshape(-1, 2)
+    ahead, aside = ((plan @ to.T - (spot * to).sum(1)).T.reshape(len(spot), -1, 4) for to in (way, right))
+    aside -= side[:, None, None] * ahead
+    frame, near, lens = _uncut(of, spot, way + side[:, None] * right, right, ahead, aside)
+    to, halves = of.aim - spot, APERTURE / 2 / np.array(LENSES)
+    deep, last = np.maximum(ahead, 0.05), ahead.max(2)
+    slant, nearest, farthest = aside / deep, deep.min(2), deep.max(2)
+    begins, ends, aside_main, deep_main = slant.min(2), slant.max(2), np.abs(slant[:, main]), deep[:, main]
     far = np.maximum(np.linalg.norm(to, axis=1), 1e-9)
-    off = np.abs((to * right).sum(1)) / np.maximum((to * way).sum(1), 1e-9)
-    wide = (np.minimum(ends[:, [main]], half) - np.maximum(begins[:, [main]], -half))[:, 0] / (2 * half[:, 0])
+    off = np.abs((to * right).sum(1) / np.maximum((to * way).sum(1), 1e-9) - side)
+    behind = COSTS["behind"] * np.maximum(0, (to @ front) / far + SIDEWAYS)
     plans = shapely.convex_hull(shapely.multipoints(corners[:count, :, [0, 2]]))
-    apart = shapely.distance(plans[main], plans)
-    missed = (left_out & ~behind & (begins < half) & (ends > -half))[:, :count]
-    cost = (
-        COSTS["middle"] * np.clip(off[frame] / half[:, 0] - ASIDE, 0, 1) + np.array(DISTORTED)[lens]
-        + (COSTS["behind"] * np.maximum(0, (to @ front) / far + SIDEWAYS))[frame]
-        + COSTS["small"] * np.maximum(0, SIZES[0] - wide) + COSTS["large"] * np.maximum(0, wide - SIZES[1])
-        + (missed * (COSTS["left_out"] + COSTS["missed"] * np.clip(1 - apart / BESIDE, 0, 1))).sum(1)
-    )  # fmt: skip
-    shape = len(frame), len(EYES), len(SLOPES)
-    costs, cuts, tall = np.empty(shape), np.empty((*shape, count), bool), half / ASPECT
-    beside, over = (begins > -half / MARGIN) & (ends < half / MARGIN), (begins < half) & (ends > -half) & ~behind
-    aside_main = np.abs(aside / deep)[frame, main]
-    for n, share in enumerate(EYES):
-        rise = (corners[..., 1] - share * of.height) / deep
-        for m, slope in enumerate(SLOPES):
-            low, high = rise.min(2)[frame] + slope, rise.max(2)[frame] + slope
-            within = over & (low < tall) & (high > -tall)
-            cut = within & ~left_out & ~(beside & (low > -tall / MARGIN) & (high < tall / MARGIN))
-            cuts[:, n, m] = cut[:, :count]
-            reach = np.maximum(aside_main, ASPECT * np.abs(rise[frame, main] + slope))
-            begin = share * of.height - slope * near
-            outside = (begin - tall[:, 0] * near < DEEP) | (begin + tall[:, 0] * near > of.height - DEEP)
-            costs[:, n, m] = (
-                cost + CROUCHED[n] + BENT[m] + cut @ kind[:, 0] + (left_out | ~within) @ kind[:, 1]
-                + COSTS["whole"] * ((reach > half / MARGIN).mean(1) + (outside & (near > 0)))
-            )  # fmt: skip
+    missed = COSTS["left_out"] + COSTS["missed"] * np.clip(1 - shapely.distance(plans[main], plans) / BESIDE, 0, 1)
+    high, kind = of.things.position[:, 1] > HIGH, np.zeros((len(corners), 2))
+    kind[len(high) :], stands = (COSTS["cut_lamp"], COSTS["lamp_out"]), np.arange(len(high)) < count
+    kind[: len(high), 0][high & ~stands], kind[: len(high), 0][~high & stands] = COSTS["cut_hung"], COSTS["cut"]
+
+    def costs_at(rows: np.ndarray, ups: Sequence[int], downs: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+        """(m, eyes, slopes) what some pictures cost at some heights, and (m, eyes, slopes, count) what is cut."""
+        of_frame, here, half = frame[rows], near[rows, None], halves[lens[rows]][:, None]
+        begin, end, tall, limit = begins[of_frame], ends[of_frame], half / ASPECT, half / MARGIN
+        left_out, ahead_of = last[of_frame] < here, last[of_frame] >= 0.05
+        over, beside = (begin < half) & (end > -half) & ahead_of, (begin > -limit) & (end < limit)
+        share = (np.minimum(end[:, [main]], half) - np.maximum(begin[:, [main]], -half)) / (2 * half)
+        fixed = (
+            COSTS["middle"] * np.clip(off[of_frame, None] / half - ASIDE, 0, 1)
+            + COSTS["small"] * np.maximum(0, SIZES[0] - share) + COSTS["large"] * np.maximum(0, share - SIZES[1])
+        )[:, 0]  # fmt: skip
+        fixed += np.array(DISTORTED)[lens[rows]] + behind[of_frame] + (left_out & over)[:, :count] @ missed
+        over, close, distant = over & ~left_out, nearest[of_frame], farthest[of_frame]
+        costs = np.empty((len(rows), len(ups), len(downs)))
+        cuts = np.empty((*costs.shape, count), bool)
+        for n, up in enumerate(ups):
+            eye = EYES[up] * of.height
+            low = (bottom - eye) / np.where(bottom > eye, distant, close)
+            rise = (top - eye) / np.where(top > eye, close, distant)
+            ends_main = [(each[main] - eye) / deep_main[of_frame] for each in (bottom, top)]
+            for m, down in enumerate(downs):
+                slope = SLOPES[down]
+                within = over & (low < tall - slope) & (rise > -tall - slope)
+                cut = within & ~(beside & (low > -tall / MARGIN - slope) & (rise < tall / MARGIN - slope))
+                reach = [np.maximum(aside_main[of_frame], ASPECT * np.abs(each + slope)) for each in ends_main]
+                starts = eye - slope * here
+                outside = (starts - tall * here < DEEP) | (starts + tall * here > of.height - DEEP)
+                costs[:, n, m] = (
+                    fixed + CROUCHED[up] + BENT[down] + cut @ kind[:, 0] + ~within @ kind[:, 1]
+                    + COSTS["whole"] * ((np.concatenate(reach, 1) > limit).mean(1) + (outside & (here > 0))[:, 0])
+                )  # fmt: skip
+                cuts[:, n, m] = cut[:, :count]
+        return costs, cuts
+
+    place = 2 * np.unique(spot.round(3), axis=0, return_inverse=True)[1].ravel()[frame] + (near > 0)
+    some = _cheapest(costs_at(np.arange(len(frame)), *USUAL)[0].min((1, 2)), place, *TRIED)
+    costs, cuts = costs_at(some, range(len(EYES)), range(len(SLOPES)))
+    frame, near, lens, place, shape = frame[some], near[some], lens[some], place[some], costs.shape
     flat = costs.reshape(len(frame), -1)
     found = np.argsort(flat, axis=1, kind="stable")[:, :BEST] + np.arange(len(flat))[:, None] * flat.shape[1]
-    taken, rows = Counter[tuple](), list[int]()
-    for row in found.ravel()[np.argsort(flat.ravel()[found.ravel()], kind="stable")].tolist():
-        place = (*spot[frame[row // flat.shape[1]]].round(3).tolist(), bool(near[row // flat.shape[1]]))
-        taken[place] += 1
-        rows += [row] if taken[place] <= EACH and len(rows) < LOOKED else []
-    one, up, down = np.unravel_index(np.array(rows), shape)
+    rows = found.ravel()[_cheapest(flat.ravel()[found.ravel()], place.repeat(found.shape[1]), *LOOKED)]
+    one, up, down = np.unravel_index(rows, shape)
     eye = np.insert(spot[frame[one]], 1, np.array(EYES)[up] * of.height, axis=1)
-    view = shifted(view_matrix(eye, eye + np.insert(way[frame[one]], 1, 0.0, axis=1)), np.array(SLOPES)[down])
+    level = view_matrix(eye, eye + np.insert(way[frame[one]], 1, 0.0, axis=1))
+    view = shifted(level, np.array(SLOPES)[down], side[frame[one]])
     return Shots(flat.ravel()[rows], view, np.array(LENSES)[lens[one]], near[one], cuts[one, up, down])
 
 
+def _cheapest(cost: np.ndarray, place: np.ndarray, each: int, most: int) -> np.ndarray:
+    """(m,) rows of the least costs, at most so many of each place and of all."""
+    order = np.lexsort((cost, place))
+    kept = order[np.arange(len(order)) - np.searchsorted(place[order], place[order]) < each]
+    return np.asarray(kept[np.argsort(cost[kept], kind="stable")][:most])
+
+
 def _uncut(
-    of: Subject, spot: np.ndarray, way: np.ndarray, ahead: np.ndarray, aside: np.ndarray
+    of: Subject, spot: np.ndarray, way: np.ndarray, right: np.ndarray, ahead: np.ndarray, aside: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which places and ways, metres ahead from where on things are seen, and which lens, (m,) each: where the camera or
     all of where it begins to see is in the room, and cuts nothing open.
 
-    `ahead`, `aside`: (f, n, 8) metres of the things' corners.
+    `way`, `right`: (f, 2) to the middle of the picture, and to its right. `ahead`, `aside`: (f, n, 4) metres of the
+    things' corners from there.
     """
-    room, right, many = shapely.Polygon(of.floor), np.stack([-way[:, 1], way[:, 0]], 1), len(LENSES)
+    room, many, wide = shapely.Polygon(of.floor), len(LENSES), APERTURE / 2 / np.array(LENSES[:STRAIGHT])
     free = np.flatnonzero(shapely.contains_xy(room.buffer(-AWAY), spot))
     free = free if len(free) else np.arange(len(spot))  # of what is hardly a room
     found = [(free.repeat(many), np.zeros(len(free) * many), np.tile(np.arange(many), len(free)))]
-    first, last, low, high = ahead.min(2), ahead.max(2), aside.min(2), aside.max(2)
-    for near, lens in product(NEARS, range(STRAIGHT)):
-        reach = near * APERTURE / 2 / LENSES[lens] + DEEP
-        met = (first < near + DEEP) & (last > near - DEEP) & (low < reach) & (high > -reach)
-        rows = np.flatnonzero(~met.any(1) & (first[:, of.main] > near))
-        ends = (spot + near * way)[rows, None] + np.array([[-reach], [reach]]) * right[rows, None]
-        rows = rows[shapely.covers(room, shapely.linestrings(ends))]
-        found.append((rows, np.full(len(rows), near), np.full(len(rows), lens)))
+    ahead, aside = ahead[:, : len(of.things.size)], aside[:, : len(of.things.size)]
+    first, last, apart = ahead.min(2), ahead.max(2), np.maximum(0, np.maximum(aside.min(2), -aside.max(2)))
+    shapely.prepare(room)
+    for near in NEARS:
+        met = np.where((first < near + DEEP) & (last > near - DEEP), apart, np.inf).min(1)
+        fits = (met[:, None] > near * wide + DEEP) & (first[:, [of.main]] > near)
+        rows, lens = np.nonzero(fits & shapely.contains_xy(room, spot + near * way)[:, None])
+        ends = near * (way[rows, None] + np.array([[-1], [1]]) * wide[lens, None, None] * right[rows, None])
+        inside = shapely.covers(room, shapely.linestrings(spot[rows, None] + ends))
+        found.append((rows[inside], np.full(inside.sum(), near), lens[inside]))
     frame, near, lens = (np.concatenate(each) for each in zip(*found, strict=True))
     return frame, near, lens
 
@@ -266,18 +298,20 @@ def _composed(of: Subject, shots: Shots) -> dict[str, np.ndarray]:
     """What each thing costs (m,) by what rays meet in some pictures."""
     half, row = APERTURE / 2 / shots.lens, np.arange(len(of.everything.size))
     which, away, along, shares, alone = of.everything.met(shots.view, half, shots.near)
+    walls = len(row) - len(of.floor)
+    leaves = walls - of.doors
     hangs = (row >= of.count) & (row < len(of.things.size))
     reach = np.where(((row < of.count) | hangs) & (row != of.main), BEFORE, WALLED)
     shown, above = np.isfinite(away) & (which < of.count), RAYS[:, 1] * half[:, None] > shots.view[:, 1, 2, None]
-    wall, averted = which >= len(row) - len(of.floor), shown & (along > AVERTED)
+    wall, averted = which >= leaves, shown & (along > AVERTED)
     towards = (shots.view[:, [0, 2], 3] - of.middle) @ of.things.of(np.arange(of.count)).facing
-    worth = np.where(hangs, HANGING, row < len(row) - len(of.floor))  # windows as much as furniture
+    worth = np.where(hangs, HANGING, row < leaves)  # windows as much as furniture
     seen = np.minimum(shares / ENOUGH, 1) @ worth
     found = {
         "hidden": 1 - shares[:, of.main] / np.maximum(alone[:, of.main], 1e-9),
         "severed": (shares[:, : of.count] * shots.cut).sum(1), "filled": filled(away, reach[which]),
         "backs": averted.mean(1), "turned": np.maximum(0, (averted & (away < CLOSE)).mean(1) - SOME),
-        "bare": np.maximum(0, shares[:, -len(of.floor) :].max(1) - BAREST),
+        "bare": np.maximum(0, shares[:, walls:].max(1) - BAREST), "doors": shares[:, leaves:walls].sum(1),
         "walls": (wall & (away < PASSED)).mean(1), "ceiling": (above & np.isinf(away)).mean(1),
         "floor": np.maximum(0, (~above & np.isinf(away)).mean(1) - FLOORED),
         "shown": shown.mean(1), "seen": np.minimum(seen, MANY), "faced": np.minimum(towards, AHEAD),

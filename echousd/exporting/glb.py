@@ -103,8 +103,7 @@ class _Tree:
             length = np.linalg.norm(world[:3, :3], axis=0)
             world[:3, :3] /= np.where(length > 0, length, 1.0)
         if prim.IsA(UsdGeom.Camera):
-            cos, sin = np.cos(tilt := _tilt(UsdGeom.Camera(prim).GetCamera())), np.sin(tilt)
-            world[:3, :3] = world[:3, :3] @ ((1, 0, 0), (0, cos, -sin), (0, sin, cos))
+            world[:3, :3] = world[:3, :3] @ _turned(UsdGeom.Camera(prim).GetCamera())
         index = self._new(path, prim.GetName(), world, parent)
         if own_category(prim):
             self.extras(index, {"id": path, "category": own_category(prim)})
@@ -319,12 +318,20 @@ def _camera(found: Gf.Camera, metres: float) -> dict[str, Any] | None:
     return {"type": "orthographic", "orthographic": lens}
 
 
-def _tilt(found: Gf.Camera) -> float:
-    """Radians by which a lens that has no shift, as in glTF, looks up to see the middle of what a shifted one sees."""
-    if found.projection != Gf.Camera.Perspective or not found.verticalApertureOffset or found.focalLength <= 0:
-        return 0.0
-    up, half = found.verticalApertureOffset / found.focalLength, found.verticalAperture / found.focalLength / 2
-    return float(np.arctan(up + half) + np.arctan(up - half)) / 2
+def _turned(found: Gf.Camera) -> np.ndarray:
+    """(3, 3) by which a lens that has no shift, as in glTF, turns to the middle of what a shifted one sees."""
+    turn = np.eye(3)
+    if found.projection == Gf.Camera.Perspective and found.focalLength > 0:
+        for axes, shift, film in (
+            ([1, 2], found.verticalApertureOffset, found.verticalAperture),
+            ([0, 2], found.horizontalApertureOffset, found.horizontalAperture),
+        ):
+            ends = np.arctan((shift + np.array([-film, film]) / 2) / found.focalLength)
+            cos, sin = np.cos(ends.mean()), np.sin(ends.mean())
+            once = np.eye(3)
+            once[np.ix_(axes, axes)] = (cos, -sin), (sin, cos)
+            turn = once @ turn
+    return turn
 
 
 def _light(prim: Usd.Prim, metres: float) -> dict[str, Any] | None:

@@ -32,10 +32,10 @@ def main_piece(room: str, categories: Sequence[str], furniture: Furniture) -> in
     return min(found)[-1] if found else None
 
 
-def window_boxes(room: RoomData) -> Furniture:
-    """Windows as boxes of 2 cm at the inner side of their walls: doors and passages are as bare as these."""
+def opening_boxes(room: RoomData, *, windows: bool) -> Furniture:
+    """Windows, or doors and passages, as boxes of 2 cm at the inner side of their walls."""
     rows = []
-    for opening in (one for one in room.graph.room.openings if one.kind == "window"):
+    for opening in (one for one in room.graph.room.openings if (one.kind == "window") is windows):
         x, z = segment(room.corners, opening).mean(0)
         yaw = np.arctan2(*inward_normal(room.corners, opening.edge))
         rows.append((opening.width, opening.height, 0.02, x, opening.sill, z, yaw))
@@ -45,7 +45,8 @@ def window_boxes(room: RoomData) -> Furniture:
 
 def write_cameras(
     pen: Pen, points: np.ndarray, furniture: Furniture, walled: np.ndarray | None = None,
-    hung: Furniture | None = None, windows: Furniture | None = None, main: int | None = None,
+    hung: Furniture | None = None, openings: tuple[Furniture | None, Furniture | None] = (None, None),
+    main: int | None = None,
 ) -> None:  # fmt: skip
     """Author `/Room/Cameras/top` (from afar, the front, +X, up in the picture) and `/Room/Cameras/perspective`.
 
@@ -54,7 +55,7 @@ def write_cameras(
         points: what is seen, see `room_points`. furniture: as of `perspective_views`.
         walled: corners of the floor of a room with walls; its perspective camera stands inside.
         hung: what hangs or stands at the walls and must not fill that camera's picture.
-        windows: boxes of these. main: row of the furniture that this camera has whole in its picture.
+        openings: boxes of windows, and of doors. main: row of the furniture that this camera has whole in its picture.
     """
     pen.define("/Room/Cameras", "Scope")
     # from afar rather than orthographic, whose width Blender takes for ten times what it is
@@ -71,14 +72,15 @@ def write_cameras(
     }  # fmt: skip
     pen.define("/Room/Cameras/top", "Camera", top)
     if walled is not None:
-        matrix, lens, near = inside_view(walled, furniture, float(upper[1]), hung, windows, main)
+        matrix, lens, near = inside_view(walled, furniture, float(upper[1]), hung, *openings, main)
     else:
         matrix, lens, near = perspective_views(points, furniture)[0], FOCAL_LENGTH, 0.0
-    slope = float(matrix[:3, 1] @ matrix[:3, 2])  # 0 of a camera that has no shift
+    side, slope = (-float(matrix[:3, 0] @ matrix[:3, 2]), float(matrix[:3, 1] @ matrix[:3, 2]))  # 0 without a shift
     sharp = centre if main is None else furniture.corners[main].mean(0)
     camera = {
-        **ops(transform=("matrix4d", Gf.Matrix4d(np.ascontiguousarray(shifted(matrix, -slope).T)))),
-        "float focalLength": lens * TENTHS, "float verticalApertureOffset": -slope * lens * TENTHS,
+        **ops(transform=("matrix4d", Gf.Matrix4d(np.ascontiguousarray(shifted(matrix, -slope, -side).T)))),
+        "float focalLength": lens * TENTHS, "float horizontalApertureOffset": side * lens * TENTHS,
+        "float verticalApertureOffset": -slope * lens * TENTHS,
         "float horizontalAperture": APERTURE * TENTHS,
         "float verticalAperture": APERTURE * TENTHS / (1.0 if walled is None else ASPECT),
         "float focusDistance": float(np.linalg.norm(matrix[:3, 3] - sharp)),

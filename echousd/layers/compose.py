@@ -250,7 +250,8 @@ def root_layer(room: RoomData, hung: Furniture | None = None, walls: Sequence[np
     lights.write_lights(pen, room, bounds)
     walled = room.floor if room.options.walls else None
     main = cameras.main_piece(room.graph.room.type, [node.category for node in room.graph.nodes], furniture)
-    cameras.write_cameras(pen, seen, furniture, walled, hung, cameras.window_boxes(room), main)
+    openings = cameras.opening_boxes(room, windows=True), cameras.opening_boxes(room, windows=False)
+    cameras.write_cameras(pen, seen, furniture, walled, hung, openings, main)
     names = [name for name in LAYERS if name != "dressing" or room.options.dress != "none"]
     layer.subLayerPaths = [f"./{layer_file(name, crate=room.options.crate)}" for name in names]
     return layer

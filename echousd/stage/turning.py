@@ -25,7 +25,7 @@ AXES = {"Y": "Z", "Z": "Y"}
 OPS = {"rotateY": "rotateZ", "rotateZ": "rotateY", "rotateX": "rotateX"}  # Z the other way round
 LENGTHS = {  # attribute that we write -> power of the unit that it is given in
     "points": 1, "extent": 1, "extentsHint": 1, "clippingRange": 1, "focalLength": 1, "focusDistance": 1,
-    "horizontalAperture": 1, "verticalAperture": 1, "verticalApertureOffset": 1,
+    "horizontalAperture": 1, "verticalAperture": 1, "horizontalApertureOffset": 1, "verticalApertureOffset": 1,
     "inputs:radius": 1, "inputs:width": 1, "inputs:height": 1,
     "physics:centerOfMass": 1, "physics:localPos0": 1, "physics:localPos1": 1, "physics:gravityMagnitude": 1,
     "physics:diagonalInertia": 2, "drive:angular:physics:damping": 2, "physics:density": -3,

@@ -16,12 +16,14 @@ from echousd.draw.views import (
     APERTURE,
     COSTS,
     LENSES,
+    STRAIGHT,
     _walls,
     inside_view,
+    shifted,
     view_matrix,
 )
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.layers.cameras import main_piece, window_boxes
+from echousd.layers.cameras import main_piece, opening_boxes
 
 FLOOR = np.array([(0.0, 0.0), (0.0, 4.0), (5.0, 4.0), (5.0, 0.0)])
 
@@ -99,7 +101,7 @@ def test_a_small_room_is_seen_through_a_wall_that_the_near_plane_cuts_away():
     things = boxes((1.2, 0.45, 0.35, 1.6, 0.0, 0.2, 0.0), (0.9, 1.1, 0.3, 2.0, 0.0, 2.03, np.pi))
     shelf = boxes((0.6, 0.3, 0.2, 1.2, 1.4, 2.09, np.pi))  # hangs on it
     view, lens, near = inside_view(floor, things, 2.6, shelf, main=0)
-    assert lens in LENSES[:2]
+    assert lens in LENSES[:STRAIGHT]
     assert not shapely.Polygon(floor).contains(shapely.Point(*view[[0, 2], 3]))
     inside = -view[[0, 2], 2]
     start = view[:3, 3] + near * np.insert(inside, 1, -view[1, 2])
@@ -179,7 +181,7 @@ def test_the_main_piece_is_whole_in_the_picture_and_the_eye_in_the_room(number):
         at = (at[1], at[0])
     piece = boxes((*size, at[0], 0.0, at[1], 0.0), (0.5, 1.9, 0.4, 0.3, 0.0, 0.3, 0.0))
     view, lens, near = inside_view(floor, piece, 2.6, main=0)
-    assert lens in LENSES[:2]
+    assert lens in LENSES[:STRAIGHT]
     assert room.contains(shapely.Point(*(view[:3, 3] - near * view[:3, 2])[[0, 2]]))
     assert np.allclose(view[:3, 1], (0, 1, 0))  # walls stay upright in the picture
     x, y, z = ((piece.corners[0] - view[:3, 3]) @ np.linalg.inv(view[:3, :3]).T).T
@@ -201,6 +203,22 @@ def test_the_camera_shows_no_bare_wall_where_it_need_not():
     bed = boxes((1.8, 0.6, 2.0, 2.5, 0.0, 2.8, 0.0))
     view, lens, near = inside_view(FLOOR, bed, 2.8, walls)
     assert bare_walls([bed, walls], view, APERTURE / 2 / lens, near) < 1 / 3
+
+
+def test_one_looks_past_doors_where_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    doors, shares = boxes(*((0.9, 2.0, 0.02, x, 0.0, 0.01, 0.0) for x in (0.7, 4.3))), []
+    for price in (0.0, 2000.0):
+        monkeypatch.setitem(COSTS, "doors", price)
+        view, lens, near = inside_view(FLOOR, BED, 2.8, doors=doors)
+        shares.append(float(met(BED.with_others(doors), view, APERTURE / 2 / lens, near)[3][1:].sum()))
+    assert shares[1] < shares[0] - 0.02
+
+
+def test_a_shifted_picture_has_its_middle_aside_and_below_while_walls_stay_level() -> None:
+    level = view_matrix(np.array([1.0, 1.4, 2.0]), np.array([1.0, 1.4, -3.0]))
+    view = shifted(level, 0.2, 0.1)
+    np.testing.assert_allclose(np.linalg.inv(view[:3, :3]) @ (0.2, -0.4, -2.0), (0.0, 0.0, -2.0), atol=1e-9)
+    np.testing.assert_array_equal(view[:3, :2], level[:3, :2])
 
 
 def test_the_camera_shows_less_bare_floor_where_it_is_asked_to(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -355,7 +373,9 @@ def test_one_looks_at_windows_rather_than_at_doors_and_passages():
     )
     graph = SceneGraph(RoomSpec("hallway", floor_polygon=corners, openings=openings), (Node("bench", "bench"),), ())
     room = SimpleNamespace(graph=graph, corners=graph.room.corners)
-    assert window_boxes(room).position[:, [0, 2]].round(2).tolist() == [[-2.0, 0.45]]
+    windows, doors = (opening_boxes(room, windows=kind).position[:, [0, 2]].round(2).tolist() for kind in (True, False))
+    assert windows == [[-2.0, 0.45]]
+    assert len(doors) == 2
 
 
 def test_what_a_line_of_sight_passes_through_hides_its_end():

@@ -151,12 +151,19 @@ def test_cameras_and_lights_look_and_shine_as_on_the_stage(root, tmp_path):
         assert (lens["znear"], lens["zfar"]) == (camera.clippingRange.min, camera.clippingRange.max)
         world = np.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)).T
         if name == "perspective":  # glTF's lenses have no shift: it looks down to the middle of the same picture
-            film, length = camera.verticalAperture / 2, camera.focalLength
-            bottom, top = np.arctan((camera.verticalApertureOffset + np.array([-film, film])) / length)
-            assert bottom < -top < 0.0
-            turned = np.cos((bottom + top) / 2), np.sin((bottom + top) / 2)
-            world[:3, 2] = world[:3, :3] @ (0, -turned[1], turned[0])
-            world[:3, 1] = np.cross(world[:3, 2], world[:3, 0])
+            length = camera.focalLength
+            ends = [
+                np.arctan((shift + np.array([-film, film]) / 2) / length)
+                for shift, film in (
+                    (camera.horizontalApertureOffset, camera.horizontalAperture),
+                    (camera.verticalApertureOffset, camera.verticalAperture),
+                )
+            ]
+            assert ends[1][0] < -ends[1][1] < 0.0
+            aside, up = (each.mean() for each in ends)
+            back = np.array([-np.sin(aside) * np.cos(up), -np.sin(up), np.cos(aside) * np.cos(up)])
+            right = np.array([np.cos(aside), 0, np.sin(aside)])
+            world[:3, :3] = world[:3, :3] @ np.stack([right, np.cross(back, right), back], 1)
         np.testing.assert_allclose(worlds[number][:3], TO_Y_UP @ world[:3], atol=1e-6)
     lights = {one["name"]: one for one in gltf.tree["extensions"]["KHR_lights_punctual"]["lights"]}
     kinds = {name: light["type"] for name, light in lights.items()}

@@ -134,7 +134,7 @@ def test_the_volume_of_a_room_with_walls_reaches_to_their_outside(room, ceiling,
 
 def test_a_camera_inside_has_the_shift_of_its_view(monkeypatch):
     level = np.array([[1.0, 0, 0, 0], [0, 1, 0, 1.2], [0, 0, 1, 3], [0, 0, 0, 1]])
-    view = shifted(level, 0.25)
+    view = shifted(level, 0.25, 0.15)
     monkeypatch.setattr("echousd.layers.cameras.inside_view", lambda *_: (view, 24.0, 0.0))
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageMetersPerUnit(stage, 1)

@@ -154,7 +154,7 @@ def test_joints_of_drawers_slide_as_far_in_another_unit():
     ("schema", "power", "names"),
     [
         ("Camera", 1, ("focalLength", "focusDistance", "horizontalAperture", "verticalAperture",
-                       "verticalApertureOffset", "clippingRange")),
+                       "horizontalApertureOffset", "verticalApertureOffset", "clippingRange")),
         ("SphereLight", 1, ("inputs:radius",)), ("RectLight", 1, ("inputs:width", "inputs:height")),
         ("PhysicsScene", 1, ("physics:gravityMagnitude",)),
         ("Mesh", 1, ("points", "extent")),
