@@ -140,13 +140,13 @@ def brick(rows: int = 16, across: int = 4) -> Relief:
 
 
 def woven(threads: int = 176) -> Relief:
-    """Plain weave, flecked, in the soft folds of what is sat on."""
+    """Plain weave, flecked, in hardly any folds: what is firm would look like stone in more."""
     u, v = _grid()
     warp, weft = np.sin(2 * np.pi * threads * u), np.sin(2 * np.pi * threads * v)
     over = np.sign(np.sin(np.pi * threads * u) * np.sin(np.pi * threads * v))
     height, (folds, lit) = np.where(over > 0, np.abs(warp), np.abs(weft)), creased()
     fleck = 0.6 * noise(31, 60.0, 160.0) + 0.6 * noise(32, 160.0, 60.0)
-    return Relief(1 + 0.12 * (height - 0.6) + 0.035 * fleck + 0.045 * lit, 0.0001 * height + 0.4 * folds)
+    return Relief(1 + 0.12 * (height - 0.6) + 0.035 * fleck + 0.012 * lit, 0.0001 * height + 0.1 * folds)
 
 
 def creased() -> tuple[np.ndarray, np.ndarray]:

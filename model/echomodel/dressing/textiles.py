@@ -121,7 +121,7 @@ def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid
     d = size[2] - lean
     cloth, trim = str(rng.choice(CLOTHS)), str(rng.choice(TRIMS))
     cord = str(rng.choice(("linen", "ebony", "blanket", "accent_plain")))
-    chop = float(rng.choice((0.0, 0.0, 0.1, 0.17))) if w < 1.3 * h else 0.0
+    chop = float(rng.choice((0.0, 0.0, 0.0, 0.09))) if w < 1.3 * h else 0.0
     body = pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), shown or cloth)
     trims: dict[str, list[Solid]] = {
         "cord": [tube(seam(body.half, chop) + np.array([0, h / 2, 0]), 0.004, cord)],
