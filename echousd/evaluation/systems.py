@@ -21,10 +21,11 @@ from echomodel.loading import load_model
 from echomodel.metrics.furniture import usual_size
 from echomodel.metrics.layouts import HALVES, Task, layout_scores
 from echomodel.protocols import RoomModel
-from echomodel.randomness import Randomness, SceneGenerators
+from echomodel.randomness import Randomness
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_room, generate_rooms
 from echomodel.rooms.statistics import room_type_statistics
+from echomodel.scene_noise import SceneGenerators
 from echomodel.vocabulary import vocabulary
 from echousd.graph.arrays import one_thread, seeded
 from echousd.place.placing import place_boxes

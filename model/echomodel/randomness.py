@@ -1,22 +1,22 @@
-"""Normal noise from one source, or of many scenes packed together, each from a source of its own.
+"""Normal noise by a seed.
 
-Noise is drawn without torch, and yet, of sixteen numbers and more, as torch's generator of the same seed draws it on
+It is drawn without torch, and yet, of sixteen numbers and more, as torch's generator of the same seed draws it on
 a CPU, but for rounding.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import groupby
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from echomodel.arrays import Array, kit, on_device
+from echomodel.arrays import Array, on_device
 
 if TYPE_CHECKING:
     import torch
+
+    from echomodel.scene_noise import SceneGenerators
 
 BLOCK = 16  # numbers that are made of as many random ones at once
 BITS = 24  # of each random number
@@ -36,6 +36,10 @@ class Noise:
             out = np.concatenate([out[: count - BLOCK], _normal(self._uniform(BLOCK))])
         return out[:count]
 
+    def normal(self, shape: Sequence[int], device: torch.device | str | None) -> Array:
+        """Noise of a shape, float32, on a device, None = of numpy."""
+        return on_device(self.draw(int(np.prod(shape))).reshape(shape), device)
+
     def _uniform(self, count: int) -> np.ndarray:
         """(count,) float64 in [0, 1)."""
         return (self._twister.randint(0, 2**32, count, np.uint32) & (2**BITS - 1)) / 2.0**BITS
@@ -48,29 +52,6 @@ def _normal(uniform: np.ndarray) -> np.ndarray:
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], 1).ravel().astype(np.float32)
 
 
-@dataclass(frozen=True, eq=False)
-class SceneGenerators:
-    """One source a scene, so that a scene draws the same numbers whatever it is packed with.
-
-    Arguments:
-        each: S sources; nodes: how many nodes each of the S scenes has, in the order of the pack. Scenes in a row
-            that have one source draw from it together, as they would if they were packed alone.
-    """
-
-    each: Sequence[Noise | torch.Generator]
-    nodes: Sequence[int]
-
-    def __post_init__(self) -> None:
-        if len(self.each) != len(self.nodes):
-            raise ValueError(f"{len(self.each)} generators for {len(self.nodes)} scenes, expected one each")
-
-    @property
-    def shared(self) -> list[tuple[Noise | torch.Generator, int]]:
-        """Every source with the nodes of its scenes in a row."""
-        rows = groupby(zip(self.each, self.nodes, strict=True), key=lambda row: id(row[0]))
-        return [(scenes[0][0], sum(nodes for _, nodes in scenes)) for scenes in (list(row) for _, row in rows)]
-
-
 Randomness: TypeAlias = "Noise | torch.Generator | SceneGenerators"
 
 
@@ -79,19 +60,10 @@ def normal(shape: Sequence[int], source: Randomness | None, device: torch.device
 
     `shape`: (R, ...); with a source a scene, R is a multiple of all nodes: so many draws behind one another.
     """
-    if isinstance(source, Noise):
-        return on_device(source.draw(int(np.prod(shape))).reshape(shape), device)
-    if not isinstance(source, SceneGenerators):
-        import torch
+    if source is not None and hasattr(source, "normal"):
+        return source.normal(shape, device)
+    import torch
 
-        where = device if source is None else source.device
-        return on_device(torch.randn(tuple(shape), generator=source, device=where), device)
-    total, rest = sum(source.nodes), tuple(shape[1:])
-    draws, left = divmod(shape[0], total)
-    if left:
-        raise ValueError(f"noise for {shape[0]} rows, expected a multiple of the pack's {total} nodes")
-    drawn = [
-        normal((draws * count, *rest), generator, device).reshape(draws, count, *rest)
-        for generator, count in source.shared
-    ]
-    return kit(drawn[0]).concat(drawn, 1).reshape(shape[0], *rest)
+    generator: torch.Generator | None = source  # type: ignore[assignment]
+    where = device if generator is None else generator.device
+    return on_device(torch.randn(tuple(shape), generator=generator, device=where), device)

@@ -17,8 +17,8 @@ from echomodel.arrays import cast, on_device
 from echomodel.boxes import Boxes
 from echomodel.files import raising
 from echomodel.graph import GraphBatch, GraphEdit
-from echomodel.randomness import SceneGenerators
 from echomodel.samplers import Sampling
+from echomodel.scene_noise import SceneGenerators
 from echomodel.text import TextEncoder, edge_text, encoder_named, node_text
 from echomodel.vocabulary import vocabulary
 from echoscene.checkpoint import load_released

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from echomodel.randomness import Noise, SceneGenerators, normal
+from echomodel.randomness import Noise, normal
+from echomodel.scene_noise import SceneGenerators
 
 
 def generator(seed):
