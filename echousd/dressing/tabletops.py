@@ -9,14 +9,13 @@ import numpy as np
 import shapely
 
 from echomodel.arrays import once
-from echomodel.boxes2d import turned
 from echomodel.dressing import KINDS, usual_size
 from echomodel.late import Late
 from echomodel.triangles import area_normals, spans_of
 from echousd.dressing.setting import APART, EDGE, Setting, Standing, Thing, around, rectangle
 from echousd.shapes.geometry import Geometry
 
-book_size, fitting_books = (Late(f"echomodel.dressing.books:{name}") for name in ("book_size", "fitting_books"))
+shelved_books = Late("echousd.dressing.shelved:shelved_books")
 laid = Late("echousd.dressing.laid:laid")
 
 LEVEL = 0.006  # metres: what differs less in height is one level
@@ -137,8 +136,6 @@ def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
 
 
 LAID = 0.6  # share of rooms whose dining table is set
-VOLUMES = 7  # kinds of single books that a row is of
-BETWEEN = 0.002  # metres from book to book
 EYE = 1.7  # metres: what is put higher cannot be seen
 CASES = ("cabinet", "shelf")  # looks of what books and baskets stand in and on: no cistern, no fridge
 STRAIGHT = ("laptop", "tray", "monitor", "keyboard")  # stand parallel to what they stand on
@@ -225,21 +222,3 @@ def stocked(setting: Setting, host: Standing, surface: Surface) -> None:
             for kind in wanted[number::2]:
                 if surface.put(setting, kind, places, word=str(number)):
                     break
-
-
-def shelved_books(setting: Setting, row: Thing, rng: np.random.Generator) -> None:
-    """Put single books in the place of a row that stands already, each a thing of its own."""
-    setting.placed.remove(row)
-    wide, tall, deep = (float(v) for v in row.size)
-    at, front = -wide / 2, deep / 2
-    fitting = fitting_books(tall, deep, VOLUMES, setting.rng("books"))
-    while fitting:
-        number = int(rng.choice(fitting))
-        size = book_size(number)
-        if at + size[0] > wide / 2:
-            return
-        place = np.array([at + size[0] / 2, 0.0, front - size[2] / 2])
-        place[::2] = turned(place[::2], row.yaw)
-        setting.placed.append(Thing("book", size, row.position + place, row.yaw, row.on, number))
-        at += size[0] + BETWEEN
-    setting.placed.append(row)
