@@ -9,7 +9,7 @@ from echousd import plugin
 
 plugin.register()  # first act: a stage opened before the schema is registered never learns it
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # Public name -> its module, as `__init__.pyi` says, imported on first use: `import echousd` loads no pxr and no torch.
 _STUB = Path(__file__).with_suffix(".pyi").read_text("utf-8")
