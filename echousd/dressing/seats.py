@@ -22,6 +22,7 @@ from echousd.dressing.soft_tops import (
 )
 
 MORE = (1.9, 2.4)  # metres of a sofa with a third cushion in its middle, and with two
+OVER = 0.019  # metres of a throw's top over an arm
 RIDGE = 0.1  # metres that an arm is higher than the seat at least so that a throw hangs over it
 
 
@@ -86,4 +87,4 @@ def over_arm(host: Standing, seat: Seat, side: float, rng: np.random.Generator) 
     arm = (level > seat.level + RIDGE) & (np.sign(side) * seat.x > 0.3 * host.size[0])
     if not 0.08 < arm.sum() * STEP < 0.34:
         return None
-    return across(host, seat, arm, z, deep, float(np.median(level[arm])) - seat.level - 0.04, rng)
+    return across(host, seat, arm, z, deep, float(np.median(level[arm])) - seat.level - 0.04, OVER, rng)

@@ -175,12 +175,14 @@ def lying(
 
 
 def across(
-    host: Standing, seat: Seat, where: np.ndarray, z: float, deep: float, most: float, rng: np.random.Generator
-) -> Thing | None:
+    host: Standing, seat: Seat, where: np.ndarray, z: float, deep: float, most: float, over: float,
+    rng: np.random.Generator,
+) -> Thing | None:  # fmt: skip
     """A throw across a bed or an arm, its middle at `z`, that lies on all of it; None where nothing flat of its height
     is.
 
     `where`: (len(seat.x),) bool, what it lies on. `most`: metres that it hangs down at most.
+    `over`: metres of its top over what is highest there.
     """
     under, x = seat.height[where][:, np.abs(seat.z - z) < deep / 2], seat.x[where]
     centre = float(x[0] + x[-1]) / 2
@@ -197,5 +199,5 @@ def across(
         for k in rows[:-1]
     ]
     lie = tuple(np.round(np.clip(top - np.array(cells), 0.0, BOARD), 3).ravel().tolist())
-    spot = host.to_room(np.array([[centre, top + 0.024 - size[1], z]]))[0]
+    spot = host.to_room(np.array([[centre, top + over - size[1], z]]))[0]
     return Thing("throw", size, spot, host.yaw, host.name, int(rng.integers(1 << 30)), lie=lie)

@@ -11,6 +11,7 @@ from small_models import small_library
 from small_room import small_graph
 
 from echomodel import text as texts
+from echousd.assets.choose import wishes_of
 from echousd.assets.index import index
 from echousd.batches.options import BatchOptions, parse_options, read_toml, request_of
 from echousd.batches.plan import read_journals
@@ -50,7 +51,7 @@ def test_a_batch_asks_a_library_as_generate_does(library, source, tmp_path, monk
     (room,) = made(source, tmp_path / "none", licenses="MIT", **shelf)
     assert "library" not in {one["shapes"] for one in room["meshes"].values()}
     options = {"assets": str(library), "stretch": 1.5}
-    wishes = request_of({"sample": {"bedroom": 1}, "options": options}, "test").options.wishes()
+    wishes = wishes_of(request_of({"sample": {"bedroom": 1}, "options": options}, "test").options)
     assert (wishes.stretch, wishes.licences, wishes.collect) == (1.5, (), False)
 
     asked = []
