@@ -76,7 +76,7 @@ def _drawn(world: World, height: int, rays: int) -> np.ndarray:
     wide = np.pad(color, ((0, 0), (1, 1), (1, 1)), mode="edge")  # of an edge's pixel each neighbour takes an eighth
     rows = wide[:, 1:-1] * 0.75 + (wide[:, :-2] + wide[:, 2:]) * 0.125
     soft = rows[..., 1:-1] * 0.75 + (rows[..., :-2] + rows[..., 2:]) * 0.125
-    return np.where(edge.reshape(height, size), soft, np.maximum(color + np.float32(SHARPER) * (color - soft), 0))
+    return np.where(edge.reshape(height, size), soft, np.clip(color + np.float32(SHARPER) * (color - soft), 0, 1))
 
 
 def _blended(seen: Seen, color: np.ndarray, tone: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
