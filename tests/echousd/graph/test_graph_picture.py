@@ -54,6 +54,17 @@ def test_a_picture_shows_boxes_and_arrows(tmp_path):
     assert {(0xDB, 0xE7, 0xF5), (0xE6, 0xD9, 0xEA), (0x3B, 0x6E, 0xA8)} <= colours  # bed, wardrobe, a direction
 
 
+def test_every_relation_has_its_arrow_in_the_colour_of_its_kind(tmp_path):
+    graph = starting_graph("bedroom")
+    draw_graph(graph, tmp_path / "graph.svg")
+    text = (tmp_path / "graph.svg").read_text()
+    kinds = {kind.name: kind.colour for kind in vocabulary().predicate_kinds}
+    for kind in {vocabulary().predicate(relation.predicate).kind for relation in graph.relations}:
+        mine = [one for one in arrows(graph) if one.kind == kind]
+        lines = text.count(f"stroke: {kinds[kind]}")
+        assert lines > len(mine), kind  # each, and the line of the legend
+
+
 def test_texts_are_drawn_as_they_are(tmp_path):
     nodes = (Node("a", "desk", style="$\\frac{1}$ [red] <b>"), Node("b" * 90, "desk", style="ß" * 300, locked=True))
     draw_graph(SceneGraph("study", nodes), tmp_path / "g.png")
