@@ -34,7 +34,7 @@ def rugs(setting: Setting) -> None:
     """One rug below every sofa group, bed and dining table that has room for it; else below the table that armchairs
     stand around, below armchairs or before the only desk; between the furniture where none of these has one. Then, up
     to `RUGS` in all, at armchairs and that desk where none is near."""
-    hosts = sorted(setting.near("rug"), key=lambda o: -float(o.size[0] * o.size[2]))
+    hosts = sorted(setting.of("rug"), key=lambda o: -float(o.size[0] * o.size[2]))
     seats = [o for o in hosts if o.row.role == "seat"]
     desks = [o for o in hosts if o.row.role == "board" and o.row.access]
     shared = [o for o in setting.stands("before") if sum(o.footprint.distance(s.footprint) < AROUND for s in seats) > 1]
@@ -53,7 +53,7 @@ def _lay(setting: Setting, host: Standing) -> None:
     """A rug at a piece, as large as there is room for; at a sofa each of its sides goes as far as it may."""
     low, high = _wished(setting, host)
     sofa, middle, half = host.row.role == "sofa", (low + high) / 2, np.minimum(high - low, LARGEST) / 2
-    group = setting.near("seat", "light", "decor", "sofa" if sofa else "seat")
+    group = setting.of("seat", "light", "decor", "sofa" if sofa else "seat")
     free = _free(setting, [host, *group, *setting.stands("head", "before", "beside")])
     ends = half * (SIDES if sofa else np.stack([-SHRUNK, SHRUNK], 1)) + middle
     plans = turned(ends[:, [[0, 0], [1, 0], [1, 1], [0, 1]], [0, 1]], np.array(host.yaw)) + host.position[[0, 2]]
@@ -70,7 +70,7 @@ def _between(setting: Setting) -> None:
     """A rug along the room near its middle, below seats at most, where there is none."""
     if setting.placed or setting.use:
         return
-    free, low, high = _free(setting, setting.near("seat")), setting.floor.min(0), setting.floor.max(0)
+    free, low, high = _free(setting, setting.of("seat")), setting.floor.min(0), setting.floor.max(0)
     middles = np.stack(np.meshgrid(*np.linspace(low, high, 16).T), -1).reshape(-1, 2)
     middles = middles[np.argsort(np.linalg.norm(middles - (low + high) / 2, axis=1))]
     whole = np.minimum(high - low - 2 * FROM_WALL, ALONE if high[0] - low[0] > high[1] - low[1] else ALONE[::-1])
@@ -110,7 +110,7 @@ def _wished(setting: Setting, host: Standing) -> tuple[np.ndarray, np.ndarray]:
     if host.row.role != "sofa":
         return np.array([-w / 2 - 0.65, -d / 2 - 0.65]), np.array([w / 2 + 0.65, d / 2 + 0.65])
     tables = [o for o in setting.stands("before") if host.footprint.distance(o.footprint) < AROUND]
-    seats = [o for o in setting.near("rug") if o.row.role in ("seat", "sofa") and o is not host]
+    seats = [o for o in setting.of("rug") if o.row.role in ("seat", "sofa") and o is not host]
     near = [o for o in seats if any(o.footprint.distance(one.footprint) < AROUND for one in (host, *tables))]
     held = np.array([[-w / 2 - BEYOND, d / 2 - LEGS], [w / 2 + BEYOND, d / 2 + 1.75]])
     middles = [o.on_floor(0, (o.size[2] - LEGS) / 2)[[0, 2]] for o in near]
@@ -155,7 +155,7 @@ def clusters(setting: Setting) -> None:
     """What lies on the floor beside furniture, as its story has it; nothing alone on bare floor."""
     rugs = _rugs(setting)
     for number, wish in enumerate(setting.story.floor):
-        for host in setting.near(wish.by):
+        for host in setting.of(wish.by):
             rng = setting.rng(host.name, "floor", str(number))
             if not setting.has(wish.share, rng):
                 continue
@@ -193,7 +193,7 @@ def cables(setting: Setting) -> None:
     if not (setting.full and setting.walls):
         return
     rugs = _rugs(setting)
-    for host in (lamp for lamp in setting.near("light") if lamp.row.support == "floor"):
+    for host in (lamp for lamp in setting.of("light") if lamp.row.support == "floor"):
         rng = setting.rng(host.name, "cable")
         ways = (thing for thing in _ways_to_walls(setting, host, rng) if not rugs.intersects(thing.footprint))
         setting.put_first(ways, host=host.name, margin=0.004)

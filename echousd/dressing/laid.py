@@ -20,7 +20,7 @@ def laid(setting: Setting, host: Standing, surface: Surface) -> None:
     rng = setting.rng(host.name, "laid")
     sizes, variant = [usual_size(kind, rng) for kind in COVER], int(rng.integers(1 << 30))
     middle, half = surface.span
-    for seat in setting.near("seat"):
+    for seat in setting.of("seat"):
         local = host.in_plan(seat.position) - middle
         beyond = np.abs(local) - half
         if np.max(beyond) > 0.6 or np.min(beyond) > 0:

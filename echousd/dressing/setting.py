@@ -133,7 +133,7 @@ class Setting:
         """Whether this room has what a share of rooms has, and every one that is dressed in full."""
         return self.full or bool(rng.random() < share)
 
-    def near(self, *words: str) -> list[Standing]:
+    def of(self, *words: str) -> list[Standing]:
         """The objects of a role or a `top`, or that a small thing goes with (`echomodel.rows.INVITES`), in order."""
         return [o for o in self.objects.values() if {o.row.role, o.row.top, *o.row.invites}.intersection(words)]
 

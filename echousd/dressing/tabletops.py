@@ -146,7 +146,7 @@ BARE = ("coat_rack", "toy_box", "hall")  # tops whose shelves and seats hold no 
 
 def tabletops(setting: Setting) -> None:
     """Things on everything that carries."""
-    for host in setting.near("board", "storage"):
+    for host in setting.of("board", "storage"):
         levels = surfaces(host)
         if not levels:
             continue
@@ -166,7 +166,7 @@ def tabletops(setting: Setting) -> None:
 def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
     rng = setting.rng(host.name, "top")
     taken: set[str] = set()
-    if name == "tv_stand" and not setting.near("screen"):
+    if name == "tv_stand" and not setting.of("screen"):
         _television(setting, host, surface)
     for number, wish in enumerate(setting.story.tops[name]):
         order = [str(k) for k in rng.permutation(wish.of)]

@@ -17,7 +17,7 @@ DRAPED = {"sofa": 0.9, "seat": 0.4}  # shares of sofas and armchairs with a blan
 
 def cushions(setting: Setting) -> None:
     """Cushions on all that invites them."""
-    for host in setting.near("cushions"):
+    for host in setting.of("cushions"):
         rng, seat = setting.rng(host.name, "cushion"), Seat.of(host)
         if seat is not None:
             cushions_on(setting, host, seat, *designs(setting, rng), rng)
@@ -33,7 +33,7 @@ def designs(setting: Setting, rng: np.random.Generator) -> tuple[Design, Design]
 
 def bed_cushions(setting: Setting) -> None:
     """Two cushions before the pillows of a wide bed, or one, as on a narrow one."""
-    for host in setting.near("bed"):
+    for host in setting.of("bed"):
         rng, seat = setting.rng(host.name, "bed cushion"), Seat.of(host)
         wide, (kind, size, variant) = float(host.size[0]), designs(setting, rng)[int(rng.integers(2))]
         if seat is None:
@@ -49,7 +49,7 @@ def bed_cushions(setting: Setting) -> None:
 
 def on_covers(setting: Setting) -> None:
     """What somebody left on the largest bed, as the story has it."""
-    for host in sorted(setting.near("bed"), key=lambda o: -float(o.size[0]))[:1]:
+    for host in sorted(setting.of("bed"), key=lambda o: -float(o.size[0]))[:1]:
         seat = Seat.of(host)
         for number, wish in enumerate(setting.story.beds):
             rng = setting.rng(host.name, "cover", str(number))
@@ -67,7 +67,7 @@ def on_covers(setting: Setting) -> None:
 
 def throws(setting: Setting) -> None:
     """A blanket across the foot of every bed that lets it lie flat and hang down, over an arm of most other seats."""
-    for host in setting.near("bed", "sofa", "cushions"):
+    for host in setting.of("bed", "sofa", "cushions"):
         rng, seat, role = setting.rng(host.name, "throw"), Seat.of(host), host.row.role
         if seat is None or (role in DRAPED and not setting.has(DRAPED[role], rng)):
             continue

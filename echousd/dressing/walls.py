@@ -140,7 +140,7 @@ def sockets(setting: Setting) -> None:
     """A socket in the wall beside every bed, desk and screen that stands at one."""
     every, rng = walls_of(setting.floor) if setting.walls else [], setting.rng("sockets")
     size, variant = np.array(rng.choice([KINDS["socket"].low, KINDS["socket"].high])), int(rng.integers(1 << 30))
-    for host in (one for word in PLUGGED for one in setting.near(word)):
+    for host in (one for word in PLUGGED for one in setting.of(word)):
         wall, along = behind(host.size, host.position, host.yaw, every) or (None, 0.0)
         if wall is not None:
             ways = [side * (float(host.size[0]) / 2 + off) for off in (0.15, 0.3, 0.6, 0.8) for side in (1, -1)]
@@ -153,7 +153,7 @@ def pictures(setting: Setting) -> None:
     if not setting.walls or setting.use:
         return
     every = walls_of(setting.floor)
-    for host in setting.near("picture", "mirror"):
+    for host in setting.of("picture", "mirror"):
         wall, along = behind(host.size, host.position, host.yaw, every) or (None, 0.0)
         if wall is None or host.top > TALLEST:
             continue
@@ -345,7 +345,7 @@ def shelves(setting: Setting) -> None:
 def clock(setting: Setting) -> None:
     """A clock on a wall where people sit together or work."""
     rng = setting.rng("wall clock")
-    if setting.walls and setting.near("clock") and setting.has(CLOCKS, rng):
+    if setting.walls and setting.of("clock") and setting.has(CLOCKS, rng):
         least = sorted(free_walls(setting, CLOCK), key=lambda one: one[0])  # where nothing larger fits
         _hung(setting, _new("wall_clock", rng), [(wall, middle / wall.length) for _, middle, wall in least], 1.62)
 
@@ -366,7 +366,7 @@ HUNG_OVER = {"coat_rack": "hung_coats", "towel_radiator": "towel"}  # a row's `t
 
 def hung_up(setting: Setting) -> None:
     """Coats side by side on a rack, towels over the rungs of a radiator; none in a block, which has neither."""
-    for host in setting.near("storage"):
+    for host in setting.of("storage"):
         kind, corners = HUNG_OVER.get(host.row.top, ""), host.geometry.mesh.vertices
         if not kind or not (abs(corners[:, 1] / float(host.size[1]) - 0.5) < 0.49).any():
             continue
@@ -396,7 +396,7 @@ def hung_up(setting: Setting) -> None:
 def tall_mirror(setting: Setting) -> None:
     """A mirror for the whole person where somebody dresses and can stand before it: in rooms with a wardrobe or bed."""
     rng = setting.rng("tall mirror")
-    if setting.walls and setting.near("tall_mirror") and setting.has(MIRRORS, rng):
+    if setting.walls and setting.of("tall_mirror") and setting.has(MIRRORS, rng):
         spots = product(_roomiest(setting), (0.18, 0.82, *SHARES))
         _hung(setting, _new("tall_mirror", rng), spots, 0.3, before=STANDING)
 

@@ -149,6 +149,7 @@ def woven(threads: int = 176) -> Relief:
     return Relief(1 + 0.12 * (height - 0.6) + 0.035 * fleck + 0.012 * lit, 0.0001 * height + 0.1 * folds)
 
 
+@cache  # four cloths lie in the same
 def creased() -> tuple[np.ndarray, np.ndarray]:
     """(SIZE, SIZE) each: how high cloth of about a metre lies that was used, metres, and how light its slopes are."""
     height = 0.008 * noise(53, 4.0, 7.0, 4.0) + 0.003 * noise(56, 11.0, 16.0, 4.0)
