@@ -202,7 +202,8 @@ def _finish(folder: Path, journal: Journal) -> None:
         place = folder / removal.path
         if digest_of(place) == removal.digest:
             place.unlink(missing_ok=True)
-        _remove_empty(place.parent, folder)
+        while (place := place.parent) != folder and place.is_dir() and not any(place.iterdir()):
+            place.rmdir()
     for path, name in journal.kept.items():
         tell_kept(folder, path, name)
     flush_all(place for place in touched if place.is_dir())
@@ -214,12 +215,6 @@ def _discard(staging: Path) -> None:
     if staging.exists():
         (staging / JOURNAL).unlink(missing_ok=True)  # before what it names
         shutil.rmtree(staging)
-
-
-def _remove_empty(folder: Path, top: Path) -> None:
-    while folder != top and folder.is_dir() and not any(folder.iterdir()):
-        folder.rmdir()
-        folder = folder.parent
 
 
 def _holds(path: Path, content: bytes) -> bool:

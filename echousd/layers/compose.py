@@ -91,7 +91,8 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     named, bindings = room_slots(room, made, built, slots)
     shown = looks.alternatives(harmony, room.graph.room.style)
     tables = {word: {name: looks.look(word, *of) for name, of in named.items()} for word in shown}
-    files |= materials.texture_files(tables[harmony], harmony)
+    for look in tables[harmony].values():  # equal images are one file
+        files |= dict(materials.look_images(look, harmony).values())
     files |= lights.image_files(room)
     layers = {
         "geometry": geometry_layer(room),

@@ -14,11 +14,6 @@ LOOKS = "/Room/Looks"
 IMAGES = {"diffuseColor": "image", "normal": "normal", "roughness": "roughness"}  # input -> its image's prim
 
 
-def texture_files(looks: Mapping[str, Look], harmony: str) -> dict[str, bytes]:
-    """Path in the room's folder -> image, for all patterns of some looks; equal ones are one file."""
-    return dict(image for look in looks.values() for image in look_images(look, harmony).values())
-
-
 def look_images(look: Look, harmony: str) -> dict[str, tuple[str, bytes]]:
     """Input of a UsdPreviewSurface -> (path in the room's folder, image) of a look with a pattern; {} without one."""
     if not look.pattern:

@@ -154,7 +154,15 @@ def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any], openings: S
     `data`: customLayerData. `openings`: of the graph, which point to their wall, frame and leaf.
     """
     pen = Pen.blank("Room", ".usdc", data)
-    write_shell(pen, built)
+    for part in built:
+        values: dict[str, Any] = {"float3[] extentsHint": np.asarray(part.extent, np.float32)}
+        if part.joint:  # a pivot to turn
+            values |= ops(translate=("double3", part.joint.anchor), rotateY=("float", 0.0))
+        pen.define(part.path, "Xform", values, ["GeomModelAPI"], kind=part.kind)
+        if part.label:
+            pen.label(part.path, category=part.label, ade20k=ade20k(part.label))
+        for mesh in part.meshes:
+            assets.write_mesh(pen, mesh.path, mesh.form)
     paths = {path for part in built for path in (part.path, *(mesh.path for mesh in part.meshes))}
     for opening in openings:
         wall = wall_name(opening.edge)
@@ -169,19 +177,6 @@ def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any], openings: S
             there = {f"rel {relationship}": target for relationship, target in ends.items() if target in paths}
             pen.over(f"{OPENINGS}/{opening.name}", there)
     return pen.layer
-
-
-def write_shell(pen: Pen, prims: Sequence[ShellPrim]) -> None:
-    """Author the parts with kind, labels and extents, and their meshes."""
-    for part in prims:
-        values: dict[str, Any] = {"float3[] extentsHint": np.asarray(part.extent, np.float32)}
-        if part.joint:  # a pivot to turn
-            values |= ops(translate=("double3", part.joint.anchor), rotateY=("float", 0.0))
-        pen.define(part.path, "Xform", values, ["GeomModelAPI"], kind=part.kind)
-        if part.label:
-            pen.label(part.path, category=part.label, ade20k=ade20k(part.label))
-        for mesh in part.meshes:
-            assets.write_mesh(pen, mesh.path, mesh.form)
 
 
 def _prims(part: ShellPart, above: str, kind: str, forms: Iterator[Surface]) -> Iterator[ShellPrim]:

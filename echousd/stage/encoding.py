@@ -8,6 +8,7 @@ from pxr import Sdf, Vt
 from echomodel.openings import Opening
 from echousd.graph import Node, RoomSpec
 from echousd.naming import free_name
+from echousd.plugin import plugin_path
 
 GRAPH_TYPE = "EchoSceneGraph"
 RELATION_TYPE = "EchoRelation"
@@ -25,71 +26,40 @@ OBJECTS_NAME = "Objects"
 OPENINGS_NAME = "Openings"
 
 ROOM = "echo:room"
-VOCABULARY = "echo:vocabulary"
-VOCABULARY_NAME = "echo-1"
-ROOM_TYPE = "echo:roomType"
-ROOM_STYLE = "echo:roomStyle"
-RESIDENT = "echo:roomResident"
-FLOOR_POLYGON = "echo:floorPolygon"
-FLOOR_SIZE = "echo:floorSize"
-HEIGHT = "echo:height"
-WALLS = "echo:wallThickness"
+VOCABULARY, VOCABULARY_NAME = "echo:vocabulary", "echo-1"
+FLOOR_POLYGON, FLOOR_SIZE = "echo:floorPolygon", "echo:floorSize"
 ROOM_FIELDS = {
-    ROOM_TYPE: "type", FLOOR_POLYGON: "floor_polygon", FLOOR_SIZE: "size", HEIGHT: "height", WALLS: "walls",
-    ROOM_STYLE: "style", RESIDENT: "resident",
+    "echo:roomType": "type", FLOOR_POLYGON: "floor_polygon", FLOOR_SIZE: "size", "echo:height": "height",
+    "echo:wallThickness": "walls", "echo:roomStyle": "style", "echo:roomResident": "resident",
 }  # fmt: skip
 
-AREA, RATIO, OUTLINE, ENTRANCE = "echo:area", "echo:ratio", "echo:outline", "echo:entrance"  # of homes
-HOME_FIELDS, HOME_ROOM_FIELDS = {AREA: "area", OUTLINE: "outline"}, {AREA: "area", RATIO: "ratio"}
+AREA, RATIO, ENTRANCE = "echo:area", "echo:ratio", "echo:entrance"  # of homes
+HOME_FIELDS, HOME_ROOM_FIELDS = {AREA: "area", "echo:outline": "outline"}, {AREA: "area", RATIO: "ratio"}
 
-KIND = "echo:kind"
-EDGE = "echo:edge"
-OFFSET = "echo:offset"
-WIDTH = "echo:width"
-SILL = "echo:sill"
-HINGE = "echo:hinge"
-SWING = "echo:swing"
+OPENING_FIELDS = {
+    f"echo:{field}": field for field in ("kind", "edge", "offset", "width", "height", "sill", "hinge", "swing")
+}
+SILL, HINGE, SWING = "echo:sill", "echo:hinge", "echo:swing"
 WALL, FRAME, LEAF = "echo:wall", "echo:frame", "echo:leaf"  # what an opening became in the room
-OPENING_FIELDS = {name: name.removeprefix("echo:") for name in (KIND, EDGE, OFFSET, WIDTH, HEIGHT, SILL, HINGE, SWING)}
 
 SUBJECT = "echo:subject"
 PREDICATE = "echo:predicate"
 OBJECT = "echo:object"
 CONFIDENCE = "echo:confidence"
 
-CATEGORY = "echo:category"
-STYLE = "echo:style"
-SIZE = "echo:size"
-POSITION = "echo:position"
-YAW = "echo:yaw"
-PLACE = "echo:place"
-BETWEEN = "echo:between"
-LOCKED = "echo:locked"
-SHAPES = "echo:shapes"
-ASSET = "echo:asset"
+CATEGORY, SIZE, YAW, SHAPES, BETWEEN = "echo:category", "echo:size", "echo:yaw", "echo:shapes", "echo:between"
 NODE_FIELDS = {
-    name: name.removeprefix("echo:") for name in (CATEGORY, STYLE, SIZE, POSITION, YAW, PLACE, LOCKED, SHAPES, ASSET)
+    f"echo:{field}": field
+    for field in ("category", "style", "size", "position", "yaw", "place", "locked", "shapes", "asset")
 }
 DRESSING = "dressing"  # the shapes of small things, which are no furniture
 FREE = "echo:attributes:"  # namespace of a node's free attributes
 
 _TYPES = Sdf.ValueTypeNames
-_NAMES = (
-    (
-        _TYPES.Token,
-        (VOCABULARY, ROOM_TYPE, ROOM_STYLE, RESIDENT, KIND, HINGE, SWING, PREDICATE, CATEGORY, STYLE, PLACE, SHAPES),
-    ),
-    (_TYPES.Double2Array, (FLOOR_POLYGON, OUTLINE)),
-    (_TYPES.Double2, (FLOOR_SIZE,)),
-    (_TYPES.Double, (HEIGHT, AREA, RATIO, OFFSET, WIDTH, SILL, CONFIDENCE, YAW)),
-    (_TYPES.DoubleArray, (WALLS,)),
-    (_TYPES.Int, (EDGE,)),
-    (_TYPES.Double3, (SIZE, POSITION)),
-    (_TYPES.Bool, (LOCKED,)),
-    (_TYPES.String, (ASSET,)),
-    (_TYPES.TokenArray, (LABELS,)),
-)
-VALUE_TYPES = {name: kind for kind, names in _NAMES for name in names}
+_SCHEMA = Sdf.Layer.FindOrOpen(str(plugin_path() / "generatedSchema.usda"))  # which says what type each property has
+VALUE_TYPES = {one.name: one.typeName for prim in _SCHEMA.rootPrims for one in prim.attributes} | {
+    LABELS: _TYPES.TokenArray
+}
 
 
 class StageError(ValueError):

@@ -93,18 +93,12 @@ def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:
             owner = known[parent]
             if owner:
                 getattr(owner, member).append(prim)
-    for prims in rooms.values():
-        _set_apart(prims)
-    return list(rooms.values())
-
-
-def _set_apart(prims: RoomPrims) -> None:
-    """Take the relations of small things from those of the furniture."""
-    small = {prim.GetPath() for prim in prims.small}
-    if small:
+    for prims in (prims for prims in rooms.values() if prims.small):
+        small = {prim.GetPath() for prim in prims.small}
         ends = [{*values.targets(one, usd.SUBJECT), *values.targets(one, usd.OBJECT)} for one in prims.relations]
         prims.small_relations = [one for one, both in zip(prims.relations, ends, strict=True) if both & small]
         prims.relations = [one for one, both in zip(prims.relations, ends, strict=True) if not both & small]
+    return list(rooms.values())
 
 
 def _room_of(graph: Usd.Prim) -> RoomPrims:

@@ -85,10 +85,11 @@ def test_what_is_authored_is_what_the_schema_says():
     definitions = [registry.FindConcretePrimDefinition(n) for n in encoding.TYPES]
     definitions += [registry.FindAppliedAPIPrimDefinition(name) for name in (encoding.NODE_API, encoding.ROOM_API)]
     declared = {name: d.GetSchemaAttributeSpec(name) for d in definitions for name in d.GetPropertyNames()}
-    for name, value_type in encoding.VALUE_TYPES.items():
-        if name != encoding.LABELS:
-            assert declared[name].typeName == value_type, name
-            assert declared[name].variability == Sdf.VariabilityUniform, name
+    fields = (encoding.ROOM_FIELDS, encoding.HOME_FIELDS, encoding.HOME_ROOM_FIELDS, encoding.OPENING_FIELDS)
+    written = {name for table in (*fields, encoding.NODE_FIELDS) for name in table}
+    for name in {*written, encoding.VOCABULARY, encoding.PREDICATE, encoding.CONFIDENCE}:
+        assert declared[name].typeName == encoding.VALUE_TYPES[name], name
+        assert declared[name].variability == Sdf.VariabilityUniform, name
     for name in (encoding.ROOM, encoding.SUBJECT, encoding.OBJECT, encoding.ENTRANCE):
         assert name in declared
 
