@@ -111,11 +111,11 @@ def corners_of(kind: str, size: np.ndarray, variant: int) -> np.ndarray:
 
 
 def upon(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | None:
-    """The spot (3,) for a thing, raised onto the solids below it; None where one stands far out, or few hold it."""
+    """The spot (3,) for a thing, brought to the solids below it; None where one stands far out, or few hold it."""
     tops = tops_of(host, spot, size)
-    top = max(float(spot[1]), float(tops.max()))
-    level = (tops > tops.max() - LEVEL).mean() > HELD
-    return np.array([spot[0], top, spot[2]]) if level and top - spot[1] < RAISED else None
+    top = float(tops.max())
+    level = (tops > top - LEVEL).mean() > HELD
+    return np.array([spot[0], top, spot[2]]) if level and abs(top - spot[1]) < RAISED else None
 
 
 def let_down(host: Standing, spot: np.ndarray, size: np.ndarray) -> np.ndarray | None:

@@ -23,7 +23,6 @@ COARSE = 0.7  # share of the faces below which a second level of detail is worth
 COLLIDERS = 64  # convex pieces of one body at most
 SLACK = 0.003  # metres that a mesh may reach beyond its convex pieces
 MOST = 0.8  # share of what the worst face lacks, from which on a face gets a corner in the same round
-FOLDS = 0.03  # metres that folds of a cover are deep
 # Levels of detail of what is hard and of what is soft, whose form is its mesh's, from the finest to boxes.
 FINENESS = ((FINEST, FINEST), (2, FINEST), (1, FINEST), (1, 2), (1, 1), (0, 1), (0, 0))
 SMALL = 0.002  # share of its box below which a solid alone is no obstacle
@@ -136,13 +135,14 @@ def covering(plain: np.ndarray, shown: np.ndarray) -> np.ndarray:
 
 
 def level(solid: Solid, corners: np.ndarray) -> np.ndarray:
-    """Corners (n, 3) of what a solid collides with: soft seats are level on top, and covers, as high as their folds."""
+    """Corners (n, 3) of what a solid collides with: soft seats are level on top, and covers amid their folds."""
     x, y, z = corners.T
+    deep, share = solid.gives
+    top = y.max() - min(deep, share * np.ptp(y))
     if solid.role == "seat" and solid.material == "fabric":
-        deep, share = solid.gives
-        y = np.minimum(y, y.max() - min(deep, share * np.ptp(y)))
+        y = np.minimum(y, top)
     elif solid.role == "cover":
-        y = np.where(y > y.max() - FOLDS, y.max(), y)
+        y = np.where(y > top - deep, top, y)
     return np.column_stack([x, y, z])
 
 

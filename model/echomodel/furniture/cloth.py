@@ -98,6 +98,10 @@ class Cover(Block):
     phase: Vector = (0.0, 0.0, 0.0)
     falls: bool = False
 
+    @property
+    def gives(self) -> tuple[float, float]:
+        return self.depth / 2, 1.0
+
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         w, h, d = self.half
         r, steps, phase = min(self.radius, h, w / 2, d / 2), (5, 8, 14, 19)[detail], np.array(self.phase)

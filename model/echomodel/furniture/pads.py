@@ -22,8 +22,11 @@ class Pad(Block):
     """
 
     soft = True
-    gives = (0.035, 0.25)
     crown: float = 0.02
+
+    @property
+    def gives(self) -> tuple[float, float]:
+        return 0.035, 0.25
 
     def puffed(self, points: Array) -> Array:
         """Points (n, 3) of the block, as far drawn in as its filling lets them be."""

@@ -64,11 +64,9 @@ class Solid:
         material: names its look. role: what it is in the piece: leg, top, seat, drawer, handle ...
         joint: how it moves, None = it is fixed.
         core: fills what boards enclose, so that a coarse grid sees one body; it has distances and no mesh.
-        gives: metres, and the most as a share of its height, that a seat of it is less full under what lies on it.
         soft: it is filled or hangs. draped: it lies in folds, which shade as one surface.
     """
 
-    gives: ClassVar[tuple[float, float]] = (0.015, 0.1)
     soft: ClassVar[bool] = False
     draped: ClassVar[bool] = False
     centre: Array = field(default_factory=lambda: np.zeros(3))
@@ -77,6 +75,11 @@ class Solid:
     role: str = ""
     joint: Joint | None = None
     core: bool = False
+
+    @property
+    def gives(self) -> tuple[float, float]:
+        """Metres, and the most as a share of its height, that its top is less full under what lies on it."""
+        return 0.015, 0.1
 
     def mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         """Vertices (n, 3) in the object's frame and outward faces (m, 3) of the closed surface."""

@@ -501,6 +501,7 @@ def test_what_is_flat_lies_on_the_solids_of_its_seat():
     host = SimpleNamespace(geometry=SimpleNamespace(colliders=[SimpleNamespace(mesh=seat), SimpleNamespace(mesh=back)]))
     size = np.array([0.4, 0.06, 0.3])
     np.testing.assert_allclose(soft_tops.upon(host, np.array([0.3, 0.385, 0.1]), size), (0.3, 0.4, 0.1), atol=1e-9)
+    np.testing.assert_allclose(soft_tops.upon(host, np.array([0.3, 0.42, 0.1]), size), (0.3, 0.4, 0.1), atol=1e-9)
     assert soft_tops.upon(host, np.array([0.3, 0.4, -0.12]), size) is None  # its back edge is in the back
     assert soft_tops.upon(host, np.array([0.3, 0.35, 0.1]), size) is None  # as high as no seat is above what one sees
     ridge = trimesh.creation.box((1.6, 0.41, 0.04))

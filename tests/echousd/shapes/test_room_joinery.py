@@ -15,6 +15,7 @@ from echomodel.data.shapeset import piece as styled
 from echomodel.furniture import solids
 from echomodel.furniture.bent import bent
 from echomodel.furniture.carpentry import box as solid_box
+from echomodel.furniture.cloth import cover
 from echomodel.furniture.pads import Pad
 from echomodel.furniture.style import WIDTH, piece_of
 from echomodel.triangles import Mesh, box
@@ -22,7 +23,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.shapes import joinery
 from echousd.shapes.colliders import collider as light_collider
 from echousd.shapes.geometry import FRAME, Origin
-from echousd.shapes.joinery import COLLIDERS, SLACK, assembled, convex_pieces, covering, within_budget
+from echousd.shapes.joinery import COLLIDERS, SLACK, assembled, convex_pieces, covering, level, within_budget
 
 SIZE = np.array([0.9, 1.0, 0.45])
 STANDING = {"lazy_sofa": 6, "shelf": 6}  # styles: bags on a point and shelves that lean on nothing are among them
@@ -115,8 +116,18 @@ def test_no_mesh_reaches_out_of_its_colliders(category):
         planes = [ConvexHull(collider.mesh.vertices).equations for collider in made.colliders]
         for part in made.parts:  # but a seat, which gives way under what lies on it
             beyond = [(part.mesh.vertices @ each[:, :3].T + each[:, 3]).max(1) for each in planes]
-            gives = Pad.gives[0] if part.name == "seat" and "fabric" in part.slots else 0.0
+            gives = Pad().gives[0] if part.name == "seat" and "fabric" in part.slots else 0.0
             assert np.min(beyond, axis=0).max() <= SLACK + gives + 1e-9, (category, style)
+
+
+def test_what_lies_on_a_cover_neither_hovers_over_its_folds_nor_sinks_out_of_sight():
+    for seed in range(4):
+        cloth = cover((-0.8, 0.4, -1.0), (0.8, 0.62, 1.0), "linen", 0.1, 0.045, np.random.default_rng(seed))
+        corners, _ = cloth.mesh()
+        top = level(cloth, corners)[:, 1].max()
+        inner = corners[(np.abs(corners[:, 0]) < 0.6) & (np.abs(corners[:, 2]) < 0.8) & (corners[:, 1] > 0.5), 1]
+        assert np.quantile(np.abs(inner - top), 0.95) < 0.024, seed
+        assert inner.max() > top + 0.01, seed
 
 
 @pytest.mark.parametrize("seed", [7, 9])
