@@ -58,8 +58,6 @@ class Store:
         root = Path(root)
         if root.exists() and not root.is_dir():
             raise ValueError(f"{root}: is a file, a store must be a folder")
-        if (root / MARK).is_file():
-            return cls.open(root)
         check_ours(root, "store", MARK)  # which another process may have begun just now
         if (root / MARK).is_file():
             return cls.open(root)

@@ -30,8 +30,11 @@ def materials(reading: Reading, prim: Usd.Prim) -> Iterator[Finding | str]:
     for node in nodes:
         if node.GetPath() not in used:
             yield Finding(node.GetPath(), "reaches no output of its material", warning=of_others(prim))
-    for node in (prim, *nodes):
-        yield from _loose_ends(node)
+    for attribute in (attribute for node in (prim, *nodes) for attribute in node.GetAuthoredAttributes()):
+        for source in attribute.GetConnections() if attribute.HasAuthoredConnections() else ():
+            other = prim.GetStage().GetPrimAtPath(source.GetPrimPath())
+            if not other or not (other.HasAttribute(source.name) or UsdShade.Shader(other).GetOutput(source.name[8:])):
+                yield Finding(attribute.GetPath(), f"connected to <{source}>, where nothing is")
     for node in nodes:
         yield from _unread(node, reading.primvars if prim.GetPath() in reading.bound else None)
 
@@ -48,15 +51,6 @@ def _used(material: Usd.Prim, outputs: list[UsdShade.Output]) -> set[Sdf.Path]:
             connected = filter(Usd.Attribute.HasAuthoredConnections, prim.GetAuthoredAttributes())
             queue += [source for attribute in connected for source in attribute.GetConnections()]
     return used
-
-
-def _loose_ends(node: Usd.Prim) -> Iterator[Finding]:
-    """Connections of a node to what is not there."""
-    for attribute in node.GetAuthoredAttributes():
-        for source in attribute.GetConnections() if attribute.HasAuthoredConnections() else ():
-            other = node.GetStage().GetPrimAtPath(source.GetPrimPath())
-            if not other or not (other.HasAttribute(source.name) or UsdShade.Shader(other).GetOutput(source.name[8:])):
-                yield Finding(attribute.GetPath(), f"connected to <{source}>, where nothing is")
 
 
 def _unread(node: Usd.Prim, primvars: set[str] | None) -> Iterator[Finding]:

@@ -33,16 +33,13 @@ quiet: ContextVar[bool] = ContextVar("quiet", default=False)  # whether errors, 
 def safe(text: str) -> str:
     """A text without characters that a terminal obeys (escapes, bells, reversed writing); long words are cut."""
     shown = "".join(
-        c if c in "\n\t" or unicodedata.category(c) not in ("Cc", "Cf", "Cs", "Zl", "Zp") else _escaped(c)
+        c if c in "\n\t" or unicodedata.category(c) not in ("Cc", "Cf", "Cs", "Zl", "Zp")
+        else c.encode("unicode_escape").decode() if ord(c) > 31 else f"\\x{ord(c):02x}"
         for c in text[: 16 * LONGEST_LINE]
-    )
+    )  # fmt: skip
     shown = ENDLESS.sub(lambda number: f"{number[1]}.{number[2][:3]}e+{len(number[2])}", shown)
     cut = re.sub(rf"(\S{{{LONGEST_WORD - 20}}})\S{{40,}}(\S{{10}})", r"\1...\2", shown)
     return cut if len(cut) <= 16 * LONGEST_LINE else cut[: 16 * LONGEST_LINE] + "..."
-
-
-def _escaped(character: str) -> str:
-    return character.encode("unicode_escape").decode() if ord(character) > 31 else f"\\x{ord(character):02x}"
 
 
 def one_line(text: str) -> str:
@@ -112,20 +109,16 @@ def _checked(callback: Callable[..., Any]) -> Callable[..., Any]:
         _began.set(time.perf_counter())
         for name, value in options.items():
             for number in value if isinstance(value, tuple | list) else (value,):
-                check_number(f"--{name.replace('_', '-')}", number)
+                flag, whole = f"--{name.replace('_', '-')}", isinstance(number, int)
+                if name == "seed" and whole and not 0 <= number <= LARGEST:
+                    raise ValueError(f"seed is {number}, allowed: 0 to {LARGEST}")
+                if isinstance(number, float) and not math.isfinite(number):
+                    raise ValueError(f"{flag} is {number}, allowed: a finite number")
+                if whole and abs(number) > LARGEST:
+                    raise ValueError(f"{flag} is {number}, allowed: -{LARGEST} to {LARGEST}")
         return callback(*values, **options)
 
     return call
-
-
-def check_number(name: str, value: Any) -> None:
-    """Raises ValueError for a NaN, an infinity, a seed below 0 or an integer beyond `LARGEST`; other values pass."""
-    if name == "--seed" and isinstance(value, int) and not 0 <= value <= LARGEST:
-        raise ValueError(f"seed is {value}, allowed: 0 to {LARGEST}")
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ValueError(f"{name} is {value}, allowed: a finite number")
-    if isinstance(value, int) and abs(value) > LARGEST:
-        raise ValueError(f"{name} is {value}, allowed: -{LARGEST} to {LARGEST}")
 
 
 def _show_all(context: typer.Context, wanted: bool) -> None:
@@ -161,15 +154,9 @@ def report(made: Sequence[Written], *, json: bool = False, more: Mapping[str, An
         more: further entries of the JSON object.
     """
     faults = [fault for each in made for fault in each.room.faults]
-    if json:
-        files = [path for each in made for path in (each.root, each.preview)]
-        rooms = {"rooms": [_room(each) for each in made]}
-        say_json(_written([path for path in files if path], faults, {**rooms, **(more or {})}), indent=2)
-    else:
-        for each in made:
-            tell_room(each)
-    if faults:
-        raise typer.Exit(1)
+    files = [path for each in made for path in (each.root, each.preview) if path]
+    content = _written(files, faults, {"rooms": [_room(each) for each in made], **(more or {})})
+    say_found(json, content, (line for each in made for line in room_lines(each)), ok=not faults)
 
 
 def _written(files: Sequence[Path], faults: Sequence[str], more: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -213,21 +200,17 @@ def _room(written: Written) -> dict[str, Any]:
     }
 
 
-def tell_room(written: Written) -> None:
-    """Say what became of a room."""
+def room_lines(written: Written) -> Iterator[str]:
+    """What became of a room."""
     room = written.room
-    say(f"room     {written.root}")
+    yield f"room     {written.root}"
     if written.preview is not None:
-        say(f"preview  {written.preview}")
+        yield f"preview  {written.preview}"
     for number, found in enumerate(room.outcomes):
         counts, several = found.counts(), len(room.outcomes) > 1
         kept = f"{counts['kept']} of {counts['kept'] + counts['broken']} measured relations kept"
-        say(f"layout_{number} {kept}" if several else f"graph    {counted(len(room.names), 'object')}, {kept}")
-        for verdict in found.broken:
-            say(f"broken   {verdict.sentence} (margin {verdict.margin:+.2f})")
-        for hit in found.collisions:
-            say(f"collide  {hit.first} and {hit.second} by {hit.depth:.2f} m")
-        for sentence in found.restless:
-            say(f"restless {sentence}")
-    for note in room.notes:
-        say(f"note     {note}")
+        yield f"layout_{number} {kept}" if several else f"graph    {counted(len(room.names), 'object')}, {kept}"
+        yield from (f"broken   {verdict.sentence} (margin {verdict.margin:+.2f})" for verdict in found.broken)
+        yield from (f"collide  {hit.first} and {hit.second} by {hit.depth:.2f} m" for hit in found.collisions)
+        yield from (f"restless {sentence}" for sentence in found.restless)
+    yield from (f"note     {note}" for note in room.notes)

@@ -11,6 +11,7 @@ import shapely
 from pxr import Usd, UsdGeom
 
 from echomodel.boxes2d import axes
+from echomodel.files import tables
 from echomodel.openings import inward_normal, rectangle
 from echomodel.triangles import cross
 from echousd.draw.scenery import Scenery
@@ -37,31 +38,7 @@ NEARS, LENSES, STRAIGHT = np.arange(0.5, 3.1, 0.25), (35.0, 31.0, 28.0, 26.0, 24
 # Which heights and slopes all are tried at; how many of a place and of all, which cost least there, at every one; how
 # many of those rays are run through; of a place, a way, a lens.
 USUAL, TRIED, LOOKED, BEST = ((1,), (1, 4)), (16, 1000), (6, 250), 3
-# What each costs: weight of what is looked at, and why.
-COSTS: dict[str, float] = {
-    # the main piece
-    "whole": 1000.0,  # share of its corners beyond the border: a picture must have all of it
-    "hidden": 140.0,  # share of it that others hide
-    "middle": 60.0,  # how far off the middle it is, from `ASIDE` of half the width on
-    "behind": 180.0,  # cosine from behind it, from `SIDEWAYS` on: its front is what one wants to see
-    "small": 300.0, "large": 150.0,  # shares of the picture's width by which it is out of `SIZES`
-    # others
-    "cut_lamp": 90.0, "cut_hung": 20.0, "cut": 25.0,  # whether the border cuts a lamp, what hangs high, furniture
-    "lamp_out": 40.0,  # whether a lamp is beyond the border: it lights what one sees
-    "severed": 350.0,  # share of the picture that cut furniture takes
-    "left_out": 8.0, "missed": 60.0,  # whether one is left out before the eye, and that near the main piece
-    "filled": 650.0,  # share of what is near, which hides the room
-    "backs": 320.0, "turned": 1000.0,  # share of backs, and of near ones from `SOME` on
-    # what is bare
-    "walls": 150.0,  # share of walls so near that they fill a side
-    "ceiling": 100.0,  # share of ceiling
-    "doors": 250.0,  # share of doors
-    "floor": 300.0, "bare": 650.0,  # shares of floor and of one bare wall, from `FLOORED` and `BAREST` on
-    # what is worth something
-    "shown": -130.0,  # share of furniture
-    "seen": -7.0,  # a thing, up to `MANY`, of which `ENOUGH` shows all
-    "faced": -12.0,  # metres towards where the room looks, up to `AHEAD`
-}  # fmt: skip
+COSTS: dict[str, float] = tables("costs.toml", __file__)
 # Of half the width; cosine; shares of the picture's width; metres over the floor from which on a lamp or what hangs is
 # high; metres from the main piece within which one is missed.
 ASIDE, SIDEWAYS, SIZES, HIGH, BESIDE = 0.33, 0.55, (0.36, 0.55), 0.25, 0.5

@@ -166,8 +166,13 @@ def tabletops(setting: Setting) -> None:
 def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
     rng = setting.rng(host.name, "top")
     taken: set[str] = set()
-    if name == "tv_stand" and not setting.of("screen"):
-        _television(setting, host, surface)
+    if name == "tv_stand" and not setting.of("screen"):  # a television in the middle, as wide as looks good on it
+        variant = int(setting.rng("television").integers(1 << 30))
+        for share in (0.6, 0.5, 0.4):
+            wide = round(min(share * float(host.size[0]), KINDS["television"].high[0]), 2)
+            size, spots = np.array([wide, round(0.56 * wide + 0.045, 3), 0.2]), ((0, -0.3), (0, 0), (0.2, 0), (-0.2, 0))
+            if surface.put(setting, "television", spots, size=size, variant=variant):
+                break
     for number, wish in enumerate(setting.story.tops[name]):
         order = [str(k) for k in rng.permutation(wish.of)]
         turn = float(rng.uniform(-0.12, 0.12))
@@ -181,17 +186,6 @@ def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
                 for place, other in enumerate(wish.beside):
                     surface.put(setting, other, word=f"{number} {place}", beside=thing)
                 break
-
-
-def _television(setting: Setting, host: Standing, surface: Surface) -> None:
-    """A television in the middle of its stand, as wide as looks good on it."""
-    variant = int(setting.rng("television").integers(1 << 30))
-    spots = ((0.0, -0.3), (0.0, 0.0), (0.2, 0.0), (-0.2, 0.0))
-    for share in (0.6, 0.5, 0.4):
-        wide = round(min(share * float(host.size[0]), KINDS["television"].high[0]), 2)
-        size = np.array([wide, round(0.56 * wide + 0.045, 3), 0.2])
-        if surface.put(setting, "television", spots, size=size, variant=variant):
-            return
 
 
 def stocked(setting: Setting, host: Standing, surface: Surface) -> None:

@@ -191,7 +191,11 @@ def arranged(
             continue
         sizes = np.round(np.stack([w, h, np.full(len(w), 0.03)], 1), 2)
         places = np.stack([along + side * x, middle + y - sizes[:, 1] / 2], 1)
-        if hung_together(setting, wall, sizes, places.tolist(), variant, on):
+        kinds = shown(setting, sizes[0], len(sizes), on or f"wall {wall.edge}")
+        every = zip(kinds, sizes, places.tolist(), strict=False)
+        hung = [hung_at(setting, wall, at, kind, size, low, variant, on) for kind, size, (at, low) in every]
+        if found := [one for one in hung if one is not None and None not in hung]:  # all of them or none
+            setting.placed += found
             return True
     return False
 
@@ -204,17 +208,6 @@ def shown(setting: Setting, size: np.ndarray, count: int, *words: str) -> list[s
     new = ([name for name in names if name not in hung] for names in series)
     names = next((names for names in new if len(names) >= count), [])
     return [names[k] for k in rng.permutation(len(names))[:count]]
-
-
-def hung_together(
-    setting: Setting, wall: Wall, sizes: np.ndarray, places: Sequence[tuple[float, float]], variant: int, on: str = ""
-) -> bool:
-    """Hang pictures of one kind and of sizes (n, 3) at places (along and low) of a wall; all of them or none."""
-    kinds = shown(setting, sizes[0], len(places), on or f"wall {wall.edge}")
-    every = zip(kinds, sizes, places, strict=False)
-    row = [hung_at(setting, wall, along, kind, size, low, variant, on) for kind, size, (along, low) in every]
-    setting.placed += [one for one in row if one is not None and None not in row]
-    return bool(row) and None not in row
 
 
 def behind(size: np.ndarray, position: np.ndarray, yaw: float, walls: list[Wall]) -> tuple[Wall, float] | None:

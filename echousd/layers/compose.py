@@ -163,8 +163,15 @@ def layout_layer(room: RoomData) -> Sdf.Layer:
     pen = _pen(room, "layout")
     pen.layer.pseudoRoot.SetInfo("upAxis", room.options.up_axis)  # its places are so already
     pen.over("/Room")
-    for number, inside in enumerate(layout_pens(pen, len(room.layouts), "layout_0")):
-        _place(inside, room, number)
+    for boxes, inside in zip(room.layouts, layout_pens(pen, len(room.layouts), "layout_0"), strict=True):
+        for number, name in enumerate(room.names):
+            x, y, z = (round(float(v), 5) + 0.0 for v in boxes.position[number])
+            turn = ("float", round(float(np.degrees(float(boxes.yaw[number]))), 4) + 0.0)
+            if room.options.up_axis == "Z":
+                values = ops(translate=("double3", (x, 0.0 - z, y)), rotateZ=turn)
+            else:
+                values = ops(translate=("double3", (x, y, z)), rotateY=turn)
+            inside.over(f"{OBJECTS}/{name}", values)
     return pen.layer
 
 
@@ -326,18 +333,6 @@ def _slugs(room: RoomData) -> dict[str, str]:
 
 def _pen(room: RoomData, layer: str) -> Pen:
     return Pen.blank("Room", data=layer_data(room, f"{room.name}_{layer}" if layer else room.name))
-
-
-def _place(pen: Pen, room: RoomData, layout: int) -> None:
-    boxes = room.layouts[layout]
-    for number, name in enumerate(room.names):
-        x, y, z = (round(float(v), 5) + 0.0 for v in boxes.position[number])
-        turn = ("float", round(float(np.degrees(float(boxes.yaw[number]))), 4) + 0.0)
-        if room.options.up_axis == "Z":
-            values = ops(translate=("double3", (x, 0.0 - z, y)), rotateZ=turn)
-        else:
-            values = ops(translate=("double3", (x, y, z)), rotateY=turn)
-        pen.over(f"{OBJECTS}/{name}", values)
 
 
 def dressing_layer(room: RoomData, dressing: Dressing, small: Mapping[str, Asset]) -> Sdf.Layer:

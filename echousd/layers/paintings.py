@@ -4,7 +4,7 @@ import glob
 import shutil
 import tempfile
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,12 +46,11 @@ def attached(root: bytes | None) -> list[str]:
     return [path for path in layer.subLayerPaths if path.startswith(f"./{FOLDER}/")] if layer else []
 
 
-def with_looks(root: bytes, looks: Sequence[str], *, unfit: bool) -> bytes:
-    """A root layer of ours whose strongest sublayers are looks, and `UNFIT` where there is one."""
+def with_sublayers(root: bytes, first: Sequence[str], keep: Callable[[str], bool]) -> bytes:
+    """A root layer of ours whose strongest sublayers are others, and of its own those that are kept."""
     layer = _parsed(root)
     assert layer
-    ours = [path for path in layer.subLayerPaths if path not in (*looks, f"./{UNFIT}")]
-    layer.subLayerPaths = [*looks, *([f"./{UNFIT}"] if unfit else []), *ours]
+    layer.subLayerPaths = [*first, *filter(keep, layer.subLayerPaths)]
     return layer.ExportToString().encode("utf-8")
 
 
@@ -176,7 +175,8 @@ def refitted(
     for left in beside.glob(f"{glob.escape(mark)}*"):  # of a run that was killed: the folder is ours alone now
         shutil.rmtree(left, ignore_errors=True)
     with tempfile.TemporaryDirectory(prefix=mark, dir=beside) as scratch:
-        for path, content in {**files, root: _alone(files[root], files)}.items():
+        alone = with_sublayers(files[root], (), lambda path: path.removeprefix("./") in files)
+        for path, content in {**files, root: alone}.items():
             place = Path(scratch) / path
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_bytes(content)
@@ -187,20 +187,13 @@ def refitted(
             unfit = {look.path: list(look.objects) for look in looks}
     if unfit:
         files[UNFIT] = unfit_layer(looks, unfit, {"generator": "echousd"})
-    files[root] = with_looks(files[root], paths, unfit=bool(unfit))
+    first = [*paths, *([f"./{UNFIT}"] if unfit else [])]
+    files[root] = with_sublayers(files[root], first, lambda path: path not in (*paths, f"./{UNFIT}"))
     return {path: content for each in along.values() for path, content in each.items()}, [
         f"{folder / path}: {', '.join(name.rpartition('/')[2] for name in names)} changed or gone since painted; shown "
         "as made, export and paint again"
         for path, names in unfit.items()
     ]
-
-
-def _alone(root: bytes, files: Mapping[str, bytes]) -> bytes:
-    """A root layer without the sublayers that are not among the room's files."""
-    layer = _parsed(root)
-    assert layer
-    layer.subLayerPaths = [path for path in layer.subLayerPaths if path.removeprefix("./") in files]
-    return layer.ExportToString().encode("utf-8")
 
 
 def _parsed(root: bytes) -> Sdf.Layer | None:

@@ -14,7 +14,7 @@ from echomodel.furniture.solids import Joint
 from echomodel.late import Late
 from echomodel.openings import Opening, edge_lengths
 from echomodel.triangles import Mesh, joined
-from echomodel.vocabulary import Category, vocabulary
+from echomodel.vocabulary import vocabulary
 from echousd.dressing.walls import behind, walls_of
 from echousd.layers import assets
 from echousd.room import RoomData
@@ -51,7 +51,11 @@ def floor_slot(room: RoomData) -> str:
 
 def covered_walls(room: RoomData) -> dict[str, str]:
     """Name of a wall -> the slot of what covers it, for walls that are not plain: tiles where it is wet, `COVERS`."""
-    use, at_walls = vocabulary().room_type(room.graph.room.type).use, _at_walls(room)
+    size, position, yaw = (np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw))
+    every, rows = walls_of(room.corners), [vocabulary().category(node.category) for node in room.graph.nodes]
+    found = (behind(size[k], position[k], float(yaw[k]), every) for k in range(len(rows)))
+    at_walls = [(row, wall_name(at[0].edge)) for row, at in zip(rows, found, strict=True) if at]
+    use = vocabulary().room_type(room.graph.room.type).use
     if use == "wet" and room.options.walls:
         if any(row.task == "cook" for row, _ in at_walls):
             return {wall: "wall_tiles" for row, wall in at_walls if row.stands == "row"}
@@ -62,14 +66,6 @@ def covered_walls(room: RoomData) -> dict[str, str]:
     longest = wall_name(int(edge_lengths(room.corners).argmax()))
     hosts = [wall for role in HOSTS for row, wall in at_walls if row.role == role]
     return {[*hosts, longest][0]: cover} if cover else {}
-
-
-def _at_walls(room: RoomData) -> list[tuple[Category, str]]:
-    """Rows of the objects that stand at a wall, in the order of the graph, and the wall's name."""
-    size, position, yaw = (np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw))
-    every, rows = walls_of(room.corners), [vocabulary().category(node.category) for node in room.graph.nodes]
-    found = (behind(size[k], position[k], float(yaw[k]), every) for k in range(len(rows)))
-    return [(row, wall_name(at[0].edge)) for row, at in zip(rows, found, strict=True) if at]
 
 
 def drawn(room: RoomData, what: str, among: int) -> int:

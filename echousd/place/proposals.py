@@ -60,7 +60,12 @@ def proposals(problem: Problem, position: np.ndarray, yaw: np.ndarray, there: np
             rows += in_view(problem, i, walls)
         if not at_wall and kind.role not in ("decor", "light", "storage"):
             rows += _in_the_open(problem, i, loose)
-        rows += _as_stated(problem, position, yaw, i)
+        for one in (one for one in problem.stated if one.subject == i):  # where the graph says that it stands
+            if one.others:
+                rows += _in_the_open(problem, i, 0.2) + midway(position, yaw, one.others)
+            else:
+                rows += along_walls(problem, i, 0.0) + _corners(problem, i, 0.0)
+                rows += _corners(problem, i, 0.0, across=True) if kind.front else []
         beside = twins(problem, position, yaw, i)
         rows = [*beside, *((*row[:3], row[3] + APART_TWINS) for row in rows)] if beside else rows
     now = (position, yaw) if kind.support == "ceiling" else (problem.position, problem.yaw)
@@ -175,18 +180,6 @@ def aside(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int) -> np
     ways = [sign * way for way in SLIDES for sign in (-1, 1)]
     slots = [(way, 0.0) for way in ways] + [(0.0, way) for way in ways if not problem.kinds[i].wall]
     return np.array(rows + [out_of(here, turn, (*slot, 0.0, 0.05 + 0.1 * abs(sum(slot)))) for slot in slots])
-
-
-def _as_stated(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int) -> list[Row]:
-    """Where the graph says that the box stands in the room: at walls, in corners, between two others, beside a twin."""
-    rows: list[Row] = []
-    for one in problem.stated:
-        if one.subject == i and not one.others:
-            rows += along_walls(problem, i, 0.0) + _corners(problem, i, 0.0)
-            rows += _corners(problem, i, 0.0, across=True) if problem.kinds[i].front else []
-        elif one.subject == i:
-            rows += _in_the_open(problem, i, 0.2) + midway(position, yaw, one.others)
-    return rows
 
 
 def twins(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int) -> list[Row]:

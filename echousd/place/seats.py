@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 
@@ -24,7 +25,10 @@ def around(own: Size, anchor: Size, kind: Category, count: int, apart: float, ah
     """Chairs: along both long sides of a table and at its ends, looking at it; along the front of one at a wall."""
     length, depth = float(anchor[0]), float(anchor[2])
     if kind.wall:
-        return _along_front(own, length, depth, count, -apart)
+        spacing = max(min(length / max(count, 1), 0.7), float(own[0]) + 0.05)
+        places = product(range(count), ((0.0, 0.0), (-0.15, 0.3), (0.2, 0.3)))
+        front = depth / 2 + own[2] / 2 + apart
+        return [((k - (count - 1) / 2) * spacing, front + off, math.pi, cost) for k, (off, cost) in places]
     if length >= depth:
         return _around(own, length, depth, count, -apart)
     # the long sides are the left and the right one: the same, turned by a quarter
@@ -52,15 +56,6 @@ def _around(own: Size, length: float, depth: float, count: int, tuck: float) -> 
         out.append((length / 2 + own[2] / 2 - tucked, 0.0, -HALF_PI, at_ends + push))
         out.append((-length / 2 - own[2] / 2 + tucked, 0.0, HALF_PI, at_ends + push))
     return out
-
-
-def _along_front(own: Size, length: float, depth: float, count: int, tuck: float) -> list[Slot]:
-    spacing = max(min(length / max(count, 1), 0.7), float(own[0]) + 0.05)
-    return [
-        ((k - (count - 1) / 2) * spacing, depth / 2 + own[2] / 2 - tuck + off, math.pi, cost)
-        for k in range(count)
-        for off, cost in ((0.0, 0.0), (-0.15, 0.3), (0.2, 0.3))
-    ]
 
 
 def at_front(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:

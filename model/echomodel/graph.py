@@ -224,6 +224,18 @@ class GraphEdit:
         return GraphEdit((self.before + shift).reshape(-1, 3), np.tile(self.added, count))
 
 
+def ordered_pairs(counts: Array) -> tuple[Array, Array, Array]:
+    """Receiver (P,), sender (P,) and scale (N, 1) of all ordered pairs of scenes with `counts` (S,) int64 nodes."""
+    each = np.asarray(on_device(counts, None))
+    per_node = each.repeat(each)
+    receiver = np.arange(len(per_node)).repeat(per_node)
+    first = (each.cumsum() - each).repeat(each).repeat(per_node)
+    sender = first + np.arange(len(receiver)) - (per_node.cumsum() - per_node).repeat(per_node)
+    different = receiver != sender
+    scale = 1 / np.sqrt(np.maximum(per_node - 1, 1).astype(np.float32))[:, None]
+    return beside(receiver[different], counts), beside(sender[different], counts), beside(scale, counts)
+
+
 def shifted(placements: Array, nodes: int) -> Array:
     """Placements whose nodes are counted from elsewhere."""
     moved = placements + cast([nodes, 0, nodes, nodes], placements)

@@ -195,7 +195,10 @@ class GraphEncoder(nn.Module):
         config = self.encoder_config
         graph.check(config)
         places = [index + number for number, index in enumerate(added)]
-        latent = insert_zeros(latent, places)
+        for place in places:
+            if not 0 <= place <= len(latent):
+                raise ValueError(f"added node {place} lies outside 0..{len(latent)}")
+            latent = torch.cat([latent[:place], latent.new_zeros(1, latent.shape[1]), latent[place:]])
         count = len(graph.classes)
         if len(latent) != count:
             raise ValueError(f"{len(latent)} latents with {len(places)} added nodes for a graph of {count} nodes")
@@ -210,12 +213,3 @@ class GraphEncoder(nn.Module):
             torch.cat([latent, flags, nodes], dim=1), edges, graph.triples[:, [0, 2]]
         )
         return new, new_edges, keep
-
-
-def insert_zeros(latent: Tensor, places: Sequence[int]) -> Tensor:
-    """(M, D) with rows of zeros inserted at `places`, indices of the result, ascending: (M + K, D)."""
-    for place in places:
-        if not 0 <= place <= len(latent):
-            raise ValueError(f"added node {place} lies outside 0..{len(latent)}")
-        latent = torch.cat([latent[:place], latent.new_zeros(1, latent.shape[1]), latent[place:]])
-    return latent

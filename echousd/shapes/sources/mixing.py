@@ -18,20 +18,13 @@ from echousd.graph.arrays import DESCRIPTION, graph_batch, one_thread, rounded, 
 from echousd.shapes.geometry import Geometry, Origin
 from echousd.shapes.joinery import assembled
 from echousd.shapes.sources.named import source_of
-from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
+from echousd.shapes.sources.source import ShapeRequest, Shapes, having, per_asset
 from echousd.shapes.styles import stated_styles
 
 if TYPE_CHECKING:
     from echomodel.protocols import RoomModel
 
 WHOLE = "echousd.shapes.sources.whole"
-
-
-def needs_furniture(model: RoomModel | None) -> RoomModel:
-    """The model; raises ValueError for none, and for one without a furniture branch."""
-    if model is None or "furniture" not in model.branches:
-        raise ValueError("these weights have no furniture branch; use --shapes sdf, --shapes boxes or other weights")
-    return model
 
 
 def furniture_of_parts(request: ShapeRequest) -> Shapes:
@@ -53,9 +46,9 @@ def furniture_of_parts(request: ShapeRequest) -> Shapes:
 def descriptions(request: ShapeRequest) -> np.ndarray:
     """(n, WIDTH) float32: the model's description of every object, rounded; those of an edited graph that stay count.
 
-    Raises ValueError as `needs_furniture` does.
+    Raises ValueError as `having` does.
     """
-    graph, model = request.graph, needs_furniture(request.model)
+    graph, model = request.graph, having("furniture", request.model)
     words = sorted(set(request.styles.values()))
     styles = np.array([words.index(request.styles[name]) for name in graph.names])
     extra = request.edited
@@ -82,11 +75,11 @@ class ShapeSource:
 
 
 SOURCES = {  # those of `echousd.graph.fields.SHAPES`
-    "parts": ShapeSource(furniture_of_parts, needs_furniture),
-    "sdf": ShapeSource(Late(f"{WHOLE}:sampled_shapes"), Late(f"{WHOLE}:needs_shapes")),
+    "parts": ShapeSource(furniture_of_parts, partial(having, "furniture")),
+    "sdf": ShapeSource(Late(f"{WHOLE}:sampled_shapes"), partial(having, "shape")),
     "boxes": ShapeSource(Late(f"{WHOLE}:plain_boxes")),
     "library": ShapeSource(partial(Late(f"{WHOLE}:chosen_models"), source="library")),
-    "guided": ShapeSource(partial(Late(f"{WHOLE}:chosen_models"), source="guided"), Late(f"{WHOLE}:needs_shapes")),
+    "guided": ShapeSource(partial(Late(f"{WHOLE}:chosen_models"), source="guided"), partial(having, "shape")),
     "own": ShapeSource(partial(Late(f"{WHOLE}:chosen_models"), source="own")),
 }
 

@@ -93,6 +93,16 @@ class Shapes:
     geometry: Mapping[str, Geometry]  # every owner -> its geometry
 
 
+OTHERS = {"furniture": "--shapes sdf, --shapes boxes", "shape": "shapes 'boxes' (--shapes boxes)"}  # without a branch
+
+
+def having(branch: str, model: RoomModel | None) -> RoomModel:
+    """The model; raises ValueError for none, and for one without a branch."""
+    if model is None or branch not in model.branches:
+        raise ValueError(f"these weights have no {branch} branch; use {OTHERS[branch]} or other weights")
+    return model
+
+
 def per_asset(request: ShapeRequest, make: Callable[[int], Geometry]) -> Shapes:
     """Geometry for the first object of each group that can share an asset (`shared_assets`).
 

@@ -14,7 +14,6 @@ from trimesh.util import append_faces
 from echomodel.arrays import on_device
 from echomodel.files import tables
 from echomodel.late import Late
-from echomodel.protocols import RoomModel
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
 from echousd.graph.arrays import DISTANCE, graph_batch, one_thread, rounded, seeded
@@ -22,7 +21,7 @@ from echousd.shapes.colliders import colliders_of
 from echousd.shapes.geometry import Geometry, Origin, Part
 from echousd.shapes.meshing import LEAST_FACES, mesh_from_shape
 from echousd.shapes.sources.named import source_of
-from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
+from echousd.shapes.sources.source import ShapeRequest, Shapes, having, per_asset
 from echousd.shapes.styles import EQUAL, first_alike
 
 if TYPE_CHECKING:
@@ -49,12 +48,6 @@ def solid_geometry(mesh: trimesh.Trimesh, category: str, origin: Origin) -> Geom
     """The geometry of one mesh (object frame, metres) whose category says which materials it has where."""
     cut, slots = material_groups(mesh, category)
     return Geometry((Part("mesh", Mesh.of(cut), slots),), colliders_of(Mesh.of(mesh), category), origin)
-
-
-def needs_shapes(model: RoomModel | None) -> None:
-    """Raises ValueError for a model without a shape branch."""
-    if model is None or "shape" not in model.branches:
-        raise ValueError("these weights have no shape branch; use shapes 'boxes' (--shapes boxes) or other weights")
 
 
 def sampled_shapes(request: ShapeRequest) -> Shapes:
@@ -93,10 +86,9 @@ def within_budget(grid: np.ndarray, size: np.ndarray, category: str, faces: int)
 
 def sampled_grids(request: ShapeRequest) -> np.ndarray:
     """(n, 64, 64, 64) float32 TSDFs of all objects; raises ValueError for a model without a shape branch."""
-    needs_shapes(request.model)
-    assert request.model is not None
+    model = having("shape", request.model)
     with request.timer.stage("shapes") as tell, one_thread():
-        grids = request.model.sample_shapes(
+        grids = model.sample_shapes(
             graph_batch(request.graph), request.centred, generator=seeded(request.seed, "shapes"), steps=request.steps,
             progress=tell, **request.edited,
         )  # fmt: skip

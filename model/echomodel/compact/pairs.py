@@ -15,7 +15,7 @@ import numpy as np
 from echomodel.arrays import NUMPY, Array, beside, cast, full, kit, on_device, parted, repeat, rows, silu, sum_of
 from echomodel.compact.learned import table_of
 from echomodel.config import names_of
-from echomodel.graph import GraphBatch
+from echomodel.graph import GraphBatch, ordered_pairs
 from echomodel.vocabulary import vocabulary
 
 CACHED = 1024  # pairs whose messages a processor's cache holds
@@ -48,18 +48,6 @@ class Pairs:
         """The pairs between the nodes where `node_mask` (N,) bool is true, with `stated` (P, 2R) instead of theirs."""
         keep = rows(node_mask[self.receiver] & node_mask[self.sender])
         return Pairs(self.receiver[keep], self.sender[keep], stated[keep], self.scale)
-
-
-def ordered_pairs(counts: Array) -> tuple[Array, Array, Array]:
-    """Receiver (P,), sender (P,) and scale (N, 1) of all ordered pairs of scenes with `counts` (S,) int64 nodes."""
-    each = np.asarray(on_device(counts, None))
-    per_node = each.repeat(each)
-    receiver = np.arange(len(per_node)).repeat(per_node)
-    first = (each.cumsum() - each).repeat(each).repeat(per_node)
-    sender = first + np.arange(len(receiver)) - (per_node.cumsum() - per_node).repeat(per_node)
-    different = receiver != sender
-    scale = 1 / np.sqrt(np.maximum(per_node - 1, 1).astype(np.float32))[:, None]
-    return beside(receiver[different], counts), beside(sender[different], counts), beside(scale, counts)
 
 
 def pairs_of(graph: GraphBatch, predicates: tuple[str, ...] | None = None) -> Pairs:

@@ -128,7 +128,15 @@ def _stand(
         low, high = (box((x - t, y, -z), (x + t, y + 2 * t, z), "metal") for y in (0, h - 2 * t))
         return both(low, *(post(x, end, t, 0, h, "metal") for end in (-z, z)), high)
     if kind == "trestle":
-        return _trestle(x, z, h, thick)
+        t, side = thick / 2, x * 0.82
+        slanted = turned((side, thick * 0.5, z * 0.25), t, h - thick, power=np.inf, turn=rotation(x=-0.12))
+        trestles = both(
+            box((side - t, 0, -z), (side + t, thick, z)),
+            box((side - t, h - thick, -z * 0.9), (side + t, h, z * 0.9)),
+            *both(slanted, axis=2),
+            box((side - t * 0.8, h * 0.45, -z * 0.25), (side + t * 0.8, h * 0.45 + thick, z * 0.25)),
+        )
+        return [*trestles, box((-side, h * 0.45, -t), (side, h * 0.45 + thick, t))]
     if kind == "hairpin":
         r, d = max(0.006, thick * 0.16), min(0.12, width * 0.12)
         return four(tube([[x - d, h, z], [x, r, z], [x, h, z - d]], r, "metal"))
@@ -143,15 +151,3 @@ def _stand(
         parts += both(box((mx - t, y - t, -mz), (mx + t, y + t, mz), material))
         parts.append(box((-mx, y - t, -t), (mx, y + t, t), material))
     return parts
-
-
-def _trestle(x: float, z: float, h: float, thick: float) -> list[Solid]:
-    t, side = thick / 2, x * 0.82
-    slanted = turned((side, thick * 0.5, z * 0.25), t, h - thick, power=np.inf, turn=rotation(x=-0.12))
-    trestles = both(
-        box((side - t, 0, -z), (side + t, thick, z)),
-        box((side - t, h - thick, -z * 0.9), (side + t, h, z * 0.9)),
-        *both(slanted, axis=2),
-        box((side - t * 0.8, h * 0.45, -z * 0.25), (side + t * 0.8, h * 0.45 + thick, z * 0.25)),
-    )
-    return [*trestles, box((-side, h * 0.45, -t), (side, h * 0.45 + thick, t))]

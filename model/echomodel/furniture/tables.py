@@ -217,8 +217,13 @@ def mirror_of(w: float, low: float, high: float, d: float, style: Style, choices
     """A mirror at the rear of a table top at `low`, up to `high`; w and d are the table's, metres."""
     tall, z = high - low, -d / 2 + 0.03
     kind = choices.pick("form", ["round", "panel", "wings"])
-    if kind == "round":
-        return [box((-0.06, low, z - 0.02), (0.06, low + tall * 0.15, z + 0.02)), *_disc(w, high, tall, z)]
+    if kind == "round":  # in a ring of wood
+        radius, up = min(w * 0.4, tall * 0.46), tall * 0.46
+        ring = turned((0, high - up, z - 0.015), (radius, up), 0.024, turn=rotation(x=np.pi / 2))
+        inner = (radius - 0.014, up - 0.014)
+        face = replace(ring, centre=ring.centre + np.array([0, 0, 0.02]), low=inner, high=inner, height=0.008)
+        foot = box((-0.06, low, z - 0.02), (0.06, low + tall * 0.15, z + 0.02))
+        return [foot, ring, replace(face, material="mirror")]
     half = w * choices.between("spread", 0.28, 0.42)
     low -= 0.005  # let into the top: a foot on it would be stood on, as its collider is the top's
     if kind == "panel":
@@ -230,15 +235,6 @@ def mirror_of(w: float, low: float, high: float, d: float, style: Style, choices
         x = s * (half + wing * 0.47)
         wings += _framed(x, low, high - 0.03, wing / 2, z + wing * 0.16, -s * WING, style)
     return [*_framed(0.0, low, high, half, z, 0.0, style), *wings]
-
-
-def _disc(w: float, high: float, tall: float, z: float) -> list[Solid]:
-    """A round mirror in a ring of wood."""
-    half, up = min(w * 0.4, tall * 0.46), tall * 0.46
-    ring = turned((0, high - up, z - 0.015), (half, up), 0.024, turn=rotation(x=np.pi / 2))
-    inner = (half - 0.014, up - 0.014)
-    face = replace(ring, centre=ring.centre + np.array([0, 0, 0.02]), low=inner, high=inner, height=0.008)
-    return [ring, replace(face, material="mirror")]
 
 
 def _framed(x: float, low: float, high: float, half: float, z: float, turn: float, style: Style) -> list[Solid]:

@@ -86,24 +86,17 @@ def style_scores(
         drawn = [rng.permutation(classes)[:SUITE].tolist() for _ in range(suites)]
         graph = GraphBatch.pack([GraphBatch.single(suite, triplets) for suite in drawn])
         sizes = np.stack([usual_size(words[number].name, rng) for suite in drawn for number in suite])
-        distance = style_distances(styles(graph, sizes))
+        described = styles(graph, sizes)
+        kinds = torch.stack([part.argmax(1) for part in described[:, :HOT].split(GROUPS, 1)], 1)
+        numbers = described[:, HOT:STYLE]
+        apart = (numbers[:, None] - numbers).abs().mean(2)  # of proportions, and the share of kinds that differ
+        distance = ((kinds[:, None] != kinds).float().mean(2) + apart / 2) / 2
         other = graph.category[:, None] != graph.category
         scene = graph.scene[:, None] == graph.scene
         out[name] = float(distance[scene & other].mean())
         if name == "told":
             out["other"] = float(distance[~scene & other].mean())
     return {**out, "ratio": out["told"] / max(out["other"], 1e-12)}
-
-
-def style_distances(descriptions: Tensor) -> Tensor:
-    """(N, N) in [0, 1]: mean of the share of kinds that differ and of how far the proportions lie apart.
-
-    `descriptions`: (N, D).
-    """
-    kinds = torch.stack([part.argmax(1) for part in descriptions[:, :HOT].split(GROUPS, 1)], 1)
-    differ = (kinds[:, None] != kinds).float().mean(2)
-    numbers = descriptions[:, HOT:STYLE]
-    return (differ + (numbers[:, None] - numbers).abs().mean(2) / 2) / 2
 
 
 def usual_size(category: str, rng: np.random.Generator) -> np.ndarray:

@@ -1,11 +1,11 @@
 """Labelling: the relations that hold in a room, found by the same rules that check them."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from echomodel.graph import ordered_pairs
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.geometry import Spread, pairs
 from echomodel.rules.margins import fronts
@@ -56,7 +56,7 @@ def label_rooms(
 
 
 def _label(rooms: Sequence[RoomBoxes], starts: np.ndarray, rules: RuleSet, headings: bool) -> np.ndarray:
-    subject, object_ = _ordered_pairs(starts)
+    subject, object_, _ = ordered_pairs(np.diff(starts))
     if not len(subject):
         return np.zeros((0, 3), np.int64)
     size, position, yaw = (
@@ -77,17 +77,6 @@ def _label(rooms: Sequence[RoomBoxes], starts: np.ndarray, rules: RuleSet, headi
     ]
     edges = np.concatenate(kept).astype(np.int64)
     return edges[np.lexsort((edges[:, 1], edges[:, 2], edges[:, 0]))]
-
-
-def _ordered_pairs(starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All (i, j), i != j, within each room, as indices into the joined boxes."""
-    subjects, objects = [], []
-    for first, last in pairwise(starts):
-        i, j = np.divmod(np.arange((last - first) ** 2), max(last - first, 1))
-        keep = i != j
-        subjects.append(first + i[keep])
-        objects.append(first + j[keep])
-    return np.concatenate(subjects).astype(np.int64), np.concatenate(objects).astype(np.int64)
 
 
 def _likeness(

@@ -10,10 +10,10 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
-from echomodel.compact.pairs import Pairs, inverse_predicates, ordered_pairs, reverse_pairs
+from echomodel.compact.pairs import Pairs, inverse_predicates, reverse_pairs
 from echomodel.config import names_of
 from echomodel.data.roomset import RoomSet
-from echomodel.graph import GraphBatch
+from echomodel.graph import GraphBatch, ordered_pairs
 from echomodel.objective.plan import Plan, kinds_of
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.telling import near_first

@@ -87,7 +87,9 @@ class Trainer:
         recipe, last = self.recipe, self.recipe.steps if until is None else min(until, self.recipe.steps)
         self.folder.mkdir(parents=True, exist_ok=True)
         log = self.folder / "log.csv"
-        begin_log(log, self.step)
+        rows = [row for row in read_log(log) if row[0] <= self.step]  # a run that was cut off may have logged more
+        with log.open("w", newline="") as handle:
+            csv.writer(handle).writerows([("step", "name", "value"), *rows])
         started = marked = time.monotonic()
         sums, logged = dict[str, float](), self.step
         self.model.train()
@@ -205,13 +207,6 @@ def step_generator(seed: int, step: int) -> torch.Generator:
     # a splitmix64 round spreads neighbouring (seed, step) over the generator's states
     mixed = (seed * 0x9E3779B97F4A7C15 + step * 0xBF58476D1CE4E5B9 + 1) % 2**63
     return torch.Generator().manual_seed(mixed)
-
-
-def begin_log(path: Path, start: int) -> None:
-    """Begin a log in long form (step, name, value); of a run that was cut off, drop the rows after step `start`."""
-    rows = [row for row in read_log(path) if row[0] <= start]
-    with path.open("w", newline="") as handle:
-        csv.writer(handle).writerows([("step", "name", "value"), *rows])
 
 
 def write_log(path: Path, step: int, values: dict[str, float]) -> None:
