@@ -91,9 +91,13 @@ def chair_legs(style: Style, w: float, d: float, h: float, thick: float, *, tie:
     return base(style, w, d, h, thick, kind, tie=tie and style.contrast > 0.55 and kind not in ("sled", "hairpin"))
 
 
-def slim_arms(w: float, d: float, seat: float, h: float, style: Style, thick: float) -> list[Solid]:
+def slim_arms(
+    w: float, d: float, seat: float, h: float, style: Style, thick: float, rail: float | None = None
+) -> list[Solid]:
+    """Boards to lean on, each on a stay from beside the seat, or on two from the height of a `rail` that carries it."""
     y = seat + min(0.22, (h - seat) * 0.55)
-    x, z0, z1 = w / 2 - thick, -d * 0.4, d * 0.34
-    rest = box((x - thick * 0.8, y - thick, z0), (x + thick * 0.8, y, z1), "wood", 0.008)
-    stay = leg((x, seat - 0.08, z1 - thick), (x, y - thick * 0.5, z1 - thick), thick, style)
-    return of_role("arm", both(rest, stay))
+    x, z0, z1 = w / 2 - thick, -d * 0.4, d * (0.34 if rail is None else 0.42)
+    rest = box((x - thick * 0.8, y - thick * 0.7, z0), (x + thick * 0.8, y, z1), "wood", 0.008)
+    foot, ends = (seat - 0.08, (z1,)) if rail is None else (rail, (z1, z0 + 2.5 * thick))
+    stays = [leg((x, foot, z - thick), (x, y - thick * 0.4, z - thick), thick, style) for z in ends]
+    return of_role("arm", both(rest, *stays))

@@ -33,19 +33,26 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
 
 
 def _framed(size: Size, style: Style, seat: float, rake: float) -> list[Solid]:
-    """A seat cushion and a leaning back cushion in a frame on legs, with slim arms or without; raked seats tilt."""
+    """A seat cushion and a leaning back cushion in a wooden frame on legs: rails below the seat, uprights and slats
+    behind the back, slim arms on the rails or none; raked seats tilt with their rails.
+    """
     w, h, d = size
-    tilt, deep, inner = 0.4 * rake, 0.12, w / 2 - 0.035 * (style.arms != "none")
-    parts = chair_legs(style, w * 0.96, d * 0.88, seat - deep, 0.04 * style.bulk, tie=False)
-    low, high = (-inner, seat - deep - 0.03, -d * 0.4), (inner, seat, d / 2)
-    parts.append(cushion(low, high, style, turn=rotation(x=-tilt)))
-    z = -d * 0.36
-    low, high = (-inner, seat - 0.08, z - 0.05), (inner, seat + (h - seat) / np.cos(rake), z + 0.05)
-    parts.append(leaning(low, high, rake, seat, z, padded=style))
+    tilt, deep, inner = 0.25 * rake, 0.12, w / 2 - 0.035 * (style.arms != "none")
     x, y, t = w * 0.48, seat - deep, 0.04 * style.bulk
-    parts += both(box((x - t, y - t, -d * 0.44), (x, y, d * 0.44), role="rail"))
-    parts += [box((-x, y - t, z - t / 2), (x, y, z + t / 2), role="rail") for z in (-d * 0.3, d * 0.36)]
-    return parts + (slim_arms(w, d, seat, h, style, 0.035) if style.arms != "none" else [])
+    parts = chair_legs(style, w * 0.96, d * 0.88, y - 0.03, t, tie=False)
+    low, high = (-inner, y - 0.01, -d * 0.4), (inner, seat, d / 2)
+    parts.append(cushion(low, high, style, turn=rotation(x=-tilt)))
+    z, tall = -d * 0.36, (h - seat) / np.cos(rake)
+    low, high = (-inner, seat - 0.08, z - 0.05), (inner, seat + tall, z + 0.05)
+    parts.append(leaning(low, high, rake, seat, z, padded=style))
+    rails = both(leaning((x - t, y - 0.06, -d * 0.44), (x, y + 0.005, d * 0.44), tilt, y, 0.0, radius=0.006))
+    rails += [leaning((-x, y - 0.055, e - t / 2), (x, y, e + t / 2), tilt, y, 0.0) for e in (-d * 0.3, d * 0.4)]
+    (b, c), a, up = (z - 0.05 - 0.7 * t, z - 0.046), x - 1.5 * t, seat + 0.78 * tall
+    post = leaning((x - 1.9 * t, y - 0.03, b), (x - 1.1 * t, up, c), rake, seat, z, radius=0.006)
+    levels = up - 0.035, seat + 0.42 * tall, seat + 0.1 * tall
+    slats = [leaning((-a, at - 0.03, b + 0.006), (a, at + 0.03, c), rake, seat, z) for at in levels]
+    parts += of_role("rail", [*rails, *both(post), *slats])
+    return parts + (slim_arms(w, d, seat, h, style, 0.035, y - 0.04) if style.arms != "none" else [])
 
 
 def upholstered_arms(w: float, foot: float, y: float, d: float, arm: float, style: Style) -> list[Solid]:
