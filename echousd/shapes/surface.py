@@ -10,6 +10,7 @@ from echomodel.triangles import Mesh, along, area_normals, bounds_of, connected_
 from echousd.shapes.finishes.slots import UPRIGHT, metres_of
 from echousd.shapes.geometry import CREASE, DRAPED
 
+EDGE = 0.08  # metres from the sides of cloth within which all of it hangs, and from that on to where none does
 NUDGE = 4e-6  # metres between points of different boards at one place
 ATLAS = 1024, 2  # texels along a side and between charts, of pieces that are unwrapped without overlaps
 
@@ -124,8 +125,14 @@ def _laid_out(
     low, high = _corners(points[faces], board)
     extent = (high - low)[board]
     hangs = draped & ((thin := extent.argmin(1)) != 1)
+    lies = draped & ~hangs
     axis[hangs], way[hangs] = thin[hangs], 1.0
+    axis[lies], way[lies] = 1, 1.0
     st = _projected(points[faces], axis, way)
+    hung, one, other = points[faces[lies]], low[board[lies], None], high[board[lies], None]
+    away = hung - (one + other) / 2  # the picture of what lies runs on over its edges
+    near = np.clip((np.abs(away) - (other - one) / 2) / EDGE + 2, 0, 1) * np.sign(away)
+    st[lies] += (near * (other - hung)[..., 1:2])[..., [0, 2]] * (1, -1)
     rows = np.arange(len(faces))
     across, along = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
     turned = extent[rows, along] > 1.05 * extent[rows, across]

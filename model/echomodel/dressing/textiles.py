@@ -7,7 +7,7 @@ import numpy as np
 
 from echomodel.dressing import any_of
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.cloth import Sheet, Slumped, folds, pillow, seam
+from echomodel.furniture.cloth import Sheet, Slumped, pillow, seam
 from echomodel.furniture.solids import Solid, ball, rotation, tube, turned
 
 LIES = (11, 16)  # cells in which a throw knows what it lies on
@@ -159,7 +159,8 @@ def throw(size: Size, rng: np.random.Generator, lie: tuple[float, ...] = ()) -> 
         hanging = np.clip((h - line[:, 1]) / max(h, 1e-6), 0, 1)
         ripple = 0.018 * (1 + np.sin(2 * np.pi * deep / d * 2.5 + phase[0] + np.sign(x))) * hanging  # away from the bed
         skew = (0.03 * np.sin(2.2 * x + phase[1]) + 0.09 * (phase[2] / 3 - 1) * x) * (1 - hanging / 2)
-        y = line[:, 1] - lower * (1 - hanging) - GATHERED * folds(x, 2.5 * deep, phase) * (1 - hanging)
+        crease = np.abs(np.sin(13 * deep + 1.4 * np.sin(2.1 * x + phase[0]) + phase[1])) ** 3  # along its rows
+        y = line[:, 1] - lower * (1 - hanging) - GATHERED * crease * (1 - hanging)
         return np.stack([x + np.sign(x) * ripple, y, deep * (1 - 0.16 * np.sin(1.4 * x + phase[2]) ** 2) + skew], -1)
 
     return [Sheet(front=spread(profile), back=spread(inner), material=str(rng.choice(THROWS)))]

@@ -78,7 +78,7 @@ def bedding(
     x, y, top = w * 0.53 + 0.02 + 0.03 * style.softness, low - 0.11, low + thick + 0.09
     end = z1 + (0.08 + 0.02 * style.softness if falls else 0.03)
     cloth = str(choices.stream("cover").choice(COVERS))
-    parts.append(cover((-x, y, start), (x, top, end), cloth, 0.12, 0.045, rng, falls=falls))
+    parts.append(cover((-x, y, start), (x, top, end), cloth, 0.12, 0.085, rng, falls=falls))
     fold = 0.16 + 0.1 * style.softness  # the sheet turned back over it
     x, y = x + 0.004, low + thick * 0.4
     parts.append(cover((-x, y, start - 0.01), (x, top + 0.02, start + fold), "linen", 0.06, 0.02, rng))

@@ -10,6 +10,7 @@ PINCH = 0.11  # of half a pillow's side that its middle stands back behind the c
 FOOT, SPREAD = 0.15, 1.3  # of a slumped cushion's height, below which it does not lean; by how much it is wider there
 SEAM = 0.025  # of half a pillow's thickness that is left at its seams
 DROOP = 0.25  # of half a pillow's thickness that its corners hang down
+LOOSE = 0.04  # metres that what hangs of a cover is in waves at most
 CHOP = 0.42  # of half a pillow's width, how wide a blow to its top dents it
 
 
@@ -74,42 +75,32 @@ def seam(half: Vector, chop: float = 0.0) -> Array:
     return np.stack([*outline(u, v, chop), -DROOP * (u * v) ** 2], 1) * half
 
 
-def folds(x: Array, z: Array, phase: Array) -> Array:
-    """How far cloth that was thrown over a bed lies below its highest folds, 0 to 1, at places in metres.
-
-    `phase`: (3,) radians, which one cloth has of its own.
-    """
-    bent = z + 0.12 * np.sin(2.3 * x + phase[2]) + 0.25 * x
-    crease = 1 - np.abs(np.sin(7.4 * bent + phase[0])) ** 0.7
-    other = 1 - np.abs(np.sin(5.1 * (x - 0.5 * z) + 0.8 * np.sin(4 * z + phase[1]))) ** 0.7
-    return np.clip(1 - 0.65 * crease - 0.5 * other, 0, 1)
-
-
 @dataclass(frozen=True, eq=False)
 class Cover(Block):
-    """Filled cloth over a mattress: its top lies in folds; sides, and the foot (+z) where it `falls`, bend down over
-    `radius` and hang in waves to an uneven hem; at its head it ends in a roll that is not straight.
+    """Filled cloth over a mattress: its top lies in broad folds that run from head to foot, along columns of its mesh;
+    sides, and the foot (+z) where it `falls`, bend down over `radius` and hang in folds to an uneven hem; at its head
+    it ends in a roll that is not straight.
 
-    `depth`: metres from the highest folds to the lowest; `phase` as of `folds`.
+    `depth`: metres from the highest folds to the lowest; `phase`: (3,) radians, which one cloth has of its own.
     """
 
-    soft = True
+    soft = draped = True
     depth: float = 0.03
     phase: Vector = (0.0, 0.0, 0.0)
     falls: bool = False
 
     @property
     def gives(self) -> tuple[float, float]:
-        return self.depth / 2, 1.0
+        return min(0.25 * self.depth, 0.0115), 1.0
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         w, h, d = self.half
-        r, steps, phase = min(self.radius, h, w / 2, d / 2), (5, 8, 14, 19)[detail], np.array(self.phase)
+        r, steps, (one, two, three) = min(self.radius, h, w / 2, d / 2), (5, 9, 18, 27)[detail], self.phase
         bend = r * np.pi / 2  # metres of cloth around an edge
         roll, hang = np.linspace(0, bend, 4), bend + np.array([0.3, 0.65, 1.0]) * max(2 * h - r, 1e-3)
         side, over = np.concatenate([roll, hang]), np.linspace(r - w, w - r, steps + 1)[1:-1]
         across = np.concatenate([r - w - side[::-1], over, w - r + side])
-        flat = np.linspace(r - d, d - r, max(3, round(1.2 * steps * d / w)) + 1)[1:-1]
+        flat = np.linspace(r - d, d - r, max(2, round(0.6 * steps * d / w)) + 1)[1:-1]
         along = np.concatenate([r - d - roll[::-1], flat, d - r + (side if self.falls else roll)])
         s, t = np.meshgrid(across, along)
         q = np.stack([np.maximum(np.abs(s) - w + r, 0), np.maximum(np.abs(t) - d + r, 0)])
@@ -118,13 +109,19 @@ class Cover(Block):
         turn, hung = np.minimum(far / max(r, 1e-9), np.pi / 2), np.clip((far - bend) / (hang[-1] - bend), 0, 1)
         x, z = np.clip(s, r - w, w - r), np.clip(t, r - d, d - r)
         line = z * out[0] ** 2 + x * out[1] ** 2 + 0.1 * out[0] * out[1]  # metres around the hem
-        wave = 0.5 + 0.5 * np.sin(17 * line + phase[0] + 1.3 * np.sin(5 * line + phase[1]) + out[0])
-        reach = r * np.sin(turn) - 0.8 * self.depth * wave * hung
-        lie = self.depth * folds(x, z, phase) * np.cos(turn)
-        y = h - r * (1 - np.cos(turn)) - hung * (2 * h - r) - lie
-        y += hung * self.depth * (0.4 + 0.3 * np.sin(9 * line + phase[2]) + 0.3 * np.sin(23 * line + phase[1]))
-        slack = self.depth * (0.5 + 0.5 * np.sin(6 * x + phase[1])) * np.clip(1 - (t + d) / 0.25, 0, 1)
-        top = np.stack([x + out[0] * reach, y, z + out[1] * reach + slack], -1)
+        # how far cloth lies below its highest folds, which fade and swell along their way and are few at the head
+        crease = np.abs(np.sin(7 * x + np.sin(4.1 * x + two) + one)) ** 4
+        swell = np.clip(0.6 + 0.8 * np.sin(3.1 * z + 4.7 * x + three), 0, 1) * np.clip(1.5 * (t + d), 0.2, 1)
+        low = 0.78 * crease * swell + 0.15 * np.sin(4.3 * z - 2.6 * x + one) ** 2
+        wave = 0.5 + 0.5 * np.sin(11 * line + one + 1.3 * np.sin(4 * line + two) + out[0])
+        wave = wave * out[0] ** 2 + (0.5 * crease + 0.5 * wave) * out[1] ** 2
+        loose = min(self.depth, LOOSE)
+        reach = r * np.sin(turn) - loose * wave * hung
+        y = h - r * (1 - np.cos(turn)) - hung * (2 * h - r) - self.depth * low * np.cos(turn)
+        y += hung * loose * (0.5 + 0.3 * np.sin(7 * line + three) + 0.2 * np.sin(13 * line + two))
+        slack = loose * (0.5 + 0.5 * np.sin(6 * x + two)) * np.clip(1 - (t + d) / 0.25, 0, 1)
+        aside = (1 - (x / (w - r)) ** 2) * (0.1 * np.sin(2.3 * z + two) + 0.3 * np.sin(three) * z)
+        top = np.stack([x + out[0] * reach + aside, y, z + out[1] * reach + slack], -1)
         return closed(top, *grid(*s.shape), (0.0, -h, 0.0))
 
 
