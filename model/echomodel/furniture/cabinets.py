@@ -13,7 +13,7 @@ from echomodel.furniture.solids import Lathe, Solid, rotation
 from echomodel.furniture.style import Choices, Style
 
 GABLED = 1.2  # metres: on what is lower people put things, for which its top is flat
-BOOKS = ("book", "cushion", "blanket", "linen", "accent")  # slots that books take their colours from
+BOOKS = ("book_a", "book_b", "book_c", "book_d", "book")  # slots that books take their colours from
 ROWS, COLUMNS = 9, 14  # at most, however large the box is
 CELLS = 18  # that are filled with books at most
 

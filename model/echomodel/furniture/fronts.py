@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, both, box, core, framed
-from echomodel.furniture.solids import Joint, Solid, ball, tube
+from echomodel.furniture.solids import Joint, Solid, ball, rotation, tube, turned
 from echomodel.furniture.style import Style
 
 Point = tuple[float, float]
@@ -14,6 +15,9 @@ PANEL, SHEET = 0.018, 0.01  # metres: thickness of a front, and of the boards of
 OPEN = math.radians(100)  # of a hinged door
 PULL = 0.75  # share of its depth that a drawer comes out
 ENOUGH, TALL = 0.12, 1.5  # metres of depth that a drawer needs; of height, from which on a door is a wardrobe's
+# tufting up to which doors as tall as that are in frames, and from which on of boards; how far these stand out, metres
+FRAMED, BOARDED, PROUD = 0.35, 0.5, {"": 0.0, "framed": 0.012, "boarded": 0.006}
+GROOVE = 0.014  # metres between a frame and the panel in it, and of the panel's bevel
 SHELVES, HANGING = 0.38, 1.35  # metres between shelves behind doors; doors from this height on hide a rail
 
 
@@ -29,7 +33,10 @@ def front(
         glazed: a pane in a frame instead of a panel.
     """
     parts: list[Solid] = []
-    face = PANEL + 0.012 * (style.fronts == "framed" and not glazed)
+    tall = kind == "door" and high[1] - low[1] > rows * TALL
+    made_of = "framed" if style.fronts == "framed" or (tall and style.tufting < FRAMED) else ""
+    made_of = "" if glazed else "boarded" if tall and style.tufting > BOARDED and not made_of else made_of
+    face = PANEL + PROUD[made_of]
     xs = np.linspace(low[0], high[0], columns + 1).tolist()
     ys = np.linspace(low[1], high[1], rows + 1).tolist()
     for i in range(columns):
@@ -47,16 +54,29 @@ def front(
                 one, other = (x0 + b / 2, y0 + b / 2, z + 0.006), (x1 - b / 2, y1 - b / 2, z + 0.01)
                 made = [box(one, other, "glass", 0.0, kind)]
                 made += framed((x0, y0, z), (x1, y1, z + PANEL), b, "accent", kind)
-            elif style.fronts == "framed":
-                wide, before = max(0.02, 0.15 * min(x1 - x0, y1 - y0)), z + PANEL + 0.012
-                made += framed((x0, y0, before - 0.016), (x1, y1, before), wide, "accent", kind)
-            made += _handle(x0, x1, y0, y1, z + PANEL, kind, hinge_left=left, style=style)
+            elif made_of == "framed":
+                wide, y = max(0.02, 0.15 * min(x1 - x0, y1 - y0)), y0 + 0.42 * (y1 - y0)
+                for a, b in ((y0, y), (y, y1)) if tall else ((y0, y1),):
+                    made += framed((x0, a, z + face - 0.016), (x1, b, z + face), wide, "accent", kind)
+                    hole = (x1 - x0) / 2 - wide, (b - a) / 2 - wide
+                    made += _panel((x0 + x1) / 2, (a + b) / 2, z + face - 0.002, *hole, kind)
+            elif made_of == "boarded":
+                edges = np.linspace(x0, x1, max(2, round((x1 - x0) / 0.11)) + 1).tolist()
+                made += [box((a, y0, z), (b - 0.006, y1, z + face), "accent", 0.002, kind) for a, b in pairwise(edges)]
+            made += _handle(x0, x1, y0, y1, z + PANEL, PROUD[made_of], kind, hinge_left=left, style=style)
             if kind == "drawer" and depth > ENOUGH:
                 made += _drawer(x0, x1, y0, y1, z - depth, z)
             parts += [replace(part, joint=joint) for part in made]
     if kind == "door" and depth > ENOUGH:
         parts += _inside(low, high, z - depth, z - 0.02)
     return parts
+
+
+def _panel(x: float, y: float, z: float, wide: float, high: float, kind: str) -> list[Solid]:
+    """A panel in a frame's hole of these half sides, up to the plane z, its edges bevelled, which light tells apart."""
+    low, form = (wide - GROOVE, high - GROOVE), {"power": np.inf, "turn": rotation(x=np.pi / 2), "material": "accent"}
+    field = low[0] - GROOVE, low[1] - GROOVE
+    return [turned((x, y, z - 0.016), low, 0.016, field, role=kind, **form)] if min(field) > GROOVE else []
 
 
 def sliding(low: Point, high: Point, z: float, count: int, material: str) -> list[Solid]:
@@ -119,16 +139,14 @@ def _inside(low: Point, high: Point, z0: float, z1: float) -> list[Solid]:
 
 
 def _handle(
-    x0: float, x1: float, y0: float, y1: float, z: float, kind: str, *, hinge_left: bool, style: Style
+    x0: float, x1: float, y0: float, y1: float, z: float, proud: float, kind: str, *, hinge_left: bool, style: Style
 ) -> list[Solid]:
     w, h, door = x1 - x0, y1 - y0, kind == "door"
     if style.handles == "none" and h < TALL:  # the doors of a wardrobe have a grip along their edge
         return []
     x = (x1 - min(0.12 * w, 0.05) if hinge_left else x0 + min(0.12 * w, 0.05)) if door else (x0 + x1) / 2
     y = (y0 + y1) / 2 if h < TALL else y0 + min(1.0, 0.5 * h)
-    deep = 0.004  # metres that a handle reaches into its front
-    if style.fronts == "framed":  # the frame stands out, the panel does not
-        z, deep = z + 0.012, 0.016
+    z, deep = z + proud, 0.004 + proud  # a frame stands out, its panel does not; metres that a handle reaches in
     if style.handles == "knob":
         r = 0.016
         places = [-0.28 * w, 0.28 * w] if not door and w > 0.75 else [0.0]

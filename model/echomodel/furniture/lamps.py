@@ -77,10 +77,11 @@ def chandelier(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts: list[Solid] = [tube([[0, body * 0.1, 0], [0, h, 0]], r, "metal")]
     parts.append(ball((0, body * 0.22, 0), (w * 0.07, body * 0.14, d * 0.07), "metal"))
     cup = min(0.07, w * 0.11)
+    bend = np.polyfit((0, 0.45, 0.85, 1), (0.3, 0.06, 0.14, 0.68 if style.taper > 0.55 else 0.42), 3)
+    ups = np.polyval(bend, outs := np.linspace(0, 1, 9) ** 0.8)
     for angle in np.arange(arms) * 2 * np.pi / arms + np.pi / arms:
         c, s = np.cos(angle) * (w / 2 - cup), np.sin(angle) * (d / 2 - cup)
-        heights = (0, 0.3), (0.45, 0.06), (0.85, 0.14), (1, 0.68 if style.taper > 0.55 else 0.42)
-        parts.append(tube([[c * out, body * up, s * out] for out, up in heights], r * 0.9, "metal"))
+        parts.append(tube([[c * out, body * up, s * out] for out, up in zip(outs, ups, strict=True)], r * 0.9, "metal"))
         if style.taper > 0.55:
             parts += shade("cone", c, body * 0.5, s, cup, cup, body * 0.4, style)
         else:
