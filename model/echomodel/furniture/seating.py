@@ -16,9 +16,9 @@ def seat_of(style: Style, w: float, d: float, y: float, thick: float, z: float =
     """A seat whose upper face lies at y: a board, or a cushion in soft styles."""
     if style.softness > 0.4:
         return cushion((-w / 2, y - thick, z - d / 2), (w / 2, y, z + d / 2), style, "fabric")
-    shape = "corners" if style.corner > 0.35 else "square"
-    board = top(shape, w, d, y, thick, style, "wood")
-    return replace(board, centre=np.array([0, y - thick, z]), role="seat")
+    thin = min(thick, 0.03)
+    board = top("corners", w, d, y, thin, style, "wood")
+    return replace(board, centre=np.array([0, y - thin, z]), rounding=0.3 * thin, role="seat")
 
 
 def leaning(
@@ -45,7 +45,7 @@ def back_rest(
     def lean(x0: float, x1: float, s0: float, s1: float, t: float, **kwargs) -> Block:
         return leaning((x0, y0 + s0 * length, z - t / 2), (x1, y0 + s1 * length, z + t / 2), rake, y0, z, **kwargs)
 
-    post, bow = max(0.024, 0.03 * style.bulk), a * (0.12 + 0.14 * style.corner)
+    post, bow = max(0.024, 0.03 * style.bulk), a * (0.2 + 0.14 * style.corner)
     if kind == "cushion":
         t = max(thick, 0.07 + 0.06 * style.softness)
         return [lean(-a, a, -0.05, 1, t, radius=0.05, material="fabric", bow=bow)]
@@ -55,7 +55,7 @@ def back_rest(
             return [soft, *both(lean(a * 0.8 - post / 2, a * 0.8 + post / 2, -0.1, 0.4, post))]
         behind = max(0.0, post * 0.4 - 0.01)  # stiles thicker than the board stand out behind it, not before it
         stile = lean(a - post - post / 2, a - post + post / 2, -0.1, 0.5, post * 0.8)
-        board = lean(-a, a, 0.0 if style.contrast < 0.5 else 0.3, 1, 0.025, radius=0.04, bow=bow)
+        board = lean(-a, a, 0.2 if style.contrast < 0.5 else 0.4, 1, 0.025, radius=0.04, bow=bow)
         return [board, *both(replace(stile, centre=stile.centre - [0, 0, behind]))]
     if kind == "oval":
         t = 0.05

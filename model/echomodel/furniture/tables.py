@@ -44,13 +44,16 @@ def dining_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     share = within(shape, style)
     fw, fd = w * share - 1.5 * style.overhang, d * share - 1.5 * style.overhang
     parts += base(style, fw, fd, h - thick, leg, kind)
-    if style.legs in ("straight", "tapered", "turned", "bun") and style.contrast < 0.7:
-        a = 0.04 + 0.05 * style.contrast
-        x, z = fw / 2 - leg * 0.6, fd / 2 - leg * 0.6
-        across = both(box((-x, h - thick - a, z - 0.01), (x, h - thick, z + 0.01)), axis=2)
-        along = both(box((x - 0.01, h - thick - a, -z), (x + 0.01, h - thick, z)))
-        parts += of_role("apron", across + along)
-    return parts
+    return parts + _apron(style, fw, fd, h - thick, leg, 0.04 + 0.04 * style.contrast)
+
+
+def _apron(style: Style, width: float, depth: float, y: float, leg: float, deep: float) -> list[Solid]:
+    """Four boards `deep` metres high below a top at `y`, from leg to leg of a base; none where legs have no room."""
+    if style.legs not in ("straight", "tapered", "turned", "bun") or style.contrast > 0.85 or width < 0.4:
+        return []
+    x, z = width / 2 - leg * 0.6, depth / 2 - leg * 0.6
+    across = both(box((-x, y - deep, z - 0.01), (x, y, z + 0.01)), axis=2)
+    return of_role("apron", across + both(box((x - 0.01, y - deep, -z), (x + 0.01, y, z))))
 
 
 def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -62,10 +65,12 @@ def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
         drum = turned((0, 0, 0), (w * 0.4, d * 0.4), h - thick, (w * 0.47, d * 0.47), material="accent")
         return [top(shape, w, d, h, thick, style), *of_role("leg", [drum])]
     if kind == "block" and shape != "round":
-        foot = max(0.04, h * 0.15)
-        low, high, columns = (-w * 0.48, foot), (w * 0.48, h - thick), choices.whole("columns", 1, 3)
-        stand = base(style, w * 0.85, d * 0.85, foot, 0.05, "plinth")
-        return [top("square", w, d, h, thick, style), *drawers(low, high, d * 0.475, 1, columns, style), *stand]
+        foot, x, z, y = max(0.07, h * 0.24), w * 0.48, d * 0.475, h - thick
+        split = x - 2 * x * choices.between("split", 0.3, 0.45)  # drawers, and beside them an open cell
+        parts = [top("square", w, d, h, thick, style), *boards((split, foot, -z), (x, y, z), 0.016, 0.008)]
+        parts += drawers((-x, foot), (split, y), z, 1, choices.whole("columns", 1, 3), style)
+        legs = style.legs if style.legs in ("straight", "tapered", "turned", "bun", "sled") else "tapered"
+        return parts + base(style, w * 0.9, d * 0.88, foot, 0.045 * style.bulk, legs)
     if kind == "nested" and w > 0.7:
         low_top = turned((w * 0.28, h * 0.62, d * 0.1), w * 0.22, thick, material="accent", role="top")
         post = turned((w * 0.28, 0, d * 0.1), w * 0.14, h * 0.62, 0.03, role="leg")
@@ -112,7 +117,8 @@ def _on_legs(
     inner = within(shape, style)
     frame = w * inner, d * inner, h - thick
     shelf = [between_legs(shape, *frame, h * low, thick * 0.8, leg, style, legs)] if low else []
-    return [board, *base(style, *frame, leg, legs), *shelf]
+    apron = _apron(style, *frame, leg, 0.03 + 0.05 * h) if shape != "round" else []
+    return [board, *base(style, *frame, leg, legs), *shelf, *apron]
 
 
 def round_end_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -166,15 +172,18 @@ def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
         sides = (-1, 1) if two else (-1 if choices.chance("side", 0.5) else 1,)
         for s in sides:
             x0, x1 = sorted((s * w * 0.48, s * (w * 0.48 - unit)))
-            foot = 0.1 if style.contrast > 0.5 else 0.02
+            foot = 0.1 if style.contrast > 0.3 else 0.04
             parts += drawers((x0, foot), (x1, y1), d * 0.46, choices.whole("rows", 2, 4), 1, style)
             for x in (x0 + 0.04, x1 - 0.04):
                 parts += both(post(x, d * 0.42, 0.02, 0, foot, role="leg"), axis=2)
         if len(sides) == 1:
             parts += both(post(-sides[0] * w * 0.47, d * 0.43, 0.025, 0, y1, role="leg"), axis=2)
     else:
-        parts += base(style, w * 0.96, d * 0.94, y1, _leg(style, w * 0.6, desk_height), legs)
-        if kind == "shallow":
+        leg = _leg(style, w * 0.6, desk_height)
+        parts += base(style, w * 0.96, d * 0.94, y1, leg, legs)
+        if kind == "legs":
+            parts += _apron(style, w * 0.96, d * 0.94, y1, leg, 0.06)
+        else:
             low, high = (-w * 0.42, max(y1 - 0.12, LAP)), (w * 0.42, y1)
             parts += drawers(low, high, d * 0.42, 1, choices.whole("columns", 2, 4), style)
     if tall:
