@@ -13,12 +13,13 @@ from echomodel.furniture.bent import bent
 from echomodel.furniture.carpentry import Size, base, both, box, of_role
 from echomodel.furniture.pads import Pad, cushion
 from echomodel.furniture.seating import chair_legs, leaning, slim_arms
-from echomodel.furniture.solids import Lathe, Solid, ball, rotation, superellipse, tube, turned
+from echomodel.furniture.solids import Block, Lathe, Solid, ball, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
 from echomodel.furniture.tufting import Tufted
 
 BODIES: list[dict[str, Any]] = list(tables("bodies.toml", __file__).values())
 padded = partial(turned, material="fabric")
+CORD = 0.0058  # metres, radius of piping
 TOUCH = 0.012  # metres that cushions side by side press into one another
 FLARED = 0.4  # softness up to which arms have no pad and flare
 
@@ -69,12 +70,14 @@ def upholstered_arms(w: float, foot: float, y: float, d: float, arm: float, styl
         side = cushion(
             (x0, foot, -d / 2 + 0.03), (x1 - 0.016, y - 0.6 * thick, d / 2 - 0.03), replace(style, softness=0.05)
         )
-        return of_role("arm", both(side, pad, *(_piping(pad) if style.piping > 0.3 else ())))
+        cords = [*_piping(pad), *_piping(side, 2)] if style.piping > 0.3 else []
+        return of_role("arm", both(side, pad, *cords))
     r = arm * 0.6
     x = (x0 + x1) / 2 - (r - arm / 2) * 0.5
     below = box((x0 + arm * 0.14, foot, -d / 2 + 0.03), (x1 - arm * 0.14, y - r, d / 2 - 0.02), "fabric", 0.03)
     roll = padded((x, y - r, -d / 2 + 0.03), r, d - 0.05, rounding=0.02, turn=rotation(x=np.pi / 2))
-    return of_role("arm", both(below, roll))
+    scroll = padded((x, y - r, d / 2 - 0.025), 0.55 * r, 0.012, rounding=0.003, turn=rotation(x=np.pi / 2))
+    return of_role("arm", both(below, roll, scroll, *(_piping(below, 2) if style.piping > 0.3 else ())))
 
 
 def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -111,16 +114,16 @@ def _cushions(
     return [*pads, *(cord for pad in pads if pad.role == "seat" for cord in _piping(pad) if style.piping > 0.3)]
 
 
-def _piping(pad: Pad) -> list[Solid]:
-    """The cord along the seam of a cushion, above its side."""
-    if min(pad.half) < 0.03:
+def _piping(of: Block, axis: int = 1) -> list[Solid]:
+    """The cord, paler than its cloth, along the seam of a cushion above its side, or (axis 2) before an arm's front."""
+    if min(of.half) < 0.03:
         return []
-    r = min(pad.radius, *pad.half)
-    sunk = r * (1 - 2**-0.5)
-    a, y, b = pad.half - sunk
-    plan = superellipse(2 + 1.5 * min(a, b) / (r + 0.01), 20) * (a, b)
-    line = np.insert(np.concatenate([plan, plan[:1]]), 1, y, axis=1)
-    return [tube(pad.puffed(line) @ pad.turn.T + pad.centre, 0.005, pad.material, "seam")]
+    r = min(of.radius, *of.half)
+    flat, high = np.delete(of.half, axis) - r * (1 - 2**-0.5), of.half[axis] - r * (1 - 2**-0.5)
+    plan = superellipse(2 + 1.5 * min(flat) / (r + 0.01), 20) * flat
+    line = np.insert(np.concatenate([plan, plan[:1]]), axis, high, axis=1)
+    line = of.puffed(line) if isinstance(of, Pad) else line
+    return [tube(line @ of.turn.T + of.centre, CORD, "cushion", "seam")]
 
 
 def _couch(
@@ -142,7 +145,7 @@ def _couch(
     pad = 0.12 + 0.06 * style.softness
     z0, z1 = -d / 2, d / 2
     parts: list[Solid] = _legs(style, w, d, foot)
-    inset, under = (0.012, 0.006) if body.get("skirt") else (arm * 0.5, foot)
+    inset, under = (0.13 * arm, 0.006) if body.get("skirt") else (arm * 0.5, foot)
     low, high = (-w / 2 + inset, under, z0 + 0.02), (w / 2 - inset, seat - pad, z1 - 0.03)
     parts.append(box(low, high, "fabric", 0.015 if body.get("skirt") else 0.045, "base"))
     tall = h - (0.06 if seats > 1 and style.contrast < 0.6 else 0.0)
@@ -268,7 +271,7 @@ def lazy_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
         for turn in np.arange(6) * np.pi / 3 + 0.3:
             around = np.array([np.cos(turn), np.sin(turn) * d / w])
             line = np.insert(profile[1:, :1] * around, 1, profile[1:, 1], axis=1)
-            seams.append(tube(line, 0.005, "fabric", "seam"))
+            seams.append(tube(line, CORD, "cushion", "seam"))
         return [bag, *seams]
     if kind == "lounger":
         lounger: list[Solid] = [
