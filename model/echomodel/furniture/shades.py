@@ -8,6 +8,8 @@ from echomodel.furniture.carpentry import box
 from echomodel.furniture.solids import Lathe, Solid, Turned, ball, turned, wall
 from echomodel.furniture.style import Style
 
+RIM = 0.012  # metres, height of a rim's binding
+
 
 def disc(
     x: float, y: float, z: float, a: float, b: float, h: float, material: str = "metal", high: float = 1.0,
@@ -49,6 +51,9 @@ def shade(kind: str, x: float, y: float, z: float, a: float, b: float, h: float,
         low, up = y + 0.9 * h, y + 0.9 * h + 0.005
         bars = (reach, 0.003), (0.003, reach * squash)
         arms = [box((x - i, low, z - k), (x + i, up, z + k), "metal", 0.0, "shade") for i, k in bars]
+        for r, e in ((a, 0.0), (neck, h - RIM)) if a > 0.08 else ():  # the bindings of its rims do not glow
+            rim = wall([(r + 0.001, e), (r + 0.001, e + RIM)], thick + 0.002)
+            arms.append(replace(skin, profile=rim, material="linen"))
     return [skin, body, light, socket, *arms]
 
 
