@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from echomodel.boxes2d import axes
 from echomodel.late import Late, lates
 from echomodel.objective.sizes import places_of
 from echomodel.objective.support import FREE, ON_CEILING
@@ -169,8 +170,12 @@ def out_of(position: np.ndarray, yaw: float, slot: tuple[float, float, float, fl
     return float(x), float(z), yaw + turn, more
 
 
-def aside(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int) -> np.ndarray:
-    """(K, 4) float: a little aside of where the box stands, and turned there; rows as `proposals`."""
+def aside(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int, fine: bool = False) -> np.ndarray:
+    """(K, 4) float: a little aside of where the box stands, and turned there; rows as `proposals`.
+
+    Arguments:
+        fine: whether what belongs at a wall, and stands off it, moves to and from it, too.
+    """
     here, turn = position[i], float(yaw[i])
     rows: list[Row] = []
     if problem.carrier[i] >= 0:
@@ -178,7 +183,11 @@ def aside(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int) -> np
     elif problem.kinds[i].support == "floor" and not problem.turned[i]:
         rows += [(float(here[0]), float(here[2]), turn + quarter * HALF_PI, 0.1) for quarter in (1, 2, 3)]
     ways = [sign * way for way in SLIDES for sign in (-1, 1)]
-    slots = [(way, 0.0) for way in ways] + [(0.0, way) for way in ways if not problem.kinds[i].wall]
+    free = not problem.kinds[i].wall
+    if fine and not free:
+        back = here[[0, 2]] - axes(np.array(turn))[1] * problem.size[i, 2] / 2
+        free = depth_inside(problem.floor, back[None])[0] > problem.behind[i] + GAP
+    slots = [(way, 0.0) for way in ways] + [(0.0, way) for way in ways if free]
     return np.array(rows + [out_of(here, turn, (*slot, 0.0, 0.05 + 0.1 * abs(sum(slot)))) for slot in slots])
 
 

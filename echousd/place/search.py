@@ -214,7 +214,7 @@ class Search:
         group = self.group(i, there, state)
         drawn = proposals(problem, state.position, state.yaw, there, i)
         rows = np.concatenate([drawn, self._joining(state, there, i)])
-        near = aside(problem, state.position, state.yaw, i)
+        near = aside(problem, state.position, state.yaw, i, self.fine)
         little = state.taste[i] + 0.3 * near[:, 3]
         first = np.concatenate([self.tastes(i, rows), little * (not self.fine)])
         taste = np.concatenate([first[: len(rows)], little])

@@ -97,6 +97,7 @@ SHARE = 0.3  # share of a front's width that may be covered
 BEDSIDE = 0.3  # metres beside a bed
 # Width from which on two sleep in a bed, metres beside it then, and to spare at its other side if one leaves less.
 FOR_TWO, AT_TWO, SPARE = 1.35, 0.45, 0.75
+BARELY = 0.1  # metres by which a narrow side counts as kept at most, where the other one is not much wider
 # Metres between a bed's side and the wall that it stands at, and from which on a wide one of a child stands free.
 SLIT, AMID = 0.1, 0.7
 INTO_BED, OF_LAMPS, OF_CHAIRS = 0.6, 0.6, 0.2  # metres between a plant and a bed's side, a floor lamp, a chair
@@ -137,7 +138,8 @@ def bed_side_free(plan: Plan) -> Found:
     who, free, _, beside = _bed_sides(plan)
     xp, two = plan.kit, (plan.size[who, 0] > FOR_TWO) & ~_of_child(plan)[who]
     most, least = xp.maximum(*free), xp.minimum(*free)
-    both = xp.where(two, xp.maximum(least - BEDSIDE, SPARE + least - most), FAR)
+    both = xp.maximum(least - BEDSIDE, at_most(SPARE + least - most, BARELY))  # kept, but not with ease
+    both = xp.where(two, both, FAR)
     seen = first_of(who, who, [most - xp.where(two, AT_TWO, BEDSIDE), both], [most, least])
     told = xp.where((free[0] < free[1]) ^ (seen.words == 0), *beside)  # who is at the side that is told
     return found(who, seen.margin, other=told, measure=seen.measure, words=seen.words)
@@ -184,14 +186,18 @@ def _at_side(plan: Plan, i: Array, j: Array) -> tuple[Array, Array, Array]:
 
 
 def plant_aside(plan: Plan) -> Found:
-    """A plant crowds neither a floor lamp nor a chair, nor stands where one gets into bed; lamps keep as far apart."""
-    chairs, lamps, plants = plan.stands("at"), plan.of("light"), plan.of("decor")
-    i, j = plan.pairs((plants | lamps) & plan.standing, (lamps | plan.of("bed") | chairs) & plan.standing, least=True)
+    """A plant crowds neither a floor lamp nor a chair, nor stands where one gets into bed; lamps keep as far apart.
+
+    Beside sofas and armchairs it may stand, better with room between.
+    """
+    seats, lamps, plants = plan.of("sofa", "seat"), plan.of("light"), plan.of("decor")
+    i, j = plan.pairs((plants | lamps) & plan.standing, (lamps | plan.of("bed") | seats) & plan.standing, least=True)
     keep = plants[i] | lamps[j]
     i, j = i[keep], j[keep]
     _, aside, along = _at_side(plan, i, j)
     xp = plan.kit
-    apart = plan.apart(i, j) - xp.where(chairs[j], OF_CHAIRS, OF_LAMPS)
+    apart, chair = plan.apart(i, j), plan.stands("at")[j]
+    apart = xp.where(seats[j] & ~chair, at_least(apart, 0.0), apart - xp.where(chair, OF_CHAIRS, OF_LAMPS))
     return plan.nearest(i, j, xp.where(plan.of("bed")[j], xp.maximum(aside - INTO_BED, -along), apart), 0.0)
 
 

@@ -10,7 +10,8 @@ from echomodel.objective.plan import FAR, Found, Plan, found
 APART = {
     ("sofa", "board"): 0.2, ("sofa", "seat"): 0.12, ("board", "board"): 0.1, ("board", "seat"): 0.05,
     ("seat", "seat"): 0.06, ("seat", "storage"): 0.12, ("bed", "seat"): 0.05, ("bed", "sofa"): 0.35,
-    ("bed", "bed"): 0.15, ("bed", "board"): 0.25, ("bed", "storage"): 0.2,
+    ("bed", "bed"): 0.15, ("bed", "board"): 0.25, ("bed", "storage"): 0.2, ("sofa", "storage"): 0.2,
+    ("board", "storage"): 0.1,
 }  # fmt: skip
 ROLES = sorted({role for pair in APART for role in pair})
 AT_BED = 0.12  # metres between a bed and who works at a desk: all ten real ones
@@ -48,10 +49,11 @@ def groups_apart(plan: Plan) -> Found:
 
 
 def _side_by_side(plan: Plan, i: Array, j: Array) -> Array:
-    """(P,) bool: desks and the like in one row, looking the same way."""
-    boards = plan.of("board")[i] & plan.of("board")[j]
+    """(P,) bool: desks and the like, and storage beside them or sofas, in one row, looking the same way."""
+    board, storage, sofa = (plan.of(role) for role in ("board", "storage", "sofa"))
+    row = (board[i] | storage[i]) & (board[j] | storage[j]) | (storage[i] & sofa[j]) | (sofa[i] & storage[j])
     aside = abs(plan.local(i, j)[0]) - plan.reach(i, j)[0] - plan.size[j, 0] / 2
-    return boards & (aside > -0.05) & (plan.kit.cos(plan.yaw[i] - plan.yaw[j]) > 0.97)
+    return row & (aside > -0.05) & (plan.kit.cos(plan.yaw[i] - plan.yaw[j]) > 0.97)
 
 
 def loungers(plan: Plan) -> Array:

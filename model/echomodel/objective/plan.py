@@ -554,7 +554,8 @@ def plan_of(
 
 
 def kinds_of(categories: Sequence[str], triplets: Array) -> tuple[Category, ...]:
-    """The rows of N words; an armchair that is told to be at a desk where nobody else sits is a chair of that desk.
+    """The rows of N words; an armchair that is told to be at a desk where nobody else sits is a chair of that desk, a
+    stool that is told to be at a coffee table goes with the sofa of that.
 
     Arguments:
         categories: N words. triplets: (E, 3) int, [subject, predicate id, object].
@@ -562,11 +563,15 @@ def kinds_of(categories: Sequence[str], triplets: Array) -> tuple[Category, ...]
     rows = [kind_of(word) for word in categories]
     near = {vocabulary().predicate_id(word) for word in ("close_by", "facing")}
     stated = [(a, b) for a, predicate, b in np.asarray(triplets).reshape(-1, 3).tolist() if predicate in near]
-    pairs = [(a, b) for a, b in (*stated, *((b, a) for a, b in stated)) if rows[b].role == "board" and rows[b].access]
-    for seat, desk in pairs:
-        others = any(b == desk and a != seat and rows[a].stands == "at" for a, b in pairs)
-        if rows[seat].role == "seat" and rows[seat].stands == "company" and not others:
-            rows[seat] = replace(rows[seat], stands="at", belongs_to=(rows[desk].name,))
+    pairs = [(a, b) for a, b in (*stated, *((b, a) for a, b in stated)) if rows[b].role == "board"]
+    for seat, board in pairs:
+        others = any(b == board and a != seat and rows[a].stands == "at" for a, b in pairs)
+        if rows[seat].role != "seat":
+            continue
+        if rows[board].access and rows[seat].stands == "company" and not others:
+            rows[seat] = replace(rows[seat], stands="at", belongs_to=(rows[board].name,))
+        elif rows[board].stands == "before" and rows[seat].stands == "at" and rows[seat].solid:
+            rows[seat] = replace(rows[seat], stands="foot", belongs_to=rows[board].belongs_to)
     return tuple(rows)
 
 

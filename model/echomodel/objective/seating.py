@@ -26,6 +26,7 @@ SQUEEZED, ROOMY, AT_END, AROUND_BOTH = 0.17, 0.6, 0.3, 1.2
 BEYOND, CORNER = 0.1, 0.1  # metres that a seat may reach beyond its side of a table, and more beyond one end of it
 # Who sits alone at a side of a table: share of it that the middle may be beside its own, metres from which on its ends.
 ALONE, OFF = 0.3, 0.05
+SEVERAL = 0.1  # share of it that the middle of several who sit there may be beside its own: 82 % of real sides
 PULL, PULL_WALL = 0.22, 0.2  # metres behind a chair at a table, before furniture and before a wall
 DESK, DESK_WALL = 0.33, 0.19  # the same at a desk, where one works
 AT = 0.5  # metres: a chair further from its table is not pulled back from it
@@ -214,7 +215,8 @@ def chairs_balanced(plan: Plan) -> Found:
 
 
 def bench_fits(plan: Plan) -> Found:
-    """A seat stands within its side of a table, before its middle if alone; a bench along one that is as long as it."""
+    """A seat stands within its side of a table, before its middle if alone, several around that; a bench along one that
+    is as long as it."""
     seats, xp = seats_at(plan), plan.kit
     half_width, half_depth = plan.reach(seats.i, seats.j)
     own = 2 * xp.where(seats.ahead, half_width, half_depth)
@@ -222,8 +224,12 @@ def bench_fits(plan: Plan) -> Found:
     aside = abs(seats.along) * ~plan.solid[seats.i]  # a stool stands anywhere
     spare = (side - own) / 2
     most = xp.where(seats.count == 1, xp.minimum(ALONE * side, at_least(spare, 0.0) + OFF), spare + BEYOND + CORNER)
-    measures = [own - side, plan.size[seats.i, 0] - own, aside]
-    margins = [BEYOND - measures[0], BEYOND - measures[1], most - aside]
+    middle = abs(sum_of(seats.side, seats.along, 4 * len(plan))[seats.side] / seats.count)
+    opposite = xp.bincount(seats.side, minlength=4 * len(plan))[seats.side ^ 1]  # of more, each sits opposite one
+    several = (seats.count > 1) & (seats.rank == 0) & (opposite <= seats.count) & ~plan.solid[seats.i]
+    together = xp.where(several, SEVERAL * side - middle, FAR)
+    measures = [own - side, plan.size[seats.i, 0] - own, aside, middle]
+    margins = [BEYOND - measures[0], BEYOND - measures[1], most - aside, together]
     return first_of(seats.i, seats.j, margins, measures)
 
 

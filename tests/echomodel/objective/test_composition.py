@@ -445,7 +445,7 @@ def test_a_bed_for_two_is_got_into_from_both_sides_where_there_is_room(gap, marg
             assert seen(access.bed_side_free, [(*bed[:2], at, 0.0)], (wide, 4.0))[0][0] > 0
 
 
-@pytest.mark.parametrize(("width", "words", "margin"), [(2.2, 0, -0.05), (2.3, 0, 0.05)])
+@pytest.mark.parametrize(("width", "words", "margin"), [(2.2, 0, -0.05), (2.3, 0, 0.05), (2.42, 1, 0.1)])
 def test_who_sleeps_in_two_in_a_narrow_room_has_more_beside_the_bed(width, words, margin):
     bed = ("double_bed", (1.8, 1.0, 2.1), (0.9 - width / 2, -0.9), 0.0)
     found, rows, _ = seen(access.bed_side_free, [bed], (width, 4.0))

@@ -9,7 +9,7 @@ from echomodel.boxes2d import axes
 from echousd.place.geometry import depth_inside
 from echousd.place.placing import place_boxes
 from echousd.place.problem import Problem, problem_of
-from echousd.place.proposals import proposals, slots_at
+from echousd.place.proposals import aside, proposals, slots_at
 from echousd.place.search import Search, State
 
 FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
@@ -82,3 +82,12 @@ def test_a_full_room_is_not_arranged_again_where_nothing_may_shrink(monkeypatch,
         floor_polygon=small, height=2.7, rigid=np.full(4, rigid),
     )  # fmt: skip
     assert len(calls) == times
+
+
+@pytest.mark.parametrize(("off", "moves"), [(0.05, False), (1.2, True)])
+def test_a_sofa_in_the_room_slides_back_and_forth_too_one_at_its_wall_along_it(off: float, moves: bool) -> None:
+    found = problem(["multi_seat_sofa"], [(2.2, 0.8, 0.9)], [(0, 0, off + 0.45 - 2.0)], [0.0])
+    fine, usual = (aside(found, found.position, found.yaw, 0, fine) for fine in (True, False))
+    assert bool((abs(fine[:, 1] - found.position[0, 2]) > 0.01).any()) == moves
+    assert not (abs(usual[:, 1] - found.position[0, 2]) > 0.01).any()
+    assert (abs(usual[:, 0] - found.position[0, 0]) > 0.01).any()
