@@ -158,6 +158,7 @@ def on_paper(request: BatchRequest, folder: Path) -> None:
     """Print how long one and two workers would take."""
     plan, alone = make_plan(request, weights_hash("")), 0.0
     seen: dict[tuple[str, int], tuple[tuple[str, Any], float]] = {}
+    folder.mkdir()
     work.room(work.Job("warm", str(folder / "warm"), 0, plan.options[0], draw=("bedroom", 9, 0)))
     for workers in (1, 2):
         pool, journal = Paper(workers, seen), Journal(shard_folder(folder / str(workers), (0, 1)))

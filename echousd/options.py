@@ -94,7 +94,7 @@ class Look(BaseModel, frozen=True, strict=True, allow_inf_nan=False):
     materialx: bool = row(False, FILES, "materials have a MaterialX network beside UsdPreviewSurface")
     instances: bool = row(False, FILES, "pieces that share an asset are instances of it: less memory, no overrides")
     thumbnails: bool = row(False, FILES, "a picture of every asset in its folder (extra: render)")
-    crate: bool = row(False, FILES, "layers as usdc, which open faster, not as text")
+    crate: bool = row(False, FILES, "layers as usdc, which open faster, not as text; with a store they always are")
 
     @model_validator(mode="after")
     def _agree(self) -> Look:

@@ -151,16 +151,16 @@ WITHOUT_NUMBERS = (str, Sdf.AssetPath, Vt.IntArray, Vt.TokenArray, type(None), T
 @rule("echo:ValueTypes", "authored")
 def value_types(_reading: Reading, authored: Authored) -> Iterator[str]:
     """Every value can be read is of the type of its attribute and one of its words: clients read nothing, or crash."""
-    attribute, found = authored.attribute, authored.value
+    attribute, found, name, kind = authored.attribute, authored.value, authored.name, authored.attribute.GetTypeName()
     if isinstance(found, Tf.ErrorException):
         yield f"a value that cannot be read: {usd_error(found)}"
-    elif misfit(attribute.GetTypeName(), found):
-        yield f"holds {shown(found)}, allowed: {attribute.GetTypeName()}"
-    elif isinstance(found, str) and attribute.GetTypeName() == Sdf.ValueTypeNames.Token:
-        words = attribute.GetMetadata("allowedTokens") or WORDS.get(attribute.GetName())
-        if words and attribute.GetName() in SPOKEN:  # the schema may be older than the words
-            words = (*words, *(row.name for row in getattr(vocabulary(), SPOKEN[attribute.GetName()])))
-        if words and found not in (*words, *ENGINES.get(attribute.GetName(), ())):
+    elif misfit(kind, found):
+        yield f"holds {shown(found)}, allowed: {kind}"
+    elif isinstance(found, str) and kind == Sdf.ValueTypeNames.Token:
+        words = attribute.GetMetadata("allowedTokens") or WORDS.get(name)
+        if words and name in SPOKEN:  # the schema may be older than the words
+            words = (*words, *(row.name for row in getattr(vocabulary(), SPOKEN[name])))
+        if words and found not in (*words, *ENGINES.get(name, ())):
             yield f"is {found!r}, allowed: {', '.join(words)}"
 
 

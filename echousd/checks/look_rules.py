@@ -3,7 +3,7 @@
 import csv
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import lru_cache, partial
 from importlib import resources
 
 import numpy as np
@@ -26,30 +26,29 @@ def materials(reading: Reading, prim: Usd.Prim) -> Iterator[Finding | str]:
     if not outputs and (nodes or not prim.HasAPI(UsdPhysics.MaterialAPI)):
         yield "a material without a surface: nothing is connected to its outputs"
         return
-    used = _used(prim, outputs)
+    used = _used(reading, outputs)
     for node in nodes:
         if node.GetPath() not in used:
             yield Finding(node.GetPath(), "reaches no output of its material", warning=of_others(prim))
-    for attribute in (attribute for node in (prim, *nodes) for attribute in node.GetAuthoredAttributes()):
-        for source in attribute.GetConnections() if attribute.HasAuthoredConnections() else ():
-            other = prim.GetStage().GetPrimAtPath(source.GetPrimPath())
+    for attribute, sources in (one for node in (prim, *nodes) for one in reading.connected(node)):
+        for source in sources:
+            other = reading.stage.GetPrimAtPath(source.GetPrimPath())
             if not other or not (other.HasAttribute(source.name) or UsdShade.Shader(other).GetOutput(source.name[8:])):
                 yield Finding(attribute.GetPath(), f"connected to <{source}>, where nothing is")
     for node in nodes:
         yield from _unread(node, reading.primvars if prim.GetPath() in reading.bound else None)
 
 
-def _used(material: Usd.Prim, outputs: list[UsdShade.Output]) -> set[Sdf.Path]:
+def _used(reading: Reading, outputs: list[UsdShade.Output]) -> set[Sdf.Path]:
     """Paths of the prims that some outputs are made from."""
-    stage, used = material.GetStage(), set()
+    used = set()
     queue = [path for out in outputs for path in out.GetAttr().GetConnections()]
     while queue:
         path = queue.pop().GetPrimPath()
-        prim = stage.GetPrimAtPath(path)
+        prim = reading.stage.GetPrimAtPath(path)
         if path not in used and prim:
             used.add(path)
-            connected = filter(Usd.Attribute.HasAuthoredConnections, prim.GetAuthoredAttributes())
-            queue += [source for attribute in connected for source in attribute.GetConnections()]
+            queue += [source for _, sources in reading.connected(prim) for source in sources]
     return used
 
 
@@ -192,7 +191,7 @@ def ranges() -> Iterator[Row]:
 
 
 TABLE = tuple(ranges())
-named_schema = cache(Usd.SchemaRegistry.GetTypeNameAndInstance)
+named_schema = Usd.SchemaRegistry.GetTypeNameAndInstance
 BY_OWNER = {at: [row for row in TABLE if at in row.at] for row in TABLE for at in row.at}
 
 
@@ -206,29 +205,25 @@ def _findings(reading: Reading) -> list[tuple[str, Finding]]:
     """The findings of all rows, each with its rule's name."""
     found = []
     for prim in reading.distinct:
-        there = {*prim.GetAuthoredPropertyNames()}
-        for owner, instance in _owners(prim):
-            for row in BY_OWNER.get(owner, ()):
-                name = row.attribute.replace("*", instance)
-                attribute = prim.GetAttribute(name) if name in there else None
-                if not attribute or not attribute.HasAuthoredValue():
-                    continue
-                values = (numbers := _numbers(attribute))[numbers > -UNLIMITED]  # physics: as the engine likes
-                if not row.allows(values, reading.metres):
-                    shown = ", ".join(f"{value:g}" for value in values[:4])
-                    message = f"is {shown}, allowed: {row.allowed} ({row.why})"
-                    found.append((row.rule, Finding(attribute.GetPath(), message)))
+        kind, there = str(prim.GetTypeName()), {*prim.GetAuthoredPropertyNames()}
+        shader = str(prim.GetAttribute("info:id").Get() or "") if kind == "Shader" else ""
+        for row, name in _rows_for(kind, shader, *applied(prim)):
+            attribute = prim.GetAttribute(name) if name in there else None
+            if not attribute or not attribute.HasAuthoredValue():
+                continue
+            values = (numbers := _numbers(attribute))[numbers > -UNLIMITED]  # physics: as the engine likes
+            if not row.allows(values, reading.metres):
+                shown = ", ".join(f"{value:g}" for value in values[:4])
+                message = f"is {shown}, allowed: {row.allowed} ({row.why})"
+                found.append((row.rule, Finding(attribute.GetPath(), message)))
     return found
 
 
-def _owners(prim: Usd.Prim) -> Iterator[tuple[str, str]]:
-    """What rows may be about in a prim: all prims, its type, its schemas and the id of a shader, with instances."""
-    yield "", ""
-    yield str(prim.GetTypeName()), ""
-    for schema in applied(prim):
-        yield named_schema(schema)
-    if prim.GetTypeName() == "Shader":
-        yield str(prim.GetAttribute("info:id").Get() or ""), ""
+@lru_cache(maxsize=4096)  # a stage has few kinds of prims
+def _rows_for(kind: str, shader: str, *schemas: str) -> list[tuple[Row, str]]:
+    """What rows are about a prim of a type with the id of a shader and some schemas, and the attribute of each."""
+    owners = [("", ""), (kind, ""), *map(named_schema, schemas), *([(shader, "")] if kind == "Shader" else [])]
+    return [(row, row.attribute.replace("*", of)) for owner, of in owners for row in BY_OWNER.get(owner, ())]
 
 
 def _numbers(attribute: Usd.Attribute) -> np.ndarray:

@@ -128,6 +128,15 @@ class Reading:
 
         return self.once("triangles", mesh.GetPrim(), read)
 
+    def connected(self, prim: Usd.Prim) -> list[tuple[Usd.Attribute, list[Sdf.Path]]]:
+        """The attributes of a prim that are connected, and to what."""
+
+        def read() -> list[tuple[Usd.Attribute, list[Sdf.Path]]]:
+            connected = filter(Usd.Attribute.HasAuthoredConnections, prim.GetAuthoredAttributes())
+            return [(attribute, attribute.GetConnections()) for attribute in connected]
+
+        return self.once("connected", prim, read)
+
     def is_guide(self, prim: Usd.Prim) -> bool:
         """Whether a prim is there for tools rather than for the eye (purpose guide or proxy)."""
         return self.once("guide", prim, lambda: UsdGeom.Imageable(prim).ComputePurpose() in HIDDEN)

@@ -9,6 +9,7 @@ import warnings
 import zipfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -190,14 +191,19 @@ def asset_paths(found: Iterable[Sdf.Spec]) -> Iterator[tuple[Sdf.Path, str]]:
 
 def misfit(kind: Sdf.ValueTypeName, found: Any) -> bool:
     """Whether a value is of another type than its attribute; OpenUSD reads such a value, but cannot write it."""
+    held = _held(kind)
+    return not isinstance(found, held) or (isinstance(found, bool) and bool not in held)
+
+
+@cache  # asked of every value
+def _held(kind: Sdf.ValueTypeName) -> tuple[type, ...]:
+    """What values of an attribute of a type are."""
     default = kind.defaultValue
-    if found is None or default is None or isinstance(found, Sdf.ValueBlock):
-        return False
-    if isinstance(default, float | Sdf.TimeCode):
-        return isinstance(found, bool) or not isinstance(found, int | float | Sdf.TimeCode)
-    if isinstance(default, int) and not isinstance(default, bool):
-        return isinstance(found, bool) or not isinstance(found, int)
-    return not isinstance(found, type(default))
+    if default is None:
+        return (object, bool)
+    whole = isinstance(default, int) and not isinstance(default, bool)
+    numbers = (int, float, Sdf.TimeCode) if isinstance(default, float | Sdf.TimeCode) else (int,) if whole else ()
+    return (*(numbers or (type(default),)), type(None), Sdf.ValueBlock)
 
 
 def check_types(layer: Sdf.Layer, where: str) -> None:

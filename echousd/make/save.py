@@ -56,6 +56,8 @@ def save_layers(room: RoomData, folder: Path, *, force: bool = False, store: str
             from echousd.store import Store
 
             shelf = Shelf(Store.create(store), folder) if store else shelf_of(old, folder)
+        if shelf:  # of many rooms, whose layers as text would take more than all else that is their own
+            room = replace(room, options=room.options.model_copy(update={"crate": True}))
         return _save_layers(room, folder, old, replace(shelf, keys={}) if shelf else None)
 
 

@@ -98,9 +98,9 @@ def test_a_room_with_a_link_is_another_room(run):
     (room / "note.txt").symlink_to("/dev/zero" if os.path.exists("/dev/zero") else run)  # noqa: PTH110
     assert room_digest(room) != before
     (room / "note.txt").unlink()
-    graph = room / "layers/graph.usda"
-    graph.rename(run.parent / "graph.usda")
-    graph.symlink_to(run.parent / "graph.usda")  # the same bytes, elsewhere
+    graph = room / "layers/graph.usdc"
+    graph.rename(run.parent / "graph.usdc")
+    graph.symlink_to(run.parent / "graph.usdc")  # the same bytes, elsewhere
     assert [problem for _, problem in verify(run)] == ["changed since it was made"]
 
 

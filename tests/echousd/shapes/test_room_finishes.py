@@ -18,8 +18,10 @@ from echomodel.triangles import Mesh
 from echousd.checks.reading import Reading
 from echousd.checks.report import find_faults
 from echousd.exporting.formats import export
+from echousd.graph import starting_graph
+from echousd.layers.compose import room_files
 from echousd.options import RoomOptions
-from echousd.shapes.finishes import baking
+from echousd.shapes.finishes import baking, pictures
 from echousd.shapes.finishes.patterns import SIZE, noise, relief
 from echousd.shapes.finishes.pictures import PROGRAMS, STOCK, printed
 from echousd.shapes.finishes.slots import HARMONIES, SLOTS, linear, material_of
@@ -258,3 +260,29 @@ def test_a_print_is_in_the_colours_of_the_harmony_and_round_things_are_round():
     rows, columns = np.argwhere(ink).T
     one = (rows < SIZE / 7) & (columns < SIZE / 5)
     assert np.ptp(columns[one]) * ASPECTS["tall"] == pytest.approx(np.ptp(rows[one]), rel=0.1)
+
+
+def test_images_that_ship_are_what_would_be_baked():
+    every = json.loads((baking.BAKED / "index.json").read_text())
+    assert {*every, "index.json"} == {file.name for file in baking.BAKED.iterdir()}
+    for file, (name, given) in every.items():
+        given = tuple(tuple(one) if isinstance(one, list) else one for one in given)
+        assert baking.baked_file(name, given).name == file
+        shipped, baked = (baking.BAKED / file).read_bytes(), getattr(pictures, name)(*given) or b""
+        assert bool(shipped) == bool(baked)
+        if shipped:  # other versions of libraries round otherwise
+            far = np.subtract(*(np.asarray(Image.open(io.BytesIO(one)), int) for one in (shipped, baked)))
+            assert np.abs(far).mean() < 0.5, (name, given)
+
+
+def test_first_rooms_bake_next_to_nothing(monkeypatch, tmp_path):
+    asked, baked = [], []
+    for name in ("color_image", "normal_image", "rough_image"):
+        image = baking.kept(lambda *given, name=name: baked.append((name, given)))
+        image.__name__ = name
+        monkeypatch.setattr(baking, name, lambda *given, image=image: asked.append(given) or image(*given))
+    monkeypatch.setattr(baking, "from_cache", lambda kind, key, make: make())
+    room = echousd.generate(starting_graph("bedroom"), progress=None)
+    room_files(room)
+    assert len(set(asked)) > 40
+    assert len(baked) < 6, f"{baked}: run docs/make_baked.py"
