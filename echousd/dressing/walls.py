@@ -83,7 +83,7 @@ def curtains(setting: Setting) -> None:
                 continue
             rng = setting.rng("curtains")
             kind, variant = str(rng.choice(_styled(setting, CURTAINS))), int(rng.integers(1 << 30))
-            full = round(min(0.45, 0.16 + 0.14 * window.width), 3)
+            full = round(min(0.6, 0.2 + 0.2 * window.width), 3)
             low, high = np.clip((window.offset - beyond, window.end + beyond), 0.02, wall.length - 0.02).tolist()
             feet = (0.015, *(window.sill - off for off in HEMS if window.sill > 0.5))
             for foot, wide in product(feet, (round(full * share, 3) for share in BUNCHED)):

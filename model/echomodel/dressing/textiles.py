@@ -40,8 +40,8 @@ def tied_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     """One curtain that a band of its cloth holds together below its middle."""
     w, h, d = size
     cloth = drape(rng)
-    band = turned((0, 0.37 * h, 0), (0.29 * w, 0.4 * d), 0.04, rounding=0.012, power=3.0, material=cloth)
-    return [*_hung(size, rng, FOLD, top=0.5, drift=0.3, material=cloth, tied=0.5), band]
+    band = turned((0, 0.37 * h, 0), (0.34 * w, 0.4 * d), 0.04, rounding=0.012, power=3.0, material=cloth)
+    return [*_hung(size, rng, FOLD, top=0.5, drift=0.3, material=cloth, tied=0.4), band]
 
 
 def eyelet_curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
