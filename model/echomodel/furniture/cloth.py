@@ -111,7 +111,7 @@ class Cover(Block):
         line = z * out[0] ** 2 + x * out[1] ** 2 + 0.1 * out[0] * out[1]  # metres around the hem
         # how far cloth lies below its highest folds, which fade and swell along their way and are few at the head
         crease = np.abs(np.sin(7 * x + np.sin(4.1 * x + two) + one)) ** 4
-        swell = np.clip(0.6 + 0.8 * np.sin(3.1 * z + 4.7 * x + three), 0, 1) * np.clip(1.5 * (t + d), 0.2, 1)
+        swell = np.clip(0.6 + 0.8 * np.sin(3.1 * z + 4.7 * x + three), 0, 1) * np.clip(1.8 * (t + d) - 0.8, 0.1, 1)
         low = 0.78 * crease * swell + 0.15 * np.sin(4.3 * z - 2.6 * x + one) ** 2
         wave = 0.5 + 0.5 * np.sin(11 * line + one + 1.3 * np.sin(4 * line + two) + out[0])
         wave = wave * out[0] ** 2 + (0.5 * crease + 0.5 * wave) * out[1] ** 2
