@@ -78,8 +78,9 @@ def filled(search: Search, state: State) -> State:
     for i in pieces:
         group = search.group(i, every, state)
         rows = proposals(problem, state.position, state.yaw, every, i)
-        rows = rows[search.hits(state, every, i, group, rows, [i]) < HIT]
-        cost = search.unlikely(state, every, i, group, rows)
+        alone = search.hits(state, every, i, group, rows, [i])
+        rows, alone = rows[alone < HIT], alone[alone < HIT]
+        cost = search.unlikely(state, every, i, group, rows, alone)
         rows, cost = rows[cost < HIT], cost[cost < HIT]
         if len(rows):
             taste, (position, yaw) = search.tastes(i, rows), search.carried(state, i, group, rows)

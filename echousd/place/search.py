@@ -355,13 +355,15 @@ class Search:
         self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray, taste: np.ndarray
     ) -> np.ndarray:
         """(k,) int: the poses that run into the least, leave the floor least and break the fewest relations."""
-        keep, half = np.arange(len(rows)), JUDGED // 2
+        keep, half, alone = np.arange(len(rows)), JUDGED // 2, None
         if len(rows) > 2 * JUDGED:  # what is lost for where the box itself stands is not looked at with its group
             alone = self.hits(state, there, i, group, rows, [i])
             first = np.argsort(alone + taste, kind="stable")[:JUDGED]
-            most = np.sort(self.unlikely(state, there, i, group, rows[first]) + taste[first])[half - 1]
+            likely = self.unlikely(state, there, i, group, rows[first], alone[first])
+            most = np.sort(likely + taste[first])[half - 1]
             keep = np.flatnonzero((alone < HIT) | (alone + taste <= most + 1 / GRAIN))
-        cost = self.unlikely(state, there, i, group, rows[keep])
+            alone = alone[keep]
+        cost = self.unlikely(state, there, i, group, rows[keep], alone)
         order = np.argsort(np.round((cost + taste[keep]) * GRAIN), kind="stable")
         if len(order) > JUDGED:
             free = order[half:]  # some of all the others that are free, too
@@ -371,10 +373,18 @@ class Search:
             order = order[np.sort(np.unique(order, return_index=True)[1])]
         return keep[order]
 
-    def unlikely(self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray) -> np.ndarray:
-        """(K,) float: what a box with its group runs into, leaves of the floor and breaks of relations at K poses."""
+    def unlikely(
+        self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray,
+        alone: np.ndarray | None = None,
+    ) -> np.ndarray:  # fmt: skip
+        """(K,) float: what a box with its group runs into, leaves of the floor and breaks of relations at K poses.
+
+        `alone`: (K,) float, `hits` of the box itself where somebody asked for them before.
+        """
         along = [*group, *self.screens[i], *(k for k, _ in self.alongside[i])]  # which may go to walls
-        return self.hits(state, there, i, group, rows, group) + self.broken(state, there, i, rows, along)
+        if alone is None or len(group) > 1:
+            alone = self.hits(state, there, i, group, rows, group)
+        return alone + self.broken(state, there, i, rows, along)
 
     def broken(self, state: State, there: np.ndarray, i: int, rows: np.ndarray, along: list[int]) -> np.ndarray:
         """(K,) float: what a box at K poses breaks of its relations to those who do not go along with it."""

@@ -123,7 +123,7 @@ def test_a_sofa_turns_to_another_wall_though_its_screen_and_a_plant_beside_that_
     search, state = searched(words, size, [(0, 0, -1.5), (0, 0, 1.8), (1.1, 0, 1.8)], [0.0, np.pi, 0.0], told)
     every = np.ones(3, bool)
     there = np.array([[0.0, -1.5, 0.0, 0.0], [-2.0, 0.0, np.pi / 2, 0.0]])
-    assert search.unlikely(state, every, 0, [0], there).tolist() == [0.0, 0.0]
+    assert [search.unlikely(state, every, 0, [0], there, at).sum() for at in (None, np.full(2, 7.0))] == [0.0, 14.0]
     assert search.group(1, every, state) == [1, 2]
     position, _ = search.carried(state, 0, [0], there[1:], screens=[[1, 2]])
     assert np.hypot(*(position[0, 2] - position[0, 1])[[0, 2]]) == pytest.approx(1.1, abs=0.05)
