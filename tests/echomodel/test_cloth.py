@@ -41,7 +41,7 @@ def test_corners_of_a_pillow_stand_out_and_its_seams_are_thin():
     assert -0.3 * HALF[1] < corner[1] < -0.1 * HALF[1]  # they droop
 
 
-def test_a_cord_runs_along_the_seam_of_its_cushion():
+def test_a_cord_runs_along_the_innerof_its_cushion():
     for chop in (0.0, 0.24):
         cushion = trimesh.Trimesh(*replace(pillow((0, 0, 0), (0.25, 0.24, 0.08), "linen"), chop=chop).mesh())
         line = seam((0.25, 0.24, 0.08), chop)
@@ -57,6 +57,13 @@ def test_a_blow_dents_the_top_of_a_cushion_and_no_two_are_alike():
     assert tops(0.2)[1] == pytest.approx(tops(0.0)[1] - 2 * 0.2 * 0.24, abs=0.02)
     assert tops(0.2)[2] == pytest.approx(tops(0.0)[2], abs=1e-3)  # its corners stand
     assert np.abs(tops(0.0)[0] - tops(0.0, 0.4)[0]).max() > 0.005
+
+
+def test_a_cushion_stands_on_all_of_its_lower_side():
+    points = pillow((0, 0.24, 0), (0.25, 0.24, 0.08), "linen").mesh()[0]
+    inner = points[np.abs(points[:, 0]) < 0.2]
+    assert inner[:, 1].min() < 0.006  # its middle, not its corners alone
+    assert inner[:, 1].max() < 0.475  # above it draws in
 
 
 def test_a_deep_cushion_leans_back_over_a_wider_foot():

@@ -6,7 +6,8 @@ import numpy as np
 
 from echomodel.furniture.solids import FINEST, IDENTITY, Array, Ball, Block, Solid, Vector, loft
 
-PINCH = 0.11  # of half a pillow's side that its middle stands back behind the corners
+# Of half a pillow's side that its middle stands back behind the corners, and the share of that below, where it lies.
+PINCH, BELOW = 0.11, 0.2
 FOOT, SPREAD = 0.15, 1.3  # of a slumped cushion's height, below which it does not lean; by how much it is wider there
 SEAM = 0.025  # of half a pillow's thickness that is left at its seams
 DROOP = 0.25  # of half a pillow's thickness that its corners hang down
@@ -44,7 +45,7 @@ class Pillow(Ball):
 def outline(u: Array, v: Array, chop: float = 0.0) -> tuple[Array, Array]:
     """Places on a pillow, -1 to 1, as its seams draw them in and a blow to its top dents them."""
     down = chop * np.exp(-((u / CHOP) ** 2)) * np.clip(v, 0, 1) ** 2
-    return u * (1 - PINCH * (1 - v**2)), v * (1 - PINCH * (1 - u**2)) - 2 * down
+    return u * (1 - PINCH * (1 - v**2)), v * (1 - PINCH * (1 - u**2) * np.where(v < 0, BELOW, 1)) - 2 * down
 
 
 def pillow(centre: Vector, half: Vector, material: str, role: str = "", turn: Array = IDENTITY) -> Pillow:
