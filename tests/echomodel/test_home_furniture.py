@@ -8,6 +8,7 @@ import pytest
 from echomodel.furniture import draw_choices, draw_style, mesh_of, sample_size, solids
 from echomodel.furniture.distances import distance
 from echomodel.furniture.fronts import front
+from echomodel.furniture.shades import shade
 from echomodel.vocabulary import vocabulary
 
 HOME = (
@@ -86,3 +87,20 @@ def test_the_doors_of_a_wardrobe_have_a_grip_where_lower_fronts_have_none():
     grips = {h: [part for part in parts if part.role == "handle"] for h, parts in made.items()}
     assert len(grips[0.7]) == 0
     assert len(grips[2.0]) == 1
+
+
+@pytest.mark.parametrize(("tufting", "at_least", "at_most"), [(0.1, 10, 14), (0.42, 1, 1), (0.9, 5, 8)])
+def test_doors_of_wardrobes_are_panelled_plain_or_boarded(tufting, at_least, at_most):
+    style = replace(draw_style(np.random.default_rng(3)), fronts="flat", tufting=tufting)
+    made = [part for part in front((0.0, 0.0), (0.6, 2.0), 0.3, 1, 1, "door", style) if part.role == "door"]
+    assert at_least <= len(made) <= at_most
+    deep = {round(float(part.mesh()[0][:, 2].max()), 3) for part in made}
+    assert (len(deep) > 1) == (tufting != 0.42)  # light finds edges in them
+
+
+def test_shades_have_bound_rims_that_do_not_glow():
+    style = draw_style(np.random.default_rng(3))
+    for kind, bound in (("drum", 2), ("cone", 2), ("dome", 0)):
+        rims = [part for part in shade(kind, 0.0, 1.0, 0.0, 0.2, 0.15, 0.25, style) if part.material == "linen"]
+        assert len(rims) == bound, kind
+        assert all(np.ptp(part.mesh()[0][:, 1]) < 0.02 for part in rims)

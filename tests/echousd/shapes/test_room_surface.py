@@ -3,7 +3,7 @@ import pytest
 import trimesh
 from solid_boxes import box_mesh
 
-from echomodel.furniture.cloth import Sheet
+from echomodel.furniture.cloth import Sheet, cover
 from echomodel.furniture.solids import Tube
 from echomodel.triangles import Mesh
 from echomodel.vocabulary import vocabulary
@@ -163,6 +163,18 @@ def test_what_is_woven_into_cloth_that_hangs_runs_on_over_its_folds():
     apart = [len(np.unique(np.column_stack([one.faces.ravel(), one.st_index]), axis=0)) for one in (hung, board)]
     assert apart[0] == len(hung.points)  # one place in the picture for each point
     assert apart[1] > apart[0]
+
+
+def test_what_is_woven_into_cloth_that_lies_runs_on_over_its_edges():
+    cloth = cover((-0.8, 0.3, -1.0), (0.8, 0.6, 1.0), "wood", 0.1, 0.0, np.random.default_rng(1), falls=True)
+    mesh = Mesh(*cloth.mesh())
+    form = surface(mesh, {"wood": np.arange(len(mesh.faces))}, crease=DRAPED)
+    place, shown = form.points[form.faces], form.st[form.st_index].reshape(-1, 3, 2) * metres_of("wood")
+    edge, line = np.roll(place, -1, 1) - place, np.roll(shown, -1, 1) - shown
+    hangs = (place[..., 0] > 0.72) & (np.abs(edge[..., 1]) > 0.04) & (np.abs(edge[..., 2]) < 0.03)
+    assert hangs.sum() > 20
+    drawn = np.linalg.norm(line[hangs], axis=1) / np.linalg.norm(edge[hangs], axis=1)
+    assert np.median(drawn) > 0.7  # else its threads were drawn out into lines
 
 
 def _waves(z: float) -> np.ndarray:
