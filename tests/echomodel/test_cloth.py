@@ -102,6 +102,15 @@ def test_a_cover_hangs_over_its_sides_and_at_its_foot_where_it_falls(falls):
     assert np.ptp(hem[hem[:, 1] < -0.06, 0]) > 0.01  # waves
 
 
+def test_a_cover_that_hangs_hides_the_corners_of_its_frame():
+    for seed in range(5):
+        cloth = cover((-0.8, 0.3, -1.0), (0.8, 0.6, 1.0), "linen", 0.1, 0.03, np.random.default_rng(seed), falls=True)
+        hem = cloth.mesh()[0]
+        hem = hem[hem[:, 1] < 0.4]
+        assert (hem[:, 0] + hem[:, 2]).max() > 1.75, seed  # a corner as round as its edges ends at 1.74
+        assert (hem[:, 2] - hem[:, 0]).max() > 1.75, seed
+
+
 def test_sofas_have_eight_bodies_and_each_family_builds_several():
     assert len(BODIES) == 8
     for family in FAMILIES:

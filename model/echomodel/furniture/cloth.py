@@ -117,7 +117,7 @@ class Cover(Block):
         wave = 0.5 + 0.5 * np.sin(11 * line + one + 1.3 * np.sin(4 * line + two) + out[0])
         wave = wave * out[0] ** 2 + (0.5 * crease + 0.5 * wave) * out[1] ** 2
         loose = min(self.depth, LOOSE)
-        reach = r * np.sin(turn) - loose * wave * hung
+        reach = (r * np.sin(turn) - loose * wave * hung) * (1 + hung * (length / np.maximum(far, 1e-9) - 1))
         y = h - r * (1 - np.cos(turn)) - hung * (2 * h - r) - self.depth * low * np.cos(turn)
         y += hung * loose * (0.5 + 0.3 * np.sin(7 * line + three) + 0.2 * np.sin(13 * line + two))
         slack = loose * (0.5 + 0.5 * np.sin(6 * x + two)) * np.clip(1 - (t + d) / 0.25, 0, 1)
