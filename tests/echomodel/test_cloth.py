@@ -42,21 +42,15 @@ def test_corners_of_a_pillow_stand_out_and_its_seams_are_thin():
 
 
 def test_a_cord_runs_along_the_innerof_its_cushion():
-    for chop in (0.0, 0.24):
-        cushion = trimesh.Trimesh(*replace(pillow((0, 0, 0), (0.25, 0.24, 0.08), "linen"), chop=chop).mesh())
-        line = seam((0.25, 0.24, 0.08), chop)
-        assert np.linalg.norm(line[1:] - line[:-1], axis=1).max() < 0.09
-        assert np.abs(trimesh.proximity.signed_distance(cushion, line)).max() < 0.004
+    cushion = trimesh.Trimesh(*pillow((0, 0, 0), (0.25, 0.24, 0.08), "linen").mesh())
+    line = seam((0.25, 0.24, 0.08))
+    assert np.linalg.norm(line[1:] - line[:-1], axis=1).max() < 0.09
+    assert np.abs(trimesh.proximity.signed_distance(cushion, line)).max() < 0.004
 
 
-def test_a_blow_dents_the_top_of_a_cushion_and_no_two_are_alike():
-    def tops(chop, x=0.0):
-        points = replace(pillow((x, 0, 0), (0.25, 0.24, 0.08), "linen"), chop=chop).mesh()[0] - (x, 0, 0)
-        return points, points[abs(points[:, 0]) < 0.03, 1].max(), points[:, 1].max()
-
-    assert tops(0.2)[1] == pytest.approx(tops(0.0)[1] - 2 * 0.2 * 0.24, abs=0.02)
-    assert tops(0.2)[2] == pytest.approx(tops(0.0)[2], abs=1e-3)  # its corners stand
-    assert np.abs(tops(0.0)[0] - tops(0.0, 0.4)[0]).max() > 0.005
+def test_no_two_cushions_are_alike():
+    one, other = (pillow((x, 0, 0), (0.25, 0.24, 0.08), "linen").mesh()[0] - (x, 0, 0) for x in (0.0, 0.4))
+    assert np.abs(one - other).max() > 0.005
 
 
 def test_a_cushion_stands_on_all_of_its_lower_side():

@@ -121,14 +121,13 @@ def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid
     d = size[2] - lean
     cloth, trim = str(rng.choice(CLOTHS)), str(rng.choice(TRIMS))
     cord = str(rng.choice(("linen", "ebony", "blanket", "accent_plain")))
-    chop = float(rng.choice((0.0, 0.0, 0.0, 0.09))) if w < 1.3 * h else 0.0
     body = pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), shown or cloth)
     trims: dict[str, list[Solid]] = {
-        "cord": [tube(seam(body.half, chop) + np.array([0, h / 2, 0]), 0.004, cord)],
+        "cord": [tube(seam(body.half) + np.array([0, h / 2, 0]), 0.004, cord)],
         "button": [ball((0, h / 2, 0), (0.016, 0.016, 0.51 * d), cord)],
         "tassels": [ball((x * w, y, 0), (0.016, low, 0.014), cord) for x in (-0.47, 0.47) for y in (low, h - low)],
     }
-    made = [replace(body, chop=chop, power=float(rng.choice((1.9, 2.3, 2.7)))), *trims.get(trim, [])]
+    made = [replace(body, power=float(rng.choice((1.9, 2.3, 2.7)))), *trims.get(trim, [])]
     return [Slumped(material=one.material, of=one, tall=h, lean=lean) for one in made] if lean else made
 
 

@@ -7,23 +7,21 @@ import numpy as np
 from echomodel.furniture.solids import FINEST, IDENTITY, Array, Ball, Block, Solid, Vector, loft
 
 # Of half a pillow's side that its middle stands back behind the corners, and the share of that below, where it lies.
-PINCH, BELOW = 0.11, 0.2
+PINCH, BELOW = 0.08, 0.2
 FOOT, SPREAD = 0.15, 1.3  # of a slumped cushion's height, below which it does not lean; by how much it is wider there
 SEAM = 0.025  # of half a pillow's thickness that is left at its seams
 DROOP = 0.25  # of half a pillow's thickness that its corners hang down
 LOOSE = 0.04  # metres that what hangs of a cover is in waves at most
-CHOP = 0.42  # of half a pillow's width, how wide a blow to its top dents it
 
 
 @dataclass(frozen=True, eq=False)
 class Pillow(Ball):
     """Two cloths sewn together at four sides and filled, the fuller the more `power`: corners stand out, sides draw
     in and pucker; thin on its least axis. Power 2 is about an ellipse from seam to seam, 5 a board. Its filling has
-    settled by where it lies, so that no two are alike; its corners droop, and `chop` of its height its top is dented.
+    settled by where it lies, so that no two are alike, and its corners droop.
     """
 
     soft = True
-    chop: float = 0.0
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         count, phase = (4, 8, 10, 12)[detail], 7.0 * float(self.centre @ (1.0, 0.3, 1.7)) + 1.0
@@ -38,14 +36,13 @@ class Pillow(Ball):
         u, flat = u[:, :1], np.concatenate([v, v[:, -2:0:-1]], 1)
         side = np.concatenate([full + SEAM, -full[:, -2:0:-1] - SEAM], 1) - DROOP * (u * flat) ** 2
         side = side / max(1, np.abs(side).max())
-        vertices, faces = loft(np.roll(np.stack([side, *outline(u, flat, self.chop)], -1), thin, -1) * self.half)
+        vertices, faces = loft(np.roll(np.stack([side, *outline(u, flat)], -1), thin, -1) * self.half)
         return vertices, _outward(vertices, faces)
 
 
-def outline(u: Array, v: Array, chop: float = 0.0) -> tuple[Array, Array]:
-    """Places on a pillow, -1 to 1, as its seams draw them in and a blow to its top dents them."""
-    down = chop * np.exp(-((u / CHOP) ** 2)) * np.clip(v, 0, 1) ** 2
-    return u * (1 - PINCH * (1 - v**2)), v * (1 - PINCH * (1 - u**2) * np.where(v < 0, BELOW, 1)) - 2 * down
+def outline(u: Array, v: Array) -> tuple[Array, Array]:
+    """Places on a pillow, -1 to 1, as its seams draw them in."""
+    return u * (1 - PINCH * (1 - v**2)), v * (1 - PINCH * (1 - u**2) * np.where(v < 0, BELOW, 1))
 
 
 def pillow(centre: Vector, half: Vector, material: str, role: str = "", turn: Array = IDENTITY) -> Pillow:
@@ -69,11 +66,11 @@ class Slumped(Solid):
         return np.stack([x, y, z * (1 + SPREAD * (1 - high) ** 2) - back], 1), faces
 
 
-def seam(half: Vector, chop: float = 0.0) -> Array:
+def seam(half: Vector) -> Array:
     """(k, 3): a line around the seam of a pillow of `half` sides, thin on z, metres."""
     t, one = np.sin(np.linspace(-1, 1, 13) * np.pi / 2)[:-1], np.ones(12)  # as of its finest mesh
     u, v = np.concatenate([t, one, -t, -one, t[:1]]), np.concatenate([-one, t, one, -t, -one[:1]])
-    return np.stack([*outline(u, v, chop), -DROOP * (u * v) ** 2], 1) * half
+    return np.stack([*outline(u, v), -DROOP * (u * v) ** 2], 1) * half
 
 
 @dataclass(frozen=True, eq=False)
