@@ -246,3 +246,12 @@ def test_office_chairs_have_a_net_in_a_frame_and_a_pad_for_the_head_or_a_padded_
         assert sum(part.role == "back" for part in parts) == count
         assert not loose_solids(parts)
         assert mesh_of(parts, size).bounds[1, 1] == pytest.approx(size[1], abs=1e-6)
+
+
+def test_the_net_of_an_office_chair_hangs_in_a_frame_around_it():
+    style = replace(draw_style(np.random.default_rng(1)), tufting=0.9, back="slats")
+    made = solids("office_chair", style, draw_choices(np.random.default_rng(1)), np.array([0.6, 1.1, 0.6]))
+    (frame,) = (part for part in made if part.role == "back" and isinstance(part, Tube))
+    wide, tall, _ = np.ptp(frame.mesh()[0], axis=0)
+    assert 0.4 < wide < 0.6
+    assert 0.4 < tall < 0.65

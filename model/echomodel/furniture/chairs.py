@@ -270,7 +270,7 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return [*parts, bent(low, (sw / 2 + 0.02, d * 0.5), 0.05, h - seat + 0.05, arms)]
     tall, turn, foot = (h - y0) / np.cos(rake), rotation(x=-rake), np.array([0.0, seat, -d * 0.4])
     if style.tufting > 0.6:  # a net in a frame, and a pad for the head
-        frame = (seam(sw * 0.46, 0.4 * tall) + np.array([0, y0 - seat + 0.41 * tall, 0])) @ turn.T + foot
+        frame = (seam((sw * 0.46, 0.4 * tall, 0.0)) + np.array([0, y0 - seat + 0.41 * tall, 0])) @ turn.T + foot
         parts.append(tube(frame, 0.022, "metal", "back"))
         parts.append(lean(sw * 0.43, y0 + 0.03, y0 + 0.8 * tall, -0.005, 0.005, material="fabric", bow=0.02))
         parts.append(lean(0.03, y0 + 0.1, y0 + 0.95 * tall, -0.055, -0.02, material="metal", radius=0.01))
