@@ -252,6 +252,8 @@ def test_the_net_of_an_office_chair_hangs_in_a_frame_around_it():
     style = replace(draw_style(np.random.default_rng(1)), tufting=0.9, back="slats")
     made = solids("office_chair", style, draw_choices(np.random.default_rng(1)), np.array([0.6, 1.1, 0.6]))
     (frame,) = (part for part in made if part.role == "back" and isinstance(part, Tube))
-    wide, tall, _ = np.ptp(frame.mesh()[0], axis=0)
+    points = frame.mesh()[0]
+    wide, tall, _ = np.ptp(points, axis=0)
     assert 0.4 < wide < 0.6
     assert 0.4 < tall < 0.65
+    assert points[np.abs(points[:, 0]) < 0.05, 1].max() > points[:, 1].max() - 0.06  # no heart
