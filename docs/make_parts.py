@@ -50,7 +50,9 @@ def main() -> None:
         found = np.asarray(model.sample_furniture(graph, boxes, generator=generator))
         for column, (vector, size) in enumerate(zip(found, sizes, strict=True)):
             parts = solids(word, *piece_of(vector), size)
-            colours = [PALETTE[one.solid.material] for one in pieces_of(parts, size) for _ in one.faces]
+            colours = [
+                PALETTE.get(one.solid.material, PALETTE["accent"]) for one in pieces_of(parts, size) for _ in one.faces
+            ]
             drawn = thumbnail(mesh_of(parts, size), PIXELS, np.array(colours, float))
             sheet.paste(drawn, (MARGIN + column * PIXELS, row * PIXELS))
     sheet.quantize(256).save(SHEET, optimize=True)
