@@ -107,11 +107,7 @@ def sweet_home(path: Path) -> list[Path]:
 def sweet_home_models(path: Path, library: Path, tell: Tell) -> Models:
     """All models; those that were looked at for this project have the class that was found by eye."""
     for fields in read_library(library):
-        name, group, known = fields["name"], fields["group"], reviewed().get(fields["key"], {})
-        category = class_by_name(name, group, fields["dims"])
-        category = "" if category and fitted(category, name, group) else category
-        category = "" if known.get("use") == "0" else known.get("class", category)
-        yield library, {"category": category, "decided": True, **fields}
+        yield library, {"category": _sweet_home_class(**fields), "decided": True, **fields}
 
 
 def read_library(path: Path) -> list[dict[str, Any]]:
@@ -192,6 +188,13 @@ def _licence_in(notice: str) -> str:
     return named[0] if named else (text[:80] or "unknown")
 
 
+def _sweet_home_class(key: str, name: str, group: str, dims: np.ndarray, **_: Any) -> str:
+    category = class_by_name(name, group, dims)
+    category = "" if category and fitted(category, name, group) else category
+    known = reviewed().get(key, {})
+    return "" if known.get("use") == "0" else known.get("class", category)
+
+
 @cache
 def reviewed() -> dict[str, dict[str, str]]:
     """What was found by eye of models of Sweet Home 3D's libraries: key -> `class`, or `use` 0."""
@@ -249,8 +252,7 @@ def objaverse_models(folder: Path, table: Path, tell: Tell) -> Models:
         about = row.get("license_info")
         about = about if isinstance(about, dict) else {}
         turn, size, materials = _turned_to_view(row.get("frontView")), row.get("size"), row.get("materials")
-        told = isinstance(size, list) and [type(v) in (int, float) and 0 < v < 1e5 for v in size] == [True] * 3
-        dims = np.array(size, float) / 100 if told else None
+        dims = np.array(size, float) / 100 if _is_size(size) else None
         yield files.get(uid), {
             "key": uid, "name": text(row.get("category")) or uid, "words": texts(row, "category", "synset"),
             "dims": dims if dims is None or turn is None else np.abs(turn @ dims), "turn": turn,
@@ -267,6 +269,11 @@ def _turned_to_view(view: Any) -> np.ndarray | None:
         return None
     c, s = round(np.cos(-view * np.pi / 2)), round(np.sin(-view * np.pi / 2))
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]], float)
+
+
+def _is_size(size: Any) -> bool:
+    numbers = isinstance(size, list) and all(isinstance(v, int | float) and not isinstance(v, bool) for v in size)
+    return numbers and len(size) == 3 and all(0 < v < 1e5 for v in size)
 
 
 # Habitat Synthetic Scenes (HSSD): glb models and a table of their categories, their up and their front

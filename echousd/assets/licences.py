@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Sequence
-from contextlib import nullcontext
 from functools import lru_cache
 from pathlib import Path
 
@@ -49,6 +48,11 @@ def allowed(licence: str, wanted: Sequence[str]) -> bool:
     return False
 
 
+def _beginning(file: Path) -> str:
+    with file.open(encoding="utf-8", errors="replace") as opened:
+        return opened.read(MOST)
+
+
 @lru_cache(maxsize=4096)
 def licence_beside(folder: Path, top: Path) -> tuple[str, str]:
     """(licence, author) of the text nearest to a model, from its folder up to the library's; ("", "") where none is."""
@@ -56,8 +60,7 @@ def licence_beside(folder: Path, top: Path) -> tuple[str, str]:
         for name in NOTICES:
             for file in (folder / name, folder / f"{name}.txt", folder / f"{name}.md"):
                 try:
-                    with file.open(encoding="utf-8", errors="replace") if file.is_file() else nullcontext() as opened:
-                        text = opened.read(MOST) if opened else ""
+                    text = _beginning(file) if file.is_file() else ""
                 except OSError:
                     continue
                 found = spdx(text) if text else ""

@@ -119,16 +119,22 @@ def _mesh(model: ModelFile, painted: bool) -> Measured:
     about = (scene.metadata or {}).get("asset") or {}
     extras = about.get("extras") or {}
     copyright_ = str(about.get("copyright") or "")
-    named = [getattr(getattr(part.visual, "material", None), "name", None) for part in scene.geometry.values()]
     return Measured(
         *append_faces([np.asarray(part.vertices, float) for part in parts], [part.faces for part in parts]),
         metres=None if obj else 1.0,  # glTF is in metres, +Y up
-        materials=tuple(dict.fromkeys(str(name) for name in (named if obj else scene.geometry) if name or not obj)),
+        materials=tuple(dict.fromkeys(_material_names(scene) if obj else map(str, scene.geometry))),
         licence=str(extras.get("license") or ""),
         author=str(extras.get("author") or copyright_),
         missing=tuple(dict.fromkeys(beside.missing)),
         coats=tuple(_coats(scene)) if painted else (),
     )
+
+
+def _material_names(scene: trimesh.Scene) -> Iterator[str]:
+    for part in scene.geometry.values():
+        name = getattr(getattr(part.visual, "material", None), "name", None)
+        if name:
+            yield str(name)
 
 
 def _coats(scene: trimesh.Scene) -> Iterator[Coat]:
@@ -225,11 +231,16 @@ def _stage_coats(
     for (paint, _), share in zip(paints, np.bincount(worn, area, len(paints)), strict=True):
         if share > 0 and paint != Paint():  # of no material that is known
             if paint not in covers:
-                covers[paint] = flat(paint.color, paint.opacity)
-                with contextlib.suppress(TextureError):
-                    if paint.texture and (found := texels(texture_bytes(paint.texture) or b"", paint.tint)) is not None:
-                        covers[paint] = found
+                covers[paint] = _stage_cover(paint)
             yield float(share), covers[paint]
+
+
+def _stage_cover(paint: Paint) -> np.ndarray:
+    found = None
+    if paint.texture:
+        with contextlib.suppress(TextureError):
+            found = texels(texture_bytes(paint.texture) or b"", paint.tint)
+    return flat(paint.color, paint.opacity) if found is None else found
 
 
 def root_prim(stage: Usd.Stage, path: Path) -> Usd.Prim:

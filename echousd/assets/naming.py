@@ -36,8 +36,7 @@ def category_of(
     size = np.ones(3) if dims is None else dims
     for text, confidence in ((name, CALLED), (group, SHELVED)):
         bare = re.sub(r"[_\-]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z0-9])", " ", text))
-        word = english(bare) if FOREIGN.search(bare) or not _within(bare) else ""  # of a name that is no English one
-        found = known_word(bare) or (word and (known_word(word) or class_by_name(word, group, size)))
+        found = known_word(bare) or _translated(bare, group, size)
         found = found or _within(bare, 2) or class_by_name(bare, group, size) or _within(bare)
         if found and fitted(found, text, group):
             return "", 0.0
@@ -70,6 +69,12 @@ def class_by_name(name: str, group: str, size: Sequence[float] | np.ndarray) -> 
         "lamp?": "floor_lamp" if height > 1.0 else "table_lamp",
     }
     return choice.get(word, word)
+
+
+def _translated(text: str, group: str, size: Sequence[float] | np.ndarray) -> str:
+    """The category of a name that is no English one, "" where it is one or means nothing of ours."""
+    word = english(text) if FOREIGN.search(text) or not _within(text) else ""
+    return (known_word(word) or class_by_name(word, group, size)) if word else ""
 
 
 def fitted(category: str, *texts: str) -> bool:

@@ -185,17 +185,22 @@ def attempt(call: Callable[[Any], Any], argument: Any) -> tuple[str, Any]:
 def _serve(pipe: Connection, parent: int) -> None:
     """A worker's life: tasks from the pipe until it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
-    if sys.platform == "linux":  # the system ends this process with its parent; elsewhere the closed pipe does
+    _die_with(parent)
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            call, argument = pipe.recv()
+            pipe.send(attempt(call, argument))
+
+
+def _die_with(parent: int) -> None:
+    """Have the system end this process with its parent (Linux); elsewhere the closed pipe does, after the task."""
+    if sys.platform == "linux":
         import ctypes
 
         with contextlib.suppress(OSError, AttributeError):
             ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     if os.getppid() != parent:
         os._exit(1)
-    with contextlib.suppress(EOFError, OSError):
-        while True:
-            call, argument = pipe.recv()
-            pipe.send(attempt(call, argument))
 
 
 def resident(process: int | None) -> float:

@@ -167,10 +167,7 @@ def load_plan(folder: Path) -> RunPlan:
     try:
         with path.open("rb") as file:
             lines = bounded_lines(file, LONGEST, path)
-            head = json.loads(next(lines))
-            kinds = {"version": str, "weights": str, "rooms": int, "request": dict, "sets": list}
-            if not isinstance(head, dict) or any(type(head.get(key)) is not kind for key, kind in kinds.items()):
-                raise ValueError("line 1 is no head of a plan")
+            head = _head(json.loads(next(lines)))
             sets = tuple(BatchOptions(**raw) for raw in head.pop("sets"))
             entries = tuple(_entry(json.loads(line), number, len(sets)) for number, line in enumerate(lines))
         texts = inside(folder, f"{STATE}/{GRAPHS}", f"{folder}: the run")
@@ -211,6 +208,14 @@ def _unequal(old: Any, new: Any, where: str = "") -> Iterator[tuple[str, Any, An
             yield from _unequal(old.get(key), new.get(key), f"{where}.{key}" if where else str(key))
     elif old != new:
         yield where.removeprefix("request."), json.dumps(old), json.dumps(new)
+
+
+def _head(raw: Any) -> dict[str, Any]:
+    """The first line of the plan; raises ValueError for one that is not as we write it."""
+    kinds = {"version": str, "weights": str, "rooms": int, "request": dict, "sets": list}
+    if not isinstance(raw, dict) or any(type(raw.get(key)) is not kind for key, kind in kinds.items()):
+        raise ValueError("line 1 is no head of a plan")
+    return raw
 
 
 def _entry(raw: Any, number: int, sets: int) -> Entry:
@@ -260,9 +265,12 @@ def is_row(row: Any) -> bool:
         return False
     if found.state == "failed":
         return "error" in row and not found.root
-    root = PurePosixPath(found.root)
-    named = root.name == found.root and root.suffix in LAYER_FORMS and IDENTIFIER.fullmatch(root.stem) is not None
-    return found.state == "done" and len(found.bounds) == 6 and bool(found.sha256) and named
+    return found.state == "done" and len(found.bounds) == 6 and bool(found.sha256) and _is_root(found.root)
+
+
+def _is_root(name: str) -> bool:
+    path = PurePosixPath(name)
+    return path.name == name and path.suffix in LAYER_FORMS and IDENTIFIER.fullmatch(path.stem) is not None
 
 
 JOURNAL = "journal.jsonl"

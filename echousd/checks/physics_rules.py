@@ -67,7 +67,13 @@ def colliders(reading: Reading) -> Iterator[Finding]:
         apart = float(np.abs(boxes[0] - boxes[1]).max()) * reading.metres
         if apart > OFF:
             yield Finding(prim.GetPath(), f"its colliders end {apart:.2g} m from its geometry, allowed: {OFF:g} m")
-    for prim in reading.prims if bodies else ():  # floors that they fall through, and walls that they pass
+    if bodies:
+        yield from _bare_shell(reading)
+
+
+def _bare_shell(reading: Reading) -> Iterator[Finding]:
+    """Floors that bodies fall through, and walls that they pass."""
+    for prim in reading.prims:
         words = words_of(prim)
         if not {"floor", "wall"} & set(words):
             continue
@@ -127,6 +133,10 @@ def masses(reading: Reading, prim: Usd.Prim) -> Iterator[str]:
         off = float(np.maximum(box[0] - at, at - box[1]).max())
         if off > APART:
             yield f"its centre of mass lies {off:.2g} m outside its geometry"
+    yield from _inertia(authored)
+
+
+def _inertia(authored: UsdPhysics.MassAPI) -> Iterator[str]:
     inertia, axes = authored.GetDiagonalInertiaAttr().Get(), authored.GetPrincipalAxesAttr()
     if inertia is not None and 2 * max(inertia) > sum(inertia) * (1 + SLACK):
         shown = ", ".join(f"{value:g}" for value in inertia)

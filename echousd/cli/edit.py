@@ -43,15 +43,8 @@ def edit(
         does = "--undo takes the last edit back" if undo else "--redo makes it again"
         does = "--recover finishes what was interrupted" if recover else does
         raise ValueError(f"{does} and does nothing else; leave the other options out")
-    if recover:  # what an interrupted run has begun
-        from echousd.folder import history
-
-        folder = room if room.is_dir() else room.parent
-        if not folder.is_dir():
-            raise ValueError(f"{room}: no such folder")
-        with held(folder, wait=wait) as finished:
-            root = room_at(folder)
-            _say_finished(root, history.steps_of(root, finished) if finished else (), json)
+    if recover:
+        _recover(room, wait, json)
         return
     of_home = undo or redo or wishes == EditRequest(relate=wishes.relate, unrelate=wishes.unrelate) != EditRequest()
     if of_home and is_home(room):
@@ -136,6 +129,18 @@ def _step(room: Path, wait: bool, json: bool, run: str) -> None:
         steps = history.steps_of(room, run) if finished == run else step(room)
         pictures = write_pictures(room) if shown else []
     _say_steps(room, pictures, {"undo": "undone", "redo": "redone"}[run], steps, json)
+
+
+def _recover(room: Path, wait: bool, json: bool) -> None:
+    """Finish what an interrupted run has begun, and say what it was."""
+    from echousd.folder import history
+
+    folder = room if room.is_dir() else room.parent
+    if not folder.is_dir():
+        raise ValueError(f"{room}: no such folder")
+    with held(folder, wait=wait) as finished:
+        root = room_at(folder)
+        _say_finished(root, history.steps_of(root, finished) if finished else (), json)
 
 
 def _say_finished(room: Path, steps: Sequence[str], json: bool) -> None:

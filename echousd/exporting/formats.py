@@ -224,13 +224,8 @@ def flat_layer(stage: Usd.Stage, *, package: Package | None = None, physics: boo
                 _as_float(attribute)  # some web loaders cannot read doubles of whole numbers from a crate file
     _bind_directly(stage)
     _drop_unused_materials(stage)
-    materials = [UsdShade.Material(prim) for prim in stage.TraverseAll() if prim.IsA(UsdShade.Material)]
-    for material in materials if package is None else ():  # MaterialX beside others has no plain colour to fall back to
-        if material.GetSurfaceOutput("mtlx") and material.GetSurfaceOutput():
-            material.GetPrim().RemoveProperty("outputs:mtlx:surface")
-            for child in material.GetPrim().GetChildren():
-                if str(UsdShade.Shader(child).GetShaderId() or "").startswith("ND_"):
-                    stage.RemovePrim(child.GetPath())
+    if package is None:
+        _drop_materialx(stage)
     shaders = [prim for prim in stage.TraverseAll() if prim.GetTypeName() == "Shader"]
     images = [prim for prim in shaders if (file := prim.GetAttribute("inputs:file")) and file.HasAuthoredValue()]
     take_assets(layer, package)
@@ -265,6 +260,16 @@ def _as_float(attribute: Usd.Attribute) -> None:
     for time, value in found.items():
         if value is not None:
             single.Set(Gf.Vec3f(value), time)
+
+
+def _drop_materialx(stage: Usd.Stage) -> None:
+    """Networks of MaterialX that stand beside others: their images have no plain colour to fall back to."""
+    for material in [UsdShade.Material(prim) for prim in stage.TraverseAll() if prim.IsA(UsdShade.Material)]:
+        if material.GetSurfaceOutput("mtlx") and material.GetSurfaceOutput():
+            material.GetPrim().RemoveProperty("outputs:mtlx:surface")
+            for child in material.GetPrim().GetChildren():
+                if str(UsdShade.Shader(child).GetShaderId() or "").startswith("ND_"):
+                    stage.RemovePrim(child.GetPath())
 
 
 def _paint_plain(image: Usd.Prim) -> None:

@@ -202,8 +202,7 @@ def _finish(folder: Path, journal: Journal) -> None:
         place = folder / removal.path
         if digest_of(place) == removal.digest:
             place.unlink(missing_ok=True)
-        while (place := place.parent) != folder and place.is_dir() and not any(place.iterdir()):
-            place.rmdir()
+        _remove_empty(place.parent, folder)
     for path, name in journal.kept.items():
         tell_kept(folder, path, name)
     flush_all(place for place in touched if place.is_dir())
@@ -215,6 +214,12 @@ def _discard(staging: Path) -> None:
     if staging.exists():
         (staging / JOURNAL).unlink(missing_ok=True)  # before what it names
         shutil.rmtree(staging)
+
+
+def _remove_empty(folder: Path, top: Path) -> None:
+    while folder != top and folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()
+        folder = folder.parent
 
 
 def _holds(path: Path, content: bytes) -> bool:

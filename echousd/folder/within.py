@@ -39,9 +39,15 @@ def check_links(folder: Path, path: Path, entry: str) -> None:
     real = os.path.realpath(path)
     if os.path.commonpath([top, real]) == top:
         return
-    below = (place for place in (*reversed(path.parents), path) if place != folder and place.is_relative_to(folder))
-    link = next(place for place in below if os.path.commonpath([top, os.path.realpath(place)]) != top)
+    link = next(
+        place for place in (*reversed(path.parents), path) if place != folder and _leads_out(place, folder, top)
+    )
     raise ValueError(
         f"{entry}, but {link} is a link to {os.path.realpath(link)}, outside of {folder}; "
         "allowed: files of the folder itself"
     )
+
+
+def _leads_out(place: Path, folder: Path, top: str) -> bool:
+    real = os.path.realpath(place)
+    return place.is_relative_to(folder) and os.path.commonpath([top, real]) != top

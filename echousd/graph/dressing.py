@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import AfterValidator
 
@@ -31,13 +31,16 @@ class SmallNode(PlainModel):
         place: against_wall for what hangs on a wall.
     """
 
-    _titled = ("object", "name")
     name: field.Name
     category: Annotated[str, AfterValidator(_small_word)]
     size: field.Size = None
     position: field.Position = None
     yaw: field.Angle = None
     place: field.Place = None
+
+    @classmethod
+    def _title(cls, fields: dict[str, Any]) -> str:
+        return f"object {shown(fields['name'])}: "
 
 
 @dataclass(frozen=True)

@@ -27,13 +27,7 @@ def with_plan(graph: SceneGraph, seed: int) -> SceneGraph:
 
     The layout is drawn for what comes back: doors then swing free and windows give light.
     """
-    nodes = [node for node in graph.nodes if None not in (node.size, node.position, node.yaw)]
-    fixed = (
-        np.array([node.size for node in nodes], float).reshape(-1, 3),
-        np.array([node.position for node in nodes], float).reshape(-1, 3),
-        np.array([node.yaw for node in nodes], float),
-    )
-    return with_placed_openings(with_floor(graph, seed), fixed, seed)
+    return with_placed_openings(with_floor(graph, seed), _fixed(graph), seed)
 
 
 def with_floor(graph: SceneGraph, seed: int) -> SceneGraph:
@@ -111,6 +105,16 @@ def with_lowered_windows(graph: SceneGraph, stated: SceneGraph, boxes: Arrays, s
         return one
 
     return graph.with_room(openings=tuple(map(lowered, graph.room.openings)))
+
+
+def _fixed(graph: SceneGraph) -> Arrays:
+    """Size, position and yaw of the objects whose box is stated."""
+    nodes = [node for node in graph.nodes if None not in (node.size, node.position, node.yaw)]
+    return (
+        np.array([node.size for node in nodes], float).reshape(-1, 3),
+        np.array([node.position for node in nodes], float).reshape(-1, 3),
+        np.array([node.yaw for node in nodes], float),
+    )
 
 
 def check_extents(extents: tuple[float, float] | None) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from inspect import Parameter, Signature, signature
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError, model_validator
@@ -35,8 +35,6 @@ class _Plain(ModelMetaclass):
 class PlainModel(BaseModel, metaclass=_Plain, frozen=True, extra="forbid"):
     """Frozen, without unknown fields, and with errors of one line."""
 
-    _titled: ClassVar[tuple[str, ...]] = ("",)  # what these call it: a word, and the fields that follow it
-
     def __init__(self, **fields: Any) -> None:
         fault = None
         try:
@@ -56,12 +54,13 @@ class PlainModel(BaseModel, metaclass=_Plain, frozen=True, extra="forbid"):
         if first["type"] == "extra_forbidden":
             message = f"unknown field, allowed: {', '.join(cls.model_fields)}"
         about = (*first["loc"], *getattr(cause, "about", ()))
-        word, *parts = cls._titled
-        told = [fields[part] for part in parts]
-        title = f" {shown(told[0] if len(told) == 1 else ' '.join(map(str, told)))}" if told else ""
-        fault = GraphError(f"{word + title + ': ' if word else ''}{where + ': ' if where else ''}{message}", about)
+        fault = GraphError(f"{cls._title(fields)}{where + ': ' if where else ''}{message}", about)
         fault.others = getattr(cause, "others", ())
         return fault
+
+    @classmethod
+    def _title(cls, fields: dict[str, Any]) -> str:
+        return ""
 
     def __dir__(self) -> list[str]:
         return sorted({*dir(type(self)), *type(self).model_fields})
@@ -92,7 +91,6 @@ class RoomSpec(PlainModel):
         resident: who lives there, which small things tell; None = as the furniture suggests.
     """
 
-    _titled = ("room",)
     type: field.RoomTypeWord
     floor_polygon: field.Corners = None
     size: field.Extents = None
@@ -109,6 +107,10 @@ class RoomSpec(PlainModel):
     def tall(self) -> float:
         """Its height in metres, which is 2.8 where nobody says."""
         return self.height or HEIGHT
+
+    @classmethod
+    def _title(cls, fields: dict[str, Any]) -> str:
+        return "room: "
 
     @model_validator(mode="after")
     def _agrees(self) -> RoomSpec:
@@ -179,7 +181,6 @@ class Node(PlainModel):
         attributes: free data, identifiers to texts, numbers or booleans.
     """
 
-    _titled = ("object", "name")
     name: field.Name
     category: field.CategoryWord
     title: field.Title = None
@@ -219,6 +220,10 @@ class Node(PlainModel):
         alone = [] if self.place is None else [Placed(self.name, self.place)]
         return (*alone, *([] if self.between is None else [Placed(self.name, "between", self.between)]))
 
+    @classmethod
+    def _title(cls, fields: dict[str, Any]) -> str:
+        return f"object {shown(fields['name'])}: "
+
 
 class Relation(PlainModel):
     """`subject predicate object`, such as bed left wardrobe: the bed is left of the wardrobe in the room's frame.
@@ -230,7 +235,6 @@ class Relation(PlainModel):
         confidence: 0 to 1.
     """
 
-    _titled = ("relation", "subject", "predicate", "object")
     subject: field.Name
     predicate: field.PredicateWord
     object: field.Name
@@ -238,6 +242,11 @@ class Relation(PlainModel):
 
     def __init__(self, subject: str, predicate: str, object: str, confidence: float = 1.0, **fields: Any) -> None:
         super().__init__(subject=subject, predicate=predicate, object=object, confidence=confidence, **fields)
+
+    @classmethod
+    def _title(cls, fields: dict[str, Any]) -> str:
+        sentence = " ".join(str(fields[part]) for part in ("subject", "predicate", "object"))
+        return f"relation {shown(sentence)}: "
 
     @property
     def triple(self) -> tuple[str, str, str]:

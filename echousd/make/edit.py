@@ -88,10 +88,7 @@ def edit(
     rebuilt = graph.room.replaced(style=saved.graph.room.style) != saved.graph.room
     along = (movable(graph) if rebuilt else begun[0][1]) - moving
     stated = with_boxes(graph, there[0], moving)
-    was = {name: [*box["position"], box["yaw"]] for name, box in box_fields(saved.graph.names, saved.boxes).items()}
-    poses = {node.name: [*node.position, node.yaw] for node in stated.nodes if node.position and node.yaw is not None}
-    elsewhere = {name for name in was.keys() & poses if np.abs(np.subtract(was[name], poses[name])).max() > STILL}
-    put = fresh | elsewhere - along  # who went along may be in the way where it came
+    put = fresh | _put_elsewhere(stated, saved) - along  # who went along may be in the way where it came
     whole = all(None not in (node.size, node.position, node.yaw) for node in stated.nodes)
 
     def way(boxes: Boxes, outcome: LayoutOutcome, moved: Collection[str]) -> set[str]:
@@ -239,6 +236,13 @@ def graph_edit(before: SceneGraph, after: SceneGraph) -> GraphEdit:
     stay = {node.name for node, new in zip(after.nodes, added.tolist(), strict=True) if not new}
     relations = tuple(r for r in before.relations if r.subject in stay and r.object in stay)
     return GraphEdit(graph_batch(after.replaced(relations=relations)).triplets, added)
+
+
+def _put_elsewhere(stated: SceneGraph, saved: SavedRoom) -> set[str]:
+    """Names of what stands elsewhere than in the saved room, locked or not."""
+    was = {name: [*box["position"], box["yaw"]] for name, box in box_fields(saved.graph.names, saved.boxes).items()}
+    there = {node.name: [*node.position, node.yaw] for node in stated.nodes if node.position and node.yaw is not None}
+    return {name for name in was.keys() & there if np.abs(np.subtract(was[name], there[name])).max() > STILL}
 
 
 def _compare(manifest: Mapping[str, Any], echo: RoomModel, *, chosen: bool, root: Path) -> None:

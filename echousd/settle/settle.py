@@ -108,9 +108,7 @@ def _solids(prim: Usd.Prim, cache: UsdGeom.XformCache, metres: float, *, moves: 
     points = (points @ world[:3, :3].T + world[:3, 3]) * metres
     if not len(faces):
         return
-    material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")[0]
-    authored = UsdPhysics.MaterialAPI(material).GetDynamicFrictionAttr().Get() if material else None
-    friction, path = FRICTION if authored is None else float(authored), str(prim.GetPath())
+    friction, path = _friction(prim), str(prim.GetPath())
     kind = prim.GetAttribute("physics:approximation").Get() or "none"
     if moves or kind in HULLS:
         yield Solid(points, friction, path)
@@ -133,6 +131,12 @@ def convex_parts(mesh: trimesh.Trimesh) -> Iterator[np.ndarray]:
     for triangle, normal, area in zip(corners, mesh.face_normals, mesh.area_faces, strict=True):
         if area > LEAST_AREA:
             yield np.concatenate([triangle, triangle - max(depth, LEAST_DEPTH) * normal])
+
+
+def _friction(prim: Usd.Prim) -> float:
+    material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")[0]
+    authored = UsdPhysics.MaterialAPI(material).GetDynamicFrictionAttr().Get() if material else None
+    return FRICTION if authored is None else float(authored)
 
 
 def _gravity(stage: Usd.Stage, metres: float) -> np.ndarray:

@@ -95,15 +95,21 @@ def regular_layers(path: Path) -> list[Sdf.Layer]:
             layer = found[name] = Sdf.Layer.FindOrOpen(name)
         except Tf.ErrorException:
             continue
-        for prim in (prim for prim in prim_specs(layer) if prim.HasInfo("clips")) if layer else ():
-            for asset in assets_in(prim.GetInfo("clips")):  # USD opens their layers for values, or at once
-                resolved = str(Ar.GetResolver().Resolve(layer.ComputeAbsolutePath(asset)))
-                _check_regular(resolved, f"{path}: {layer.identifier}: <{prim.path}>: clips")
+        if layer:
+            _check_clips(layer, path)
         for asset in layer.GetCompositionAssetDependencies() if layer else ():
             other = layer.ComputeAbsolutePath(asset)
             _check_regular(str(Ar.GetResolver().Resolve(other)), f"{path}: a layer, {layer.identifier},")
             todo.append(other)
     return [layer for layer in found.values() if layer]
+
+
+def _check_clips(layer: Sdf.Layer, path: Path) -> None:
+    """Raises StageError for value clips that are no files: USD opens their layers for values, or at once."""
+    for prim in (prim for prim in prim_specs(layer) if prim.HasInfo("clips")):
+        for asset in assets_in(prim.GetInfo("clips")):
+            resolved = str(Ar.GetResolver().Resolve(layer.ComputeAbsolutePath(asset)))
+            _check_regular(resolved, f"{path}: {layer.identifier}: <{prim.path}>: clips")
 
 
 def specs(layer: Sdf.Layer) -> list[Sdf.Spec]:

@@ -79,12 +79,16 @@ def _procthor_room(one: Any, ours: Any, data: Any) -> Room:
         name, words = str(ours["name"]), (str(ours["type"]), *words)
     if ours and len(ours["walls"]) == len(corners):
         corners = offset(corners, [-float(thick) for thick in ours["walls"]])
-    tops = [c["y"] for wall in data.get("walls", ()) if wall.get("roomId") == one["id"] for c in wall["polygon"]]
-    return Room(name, words, corners, data.get("wall_height") or max(tops, default=None))
+    return Room(name, words, corners, _ceiling(one, data))
 
 
 def _flat(corners: Any) -> np.ndarray:
     return np.array([(corner["x"], corner["z"]) for corner in corners], float) @ MAP.T
+
+
+def _ceiling(room: Any, data: Any) -> float | None:
+    tops = [c["y"] for wall in data.get("walls", ()) if wall.get("roomId") == room["id"] for c in wall["polygon"]]
+    return data.get("wall_height") or max(tops, default=None)
 
 
 def _open_walls(data: Any) -> list[Any]:

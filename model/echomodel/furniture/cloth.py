@@ -11,6 +11,7 @@ PINCH, BELOW = 0.08, 0.2
 FOOT, SPREAD = 0.15, 1.3  # of a slumped cushion's height, below which it does not lean; by how much it is wider there
 SEAM = 0.025  # of half a pillow's thickness that is left at its seams
 DROOP = 0.25  # of half a pillow's thickness that its corners hang down
+SUNK = 0.0115  # metres below its highest folds at most that things lie on a cover: half of it is about as high
 LOOSE = 0.04  # metres that what hangs of a cover is in waves at most
 
 
@@ -89,7 +90,7 @@ class Cover(Block):
 
     @property
     def gives(self) -> tuple[float, float]:
-        return min(0.25 * self.depth, 0.0115), 1.0
+        return min(0.25 * self.depth, SUNK), 1.0
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         w, h, d = self.half

@@ -115,7 +115,11 @@ def hob_safe(plan: Plan) -> Found:
     corner = xp.minimum(least[who], wall)
     out = joined(out, found(who, corner - LANDING / 2, other=xp.where(wall < least[who], -1, about[who]),
                             measure=corner, words=xp.ones_like(who)))  # fmt: skip
-    margin = full(plan.yaw, len(who), FAR)
+    return joined(out, _under_windows(plan, who))
+
+
+def _under_windows(plan: Plan, who: Array) -> Found:
+    margin, xp = full(plan.yaw, len(who), FAR), plan.kit
     for scenes, polygon, openings in plan.rooms:
         here = (plan.scene[who] >= scenes[0]) & (plan.scene[who] <= scenes[-1])
         for one in (opening for opening in openings if opening.kind == "window" and opening.edge < len(polygon)):
@@ -124,7 +128,7 @@ def hob_safe(plan: Plan) -> Found:
             behind = (forward < -plan.size[who, None, 2] / 4).all(1) & (forward > -plan.size[who, None, 2]).all(1)
             beside = xp.maximum(xp.amin(lateral, 1), -xp.amax(lateral, 1)) - plan.size[who, 0] / 2
             margin = xp.where(here & behind, xp.minimum(margin, beside), margin)
-    return joined(out, found(who, margin, measure=-margin, words=xp.full_like(who, 2)))
+    return found(who, margin, measure=-margin, words=xp.full_like(who, 2))
 
 
 def standing_room(plan: Plan) -> Found:
