@@ -76,11 +76,12 @@ def read_room(root: str | Path) -> SavedRoom:
     at = stage.GetPrimAtPath(manifest["room_path"])
     objects, z_up, metres = f"{at.GetPath()}/{OBJECTS.rpartition('/')[2]}", stands_z_up(at), metres_per_unit(stage)
     for node in graph.nodes:
-        asset = manifest["assets"].get(node.name)
-        read = read_original if "asset" in manifest.get("meshes", {}).get(asset, {}) else _geometry
         where = f"{objects}/{node.name}"
+        prim = stage.GetPrimAtPath(where)
+        asset: str | None = manifest["assets"].get(node.name) or _asset_of(prim, manifest)
+        read = read_original if "asset" in manifest.get("meshes", {}).get(asset, {}) else _geometry
         try:
-            found = made.get(asset) or read(stage.GetPrimAtPath(where), asset, node.category, manifest)
+            found = made.get(asset or "") or read(prim, asset, node.category, manifest)
         except (TypeError, ValueError, IndexError, AttributeError, ArithmeticError, Tf.ErrorException) as error:
             if read is read_original and isinstance(error, ValueError):
                 raise
@@ -127,6 +128,12 @@ def _boxes(stage: Usd.Stage, objects: str, graph: SceneGraph, size: np.ndarray) 
         position.append(place * metres_per_unit(stage))
         yaw.append(np.arctan2(front[0], front[2]))
     return Boxes(size, *(np.array(v, np.float32) for v in (position, yaw)))
+
+
+def _asset_of(prim: Usd.Prim, manifest: Mapping[str, Any]) -> str | None:
+    """The room's asset that a prim refers to whose name the manifest does not know: a piece renamed or copied since."""
+    name = prim.GetAssetInfoByKey("name") if prim else None
+    return name if name in manifest["assets"].values() else None
 
 
 def _geometry(root: Usd.Prim, asset: str | None, category: str, manifest: Mapping[str, Any]) -> Geometry | None:

@@ -8,12 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
 from echomodel.boxes2d import footprints, seen
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.graph.nodes import OBSTACLE
+from echousd.graph.titles import identifier_of
 from echousd.naming import free_name
 from echousd.stage.contents import room_frame
 from echousd.stage.encoding import StageError
@@ -180,12 +181,12 @@ def _read(
             skipped["no bounds"] += 1
             continue
         prims.PruneChildren()
-        ascii_name = prim.GetName().encode("ascii", "replace").decode().replace("?", "_")
-        name = free_name(Tf.MakeValidIdentifier(ascii_name), taken)
+        called = prim.GetName()
+        name = free_name(called, taken) if called.isascii() else identifier_of(called, category, taken)
         taken.add(name)
         node = Node(
             name, category, size=box.size, position=box.position, yaw=box.yaw, locked=bool(about), attributes=about,
-            shapes="boxes" if about else None,
+            shapes="boxes" if about else None, title=None if called.isascii() else called,
         )  # fmt: skip
         nodes.append((prim.GetPath(), node))
     _tell(stage, skipped, obstacles)

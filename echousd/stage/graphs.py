@@ -98,8 +98,8 @@ class _Editor:
         self.target = stage.GetEditTarget()
         self.layer = self.target.GetLayer()
         self.names = node_names(prims)
-        self.nodes = {prim.GetName(): prim for prim in prims.nodes}
-        self.paths = {prim.GetName(): prim.GetPath() for prim in prims.nodes}
+        self.nodes = {self.names[prim.GetPath()]: prim for prim in prims.nodes}
+        self.paths = {name: path for path, name in self.names.items()}
         self.objects = prims.room.GetPath().AppendChild(usd.OBJECTS_NAME)
         if prims.nodes and not stage.GetPrimAtPath(self.objects):
             self.objects = prims.nodes[0].GetPath().GetParentPath()
@@ -293,13 +293,14 @@ class _Editor:
         """Bring nodes and relations in the graph's order, where they are not, by `reorder nameChildren`."""
         prims = next(prims for prims in find_rooms(self.stage) if prims.room == self.prims.room)
         names = node_names(prims)
+        called = {name: path.name for path, name in names.items()}
         related: dict[tuple[str, str, str], Usd.Prim] = {}
         for prim in prims.relations:
             relation = relation_of(prim, names)
             if relation:
                 related.setdefault(relation.triple, prim)
         wanted = (
-            (prims.nodes, prims.nodes, [*graph.names]),
+            (prims.nodes, prims.nodes, [called[name] for name in graph.names]),
             ([*related.values()], prims.relations, [related[r.triple].GetName() for r in graph.relations]),
             (prims.openings, prims.openings, [opening.name for opening in graph.room.openings]),
         )

@@ -22,6 +22,7 @@ from echousd.stage import values
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 
+identifier_of = Late("echousd.graph.titles:identifier_of")
 foreign_graph, foreign_rooms = (Late(f"echousd.stage.foreign:{name}") for name in ("foreign_graph", "foreign_rooms"))
 
 
@@ -174,13 +175,13 @@ def _strength(prim: Usd.Prim) -> int:
 
 
 def node_names(prims: RoomPrims, *, small: bool = False) -> dict[Sdf.Path, str]:
-    """Path to node name (the prim's own name), with `small` of small things too.
+    """Path to node name (the prim's own, spelled in ASCII), with `small` of small things too.
 
     Raises StageError where two prims of one room share a name.
     """
-    names: dict[Sdf.Path, str] = {}
+    members = (*prims.nodes, *(prims.small if small else ()))
     seen: dict[str, Sdf.Path] = {}
-    for prim in (*prims.nodes, *(prims.small if small else ())):
+    for prim in members:
         path, name = prim.GetPath(), prim.GetName()
         if name in seen:
             raise StageError(
@@ -188,7 +189,9 @@ def node_names(prims: RoomPrims, *, small: bool = False) -> dict[Sdf.Path, str]:
                 "allowed: a name of its own for each node of a room"
             )
         seen[name] = path
-        names[path] = name
+    names = {path: name for name, path in seen.items()}
+    for prim in (prim for prim in members if not prim.GetName().isascii()):
+        names[prim.GetPath()] = identifier_of(prim.GetName(), _category(prim) or "", {*names.values()})
     return names
 
 
@@ -220,21 +223,26 @@ def read_node(prim: Usd.Prim, name: str, names: dict[Sdf.Path, str]) -> Node:
             free[attribute.removeprefix(usd.FREE)] = value(prim, attribute)
     fields = {key: found for key, found in fields.items() if found is not None}
     free = {key: found for key, found in free.items() if found is not None}
-    if "category" not in fields:
-        labels = values.texts(prim.GetAttribute(usd.LABELS))
-        if not labels:
-            raise StageError(f"{place(prim)}: no category, allowed: {usd.CATEGORY} or {usd.LABELS} with one word")
-        fields["category"] = labels[0]
+    if fields.setdefault("category", _category(prim)) is None:
+        raise StageError(f"{place(prim)}: no category, allowed: {usd.CATEGORY} or {usd.LABELS} with one word")
     with faults(place(prim)):
         return Node(name, attributes=free, **fields)
 
 
+def _category(prim: Usd.Prim) -> Any:
+    """The category that a prim states, else its first label; None without either."""
+    return value(prim, usd.CATEGORY) or next(iter(values.texts(prim.GetAttribute(usd.LABELS))), None)
+
+
 def _title(prim: Usd.Prim) -> str | None:
-    """The display name of a prim, None for one that is no title: any host may write what it likes there."""
+    """The display name of a prim, None for one that is no title: any host may write what it likes there.
+
+    Without one, a prim's name in another script than a node's is its title.
+    """
     try:
         return title(prim.GetDisplayName())
     except ValueError:
-        return None
+        return None if prim.GetName().isascii() else prim.GetName()
 
 
 def _between(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> tuple[str, ...] | None:

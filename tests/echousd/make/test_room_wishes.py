@@ -195,6 +195,33 @@ def test_an_object_that_was_written_by_hand_is_named_with_the_remedy(root):
         read_room(root)
 
 
+@pytest.mark.parametrize("copied", [False, True])
+def test_a_piece_that_was_renamed_or_copied_in_the_layers_is_edited_like_others(root, echousd_command, copied):
+    before, was = files(root.parent), box(root, "wardrobe")
+    old, new = "/Room/Objects/wardrobe", "/Room/Objects/closet"
+    if copied:
+        for name in ("graph", "geometry", "layout"):
+            layer = Sdf.Layer.FindOrOpen(str(root.parent / "layers" / f"{name}.usda"))
+            assert Sdf.CopySpec(layer, old, layer, new)
+            layer.Save()
+    else:
+        stage = Usd.Stage.Open(str(root))
+        editor = Usd.NamespaceEditor(stage)
+        assert editor.MovePrimAtPath(old, new)
+        assert editor.ApplyEdits()
+        for layer in stage.GetLayerStack(includeSessionLayers=False):
+            layer.Save()
+    done = echousd_command("edit", root, "--shapes", "boxes", "--add", "chair:nightstand", "--lock", "closet")
+    assert done.code in (0, 1), done.err
+    saved = read_room(root)
+    assert saved.graph.names.count("closet") == 1
+    assert ("wardrobe" in saved.graph.names) == copied
+    assert saved.assets["closet"] == "wardrobe"
+    for value, expected in zip(box(root, "closet"), was, strict=True):
+        np.testing.assert_allclose(value, expected, atol=1e-3)
+    assert files(root.parent)["wardrobe_geo.usdc"] == before["wardrobe_geo.usdc"]
+
+
 def test_edits_are_taken_back_byte_for_byte(root, echousd_command):
     states = [files(root.parent)]
     assert echousd_command("edit", root, "--undo").err == f"error: {root}: no edit to take back\n"

@@ -82,13 +82,15 @@ def test_a_prim_name_that_is_no_identifier(tmp_path):
 
 
 def test_a_name_that_usd_allows_and_the_graph_does_not():
-    stage = changed(lambda stage: stage.DefinePrim("/Room/Objects/Stuhl_für_Gäste", "Xform"))
-    prim = stage.GetPrimAtPath("/Room/Objects/Stuhl_für_Gäste")
+    name = "Stuhl_für_Gäste" * 9
+    stage = changed(lambda stage: stage.DefinePrim(f"/Room/Objects/{name}", "Xform"))
+    prim = stage.GetPrimAtPath(f"/Room/Objects/{name}")
     prim.ApplyAPI("EchoNodeAPI")
     prim.CreateAttribute("echo:category", Sdf.ValueTypeNames.Token).Set("chair")
     message = complaint(stage)
-    assert "</Room/Objects/Stuhl_für_Gäste>" in message
-    assert "is no identifier, allowed: letters, digits and _" in message
+    assert f"</Room/Objects/{name}>" in message
+    assert "name" in message
+    assert "allowed: " in message
 
 
 def test_cyclic_sublayers(tmp_path, capfd):

@@ -228,7 +228,10 @@ def test_names_become_identifiers_of_their_own():
     stage = stage_of("Y", 1.0)
     for parent in ("a", "b"):
         label(box_mesh(stage, f"/World/{parent}/Stühle", (0, 0, 0), (1, 1, 1)).GetPrim(), "chair")
-    assert [node.name for node in read_graph(stage).nodes] == ["St_hle", "St_hle_2"]
+    label(box_mesh(stage, "/World/椅子", (0, 0, 0), (1, 1, 1)).GetPrim(), "chair")
+    nodes = read_graph(stage).nodes
+    assert [node.name for node in nodes] == ["Stuehle", "Stuehle_2", "chair"]
+    assert [node.title for node in nodes] == ["Stühle", "Stühle", "椅子"]
 
 
 def test_instances_are_read():

@@ -301,3 +301,26 @@ def test_the_first_objects_of_a_graph_get_a_place():
         del layer.GetPrimAtPath("/Room/SceneGraph").nameChildren[prim.name]
     update_graph(layer, GRAPH)
     assert read_graph(Usd.Stage.Open(layer)) == GRAPH
+
+
+def test_prims_named_in_any_script_are_nodes_and_keep_their_names():
+    stage = Usd.Stage.CreateInMemory()
+    write_graph(GRAPH, stage)
+    editor = Usd.NamespaceEditor(stage)
+    for old, new in (("stand", "Nachttisch_groß"), ("closet", "衣柜")):
+        assert editor.MovePrimAtPath(f"/Room/Objects/{old}", f"/Room/Objects/{new}")
+        assert editor.ApplyEdits()
+    graph = read_graph(stage)
+    assert graph.names == ("bed", "Nachttisch_gross", "wardrobe")
+    assert [node.title for node in graph.nodes] == [None, "Nachttisch_groß", "衣柜"]
+    assert [str(relation) for relation in graph.relations] == [
+        "Nachttisch_gross left bed", "wardrobe taller_than bed"
+    ]  # fmt: skip
+    update_graph(stage, graph.unrelate("wardrobe", "taller_than", "bed").relate("wardrobe", "front", "bed").lock("bed"))
+    names = [prim.GetName() for prim in stage.GetPrimAtPath("/Room/Objects").GetChildren()]
+    assert names == ["bed", "Nachttisch_groß", "衣柜"]
+    assert "wardrobe front bed" in map(str, read_graph(stage).relations)
+    update_graph(stage, read_graph(stage).remove_node("wardrobe"))
+    assert [str(path) for path in (p.GetPath() for p in stage.GetPrimAtPath("/Room/Objects").GetChildren())] == [
+        "/Room/Objects/bed", "/Room/Objects/Nachttisch_groß"
+    ]  # fmt: skip
