@@ -14,6 +14,7 @@ from echousd.draw.drawables import rgb
 from echousd.exporting.glb import glb
 from echousd.exporting.habitat import habitat_files, sceneeval_files
 from echousd.exporting.packing import Package, Reach, check_types, images_beside, take_assets, without_clock
+from echousd.stage.encoding import BETWEEN, OBJECT, SUBJECT
 from echousd.stage.files import layer_bytes, open_stage, prim_specs, source, write_all
 from echousd.stage.showing import selected_layout, showing_layout
 from echousd.stage.units import set_units
@@ -216,6 +217,7 @@ def flat_layer(stage: Usd.Stage, *, package: Package | None = None, physics: boo
     if not physics:
         without_physics(layer)
     stage = Usd.Stage.Open(layer)
+    _drop_relations_without_ends(stage)
     for prim in stage.TraverseAll():
         prim.ClearMetadata("instanceable")
         prim.ClearMetadata("assetInfo")  # it holds the absolute path of a file that is no longer needed
@@ -250,6 +252,16 @@ def _without_instances(stage: Usd.Stage) -> Iterator[None]:
         yield
     finally:
         session.TransferContent(before)
+
+
+def _drop_relations_without_ends(stage: Usd.Stage) -> None:
+    """Take out what the graph says of prims that are deactivated on the stage, as nothing is left of them here."""
+    for prim in list(stage.TraverseAll()):
+        kept = {name: all(map(stage.GetPrimAtPath, targets(prim, name))) for name in (SUBJECT, OBJECT, BETWEEN)}
+        if not (kept[SUBJECT] and kept[OBJECT]):
+            stage.RemovePrim(prim.GetPath())
+        elif not kept[BETWEEN]:
+            prim.RemoveProperty(BETWEEN)
 
 
 def _as_float(attribute: Usd.Attribute) -> None:

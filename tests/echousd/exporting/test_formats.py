@@ -172,6 +172,19 @@ def test_flat_usd_keeps_the_graph_and_its_images(root, room, tmp_path, ending):
     assert {path.name for path in (tmp_path / "out").iterdir()} == {f"room{ending}", "room_textures"}
 
 
+@pytest.mark.parametrize("ending", [".usdz", ".usdc"])
+def test_flat_usd_of_a_room_with_a_piece_switched_off_has_the_graph_that_is_left(room, tmp_path, ending):
+    root = room.save(tmp_path / "bedroom", preview=False)
+    layer = Sdf.Layer.CreateNew(str(root.with_name("mine.usda")))
+    layer.subLayerPaths = [f"./{root.name}"]
+    stage = Usd.Stage.Open(layer)
+    stage.GetPrimAtPath("/Room/Objects/bed").SetActive(False)
+    layer.Save()
+    graph = echousd.read_graph(layer.realPath)
+    assert 0 < len(graph.relations) < len(room.graph.relations)
+    assert echousd.read_graph(export(layer.realPath, tmp_path / f"flat{ending}")) == graph
+
+
 def physics_of(stage):
     """How much physics of each sort a stage holds."""
     prims = list(stage.TraverseAll())
