@@ -64,10 +64,10 @@ def _one(
     try:
         stage = open_stage(room)
         if is_home(stage):  # what a single room does not need is not loaded to see that it is one
-            from echousd.home.check import check_home
+            from echousd.home.check import check_home, room_files
             from echousd.home.existing import plan_there
 
-            if plan_there(room) is not None:
+            if room_files(stage) and plan_there(room) is not None:
                 home = check_home(room, rules=rules, layout=layout, settle=settle)
                 if not json:
                     _show(*_of_home(home, strict))

@@ -56,10 +56,10 @@ class HomeReport:
 
 def check_home(path: Path, *, rules: str = "strict", layout: int | None = None, settle: bool = False) -> HomeReport:
     """Judge the home on a stage; arguments as `echousd.check`. Raises StageError where it holds no plan."""
-    plan = plan_there(path)
-    if plan is None:
-        raise ValueError(f"{path}: no home, allowed: a stage of rooms with floors side by side")
-    stage = open_stage(path)
+    plan, stage = plan_there(path), open_stage(path)
+    files = room_files(stage)
+    if plan is None or files is None:
+        raise ValueError(f"{path}: no home, allowed: rooms with floors side by side, each the payload of its prim")
     ground = open_ground(plan, furniture(plan, path))
     reached = walked(plan, ground)
     faults = [("broken", f"{relation}: the plan does not keep it") for relation in plan.broken()]
@@ -72,21 +72,20 @@ def check_home(path: Path, *, rules: str = "strict", layout: int | None = None, 
         if share < REACHED
     ]
     faults += [("ways", says) for says in _blocked(plan, ground)]
-    rooms = {
-        name: check(_room_file(prims.room), rules=rules, layout=layout, settle=settle)
-        for name, prims in named_rooms(stage).items()
-    }
+    rooms = {name: check(file, rules=rules, layout=layout, settle=settle) for name, file in files.items()}
     return HomeReport(tuple(faults), reached, len(plan.home.relations), rooms)
 
 
-def _room_file(prim: Usd.Prim) -> Path:
-    """The root layer of the room that a prim has as its payload."""
-    for spec in prim.GetPrimStack():
-        for payload in spec.payloadList.GetAddedOrExplicitItems():
-            return Path(spec.layer.ComputeAbsolutePath(payload.assetPath))
-    raise ValueError(
-        f"<{prim.GetPath()}>: no payload, allowed: rooms in files of their own, as echousd generate has them"
-    )
+def room_files(stage: Usd.Stage) -> dict[str, Path] | None:
+    """The root layers of a home's rooms, its payloads as `echousd generate` has them; None where a room is none."""
+    files = {}
+    for name, prims in named_rooms(stage).items():
+        listed = [(spec.layer, spec.payloadList.GetAddedOrExplicitItems()) for spec in prims.room.GetPrimStack()]
+        named = [layer.ComputeAbsolutePath(payload.assetPath) for layer, payloads in listed for payload in payloads]
+        if not named:
+            return None
+        files[name] = Path(named[0])
+    return files
 
 
 def _openings(plan: HomePlan) -> Iterator[str]:

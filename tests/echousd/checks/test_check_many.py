@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from pxr import Usd, UsdGeom
 from small_room import BARE, StandIn, small_graph
 
 import echousd
@@ -36,6 +37,23 @@ def test_a_folder_and_a_pattern_of_rooms(rooms, echousd_command):
     found = json.loads(echousd_command("check", rooms / "*" / "*.usda", "--json").out)
     assert [entry["room"] for entry in found] == [str(rooms / n / f"{n}.usda") for n in "ab"]
     assert "ok" in json.loads(echousd_command("check", rooms / "a", "--json").out)
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_a_stage_that_refers_to_rooms_side_by_side_is_checked_as_it_stands_there(rooms, echousd_command, flat):
+    stage = Usd.Stage.CreateNew(str(rooms / "house.usda"))
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/House").GetPrim())
+    for number, name in enumerate("ab"):
+        prim = UsdGeom.Xform.Define(stage, f"/House/{name}")
+        prim.GetPrim().GetReferences().AddReference(f"./{name}/{name}.usda")
+        prim.AddTranslateOp().Set((10.0 * number, 0.0, 0.0))
+    stage.Save()
+    file = echousd.export(rooms / "house.usda", rooms / "flat.usdc") if flat else rooms / "house.usda"
+    report = echousd.check(file)
+    assert report.rooms == ("/House/a", "/House/b")
+    assert json.loads(echousd_command("check", file, "--json").out) == report.to_json()
 
 
 @pytest.mark.parametrize("pattern", ["*", "**", "**/*.usda", "?"])
