@@ -56,7 +56,7 @@ def edit(
     if alone:
         _step(own_root(room), wait, json, "undo" if undo else "redo")
         return
-    changes["outside"] = outside or ()
+    changes["outside"] = (*(outside or ()), *(Path(text.partition(":")[2].strip()).parent for text in wishes.reshape))
     nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
     _change(
         f"edit {_name_of(wishes, changes)}", lambda: (room, wished(read_room(room), wishes)), output or room.parent,

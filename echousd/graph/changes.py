@@ -23,4 +23,5 @@ class EditRequest:
     move: Sequence[str] = _ask("Where to, name:x,z or name:x,y,z, metres.")
     turn: Sequence[str] = _ask("Heading, name:degrees; 0 looks along +Z.")
     resize: Sequence[str] = _ask("Size at heading 0, name:x,y,z, metres.")
+    reshape: Sequence[str] = _ask("Model of your own in its place, name:file (USD, glTF, OBJ).")
     restyle: Sequence[str] = _ask("Style, name:style, or room:industrial; without a style none.")

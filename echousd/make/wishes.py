@@ -16,6 +16,7 @@ from echousd.graph.changes import EditRequest
 from echousd.graph.starting import ONE_IS_ENOUGH
 from echousd.graph.text import stating, without
 from echousd.graph.titles import composed, identifier_of, is_title, name_of
+from echousd.make.pipeline import with_own_pieces
 from echousd.make.reading import SavedRoom, read_room
 from echousd.place.living import living_faults
 from echousd.room import RoomData
@@ -63,6 +64,7 @@ def wished(saved: SavedRoom, wishes: EditRequest) -> SceneGraph:
         name, size = _named(graph, text)
         numbers = _numbers("resize", text, size, (3,), "name:x,y,z, metres")
         graph = _placed(graph, saved, name).update_node(name, size=numbers)
+    graph = with_own_pieces(graph, dict(_named(graph, text) for text in wishes.reshape))
     for text in wishes.restyle:
         name, style = _parts(text)
         if name == "room" and name not in graph.names:

@@ -195,6 +195,21 @@ def test_an_object_that_was_written_by_hand_is_named_with_the_remedy(root):
         read_room(root)
 
 
+def test_a_model_of_ones_own_takes_the_place_of_a_piece(root, tmp_path, echousd_command):
+    stage = Usd.Stage.CreateNew(str(tmp_path / "models.usda"))
+    stage.SetDefaultPrim(UsdGeom.Cube.Define(stage, "/Own").GetPrim())
+    UsdGeom.SetStageMetersPerUnit(stage, 0.5)
+    stage.Save()
+    before = files(root.parent)
+    done = echousd_command("edit", root, "--reshape", f"wardrobe: {tmp_path / 'models.usda'}")
+    assert done.code in (0, 1), done.err
+    np.testing.assert_allclose(box(root, "wardrobe")[0], (1.0, 1.0, 1.0), atol=1e-3)
+    assert echousd.read_graph(root).node("wardrobe").asset == "../models.usda"
+    assert files(root.parent)["bed_geo.usdc"] == before["bed_geo.usdc"]
+    done = echousd_command("edit", root, "--reshape", "wardrobe:gone.usda")
+    assert (done.code, "object 'wardrobe': gone.usda: no such file" in done.err) == (2, True)
+
+
 @pytest.mark.parametrize("copied", [False, True])
 def test_a_piece_that_was_renamed_or_copied_in_the_layers_is_edited_like_others(root, echousd_command, copied):
     before, was = files(root.parent), box(root, "wardrobe")
