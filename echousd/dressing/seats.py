@@ -40,7 +40,7 @@ def cushions_on(
     apart = 0.28 / (wide / 2 - 0.25) if wide > MORE[1] else 0.0
     ends += [(end, odd) for end in dict.fromkeys((-apart, apart)) if more and wide > MORE[0]]
     for end, (kind, size, variant) in ends if wide > 1.3 else [(float(rng.choice([-0.6, 0.6])), narrow)]:
-        turn = -0.12 * end * float(rng.uniform(0.3, 1.6))
+        turn = -0.28 * end * float(rng.uniform(0.3, 1.6))
         for lean in (LEAN * size[1], 0.0):  # upright on what is too shallow
             deep = size + np.array([0.0, 0.0, lean])
             spot = standing_on(host, at_back(seat, end, deep), turn, deep, corners_of(kind, deep, variant))

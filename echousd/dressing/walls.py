@@ -297,8 +297,8 @@ def free_walls(setting: Setting, least: float = 0.0) -> list[tuple[float, float,
     return sorted(found, key=lambda one: (-round(one[0], 4), one[2].edge, one[1]))
 
 
-SHARES = (0.3, 0.7, 0.5, 0.18, 0.82)  # of a wall's length: aside first, so that a picture has room beside it
-BROAD, CLOCK = 1.7, 0.6  # metres of free wall: a shelf is aside on a longer one, a clock hangs on one so short
+# Metres of free wall: a shelf is aside on a longer one, a clock hangs on one so short, and a tall mirror.
+BROAD, CLOCK, MIRROR = 1.7, 0.6, 0.7
 DOUBLE, HIGHER = 0.5, 0.28  # share of shelves with another below, and metres between them
 SHELF, LOW = 1.38, 0.85  # metres from the floor to the board of a wall shelf, and to a niche
 WALL_SHELVES = ("wall_shelf", "ledge", "box_shelf", "niche")  # without a style; of a room both are alike
@@ -390,28 +390,15 @@ def tall_mirror(setting: Setting) -> None:
     """A mirror for the whole person where somebody dresses and can stand before it: in rooms with a wardrobe or bed."""
     rng = setting.rng("tall mirror")
     if setting.walls and setting.of("tall_mirror") and setting.has(MIRRORS, rng):
-        spots = product(_roomiest(setting), (0.18, 0.82, *SHARES))
-        _hung(setting, _new("tall_mirror", rng), spots, 0.3, before=STANDING)
+        one = _new("tall_mirror", rng)
+        free = [(wall, middle, length / 2 - one.size[0]) for length, middle, wall in free_walls(setting, MIRROR)]
+        spots = ((wall, (middle + aside) / wall.length) for wall, middle, way in free for aside in (way, -way, 0.0))
+        _hung(setting, one, spots, 0.3, before=STANDING)
 
 
 def _new(kind: str, rng: np.random.Generator) -> Thing:
     """A thing of a usual size that has no place yet."""
     return Thing(kind, usual_size(kind, rng), np.zeros(3), 0.0, "", int(rng.integers(1 << 30)))
-
-
-def _roomiest(setting: Setting) -> Iterable[Wall]:
-    """Walls, those with the least hung and the fewest openings first."""
-
-    def used(wall: Wall) -> float:
-        here = sum(o.width for o in setting.openings if o.edge == wall.edge)
-        for thing in setting.placed:
-            off = (thing.position[[0, 2]] - wall.start) @ wall.inside
-            along = (thing.position[[0, 2]] - wall.start) @ wall.along
-            if thing.position[1] > 0.5 and abs(off) < 0.3 and 0 < along < wall.length:
-                here += float(thing.size[0])
-        return here - wall.length
-
-    return sorted(walls_of(setting.floor), key=lambda wall: (round(used(wall), 6), wall.edge))
 
 
 def _hung(setting: Setting, one: Thing, spots: Iterable[tuple[Wall, float]], low: float, **free: float) -> Thing | None:

@@ -12,7 +12,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from echomodel.dressing import ASPECTS, PRINTS
-from echousd.shapes.finishes.patterns import SIZE, aged, carpet, noise, relief
+from echousd.shapes.finishes.media import MEDIA, PRESS, worked
+from echousd.shapes.finishes.patterns import SIZE, aged, carpet, noise, relief, rumpled
 from echousd.shapes.finishes.slots import HARMONIES, Color
 from echousd.srgb import from_linear, to_linear
 
@@ -201,9 +202,11 @@ def printed(name: str, harmony: str) -> np.ndarray:
     sheet = Sheet(name, harmony)
     for row in sheet.row["of"]:
         PROGRAMS[next(iter(row))](sheet, row)
+    if "kind" in sheet.row:
+        return worked(sheet.image, sheet.color("paper"), MEDIA.get(sheet.row["kind"], PRESS), sheet.seed)
     drawn = to_linear(np.arange(256) / 255)[np.asarray(sheet.image.resize((SIZE, SIZE), Image.Resampling.BOX))]
-    grain = 1 + 0.02 * noise(101, 90.0, 90.0) if name.startswith("picture_") else carpet().tone
-    return np.clip(drawn * grain[..., None], 0, 1)
+    cloth = rumpled if name.startswith("cushion_") else carpet
+    return np.clip(drawn * cloth().tone[..., None], 0, 1)
 
 
 def color_image(pattern: str, color: Color, harmony: str, worn: float = 0.0) -> bytes:

@@ -112,7 +112,7 @@ CLOTHS = ("accent_cloth", "accent_plain", "accent_striped", "accent_checked", "b
 TRIMS = ("", "", "cord", "cord", "button", "tassels")  # of cushions
 
 
-LEAN, UPRIGHT = 0.28, 0.185  # of its height that a top is behind its foot; metres, the deepest that is upright
+LEAN, UPRIGHT = 0.28, 0.225  # of its height that a top is behind its foot; metres, the deepest that is upright
 
 
 def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
@@ -127,8 +127,9 @@ def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid
         "button": [ball((0, h / 2, 0), (0.016, 0.016, 0.51 * d), cord)],
         "tassels": [ball((x * w, y, 0), (0.016, low, 0.014), cord) for x in (-0.47, 0.47) for y in (low, h - low)],
     }
-    made = [replace(body, power=float(rng.choice((1.9, 2.3, 2.7)))), *trims.get(trim, [])]
-    return [Slumped(material=one.material, of=one, tall=h, lean=lean) for one in made] if lean else made
+    made = [replace(body, power=float(rng.choice((1.3, 1.5, 1.8)))), *trims.get(trim, [])]
+    aside = float(rng.uniform(-0.12, 0.12)) * h
+    return [Slumped(material=one.material, of=one, tall=h, lean=lean, aside=aside) for one in made] if lean else made
 
 
 lumbar_cushion = cushion  # long and low, for the small of the back

@@ -25,7 +25,7 @@ class Pillow(Ball):
     soft = True
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        count, phase = (4, 8, 10, 12)[detail], 7.0 * float(self.centre @ (1.0, 0.3, 1.7)) + 1.0
+        count, phase = (4, 8, 10, 14)[detail], 7.0 * float(self.centre @ (1.0, 0.3, 1.7)) + 1.0
         line = np.sin(np.linspace(-1, 1, count + 1) * np.pi / 2)
         u, v = np.meshgrid(line, line, indexing="ij")
         dent = 0.14 * np.sin(2.2 * u + phase) * np.cos(1.8 * v + 1.6 * phase) - 0.12 * v
@@ -53,18 +53,22 @@ def pillow(centre: Vector, half: Vector, material: str, role: str = "", turn: Ar
 
 @dataclass(frozen=True, eq=False)
 class Slumped(Solid):
-    """Another solid that leans back (-z) above its foot, which spreads: `lean` metres at the height `tall`."""
+    """Another solid that leans back (-z) above its foot, which spreads: `lean` metres at the height `tall`; there it
+    sinks `aside`, too, and its corner on that side comes down as far.
+    """
 
     of: Solid = field(default_factory=Solid)
     tall: float = 1.0
     lean: float = 0.0
+    aside: float = 0.0
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         vertices, faces = self.of.mesh(detail)
         x, y, z = vertices.T
         high = np.clip(y / self.tall, 0, 1)
         back = self.lean * (np.clip(high - FOOT, 0, 1) / (1 - FOOT) - 0.5)
-        return np.stack([x, y, z * (1 + SPREAD * (1 - high) ** 2) - back], 1), faces
+        down = np.abs(self.aside) * high**2 * (0.5 + np.sign(self.aside) * x / self.tall)
+        return np.stack([x + self.aside * high**2, y - down, z * (1 + SPREAD * (1 - high) ** 2) - back], 1), faces
 
 
 def seam(half: Vector) -> Array:

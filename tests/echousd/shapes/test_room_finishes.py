@@ -22,7 +22,8 @@ from echousd.graph import starting_graph
 from echousd.layers.compose import room_files
 from echousd.options import RoomOptions
 from echousd.shapes.finishes import baking, pictures
-from echousd.shapes.finishes.patterns import SIZE, noise, relief
+from echousd.shapes.finishes.media import MEDIA, PRESS, worked
+from echousd.shapes.finishes.patterns import SIZE, creased, noise, relief
 from echousd.shapes.finishes.pictures import PROGRAMS, STOCK, printed
 from echousd.shapes.finishes.slots import HARMONIES, SLOTS, linear, material_of
 from echousd.shapes.geometry import CREASE, Origin
@@ -232,9 +233,10 @@ def test_a_baked_image_is_kept_for_later_processes(tmp_path, monkeypatch):
 def test_no_two_prints_are_nearly_the_same(what, monkeypatch):
     """What hangs or lies in fifty rooms is not met all the time, and can be read where it is."""
     names = [name for name in PRINTS if name.startswith(f"{what}_")]
-    for module in ("pictures", "patterns"):  # an eighth of this is looked at
+    for module in ("pictures", "patterns", "media"):  # an eighth of this is looked at
         monkeypatch.setattr(f"echousd.shapes.finishes.{module}.SIZE", SIZE // 4)
         monkeypatch.setattr(f"echousd.shapes.finishes.{module}.noise", noise.__wrapped__)
+    monkeypatch.setattr("echousd.shapes.finishes.patterns.creased", creased.__wrapped__)
     drawn = [printed(name, "clay")[::2, ::2] for name in names]
     apart = [float(np.abs(one - other).mean()) for k, one in enumerate(drawn) for other in drawn[:k]]
     assert min(apart) > 0.02
@@ -252,6 +254,17 @@ def test_what_is_printed_names_colours_and_programs_that_there_are(harmony):
         assert all(word in tones or re.fullmatch("[0-9a-f]{6}", word) for word in words), name
         assert {next(iter(one)) for one in row["of"]} <= PROGRAMS.keys(), name
         assert row["form"] in ASPECTS
+
+
+@pytest.mark.parametrize("medium", sorted({*MEDIA.values(), PRESS}))
+def test_paint_lies_unevenly_and_leaves_bare_paper_alone(medium):
+    image = Image.new("RGB", (2 * SIZE, 2 * SIZE), "#f4efe6")
+    image.paste("#3f6b8a", (0, 0, SIZE, 2 * SIZE))
+    made = worked(image, (0xF4, 0xEF, 0xE6), medium, 7)
+    assert made[:, -SIZE // 8 :] == pytest.approx(np.broadcast_to(linear("f4efe6"), (SIZE, SIZE // 8, 3)), abs=1e-4)
+    painted = made[:, SIZE // 8 : SIZE // 3]
+    assert painted.mean((0, 1)) == pytest.approx(linear("3f6b8a"), abs=0.06)
+    assert painted.std((0, 1)).max() > 0.02
 
 
 def test_a_print_is_in_the_colours_of_the_harmony_and_round_things_are_round():
