@@ -1,4 +1,4 @@
-"""Books: single ones, rows, stacks, a notebook."""
+"""Books: single ones, rows, stacks."""
 
 from itertools import islice
 
@@ -87,15 +87,6 @@ def book_stack(size: Size, rng: np.random.Generator) -> list[Solid]:
         parts += _flat(at, thick, w * share * 0.92, d * share * 0.92, turn, str(rng.choice(COVERS)))
         at += thick
     return parts
-
-
-def notebook(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """A closed notebook, thick or thin, with a pencil on it."""
-    w, h, d = size
-    book = h * float(rng.uniform(0.45, 0.7))
-    parts = _flat(0.0, book, w, d, rotation(), str(rng.choice(COVERS)))
-    r, turn = (h - book) / 2, rotation(y=float(rng.uniform(-0.5, 0.5)))
-    return [*parts, Block(np.array([w * 0.12, book + r, 0]), turn, "frame", half=np.array([r, r, d * 0.36]))]
 
 
 def _flat(at: float, thick: float, w: float, d: float, turn: np.ndarray, cover: str) -> list[Solid]:
