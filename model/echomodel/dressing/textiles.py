@@ -118,9 +118,10 @@ LEAN, UPRIGHT = 0.28, 0.225  # of its height that a top is behind its foot; metr
 def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
     """A cushion on a side, full or slack, of one of some cloths or of a print, trimmed; a deep one leans back."""
     (w, h, _), lean, low = size, LEAN * size[1] if size[2] > UPRIGHT else 0.0, 0.022
-    d = size[2] - lean
+    d, aside = size[2] - lean, float(rng.uniform(-0.12, 0.12)) * h if lean else 0.0
     cloth, trim = str(rng.choice(CLOTHS)), str(rng.choice(TRIMS))
     cord = str(rng.choice(("linen", "ebony", "blanket", "accent_plain")))
+    w -= abs(aside)
     body = pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), shown or cloth)
     trims: dict[str, list[Solid]] = {
         "cord": [tube(seam(body.half) + np.array([0, h / 2, 0]), 0.004, cord)],
@@ -128,7 +129,6 @@ def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid
         "tassels": [ball((x * w, y, 0), (0.016, low, 0.014), cord) for x in (-0.47, 0.47) for y in (low, h - low)],
     }
     made = [replace(body, power=float(rng.choice((1.3, 1.5, 1.8)))), *trims.get(trim, [])]
-    aside = float(rng.uniform(-0.12, 0.12)) * h
     return [Slumped(material=one.material, of=one, tall=h, lean=lean, aside=aside) for one in made] if lean else made
 
 

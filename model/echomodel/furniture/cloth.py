@@ -68,7 +68,9 @@ class Slumped(Solid):
         high = np.clip(y / self.tall, 0, 1)
         back = self.lean * (np.clip(high - FOOT, 0, 1) / (1 - FOOT) - 0.5)
         down = np.abs(self.aside) * high**2 * (0.5 + np.sign(self.aside) * x / self.tall)
-        return np.stack([x + self.aside * high**2, y - down, z * (1 + SPREAD * (1 - high) ** 2) - back], 1), faces
+        return np.stack(
+            [x + self.aside * (high**2 - 0.5), y - down, z * (1 + SPREAD * (1 - high) ** 2) - back], 1
+        ), faces
 
 
 def seam(half: Vector) -> Array:
