@@ -67,7 +67,7 @@ def room_boxes(graph: SceneGraph) -> RoomBoxes:
         corners = np.array(((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])))
     return RoomBoxes(
         id="stage", room_type=graph.room.type, floor_polygon=np.asarray(corners, float),
-        height=graph.room.height or float((position[:, 1] + size[:, 1]).max()),
+        height=graph.room.height or max(graph.room.tall, float((position[:, 1] + size[:, 1]).max())),
         categories=tuple(node.category for node in graph.nodes), size=size, position=position,
         yaw=np.array([node.yaw for node in graph.nodes], float), models=("",) * len(graph.nodes),
         styles=tuple(styles.get(node.style, -1) if node.style else -1 for node in graph.nodes),

@@ -47,6 +47,13 @@ def test_a_room_comes_back_from_its_graph(relations):
     assert room_of(theirs, "one").styles == (0, -1, 1)
 
 
+def test_a_room_whose_height_nobody_states_is_as_high_as_it_is_made():
+    graph = graph_of(ROOM).with_room(height=None)
+    assert room_of(graph, "one").height == graph.room.tall == 2.8
+    taller = graph.update_node("double_bed", size=(1.6, 3.1, 2.0))
+    assert room_of(taller, "one").height == 3.1
+
+
 def test_without_a_floor_a_room_is_the_rectangle_around_its_furniture_however_it_is_turned():
     graph = graph_of(replace(ROOM, floor_polygon=np.zeros((0, 2))), None)
     corners = room_of(graph, "one").floor_polygon
