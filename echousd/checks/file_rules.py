@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
@@ -13,14 +13,16 @@ from echomodel.vocabulary import vocabulary
 from echousd.checks.reading import Authored, Finding, Reading, holder, rule
 from echousd.exporting.packing import Reach, misfit
 from echousd.stage.files import usd_error
+from echousd.stage.harmless import as_written
 from echousd.stage.units import METRES, UP_AXIS, upwards
 from echousd.stage.values import LARGEST, UNREADABLE, asset, shown
-from echousd.textures import READABLE, TextureError, file_of, read_image
+from echousd.textures import READABLE, TextureError, decoded, file_of, texture_bytes
 
 KILOGRAMS = "kilogramsPerUnit"
 SAME = 1e-6  # relative difference of units that are the same
 UNLIKE = math.log(2)  # of the factor by which something may be scaled beside its unit
 LEVEL = 0.5  # cosine of the angle between a model's up and the room's
+BAKED = "textures"  # folder of a room's own images, which are whole as they were written
 ABSOLUTE = re.compile(r"^(?:/|\\\\|[A-Za-z]:[\\/]|file:)")
 
 
@@ -76,7 +78,9 @@ def _stamp(path: str) -> tuple[int, ...]:
 @lru_cache(maxsize=4096)  # rooms of one store share their images
 def _image_fault(path: str, _stamp: tuple[int, ...]) -> str:
     try:
-        read_image(path)
+        content = texture_bytes(path)
+        if content and not (Path(path).parent.name == BAKED and as_written(Path(path), content)):
+            decoded(content, path)
     except TextureError as error:
         return str(error)
     return ""

@@ -14,7 +14,7 @@ from echousd.draw.outside import turning_views, without_near_walls
 from echousd.draw.rendering import HERO, as_image, cameras_of, render_stage, scenery_of
 from echousd.draw.tracing import FINE, QUICK, trace
 from echousd.stage.files import open_stage
-from echousd.stage.paths import component_file, thumbnail_file
+from echousd.stage.paths import asset_file, thumbnail_file
 from echousd.stage.showing import showing_layout, showing_variant
 from echousd.textures import encoded
 
@@ -88,7 +88,7 @@ def thumbnails(files: Mapping[str, bytes], names: Iterable[str]) -> dict[str, by
     `files`: relative path -> content of the room's assets. `names`: of the assets. Raises RenderUnavailable (a
     ValueError) without the extra `render`.
     """
-    wanted = [name for name in names if thumbnail_file(name) not in files and component_file(name) in files]
+    wanted = [name for name in names if thumbnail_file(name) not in files and asset_file(name) in files]
     found: dict[str, bytes] = {}
     with tempfile.TemporaryDirectory(prefix="echousd-") as folder:
         for name in wanted:
@@ -97,7 +97,7 @@ def thumbnails(files: Mapping[str, bytes], names: Iterable[str]) -> dict[str, by
                 place = Path(folder) / path
                 place.parent.mkdir(parents=True, exist_ok=True)
                 place.write_bytes(content)
-            found[thumbnail_file(name)] = picture(Path(folder) / component_file(name))
+            found[thumbnail_file(name)] = picture(Path(folder) / asset_file(name))
     return found
 
 

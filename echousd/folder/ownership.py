@@ -11,7 +11,7 @@ from echousd.draw.pictures import is_ours
 from echousd.folder.folder import backup_name
 from echousd.folder.within import inside
 from echousd.naming import free_name
-from echousd.stage.paths import coarse_file, component_file, payload_file
+from echousd.stage.paths import asset_file
 
 if TYPE_CHECKING:
     from echousd.room import RoomData
@@ -24,7 +24,7 @@ def free_assets(folder: Path, room: RoomData, recorded: Mapping[str, str]) -> di
     inner = (path.relative_to(folder) for path in files)
     taken = {path.parts[1] for path in inner if path.as_posix() not in recorded} | set(room.assets.values())
     for asset in dict.fromkeys(room.assets.values()):
-        parts = (component_file(asset), payload_file(asset), coarse_file(asset))
+        parts = (asset_file(asset), asset_file(asset, "geo"), asset_file(asset, "low"))
         foreign = any(path not in recorded and inside(folder, path, "an asset").exists() for path in parts)
         if foreign and asset not in room.carried:
             renamed[asset] = free_name(asset, taken)

@@ -27,17 +27,7 @@ from echousd.shapes.styles import ROOM_STYLE
 from echousd.shapes.surface import Surface, surfaces
 from echousd.stage.encoding import relation_name
 from echousd.stage.files import layer_bytes
-from echousd.stage.paths import (
-    DRESSING,
-    OBJECTS,
-    SHELL,
-    class_path,
-    coarse_file,
-    component_file,
-    layer_file,
-    payload_file,
-    piece_path,
-)
+from echousd.stage.paths import DRESSING, OBJECTS, SHELL, asset_file, class_path, layer_file, piece_path
 from echousd.stage.pen import Pen, layout_pens, ops
 from echousd.stage.taxonomy import ade20k, word_of
 from echousd.stage.write import graph_layer as write_graph_layer
@@ -293,9 +283,9 @@ def _written(room: RoomData, name: str, category: str, style: str, geometry: Geo
     payload = assets.geometry_layer(name, forms, geometry, data, style)
     layer = assets.component_layer(name, category, extent, geometry, data)
     coarse = _forms(name, geometry.coarse) if geometry.coarse else {}
-    low = {coarse_file(name): _bytes(room, assets.coarse_layer(name, coarse, data), ".usdc")} if coarse else {}
+    low = {asset_file(name, "low"): _bytes(room, assets.coarse_layer(name, coarse, data), ".usdc")} if coarse else {}
     files = {
-        **low, payload_file(name): _bytes(room, payload, ".usdc"), component_file(name): _bytes(room, layer, ".usda"),
+        **low, asset_file(name, "geo"): _bytes(room, payload, ".usdc"), asset_file(name): _bytes(room, layer, ".usda"),
     }  # fmt: skip
     return Asset(name, slots, files)
 

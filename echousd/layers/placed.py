@@ -12,7 +12,7 @@ from echousd.layers.assets import as_asked, component_layer, geometry_layer
 from echousd.options import Look
 from echousd.shapes.geometry import Geometry, Origin, Original
 from echousd.stage.files import layer_bytes
-from echousd.stage.paths import component_file, original_file, payload_file, payload_name, piece_name
+from echousd.stage.paths import asset_file, layer_name, original_file, piece_name
 from echousd.stage.pen import ops, say
 
 PLACES, MODEL = "placed", "model"  # the prim that corrects unit, axes, pivot and front, and the model below it
@@ -31,11 +31,11 @@ def placed_files(
     assert original is not None
     component = component_layer(name, category, geometry.mesh.bounds, geometry, data)
     _place(component, name, original, _reference(name, original, folder))
-    ours = {component_file(name): component}
+    ours = {asset_file(name): component}
     if not original.colliders:
-        ours[payload_file(name)] = geometry_layer(name, {}, geometry, data)
+        ours[asset_file(name, "geo")] = geometry_layer(name, {}, geometry, data)
     for layer in ours.values():
-        as_asked(layer, options, theirs=lambda path: path != f"./{payload_name(name)}")
+        as_asked(layer, options, theirs=lambda path: path != f"./{layer_name(name, 'geo')}")
     found = {path: layer_bytes(layer, path[-5:]) for path, layer in ours.items()}
     return found | {original_file(name, path): content for path, content in original.files.items()}
 
@@ -46,12 +46,12 @@ def carried_files(name: str, original: Original, old: Mapping[str, bytes], folde
     if original.layer is None:
         return files
     layer = Sdf.Layer.CreateAnonymous(".usda")
-    layer.ImportFromString(files[component_file(name)].decode())
+    layer.ImportFromString(files[asset_file(name)].decode())
     model = layer.GetPrimAtPath(f"/{name}/{piece_name(name, PLACES)}/{piece_name(name, MODEL)}")
     path = _reference(name, original, folder)
     if model and all(payload.assetPath != path for payload in model.payloadList.prependedItems):
         model.payloadList.prependedItems = [Sdf.Payload(path, Sdf.Path(original.prim))]
-        files[component_file(name)] = layer_bytes(layer, ".usda")
+        files[asset_file(name)] = layer_bytes(layer, ".usda")
     return files
 
 

@@ -18,7 +18,7 @@ from echousd.pending import check_written
 from echousd.stage.encoding import LABELS
 from echousd.stage.files import layer_bytes, write_all
 from echousd.stage.harmless import check_harmless
-from echousd.stage.paths import coarse_file, coarse_name, component_file, payload_file, payload_name
+from echousd.stage.paths import asset_file, layer_name
 from echousd.stage.turning import rescale, turn_up
 from echousd.stage.vouched import just_written
 
@@ -47,7 +47,7 @@ def pack(
     source = manifest.get("source") or "none"
     assets = {name: _files(root, manifest, name) for name in names or known}
     # Not those that hold a model as somebody else made it.
-    ours = [n for n, own in assets.items() if payload_file(n) in own and not any("/original/" in path for path in own)]
+    ours = [n for n, own in assets.items() if asset_file(n, "geo") in own and not any("/original/" in at for at in own)]
     for name in ours:
         check_free(out / name / INSIDE, force=force)
     files: dict[Path, bytes] = {}
@@ -70,11 +70,12 @@ def package(name: str, files: Mapping[str, bytes], *, author: str, source: str) 
     with tempfile.TemporaryDirectory(prefix="echousd-") as folder:
         scratch = Path(folder)
         (scratch / "payload").mkdir()
-        for file, path in ((payload_name(name), payload_file(name)), (coarse_name(name), coarse_file(name))):
+        for part in ("geo", "low"):
+            file, path = layer_name(name, part), asset_file(name, part)
             if path in files:
                 _turned(scratch, file, files[path]).Export(str(scratch / "payload" / file))
                 (scratch / file).unlink()
-        layer = _turned(scratch, f"{name}.usda", files[component_file(name)])
+        layer = _turned(scratch, f"{name}.usda", files[asset_file(name)])
         UsdUtils.ModifyAssetPaths(layer, lambda path: f"./payload/{path[2:]}" if path.endswith(".usdc") else path)
         main = scratch / f"{name}.usda"
         main.write_bytes(layer_bytes(layer, ".usda"))

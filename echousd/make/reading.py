@@ -28,16 +28,7 @@ from echousd.shapes.geometry import LICENCE, Collider, Geometry, Origin, Origina
 from echousd.shapes.matter import read_mass
 from echousd.stage.contents import read_contents, room_frame, surface_of
 from echousd.stage.files import open_stage, opened
-from echousd.stage.paths import (
-    DESCRIPTION,
-    GEO,
-    OBJECTS,
-    coarse_file,
-    component_file,
-    payload_file,
-    piece_name,
-    piece_of,
-)
+from echousd.stage.paths import DESCRIPTION, GEO, OBJECTS, asset_file, piece_name, piece_of
 from echousd.stage.read import find_rooms, read_graph
 from echousd.stage.showing import each_layout
 from echousd.stage.units import Z_TO_Y, metres_per_unit
@@ -98,9 +89,10 @@ def read_room(root: str | Path) -> SavedRoom:
                 carried[asset] = asset_from(shelf, asset)
             else:
                 recorded = (path for path in manifest["files"] if path.startswith(f"assets/{asset}/"))
-                paths = dict.fromkeys((payload_file(asset), component_file(asset), coarse_file(asset), *recorded))
+                ours = (asset_file(asset, part) for part in ("geo", "", "low"))
+                paths = dict.fromkeys((*ours, *recorded))
                 files = {path: inside(root.parent, path, f"asset {asset!r}") for path in paths}
-                must = component_file(asset)
+                must = asset_file(asset)
                 carried[asset] = {path: f.read_bytes() for path, f in files.items() if path == must or f.exists()}
         assets[node.name], geometry[node.name] = asset, found
     bounds = np.array([geometry[name].mesh.bounds for name in graph.names])

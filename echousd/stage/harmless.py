@@ -39,14 +39,15 @@ def _harmless(path: Path) -> bool:
         return True
     packed = content.startswith((CRATE, b"PK"))
     text = not packed and sum(content.count(mark) for mark in (b"{", b"[", b"(")) <= NESTED
-    if not (text or _listed(path, files.digest(content)) or stored(path)):
+    if not (text or as_written(path, content) or stored(path)):
         return False
     read_here.add(stamp)
     return True
 
 
-def _listed(path: Path, digest: str) -> bool:
-    """Whether the manifest of a room that a file may lie in says that the room was written with it."""
+def as_written(path: Path, content: bytes) -> bool:
+    """Whether the manifest of a room that a file may lie in says that the room was written with its content."""
+    digest = files.digest(content)
     for folder in path.resolve().parents[:DEEP]:
         for listing in (place for place in folder.glob("*.json") if place.with_suffix(".usda").is_file()):
             with suppress(OSError, ValueError, TypeError, KeyError, AttributeError):

@@ -33,29 +33,14 @@ def piece_of(asset: str, prim: str) -> str | None:
     return None if piece == prim else piece
 
 
-def payload_name(asset: str) -> str:
-    """File name of an asset's geometry, beside its component layer."""
-    return f"{asset}_geo.usdc"
+def layer_name(asset: str, part: str = "") -> str:
+    """File name of an asset's component layer, or of its geometry beside that: `geo`, or `low` with few faces."""
+    return f"{asset}_{part}.usdc" if part else f"{asset}.usda"
 
 
-def payload_file(asset: str) -> str:
-    """Path of an asset's geometry in the room's folder."""
-    return f"assets/{asset}/{payload_name(asset)}"
-
-
-def coarse_name(asset: str) -> str:
-    """File name of an asset's geometry with few faces, beside its component layer."""
-    return f"{asset}_low.usdc"
-
-
-def coarse_file(asset: str) -> str:
-    """Path of an asset's geometry with few faces in the room's folder; not every asset has one."""
-    return f"assets/{asset}/{coarse_name(asset)}"
-
-
-def component_file(asset: str) -> str:
-    """Path of an asset's component layer in the room's folder."""
-    return f"assets/{asset}/{asset}.usda"
+def asset_file(asset: str, part: str = "") -> str:
+    """Path in the room's folder of one of an asset's layers, see `layer_name`; not every asset has one of few faces."""
+    return f"assets/{asset}/{layer_name(asset, part)}"
 
 
 def original_file(asset: str, path: str) -> str:

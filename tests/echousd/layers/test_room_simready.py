@@ -7,7 +7,7 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echousd.layers import simready
 from echousd.layers.simready import FURNITURE, pack
-from echousd.stage.paths import payload_file
+from echousd.stage.paths import asset_file
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def test_models_that_are_anothers_wholly_or_in_part_are_left_out(room, tmp_path,
         found = read(root, manifest, name)
         if name == "bed":
             return {**found, "assets/bed/original/bed.png": b"picture"}
-        return {path: held for path, held in found.items() if name != "lamp" or path != payload_file("lamp")}
+        return {path: held for path, held in found.items() if name != "lamp" or path != asset_file("lamp", "geo")}
 
     read = simready._files
     monkeypatch.setattr(simready, "_files", files)
