@@ -12,10 +12,10 @@ from echomodel.triangles import area_normals, lengths
 from echousd.layers.materials import write_looks, write_palettes
 from echousd.layers.physics import write_asset_physics, write_joints
 from echousd.options import Look
-from echousd.shapes.geometry import CREASE, Geometry
+from echousd.shapes.geometry import Geometry
 from echousd.shapes.looks import alternatives, look, palette_for
-from echousd.shapes.surface import Surface, surfaces
-from echousd.stage.paths import CLASSES, DESCRIPTION, GEO, MTL, ROOM, class_path, coarse_name, payload_name, piece_path
+from echousd.shapes.surface import Surface, plain
+from echousd.stage.paths import CLASSES, DESCRIPTION, GEO, MTL, ROOM, class_path, layer_name, piece_path
 from echousd.stage.pen import Pen, ops, say
 from echousd.stage.taxonomy import ade20k
 from echousd.stage.units import METRES
@@ -60,6 +60,7 @@ def write_mesh(pen: Pen, path: str, form: Surface, **about: str) -> None:
 
     `about`: other tokens of its own that vary, such as its purpose.
     """
+    each = {3 * len(form.faces): "faceVarying", len(form.faces): "uniform", 1: "constant"}
     spec = pen.define(path, "Mesh", {
         # Blender merges an Xform with an only child that has no transform of its own, and the Xform's name is lost.
         # In floats: three.js fails on whole numbers in doubles of a usdc.
@@ -69,8 +70,8 @@ def write_mesh(pen: Pen, path: str, form: Surface, **about: str) -> None:
         "normal3f[] primvars:normals": form.normals, "int[] primvars:normals:indices": form.normal_index,
         "texCoord2f[] primvars:st": form.st, "int[] primvars:st:indices": form.st_index,
     } | {f"uniform token {name}": value for name, value in about.items()})  # fmt: skip
-    for name in ("primvars:normals", "primvars:st"):
-        spec.attributes[name].SetInfo("interpolation", "faceVarying")
+    for name, index in (("primvars:normals", form.normal_index), ("primvars:st", form.st_index)):
+        spec.attributes[name].SetInfo("interpolation", each[len(index)])
     if len(form.groups) > 1:
         family = {"uniform token elementType": "face", "uniform token familyName": "materialBind"}
         for name, faces in form.groups.items():
@@ -95,8 +96,7 @@ def geometry_layer(
     for path, form in forms.items():
         write_mesh(pen, f"/{name}{path}", form)
     guides = () if geometry.theirs_collides else geometry.colliders
-    wholes = [(guide.mesh, {"collider": np.arange(len(guide.mesh.faces))}, CREASE) for guide in guides]
-    for collider, form in zip(guides, surfaces(wholes), strict=True) if guides else ():
+    for collider, form in zip(guides, plain([guide.mesh for guide in guides]), strict=True) if guides else ():
         write_mesh(pen, piece_path(f"/{name}", name, collider.name, collider.body), form, purpose="guide")
     _write_looks(pen, name, style, {part: tuple(form.groups) for part, form in forms.items()})
     return pen.layer
@@ -194,6 +194,6 @@ def _add_arcs(layer: Sdf.Layer, name: str, geometry: Geometry) -> None:
     if geometry.coarse:
         # a payload inside a variant is stronger than the one beside it, so that its meshes win
         variant = layer.GetPrimAtPath(f"/{name}").variantSets[LOD].variants[LOW].primSpec
-        variant.payloadList.prependedItems.append(Sdf.Payload(f"./{coarse_name(name)}", Sdf.Path(f"/{name}")))
-    payload = Sdf.Payload(f"./{payload_name(name)}", Sdf.Path(f"/{name}"))
+        variant.payloadList.prependedItems.append(Sdf.Payload(f"./{layer_name(name, 'low')}", Sdf.Path(f"/{name}")))
+    payload = Sdf.Payload(f"./{layer_name(name, 'geo')}", Sdf.Path(f"/{name}"))
     layer.GetPrimAtPath(f"/{name}").payloadList.prependedItems.append(payload)

@@ -11,6 +11,7 @@ from echousd.shapes.finishes.slots import UPRIGHT, metres_of
 from echousd.shapes.geometry import CREASE, DRAPED
 
 EDGE = 0.08  # metres from the sides of cloth within which all of it hangs, and from that on to where none does
+UP = (0.0, 1.0, 0.0)  # the normal of triangles without area
 NUDGE = 4e-6  # metres between points of different boards at one place
 ATLAS = 1024, 2  # texels along a side and between charts, of pieces that are unwrapped without overlaps
 
@@ -21,10 +22,10 @@ class Surface:
 
     points: np.ndarray  # (v, 3) float32, metres
     faces: np.ndarray  # (f, 3) int32, indices into points, counter-clockwise seen from outside
-    normals: np.ndarray  # normals, normal_index: (k, 3) float32 unit vectors and (3 f) int32, one index per face corner
-    normal_index: np.ndarray
-    st: np.ndarray  # st, st_index: (t, 2) float32 and (3 f) int32
-    st_index: np.ndarray
+    normals: np.ndarray  # (k, 3) float32 unit vectors
+    normal_index: np.ndarray  # (3 f) int32, of every face corner, or (f) int32, of every face, all of whose edges show
+    st: np.ndarray  # (t, 2) float32
+    st_index: np.ndarray  # (3 f) int32, or (1) int32, of what has no picture
     # material group -> (m,) int32 face numbers; together they name every face exactly once
     groups: Mapping[str, np.ndarray]
 
@@ -75,6 +76,18 @@ def surfaces(forms: Sequence[tuple[Mesh, Mapping[str, np.ndarray], float]], *, a
     ]
 
 
+def plain(meshes: Sequence[Mesh]) -> list[Surface]:
+    """Meshes in one colour, all of whose edges show: for what is there to be bumped into."""
+    size = lengths(normal := area_normals(np.concatenate([mesh.triangles for mesh in meshes])))[:, None]
+    unit = np.where(size > 0, normal / np.maximum(size, 1e-30), UP)
+    found = _indexed(unit, 4, np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes]))
+    nowhere = np.zeros((1, 2), np.float32), np.zeros(1, np.int32)
+    return [
+        Surface(np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32), *normals, *nowhere, {})
+        for mesh, normals in zip(meshes, found, strict=True)
+    ]
+
+
 def creased_normals(mesh: Mesh, crease: float = CREASE) -> tuple[np.ndarray, np.ndarray]:
     """Corner normals, smooth within `crease` radians: ((k, 3) float32 values, (3 f) int32 indices)."""
     faces = np.asarray(mesh.faces)
@@ -104,7 +117,7 @@ def _corner_normals(points: np.ndarray, faces: np.ndarray, sharpest: np.ndarray)
     length = np.sqrt(along(total.T, total.T))[:, None]
     total = np.where(length > 1e-12, total / np.maximum(length, 1e-12), unit[corner_face])
     flat = np.flatnonzero(length <= 1e-12)
-    total[flat[np.linalg.norm(total[flat], axis=1) < 0.5]] = (0.0, 1.0, 0.0)  # of triangles without area
+    total[flat[np.linalg.norm(total[flat], axis=1) < 0.5]] = UP
     return total
 
 
