@@ -13,13 +13,13 @@ from zipfile import is_zipfile
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.model import check_numbers
 from echomodel.config import from_dict
-from echomodel.files import raising, whole_file
+from echomodel.files import raising
+from echomodel.tensors import write_tensors
 from echomodel.vocabulary import vocabulary
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig
 from echoscene.model import ReleasedModel
@@ -92,8 +92,7 @@ def write_released(
     state = {key: value.detach().clone().contiguous() for key, value in nn.Module.state_dict(model).items()}
     target = Path(target)
     target.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(target) as beside:
-        save_file(state, beside, metadata=metadata)
+    write_tensors(target, state, metadata)
 
 
 def load_released(path: str | os.PathLike[str]) -> nn.Module:

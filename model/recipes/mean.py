@@ -11,12 +11,12 @@ import sys
 from pathlib import Path
 
 import torch
-from safetensors.torch import save_file
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from echomodel.compact.model import read_weights
 from echomodel.compact.weights import grown_tables, joined_config, words_of
+from echomodel.tensors import write_tensors
 
 
 def main() -> None:
@@ -40,7 +40,7 @@ def main() -> None:
             each[row, len(tensors[key]) :] = torch.nan  # words that this file does not know
         mean[key] = each.nanmean(0).to(first.dtype)
     most = max(files, key=lambda path: sum(map(len, known[path].values())))
-    save_file(mean, options.output, files[most][0])
+    write_tensors(options.output, mean, files[most][0])
 
 
 if __name__ == "__main__":

@@ -77,7 +77,7 @@ def test_a_set_of_one_file(folder, tmp_path):
         packed.writestr("note.npy", b"\x93NUMPY\x01\x00\x03\x00('\n")
     for content in (b"PK", pickle.dumps({}), (tmp_path / "header.npz").read_bytes()):
         (tmp_path / "bad.npz").write_bytes(content)
-        with pytest.raises(ValueError, match=r"bad.npz: not a packed set of rooms, allowed: what `echousd"):
+        with pytest.raises(ValueError, match=r"bad.npz: not a packed set of rooms, allowed: a .npz of `echousd"):
             RoomSet(tmp_path / "bad.npz")
 
 

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor, nn
 from torch.overrides import TorchFunctionMode
 
@@ -31,7 +30,8 @@ from echomodel.compact.weights import (
     words_of,
 )
 from echomodel.config import CompactConfig, to_json
-from echomodel.files import raising, whole_file
+from echomodel.files import raising
+from echomodel.tensors import write_tensors
 
 if TYPE_CHECKING:
     from echomodel.compact.shape import Autoencoder, ShapeDenoiser
@@ -91,8 +91,7 @@ class CompactModel(nn.Module):
             "statistics": json.dumps(self.statistics.to_json()),
             "parts": json.dumps(list(parts)),
         }
-        with whole_file(path) as beside:
-            save_file(rounded(tensors), beside, metadata=metadata)
+        write_tensors(path, rounded(tensors), metadata)
 
 
 def check_numbers(raw: dict[str, Any], tensors: int, where: str = "") -> None:

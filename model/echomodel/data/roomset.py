@@ -126,7 +126,7 @@ def _unpacked(path: Path) -> tuple[dict, dict[str, np.ndarray]]:
                     into[...] = column / STEPS.get(field, MILLIMETRES) if into.dtype.kind == "f" else column
         most = {kind: len(note[kind]) for kind in _words()}
     except (OSError, KeyError, TypeError, ValueError, EOFError, TokenError, zipfile.BadZipFile, zlib.error):
-        raise ValueError(f"{path}: not a packed set of rooms, allowed: what `echousd data import` writes") from None
+        raise ValueError(f"{path}: not a packed set of rooms, allowed: a .npz of `echousd data import`") from None
     rooms = tables["rooms"]
     wrong = [name for name in list(TABLES)[1:] if rooms[name].sum(dtype=np.uint64) != len(tables[name])]
     wrong += [] if tables["objects"]["category"].max(initial=0) < most["categories"] else ["categories"]

@@ -12,11 +12,11 @@ from typing import Any, Protocol
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from echomodel.config import to_json
 from echomodel.files import raising, whole_file
+from echomodel.tensors import write_tensors
 from echomodel.training.recipe import Recipe
 
 # Fields of a recipe that may change on the way: length, rates and weights, files, and what the machine offers.
@@ -147,8 +147,7 @@ class Trainer:
                 tensors[f"optimizer.{key}.{name}"] = torch.as_tensor(value)
         metadata = {"step": str(self.step), "recipe": to_json(self.recipe)}
         copies = {key: value.detach().cpu().contiguous().clone() for key, value in tensors.items()}
-        with whole_file(self.folder / "checkpoint.safetensors") as beside:
-            save_file(copies, beside, metadata=metadata)
+        write_tensors(self.folder / "checkpoint.safetensors", copies, metadata)
         self.average.write(self.folder / "weights.safetensors", self.stage.saved)
 
     def _load(self) -> None:
