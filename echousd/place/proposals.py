@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -170,11 +170,13 @@ def out_of(position: np.ndarray, yaw: float, slot: tuple[float, float, float, fl
     return float(x), float(z), yaw + turn, more
 
 
-def aside(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int, fine: bool = False) -> np.ndarray:
+def aside(
+    problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int, fine: bool = False, short: Sequence[float] = ()
+) -> np.ndarray:
     """(K, 4) float: a little aside of where the box stands, and turned there; rows as `proposals`.
 
     Arguments:
-        fine: whether what belongs at a wall, and stands off it, moves to and from it, too.
+        fine: whether what belongs at a wall, and stands off it, moves to and from it, too. short: further metres.
     """
     here, turn = position[i], float(yaw[i])
     rows: list[Row] = []
@@ -182,7 +184,7 @@ def aside(problem: Problem, position: np.ndarray, yaw: np.ndarray, i: int, fine:
         turn = float(yaw[problem.carrier[i]])
     elif problem.kinds[i].support == "floor" and not problem.turned[i]:
         rows += [(float(here[0]), float(here[2]), turn + quarter * HALF_PI, 0.1) for quarter in (1, 2, 3)]
-    ways = [sign * way for way in SLIDES for sign in (-1, 1)]
+    ways = [sign * way for way in (*SLIDES, *short) for sign in (-1, 1)]
     free = not problem.kinds[i].wall
     if fine and not free:
         back = here[[0, 2]] - axes(np.array(turn))[1] * problem.size[i, 2] / 2

@@ -26,7 +26,7 @@ from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
 from echousd.place.geometry import beyond, depths
 from echousd.place.problem import Problem
-from echousd.place.proposals import Row, aside, height_of, out_of, out_of_habit, proposals, slots_at, twins
+from echousd.place.proposals import SLIDES, Row, aside, height_of, out_of, out_of_habit, proposals, slots_at, twins
 from echousd.place.solver import PlaceConfig
 
 filled, involved, part_of, rebuilt, reseated, with_along = lates(
@@ -53,6 +53,7 @@ ASIDE = 0.1  # metres from its axis of a group within which nobody stands to one
 ASTRAY = 1.0  # metres from its slots beyond which a box is no longer at what it attends
 LIKED = 0.05  # of what slots are liked less, where chairs are seated together
 NEXT = 8  # places at walls, the nearest to whom storage is told near, at which that relation is looked at
+HAIR = 1e-3  # metres beyond which what a term just missed is kept
 LIT = 0.35  # metres between the middles of a lamp and of what it hangs over
 
 
@@ -84,6 +85,7 @@ class Search:
     def __init__(self, problem: Problem, terms: tuple[Term, ...] = TERMS, yields: frozenset[str] = frozenset()) -> None:
         self.problem, self.judged, self.walked, self.bare = problem, 0, False, False
         self.fine = False  # whether little moves are looked at before all others
+        self.short: dict[int, list[float]] = {}  # metres by which terms about a box are just missed
         self.budget = round(BUDGET * max(1.0, len(problem.size) / PIECES))
         numbers, words = {int(number) for number in problem.triplets[:, 1]}, vocabulary().predicates
         stated = {row.name for row in words if row.id in numbers} | {"placed"}
@@ -160,9 +162,12 @@ class Search:
         total = float(cost.sum())
         firm, whole = (of.repeat([len(found.who) for found in every]) for of in (self.firm, self.whole))
         self.bare = len(state.yaw) >= MANY and bool((cost[whole] > WRONG).any())
+        self.short = {}
         for row in rows(firm & (cost > least)).tolist():
             for box in {int(seen.who[row]), int(seen.other[row])} - {-1}:
                 worst[box] = worst.get(box, 0.0) + float(cost[row])
+                if 0.0 < -seen.margin[row] < SLIDES[0]:
+                    self.short.setdefault(box, []).append(HAIR - float(seen.margin[row]))
         lost = self._unreached(state.position, state.yaw)
         self.walked = bool(lost)
         for box in lost:
@@ -214,7 +219,7 @@ class Search:
         group = self.group(i, there, state)
         drawn = proposals(problem, state.position, state.yaw, there, i)
         rows = np.concatenate([drawn, self._joining(state, there, i)])
-        near = aside(problem, state.position, state.yaw, i, self.fine)
+        near = aside(problem, state.position, state.yaw, i, self.fine, self.short.get(i, ()))
         little = state.taste[i] + 0.3 * near[:, 3]
         first = np.concatenate([self.tastes(i, rows), little * (not self.fine)])
         taste = np.concatenate([first[: len(rows)], little])

@@ -15,12 +15,14 @@ from echousd.place.search import Search, State
 FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
 
 
-def problem(words: list[str], size: list, position: list, yaw: list, fixed: tuple[int, ...] = ()) -> Problem:
-    """The problem of boxes in a room of 5 by 4 metres, some of them fixed."""
+def problem(
+    words: list[str], size: list, position: list, yaw: list, fixed: tuple[int, ...] = (), floor: np.ndarray = FLOOR
+) -> Problem:
+    """The problem of boxes in a room, some of them fixed."""
     still, none = np.isin(np.arange(len(words)), fixed), np.zeros(len(words), bool)
     return problem_of(
         words, np.array(size, float), np.array(position, float), np.array(yaw, float), np.zeros((0, 3), int),
-        floor_polygon=FLOOR, height=2.7, fixed=still, rigid=none, turned=still,
+        floor_polygon=floor, height=2.7, fixed=still, rigid=none, turned=still,
     ).spread()  # fmt: skip
 
 
@@ -91,3 +93,16 @@ def test_a_sofa_in_the_room_slides_back_and_forth_too_one_at_its_wall_along_it(o
     assert bool((abs(fine[:, 1] - found.position[0, 2]) > 0.01).any()) == moves
     assert not (abs(usual[:, 1] - found.position[0, 2]) > 0.01).any()
     assert (abs(usual[:, 0] - found.position[0, 0]) > 0.01).any()
+
+
+def test_what_is_missed_by_a_hair_is_moved_by_as_much() -> None:
+    floor = np.array([(-1.2, -1.5), (1.2, -1.5), (1.2, 1.5), (-1.2, 1.5)])
+    bed, shelf = (1.0, 0.9, 2.0), (0.7475, 1.8, 2.0)  # 0.505 m beside the bed: 0.3 m at one side, 0.2 at the other
+    position = [(-0.2, 0.0, -0.0375), (-0.2, 0.0, -1.12625), (-0.2, 0.0, 1.12625)]
+    words = ["single_bed", "bookshelf", "bookshelf"]
+    found = problem(words, [bed, shelf, shelf], position, [np.pi / 2] * 3, fixed=(1, 2), floor=floor)
+    search, state = Search(found), State(found.position, found.yaw, np.zeros(3))
+    assert 0 in search.faults(state)[1]
+    after = search.swept(state, [0])
+    assert not search.faults(after)[1]
+    assert abs(after.position[0, 2] - state.position[0, 2]) < 0.02
