@@ -7,9 +7,8 @@ from itertools import product
 import numpy as np
 
 from echomodel.boxes2d import axes
-from echomodel.objective.access import DEEP, PASSAGE, WALKED_BEHIND, WATCHED_FREE, to_wall
+from echomodel.objective.access import DEEP, FARTHEST, WALKED_BEHIND, to_wall
 from echomodel.objective.crowding import HAND
-from echomodel.objective.sight import WATCHED_FROM
 from echomodel.objective.sizes import TUCKED
 from echomodel.vocabulary import Category, vocabulary
 from echousd.place.problem import Problem
@@ -139,12 +138,12 @@ def in_view(problem: Problem, i: int, at_walls: Sequence[Row]) -> list[Row]:
     """In the room before a screen at the far wall, where a sofa at its own wall would be too far from it."""
     if not any(role == "opposite" and a == i for role, a in zip(problem.slot_roles, problem.anchor, strict=True)):
         return []
-    far, rows = WATCHED_FROM["sofa"][1], np.array(at_walls).reshape(-1, 4)
+    rows = np.array(at_walls).reshape(-1, 4)
     front = axes(rows[:, 2])[1]
     free = to_wall(problem.plan, np.zeros(len(rows), int), rows[:, :2], front)
-    deep = free + float(problem.size[i, 2]) / 2 > DEEP
-    away = [free - AMID * far, np.full(len(rows), WALKED_BEHIND - 0.01 - problem.behind[i]), free - WATCHED_FREE]
-    keep = [free > max(far, AMID * far + PASSAGE), deep, deep & (free > WATCHED_FREE + WALKED_BEHIND)]
+    depth = free + float(problem.size[i, 2]) / 2
+    away = [free - AMID * FARTHEST, np.full(len(rows), WALKED_BEHIND - 0.01 - problem.behind[i]), depth - FARTHEST]
+    keep = [free > FARTHEST, depth > DEEP, depth > FARTHEST + WALKED_BEHIND]
     out = [(rows + np.pad(off[:, None] * front, ((0, 0), (0, 2))))[at] for off, at in zip(away, keep, strict=True)]
     return [(x, z, yaw, more) for x, z, yaw, more in np.concatenate(out).tolist()]
 

@@ -120,7 +120,8 @@ def read_contents(prims: RoomPrims) -> RoomContents:
     stage = prims.room.GetStage()
     cache = UsdGeom.XformCache(NOW)
     to_room = readable(lambda: room_frame(prims.room, cache), np.eye(4))
-    names = readable_names(prims)
+    nameless: dict[Sdf.Path, str] = {}
+    names = readable(lambda: node_names(prims), nameless)
     owners = {prim.GetPath() for prim in prims.nodes}
     objects, missing = [], []
     for prim in prims.nodes:
@@ -139,12 +140,6 @@ def read_contents(prims: RoomPrims) -> RoomContents:
     assert stage
     relations = tuple({relation.triple: relation for relation in relations}.values())
     return RoomContents(str(prims.room.GetPath()), spec, tuple(objects), tuple(missing), relations)
-
-
-def readable_names(prims: RoomPrims) -> dict[Sdf.Path, str]:
-    """`node_names`, none where two are the same, which the validators report."""
-    nameless: dict[Sdf.Path, str] = {}
-    return readable(lambda: node_names(prims), nameless)
 
 
 def room_frame(room: Usd.Prim, cache: UsdGeom.XformCache) -> np.ndarray:

@@ -15,12 +15,12 @@ CROOKED = math.radians(1.0)  # 98 % of such furniture in real rooms is turned le
 TOUCHING = 0.3  # metres: 93 % of real beds, nightstands and tv stands have a smaller gap behind
 DEEP = 6.0  # metres of the room along its axis from which on it does; or something of another group stands behind it
 # Metres behind it at most, if nothing stands there (two of 129 real sofas have more), and what of more counts; in a
-# hall so deep that from there no screen at the wall ahead is watched more, beside the depth of both halves.
-WALKED_BEHIND, BARE, IN_HALL, HALVES = 1.3, 0.02, 6.0, 0.4
+# hall so deep that from there no screen at the wall ahead is watched more.
+WALKED_BEHIND, BARE, IN_HALL = 1.3, 0.02, 6.0
 MET = 0.25  # share of its width from which on something is behind it
-# Metres: a sofa so far from the wall may stand in the room on purpose, one walks behind it; who does so puts it so near
-# to its screen: 94 of 100 real sofas, and all three that stand free.
-PASSAGE, WATCHED_FREE = 0.75, 4.4
+# Metres: a sofa so far from the wall may stand in the room on purpose, one walks behind it; as far from its screen at
+# most are 97 of 100 real ones.
+PASSAGE, FARTHEST = 0.75, 4.8
 
 
 def parallel(plan: Plan) -> Found:
@@ -59,7 +59,7 @@ def at_wall(plan: Plan) -> Found:
     free, margin, xp = free[who] & (gap >= PASSAGE), TOUCHING - gap, plan.kit
     if bool(free.any()):
         depth = gap + plan.size[who, 2] + wall_ahead(plan, who)
-        most = (depth - WATCHED_FREE - HALVES).clip(WALKED_BEHIND, IN_HALL)
+        most = (depth - FARTHEST).clip(WALKED_BEHIND, IN_HALL)
         bare = at_least(most - gap, -BARE)
         bare = xp.where(depth >= DEEP, bare, margin)
         bare = xp.where(_backed(plan, who, held(gap)), FAR, bare)

@@ -50,9 +50,8 @@ def faults_of(plan: Plan, kinds: Collection[str] = BY_EYE, terms: Sequence[Term]
             who, other = int(seen.who[row]), int(seen.other[row])
             if bool(plan.fixed[who]):
                 continue
-            text = term.says[int(seen.words[row]) % len(term.says)]
-            sentence = text.replace("{a}", "\0").replace("{b}", "\1").format(x=max(float(seen.measure[row]), 0.0))
-            sentence = sentence.replace("\0", "{a}").replace("\1", "{b}")
+            text, number = term.says[int(seen.words[row]) % len(term.says)], max(float(seen.measure[row]), 0.0)
+            sentence = text.format(a="{a}", b="{b}", x=number)
             out.append(Fault(who, other, term.name, float(seen.margin[row]), sentence))
     return out
 

@@ -24,7 +24,7 @@ AHEAD, IN_VIEW = 1.0, 1.5  # metres before a sofa and a group's armchair to othe
 COVERED = 0.1  # share of its width from which on something is before it
 KNEES, KNEES_WALL = 0.4, 0.6  # metres before a sofa or armchair, before furniture of other groups and before a wall
 ROOM = 0.25  # metres before a seat to its own group's lamps and other seats, and, but for the first sofa, to its table
-END = 0.8  # metres before an armchair that looks at a sofa's end, to that
+END = 0.8  # metres before an armchair that looks at the end of a sofa or of storage, to that
 TOUCHED = 0.1  # metres between a coffee table and other seats than its sofa: 95 % of real ottomans keep 0.12
 # Metres to what an armchair looks at, to 45 degrees, and to a wall that it does not look at.
 SEEN, FACED = 3.0, 2.0
@@ -118,23 +118,25 @@ def knees_free(plan: Plan) -> Found:
 
 
 def seat_room(plan: Plan) -> Found:
-    """One can sit down in a group, too: nothing but its table stands close before a sofa or armchair, nor a sofa's end
-    before an armchair."""
+    """One can sit down in a group, too: nothing but its table stands close before a sofa or armchair, nor the end of a
+    sofa or of storage before an armchair."""
     block = (plan.of("sofa", "light", "decor", "storage", "bed") | plan.stands("company", "beside")) & plan.standing
     close = clear(plan, loungers(plan), block, ROOM, -FAR, kin=True)
     tables = plan.stands("before") & plan.standing  # which a second sofa, an armchair or an ottoman does not touch
     chairs, ottomans = (plan.stands(word) & plan.of("seat") & plan.standing for word in ("company", "foot"))
     i, j = plan.pairs((plan.stands("with") & plan.standing) | chairs | ottomans, tables, least=True)
-    one, sofa = plan.pairs(chairs, plan.of("sofa") & plan.standing, least=True)
-    lateral, forward = plan.local(one, sofa)
-    aside = (abs(lateral) > plan.size[sofa, 0] / 2) & (forward < plan.size[sofa, 2] / 2)
-    ends = plan.kit.where(aside, plan.more_ahead(one, sofa, END, MET), FAR)
+    long = plan.of("sofa", "storage") & ~plan.stands("head")
+    one, other = plan.pairs(chairs, long & plan.standing, least=True)
+    lateral, forward = plan.local(one, other)
+    level = plan.of("storage")[other] | (forward < plan.size[other, 2] / 2)  # a sofa is looked at from before it, too
+    aside = (abs(lateral) > plan.size[other, 0] / 2) & level
+    ends = plan.kit.where(aside, plan.more_ahead(one, other, END, MET), FAR)
     knees = plan.kit.where(ottomans[i], FAR, plan.more_ahead(i, j, ROOM, MET))
     margin = plan.kit.concat([plan.kit.minimum(plan.apart(i, j) - TOUCHED, knees), ends])
-    least, about = plan.worst(plan.kit.concat([i, one]), margin, plan.kit.concat([j, sofa]))
+    least, about = plan.worst(plan.kit.concat([i, one]), margin, plan.kit.concat([j, other]))
     met = least < 0
     met[close.who[close.margin < 0]] = False
     who = rows(met)
-    end = plan.of("sofa")[about[who]]
+    end = long[about[who]]
     measure = at_least(plan.kit.where(end, least[who] + END, plan.apart(who, about[who])), 0.0)
     return joined(close, found(who, least[who], other=about[who], measure=measure, words=1 * end))

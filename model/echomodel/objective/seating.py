@@ -16,7 +16,7 @@ from echomodel.objective.sizes import ELBOW
 LOOK = math.radians(60.0)  # chairs at a corner of their table look at it by up to 45 degrees
 NEAR_TABLE = 1.5  # metres: a seat further from its table is judged for its distance alone
 REACH, BENCH = 0.25, 0.12  # metres between a seat's front and its table: 95 % of real chairs are nearer; a bench's
-AT_DESK = 0.33  # share of a desk's width that a seat's middle may lie beside its own: 19 of 20 real ones
+AT_DESK = 0.26  # share of a desk's width that a seat's middle may lie beside its own: nine of ten real ones
 STAGGERED = 0.12  # metres between a chair's middle and that of the one opposite, where both sides have as many
 SPACED = 0.16  # metres by which the distances of neighbours at one side of a table differ: 95 % of real sides
 LEVEL = 0.12  # metres by which chairs are pushed under their table unlike each other
@@ -26,7 +26,7 @@ SQUEEZED, ROOMY, AT_END, AROUND_BOTH = 0.17, 0.6, 0.3, 1.2
 BEYOND, CORNER = 0.1, 0.1  # metres that a seat may reach beyond its side of a table, and more beyond one end of it
 # Who sits alone at a side of a table: share of it that the middle may be beside its own, metres from which on its ends.
 ALONE, OFF = 0.3, 0.05
-SEVERAL = 0.1  # share of it that the middle of several who sit there may be beside its own: 82 % of real sides
+SEVERAL = 0.1  # the same of several, 82 % of real sides, and of two at both ends or alone at their table, all 46
 PULL, PULL_WALL = 0.22, 0.2  # metres behind a chair at a table, before furniture and before a wall
 DESK, DESK_WALL = 0.33, 0.19  # the same at a desk, where one works
 AT = 0.5  # metres: a chair further from its table is not pulled back from it
@@ -215,8 +215,8 @@ def chairs_balanced(plan: Plan) -> Found:
 
 
 def bench_fits(plan: Plan) -> Found:
-    """A seat stands within its side of a table, before its middle if alone, several around that; a bench along one that
-    is as long as it."""
+    """A seat stands within its side of a table, before its middle if alone, several around that, as do two at its ends
+    or alone there; a bench along one that is as long as it."""
     seats, xp = seats_at(plan), plan.kit
     half_width, half_depth = plan.reach(seats.i, seats.j)
     own = 2 * xp.where(seats.ahead, half_width, half_depth)
@@ -226,7 +226,9 @@ def bench_fits(plan: Plan) -> Found:
     most = xp.where(seats.count == 1, xp.minimum(ALONE * side, at_least(spare, 0.0) + OFF), spare + BEYOND + CORNER)
     middle = abs(sum_of(seats.side, seats.along, 4 * len(plan))[seats.side] / seats.count)
     opposite = xp.bincount(seats.side, minlength=4 * len(plan))[seats.side ^ 1]  # of more, each sits opposite one
-    several = (seats.count > 1) & (seats.rank == 0) & (opposite <= seats.count) & ~plan.solid[seats.i]
+    wide = plan.size[seats.j, 0] >= plan.size[seats.j, 2]
+    two = (opposite == 1) & ((seats.ahead != wide) | (xp.bincount(seats.j, minlength=len(plan))[seats.j] == 2))
+    several = ((seats.count > 1) | two) & (seats.rank == 0) & (opposite <= seats.count) & ~plan.solid[seats.i]
     together = xp.where(several, SEVERAL * side - middle, FAR)
     measures = [own - side, plan.size[seats.i, 0] - own, aside, middle]
     margins = [BEYOND - measures[0], BEYOND - measures[1], most - aside, together]

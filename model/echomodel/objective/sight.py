@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 
-from echomodel.arrays import Array, at_least, at_most, cast, full, held, least_of, once, pairs_in, rows
-from echomodel.objective.access import PASSAGE, WATCHED_FREE, screens
+from echomodel.arrays import Array, at_least, cast, full, held, least_of, once, pairs_in, rows
+from echomodel.objective.access import FARTHEST, screens
 from echomodel.objective.company import first_of, stated_of
 from echomodel.objective.plan import FAR, Found, Plan, facing_angle, found, nobody, worst
 
-# From a viewer's front to the screen: 98 of 100 real sofas and 95 of 100 real beds are turned less.
-ASIDE = {"sofa": math.radians(25.0), "bed": math.radians(30.0), "seat": math.radians(45.0)}
 TURNED = math.radians(45.0)  # from a screen's own front to who watches it
-# Metres between the middles of a screen and its viewer: 99 of 100 real sofas and all real beds.
-WATCHED_FROM = {"sofa": (1.2, 5.2), "bed": (0.9, 4.2), "seat": (0.9, 5.2)}
+# From a viewer's front to the screen, degrees: 98 of 100 real sofas and 95 of 100 real beds are turned less; metres
+# between their middles, at least and at most: 97 of 100 real sofas and all real beds.
+VIEWS = {"sofa": (25.0, 1.2, FARTHEST), "bed": (30.0, 0.9, 4.2), "seat": (45.0, 0.9, 5.2)}
 WATCHING = ("facing", "opposite")  # predicates that say who watches
 ON_AXIS = 0.6  # metres beside the axis of its viewer
 STEPS = tuple(0.1 + 0.8 * step / 12 for step in range(13))  # shares of the line of sight where things may be in it
@@ -76,15 +75,11 @@ def _watched(plan: Plan) -> tuple[Found, Array, Array, Array]:
         good = better(plan, i, j)
         keep = good | (xp.bincount(i[good], minlength=len(plan))[i] == 0)
         i, j = i[keep], j[keep]
-    roles = [plan.kinds[viewer].role for viewer in j.tolist()]
-    aside = plan.numbers([ASIDE.get(role, ASIDE["seat"]) for role in roles])
-    span = plan.numbers([WATCHED_FROM.get(role, WATCHED_FROM["seat"]) for role in roles])
+    aside, near, most = plan.numbers([VIEWS.get(plan.kinds[viewer].role, VIEWS["seat"]) for viewer in j.tolist()]).T
     seen, own = facing_angle(*plan.local(i, j)), facing_angle(*plan.local(j, i))
     away = (plan.position[i] - plan.position[j])[:, ::2]
     far = xp.sqrt(at_least((away * away).sum(1), 1e-12))
-    free = plan.of("sofa")[j] & (plan.back_gaps(j) >= PASSAGE)
-    most = xp.where(free, at_most(span[:, 1], WATCHED_FREE), span[:, 1])
-    margins = [aside - seen, TURNED - own, far - span[:, 0], most - far]
+    margins = [xp.deg2rad(aside) - seen, TURNED - own, far - near, most - far]
     view = first_of(i, j, margins, [xp.rad2deg(seen), xp.rad2deg(own), far, far])
     clear, about = _clear(plan, i, j)
     worse = -held(xp.minimum(view.margin, clear))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echomodel.objective import access, crowding, seating
+from echomodel.objective import access, company, crowding, lounging, seating
 from echomodel.objective.plan import kinds_of, plan_of
 from echomodel.rules.geometry import Spread
 from echomodel.vocabulary import vocabulary
@@ -59,3 +59,36 @@ def test_a_stool_told_to_be_at_a_coffee_table_goes_with_its_sofa():
     assert stool.stands == "foot"
     assert "sofa" in stool.belongs_to
     assert kinds_of(words, told_near((2, 3)))[2].stands == kinds_of(words, np.zeros((0, 3), int))[2].stands == "at"
+
+
+@pytest.mark.parametrize(("aside", "margin"), [(0.3, 0.064), (0.4, -0.036)])
+def test_who_works_alone_at_a_desk_sits_before_its_middle(aside, margin):
+    desk, chair = ("desk", (1.4, 0.75, 0.7), (0.0, -1.6), 0.0), ("office_chair", (0.6, 1.0, 0.6), (aside, -1.0), np.pi)
+    assert seen(seating.seat_before_desk, [desk, chair])[0] == {1: pytest.approx(margin)}
+
+
+@pytest.mark.parametrize(
+    ("word", "end"), [("bookshelf", 0.0), ("tv_stand", 0.0), ("bookshelf", 0.3), ("nightstand", 0.0)]
+)
+def test_an_armchair_looks_at_no_end_of_storage(word, end):
+    chair = ("armchair", (0.8, 0.8, 0.8), (1.9, 1.5), -HALF)
+    storage = (word, (1.8, 0.5, 0.4), (-end, 1.78), np.pi)  # its end is 0.6 m before the armchair, or 0.9
+    found, rows = seen(lounging.seat_room, [chair, storage])
+    told = (found.get(0, 1.0) < 0, 1 in rows.words.tolist())
+    assert told == (word != "nightstand" and not end,) * 2
+
+
+@pytest.mark.parametrize(("at", "behind"), [((0.0, -1.5), True), ((-1.7, 0.0), False)])
+def test_a_second_sofa_stands_not_behind_the_first(at, behind):
+    sofa, low = (
+        ("multi_seat_sofa", (2.2, 0.85, 0.9), (0.0, 0.0), 0.0),
+        ("coffee_table", (1.1, 0.4, 0.6), (0.0, 1.1), 0.0),
+    )
+    other = ("loveseat_sofa", (1.5, 0.85, 0.9), at, 0.0 if behind else HALF)
+    rows = seen(company.at_its_side, [sofa, low, other])[1]
+    told = [
+        (m < 0, w)
+        for k, m, w in zip(rows.who.tolist(), rows.margin.tolist(), rows.words.tolist(), strict=True)
+        if k == 2
+    ]
+    assert ((True, 1) in told) == behind
