@@ -38,7 +38,7 @@ from outdoors import (
     scattered,
     tree,
 )
-from PIL import Image
+from PIL import Image, ImageFilter
 
 from echousd.draw.tracing import embree
 from echousd.srgb import from_linear
@@ -47,6 +47,7 @@ FOLDER = Path(__file__).parents[1] / "echousd/shapes/finishes/views"
 WIDE = 2048  # pixels around
 BAND = (52.0, -42.0)  # degrees of elevation between which anything but sky and ground is
 RAYS, QUALITY = 3, 78  # per pixel; of JPEG
+SOFT = 0.8  # pixels, so that near a window none is seen: what lies around is never quite in focus indoors
 SUNNY, FAR = np.array([1.55, 1.42, 1.20]), 2600.0  # what the sun gives to what faces it; metres that haze takes
 HAZE = np.array([0.66, 0.76, 0.87])
 
@@ -483,13 +484,20 @@ def developed(light: np.ndarray) -> np.ndarray:
     return np.where(opened < 0.55, opened, 0.55 + 0.45 * (1 - np.exp(-(opened - 0.55) / 0.45)))
 
 
+def softened(pixels: np.ndarray) -> Image.Image:
+    """The image of (h, w, 3) uint8 pixels, out of focus by `SOFT`, also over its seam."""
+    beyond = round(4 * SOFT)
+    wide = Image.fromarray(np.pad(pixels, ((0, 0), (beyond, beyond), (0, 0)), mode="wrap"))
+    return wide.filter(ImageFilter.GaussianBlur(SOFT)).crop((beyond, 0, beyond + pixels.shape[1], len(pixels)))
+
+
 def main() -> None:
     """Draw those that are named, or all."""
     FOLDER.mkdir(exist_ok=True)
     for name in sys.argv[1:] or VIEWS:
         pixels = (np.clip(from_linear(developed(drawn(name))), 0, 1) * 255 + 0.5).astype(np.uint8)
         out = io.BytesIO()
-        Image.fromarray(pixels).save(out, "JPEG", quality=QUALITY)
+        softened(pixels).save(out, "JPEG", quality=QUALITY)
         (FOLDER / f"{name}.jpg").write_bytes(out.getvalue())
 
 

@@ -45,7 +45,7 @@ DAY = 0.5  # radiance of the sky by day
 BANDS = 64  # heights of the sky whose light is told apart
 # The brightest shade over what white paper is on the average in the room, by night and by day, as eyes see it; the
 # share of its light that is seen at its rim.
-GLOWING, RIM = (3.2, 3.5), 0.25
+GLOWING, RIM = (3.2, 3.5), 0.12
 # Metres around a lamp where it throws no shadow of its own, and how far from a bulb its shade may be; its places that
 # light comes from, where it has no shade as far around the bulb.
 OWN, SHADED, SPOTS, BULB = 0.12, 0.5, 24, 0.05
@@ -170,7 +170,7 @@ def with_ceiling(scenery: Scenery) -> Scenery:
         "normals": np.broadcast_to(np.array([0, -1, 0], np.float32), (2, 3, 3)),
         "flat_colors": np.broadcast_to(CEILING, (2, 3)), "emissive": np.zeros((2, 3), np.float32),
         "gloss": np.zeros(2, np.float32), "thin": np.zeros(2, np.float32), "st": np.zeros((2, 3, 2), np.float32),
-        "texture": np.full(2, -1),
+        "texture": np.full((2, 2), -1),
         "wall": np.full(2, -1),
     }  # fmt: skip
     parts = [{key: getattr(scenery, key) for key in added}, *scenery.above, added]

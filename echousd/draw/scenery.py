@@ -25,6 +25,7 @@ GOLDEN = 0.61803398875
 MIXED = np.array([0.3141, 0.2718, 0.1618], np.float32)  # so that no two colours of a room add up to the same
 SHELL = ("floor", "wall", "ceiling", "door", "window")
 SMALL = 0.35  # metres: what is no larger hides nothing that a picture is of
+COLOR, RELIEF = 0, 1
 LEVELS = 7  # sizes of an image, each half of the one before
 # Opacity of a pane below which one looks through it; twice the m² of upright glass from which on it glazes a front.
 SEEN_THROUGH, GLAZED = 0.5, 0.03
@@ -49,7 +50,7 @@ class Scenery:
     gloss: np.ndarray  # gloss, thin: (f,) float32 in [0, 1]; the latter what comes through it of light from behind
     thin: np.ndarray
     st: np.ndarray  # (f, 3, 2) float32 texture coordinates
-    texture: np.ndarray  # (f,) int, which of `images` colours the face, -1 for none
+    texture: np.ndarray  # (f, 2) int, which of `images` are a face's `COLOR` and `RELIEF` (normals), -1 for none
     # each as read with its sides halved so often, `image_of`; and (3,) float32, what its linear RGB is multiplied by
     images: tuple[tuple[Callable[[int], np.ndarray], np.ndarray], ...]
     # of each object whether it hangs on a wall, its lower and upper corner (3,) in its frame, and that, (4, 4)
@@ -92,7 +93,7 @@ class Scenery:
         """What rays that met faces ask of them."""
         apart = (np.concatenate([each[:, :1], each[:, 1:] - each[:, :1]], 1) for each in (self.normals, self.st))
         tables = (*(each.reshape(len(each), -1) for each in apart), self.flat_colors, self.flat_colors @ LUMA)
-        material = np.append(self.flat_colors @ MIXED + 3 * self.emissive @ MIXED + self.texture, -9)
+        material = np.append(self.flat_colors @ MIXED + 3 * self.emissive @ MIXED + self.texture[:, COLOR], -9)
         planes = [np.ascontiguousarray(each.T, np.float32) for each in (*tables, material)]
         return Planes._make([*planes, np.abs(self.normals[:, 0]).argmax(1), self.emissive.any(1)])
 
@@ -100,19 +101,20 @@ class Scenery:
     def texels(self) -> np.ndarray:
         """(f,) float32, pixels of its image that a metre of each face has."""
         sizes = 2 * np.array([read(1).shape[1::-1] for read, _ in self.images] or [(1, 1)], np.float32)
-        flat = np.diff(self.st, axis=1) * sizes[self.texture][:, None]
+        flat = np.diff(self.st, axis=1) * sizes[self.texture[:, COLOR]][:, None]
         area = lengths(area_normals(self.triangles))
         pixels = np.abs(flat[:, 0, 0] * flat[:, 1, 1] - flat[:, 0, 1] * flat[:, 1, 0])
         return np.sqrt(pixels / np.maximum(area, 1e-9)).astype(np.float32)
 
-    def atlas(self, face: np.ndarray, breadth: np.ndarray) -> tuple[np.ndarray, ...]:
-        """The images of faces (n,) as they are seen where a pixel is `breadth` (n,) metres wide, and halved further.
+    def atlas(self, face: np.ndarray, breadth: np.ndarray, fine: bool = False) -> tuple[np.ndarray, ...]:
+        """The images of faces (n,), if `fine` those of normals, too, as they are seen where a pixel is `breadth` (n,)
+        metres wide, and halved further.
 
         In one row: (3, n) uint8 pixels; (3, images * `LEVELS`) int, the first of each, its width and height; and
         (3, images) float32, what each's linear RGB is multiplied by.
         """
-        drawn = np.flatnonzero(self.texture.take(face) >= 0)
-        place = self._halved(face.take(drawn), breadth.take(drawn))
+        number = self.texture[:, : RELIEF + fine].T.take(face, 1)
+        place = self._halved(number, face, breadth)[number >= 0]
         asked = np.bincount(place, minlength=len(self.images) * LEVELS).reshape(-1, LEVELS) > 0
         pixels, places, first = [np.zeros((0, 3), np.uint8)], list[tuple[int, int, int]](), 0
         for (read, _), levels in zip(self.images, asked, strict=True):
@@ -127,24 +129,36 @@ class Scenery:
         tables = (each.reshape(-1, 3).T for each in (np.concatenate(pixels), np.array(places, int), tints))
         return tuple(map(np.ascontiguousarray, tables))
 
-    def _halved(self, face: np.ndarray, breadth: np.ndarray) -> np.ndarray:
-        """(n,) int, the number of the image of each face and how often it is halved, as one."""
+    def _halved(self, number: np.ndarray, face: np.ndarray, breadth: np.ndarray) -> np.ndarray:
+        """(..., n) int, the numbers of images on faces (n,) and how often each is halved, as one."""
         level = np.log2(np.maximum(breadth * self.texels.take(face), 1))
-        return self.texture.take(face) * LEVELS + np.minimum(level, LEVELS - 1).astype(np.intp)
+        return number * LEVELS + np.minimum(level, LEVELS - 1).astype(np.intp)
+
+    def told(
+        self, kind: int, face: np.ndarray, bary: np.ndarray, breadth: np.ndarray, atlas: tuple[np.ndarray, ...],
+        scale: np.ndarray,
+    ) -> tuple[np.ndarray, ...]:  # fmt: skip
+        """What images of a kind say of places `breadth` (n,) metres wide on faces (n,), at `bary` (2, n) between their
+        corners: (m,) int which have one, (3, m) what it says, of a byte as `scale` (256,) has it, (m,) int its number.
+
+        It is that of an image reduced until its pixels are so wide: finer ones would flicker ("mip map").
+        """
+        number = self.texture[:, kind].take(face)
+        drawn = np.flatnonzero(number >= 0)
+        face, (u, v), number = face.take(drawn), bary.take(drawn, 1), number.take(drawn)
+        place, laid = self._halved(number, face, breadth.take(drawn)), self.planes.laid.take(face, 1)
+        right, up = laid[:2] + u * laid[2:4] + v * laid[4:]
+        return drawn, between(atlas[0], right, 1 - up, atlas[1].take(place, 1), scale), number
 
     def colors(
         self, face: np.ndarray, bary: np.ndarray, breadth: np.ndarray, atlas: tuple[np.ndarray, ...]
     ) -> np.ndarray:
-        """(3, n) colour of places `breadth` (n,) metres wide on faces (n,), at `bary` (2, n) between their corners.
-
-        It is that of an image reduced until its pixels are so wide: finer ones would flicker ("mip map").
-        """
-        out, drawn = self.planes.color.take(face, 1), np.flatnonzero(self.texture.take(face) >= 0)
-        face, (u, v) = face.take(drawn), bary.take(drawn, 1)
-        place, laid = self._halved(face, breadth.take(drawn)), self.planes.laid.take(face, 1)
-        right, up = laid[:2] + u * laid[2:4] + v * laid[4:]
-        pixels, places, tints = atlas
-        out[:, drawn] = between(pixels, right, 1 - up, *places.take(place, 1)) * tints.take(place // LEVELS, 1)
+        """(3, n) colour of places, as in `told`."""
+        out, (drawn, color, number) = (
+            self.planes.color.take(face, 1),
+            self.told(COLOR, face, bary, breadth, atlas, LINEAR),
+        )
+        out[:, drawn] = color * atlas[2].take(number, 1)
         return out
 
 
@@ -162,9 +176,12 @@ class Planes(NamedTuple):
     glows: np.ndarray
 
 
-def between(pixels: np.ndarray, right: np.ndarray, down: np.ndarray, first: Any, width: Any, height: Any) -> np.ndarray:
-    """(3, n) linear RGB of images at shares (n,) of their widths and heights, between their pixels; they go on beyond
-    their borders. `pixels`, `first`, `width`, `height`: as of an `atlas`."""
+def between(
+    pixels: np.ndarray, right: np.ndarray, down: np.ndarray, place: Any, scale: np.ndarray = LINEAR
+) -> np.ndarray:
+    """(3, n) values of images at shares (n,) of their widths and heights, between their pixels; they go on beyond their
+    borders. `pixels`: as of an `atlas`; `place`: of its places, for each; `scale`: (256,) the value of a byte."""
+    first, width, height = place
     x, y = (right - np.floor(right)) * width - 0.5, (down - np.floor(down)) * height - 0.5
     column, row = np.floor(x), np.floor(y)
     x, y, column, row = (x - column).astype("f4"), (y - row).astype("f4"), column.astype(int), row.astype(int)
@@ -172,7 +189,7 @@ def between(pixels: np.ndarray, right: np.ndarray, down: np.ndarray, first: Any,
     column, row = column + 1, row + 1
     beside, below = column * (column < width), row * (row < height)
     upper, lower = (
-        (1 - x) * LINEAR.take(pixels.take(line + left, 1)) + x * LINEAR.take(pixels.take(line + beside, 1))
+        (1 - x) * scale.take(pixels.take(line + left, 1)) + x * scale.take(pixels.take(line + beside, 1))
         for line in (first + above * width, first + below * width)
     )
     return (1 - y) * upper + y * lower
@@ -195,7 +212,7 @@ def outside(scenery: Scenery, origin: np.ndarray, direction: np.ndarray) -> tupl
         else:  # by latitude and longitude, +Z in the middle and +X left of it, as OpenEXR and Hydra have them
             x, y, z = direction[:, here]
             across, down = 0.5 - np.arctan2(x, z) / (2 * np.pi), np.arccos(np.clip(y, -1, 1)) / np.pi
-            out[:, here] = between(scenery.lights.planes, across, down, 0, around.shape[1], around.shape[0])
+            out[:, here] = between(scenery.lights.planes, across, down, (0, *around.shape[1::-1]))
         through |= here
     return out, through
 
@@ -260,22 +277,26 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             "st": np.zeros((count, 3, 2), np.float32) if mesh.st is None else mesh.st.astype(np.float32),
             "flat_colors": np.zeros((count, 3), np.float32), "emissive": np.zeros((count, 3), np.float32),
             "gloss": np.zeros(count, np.float32), "thin": np.full(count, HANGING.get(mesh.category, 0.0), "f4"),
-            "texture": np.full(count, -1), "wall": np.full(count, walls.get(mesh.component, -1)),
+            "texture": np.full((count, 2), -1), "wall": np.full(count, walls.get(mesh.component, -1)),
         }  # fmt: skip
         plain, clear = Paint(color=class_color(mesh.category), roughness=1.0), np.zeros(count, bool)
         for paint, faces in ((plain, np.arange(count)),) if by_class else mesh.paints:
             part["flat_colors"][faces], part["emissive"][faces] = paint.color, paint.emissive
             part["gloss"][faces] = min(1.0, 0.5 * (1 - paint.roughness) + 0.35 * paint.metallic)
-            part["texture"][faces], clear[faces] = -1, paint.opacity < SEEN_THROUGH
+            part["texture"][faces], clear[faces] = (-1, -1), paint.opacity < SEEN_THROUGH
             part["thin"][faces] *= SHEER if paint.opacity < 1 else 1
             if paint.texture:
                 key, found = (paint.texture, paint.tint), cache(partial(image_of, paint.image, paint.texture))
                 read, tint = images.setdefault(key, (found, np.array(paint.tint, np.float32)))
-                part["texture"][faces] = [*images].index(key)
+                part["texture"][faces, COLOR] = [*images].index(key)
                 # most images are seen in half their size at most, in which a JPEG is read in half of the time
                 if key not in means:
                     means[key] = LINEAR[read(1)[::8, ::8]].mean((0, 1)) * tint
                 part["flat_colors"][faces] = means[key]
+                if paint.normal:
+                    found = cache(partial(image_of, paint.normal.prim, paint.normal.path))
+                    images.setdefault((paint.normal,), (found, np.ones(3, np.float32)))
+                    part["texture"][faces, RELIEF] = [*images].index((paint.normal,))
         if mesh.category == "beam":
             above.append(part)
             continue

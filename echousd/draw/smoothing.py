@@ -27,7 +27,8 @@ def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, reach
     for apart in sorted({ring for _, rings, *_ in reach for ring in rings}):
         # passes with ever wider holes reach far with few neighbours ("a trous")
         parts = [(layers, light[layers], *alike) for layers, rings, *alike in reach if apart in rings]
-        sums = [(layers, own, own.mean(0), own.copy(), np.ones_like(own[0]), *alike) for layers, own, *alike in parts]
+        of = ((layers, own, np.abs(own).mean(0), *alike) for layers, own, *alike in parts)
+        sums = [(layers, own, bright, own.copy(), np.ones_like(bright), *alike) for layers, own, bright, *alike in of]
         # what two share they give each other: half of all eight are met
         for down, across in ((0, apart), (apart, -apart), (apart, 0), (apart, apart)):
             for top in range(0, height - down, BAND):

@@ -7,13 +7,17 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
+from PIL import Image, ImageFilter
 
+from echomodel.late import lates
 from echomodel.triangles import along
 from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SUN, Bounced, evened, exposure, rolled
 from echousd.draw.scenery import CLOTH, SKY_LIGHT, Scenery, next_room, outside
 from echousd.draw.smoothing import RINGS, same_surface, smooth_light
 from echousd.draw.views import View
 
+# What only fine pictures show is not loaded for others.
+slanted, turned, tilted = lates("echousd.draw.relief", "slanted", "turned", "tilted")
 FINE, QUICK = 3, 2  # squared: rays per pixel
 SHARPER = 0.6  # of how a pixel within a surface differs from those around it: grain and weave are seen from afar
 AROUND = 2  # per ray: rays to what stands around
@@ -25,6 +29,8 @@ CREVICE, PALE, SHEEN = 1.0, 0.55, 0.05
 # Gloss from which on surfaces mirror, and are metal, of which so much is not mirrored; how far from where a mirror
 # would a rough one mirrors.
 GLOSSY, METAL, MATT, BLUR = 0.2, 0.5, 0.4, 0.15
+WASHED = 0.25  # how much less coloured a shade is that a bulb shines through
+HALO = (0.02, 0.2)  # width, of the picture's, over which what shines is spread, and the share of it
 GLINT = 1.2  # of the mean light: at most what rough surfaces mirror of a lamp, whose noise looks like smoke
 
 
@@ -47,7 +53,8 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
     shift = np.random.default_rng(seed).random(4)
     sun = scenery.lights.sun
     sun = np.float32(SUN / np.pi) * (0 * SUN_LIGHT if sun is None else sun[1]) if view.inside else 0.55 * SUN_LIGHT
-    world = World(embree(scenery.triangles), scenery, view, size, shift, Bounced.dark(*scenery.bounds), sun)
+    dark = Bounced.dark(*scenery.bounds)
+    world = World(embree(scenery.triangles), scenery, view, size, shift, dark, sun, rays >= FINE)
     return _drawn(_lit(world), height, rays).transpose(1, 2, 0) ** np.float32(1 / 2.2)
 
 
@@ -62,13 +69,15 @@ def _drawn(world: World, height: int, rays: int) -> np.ndarray:
     pixel, more = _met(world, np.tile(pixel, many - 1), places[:, 1:].repeat(len(pixel), 1), seen)
     edge = np.bincount(pixel, minlength=height * size) > 0
     light = _light_of(world, seen, near, edge, 2 * rays, max(1, (rays - 1) ** 2))
-    world = world._replace(atlas=world.scenery.atlas(seen.face, _breadth(world, seen)))
+    world = world._replace(atlas=world.scenery.atlas(seen.face, _breadth(world, seen), world.fine))
     color = _colored(world, seen, light)
-    own = np.flatnonzero((seen.face >= 0) & ~world.scenery.planes.glows.take(seen.face))  # no lamp, nothing outside
-    own = own[::4]  # which tell as well how bright it is
+    met = seen.face >= 0
+    lamps = met & world.scenery.planes.glows.take(seen.face)
+    own = np.flatnonzero(met & ~lamps)[::4]  # which tell as well how bright it is
     tone = exposure(color.take(own, 1) if len(own) else color, world.white, world.scenery.lights.day)
     tone = tone if world.view.inside else rolled
     color = _blended(seen, color, tone)
+    halo = _halo((color * (lamps | (seen.shown == 1))).reshape(3, height, size))
     finer = _colored(world, more, _lent(world, more, pixel, seen, light))
     finer = _blended(more, finer, tone) - color.take(pixel, 1)
     color += np.stack([np.bincount(pixel, part / many, len(edge)) for part in finer])
@@ -76,7 +85,16 @@ def _drawn(world: World, height: int, rays: int) -> np.ndarray:
     wide = np.pad(color, ((0, 0), (1, 1), (1, 1)), mode="edge")  # of an edge's pixel each neighbour takes an eighth
     rows = wide[:, 1:-1] * 0.75 + (wide[:, :-2] + wide[:, 2:]) * 0.125
     soft = rows[..., 1:-1] * 0.75 + (rows[..., :-2] + rows[..., 2:]) * 0.125
-    return np.where(edge.reshape(height, size), soft, np.clip(color + np.float32(SHARPER) * (color - soft), 0, 1))
+    color = np.where(edge.reshape(height, size), soft, np.clip(color + np.float32(SHARPER) * (color - soft), 0, 1))
+    return color + halo * (1 - color)
+
+
+def _halo(color: np.ndarray) -> np.ndarray:
+    """(3, height, size) what lenses and eyes spread of what shines, as it is shown, over all around it, see `HALO`."""
+    wide, share = HALO
+    image = Image.fromarray((np.clip(color, 0, 1) * 255).astype(np.uint8).transpose(1, 2, 0)).reduce(4)
+    image = image.filter(ImageFilter.GaussianBlur(wide * image.width)).resize(color.shape[:0:-1])
+    return np.float32(share / 255) * np.asarray(image).transpose(2, 0, 1)
 
 
 def _blended(seen: Seen, color: np.ndarray, tone: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
@@ -100,8 +118,8 @@ MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
 
 class World(NamedTuple):
     """What rays run through: the tree, what is in it, the camera, pixels across, shifts of the first; what light is
-    thrown back, what the sun gives to what faces it, how much brighter shades are than told, and the mean
-    light, by colour; and the images as they are seen."""
+    thrown back, what the sun gives to what faces it, whether folds and weaves show, how much brighter shades are than
+    told, and the mean light, by colour; and the images as they are seen."""
 
     scene: Any
     scenery: Scenery
@@ -110,9 +128,26 @@ class World(NamedTuple):
     shift: np.ndarray
     thrown: Bounced
     sun: np.ndarray
+    fine: bool = False
     glow: np.ndarray = np.ones(3, np.float32)
     white: np.ndarray = np.ones(3, np.float32)
     atlas: Any = None
+
+    @property
+    def rows(self) -> int:
+        """How many there are of light, see `_asked`."""
+        return 5 + 3 * self.fine
+
+    @property
+    def towards(self) -> np.ndarray:
+        """(3, 1) where the sun is."""
+        sun = self.scenery.lights.sun if self.view.inside else None
+        return (ABOVE if sun is None else sun[0])[:, None]
+
+    @property
+    def tint(self) -> np.ndarray:
+        """(3, 1) the colour of the mean light."""
+        return (self.white / max(float(self.white @ LUMA), 1e-6))[:, None]
 
 
 class Seen(NamedTuple):
@@ -249,9 +284,9 @@ def _see_through(world: World, way: np.ndarray, seen: Seen) -> None:
 
 
 def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndarray:
-    """(5, n) what falls on what was seen in some pixels: soft light by colour, what is mirrored to the eye, and the
-    share of the sun that shines there."""
-    out = np.zeros((5, len(pixel)), np.float32)
+    """(rows, n) what falls on what was seen in some pixels: soft light by colour, what is mirrored to the eye, and the
+    share of the sun that shines there; in fine pictures how soft light grows, see `slanted`."""
+    out = np.zeros((world.rows, len(pixel)), np.float32)
     for here, part in seen.blocks():
         part, shift = part._replace(point=part.point + BEFORE * part.normal), _shifts(world, pixel[here])
         for sample in range(samples):
@@ -267,7 +302,7 @@ def _shifts(world: World, pixel: np.ndarray) -> np.ndarray:
 
 
 def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, often: int, seldom: int) -> np.ndarray:
-    """(5, n) light at all pixels: asked at every second of every second row, lent to those of the same surface.
+    """(rows, n) light at all pixels: asked at every second of every second row, lent to those of the same surface.
 
     Where there is little of a surface around to smooth the light over, at an `edge` (n,), it is asked `often`, and what
     is `near` one (n,) shares it by place: trims a pixel wide have no neighbours in rows and columns.
@@ -276,25 +311,25 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     met, coarse, inside = seen.face.reshape(shape) >= 0, np.s_[..., ::2, ::2], world.view.inside
     normal, point = (each.reshape(3, *shape) for each in (seen.normal, seen.point))
     asked, torn, number = met[coarse], edge.reshape(shape)[coarse], np.arange(met.size).reshape(shape)[coarse]
-    found = np.zeros((6, asked.size), np.float32)  # the last: whether the sun shines
+    found = np.zeros((world.rows + 1, asked.size), np.float32)  # the last: whether the sun shines
     known = [normal[coarse].copy(), point[coarse].copy()]
     for here, times in ((asked & torn, often), (asked & ~torn, seldom)):
-        found[:5, here.ravel()] = _asked(world, seen.of(number[here]), number[here], times)
+        found[:-1, here.ravel()] = _asked(world, seen.of(number[here]), number[here], times)
     thin = np.flatnonzero(asked & near.reshape(shape)[coarse])
-    raw, slim = found[:5, thin], number.ravel()[thin]
-    found[:4, thin] = _pooled(seen.of(slim), raw[:4])
-    found[5] = found[4] > 0
+    raw, slim = found[:-1, thin], number.ravel()[thin]
+    smooth = np.arange(world.rows) != 4
+    found[np.ix_(np.flatnonzero(smooth), thin)] = _pooled(seen.of(slim), raw[smooth])
+    found[-1] = found[4] > 0
     gloss = world.scenery.gloss.take(seen.face).reshape(shape)[coarse]
     reach = (
         (np.s_[:3], RINGS), (np.s_[3:4], RINGS[:3], gloss), (np.s_[4:5], () if inside else RINGS),
-        (np.s_[5:], RINGS[:1]),
+        (np.s_[5:-1], RINGS if world.fine else ()), (np.s_[-1:], RINGS[:1]),
     )  # fmt: skip
-    found = found.reshape(6, *asked.shape)
-    found = smooth_light(found, known[0], known[1], reach)
-    mixed = ((found[5] > 0.01) & (found[5] < 0.99)).repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
-    light, weight = np.zeros((5, *shape), np.float32), np.zeros(shape, np.float32)
+    found = smooth_light(found.reshape(-1, *asked.shape), known[0], known[1], reach)
+    mixed = ((found[-1] > 0.01) & (found[-1] < 0.99)).repeat(2, 0).repeat(2, 1)[: shape[0], : shape[1]]
+    light, weight = np.zeros((world.rows, *shape), np.float32), np.zeros(shape, np.float32)
     there, *known, found = (
-        np.pad(each, [(0, 0)] * (each.ndim - 2) + [(0, 1)] * 2, "edge") for each in (asked, *known, found[:5])
+        np.pad(each, [(0, 0)] * (each.ndim - 2) + [(0, 1)] * 2, "edge") for each in (asked, *known, found[:-1])
     )
     for odd in product((0, 1), repeat=2):  # of the one, two or four that were asked around it, those of its own surface
         here = np.s_[..., odd[0] :: 2, odd[1] :: 2]
@@ -306,7 +341,7 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
             lent += fits * found[beside]
             many += fits
         light[here], weight[here] = lent / np.maximum(many, 1), many
-    rest, flat = np.flatnonzero(met & (weight == 0)), light.reshape(5, -1)
+    rest, flat = np.flatnonzero(met & (weight == 0)), light.reshape(world.rows, -1)
     # with what was asked of slim things beside them: alone they would be lighter and darker dashes along a trim
     more = np.concatenate([_asked(world, seen.of(rest), rest, often // 2), raw], 1)
     flat[:, rest] = _pooled(seen.of(np.concatenate([rest, slim])), more)[:, : len(rest)]
@@ -314,7 +349,7 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     facing, shift = seen.normal.take(border, 1), _shifts(world, border)[:2]
     there = seen.point.take(border, 1) + BEFORE * facing
     flat[4, border] = np.mean([_sunny(world, there, facing, _even(n, shift)) for n in range(often)], 0)
-    return smooth_light(light, normal, point, ((np.s_[:], RINGS[:1]),)).reshape(5, -1)
+    return smooth_light(light, normal, point, ((np.s_[:], RINGS[:1]),)).reshape(world.rows, -1)
 
 
 def _pooled(seen: Seen, light: np.ndarray) -> np.ndarray:
@@ -336,8 +371,8 @@ def _pooled(seen: Seen, light: np.ndarray) -> np.ndarray:
 
 
 def _lent(world: World, more: Seen, pixel: np.ndarray, seen: Seen, light: np.ndarray) -> np.ndarray:
-    """(5, n) light of what further rays in some pixels met: that of the same surface there or beside it, else asked."""
-    out, wanted = np.zeros((5, len(pixel)), np.float32), np.flatnonzero(more.face >= 0)
+    """(rows, n) light of what further rays in some pixels met: that of their surface there or beside it, else asked."""
+    out, wanted = np.zeros((world.rows, len(pixel)), np.float32), np.flatnonzero(more.face >= 0)
     for apart in BESIDE @ (1, world.size):
         other = np.clip(pixel.take(wanted) + apart, 0, light.shape[1] - 1)
         own = more.normal.take(wanted, 1), more.point.take(wanted, 1)
@@ -350,18 +385,23 @@ def _lent(world: World, more: Seen, pixel: np.ndarray, seen: Seen, light: np.nda
 
 
 def _colored(world: World, everything: Seen, falling: np.ndarray) -> np.ndarray:
-    """(3, n) radiance of what was seen in light (5, n)."""
+    """(3, n) radiance of what was seen in light (rows, n)."""
     scenery, out, sun = world.scenery, np.empty_like(everything.glow), world.sun[:, None]
     for here, seen in everything.blocks():
         light = falling[:, here]
-        color = scenery.colors(seen.face, seen.bary, _breadth(world, seen), world.atlas)
-        fallen = light[:3] + light[4] * sun
+        looks = seen.face, seen.bary, _breadth(world, seen), world.atlas
+        color, fallen = scenery.colors(*looks), light[:3] + light[4] * sun
+        if world.fine:
+            turn = turned(scenery, seen.normal, *looks)
+            fallen = tilted(light[:3], light[5:], light[4] * sun, world.towards, seen.normal, turn)
         fallen = evened(fallen, world.white, world.view.inside)
         color += np.float32(SHEEN) * (1 - color)
         metal = scenery.gloss.take(seen.face) > METAL
-        out[:, here] = color * fallen * np.where(metal, np.float32(MATT), 1) + light[3] * np.where(metal, color, 1)
+        mirrored = light[3] * world.tint * np.where(metal, color, 1)
+        out[:, here] = color * fallen * np.where(metal, np.float32(MATT), 1) + mirrored
         if len(shade := np.flatnonzero(scenery.planes.glows.take(seen.face))):  # less what they throw on themselves
-            bright = scenery.emissive.take(seen.face.take(shade), 0).T + light[3, shade]
+            bright = scenery.emissive.take(seen.face.take(shade), 0).T
+            bright += np.float32(WASHED) * (LUMA @ bright - bright) + light[3, shade]
             out[:, here.start + shade] = bright * world.glow[:, None] * _through(world, seen.of(shade))
         missed = np.flatnonzero(seen.face < 0)
         out[:, here.start + missed] = seen.glow.take(missed, 1)
@@ -407,19 +447,19 @@ def embree(triangles: np.ndarray) -> Any:
 
 
 def _light(world: World, seen: Seen, sample: int, shift: np.ndarray) -> np.ndarray:
-    """(5, n) what falls on points by one sample of the sun, a window and a lamp, and what is around, see `_asked`."""
-    out, at = np.zeros((5, len(seen.face)), np.float32), (seen.point, seen.normal)
+    """(rows, n) what falls on points by one sample of the sun, a window and a lamp, and what is around: `_asked`."""
+    out, at = np.zeros((world.rows, len(seen.face)), np.float32), (seen.point, seen.normal)
     spots = [_even(sample, part) for part in (shift[:2], shift[2:])]
-    out[:3], out[4] = _direct(world, *at, *spots)
+    soft, out[4] = _direct(world, *at, *spots)
     share = world.scenery.thin.take(seen.face)
     if len(cloth := np.flatnonzero(share)):  # which light comes through
         point, normal, *spots = (each.take(cloth, 1) for each in (*at, *spots))
         some, sun = _direct(world, point - THICK * normal, -normal, *spots)
-        out[:3, cloth] += share.take(cloth) * (some + sun * world.sun[:, None])
-    dim = np.float32(DIM * max(world.scenery.lights.sky, 0.1)) * world.white / max(float(world.white @ LUMA), 1e-6)
-    out[:3], out[3] = out[:3] + dim[:, None], _mirrored(world, seen, _even(sample, shift[:2]))
+        soft[:3, cloth] += share.take(cloth) * (some[:3] + sun * world.sun[:, None])
     for ray in range(AROUND):
-        out[:3] += _gathered(world, *at, _even(sample * AROUND + ray, shift[2:])) / AROUND
+        soft += _gathered(world, *at, _even(sample * AROUND + ray, shift[2:])) / AROUND
+    out[:3] = soft[:3] + np.float32(DIM * max(world.scenery.lights.sky, 0.1)) * world.tint
+    out[3], out[5:] = _mirrored(world, seen, _even(sample, shift[:2])), soft[3:]
     return out
 
 
@@ -447,12 +487,12 @@ def _mirrored(world: World, seen: Seen, square: np.ndarray) -> np.ndarray:
 def _direct(
     world: World, point: np.ndarray, normal: np.ndarray, spot: np.ndarray, turn: np.ndarray
 ) -> tuple[np.ndarray, ...]:
-    """(3, n) what comes from windows and lamps, (n,) the sun's share.
+    """(3, n) what comes from windows and lamps, if fine as `slanted` has it; (n,) the sun's share.
 
     `spot`, `turn`: (2, n) in [0, 1), which place in which window and lamp is asked.
     """
     scene, scenery, lights = world.scene, world.scenery, world.scenery.lights
-    light, inside = np.zeros(point.shape, np.float32), world.view.inside
+    light, inside = np.zeros((world.rows - 2, point.shape[1]), np.float32), world.view.inside
     panes, panels = scenery.panes.reshape(-1, 9).T, lights.panels.reshape(-1, 12).T
     for flat in (panes, panels) if inside else ():  # one place in one window and in one panel for each ray
         if not (many := flat.shape[1]):
@@ -464,14 +504,16 @@ def _direct(
         outwards = np.abs(outwards) if flat is panes else np.maximum(outwards, 0)
         seen = np.clip(along(way, normal), 0, None) * 4 * outwards / np.maximum(away, 0.2) ** 2
         share = free(scene, point, way, away, seen > 1e-4) * np.minimum(seen, 1.5)  # none a spark near a pane
-        light += share * np.float32(many / np.pi) * (lights.from_sky(way) if flat is panes else plane[9:])
+        share = share * np.float32(many / np.pi) * (lights.from_sky(way) if flat is panes else plane[9:])
+        light += slanted(share, way, normal) if world.fine else share
     if inside and len(lights.bulbs):  # one lamp for each ray
         which = np.minimum((turn[1] * len(lights.bulbs)).astype(int), len(lights.bulbs) - 1)
         way, away = way_to(point, lights.bulbs[which, (spot[0] * lights.bulbs.shape[1]).astype(int)].T)
         facing = np.clip(along(normal, way), 0, None) * len(lights.bulbs) / (away**2 + OWN**2)
         own = np.maximum(OWN, np.ptp(lights.bulbs, axis=1).max(-1))[which]  # what is so near is its shade
         lit = free(scene, point, way, away - own, facing > 0) * facing / np.float32(np.pi)
-        light += lit * lights.shining.T.take(which, 1)
+        share = lit * lights.shining.T.take(which, 1)
+        light += slanted(share, way, normal) if world.fine else share
     return light, _sunny(world, point, normal, spot)
 
 
@@ -480,21 +522,22 @@ def _sunny(world: World, point: np.ndarray, normal: np.ndarray, spot: np.ndarray
     sun, inside = world.scenery.lights.sun, world.view.inside
     if inside and (sun is None or not len(world.scenery.panes)):
         return np.zeros(point.shape[1], np.float32)
-    towards, soft = (sun[0], np.float32(0.005)) if inside and sun is not None else (ABOVE, SUN_SPREAD)
-    towards = _unit(towards[:, None] + soft * _on_sphere(spot))
+    towards = _unit(world.towards + np.float32(0.005 if inside else SUN_SPREAD) * _on_sphere(spot))
     facing = np.clip(along(normal, towards), 0, None)
     return free(world.scene, point, towards, np.full(len(facing), 1e3, np.float32), facing > 0) * facing
 
 
 def _gathered(world: World, point: np.ndarray, normal: np.ndarray, square: np.ndarray) -> np.ndarray:
-    """(3, n) what surfaces throw on points by one ray each, which goes to `square` (2, n), see `CREVICE`."""
+    """(3, n) what surfaces throw on points by one ray each, which goes to `square` (2, n), see `CREVICE`; if fine as
+    `slanted` has it."""
     way = _unit(normal + _on_sphere(square))  # cosine-weighted
     face, far, _ = _hit(world, point, way)
     rows = world.thrown.rows(point, way, far, world.scenery.planes.axis.take(face))
     thrown, missed = world.thrown.radiance.take(rows, 1), np.flatnonzero(face < 0)
     thrown[:, missed] = 0 if world.view.inside else (0.92 + 0.35 * way[1].take(missed)) * SKY_LIGHT[:, None]
     pale, far[missed] = PALE * world.scenery.planes.luma.take(face), CREVICE
-    return thrown * (pale + (1 - pale) * np.minimum(far / np.float32(CREVICE), 1))
+    thrown *= pale + (1 - pale) * np.minimum(far / np.float32(CREVICE), 1)
+    return slanted(thrown, way, normal) if world.fine else thrown
 
 
 def _lit(world: World) -> World:
@@ -526,12 +569,12 @@ def _lit(world: World) -> World:
     often = np.tile(point, OFTEN), np.tile(normal, OFTEN)
     spots = rng.random((OFTEN, 2, len(rows), 2), np.float32).transpose(1, 3, 0, 2).reshape(2, 2, -1)
     some, sun = _direct(world, *often, *spots)
-    direct = (some + sun * world.sun[:, None]).reshape(3, OFTEN, -1).mean(1)
+    direct = (some[:3] + sun * world.sun[:, None]).reshape(3, OFTEN, -1).mean(1)
     light = np.zeros_like(point)
     for _ in range(TURNS):
         world = world._replace(thrown=world.thrown.lit(rows, albedo * (direct + light)))
         squares = rng.random((OFTEN, len(rows), 2), np.float32).transpose(2, 0, 1).reshape(2, -1)
-        light = _gathered(world, *often, squares).reshape(3, OFTEN, -1).mean(1)
+        light = _gathered(world, *often, squares)[:3].reshape(3, OFTEN, -1).mean(1)
     white, emissive = (direct + light).mean(1), world.scenery.emissive
     # shades of the room's whole colour would be yellower than what they light
     tinted = white**0.8 * (white @ LUMA) ** 0.2

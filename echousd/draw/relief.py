@@ -1,0 +1,50 @@
+"""Folds, weaves and grooves that only images of normals tell: how they turn surfaces, and the light that falls then."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echomodel.triangles import along
+from echousd.draw.indoors import LUMA
+from echousd.draw.scenery import RELIEF, Scenery
+
+NORMAL = np.arange(256, dtype=np.float32) / 127.5 - 1  # of a byte of an image of normals
+STEEPEST = np.float32(0.2)  # the least cosine that counts of light that comes aslant, and of what is turned
+SHARE = 0.3, 1.8  # least and most of a surface's light that its folds and grooves have
+
+
+def slanted(light: np.ndarray, way: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """(6, n) light (3, n) that comes from `way` (3, n) to surfaces, and how its brightness grows as they turn.
+
+    A surface whose normal is turned by d has the product of d and the last three more, as cosines grow with it.
+    """
+    return np.concatenate([light, way * (LUMA @ light / np.maximum(along(way, normal), STEEPEST))])
+
+
+def turned(
+    scenery: Scenery, normal: np.ndarray, face: np.ndarray, bary: np.ndarray, breadth: np.ndarray,
+    atlas: tuple[np.ndarray, ...],
+) -> np.ndarray:  # fmt: skip
+    """(3, n) by how much images turn normals (3, n) on faces; of what as in `Scenery.told`."""
+    drawn, (right, up, ahead), _ = scenery.told(RELIEF, face, bary, breadth, atlas, NORMAL)
+    corners, st, own = scenery.triangles[face[drawn]], scenery.st[face[drawn]], normal.take(drawn, 1)
+    (one, two), ((a, c), (b, d)) = np.diff(corners, axis=1).transpose(1, 2, 0), np.diff(st, axis=1).transpose(2, 1, 0)
+    ways = (np.sign(a * d - b * c) * way for way in (d * one - b * two, a * two - c * one))  # of the image on the face
+    across, upwards = (way / np.sqrt(np.maximum(along(way, way), np.float32(1e-18))) for way in ways)
+    leaned = right * across + up * upwards + np.maximum(ahead, STEEPEST) * own
+    out = np.zeros_like(normal)
+    out[:, drawn] = leaned / np.sqrt(along(leaned, leaned)) - own
+    return out
+
+
+def tilted(
+    light: np.ndarray, rise: np.ndarray, sun: np.ndarray, towards: np.ndarray, normal: np.ndarray, turn: np.ndarray
+) -> np.ndarray:
+    """(3, n) light that falls on surfaces whose normals (3, n) are turned by `turn` (3, n).
+
+    `light`: (3, n) soft light on what is not turned. `rise`: (3, n) see `slanted`. `sun`: (3, n) light of the sun,
+    which is `towards` (3, 1).
+    """
+    share = 1 + along(rise, turn) / np.maximum(LUMA @ light, np.float32(1e-6))
+    steep = 1 + along(towards, turn) / np.maximum(along(towards, normal), STEEPEST)
+    return light * np.clip(share, *SHARE) + sun * np.clip(steep, *SHARE)
