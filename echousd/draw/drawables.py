@@ -1,7 +1,5 @@
 """Visible meshes of a stage as numpy arrays with their materials: what pictures and other formats are made from."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any

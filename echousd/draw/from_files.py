@@ -1,7 +1,5 @@
 """Pictures of rooms and models in files: one, one through each camera, a turn around the room, thumbnails."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager

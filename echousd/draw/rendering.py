@@ -1,7 +1,5 @@
 """Pictures of any stage without a GPU or a display: one view, or a sheet of several."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

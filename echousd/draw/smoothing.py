@@ -1,7 +1,5 @@
 """Light that few rays found, smoothed over the flat piece of surface that it lies on."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 from typing import Any

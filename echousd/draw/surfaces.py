@@ -1,7 +1,5 @@
 """What of a room can be painted: per object its triangles, with the face corners of the prims that they are."""
 
-from __future__ import annotations
-
 import hashlib
 import warnings
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Where a camera stands to see a room from inside, and what those of a stage see."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple

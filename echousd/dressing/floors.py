@@ -1,7 +1,5 @@
 """What lies and stands on the floor: rugs, shoes, clusters by furniture; what stands in corners where nobody walks."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Small things as nodes of the room's scene graph, with what they stand on and hang over (option `dress_graph`)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cushions and throws on sofas and armchairs, which have arms and a back."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echomodel.dressing.textiles import LEAN

@@ -1,7 +1,5 @@
 """What the dressing of a room looks at, and what it decides: things in their places; no pxr here."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

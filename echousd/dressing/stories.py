@@ -1,7 +1,5 @@
 """Who lives in a room, and what therefore lies on its furniture, shelves, beds and floor: rows of `stories.toml`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """What lies and stands on furniture, and where: on level parts of its mesh with air above."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

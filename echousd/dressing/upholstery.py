@@ -1,7 +1,5 @@
 """Cushions and what somebody left on beds, cushions on sofas and armchairs, throws over all of them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echomodel.dressing import names_of, usual_size

@@ -1,7 +1,5 @@
 """What hangs on walls: curtains, pictures and mirrors; in a full room shelves, a clock and coats, too."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A graph as arrays and as models take it, randomness for every branch, numbers rounded so that bytes are equal."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager

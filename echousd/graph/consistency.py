@@ -1,7 +1,5 @@
 """Do the relations of a graph contradict each other? Every message names the relations that do."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

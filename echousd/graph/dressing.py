@@ -1,7 +1,5 @@
 """Small things as nodes of a room's scene graph (option `dress_graph`)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """The fields of nodes, relations and rooms: what each may hold, checked with a message that says what is allowed."""
 
-from __future__ import annotations
-
 import unicodedata
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeAlias

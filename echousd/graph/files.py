@@ -1,7 +1,5 @@
 """Scene graphs in files, told apart by extension (USD: `echousd.stage`)."""
 
-from __future__ import annotations
-
 import math
 import os
 import stat

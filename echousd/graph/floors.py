@@ -1,7 +1,5 @@
 """Floors and openings of graphs that state none, and floors that cannot hold their furniture."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

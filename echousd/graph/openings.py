@@ -1,7 +1,5 @@
 """Doors, windows and passages in the words of a person: `{wall: north, offset: 0.6, width: 0.9}` or `north 0.6 0.9`."""
 
-from __future__ import annotations
-
 import difflib
 import math
 from collections.abc import Iterable, Mapping, Sequence

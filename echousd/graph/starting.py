@@ -1,7 +1,5 @@
 """A first graph of a room type and counts."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any

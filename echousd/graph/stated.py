@@ -1,7 +1,5 @@
 """Fields that few graphs state: headings in degrees, outlines of floors, attributes, places and what is between."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

@@ -3,8 +3,6 @@
 Words such as on, no and 12:30 stay text (YAML 1.2), keys may not repeat, aliases are refused, nesting is bounded.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Names in any script: what a person calls an object is its title, and a USD identifier is made of it."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Container, Mapping

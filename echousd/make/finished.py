@@ -1,7 +1,5 @@
 """A finished room: its data, how it is saved and shown, and where it was written."""
 
-from __future__ import annotations
-
 import base64
 import tempfile
 import weakref

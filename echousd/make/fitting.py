@@ -1,7 +1,5 @@
 """Floor and furniture brought together: a proposed floor made wider; what has no place left out (`fit="drop"`)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A room as one flat file; what differs between its layouts is in variants of `layout`."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping
 from dataclasses import replace

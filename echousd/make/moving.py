@@ -1,7 +1,5 @@
 """Pieces moved out of one another: which goes, who goes with it, and to where what the graph and people ask holds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A room read back from its folder: graph, boxes, meshes, files, what is locked; in metres, +Y up, however saved."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """A room whose furniture stands where it comes to rest."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

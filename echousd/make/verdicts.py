@@ -1,7 +1,5 @@
 """What became of every relation that a graph states, and which boxes collide."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

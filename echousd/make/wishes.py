@@ -1,7 +1,5 @@
 """What a person wishes to change: in words, read off a stronger layer, or of somebody's half-furnished stage."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A room built up again: pieces taken out and put in one after the other, seats anew, storage along its walls."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import groupby, product

@@ -1,7 +1,5 @@
 """Which demands of a room contradict each other, where some of them could not be met."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

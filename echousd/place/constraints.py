@@ -4,8 +4,6 @@ What the graph states has the margins of `echomodel.rules`, whose slopes are dif
 moved at once. Headings stay, and so do the slopes of what stands apart, against a wall or on something.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias

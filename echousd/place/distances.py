@@ -1,7 +1,5 @@
 """Small distances: as they were drawn where a person leaves them so, else spread as in real rooms, not all alike."""
 
-from __future__ import annotations
-
 import math
 import zlib
 from collections.abc import Sequence

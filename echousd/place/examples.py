@@ -5,8 +5,6 @@ after every search is left out; of the others the cheapest is kept. Further room
 nothing to object to, one in eight, are kept as they are: they cost a tenth of a searched one.
 """
 
-from __future__ import annotations
-
 import csv
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Fitted units are planned first, as one group along the walls; everything else is placed around them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echomodel.objective.table import cost_of

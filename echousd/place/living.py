@@ -1,7 +1,5 @@
 """What a person would point at in a room, in the words of its graph."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Poses that a person would try for a piece: at what it attends, along the walls, over what it lights, in the open."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

@@ -7,8 +7,6 @@ The same for equal settings on any machine: costs are compared to a ten-thousand
 counts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

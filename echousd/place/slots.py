@@ -4,8 +4,6 @@ Each is asked with the metres that are kept between the two, negative under a ta
 something is before the middle of that (`distances.kept_apart`).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

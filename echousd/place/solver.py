@@ -5,8 +5,6 @@ min 1/2 |step|^2_W + sum_r rho_r/2 violation_r^2, whose minimum is found exactly
 because the objective is piecewise quadratic. The weights rho are so large that a constraint which can be met is met.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -2,8 +2,6 @@
 that they laid out scores by itself: faults by the terms of the objective, and the field's figures by its boxes.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Rules of walls and access: what belongs at a wall touches it, fronts open, doors swing, windows give light."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Terms of company: nightstands at the head, what is small at the side of what it serves, lamps over what is lit."""
 
-from __future__ import annotations
-
 import math
 
 from echomodel.arrays import Array, at_least, cast, full, held, kit, least_of, norm, pairs_in, put, sum_of

@@ -3,8 +3,6 @@
 Distances were measured on 300 real rooms with their furniture, unless a standard is named.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Copies of one room that differ in the poses of its boxes alone: what is said of its words is said once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Rules of free space: groups keep apart, chairs can be pulled out, knees have room, beds are walked round."""
 
-from __future__ import annotations
-
 from echomodel.arrays import Array, at_least, cast, rows
 from echomodel.objective.access import FOR_TWO, wall_ahead
 from echomodel.objective.plan import FAR, Found, Plan, found

@@ -1,7 +1,5 @@
 """What a person would point at in a room: the terms that it misses, in words."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 

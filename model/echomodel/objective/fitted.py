@@ -1,7 +1,5 @@
 """Terms of fitted rooms: kitchens in rows, their ways and landings, and where one stands at what washes."""
 
-from __future__ import annotations
-
 from echomodel.arrays import Array, at_least, full, norm, rows, sum_of
 from echomodel.objective.access import before_fronts
 from echomodel.objective.plan import FAR, Found, Plan, found, joined, worst

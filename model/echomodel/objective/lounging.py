@@ -1,7 +1,5 @@
 """Terms of sofas and armchairs: groups look at each other, with room for knees and a table in reach."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,8 +1,6 @@
 """Terms of relations and of physics: what the graph states; nothing runs into anything, leaves the room or hangs in
 the air."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Terms of tables and of who sits at them: in reach, evenly around, with room for elbows and to get up."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

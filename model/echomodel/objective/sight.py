@@ -1,7 +1,5 @@
 """Terms of what is watched: a screen lies ahead of its viewer, and nothing stands between them."""
 
-from __future__ import annotations
-
 import math
 
 from echomodel.arrays import Array, at_least, cast, full, held, least_of, once, pairs_in, rows

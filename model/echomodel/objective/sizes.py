@@ -1,7 +1,5 @@
 """Rule of scale: nothing is larger or smaller than such furniture comes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from functools import cache
 

@@ -1,7 +1,5 @@
 """What each piece of furniture rests on, and which may share space because they belong together."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

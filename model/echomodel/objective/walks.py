@@ -1,8 +1,6 @@
 """Terms of ways through one room, which have no gradient: a robot of 0.2 m radius walks from the door to every piece
 (as SceneEval and PhyScene ask of rooms), a person walks in."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
