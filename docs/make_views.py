@@ -40,7 +40,7 @@ from outdoors import (
 )
 from PIL import Image, ImageFilter
 
-from echousd.draw.tracing import embree
+from echousd.draw.rays import embree
 from echousd.srgb import from_linear
 
 FOLDER = Path(__file__).parents[1] / "echousd/shapes/finishes/views"

@@ -6,8 +6,6 @@
 Whoever names a file in a store knows the hash of its content; that is why packing and check let a room reach in.
 """
 
-from __future__ import annotations
-
 import hashlib
 import lzma
 import os
@@ -53,7 +51,7 @@ class Store:
     root: Path
 
     @classmethod
-    def create(cls, root: str | os.PathLike[str]) -> Store:
+    def create(cls, root: str | os.PathLike[str]) -> "Store":
         """The store in a folder, made if it is not there; raises ValueError for a folder that holds other things."""
         root = Path(root)
         if root.exists() and not root.is_dir():
@@ -67,7 +65,7 @@ class Store:
         return cls(root)
 
     @classmethod
-    def open(cls, root: str | os.PathLike[str]) -> Store:
+    def open(cls, root: str | os.PathLike[str]) -> "Store":
         """The store in a folder; raises ValueError where there is none, or one of another version."""
         root = Path(root)
         try:

@@ -1,7 +1,5 @@
 """Make or bring up to date the index of a library; look through it: every model with its picture, and corrections."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re
@@ -122,7 +120,7 @@ def _entries(folders: Sequence[Path], tell: Callable[[str], None]) -> Iterator[E
             yield replace(entry, key=key)
 
 
-def _stays(old: AssetRecord, entry: Entry, file: Path, wishes: Corrections) -> bool:
+def _stays(old: AssetRecord, entry: Entry, file: Path, wishes: "Corrections") -> bool:
     """Whether a row is still true: the file is the same one, and nobody corrects it otherwise than before."""
     unchanged = bool(old.stamp) and old.stamp == stamp(entry.file.path)
     place = old.uri.partition("!")[0] == relative(entry.file.path, file)

@@ -1,7 +1,5 @@
 """A model's file and what lies beside it: read with doubt, as a model may name anything."""
 
-from __future__ import annotations
-
 import io
 import os
 import zipfile
@@ -123,6 +121,6 @@ class Beside(Resolver):
         """Nothing is written beside a model."""
         raise ValueError(f"{self.model}: {name!r} is not written beside it")
 
-    def namespaced(self, namespace: str) -> Beside:
+    def namespaced(self, namespace: str) -> "Beside":
         """Itself."""
         return self

@@ -1,7 +1,5 @@
 """Rules on meshes: faces, normals, extents and texture coordinates, even scales, materials inside the default prim."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache, reduce
@@ -184,7 +182,7 @@ class Laid:
     fault: str = ""
 
     @classmethod
-    def of(cls, primvar: UsdGeom.Primvar, width: int, arrays: MeshArrays, word: str) -> Laid:
+    def of(cls, primvar: UsdGeom.Primvar, width: int, arrays: MeshArrays, word: str) -> "Laid":
         """A primvar of so many numbers each; raises as `array`."""
         values, name = array(primvar.GetAttr(), width), primvar.GetName()
         if primvar.IsIndexed():
@@ -196,7 +194,7 @@ class Laid:
         return cls.counted(values, primvar.GetInterpolation(), arrays, f"{name} has {len(values)} {word}")
 
     @classmethod
-    def counted(cls, values: np.ndarray, interpolation: str, arrays: MeshArrays, problem: str) -> Laid:
+    def counted(cls, values: np.ndarray, interpolation: str, arrays: MeshArrays, problem: str) -> "Laid":
         """Values that must be as many as their interpolation asks for on a mesh; `problem` says how many there are."""
         tokens = UsdGeom.Tokens
         many = {

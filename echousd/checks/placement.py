@@ -1,7 +1,5 @@
 """Where objects stand, inside the floor and on something, and which of their meshes run into each other."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -70,7 +68,7 @@ class Whole:
     strangers: tuple[Surrounding, ...] = ()
 
     @classmethod
-    def of(cls, prims: RoomPrims, reading: Reading) -> Whole:
+    def of(cls, prims: RoomPrims, reading: Reading) -> "Whole":
         """All of a room on the stage that is read."""
         small, shell, strangers = [], [], []
         for one in surroundings(prims):

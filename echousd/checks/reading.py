@@ -1,7 +1,5 @@
 """What a rule is, reads and reports: a stage whose prims, rooms, transforms and meshes are each read once; findings."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -61,7 +59,7 @@ class Reading:
         return [UsdGeom.Mesh(prim) for prim in self.distinct if prim.IsA(UsdGeom.Mesh)]
 
     @cached_property
-    def authored(self) -> list[Authored]:
+    def authored(self) -> "list[Authored]":
         """All attributes of the distinct prims that somebody authored."""
         return [Authored(attribute) for prim in self.distinct for attribute in prim.GetAuthoredAttributes()]
 

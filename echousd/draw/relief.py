@@ -1,7 +1,5 @@
 """Folds, weaves and grooves that only images of normals tell: how they turn surfaces, and the light that falls then."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echomodel.triangles import along

@@ -1,7 +1,5 @@
 """What a picture needs to know of a stage: world-space triangles with normals, colours and textures (Y-up, metres)."""
 
-from __future__ import annotations
-
 import colorsys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -89,7 +87,7 @@ class Scenery:
         return int(level.argmax()), int(upright.argmax())
 
     @cached_property
-    def planes(self) -> Planes:
+    def planes(self) -> "Planes":
         """What rays that met faces ask of them."""
         apart = (np.concatenate([each[:, :1], each[:, 1:] - each[:, :1]], 1) for each in (self.normals, self.st))
         tables = (*(each.reshape(len(each), -1) for each in apart), self.flat_colors, self.flat_colors @ LUMA)

@@ -1,7 +1,5 @@
 """What of the furniture a camera sees: boxes that hide one another."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -44,11 +42,11 @@ class Furniture:
         turns = upright(-self.yaw)  # from the room's frame to each object's
         return np.asarray(self.position[:, None] + np.einsum("nji,nkj->nki", turns, CUBE * self.size[:, None]))
 
-    def of(self, rows: np.ndarray) -> Furniture:
+    def of(self, rows: np.ndarray) -> "Furniture":
         """Some of these boxes."""
         return Furniture(self.size[rows], self.position[rows], self.yaw[rows])
 
-    def with_others(self, *others: Furniture | None) -> Furniture:
+    def with_others(self, *others: "Furniture | None") -> "Furniture":
         """These boxes, then some others."""
         every = [self, *(other for other in others if other is not None)]
         return Furniture(*(np.concatenate([getattr(one, f.name) for one in every]) for f in fields(Furniture)))

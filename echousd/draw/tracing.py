@@ -1,10 +1,7 @@
 """Light in a picture: rays through Embree, soft sun, occluded sky, what surfaces throw on, the noise smoothed away."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from itertools import product
-from typing import Any, NamedTuple
 
 import numpy as np
 from PIL import Image, ImageFilter
@@ -12,6 +9,20 @@ from PIL import Image, ImageFilter
 from echomodel.late import lates
 from echomodel.triangles import along
 from echousd.draw.indoors import DIM, GLOWING, LUMA, OWN, RIM, SUN, Bounced, evened, exposure, rolled
+from echousd.draw.rays import (
+    BLOCK,
+    Seen,
+    World,
+    camera_rays,
+    embree,
+    even,
+    first_hit,
+    free,
+    on_sphere,
+    shifts,
+    unit,
+    way_to,
+)  # fmt: skip
 from echousd.draw.scenery import CLOTH, SKY_LIGHT, Scenery, next_room, outside
 from echousd.draw.smoothing import RINGS, same_surface, smooth_light
 from echousd.draw.views import View
@@ -32,10 +43,6 @@ GLOSSY, METAL, MATT, BLUR = 0.2, 0.5, 0.4, 0.15
 WASHED = 0.25  # how much less coloured a shade is that a bulb shines through
 HALO = (0.02, 0.2)  # width, of the picture's, over which what shines is spread, and the share of it
 GLINT = 1.2  # of the mean light: at most what rough surfaces mirror of a lamp, whose noise looks like smoke
-
-
-class RenderUnavailable(ImportError, ValueError):
-    """Embree is not installed; the message says how to get it."""
 
 
 def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: int = 0) -> np.ndarray:
@@ -104,7 +111,6 @@ def _blended(seen: Seen, color: np.ndarray, tone: Callable[[np.ndarray], np.ndar
     return color
 
 
-BLOCK = 32_000  # rays at a time, which bounds the memory and stays in the cache
 # Pixels to the right and down, near ones first.
 BESIDE = np.array(sorted(product(range(-2, 3), repeat=2), key=lambda at: at[0] ** 2 + at[1] ** 2)[:13])
 POOL, CORNERS = 0.15, np.array(list(product((0, 1), repeat=3)))  # metres; of a cell of these
@@ -114,84 +120,6 @@ BEFORE, THICK = np.float32(2e-3), np.float32(0.016)
 # cosine by which that is less aside; how bright bars of the window are before the light.
 BEHIND, SEEN_BY, CLOSER, BAR = 0.05, 0.42, 6, 0.45
 MIRROR = 0.8  # gloss of what mirrors like glass with silver behind it
-
-
-class World(NamedTuple):
-    """What rays run through: the tree, what is in it, the camera, pixels across, shifts of the first; what light is
-    thrown back, what the sun gives to what faces it, whether folds and weaves show, how much brighter shades are than
-    told, and the mean light, by colour; and the images as they are seen."""
-
-    scene: Any
-    scenery: Scenery
-    view: View
-    size: int
-    shift: np.ndarray
-    thrown: Bounced
-    sun: np.ndarray
-    fine: bool = False
-    glow: np.ndarray = np.ones(3, np.float32)
-    white: np.ndarray = np.ones(3, np.float32)
-    atlas: Any = None
-
-    @property
-    def rows(self) -> int:
-        """How many there are of light, see `_asked`."""
-        return 5 + 3 * self.fine
-
-    @property
-    def towards(self) -> np.ndarray:
-        """(3, 1) where the sun is."""
-        sun = self.scenery.lights.sun if self.view.inside else None
-        return (ABOVE if sun is None else sun[0])[:, None]
-
-    @property
-    def tint(self) -> np.ndarray:
-        """(3, 1) the colour of the mean light."""
-        return (self.white / max(float(self.white @ LUMA), 1e-6))[:, None]
-
-
-class Seen(NamedTuple):
-    """What n rays met: faces (n,), -1 for none; points and normals (3, n); places between the face's corners (2, n);
-    and colour (3, n) of what lies around, and the share (n,) that it has in the picture as it is: all through a pane,
-    some through thin cloth before one."""
-
-    face: np.ndarray
-    point: np.ndarray
-    normal: np.ndarray
-    bary: np.ndarray
-    glow: np.ndarray
-    shown: np.ndarray
-
-    def of(self, rows: np.ndarray) -> Seen:
-        """Those of some rays, by their numbers: `take` is four times as fast as an index is."""
-        return Seen(*(value.take(rows, -1) for value in self))
-
-    def blocks(self) -> Iterator[tuple[slice, Seen]]:
-        """Those of `BLOCK` rays at a time, and which they are."""
-        for start in range(0, len(self.face), BLOCK):
-            yield (here := slice(start, start + BLOCK)), Seen(*(value[..., here] for value in self))
-
-
-def _rays(world: World, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where rays through places of the picture, in pixels from its upper left corner, begin and go, (3, n) float32."""
-    view, axes = world.view, world.view.matrix[:3, :, None].astype(np.float32)
-    u = ((x / world.size * 2 - 1) * view.half).astype(np.float32)
-    v = ((1 / view.aspect - y / world.size * 2) * view.half).astype(np.float32)
-    aside = u * axes[:, 0] + v * axes[:, 1]
-    if view.orthographic:
-        return axes[:, 3] + aside, np.broadcast_to(-axes[:, 2], aside.shape)
-    way = aside - axes[:, 2]
-    return axes[:, 3] + np.float32(view.near) * way, _unit(way)
-
-
-def _hit(world: World, origin: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, ...]:
-    """What Embree says of rays (3, n): faces (n,), -1 for none, metres to them, 0 to none, and places between their
-    corners (2, n)."""
-    hit = world.scene.run(_rows(origin), _rows(way), output=1)
-    met = hit["primID"] >= 0
-    bary = np.stack([hit["u"], hit["v"]])
-    bary[:, ~met] = 0
-    return hit["primID"], np.where(met, hit["tfar"], np.float32(0)), bary
 
 
 def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None = None) -> tuple[np.ndarray, Seen]:
@@ -205,8 +133,8 @@ def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None 
         here = slice(start, start + BLOCK)
         rows, (right, below) = pixel[here], np.broadcast_to(place, (2, len(pixel)))[:, here]
         down, across = np.divmod(rows, world.size)
-        origin, way = _rays(world, across + right, down + below)
-        hit: Sequence[np.ndarray] = _hit(world, origin, way)
+        origin, way = camera_rays(world, across + right, down + below)
+        hit: Sequence[np.ndarray] = first_hit(world, origin, way)
         if first is not None:
             new = np.flatnonzero(hit[0] != first.face.take(rows))
             origin, way, rows, *hit = (each.take(new, -1) for each in (origin, way, rows, *hit))
@@ -216,7 +144,7 @@ def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None 
             way, normal = way.take(mirror, 1), part.normal.take(mirror, 1)
             way = way - 2 * along(way, normal) * normal
             origin = part.point.take(mirror, 1) + BEFORE * normal
-            for own, other in zip(part, _seen(world, origin, way, _hit(world, origin, way)), strict=True):
+            for own, other in zip(part, _seen(world, origin, way, first_hit(world, origin, way)), strict=True):
                 own[..., mirror] = other
         if first is not None:
             differs = np.flatnonzero(_other(world, part, first.of(rows)))
@@ -245,7 +173,7 @@ def _at_edges(world: World, seen: Seen, shape: tuple[int, int]) -> np.ndarray:
 
 
 def _seen(world: World, origin: np.ndarray, way: np.ndarray, hit: Sequence[np.ndarray]) -> Seen:
-    """What rays met, of what `_hit` says of them."""
+    """What rays met, of what `first_hit` says of them."""
     scenery, (face, far, (u, v)) = world.scenery, hit
     missed, count = np.flatnonzero(face < 0), len(face)
     glow, shown = np.zeros((3, count), np.float32), np.zeros(count, np.float32)
@@ -256,7 +184,7 @@ def _seen(world: World, origin: np.ndarray, way: np.ndarray, hit: Sequence[np.nd
         shown[missed], past = through, np.flatnonzero(~through)
         glow[:, missed[past]] = next_room(scenery, world.white, begin.take(past, 1), towards.take(past, 1))
     lean = scenery.planes.normal.take(face, 1)
-    normal = _unit(lean[:3] + u * lean[3:6] + v * lean[6:])
+    normal = unit(lean[:3] + u * lean[3:6] + v * lean[6:])
     averted = np.flatnonzero(along(normal, way) > 0)  # seen from behind, or at a rim whose round normals look away
     a, b, c = (scenery.triangles[face[averted], corner].T for corner in range(3))
     flat = np.cross(b - a, c - a, axis=0)
@@ -277,7 +205,7 @@ def _see_through(world: World, way: np.ndarray, seen: Seen) -> None:
     way = way.take(sheer, 1)
     point, facing = seen.point.take(sheer, 1) + BEHIND * way, np.abs(along(way, seen.normal.take(sheer, 1)))
     around, through = outside(scenery, point, way)
-    behind = _hit(world, point, way)[0]
+    behind = first_hit(world, point, way)[0]
     open_ = (behind < 0) | (scenery.thin.take(behind) > 0)
     seen.glow[:, sheer] = scenery.lights.there(around) * np.where(open_, 1, np.float32(BAR))
     seen.shown[sheer] = SEEN_BY * through * facing**CLOSER
@@ -288,17 +216,10 @@ def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndar
     share of the sun that shines there; in fine pictures how soft light grows, see `slanted`."""
     out = np.zeros((world.rows, len(pixel)), np.float32)
     for here, part in seen.blocks():
-        part, shift = part._replace(point=part.point + BEFORE * part.normal), _shifts(world, pixel[here])
+        part, shift = part._replace(point=part.point + BEFORE * part.normal), shifts(world, pixel[here])
         for sample in range(samples):
             out[:, here] += _light(world, part, sample, shift)
     return out / np.float32(samples)
-
-
-def _shifts(world: World, pixel: np.ndarray) -> np.ndarray:
-    """(4, n) float32 what samples in some pixels are moved by."""
-    down, across = np.divmod(pixel, world.size)
-    moved = LATTICE[0][:, None] * across + LATTICE[1][:, None] * down + world.shift[:, None]
-    return (moved - np.floor(moved)).astype(np.float32)
 
 
 def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, often: int, seldom: int) -> np.ndarray:
@@ -346,9 +267,9 @@ def _light_of(world: World, seen: Seen, near: np.ndarray, edge: np.ndarray, ofte
     more = np.concatenate([_asked(world, seen.of(rest), rest, often // 2), raw], 1)
     flat[:, rest] = _pooled(seen.of(np.concatenate([rest, slim])), more)[:, : len(rest)]
     border = np.flatnonzero(met & mixed & inside)  # of the sun's light: sharper than two pixels
-    facing, shift = seen.normal.take(border, 1), _shifts(world, border)[:2]
+    facing, shift = seen.normal.take(border, 1), shifts(world, border)[:2]
     there = seen.point.take(border, 1) + BEFORE * facing
-    flat[4, border] = np.mean([_sunny(world, there, facing, _even(n, shift)) for n in range(often)], 0)
+    flat[4, border] = np.mean([_sunny(world, there, facing, even(n, shift)) for n in range(often)], 0)
     return smooth_light(light, normal, point, ((np.s_[:], RINGS[:1]),)).reshape(world.rows, -1)
 
 
@@ -410,11 +331,11 @@ def _colored(world: World, everything: Seen, falling: np.ndarray) -> np.ndarray:
 
 def _through(world: World, seen: Seen) -> np.ndarray:
     """(n,) in [0, 1] how much of a lamp's light comes through its shade: most at the bulb, little at its rim."""
-    back, bulbs = _unit(world.view.matrix[:3, 3:].astype("f4") - seen.point), world.scenery.lights.bulbs.mean(1)
+    back, bulbs = unit(world.view.matrix[:3, 3:].astype("f4") - seen.point), world.scenery.lights.bulbs.mean(1)
     share = np.clip(along(back, seen.normal), 0, 1)
     if len(bulbs):
         away = seen.point[:, None] - bulbs.T[:, :, None]
-        share *= along(_unit(away[:, along(away, away).argmin(0), np.arange(len(share))]), seen.normal) ** 2
+        share *= along(unit(away[:, along(away, away).argmin(0), np.arange(len(share))]), seen.normal) ** 2
     return np.asarray(RIM + (1 - RIM) * share)
 
 
@@ -426,30 +347,14 @@ def _breadth(world: World, seen: Seen) -> np.ndarray:
     return np.asarray(2 * world.view.half / world.size * (away / np.sqrt(slant)) ** (not world.view.orthographic))
 
 
-ABOVE = np.array([0.38, 0.84, 0.32], np.float32) / np.float32(0.9759)
 SUN_SPREAD = 0.10  # radius of the sun's disc at distance 1: soft shadows
 SUN_LIGHT = np.array([1.05, 0.99, 0.90], np.float32)
-# Of each pixel's shifts, a step to the right and one down: neighbours have different ones, so that smoothing sees all.
-LATTICE = np.array([(0.75487767, 0.81917251, 0.54970048, 0.73389190), (0.56984029, 0.67104361, 0.85667488, 0.62870672)])
-R2 = np.array([0.7548776662, 0.5698402910], np.float32)
-
-
-def embree(triangles: np.ndarray) -> Any:
-    """The tree of Embree of triangles (f, 3, 3), which rays are run through; raises RenderUnavailable without it."""
-    try:
-        from embreex import rtcore_scene
-        from embreex.mesh_construction import TriangleMesh
-    except ImportError as error:
-        raise RenderUnavailable(f'drawing needs Embree ({error}): pip install "echousd[render]"') from None
-    scene = rtcore_scene.EmbreeScene()
-    TriangleMesh(scene, np.ascontiguousarray(triangles, np.float32))
-    return scene
 
 
 def _light(world: World, seen: Seen, sample: int, shift: np.ndarray) -> np.ndarray:
     """(rows, n) what falls on points by one sample of the sun, a window and a lamp, and what is around: `_asked`."""
     out, at = np.zeros((world.rows, len(seen.face)), np.float32), (seen.point, seen.normal)
-    spots = [_even(sample, part) for part in (shift[:2], shift[2:])]
+    spots = [even(sample, part) for part in (shift[:2], shift[2:])]
     soft, out[4] = _direct(world, *at, *spots)
     share = world.scenery.thin.take(seen.face)
     if len(cloth := np.flatnonzero(share)):  # which light comes through
@@ -457,9 +362,9 @@ def _light(world: World, seen: Seen, sample: int, shift: np.ndarray) -> np.ndarr
         some, sun = _direct(world, point - THICK * normal, -normal, *spots)
         soft[:3, cloth] += share.take(cloth) * (some[:3] + sun * world.sun[:, None])
     for ray in range(AROUND):
-        soft += _gathered(world, *at, _even(sample * AROUND + ray, shift[2:])) / AROUND
+        soft += _gathered(world, *at, even(sample * AROUND + ray, shift[2:])) / AROUND
     out[:3] = soft[:3] + np.float32(DIM * max(world.scenery.lights.sky, 0.1)) * world.tint
-    out[3], out[5:] = _mirrored(world, seen, _even(sample, shift[:2])), soft[3:]
+    out[3], out[5:] = _mirrored(world, seen, even(sample, shift[:2])), soft[3:]
     return out
 
 
@@ -469,10 +374,10 @@ def _mirrored(world: World, seen: Seen, square: np.ndarray) -> np.ndarray:
     gloss = scenery.gloss.take(seen.face)
     out, some = np.zeros(len(gloss), np.float32), np.flatnonzero(gloss > GLOSSY)
     point, normal, gloss = (each.take(some, -1) for each in (seen.point, seen.normal, gloss))
-    toward = _unit(eye[:, 2] + 0 * point if world.view.orthographic else eye[:, 3] - point)
+    toward = unit(eye[:, 2] + 0 * point if world.view.orthographic else eye[:, 3] - point)
     facing, rough = np.clip(along(toward, normal), 0, 1), np.clip(1 - 2 * gloss, 0, 1)
-    way = _unit(2 * facing * normal - toward + BLUR * rough**2 * _on_sphere(square.take(some, 1)))
-    face, far, _ = _hit(world, point, way)
+    way = unit(2 * facing * normal - toward + BLUR * rough**2 * on_sphere(square.take(some, 1)))
+    face, far, _ = first_hit(world, point, way)
     rows = world.thrown.rows(point, way, far, scenery.planes.axis.take(face))
     within = LUMA @ world.thrown.radiance.take(rows, 1)
     bright = np.flatnonzero(scenery.planes.glows.take(face))
@@ -522,7 +427,7 @@ def _sunny(world: World, point: np.ndarray, normal: np.ndarray, spot: np.ndarray
     sun, inside = world.scenery.lights.sun, world.view.inside
     if inside and (sun is None or not len(world.scenery.panes)):
         return np.zeros(point.shape[1], np.float32)
-    towards = _unit(world.towards + np.float32(0.005 if inside else SUN_SPREAD) * _on_sphere(spot))
+    towards = unit(world.towards + np.float32(0.005 if inside else SUN_SPREAD) * on_sphere(spot))
     facing = np.clip(along(normal, towards), 0, None)
     return free(world.scene, point, towards, np.full(len(facing), 1e3, np.float32), facing > 0) * facing
 
@@ -530,8 +435,8 @@ def _sunny(world: World, point: np.ndarray, normal: np.ndarray, spot: np.ndarray
 def _gathered(world: World, point: np.ndarray, normal: np.ndarray, square: np.ndarray) -> np.ndarray:
     """(3, n) what surfaces throw on points by one ray each, which goes to `square` (2, n), see `CREVICE`; if fine as
     `slanted` has it."""
-    way = _unit(normal + _on_sphere(square))  # cosine-weighted
-    face, far, _ = _hit(world, point, way)
+    way = unit(normal + on_sphere(square))  # cosine-weighted
+    face, far, _ = first_hit(world, point, way)
     rows = world.thrown.rows(point, way, far, world.scenery.planes.axis.take(face))
     thrown, missed = world.thrown.radiance.take(rows, 1), np.flatnonzero(face < 0)
     thrown[:, missed] = 0 if world.view.inside else (0.92 + 0.35 * way[1].take(missed)) * SKY_LIGHT[:, None]
@@ -550,12 +455,12 @@ def _lit(world: World) -> World:
     met: list[tuple[np.ndarray, ...]] = []
     for count in PLACES:  # from the eye all around or, where it is outside, ahead, then from what it sees
         origin, square = point.take(np.arange(count) % point.shape[1], 1), rng.random((count, 2), np.float32).T
-        way = _unit(normal.take(np.arange(count) % normal.shape[1], 1) + _on_sphere(square))
+        way = unit(normal.take(np.arange(count) % normal.shape[1], 1) + on_sphere(square))
         if not (met or world.view.inside):
-            origin, way = _rays(
+            origin, way = camera_rays(
                 world, *(square * np.array([[world.size], [world.size / world.view.aspect]], np.float32))
             )
-        face, far, _ = _hit(world, origin, way)
+        face, far, _ = first_hit(world, origin, way)
         there = np.flatnonzero(face >= 0)
         origin, way, face, far = (each.take(there, -1) for each in (origin, way, face, far))
         normal = normals.take(face, 1)
@@ -580,42 +485,3 @@ def _lit(world: World) -> World:
     tinted = white**0.8 * (white @ LUMA) ** 0.2
     glow = np.interp(world.scenery.lights.day, (0, 1), GLOWING) * tinted / float((emissive @ LUMA).max(initial=1e-6))
     return world._replace(glow=glow.astype(np.float32), white=white)
-
-
-def way_to(point: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Directions (3, n) from points to places, and how far they are, (n,) metres."""
-    way = place - point
-    away = np.sqrt(np.maximum(along(way, way), 1e-12))
-    return way / away, away
-
-
-def free(scene: Any, point: np.ndarray, way: np.ndarray, away: np.ndarray, asked: np.ndarray) -> np.ndarray:
-    """(n,) float32: 1 if nothing stands within `away` metres in a direction (3, n), 0 elsewhere or if not `asked`."""
-    out, ask = np.zeros(len(away), np.float32), np.flatnonzero(asked & (away > 0.02))
-    out[asked & (away <= 0.02)] = 1.0
-    if len(ask):
-        far = np.ascontiguousarray(away[ask] - 0.01, np.float32)
-        out[ask] = scene.run(_rows(point.take(ask, 1)), _rows(way.take(ask, 1)), dists=far, query="OCCLUDED") != 0
-    return out
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.sqrt(np.maximum(along(vectors, vectors), 1e-18))
-
-
-def _even(number: int, shift: np.ndarray) -> np.ndarray:
-    """Point `number` of the R2 sequence, which fills the unit square evenly, moved by a shift (2, n) per pixel."""
-    moved = shift + (R2 * (number + 1) % 1.0)[:, None]
-    return moved - np.floor(moved)  # four times as fast as a remainder
-
-
-def _on_sphere(square: np.ndarray) -> np.ndarray:
-    """(3, n) points of the unit square (2, n), spread evenly over the unit sphere."""
-    height = 2 * square[0] - 1
-    radius, angle = np.sqrt(np.clip(1 - height**2, 0, 1)), np.float32(2 * np.pi) * square[1]
-    return np.stack([radius * np.cos(angle), height, radius * np.sin(angle)])
-
-
-def _rows(vectors: np.ndarray) -> np.ndarray:
-    """(n, 3) float32 of vectors (3, n), as Embree takes them: four times as fast as a copy of the transpose."""
-    return np.stack([*vectors], 1, dtype=np.float32, casting="same_kind")

@@ -1,7 +1,5 @@
 """The soft tops of beds, sofas and armchairs: how high they are, and where on them a thing lies and is clear."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
@@ -35,7 +33,7 @@ class Seat:
 
     @classmethod
     @lru_cache(maxsize=4)  # three rules ask about one bed
-    def of(cls, host: Standing) -> Seat | None:
+    def of(cls, host: Standing) -> "Seat | None":
         """The seat of an object, None where nothing of it looks like one."""
         corners = host.geometry.mesh.triangles
         normal = area_normals(corners)

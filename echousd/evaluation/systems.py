@@ -1,7 +1,5 @@
 """Whoever lays out rooms, by one protocol: asked the same tasks, each room drawn from a seed of its own."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -56,7 +54,7 @@ class System:
     finish: str = ""
 
     @classmethod
-    def parse(cls, text: str) -> System:
+    def parse(cls, text: str) -> "System":
         """From `BASE[+FINISH]`; raises ValueError for what there is not."""
         if text == "default":
             text = "network+search"

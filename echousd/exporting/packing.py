@@ -1,7 +1,5 @@
 """What a room may take along into an archive: its own images, nothing else of this machine, values that are written."""
 
-from __future__ import annotations
-
 import io
 import os
 import struct
@@ -42,7 +40,7 @@ class Reach:
     places: tuple[Path, ...]
 
     @classmethod
-    def of(cls, stage: Usd.Stage, search: Sequence[str | os.PathLike[str]] = ()) -> Reach:
+    def of(cls, stage: Usd.Stage, search: Sequence[str | os.PathLike[str]] = ()) -> "Reach":
         """The reach of a stage: of its root layer, of `search` and of OpenUSD's own search path variable."""
         root = file_of(stage.GetRootLayer().realPath).resolve()
         own = root if root.suffix == ".usdz" else root.parent

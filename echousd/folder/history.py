@@ -1,7 +1,5 @@
 """What a room was before each edit: the files that the edit replaced, archived; steps back and forth (no pxr here)."""
 
-from __future__ import annotations
-
 import io
 import json
 import os
@@ -142,7 +140,7 @@ def undone(folder: Path) -> list[str]:
     return [archive for archive, note in _numbered(folder) if isinstance(note, _Note)]
 
 
-def _numbered(folder: Path) -> Iterator[tuple[str, _Note | ValueError]]:
+def _numbered(folder: Path) -> "Iterator[tuple[str, _Note | ValueError]]":
     """Paths of the archives of edits that were taken back, by number, and what each says, or what is wrong with it."""
     found = [path for path in inside(folder, UNDONE, "a file of the room").glob("*.zip") if path.stem.isdecimal()]
     for archive in (f"{UNDONE}/{path.name}" for path in sorted(found, key=lambda path: int(path.stem))):

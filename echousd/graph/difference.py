@@ -1,7 +1,5 @@
 """The steps from one scene graph to another."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,7 +29,7 @@ class GraphDiff:
     reweighted: tuple[tuple[Relation, Relation], ...] = ()
 
     @classmethod
-    def between(cls, before: SceneGraph, after: SceneGraph) -> GraphDiff:
+    def between(cls, before: SceneGraph, after: SceneGraph) -> "GraphDiff":
         """The steps from `before` to `after`; another order of the same nodes or relations is no step."""
         old, new = {n.name: n for n in before.nodes}, {n.name: n for n in after.nodes}
         was, will = {r.triple: r for r in before.relations}, {r.triple: r for r in after.relations}

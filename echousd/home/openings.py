@@ -1,7 +1,5 @@
 """Doors, passages and windows of a plan: each once, with a leaf in one room, swinging free, clear of all others."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -140,7 +138,7 @@ class _Hole:
         """What must stay free on each of its sides."""
         return [shapely.Polygon(free_area(floor.corners, opening)) for floor, opening in self.sides]
 
-    def meets(self, other: _Hole) -> float:
+    def meets(self, other: "_Hole") -> float:
         """What speaks against two holes together: swings that cross, holes in one place."""
         out = 0.0
         for number, (floor, mine) in enumerate(self.sides):

@@ -147,8 +147,9 @@ def write_preview(root: Path, stage: Usd.Stage | None = None) -> Path | None:
 
     `stage`: of the root layer, where it is open.
     """
+    from echousd.draw.rays import RenderUnavailable
     from echousd.draw.rendering import render_stage
-    from echousd.draw.tracing import QUICK, RenderUnavailable
+    from echousd.draw.tracing import QUICK
 
     out = root.with_suffix(".png")
     try:

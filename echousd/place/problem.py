@@ -1,7 +1,5 @@
 """A problem of placing: what is fixed, what stands on what, on which wall each piece leans, who may overlap whom."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -52,11 +50,11 @@ class Problem:
     wall: np.ndarray
     behind: np.ndarray
 
-    def at(self, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> Problem:
+    def at(self, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> "Problem":
         """The same room with boxes of size and at position (n, 3), metres, and yaw (n,), radians."""
         return replace(self, plan=replace(self.plan, size=size, position=position, yaw=yaw))
 
-    def spread(self) -> Problem:
+    def spread(self) -> "Problem":
         """The problem whose pieces keep usual distances to walls where drawn ones are too alike, at those walls."""
         usual = kept_behind(self.categories, self.size, np.full(len(self.size), np.nan))
         walled = np.isin(np.arange(len(usual)), [one.subject for one in self.stated if not one.others])  # of walls

@@ -1,7 +1,5 @@
 """The geometry of one piece of furniture: parts with material slots, colliders, and where it all comes from."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -68,7 +66,7 @@ class Mass:
     inertia: np.ndarray  # (3,) float, moments about the principal axes, kg m²
     axes: np.ndarray  # (3, 3) float rotation, its columns are them
 
-    def seen(self, frame: np.ndarray) -> Mass:
+    def seen(self, frame: np.ndarray) -> "Mass":
         """The same in another frame, whose axes and unit `frame` (3, 3) turns to and scales by."""
         scale = float(np.cbrt(abs(np.linalg.det(frame))))
         return Mass(self.mass, frame @ self.centre, scale**2 * self.inertia, frame @ self.axes / scale)

@@ -1,7 +1,5 @@
 """The shell of a room: its floor, and walls with doors and windows, solid between mitred corners."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -42,7 +40,7 @@ class ShellPart:
     name: str  # of its prim
     label: str  # what it is, "" for a part of what is labelled
     pieces: tuple[ShellPiece, ...]  # its meshes
-    inner: tuple[ShellPart, ...] = ()  # parts that belong to it
+    inner: "tuple[ShellPart, ...]" = ()  # parts that belong to it
     joint: Joint | None = None  # how it moves against the part that it belongs to, None = not at all
 
 

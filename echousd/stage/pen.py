@@ -4,8 +4,6 @@ Properties are called as usda spells them: `uniform token purpose`, `rel materia
 `color3f inputs:diffuseColor.connect`. The layouts of a room are variants of a set: written here, and listed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
@@ -26,7 +24,7 @@ class Pen:
         self.layer, self.scope, self.into = layer, Sdf.Path(scope), into
 
     @classmethod
-    def blank(cls, default_prim: str, kind: str = ".usda", data: Mapping[str, Any] = NOTHING) -> Pen:
+    def blank(cls, default_prim: str, kind: str = ".usda", data: Mapping[str, Any] = NOTHING) -> "Pen":
         """A pen for a new layer of a kind of file, with customLayerData and the metadata that all our layers carry."""
         layer = Sdf.Layer.CreateAnonymous(kind)
         for name, value in (("upAxis", "Y"), ("metersPerUnit", 1.0), ("kilogramsPerUnit", 1.0)):
@@ -68,7 +66,7 @@ class Pen:
         """Bind a material, of whatever layer; three.js's parser would lose a `custom rel`."""
         self.over(path, {"rel material:binding": material}, ["MaterialBindingAPI"])
 
-    def variants(self, path: str, name: str, words: Iterable[str], chosen: str | None) -> dict[str, Pen]:
+    def variants(self, path: str, name: str, words: Iterable[str], chosen: str | None) -> "dict[str, Pen]":
         """A pen for each variant of a set on a prim; `chosen`: what is seen, None = another layer says it."""
         spec = self.over(path)
         made = spec.variantSets.get(name) or Sdf.VariantSetSpec(spec, name)

@@ -6,8 +6,8 @@ import numpy as np
 import shapely
 
 from echomodel.triangles import area_normals
+from echousd.draw.rays import RenderUnavailable, embree, free, way_to
 from echousd.draw.surfaces import Painted, Surfaces
-from echousd.draw.tracing import RenderUnavailable, embree, free, way_to
 from echousd.draw.views import view_matrix
 from echousd.texturing.atlas import Unwrapped, texel_faces
 from echousd.texturing.job import JobCamera

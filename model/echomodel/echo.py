@@ -1,7 +1,5 @@
 """EchoModel: the compact model behind two calls, boxes for a graph and shapes for its boxes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -50,7 +48,7 @@ class EchoModel:
         self.hash = hash
 
     @classmethod
-    def load(cls, path: str | Path | None = None, *, device: Any = "cpu") -> EchoModel:
+    def load(cls, path: str | Path | None = None, *, device: Any = "cpu") -> "EchoModel":
         """Load the weights that ship with the package, a weights file, a folder of such, or that of a training.
 
         Arguments:
@@ -70,7 +68,7 @@ class EchoModel:
         return cls(*load_weights(files, device))
 
     @cached_property
-    def in_torch(self) -> EchoModel:
+    def in_torch(self) -> "EchoModel":
         """The same weights as modules of torch, which shapes need."""
         return EchoModel.load() if self.device is None else self
 

@@ -1,7 +1,5 @@
 """A room as labelled boxes: the plain form in which rooms are generated, read, scored and converted (numpy only)."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterable, Sequence
@@ -83,7 +81,7 @@ class RoomBoxes:
         )  # fmt: skip
 
     @classmethod
-    def from_json(cls, raw: dict) -> RoomBoxes:
+    def from_json(cls, raw: dict) -> "RoomBoxes":
         """Read one entry of a rooms file; raises ValueError that names the field which is not as allowed."""
         items = raw.get("objects") if isinstance(raw, dict) else None
         if not isinstance(items, list) or not all(isinstance(one, dict) for one in items):

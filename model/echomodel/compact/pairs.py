@@ -4,8 +4,6 @@ the latent graph, whose nodes know their relations, before and after an edit (Ec
 In an echo every node hears the merged messages of its scene and updates itself (EchoScene Eq. 1, section 3.3).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -40,11 +38,11 @@ class Pairs:
     stated: Array
     scale: Array
 
-    def to(self, device: Any) -> Pairs:
+    def to(self, device: Any) -> "Pairs":
         """The same pairs as tensors on a device, or with None as arrays of numpy."""
         return Pairs(*(on_device(of, device) for of in (self.receiver, self.sender, self.stated, self.scale)))
 
-    def without(self, node_mask: Array, stated: Array) -> Pairs:
+    def without(self, node_mask: Array, stated: Array) -> "Pairs":
         """The pairs between the nodes where `node_mask` (N,) bool is true, with `stated` (P, 2R) instead of theirs."""
         keep = rows(node_mask[self.receiver] & node_mask[self.sender])
         return Pairs(self.receiver[keep], self.sender[keep], stated[keep], self.scale)

@@ -3,8 +3,6 @@
 Rooms are small: torch takes as long to be loaded as all of a bedroom takes to be made.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections import defaultdict
@@ -54,10 +52,10 @@ class Net:
         """What a network of its own kind does with these, else what `mapped` does."""
         return getattr(self, "forward", self.mapped)(*arguments, **named)
 
-    def __getitem__(self, number: int) -> Net:
+    def __getitem__(self, number: int) -> "Net":
         return vars(self)[str(number)]
 
-    def __iter__(self) -> Iterator[Net]:
+    def __iter__(self) -> "Iterator[Net]":
         return (self[number] for number in self.numbered)
 
     def mapped(self, x: np.ndarray) -> np.ndarray:

@@ -4,8 +4,6 @@ A set is one compressed file (`pack_rooms`), or a folder of such files `rooms-00
 is, written last. A file holds four tables, one entry per room, object, floor corner and opening, column by column.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import zipfile
@@ -50,7 +48,7 @@ MOST = 2**15  # such steps
 def build_rooms(
     directory: str | os.PathLike[str], count: int, seed: int, styles: int, progress: StepListener | None = None, *,
     halls: float = 0.0,
-) -> RoomSet:  # fmt: skip
+) -> "RoomSet":  # fmt: skip
     """Generate a set of rooms, shard by shard; the same bytes for the same seed, whenever interrupted.
 
     Arguments:

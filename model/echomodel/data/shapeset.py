@@ -5,8 +5,6 @@ entry per shape, then the compressed grids. Shape number `style * C + category` 
 category in that style, C being the number of categories; rooms name it `s{style}_{category}`.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re
@@ -70,7 +68,7 @@ def quantised(tsdf: np.ndarray) -> np.ndarray:
 
 def build_shapes(
     directory: str | os.PathLike[str], styles: int, seed: int, progress: StepListener | None = None
-) -> ShapeSet:
+) -> "ShapeSet":
     """Make all categories in `styles` styles, shard by shard; the same bytes for the same seed, whenever interrupted.
 
     Arguments:
@@ -99,7 +97,7 @@ def build_shapes(
     return finish_set(folder, plan, total)
 
 
-def finish_set(folder: Path, info: dict, count: int) -> ShapeSet:
+def finish_set(folder: Path, info: dict, count: int) -> "ShapeSet":
     """Write `shapes.json`, which makes the shards of a folder a set, and open it."""
     categories = [category.name for category in vocabulary().categories]
     grid = {"resolution": RESOLUTION, "truncation": TRUNCATION}

@@ -1,7 +1,5 @@
 """Intervals, paired tests and their power for figures that are sums over rooms."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -23,12 +21,12 @@ class Counts:
     whole: np.ndarray
 
     @classmethod
-    def of(cls, pairs: Sequence[Pair]) -> Counts:
+    def of(cls, pairs: Sequence[Pair]) -> "Counts":
         """From (part, whole) of each room."""
         part, whole = np.moveaxis(np.array(pairs, float).reshape(len(pairs), 2, -1), 1, 0)
         return cls(part, whole)
 
-    def at(self, rooms: np.ndarray) -> Counts:
+    def at(self, rooms: np.ndarray) -> "Counts":
         """Of some rooms alone, (n,) bool."""
         return Counts(self.part[rooms], self.whole[rooms])
 

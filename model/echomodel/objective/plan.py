@@ -1,7 +1,5 @@
 """What living rules look at: boxes with what their words say, walls, openings and who attends whom."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -37,7 +35,7 @@ class Found:
     measure: Array
     words: Array
 
-    def take(self, rows: Array) -> Found:
+    def take(self, rows: Array) -> "Found":
         """Some of the rows, by number or mask."""
         return Found(self.who[rows], self.other[rows], self.margin[rows], self.measure[rows], self.words[rows])
 
@@ -125,7 +123,7 @@ class Plan:
         """The library whose arrays these are: `numpy`, or `torch` where gradients are asked for."""
         return kit(self.size)
 
-    def at(self, position: Array, yaw: Array) -> Plan:
+    def at(self, position: Array, yaw: Array) -> "Plan":
         """The same boxes at position (N, 3) and yaw (N,): whom each attends and what carries it stays as it is here."""
         out = replace(self, position=position, yaw=yaw)
         vars(out).update({name: getattr(self, name) for name in OF_WORDS})
@@ -256,7 +254,7 @@ class Plan:
         return out
 
     @property
-    def first(self) -> Plan:
+    def first(self) -> "Plan":
         """The plan whose floors are these, and whose words are said of all copies of it."""
         return self
 

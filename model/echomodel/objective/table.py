@@ -6,8 +6,6 @@ In a conflict the kinds count in their order: relations, physics, living, compos
 explains a room asks this table and holds no distance of his own.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -65,7 +63,7 @@ class Term:
     weight: float = 1.0
 
     @property
-    def eased(self) -> Term:
+    def eased(self) -> "Term":
         """The same term, as it is asked of a room where nothing is wrong any longer."""
         return replace(self, slack=max(self.slack, self.ease))
 

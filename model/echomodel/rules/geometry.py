@@ -1,7 +1,5 @@
 """Geometry of pairs of boxes, many at once: extents, corners, footprints and their overlap."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -34,7 +32,7 @@ class Spread:
     yaw: Array
 
     @classmethod
-    def of(cls, boxes: BoxesLike) -> Spread:
+    def of(cls, boxes: BoxesLike) -> "Spread":
         """Boxes as arrays of numpy, float64."""
         return cls(*(np.asarray(of, np.float64) for of in (boxes.size, boxes.position, boxes.yaw)))
 

@@ -5,8 +5,6 @@ What is wrong with rooms that the network draws itself is led back through the l
 person who looks at a draw counts what is wrong in it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import ClassVar
@@ -60,7 +58,7 @@ class LayoutStage:
         self.trained = tuple(part for part in self.saved if part not in recipe.frozen)
 
     @classmethod
-    def open(cls, start: Start) -> LayoutStage:
+    def open(cls, start: Start) -> "LayoutStage":
         """The stage of a recipe; new layouts are normalised by its rooms, new categories by those of them."""
         rooms, held = (start.rooms(held=held) for held in (False, True))
         names, known = start.model.config.categories, start.model.statistics

@@ -1,7 +1,5 @@
 """The parts stage: denoising descriptions of all furniture of a scene, joined by their echoes (EchoScene 3.4)."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -74,7 +72,7 @@ class PartsStage:
         self.sizes = torch.tensor(np.array([[sample_size(w, rng) for _ in range(200)] for w in words])).float()
 
     @classmethod
-    def open(cls, start: Start) -> PartsStage:
+    def open(cls, start: Start) -> "PartsStage":
         """The stage of a recipe."""
         return cls(start.rooms(held=False), start.recipe.nodes)
 

@@ -1,7 +1,5 @@
 """Rooms packed into tensors for training: relations as bits per ordered pair, drawn, mirrored and thinned per batch."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
@@ -57,7 +55,7 @@ class PackedRooms:
         return len(self.count)
 
     @classmethod
-    def build(cls, rooms: Sequence[RoomBoxes], rules: int) -> PackedRooms:
+    def build(cls, rooms: Sequence[RoomBoxes], rules: int) -> "PackedRooms":
         """Pack rooms whose `relations` are filled in; `rules` says by which rule set they were labelled."""
         graphs = [room.graph() for room in rooms]
         boxes = Boxes.cat([room.boxes() for room in rooms])
@@ -71,7 +69,7 @@ class PackedRooms:
         )  # fmt: skip
 
     @classmethod
-    def from_set(cls, rooms: RoomSet, rules: Sequence[str], *, held: bool) -> PackedRooms:
+    def from_set(cls, rooms: RoomSet, rules: Sequence[str], *, held: bool) -> "PackedRooms":
         """One part of a room set, every room once per rule set; the last twentieth where nothing is held out."""
         mask = rooms.held_out if rooms.held_out.any() else np.arange(len(rooms)) >= len(rooms) * 19 // 20
         numbers = (mask == held).nonzero()[0]
@@ -112,7 +110,7 @@ class LayoutBatch:
     touched: Tensor
     allowed: Tensor
 
-    def to(self, device: torch.device | str) -> LayoutBatch:
+    def to(self, device: torch.device | str) -> "LayoutBatch":
         """The same batch on another device."""
         return LayoutBatch(**{f.name: vars(self)[f.name].to(device) for f in fields(self)})
 

@@ -14,10 +14,11 @@ from echousd.draw.drawables import read_drawables
 from echousd.draw.from_files import render, render_turn
 from echousd.draw.indoors import LUMA, Bounced
 from echousd.draw.outside import turning_views, without_near_walls
+from echousd.draw.rays import Seen, World, embree
 from echousd.draw.rendering import render_stage
 from echousd.draw.scenery import BACKGROUND, class_color, next_room, outside, read_scenery
 from echousd.draw.smoothing import RINGS, smooth_light
-from echousd.draw.tracing import Seen, World, _light, embree, trace
+from echousd.draw.tracing import _light, trace
 from echousd.draw.views import hero_view, stage_views
 from echousd.options import RoomOptions
 
