@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from string import ascii_lowercase
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
-from echomodel.dressing import KINDS, usual_size
+from echomodel.dressing import KINDS, usual
 from echomodel.late import Late
 from echomodel.openings import Opening, inward_normal
 from echomodel.vocabulary import vocabulary
 from echousd.draw.sight import Furniture
 from echousd.dressing import floors, tabletops, upholstery, walls
 from echousd.dressing.floors import CORNER_AIR, GREEN
-from echousd.dressing.setting import Setting, Thing, geometry_of, standing
+from echousd.dressing.setting import Recipe, Setting, Thing, standing
 from echousd.dressing.stories import guessed, story
 from echousd.dressing.walls import EYE, WIDEST, arranged, free_walls, hung_at
 from echousd.naming import free_name
 from echousd.room import RoomData
-from echousd.shapes.geometry import Geometry
 
 if TYPE_CHECKING:
     from echousd.graph.dressing import DressingGraph
@@ -37,15 +37,10 @@ class Dressing:
 
     layouts: tuple[Mapping[str, Thing], ...]  # for every layout of the room, name of a thing -> the thing
     assets: Mapping[str, str]  # name of a thing -> name of its asset; one name is one asset in all layouts
-    geometry: Mapping[str, Geometry]  # name of an asset -> its geometry
+    recipes: Mapping[str, Recipe]  # name of an asset -> what it is
     bare: frozenset[str] = frozenset()  # names of the windows that have curtains in no layout
     cuts: tuple[Opening, ...] = ()  # of walls, for what is sunk into them
     graphs: tuple[DressingGraph, ...] = ()  # the things of every layout as nodes, none without `dress_graph`
-
-    @property
-    def kinds(self) -> dict[str, str]:
-        """Name of an asset -> its kind."""
-        return {self.assets[name]: t.kind for things in self.layouts for name, t in things.items()}
 
     @property
     def hung(self) -> Furniture:
@@ -62,9 +57,8 @@ def dress(room: RoomData) -> Dressing:
     layouts: list[dict[str, Thing]] = []
     graphs: list[DressingGraph] = []
     assets: dict[str, str] = {}
-    geometry: dict[str, Geometry] = {}
-    known: dict[tuple, str] = {}
-    kinds: dict[str, tuple] = {}
+    known: dict[Recipe, str] = {}
+    kinds: dict[str, Recipe] = {}
     taken = {*room.names, *room.assets.values()}
     bare = {o.name for o in room.graph.room.openings if o.kind == "window"}
     for number in range(len(room.layouts)):
@@ -74,10 +68,10 @@ def dress(room: RoomData) -> Dressing:
         if room.options.dress == "none":  # rails hang where curtains would
             continue
         for found in setting.placed:
-            key = (found.kind, *np.round(found.size, 4).tolist(), found.variant, found.lie)
-            if key not in known:
-                known[key] = free_name(f"small_{found.kind}", taken | set(geometry))
-                geometry[known[key]] = geometry_of(found.kind, tuple(found.size.tolist()), *key[-2:])
+            if (key := found.recipe) not in known:
+                form = ascii_lowercase[found.variant : found.variant + 1]  # none of those in sizes of their own
+                word = f"small_{found.kind}_{form}".rstrip("_")
+                known[key] = free_name(word, taken | set(known.values()))
             word = "_".join([*found.on.split(), KINDS[found.kind].name])  # which stays where other things come or go
             name = free_name(word, taken | set(named))
             while kinds.setdefault(name, key) != key:  # a name has one asset in all layouts
@@ -86,7 +80,8 @@ def dress(room: RoomData) -> Dressing:
         layouts.append(named)
         if room.options.dress_graph:
             graphs.append(graph_of(setting, named))
-    return Dressing(tuple(layouts), assets, geometry, frozenset(bare), tuple(setting.cuts), tuple(graphs))
+    recipes = {asset: recipe for recipe, asset in known.items()}
+    return Dressing(tuple(layouts), assets, recipes, frozenset(bare), tuple(setting.cuts), tuple(graphs))
 
 
 def dressed(room: RoomData, layout: int = 0) -> Setting:
@@ -126,9 +121,9 @@ def bare_walls(setting: Setting) -> None:
         return
     for length, middle, wall in free_walls(setting):
         rng = setting.rng(f"wall {wall.edge}", f"bare {middle:.1f}")
-        kind, variant = str(rng.choice(DECOR)), int(rng.integers(1 << 30))
+        kind = str(rng.choice(DECOR))
         if length < SHORT and setting.resident != "child" and rng.random() < OTHER:
-            size = usual_size(kind, rng)
+            size, variant = usual(kind, rng)
             one = hung_at(setting, wall, middle, kind, size, EYE - float(size[1]) / 2, variant)
             if one and kind not in {thing.kind for thing in setting.placed}:
                 setting.placed.append(one)
@@ -151,7 +146,7 @@ def bare_corners(setting: Setting) -> None:
             return
         rng = setting.rng(f"corner {number}", "bare")
         kind = "floor_plant" if green < GREEN else "floor_vase"
-        size, variant = usual_size(kind, rng), int(rng.integers(1 << 30))
+        size, variant = usual(kind, rng)
         middles = [setting.floor[number] + (inside[0] + inside[1]) * (float(size[0]) / 2 + off) for off in (0.1, 0.2)]
         turn = float(rng.uniform(-3, 3))
         things = (Thing(kind, size, np.array([x, 0.0, z]), turn, "", variant) for x, z in middles)

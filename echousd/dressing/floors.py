@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from echomodel.boxes2d import seen, turned
-from echomodel.dressing import KINDS, names_of, usual_size
+from echomodel.dressing import KINDS, names_of, usual
 from echomodel.openings import hinge_point, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, around, rectangle
 from echousd.dressing.stories import Wish
@@ -136,15 +136,13 @@ def by_doors(setting: Setting) -> None:
         rng = setting.rng(door.name, "shoes")
         if rng.random() > SHOES:  # of rooms, not of doors
             return
-        size = usual_size("shoes", rng)
+        size, variant = usual("shoes", rng)
         hinge, closed = hinge_point(setting.floor, door)
         inside = inward_normal(setting.floor, door.edge)
         yaw = float(np.arctan2(-inside[0], -inside[1])) + float(rng.uniform(-0.15, 0.15))
         along = (door.width + 0.3, door.width + 0.45, door.width + 0.65, -0.3, -0.5)
         middles = [hinge + closed * share + inside * (size[2] / 2 + 0.05) for share in along]
-        pairs = (
-            Thing("shoes", size, np.array([x, 0.0, z]), yaw, variant=int(rng.integers(1 << 30))) for x, z in middles
-        )
+        pairs = (Thing("shoes", size, np.array([x, 0.0, z]), yaw, variant=variant) for x, z in middles)
         if setting.put_first(pairs, margin=0.03):
             return
 
@@ -162,7 +160,7 @@ def clusters(setting: Setting) -> None:
             if first is None:
                 continue
             for kind in wish.beside:
-                size, turn, variant = usual_size(kind, rng), float(rng.uniform(-3, 3)), int(rng.integers(1 << 30))
+                (size, variant), turn = usual(kind, rng), float(rng.uniform(-3, 3))
                 places = first.position + np.insert(1.15 * around(first, size, rng), 1, 0.0, axis=1)
                 setting.put_first((Thing(kind, size, place, turn, "", variant) for place in places), margin=0.02)
             break
@@ -170,8 +168,8 @@ def clusters(setting: Setting) -> None:
 
 def _by(host: Standing, wish: Wish, rng: np.random.Generator) -> list[Thing]:
     """A wished thing at each of its places beside furniture."""
-    kind, variant = str(rng.choice(wish.of)), int(rng.integers(1 << 30))
-    size, lean = usual_size(kind, rng), float(rng.uniform(-3, 3) if wish.turn == "any" else rng.uniform(-0.2, 0.2))
+    size, variant = usual(kind := str(rng.choice(wish.of)), rng)
+    lean = float(rng.uniform(-3, 3) if wish.turn == "any" else rng.uniform(-0.2, 0.2))
     out = []
     for x, z, dx, dz in wish.at:
         place = host.on_floor(x * host.size[0] / 2 + dx, z * host.size[2] / 2 + dz)

@@ -21,6 +21,7 @@ from echousd.shapes.joinery import part_of, within_budget
 from echousd.shapes.matter import weighed
 
 ORIGIN = Origin("dressing")
+Recipe = tuple[str, tuple[float, ...], int, tuple[float, ...]]  # kind, extents, variant and `lie` of a `Thing`
 SKIN = 1e-4  # metres that count as nothing
 EDGE = 0.01  # metres that a small thing keeps from the edge of what it stands on
 APART = 0.008  # metres of air between a small thing and everything else
@@ -36,7 +37,7 @@ class Thing:
     position: np.ndarray  # (3,) centre of its bottom, room frame
     yaw: float  # radians about +Y
     on: str = ""  # the object that it belongs to, "" for floor and walls
-    variant: int = 0  # seed of its program; things of one kind, size and variant share an asset
+    variant: int = 0  # seed of its program
     count: int = 1  # how many things a person would count
     lie: tuple[float, ...] = ()  # of cloth: how far below its top what it lies on is, in a grid, metres
 
@@ -44,6 +45,11 @@ class Thing:
     def footprint(self) -> shapely.Polygon:
         """Its box in plan."""
         return rectangle(self.position[[0, 2]], self.size[[0, 2]], self.yaw)
+
+    @property
+    def recipe(self) -> Recipe:
+        """What its form follows from; things of one recipe share an asset."""
+        return self.kind, tuple(np.round(self.size, 4).tolist()), self.variant, self.lie
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,7 +238,7 @@ def _section(thing: Standing, number: int, low: float, high: float) -> shapely.G
 
 
 @lru_cache(maxsize=100)  # a room that is edited keeps most of its things
-def geometry_of(kind: str, size: tuple[float, float, float], variant: int, lie: tuple[float, ...] = ()) -> Geometry:
+def geometry_of(kind: str, size: tuple[float, ...], variant: int, lie: tuple[float, ...] = ()) -> Geometry:
     """The geometry of a thing, with one hull to bump into that stands; a niche holds things, and has one a board."""
     solids = solids_of(kind, np.array(size), np.random.default_rng(variant), **({"lie": lie} if lie else {}))
     pieces = within_budget(solids, np.array(size), KINDS[kind].faces)

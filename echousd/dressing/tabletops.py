@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 
 from echomodel.arrays import once
-from echomodel.dressing import KINDS, usual_size
+from echomodel.dressing import KINDS, usual
 from echomodel.late import Late
 from echomodel.triangles import area_normals, spans_of
 from echousd.dressing.setting import APART, EDGE, Setting, Standing, Thing, around, rectangle
@@ -60,7 +60,8 @@ class Surface:
         `beside`: a thing on the level around which it is put instead.
         """
         rng = setting.rng(self.host.name, kind, word, f"{self.y:.2f}")
-        size = usual_size(kind, rng) if size is None else size
+        if size is None:
+            size, variant = usual(kind, rng)
         if size[1] > self.air or not self.area.area > 0:
             return None
         middle, half = self.span
@@ -201,7 +202,7 @@ def stocked(setting: Setting, host: Standing, surface: Surface) -> None:
             size = np.round([length * share, tall, min(deep - 0.03, rng.uniform(0.15, 0.2))], 3)
             if size[0] < 0.1 or tall < 0.14 or size[2] < 0.1:
                 break
-            at = [(x, 0.9) for x in (-0.99 * side, 0.99 * side, -0.5 * side, 0.5 * side, 0.0)]
+            at = [(x * side, z) for z in (0.9, 0.0) for x in (-0.99, 0.99, -0.5, 0.5, 0.0)]
             row = surface.put(setting, "book_row", at, size=size, count=max(1, int(size[0] / 0.03)), word="row")
             if row:
                 if setting.full:

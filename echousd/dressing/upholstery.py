@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from echomodel.dressing import names_of, usual_size
+from echomodel.dressing import names_of, usual
 from echomodel.dressing.textiles import LEAN
 from echomodel.late import lates
 from echousd.dressing.setting import Setting
@@ -25,7 +25,7 @@ def designs(setting: Setting, rng: np.random.Generator) -> tuple[Design, Design]
     """Two cushions that go together: one plain, one of a print, either of them first; the second often a long one."""
     form = str(rng.choice(("square", "lumbar")))
     kinds = [str(rng.choice(names_of("cushion", form, setting.resident, setting.style) or ["cushion"])), "cushion"]
-    made = [(kind, usual_size(kind, rng), int(rng.integers(1 << 30))) for kind in kinds]
+    made = [(kind, *usual(kind, rng)) for kind in kinds]
     return (made[0], made[1]) if form == "square" and rng.random() < 0.5 else (made[1], made[0])
 
 
@@ -53,8 +53,8 @@ def on_covers(setting: Setting) -> None:
             rng = setting.rng(host.name, "cover", str(number))
             if seat is None or not setting.has(wish.share, rng):
                 continue
-            kind, variant, turn = str(rng.choice(wish.of)), int(rng.integers(1 << 30)), float(rng.uniform(-0.5, 0.5))
-            size = usual_size(kind, rng)
+            kind, turn = str(rng.choice(wish.of)), float(rng.uniform(-0.5, 0.5))
+            size, variant = usual(kind, rng)
             for at in wish.at:
                 x, z = (0.0, 0.0) if at == "pillows" else np.array(at) * host.size[[0, 2]] / 2
                 spot = seat.before_pillows(x, size) if at == "pillows" else np.array([x, seat.level, z])

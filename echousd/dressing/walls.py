@@ -8,7 +8,7 @@ from itertools import islice, product
 import numpy as np
 
 from echomodel.boxes2d import axes
-from echomodel.dressing import KINDS, printed, usual_size
+from echomodel.dressing import KINDS, printed, usual
 from echomodel.dressing import thing as solids_of
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, rectangle, standing
@@ -158,7 +158,7 @@ def pictures(setting: Setting) -> None:
         rng, least = setting.rng(host.name, "picture"), host.top + OVER
         kind, one = mirror_over(host, rng), None
         if kind:
-            size, variant = usual_size(kind, rng), int(rng.integers(1 << 30))
+            size, variant = usual(kind, rng)
             one = hung_at(setting, wall, along, kind, size, max(least, LOWEST), variant, host.name)
         if one is not None:
             setting.placed.append(one)
@@ -313,8 +313,7 @@ def shelves(setting: Setting) -> None:
     kinds = [
         kind for kind in (setting.style.shelves if setting.style else WALL_SHELVES) if setting.own or kind != "niche"
     ]
-    kind, variant = str(rng.choice(kinds)), int(rng.integers(1 << 30))
-    size = usual_size(kind, rng)
+    size, variant = usual(kind := str(rng.choice(kinds)), rng)
     low, step = max(SHELF - float(size[1]), LOW), float(size[1]) + HIGHER
     one = Thing(kind, size, np.zeros(3), 0.0, "", variant)
     for length, middle, wall in free_walls(setting):
@@ -362,7 +361,7 @@ def hung_up(setting: Setting) -> None:
         if not kind or not (abs(corners[:, 1] / float(host.size[1]) - 0.5) < 0.49).any():
             continue
         rng = setting.rng(host.name, kind)
-        size = usual_size(kind, rng)
+        size, _ = usual(kind, rng)
         w, h, d = (float(side) for side in host.size)
         if kind == "hung_coats":
             pegs = (corners[:, 1] > 0.6 * h) & (corners[:, 2] > 0.05 - d / 2) & (abs(corners[:, 0]) < w / 2 - 0.06)
@@ -396,7 +395,8 @@ def tall_mirror(setting: Setting) -> None:
 
 def _new(kind: str, rng: np.random.Generator) -> Thing:
     """A thing of a usual size that has no place yet."""
-    return Thing(kind, usual_size(kind, rng), np.zeros(3), 0.0, "", int(rng.integers(1 << 30)))
+    size, variant = usual(kind, rng)
+    return Thing(kind, size, np.zeros(3), 0.0, "", variant)
 
 
 def _hung(setting: Setting, one: Thing, spots: Iterable[tuple[Wall, float]], low: float, **free: float) -> Thing | None:

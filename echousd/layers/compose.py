@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,10 +17,11 @@ from echomodel.dressing import KINDS
 from echomodel.late import Late
 from echousd.draw.sight import Furniture
 from echousd.dressing.dress import Dressing, dress
-from echousd.dressing.setting import Thing
+from echousd.dressing.setting import Recipe, Thing, geometry_of
 from echousd.layers import assets, cameras, lights, materials, physics, structure
 from echousd.layers.cameras import room_points
 from echousd.naming import free_name
+from echousd.options import Look
 from echousd.room import RoomData
 from echousd.shapes import looks
 from echousd.shapes.geometry import LICENCE, Geometry, Part
@@ -40,6 +42,8 @@ attribution, carried_files, placed_files = (Late(f"echousd.layers.placed:{name}"
 write_nodes, thumbnails = Late("echousd.dressing.nodes:write_nodes"), Late("echousd.draw.from_files:thumbnails")
 FILE = "ATTRIBUTION.md"
 OTHERS = "room_others"  # what the names of a room's second materials begin with
+ASSETS = {"atlas", "meters_per_unit", "up_axis", "room_path"}  # options that the files of an asset depend on
+GENERATOR = f"echousd {echousd.__version__}"
 LAYERS = ("dressing", "materials", "physics", "layout", "graph", "geometry", "shell")  # strongest first
 
 
@@ -67,10 +71,8 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     if theirs := {name: origin for name, origin in origins.items() if origin.asset}:  # models of other people
         files[FILE] = attribution(room.name, theirs).encode()
     dressing = dress(room)
-    small = {
-        name: _written(room, name, KINDS[dressing.kinds[name]].name, ROOM_STYLE, geometry)
-        for name, geometry in dressing.geometry.items()
-    }
+    asked = Look(**room.options.model_dump(include=ASSETS))
+    small = {name: _small(asked, name, recipe) for name, recipe in dressing.recipes.items()}
     for asset in small.values():
         files.update(asset.files)
     if room.options.thumbnails:
@@ -99,18 +101,18 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
         if shelf is not None:
             shelf.redirect(layer)
         path = layer_file(name, crate=room.options.crate)
-        files[path] = _bytes(room, layer, path)
+        files[path] = _bytes(room.options, layer, path)
     root = root_layer(room, dressing.hung, [part.extent for part in built if part.label == "wall"])
     if shelf is not None:
         shelf.redirect(root, above=".")
-    files[f"{room.name}.usda"] = _bytes(room, root, ".usda")
+    files[f"{room.name}.usda"] = _bytes(room.options, root, ".usda")
     return files
 
 
 def layer_data(room: RoomData, name: str) -> dict[str, Any]:
     """The customLayerData of a layer: who made it, from what, and under which licence."""
     return {
-        "asset_name": name, "generator": f"echousd {echousd.__version__}", "seed": room.provenance.seed,
+        "asset_name": name, "generator": GENERATOR, "seed": room.provenance.seed,
         "model": room.provenance.model, "asset_license": LICENCE,
     }  # fmt: skip
 
@@ -265,27 +267,33 @@ def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Pa
         assert geometry.original is not None
         if name in room.carried:
             return Asset(name, {}, carried_files(name, geometry.original, room.carried[name], folder))
-        data = _asset_data(room, name, geometry)
+        data = _asset_data(name, geometry)
         word = word_of(room.graph.node(user))
         return Asset(name, {}, placed_files(name, word, geometry, data, folder, room.options))
     if name in room.carried:
         carried = {piece_path("", name, part.name, part.body): tuple(part.slots) for part in geometry.parts}
         return Asset(name, carried, room.carried[name])
-    return _written(room, name, word_of(room.graph.node(user)), room.styles[user], geometry)
+    return _written(room.options, name, word_of(room.graph.node(user)), room.styles[user], geometry)
 
 
-def _written(room: RoomData, name: str, category: str, style: str, geometry: Geometry) -> Asset:
-    forms = _forms(name, geometry.parts, atlas=room.options.atlas)
+@lru_cache(maxsize=1024)  # of some 25 kB each
+def _small(look: Look, name: str, recipe: Recipe) -> Asset:
+    """A small thing, of which rooms have many; `look`: as `ASSETS` says."""
+    return _written(look, name, KINDS[recipe[0]].name, ROOM_STYLE, geometry_of(*recipe))
+
+
+def _written(look: Look, name: str, category: str, style: str, geometry: Geometry) -> Asset:
+    forms = _forms(name, geometry.parts, atlas=look.atlas)
     slots = {part: tuple(form.groups) for part, form in forms.items()}
     extents = np.stack([form.extent for form in forms.values()])
     extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])
-    data = _asset_data(room, name, geometry)
+    data = _asset_data(name, geometry)
     payload = assets.geometry_layer(name, forms, geometry, data, style)
     layer = assets.component_layer(name, category, extent, geometry, data)
     coarse = _forms(name, geometry.coarse) if geometry.coarse else {}
-    low = {asset_file(name, "low"): _bytes(room, assets.coarse_layer(name, coarse, data), ".usdc")} if coarse else {}
+    low = {asset_file(name, "low"): _bytes(look, assets.coarse_layer(name, coarse, data), ".usdc")} if coarse else {}
     files = {
-        **low, asset_file(name, "geo"): _bytes(room, payload, ".usdc"), asset_file(name): _bytes(room, layer, ".usda"),
+        **low, asset_file(name, "geo"): _bytes(look, payload, ".usdc"), asset_file(name): _bytes(look, layer, ".usda"),
     }  # fmt: skip
     return Asset(name, slots, files)
 
@@ -296,18 +304,15 @@ def _forms(name: str, parts: Sequence[Part], *, atlas: bool = False) -> dict[str
     return {piece_path("", name, part.name, part.body): form for part, form in zip(parts, made, strict=True)}
 
 
-def _bytes(room: RoomData, layer: Sdf.Layer, path: str) -> bytes:
+def _bytes(look: Look, layer: Sdf.Layer, path: str) -> bytes:
     """A layer of the room as it lies on disk, in the conventions that are asked for; `path` ends as its file does."""
-    return layer_bytes(assets.as_asked(layer, room.options), path[-5:])
+    return layer_bytes(assets.as_asked(layer, look), path[-5:])
 
 
-def _asset_data(room: RoomData, name: str, geometry: Geometry) -> dict[str, Any]:
+def _asset_data(name: str, geometry: Geometry) -> dict[str, Any]:
     """The customLayerData of an asset's layers."""
-    data = {key: value for key, value in layer_data(room, name).items() if key not in ("seed", "model")}
-    data["asset_license"] = geometry.origin.licence
-    if geometry.origin.credit:
-        data["asset_credit"] = geometry.origin.credit
-    return data
+    credit = {"asset_credit": geometry.origin.credit} if geometry.origin.credit else {}
+    return {"asset_name": name, "generator": GENERATOR, "asset_license": geometry.origin.licence, **credit}
 
 
 def _slugs(room: RoomData) -> dict[str, str]:

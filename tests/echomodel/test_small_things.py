@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from echomodel.dressing import KINDS, thing, usual_size
+from echomodel.dressing import FORMS, KINDS, thing, usual
 from echomodel.dressing.books import book_size
 from echomodel.furniture.solids import pieces_of
 
@@ -13,13 +13,24 @@ from echomodel.furniture.solids import pieces_of
 @pytest.mark.parametrize("seed", [0, 3])
 def test_closed_solids_that_fill_their_size(kind, seed):
     rng = np.random.default_rng(seed)
-    size = usual_size(kind, rng)
+    size, _ = usual(kind, rng)
     pieces = pieces_of(thing(kind, size, rng), size, detail=seed)
     for piece in pieces:
         assert trimesh.Trimesh(piece.vertices, piece.faces, process=False).is_volume
     points = np.concatenate([piece.vertices for piece in pieces])
     assert np.ptp(points, axis=0) == pytest.approx(size, abs=1e-6)
     assert points[:, 1].min() == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["vase", "keyboard"])
+def test_forms_of_usual_size_are_few_and_each_has_a_size(kind):
+    rng = np.random.default_rng(2)
+    drawn = [usual(kind, rng) for _ in range(400)]
+    sizes = {form: {tuple(size.tolist()) for size, own in drawn if own == form} for _, form in drawn}
+    assert sorted(sizes) == list(range(FORMS))
+    assert all(len(found) == 1 for found in sizes.values())
+    row = KINDS[kind]
+    assert all((size >= row.low).all() and (size <= row.high).all() for size, _ in drawn)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -34,7 +45,7 @@ def test_all_solids_of_a_thing_fit_its_triangles(kind, edge):
 @pytest.mark.parametrize("kind", KINDS)
 def test_programs_draw_in_about_the_size_that_was_asked_for(kind):
     rng = np.random.default_rng(1)
-    size = usual_size(kind, rng)
+    size, _ = usual(kind, rng)
     points = np.concatenate([piece.vertices for piece in pieces_of(thing(kind, size, rng))])
     assert np.ptp(points, axis=0) == pytest.approx(size, rel=0.35), "stretched by a third"
 

@@ -104,6 +104,7 @@ def _solid(row: Row, size: Size, material: str) -> Solid:
 
 
 KINDS: dict[str, Kind] = _kinds()
+FORMS = 12  # of a kind: rooms share them, and hardly any has two that are alike
 
 
 def _category(name: str) -> Kind:
@@ -116,10 +117,11 @@ def _category(name: str) -> Kind:
 SMALL: dict[str, Kind] = {name: _category(name) for name in dict.fromkeys(kind.name for kind in KINDS.values())}
 
 
-def usual_size(kind: str, rng: np.random.Generator) -> np.ndarray:
-    """(3,) float, metres: extents of one such thing."""
+def usual(kind: str, rng: np.random.Generator) -> tuple[np.ndarray, int]:
+    """Extents (3,) float, metres, and the seed of the program of one of a kind's `FORMS` of usual size."""
     low, high = np.array(KINDS[kind].low), np.array(KINDS[kind].high)
-    return np.round(low + (high - low) * rng.random(), 4)
+    form = int(rng.random() * FORMS)
+    return np.round(low + (high - low) * (form + 0.5) / FORMS, 4), form
 
 
 def thing(kind: str, size: np.ndarray, rng: np.random.Generator, **form: tuple[float, ...]) -> list[Solid]:

@@ -22,7 +22,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.checks import check
 from echousd.dressing import floors, soft_tops, tabletops, upholstery
 from echousd.dressing.dress import RULES, TALL, Dressing, dress, dressed, setting_of
-from echousd.dressing.setting import Setting, Thing, meets, standing
+from echousd.dressing.setting import Setting, Thing, geometry_of, meets, standing
 from echousd.dressing.soft_tops import STEP, Seat
 from echousd.dressing.tabletops import surfaces
 from echousd.dressing.walls import BLINDS, CURTAINS, RADIATORS, curtains, radiators, sockets
@@ -249,7 +249,7 @@ def test_full_rooms_are_full_and_clean(name, least, tmp_path):
     things = dressed(room).placed
     assert len(things) >= least
     assert len({thing.kind for thing in things}) >= 15
-    assert len(dress(room).geometry) < 50  # single books share their assets
+    assert len(dress(room).recipes) < 50  # single books share their assets
     setting = setting_of(room)
     upright = [t for t in things if not KINDS[t.kind].lies and KINDS[t.kind].name not in ("cushion", "folded_blanket")]
     for number, one in enumerate(upright):
@@ -565,7 +565,7 @@ def test_niches_are_cut_into_walls_and_hold_what_stands_in_them(tmp_path):
     for one in inside:
         (niche,) = (n for n in niches.values() if np.abs(n.position - one.position)[[0, 2]].max() < 0.5)
         assert niche.position[1] < one.position[1] < one.position[1] + one.size[1] < niche.position[1] + niche.size[1]
-        hulls = dressing.geometry[next(a for a, kind in dressing.kinds.items() if kind == "niche")].colliders
+        hulls = geometry_of(*next(recipe for recipe in dressing.recipes.values() if recipe[0] == "niche")).colliders
         middle = turned((one.position - niche.position)[None, ::2], -niche.yaw)
         local = np.array([*middle[0], one.position[1] + one.size[1] / 2 - niche.position[1]])[[0, 2, 1]]
         assert len(hulls) > 4
