@@ -15,7 +15,8 @@ from echousd.place.problem import Problem
 from echousd.place.slots import HALF_PI, INNER, Row, Size, Slot, head
 
 DEEPER = 0.27  # metres that a chair is pushed under its table where room is scarce
-AMID = 0.7  # share of the farthest watching distance at which a sofa stands in the room
+# Share of the farthest watching distance at which a sofa stands in the room, in halls metres less than that.
+AMID, NEARER = 0.7, 0.4
 NIGHTSTAND = 0.55  # metres that a nightstand takes beside a bed
 LONG = 1.3  # times as long as deep
 
@@ -141,9 +142,9 @@ def in_view(problem: Problem, i: int, at_walls: Sequence[Row]) -> list[Row]:
     rows = np.array(at_walls).reshape(-1, 4)
     front = axes(rows[:, 2])[1]
     free = to_wall(problem.plan, np.zeros(len(rows), int), rows[:, :2], front)
-    depth = free + float(problem.size[i, 2]) / 2
-    away = [free - AMID * FARTHEST, np.full(len(rows), WALKED_BEHIND - 0.01 - problem.behind[i]), depth - FARTHEST]
-    keep = [free > FARTHEST, depth > DEEP, depth > FARTHEST + WALKED_BEHIND]
+    deep, most = free + float(problem.size[i, 2]) / 2 > DEEP, FARTHEST - NEARER
+    away = [free - AMID * FARTHEST, np.full(len(rows), WALKED_BEHIND - 0.01 - problem.behind[i]), free - most]
+    keep = [free > FARTHEST, deep, deep & (free > most + WALKED_BEHIND)]
     out = [(rows + np.pad(off[:, None] * front, ((0, 0), (0, 2))))[at] for off, at in zip(away, keep, strict=True)]
     return [(x, z, yaw, more) for x, z, yaw, more in np.concatenate(out).tolist()]
 
