@@ -286,10 +286,9 @@ class Journal:
     def __init__(self, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self.path = inside(folder, JOURNAL, f"{folder}: the run")
-        torn = self.path.is_file() and self.path.stat().st_size and not _ends_line(self.path)
         links = getattr(os, "O_NOFOLLOW", 0)
         self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | links, 0o644)
-        if torn:  # of a run that was killed while it wrote: its half line is no room
+        if os.fstat(self._file).st_size:  # a run that was killed while it wrote left half a line, which is no room
             os.write(self._file, b"\n")
 
     def append(self, row: dict[str, Any]) -> None:
@@ -372,12 +371,6 @@ def _rows(path: Path) -> Iterator[dict[str, Any]]:
             try:
                 row = json.loads(line)
             except (ValueError, RecursionError):
-                continue  # torn by a kill or a power cut, or longer than any of ours
+                continue  # empty, torn by a kill or a power cut, or longer than any of ours
             if is_row(row):
                 yield row
-
-
-def _ends_line(path: Path) -> bool:
-    with path.open("rb") as file:
-        file.seek(-1, os.SEEK_END)
-        return file.read(1) == b"\n"

@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Iterator
 
 import numpy as np
-from pxr import Kind, Sdf, Usd, UsdGeom
+from pxr import Kind, Usd, UsdGeom
 
 from echomodel.dressing import SMALL
 from echomodel.vocabulary import UnknownWord, normalised
@@ -13,13 +13,13 @@ from echousd.graph.nodes import OBSTACLE
 from echousd.layers.physics import CORNERS_API, FRICTION_API
 from echousd.stage import encoding as usd
 from echousd.stage.boxes import read_small
-from echousd.stage.contents import components, room_frame, words_of
+from echousd.stage.contents import components, readable_names, room_frame, words_of
 from echousd.stage.encoding import StageError
 from echousd.stage.forms import shown
 from echousd.stage.labels import LABELS_SCHEMA, is_structure, known_category, spaced
-from echousd.stage.read import RoomPrims, StatedTwice, find_rooms, node_names, relation_of, room_graph, value
+from echousd.stage.read import StatedTwice, find_rooms, node_names, relation_of, room_graph, value
 from echousd.stage.taxonomy import SHELL, ade20k
-from echousd.stage.values import UNREADABLE, lineage, readable, targets, texts
+from echousd.stage.values import UNREADABLE, lineage, targets, texts
 
 UPRIGHT = 0.5  # cosine of the angle between an object's up and the room's
 SIZE = 0.05, 0.1  # metres, and share of the stated size: differences below either are none
@@ -65,7 +65,7 @@ def stated_boxes(reading: Reading) -> Iterator[Finding]:
     """Geometry is as large and turned as the graph states."""
     for room in reading.rooms:
         stating = {prim.GetPath() for prim in room.nodes if _states(prim, (usd.SIZE, usd.YAW))}
-        paths = {name: path for path, name in _names(room).items() if path in stating} if stating else {}
+        paths = {name: path for path, name in readable_names(room).items() if path in stating} if stating else {}
         for thing in reading.contents(room).objects if paths else ():
             node = thing.node
             if node.name not in paths or not len(thing.points):
@@ -80,12 +80,6 @@ def stated_boxes(reading: Reading) -> Iterator[Finding]:
                 if abs(turn) > TURN:
                     message = f"{usd.YAW} is {node.yaw:.3g}, it is turned by {thing.yaw:.3g} radians"
                     yield Finding(paths[node.name], message)
-
-
-def _names(room: RoomPrims) -> dict[Sdf.Path, str]:
-    """Names of a room's nodes by path, none where they cannot be told, which echo:EdgeTargets reports."""
-    nameless: dict[Sdf.Path, str] = {}
-    return readable(lambda: node_names(room), nameless)
 
 
 def _states(prim: Usd.Prim, names: tuple[str, ...]) -> bool:

@@ -64,11 +64,10 @@ def _one(
     try:
         stage = open_stage(room)
         if is_home(stage):  # what a single room does not need is not loaded to see that it is one
-            from echousd.home.check import check_home, room_files
-            from echousd.home.existing import plan_there
+            from echousd.home.check import check_home
 
-            if room_files(stage) and plan_there(room) is not None:
-                home = check_home(room, rules=rules, layout=layout, settle=settle)
+            home = check_home(room, rules=rules, layout=layout, settle=settle)
+            if home is not None:
                 if not json:
                     _show(*_of_home(home, strict))
                 return home.good(strict=strict), home.to_json()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -178,14 +177,7 @@ def to_usd(
 
     check_free(out, force=force)
     found = load_rooms(rooms, limit)
-    if known:
-        kept = with_known_words(found)
-        # Relations speak of places in the list: they stay valid only where nothing was left out.
-        found = [
-            room if len(room) < len(old) else replace(room, relations=old.relations)
-            for room, old in zip(kept, found, strict=True)
-        ]
-    write_stages(found, out, None if rules == "none" else rules)
+    write_stages(with_known_words(found) if known else found, out, None if rules == "none" else rules)
 
 
 @documented_command(data_app, "data import")

@@ -136,10 +136,7 @@ def rooms_against(settings: SuiteSettings) -> tuple[list[RoomBoxes], list[RoomBo
         rooms = SGFront(path, split="test").rooms()
     else:
         rooms = rooms_from(path, held_out=True)
-    known = [
-        replace(new, relations=old.relations if published and len(new) == len(old) else None)
-        for new, old in zip(known_rooms(settings.against, rooms), rooms, strict=True)
-    ]
+    known = [room if published else replace(room, relations=None) for room in known_rooms(settings.against, rooms)]
     rooms = [room for room in known if len(room) > 1 and len(room.floor_polygon) > 2]
     if len(rooms) < 4:
         needed = "4 are needed (of a set among those held out, every twentieth)"
@@ -200,11 +197,8 @@ def rooms_of(system: System, settings: SuiteSettings) -> tuple[list[Task], list[
     bare = sum(len(room.floor_polygon) < 3 for room in known)
     if bare:
         notes.append(f"{system.name}: {bare} of {len(known)} rooms have no floor, figures of floors leave them out")
-    tasks = []
-    for old, new in zip(found, known, strict=True):
-        kept = old.relations if old.relations is not None and len(old) == len(new) else ()
-        if len(new):
-            tasks.append(Task(new, np.array(kept, np.int64).reshape(-1, 3)))
+    stated = [np.array(() if room.relations is None else room.relations, np.int64).reshape(-1, 3) for room in known]
+    tasks = [Task(room, kept) for room, kept in zip(known, stated, strict=True) if len(room)]
     if len(tasks) < 2:
         raise ValueError(f"{system.name}: {len(tasks)} rooms with known objects, 2 or more are needed for an interval")
     return _spread(tasks, settings.count), notes

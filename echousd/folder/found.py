@@ -36,7 +36,7 @@ def room_at(place: Path) -> Path:
     """The one root layer at a path: a file itself, of a folder its room; raises ValueError where several are."""
     if not place.is_dir():
         return place
-    found = _room_in(place)
+    found = root_in(place)
     if found is not None:
         return found
     rooms = rooms_at(place)
@@ -107,7 +107,7 @@ def layer_over(place: Path) -> Path:
 
 
 def _rooms_below(place: Path) -> list[Path]:
-    rooms = [_room_in(folder) for folder in (place, *sorted(path for path in place.rglob("*") if path.is_dir()))]
+    rooms = [root_in(folder) for folder in (place, *sorted(path for path in place.rglob("*") if path.is_dir()))]
     return [room for room in rooms if room is not None]
 
 
@@ -120,7 +120,8 @@ def _rooms_of(matches: list[Path]) -> list[Path]:
     return sorted(dict.fromkeys(rooms))
 
 
-def _room_in(folder: Path) -> Path | None:
+def root_in(folder: Path) -> Path | None:
+    """The root layer of the room whose folder it is, None where there is none."""
     manifest = find_manifest(folder)
     if manifest is None and half_written(folder):  # the first room there: whoever opens it is told
         return folder / f"{folder.name}.usda"

@@ -54,12 +54,14 @@ class HomeReport:
         }
 
 
-def check_home(path: Path, *, rules: str = "strict", layout: int | None = None, settle: bool = False) -> HomeReport:
-    """Judge the home on a stage; arguments as `echousd.check`. Raises StageError where it holds no plan."""
-    plan, stage = plan_there(path), open_stage(path)
-    files = room_files(stage)
+def check_home(
+    path: Path, *, rules: str = "strict", layout: int | None = None, settle: bool = False
+) -> HomeReport | None:
+    """Judge the home in a file, as `echousd.check`; None for other rooms than payloads with floors side by side."""
+    files = _room_files(open_stage(path))
+    plan = plan_there(path) if files else None
     if plan is None or files is None:
-        raise ValueError(f"{path}: no home, allowed: rooms with floors side by side, each the payload of its prim")
+        return None
     ground = open_ground(plan, furniture(plan, path))
     reached = walked(plan, ground)
     faults = [("broken", f"{relation}: the plan does not keep it") for relation in plan.broken()]
@@ -76,7 +78,7 @@ def check_home(path: Path, *, rules: str = "strict", layout: int | None = None, 
     return HomeReport(tuple(faults), reached, len(plan.home.relations), rooms)
 
 
-def room_files(stage: Usd.Stage) -> dict[str, Path] | None:
+def _room_files(stage: Usd.Stage) -> dict[str, Path] | None:
     """The root layers of a home's rooms, its payloads as `echousd generate` has them; None where a room is none."""
     files = {}
     for name, prims in named_rooms(stage).items():

@@ -32,7 +32,9 @@ if TYPE_CHECKING:
     from echomodel.protocols import RoomModel
 
 # of a room that is there already
-with_earlier_locks, with_locked_places = lates("echousd.make.reading", "with_earlier_locks", "with_locked_places")
+with_earlier_locks, with_locked_places, with_locked_shapes = lates(
+    "echousd.make.reading", "with_earlier_locks", "with_locked_places", "with_locked_shapes"
+)
 with_space, wishes_of = Late("echousd.make.fitting:with_space"), Late("echousd.assets.choose:wishes_of")
 
 
@@ -107,11 +109,12 @@ def generate(
         check_doors(graph)
         graph, left_out = with_space(graph) if asked.fit == "drop" else (graph, ())
         crowded = check_space(graph)
-    made = furnished(Brief(
+    brief = Brief(
         with_plan(graph, asked.seed), graph, graph.room.type, asked, shapes,
         Provenance(asked.seed, echo.preset, echo.hash, shapes, file), wishes, echo, timer, [{}] * asked.layouts,
         notes=(*filter(None, [other]), *crowded, *held, *homeless, *left_out, *unusual(graph)),
-    ))  # fmt: skip
+    )  # fmt: skip
+    made = furnished(with_locked_shapes(brief, earlier) if earlier and any(n.locked for n in graph.nodes) else brief)
     if asked.settle:
         from echousd.make.resting import settled
 

@@ -1,9 +1,10 @@
 """A room read back from its folder: graph, boxes, meshes, files, what is locked; in metres, +Y up, however saved."""
 
-import os
 import warnings
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,14 @@ from pxr import Sdf, Tf, Usd, UsdGeom
 from echomodel.boxes import Boxes
 from echomodel.triangles import Mesh
 from echousd.folder.folder import recover
-from echousd.folder.found import manifest_of
+from echousd.folder.found import manifest_of, root_in
 from echousd.folder.manifest import find_manifest
 from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.graph import SceneGraph
 from echousd.graph.text import graph_from_plain
 from echousd.layers.placed import MODEL, PLACES
+from echousd.make.furnishing import SAME, Brief, box_fields
 from echousd.naming import STAGE_FORMS
 from echousd.shapes.colliders import approximation, collider_of
 from echousd.shapes.geometry import LICENCE, Collider, Geometry, Origin, Original, Part
@@ -32,6 +34,7 @@ from echousd.stage.showing import each_layout
 from echousd.stage.units import Z_TO_Y, metres_per_unit
 from echousd.stage.values import NOW, matrix, reading
 
+WRITTEN_BY = "up_axis", "meters_per_unit", "faces", "atlas", "materialx", "thumbnails"  # options of an asset's files
 SCALED = 0.01  # what a prim may be scaled by, more or less, before it is said
 
 
@@ -202,9 +205,7 @@ def _original(root: Usd.Prim, asset: str) -> Original:
     for spec in model.GetPrimStack() if model else ():
         for payload in spec.payloadList.prependedItems:
             path = spec.layer.ComputeAbsolutePath(payload.assetPath)
-            if os.path.commonpath([Path(path).parent, Path(spec.layer.realPath).parent]) != str(
-                Path(spec.layer.realPath).parent
-            ):
+            if not Path(path).is_relative_to(Path(spec.layer.realPath).parent):
                 layer = Path(path)
             prim = payload.primPath or prim
     pose = np.array(UsdGeom.Xformable(places).GetLocalTransformation(NOW)).T if places else np.eye(4)
@@ -264,46 +265,64 @@ def with_earlier_locks(graph: SceneGraph, earlier: Path | None) -> tuple[SceneGr
 
     `earlier`: folder or root layer of that generation. Returns the graph, and a sentence for each object that stays.
     """
-    folder = earlier if earlier is None or earlier.is_dir() else earlier.parent
-    manifest = find_manifest(folder, earlier.stem) if earlier and folder and folder.is_dir() else None
-    if not manifest:
-        return graph, ()
+    manifest = find_manifest(earlier if earlier.is_dir() else earlier.parent, earlier.stem) if earlier else None
     try:
-        old = graph_from_plain(SceneGraph, manifest.get("graph"))
-    except ValueError:  # no graph that can be read
+        old = graph_from_plain(SceneGraph, (manifest or {}).get("graph"))
+    except ValueError:  # none that can be read
         return graph, ()
-    kept = {
-        node.name: node.replaced(locked=True, size=node.size or was.size, position=was.position, yaw=was.yaw)
-        for node in graph.nodes
-        if node.name in old.names and (node.locked, node.position, node.yaw) == (False, None, None)
-        for was in [old.node(node.name)]
-        if was.locked and was.category == node.category
-    }
-    return graph.replaced(nodes=tuple(kept.get(node.name, node) for node in graph.nodes)), tuple(
-        f"{name} stays locked as in the room that is there; echousd edit --unlock frees it" for name in kept
-    )
+    locked = {(node.name, node.category): node for node in old.nodes if node.locked}
+    free = [node for node in graph.nodes if (node.locked, node.position, node.yaw) == (False, None, None)]
+    kept = [node for node in free if (node.name, node.category) in locked]
+    for node in kept:
+        was = locked[node.name, node.category]
+        fields = {"size": node.size or was.size, "position": was.position, "yaw": was.yaw}
+        graph = graph.update_node(node.name, locked=True, **fields)
+    stays = "stays locked as in the room that is there; echousd edit --unlock frees it"
+    return graph, tuple(f"{node.name} {stays}" for node in kept)
+
+
+piece_asked = attrgetter("name", "category", "shapes", "asset")
+
+
+def with_locked_shapes(brief: Brief, earlier: Path) -> Brief:
+    """The brief in which locked objects, and others of one asset with them, keep the shapes of the last generation.
+
+    Nothing is kept of a room whose assets were made or written otherwise, or that cannot be read. `earlier`: as above.
+    """
+    saved, root = None, _stage_of(earlier)
+    with suppress(ValueError):
+        saved = read_room(root) if root else None
+    asked = {"shapes": brief.shapes, **{name: getattr(brief.options, name) for name in WRITTEN_BY}}
+    if saved is None or any(saved.manifest[name] != value for name, value in asked.items()):
+        return brief
+    boxes = box_fields(saved.graph.names, saved.boxes)
+    made = {piece_asked(node): boxes[node.name]["size"] for node in saved.graph.nodes if node.asset is None}
+    alike = [node for node in brief.graph.nodes if piece_asked(node) in made]
+    same = [one for one in alike if np.allclose(one.size or made[piece_asked(one)], made[piece_asked(one)], atol=SAME)]
+    locked = {saved.assets[node.name] for node in same if node.locked}
+    assets = {node.name: saved.assets[node.name] for node in same if saved.assets[node.name] in locked}
+    return replace(
+        brief, assets=assets, moving=assets.keys(), boxes=[{name: boxes[name] for name in assets}] * len(brief.boxes),
+        geometry={name: saved.geometry[name] for name in assets},
+        carried={asset: saved.carried[asset] for asset in locked},
+    )  # fmt: skip
 
 
 def _stage_of(file: Path) -> Path | None:
     """The stage at a path: the file itself, or the root layer of a room's folder."""
-    if file.is_dir():
-        manifest = find_manifest(file, file.resolve().name)
-        file = file / f"{manifest['name']}.usda" if manifest else file
-    return file if file.is_file() and file.suffix in STAGE_FORMS else None
+    found = root_in(file) if file.is_dir() else file
+    return found if found and found.is_file() and found.suffix in STAGE_FORMS else None
 
 
 def _filled(graph: SceneGraph, file: Path, wanted: set[str]) -> tuple[SceneGraph, set[str]]:
     stage = opened(file)
     things = {thing.node.name: thing for room in find_rooms(stage) for thing in read_contents(room).objects}
     found = wanted & things.keys()
-    nodes = []
-    for node in graph.nodes:
-        if node.name in found:
-            thing = things[node.name]
-            node = node.replaced(
-                size=node.size or tuple(thing.size.round(4).tolist()),
-                position=node.position or tuple(thing.position.round(4).tolist()),
-                yaw=round(float(thing.yaw), 7) if node.yaw is None else node.yaw,
-            )
-        nodes.append(node)
-    return graph.replaced(nodes=tuple(nodes)), found
+    for name in found:
+        thing, node = things[name], graph.node(name)
+        graph = graph.update_node(
+            name, size=node.size or tuple(thing.size.round(4).tolist()),
+            position=node.position or tuple(thing.position.round(4).tolist()),
+            yaw=round(float(thing.yaw), 7) if node.yaw is None else node.yaw,
+        )  # fmt: skip
+    return graph, found

@@ -120,8 +120,7 @@ def read_contents(prims: RoomPrims) -> RoomContents:
     stage = prims.room.GetStage()
     cache = UsdGeom.XformCache(NOW)
     to_room = readable(lambda: room_frame(prims.room, cache), np.eye(4))
-    nameless: dict[Sdf.Path, str] = {}
-    names = readable(lambda: node_names(prims), nameless)
+    names = readable_names(prims)
     owners = {prim.GetPath() for prim in prims.nodes}
     objects, missing = [], []
     for prim in prims.nodes:
@@ -140,6 +139,12 @@ def read_contents(prims: RoomPrims) -> RoomContents:
     assert stage
     relations = tuple({relation.triple: relation for relation in relations}.values())
     return RoomContents(str(prims.room.GetPath()), spec, tuple(objects), tuple(missing), relations)
+
+
+def readable_names(prims: RoomPrims) -> dict[Sdf.Path, str]:
+    """`node_names`, none where two are the same, which the validators report."""
+    nameless: dict[Sdf.Path, str] = {}
+    return readable(lambda: node_names(prims), nameless)
 
 
 def room_frame(room: Usd.Prim, cache: UsdGeom.XformCache) -> np.ndarray:

@@ -1,7 +1,6 @@
 """The `paper` stages: the paper's own sizes and wiring trained on our rooms (EchoScene 3.5 and its supplement)."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -38,9 +37,8 @@ class PublishedRooms:
     """
 
     def __init__(self, folder: Path) -> None:
-        rooms = SGFront(folder).rooms()
-        pairs = zip(with_known_words(rooms), rooms, strict=True)
-        self.rooms = [replace(new, relations=old.relations) for new, old in pairs if len(new) == len(old) > 0]
+        rooms = with_known_words(SGFront(folder).rooms())
+        self.rooms = [room for room in rooms if len(room) and room.relations is not None]
         if not self.rooms:
             raise ValueError(f"{folder}: no scan of trainval with objects that the vocabulary holds")
         self.held_out = kept_out(np.arange(len(self.rooms)))

@@ -267,7 +267,7 @@ def rooms_of_type(rooms: list[RoomBoxes], word: str, path: Path) -> list[RoomBox
 
 
 def with_known_words(rooms: Iterable[RoomBoxes]) -> list[RoomBoxes]:
-    """The rooms in the vocabulary's words, without the objects that it does not hold."""
+    """The rooms in the vocabulary's words, without the objects that it does not hold; relations stay where all do."""
     out = []
     for room in rooms:
         rows = [vocabulary().known_category(word) for word in room.categories]
@@ -275,7 +275,8 @@ def with_known_words(rooms: Iterable[RoomBoxes]) -> list[RoomBoxes]:
         styles = room.styles or (-1,) * len(room)
         models = room.models or ("",) * len(room)
         known = replace(
-            room, room_type=vocabulary().room_type(room.room_type).name, relations=None,
+            room, room_type=vocabulary().room_type(room.room_type).name,
+            relations=room.relations if len(keep) == len(room) else None,
             categories=tuple(row.name for row in rows if row is not None), size=room.size[keep],
             position=room.position[keep], yaw=room.yaw[keep], models=tuple(models[k] for k in keep),
             styles=tuple(styles[k] for k in keep),

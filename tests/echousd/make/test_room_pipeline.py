@@ -206,6 +206,28 @@ def test_what_is_locked_stays_where_the_last_generation_put_it(tmp_path: Path) -
     assert with_locked_places(locked.update_node("wardrobe", position=(0.5, 0.0, 0.5)))[1] == ()
 
 
+def test_what_is_locked_keeps_its_shape_and_so_does_its_twin(tmp_path: Path) -> None:
+    nodes = (Node("bed", "double_bed", locked=True), Node("wardrobe", "wardrobe"))
+    nodes += tuple(
+        Node(f"stand_{side}", "nightstand", style="pair", locked=side == "left") for side in ("left", "right")
+    )
+    graph = SceneGraph(RoomSpec("bedroom", size=(4.2, 4.2)), nodes, (Relation("stand_left", "left", "stand_right"),))
+    first = echousd.generate(graph, seed=1, **BARE)
+    root = first.save(tmp_path / "room", preview=False)
+
+    files = {name: f"assets/{asset}/{asset}_geo.usdc" for name, asset in first.assets.items()}
+    made = {name: (root.parent / file).read_bytes() for name, file in files.items()}
+
+    def kept(**options: object) -> list[str]:
+        room = echousd.generate(graph, seed=9, earlier=root.parent, **options, **BARE)
+        assert room.assets == first.assets
+        folder = room.save(tmp_path / "again", preview=False).parent
+        return [name for name, file in files.items() if (folder / file).read_bytes() == made[name]]
+
+    assert kept() == ["bed", "stand_left", "stand_right"]
+    assert kept(faces=2000) == []
+
+
 def test_where_every_box_is_given_none_is_drawn() -> None:
     class Silent(StandIn):
         def sample_layout(self, graph, **kwargs):
