@@ -1,12 +1,13 @@
 """Floors and openings of graphs that state none, and floors that cannot hold their furniture."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from echomodel.boxes2d import footprints
 from echomodel.openings import STEP, WINDOW_DEPTH, WINDOWS, Opening, signed_area, sliding, swing_area, zone
-from echomodel.sizes import footprint
+from echomodel.sizes import footprint, size_statistics
 from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError
 from echousd.graph.nodes import HEIGHT
@@ -29,12 +30,13 @@ def with_plan(graph: SceneGraph, seed: int) -> SceneGraph:
 
 
 def with_floor(graph: SceneGraph, seed: int) -> SceneGraph:
-    """The graph with the floor that such a room would have, where it states none and fixes no object's place.
+    """The graph with the floor that such a room would have, where it states none and is no arrangement of others.
 
     The same seed and graph give the same floor. More objects in a row to the left and right than to the front and
-    behind make the room wider than deep. Some floors are L-shaped, as real ones are, where no opening counts walls.
+    behind make the room wider than deep. Some floors are L-shaped, as real ones are, where no opening counts walls and
+    no object's place is stated; those that are stand on it, though its middle has to move.
     """
-    if graph.room.extents is not None or any(node.position is not None for node in graph.nodes):
+    if graph.room.extents is not None or any(node.locked and node.asset for node in graph.nodes):
         return graph
     from echomodel.plans import floor_extents, floor_outline, longest_side
 
@@ -44,12 +46,24 @@ def with_floor(graph: SceneGraph, seed: int) -> SceneGraph:
     furniture = [node.category for node in graph.nodes], [node.size for node in graph.nodes]
     share, rng = (1 + ahead) / (2 + ahead + aside), _generator(seed, "floor")
     extents = floor_extents(graph.room.type, *furniture, rng, along_x=share, openings=graph.room.openings)
-    cut = None
+    cut, there = None, footprints(*_fixed(graph)).reshape(-1, 2)
+    if len(there):
+        sides = np.maximum(extents, np.ceil(10 * np.ptp(there, axis=0)) / 10)
+        low = np.clip(-sides / 2, there.max(0) - sides, there.min(0)).round(3)
+        return graph.with_room(**rectangle(low, low + sides))
     if not graph.room.openings:
         cut = floor_outline(graph.room.type, extents, longest_side(*furniture), _generator(seed, "outline"))
     if cut is None:
         return graph.with_room(size=extents)
     return graph.with_room(floor_polygon=tuple(map(tuple, cut.tolist())))
+
+
+def rectangle(low: np.ndarray, high: np.ndarray) -> dict[str, Any]:
+    """The fields of a room whose floor reaches from one corner (x, z) to the other, metres."""
+    if np.allclose(low, -high):
+        return {"size": tuple((high - low).tolist()), "floor_polygon": None}
+    (x, z), (right, ahead) = low.tolist(), high.tolist()
+    return {"size": None, "floor_polygon": ((x, z), (right, z), (right, ahead), (x, ahead))}
 
 
 def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGraph:
@@ -99,20 +113,21 @@ def with_lowered_windows(graph: SceneGraph, stated: SceneGraph, boxes: Arrays, s
         for sill, deep in wanted if one.kind == "window" and one not in stated.room.openings else ():
             before = shapely.intersects(plans, shapely.Polygon(zone(corners, one, deep)))
             if sill < one.sill and not (before & (position[:, 1] + size[:, 1] > sill)).any():
-                return replace(one, sill=sill, height=one.height + one.sill - sill)
+                return replace(one, sill=sill, height=round(one.height + one.sill - sill, 4))
         return one
 
     return graph.with_room(openings=tuple(map(lowered, graph.room.openings)))
 
 
 def _fixed(graph: SceneGraph) -> Arrays:
-    """Size, position and yaw of the objects whose box is stated."""
-    nodes = [node for node in graph.nodes if None not in (node.size, node.position, node.yaw)]
-    return (
-        np.array([node.size for node in nodes], float).reshape(-1, 3),
-        np.array([node.position for node in nodes], float).reshape(-1, 3),
-        np.array([node.yaw for node in nodes], float),
-    )
+    """Size, position and yaw of the objects whose place is stated: of usual size, and as deep as wide, where no size
+    or no yaw is."""
+    nodes = [node for node in graph.nodes if node.position is not None]
+    size = np.array([node.size or size_statistics(node.category).median for node in nodes]).reshape(-1, 3)
+    turned = np.array([node.yaw is None for node in nodes], bool)
+    size[turned, ::2] = size[turned, ::2].max(1, keepdims=True)
+    position = np.array([node.position for node in nodes], float).reshape(-1, 3)
+    return size, position, np.array([node.yaw or 0.0 for node in nodes], float)
 
 
 def check_extents(extents: tuple[float, float] | None) -> None:

@@ -8,7 +8,7 @@ from echomodel.boxes import Boxes
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.graph.consistency import GraphError
-from echousd.graph.floors import check_space
+from echousd.graph.floors import check_space, rectangle
 from echousd.make.verdicts import colliding
 from echousd.place.living import living_faults
 
@@ -81,23 +81,15 @@ def _dispensable(graph: SceneGraph, names: tuple[str, ...] | list[str]) -> str |
 
 
 def with_wider_floor(graph: SceneGraph, corners: np.ndarray) -> SceneGraph:
-    """The graph with its proposed floor made large enough for corners (n, 2) of furniture, x and z in metres.
+    """The graph whose proposed floor is the rectangle around it and corners (n, 2) of furniture, where it lacks some.
 
-    An L-shaped floor that does not hold them becomes the rectangle around it, and its openings are placed anew.
+    x and z in metres. Openings in the walls of a floor that was no rectangle go.
     """
     import shapely
 
-    room = graph.room
-    if room.extents is None or not len(corners):
+    floor = graph.room.corners
+    if floor is None or not len(corners) or shapely.Polygon(floor).buffer(1e-3).covers(shapely.MultiPoint(corners)):
         return graph
-    size = room.extents
-    if room.floor_polygon:
-        outline = shapely.Polygon(room.floor_polygon).buffer(1e-3)
-        if outline.covers(shapely.MultiPoint(corners)):
-            return graph
-        room = room.replaced(floor_polygon=None, size=size, openings=())
-    needed = 2 * np.abs(corners).max(0)
-    if (needed > np.array(size) + 1e-3).any():
-        x, z = (float(v) for v in np.maximum(size, np.ceil(needed * 10) / 10))
-        room = room.replaced(size=(x, z))
-    return graph if room is graph.room else graph.replaced(room=room)
+    both = np.concatenate([floor, corners])
+    openings = graph.room.openings if len(floor) == 4 else ()
+    return graph.with_room(openings=openings, **rectangle(both.min(0).round(3), both.max(0).round(3)))

@@ -277,6 +277,9 @@ def with_earlier_locks(graph: SceneGraph, earlier: Path | None) -> tuple[SceneGr
         was = locked[node.name, node.category]
         fields = {"size": node.size or was.size, "position": was.position, "yaw": was.yaw}
         graph = graph.update_node(node.name, locked=True, **fields)
+    if graph.room.extents is None and any(node.locked and node.name in old.names for node in graph.nodes):
+        around = {"floor_polygon": old.room.floor_polygon, "size": old.room.size}  # the walls that they stand at
+        graph = graph.with_room(openings=graph.room.openings or old.room.openings, **around)
     stays = "stays locked as in the room that is there; echousd edit --unlock frees it"
     return graph, tuple(f"{node.name} {stays}" for node in kept)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
+from echomodel.boxes2d import footprints
 from echomodel.openings import USUAL, Opening, free_area, inward_normal, segment, swing_area
 from echomodel.rooms.runs import WORKTOP
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
@@ -37,8 +38,22 @@ def test_a_floor_is_proposed_once_and_follows_the_seed() -> None:
     assert with_floor(made[0], 5) is made[0]
     stated = GRAPH.replaced(room=RoomSpec("bedroom", size=(3, 3)))
     assert with_floor(stated, 1) is stated
-    placed = GRAPH.update_node("bed", position=(5.0, 0.0, 1.0))
-    assert with_floor(placed, 1) is placed
+
+
+@pytest.mark.parametrize("yaw", [None, 0.3])
+@pytest.mark.parametrize("x", [0.3, -5.0, 400.0])
+def test_a_proposed_floor_holds_what_has_its_place_already(x: float, yaw: float | None) -> None:
+    size, where = (1.6, 1.0, 2.0), np.array((x, 0.0, 0.4))
+    placed = GRAPH.update_node("bed", size=size, position=tuple(where), yaw=yaw)
+    for seed in range(4):
+        made = with_plan(placed, seed).room
+        assert {opening.kind for opening in made.openings} == {"door", "window"}
+        assert np.allclose(made.extents, with_floor(GRAPH, seed).room.extents, atol=1.5)
+        assert (made.size is not None) == (x == 0.3)
+        for turn in (0.0, np.pi / 2) if yaw is None else (yaw,):
+            corners = footprints(np.array([size]), where[None], np.array([turn]))[0]
+            assert (corners >= made.corners.min(0) - 2e-3).all()
+            assert (corners <= made.corners.max(0) + 2e-3).all()
 
 
 def test_openings_are_placed_where_none_is_stated() -> None:

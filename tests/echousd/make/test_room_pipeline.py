@@ -294,6 +294,10 @@ def test_a_lock_of_the_last_generation_stays(tmp_path):
     assert again.graph.node("wardrobe").locked
     assert again.boxes.position[again.names.index("wardrobe")].tolist() == pytest.approx([-1.2, 0.0, 0.5], abs=1e-3)
     assert any(note.startswith("wardrobe stays locked as in the room that is there") for note in again.notes)
+    bare = small_graph().with_room(size=None)
+    again = echousd.generate(bare, seed=4, model=StandIn(), shapes="boxes", place=False, earlier=root.parent)
+    assert again.graph.room == room.graph.room
+    assert again.graph.room.openings
     moved = small_graph().update_node("wardrobe", position=(1.0, 0.0, 1.0))
     again = echousd.generate(moved, model=StandIn(), shapes="boxes", place=False, earlier=root.parent)
     assert not again.graph.node("wardrobe").locked
