@@ -43,6 +43,7 @@ for family in FAMILIES:
     importlib.import_module(f"echousd.checks.{family}_rules")  # its rules enter the table
 JOINED = tuple(rule for rule in RULES if rule.name in ("echo:Joints", "echo:PhysicsValues"))
 ALONE = "echo:Validators"
+PACKED, OF_PACKAGES = ".usdz", "usdUtilsValidators:UsdzPackageValidator"  # which looks through all layers to find none
 UNKNOWN_NODE, MATERIALX = ".MissingShaderIdInRegistry", "shaderId 'ND_"
 
 
@@ -77,13 +78,13 @@ def find_faults(reading: Reading) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]
     with showing_variant(stage, ARTICULATION, ARTICULATED) as changed:  # doors and drawers are joined in it alone
         joined = Reading(stage)
         own += [(rule, found) for rule in JOINED if changed for found in safely(rule, joined)]
-    errors, warnings = _faults_of_usd(stage)
+    errors, warnings = _faults_of_usd(reading)
     for rule, found in own:
         (warnings if found.warning else errors).add(Fault(rule.name, str(found.path), found.message))
     return tuple(sorted(errors)), tuple(sorted(warnings))
 
 
-def _faults_of_usd(stage: Usd.Stage) -> tuple[set[Fault], set[Fault]]:
+def _faults_of_usd(reading: Reading) -> tuple[set[Fault], set[Fault]]:
     """Errors and warnings of OpenUSD's own validators."""
     try:
         from pxr import UsdValidation
@@ -93,10 +94,13 @@ def _faults_of_usd(stage: Usd.Stage) -> tuple[set[Fault], set[Fault]]:
         version = ".".join(map(str, Usd.GetVersion()))
         alone = f"OpenUSD {version} has no UsdValidation for Python: only our own rules ran"
         return set(), {Fault(ALONE, "/", alone)}
+    files = (path for layer, paths in reading.named_files.items() for path in (layer.identifier, *paths))
+    if readable(lambda: not any(PACKED in path for path in files), False):
+        known = [one for one in known if one.GetMetadata().name != OF_PACKAGES]
     context = UsdValidation.ValidationContext(known)
     silence = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what the report says as well
     try:
-        found_errors = context.Validate(stage)
+        found_errors = context.Validate(reading.stage)
     except Tf.ErrorException as stopped:  # a validator that cannot read the stage ends the whole run
         return {Fault(ALONE, "/", f"OpenUSD's validators stopped: {usd_error(stopped)}")}, set()
     finally:
