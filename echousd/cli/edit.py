@@ -30,7 +30,7 @@ def edit(
 ) -> None:  # fmt: skip
     """Change what a room holds; objects that the change does not touch stay byte for byte.
 
-    Every option may be given several times.
+    Every change may be given several times.
     """
     from echousd.folder.found import is_home, refuse_house
     from echousd.graph.changes import EditRequest

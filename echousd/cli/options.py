@@ -143,7 +143,9 @@ def _flags(*, edits: bool, asks: bool, batch: bool) -> list[Parameter]:
         from echousd.graph.changes import EditRequest
 
         for one in fields(EditRequest):
-            kind: Any = Annotated[list[str] | None, typer.Option(help=one.metadata["help"])]
+            kind: Any = Annotated[
+                list[str] | None, typer.Option(help=one.metadata["help"], metavar=one.metadata["form"])
+            ]
             wishes.append(Parameter(one.name, Parameter.KEYWORD_ONLY, default=None, annotation=kind))
     return [*wishes, *(_flag(name, rows[name]) for name in ordered)]
 
