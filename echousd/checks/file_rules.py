@@ -48,7 +48,7 @@ def paths_inside(reading: Reading) -> Iterator[Finding]:
         for path in (path for path in paths if not ABSOLUTE.match(path)):
             full = layer.ComputeAbsolutePath(path)
             if full and not reach.holds(full):
-                what = f"leads out of the room's folder {reach.places[0]}, allowed: a file below it"
+                what = f"leads out of {reach.places[0]}, allowed: a file below it (--collect takes models along)"
                 message = f"{layer.GetDisplayName()}: asset path {path!r} {what}"
                 yield Finding(holder(layer, path), message, warning=bool(Sdf.FileFormat.FindByExtension(full)))
 
