@@ -57,7 +57,7 @@ def generate(
             rooms.
         model: a loaded model, or a sampler of your own (any object that keeps `echomodel.protocols.RoomModel`); None =
             the model of the option `weights`.
-        earlier: folder or root layer of the last generation, where locked objects without a place are looked for.
+        earlier: folder or root layer of the last generation; what is locked keeps its place, shape and room.
         outside: folders besides those of the graph's file and of the library's index in which models may lie.
         boxes: layout of your own, n boxes in the order of the graph's nodes, such as `echomodel.boxes.Boxes`: size and
             position (n, 3) float, of the bottoms' centres, metres, yaw (n) float, radians, in the room's frame;
