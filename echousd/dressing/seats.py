@@ -21,6 +21,7 @@ from echousd.dressing.soft_tops import (
 
 MORE = (1.9, 2.4)  # metres of a sofa with a third cushion in its middle, and with two
 OVER = 0.019  # metres of a throw's top over an arm
+RISE = 0.06  # metres that an arm rises along a throw at most: off a steeper one it slides, and a tub's walls are round
 RIDGE = 0.1  # metres that an arm is higher than the seat at least so that a throw hangs over it
 
 
@@ -81,8 +82,9 @@ def at_back(seat: Seat, end: float, size: np.ndarray) -> np.ndarray | None:
 def over_arm(host: Standing, seat: Seat, side: float, rng: np.random.Generator) -> Thing | None:
     """A throw over the arm of a sofa at a side, below 0 the left one; None where there is none to hang it over."""
     z, deep = 0.12 * float(host.size[2]), float(rng.uniform(0.42, 0.6))
-    level = seat.height[:, np.abs(seat.z - z) < deep / 2].min(1)
+    under = seat.height[:, np.abs(seat.z - z) < deep / 2]
+    level = under.min(1)
     arm = (level > seat.level + RIDGE) & (np.sign(side) * seat.x > 0.3 * host.size[0])
-    if not 0.08 < arm.sum() * STEP < 0.34:
+    if not 0.08 < arm.sum() * STEP < 0.34 or np.ptp(under[arm], axis=1).max() > RISE:
         return None
     return across(host, seat, arm, z, deep, float(np.median(level[arm])) - seat.level - 0.04, OVER, rng)

@@ -11,7 +11,7 @@ from echomodel.dressing.textiles import LEAN
 from echomodel.triangles import joined
 from echousd import generate
 from echousd.dressing.dress import dressed
-from echousd.dressing.seats import at_back, standing_on
+from echousd.dressing.seats import at_back, over_arm, standing_on
 from echousd.dressing.setting import ORIGIN, geometry_of, standing
 from echousd.dressing.soft_tops import STEP, Seat, heights_of, let_down
 from echousd.graph import SceneGraph
@@ -46,6 +46,20 @@ def test_cushions_lie_on_their_seat_not_on_the_foot_of_its_back():
     spot = at_back(seat, 0.0, size)
     assert spot[2] < -0.25  # against the back
     assert spot[1] == pytest.approx(0.43)
+
+
+@pytest.mark.parametrize(("rise", "hangs"), [(0.0, True), (0.05, True), (0.14, False)])
+def test_a_throw_hangs_over_an_arm_that_is_level(rise, hangs):
+    """The walls of a tub chair rise to its back and are round in plan: a throw over them reaches into both sides."""
+    line = np.arange(-0.4, 0.4, STEP) + STEP / 2
+    height = np.full((len(line), len(line)), 0.4)
+    arms = np.abs(line) > 0.27
+    height[arms] = 0.75 - rise * line / 0.5  # over half a metre
+    box = np.array(list(itertools.product((-0.4, 0.4), (0.0, 0.42), (-0.4, 0.4))))
+    for side in (-1.0, 1.0):
+        for seed in range(4):
+            found = over_arm(seat_of(box), Seat(line, line, height, 0.4), side, np.random.default_rng(seed))
+            assert (found is not None) == hangs
 
 
 @pytest.mark.parametrize("variant", [228333841, *range(30)])  # the first has tassels, which were its lowest
