@@ -25,7 +25,7 @@ SUN = 4 * np.array([1.12, 1.0, 0.78], np.float32)
 CEILING = np.array([0.87, 0.86, 0.84], np.float32)
 # What is seen through windows is exposed for itself, as photographers of interiors blend it in: how bright by day, the
 # power of the sky's light by which it is less in the evening, that by which its shadows are opened, and haze before it.
-THERE, DUSK, OPENED, VEIL = 1.4, 0.5, 0.85, 0.03
+THERE, DUSK, OPENED, VEIL = 1.9, 0.5, 0.85, 0.03
 WHITER = 0.36  # how much less coloured the light of lamps is than told: no wall is as yellow to eyes
 DIM = 0.004  # radiance at every place of a room without lamps and windows, so that one sees it
 # To the colour of the light, by night and by day: lamps stay warm. What so many of a hundred points of the picture are
@@ -39,13 +39,13 @@ WHITE, PAPER = 84, 0.95  # what so many of a hundred points are darker than come
 CONTRAST, KNEE = 1.5, 0.6  # power about what is bright, and from where on highlights are rolled off
 # Share of colours that keep their hue where they are bright, which film bleaches, and how much more coloured all are,
 # by night, when lamps are warm, not yellow, and by day.
-HUE, CHROMA = (0.5, 0.8), (1.0, 1.3)
+HUE, CHROMA = (0.5, 0.8), (1.0, 1.12)
 LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 DAY = 0.5  # radiance of the sky by day
 BANDS = 64  # heights of the sky whose light is told apart
 # The brightest shade over what white paper is on the average in the room, by night and by day, as eyes see it; the
 # share of its light that is seen at its rim.
-GLOWING, RIM = (3.2, 3.5), 0.12
+GLOWING, RIM = (2.4, 2.6), 0.12
 # Metres around a lamp where it throws no shadow of its own, and how far from a bulb its shade may be; its places that
 # light comes from, where it has no shade as far around the bulb.
 OWN, SHADED, SPOTS, BULB = 0.12, 0.5, 24, 0.05
