@@ -263,25 +263,29 @@ def with_locked_places(graph: SceneGraph, *files: Path | None) -> tuple[SceneGra
 def with_earlier_locks(graph: SceneGraph, earlier: Path | None) -> tuple[SceneGraph, tuple[str, ...]]:
     """The graph in which what the last generation has locked stays so, where the graph says nothing of its place.
 
-    `earlier`: folder or root layer of that generation. Returns the graph, and a sentence for each object that stays.
+    `earlier`: folder or root layer of that generation. Returns the graph, and a sentence for each object that stays and
+    one for edits that do not.
     """
-    manifest = find_manifest(earlier if earlier.is_dir() else earlier.parent, earlier.stem) if earlier else None
+    manifest = (find_manifest(earlier if earlier.is_dir() else earlier.parent, earlier.stem) if earlier else None) or {}
     try:
-        old = graph_from_plain(SceneGraph, (manifest or {}).get("graph"))
+        old = graph_from_plain(SceneGraph, manifest.get("graph"))
     except ValueError:  # none that can be read
         return graph, ()
+    was, asked = ({*one.names, *(relation.triple for relation in one.relations)} for one in (old, graph))
+    edits = len(manifest.get("history", ())) if was != asked else 0
+    gone = f"what {edits} edit{'s' * (edits > 1)} made of the room that is there goes; generate ROOM -o ROOM keeps it"
     locked = {(node.name, node.category): node for node in old.nodes if node.locked}
     free = [node for node in graph.nodes if (node.locked, node.position, node.yaw) == (False, None, None)]
     kept = [node for node in free if (node.name, node.category) in locked]
     for node in kept:
-        was = locked[node.name, node.category]
-        fields = {"size": node.size or was.size, "position": was.position, "yaw": was.yaw}
+        place = locked[node.name, node.category]
+        fields = {"size": node.size or place.size, "position": place.position, "yaw": place.yaw}
         graph = graph.update_node(node.name, locked=True, **fields)
     if graph.room.extents is None and any(node.locked and node.name in old.names for node in graph.nodes):
         around = {"floor_polygon": old.room.floor_polygon, "size": old.room.size}  # the walls that they stand at
         graph = graph.with_room(openings=graph.room.openings or old.room.openings, **around)
     stays = "stays locked as in the room that is there; echousd edit --unlock frees it"
-    return graph, tuple(f"{node.name} {stays}" for node in kept)
+    return graph, (*[gone] * bool(edits), *(f"{node.name} {stays}" for node in kept))
 
 
 piece_asked = attrgetter("name", "category", "shapes", "asset")

@@ -294,6 +294,11 @@ def test_a_lock_of_the_last_generation_stays(tmp_path):
     assert again.graph.node("wardrobe").locked
     assert again.boxes.position[again.names.index("wardrobe")].tolist() == pytest.approx([-1.2, 0.0, 0.5], abs=1e-3)
     assert any(note.startswith("wardrobe stays locked as in the room that is there") for note in again.notes)
+    edited = echousd.edit(root, locked.remove_node("lamp"), model=StandIn(), place=False)
+    edited.save(root.parent, preview=False)
+    for graph, told in ((small_graph(), True), (edited.graph, False)):
+        notes = echousd.generate(graph, model=StandIn(), shapes="boxes", place=False, earlier=root.parent).notes
+        assert any(note.startswith("what 2 edits made of the room that is there goes") for note in notes) == told
     bare = small_graph().with_room(size=None)
     again = echousd.generate(bare, seed=4, model=StandIn(), shapes="boxes", place=False, earlier=root.parent)
     assert again.graph.room == room.graph.room
