@@ -441,6 +441,7 @@ def _gathered(world: World, point: np.ndarray, normal: np.ndarray, square: np.nd
     thrown, missed = world.thrown.radiance.take(rows, 1), np.flatnonzero(face < 0)
     thrown[:, missed] = 0 if world.view.inside else (0.92 + 0.35 * way[1].take(missed)) * SKY_LIGHT[:, None]
     pale, far[missed] = PALE * world.scenery.planes.luma.take(face), CREVICE
+    far[world.scenery.thin.take(face) > 0] = CREVICE  # light comes through
     thrown *= pale + (1 - pale) * np.minimum(far / np.float32(CREVICE), 1)
     return slanted(thrown, way, normal) if world.fine else thrown
 
