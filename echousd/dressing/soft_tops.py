@@ -191,9 +191,9 @@ def across(
     half = float(np.abs(x[(under > top - 0.2).any(1)]).max()) + STEP / 2
     size = np.round([2 * half + 0.08, 0.012 + min(most, rng.uniform(0.2, 0.32)), deep], 3)
     rows, columns = np.linspace(0, under.shape[1], LIES[0] + 1), np.linspace(-half, half, LIES[1] + 1)
-    near = min(0.08, 0.3 * half)
+    near = min(0.06, 0.3 * half)
     cells = [
-        [under[np.abs(x - at - half / LIES[1]) < near, max(int(k) - 2, 0) : int(k) + 5].max() for at in columns[:-1]]
+        [under[np.abs(x - at - half / LIES[1]) < near, max(int(k) - 2, 0) : int(k) + 6].max() for at in columns[:-1]]
         for k in rows[:-1]
     ]
     lie = tuple(np.round(np.clip(top - np.array(cells), 0.0, BOARD), 3).ravel().tolist())

@@ -9,7 +9,7 @@ from echousd.dressing.setting import Setting
 from echousd.dressing.soft_tops import Design, Seat, across, corners_of, let_down, lying, put
 
 cushions_on, over_arm = lates("echousd.dressing.seats", "cushions_on", "over_arm")
-WIDE_BED, OVER = 1.3, 0.024  # metres: of a throw's top over a bed, whose cover lies in folds
+WIDE_BED, OVER = 1.3, 0.036  # metres: of a throw's top over a bed, whose cover lies in folds
 DRAPED = {"sofa": 0.9, "seat": 0.4}  # shares of sofas and armchairs with a blanket over an arm
 
 

@@ -324,8 +324,7 @@ def shelves(setting: Setting) -> None:
             solids, name = solids_of(kind, size, np.random.default_rng(variant)), f"wall shelf {done + 1}"
             made = assembled(solids, size, faces=1200, origin=Origin("dressing"))
             carrier = setting.carriers[name] = standing(name, "shelf", size, board.position, board.yaw, made)
-            levels = surfaces(carrier)
-            for level in levels[1:] if kind == "niche" else [max(levels, key=lambda level: level.area.area)]:
+            for level in surfaces(carrier)[kind == "niche" :]:
                 stocked(setting, carrier, level)
             done += 1
         if done > 1:

@@ -125,18 +125,21 @@ def boarded(boards: int = 8) -> Relief:
     return Relief(1 - 0.28 * groove, -0.004 * groove)
 
 
-def brick(rows: int = 16, across: int = 4) -> Relief:
-    """Stretchers in running bond, each of a tone of its own, with pale joints."""
-    u, v = _grid()
-    row = np.floor(rows * v).astype(int)
+def brick(rows: int = 32, across: int = 8) -> Relief:
+    """Stretchers in running bond, no edge straight, each of a tone and a hue of its own, with pale joints."""
+    u, v = (line + 0.0009 * noise(seed, 40.0, 40.0, 3.0) for line, seed in zip(_grid(), (12, 13), strict=True))
+    row = np.floor(rows * v).astype(int) % rows
     place = across * u + 0.5 * (row % 2)
-    edge = np.minimum(np.abs((place + 0.5) % 1.0 - 0.5) / across, np.abs((rows * v + 0.5) % 1.0 - 0.5) / rows + 0 * u)
-    joint = np.clip(1.6 - edge / 0.005, 0, 1)
-    own = np.random.default_rng(10).normal(1.0, 0.1, (rows, across))[row, np.floor(place).astype(int) % across]
+    edge = np.minimum(np.abs((place + 0.5) % 1.0 - 0.5) / across, np.abs((rows * v + 0.5) % 1.0 - 0.5) / rows)
+    joint, rng = np.clip(1.6 - edge / 0.0028, 0, 1), np.random.default_rng(10)
+    number = row, np.floor(place).astype(int) % across
+    own, hue = (rng.normal(mean, spread, (rows, across))[number] for mean, spread in ((1.0, 0.14), (0.0, 0.06)))
     grain = noise(11, 60.0, 60.0)
-    tone = ((own + 0.05 * grain) * (1 - joint) + 1.35 * joint)[..., None] * np.ones(3)
-    tone[..., 1:] += joint[..., None] * (0.3, 0.5)  # mortar is no red
-    return Relief(tone, 0.0006 * grain * (1 - joint) - 0.004 * joint, 0.1 * joint)
+    fired = own + 0.07 * grain + 0.05 * noise(14, 12.0, 12.0)
+    mortar = (1.35 + 0.05 * grain)[..., None] * (1.0, 1.25, 1.4)  # is no red
+    joint = joint[..., None]
+    tone = fired[..., None] * (1 + hue[..., None] * (0.2, 1.0, 0.7)) * (1 - joint) + mortar * joint
+    return Relief(tone, 0.0006 * grain * (1 - joint[..., 0]) - 0.004 * joint[..., 0], 0.1 * joint[..., 0])
 
 
 def woven(threads: int = 176) -> Relief:
@@ -159,12 +162,12 @@ def creased() -> np.ndarray:
     return height
 
 
-def knitted(stitches: int = 32) -> Relief:
-    """Rows of stitches, V beside V."""
+def knitted(stitches: int = 96) -> Relief:
+    """Rows of stitches, V beside V, in the folds of a thing that is soft."""
     u, v = _grid()
     slant = np.abs((u * stitches) % 1.0 - 0.5)
     height = np.abs(np.sin(np.pi * (v * stitches + slant))) * (1 - (2 * slant - 0.5) ** 2)
-    return Relief(1 + 0.32 * (height - height.mean()) + 0.03 * noise(41, 30.0, 30.0), 0.002 * height)
+    return Relief(1 + 0.32 * (height - height.mean()) + 0.03 * noise(41, 90.0, 90.0), 0.0007 * height + creased())
 
 
 def linen() -> Relief:

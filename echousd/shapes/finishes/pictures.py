@@ -223,7 +223,8 @@ def color_image(pattern: str, color: Color, harmony: str, worn: float = 0.0) -> 
 
 def normal_image(pattern: str, metres: float) -> bytes | None:
     """Tangent-space normals of a pattern that covers `metres`, +Y up as UsdPreviewSurface takes it; None if flat."""
-    height = None if pattern in PRINTS else relief(pattern).height
+    cloth = "rumpled" if pattern.startswith("cushion_") else pattern
+    height = None if cloth in PRINTS else relief(cloth).height
     if height is None:
         return None
     step = 2 * max(metres, 0.4) / len(height)

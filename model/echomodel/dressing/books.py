@@ -1,11 +1,12 @@
 """Books: single ones, rows, stacks."""
 
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.solids import Block, Solid, rotation
+from echomodel.furniture.solids import Solid, rotation
 
 COVERS = ("book_a", "book_b", "book_c", "book_d")
 COVER = 0.003  # metres
@@ -74,26 +75,18 @@ def _upright(
     ]
 
 
+LAID = np.array([(0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])  # turns what is upright on its side
+
+
 def book_stack(size: Size, rng: np.random.Generator) -> list[Solid]:
-    """Books that lie on one another, each a little turned."""
+    """Books that lie on one another, each a little turned and smaller than the one below."""
     w, h, d = size
     count = max(2, round(h / 0.03))
     parts: list[Solid] = []
-    at = 0.0
     for number in range(count):
-        thick = h / count
-        share = 1.0 - 0.1 * number - rng.uniform(0, 0.05)
-        turn = rotation(y=float(rng.uniform(-0.14, 0.14)))
-        parts += _flat(at, thick, w * share * 0.92, d * share * 0.92, turn, str(rng.choice(COVERS)))
-        at += thick
+        share = 0.92 * (1.0 - 0.1 * number - rng.uniform(0, 0.05))
+        middle, place = np.array([0, d * share / 2, 0]), np.array([0, (number + 0.5) * h / count, 0])
+        turn = rotation(y=float(rng.uniform(-0.14, 0.14))) @ LAID
+        upright = book(np.array([h / count, d * share, w * share]), rng)
+        parts += [replace(one, centre=turn @ (one.centre - middle) + place, turn=turn) for one in upright]
     return parts
-
-
-def _flat(at: float, thick: float, w: float, d: float, turn: np.ndarray, cover: str) -> list[Solid]:
-    half, board = np.array([w / 2, thick / 2, d / 2]), min(COVER, thick / 5)
-    middle = np.array([0.0, at + thick / 2, 0.0])
-    lower, upper = (middle + np.array([0, s * (thick / 2 - board / 2), 0]) for s in (-1, 1))
-    plate, spine = np.array([w / 2, board / 2, d / 2]), np.array([board / 2, thick / 2, d / 2])
-    back = middle + turn @ np.array([-w / 2 + board / 2, 0, 0])
-    covers = [Block(at, turn, cover, half=part) for at, part in ((lower, plate), (upper, plate), (back, spine))]
-    return [*covers, Block(middle, turn, "paper", half=half - (0.004, board, 0.004))]

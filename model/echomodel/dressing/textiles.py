@@ -10,10 +10,11 @@ from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.cloth import Sheet, Slumped, pillow, seam
 from echomodel.furniture.solids import Solid, ball, rotation, tube, turned
 
-LIES = (11, 16)  # cells in which a throw knows what it lies on
-FOLD, GATHERED = 0.14, 0.018  # metres of curtain from one fold to the next; of a throw from the highest to the lowest
+LIES = (8, 24)  # cells in which a throw knows what it lies on
+FOLD, GATHERED = 0.14, 0.028  # metres of curtain from one fold to the next; of a throw from the highest to the lowest
 FULL = (0.4, 1.0)  # of the fullest fold at a foot, the others
 BREAK = (0.05, 0.3)  # share of its height over its foot where a curtain breaks, and of a fold that is less deep there
+FRINGE = 0.045  # metres that threads hang from the ends of a throw
 BENDS, ROUND = (np.arange(10) + 0.5) * np.pi / 5, 0.075  # where in a fold, radians, points are; wider than a wave there
 DRAPES = ("curtain", "curtain", "linen", "drape", "drape", "velvet", "drape_striped")  # what curtains are of
 THROWS = ("accent_cloth", "accent_cloth", "accent_striped", "accent_checked")
@@ -136,31 +137,35 @@ lumbar_cushion = cushion  # long and low, for the small of the back
 
 
 def throw(size: Size, rng: np.random.Generator, lie: tuple[float, ...] = ()) -> list[Solid]:
-    """A blanket over the foot of a bed: it lies across and hangs down at both sides by its height.
+    """A blanket over the foot of a bed: it lies across, follows what is below down to its edges, and hangs down at both
+    sides by its height, where it ends in fringes.
 
     `lie`: how far below its top the bed is, metres, in `LIES` cells from the head and from the left.
     """
     w, h, d = size
-    thick, round_off = 0.012, 0.05
+    round_off, fringe = 0.05, min(FRINGE, 0.25 * h)
     flat = w / 2 - round_off
     turn = np.linspace(0, np.pi / 2, 4)
     corner = np.stack([flat + round_off * np.sin(turn), h - round_off * (1 - np.cos(turn))], 1)
-    hang = np.stack([np.full(3, w / 2), np.linspace(h - round_off, 0, 4)[1:]], 1)
-    side = np.concatenate([[[share * flat, h] for share in np.linspace(0, 1, 9)[1:-1]], corner, hang])
+    hang = np.stack([np.full(3, w / 2), np.linspace(h - round_off, fringe, 4)[1:]], 1)
+    side = np.concatenate([[[share * flat, h] for share in np.linspace(0, 1, 12)[1:-1]], corner, hang])
     profile = np.concatenate([side[::-1] * (-1, 1), [[0.0, h]], side])
-    inner = np.stack([profile[:, 0] * (1 - 2 * thick / w), profile[:, 1] - thick * (profile[:, 1] > h - round_off)], 1)
-    z, phase = np.linspace(-d / 2, d / 2, LIES[0]), rng.uniform(0, 6, 3)
+    share, phase = np.linspace(-1, 1, 2 * LIES[0] - 1), rng.uniform(0, 6, 3)
     cells, at = np.reshape(lie or np.zeros(LIES), LIES), (np.arange(LIES[1]) + 0.5) / LIES[1] * 2 - 1
     lower = np.array([np.interp(profile[:, 0] / (w / 2), at, row) for row in cells])
     lower[1:-1] = (lower[:-2] + 2 * lower[1:-1] + lower[2:]) / 4
-
-    def spread(line: np.ndarray) -> np.ndarray:
-        x, deep = np.meshgrid(line[:, 0], z)
-        hanging = np.clip((h - line[:, 1]) / max(h, 1e-6), 0, 1)
-        ripple = 0.018 * (1 + np.sin(2 * np.pi * deep / d * 2.5 + phase[0] + np.sign(x))) * hanging  # away from the bed
-        skew = (0.03 * np.sin(2.2 * x + phase[1]) + 0.09 * (phase[2] / 3 - 1) * x) * (1 - hanging / 2)
-        crease = np.abs(np.sin(13 * deep + 1.4 * np.sin(2.1 * x + phase[0]) + phase[1])) ** 3  # along its rows
-        y = line[:, 1] - lower * (1 - hanging) - GATHERED * crease * (1 - hanging)
-        return np.stack([x + np.sign(x) * ripple, y, deep * (1 - 0.16 * np.sin(1.4 * x + phase[2]) ** 2) + skew], -1)
-
-    return [Sheet(front=spread(profile), back=spread(inner), material=str(rng.choice(THROWS)))]
+    lower = np.array([np.interp(share, np.linspace(-1, 1, LIES[0]), column) for column in lower.T]).T
+    x, deep = np.meshgrid(profile[:, 0], share * d / 2)
+    hanging, end = np.clip((h - profile[:, 1]) / max(h, 1e-6), 0, 1), np.abs(share[:, None])
+    ripple = 0.018 * (1 + np.sin(2 * np.pi * deep / d * 2.5 + phase[0] + np.sign(x))) * hanging  # away from the bed
+    skew = (0.03 * np.sin(2.2 * x + phase[1]) + 0.09 * (phase[2] / 3 - 1) * x) * (1 - hanging / 2)
+    gathered = deep * (1 - 0.16 * np.sin(1.4 * x + phase[2]) ** 2) + skew + 0.012 * np.sin(11 * x) * share[:, None]
+    fold = 12 * deep + 1.6 * np.sin(2.1 * x + phase[0]) + 0.7 * np.sin(5.3 * x + phase[2]) + phase[1]
+    # along its rows it lies in folds, and its hems on what is below
+    lower = lower + min(1.0, w) * GATHERED * np.maximum(np.abs(np.sin(fold)) ** 3, 0.9 * end**8)
+    front = np.stack([x + np.sign(x) * ripple, profile[:, 1] - lower * (1 - hanging), gathered], -1)
+    under = 0.009 * (1 - 0.8 * end**6)  # thin at its hems
+    back = front - np.stack([np.sign(x) * under * (hanging > 0), under * (hanging < 0.5), 0 * x], -1)
+    material, knots = str(rng.choice(THROWS)), np.concatenate([front[:, 0], front[:, -1]])
+    ends = [tube([knot, knot - (0, fringe * rng.uniform(0.7, 1.0), 0)], 0.004, material) for knot in knots]
+    return [Sheet(front=front, back=back, material=material), *ends]

@@ -8,7 +8,7 @@ from echomodel.furniture.solids import FINEST, IDENTITY, Array, Ball, Block, Sol
 
 # Of half a pillow's side that its middle stands back behind the corners, and the share of that below, where it lies.
 PINCH, BELOW = 0.08, 0.2
-FOOT, SPREAD = 0.15, 1.3  # of a slumped cushion's height, below which it does not lean; by how much it is wider there
+FOOT, SPREAD = 0.15, 0.5  # of a slumped cushion's height, below which it does not lean; by how much it is wider there
 SEAM = 0.025  # of half a pillow's thickness that is left at its seams
 DROOP = 0.25  # of half a pillow's thickness that its corners hang down
 SUNK = 0.0115  # metres below its highest folds at most that things lie on a cover: half of it is about as high
@@ -28,10 +28,11 @@ class Pillow(Ball):
         count, phase = (4, 8, 10, 14)[detail], 7.0 * float(self.centre @ (1.0, 0.3, 1.7)) + 1.0
         line = np.sin(np.linspace(-1, 1, count + 1) * np.pi / 2)
         u, v = np.meshgrid(line, line, indexing="ij")
-        dent = 0.14 * np.sin(2.2 * u + phase) * np.cos(1.8 * v + 1.6 * phase) - 0.12 * v
+        dent = 0.12 * np.sin(2.2 * u + phase) * np.cos(1.8 * v + 1.6 * phase)
         pulled = 0.3 * np.cos(9 * np.arctan2(v, u) + 0.4 * np.sin(phase)) * np.abs(u * v) ** 0.7
         seams = 0.2 * (np.sin(9 * v + phase) * u**6 + np.sin(8 * u + 2 * phase) * v**6)
-        full = ((1 - u**2) * (1 - v**2)) ** (1.04 / self.power) * (1 + dent + pulled + seams)
+        settled = np.where(v < 0, v**8, v**2)  # its filling, below
+        full = ((1 - u**2) * (1 - settled)) ** (1.04 / self.power) * (1 + dent + pulled + seams)
         thin = int(np.argmin(self.half))
         # a ring is one loop around the pillow at one u: over its front, back behind
         u, flat = u[:, :1], np.concatenate([v, v[:, -2:0:-1]], 1)
@@ -54,8 +55,7 @@ def pillow(centre: Vector, half: Vector, material: str, role: str = "", turn: Ar
 @dataclass(frozen=True, eq=False)
 class Slumped(Solid):
     """Another solid that leans back (-z) above its foot, which spreads: `lean` metres at the height `tall`; there it
-    sinks `aside`, too, and its corner on that side comes down as far.
-    """
+    sinks `aside`, too, and its corner on that side comes down as far."""
 
     of: Solid = field(default_factory=Solid)
     tall: float = 1.0
@@ -75,7 +75,7 @@ class Slumped(Solid):
 
 def seam(half: Vector) -> Array:
     """(k, 3): a line around the seam of a pillow of `half` sides, thin on z, metres."""
-    t, one = np.sin(np.linspace(-1, 1, 13) * np.pi / 2)[:-1], np.ones(12)  # as of its finest mesh
+    t, one = np.sin(np.linspace(-1, 1, 15) * np.pi / 2)[:-1], np.ones(14)  # as of its finest mesh
     u, v = np.concatenate([t, one, -t, -one, t[:1]]), np.concatenate([-one, t, one, -t, -one[:1]])
     return np.stack([*outline(u, v), -DROOP * (u * v) ** 2], 1) * half
 

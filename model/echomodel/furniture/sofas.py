@@ -13,7 +13,7 @@ from echomodel.furniture.bent import bent
 from echomodel.furniture.carpentry import Size, base, both, box, of_role
 from echomodel.furniture.pads import Pad, cushion
 from echomodel.furniture.seating import chair_legs, leaning, slim_arms
-from echomodel.furniture.solids import Block, Lathe, Solid, ball, rotation, superellipse, tube, turned
+from echomodel.furniture.solids import Block, Lathe, Solid, Vector, ball, rotation, superellipse, tube, turned
 from echomodel.furniture.style import Choices, Style
 from echomodel.furniture.tufting import Tufted
 
@@ -216,7 +216,19 @@ def _curved(size: Size, style: Style, stand: Sequence[Solid] = (), seat: float =
     parts.append(padded((0, foot, 0), (w / 2 - wall * 0.7, d * 0.45), tall * 0.62, role="base", **form))
     form["rounding"] = 0.05 * style.softness
     middle, half = (0, foot + tall * 0.6, d * 0.04), (w / 2 - wall, d * 0.44)
-    return [*parts, padded(middle, half, tall * 0.4, role="seat", **form)]
+    cushioned = padded(middle, half, tall * 0.4, role="seat", **form)
+    return [*parts, cushioned, *_seams(middle, half, tall * 0.4, power + 1, 0.35 * form["rounding"])]
+
+
+def _seams(middle: Vector, half: tuple[float, float], tall: float, power: float, r: float) -> list[Solid]:
+    """Cords on a round seat: around its upper edge, and over a wide one from back to front between its places."""
+    a, b, top = half[0] - r, half[1] - r, tall - 0.3 * r
+    around = np.insert(superellipse(power, 28) * (a, b), 1, top, axis=1)
+    lines, count = [np.concatenate([around, around[:1]])], max(1, round(2 * a / 0.75))
+    for x in np.linspace(-a, a, count + 1)[1:-1]:
+        deep = b * (1 - abs(x / a) ** power) ** (1 / power)
+        lines.append(np.array([[x, tall, -0.9 * deep], [x, tall, deep - r], [x, top, deep], [x, 0.02, deep + r]]))
+    return [tube(line + middle, CORD, "cushion", "seam") for line in lines]
 
 
 def l_shaped_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
