@@ -45,7 +45,7 @@ DAY = 0.5  # radiance of the sky by day
 BANDS = 64  # heights of the sky whose light is told apart
 # The brightest shade over what white paper is on the average in the room, by night and by day, as eyes see it; the
 # share of its light that is seen at its rim.
-GLOWING, RIM = (2.4, 2.6), 0.12
+GLOWING, RIM = (2.4, 2.6), 0.35
 # Metres around a lamp where it throws no shadow of its own, and how far from a bulb its shade may be; its places that
 # light comes from, where it has no shade as far around the bulb.
 OWN, SHADED, SPOTS, BULB = 0.12, 0.5, 24, 0.05

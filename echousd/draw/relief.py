@@ -8,7 +8,7 @@ from echousd.draw.scenery import RELIEF, Scenery
 
 NORMAL = np.arange(256, dtype=np.float32) / 127.5 - 1  # of a byte of an image of normals
 STEEPEST = np.float32(0.2)  # the least cosine that counts of light that comes aslant, and of what is turned
-SHARE = 0.3, 1.8  # least and most of a surface's light that its folds and grooves have
+SHARE = 0.6, 1.35  # least and most of a surface's light that its folds have: they light each other
 
 
 def slanted(light: np.ndarray, way: np.ndarray, normal: np.ndarray) -> np.ndarray:

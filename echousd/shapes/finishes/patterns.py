@@ -228,7 +228,7 @@ def papered() -> Relief:
 def carpet() -> Relief:
     """Wall-to-wall carpet, loops in rows."""
     fine, soft = noise(83, 200.0, 200.0, 4.0), noise(84, 10.0, 10.0)
-    return Relief(1 + 0.06 * fine + 0.012 * soft, 0.002 * fine)
+    return Relief(1 + 0.06 * fine + 0.012 * soft, 0.0003 * fine)
 
 
 def carpet_tiles(across: int = 4) -> Relief:
@@ -236,7 +236,7 @@ def carpet_tiles(across: int = 4) -> Relief:
     own, cell = np.random.default_rng(89).normal(1.0, 0.06, (across, across)), np.ones((SIZE // across,) * 2)
     rows, odd = noise(83, 40.0, 240.0, 4.0), np.kron(np.indices(own.shape).sum(0) % 2, cell)
     loops = np.where(odd > 0, rows, rows.T)
-    return Relief(np.kron(own, cell) + 0.05 * loops, 0.001 * loops)
+    return Relief(np.kron(own, cell) + 0.05 * loops, 0.0003 * loops)
 
 
 def tiles(across: int = 4) -> Relief:
