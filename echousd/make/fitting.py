@@ -83,13 +83,13 @@ def _dispensable(graph: SceneGraph, names: tuple[str, ...] | list[str]) -> str |
 def with_wider_floor(graph: SceneGraph, corners: np.ndarray) -> SceneGraph:
     """The graph whose proposed floor is the rectangle around it and corners (n, 2) of furniture, where it lacks some.
 
-    x and z in metres. Openings in the walls of a floor that was no rectangle go.
+    x and z in metres, of whole millimetres. Openings in the walls of a floor that was no rectangle go.
     """
     import shapely
 
     floor = graph.room.corners
     if floor is None or not len(corners) or shapely.Polygon(floor).buffer(1e-3).covers(shapely.MultiPoint(corners)):
         return graph
-    both = np.concatenate([floor, corners])
+    both = 1e3 * np.concatenate([floor, corners])
     openings = graph.room.openings if len(floor) == 4 else ()
-    return graph.with_room(openings=openings, **rectangle(both.min(0).round(3), both.max(0).round(3)))
+    return graph.with_room(openings=openings, **rectangle(np.floor(both.min(0)) / 1e3, np.ceil(both.max(0)) / 1e3))
