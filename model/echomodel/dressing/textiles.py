@@ -8,7 +8,7 @@ import numpy as np
 from echomodel.dressing import any_of
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.cloth import Sheet, Slumped, pillow, seam
-from echomodel.furniture.solids import Solid, ball, rotation, tube, turned
+from echomodel.furniture.solids import Solid, rotation, tube, turned
 
 LIES = (8, 24)  # cells in which a throw knows what it lies on
 FOLD, GATHERED = 0.14, 0.028  # metres of curtain from one fold to the next; of a throw from the highest to the lowest
@@ -110,26 +110,19 @@ sheer_curtain = partial(_hung, fold=0.85 * FOLD, top=0.5, drift=0.8, material="s
 
 
 CLOTHS = ("accent_cloth", "accent_plain", "accent_striped", "accent_checked", "blanket", "velvet", "linen", "drape")
-TRIMS = ("", "", "cord", "cord", "button", "tassels")  # of cushions
-
-
 LEAN, UPRIGHT = 0.28, 0.225  # of its height that a top is behind its foot; metres, the deepest that is upright
 
 
 def cushion(size: Size, rng: np.random.Generator, shown: str = "") -> list[Solid]:
-    """A cushion on a side, full or slack, of one of some cloths or of a print, trimmed; a deep one leans back."""
-    (w, h, _), lean, low = size, LEAN * size[1] if size[2] > UPRIGHT else 0.0, 0.022
+    """A cushion on a side, full or slack, of one of some cloths or of a print, often corded; a deep one leans back."""
+    (w, h, _), lean = size, LEAN * size[1] if size[2] > UPRIGHT else 0.0
     d, aside = size[2] - lean, float(rng.uniform(-0.12, 0.12)) * h if lean else 0.0
-    cloth, trim = str(rng.choice(CLOTHS)), str(rng.choice(TRIMS))
+    cloth, corded = str(rng.choice(CLOTHS)), bool(rng.random() < 0.4)
     cord = str(rng.choice(("linen", "ebony", "blanket", "accent_plain")))
     w -= abs(aside)
     body = pillow((0, h / 2, 0), (w / 2, h / 2, d / 2), shown or cloth)
-    trims: dict[str, list[Solid]] = {
-        "cord": [tube(seam(body.half) + np.array([0, h / 2, 0]), 0.004, cord)],
-        "button": [ball((0, h / 2, 0), (0.016, 0.016, 0.51 * d), cord)],
-        "tassels": [ball((x * w, y, 0), (0.016, low, 0.014), cord) for x in (-0.47, 0.47) for y in (low, h - low)],
-    }
-    made = [replace(body, power=float(rng.choice((1.3, 1.5, 1.8)))), *trims.get(trim, [])]
+    made: list[Solid] = [replace(body, power=float(rng.uniform(1.7, 2.6)))]
+    made += [tube(seam(body.half) + np.array([0, h / 2, 0]), 0.004, cord)] * corded
     return [Slumped(material=one.material, of=one, tall=h, lean=lean, aside=aside) for one in made] if lean else made
 
 

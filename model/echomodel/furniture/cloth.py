@@ -8,7 +8,9 @@ from echomodel.furniture.solids import FINEST, IDENTITY, Array, Ball, Block, Sol
 
 # Of half a pillow's side that its middle stands back behind the corners, and the share of that below, where it lies.
 PINCH, BELOW = 0.08, 0.2
-FOOT, SPREAD = 0.15, 0.5  # of a slumped cushion's height, below which it does not lean; by how much it is wider there
+# Of a slumped cushion's height: below the first it does not lean, about as much as the last of its foot is flat. By how
+# much it is wider there.
+FOOT, SPREAD, FLAT = 0.15, 0.5, 0.1
 SEAM = 0.025  # of half a pillow's thickness that is left at its seams
 DROOP = 0.25  # of half a pillow's thickness that its corners hang down
 SUNK = 0.0115  # metres below its highest folds at most that things lie on a cover: half of it is about as high
@@ -22,16 +24,16 @@ class Pillow(Ball):
     settled by where it lies, so that no two are alike, and its corners droop.
     """
 
-    soft = True
+    soft = draped = True
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         count, phase = (4, 8, 10, 14)[detail], 7.0 * float(self.centre @ (1.0, 0.3, 1.7)) + 1.0
         line = np.sin(np.linspace(-1, 1, count + 1) * np.pi / 2)
         u, v = np.meshgrid(line, line, indexing="ij")
         dent = 0.12 * np.sin(2.2 * u + phase) * np.cos(1.8 * v + 1.6 * phase)
-        pulled = 0.3 * np.cos(9 * np.arctan2(v, u) + 0.4 * np.sin(phase)) * np.abs(u * v) ** 0.7
-        seams = 0.2 * (np.sin(9 * v + phase) * u**6 + np.sin(8 * u + 2 * phase) * v**6)
-        settled = np.where(v < 0, v**8, v**2)  # its filling, below
+        pulled = 0.15 * np.cos(9 * np.arctan2(v, u) + 0.4 * np.sin(phase)) * np.abs(u * v) ** 0.7
+        seams = 0.12 * (np.sin(7 * v + phase) * u**6 + np.sin(6 * u + 2 * phase) * v**6)
+        settled = np.where(v < 0, v**4, v**2)  # its filling, below
         full = ((1 - u**2) * (1 - settled)) ** (1.04 / self.power) * (1 + dent + pulled + seams)
         thin = int(np.argmin(self.half))
         # a ring is one loop around the pillow at one u: over its front, back behind
@@ -54,8 +56,10 @@ def pillow(centre: Vector, half: Vector, material: str, role: str = "", turn: Ar
 
 @dataclass(frozen=True, eq=False)
 class Slumped(Solid):
-    """Another solid that leans back (-z) above its foot, which spreads: `lean` metres at the height `tall`; there it
-    sinks `aside`, too, and its corner on that side comes down as far."""
+    """Another solid that leans back (-z) above its foot, which is spread and flat: `lean` metres at the height `tall`;
+    there it sinks `aside`, too, and its corner on that side comes down as far."""
+
+    soft = draped = True
 
     of: Solid = field(default_factory=Solid)
     tall: float = 1.0
@@ -65,11 +69,11 @@ class Slumped(Solid):
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         vertices, faces = self.of.mesh(detail)
         x, y, z = vertices.T
-        high = np.clip(y / self.tall, 0, 1)
+        high = (np.hypot(np.clip(y / self.tall, 0, 1), FLAT) - FLAT) / (np.hypot(1, FLAT) - FLAT)
         back = self.lean * (np.clip(high - FOOT, 0, 1) / (1 - FOOT) - 0.5)
         down = np.abs(self.aside) * high**2 * (0.5 + np.sign(self.aside) * x / self.tall)
         return np.stack(
-            [x + self.aside * (high**2 - 0.5), y - down, z * (1 + SPREAD * (1 - high) ** 2) - back], 1
+            [x + self.aside * (high**2 - 0.5), self.tall * high - down, z * (1 + SPREAD * (1 - high) ** 2) - back], 1
         ), faces
 
 

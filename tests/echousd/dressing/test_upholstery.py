@@ -62,7 +62,7 @@ def test_a_throw_hangs_over_an_arm_that_is_level(rise, hangs):
             assert (found is not None) == hangs
 
 
-@pytest.mark.parametrize("variant", [228333841, *range(30)])  # the first has tassels, which were its lowest
+@pytest.mark.parametrize("variant", [228333841, *range(30)])  # the first had tassels, which were its lowest
 def test_a_cushion_that_leans_stands_on_its_foot(variant):
     size, _ = usual("cushion", np.random.default_rng(variant))
     if variant > 30:
