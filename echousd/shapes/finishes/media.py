@@ -10,7 +10,7 @@ from echousd.srgb import to_linear
 
 AROUND = 0.03  # heights of a sheet: what is about a place, from which rims and the sides of forms stand out
 # Shares: how far colour runs as water does, and how far a brush shows.
-WATERCOLOUR, GOUACHE, PRESS = (1.0, 0.0), (0.4, 1.0), (0.2, 0.0)
+WATERCOLOUR, GOUACHE, PRESS = (0.4, 0.0), (0.2, 0.7), (0.2, 0.0)
 MEDIA: Mapping[str, tuple[float, float]] = {  # kind of a print -> its medium
     "line_art": WATERCOLOUR, "botanical": WATERCOLOUR, "silhouette": WATERCOLOUR, "still_life": GOUACHE,
     "landscape": GOUACHE, "abstract": GOUACHE, "childs": GOUACHE,
