@@ -60,7 +60,6 @@ def write_mesh(pen: Pen, path: str, form: Surface, **about: str) -> None:
 
     `about`: other tokens of its own that vary, such as its purpose.
     """
-    each = {3 * len(form.faces): "faceVarying", len(form.faces): "uniform", 1: "constant"}
     spec = pen.define(path, "Mesh", {
         # Blender merges an Xform with an only child that has no transform of its own, and the Xform's name is lost.
         # In floats: three.js fails on whole numbers in doubles of a usdc.
@@ -71,7 +70,8 @@ def write_mesh(pen: Pen, path: str, form: Surface, **about: str) -> None:
         "texCoord2f[] primvars:st": form.st, "int[] primvars:st:indices": form.st_index,
     } | {f"uniform token {name}": value for name, value in about.items()})  # fmt: skip
     for name, index in (("primvars:normals", form.normal_index), ("primvars:st", form.st_index)):
-        spec.attributes[name].SetInfo("interpolation", each[len(index)])
+        each = "uniform" if len(index) == len(form.faces) else "faceVarying"
+        spec.attributes[name].SetInfo("interpolation", each)
     if len(form.groups) > 1:
         family = {"uniform token elementType": "face", "uniform token familyName": "materialBind"}
         for name, faces in form.groups.items():

@@ -25,7 +25,7 @@ class Surface:
     normals: np.ndarray  # (k, 3) float32 unit vectors
     normal_index: np.ndarray  # (3 f) int32, of every face corner, or (f) int32, of every face, all of whose edges show
     st: np.ndarray  # (t, 2) float32
-    st_index: np.ndarray  # (3 f) int32, or (1) int32, of what has no picture
+    st_index: np.ndarray  # (3 f) int32
     # material group -> (m,) int32 face numbers; together they name every face exactly once
     groups: Mapping[str, np.ndarray]
 
@@ -81,11 +81,14 @@ def plain(meshes: Sequence[Mesh]) -> list[Surface]:
     size = lengths(normal := area_normals(np.concatenate([mesh.triangles for mesh in meshes])))[:, None]
     unit = np.where(size > 0, normal / np.maximum(size, 1e-30), UP)
     found = _indexed(unit, 4, np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes]))
-    nowhere = np.zeros((1, 2), np.float32), np.zeros(1, np.int32)
+    nowhere = np.zeros((1, 2), np.float32)
     return [
-        Surface(np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32), *normals, *nowhere, {})
+        Surface(
+            np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32), *normals,
+            nowhere, np.zeros(mesh.faces.size, np.int32), {},  # MuJoCo reads no texture coordinates but of each corner
+        )
         for mesh, normals in zip(meshes, found, strict=True)
-    ]
+    ]  # fmt: skip
 
 
 def creased_normals(mesh: Mesh, crease: float = CREASE) -> tuple[np.ndarray, np.ndarray]:

@@ -199,7 +199,7 @@ def test_meshes_have_normals_uvs_and_materials(stage):
         faces, corners = mesh.GetFaceVertexCountsAttr().Get(), mesh.GetFaceVertexIndicesAttr().Get()
         each = {"normals": ("faceVarying", len(corners)), "st": ("faceVarying", len(corners))}
         if mesh.ComputePurpose() == "guide":  # what is bumped into has edges and no picture
-            each = {"normals": ("uniform", len(faces)), "st": ("constant", 1)}
+            each = {"normals": ("uniform", len(faces)), "st": ("faceVarying", 3 * len(faces))}
         for name, (interpolation, count) in each.items():
             primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar(name)
             assert primvar.GetInterpolation() == interpolation
