@@ -4,6 +4,7 @@ import numpy as np
 
 from echomodel.triangles import along
 from echousd.draw.indoors import LUMA
+from echousd.draw.rays import unit
 from echousd.draw.scenery import RELIEF, Scenery
 
 NORMAL = np.arange(256, dtype=np.float32) / 127.5 - 1  # of a byte of an image of normals
@@ -28,10 +29,9 @@ def turned(
     corners, st, own = scenery.triangles[face[drawn]], scenery.st[face[drawn]], normal.take(drawn, 1)
     (one, two), ((a, c), (b, d)) = np.diff(corners, axis=1).transpose(1, 2, 0), np.diff(st, axis=1).transpose(2, 1, 0)
     ways = (np.sign(a * d - b * c) * way for way in (d * one - b * two, a * two - c * one))  # of the image on the face
-    across, upwards = (way / np.sqrt(np.maximum(along(way, way), np.float32(1e-18))) for way in ways)
-    leaned = right * across + up * upwards + np.maximum(ahead, STEEPEST) * own
+    across, upwards = map(unit, ways)
     out = np.zeros_like(normal)
-    out[:, drawn] = leaned / np.sqrt(along(leaned, leaned)) - own
+    out[:, drawn] = unit(right * across + up * upwards + np.maximum(ahead, STEEPEST) * own) - own
     return out
 
 
