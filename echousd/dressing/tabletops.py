@@ -17,7 +17,7 @@ shelved_books = Late("echousd.dressing.shelved:shelved_books")
 laid = Late("echousd.dressing.laid:laid")
 
 LEVEL = 0.006  # metres: what differs less in height is one level
-LEAST = 0.012  # m² of a level
+LEAST, CRACK = 0.012, 5e-4  # m² of a level; metres: cracks between triangles on the grid that joins them
 AIR = 0.6  # metres of air above a top that nothing covers
 ROW = 0.8  # metres of books side by side at most, so that all are drawn
 
@@ -50,7 +50,7 @@ class Surface:
 
     def put(
         self, setting: Setting, kind: str, at: Sequence[tuple[float, float]] = (), *, size: np.ndarray | None = None,
-        turn: float = 0.0, variant: int | None = None, count: int = 1, word: str = "", beside: Thing | None = None,
+        turn: float = 0.0, variant: int = 0, count: int = 1, word: str = "", beside: Thing | None = None,
     ) -> Thing | None:  # fmt: skip
         """Put a thing on the first of some places that is free; None where none is.
 
@@ -77,10 +77,7 @@ class Surface:
             if len(self.above.query(plan.buffer(APART), predicate="intersects")):
                 continue
             position = self.host.to_room(np.array([[place[0], self.y, place[1]]]))[0]
-            thing = Thing(
-                kind, size, position, self.host.yaw + turn, self.host.name,
-                int(rng.integers(1 << 30)) if variant is None else variant, count,
-            )  # fmt: skip
+            thing = Thing(kind, size, position, self.host.yaw + turn, self.host.name, variant, count)
             if setting.put_first([thing], host=self.host.name, floor=False):
                 self.area = self.area.difference(plan.buffer(2 * APART))
                 return thing
@@ -112,6 +109,7 @@ def _levels(geometry: Geometry) -> list[tuple[float, float, shapely.Geometry, sh
         y = float(height[group].max())
         faces = up[group]
         level = shapely.union_all(shapely.polygons(corners[faces][:, :, [0, 2]]), grid_size=1e-4)
+        level = level.buffer(CRACK, join_style="mitre").buffer(-CRACK, join_style="mitre")
         covered = [top - y - 0.04 for top, _, other, _ in found if other.intersection(level).area > 0.3 * level.area]
         air = min([*covered, AIR])
         air = min([air, *(under[(under > y + air / 2) & (under < y + air)] - y - 0.004)])
@@ -203,7 +201,8 @@ def stocked(setting: Setting, host: Standing, surface: Surface) -> None:
             if size[0] < 0.1 or tall < 0.14 or size[2] < 0.1:
                 break
             at = [(x * side, z) for z in (0.9, 0.0) for x in (-0.99, 0.99, -0.5, 0.5, 0.0)]
-            row = surface.put(setting, "book_row", at, size=size, count=max(1, int(size[0] / 0.03)), word="row")
+            count, variant = max(1, int(size[0] / 0.03)), int(rng.integers(1 << 30))
+            row = surface.put(setting, "book_row", at, size=size, variant=variant, count=count)
             if row:
                 if setting.full:
                     shelved_books(setting, row, rng)

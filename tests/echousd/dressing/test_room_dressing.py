@@ -24,7 +24,6 @@ from echousd.dressing import floors, soft_tops, tabletops, upholstery
 from echousd.dressing.dress import RULES, TALL, Dressing, dress, dressed, setting_of
 from echousd.dressing.setting import Setting, Thing, geometry_of, meets, standing
 from echousd.dressing.soft_tops import STEP, Seat
-from echousd.dressing.tabletops import surfaces
 from echousd.dressing.walls import BLINDS, CURTAINS, RADIATORS, curtains, radiators, sockets
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.compose import room_files
@@ -279,40 +278,6 @@ def test_doors_stay_free(room):
     for thing in dressed(room).placed:
         if KINDS[thing.kind].name != "curtain":
             assert not any(way.intersects(thing.footprint) and thing.position[1] < o.height for way, o in setting.ways)
-
-
-def test_levels_of_a_shelf_have_air_and_what_stands_there_is_left_alone():
-    from echomodel.furniture import draw_choices, draw_style, solids
-    from echousd.dressing.setting import standing
-    from echousd.shapes.geometry import Origin
-    from echousd.shapes.joinery import assembled
-
-    size = np.array([1.0, 1.9, 0.35])
-    rng = np.random.default_rng(5)
-    parts = solids("bookshelf", draw_style(rng), draw_choices(rng), size)
-    host = standing(
-        "shelf", "bookshelf", size, np.zeros(3), 0.0, assembled(parts, size, faces=5000, origin=Origin("x"))
-    )
-    levels = surfaces(host)
-    assert len(levels) >= 3
-    for level in levels:
-        assert level.air >= 0.06
-        assert shapely.box(-0.51, -0.18, 0.51, 0.18).contains(level.area)
-
-
-@pytest.mark.parametrize(("thick", "front", "closed"), [(0.02, False, False), (0.09, False, False), (0.02, True, True)])
-def test_a_thick_board_above_closes_no_shelf_and_a_front_does(thick, front, closed):
-    from echomodel.furniture.carpentry import box
-    from echousd.shapes.joinery import assembled
-
-    size = np.array([0.8, 0.6, 0.4])
-    parts = [box((-0.4, 0, -0.2), (0.4, 0.02, 0.2), "wood"), box((-0.4, 0.6 - thick, -0.2), (0.4, 0.6, 0.2), "wood")]
-    parts += [box((x, 0, -0.2), (x + 0.02, 0.6, 0.2), "wood") for x in (-0.4, 0.38)]
-    parts += [box((-0.36, 0.1, 0.19), (0.36, 0.5, 0.2), "wood")] * front
-    host = standing("shelf", "bookshelf", size, np.zeros(3), 0.0, assembled(parts, size, faces=500, origin=Origin("x")))
-    level = min((one for one in surfaces(host) if one.area.area > 0.1), key=lambda one: one.y)
-    assert level.closed == closed
-    assert level.air == pytest.approx(0.58 - max(thick, 0.04), abs=0.006)
 
 
 def test_layouts_have_dressings_of_their_own(tmp_path):
