@@ -1,6 +1,7 @@
 """Rays through a scene: from which camera they come, what they run through, and what they meet."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from echousd.draw.scenery import Scenery
 from echousd.draw.views import View
 
 BLOCK = 32_000  # rays at a time, which bounds the memory and stays in the cache
+SHARED = 2_000  # rays from which on half of them run on another thread: Embree lets go of Python's lock
 ABOVE = np.array([0.38, 0.84, 0.32], np.float32) / np.float32(0.9759)  # where the sun of what has no light is
 # Of each pixel's shifts, a step to the right and one down: neighbours have different ones, so that smoothing sees all.
 LATTICE = np.array([(0.75487767, 0.81917251, 0.54970048, 0.73389190), (0.56984029, 0.67104361, 0.85667488, 0.62870672)])
@@ -30,6 +32,7 @@ def embree(triangles: np.ndarray) -> Any:
         raise RenderUnavailable(f'drawing needs Embree ({error}): pip install "echousd[render]"') from None
     scene = rtcore_scene.EmbreeScene()
     TriangleMesh(scene, np.ascontiguousarray(triangles, np.float32))
+    scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))  # which builds it: no two threads shall
     return scene
 
 
@@ -104,11 +107,11 @@ def camera_rays(world: World, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray,
 def first_hit(world: World, origin: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, ...]:
     """What Embree says of rays (3, n): faces (n,), -1 for none, metres to them, 0 to none, and places between their
     corners (2, n)."""
-    hit = world.scene.run(_rows(origin), _rows(way), output=1)
-    met = hit["primID"] >= 0
-    bary = np.stack([hit["u"], hit["v"]])
-    bary[:, ~met] = 0
-    return hit["primID"], np.where(met, hit["tfar"], np.float32(0)), bary
+    origin, way = _rows(origin), _rows(way)
+    hits = _shared(len(way), lambda here: world.scene.run(origin[here], way[here], output=1))
+    face, far, *bary = (np.concatenate([hit[what] for hit in hits]) for what in ("primID", "tfar", "u", "v"))
+    met = face >= 0
+    return face, np.where(met, far, np.float32(0)), np.where(met, bary, np.float32(0))
 
 
 def way_to(point: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -120,12 +123,21 @@ def way_to(point: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def free(scene: Any, point: np.ndarray, way: np.ndarray, away: np.ndarray, asked: np.ndarray) -> np.ndarray:
     """(n,) float32: 1 if nothing stands within `away` metres in a direction (3, n), 0 elsewhere or if not `asked`."""
-    out, ask = np.zeros(len(away), np.float32), np.flatnonzero(asked & (away > 0.02))
-    out[asked & (away <= 0.02)] = 1.0
-    if len(ask):
-        far = np.ascontiguousarray(away[ask] - 0.01, np.float32)
-        out[ask] = scene.run(_rows(point.take(ask, 1)), _rows(way.take(ask, 1)), dists=far, query="OCCLUDED") != 0
+    out, ask = (asked & (away <= 0.02)).astype(np.float32), np.flatnonzero(asked & (away > 0.02))
+    far = np.ascontiguousarray(away[ask] - 0.01, np.float32)
+    origin, way = _rows(point.take(ask, 1)), _rows(way.take(ask, 1))
+    hits = _shared(len(ask), lambda at: scene.run(origin[at], way[at], dists=far[at], query="OCCLUDED"))
+    out[ask] = np.concatenate(hits) != 0
     return out
+
+
+def _shared(many: int, run: Callable[[slice], Any]) -> list[Any]:
+    """What so many rays meet, in their order; from `SHARED` on half of them run beside the others."""
+    half = many // 2 if many >= SHARED else 0
+    with ThreadPoolExecutor(1) as beside:
+        first = beside.map(run, [slice(half)] if half else [])
+        rest = run(slice(half, many))
+    return [*first, rest]
 
 
 def shifts(world: World, pixel: np.ndarray) -> np.ndarray:

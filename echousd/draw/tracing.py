@@ -127,8 +127,7 @@ def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None 
 
     Where `first` tells what was seen in each pixel already: only what is another surface or material.
     """
-    parts: list[Seen] = []
-    pixels = []
+    found: list[tuple[np.ndarray, Seen]] = []
     for start in range(0, max(len(pixel), 1), BLOCK):
         here = slice(start, start + BLOCK)
         rows, (right, below) = pixel[here], np.broadcast_to(place, (2, len(pixel)))[:, here]
@@ -149,8 +148,8 @@ def _met(world: World, pixel: np.ndarray, place: np.ndarray, first: Seen | None 
         if first is not None:
             differs = np.flatnonzero(_other(world, part, first.of(rows)))
             part, rows = part.of(differs), rows.take(differs)
-        parts.append(part)
-        pixels.append(rows)
+        found.append((rows, part))
+    pixels, parts = zip(*found, strict=True)
     return np.concatenate(pixels), Seen(*(np.concatenate(each, -1) for each in zip(*parts, strict=True)))
 
 

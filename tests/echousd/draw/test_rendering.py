@@ -1,5 +1,7 @@
 import sys
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import combinations
 
@@ -424,3 +426,22 @@ def test_a_shifted_lens_shows_what_usd_says(kind, up):
         if up == "Z":
             point = np.array([point[0], -point[2], point[1]])
         np.testing.assert_allclose(into.Transform(Gf.Vec3d(*point))[:2], (u, v), atol=1e-6)
+
+
+@pytest.mark.parametrize("rays", [2, 3])
+def test_a_picture_is_the_same_bit_for_bit_with_one_thread_and_two(root, monkeypatch, rays):
+    scenery = read_scenery(Usd.Stage.Open(str(root)))
+    view = turning_views(scenery, 2)[0]
+    threads, found = set(), []
+    for share in (10**9, 2):
+        monkeypatch.setattr("echousd.draw.rays.SHARED", share)
+        with monkeypatch.context() as patch:
+            patch.setattr("echousd.draw.rays.ThreadPoolExecutor", lambda count: told(threads, count))
+            found.append(trace(scenery, view, 96, rays=rays))
+        assert bool(threads) == (share == 2)
+    np.testing.assert_array_equal(*found)
+
+
+def told(threads, count):
+    """A pool that tells which of its threads had something to do."""
+    return ThreadPoolExecutor(count, initializer=lambda: threads.add(threading.get_ident()))
