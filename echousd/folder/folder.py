@@ -44,9 +44,7 @@ def claim(folder: Path, *, force: bool, root: str = "") -> dict[str, Any]:
 def check_writable(folder: Path) -> None:
     """Raises ValueError where nothing can be written into `folder`, or where it cannot be created."""
     check_path(folder)
-    nearest = folder
-    while not nearest.exists():
-        nearest = nearest.parent
+    nearest = next(place for place in (folder, *folder.parents) if place.exists())
     if not nearest.is_dir():
         here = "is a file, the output must be a folder"
         raise ValueError(f"{folder}: {here}" if nearest == folder else f"{folder}: {nearest} is a file, not a folder")
@@ -90,22 +88,21 @@ def _stage(
     for path in (*order, *remove):
         if inside(folder, path, "a file of the room").is_dir():
             raise ValueError(f"{folder / path}: is a folder, where a file of the room belongs; nothing was changed")
-        blocking = [place for place in (folder / path).parents if place != folder and place.is_file()]
-        if blocking and path in files:
-            raise ValueError(f"{blocking[0]}: is a file, where a folder of the room belongs; nothing was changed")
+    above = {place for path in order for place in (folder / path).parents} - {*folder.parents}
+    for blocking in (place for place in sorted(above) if place.is_file()):
+        raise ValueError(f"{blocking}: is a file, where a folder of the room belongs; nothing was changed")
     try:
         _discard(staging)
         staging.mkdir()
-        changed = [path for path in order if not _holds(folder / path, files[path])]
-        for number, path in enumerate(changed):
-            (staging / str(number)).write_bytes(files[path])
-        move = [
-            Move(staged=str(number), to=path, digest=digest(files[path]), over=digest_of(folder / path))
-            for number, path in enumerate(changed)
-        ]
+        move: list[Move] = []
+        for path in order:
+            new, old = digest(files[path]), digest_of(folder / path)
+            if new != old:
+                (staging / str(len(move))).write_bytes(files[path])
+                move.append(Move(staged=str(len(move)), to=path, digest=new, over=old))
         gone = [Removal(path=path, digest=digest_of(folder / path)) for path in remove if (folder / path).is_file()]
         journal = Journal(run=run_of(folder), move=move, remove=gone, kept=kept)
-        if changed:
+        if move:
             write_journal(staging, journal)
         else:
             _discard(staging)
@@ -220,13 +217,6 @@ def _remove_empty(folder: Path, top: Path) -> None:
     while folder != top and folder.is_dir() and not any(folder.iterdir()):
         folder.rmdir()
         folder = folder.parent
-
-
-def _holds(path: Path, content: bytes) -> bool:
-    try:
-        return path.stat().st_size == len(content) and path.read_bytes() == content
-    except OSError:
-        return False
 
 
 def check_output(output: Path, *, flat: bool, force: bool) -> None:

@@ -83,24 +83,22 @@ def regular_layers(path: Path) -> list[Sdf.Layer]:
     Broken and missing ones are left to composition, which says what is wrong with them.
     """
     found: dict[str, Sdf.Layer] = {}
-    todo = [str(path)]
+    todo = [(str(path), "")]
     while todo:
-        name = todo.pop()
+        name, named_by = todo.pop()
         if name in found:
             continue
         try:
-            file = Path(Ar.SplitPackageRelativePathOuter(str(Ar.GetResolver().Resolve(name)))[0])
-            if file.is_file() and not Sdf.Layer.Find(name):
+            file = _regular(str(Ar.GetResolver().Resolve(name)), named_by)
+            if file and not Sdf.Layer.Find(name):
                 check_harmless(file, path)
             layer = found[name] = Sdf.Layer.FindOrOpen(name)
         except Tf.ErrorException:
             continue
         if layer:
             _check_clips(layer, path)
-        for asset in layer.GetCompositionAssetDependencies() if layer else ():
-            other = layer.ComputeAbsolutePath(asset)
-            _check_regular(str(Ar.GetResolver().Resolve(other)), f"{path}: a layer, {layer.identifier},")
-            todo.append(other)
+            named_by = f"{path}: a layer, {layer.identifier},"
+            todo += [(layer.ComputeAbsolutePath(asset), named_by) for asset in layer.GetCompositionAssetDependencies()]
     return [layer for layer in found.values() if layer]
 
 
@@ -109,7 +107,7 @@ def _check_clips(layer: Sdf.Layer, path: Path) -> None:
     for prim in (prim for prim in prim_specs(layer) if prim.HasInfo("clips")):
         for asset in assets_in(prim.GetInfo("clips")):
             resolved = str(Ar.GetResolver().Resolve(layer.ComputeAbsolutePath(asset)))
-            _check_regular(resolved, f"{path}: {layer.identifier}: <{prim.path}>: clips")
+            _regular(resolved, f"{path}: {layer.identifier}: <{prim.path}>: clips")
 
 
 def specs(layer: Sdf.Layer) -> list[Sdf.Spec]:
@@ -142,10 +140,14 @@ def assets_in(value: object) -> Iterator[str]:
             yield from assets_in(entry)
 
 
-def _check_regular(resolved: str, where: str) -> None:
+def _regular(resolved: str, named_by: str) -> Path | None:
+    """The file of a layer, None where there is none; raises StageError for what is no file, and says who names it."""
     file = Path(Ar.SplitPackageRelativePathOuter(resolved)[0]) if resolved else None
-    if file is not None and file.exists() and not file.is_file():
-        raise StageError(f"{where} names {str(file)!r}, not a regular file, allowed: layers")
+    if file is None or file.is_file():
+        return file
+    if not file.exists():
+        return None
+    raise StageError(f"{named_by} names {str(file)!r}, not a regular file, allowed: layers")
 
 
 class MissingMaterials(UserWarning):
@@ -164,9 +166,7 @@ def check_path(path: Path) -> None:
 
 def opened(stage: Usd.Stage | str | os.PathLike[str]) -> Usd.Stage:
     """The stage itself, or the one in the file at that path."""
-    if isinstance(stage, Usd.Stage):
-        return stage
-    return open_stage(stage)
+    return stage if isinstance(stage, Usd.Stage) else open_stage(stage)
 
 
 def source(stage: Usd.Stage) -> str:
