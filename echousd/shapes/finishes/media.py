@@ -31,14 +31,15 @@ def worked(image: Image.Image, paper: tuple[int, int, int], medium: tuple[float,
     moved = [field(number, 14.0, 14.0, 4.0) * (0.0025 * wet + 0.0015 * brush) * SIZE for number in (0, 1)]
     places = zip(np.indices((SIZE, SIZE)), moved, strict=True)
     rows, columns = (np.clip(np.rint(at + by), 0, SIZE - 1).astype(int) for at, by in places)
-    # how much of the light that paper alone sends back is taken by what is drawn, and by what is about it
+    # of the light that paper alone sends back, how much is taken by what is drawn, and by what is about it, by plane
     linear, sheet = to_linear(np.arange(256) / 255), to_linear(np.array(paper) / 255)
-    taken = -np.log(np.maximum(linear[:, None] / sheet, 0.004))
-    load, near = (taken[np.asarray(one)[rows, columns], np.arange(3)] for one in (small, soft))
+    taken = -np.log(np.maximum(linear[:, None] / sheet, 0.004)).T
+    planes = (np.asarray(one).reshape(-1, 3).T.take(rows * SIZE + columns, 1) for one in (small, soft))
+    load, near = (np.stack([*map(np.take, taken, drawn)]) for drawn in planes)
     # it dries in pools, lies in strokes and on the grain of the paper, and is deeper away from the light, upper left
-    mean, before = near.mean(-1), np.clip(np.arange(SIZE) - round(AROUND * SIZE), 0, None)
+    mean, before = near.mean(0), np.clip(np.arange(SIZE) - round(AROUND * SIZE), 0, None)
     density = 1 + wet * (0.2 * field(2, 3.0, 3.0) + 0.12 * field(3, 16.0, 16.0)) + 0.06 * noise(101, 90.0, 90.0)
     density += 0.08 * brush * field(4, 14.0, 90.0)
     density += (0.25 * wet + 0.4 * brush) * np.tanh(mean[np.ix_(before, before)] - mean)
-    load = load * np.maximum(density, 0.2)[..., None] + 0.35 * wet * np.maximum(load - near, 0)
-    return np.minimum(sheet * np.exp(-load), 1.0)
+    load = load * np.maximum(density, 0.2) + 0.35 * wet * np.maximum(load - near, 0)
+    return np.minimum(sheet * np.exp(-load).transpose(1, 2, 0), 1.0)
