@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -83,8 +84,9 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     named, bindings = room_slots(room, made, built, slots)
     shown = looks.alternatives(harmony, room.graph.room.style)
     tables = {word: {name: looks.look(word, *of) for name, of in named.items()} for word in shown}
-    for look in tables[harmony].values():  # equal images are one file
-        files |= dict(materials.look_images(look, harmony).values())
+    with ThreadPoolExecutor(2) as pool:  # what bakes them lets go of Python's lock; equal images are one file
+        for images in pool.map(lambda look: materials.look_images(look, harmony), tables[harmony].values()):
+            files |= dict(images.values())
     files |= lights.image_files(room)
     layers = {
         "geometry": geometry_layer(room),

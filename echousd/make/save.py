@@ -102,11 +102,9 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
         owned |= {path: recorded[path] for path in kept_steps & recorded.keys()}
         owned |= {path: folders.digest(content) for path, content in archive.items()}
     gone = [path for path in gone if path not in owned or path in needed]
-    fields = (
-        manifest_of(room, owned)
-        | {"history": history}
-        | ({"store": shelf.at, "stored": dict(sorted(shelf.keys.items()))} if shelf else {})
-    )
+    fields = {**manifest_of(room, owned), "history": history}
+    if shelf:
+        fields |= {"store": shelf.at, "stored": dict(sorted(shelf.keys.items()))}
     files[manifest] = (json.dumps(fields, indent=1) + "\n").encode()
     left = {path: ownership.read(folder, path) or b"" for path in gone if path not in needed}
     stale = [path for path, content in left.items() if folders.digest(content) == recorded[path]]
